@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+# `make` says what there is to do.
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+MAKEFLAGS += --no-print-directory --no-builtin-rules
+
+VENV   := build/venv
+PYTHON := $(VENV)/bin/python
+SETUP  := $(VENV)/stamp
+JOBS   ?= 2
+export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
+
+RTL      := $(shell find rtl -name '*.sv' | sort)
+LINTED   := $(RTL:%.sv=build/lint/%.ok)
+FIRMWARE := build/firmware/firmware.hex
+
+say = @printf '%s\n' '--- $(1)'
+
+help:             ## this list
+	@printf 'make TARGET, with TARGET one of\n\n'
+	@sed -nE 's/^([a-z]+): [^#]*## (.*)/  \1\t\2/p; s/^([a-z]+): *## (.*)/  \1\t\2/p' $(MAKEFILE_LIST) | sort -u -k1,1 | expand -t 14
+	@printf '\nThe first target that needs them fetches the tools into build/venv (tools/setup.sh).\n'
+
+demo: $(SETUP) $(FIRMWARE)   ## the S0 stage: home it, move it, show where it went
+	@$(PYTHON) -m experiments.s0_stage
+
+test: $(SETUP) $(FIRMWARE)   ## all tests; K=words of a name, SIM=icarus|verilator, SEED=number|random, WAVES=1
+	$(call say,tests$(if $K, of $K)$(if $(SIM), under $(SIM))$(if $(SEED), with SEED=$(SEED)))
+	@SIM='$(SIM)' SEED='$(SEED)' WAVES='$(WAVES)' $(PYTHON) -m pytest -q -n $(JOBS) $(if $K,-k '$K') tb
+
+check: fresh lint test prove  ## what every change must pass: made files fresh, lint, tests, proofs
+	@echo 'check: all passed'
+
+lint: $(SETUP)   ## verilator -Wall over every module, ruff over the Python
+	$(call say,lint: verilator -Wall over $(words $(RTL)) modules; ruff)
+	@$(MAKE) -k -j$(JOBS) $(LINTED)
+	@$(PYTHON) -m ruff check -q --output-format concise .
+
+VERILATOR = VERILATOR_ROOT=$$(echo $(CURDIR)/$(VENV)/lib/python3*/site-packages/verilator); \
+            $$VERILATOR_ROOT/bin/verilator_bin
+ROOMS     = $(foreach d,$(sort $(dir $(RTL))),-y $d) -y $$VERILATOR_ROOT/../pythondata_cpu_picorv32/verilog
+
+build/lint/%.ok: %.sv $(RTL) rtl/cpu/picorv32.vlt Makefile | $(SETUP)
+	@mkdir -p $(@D)
+	@export $(VERILATOR) --lint-only -Wall --quiet --timescale 1ns/1ps $(ROOMS) +libext+.sv+.v --top-module $(*F) rtl/cpu/picorv32.vlt $< \
+		> $@.log 2>&1 && ! grep -q . $@.log || { cat $@.log; false; }
+	@touch $@
+
+prove: $(SETUP)   ## the properties in the modules that carry any; K=words of a name
+	$(call say,proofs)
+	@$(PYTHON) tools/prove.py $(if $K,-k '$K') -j $(JOBS)
+
+tables: $(SETUP)  ## write the made files again: registers, line, tables of numbers, the list of modules
+	@for table in $(filter-out tables/modules.py,$(sort $(wildcard tables/*.py))) tables/modules.py; do $(PYTHON) $$table || exit 1; done
+
+fresh: $(SETUP)
+	$(call say,made files are fresh)
+	@stale=0; for table in $(sort $(wildcard tables/*.py)); do $(PYTHON) $$table --check || stale=1; done; exit $$stale
+
+firmware: $(SETUP)   ## the soft core's program, build/firmware/firmware.hex
+	@$(PYTHON) sw/firmware/build.py --out build/firmware
+
+$(FIRMWARE): $(wildcard sw/firmware/*) | $(SETUP)
+	$(call say,firmware)
+	@$(PYTHON) sw/firmware/build.py --out build/firmware
+
+figure: $(SETUP) $(FIRMWARE)   ## NAME=x measures one figure afresh; the last line is `x VALUE UNIT`
+	@$(PYTHON) -m experiments.figure $(or $(NAME),$(error say which: make figure NAME=x))
+
+figures: $(SETUP) $(FIRMWARE)  ## all figures, and their page
+	@$(PYTHON) -m experiments.figure --all
+
+soak: $(SETUP) $(FIRMWARE)     ## the stage for as long as you let it, under disturbance
+	@$(PYTHON) -m experiments.soak
+
+clean:            ## remove what was built; the tools in build/venv stay (rm -rf build removes them too)
+	@[ ! -d build ] || find build -mindepth 1 -maxdepth 1 ! -name venv -exec rm -rf {} +
+	@find . -name __pycache__ -not -path './build/*' -prune -exec rm -rf {} +
+	@echo 'clean: build/venv stays; rm -rf build removes it too'
+
+$(SETUP): requirements.lock pyproject.toml tools/setup.sh
+	@tools/setup.sh
+
+.PHONY: help demo test check lint prove tables fresh firmware figure figures soak clean

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+// axis -- one machine axis from the pins of its grating to the pins of its motor, behind one block of registers.
+//
+// latency  see the rooms; sample to position 32 clk at most, position to command within one servo tick
+// rate     one sample per `sample_tick`, one command per `tick`
+// source   S0: interferometer with sine, cosine and comparator outputs, limit switches, DC motor
+// model    the models of its blocks; proved in motion by tb/system
+`default_nettype none
+
+module axis #(
+    parameter int CLK_HZ = 4_000_000,           // clk frequency
+    parameter int W = 8                         // bits of a sample
+) (
+    input  wire                  clk,
+    input  wire                  rst,
+    input  wire                  tick,          // strobe: servo tick
+    input  wire                  sample_tick,   // strobe: start a conversion
+    input  wire                  estop,         // level: 1 pressed
+    input  wire                  watchdog_expired, // level: the line is silent
+    input  wire                  cpu_trap,      // level: the soft core has stopped
+    input  wire                  select,        // register bus, this axis
+    input  wire                  write,
+    input  wire        [5:0]     word,          // 32-bit word of the block
+    input  wire        [31:0]    wdata,
+    output logic       [31:0]    rdata,
+    input  wire                  encoder_a,     // pins from here on
+    input  wire                  encoder_b,
+    input  wire                  adc_sin,       // serial data, synchronous to adc_sclk
+    input  wire                  adc_cos,
+    input  wire                  limit_low_open, // 1: pressed or wire cut
+    input  wire                  limit_high_open,
+    input  wire                  drive_fault_n,
+    output logic                 adc_cs_n,
+    output logic                 adc_sclk,
+    output logic                 bridge_a,
+    output logic                 bridge_b,
+    output logic                 drive_enable
+);
+    localparam int LIMIT_CLK = CLK_HZ / 10_000; // a limit switch must be stable for 0.1 ms
+
+    // settings and strobes from the registers
+    wire               control_enable, control_closed_loop, control_homing;
+    wire               strobes_reset_faults, strobes_hold_here, strobes_start, strobes_brake;
+    wire        [31:0] following_limit, segment_jerk, brake_rate;
+    wire signed [31:0] shift_origin;
+    wire               shift_origin_written, segment_ticks_written, segment_last;
+    wire        [15:0] deglitch, amplitude_low, amplitude_high, dead_band, pwm_period;
+    wire        [7:0]  spike_step, spike_hold;
+    wire        [19:0] disagreement_limit;
+    wire        [4:0]  encoder_fault_mask;
+    wire        [23:0] kp, ki, kd, kv, ka, segment_ticks;
+    wire        [14:0] output_limit, integral_limit;
+    wire signed [15:0] open_command;
+    wire signed [63:0] segment_velocity, segment_acceleration;
+
+    // sense
+    wire        pin_a, pin_b, pin_low, pin_high, pin_fault_n, a, b, a_rejected, b_rejected, limit_low, limit_high;
+    wire        low_rejected, high_rejected;
+    wire        converted, sampled, sample_rejected, too_low, too_high;
+    wire signed [W-1:0] raw_sin, raw_cos, sin, cos;
+    wire        [15:0]  amplitude;
+
+    synchroniser #(.W(5)) u_pins (.clk, .rst, .d({drive_fault_n, limit_high_open, limit_low_open, encoder_b, encoder_a}),
+                                  .q({pin_fault_n, pin_high, pin_low, pin_b, pin_a}));
+    deglitcher u_a (.clk, .rst, .stable(deglitch), .level(pin_a), .filtered(a), .rejected(a_rejected));
+    deglitcher u_b (.clk, .rst, .stable(deglitch), .level(pin_b), .filtered(b), .rejected(b_rejected));
+    deglitcher u_low (.clk, .rst, .stable(16'(LIMIT_CLK)), .level(pin_low), .filtered(limit_low), .rejected(low_rejected));
+    deglitcher u_high (.clk, .rst, .stable(16'(LIMIT_CLK)), .level(pin_high), .filtered(limit_high), .rejected(high_rejected));
+    dual_adc_reader #(.W(W)) u_converter (.clk, .rst, .start(sample_tick), .sdata_a(adc_sin), .sdata_b(adc_cos),
+                                          .cs_n(adc_cs_n), .sclk(adc_sclk), .valid(converted), .sin(raw_sin), .cos(raw_cos));
+    spike_limiter #(.W(W)) u_limiter (.clk, .rst, .step(spike_step), .hold(spike_hold), .valid(converted), .sin(raw_sin), .cos(raw_cos),
+                                      .done(sampled), .sin_out(sin), .cos_out(cos), .rejected(sample_rejected));
+    amplitude_monitor #(.W(W)) u_amplitude (.clk, .rst, .low(amplitude_low), .high(amplitude_high), .valid(sampled), .sin, .cos,
+                                            .amplitude, .too_low, .too_high);
+
+    // decode
+    wire signed [31:0] quadrature_count;
+    wire signed [1:0]  quadrature_step;
+    wire               illegal;
+
+    quadrature_decoder u_decoder (.clk, .rst, .a, .b, .count(quadrature_count), .step(quadrature_step), .illegal);
+
+    // interpolate
+    wire               phase_valid, stepped, overspeed;
+    wire        [15:0] phase;
+    wire signed [16:0] step;
+
+    arctan_table #(.W(W)) u_arctan (.clk, .rst, .valid(sampled), .sin, .cos, .done(phase_valid), .phase);
+    fringe_tracker u_tracker (.clk, .rst, .valid(phase_valid), .phase, .done(stepped), .step, .overspeed);
+
+    // position
+    wire               position_valid, disagreement, zero_up, zero_down;
+    wire signed [47:0] position;
+    wire signed [31:0] velocity;
+
+    unwrap u_position (.clk, .rst, .valid(stepped), .step, .phase, .shift(shift_origin_written), .shift_periods(shift_origin),
+                       .done(position_valid), .position);
+    coarse_check u_coarse (.clk, .rst, .limit(disagreement_limit), .valid(position_valid), .position, .count(quadrature_count),
+                           .shift(shift_origin_written), .shift_periods(shift_origin), .disagreement);
+    zero_crossing u_zero (.clk, .rst, .valid(position_valid), .position, .shift(shift_origin_written), .up(zero_up), .down(zero_down));
+    velocity_estimator u_velocity (.clk, .rst, .tick, .position, .shift(shift_origin_written), .shift_periods(shift_origin), .velocity);
+
+    // control
+    wire signed [47:0] target;
+    wire signed [31:0] target_velocity, target_acceleration, error;
+    wire               moving, underrun, commanded, saturated, block_up, block_down;
+    wire        [4:0]  queue_free;
+    wire signed [15:0] servo_command;
+
+    profile_player u_profile (.clk, .rst, .tick, .push(segment_ticks_written), .segment_velocity, .segment_acceleration,
+                              .segment_jerk, .segment_ticks, .segment_last, .start(strobes_start), .hold_here(strobes_hold_here),
+                              .brake(strobes_brake), .brake_rate, .position, .shift(shift_origin_written), .shift_periods(shift_origin),
+                              .target, .target_velocity, .target_acceleration, .moving, .queue_free, .underrun);
+    pid_servo u_servo (.clk, .rst, .tick, .closed_loop(control_closed_loop), .kp, .ki, .kd, .kv, .ka, .output_limit, .integral_limit,
+                       .dead_band, .target, .target_velocity, .target_acceleration, .moving, .position, .velocity, .open_command,
+                       .block_up, .block_down, .valid(commanded), .command(servo_command), .error, .saturated);
+
+    // guard
+    wire               passed;
+    wire signed [15:0] command;
+    wire        [8:0]  faults, causes_now, first_fault;
+    wire signed [47:0] fault_position;
+    wire        [4:0]  encoder_events = {disagreement, too_high, too_low, overspeed, illegal};   // order of axis_registers
+
+    axis_guard u_guard (.clk, .rst, .enable_request(control_enable), .closed_loop(control_closed_loop), .homing(control_homing),
+                        .reset_faults(strobes_reset_faults), .limit_low, .limit_high, .estop, .drive_fault(!pin_fault_n),
+                        .encoder_fault(|(encoder_events & encoder_fault_mask)), .following_limit, .error, .error_valid(commanded),
+                        .watchdog_expired, .cpu_trap, .profile_underrun(underrun), .position, .valid_in(commanded), .command_in(servo_command),
+                        .valid_out(passed), .command_out(command), .enabled(drive_enable), .faults, .causes_now, .first_fault,
+                        .fault_position, .block_up, .block_down);
+
+    // drive
+    bridge_pwm u_bridge (.clk, .rst, .period(pwm_period), .enable(drive_enable), .valid(passed), .command, .bridge_a, .bridge_b);
+
+    // registers
+    axis_registers u_registers (.clk, .rst, .select, .write, .word, .wdata, .rdata,
+        .control_enable, .control_closed_loop, .control_homing,
+        .strobes_reset_faults, .strobes_hold_here, .strobes_start, .strobes_brake,
+        .state_enabled(drive_enable), .state_limit_low(limit_low), .state_limit_high(limit_high), .state_estop(estop),
+        .state_drive_fault(!pin_fault_n), .state_moving(moving), .state_saturated(saturated), .state_queue_free(queue_free),
+        .faults_limit_low(faults[0]), .faults_limit_high(faults[1]), .faults_estop(faults[2]), .faults_following_error(faults[3]),
+        .faults_encoder(faults[4]), .faults_line_watchdog(faults[5]), .faults_drive(faults[6]), .faults_cpu(faults[7]),
+        .faults_profile_underrun(faults[8]), .causes_now, .first_fault, .fault_position, .following_limit,
+        .position, .target, .velocity, .shift_origin, .shift_origin_written, .zero_crossing_up(zero_up), .zero_crossing_down(zero_down),
+        .sensing_deglitch(deglitch), .sensing_spike_step(spike_step), .sensing_spike_hold(spike_hold),
+        .amplitude_window_low(amplitude_low), .amplitude_window_high(amplitude_high), .disagreement_limit,
+        .sample_sin(16'(sin)), .sample_cos(16'(cos)), .phase_phase(phase), .phase_amplitude(amplitude), .quadrature_count,
+        .encoder_events_illegal_edge(illegal), .encoder_events_overspeed(overspeed), .encoder_events_amplitude_low(too_low),
+        .encoder_events_amplitude_high(too_high), .encoder_events_disagreement(disagreement), .encoder_fault_mask,
+        .rejected_pulses(a_rejected | b_rejected), .rejected_samples(sample_rejected),
+        .kp, .ki, .kd, .kv, .ka, .servo_limits_output(output_limit), .servo_limits_integral(integral_limit), .dead_band,
+        .following_error(error), .command, .open_command, .pwm_period,
+        .segment_velocity, .segment_acceleration, .segment_jerk, .segment_ticks, .segment_ticks_written, .segment_ticks_last(segment_last),
+        .brake_rate);
+
+    wire unused = &{1'b0, low_rejected, high_rejected, quadrature_step};
+endmodule
+
+`default_nettype wire

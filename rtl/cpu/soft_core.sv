@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// soft_core -- RISC-V processor (rv32im) with its memory, and the master of the register bus.
+//
+// latency  memory answers without a wait, registers with one of 1 clk
+// rate     an operation takes 3 clk, a memory access 5, a register access or a product 6, a quotient 40
+// source   PicoRV32, from the package pythondata_cpu_picorv32; its look-ahead address reaches the memory one clk early
+// model    tb/cpu/soft_core.py, the results of the program tb/cpu/program.c
+//
+// map      0000_0000 memory (start address 0, stack from its end), 8000_0000 registers (64 KiB, whole words only).
+//          Anything else, a misaligned access and an illegal instruction stop the core: trap stands until rst.
+`default_nettype none
+
+module soft_core #(
+    parameter int MEMORY_BYTES = 32768,         // a power of two
+    parameter FIRMWARE = ""                     // file of its contents at power-up, see node_memory
+) (
+    input  wire                  clk,
+    input  wire                  rst,           // starts the core at address 0; memory keeps what it holds
+    output logic                 select,        // strobe: one access to the registers
+    output logic                 write,         // with select: wdata is to be written, else read
+    output logic       [15:0]    address,       // of a register, bytes
+    output logic       [31:0]    wdata,
+    input  wire        [31:0]    rdata,         // stands the clk after select
+    output logic                 trap           // level: the core has stopped
+);
+    localparam int A = $clog2(MEMORY_BYTES);
+
+    wire        core_trap, mem_valid, mem_instr, mem_la_read, mem_la_write;
+    wire [31:0] mem_addr, mem_wdata, mem_la_wdata, memory_rdata;
+    // verilator lint_off UNUSEDSIGNAL
+    wire [31:0] mem_la_addr;                    // of a word: bits 1:0 are zero
+    // verilator lint_on UNUSEDSIGNAL
+    wire [3:0]  mem_wstrb, mem_la_wstrb;
+    logic       answered, lost;                 // the registers have answered; an access went nowhere
+
+    wire in_memory    = mem_addr[31:A] == '0;
+    wire in_registers = mem_addr[31:16] == 16'h8000 && !mem_instr && (&mem_wstrb || ~|mem_wstrb);
+    wire la_in_memory = mem_la_addr[31:A] == '0;
+
+    assign select  = mem_valid && in_registers && !answered;
+    assign write   = mem_wstrb[0];
+    assign address = mem_addr[15:0];
+    assign wdata   = mem_wdata;
+    assign trap    = core_trap || lost;
+
+    always_ff @(posedge clk) begin
+        answered <= select;
+        if (mem_valid && !in_memory && !in_registers) lost <= 1'b1;
+        if (rst) begin
+            answered <= 1'b0;
+            lost     <= 1'b0;
+        end
+    end
+
+    node_memory #(.BYTES(MEMORY_BYTES), .FIRMWARE(FIRMWARE)) u_memory (
+        .clk, .read(mem_la_read), .write(mem_la_wstrb & {4{mem_la_write && la_in_memory}}), .address(mem_la_addr[A-1:2]),
+        .wdata(mem_la_wdata), .rdata(memory_rdata));
+
+    picorv32 #(.ENABLE_COUNTERS(0), .ENABLE_COUNTERS64(0), .BARREL_SHIFTER(1), .ENABLE_MUL(1), .ENABLE_FAST_MUL(1), .ENABLE_DIV(1),
+               .CATCH_MISALIGN(1), .CATCH_ILLINSN(1), .REGS_INIT_ZERO(1), .STACKADDR(32'(MEMORY_BYTES))) u_core (
+        .clk, .resetn(!rst), .trap(core_trap), .mem_valid, .mem_instr, .mem_ready(answered || (mem_valid && in_memory)), .mem_addr,
+        .mem_wdata, .mem_wstrb, .mem_rdata(answered ? rdata : memory_rdata), .mem_la_read, .mem_la_write, .mem_la_addr,
+        .mem_la_wdata, .mem_la_wstrb, .pcpi_wr(1'b0), .pcpi_rd(32'd0), .pcpi_wait(1'b0), .pcpi_ready(1'b0), .irq(32'd0),
+        // no co-processor, no interrupts, no trace:
+        // verilator lint_off PINCONNECTEMPTY
+        .pcpi_valid(), .pcpi_insn(), .pcpi_rs1(), .pcpi_rs2(), .eoi(), .trace_valid(), .trace_data());
+        // verilator lint_on PINCONNECTEMPTY
+endmodule
+
+`default_nettype wire

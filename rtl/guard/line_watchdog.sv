@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// line_watchdog -- tells when the master has been silent for too long while a drive is on.
+//
+// latency  expired rises time_ms * (CLK_HZ / 1000) + 1 clk after the last frame_good, or after armed rose if that came
+//          later; it falls 1 clk after frame_good or after armed fell
+// model    tb/guard/line_watchdog.py, equal in every bit of every cycle
+// proved   expired only while armed and only without a good frame in the clk before; once up it stays until one of them
+`default_nettype none
+
+module line_watchdog #(
+    parameter int CLK_HZ = 4_000_000                        // a multiple of 1000
+) (
+    input  wire                  clk,
+    input  wire                  rst,
+    input  wire        [15:0]    time_ms,                   // longest silence; 0: 65536 ms; a new one counts at once
+    input  wire                  frame_good,                // strobe: a right frame for this node
+    input  wire                  armed,                     // level: a drive is enabled
+    output logic                 expired                    // level: the line has been silent for time_ms
+);
+    if (CLK_HZ < 1000 || CLK_HZ % 1000 != 0) begin : g_check CLK_HZ_MUST_BE_A_MULTIPLE_OF_1000 u_error (); end
+
+    localparam int CLK_MS = CLK_HZ / 1000;
+    localparam int P      = CLK_MS > 1 ? $clog2(CLK_MS) : 1;
+
+    logic [P-1:0]  part;                                    // clk of the running millisecond
+    logic [16:0]   silent;                                  // ms
+
+    wire [16:0] longest = {time_ms == 16'd0, time_ms};
+    wire        whole   = part == P'(CLK_MS - 1);
+    wire        over    = silent >= longest;
+
+    always_ff @(posedge clk) begin
+        if (frame_good || !armed || rst) begin
+            part    <= '0;
+            silent  <= '0;
+            expired <= 1'b0;
+        end else begin
+            if (!over) part <= whole ? '0 : part + 1'b1;
+            if (!over && whole) silent <= silent + 1'b1;
+            if (over) expired <= 1'b1;
+        end
+    end
+
+`ifdef FORMAL
+    logic past = 1'b0;
+    always @(posedge clk) begin
+        past <= 1'b1;
+        if (!past) assume (rst);
+        if (past) begin
+            if (expired) assert ($past(armed) && !$past(frame_good));
+            if ($past(expired) && $past(armed) && !$past(frame_good) && !$past(rst)) assert (expired);
+            if (expired && !$past(expired)) assert ($past(silent) >= $past(longest));
+            cover (part == 3 && $past(frame_good, 4));
+        end
+    end
+`endif
+endmodule
+
+`default_nettype wire

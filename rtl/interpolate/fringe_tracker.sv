@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// fringe_tracker -- the signed step from phase to phase, its whole periods found by foreseeing the next phase.
+//
+// latency  1 clk from valid to done, no lag in the step        rate  one phase per clk
+// foresees the last step again. Less than a quarter period from that: the step, at any speed below a period a sample.
+// strays   Farther away it is an overspeed. The step still ends on the phase, and the next phase is awaited where it would
+//          be without this one, so one bad sample costs nothing but itself (below a quarter period a sample; proved there).
+//          A second one in a row, or a step of a period or more: the nearest step is taken, from then on as from standstill;
+//          whole periods may then be lost, and the overspeed says so.
+// source   S0 limit filter 2 (a count is held against the one before it), with the speed in the prediction
+// model    tb/interpolate/fringe_tracker.py, equal in every bit of every cycle
+// proof    depth 6
+// proved   modulo a period the step is the phase less the phase before; without overspeed it is less than a quarter period
+//          from the one foreseen; at any constant speed below a quarter period a sample, one bad sample in four moves nothing
+`default_nettype none
+
+module fringe_tracker (
+    input  wire                  clk,
+    input  wire                  rst,       // forgets the phase; the next one is the first, with step 0
+    input  wire                  valid,     // strobe: phase is new
+    input  wire        [15:0]    phase,     // one signal period = 2^16
+    output logic                 done,      // strobe: step is new
+    output logic signed [16:0]   step,      // 2^-16 period since the phase before
+    output logic                 overspeed  // strobe, with done: a quarter period or more from where it was expected
+);
+    localparam signed [15:0] QUARTER = 16'sd16384;
+
+    logic               started, strayed;   // strayed: the last phase was an overspeed
+    logic        [15:0] last;
+    logic signed [16:0] speed;              // step per sample, of the samples that did not stray
+    logic signed [17:0] foreseen;           // step: speed, or what leads back to the line after a stray one
+
+    wire signed [15:0] deviation = $signed(phase - last - foreseen[15:0]);
+    wire signed [18:0] wanted    = 19'(foreseen) + 19'(deviation);
+    wire               near      = deviation > -QUARTER && deviation < QUARTER;
+    wire               fits      = wanted[18:16] == {3{wanted[16]}};
+    wire signed [15:0] nearest   = $signed(phase - last);
+
+    always_ff @(posedge clk) begin
+        done      <= valid;
+        overspeed <= 1'b0;
+        if (valid) begin
+            started <= 1'b1;
+            strayed <= 1'b0;
+            last    <= phase;
+            if (!started) step <= '0;
+            else if (fits && near) begin
+                step <= wanted[16:0];
+                if (!strayed) speed <= wanted[16:0];
+                foreseen <= strayed ? 18'(speed) : 18'(wanted);
+            end else begin
+                overspeed <= 1'b1;
+                if (fits && !strayed) begin
+                    step     <= wanted[16:0];
+                    strayed  <= 1'b1;
+                    foreseen <= 18'(speed) - 18'(deviation);
+                end else begin
+                    step     <= 17'(nearest);
+                    speed    <= '0;
+                    foreseen <= '0;
+                end
+            end
+        end
+        if (rst) begin
+            started   <= 1'b0;
+            strayed   <= 1'b0;
+            speed     <= '0;
+            foreseen  <= '0;
+            step      <= '0;
+            done      <= 1'b0;
+            overspeed <= 1'b0;
+        end
+    end
+
+`ifdef FORMAL
+    logic past = 1'b0;
+    always @(posedge clk) begin
+        past <= 1'b1;
+        if (!past) assume (rst);
+        if (past && !$past(rst)) begin
+            assert (done == $past(valid));
+            if (done) assert (last == $past(phase));
+            if (done && $past(started)) assert (step[15:0] == last - $past(last));
+            if (done && $past(started) && !overspeed) begin
+                assert (19'(step) - 19'($past(foreseen)) < 19'(QUARTER));
+                assert (19'($past(foreseen)) - 19'(step) < 19'(QUARTER));
+            end
+            if (overspeed) assert (done);
+            cover (overspeed && !strayed);
+            cover (done && $past(strayed) && !overspeed);
+        end
+    end
+
+    // a scale that moves by `pace` a sample, seen with now and then a bad sample: three good ones at least in between
+    (* anyconst *) logic signed [16:0] pace;
+    (* anyconst *) logic               lawful;     // 0: any phase may come
+    (* anyseq *)   logic               bad;
+    logic signed [23:0] scale, seen;        // where the scale will be at the next sample; the sum of the steps
+    logic        [1:0]  good, settled;      // samples since the last bad one, up to 3; since reset, up to 2: phase and speed are known
+    wire  signed [23:0] sum  = done ? seen + 24'(step) : seen;
+    wire  signed [23:0] away = sum - (scale - 24'(pace));
+    wire  signed [23:0] drag = 24'(speed) - 24'(pace);      // what a bad sample that did not stray left in the speed
+    always @(posedge clk) begin
+        if (lawful) begin
+            assume (pace > -17'sd16384 && pace < 17'sd16384);
+            if (bad) assume (good == 3 && settled == 2);
+            if (valid && !bad) assume (phase == scale[15:0]);
+        end
+        if (done) seen <= sum;
+        if (valid) begin
+            scale   <= scale + 24'(pace);
+            good    <= bad ? 2'd0 : good == 3 ? 2'd3 : good + 1'b1;
+            settled <= settled == 2 ? 2'd2 : settled + 1'b1;
+        end
+        if (rst) begin
+            scale   <= '0;
+            seen    <= '0;
+            good    <= 2'd3;
+            settled <= '0;
+        end
+        if (past && lawful) begin
+            if (settled != 0 && good != 0) assert (away == 0);      // the claim; what follows only leads to it
+            assert (started == (settled != 0) && settled <= 2);
+            if (started) assert (sum[15:0] == last);
+            else assert (sum == 0 && scale == 0);
+            if (settled < 2) assert (!strayed && speed == 0 && foreseen == 0 && good == 3);
+            else case (good)
+                0: if (strayed) assert (speed == pace && 24'(foreseen) == 24'(pace) - away && away >= -32768 && away < 32768);
+                   else assert (drag == away && foreseen == 18'(speed) && away > -16384 && away < 16384);
+                1: if (strayed) assert (24'(foreseen) == 24'(pace) + drag + drag + drag && drag > -16384 && drag < 16384
+                                        && (drag >= 8192 || drag <= -8192));
+                   else assert (foreseen == 18'(speed) && drag > -8192 && drag < 8192);
+                2: assert (!strayed && foreseen == 18'(speed) && (speed == pace || speed == 0));
+                default: assert (!strayed && foreseen == 18'(speed) && speed == pace);
+            endcase
+        end
+        cover (past && lawful && good == 0 && strayed && pace == 17'sd1000);
+    end
+`endif
+endmodule
+
+`default_nettype wire

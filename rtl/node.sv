@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+// node -- a complete motion controller on a multi-drop line: soft core, line, axes.
+//
+// latency  see axis and the rooms link and cpu     rate  see there
+// source   S0: one slave computer per axis, many on one line; here one node may have several axes
+// model    the models of its blocks; proved in motion by tb/system
+`default_nettype none
+
+module node #(
+    parameter int CLK_HZ = 4_000_000,           // clk frequency
+    parameter int AXES = 1,                     // 1..8
+    parameter int W = 8,                        // bits of a sample
+    parameter int MEMORY_BYTES = 32768,         // of the soft core, program and data
+    parameter FIRMWARE = ""                     // file of its contents at power-up
+) (
+    input  wire                  clk,
+    input  wire                  rst,
+    input  wire        [3:0]     address,       // on the line
+    input  wire                  estop_open,    // 1: pressed or wire cut
+    input  wire                  line_rx,       // idles high
+    output logic                 line_tx,
+    output logic                 line_driver_enable,
+    input  wire        [AXES-1:0] encoder_a,
+    input  wire        [AXES-1:0] encoder_b,
+    input  wire        [AXES-1:0] adc_sin,
+    input  wire        [AXES-1:0] adc_cos,
+    input  wire        [AXES-1:0] limit_low_open, // 1: pressed or wire cut
+    input  wire        [AXES-1:0] limit_high_open,
+    input  wire        [AXES-1:0] drive_fault_n,
+    output logic       [AXES-1:0] adc_cs_n,
+    output logic       [AXES-1:0] adc_sclk,
+    output logic       [AXES-1:0] bridge_a,
+    output logic       [AXES-1:0] bridge_b,
+    output logic       [AXES-1:0] drive_enable
+);
+    // cpu
+    wire               select, write, trap, node_select, line_select;
+    wire        [15:0] bus_address;
+    wire        [31:0] wdata, rdata, node_rdata, line_rdata;
+    wire        [AXES-1:0]    axis_select;
+    wire        [32*AXES-1:0] axis_rdata;
+    wire        [5:0]  word = bus_address[7:2];
+
+    soft_core #(.MEMORY_BYTES(MEMORY_BYTES), .FIRMWARE(FIRMWARE)) u_core (.clk, .rst, .select, .write, .address(bus_address), .wdata,
+                                                                        .rdata, .trap);
+    register_bus #(.AXES(AXES)) u_bus (.clk, .select, .address(bus_address), .node_rdata, .line_rdata, .axis_rdata,
+                                       .node_select, .line_select, .axis_select, .rdata);
+
+    // time
+    wire        [63:0] now;
+    wire        [23:0] tick_period;
+    wire        [15:0] sample_period;
+    wire               tick, sample_tick;
+
+    time_stamp u_time (.clk, .rst, .now);
+    tick_divider #(.W(24)) u_tick (.clk, .rst, .period(tick_period), .tick);
+    tick_divider #(.W(16)) u_sample_tick (.clk, .rst, .period(sample_period), .tick(sample_tick));
+    node_registers u_node_registers (.clk, .rst, .select(node_select), .write, .word, .wdata, .rdata(node_rdata),
+        .clk_hz(32'(CLK_HZ)), .build_axes(4'(AXES)), .build_address(address), .build_memory(8'(MEMORY_BYTES / 1024)),
+        .time_stamp(now), .tick_period, .sample_period);
+
+    // link
+    wire               rx, estop, received, ninth, framing_error, start_glitch, filtered, filtered_command;
+    wire               checked, command, good, frame_good, frame_bad, present, overrun, receive_read;
+    wire        [7:0]  received_data, filtered_data, data, transmit_data, crc_byte;
+    wire        [9:0]  receive;
+    wire        [7:0]  receive_free;
+    wire               receiving, transmit_overrun;
+    wire               sending, transmit_command, transmit_written, crc_byte_written, crc_start;
+    wire               to_send, send_ready, send_command;
+    wire        [7:0]  transmit_free, send_data;
+    wire        [19:0] bit_time;
+    wire        [15:0] watchdog_time;
+    wire        [31:0] crc;
+    wire               watchdog_expired;
+
+    synchroniser #(.W(2), .RESET(3)) u_line_pins (.clk, .rst, .d({estop_open, line_rx | line_driver_enable}), .q({estop, rx}));
+    character_receiver u_receiver (.clk, .rst, .bit_time, .rx, .valid(received), .data(received_data), .ninth, .framing_error,
+                                   .start_glitch, .busy(receiving));
+    address_filter u_filter (.clk, .rst, .address, .valid_in(received), .data_in(received_data), .ninth, .valid(filtered),
+                             .data(filtered_data), .command(filtered_command));
+    frame_check u_check (.clk, .rst, .valid_in(filtered), .data_in(filtered_data), .command_in(filtered_command), .framing_error,
+                         .valid(checked), .data, .command, .good, .frame_good, .frame_bad);
+    word_queue #(.W(10), .DEPTH(128)) u_received (.clk, .rst, .push(checked), .in({good, command, data}), .pop(receive_read),
+                                                 .present, .out(receive), .free(receive_free), .overrun);
+    word_queue #(.W(9), .DEPTH(128)) u_to_send (.clk, .rst, .push(transmit_written), .in({transmit_command, transmit_data}),
+                                                .pop(send_ready), .present(to_send), .out({send_command, send_data}),
+                                                .free(transmit_free), .overrun(transmit_overrun));
+    character_transmitter u_transmitter (.clk, .rst, .bit_time, .valid(to_send), .ready(send_ready), .data(send_data),
+                                         .ninth(send_command), .tx(line_tx), .driver_enable(line_driver_enable), .busy(sending));
+    crc32_stream u_crc (.clk, .rst, .start(crc_start), .valid(crc_byte_written), .data(crc_byte), .crc);
+    line_watchdog #(.CLK_HZ(CLK_HZ)) u_watchdog (.clk, .rst, .time_ms(watchdog_time), .frame_good, .armed(|drive_enable),
+                                                 .expired(watchdog_expired));
+    line_registers u_line_registers (.clk, .rst, .select(line_select), .write, .word, .wdata, .rdata(line_rdata), .bit_time,
+        .receive_data(receive[7:0]), .receive_command(receive[8]), .receive_good(receive[9]), .receive_present(present),
+        .receive_read, .transmit_data, .transmit_written, .transmit_command,
+        .state_transmit_free(transmit_free), .state_sending(sending), .frames_good(frame_good), .frames_bad(frame_bad),
+        .framing_errors(framing_error), .start_glitches(start_glitch), .overruns(overrun), .crc_byte_data(crc_byte),
+        .crc_byte_written, .crc_start_start(crc_start), .crc, .watchdog_time);
+
+    wire unused = &{1'b0, receiving, receive_free, transmit_overrun, bus_address[1:0]};
+
+    // axes
+    for (genvar n = 0; n < AXES; n++) begin : g_axis
+        axis #(.CLK_HZ(CLK_HZ), .W(W)) u_axis (.clk, .rst, .tick, .sample_tick, .estop, .watchdog_expired, .cpu_trap(trap),
+            .select(axis_select[n]), .write, .word, .wdata, .rdata(axis_rdata[32*n +: 32]),
+            .encoder_a(encoder_a[n]), .encoder_b(encoder_b[n]), .adc_sin(adc_sin[n]), .adc_cos(adc_cos[n]),
+            .limit_low_open(limit_low_open[n]), .limit_high_open(limit_high_open[n]), .drive_fault_n(drive_fault_n[n]),
+            .adc_cs_n(adc_cs_n[n]), .adc_sclk(adc_sclk[n]), .bridge_a(bridge_a[n]), .bridge_b(bridge_b[n]),
+            .drive_enable(drive_enable[n]));
+    end
+endmodule
+
+`default_nettype wire

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// axis -- what an axis is doing: off, holding, moving, homing, faulted. Requests answer with a line_cause at once; what they
+// began goes on in axis_poll, and its outcome is axis_ended.
+#ifndef MOIRE_AXIS_H
+#define MOIRE_AXIS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+void axis_start(unsigned n);
+void axis_poll(unsigned n);
+
+uint8_t axis_enable(unsigned n, bool on);
+uint8_t axis_home(unsigned n);
+uint8_t axis_move(unsigned n, int64_t target, uint32_t *duration_ticks);
+uint8_t axis_stop(unsigned n);
+uint8_t axis_reset_faults(unsigned n);
+uint8_t axis_set_parameter(unsigned n, uint8_t id, int64_t value);
+
+uint8_t axis_state(unsigned n);         // a line_state
+uint8_t axis_ended(unsigned n);         // a line_cause
+uint8_t axis_flags(unsigned n);         // line_flag bits
+int32_t axis_home_phase(unsigned n);    // [2^-16 period] last homing: its place above the phase zero it chose
+
+#endif

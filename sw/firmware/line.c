@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: Apache-2.0
+// line -- frames in, requests done, replies out.
+//
+// The hardware passes only words of frames for this node and marks the last word of a right one; a frame that it does not
+// mark is forgotten when the next command byte comes. Causes are looked for in this order: wrong_map, unknown_operation,
+// wrong_length, no_such_axis, out_of_range of a value, then what the axis says (faulted, not_enabled, busy, not_homed,
+// out_of_travel).
+#include "line.h"
+
+#include "axis.h"
+#include "hardware.h"
+#include "line_protocol.h"
+#include "parameters.h"
+#include "planner.h"
+
+#define WAY_MASK 0x30u
+#define WAY_TO_NODE 0x20u
+#define WAY_FROM_NODE 0x10u
+#define READY 0x40u
+#define CRC_BYTES 4u
+#define WORDS_A_POLL 8u                 // then the axes have their turn
+
+#define OPERATION_LENGTH(name, code, request, reply) [code] = request,
+static const uint8_t request_length[] = {LINE_OPERATIONS(OPERATION_LENGTH)};
+
+static unsigned axes;
+static bool wrong_map;
+static bool receiving;
+static uint8_t received;                                        // bytes in request
+static uint8_t request[1 + LINE_LONGEST_BODY + CRC_BYTES];      // length, body, CRC-32
+static uint8_t reply[1 + LINE_LONGEST_BODY + CRC_BYTES];
+static uint8_t *const asked = &request[1], *const answer = &reply[1];
+static bool answered;                                           // there was a request, with this CRC-32:
+static uint32_t answered_crc;
+static uint32_t repeated, refused;
+
+static uint64_t get(const uint8_t *from, unsigned bytes)
+{
+    uint64_t value = 0;
+    while (bytes--) value = value << 8 | from[bytes];
+    return value;
+}
+
+static void put(uint32_t at, uint64_t value, unsigned bytes)
+{
+    uint8_t *to = &answer[at];
+    while (bytes--) {
+        *to++ = (uint8_t)value;
+        value >>= 8;
+    }
+}
+
+static uint8_t identify(void)
+{
+    put(LINE_IDENTIFY_REPLY_MAP_CRC, node_read(NODE_MAP_CRC), 4);
+    put(LINE_IDENTIFY_REPLY_PROTOCOL_CRC, PROTOCOL_CRC, 4);
+    put(LINE_IDENTIFY_REPLY_VERSION, LINE_VERSION, 2);
+    put(LINE_IDENTIFY_REPLY_ADDRESS, FIELD_GET(node_read(NODE_BUILD), NODE_BUILD_ADDRESS), 1);
+    put(LINE_IDENTIFY_REPLY_AXES, axes, 1);
+    put(LINE_IDENTIFY_REPLY_CLK_HZ, node_read(NODE_CLK_HZ), 4);
+    put(LINE_IDENTIFY_REPLY_TICK_HZ, PLANNER_TICK_HZ, 4);
+    put(LINE_IDENTIFY_REPLY_SAMPLE_HZ, SAMPLE_HZ, 4);
+    reply[0] = LINE_IDENTIFY_REPLY_LENGTH;
+    return LINE_CAUSE_OK;
+}
+
+static uint8_t status(unsigned axis)
+{
+    int64_t position = axis_read_position(axis, AXIS_POSITION);
+    axis_poll(axis);
+    put(LINE_STATUS_REPLY_STATE, axis_state(axis), 1);
+    put(LINE_STATUS_REPLY_ENDED, axis_ended(axis), 1);
+    put(LINE_STATUS_REPLY_FLAGS, axis_flags(axis), 1);
+    put(LINE_STATUS_REPLY_ENCODER_EVENTS, axis_read(axis, AXIS_ENCODER_EVENTS), 1);
+    put(LINE_STATUS_REPLY_FAULTS, axis_read(axis, AXIS_FAULTS), 2);
+    put(LINE_STATUS_REPLY_FIRST_FAULT, axis_read(axis, AXIS_FIRST_FAULT), 2);
+    put(LINE_STATUS_REPLY_POSITION, (uint64_t)position, 8);
+    put(LINE_STATUS_REPLY_TARGET, (uint64_t)axis_read_position(axis, AXIS_TARGET), 8);
+    put(LINE_STATUS_REPLY_VELOCITY, axis_read(axis, AXIS_VELOCITY), 4);
+    put(LINE_STATUS_REPLY_COMMAND, axis_read(axis, AXIS_COMMAND), 2);
+    put(LINE_STATUS_REPLY_COUNTS, (uint64_t)((position * parameters_get(axis, LINE_PARAMETER_COUNTS_PER_PERIOD)) >> 16), 8);
+    reply[0] = LINE_STATUS_REPLY_LENGTH;
+    return LINE_CAUSE_OK;
+}
+
+static uint8_t enable(unsigned axis)
+{
+    uint8_t on = asked[LINE_ENABLE_REQUEST_ON];
+    return on > 1 ? LINE_CAUSE_OUT_OF_RANGE : axis_enable(axis, on);
+}
+
+static uint8_t move(unsigned axis)
+{
+    uint32_t ticks = 0;
+    uint8_t cause = axis_move(axis, (int64_t)get(&asked[LINE_MOVE_REQUEST_TARGET], 8), &ticks);
+    put(LINE_MOVE_REPLY_DURATION_TICKS, ticks, 4);
+    reply[0] = LINE_MOVE_REPLY_LENGTH;
+    return cause;
+}
+
+static uint8_t get_parameter(unsigned axis)
+{
+    uint8_t id = asked[LINE_GET_PARAMETER_REQUEST_PARAMETER];
+    if (parameters_check(id, 0) == LINE_CAUSE_UNKNOWN_PARAMETER) return LINE_CAUSE_UNKNOWN_PARAMETER;
+    put(LINE_GET_PARAMETER_REPLY_VALUE, (uint64_t)parameters_get(axis, id), 8);
+    reply[0] = LINE_GET_PARAMETER_REPLY_LENGTH;
+    return LINE_CAUSE_OK;
+}
+
+static uint8_t set_parameter(unsigned axis)
+{
+    return axis_set_parameter(axis, asked[LINE_SET_PARAMETER_REQUEST_PARAMETER],
+                              (int64_t)get(&asked[LINE_SET_PARAMETER_REQUEST_VALUE], 8));
+}
+
+static uint8_t counters(void)
+{
+    put(LINE_COUNTERS_REPLY_FRAMES_GOOD, line_read(LINE_FRAMES_GOOD), 4);
+    put(LINE_COUNTERS_REPLY_FRAMES_BAD, line_read(LINE_FRAMES_BAD), 4);
+    put(LINE_COUNTERS_REPLY_FRAMING_ERRORS, line_read(LINE_FRAMING_ERRORS), 4);
+    put(LINE_COUNTERS_REPLY_START_GLITCHES, line_read(LINE_START_GLITCHES), 4);
+    put(LINE_COUNTERS_REPLY_OVERRUNS, line_read(LINE_OVERRUNS), 4);
+    put(LINE_COUNTERS_REPLY_REPEATED, repeated, 4);
+    put(LINE_COUNTERS_REPLY_REFUSED, refused, 4);
+    reply[0] = LINE_COUNTERS_REPLY_LENGTH;
+    return LINE_CAUSE_OK;
+}
+
+static uint8_t encoder(unsigned axis)
+{
+    uint32_t sample = axis_read(axis, AXIS_SAMPLE), phase = axis_read(axis, AXIS_PHASE);
+    put(LINE_ENCODER_REPLY_SIN, FIELD_GET(sample, AXIS_SAMPLE_SIN), 2);
+    put(LINE_ENCODER_REPLY_COS, FIELD_GET(sample, AXIS_SAMPLE_COS), 2);
+    put(LINE_ENCODER_REPLY_PHASE, FIELD_GET(phase, AXIS_PHASE_PHASE), 2);
+    put(LINE_ENCODER_REPLY_AMPLITUDE, FIELD_GET(phase, AXIS_PHASE_AMPLITUDE), 2);
+    put(LINE_ENCODER_REPLY_QUADRATURE_COUNT, axis_read(axis, AXIS_QUADRATURE_COUNT), 4);
+    put(LINE_ENCODER_REPLY_REJECTED_PULSES, axis_read(axis, AXIS_REJECTED_PULSES), 4);
+    put(LINE_ENCODER_REPLY_REJECTED_SAMPLES, axis_read(axis, AXIS_REJECTED_SAMPLES), 4);
+    put(LINE_ENCODER_REPLY_HOME_PHASE, (uint32_t)axis_home_phase(axis), 4);
+    put(LINE_ENCODER_REPLY_FAULT_POSITION, (uint64_t)axis_read_position(axis, AXIS_FAULT_POSITION), 8);
+    reply[0] = LINE_ENCODER_REPLY_LENGTH;
+    return LINE_CAUSE_OK;
+}
+
+// A block has 64 words; those without a register read 0. Reading `receive` would take a word from the line.
+static uint8_t read_register(void)
+{
+    uint32_t address = (uint32_t)get(&asked[LINE_READ_REGISTER_REQUEST_ADDRESS], 2), block = address & ~0xFFu;
+    bool exists = block == NODE_BASE || block == LINE_BASE || (block >= AXIS_BASE && block < AXIS_BASE + axes * AXIS_STRIDE);
+    if (!exists || address % 4 || address == LINE_BASE + LINE_RECEIVE) return LINE_CAUSE_NO_SUCH_REGISTER;
+    put(LINE_READ_REGISTER_REPLY_VALUE, register_read(address), 4);
+    reply[0] = LINE_READ_REGISTER_REPLY_LENGTH;
+    return LINE_CAUSE_OK;
+}
+
+static uint8_t execute(uint8_t operation, uint8_t length)
+{
+    unsigned axis = asked[LINE_REQUEST_HEAD];                   // of those operations that have one
+    if (wrong_map && operation != LINE_OPERATION_IDENTIFY) return LINE_CAUSE_WRONG_MAP;
+    if (length < LINE_REQUEST_HEAD) return LINE_CAUSE_WRONG_LENGTH;
+    if (operation >= sizeof request_length || request_length[operation] == 0) return LINE_CAUSE_UNKNOWN_OPERATION;
+    if (length != request_length[operation]) return LINE_CAUSE_WRONG_LENGTH;
+
+    switch (operation) {
+    case LINE_OPERATION_IDENTIFY: return identify();
+    case LINE_OPERATION_COUNTERS: return counters();
+    case LINE_OPERATION_READ_REGISTER: return read_register();
+    default: break;
+    }
+    if (axis >= axes) return LINE_CAUSE_NO_SUCH_AXIS;
+    switch (operation) {
+    case LINE_OPERATION_STATUS: return status(axis);
+    case LINE_OPERATION_ENABLE: return enable(axis);
+    case LINE_OPERATION_HOME: return axis_home(axis);
+    case LINE_OPERATION_MOVE: return move(axis);
+    case LINE_OPERATION_STOP: return axis_stop(axis);
+    case LINE_OPERATION_RESET_FAULTS: return axis_reset_faults(axis);
+    case LINE_OPERATION_GET_PARAMETER: return get_parameter(axis);
+    case LINE_OPERATION_SET_PARAMETER: return set_parameter(axis);
+    case LINE_OPERATION_ENCODER: return encoder(axis);
+    default: return LINE_CAUSE_UNKNOWN_OPERATION;
+    }
+}
+
+static uint8_t own_address(void)
+{
+    return (uint8_t)FIELD_GET(node_read(NODE_BUILD), NODE_BUILD_ADDRESS);
+}
+
+static void seal(void)                                          // length and CRC-32 around the body
+{
+    uint32_t length = reply[0], crc;
+    line_write(LINE_CRC_START, LINE_CRC_START_START_MASK);
+    line_write(LINE_CRC_BYTE, READY | WAY_FROM_NODE | own_address());
+    for (uint32_t n = 0; n <= length; n++) line_write(LINE_CRC_BYTE, reply[n]);
+    crc = line_read(LINE_CRC);
+    put(length, crc, CRC_BYTES);
+}
+
+static void frame(void)
+{
+    uint8_t length = request[0], cause;
+    uint32_t crc = (uint32_t)get(&asked[length], CRC_BYTES);
+    if (answered && crc == answered_crc && asked[0] == answer[0]) {
+        repeated++;
+        return;
+    }
+    reply[0] = LINE_REPLY_HEAD;
+    answer[0] = asked[0];
+    answer[1] = length < LINE_REQUEST_HEAD ? 0 : asked[1];
+    cause = execute(answer[1], length);
+    if (cause != LINE_CAUSE_OK) {
+        refused++;
+        reply[0] = LINE_REPLY_HEAD;
+    }
+    answer[2] = cause;
+    answered = true;
+    answered_crc = crc;
+    seal();
+}
+
+static void send(uint8_t data)
+{
+    line_write(LINE_TRANSMIT, data);
+}
+
+static void command_byte(uint8_t data)
+{
+    uint32_t bytes = 1;
+    receiving = (data & WAY_MASK) == WAY_TO_NODE;
+    received = 0;
+    if (!receiving) bytes += 1 + reply[0] + CRC_BYTES;
+    if (FIELD_GET(line_read(LINE_STATE), LINE_STATE_TRANSMIT_FREE) < bytes) return;    // silence, rather than half an answer
+    send(READY | (data & 0x3F));
+    for (uint32_t n = 0; n + 1 < bytes; n++) send(reply[n]);
+}
+
+void line_start(unsigned served_axes)
+{
+    axes = served_axes;
+    wrong_map = !hardware_map_fits();
+    receiving = answered = false;
+    repeated = refused = 0;
+    reply[0] = LINE_REPLY_HEAD;
+    answer[0] = answer[1] = 0;
+    answer[2] = LINE_CAUSE_OK;
+    seal();
+}
+
+void line_poll(void)
+{
+    for (uint32_t words = 0; words < WORDS_A_POLL; words++) {
+        uint32_t word = line_read(LINE_RECEIVE);
+        if (!FIELD_GET(word, LINE_RECEIVE_PRESENT)) return;
+        uint8_t data = (uint8_t)FIELD_GET(word, LINE_RECEIVE_DATA);
+        if (FIELD_GET(word, LINE_RECEIVE_COMMAND)) {
+            command_byte(data);
+            continue;
+        }
+        if (!receiving || received == sizeof request) continue;
+        request[received++] = data;
+        if (FIELD_GET(word, LINE_RECEIVE_GOOD)) {
+            receiving = false;
+            if (received == 1u + request[0] + CRC_BYTES) frame();
+        }
+    }
+}

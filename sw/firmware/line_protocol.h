@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+// Made by tables/line.py from tables/line.toml: do not edit.
+#ifndef MOIRE_LINE_PROTOCOL_H
+#define MOIRE_LINE_PROTOCOL_H
+
+#define PROTOCOL_CRC         0x478DAD3Cu    // CRC-32 of line.toml
+#define LINE_VERSION         1u
+#define LINE_LONGEST_BODY    64u
+#define LINE_REQUEST_HEAD    2u    // sequence, operation
+#define LINE_REPLY_HEAD      3u    // sequence, operation, cause
+
+enum line_cause {
+    LINE_CAUSE_OK = 0,    // done
+    LINE_CAUSE_UNKNOWN_OPERATION = 1,    // the node does not know this command
+    LINE_CAUSE_WRONG_LENGTH = 2,    // the command has the wrong length
+    LINE_CAUSE_NO_SUCH_AXIS = 3,    // the node has no axis of this number
+    LINE_CAUSE_UNKNOWN_PARAMETER = 4,    // the node has no parameter of this number
+    LINE_CAUSE_OUT_OF_RANGE = 5,    // the value is outside what this parameter allows
+    LINE_CAUSE_OUT_OF_TRAVEL = 6,    // the target is outside the travel
+    LINE_CAUSE_NOT_HOMED = 7,    // the axis has no zero yet: home it first
+    LINE_CAUSE_NOT_ENABLED = 8,    // the drive is off: enable it first
+    LINE_CAUSE_FAULTED = 9,    // a fault is latched: remove its cause and reset it first
+    LINE_CAUSE_FAULT_STANDS = 10,    // the cause of the fault still stands
+    LINE_CAUSE_BUSY = 11,    // the axis is moving: stop it or wait
+    LINE_CAUSE_WRONG_MAP = 12,    // firmware and hardware were not made for each other (register maps differ)
+    LINE_CAUSE_NO_SUCH_REGISTER = 13,    // the node has no register at this address
+    LINE_CAUSE_STOPPED = 14,    // stopped by the host
+    LINE_CAUSE_NO_SWITCH = 15,    // no limit switch was found within the travel
+    LINE_CAUSE_SWITCH_STUCK = 16,    // the limit switch did not open within the home distance
+    LINE_CAUSE_NOT_SETTLED = 17,    // the target was not reached within the settling time
+    LINE_CAUSE_ENDED_BY_FAULT = 18,    // a fault ended the motion
+    LINE_CAUSE_RUNNING = 19,    // the motion is under way
+    LINE_CAUSE_NEVER = 20,    // no motion was asked for yet
+};
+
+enum line_fault {    // bits
+    LINE_FAULT_LIMIT_LOW = 1 << 0,    // limit switch at the low end
+    LINE_FAULT_LIMIT_HIGH = 1 << 1,    // limit switch at the high end
+    LINE_FAULT_ESTOP = 1 << 2,    // emergency stop
+    LINE_FAULT_FOLLOWING_ERROR = 1 << 3,    // following error too large
+    LINE_FAULT_ENCODER = 1 << 4,    // encoder fault
+    LINE_FAULT_LINE_WATCHDOG = 1 << 5,    // the line fell silent
+    LINE_FAULT_DRIVE = 1 << 6,    // the drive reports a fault
+    LINE_FAULT_CPU = 1 << 7,    // the soft core stopped
+    LINE_FAULT_PROFILE_UNDERRUN = 1 << 8,    // the profile ran out of segments
+};
+
+enum line_encoder_event {    // bits
+    LINE_ENCODER_EVENT_ILLEGAL_EDGE = 1 << 0,    // both quadrature levels changed at once
+    LINE_ENCODER_EVENT_OVERSPEED = 1 << 1,    // the phase jumped: too fast, or the signal is broken
+    LINE_ENCODER_EVENT_AMPLITUDE_LOW = 1 << 2,    // signal too small
+    LINE_ENCODER_EVENT_AMPLITUDE_HIGH = 1 << 3,    // signal too large
+    LINE_ENCODER_EVENT_DISAGREEMENT = 1 << 4,    // interpolated position and quadrature count differ
+};
+
+enum line_state {
+    LINE_STATE_OFF = 0,    // drive off
+    LINE_STATE_HOLDING = 1,    // holding position
+    LINE_STATE_HOMING = 2,    // homing
+    LINE_STATE_MOVING = 3,    // moving
+    LINE_STATE_SETTLING = 4,    // settling
+    LINE_STATE_STOPPING = 5,    // stopping
+    LINE_STATE_FAULTED = 6,    // faulted
+};
+
+enum line_flag {    // bits
+    LINE_FLAG_ENABLED = 1 << 0,    // drive on
+    LINE_FLAG_HOMED = 1 << 1,    // zero known
+    LINE_FLAG_LIMIT_LOW = 1 << 2,    // switch at the low end pressed
+    LINE_FLAG_LIMIT_HIGH = 1 << 3,    // switch at the high end pressed
+    LINE_FLAG_ESTOP = 1 << 4,    // emergency stop pressed
+    LINE_FLAG_SETTLED = 1 << 5,    // inside the settling window
+    LINE_FLAG_SATURATED = 1 << 6,    // command at its limit
+};
+
+enum line_operation {
+    LINE_OPERATION_IDENTIFY = 1,    // who is there, and what was it built from
+    LINE_OPERATION_STATUS = 2,    // state, position and faults of an axis; ended is the cause of the last motion
+    LINE_OPERATION_ENABLE = 3,    // drive on (1) or off (0)
+    LINE_OPERATION_HOME = 4,    // find the zero: to the limit switch, away from it, nearest phase zero
+    LINE_OPERATION_MOVE = 5,    // go to a position
+    LINE_OPERATION_STOP = 6,    // controlled stop; the drive stays on
+    LINE_OPERATION_RESET_FAULTS = 7,    // clear latched faults whose cause is gone; the drive stays off
+    LINE_OPERATION_GET_PARAMETER = 8,    // read a parameter
+    LINE_OPERATION_SET_PARAMETER = 9,    // write a parameter; not while the axis moves
+    LINE_OPERATION_COUNTERS = 10,    // what happened on the line
+    LINE_OPERATION_ENCODER = 11,    // the sensor as it is now, and where the last homing met its phase zero
+    LINE_OPERATION_READ_REGISTER = 12,    // one word of the register map, by byte address
+};
+
+// Lengths of whole bodies and offsets of their fields, in bytes, little endian.
+#define LINE_IDENTIFY_REQUEST_LENGTH 2u
+#define LINE_IDENTIFY_REPLY_LENGTH 27u
+#define LINE_IDENTIFY_REPLY_MAP_CRC 3u    // u32
+#define LINE_IDENTIFY_REPLY_PROTOCOL_CRC 7u    // u32
+#define LINE_IDENTIFY_REPLY_VERSION 11u    // u16
+#define LINE_IDENTIFY_REPLY_ADDRESS 13u    // u8
+#define LINE_IDENTIFY_REPLY_AXES 14u    // u8
+#define LINE_IDENTIFY_REPLY_CLK_HZ 15u    // u32
+#define LINE_IDENTIFY_REPLY_TICK_HZ 19u    // u32
+#define LINE_IDENTIFY_REPLY_SAMPLE_HZ 23u    // u32
+#define LINE_STATUS_REQUEST_LENGTH 3u
+#define LINE_STATUS_REQUEST_AXIS 2u    // u8
+#define LINE_STATUS_REPLY_LENGTH 41u
+#define LINE_STATUS_REPLY_STATE 3u    // u8
+#define LINE_STATUS_REPLY_ENDED 4u    // u8
+#define LINE_STATUS_REPLY_FLAGS 5u    // u8
+#define LINE_STATUS_REPLY_ENCODER_EVENTS 6u    // u8
+#define LINE_STATUS_REPLY_FAULTS 7u    // u16
+#define LINE_STATUS_REPLY_FIRST_FAULT 9u    // u16
+#define LINE_STATUS_REPLY_POSITION 11u    // i64
+#define LINE_STATUS_REPLY_TARGET 19u    // i64
+#define LINE_STATUS_REPLY_VELOCITY 27u    // i32
+#define LINE_STATUS_REPLY_COMMAND 31u    // i16
+#define LINE_STATUS_REPLY_COUNTS 33u    // i64
+#define LINE_ENABLE_REQUEST_LENGTH 4u
+#define LINE_ENABLE_REQUEST_AXIS 2u    // u8
+#define LINE_ENABLE_REQUEST_ON 3u    // u8
+#define LINE_ENABLE_REPLY_LENGTH 3u
+#define LINE_HOME_REQUEST_LENGTH 3u
+#define LINE_HOME_REQUEST_AXIS 2u    // u8
+#define LINE_HOME_REPLY_LENGTH 3u
+#define LINE_MOVE_REQUEST_LENGTH 11u
+#define LINE_MOVE_REQUEST_AXIS 2u    // u8
+#define LINE_MOVE_REQUEST_TARGET 3u    // i64
+#define LINE_MOVE_REPLY_LENGTH 7u
+#define LINE_MOVE_REPLY_DURATION_TICKS 3u    // u32
+#define LINE_STOP_REQUEST_LENGTH 3u
+#define LINE_STOP_REQUEST_AXIS 2u    // u8
+#define LINE_STOP_REPLY_LENGTH 3u
+#define LINE_RESET_FAULTS_REQUEST_LENGTH 3u
+#define LINE_RESET_FAULTS_REQUEST_AXIS 2u    // u8
+#define LINE_RESET_FAULTS_REPLY_LENGTH 3u
+#define LINE_GET_PARAMETER_REQUEST_LENGTH 4u
+#define LINE_GET_PARAMETER_REQUEST_AXIS 2u    // u8
+#define LINE_GET_PARAMETER_REQUEST_PARAMETER 3u    // u8
+#define LINE_GET_PARAMETER_REPLY_LENGTH 11u
+#define LINE_GET_PARAMETER_REPLY_VALUE 3u    // i64
+#define LINE_SET_PARAMETER_REQUEST_LENGTH 12u
+#define LINE_SET_PARAMETER_REQUEST_AXIS 2u    // u8
+#define LINE_SET_PARAMETER_REQUEST_PARAMETER 3u    // u8
+#define LINE_SET_PARAMETER_REQUEST_VALUE 4u    // i64
+#define LINE_SET_PARAMETER_REPLY_LENGTH 3u
+#define LINE_COUNTERS_REQUEST_LENGTH 2u
+#define LINE_COUNTERS_REPLY_LENGTH 31u
+#define LINE_COUNTERS_REPLY_FRAMES_GOOD 3u    // u32
+#define LINE_COUNTERS_REPLY_FRAMES_BAD 7u    // u32
+#define LINE_COUNTERS_REPLY_FRAMING_ERRORS 11u    // u32
+#define LINE_COUNTERS_REPLY_START_GLITCHES 15u    // u32
+#define LINE_COUNTERS_REPLY_OVERRUNS 19u    // u32
+#define LINE_COUNTERS_REPLY_REPEATED 23u    // u32
+#define LINE_COUNTERS_REPLY_REFUSED 27u    // u32
+#define LINE_ENCODER_REQUEST_LENGTH 3u
+#define LINE_ENCODER_REQUEST_AXIS 2u    // u8
+#define LINE_ENCODER_REPLY_LENGTH 35u
+#define LINE_ENCODER_REPLY_SIN 3u    // i16
+#define LINE_ENCODER_REPLY_COS 5u    // i16
+#define LINE_ENCODER_REPLY_PHASE 7u    // u16
+#define LINE_ENCODER_REPLY_AMPLITUDE 9u    // u16
+#define LINE_ENCODER_REPLY_QUADRATURE_COUNT 11u    // i32
+#define LINE_ENCODER_REPLY_REJECTED_PULSES 15u    // u32
+#define LINE_ENCODER_REPLY_REJECTED_SAMPLES 19u    // u32
+#define LINE_ENCODER_REPLY_HOME_PHASE 23u    // i32
+#define LINE_ENCODER_REPLY_FAULT_POSITION 27u    // i64
+#define LINE_READ_REGISTER_REQUEST_LENGTH 4u
+#define LINE_READ_REGISTER_REQUEST_ADDRESS 2u    // u16
+#define LINE_READ_REGISTER_REPLY_LENGTH 7u
+#define LINE_READ_REGISTER_REPLY_VALUE 3u    // u32
+
+// X(name, code, length of the request body, length of the reply body if the cause is ok)
+#define LINE_OPERATIONS(X) \
+    X(identify, 1, 2, 27) \
+    X(status, 2, 3, 41) \
+    X(enable, 3, 4, 3) \
+    X(home, 4, 3, 3) \
+    X(move, 5, 11, 7) \
+    X(stop, 6, 3, 3) \
+    X(reset_faults, 7, 3, 3) \
+    X(get_parameter, 8, 4, 11) \
+    X(set_parameter, 9, 12, 3) \
+    X(counters, 10, 2, 31) \
+    X(encoder, 11, 3, 35) \
+    X(read_register, 12, 4, 7)
+
+enum line_parameter {
+    LINE_PARAMETER_PERIOD = 1,    // [1 pm] length of one signal period
+    LINE_PARAMETER_COUNTS_PER_PERIOD = 2,    // subdivision N of the read-out
+    LINE_PARAMETER_TRAVEL_LOW = 3,    // [1/65536 period] lowest target
+    LINE_PARAMETER_TRAVEL_HIGH = 4,    // [1/65536 period] highest target
+    LINE_PARAMETER_VELOCITY = 5,    // [1 period/s] top speed of a move
+    LINE_PARAMETER_ACCELERATION = 6,    // [1 period/s2] largest acceleration
+    LINE_PARAMETER_JERK = 7,    // [1 period/s3] largest jerk
+    LINE_PARAMETER_HOME_VELOCITY = 8,    // [1 period/s] speed towards the limit switch
+    LINE_PARAMETER_HOME_CREEP = 9,    // [1 period/s] speed while the switch edge is sought
+    LINE_PARAMETER_HOME_DISTANCE = 10,    // [1/65536 period] from the switch edge to the zero
+    LINE_PARAMETER_HOME_END = 11,    // switch that homing uses: 0 low end, 1 high end
+    LINE_PARAMETER_SETTLE_WINDOW = 12,    // [1/65536 period] a move has ended when the error stays inside this
+    LINE_PARAMETER_SETTLE_TIME = 13,    // [0.001 s] for this long
+    LINE_PARAMETER_SETTLE_TIMEOUT = 14,    // [0.001 s] or is given up after this
+    LINE_PARAMETER_KP = 15,    // [1/65536] servo: proportional gain, see axis_registers.kp
+    LINE_PARAMETER_KI = 16,    // [1/16777216] servo: integral gain per tick
+    LINE_PARAMETER_KD = 17,    // [1/65536] servo: derivative gain
+    LINE_PARAMETER_KV = 18,    // [1/65536] servo: velocity feed-forward
+    LINE_PARAMETER_KA = 19,    // [1/256] servo: acceleration feed-forward
+    LINE_PARAMETER_OUTPUT_LIMIT = 20,    // [1/32768] servo: largest command, of full scale
+    LINE_PARAMETER_INTEGRAL_LIMIT = 21,    // [1/32768] servo: largest integral term, of full scale
+    LINE_PARAMETER_DEAD_BAND = 22,    // [1/65536 period] servo: the integrator rests inside this at standstill
+    LINE_PARAMETER_FOLLOWING_LIMIT = 23,    // [1/65536 period] guard: largest following error
+    LINE_PARAMETER_DEGLITCH = 24,    // [1e-9 s] deglitcher: a level must be stable this long
+    LINE_PARAMETER_SPIKE_STEP = 25,    // limit filter 1: largest step between samples; 0 off
+    LINE_PARAMETER_SPIKE_HOLD = 26,    // limit filter 1: samples in a row it may hold back
+    LINE_PARAMETER_AMPLITUDE_LOW = 27,    // encoder: smallest good amplitude, converter counts
+    LINE_PARAMETER_AMPLITUDE_HIGH = 28,    // encoder: largest good amplitude, converter counts
+    LINE_PARAMETER_DISAGREEMENT_LIMIT = 29,    // [1/65536 period] encoder: interpolated position against quadrature count; 0 off
+    LINE_PARAMETER_ENCODER_FAULT_MASK = 30,    // encoder: which events are a fault (bits of encoder_event)
+    LINE_PARAMETER_PWM_FREQUENCY = 31,    // [1 Hz] drive: PWM frequency
+    LINE_PARAMETER_WATCHDOG_TIME = 32,    // [0.001 s] guard: longest silence of the line while a drive is on (all axes)
+};
+#define LINE_PARAMETER_COUNT 32u
+
+// X(name, id, min, max, default): all int64_t, in counts of the wire
+#define LINE_PARAMETERS(X) \
+    X(period, 1, 1LL, 4000000000LL, 800000LL) \
+    X(counts_per_period, 2, 1LL, 65536LL, 160LL) \
+    X(travel_low, 3, -140737488355328LL, 140737488355327LL, -65536000LL) \
+    X(travel_high, 4, -140737488355328LL, 140737488355327LL, 9797632000LL) \
+    X(velocity, 5, 1LL, 1000000LL, 6000LL) \
+    X(acceleration, 6, 1LL, 100000000LL, 125000LL) \
+    X(jerk, 7, 1LL, 2000000000LL, 12500000LL) \
+    X(home_velocity, 8, 1LL, 1000000LL, 5000LL) \
+    X(home_creep, 9, 1LL, 1000000LL, 125LL) \
+    X(home_distance, 10, 65536LL, 1000000000LL, 81920000LL) \
+    X(home_end, 11, 0LL, 1LL, 0LL) \
+    X(settle_window, 12, 1LL, 65536000LL, 1638LL) \
+    X(settle_time, 13, 1LL, 10000LL, 20LL) \
+    X(settle_timeout, 14, 1LL, 60000LL, 2000LL) \
+    X(kp, 15, 0LL, 16777215LL, 1600LL) \
+    X(ki, 16, 0LL, 16777215LL, 16000LL) \
+    X(kd, 17, 0LL, 16777215LL, 20000LL) \
+    X(kv, 18, 0LL, 16777215LL, 4942LL) \
+    X(ka, 19, 0LL, 16777215LL, 643LL) \
+    X(output_limit, 20, 0LL, 32767LL, 32000LL) \
+    X(integral_limit, 21, 0LL, 32767LL, 20000LL) \
+    X(dead_band, 22, 0LL, 65535LL, 400LL) \
+    X(following_limit, 23, 1LL, 2147483647LL, 4096000LL) \
+    X(deglitch, 24, 0LL, 1000000LL, 10000LL) \
+    X(spike_step, 25, 0LL, 255LL, 0LL) \
+    X(spike_hold, 26, 0LL, 255LL, 3LL) \
+    X(amplitude_low, 27, 0LL, 65535LL, 32LL) \
+    X(amplitude_high, 28, 0LL, 65535LL, 160LL) \
+    X(disagreement_limit, 29, 0LL, 1048575LL, 49152LL) \
+    X(encoder_fault_mask, 30, 0LL, 31LL, 30LL) \
+    X(pwm_frequency, 31, 1000LL, 200000LL, 20000LL) \
+    X(watchdog_time, 32, 10LL, 65535LL, 500LL)
+
+#endif

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// main -- start, then poll for ever: line, clock, axes. There are no interrupts; nothing waits.
+#include "axis.h"
+#include "clock.h"
+#include "hardware.h"
+#include "line.h"
+#include "parameters.h"
+
+static unsigned axes;                   // those that may be touched: none if the register maps differ
+
+void firmware_start(void)
+{
+    unsigned built = FIELD_GET(node_read(NODE_BUILD), NODE_BUILD_AXES);
+    if (built > HARDWARE_AXES) built = HARDWARE_AXES;
+    axes = hardware_map_fits() ? built : 0;
+    clock_start();
+    parameters_start_node();
+    for (unsigned n = 0; n < axes; n++) axis_start(n);
+    line_start(built);
+}
+
+void firmware_poll(void)
+{
+    line_poll();
+    clock_poll();
+    for (unsigned n = 0; n < axes; n++) {
+        axis_poll(n);
+        line_poll();
+    }
+}
+
+int main(void)
+{
+    firmware_start();
+    while (hardware_stack_intact()) firmware_poll();
+    hardware_halt();
+    return 0;
+}

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+// parameters -- the settings of the axes, and those registers that follow from them.
+#include "parameters.h"
+
+#include "hardware.h"
+#include "line_protocol.h"
+
+#define LIMITS(name, id, low, high, value) [id] = {low, high, value},
+
+static const struct { int64_t low, high, value; } table[LINE_PARAMETER_COUNT + 1] = {LINE_PARAMETERS(LIMITS)};
+
+static int64_t parameters[HARDWARE_AXES][LINE_PARAMETER_COUNT + 1];
+static struct planner_limits limits[HARDWARE_AXES];     // velocity: that of a move
+
+static uint32_t held(uint64_t value, uint32_t mask)
+{
+    return value > mask ? mask : (uint32_t)value;
+}
+
+void parameters_start_node(void)
+{
+    uint32_t clk_hz = node_read(NODE_CLK_HZ);
+    line_write(LINE_BIT_TIME, held((16 * (uint64_t)clk_hz + BAUD / 2) / BAUD, LINE_BIT_TIME_MASK));
+    node_write(NODE_SAMPLE_PERIOD, held(clk_hz / SAMPLE_HZ, NODE_SAMPLE_PERIOD_MASK));
+    node_write(NODE_TICK_PERIOD, held(clk_hz / PLANNER_TICK_HZ, NODE_TICK_PERIOD_MASK));
+}
+
+static void apply_motion(unsigned axis)
+{
+    const int64_t *p = parameters[axis];
+    limits[axis] = planner_limits((uint32_t)p[LINE_PARAMETER_VELOCITY], (uint32_t)p[LINE_PARAMETER_ACCELERATION],
+                                  (uint32_t)p[LINE_PARAMETER_JERK]);
+    axis_write(axis, AXIS_BRAKE_RATE, held(limits[axis].acceleration >> 8, AXIS_BRAKE_RATE_MASK));
+}
+
+static void apply_sensing(unsigned axis)
+{
+    const int64_t *p = parameters[axis];
+    uint64_t clk = (uint64_t)p[LINE_PARAMETER_DEGLITCH] * node_read(NODE_CLK_HZ) / 1000000000u;
+    axis_write(axis, AXIS_SENSING, FIELD_PUT(AXIS_SENSING_DEGLITCH, held(clk, 0xFFFF)) |
+                                   FIELD_PUT(AXIS_SENSING_SPIKE_STEP, p[LINE_PARAMETER_SPIKE_STEP]) |
+                                   FIELD_PUT(AXIS_SENSING_SPIKE_HOLD, p[LINE_PARAMETER_SPIKE_HOLD]));
+}
+
+// The registers that follow from this parameter.
+static void apply(unsigned axis, uint8_t id)
+{
+    const int64_t *p = parameters[axis];
+    uint32_t value = (uint32_t)p[id];
+    switch (id) {
+    case LINE_PARAMETER_VELOCITY:
+    case LINE_PARAMETER_ACCELERATION:
+    case LINE_PARAMETER_JERK: apply_motion(axis); break;
+    case LINE_PARAMETER_KP: axis_write(axis, AXIS_KP, value); break;
+    case LINE_PARAMETER_KI: axis_write(axis, AXIS_KI, value); break;
+    case LINE_PARAMETER_KD: axis_write(axis, AXIS_KD, value); break;
+    case LINE_PARAMETER_KV: axis_write(axis, AXIS_KV, value); break;
+    case LINE_PARAMETER_KA: axis_write(axis, AXIS_KA, value); break;
+    case LINE_PARAMETER_OUTPUT_LIMIT:
+    case LINE_PARAMETER_INTEGRAL_LIMIT:
+        axis_write(axis, AXIS_SERVO_LIMITS, FIELD_PUT(AXIS_SERVO_LIMITS_OUTPUT, p[LINE_PARAMETER_OUTPUT_LIMIT]) |
+                                            FIELD_PUT(AXIS_SERVO_LIMITS_INTEGRAL, p[LINE_PARAMETER_INTEGRAL_LIMIT]));
+        break;
+    case LINE_PARAMETER_DEAD_BAND: axis_write(axis, AXIS_DEAD_BAND, value); break;
+    case LINE_PARAMETER_FOLLOWING_LIMIT: axis_write(axis, AXIS_FOLLOWING_LIMIT, value); break;
+    case LINE_PARAMETER_DEGLITCH:
+    case LINE_PARAMETER_SPIKE_STEP:
+    case LINE_PARAMETER_SPIKE_HOLD: apply_sensing(axis); break;
+    case LINE_PARAMETER_AMPLITUDE_LOW:
+    case LINE_PARAMETER_AMPLITUDE_HIGH:
+        axis_write(axis, AXIS_AMPLITUDE_WINDOW, FIELD_PUT(AXIS_AMPLITUDE_WINDOW_LOW, p[LINE_PARAMETER_AMPLITUDE_LOW]) |
+                                                FIELD_PUT(AXIS_AMPLITUDE_WINDOW_HIGH, p[LINE_PARAMETER_AMPLITUDE_HIGH]));
+        break;
+    case LINE_PARAMETER_DISAGREEMENT_LIMIT: axis_write(axis, AXIS_DISAGREEMENT_LIMIT, value); break;
+    case LINE_PARAMETER_ENCODER_FAULT_MASK: axis_write(axis, AXIS_ENCODER_FAULT_MASK, value); break;
+    case LINE_PARAMETER_PWM_FREQUENCY: axis_write(axis, AXIS_PWM_PERIOD, held(node_read(NODE_CLK_HZ) / value, AXIS_PWM_PERIOD_MASK)); break;
+    case LINE_PARAMETER_WATCHDOG_TIME: line_write(LINE_WATCHDOG_TIME, value); break;
+    default: break;
+    }
+}
+
+void parameters_start(unsigned axis)
+{
+    for (uint8_t id = 1; id <= LINE_PARAMETER_COUNT; id++) parameters[axis][id] = table[id].value;
+    for (uint8_t id = 1; id <= LINE_PARAMETER_COUNT; id++) apply(axis, id);
+}
+
+uint8_t parameters_check(uint8_t id, int64_t value)
+{
+    if (id < 1 || id > LINE_PARAMETER_COUNT) return LINE_CAUSE_UNKNOWN_PARAMETER;
+    return value < table[id].low || value > table[id].high ? LINE_CAUSE_OUT_OF_RANGE : LINE_CAUSE_OK;
+}
+
+void parameters_set(unsigned axis, uint8_t id, int64_t value)
+{
+    parameters[axis][id] = value;
+    if (id == LINE_PARAMETER_WATCHDOG_TIME)                             // there is one line for all axes
+        for (unsigned other = 0; other < HARDWARE_AXES; other++) parameters[other][id] = value;
+    apply(axis, id);
+}
+
+int64_t parameters_get(unsigned axis, uint8_t id)
+{
+    return parameters[axis][id];
+}
+
+struct planner_limits parameters_limits(unsigned axis, uint8_t velocity_id)
+{
+    struct planner_limits made = limits[axis];
+    if (velocity_id != LINE_PARAMETER_VELOCITY) made.velocity = planner_velocity((uint32_t)parameters[axis][velocity_id]);
+    return made;
+}

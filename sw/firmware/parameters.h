@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// parameters -- the settings of the axes, and those registers that follow from them.
+#ifndef MOIRE_PARAMETERS_H
+#define MOIRE_PARAMETERS_H
+
+#include <stdint.h>
+
+#include "planner.h"
+
+#define SAMPLE_HZ 100000u
+#define BAUD 115200u
+
+void parameters_start_node(void);                       // clock dividers, line speed
+void parameters_start(unsigned axis);                   // defaults, into the registers too
+uint8_t parameters_check(uint8_t id, int64_t value);    // a line_cause
+void parameters_set(unsigned axis, uint8_t id, int64_t value);
+int64_t parameters_get(unsigned axis, uint8_t id);
+struct planner_limits parameters_limits(unsigned axis, uint8_t velocity_id);
+
+#endif

@@ -1,0 +1,414 @@
+// SPDX-License-Identifier: Apache-2.0
+// The register map as the firmware sees it; made by tables/registers.py from tables/registers.rdl; change those.
+//
+// NODE_x, LINE_x, AXIS_x are byte offsets inside a block. Fields: FIELD_GET(word, AXIS_STATE_QUEUE_FREE),
+// FIELD_GET_SIGNED, FIELD_PUT(AXIS_CONTROL_ENABLE, 1). A value alone in its register has the register's name.
+#ifndef MOIRE_REGISTERS_H
+#define MOIRE_REGISTERS_H
+
+#include <stdint.h>
+
+#define REGISTERS_BASE 0x80000000u
+#define MAP_CRC 0x6359f22au            // CRC-32 of tables/registers.rdl
+
+#define NODE_BASE 0x000u
+#define LINE_BASE 0x100u
+#define AXIS_BASE 0x400u
+#define AXIS_STRIDE 0x100u
+
+#define FIELD_GET(word, field) (((uint32_t)(word) & field##_MASK) >> field##_SHIFT)
+#define FIELD_GET_SIGNED(word, field) \
+    ((int32_t)((uint32_t)(word) << (32 - field##_SHIFT - field##_WIDTH)) >> (32 - field##_WIDTH))
+#define FIELD_PUT(field, value) (((uint32_t)(value) << field##_SHIFT) & field##_MASK)
+
+#ifndef MOIRE_REGISTER_ACCESS                // a host test may bring its own two functions
+static inline uint32_t register_read(uint32_t offset)
+{ return *(volatile uint32_t *)(uintptr_t)(REGISTERS_BASE + offset); }
+static inline void register_write(uint32_t offset, uint32_t value)
+{ *(volatile uint32_t *)(uintptr_t)(REGISTERS_BASE + offset) = value; }
+#else
+uint32_t register_read(uint32_t offset);
+void register_write(uint32_t offset, uint32_t value);
+#endif
+
+// 64 bits: reading the low word latches the high one, writing the high word commits both.
+static inline uint64_t register_read_wide(uint32_t offset)
+{ uint32_t low = register_read(offset); return (uint64_t)register_read(offset + 4) << 32 | low; }
+static inline void register_write_wide(uint32_t offset, uint64_t value)
+{ register_write(offset, (uint32_t)value); register_write(offset + 4, (uint32_t)(value >> 32)); }
+
+static inline uint32_t node_read(uint32_t offset)
+{ return register_read(NODE_BASE + offset); }
+static inline void node_write(uint32_t offset, uint32_t value)
+{ register_write(NODE_BASE + offset, value); }
+static inline uint64_t node_read_wide(uint32_t offset)
+{ return register_read_wide(NODE_BASE + offset); }
+static inline uint32_t line_read(uint32_t offset)
+{ return register_read(LINE_BASE + offset); }
+static inline void line_write(uint32_t offset, uint32_t value)
+{ register_write(LINE_BASE + offset, value); }
+static inline uint32_t axis_read(unsigned axis, uint32_t offset)
+{ return register_read(AXIS_BASE + axis * AXIS_STRIDE + offset); }
+static inline void axis_write(unsigned axis, uint32_t offset, uint32_t value)
+{ register_write(AXIS_BASE + axis * AXIS_STRIDE + offset, value); }
+static inline uint64_t axis_read_wide(unsigned axis, uint32_t offset)
+{ return register_read_wide(AXIS_BASE + axis * AXIS_STRIDE + offset); }
+static inline void axis_write_wide(unsigned axis, uint32_t offset, uint64_t value)
+{ register_write_wide(AXIS_BASE + axis * AXIS_STRIDE + offset, value); }
+
+// node: identity, clock, health of the soft core
+#define NODE_MAP_CRC                                   0x000u  // r: CRC-32 of the register source
+#define NODE_MAP_CRC_MASK                              0xffffffffu
+#define NODE_MAP_CRC_SHIFT                             0
+#define NODE_MAP_CRC_WIDTH                             32
+#define NODE_CLK_HZ                                    0x004u  // r: clk frequency [Hz]
+#define NODE_CLK_HZ_MASK                               0xffffffffu
+#define NODE_CLK_HZ_SHIFT                              0
+#define NODE_CLK_HZ_WIDTH                              32
+#define NODE_BUILD                                     0x008u  // r: what was built
+#define NODE_BUILD_AXES_MASK                           0x0000000fu
+#define NODE_BUILD_AXES_SHIFT                          0
+#define NODE_BUILD_AXES_WIDTH                          4
+#define NODE_BUILD_ADDRESS_MASK                        0x000000f0u
+#define NODE_BUILD_ADDRESS_SHIFT                       4
+#define NODE_BUILD_ADDRESS_WIDTH                       4
+#define NODE_BUILD_MEMORY_MASK                         0x0000ff00u
+#define NODE_BUILD_MEMORY_SHIFT                        8
+#define NODE_BUILD_MEMORY_WIDTH                        8
+#define NODE_TIME_STAMP                                0x010u  // r: clk since reset, wraps; the time stamp of everything [clk]
+#define NODE_TIME_STAMP_LOW                            0x010u
+#define NODE_TIME_STAMP_HIGH                           0x014u
+#define NODE_TIME_STAMP_WIDTH                          64
+#define NODE_TICK_PERIOD                               0x018u  // rw: servo tick of all axes [clk]
+#define NODE_TICK_PERIOD_MASK                          0x00ffffffu
+#define NODE_TICK_PERIOD_SHIFT                         0
+#define NODE_TICK_PERIOD_WIDTH                         24
+#define NODE_SAMPLE_PERIOD                             0x01cu  // rw: sample rate of all converters [clk]
+#define NODE_SAMPLE_PERIOD_MASK                        0x0000ffffu
+#define NODE_SAMPLE_PERIOD_SHIFT                       0
+#define NODE_SAMPLE_PERIOD_WIDTH                       16
+
+// line: 9-bit UART, address filter, frame check, watchdog
+#define LINE_BIT_TIME                                  0x000u  // rw: duration of one bit [1/16 clk]
+#define LINE_BIT_TIME_MASK                             0x000fffffu
+#define LINE_BIT_TIME_SHIFT                            0
+#define LINE_BIT_TIME_WIDTH                            20
+#define LINE_RECEIVE                                   0x004u  // r: one received word; reading takes it from the queue
+#define LINE_RECEIVE_DATA_MASK                         0x000000ffu
+#define LINE_RECEIVE_DATA_SHIFT                        0
+#define LINE_RECEIVE_DATA_WIDTH                        8
+#define LINE_RECEIVE_COMMAND_MASK                      0x00000100u  // the 9th bit: a command byte for this node
+#define LINE_RECEIVE_COMMAND_SHIFT                     8
+#define LINE_RECEIVE_COMMAND_WIDTH                     1
+#define LINE_RECEIVE_GOOD_MASK                         0x00000200u  // last byte of a frame whose length and CRC-32 are right
+#define LINE_RECEIVE_GOOD_SHIFT                        9
+#define LINE_RECEIVE_GOOD_WIDTH                        1
+#define LINE_RECEIVE_PRESENT_MASK                      0x00000400u  // 0: the queue was empty, nothing was taken
+#define LINE_RECEIVE_PRESENT_SHIFT                     10
+#define LINE_RECEIVE_PRESENT_WIDTH                     1
+#define LINE_TRANSMIT                                  0x008u  // w: one word to send
+#define LINE_TRANSMIT_DATA_MASK                        0x000000ffu
+#define LINE_TRANSMIT_DATA_SHIFT                       0
+#define LINE_TRANSMIT_DATA_WIDTH                       8
+#define LINE_TRANSMIT_COMMAND_MASK                     0x00000100u
+#define LINE_TRANSMIT_COMMAND_SHIFT                    8
+#define LINE_TRANSMIT_COMMAND_WIDTH                    1
+#define LINE_STATE                                     0x00cu  // r: state of the queues
+#define LINE_STATE_TRANSMIT_FREE_MASK                  0x000000ffu
+#define LINE_STATE_TRANSMIT_FREE_SHIFT                 0
+#define LINE_STATE_TRANSMIT_FREE_WIDTH                 8
+#define LINE_STATE_SENDING_MASK                        0x00000100u
+#define LINE_STATE_SENDING_SHIFT                       8
+#define LINE_STATE_SENDING_WIDTH                       1
+#define LINE_FRAMES_GOOD                               0x010u  // rw: frames received whole; writing clears
+#define LINE_FRAMES_GOOD_MASK                          0xffffffffu
+#define LINE_FRAMES_GOOD_SHIFT                         0
+#define LINE_FRAMES_GOOD_WIDTH                         32
+#define LINE_FRAMES_BAD                                0x014u  // rw: frames for this node with a wrong CRC-32 or length; writing clears
+#define LINE_FRAMES_BAD_MASK                           0xffffffffu
+#define LINE_FRAMES_BAD_SHIFT                          0
+#define LINE_FRAMES_BAD_WIDTH                          32
+#define LINE_FRAMING_ERRORS                            0x018u  // rw: characters without a stop bit; writing clears
+#define LINE_FRAMING_ERRORS_MASK                       0xffffffffu
+#define LINE_FRAMING_ERRORS_SHIFT                      0
+#define LINE_FRAMING_ERRORS_WIDTH                      32
+#define LINE_START_GLITCHES                            0x01cu  // rw: start bits that were only glitches; writing clears
+#define LINE_START_GLITCHES_MASK                       0xffffffffu
+#define LINE_START_GLITCHES_SHIFT                      0
+#define LINE_START_GLITCHES_WIDTH                      32
+#define LINE_OVERRUNS                                  0x020u  // rw: words lost because the receive queue was full; writing clears
+#define LINE_OVERRUNS_MASK                             0xffffffffu
+#define LINE_OVERRUNS_SHIFT                            0
+#define LINE_OVERRUNS_WIDTH                            32
+#define LINE_CRC_BYTE                                  0x024u  // w: CRC-32 of what is to be sent: writing a byte takes it in: data
+#define LINE_CRC_BYTE_DATA_MASK                        0x000000ffu
+#define LINE_CRC_BYTE_DATA_SHIFT                       0
+#define LINE_CRC_BYTE_DATA_WIDTH                       8
+#define LINE_CRC_START                                 0x028u  // w: start the CRC-32 afresh: start
+#define LINE_CRC_START_START_MASK                      0x00000001u
+#define LINE_CRC_START_START_SHIFT                     0
+#define LINE_CRC_START_START_WIDTH                     1
+#define LINE_CRC                                       0x02cu  // r: the CRC-32 so far, final inversion done
+#define LINE_CRC_MASK                                  0xffffffffu
+#define LINE_CRC_SHIFT                                 0
+#define LINE_CRC_WIDTH                                 32
+#define LINE_WATCHDOG_TIME                             0x030u  // rw: longest silence of the master while a drive is enabled; 0 reads as the longest [0.001 s]
+#define LINE_WATCHDOG_TIME_MASK                        0x0000ffffu
+#define LINE_WATCHDOG_TIME_SHIFT                       0
+#define LINE_WATCHDOG_TIME_WIDTH                       16
+
+// axis: sensor, position, servo, profile, drive, guard
+#define AXIS_CONTROL                                   0x000u  // rw: requests; the guard decides
+#define AXIS_CONTROL_ENABLE_MASK                       0x00000001u  // ask for the drive; the guard grants it only without a latched fault
+#define AXIS_CONTROL_ENABLE_SHIFT                      0
+#define AXIS_CONTROL_ENABLE_WIDTH                      1
+#define AXIS_CONTROL_CLOSED_LOOP_MASK                  0x00000002u  // 1: servo commands the drive, 0: open_command does
+#define AXIS_CONTROL_CLOSED_LOOP_SHIFT                 1
+#define AXIS_CONTROL_CLOSED_LOOP_WIDTH                 1
+#define AXIS_CONTROL_HOMING_MASK                       0x00000004u  // 1: a limit switch only blocks the way into it, 0: it is a fault
+#define AXIS_CONTROL_HOMING_SHIFT                      2
+#define AXIS_CONTROL_HOMING_WIDTH                      1
+#define AXIS_STROBES                                   0x004u  // w: strobes
+#define AXIS_STROBES_RESET_FAULTS_MASK                 0x00000001u  // clear latched faults whose cause is gone; needs enable = 0
+#define AXIS_STROBES_RESET_FAULTS_SHIFT                0
+#define AXIS_STROBES_RESET_FAULTS_WIDTH                1
+#define AXIS_STROBES_HOLD_HERE_MASK                    0x00000002u  // target := position, profile queue emptied
+#define AXIS_STROBES_HOLD_HERE_SHIFT                   1
+#define AXIS_STROBES_HOLD_HERE_WIDTH                   1
+#define AXIS_STROBES_START_MASK                        0x00000004u  // play the queued segments
+#define AXIS_STROBES_START_SHIFT                       2
+#define AXIS_STROBES_START_WIDTH                       1
+#define AXIS_STROBES_BRAKE_MASK                        0x00000008u  // controlled stop: queue emptied, the target velocity falls to zero at brake_rate
+#define AXIS_STROBES_BRAKE_SHIFT                       3
+#define AXIS_STROBES_BRAKE_WIDTH                       1
+#define AXIS_STATE                                     0x008u  // r: state of the axis
+#define AXIS_STATE_ENABLED_MASK                        0x00000001u  // the drive is on
+#define AXIS_STATE_ENABLED_SHIFT                       0
+#define AXIS_STATE_ENABLED_WIDTH                       1
+#define AXIS_STATE_LIMIT_LOW_MASK                      0x00000002u  // level of the switch at the low end, deglitched; 1: pressed
+#define AXIS_STATE_LIMIT_LOW_SHIFT                     1
+#define AXIS_STATE_LIMIT_LOW_WIDTH                     1
+#define AXIS_STATE_LIMIT_HIGH_MASK                     0x00000004u  // level of the switch at the high end, deglitched; 1: pressed
+#define AXIS_STATE_LIMIT_HIGH_SHIFT                    2
+#define AXIS_STATE_LIMIT_HIGH_WIDTH                    1
+#define AXIS_STATE_ESTOP_MASK                          0x00000008u  // 1: emergency stop is pressed
+#define AXIS_STATE_ESTOP_SHIFT                         3
+#define AXIS_STATE_ESTOP_WIDTH                         1
+#define AXIS_STATE_DRIVE_FAULT_MASK                    0x00000010u  // 1: the drive reports a fault
+#define AXIS_STATE_DRIVE_FAULT_SHIFT                   4
+#define AXIS_STATE_DRIVE_FAULT_WIDTH                   1
+#define AXIS_STATE_MOVING_MASK                         0x00000020u  // a profile is being played
+#define AXIS_STATE_MOVING_SHIFT                        5
+#define AXIS_STATE_MOVING_WIDTH                        1
+#define AXIS_STATE_SATURATED_MASK                      0x00000040u  // the command stands at its limit
+#define AXIS_STATE_SATURATED_SHIFT                     6
+#define AXIS_STATE_SATURATED_WIDTH                     1
+#define AXIS_STATE_QUEUE_FREE_MASK                     0x00000f80u  // segments that may still be queued
+#define AXIS_STATE_QUEUE_FREE_SHIFT                    7
+#define AXIS_STATE_QUEUE_FREE_WIDTH                    5
+#define AXIS_FAULTS                                    0x00cu  // r: latched causes
+#define AXIS_FAULTS_LIMIT_LOW_MASK                     0x00000001u
+#define AXIS_FAULTS_LIMIT_LOW_SHIFT                    0
+#define AXIS_FAULTS_LIMIT_LOW_WIDTH                    1
+#define AXIS_FAULTS_LIMIT_HIGH_MASK                    0x00000002u
+#define AXIS_FAULTS_LIMIT_HIGH_SHIFT                   1
+#define AXIS_FAULTS_LIMIT_HIGH_WIDTH                   1
+#define AXIS_FAULTS_ESTOP_MASK                         0x00000004u
+#define AXIS_FAULTS_ESTOP_SHIFT                        2
+#define AXIS_FAULTS_ESTOP_WIDTH                        1
+#define AXIS_FAULTS_FOLLOWING_ERROR_MASK               0x00000008u
+#define AXIS_FAULTS_FOLLOWING_ERROR_SHIFT              3
+#define AXIS_FAULTS_FOLLOWING_ERROR_WIDTH              1
+#define AXIS_FAULTS_ENCODER_MASK                       0x00000010u
+#define AXIS_FAULTS_ENCODER_SHIFT                      4
+#define AXIS_FAULTS_ENCODER_WIDTH                      1
+#define AXIS_FAULTS_LINE_WATCHDOG_MASK                 0x00000020u
+#define AXIS_FAULTS_LINE_WATCHDOG_SHIFT                5
+#define AXIS_FAULTS_LINE_WATCHDOG_WIDTH                1
+#define AXIS_FAULTS_DRIVE_MASK                         0x00000040u
+#define AXIS_FAULTS_DRIVE_SHIFT                        6
+#define AXIS_FAULTS_DRIVE_WIDTH                        1
+#define AXIS_FAULTS_CPU_MASK                           0x00000080u
+#define AXIS_FAULTS_CPU_SHIFT                          7
+#define AXIS_FAULTS_CPU_WIDTH                          1
+#define AXIS_FAULTS_PROFILE_UNDERRUN_MASK              0x00000100u
+#define AXIS_FAULTS_PROFILE_UNDERRUN_SHIFT             8
+#define AXIS_FAULTS_PROFILE_UNDERRUN_WIDTH             1
+#define AXIS_CAUSES_NOW                                0x010u  // r: causes that stand now, same order as faults
+#define AXIS_CAUSES_NOW_MASK                           0x000001ffu
+#define AXIS_CAUSES_NOW_SHIFT                          0
+#define AXIS_CAUSES_NOW_WIDTH                          9
+#define AXIS_FIRST_FAULT                               0x014u  // r: the cause that came first, same order as faults; one bit
+#define AXIS_FIRST_FAULT_MASK                          0x000001ffu
+#define AXIS_FIRST_FAULT_SHIFT                         0
+#define AXIS_FIRST_FAULT_WIDTH                         9
+#define AXIS_FAULT_POSITION                            0x018u  // r: position when the first fault latched [1/65536 period]
+#define AXIS_FAULT_POSITION_LOW                        0x018u
+#define AXIS_FAULT_POSITION_HIGH                       0x01cu
+#define AXIS_FAULT_POSITION_WIDTH                      48
+#define AXIS_FOLLOWING_LIMIT                           0x020u  // rw: largest |target - position| while closed_loop; 0 switches the check off [1/65536 period]
+#define AXIS_FOLLOWING_LIMIT_MASK                      0xffffffffu
+#define AXIS_FOLLOWING_LIMIT_SHIFT                     0
+#define AXIS_FOLLOWING_LIMIT_WIDTH                     32
+#define AXIS_POSITION                                  0x028u  // r: position [1/65536 period]
+#define AXIS_POSITION_LOW                              0x028u
+#define AXIS_POSITION_HIGH                             0x02cu
+#define AXIS_POSITION_WIDTH                            48
+#define AXIS_TARGET                                    0x030u  // r: target of the servo [1/65536 period]
+#define AXIS_TARGET_LOW                                0x030u
+#define AXIS_TARGET_HIGH                               0x034u
+#define AXIS_TARGET_WIDTH                              48
+#define AXIS_VELOCITY                                  0x038u  // r: velocity [1/65536 period/tick]
+#define AXIS_VELOCITY_MASK                             0xffffffffu
+#define AXIS_VELOCITY_SHIFT                            0
+#define AXIS_VELOCITY_WIDTH                            32
+#define AXIS_SHIFT_ORIGIN                              0x03cu  // rw: move the origin: position and target both grow by this many whole periods, in one clk [period]
+#define AXIS_SHIFT_ORIGIN_MASK                         0xffffffffu
+#define AXIS_SHIFT_ORIGIN_SHIFT                        0
+#define AXIS_SHIFT_ORIGIN_WIDTH                        32
+#define AXIS_ZERO_CROSSING                             0x040u  // rw: the absolute zero was passed
+#define AXIS_ZERO_CROSSING_UP_MASK                     0x00000001u  // going up; write 1 to clear
+#define AXIS_ZERO_CROSSING_UP_SHIFT                    0
+#define AXIS_ZERO_CROSSING_UP_WIDTH                    1
+#define AXIS_ZERO_CROSSING_DOWN_MASK                   0x00000002u  // going down; write 1 to clear
+#define AXIS_ZERO_CROSSING_DOWN_SHIFT                  1
+#define AXIS_ZERO_CROSSING_DOWN_WIDTH                  1
+#define AXIS_SENSING                                   0x044u  // rw: settings of the sensor path
+#define AXIS_SENSING_DEGLITCH_MASK                     0x0000ffffu  // a level must be stable this long [clk]
+#define AXIS_SENSING_DEGLITCH_SHIFT                    0
+#define AXIS_SENSING_DEGLITCH_WIDTH                    16
+#define AXIS_SENSING_SPIKE_STEP_MASK                   0x00ff0000u  // limit filter 1: largest step between samples, full scale 2^(W-1); 0: off
+#define AXIS_SENSING_SPIKE_STEP_SHIFT                  16
+#define AXIS_SENSING_SPIKE_STEP_WIDTH                  8
+#define AXIS_SENSING_SPIKE_HOLD_MASK                   0xff000000u  // samples in a row that limit filter 1 may hold back
+#define AXIS_SENSING_SPIKE_HOLD_SHIFT                  24
+#define AXIS_SENSING_SPIKE_HOLD_WIDTH                  8
+#define AXIS_AMPLITUDE_WINDOW                          0x048u  // rw: amplitude window; full scale 2^(W-1)
+#define AXIS_AMPLITUDE_WINDOW_LOW_MASK                 0x0000ffffu
+#define AXIS_AMPLITUDE_WINDOW_LOW_SHIFT                0
+#define AXIS_AMPLITUDE_WINDOW_LOW_WIDTH                16
+#define AXIS_AMPLITUDE_WINDOW_HIGH_MASK                0xffff0000u
+#define AXIS_AMPLITUDE_WINDOW_HIGH_SHIFT               16
+#define AXIS_AMPLITUDE_WINDOW_HIGH_WIDTH               16
+#define AXIS_DISAGREEMENT_LIMIT                        0x04cu  // rw: largest difference of interpolated position and quadrature count; 0: not checked [1/65536 period]
+#define AXIS_DISAGREEMENT_LIMIT_MASK                   0x000fffffu
+#define AXIS_DISAGREEMENT_LIMIT_SHIFT                  0
+#define AXIS_DISAGREEMENT_LIMIT_WIDTH                  20
+#define AXIS_SAMPLE                                    0x050u  // r: last sample after limit filter 1
+#define AXIS_SAMPLE_SIN_MASK                           0x0000ffffu
+#define AXIS_SAMPLE_SIN_SHIFT                          0
+#define AXIS_SAMPLE_SIN_WIDTH                          16
+#define AXIS_SAMPLE_COS_MASK                           0xffff0000u
+#define AXIS_SAMPLE_COS_SHIFT                          16
+#define AXIS_SAMPLE_COS_WIDTH                          16
+#define AXIS_PHASE                                     0x054u  // r: phase and amplitude of the last sample
+#define AXIS_PHASE_PHASE_MASK                          0x0000ffffu
+#define AXIS_PHASE_PHASE_SHIFT                         0
+#define AXIS_PHASE_PHASE_WIDTH                         16
+#define AXIS_PHASE_AMPLITUDE_MASK                      0xffff0000u
+#define AXIS_PHASE_AMPLITUDE_SHIFT                     16
+#define AXIS_PHASE_AMPLITUDE_WIDTH                     16
+#define AXIS_QUADRATURE_COUNT                          0x058u  // r: count of the quadrature decoder [1/4 period]
+#define AXIS_QUADRATURE_COUNT_MASK                     0xffffffffu
+#define AXIS_QUADRATURE_COUNT_SHIFT                    0
+#define AXIS_QUADRATURE_COUNT_WIDTH                    32
+#define AXIS_ENCODER_EVENTS                            0x05cu  // rw: what was wrong with the sensor since it was last cleared; write 1 to clear
+#define AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_MASK          0x00000001u  // both levels changed at once
+#define AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_SHIFT         0
+#define AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_WIDTH         1
+#define AXIS_ENCODER_EVENTS_OVERSPEED_MASK             0x00000002u  // phase moved more than a quarter period from where it was expected
+#define AXIS_ENCODER_EVENTS_OVERSPEED_SHIFT            1
+#define AXIS_ENCODER_EVENTS_OVERSPEED_WIDTH            1
+#define AXIS_ENCODER_EVENTS_AMPLITUDE_LOW_MASK         0x00000004u
+#define AXIS_ENCODER_EVENTS_AMPLITUDE_LOW_SHIFT        2
+#define AXIS_ENCODER_EVENTS_AMPLITUDE_LOW_WIDTH        1
+#define AXIS_ENCODER_EVENTS_AMPLITUDE_HIGH_MASK        0x00000008u
+#define AXIS_ENCODER_EVENTS_AMPLITUDE_HIGH_SHIFT       3
+#define AXIS_ENCODER_EVENTS_AMPLITUDE_HIGH_WIDTH       1
+#define AXIS_ENCODER_EVENTS_DISAGREEMENT_MASK          0x00000010u  // interpolated position and quadrature count differ
+#define AXIS_ENCODER_EVENTS_DISAGREEMENT_SHIFT         4
+#define AXIS_ENCODER_EVENTS_DISAGREEMENT_WIDTH         1
+#define AXIS_ENCODER_FAULT_MASK                        0x060u  // rw: which encoder events are a fault; same order as encoder_events
+#define AXIS_ENCODER_FAULT_MASK_MASK                   0x0000001fu
+#define AXIS_ENCODER_FAULT_MASK_SHIFT                  0
+#define AXIS_ENCODER_FAULT_MASK_WIDTH                  5
+#define AXIS_REJECTED_PULSES                           0x064u  // rw: pulses that the deglitcher of a or b held back; writing clears
+#define AXIS_REJECTED_PULSES_MASK                      0xffffffffu
+#define AXIS_REJECTED_PULSES_SHIFT                     0
+#define AXIS_REJECTED_PULSES_WIDTH                     32
+#define AXIS_REJECTED_SAMPLES                          0x068u  // rw: samples that limit filter 1 held back; writing clears
+#define AXIS_REJECTED_SAMPLES_MASK                     0xffffffffu
+#define AXIS_REJECTED_SAMPLES_SHIFT                    0
+#define AXIS_REJECTED_SAMPLES_WIDTH                    32
+#define AXIS_KP                                        0x080u  // rw: proportional gain on the error [1/65536 command/(period/65536)]
+#define AXIS_KP_MASK                                   0x00ffffffu
+#define AXIS_KP_SHIFT                                  0
+#define AXIS_KP_WIDTH                                  24
+#define AXIS_KI                                        0x084u  // rw: integral gain, each tick [1/16777216 command/(period/65536)]
+#define AXIS_KI_MASK                                   0x00ffffffu
+#define AXIS_KI_SHIFT                                  0
+#define AXIS_KI_WIDTH                                  24
+#define AXIS_KD                                        0x088u  // rw: derivative gain on the velocity error [1/65536 command/(period/65536/tick)]
+#define AXIS_KD_MASK                                   0x00ffffffu
+#define AXIS_KD_SHIFT                                  0
+#define AXIS_KD_WIDTH                                  24
+#define AXIS_KV                                        0x08cu  // rw: feed-forward of the target velocity [1/65536 command/(period/65536/tick)]
+#define AXIS_KV_MASK                                   0x00ffffffu
+#define AXIS_KV_SHIFT                                  0
+#define AXIS_KV_WIDTH                                  24
+#define AXIS_KA                                        0x090u  // rw: feed-forward of the target acceleration [1/256 command/(period/65536/tick2)]
+#define AXIS_KA_MASK                                   0x00ffffffu
+#define AXIS_KA_SHIFT                                  0
+#define AXIS_KA_WIDTH                                  24
+#define AXIS_SERVO_LIMITS                              0x094u  // rw: limits of the servo; full scale 2^15
+#define AXIS_SERVO_LIMITS_OUTPUT_MASK                  0x00007fffu  // largest |command|
+#define AXIS_SERVO_LIMITS_OUTPUT_SHIFT                 0
+#define AXIS_SERVO_LIMITS_OUTPUT_WIDTH                 15
+#define AXIS_SERVO_LIMITS_INTEGRAL_MASK                0x3fff8000u  // largest |integral term|
+#define AXIS_SERVO_LIMITS_INTEGRAL_SHIFT               15
+#define AXIS_SERVO_LIMITS_INTEGRAL_WIDTH               15
+#define AXIS_DEAD_BAND                                 0x098u  // rw: the integrator rests while |error| is not above this and the profile stands [1/65536 period]
+#define AXIS_DEAD_BAND_MASK                            0x0000ffffu
+#define AXIS_DEAD_BAND_SHIFT                           0
+#define AXIS_DEAD_BAND_WIDTH                           16
+#define AXIS_FOLLOWING_ERROR                           0x09cu  // r: target - position, held inside 32 bits [1/65536 period]
+#define AXIS_FOLLOWING_ERROR_MASK                      0xffffffffu
+#define AXIS_FOLLOWING_ERROR_SHIFT                     0
+#define AXIS_FOLLOWING_ERROR_WIDTH                     32
+#define AXIS_COMMAND                                   0x0a0u  // r: command to the drive as the guard lets it pass
+#define AXIS_COMMAND_MASK                              0x0000ffffu
+#define AXIS_COMMAND_SHIFT                             0
+#define AXIS_COMMAND_WIDTH                             16
+#define AXIS_OPEN_COMMAND                              0x0a4u  // rw: command while closed_loop = 0
+#define AXIS_OPEN_COMMAND_MASK                         0x0000ffffu
+#define AXIS_OPEN_COMMAND_SHIFT                        0
+#define AXIS_OPEN_COMMAND_WIDTH                        16
+#define AXIS_PWM_PERIOD                                0x0a8u  // rw: PWM period [clk]
+#define AXIS_PWM_PERIOD_MASK                           0x0000ffffu
+#define AXIS_PWM_PERIOD_SHIFT                          0
+#define AXIS_PWM_PERIOD_WIDTH                          16
+#define AXIS_SEGMENT_VELOCITY                          0x0b0u  // rw: velocity at the start of the segment [2^-40 period/tick]
+#define AXIS_SEGMENT_VELOCITY_LOW                      0x0b0u
+#define AXIS_SEGMENT_VELOCITY_HIGH                     0x0b4u
+#define AXIS_SEGMENT_VELOCITY_WIDTH                    64
+#define AXIS_SEGMENT_ACCELERATION                      0x0b8u  // rw: acceleration at the start of the segment [2^-40 period/tick2]
+#define AXIS_SEGMENT_ACCELERATION_LOW                  0x0b8u
+#define AXIS_SEGMENT_ACCELERATION_HIGH                 0x0bcu
+#define AXIS_SEGMENT_ACCELERATION_WIDTH                64
+#define AXIS_SEGMENT_JERK                              0x0c0u  // rw: jerk of the segment [2^-40 period/tick3]
+#define AXIS_SEGMENT_JERK_MASK                         0xffffffffu
+#define AXIS_SEGMENT_JERK_SHIFT                        0
+#define AXIS_SEGMENT_JERK_WIDTH                        32
+#define AXIS_SEGMENT_TICKS                             0x0c4u  // rw: duration of the segment; writing queues it
+#define AXIS_SEGMENT_TICKS_MASK                        0x00ffffffu
+#define AXIS_SEGMENT_TICKS_SHIFT                       0
+#define AXIS_SEGMENT_TICKS_WIDTH                       24
+#define AXIS_SEGMENT_TICKS_LAST_MASK                   0x01000000u  // 1: the profile ends with this segment, 0: another must follow or it is an underrun
+#define AXIS_SEGMENT_TICKS_LAST_SHIFT                  24
+#define AXIS_SEGMENT_TICKS_LAST_WIDTH                  1
+#define AXIS_BRAKE_RATE                                0x0c8u  // rw: how the target velocity falls after the strobe brake [2^-32 period/tick2]
+#define AXIS_BRAKE_RATE_MASK                           0xffffffffu
+#define AXIS_BRAKE_RATE_SHIFT                          0
+#define AXIS_BRAKE_RATE_WIDTH                          32
+
+#endif

@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: Apache-2.0
+# start -- from reset to main: stack, zeroed data. A return, like any trap, stops the core; the guard then switches the drives off.
+    .section .start, "ax"
+    .globl _start
+_start:
+    la      sp, _stack_top
+    la      t0, _zero_start
+    la      t1, _zero_end
+1:  bgeu    t0, t1, 2f
+    sw      zero, 0(t0)
+    addi    t0, t0, 4
+    j       1b
+2:  la      t0, _stack_limit
+    li      t1, 0x4d6f6972                  # STACK_MARK
+    sw      t1, 0(t0)
+    call    main
+    ebreak

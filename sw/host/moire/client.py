@@ -1,0 +1,520 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Nodes and axes as a program sees them: real units, words, and exceptions that say what to do.
+
+    with SerialLine("/dev/ttyUSB0") as port:
+        axis = Line(port).axis(address=1)
+        axis.enable()
+        axis.home()
+        print(axis.move(mm=1.5).position_nm)
+        axis.disable()
+
+A drive stays on only while somebody talks on the line: the node's watchdog switches it off after `watchdog_time`.
+"""
+import random
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from . import units
+from .errors import LineError, MotionFailed, NobodyAnswers, OutOfRange, Refused, UnknownName, WrongBuild
+from .line_tables import CAUSES, ENCODER_EVENTS, FAULTS, FLAGS, PROTOCOL_CRC, PARAMETERS, STATES
+from .protocol import ADDRESSES, Exchange, Timing, request_body
+from .registers import FIELDS, MAP_CRC
+from .transport import Transport
+
+COUNTS = 65536               # of the wire, in one signal period
+FULL_SCALE = 32768           # of the command
+POLL_S = 0.05                # between two looks at a motion, where a Line is not told otherwise
+
+CAUSE_CODES = {name: code for code, (name, _) in CAUSES.items()}
+
+# unit in line.toml: what people write; its worth there, the period taken as one nm; whether a period is in it
+KINDS = {
+    "pm": (units.LENGTH, Fraction(1, 1000), False),
+    "period": (units.LENGTH, Fraction(1), True),
+    "period/s": (units.SPEED, Fraction(1, 10**6), True),
+    "period/s2": (units.ACCELERATION, Fraction(1, 10**6), True),
+    "period/s3": (units.JERK, Fraction(1, 10**6), True),
+    "s": (units.TIME, Fraction(1), False),
+    "Hz": (units.FREQUENCY, Fraction(1), False),
+    "": (units.NUMBER, Fraction(1), False),
+}
+
+
+def bits(table: dict, value: int) -> tuple:
+    """Names of the bits that are set; a bit without a name is named by its number."""
+    return tuple(table[bit][0] if bit in table else f"bit {bit}" for bit in range(value.bit_length()) if value >> bit & 1)
+
+
+def words(table: dict, names) -> str:
+    said = dict(table.values())
+    return ", ".join(said.get(name, name) for name in names)
+
+
+def named(table: dict, code: int, what: str) -> str:
+    return table[code][0] if code in table else f"{what} {code}"
+
+
+# ------------------------------------------------------------------ what the node tells
+
+@dataclass(frozen=True)
+class Identity:
+    address: int
+    map_crc: int
+    protocol_crc: int
+    version: int
+    axes: int
+    clk_hz: int
+    tick_hz: int
+    sample_hz: int
+
+    def check(self):
+        """Raises WrongBuild unless node and host were made from the same tables."""
+        if self.protocol_crc != PROTOCOL_CRC:
+            raise WrongBuild(self.address, "protocol table (line.toml)", self.protocol_crc, PROTOCOL_CRC)
+        if self.map_crc != MAP_CRC:
+            raise WrongBuild(self.address, "register map (registers.rdl)", self.map_crc, MAP_CRC)
+
+    @property
+    def matches(self) -> bool:
+        return (self.protocol_crc, self.map_crc) == (PROTOCOL_CRC, MAP_CRC)
+
+
+@dataclass(frozen=True)
+class Status:
+    state: str
+    ended: str                     # cause of the last motion
+    enabled: bool
+    homed: bool
+    limit_low: bool
+    limit_high: bool
+    estop: bool
+    settled: bool
+    saturated: bool
+    faults: tuple
+    first_fault: tuple
+    encoder_events: tuple
+    position_nm: float
+    target_nm: float
+    velocity_mm_s: float
+    drive_command: float           # of full scale, -1…1
+    counts: int                    # position in counts of the read-out
+
+    @property
+    def words(self) -> str:
+        return words(STATES, [self.state])
+
+    @property
+    def fault_words(self) -> str:
+        return words(FAULTS, self.faults)
+
+    @property
+    def ended_words(self) -> str:
+        return words(CAUSES, [self.ended])
+
+    @property
+    def in_motion(self) -> bool:
+        return self.state in ("homing", "moving", "settling", "stopping")
+
+
+@dataclass(frozen=True)
+class Encoder:
+    sin: int
+    cos: int
+    phase: float                   # of a period
+    amplitude: int                 # converter counts
+    quadrature_count: int
+    rejected_pulses: int
+    rejected_samples: int
+    home_phase_nm: float           # from where homing arrived to the phase zero that it took
+    home_margin: float             # 1: arrived right on the phase zero, 0: midway between two
+    fault_position_nm: float
+
+
+@dataclass(frozen=True)
+class ParameterValue:
+    name: str
+    id: int
+    counts: int                    # as on the line
+    value: Fraction                # in `unit`
+    unit: str
+    minimum: Fraction
+    maximum: Fraction
+    default: Fraction
+    text: str
+    quantity: units.Quantity = field(repr=False)
+
+    def written(self, digits: int | None = None) -> str:
+        return units.with_unit(self.quantity, self.value, digits)
+
+    @property
+    def range_words(self) -> str:
+        return " to ".join(units.with_unit(self.quantity, end, 6) for end in (self.minimum, self.maximum))
+
+
+@dataclass
+class Statistics:
+    """What this host met on the line."""
+
+    exchanges: int = 0
+    repeats: int = 0
+    no_answer: int = 0
+    garbled: int = 0
+    old_reply: int = 0
+
+
+# ------------------------------------------------------------------ line
+
+class Line:
+    """The nodes on one transport. `random_source` gives the first sequence number for each node."""
+
+    FIND_ANSWER_S = 0.05
+    FIND_TRIES = 2
+
+    def __init__(self, transport: Transport, tries: int = 5, answer_s: float = 0.1, random_source: random.Random | None = None,
+                 poll_s: float = POLL_S):
+        self.transport, self.tries, self.answer_s, self.poll_s = transport, tries, answer_s, poll_s
+        self.random = random_source or random.SystemRandom()
+        self.sequences, self.nodes = {}, {}
+        self.statistics = Statistics()
+        self.in_order = True           # false while words of a broken exchange may still be on the way
+
+    def exchange(self, address: int, operation: str, /, tries=None, answer_s=None, **fields):
+        """One request, repeated where needed; returns the reply whatever its cause."""
+        # after the first, the number differs from that of every frame the node can remember: a request cannot be taken for an old one
+        sequence = (self.sequences[address] + 1) % 256 if address in self.sequences else self.random.randrange(256)
+        self.sequences[address] = sequence
+        character_s = self.transport.character_s
+        timing = Timing(character_s, answer=answer_s or self.answer_s, quiet=max(0.01, 3 * character_s))
+        exchange = Exchange(address, request_body(operation, sequence, **fields), tries or self.tries, timing)
+        if not self.in_order:
+            self.let_fall_silent(timing)
+        self.in_order = False
+        self.statistics.exchanges += 1
+        try:
+            self.carry(exchange)
+        finally:
+            self.statistics.repeats += exchange.attempts - 1
+            for event in exchange.events:
+                name = event.replace(" ", "_")
+                setattr(self.statistics, name, getattr(self.statistics, name) + 1)
+        reply = exchange.result()
+        self.in_order = True
+        return reply
+
+    def carry(self, exchange: Exchange):
+        while not exchange.finished:
+            sending = exchange.words_to_send()
+            if sending:
+                self.transport.send(sending)
+            wanted = exchange.wanted
+            received = self.transport.receive(wanted, exchange.timeout_s)
+            exchange.feed(received)
+            if len(received) < wanted:
+                exchange.silence()
+
+    def let_fall_silent(self, timing: Timing):
+        for _ in range(Exchange.LONGEST_NOISE):
+            if not self.transport.receive(1, timing.quiet):
+                return
+
+    def request(self, address: int, operation: str, /, **fields) -> dict:
+        """The fields of the reply; Refused when the node says no."""
+        reply = self.exchange(address, operation, **fields)
+        if reply.cause == 0:
+            return reply.fields
+        cause = named(CAUSES, reply.cause, "cause")
+        raise Refused(cause, reply.cause, f"node {address} refused '{operation}': {words(CAUSES, [cause])}")
+
+    def identify(self, address: int, **patience) -> Identity:
+        reply = self.exchange(address, "identify", **patience)
+        if reply.cause:
+            cause = named(CAUSES, reply.cause, "cause")
+            raise Refused(cause, reply.cause, f"node {address} refused 'identify': {words(CAUSES, [cause])}")
+        return Identity(**{**reply.fields, "address": address})
+
+    def find(self, addresses=ADDRESSES) -> list:
+        """Identities of all nodes that answer, of any build."""
+        found = []
+        for address in addresses:
+            if not self.transport.reaches(address):
+                continue
+            try:
+                found.append(self.identify(address, tries=self.FIND_TRIES, answer_s=self.FIND_ANSWER_S))
+            except NobodyAnswers:
+                continue
+        return found
+
+    def node(self, address: int = 1) -> "Node":
+        """Connects at the first time: identifies the node and refuses one of another build."""
+        if address not in self.nodes:
+            self.nodes[address] = Node(self, address)
+        return self.nodes[address]
+
+    def axis(self, address: int = 1, axis: int = 0) -> "Axis":
+        return self.node(address).axis(axis)
+
+
+# ------------------------------------------------------------------ node
+
+class Node:
+    """One controller on the line. Made by Line.node()."""
+
+    def __init__(self, line: Line, address: int):
+        self.line, self.address = line, address
+        self.identity = line.identify(address)
+        self.identity.check()
+        self.axes = {}
+
+    def request(self, operation: str, **fields) -> dict:
+        return self.line.request(self.address, operation, **fields)
+
+    def axis(self, number: int = 0) -> "Axis":
+        if not 0 <= number < self.identity.axes:
+            code = CAUSE_CODES["no_such_axis"]
+            known = "only axis 0" if self.identity.axes == 1 else f"axes 0 to {self.identity.axes - 1}"
+            raise Refused("no_such_axis", code, f"node {self.address} has no axis {number}: it has {known}")
+        if number not in self.axes:
+            self.axes[number] = Axis(self, number)
+        return self.axes[number]
+
+    def counters(self) -> dict:
+        """What the node met on the line, by name."""
+        return self.request("counters")
+
+    def read_register(self, address: int) -> int:
+        """One 32-bit word of the register map."""
+        if address % 4 or not 0 <= address < 65536:
+            raise OutOfRange(f"{address:#x} is no register address: allowed are multiples of 4 from 0 to 0xfffc")
+        try:
+            return self.request("read_register", address=address)["value"]
+        except Refused as refused:
+            raise with_more(refused, f"address {address:#06x}") from None
+
+    def read_named(self, name: str, axis: int = 0) -> dict:
+        """Counts of the fields of a register, by name: "axis.position", "line.frames_good"."""
+        fields = register_fields(name)
+        address, wide = fields[0].address(axis), max(field.low + field.width for field in fields) > 32
+        word = self.read_register(address)
+        if wide:        # reading the low word latched the high one
+            word |= self.read_register(address + 4) << 32
+        return {field.field: field.value(word) for field in fields}
+
+
+def register_fields(name: str) -> list:
+    fields = [known for known in FIELDS if f"{known.block}.{known.register}" == name]
+    if not fields:
+        several = ", ".join(dict.fromkeys(f"{known.block}.{known.register}" for known in FIELDS))
+        raise UnknownName(f"there is no register '{name}': known are {several}, or an address such as 0x400")
+    if not any("r" in known.access for known in fields):
+        raise OutOfRange(f"the register {name} can only be written")
+    return fields
+
+
+def with_more(error, more: str):
+    """The same error with a fact at its end."""
+    return type(error)(error.cause, error.code, f"{error} ({more})")
+
+
+# ------------------------------------------------------------------ axis
+
+class Axis:
+    """One axis of a node. Made by Line.axis() or Node.axis()."""
+
+    def __init__(self, node: Node, number: int):
+        self.node, self.number = node, number
+        self.period_nm = self.read_period()
+
+    def read_period(self) -> Fraction:
+        return Fraction(self.request("get_parameter", parameter=PARAMETERS["period"].id)["value"], 1000)
+
+    @property
+    def transport(self) -> Transport:
+        return self.node.line.transport
+
+    def request(self, operation: str, **fields) -> dict:
+        try:
+            return self.node.request(operation, axis=self.number, **fields)
+        except Refused as refused:
+            if refused.cause in ("faulted", "fault_stands"):
+                raise with_more(refused, self.status().fault_words or "no fault is left") from None
+            raise
+
+    # position
+
+    def to_nm(self, counts: int) -> float:
+        return float(counts * self.period_nm / COUNTS)
+
+    def to_counts(self, nm) -> int:
+        return round(units.parse_length(nm) * COUNTS / self.period_nm)
+
+    def status(self) -> Status:
+        told = self.request("status")
+        flags = bits(FLAGS, told["flags"])
+        return Status(
+            state=named(STATES, told["state"], "state"), ended=named(CAUSES, told["ended"], "cause"),
+            **{name: name in flags for name, _ in FLAGS.values()},
+            faults=bits(FAULTS, told["faults"]), first_fault=bits(FAULTS, told["first_fault"]),
+            encoder_events=bits(ENCODER_EVENTS, told["encoder_events"]),
+            position_nm=self.to_nm(told["position"]), target_nm=self.to_nm(told["target"]),
+            velocity_mm_s=self.to_nm(told["velocity"]) * self.node.identity.tick_hz / 1e6,
+            drive_command=told["command"] / FULL_SCALE, counts=told["counts"])
+
+    def encoder(self) -> Encoder:
+        told = self.request("encoder")
+        return Encoder(
+            sin=told["sin"], cos=told["cos"], phase=told["phase"] / COUNTS, amplitude=told["amplitude"],
+            quadrature_count=told["quadrature_count"], rejected_pulses=told["rejected_pulses"], rejected_samples=told["rejected_samples"],
+            home_phase_nm=self.to_nm(told["home_phase"]), home_margin=1 - abs(told["home_phase"]) / (COUNTS / 2),
+            fault_position_nm=self.to_nm(told["fault_position"]))
+
+    # motion
+
+    def enable(self):
+        self.request("enable", on=1)
+
+    def disable(self):
+        self.request("enable", on=0)
+
+    def reset(self):
+        """Clear latched faults whose cause is gone. The drive stays off."""
+        self.request("reset_faults")
+
+    def stop(self):
+        """Controlled stop; the drive stays on. Does not wait: see wait()."""
+        self.request("stop")
+
+    def home(self, progress=None) -> Status:
+        """Find the zero; returns when it is reached. `progress` is called with a Status from time to time."""
+        return self.motion("home", progress)
+
+    def move(self, nm=None, *, mm=None, by: bool = False, progress=None) -> Status:
+        """To a position, or by a distance; returns when settled. The target is a number, or a text such as "1.5mm"."""
+        if (nm is None) == (mm is None):
+            raise OutOfRange("a move needs a target in nm or in mm, and not both")
+        target_nm = units.parse_length(nm) if mm is None else Fraction(mm) * 10**6
+        if by:
+            target_nm += Fraction(self.status().target_nm)
+        try:
+            return self.motion("move", progress, target=self.to_counts(target_nm))
+        except Refused as refused:
+            if refused.cause == "out_of_travel":
+                low, high = (self.get_parameter(name).written(9) for name in ("travel_low", "travel_high"))
+                raise with_more(refused, f"target {units.format_length(target_nm)}, allowed {low} to {high}") from None
+            raise
+
+    def motion(self, operation: str, progress, **fields) -> Status:
+        """Whatever interrupts the wait, Ctrl-C too, stops the axis under control first."""
+        try:
+            self.request(operation, **fields)
+            return self.wait(progress)
+        except (LineError, Refused, MotionFailed):
+            raise
+        except BaseException:
+            self.bring_to_rest()
+            raise
+
+    def wait(self, progress=None) -> Status:
+        """Until the motion under way has ended; MotionFailed unless it ended well."""
+        while True:
+            status = self.status()
+            if progress is not None:
+                progress(status)
+            if status.ended != "running":
+                break
+            self.transport.wait(self.node.line.poll_s)
+        if status.ended in ("ok", "never"):
+            return status
+        sentence = f"axis {self.number} of node {self.node.address}: {status.ended_words}"
+        if status.ended == "ended_by_fault":
+            sentence += f": {words(FAULTS, status.first_fault or status.faults)}"
+        sentence += f" (at {units.format_length(status.position_nm)}, target {units.format_length(status.target_nm)})"
+        raise MotionFailed(status.ended, CAUSE_CODES.get(status.ended, -1), sentence)
+
+    def bring_to_rest(self):
+        try:
+            self.stop()
+            while self.status().in_motion:
+                self.transport.wait(self.node.line.poll_s)
+        except Refused:
+            pass        # the drive is off
+        except LineError as error:
+            sentence = f"axis {self.number} of node {self.node.address} could not be told to stop, its watchdog has to: {error}"
+            raise LineError(self.node.address, sentence) from None
+
+    def let_pass(self, seconds: float, progress=None) -> Status:
+        """Let time pass, talking often enough for the watchdog."""
+        end = self.transport.now() + seconds
+        while True:
+            status = self.status()
+            if progress is not None:
+                progress(status)
+            left = end - self.transport.now()
+            if left <= 0:
+                return status
+            self.transport.wait(min(self.node.line.poll_s, left))
+
+    # parameters
+
+    def parameter_value(self, name: str, counts: int, period_nm=None) -> ParameterValue:
+        known = parameter(name)
+        one = one_count(known, period_nm or self.period_nm)
+        quantity = KINDS[known.unit][0]
+        return ParameterValue(name, known.id, counts, counts * one, quantity.base, known.min * one, known.max * one, known.default * one,
+                              known.text, quantity)
+
+    def get_parameter(self, name: str) -> ParameterValue:
+        return self.parameter_value(name, self.request("get_parameter", parameter=parameter(name).id)["value"])
+
+    def parameter_counts(self, name: str, value, period_nm=None) -> int:
+        """What the wire carries for a value in real units; OutOfRange says what is allowed."""
+        known = parameter(name)
+        one, quantity = one_count(known, period_nm or self.period_nm), KINDS[known.unit][0]
+        wanted = quantity.parse(value)
+        counts = round(wanted / one)
+        if not known.min <= counts <= known.max:
+            allowed = self.parameter_value(name, known.default, period_nm).range_words
+            raise OutOfRange(f"{name} allows {allowed}, not {units.with_unit(quantity, wanted, 6)}")
+        if known.lsb == 1 and not known.unit and wanted != counts:
+            raise OutOfRange(f"{name} takes whole numbers, not {units.decimal(wanted)}")
+        return counts
+
+    def set_parameter(self, name: str, value) -> ParameterValue:
+        """`value` is a number in the unit of get_parameter(), or a text with a unit. Returns what was set: the nearest count."""
+        return self.write_parameter(name, self.parameter_counts(name, value))
+
+    def write_parameter(self, name: str, counts: int) -> ParameterValue:
+        try:
+            self.request("set_parameter", parameter=parameter(name).id, value=counts)
+        except Refused as refused:
+            raise with_more(refused, f"{name} {self.parameter_value(name, counts).written(6)}") from None
+        if name == "period":
+            self.period_nm = self.read_period()
+        return self.parameter_value(name, counts)
+
+    def parameters(self) -> dict:
+        """All, by name."""
+        return {name: self.get_parameter(name) for name in PARAMETERS}
+
+    def save_parameters(self) -> dict:
+        """All as exact texts, ready for a JSON file."""
+        return {name: value.written() for name, value in self.parameters().items()}
+
+    def load_parameters(self, texts: dict) -> dict:
+        """Some or all, as saved. Every one is checked before the first is written; the period goes first, since lengths hang on it."""
+        period_nm = self.period_nm
+        if "period" in texts:
+            period_nm = Fraction(self.parameter_counts("period", texts["period"]), 1000)
+        counts = {name: self.parameter_counts(name, texts[name], period_nm) for name in sorted(texts, key=lambda name: name != "period")}
+        return {name: self.write_parameter(name, value) for name, value in counts.items()}
+
+
+def parameter(name: str):
+    if name not in PARAMETERS:
+        raise UnknownName(f"there is no parameter '{name}': known are {', '.join(PARAMETERS)}")
+    return PARAMETERS[name]
+
+
+def one_count(known, period_nm: Fraction) -> Fraction:
+    _, worth, periodic = KINDS[known.unit]
+    return known.lsb * worth * (period_nm if periodic else 1)
+

@@ -1,0 +1,646 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command `moire`: find nodes, home and move axes, read and set parameters, from a shell or a file."""
+import argparse
+import json
+import os
+import queue
+import re
+import shlex
+import sys
+import threading
+from dataclasses import asdict
+from fractions import Fraction
+from pathlib import Path
+
+from . import units
+from .client import Line, register_fields
+from .errors import BadFile, LineError, MoireError, OutOfRange, PortError, TwinNotBuilt, UnitError
+from .line_tables import PARAMETERS
+from .protocol import ADDRESSES
+from .registers import FIELDS
+from .transport import BAUD, SerialLine
+
+EXAMPLES = """\
+several commands in one call, with -- between them:
+  moire --port twin home -- move 1mm -- status
+  moire --port /dev/ttyUSB0 reset -- home -- move 200um -- move -50nm --by
+
+lengths are written with pm nm um mm cm m (1.5mm, 200um, 50nm), speeds as 5mm/s, times as 20ms.
+
+--port twin is the built-in simulated stage. It powers up afresh in every call, so write all commands in one call, or
+use 'run FILE' or 'shell'. Options before or in the first command hold for all that follow; --address and --axis may be
+given again in each.
+
+a drive stays on only while somebody talks on the line. What a call switched on it switches off at its end.
+
+exit codes: 0 done; 1 the node refused, or a motion ended badly; 2 wrong usage, value or file; 3 nobody answers, or the
+line is garbled; 4 the port does not work; 5 node and host were made from different sources; 130 interrupted (Ctrl-C
+stops a moving axis under control)
+"""
+DEFAULTS = dict(port=None, baud=BAUD, parity="auto", address=1, axis=0, json=False)
+OF_THE_PORT = ("port", "baud", "parity")
+OF_THE_CALL = (*OF_THE_PORT, "json")
+KEEP_COMPANY_S = 0.1
+NOT_INSIDE = ("run", "shell")
+INTERRUPTED = 130
+
+
+class UsageError(MoireError):
+    exit_code = 2
+
+
+class Parser(argparse.ArgumentParser):
+    """Complains in one sentence."""
+
+    def error(self, message):
+        raise UsageError(f"{message} (see: {self.prog} --help)")
+
+
+# ------------------------------------------------------------------ arguments
+
+def checked(parse):
+    """A converter for argparse that keeps our sentence."""
+    def convert(text):
+        try:
+            return parse(text)
+        except MoireError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+    return convert
+
+
+def address_number(text):
+    try:
+        number = int(text)
+    except ValueError:
+        number = 0
+    if number not in ADDRESSES:
+        raise argparse.ArgumentTypeError(f"'{text.strip()}' is no address: allowed are {ADDRESSES[0]} to {ADDRESSES[-1]}")
+    return number
+
+
+def positive_number(text):
+    try:
+        number = int(text)
+    except ValueError:
+        number = 0
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"'{text.strip()}' is no whole number above 0")
+    return number
+
+
+def axis_number(text):
+    try:
+        number = int(text)
+    except ValueError:
+        number = -1
+    if not 0 <= number <= 255:
+        raise argparse.ArgumentTypeError(f"'{text.strip()}' is no axis: the first is 0")
+    return number
+
+
+def waiting_time(text):
+    seconds = units.parse_time(text)
+    if seconds < 0:
+        raise UnitError(f"'{text.strip()}' is in the past: write a time such as 20ms")
+    return seconds
+
+
+def common_options() -> argparse.ArgumentParser:
+    common = Parser(add_help=False, argument_default=argparse.SUPPRESS)
+    group = common.add_argument_group("line")
+    group.add_argument("--port", help="serial port (/dev/ttyUSB0, COM3, rfc2217://host:port), or 'twin' for the simulated stage; "
+                                      "else the variable MOIRE_PORT")
+    group.add_argument("--baud", type=positive_number, help=f"baud rate of the line, {BAUD} unless given")
+    group.add_argument(
+        "--parity",
+        choices=("auto", "mark", "odd"),
+        help="how the 9th bit is made: auto takes mark where the port can do it; odd reaches only the addresses 1 2 4 7 8 11 13 14",
+    )
+    group.add_argument(
+        "--address", type=address_number, metavar="N", help=f"address of the node, {ADDRESSES[0]} to {ADDRESSES[-1]}; 1 unless given"
+    )
+    group.add_argument("--axis", type=axis_number, metavar="N", help="axis of the node; 0 unless given")
+    group.add_argument("--json", action="store_true", help="one JSON object a line for each command, errors too")
+    return common
+
+
+def make_parser() -> Parser:
+    common = common_options()
+    parser = Parser(prog="moire", parents=[common], description="Motion controllers on a multi-drop line: find, home, move, look.",
+                    epilog=EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
+
+    def command(name, handler, text, example, under=commands, **extra):
+        made = under.add_parser(
+            name, parents=[common], help=text, description=text[0].upper() + text[1:] + ".", epilog=f"example: {example}", **extra
+        )
+        made.set_defaults(handler=handler)
+        return made
+
+    find = command("find", do_find, "who is on the line", "moire --port /dev/ttyUSB0 find")
+    find.add_argument("addresses", nargs="*", type=address_number, metavar="ADDRESS", help="all 15 unless given")
+    command("status", do_status, "state, position and faults of an axis", "moire --port /dev/ttyUSB0 status --address 2")
+    command(
+        "enable",
+        do_enable,
+        "switch the drive on, for the commands that follow in the same call",
+        "moire --port twin enable -- wait 1s -- status",
+    )
+    command("disable", do_disable, "switch the drive off", "moire --port /dev/ttyUSB0 disable")
+    command("home", do_home, "find the zero; switches the drive on where needed", "moire --port twin home -- status")
+    move = command(
+        "move",
+        do_move,
+        "go to a position, or by a distance; switches the drive on where needed",
+        "moire --port twin home -- move 1.5mm -- move -200um --by",
+    )
+    move.add_argument("target", type=checked(units.parse_length), metavar="LENGTH", help="where to, with a unit: 1.5mm, 200um, 50nm")
+    move.add_argument("--by", action="store_true", help="LENGTH is a distance from the present target")
+    command("stop", do_stop, "stop under control; the drive stays on", "moire --port /dev/ttyUSB0 stop")
+    wait = command("wait", do_wait, "let time pass, drives stay on", "moire --port twin home -- wait 0.5s -- status")
+    wait.add_argument("time", type=checked(waiting_time), metavar="TIME", help="how long, with a unit: 20ms, 1.5s")
+    command("reset", do_reset, "clear latched faults whose cause is gone; the drive stays off", "moire --port /dev/ttyUSB0 reset -- status")
+    command("counters", do_counters, "what happened on the line, seen by node and host", "moire --port /dev/ttyUSB0 counters --json")
+    command("encoder", do_encoder, "the sensor as it is now", "moire --port /dev/ttyUSB0 encoder")
+    register = command(
+        "register", do_register, "read registers of the node, by name or by address", "moire --port twin register axis.position 0x400"
+    )
+    register.add_argument("registers", nargs="*", metavar="REGISTER", help="such as line.frames_good or 0x110; without one: list the names")
+
+    params = commands.add_parser(
+        "params",
+        help="parameters of an axis: list, get, set, save, load",
+        description="Parameters of an axis.",
+        epilog="example: moire --port /dev/ttyUSB0 params set velocity 5mm/s -- params save stage.json",
+        parents=[common],
+    )
+    actions = params.add_subparsers(dest="action", metavar="ACTION", required=True, parser_class=Parser)
+    command("list", do_params_get, "all, with unit and range", "moire --port twin params list", actions).set_defaults(names=[])
+    get = command("get", do_params_get, "one or some", "moire --port twin params get velocity kp", actions)
+    get.add_argument("names", nargs="+", metavar="NAME", choices=list(PARAMETERS), help="see: params list")
+    put = command("set", do_params_set, "write one, with its unit", "moire --port twin params set velocity 5mm/s", actions)
+    put.add_argument("name", metavar="NAME", choices=list(PARAMETERS), help="see: params list")
+    put.add_argument("value", metavar="VALUE", help="with a unit where it has one: 5mm/s, 20ms, 20kHz, 0.5")
+    save = command("save", do_params_save, "all into a JSON file", "moire --port twin params save stage.json", actions)
+    save.add_argument("file", metavar="FILE")
+    load = command(
+        "load",
+        do_params_load,
+        "all that are in a JSON file; each is checked before the first is written",
+        "moire --port twin params load stage.json",
+        actions,
+    )
+    load.add_argument("file", metavar="FILE")
+
+    run = command("run", do_run, "commands from a file, one a line, # begins a remark", "moire --port twin run warm_up.txt")
+    run.add_argument("file", metavar="FILE", help="- is the standard input")
+    command("shell", do_shell, "commands from the keyboard, until 'quit'; drives stay on between them", "moire --port twin shell")
+    return parser
+
+
+def segments(arguments) -> list:
+    """The commands between the --; lengths below zero are kept from looking like options."""
+    parts = [[]]
+    for argument in arguments:
+        if argument == "--":
+            parts.append([])
+        else:
+            parts[-1].append(" " + argument if re.match(r"-[0-9.]", argument) else argument)
+    if any(not part for part in parts):
+        where = " beside --" if len(parts) > 1 else ""
+        raise UsageError(f"a command is missing{where} (see: moire --help)")
+    return parts
+
+
+def parse(arguments, before: dict) -> list:
+    """Namespaces of all commands; what the first says about the line holds for all."""
+    parser, parsed = make_parser(), []
+    for part in segments(arguments):
+        said = vars(parser.parse_args(part))
+        if not parsed:
+            before = {**before, **{name: said[name] for name in DEFAULTS if name in said}}
+        parsed.append({**before, **said})
+    call = {name: command[name] for name in OF_THE_CALL for command in parsed if command[name] != before[name]}
+    return [argparse.Namespace(**{**command, **call}) for command in parsed]
+
+
+# ------------------------------------------------------------------ session
+
+class Session:
+    """One call: the transport opens at the first command that needs it."""
+
+    def __init__(self, options: argparse.Namespace, open_transport=None, out=None, err=None):
+        self.options, self.open_transport = options, open_transport or open_port
+        self.out, self.err = out or sys.stdout, err or sys.stderr
+        self.opened, self.switched_on = None, {}
+
+    def open(self) -> Line:
+        if self.opened is None:
+            self.opened = Line(self.open_transport(self.options))
+        return self.opened
+
+    @property
+    def line(self) -> Line:
+        return self.open()
+
+    def axis(self, command):
+        return self.line.axis(command.address, command.axis)
+
+    def switch_on(self, command):
+        axis = self.axis(command)
+        if not axis.status().enabled:
+            axis.enable()
+        self.switched_on[command.address, command.axis] = axis
+        return axis
+
+    def keep_company(self):
+        """The watchdog of a node counts the silence while we wait for a person."""
+        for place, axis in list(self.switched_on.items()):
+            if not axis.status().enabled:
+                del self.switched_on[place]
+
+    def say(self, told: dict, text: str):
+        print(json.dumps(told, default=plain) if self.options.json else text, file=self.out, flush=True)
+
+    def complain(self, command: str | None, error: MoireError):
+        if self.options.json:
+            told = {"command": command, "error": type(error).__name__, "message": str(error), "exit_code": error.exit_code}
+            if hasattr(error, "cause"):
+                told["cause"] = error.cause
+            print(json.dumps(told), file=self.out, flush=True)
+        else:
+            print(f"moire: {error}", file=self.err, flush=True)
+
+    def progress(self):
+        """A line that follows the motion, where a person looks at it."""
+        if self.options.json or not self.err.isatty():
+            return None
+
+        def show(status):
+            text = f"\r{status.words:<18} {status.position_nm / 1e6:14.6f} mm  {status.velocity_mm_s:9.4f} mm/s "
+            print(text, end="", file=self.err, flush=True)
+        return show
+
+    def end_progress(self, show):
+        if show is not None:
+            print("\r" + " " * 60 + "\r", end="", file=self.err, flush=True)
+
+    def close(self):
+        if self.opened is None:
+            return
+        for axis in self.switched_on.values():
+            try:
+                axis.disable()
+            except MoireError:
+                pass        # the watchdog of the node does it
+        self.opened.transport.close()
+
+
+def plain(value):
+    return float(value) if isinstance(value, Fraction) else str(value)
+
+
+def open_port(options):
+    port = options.port or os.environ.get("MOIRE_PORT")
+    if not port:
+        raise PortError("no port: write --port /dev/ttyUSB0, or --port twin for the simulated stage")
+    if port == "twin":
+        return open_twin(options.baud)
+    return SerialLine(port, options.baud, options.parity)
+
+
+def open_twin(baud: int):
+    """The simulated S0 stage, from the search path or from the checkout that this file lies in."""
+    software = str(Path(__file__).resolve().parents[2])
+    if software not in sys.path:
+        sys.path.append(software)
+    try:
+        import twin
+    except ImportError as error:
+        raise TwinNotBuilt(f"the simulated stage is not here: use the checkout of Moire and its build/venv ({error})") from None
+    try:
+        return twin.TwinTransport(twin.Twin(baud=baud))
+    except (twin.BuildError, OSError) as error:
+        raise TwinNotBuilt(f"the simulated stage cannot be built: {str(error).strip().splitlines()[-1]}") from None
+
+
+# ------------------------------------------------------------------ commands
+
+def place(command) -> dict:
+    return {"command": command.command, "address": command.address, "axis": command.axis}
+
+
+def told_status(session, command, status):
+    told = {**place(command), **asdict(status), "words": status.words, "fault_words": status.fault_words, "ended_words": status.ended_words}
+    possible = ((status.limit_low, "low end pressed"), (status.limit_high, "high end pressed"), (status.estop, "emergency stop pressed"))
+    switches = [text for pressed, text in possible if pressed]
+    rows = [
+        ("position", f"{status.position_nm / 1e6:.6f} mm   {status.counts} counts"),
+        ("target", f"{status.target_nm / 1e6:.6f} mm   error {status.target_nm - status.position_nm:.1f} nm"),
+        ("velocity", f"{status.velocity_mm_s:.4f} mm/s"),
+        ("command", f"{100 * status.drive_command:.1f} %" + (", at its limit" if status.saturated else "")),
+        ("switches", ", ".join(switches) or "free"),
+        ("faults", status.fault_words or "none"),
+    ]
+    if status.encoder_events:
+        rows.append(("encoder", ", ".join(status.encoder_events)))
+    head = f"node {command.address} axis {command.axis}: {status.words}, {'zero known' if status.homed else 'not homed'}"
+    session.say(told, head + "".join(f"\n  {name:<9} {text}" for name, text in rows))
+
+
+def do_find(session, command):
+    wanted = command.addresses or ADDRESSES
+    found = session.line.find(wanted)
+    if not found:
+        raise LineError(0, f"nobody answers at the addresses {', '.join(map(str, wanted))}: check power, wiring and baud rate")
+    told = {"command": "find", "nodes": [{**asdict(node), "matches": node.matches} for node in found]}
+    session.say(told, "\n".join(map(identity_words, found)))
+
+
+def identity_words(node) -> str:
+    axes = "1 axis" if node.axes == 1 else f"{node.axes} axes"
+    build = "made from the same sources" if node.matches else "MADE FROM OTHER SOURCES than this host package"
+    return (f"node {node.address}: {axes}, clock {node.clk_hz / 1e6:g} MHz, servo {node.tick_hz / 1e3:g} kHz, "
+            f"samples {node.sample_hz / 1e3:g} kHz, {build}")
+
+
+def do_status(session, command):
+    told_status(session, command, session.axis(command).status())
+
+
+def do_enable(session, command):
+    axis = session.axis(command)
+    axis.enable()
+    session.switched_on[command.address, command.axis] = axis
+    session.say({**place(command), "enabled": True}, f"node {command.address} axis {command.axis}: drive on")
+
+
+def do_disable(session, command):
+    session.axis(command).disable()
+    session.switched_on.pop((command.address, command.axis), None)
+    session.say({**place(command), "enabled": False}, f"node {command.address} axis {command.axis}: drive off")
+
+
+def do_motion(session, command, motion):
+    axis, show = session.switch_on(command), session.progress()
+    began = session.line.transport.now()
+    try:
+        status = motion(axis, show)
+    finally:
+        session.end_progress(show)
+    seconds = session.line.transport.now() - began
+    error = status.target_nm - status.position_nm
+    session.say(
+        {**place(command), "position_nm": status.position_nm, "target_nm": status.target_nm, "error_nm": error, "time_s": seconds},
+        f"node {command.address} axis {command.axis}: at {status.position_nm / 1e6:.6f} mm, error {error:.1f} nm, after {seconds:.3f} s",
+    )
+
+
+def do_home(session, command):
+    do_motion(session, command, lambda axis, show: axis.home(progress=show))
+
+
+def do_move(session, command):
+    do_motion(session, command, lambda axis, show: axis.move(command.target, by=command.by, progress=show))
+
+
+def do_stop(session, command):
+    axis = session.axis(command)
+    axis.stop()
+    while axis.status().in_motion:
+        session.line.transport.wait(KEEP_COMPANY_S)
+    told_status(session, command, axis.status())
+
+
+def do_wait(session, command):
+    axis, show = session.axis(command), session.progress()
+    try:
+        status = axis.let_pass(float(command.time), show)
+    finally:
+        session.end_progress(show)
+    told_status(session, command, status)
+
+
+def do_reset(session, command):
+    session.axis(command).reset()
+    session.say({**place(command), "faults": []}, f"node {command.address} axis {command.axis}: no fault is latched")
+
+
+def do_counters(session, command):
+    node = session.line.node(command.address).counters()
+    host = asdict(session.line.statistics)
+    rows = [f"node {command.address}:", *(f"  {name:<15} {value}" for name, value in node.items()),
+            "seen by this host in this call:", *(f"  {name:<15} {value}" for name, value in host.items())]
+    session.say({"command": "counters", "address": command.address, "node": node, "host": host}, "\n".join(rows))
+
+
+def do_encoder(session, command):
+    encoder = session.axis(command).encoder()
+    rows = [
+        ("sine, cosine", f"{encoder.sin} {encoder.cos} converter counts"), ("phase", f"{360 * encoder.phase:.3f} degrees"),
+        ("amplitude", f"{encoder.amplitude} converter counts"), ("quadrature", f"{encoder.quadrature_count} quarter periods"),
+        ("rejected", f"{encoder.rejected_pulses} pulses, {encoder.rejected_samples} samples"),
+        ("home phase", f"{encoder.home_phase_nm:.1f} nm from the phase zero taken, margin {100 * encoder.home_margin:.0f} %"),
+        ("first fault", f"at {encoder.fault_position_nm / 1e6:.6f} mm"),
+    ]
+    head = f"node {command.address} axis {command.axis}:"
+    session.say({**place(command), **asdict(encoder)}, head + "".join(f"\n  {name:<12} {text}" for name, text in rows))
+
+
+def do_register(session, command):
+    names = list(dict.fromkeys(f"{field.block}.{field.register}" for field in FIELDS if "r" in field.access))
+    if not command.registers:
+        session.say({"command": "register", "names": names}, "\n".join(names))
+        return
+    for name in command.registers:        # before the first is read
+        if not re.match(r"0[xX]|[0-9]", name):
+            register_fields(name)
+    told, rows, node = {}, [], session.line.node(command.address)
+    for name in command.registers:
+        if re.match(r"0[xX]|[0-9]", name):
+            value = node.read_register(register_address(name))
+            told[name] = value
+            rows.append(f"{name} = 0x{value:08X} {value}")
+        else:
+            told[name] = node.read_named(name, session.axis(command).number if name.startswith("axis.") else 0)
+            rows.append(f"{name}: " + ", ".join(f"{field} = {value}" for field, value in told[name].items()))
+    session.say({**place(command), "registers": told}, "\n".join(rows))
+
+
+def register_address(text: str) -> int:
+    try:
+        return int(text, 0)
+    except ValueError:
+        raise OutOfRange(f"'{text}' is no register address: write it like 0x400, or a name like axis.position") from None
+
+
+def told_parameter(value) -> dict:
+    return {
+        "name": value.name,
+        "value": value.value,
+        "unit": value.unit,
+        "written": value.written(),
+        "minimum": value.minimum,
+        "maximum": value.maximum,
+        "default": value.default,
+        "text": value.text,
+    }
+
+
+def say_parameters(session, command, values):
+    rows = [f"{value.name:<19} {value.written(6):<14} {value.range_words:<32} {value.text}" for value in values]
+    session.say({**place(command), "action": command.action, "parameters": [told_parameter(value) for value in values]}, "\n".join(rows))
+
+
+def do_params_get(session, command):
+    axis = session.axis(command)
+    say_parameters(session, command, [axis.get_parameter(name) for name in command.names or PARAMETERS])
+
+
+def do_params_set(session, command):
+    say_parameters(session, command, [session.axis(command).set_parameter(command.name, command.value)])
+
+
+def do_params_save(session, command):
+    saved = session.axis(command).save_parameters()
+    try:
+        Path(command.file).write_text(json.dumps({"parameters": saved}, indent=4) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise BadFile(f"the file {command.file} cannot be written: {error.strerror}") from None
+    session.say(
+        {**place(command), "action": "save", "file": command.file, "count": len(saved)}, f"{len(saved)} parameters saved in {command.file}"
+    )
+
+
+def do_params_load(session, command):
+    texts = read_parameters(command.file)
+    loaded = session.axis(command).load_parameters(texts)
+    session.say(
+        {**place(command), "action": "load", "file": command.file, "count": len(loaded)},
+        f"{len(loaded)} parameters loaded from {command.file}",
+    )
+
+
+def read_parameters(file: str) -> dict:
+    try:
+        told = json.loads(read_text(file))
+    except ValueError as error:
+        raise BadFile(f"the file {file} is no JSON: {error}") from None
+    texts = told.get("parameters") if isinstance(told, dict) else None
+    if not isinstance(texts, dict) or not all(isinstance(text, str) for text in texts.values()):
+        raise BadFile(f'the file {file} holds no parameters: it must look like {{"parameters": {{"velocity": "5mm/s"}}}}')
+    return texts
+
+
+def read_text(file: str) -> str:
+    try:
+        return sys.stdin.read() if file == "-" else Path(file).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadFile(f"the file {file} cannot be read: {getattr(error, 'strerror', None) or 'it is no text'}") from None
+
+
+# ------------------------------------------------------------------ several commands
+
+def parse_line(text: str, options) -> list:
+    """The commands of one line of a file or of the shell."""
+    try:
+        arguments = shlex.split(text, comments=True)
+    except ValueError as error:
+        raise UsageError(f"'{text.strip()}' cannot be read: {error}") from None
+    if not arguments:
+        return []
+    commands = parse(arguments, {name: getattr(options, name) for name in DEFAULTS})
+    for command in commands:
+        if command.command in NOT_INSIDE:
+            raise UsageError(f"'{command.command}' cannot stand inside a file or a shell")
+        for name in OF_THE_PORT:
+            if getattr(command, name) != getattr(options, name):
+                raise UsageError(f"--{name} holds for the whole call: give it to 'moire' itself")
+    return commands
+
+
+def do_run(session, command):
+    """All lines are read before the first command is carried out."""
+    commands = []
+    for number, text in enumerate(read_text(command.file).splitlines(), 1):
+        try:
+            commands += parse_line(text, command)
+        except MoireError as error:
+            raise UsageError(f"line {number} of {command.file}: {error}") from None
+    for inner in commands:
+        carry_out(session, inner)
+
+
+def do_shell(session, command):
+    lines, here = queue.Queue(), sys.stdin.isatty()
+
+    def read():
+        for text in sys.stdin:
+            lines.put(text)
+        lines.put(None)
+
+    session.open()        # a port that does not open is told now
+    threading.Thread(target=read, daemon=True).start()
+    while True:
+        if here:
+            print("moire> ", end="", file=session.err, flush=True)
+        text = next_line(session, lines)
+        if text is None or text.strip() in ("quit", "exit"):
+            return
+        try:
+            for inner in parse_line(text, command):
+                carry_out(session, inner)
+        except MoireError as error:
+            if not here:
+                raise
+            session.complain(None, error)
+        except KeyboardInterrupt:
+            if not here:
+                raise
+            print("\nstopped", file=session.err)
+        except SystemExit:
+            pass        # --help
+
+
+def next_line(session, lines):
+    while True:
+        try:
+            return lines.get(timeout=None if session.line.transport.time_stands else KEEP_COMPANY_S)
+        except queue.Empty:
+            session.keep_company()
+
+
+def carry_out(session, command):
+    session.options = command
+    try:
+        command.handler(session, command)
+    except MoireError as error:
+        error.command = getattr(error, "command", command.command)
+        raise
+
+
+def main(arguments=None, open_transport=None, out=None, err=None) -> int:
+    """Returns the exit code."""
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    session = Session(argparse.Namespace(**{**DEFAULTS, "json": "--json" in arguments}), open_transport, out, err)
+    try:
+        commands = parse(arguments, DEFAULTS)
+        if len(commands) > 1:
+            for command in commands:
+                if command.command in NOT_INSIDE:
+                    raise UsageError(f"'{command.command}' stands alone in its call")
+        for command in commands:
+            carry_out(session, command)
+        return 0
+    except MoireError as error:
+        session.complain(getattr(error, "command", None), error)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print("moire: interrupted; what moved was stopped under control", file=session.err)
+        return INTERRUPTED
+    finally:
+        session.close()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Builds the twin's libraries: Verilator makes C++ of rtl/node.sv, g++ makes one shared library of it and the plant.
+
+Everything lies under build/twin/<hash of all that goes in>, so nothing is built twice. The firmware is no part of it: it
+is written into the nodes' memory when a twin is made.
+
+    python sw/twin/build.py          builds both libraries and the firmware, says where they are
+"""
+import fcntl
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from importlib.util import find_spec
+from pathlib import Path
+
+if __package__:
+    from . import parameters
+else:
+    import parameters
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+BUILD = ROOT / "build" / "twin"
+MEMORY_BYTES = 32768
+CORE_PACKAGE = "pythondata_cpu_picorv32"
+COMPILE = ["-std=c++17", "-O3", "-march=native", "-fPIC", "-fno-strict-aliasing", "-fno-semantic-interposition", "-fvisibility=hidden",
+           "-w", "-pthread"]
+OWN = ["-std=c++17", "-O3", "-march=native", "-ffp-contract=off", "-fPIC", "-Wall", "-Wextra", "-Werror"]
+
+
+class BuildError(Exception):
+    """One line that says what is missing or what went wrong."""
+
+
+def package(name, why):
+    spec = find_spec(name)
+    if not spec:
+        raise BuildError(f"the package {name} is missing ({why}): pip install it into the virtual environment")
+    return Path(spec.submodule_search_locations[0])
+
+
+def compiler():
+    found = shutil.which(os.environ.get("CXX", "g++"))
+    if not found:
+        raise BuildError("g++ is missing, the twin needs it: apt install g++ (or set CXX to another compiler)")
+    return found
+
+
+def say(text):
+    print(f"twin: {text}", file=sys.stderr, flush=True)
+
+
+def run(command, what, cwd=None, environment=None):
+    """Run a command; when it fails, its first error is the message and the whole output is kept in a file."""
+    result = subprocess.run([str(c) for c in command], cwd=cwd, env=environment, capture_output=True, text=True)
+    if result.returncode:
+        output = result.stdout + result.stderr
+        log = BUILD / f"{what.split()[0].replace('/', '_')}.log"
+        log.write_text(output)
+        lines = [line.strip() for line in output.splitlines() if line.strip()] or ["no output"]
+        first = next((line for line in lines if "%Error" in line or "%Warning" in line or "error:" in line), lines[-1])
+        raise BuildError(f"{what} failed: {first} (all of it: {log.relative_to(ROOT)})")
+    return result.stdout
+
+
+def digest(files, *more):
+    total = hashlib.sha256(repr(more).encode())
+    for file in files:
+        total.update(str(file.name).encode() + b"\0" + file.read_bytes())
+    return total.hexdigest()[:16]
+
+
+def own_sources():
+    return sorted(p for p in HERE.iterdir() if p.suffix in (".cpp", ".h", ".toml", ".py"))
+
+
+def made_once(folder, result, make):
+    """The file `result` in `folder`, made by make(folder) in a folder of its own that then takes its place."""
+    if (folder / result).exists():
+        return folder / result
+    BUILD.mkdir(parents=True, exist_ok=True)
+    with open(BUILD / "lock", "w") as lock:                   # parallel tests may want the same build
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (folder / result).exists():
+            with tempfile.TemporaryDirectory(dir=BUILD, prefix="making-") as making:
+                make(Path(making))
+                shutil.rmtree(folder, ignore_errors=True)
+                shutil.copytree(making, folder, ignore=shutil.ignore_patterns("*.o", "*.cpp", "*.h", "*.mk", "*.d", "*.dat"))
+    return folder / result
+
+
+def stage_library():
+    """libstage.so: one stage without a node. No Verilator needed, a few seconds."""
+    tool = compiler()
+
+    def make(folder):
+        (folder / "parameters.h").write_text(parameters.header())
+        sources = [HERE / name for name in ("stage_library.cpp", "stage.cpp", "plant.cpp", "interferometer.cpp")]
+        run([tool, *OWN, "-shared", f"-I{folder}", f"-I{HERE}", *sources, "-o", folder / "libstage.so"], "g++ of the stage")
+
+    return made_once(BUILD / f"stage-{digest(own_sources(), tool)}", "libstage.so", make)
+
+
+def rtl_path():
+    """Every folder in which a module is found by its name."""
+    rooms = sorted({p.parent for p in (ROOT / "rtl").rglob("*.sv")})
+    return rooms + [package(CORE_PACKAGE, "the soft core") / "verilog"]
+
+
+def runtime(tool, verilator):
+    """Verilator's own run-time part, the same for every design."""
+    files = [verilator / "include" / name for name in ("verilated.cpp", "verilated_threads.cpp")]
+
+    def make(folder):
+        objects = []
+        for file in files:
+            objects.append(folder / f"{file.stem}.o")
+            run([tool, *COMPILE, "-DVERILATOR=1", f"-I{verilator / 'include'}", "-c", file, "-o", objects[-1]], "g++ of the run-time part")
+        run(["ar", "rcs", folder / "libverilated.a", *objects], "ar")
+
+    return made_once(BUILD / f"runtime-{digest(files, tool, COMPILE)}", "libverilated.a", make)
+
+
+def verilate(folder, verilator, clk_hz, axes):
+    find = [word for path in rtl_path() for word in ("-y", path)]
+    environment = {**os.environ, "VERILATOR_ROOT": str(verilator)}
+    settings = ["-O3", "--x-assign", "fast", "--x-initial", "fast", "--no-timing", "--timescale", "1ns/1ps", "-Wall"]
+    values = [f"-GCLK_HZ={clk_hz}", f"-GAXES={axes}", f"-GMEMORY_BYTES={MEMORY_BYTES}", '-GFIRMWARE=""']
+    run([verilator / "bin" / "verilator_bin", "--cc", *settings, "--prefix", "Vnode", "--top-module", "node", *values, *find,
+         "+libext+.sv+.v", ROOT / "rtl" / "cpu" / "picorv32.vlt", ROOT / "rtl" / "node.sv", "--Mdir", folder], "verilator",
+        environment=environment)
+    code = (folder / "Vnode___024root.h").read_text()
+    words = [line.split()[-1].rstrip(";") for line in code.splitlines() if line.rstrip().endswith("u_memory__DOT__memory;")]
+    if len(words) != 1:
+        raise BuildError("the memory of the soft core was not found in Verilator's output: has node_memory been renamed?")
+    once = "__Vtrigprevexpr___TOP__clk__0"
+    alone = once in code and code.count("__Vtrigprevexpr") == 1 and "Vnode___024root___eval(" in (folder / "Vnode.cpp").read_text()
+    rearm = f"#define REARM_CLK(pins) (pins).{once} = 0\n" if alone else ""
+    includes = "".join(f'#include "{p.name}"\n' for p in sorted(folder.glob("Vnode*.cpp")))
+    (folder / "verilated_node.h").write_text(
+        f"// SPDX-License-Identifier: Apache-2.0\n// Made by sw/twin/build.py.\n#pragma once\n{includes}"
+        f"constexpr int CLK_HZ = {clk_hz}, AXES = {axes}, MEMORY_WORDS = {MEMORY_BYTES // 4};\n"
+        f"#define NODE_MEMORY {words[0]}\n{rearm}")
+
+
+def twin_library(clk_hz=4_000_000, axes=1):
+    """libtwin.so: Verilated nodes, stages and line."""
+    tool = compiler()
+    verilator = package("verilator", "it makes C++ of the RTL")
+    sources = [*own_sources(), *sorted((ROOT / "rtl").rglob("*.sv")), *sorted((ROOT / "rtl").rglob("*.vlt")),
+               package(CORE_PACKAGE, "the soft core") / "verilog" / "picorv32.v"]
+    folder = BUILD / f"twin-{digest(sources, tool, COMPILE, clk_hz, axes, (verilator / 'bin' / 'verilator_bin').stat().st_size)}"
+    if (folder / "libtwin.so").exists():
+        return folder / "libtwin.so"
+    start = time.monotonic()
+    say(f"building {folder.relative_to(ROOT)} (clk {clk_hz} Hz, {axes} {'axis' if axes == 1 else 'axes'} a node)")
+    support = runtime(tool, verilator)
+
+    def make(folder):
+        (folder / "parameters.h").write_text(parameters.header())
+        verilate(folder, verilator, clk_hz, axes)
+        say(f"verilated after {time.monotonic() - start:.0f} s")
+        include = [f"-I{folder}", f"-I{HERE}", f"-I{verilator / 'include'}"]
+        defines = ["-DVERILATOR=1", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TIMING=0", "-DVM_TRACE=0"]
+        machine = ["stage", "plant", "interferometer", "line"]
+        jobs = [("twin", [*COMPILE, *defines])] + [(name, [*OWN, "-fvisibility=hidden"]) for name in machine]
+        with ThreadPoolExecutor(2) as pool:
+            list(pool.map(lambda job: run([tool, *job[1], *include, "-c", HERE / f"{job[0]}.cpp", "-o", folder / f"{job[0]}.o"],
+                                          f"g++ of {job[0]}.cpp"), jobs))
+        run([tool, "-shared", "-pthread", *[folder / f"{name}.o" for name in ("twin", *machine)], support, "-o", folder / "libtwin.so"],
+            "linking the twin")
+
+    library = made_once(folder, "libtwin.so", make)
+    say(f"built after {time.monotonic() - start:.0f} s")
+    return library
+
+
+def firmware():
+    """The firmware's words, built first when it is not fresh."""
+    script = ROOT / "sw" / "firmware" / "build.py"
+    if not script.exists():
+        raise BuildError("sw/firmware/build.py is missing: the twin has no firmware to run")
+    BUILD.mkdir(parents=True, exist_ok=True)
+    with open(BUILD / "firmware.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        run([sys.executable, script, "--memory", MEMORY_BYTES], "the firmware's build")
+        return words_of(ROOT / "build" / "firmware" / "firmware.hex")
+
+
+def words_of(file):
+    """Words of a $readmemh file, the zeros at its end left out."""
+    words, address = {}, 0
+    for token in Path(file).read_text().split():
+        if token.startswith("@"):
+            address = int(token[1:], 16)
+        elif not token.startswith("//"):
+            words[address] = int(token, 16)
+            address += 1
+    used = max((n for n, word in words.items() if word), default=-1) + 1
+    return [words.get(n, 0) for n in range(used)]
+
+
+if __name__ == "__main__":
+    try:
+        print(stage_library().relative_to(ROOT))
+        print(twin_library().relative_to(ROOT))
+        firmware()
+    except BuildError as error:
+        sys.exit(f"twin: {error}")

@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: Apache-2.0
+// Nodes (the RTL, Verilated), each with its stages, on one line with a host; and their C interface.
+//
+// All nodes share clk. A clk is: every node takes its pins and sees the rising edge, then the machine and the line take the
+// node's outputs and set the pins for the next edge. One translation unit with the Verilated code, so that all of it inlines.
+#include <memory>
+
+#include "line.h"
+#include "stage.h"
+#include "verilated_node.h"                                   // made by build.py: the Verilated sources, CLK_HZ, AXES, REARM_CLK
+
+namespace twin {
+
+constexpr int RESET_CLK = 16;
+constexpr uint32_t ALL_AXES = (1u << AXES) - 1;
+
+struct Firmware {
+    const uint32_t* words;
+    int count;
+};
+
+class Core {                                                  // a Verilated node and its clk
+public:
+    Core(unsigned address, const Firmware& firmware) : context_(new VerilatedContext), model_(new Vnode(context_.get())), pins(*model_->rootp) {
+        pins.clk = 0;
+        pins.address = address;
+        pins.line_rx = 1;
+        pins.estop_open = 0;
+        pins.encoder_a = pins.encoder_b = pins.adc_sin = pins.adc_cos = 0;
+        pins.limit_low_open = pins.limit_high_open = 0;
+        pins.drive_fault_n = ALL_AXES;
+        pins.rst = 1;
+        model_->eval();
+        for (int n = 0; n < firmware.count; n++) pins.NODE_MEMORY[n] = firmware.words[n];
+        for (int n = 0; n < RESET_CLK; n++) clk();
+        pins.rst = 0;
+    }
+    ~Core() { model_->final(); }
+    void clk() {
+        pins.clk = 1;
+#ifdef REARM_CLK
+        REARM_CLK(pins);                                      // as if the falling edge had been evaluated: nothing depends on it,
+        Vnode___024root___eval(&pins);                        // and nothing prints or finishes, which eval() looks after
+#else
+        model_->eval();
+        pins.clk = 0;
+        model_->eval();
+#endif
+    }
+
+private:
+    std::unique_ptr<VerilatedContext> context_;
+    std::unique_ptr<Vnode> model_;
+
+public:
+    Vnode___024root& pins;
+};
+
+class Node {
+public:
+    Node(unsigned address, const Firmware& firmware, const Parameters* parameters, uint64_t seed) : core(address, firmware) {
+        for (int n = 0; n < AXES; n++) stages.emplace_back(parameters[n], seed, uint64_t(address) << 16 | unsigned(n) << 8, CLK_HZ);
+    }
+    void step(uint64_t now, bool line_rx) {
+        auto& pins = core.pins;
+        pins.line_rx = line_rx;
+        core.clk();
+        uint32_t a = 0, b = 0, sin = 0, cos = 0, low = 0, high = 0, fault = 0;
+        for (int n = 0; n < AXES; n++) {
+            Stage& stage = stages[n];
+            stage.step(now, pins.adc_cs_n >> n & 1, pins.adc_sclk >> n & 1, pins.bridge_a >> n & 1, pins.bridge_b >> n & 1,
+                       pins.drive_enable >> n & 1);
+            a |= uint32_t(stage.interferometer.a) << n;
+            b |= uint32_t(stage.interferometer.b) << n;
+            sin |= stage.interferometer.sdata_sin() << n;
+            cos |= stage.interferometer.sdata_cos() << n;
+            low |= uint32_t(stage.low_open()) << n;
+            high |= uint32_t(stage.high_open()) << n;
+            fault |= uint32_t(stage.drive_fault) << n;
+        }
+        pins.encoder_a = a;
+        pins.encoder_b = b;
+        pins.adc_sin = sin;
+        pins.adc_cos = cos;
+        pins.limit_low_open = low;
+        pins.limit_high_open = high;
+        pins.drive_fault_n = ~fault & ALL_AXES;
+    }
+
+    Core core;
+    std::vector<Stage> stages;
+};
+
+class Twin {
+public:
+    Twin(uint64_t seed, int count, const uint8_t* addresses, const Firmware& firmware, const Parameters* parameters, double bit_clk)
+        : line(seed, CLK_HZ, bit_clk) {
+        for (int n = 0; n < count; n++) nodes.emplace_back(new Node(addresses[n], firmware, parameters + n * AXES, seed));
+    }
+    void step() {
+        now++;
+        uint32_t driving = 0, levels = 0;
+        for (size_t n = 0; n < nodes.size(); n++) {
+            auto& pins = nodes[n]->core.pins;
+            nodes[n]->step(now, line.heard_by(int(n), pins.line_driver_enable));
+            driving |= uint32_t(pins.line_driver_enable) << n;
+            levels |= uint32_t(pins.line_tx) << n;
+        }
+        line.step(now, driving, levels);
+    }
+
+    uint64_t now = 0;
+    Line line;
+    std::vector<std::unique_ptr<Node>> nodes;
+};
+
+// One node without a machine, fed with the levels of a line as they are: for campaigns of many damaged frames.
+class FrameBench {
+public:
+    FrameBench(unsigned address, const Firmware& firmware, double bit_clk) : core_(address, firmware), bit_clk_(bit_clk) {
+        host_.set_bit_time(bit_clk);
+        idle(CLK_HZ / 50);                                    // the firmware starts
+    }
+    void idle(uint64_t clk) {
+        while (clk--) step(true);
+    }
+    // Levels, one a cell; then waits until `enough` words are there and the driver is off again, or the line was quiet for
+    // quiet_cells, or most_cells have passed. Returns the count of words.
+    int exchange(const uint8_t* levels, int count, int enough, int quiet_cells, int most_cells, uint16_t* words, int most_words) {
+        host_.received.clear();
+        double end = double(now_);
+        for (int n = 0; n < count; n++) {
+            end += bit_clk_;
+            while (double(now_) < end) step(levels[n]);
+        }
+        const uint64_t quiet = uint64_t(quiet_cells * bit_clk_), stop = now_ + uint64_t(most_cells * bit_clk_);
+        for (uint64_t silent = 0; silent < quiet && now_ < stop;) {
+            step(true);
+            silent = core_.pins.line_driver_enable ? 0 : silent + 1;
+            if (silent && host_.received.size() >= size_t(enough)) break;
+        }
+        const int got = int(std::min<size_t>(host_.received.size(), size_t(most_words)));
+        std::copy_n(host_.received.begin(), got, words);
+        return got;
+    }
+    uint64_t now() const { return now_; }
+
+private:
+    void step(bool level) {
+        now_++;
+        core_.pins.line_rx = level | core_.pins.line_driver_enable;
+        core_.clk();
+        host_.step(now_, !core_.pins.line_driver_enable || core_.pins.line_tx);
+    }
+
+    Core core_;
+    HostUart host_;
+    double bit_clk_;
+    uint64_t now_ = 0;
+};
+
+enum Switch { LOW_SWITCH, HIGH_SWITCH, DRIVE_FAULT, MOTOR_JAM };
+
+}  // namespace twin
+
+using namespace twin;
+
+namespace {
+Stage& stage_of(Twin* t, int axis) { return t->nodes[size_t(axis / AXES)]->stages[size_t(axis % AXES)]; }
+}  // namespace
+
+#pragma GCC visibility push(default)
+extern "C" {
+
+int twin_axes() { return AXES; }
+int twin_parameter_count() { return PARAMETER_COUNT; }
+int twin_memory_words() { return MEMORY_WORDS; }
+void* twin_new(uint64_t seed, int nodes, const uint8_t* addresses, const uint32_t* firmware, int words, const Parameters* parameters, double bit_clk) {
+    return new Twin(seed, nodes, addresses, {firmware, words}, parameters, bit_clk);
+}
+void twin_delete(Twin* t) { delete t; }
+uint64_t twin_now(Twin* t) { return t->now; }
+void twin_run(Twin* t, uint64_t clk) {
+    while (clk--) t->step();
+}
+// Runs until `words` words are there or `clk` have passed; returns how many are there.
+int twin_run_until_words(Twin* t, int words, uint64_t clk) {
+    const auto& received = t->line.host.received;
+    while (received.size() < size_t(words) && clk--) t->step();
+    return int(received.size());
+}
+void twin_send_words(Twin* t, const uint16_t* words, int count, const uint32_t* flips, int flip_count, int gap_cells) {
+    t->line.host.send_words(words, count, flips, flip_count, gap_cells);
+}
+void twin_send_levels(Twin* t, const uint8_t* levels, int count, double cell_clk) { t->line.host.send_levels(levels, count, cell_clk); }
+int twin_receive_words(Twin* t, uint16_t* out, int most) {
+    auto& received = t->line.host.received;
+    const int count = int(std::min<size_t>(received.size(), size_t(most)));
+    std::copy_n(received.begin(), count, out);
+    received.erase(received.begin(), received.begin() + count);
+    return count;
+}
+void twin_host_bit_time(Twin* t, double clk) { t->line.host.set_bit_time(clk); }
+void twin_flip_reply(Twin* t, const uint32_t* cells, int count) { t->line.flip_reply(cells, count); }
+void twin_line_spikes(Twin* t, double rate, double shortest, double longest) { t->line.spikes(rate, shortest, longest, t->now); }
+void twin_cut(Twin* t, int node, int cut) {                   // node -1: the host
+    if (node < 0)
+        t->line.host_cut = Cut(cut);
+    else
+        t->line.cut_node(node, Cut(cut));
+}
+// level, host drives, nodes that drive, collisions, framing errors, start glitches, edges, clk of last drive, words waiting
+void twin_line_state(Twin* t, uint64_t* out) {
+    uint64_t driving = 0;
+    for (size_t n = 0; n < t->nodes.size(); n++) driving |= uint64_t(t->nodes[n]->core.pins.line_driver_enable) << n;
+    const Line& line = t->line;
+    const uint64_t state[] = {line.at_nodes, line.host.drives(), driving, line.collisions, line.host.framing_errors,
+                              line.host.start_glitches, line.edges, line.last_driven, line.host.received.size()};
+    std::copy(std::begin(state), std::end(state), out);
+}
+int twin_set(Twin* t, int axis, const char* name, double value) { return stage_of(t, axis).set(name, value); }
+void twin_place(Twin* t, int axis, double position) { stage_of(t, axis).plant.place(position); }
+void twin_push(Twin* t, int axis, double newton) { stage_of(t, axis).plant.external_force = newton; }
+void twin_estop(Twin* t, int node, int pressed) { t->nodes[size_t(node)]->core.pins.estop_open = pressed != 0; }
+void twin_switch(Twin* t, int axis, int which, int on) {
+    Stage& stage = stage_of(t, axis);
+    if (which == LOW_SWITCH) stage.force_low = on;
+    if (which == HIGH_SWITCH) stage.force_high = on;
+    if (which == DRIVE_FAULT) stage.drive_fault = on;
+    if (which == MOTOR_JAM) stage.plant.jammed = on;
+}
+void twin_signal_fault(Twin* t, int axis, int fault, int level) {
+    stage_of(t, axis).interferometer.fault = SignalFault(fault);
+    stage_of(t, axis).interferometer.stuck_level = level;
+}
+// time s, position m, velocity m/s, nut m, motor rad/s, current A, voltage V, screw force N, low, high, a, b, enabled, code sin, cos
+void twin_truth(Twin* t, int axis, double* out) {
+    const Stage& s = stage_of(t, axis);
+    const auto& pins = t->nodes[size_t(axis / AXES)]->core.pins;
+    const double truth[] = {double(t->now) / CLK_HZ, s.position(t->now), s.plant.velocity, s.plant.nut(), s.plant.speed, s.plant.current,
+                            s.plant.voltage, s.plant.screw_force(), double(s.low_open()), double(s.high_open()),
+                            double(s.interferometer.a), double(s.interferometer.b), double(pins.drive_enable >> (axis % AXES) & 1),
+                            double(s.interferometer.code_sin), double(s.interferometer.code_cos)};
+    std::copy(std::begin(truth), std::end(truth), out);
+}
+void twin_trace(Twin* t, int axis, uint64_t every_clk) { stage_of(t, axis).trace(every_clk); }
+int twin_trace_rows(Twin* t, int axis) { return int(stage_of(t, axis).rows.size()); }
+void twin_trace_take(Twin* t, int axis, TraceRow* out) {
+    auto& rows = stage_of(t, axis).rows;
+    std::copy(rows.begin(), rows.end(), out);
+    rows.clear();
+}
+
+void* frame_bench_new(unsigned address, const uint32_t* firmware, int words, double bit_clk) {
+    return new FrameBench(address, {firmware, words}, bit_clk);
+}
+void frame_bench_delete(FrameBench* bench) { delete bench; }
+void frame_bench_idle(FrameBench* bench, uint64_t clk) { bench->idle(clk); }
+uint64_t frame_bench_now(FrameBench* bench) { return bench->now(); }
+int frame_bench_exchange(FrameBench* bench, const uint8_t* levels, int count, int enough, int quiet_cells, int most_cells, uint16_t* words,
+                         int most) {
+    return bench->exchange(levels, count, enough, quiet_cells, most_cells, words, most);
+}
+
+}  // extern "C"
+#pragma GCC visibility pop

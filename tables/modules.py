@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The table of modules in rtl/README.md, made of the modules' own headers; and the rules that every module keeps.
+
+python tables/modules.py [--check]        --check writes nothing and refuses a stale table
+"""
+import re
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGE = ROOT / "rtl" / "README.md"
+BEGIN, END = "<!-- modules -->", "<!-- /modules -->"
+COLUMNS = ["room", "module", "purpose", "latency", "rate", "source", "proved", "model", "test"]
+
+
+def header(text):
+    """Name, purpose and facts from the comment at the head of a module; a fact may go on in indented lines."""
+    lines = []
+    for line in text.splitlines()[1:]:
+        if not line.startswith("//"):
+            break
+        lines.append(line[2:].removeprefix(" ").rstrip())
+    first = re.match(r"(\w+) -- (.*)", lines[0]) if lines else None
+    facts, key = {"purpose": first.group(2)} if first else {}, "purpose"
+    for line in lines[1:]:
+        new = re.match(r"([a-z]+)\s{2,}(\S.*)", line)
+        if new:
+            key, words = new.groups()
+            words, both, rate = words.partition(" rate  ") if key == "latency" else (words, "", "")
+            facts[key] = words.strip()
+            if both:
+                facts["rate"], key = rate.strip(), "rate"
+        elif line.startswith("  ") and key:
+            facts[key] += " " + line.strip()
+        elif not line.strip():
+            key = None
+        elif key == "purpose":
+            facts[key] += " " + line.strip()
+    return first.group(1) if first else None, facts
+
+
+def check_of(path):
+    """(model, test) of a module as paths from ROOT, made of its place."""
+    room, name = path.parent.relative_to(ROOT / "rtl"), path.stem
+    if not room.name:                                       # axis, node: block diagrams; whole-system tests are theirs
+        return None, Path("tb/system")
+    if name.endswith("_registers"):
+        return Path("tb/link/register_block.py"), Path("tb/link/test_registers.py")
+    if name.endswith("_rom"):                               # a made table: its generator is the model
+        user = name.removesuffix("_rom")
+        return Path("tables") / f"{user}.py", next((p.relative_to(ROOT) for p in (ROOT / "tb" / room).glob(f"test_{user}*.py")), None)
+    return Path("tb") / room / f"{name}.py", Path("tb") / room / f"test_{name}.py"
+
+
+def row(path, wrong):
+    """The cells of a module; what breaks a rule goes into `wrong`."""
+    text, here = path.read_text(), path.relative_to(ROOT)
+    name, facts = header(text)
+    model, test = check_of(path)
+    named = re.search(r"tb/[\w/]+\.\w+", facts.get("model", ""))
+    if named and model:
+        model = Path(named.group(0))
+    if not text.startswith("// SPDX-License-Identifier: Apache-2.0\n"):
+        wrong.append(f"{here}: the first line must be // SPDX-License-Identifier: Apache-2.0")
+    if name != path.stem:
+        wrong.append(f"{here}: the header must begin with `// {path.stem} -- purpose`")
+    if not re.search(rf"^module {path.stem}\b", text, re.MULTILINE):
+        wrong.append(f"{here}: module and file must have the same name")
+    if model and not (ROOT / model).exists():
+        wrong.append(f"{here}: its model {model} is missing")
+    if not test or not (ROOT / test).exists():
+        wrong.append(f"{here}: its test {test or ''} is missing")
+    if ("`ifdef FORMAL" in text) != ("proved" in facts):
+        wrong.append(f"{here}: `proved` in the header and properties in the module go together")
+    room = path.parent.name if path.parent != ROOT / "rtl" else ""
+    link = lambda p: f"[{p.name}](../{p.as_posix()})" if p else ""
+    place = path.relative_to(ROOT / "rtl").as_posix()
+    return [room, f"[{path.stem}]({place})", *(facts.get(c, "") for c in COLUMNS[2:7]), link(model), link(test)]
+
+
+def main():
+    if sys.argv[1:] not in ([], ["--check"]):
+        sys.exit(__doc__.strip())
+    wrong = []
+    rows = [row(p, wrong) for p in sorted((ROOT / "rtl").rglob("*.sv"), key=lambda p: (p.parent != ROOT / "rtl", p))]
+    if wrong:
+        sys.exit("\n".join(wrong))
+    cell = lambda text: text.replace("|", "\\|")
+    table = ["| " + " | ".join(COLUMNS) + " |", "|" + " --- |" * len(COLUMNS)] + ["| " + " | ".join(map(cell, r)) + " |" for r in rows]
+    page = PAGE.read_text() if PAGE.exists() else f"{BEGIN}\n{END}\n"
+    before, begin, rest = page.partition(BEGIN)
+    old, end, after = rest.partition(END)
+    if not begin or not end:
+        sys.exit(f"rtl/README.md must have the marks {BEGIN} and {END}, in this order")
+    new = f"{before}{BEGIN}\n" + "\n".join(table) + f"\n{END}{after}"
+    if new == page and PAGE.exists():
+        return
+    if sys.argv[1:]:
+        sys.exit("stale, run `make tables`: rtl/README.md")
+    PAGE.write_text(new)
+    print("made rtl/README.md")
+
+
+if __name__ == "__main__":
+    main()

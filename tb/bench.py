@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The one way a test reaches the simulator, and the few gestures every test shares.
+
+SIM=icarus|verilator   SEED=number|random   WAVES=1 (the wave file lies beside the results, under build/)
+"""
+import fcntl
+import hashlib
+import os
+import random
+import re
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+from cocotb.clock import Clock
+from cocotb.triggers import RisingEdge
+from cocotb_tools.check_results import get_results
+from cocotb_tools.runner import as_sv_literal, get_runner
+
+ROOT = Path(__file__).resolve().parent.parent
+WAIVERS = [ROOT / "rtl" / "cpu" / "picorv32.vlt"]        # foreign sources only; our own waivers stand in the line they excuse
+
+
+def package(name):
+    """Folder of an installed package, without importing it."""
+    spec = find_spec(name)
+    return Path(spec.submodule_search_locations[0]) if spec else None
+
+
+def search_path():
+    """Every folder in which a module is found by its name: the rooms of rtl/, and the soft core's package."""
+    rooms = sorted({p.parent for p in (ROOT / "rtl").rglob("*.sv")})
+    core = package("pythondata_cpu_picorv32")
+    return rooms + ([core / "verilog"] if core else [])
+
+
+def source_of(top):
+    found = list((ROOT / "rtl").rglob(f"{top}.sv"))
+    assert len(found) == 1, f"there must be exactly one {top}.sv under rtl/, found {[str(p.relative_to(ROOT)) for p in found]}"
+    return found[0]
+
+
+def model_path(*extra):
+    """Put every room of tb/ on sys.path, so that a model is imported by its name, then sw/, sw/host/ and tables/; the simulator
+    inherits the path. (Without sw/ on it the room tb/twin would stand before the package twin.)"""
+    rooms = [ROOT / "tb", *sorted(p for p in (ROOT / "tb").iterdir() if p.is_dir() and p.name[0] not in "._"), *extra]
+    sys.path[:0] = [folder for folder in map(str, reversed(rooms)) if folder not in sys.path]
+    sys.path += [folder for folder in (str(ROOT / f) for f in ("sw/host", "sw", "tables")) if folder not in sys.path]
+
+
+def seed():
+    """SEED of the environment, 1 without it; `random` draws one."""
+    wanted = os.environ.get("SEED") or "1"
+    return random.SystemRandom().randrange(1, 2**31) if wanted == "random" else int(wanted)
+
+
+def direct_verilator(runner):
+    """Call the compiler itself: Verilator's Perl front end is not needed, and a minimal system has no Pod::Usage for it."""
+    folder = package("verilator")
+    if folder and (folder / "bin" / "verilator_bin").exists():
+        os.environ["VERILATOR_ROOT"] = str(folder)
+        runner._simulator_in_path_build_only = lambda: setattr(runner, "executable", str(folder / "bin" / "verilator_bin"))
+    os.environ["MAKEFLAGS"] = "CFG_CXXFLAGS_PCH_I=-include"           # else larger designs miss their precompiled header
+
+
+def run(top, test, **parameters):
+    """Build module `top` with `parameters` and run the cocotb tests in the file `test`. Files are found by name."""
+    __tracebackhide__ = True
+    sim, waves, here = os.environ.get("SIM") or "icarus", bool(os.environ.get("WAVES")), Path(test).resolve()
+    name = os.environ.get("PYTEST_CURRENT_TEST", "run").split("::")[-1].split(" ")[0]
+    values = {k: as_sv_literal(v) for k, v in parameters.items()}
+    tag = "-".join([top, *(f"{k}{v}" for k, v in values.items()), *(["waves"] if waves else [])])
+    if not re.fullmatch(r"[\w.-]{1,100}", tag):
+        tag = f"{top}-{hashlib.sha256(tag.encode()).hexdigest()[:12]}"
+    shared = ROOT / "build" / sim / tag
+    own = shared / re.sub(r"[^\w.-]", "_", f"{here.stem}.{name}")
+    own.mkdir(parents=True, exist_ok=True)
+    runner, build = get_runner(sim), own if sim == "icarus" else shared   # Icarus compiles at once: nothing to share
+    args = [a for d in search_path() for a in ("-y", str(d))]
+    if sim == "icarus":
+        sources, args = [], [*args, "-Y.sv", "-Y.v", "-Wall", "-Wno-timescale"]
+    else:
+        sources, args = [w for w in WAIVERS if w.exists()], [*args, "+libext+.sv+.v", "-Wall"]
+        direct_verilator(runner)
+    with open(shared / "lock", "w") as lock:              # parallel workers may want the same build
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        runner.build(sources=[*sources, source_of(top)], hdl_toplevel=top, parameters=values, always=True,
+                     build_args=args, build_dir=build, timescale=("1ns", "1ps"), waves=waves)
+    model_path(here.parent)
+    number = seed()
+    print(f"{top} under {sim}, SEED={number}", flush=True)
+    failed = f"{top} under {sim}: {{}}. Again: make test K={name.split('[')[0]} SIM={sim} SEED={number}"
+    try:
+        count, wrong = get_results(runner.test(hdl_toplevel=top, test_module=here.stem, build_dir=build, test_dir=own, seed=number,
+                                               waves=waves))
+    except (SystemExit, RuntimeError):                    # the runner's words for a failed test and for no result at all
+        count, wrong = None, None
+    if wrong != 0 or not count:
+        pytest.fail(failed.format(f"no test ran from {here.name}" if count == 0 else "failed, see its output"), pytrace=False)
+
+
+async def start(dut, period_ns=10, **inputs):
+    """Clock running, inputs at the given levels, two cycles of reset; returns just after reset falls."""
+    for name, level in inputs.items():
+        getattr(dut, name).value = level
+    dut.rst.value = 1
+    Clock(dut.clk, period_ns, "ns").start()
+    for _ in range(2):
+        await RisingEdge(dut.clk)
+    dut.rst.value = 0

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""tick_divider: exact periods at both ends of the range, a period changed under way, and random settings against the model."""
+import random
+
+import cocotb
+import pytest
+from cocotb.triggers import FallingEdge, RisingEdge
+from tick_divider import TickDivider
+
+from bench import run, start
+
+
+async def clk(dut, period, rst=0):
+    dut.period.value, dut.rst.value = period, rst
+    await RisingEdge(dut.clk)
+    await FallingEdge(dut.clk)
+    return int(dut.tick.value)
+
+
+async def ticks(dut, period, n):
+    """The clk, counted from 1, in which ticks came."""
+    return [k for k in range(1, n + 1) if await clk(dut, period)]
+
+
+@cocotb.test()
+async def a_tick_comes_each_period_and_the_first_a_period_after_reset(dut):
+    longest = (1 << int(dut.W.value)) - 1
+    await start(dut, period=0)
+    for period in (1, 2, 3, 10, min(longest, 1000)):
+        await clk(dut, period, rst=1)
+        assert await ticks(dut, period, 3 * period) == [period, 2 * period, 3 * period]
+
+
+@cocotb.test()
+async def the_longest_period_is_exact(dut):
+    longest = (1 << int(dut.W.value)) - 1
+    await start(dut, period=0)
+    if longest < 1 << 10:
+        assert await ticks(dut, longest, 2 * longest) == [longest, 2 * longest]
+
+
+@cocotb.test()
+async def period_0_never_ticks_and_the_next_period_begins_whole(dut):
+    await start(dut, period=5)
+    await ticks(dut, 5, 3)
+    assert await ticks(dut, 0, 100) == []
+    assert await ticks(dut, 5, 10) == [5, 10]
+
+
+@cocotb.test()
+async def a_shorter_period_counts_at_once(dut):
+    await start(dut, period=0)
+    assert await ticks(dut, 200, 50) == []
+    assert await ticks(dut, 20, 41) == [1, 21, 41]
+    assert await ticks(dut, 30, 30) == [30]
+
+
+@cocotb.test()
+async def any_setting_matches_the_model(dut):
+    await start(dut, period=0)
+    model, period = TickDivider(), 0
+    for n in range(5000):
+        if random.random() < 0.05:
+            period = random.choice([0, 1, 2, random.randrange(40)])
+        rst = int(random.random() < 0.01 or n == 0)
+        assert await clk(dut, period, rst) == model.step(period, rst), f"clk {n}"
+
+
+@pytest.mark.parametrize("w", [8, 24])
+def test_tick_divider(w):
+    run("tick_divider", __file__, W=w)

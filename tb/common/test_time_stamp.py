@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""time_stamp: counts every clk, wraps, and begins again after a reset in mid-flow."""
+import cocotb
+import pytest
+from cocotb.triggers import FallingEdge, RisingEdge
+
+from bench import run, start
+from time_stamp import time_stamp
+
+
+@cocotb.test()
+async def every_clk_counts_and_the_end_wraps(dut):
+    w = int(dut.W.value)
+    await start(dut)
+    for clk in range(1, min(3 << w, 2000)):
+        await RisingEdge(dut.clk)
+        await FallingEdge(dut.clk)
+        assert int(dut.now.value) == time_stamp(clk, w), f"clk {clk}"
+
+
+@cocotb.test()
+async def reset_in_mid_flow_starts_again(dut):
+    await start(dut)
+    for _ in range(7):
+        await RisingEdge(dut.clk)
+    dut.rst.value = 1
+    await RisingEdge(dut.clk)
+    dut.rst.value = 0
+    await FallingEdge(dut.clk)
+    assert int(dut.now.value) == 0
+    await RisingEdge(dut.clk)
+    await FallingEdge(dut.clk)
+    assert int(dut.now.value) == 1
+
+
+@pytest.mark.parametrize("w", [4, 64])
+def test_time_stamp(w):
+    run("time_stamp", __file__, W=w)

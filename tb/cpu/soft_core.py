@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What tb/cpu/program.c must find: the results of rv32im for two operands, in the order in which the program writes them."""
+MASK = (1 << 32) - 1
+
+
+def signed(x, w=32):
+    return (x & (1 << w) - 1) - (1 << w if x >> w - 1 & 1 else 0)
+
+
+def divide(a, b, w_signed):
+    """Quotient and remainder as RISC-V has them: towards zero, and defined for a divisor of 0 and for overflow."""
+    if w_signed:
+        a, b = signed(a), signed(b)
+    if b == 0:
+        return -1, a
+    quotient = abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)
+    return quotient, a - quotient * b
+
+
+def results(a, b):
+    sa, sb, n = signed(a), signed(b), b & 31
+    out = [a + b, a - b, a & b, a | b, a ^ b, a << n, a >> n, sa >> n, sa < sb, a < b,
+           a * b, sa * sb >> 32, sa * b >> 32, a * b >> 32]
+    (div, rem), (divu, remu) = divide(a, b, True), divide(a, b, False)
+    out += [div, divu, rem, remu]
+    memory = a.to_bytes(4, "little") + b.to_bytes(4, "little")
+    halves = [int.from_bytes(memory[k:k + 2], "little") for k in range(0, 8, 2)]
+    out += [*memory, *(signed(x, 8) for x in memory), *halves, *(signed(x, 16) for x in halves)]
+    out += [b, a, b & ~0xFF0000 | 0x5A0000, a & 0xFFFF | 0xA55A0000, a >> 8 & 0xFF]
+    return [int(x) & MASK for x in out]

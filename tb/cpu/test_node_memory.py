@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""node_memory: what the file says at power-up, single bytes, both ends, random accesses; and block RAM in synthesis."""
+import random
+import re
+import subprocess
+import sys
+from importlib.util import find_spec
+
+import cocotb
+import pytest
+from cocotb.clock import Clock
+from cocotb.triggers import FallingEdge, RisingEdge
+from node_memory import NodeMemory
+
+from bench import ROOT, run, source_of
+
+BYTES = 1024
+CONTENTS = [n * 0x9E3779B1 % (1 << 32) for n in range(BYTES // 4)]      # any words, all different
+
+
+def contents_in(path):
+    path.write_text("\n".join(f"{word:08x}" for word in CONTENTS))
+    return path
+
+
+async def clk(dut, read, write, address, wdata=0):
+    dut.read.value, dut.write.value, dut.address.value, dut.wdata.value = read, write, address, wdata
+    await RisingEdge(dut.clk)
+    await FallingEdge(dut.clk)
+    return dut.rdata.value
+
+
+async def begin(dut):
+    dut.read.value, dut.write.value = 0, 0
+    Clock(dut.clk, 10, "ns").start()
+    await FallingEdge(dut.clk)
+
+
+@cocotb.test()
+async def the_file_stands_in_it_at_power_up_and_latency_is_1(dut):
+    await begin(dut)
+    for n, word in enumerate(CONTENTS):
+        assert int(await clk(dut, 1, 0, n)) == word
+
+
+@cocotb.test()
+async def each_byte_enable_writes_its_byte_alone(dut):
+    await begin(dut)
+    for address in (0, BYTES // 4 - 1):
+        await clk(dut, 0, 15, address, 0x03020100)
+        for write, want in [(1, 0x030201AA), (2, 0x0302BBAA), (4, 0x03CCBBAA), (8, 0xDDCCBBAA)]:
+            await clk(dut, 0, write, address, 0xDDCCBBAA)
+            assert int(await clk(dut, 1, 0, address)) == want
+
+
+@cocotb.test()
+async def any_access_matches_the_model(dut):
+    await begin(dut)
+    model = NodeMemory([0] * (BYTES // 4))
+    for n in range(BYTES // 4):
+        await clk(dut, 0, 15, n, 0)
+    model.step(1, 0, 0, 0)
+    await clk(dut, 1, 0, 0)
+    for n in range(3000):
+        word = random.getrandbits(1), random.choice([0, 15, random.getrandbits(4)]), random.randrange(16), random.getrandbits(32)
+        assert int(await clk(dut, *word)) == model.step(*word), f"clk {n}"
+
+
+def test_node_memory():
+    (ROOT / "build").mkdir(exist_ok=True)
+    run("node_memory", __file__, BYTES=BYTES, FIRMWARE=str(contents_in(ROOT / "build" / "node_memory.hex")))
+
+
+@pytest.mark.skipif(not find_spec("pyosys"), reason="pyosys is not installed")
+def test_32_kib_are_16_block_rams_of_an_ecp5_and_hold_the_file(tmp_path):
+    """In a process of its own: the synthesis library keeps its memory, and one test should not be the next one's load."""
+    file = contents_in(tmp_path / "node_memory.hex")
+    script = f"""
+from pyosys import libyosys
+design = libyosys.Design()
+for step in ['read_verilog -sv {source_of("node_memory")}', 'chparam -set FIRMWARE "{file}" node_memory',
+             'synth_ecp5 -top node_memory', 'write_verilog {tmp_path / "netlist.v"}']:
+    design.run_pass('tee -q ' + step)
+"""
+    subprocess.run([sys.executable, "-c", script], check=True, timeout=120, stdout=subprocess.DEVNULL)
+    netlist = (tmp_path / "netlist.v").read_text()
+    assert netlist.count("DP16KD #(") == 16
+    assert len(re.findall(r"TRELLIS_FF #\(|TRELLIS_DPR16X4", netlist)) == 0
+    assert len(re.findall(r"\.INITVAL_00\(320'h(?=[0-9a-f]*[1-9a-f])", netlist)) == 16

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""register_bus: every block at both ends of its range, nobody's addresses, and random accesses against the model."""
+import random
+
+import cocotb
+import pytest
+from cocotb.clock import Clock
+from cocotb.triggers import FallingEdge
+from register_bus import RegisterBus
+
+from bench import run
+
+
+async def access(dut, model, select, address):
+    """One clk with this access; selects and answer are compared with the model, the answer is returned."""
+    word = lambda: random.getrandbits(32)
+    dut.select.value, dut.address.value = select, address
+    await FallingEdge(dut.clk)
+    got = int(dut.node_select.value), int(dut.line_select.value), int(dut.axis_select.value)
+    assert got == model.selects(select, address), f"address {address:#x}: selects {got}"
+    model.step(select, address)
+    node, line, axes = word(), word(), [word() for _ in range(model.axes)]
+    dut.node_rdata.value, dut.line_rdata.value = node, line
+    dut.axis_rdata.value = sum(x << 32 * n for n, x in enumerate(axes))
+    dut.select.value = 0
+    return node, line, axes
+
+
+async def check(dut, model, select, address):
+    """An access, then the clk in which its answer passes."""
+    blocks = await access(dut, model, select, address)
+    dut.select.value = select
+    await FallingEdge(dut.clk)
+    assert int(dut.rdata.value) == model.rdata(*blocks), f"address {address:#x}"
+    return int(dut.rdata.value), blocks
+
+
+async def begin(dut):
+    Clock(dut.clk, 10, "ns").start()
+    dut.select.value, dut.address.value, dut.node_rdata.value, dut.line_rdata.value, dut.axis_rdata.value = 0, 0, 0, 0, 0
+    await FallingEdge(dut.clk)
+    await FallingEdge(dut.clk)
+    return RegisterBus(int(dut.AXES.value))
+
+
+@cocotb.test()
+async def each_block_answers_at_both_ends_of_its_range(dut):
+    model = await begin(dut)
+    for block, base in [(0, 0x000), (1, 0x100)] + [(2 + n, 0x400 + 0x100 * n) for n in range(model.axes)]:
+        for address in (base, base + 0xFC):
+            value, (node, line, axes) = await check(dut, model, 1, address)
+            assert value == [node, line, *axes][block]
+
+
+@cocotb.test()
+async def nobody_answers_elsewhere(dut):
+    model = await begin(dut)
+    for address in (0x200, 0x3FC, 0x400 + 0x100 * model.axes, 0xFFFC):
+        assert (await check(dut, model, 1, address))[0] == 0
+    assert (await check(dut, model, 0, 0))[0] == 0
+
+
+@cocotb.test()
+async def any_access_matches_the_model(dut):
+    model = await begin(dut)
+    for _ in range(500):
+        await check(dut, model, random.getrandbits(1), random.choice([random.getrandbits(11), random.getrandbits(16)]) & ~3)
+
+
+@pytest.mark.parametrize("axes", [1, 3])
+def test_register_bus(axes):
+    run("register_bus", __file__, AXES=axes)

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""soft_core: a compiled program does every instruction and access width on operands from the register bus, then goes wrong
+in every way it can. The program's results are those of tb/cpu/soft_core.py."""
+import random
+import struct
+import subprocess
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+import cocotb
+from cocotb.triggers import FallingEdge, RisingEdge
+from soft_core import results
+
+from bench import ROOT, run, start
+
+BYTES = 2048
+BUILD = ROOT / "build" / "soft_core"
+OPERANDS = [0, 1, 2, 0xFFFFFFFF, 0x80000000, 0x7FFFFFFF, 0x0000FFFF, 31]
+TRAPS = range(1, 14)                    # ORDER in program.c
+A_TURN = len(results(0, 0))
+
+
+class Registers:
+    """The other side of the register bus: answers one clk after select, and keeps what was written."""
+
+    def __init__(self, dut):
+        self.dut, self.words, self.written, self.selects = dut, {0: 0, 4: 0, 8: 0}, [], 0
+
+    async def clk(self, rst=0):
+        """One clk; what the bus shows before its edge is what counts."""
+        dut = self.dut
+        dut.rst.value = rst
+        strobe = not rst and str(dut.select.value) == "1"
+        if strobe:
+            self.selects += 1
+            address = int(dut.address.value)
+            if int(dut.write.value):
+                self.written.append((address, int(dut.wdata.value)))
+        await RisingEdge(dut.clk)
+        dut.rdata.value = self.words.get(address, 0) if strobe and not int(dut.write.value) else random.getrandbits(32)
+        await FallingEdge(dut.clk)
+        return int(dut.trap.value)
+
+    async def until(self, done, clks=5000):
+        for n in range(clks):
+            if done():
+                return n
+            await self.clk()
+        raise AssertionError(f"the program did not come so far in {clks} clk")
+
+    def taken(self, address):
+        return [value for where, value in self.written if where == address]
+
+
+async def begin(dut):
+    await start(dut, rdata=0)
+    registers = Registers(dut)
+    for _ in range(3):
+        await registers.clk(rst=1)
+    return registers
+
+
+@cocotb.test()
+async def every_instruction_and_access_width_has_the_right_result(dut):
+    registers = await begin(dut)
+    pairs = [(a, b) for a in OPERANDS[:6] for b in (0, 0xFFFFFFFF)] + [(0x80000000, 31), (0x7FFFFFFF, 0x80000000)]
+    pairs += [(random.getrandbits(32), random.getrandbits(random.choice([5, 16, 32]))) for _ in range(8)]
+    for a, b in pairs:                                  # each is set just after the last result of the one before
+        registers.written.clear()
+        registers.words[0], registers.words[4] = a, b
+        await registers.until(lambda: len(registers.taken(0xFFFC)) >= A_TURN)
+        got, want = registers.taken(0xFFFC), results(a, b)
+        assert got == want, f"operands {a:#x}, {b:#x}: results {[n for n, (g, w) in enumerate(zip(got, want)) if g != w]} are wrong"
+        assert not int(dut.trap.value)
+
+
+@cocotb.test()
+async def it_starts_with_the_stack_at_the_end_of_the_memory(dut):
+    registers = await begin(dut)
+    await registers.until(lambda: registers.taken(0x10))
+    assert registers.taken(0x0C) == [BYTES]
+
+
+@cocotb.test()
+async def every_wrong_access_traps_and_reset_starts_again(dut):
+    registers = await begin(dut)
+    await registers.until(lambda: registers.taken(0x10))
+    starts = registers.taken(0x10)[0]
+    for order in TRAPS:
+        registers.words[8] = order
+        await registers.until(lambda: str(dut.trap.value) == "1")
+        written, selects = len(registers.written), registers.selects
+        for _ in range(200):
+            assert await registers.clk(), f"order {order}: the trap stands until reset"
+        assert (len(registers.written), registers.selects) == (written, selects), f"order {order}: the bus is quiet in a trap"
+        assert all(where in (0x0C, 0x10, 0xFFFC) for where, _ in registers.written), f"order {order}: nothing was written elsewhere"
+        registers.words[8] = 0
+        registers.written.clear()
+        assert not await registers.clk(rst=1)
+        await registers.until(lambda: len(registers.taken(0xFFFC)) >= 20)
+        starts += 1
+        assert registers.taken(0x10) == [starts], "the memory keeps what it holds through a reset"
+
+
+@cocotb.test()
+async def an_operation_takes_3_clk_a_product_6_a_quotient_40_and_a_register_access_6(dut):
+    registers = await begin(dut)
+    registers.words[0], registers.words[4] = 0x12345678, 0x9ABC
+    times = []
+    for n in range(700):
+        before = len(registers.taken(0xFFFC))
+        await registers.clk()
+        times += [n] * (len(registers.taken(0xFFFC)) - before)
+    took = [b - a - 6 for a, b in zip(times, times[1:])]           # an operation and a write to RESULT
+    dut._log.info(f"clk for sub … remu: {took[:17]}")
+    assert took[:9] == [3] * 9 and took[9:13] == [6] * 4 and took[13:17] == [40] * 4
+
+
+@cocotb.test()
+async def a_register_access_is_one_strobe(dut):
+    registers = await begin(dut)
+    await registers.until(lambda: registers.taken(0x10))
+    strobes = []
+    for _ in range(500):
+        strobes.append(int(dut.select.value))
+        await registers.clk()
+    assert sum(strobes) > 10 and not any(a and b for a, b in zip(strobes, strobes[1:]))
+
+
+def compiled():
+    """The program as a file for $readmemh, the whole memory long; by the tools of the firmware's own build."""
+    found = spec_from_file_location("firmware_build", ROOT / "sw" / "firmware" / "build.py")
+    firmware = module_from_spec(found)
+    found.loader.exec_module(firmware)
+    here, command, libraries = Path(__file__).parent, *firmware.compiler()
+    BUILD.mkdir(parents=True, exist_ok=True)
+    elf, words = BUILD / "program.elf", BUILD / "program.hex"
+    subprocess.run([*command, *firmware.FLAGS, f"-DMEMORY_BYTES={BYTES}", f"-Wl,-T,{here / 'program.ld'}", "-o", str(elf),
+                    str(here / "program.c"), *libraries], check=True, timeout=300)
+    content, _ = firmware.image(firmware.load_segments(elf.read_bytes())[0], BYTES)
+    words.write_text("".join(f"{word:08x}\n" for (word,) in struct.iter_unpack("<I", content)))
+    return words
+
+
+def test_soft_core():
+    run("soft_core", __file__, MEMORY_BYTES=BYTES, FIRMWARE=str(compiled()))

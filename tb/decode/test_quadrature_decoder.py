@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""quadrature_decoder: a known turn, the jitter of S0, the wrap, the illegal edge, its start, and random levels against the model."""
+import random
+
+import cocotb
+import pytest
+from cocotb.triggers import FallingEdge, RisingEdge
+
+from bench import run, start
+from quadrature_decoder import QuadratureDecoder
+
+TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]        # a leads b: up
+
+
+async def begin(dut, a=0, b=0, settled=True):
+    """Reset with the pins at these levels; the model has seen the same clk."""
+    await start(dut, a=a, b=b)
+    model = QuadratureDecoder(int(dut.W.value), int(dut.SETTLE.value))
+    model.step(a, b, 1)
+    if settled:
+        await drive(dut, model, [(a, b)] * int(dut.SETTLE.value))
+    return model
+
+
+async def drive(dut, model, levels, rst=0):
+    """Put each (a, b) on the pins for one clk and hold the model beside the design; return (count, step, illegal) of each clk."""
+    out = []
+    dut.rst.value = rst
+    for clk, (a, b) in enumerate(levels):
+        dut.a.value, dut.b.value = a, b
+        await RisingEdge(dut.clk)
+        await FallingEdge(dut.clk)
+        got = dut.count.value.to_signed(), dut.step.value.to_signed(), int(dut.illegal.value)
+        want = model.step(a, b, rst)
+        assert got == want, f"clk {clk}: (count, step, illegal) is {got}, the model has {want}"
+        out.append(got)
+    dut.rst.value = 0
+    return out
+
+
+@cocotb.test()
+async def latency_is_1(dut):
+    model = await begin(dut)
+    assert await drive(dut, model, [(1, 0), (1, 0)]) == [(1, 1, 0), (1, 0, 0)]
+
+
+@cocotb.test()
+async def one_turn_is_four_counts(dut):
+    model = await begin(dut)
+    assert [count for count, _, _ in await drive(dut, model, TURN[1:] + TURN[:1])] == [1, 2, 3, 4]
+    assert [count for count, _, _ in await drive(dut, model, TURN[::-1])] == [3, 2, 1, 0]
+
+
+@cocotb.test()
+async def s0_up_is_a_rising_while_b_is_low_and_down_while_b_is_high(dut):
+    model = await begin(dut)
+    assert (await drive(dut, model, [(1, 0)]))[-1] == (1, 1, 0)
+    await drive(dut, model, [(1, 1), (0, 1)])
+    assert (await drive(dut, model, [(1, 1)]))[-1] == (2, -1, 0)
+
+
+@cocotb.test()
+async def s0_jitter_reversal_over_falling_edge_c_leaves_no_count_too_many(dut):
+    model = await begin(dut)
+    before, _, _ = (await drive(dut, model, [(1, 0), (1, 1)]))[-1]
+    for _ in range(5):                                  # past C (a falls, b high) and back over it
+        out = await drive(dut, model, [(0, 1), (1, 1)])
+        assert out == [(before + 1, 1, 0), (before, -1, 0)]
+    assert (await drive(dut, model, [(1, 0), (0, 0)]))[-1][0] == 0
+
+
+@cocotb.test()
+async def s0_jitter_reversal_over_rising_edge_b_is_not_half_a_pulse_off(dut):
+    model = await begin(dut)
+    for _ in range(5):                                  # past B (a rises, b low) and back over it
+        assert await drive(dut, model, [(1, 0), (0, 0)]) == [(1, 1, 0), (0, -1, 0)]
+    assert (await drive(dut, model, TURN[1:] + TURN[:1]))[-1][0] == 4
+
+
+@cocotb.test()
+async def power_up_at_any_levels_makes_no_count(dut):
+    for a, b in TURN:
+        model = await begin(dut, a, b, settled=False)
+        assert await drive(dut, model, [(a, b)] * 20) == [(0, 0, 0)] * 20
+
+
+@cocotb.test()
+async def levels_that_arrive_late_after_reset_make_no_count(dut):
+    model = await begin(dut, 0, 0, settled=False)
+    late = int(dut.SETTLE.value) - 1                    # what is in front fills meanwhile
+    assert await drive(dut, model, [(0, 0)] * late + [(1, 1)] * 9) == [(0, 0, 0)] * (late + 9)
+    assert (await drive(dut, model, [(0, 1)]))[-1] == (1, 1, 0)
+
+
+@cocotb.test()
+async def illegal_edges_are_reported_and_never_count(dut):
+    model = await begin(dut)
+    for a, b in [(0, 0), (1, 1), (0, 0), (1, 1)] * 5:
+        (count, step, _), = await drive(dut, model, [(a, b)])
+        assert (count, step) == (0, 0)
+    assert (await drive(dut, model, [(0, 0)]))[-1] == (0, 0, 1)
+    await drive(dut, model, [(1, 0)])
+    assert (await drive(dut, model, [(0, 1)]))[-1] == (1, 0, 1)
+    assert (await drive(dut, model, [(0, 0)]))[-1] == (2, 1, 0)        # the new levels are the state from here on
+
+
+@cocotb.test()
+async def count_wraps_and_comes_back(dut):
+    model = await begin(dut)
+    there = TURN * (1 << min(int(dut.W.value), 8))
+    await drive(dut, model, there)
+    assert (await drive(dut, model, there[::-1]))[-1][0] == 0
+
+
+@cocotb.test()
+async def reset_in_the_middle_of_a_motion_makes_zero_of_where_it_is(dut):
+    model = await begin(dut)
+    await drive(dut, model, TURN * 2 + TURN[:3])
+    assert await drive(dut, model, [TURN[3]], rst=1) == [(0, 0, 0)]
+    await drive(dut, model, [TURN[3]] * int(dut.SETTLE.value))
+    assert (await drive(dut, model, [TURN[0]]))[-1] == (1, 1, 0)
+
+
+@cocotb.test()
+async def any_levels_match_the_model(dut):
+    model = await begin(dut)
+    for _ in range(20):
+        await drive(dut, model, [(random.getrandbits(1), random.getrandbits(1)) for _ in range(250)])
+        place, path = 0, []
+        for _ in range(250):                            # legal edges only, with pauses
+            place += random.choice([-1, 0, 0, 1])
+            path.append(TURN[place % 4])
+        await drive(dut, model, path)
+        if random.random() < 0.3:
+            await drive(dut, model, path[:1], rst=1)
+
+
+@pytest.mark.parametrize("w, settle", [(32, 8), (4, 1)])
+def test_quadrature_decoder(w, settle):
+    run("quadrature_decoder", __file__, W=w, SETTLE=settle)

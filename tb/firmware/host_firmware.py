@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The firmware as a shared library of this computer, its registers served by Python."""
+import ctypes
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE = ROOT / "sw" / "firmware"
+BRIDGE = Path(__file__).with_name("register_bridge.c")
+LIBRARY = ROOT / "build" / "firmware" / "host_firmware.so"
+SEGMENTS = 16
+
+
+class Limits(ctypes.Structure):
+    _fields_ = [("velocity", ctypes.c_uint64), ("acceleration", ctypes.c_uint64), ("jerk", ctypes.c_uint32)]
+
+
+class Segment(ctypes.Structure):
+    _fields_ = [("velocity", ctypes.c_int64), ("acceleration", ctypes.c_int64), ("jerk", ctypes.c_int32), ("ticks", ctypes.c_uint32)]
+
+
+class Plan(ctypes.Structure):
+    _fields_ = [("ticks", ctypes.c_uint32), ("count", ctypes.c_uint8), ("next", ctypes.c_uint8), ("segment", Segment * SEGMENTS)]
+
+
+READ = ctypes.CFUNCTYPE(ctypes.c_uint32, ctypes.c_uint32)
+WRITE = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32)
+
+
+@cache
+def library():
+    """Compile if a source is newer; gcc or clang of the system, else zig."""
+    sources = [*sorted(SOURCE.glob("*.[ch]")), BRIDGE]
+    if not LIBRARY.exists() or LIBRARY.stat().st_mtime < max(path.stat().st_mtime for path in sources):
+        command = next(([name] for name in ("cc", "gcc", "clang", "g++") if shutil.which(name)), [sys.executable, "-m", "ziglang", "cc"])
+        LIBRARY.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=LIBRARY.parent) as folder:     # two runs at once must not meet
+            made = Path(folder) / LIBRARY.name
+            subprocess.run([*command, "-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion", "-Werror",
+                            "-fsanitize=undefined", "-fsanitize-undefined-trap-on-error",      # undefined behaviour ends the test
+                            "-shared", "-fPIC", "-DMOIRE_REGISTER_ACCESS", f"-I{SOURCE}",
+                            *(str(path) for path in sources if path.suffix == ".c"), "-o", str(made)], check=True)
+            os.replace(made, LIBRARY)
+    loaded = ctypes.CDLL(str(LIBRARY))
+    loaded.planner_limits.restype = Limits
+    loaded.planner_move.restype = loaded.planner_take.restype = ctypes.c_bool
+    loaded.planner_move.argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Limits), ctypes.c_int64]
+    return loaded

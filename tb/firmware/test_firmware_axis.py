@@ -1,0 +1,492 @@
+# SPDX-License-Identifier: Apache-2.0
+"""axis.c: enabling, moving, stopping, homing and what a fault does, on an axis that lives in fake_machine."""
+import random
+
+import pytest
+from fake_machine import DEFINES, FAULT, PARAMETER, PERIOD, Axis, Machine
+from planner import distance, limits
+
+from bench import seed
+
+HOLD = DEFINES["AXIS_STROBES_HOLD_HERE_MASK"]
+BRAKE = DEFINES["AXIS_STROBES_BRAKE_MASK"]
+RESET = DEFINES["AXIS_STROBES_RESET_FAULTS_MASK"]
+ENABLE = DEFINES["AXIS_CONTROL_ENABLE_MASK"]
+CLOSED_LOOP = DEFINES["AXIS_CONTROL_CLOSED_LOOP_MASK"]
+HOMING = DEFINES["AXIS_CONTROL_HOMING_MASK"]
+STEPS_OF_HOMING = [3, 40, 68, 72, 76, 80, 120, 170, 190, 205]     # ms: approach, catch, creep, depart, settle, zero
+DISTANCE = 100 * PERIOD                                     # from switch to zero
+SHORT = {"travel_low": -50 * PERIOD, "travel_high": 2000 * PERIOD, "home_distance": DISTANCE, "home_velocity": 2000}
+
+
+def enabled(*axes, **parameters):
+    machine = Machine(*axes)
+    machine.set(**{**SHORT, **parameters})
+    machine.ask("enable", axis=0, on=1)
+    return machine
+
+
+def homed(axis=None, **parameters):
+    machine = enabled(axis or Axis(position=50 * PERIOD, low=0), **parameters)
+    machine.ask("home", axis=0)
+    assert machine.run(20_000, until=lambda: machine.status()["ended"] != "running")
+    assert machine.status()["ended"] == "ok"
+    return machine
+
+
+def finish(machine, ms=20_000):
+    assert machine.run(ms, until=lambda: machine.status()["ended"] != "running"), "the motion does not end"
+    return machine.status()["ended"]
+
+
+# enable
+
+def test_the_drive_is_off_at_start():
+    machine = Machine()
+    machine.run(10)
+    status = machine.status()
+    assert (status["state"], status["ended"], status["flags"]) == ("off", "never", set())
+    assert machine.axes[0].control == 0
+
+
+def test_enable_holds_here_before_the_loop_is_closed():
+    axis = Axis(position=12345)
+    machine = Machine(axis)
+    axis.player.target, axis.strobes = 0, []
+    machine.ask("enable", axis=0, on=1)
+    assert axis.strobes == [(HOLD, 0)] and axis.control == ENABLE | CLOSED_LOOP and axis.target == 12345
+    status = machine.status()
+    assert status["state"] == "holding" and status["flags"] == {"enabled", "settled"}
+
+
+def test_enable_twice_does_not_disturb_a_motion():
+    machine = homed()
+    machine.ask("move", axis=0, target=500 * PERIOD)
+    machine.run(5)
+    machine.axes[0].strobes = []
+    machine.ask("enable", axis=0, on=1)
+    assert machine.axes[0].strobes == [] and machine.status()["state"] == "moving"
+
+
+def test_enable_off_is_always_allowed_and_ends_a_motion():
+    machine = homed()
+    machine.ask("move", axis=0, target=500 * PERIOD)
+    machine.run(20)
+    machine.ask("enable", axis=0, on=0)
+    status = machine.status()
+    assert (status["state"], status["ended"]) == ("off", "stopped") and "enabled" not in status["flags"]
+    assert not machine.axes[0].player.moving and machine.axes[0].control == 0
+    machine.ask("enable", axis=0, on=0)
+    assert "homed" in machine.status()["flags"]
+
+
+def test_enable_takes_only_0_and_1():
+    assert Machine().request("enable", axis=0, on=2)[0] == "out_of_range"
+
+
+@pytest.mark.parametrize("fault", ["estop", "drive"])
+def test_enable_is_refused_while_a_fault_is_latched(fault):
+    machine = Machine()
+    machine.axes[0].causes = FAULT[fault]
+    machine.run(2)
+    assert machine.request("enable", axis=0, on=1)[0] == "faulted" and machine.axes[0].control == 0
+    machine.ask("enable", axis=0, on=0)
+
+
+def test_enable_is_refused_if_the_guard_does_not_agree():
+    """Causes that latch only when the drive is asked for."""
+    machine = Machine()
+    machine.axes[0].causes = FAULT["encoder"]
+    assert machine.request("enable", axis=0, on=1)[0] == "faulted"
+    assert machine.status()["state"] == "faulted" and machine.axes[0].control == 0
+
+
+# move
+
+def test_a_move_ends_exactly_at_its_target():
+    machine = homed()
+    for target in (500 * PERIOD + 1, 500 * PERIOD, 0, SHORT["travel_low"], SHORT["travel_high"]):
+        ticks = machine.ask("move", axis=0, target=target)["duration_ticks"]
+        assert machine.status()["state"] in ("moving", "settling")
+        assert finish(machine, ticks / 4 + 100) == "ok"
+        status = machine.status()
+        assert status["target"] == status["position"] == target and status["state"] == "holding"
+
+
+def test_the_duration_is_that_of_the_profile():
+    machine = homed()
+    ticks = machine.ask("move", axis=0, target=700 * PERIOD)["duration_ticks"]
+    machine.run(ticks // 4)
+    assert machine.axes[0].player.moving == bool(ticks % 4)
+    machine.run(1)
+    assert not machine.axes[0].player.moving and machine.axes[0].target == 700 * PERIOD
+
+
+def test_each_limit_of_the_motion_counts_from_when_it_is_set():
+    machine = homed()
+    last = machine.ask("move", axis=0, target=100 * PERIOD)["duration_ticks"]
+    assert finish(machine) == "ok"
+    for n, (name, value) in enumerate((("jerk", 1_000_000), ("acceleration", 20_000), ("velocity", 700))):
+        machine.set(**{name: value})
+        ticks = machine.ask("move", axis=0, target=100 * PERIOD * (n % 2))["duration_ticks"]
+        assert finish(machine) == "ok" and ticks > last
+        last = ticks
+    assert machine.axes[0].word[DEFINES["AXIS_BRAKE_RATE"]] == limits(700, 20_000, 1_000_000)[1] >> 8
+
+
+def test_a_move_to_where_the_axis_is_ends_after_the_settling_time():
+    machine = homed()
+    assert machine.ask("move", axis=0, target=0)["duration_ticks"] == 0
+    assert machine.status()["ended"] == "running"
+    assert finish(machine, PARAMETER["settle_time"]["default"] + 2) == "ok"
+
+
+def test_any_sequence_of_moves_lands_exactly():
+    draw = random.Random(seed())
+    machine = homed(jerk=2_000_000_000, acceleration=3_000_000)
+    for _ in range(60):
+        target = draw.randrange(SHORT["travel_low"], SHORT["travel_high"] + 1)
+        machine.ask("move", axis=0, target=target)
+        assert finish(machine) == "ok" and machine.status()["position"] == target
+
+
+def test_a_move_longer_than_the_longest_segment_is_fed_piece_by_piece():
+    machine = homed(velocity=1, travel_high=20_000 * PERIOD)
+    axis = machine.axes[0]
+    axis.pushed = []
+    ticks = machine.ask("move", axis=0, target=20_000 * PERIOD)["duration_ticks"]
+    assert ticks > 4 * (1 << 24)
+    while sum(segment[3] for segment in axis.pushed) < ticks:
+        axis.player.queue.clear()                           # as if they had been played
+        machine.poll()
+    assert [segment[4] for segment in axis.pushed][-1] == 1 and not any(segment[4] for segment in axis.pushed[:-1])
+
+
+def test_motions_are_refused_in_the_documented_order():
+    axis = Axis(position=50 * PERIOD, low=0)
+    machine = Machine(axis)
+    machine.set(**SHORT)
+
+    def move(target=0):
+        return machine.request("move", axis=0, target=target)[0]
+
+    beyond = SHORT["travel_high"] + 1
+    axis.causes = FAULT["estop"]
+    machine.run(1)
+    assert move(beyond) == machine.request("home", axis=0)[0] == "faulted"
+    axis.causes = 0
+    machine.ask("reset_faults", axis=0)
+    assert move(beyond) == machine.request("home", axis=0)[0] == "not_enabled"
+    machine.ask("enable", axis=0, on=1)
+    assert move(beyond) == "not_homed"
+    machine.ask("home", axis=0)
+    assert move(beyond) == machine.request("home", axis=0)[0] == "busy"
+    assert finish(machine) == "ok"
+    assert move(beyond) == move(SHORT["travel_low"] - 1) == move(-2**63) == move(2**63 - 1) == "out_of_travel"
+    assert move(1000 * PERIOD) == "ok"
+    assert move(0) == machine.request("home", axis=0)[0] == "busy"
+
+
+def test_parameters_are_refused_while_the_axis_moves():
+    machine = homed()
+    machine.ask("move", axis=0, target=500 * PERIOD)
+    assert machine.request("set_parameter", axis=0, parameter=PARAMETER["kp"]["id"], value=1)[0] == "busy"
+    machine.ask("get_parameter", axis=0, parameter=PARAMETER["kp"]["id"])
+    finish(machine)
+    machine.set(kp=1)
+
+
+def test_a_move_of_days_is_refused():
+    machine = homed()
+    machine.set(velocity=1, travel_high=2**46)
+    assert machine.request("move", axis=0, target=2**46)[0] == "out_of_range"
+    assert machine.status()["state"] == "holding"
+
+
+def test_an_axis_that_does_not_arrive_is_not_settled_but_goes_on_holding():
+    machine = homed(settle_timeout=200, following_limit=2**31 - 1)
+    machine.axes[0].seized = True
+    machine.ask("move", axis=0, target=PERIOD)
+    assert finish(machine) == "not_settled"
+    assert machine.status()["state"] == "holding" and "enabled" in machine.status()["flags"]
+    assert "settled" not in machine.status()["flags"]
+
+
+def test_settling_means_the_whole_time_inside_the_window():
+    machine = homed(settle_time=50, settle_timeout=2000)
+    axis = machine.axes[0]
+    machine.ask("move", axis=0, target=PERIOD)
+    assert machine.run(5000, until=lambda: machine.status()["state"] == "settling")
+    for _ in range(5):
+        machine.run(30)
+        assert machine.status()["ended"] == "running"
+        axis.machine += PERIOD                              # pushed out
+        machine.poll()
+    machine.run(60)
+    assert machine.status()["ended"] == "ok"
+
+
+# stop
+
+def test_stop_brakes_and_keeps_the_drive_on():
+    machine = homed()
+    machine.ask("move", axis=0, target=1500 * PERIOD)
+    machine.run(100)
+    before = machine.axes[0].position
+    machine.axes[0].strobes = []
+    machine.ask("stop", axis=0)
+    assert [strobes for strobes, _ in machine.axes[0].strobes] == [BRAKE] and machine.status()["state"] == "stopping"
+    machine.ask("stop", axis=0)                             # once more changes nothing
+    assert len(machine.axes[0].strobes) == 1
+    assert machine.request("move", axis=0, target=0)[0] == "busy"
+    assert finish(machine) == "stopped"
+    status = machine.status()
+    assert status["state"] == "holding" and "enabled" in status["flags"]
+    assert before < status["position"] < before + 200 * PERIOD
+    machine.ask("move", axis=0, target=0)
+    assert finish(machine) == "ok"
+
+
+def test_stop_while_nothing_moves_is_done():
+    machine = homed()
+    machine.ask("stop", axis=0)
+    assert machine.status()["ended"] == "ok" and machine.status()["state"] == "holding"
+    machine.ask("enable", axis=0, on=0)
+    machine.ask("stop", axis=0)
+
+
+def test_stop_while_settling_ends_it():
+    machine = homed(settle_time=500)
+    machine.ask("move", axis=0, target=PERIOD)
+    assert machine.run(5000, until=lambda: machine.status()["state"] == "settling")
+    machine.ask("stop", axis=0)
+    assert machine.status()["ended"] == "stopped"
+
+
+# faults
+
+@pytest.mark.parametrize("fault", [name for name in FAULT if name not in ("limit_low", "limit_high", "following_error")])
+def test_a_fault_ends_the_motion_and_is_named(fault):
+    machine = homed()
+    axis = machine.axes[0]
+    machine.ask("move", axis=0, target=1500 * PERIOD)
+    machine.run(100)
+    axis.causes = FAULT[fault]
+    machine.run(2)
+    where, status = axis.position, machine.status()
+    assert (status["state"], status["ended"]) == ("faulted", "ended_by_fault") and "enabled" not in status["flags"]
+    assert status["faults"] == status["first_fault"] == FAULT[fault] and not axis.player.moving and axis.control == 0
+    assert machine.ask("encoder", axis=0)["fault_position"] == where
+    assert ("homed" in status["flags"]) == (fault != "encoder")         # only an encoder fault loses the zero
+    assert machine.request("move", axis=0, target=0)[0] == "faulted"
+
+    if fault in ("estop", "drive", "cpu"):
+        assert machine.request("reset_faults", axis=0)[0] == "fault_stands"
+    axis.causes = 0
+    machine.ask("reset_faults", axis=0)
+    assert machine.status()["state"] == "off" and machine.status()["faults"] == 0
+    machine.ask("enable", axis=0, on=1)
+    assert machine.request("move", axis=0, target=0)[0] == ("ok" if fault != "encoder" else "not_homed")
+
+
+def test_a_fault_while_nothing_moves_leaves_the_outcome_of_the_last_motion():
+    machine = homed()
+    machine.axes[0].causes = FAULT["estop"]
+    machine.run(2)
+    assert machine.status()["state"] == "faulted" and machine.status()["ended"] == "ok"
+
+
+def test_an_axis_that_cannot_follow_is_a_fault():
+    machine = homed(following_limit=3 * PERIOD)
+    machine.axes[0].seized = True
+    machine.ask("move", axis=0, target=100 * PERIOD)
+    assert finish(machine) == "ended_by_fault" and machine.status()["faults"] == FAULT["following_error"]
+    machine.axes[0].seized = False
+    machine.ask("reset_faults", axis=0)
+    machine.ask("enable", axis=0, on=1)
+    assert machine.status()["state"] == "holding"
+
+
+def test_reset_without_a_fault_does_not_switch_the_drive_off():
+    machine = homed()
+    machine.axes[0].strobes = []
+    machine.ask("reset_faults", axis=0)
+    assert machine.status()["state"] == "holding" and machine.axes[0].strobes == []
+
+
+def test_reset_forgets_the_encoder_events():
+    machine = Machine()
+    machine.axes[0].word[DEFINES["AXIS_ENCODER_EVENTS"]] = 0b10101
+    assert machine.status()["encoder_events"] == 0b10101
+    machine.ask("reset_faults", axis=0)
+    assert machine.status()["encoder_events"] == 0
+
+
+def test_reset_is_asked_for_with_enable_off():
+    machine = homed()
+    axis = machine.axes[0]
+    axis.causes = FAULT["estop"]
+    machine.run(1)
+    axis.causes, axis.strobes = 0, []
+    machine.ask("reset_faults", axis=0)
+    assert [(strobes, control & ENABLE) for strobes, control in axis.strobes] == [(RESET, 0)]
+
+
+def test_running_into_a_switch_is_a_fault_and_there_is_a_way_off_it():
+    machine = homed(Axis(position=50 * PERIOD, low=0, high=300 * PERIOD))
+    axis = machine.axes[0]
+    machine.ask("move", axis=0, target=1000 * PERIOD)
+    assert finish(machine) == "ended_by_fault" and machine.status()["first_fault"] == FAULT["limit_high"]
+    machine.ask("reset_faults", axis=0)
+    machine.ask("enable", axis=0, on=1)
+    machine.run(10)
+    assert axis.pressed_high and axis.control & HOMING and machine.status()["state"] == "holding"
+    machine.ask("move", axis=0, target=0)
+    assert finish(machine) == "ok" and not axis.control & HOMING          # off the switch it is a fault again
+    machine.ask("move", axis=0, target=1000 * PERIOD)
+    assert finish(machine) == "ended_by_fault"
+
+
+def test_faults_of_one_axis_leave_the_other_alone():
+    machine = Machine(Axis(), Axis())
+    for axis in (0, 1):
+        machine.ask("enable", axis=axis, on=1)
+    machine.axes[1].causes = FAULT["encoder"]
+    machine.run(5)
+    assert machine.status(axis=0)["state"] == "holding" and machine.status(axis=1)["state"] == "faulted"
+
+
+# home
+
+def place(axis):
+    """Where the zero of the node lies, in positions of the machine."""
+    return -axis.origin
+
+
+@pytest.mark.parametrize("offset", [0, 1, PERIOD // 2 - 1, PERIOD // 2, PERIOD - 1, 17 * PERIOD + 12345])
+def test_home_puts_the_zero_at_a_phase_zero_a_distance_from_the_edge(offset):
+    machine = homed(Axis(position=50 * PERIOD, low=-10 * PERIOD + offset))
+    axis, answer = machine.axes[0], machine.ask("encoder", axis=0)
+    edge = axis.low_at + PERIOD // 2                        # where the switch opens
+    assert place(axis) % PERIOD == 0
+    asked = place(axis) + answer["home_phase"]              # edge + distance, as the firmware saw it
+    assert abs(answer["home_phase"]) <= PERIOD // 2
+    assert 0 <= asked - edge - DISTANCE < PERIOD // 4       # the creep goes on for at most two polls
+    assert axis.position == axis.target == 0 and machine.status()["state"] == "holding"
+    assert machine.status()["flags"] == {"enabled", "homed", "settled"} and not axis.control & HOMING
+
+
+def test_home_stops_creeping_when_the_switch_opens():
+    machine = homed()
+    assert [strobes for strobes, _ in machine.axes[0].strobes].count(BRAKE) == 1
+
+
+def test_the_target_follows_an_axis_that_slides_into_its_switch():
+    axis = Axis(position=50 * PERIOD, low=0)
+    machine = enabled(axis, following_limit=8 * PERIOD)
+    machine.ask("home", axis=0)
+    assert machine.run(1000, until=lambda: axis.pressed_low)
+    machine.poll()
+    axis.seized = True
+    for _ in range(20):
+        axis.machine -= PERIOD
+        machine.run(1)
+    axis.seized = False
+    assert axis.machine < -19 * PERIOD and finish(machine) == "ok"
+
+
+def test_the_longest_search_stays_inside_the_numbers():
+    axis = Axis()
+    machine = enabled(axis, travel_low=-2**47, travel_high=2**47 - 1, home_velocity=1_000_000)
+    machine.ask("home", axis=0)
+    machine.poll(10)
+    assert distance(segment[:4] for segment in axis.pushed) == -2**46 << 24
+
+
+def test_home_comes_back_to_a_switch_that_threw_the_axis_off():
+    axis = Axis(position=50 * PERIOD, low=0)
+    machine = enabled(axis)
+    machine.ask("home", axis=0)
+    assert machine.run(1000, until=lambda: axis.pressed_low)
+    axis.machine = 7 * PERIOD
+    assert finish(machine) == "ok"
+    assert 0 <= place(axis) + machine.ask("encoder", axis=0)["home_phase"] - DISTANCE - PERIOD // 2 < PERIOD // 4
+
+
+def test_home_works_at_the_high_end_too():
+    machine = homed(Axis(position=0, high=33 * PERIOD), home_end=1)
+    asked = place(machine.axes[0]) + machine.ask("encoder", axis=0)["home_phase"]
+    assert -PERIOD // 4 < asked - (33 * PERIOD - PERIOD // 2 - DISTANCE) <= 0
+
+
+@pytest.mark.parametrize("depth", [0, PERIOD // 3, 20 * PERIOD])
+def test_home_from_a_pressed_switch_goes_away_first(depth):
+    axis = Axis(position=-depth, low=0)
+    machine = homed(axis)
+    assert axis.pushed[0][2] > 0                            # the first jerk leads away
+    assert 0 <= place(axis) + machine.ask("encoder", axis=0)["home_phase"] - DISTANCE - PERIOD // 2 < PERIOD // 4
+
+
+def test_home_twice_finds_the_same_zero():
+    axis = Axis(position=50 * PERIOD, low=777)
+    machine = homed(axis)
+    first = place(axis)
+    machine.ask("move", axis=0, target=500 * PERIOD)
+    assert finish(machine) == "ok"
+    machine.ask("home", axis=0)
+    assert "homed" not in machine.status()["flags"] and machine.status()["state"] == "homing"
+    assert finish(machine) == "ok" and place(axis) == first
+
+
+def test_home_without_a_switch_ends_within_the_travel():
+    machine = enabled(Axis(position=0))
+    machine.ask("home", axis=0)
+    assert finish(machine) == "no_switch"
+    span = SHORT["travel_high"] - SHORT["travel_low"] + DISTANCE
+    assert machine.axes[0].target == -span and machine.status()["flags"] == {"enabled", "settled"}
+
+
+def test_home_with_a_switch_that_does_not_open_ends_after_the_home_distance():
+    axis = Axis(position=30 * PERIOD, low=0)
+    axis.stuck_low = True
+    machine = enabled(axis)
+    machine.ask("home", axis=0)
+    assert finish(machine) == "switch_stuck" and axis.position < DISTANCE + PERIOD
+    assert machine.request("move", axis=0, target=0)[0] == "not_homed"
+
+
+def test_home_that_does_not_settle_says_so():
+    axis = Axis(position=30 * PERIOD, low=0)
+    machine = enabled(axis, settle_timeout=100, following_limit=2**31 - 1)
+    machine.ask("home", axis=0)
+    assert machine.run(20_000, until=lambda: axis.position > DISTANCE)
+    axis.seized = True
+    axis.machine += PERIOD
+    assert finish(machine) == "not_settled" and "homed" not in machine.status()["flags"]
+
+
+@pytest.mark.parametrize("ms", STEPS_OF_HOMING)
+def test_home_can_be_stopped_at_any_time(ms):
+    axis = Axis(position=100 * PERIOD, low=0)
+    machine = enabled(axis)
+    machine.ask("home", axis=0)
+    machine.run(ms)
+    machine.ask("stop", axis=0)
+    assert finish(machine) == "stopped"
+    status = machine.status()
+    assert status["state"] == "holding" and "homed" not in status["flags"] and status["faults"] == 0
+    assert bool(axis.control & HOMING) == axis.pressed_low
+    machine.ask("home", axis=0)
+    assert finish(machine) == "ok"
+
+
+@pytest.mark.parametrize("ms", STEPS_OF_HOMING)
+def test_a_fault_ends_homing(ms):
+    axis = Axis(position=100 * PERIOD, low=0)
+    machine = enabled(axis)
+    machine.ask("home", axis=0)
+    machine.run(ms)
+    axis.causes = FAULT["estop"]
+    machine.run(2)
+    status = machine.status()
+    assert (status["state"], status["ended"]) == ("faulted", "ended_by_fault") and axis.control == 0 and "homed" not in status["flags"]

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""planner: every move lands exactly, keeps its limits and is nearly as short as motion can be."""
+import ctypes
+import random
+
+import pytest
+from host_firmware import Plan, Segment, library
+from planner import distance, gone, limits, peaks, shortest, steps
+
+from bench import seed
+
+S0 = 6000, 125_000, 12_500_000                      # the stage of S0: period/s, /s2, /s3
+LONGER_TICKS = 4                                    # a move is at most so many ticks (and four are the fewest) ...
+LONGER = 1.001                                      # ... and this factor longer than the continuous optimum (jerk >= 10 000)
+LONGER_AT_LOW_JERK = 1.03                           # down to 1 period/s3, where one unit of jerk is 6 percent of it
+
+
+def plan_of(length, rates=S0):
+    """The segments of a move, and its ticks; None if it is refused."""
+    made, plan = library().planner_limits(*rates), Plan()
+    assert (made.velocity, made.acceleration, made.jerk) == limits(*rates)
+    if not library().planner_move(ctypes.byref(plan), ctypes.byref(made), length):
+        return None
+    return [(s.velocity, s.acceleration, s.jerk, s.ticks) for s in plan.segment[:plan.count]], plan.ticks
+
+
+def check(length, rates):
+    plan, ticks = plan_of(length, rates)
+    assert distance(plan) == length << 24, f"{length} at {rates}"
+    assert sum(s[3] for s in plan) == ticks and all(s[3] > 0 for s in plan) and len(plan) <= 14
+    for peak, limit, name in zip(peaks(plan), limits(*rates), ("velocity", "acceleration", "jerk")):
+        assert peak <= limit, f"{name} {peak} above {limit}: {length} at {rates}"
+    best = shortest(abs(length) << 24, *limits(*rates))
+    factor = LONGER if rates[2] >= 10_000 else LONGER_AT_LOW_JERK
+    assert ticks <= factor * best + LONGER_TICKS, f"{ticks} ticks, optimum {best}: {length} at {rates}"
+    return ticks, best
+
+
+def random_rates(draw):
+    def spread(low, high):
+        return int(low * (high / low) ** draw.random())
+    return spread(1, 1_000_000), spread(1, 100_000_000), spread(1, 2_000_000_000)
+
+
+def test_a_move_of_one_lsb_takes_four_ticks():
+    plan, ticks = plan_of(1)
+    assert ticks == 4 and list(steps(plan)) == [0, 0, 1 << 23, 1 << 23] and distance(plan) == 1 << 24
+
+
+def test_the_closed_form_is_the_recursion():
+    segment = (123456789, -98765, 432, 300)
+    path = 0
+    for n, step in enumerate(steps([segment])):
+        assert gone(segment, n) == path
+        path += step
+
+
+def test_no_distance_is_no_segment():
+    assert plan_of(0) == ([], 0)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("length", [1, 2, 3, 65535, 65536, 65537, 125 << 16, 150_000 << 16, (1 << 38) - 1])
+def test_a_move_of_s0_lands_exactly_inside_its_limits(length, sign):
+    check(sign * length, S0)
+
+
+def test_the_way_back_is_the_mirror():
+    for length in (1, 777, 123_456_789):
+        there, back = plan_of(length)[0], plan_of(-length)[0]
+        assert back == [(-v, -a, -j, n) for v, a, j, n in there]
+
+
+def test_any_move_lands_exactly_inside_its_limits():
+    draw = random.Random(seed())
+    worst = {"S0": (0, 0), "any": (0, 0)}
+    for n in range(6000):
+        kind = "S0" if n % 3 == 0 else "any"
+        rates = S0 if kind == "S0" else random_rates(draw)
+        length = int(2 ** (draw.random() * 40)) * draw.choice((1, -1))
+        if plan_of(length, rates) is None:
+            assert shortest(abs(length) << 24, *limits(*rates)) > 2**29
+            continue
+        ticks, best = check(length, rates)
+        if best > 40:
+            worst[kind] = max(worst[kind], (ticks / best, ticks - best))
+    print(f"worst time over optimum: S0 {worst['S0'][0]:.4f}, any limits {worst['any'][0]:.4f} (moves above 40 ticks, seed {seed()})")
+
+
+@pytest.mark.parametrize("rates", [(1_000_000, 1_000_000, 1), (1_000_000, 1_000_000, 2), (1_000_000, 1, 1_000_000_000),
+                                   (30, 100_000_000, 2_000_000_000), (100, 300, 1)])
+def test_limits_of_few_units_are_reached_but_not_passed(rates):
+    draw = random.Random(seed())
+    highest = [0, 0, 0]
+    for _ in range(1500):
+        length = int(2 ** (10 + draw.random() * 26))
+        check(length, rates)
+        highest = [max(pair) for pair in zip(highest, peaks(plan_of(length, rates)[0]))]
+    assert any(high == limit for high, limit in zip(highest, limits(*rates)))
+
+
+def test_every_step_of_short_moves_is_inside_the_limits():
+    """All steps, one by one, instead of the ends of segments: `peaks` itself is checked."""
+    draw = random.Random(seed())
+    for _ in range(300):
+        rates = random_rates(draw)
+        plan = plan_of(int(2 ** (draw.random() * 30)) + 1, rates)
+        if plan is None or plan[1] > 5000:
+            continue
+        seen = [0, 0, *steps(plan[0]), 0, 0]
+        first = [b - a for a, b in zip(seen, seen[1:])]
+        second = [b - a for a, b in zip(first, first[1:])]
+        assert [max(map(abs, x)) for x in (seen, first, second)] == peaks(plan[0])
+
+
+def test_a_plan_taken_in_pieces_is_the_same_motion():
+    for length, rates in ((20_000 << 16, (1, 1, 1)), (9 << 16, S0), (1 << 35, (3, 1000, 77))):
+        made, plan, piece, last = library().planner_limits(*rates), Plan(), Segment(), ctypes.c_bool()
+        assert library().planner_move(ctypes.byref(plan), ctypes.byref(made), length)
+        pieces = []
+        while library().planner_take(ctypes.byref(plan), ctypes.byref(piece), ctypes.byref(last)):
+            pieces.append((piece.velocity, piece.acceleration, piece.jerk, piece.ticks))
+            assert piece.ticks <= 0x800000 and last.value == (sum(p[3] for p in pieces) == plan.ticks)
+        assert distance(pieces) == length << 24 and peaks(pieces) == peaks(plan_of(length, rates)[0])
+
+
+def test_a_move_of_days_is_refused():
+    assert plan_of(1 << 47, (1, 1, 1)) is None

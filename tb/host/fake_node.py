@@ -1,0 +1,306 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A node in Python, written from docs/protocol.md and not from the host's code, and a line to it that can be spoilt."""
+import binascii
+import random
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "sw" / "host"))
+
+from moire.line_tables import CAUSES, PROTOCOL_CRC, OPERATIONS, PARAMETERS, STATES  # noqa: E402  (found through the line above)
+from moire.registers import MAP_CRC  # noqa: E402
+from moire.transport import Transport  # noqa: E402
+
+CAUSE = {name: code for code, (name, _) in CAUSES.items()}
+STATE = {name: code for code, (name, _) in STATES.items()}
+SIZE = {"u8": 1, "i8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "i64": 8, "u64": 8}
+TICK_HZ = 4000
+LIMIT_LOW, ESTOP = 1 << 0, 1 << 2
+
+
+def bytes_of(value, kind):
+    return value.to_bytes(SIZE[kind], "little", signed=kind.startswith("i"))
+
+
+class FakeAxis:
+    """An axis that gets where it should, at a constant speed."""
+
+    def __init__(self):
+        self.parameters = {known.id: known.default for known in PARAMETERS.values()}
+        self.enabled = self.homed = False
+        self.faults = self.standing = self.events = 0
+        self.position = self.target = 123456
+        self.begin, self.until, self.stop_until = 0.0, 0.0, None
+        self.kind, self.ended, self.end_as = None, "never", "ok"
+        self.writes = []
+
+    def advance(self, now):
+        """The motion as it stands at this time."""
+        if self.standing and self.enabled:
+            self.faults |= self.standing
+            self.enabled = False
+            if self.kind:
+                self.kind, self.ended = None, "ended_by_fault"
+        if self.kind and now >= self.until:
+            if self.kind == "homing":
+                self.homed = self.end_as == "ok"
+            if self.kind != "stopping" and self.end_as == "ok":
+                self.position = self.target
+            self.target = self.position
+            self.ended = "stopped" if self.kind == "stopping" else self.end_as
+            self.kind = None
+        elif self.kind in ("moving", "homing"):
+            share = (now - self.begin) / (self.until - self.begin)
+            self.position = round(self.start + share * (self.target - self.start))
+            self.begin, self.start = now, self.position
+
+    def go(self, kind, now, seconds, target=None):
+        self.kind, self.begin, self.until, self.ended = kind, now, now + seconds, "running"
+        self.start, self.target = self.position, self.target if target is None else target
+
+    @property
+    def state(self):
+        if self.faults:
+            return "faulted"
+        return self.kind or ("holding" if self.enabled else "off")
+
+
+class FakeNode:
+    def __init__(self, address=1, axes=1, map_crc=MAP_CRC, protocol_crc=PROTOCOL_CRC):
+        self.address, self.map_crc, self.protocol_crc = address, map_crc, protocol_crc
+        self.axes = [FakeAxis() for _ in range(axes)]
+        self.now, self.registers = 0.0, {0x400: 7}
+        self.expecting, self.payload = None, []
+        self.last, self.reply = None, bytes([0, 0, 0])
+        self.counters = dict.fromkeys(
+            ("frames_good", "frames_bad", "framing_errors", "start_glitches", "overruns", "repeated", "refused"), 0
+        )
+        self.executed = []             # names of the operations, without repetitions
+        self.wrong_map = False
+
+    # the line
+
+    def hear(self, word):
+        """Words that the node answers to this one."""
+        if word >> 8:
+            if self.expecting and self.payload:
+                self.counters["frames_bad"] += 1
+            self.expecting, self.payload = None, []
+            if word & 0xFF == 0x20 | self.address:
+                self.expecting = word & 0xFF
+                return [0x60 | self.address]
+            if word & 0xFF == 0x10 | self.address:
+                inside = bytes([0x50 | self.address, len(self.reply)]) + self.reply
+                return list(inside + binascii.crc32(inside).to_bytes(4, "little"))
+            return []
+        if self.expecting is None:
+            return []
+        self.payload.append(word)
+        length = self.payload[0]
+        if not 1 <= length <= 64:
+            self.counters["frames_bad"] += 1
+            self.expecting = None
+        elif len(self.payload) == length + 5:
+            self.frame(bytes(self.payload))
+            self.expecting = None
+        return []
+
+    def frame(self, payload):
+        inside, crc = payload[:-4], payload[-4:]
+        if binascii.crc32(bytes([self.expecting]) + inside).to_bytes(4, "little") != crc:
+            self.counters["frames_bad"] += 1
+            return
+        self.counters["frames_good"] += 1
+        if self.last == (inside[1], crc):
+            self.counters["repeated"] += 1
+            return
+        self.last = (inside[1], crc)
+        self.reply = self.execute(inside[1:])
+
+    # the firmware
+
+    def execute(self, body):
+        sequence, code = body[0], body[1]
+        operation = next((known for known in OPERATIONS.values() if known.code == code), None)
+        cause, fields = "unknown_operation", {}
+        if operation:
+            self.executed.append(operation.name)
+            values, place = {}, 2
+            for name, kind in operation.request:
+                values[name] = int.from_bytes(body[place:place + SIZE[kind]], "little", signed=kind.startswith("i"))
+                place += SIZE[kind]
+            if place != len(body):
+                cause = "wrong_length"
+            elif self.wrong_map and operation.name != "identify":
+                cause = "wrong_map"
+            elif values.get("axis", 0) >= len(self.axes):
+                cause = "no_such_axis"
+            else:
+                axis = self.axes[values.pop("axis", 0)]
+                axis.advance(self.now)
+                cause, fields = getattr(self, "do_" + operation.name)(axis, **values)
+        if cause != "ok":
+            self.counters["refused"] += 1
+            return bytes([sequence, code, CAUSE[cause]])
+        return bytes([sequence, code, 0]) + b"".join(bytes_of(fields[name], kind) for name, kind in operation.reply)
+
+    def do_identify(self, _):
+        return "ok", dict(
+            map_crc=self.map_crc,
+            protocol_crc=self.protocol_crc,
+            version=1,
+            address=self.address,
+            axes=len(self.axes),
+            clk_hz=4000000,
+            tick_hz=TICK_HZ,
+            sample_hz=100000,
+        )
+
+    def do_status(self, axis):
+        flags = (
+            axis.enabled
+            | axis.homed << 1
+            | (axis.standing & LIMIT_LOW) << 2
+            | bool(axis.standing & ESTOP) << 4
+            | (axis.kind is None and axis.enabled) << 5
+        )
+        return "ok", dict(
+            state=STATE[axis.state],
+            ended=CAUSE[axis.ended],
+            flags=flags,
+            encoder_events=axis.events,
+            faults=axis.faults,
+            first_fault=axis.faults & -axis.faults,
+            position=axis.position,
+            target=axis.target,
+            velocity=98304 if axis.kind == "moving" else 0,
+            command=-16384 if axis.kind else 0,
+            counts=axis.position * axis.parameters[2] >> 16,
+        )
+
+    def do_enable(self, axis, on):
+        if on and axis.faults:
+            return "faulted", {}
+        axis.enabled = bool(on)
+        if not on and axis.kind:
+            axis.kind, axis.ended = None, "stopped"
+        return "ok", {}
+
+    def ready(self, axis):
+        return "faulted" if axis.faults else "not_enabled" if not axis.enabled else "busy" if axis.kind else "ok"
+
+    def do_home(self, axis):
+        if self.ready(axis) != "ok":
+            return self.ready(axis), {}
+        axis.go("homing", self.now, 0.8, 0)
+        return "ok", {}
+
+    def do_move(self, axis, target):
+        if self.ready(axis) != "ok":
+            return self.ready(axis), {}
+        if not axis.homed:
+            return "not_homed", {}
+        if not axis.parameters[3] <= target <= axis.parameters[4]:
+            return "out_of_travel", {}
+        seconds = abs(target - axis.position) / 65536 / axis.parameters[5] + 0.05
+        axis.go("moving", self.now, seconds, target)
+        return "ok", {"duration_ticks": round(seconds * TICK_HZ)}
+
+    def do_stop(self, axis):
+        if not axis.enabled:
+            return "not_enabled", {}
+        if axis.kind and axis.kind != "stopping":
+            axis.go("stopping", self.now, 0.1)
+        return "ok", {}
+
+    def do_reset_faults(self, axis):
+        if axis.standing:
+            return "fault_stands", {}
+        axis.faults = 0
+        return "ok", {}
+
+    def do_get_parameter(self, axis, parameter):
+        return ("ok", {"value": axis.parameters[parameter]}) if parameter in axis.parameters else ("unknown_parameter", {})
+
+    def do_set_parameter(self, axis, parameter, value):
+        known = next((known for known in PARAMETERS.values() if known.id == parameter), None)
+        if known is None:
+            return "unknown_parameter", {}
+        if axis.kind:
+            return "busy", {}
+        if not known.min <= value <= known.max:
+            return "out_of_range", {}
+        axis.parameters[parameter] = value
+        axis.writes.append(known.name)
+        return "ok", {}
+
+    def do_counters(self, _):
+        return "ok", self.counters
+
+    def do_encoder(self, axis):
+        return "ok", dict(
+            sin=-100,
+            cos=27,
+            phase=axis.position & 0xFFFF,
+            amplitude=103,
+            quadrature_count=-4,
+            rejected_pulses=1,
+            rejected_samples=2,
+            home_phase=-16384,
+            fault_position=65536,
+        )
+
+    def do_read_register(self, _, address):
+        return ("ok", {"value": self.registers[address]}) if address in self.registers else ("no_such_register", {})
+
+
+class FakeLine(Transport):
+    """All nodes on one pair of wires. `to_node` and `from_node` may change, lose or multiply each word: word -> list of words."""
+
+    time_stands = True
+
+    def __init__(self, *nodes):
+        self.nodes, self.arrived, self.clock, self.closed = nodes, [], 0.0, False
+        self.to_node = self.from_node = lambda word: [word]
+        self.at = []                   # (time, action), done when the time comes
+
+    def pass_time(self, seconds):
+        self.clock += seconds
+        for node in self.nodes:
+            node.now = self.clock
+            for axis in node.axes:
+                axis.advance(self.clock)
+        for due in [entry for entry in self.at if entry[0] <= self.clock]:
+            self.at.remove(due)
+            due[1]()
+
+    def send(self, words):
+        for word in words:
+            self.pass_time(self.character_s)
+            for heard in self.to_node(word):
+                for node in self.nodes:
+                    for answer in node.hear(heard):
+                        self.arrived += self.from_node(answer)
+
+    def receive(self, count, timeout_s):
+        taken, self.arrived = self.arrived[:count], self.arrived[count:]
+        self.pass_time(len(taken) * self.character_s if len(taken) == count else timeout_s)
+        return taken
+
+    def now(self):
+        return self.clock
+
+    def wait(self, seconds):
+        self.pass_time(seconds)
+
+    def close(self):
+        self.closed = True
+
+
+def spoil(source: random.Random, share: float):
+    """Loses, changes or doubles this share of the words."""
+    def change(word):
+        if source.random() >= share:
+            return [word]
+        return source.choice([[], [word ^ 1 << source.randrange(9)], [word, word], [source.randrange(512)]])
+    return change

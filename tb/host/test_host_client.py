@@ -1,0 +1,347 @@
+# SPDX-License-Identifier: Apache-2.0
+"""client: what a node says in real units and words, every refusal with its values, motions that end well, badly and by Ctrl-C."""
+import random
+from fractions import Fraction
+
+import pytest
+from fake_node import ESTOP, LIMIT_LOW, FakeLine, FakeNode
+
+from bench import seed
+from moire.client import Line
+from moire.errors import LineError, LineGarbled, MotionFailed, NobodyAnswers, OutOfRange, Refused, UnitError, UnknownName, WrongBuild
+from moire.line_tables import CAUSES, PROTOCOL_CRC, PARAMETERS
+from moire.registers import FIELDS, MAP_CRC
+
+SEED = seed()
+
+
+def stage(**node):
+    fake = FakeLine(FakeNode(**node))
+    return fake, fake.nodes[0], Line(fake).axis(fake.nodes[0].address)
+
+
+def homed_stage():
+    fake, node, axis = stage()
+    axis.enable()
+    axis.home()
+    return fake, node, axis
+
+
+# ------------------------------------------------------------------ who is there
+
+def test_find_tells_every_node_of_any_build():
+    fake = FakeLine(FakeNode(3, axes=2), FakeNode(15, map_crc=5))
+    found = Line(fake).find()
+    assert [(node.address, node.axes, node.matches) for node in found] == [(3, 2, True), (15, 1, False)]
+    assert Line(fake).find([1, 2]) == []
+    assert fake.now() < 10
+
+
+def test_nobody_is_a_clear_exception():
+    with pytest.raises(NobodyAnswers, match="nobody answers at address 4, asked 5 times: check power"):
+        Line(FakeLine(FakeNode(1))).axis(4)
+
+
+@pytest.mark.parametrize("crc, value, words", [("map_crc", MAP_CRC, "register map"), ("protocol_crc", PROTOCOL_CRC, "protocol table")])
+def test_a_node_of_another_build_is_refused_with_both_numbers(crc, value, words):
+    with pytest.raises(WrongBuild, match=f"{words}.*CRC-32 0000BEEF in the node, {value:08X} in this host") as caught:
+        Line(FakeLine(FakeNode(**{crc: 0xBEEF}))).axis()
+    assert (caught.value.node, caught.value.host) == (0xBEEF, value)
+
+
+def test_an_axis_that_is_not_there_is_refused():
+    with pytest.raises(Refused, match="node 1 has no axis 1: it has only axis 0"):
+        Line(FakeLine(FakeNode())).axis(1, 1)
+    with pytest.raises(Refused, match="axes 0 to 1"):
+        Line(FakeLine(FakeNode(axes=2))).axis(1, 2)
+
+
+def test_a_garbled_line_is_told_from_a_silent_one():
+    fake = FakeLine(FakeNode())
+    fake.from_node = lambda word: [word ^ 4]
+    with pytest.raises(LineGarbled, match="garbled, tried 5 times: 65 came instead of 61"):
+        Line(fake).axis()
+
+
+# ------------------------------------------------------------------ real units
+
+def test_status_is_in_real_units():
+    fake, node, axis = stage()
+    inside = node.axes[0]
+    inside.enabled, inside.homed, inside.position, inside.target = True, True, 65536 * 1250 + 4096, 65536 * 1250
+    inside.events = 0b10010
+    status = axis.status()
+    assert status.position_nm == pytest.approx(1_000_050) and status.target_nm == 1_000_000
+    assert status.counts == 1250 * 160 + 10
+    assert status.enabled and status.homed and status.settled and not status.estop and not status.limit_low
+    assert (status.state, status.words, status.faults, status.encoder_events) == (
+        "holding",
+        "holding position",
+        (),
+        ("overspeed", "disagreement"),
+    )
+    inside.go("moving", fake.now(), 1.0, 0)
+    status = axis.status()
+    # 1.5 periods of 800 nm in a tick of 0.25 ms
+    assert status.velocity_mm_s == pytest.approx(4.8) and status.drive_command == -0.5 and status.in_motion
+
+
+def test_the_period_is_read_from_the_node():
+    fake = FakeLine(FakeNode())
+    fake.nodes[0].axes[0].parameters[1] = 4_000_000
+    axis = Line(fake).axis()
+    assert axis.period_nm == 4000 and axis.to_nm(65536) == 4000 and axis.to_counts(-6000) == -98304
+
+
+def test_encoder_counters_and_registers():
+    fake, node, axis = stage()
+    encoder = axis.encoder()
+    assert (encoder.sin, encoder.cos, encoder.amplitude, encoder.quadrature_count) == (-100, 27, 103, -4)
+    assert encoder.home_phase_nm == -200 and encoder.home_margin == 0.5 and encoder.fault_position_nm == 800
+    assert axis.node.counters()["frames_good"] == 4                # identify, period, encoder and its own
+    assert axis.node.read_register(0x400) == 7
+    with pytest.raises(Refused, match=r"no register at this address \(address 0x0404\)"):
+        axis.node.read_register(0x404)
+    for wrong in (2, -4, 65536):
+        with pytest.raises(OutOfRange, match="multiples of 4"):
+            axis.node.read_register(wrong)
+
+
+def test_registers_are_read_by_name_and_wide_ones_low_word_first():
+    _, node, axis = stage()
+    known = {(field.block, field.register): field for field in FIELDS}
+    place = known["axis", "position"].address()
+    node.registers = {place: 0xFFFF0000, place + 4: 0x0000FFFF, known["axis", "control"].address(): 0b101}
+    assert axis.node.read_named("axis.position") == {"value": -65536}
+    assert axis.node.read_named("axis.control") == {"enable": 1, "closed_loop": 0, "homing": 1}
+    with pytest.raises(UnknownName, match="there is no register 'axis.speed': known are node.map_crc"):
+        axis.node.read_named("axis.speed")
+    with pytest.raises(OutOfRange, match="line.transmit can only be written"):
+        axis.node.read_named("line.transmit")
+
+
+# ------------------------------------------------------------------ motion
+
+def test_home_and_move_go_where_they_should():
+    fake, node, axis = stage()
+    axis.enable()
+    seen = []
+    status = axis.home(progress=seen.append)
+    assert status.homed and status.position_nm == 0 and {"homing", "holding"} == {each.state for each in seen}
+    assert axis.move(mm=1.5).position_nm == 1_500_000
+    assert axis.move("-200um", by=True).position_nm == 1_300_000
+    assert axis.move(50).position_nm == pytest.approx(50, abs=0.01)
+    with pytest.raises(OutOfRange, match="in nm or in mm, and not both"):
+        axis.move(1, mm=1)
+    with pytest.raises(UnitError):
+        axis.move("fast")
+
+
+def test_refusals_carry_the_words_of_the_table_and_the_values():
+    fake, node, axis = stage()
+    with pytest.raises(Refused, match="node 1 refused 'home': the drive is off: enable it first") as caught:
+        axis.home()
+    assert (caught.value.cause, caught.value.code) == ("not_enabled", 8)
+    axis.enable()
+    with pytest.raises(Refused, match="home it first"):
+        axis.move(mm=1)
+    axis.home()
+    with pytest.raises(Refused, match=r"outside the travel \(target 130mm, allowed -800um to 119.6mm\)"):
+        axis.move(mm=130)
+    node.axes[0].go("moving", fake.now(), 10.0, 65536)
+    with pytest.raises(Refused, match="stop it or wait"):
+        axis.move(mm=1)
+    with pytest.raises(Refused, match=r"stop it or wait \(kp 0.5\)"):
+        axis.set_parameter("kp", 0.5)
+
+
+def test_every_cause_of_the_table_becomes_a_refusal_with_its_words():
+    for code, (name, words) in CAUSES.items():
+        fake, node, axis = stage()
+        node.execute = lambda body, code=code: bytes([body[0], body[1], code])
+        if code == 0:
+            continue
+        with pytest.raises(Refused) as caught:
+            axis.node.request("stop", axis=0)
+        assert caught.value.cause == name and words in str(caught.value)
+    node.execute = lambda body: bytes([body[0], body[1], 200])
+    with pytest.raises(Refused, match="cause 200"):
+        axis.node.request("stop", axis=0)
+
+
+def test_hardware_and_firmware_that_do_not_fit_are_refused_in_words():
+    fake = FakeLine(FakeNode())
+    fake.nodes[0].wrong_map = True
+    with pytest.raises(Refused, match="register maps differ"):
+        Line(fake).axis()
+
+
+def test_a_fault_is_told_in_words_until_it_is_reset():
+    fake, node, axis = homed_stage()
+    node.axes[0].standing = ESTOP
+    status = axis.status()
+    assert (status.state, status.faults, status.first_fault, status.fault_words, status.estop) == (
+        "faulted",
+        ("estop",),
+        ("estop",),
+        "emergency stop",
+        True,
+    )
+    with pytest.raises(Refused, match=r"remove its cause and reset it first \(emergency stop\)"):
+        axis.enable()
+    with pytest.raises(Refused, match=r"the cause of the fault still stands \(emergency stop\)"):
+        axis.reset()
+    node.axes[0].standing = 0
+    axis.reset()
+    assert axis.status().faults == ()
+
+
+def test_a_motion_that_a_fault_ends_names_the_first_fault():
+    fake, node, axis = homed_stage()
+    fake.at.append((fake.now() + 0.2, lambda: setattr(node.axes[0], "standing", LIMIT_LOW)))
+    with pytest.raises(
+        MotionFailed, match=r"axis 0 of node 1: a fault ended the motion: limit switch at the low end \(at .*, target 10mm\)"
+    ) as caught:
+        axis.move(mm=10)
+    assert caught.value.cause == "ended_by_fault"
+
+
+@pytest.mark.parametrize("cause", ["no_switch", "switch_stuck", "not_settled"])
+def test_a_motion_that_ends_badly_says_how(cause):
+    fake, node, axis = homed_stage()
+    node.axes[0].end_as = cause
+    with pytest.raises(MotionFailed, match=dict(CAUSES.values())[cause]):
+        axis.home()
+
+
+def test_stop_from_the_progress_call_ends_the_motion_as_stopped():
+    fake, node, axis = homed_stage()
+    with pytest.raises(MotionFailed, match="stopped by the host"):
+        axis.move(mm=10, progress=lambda status: axis.stop() if status.position_nm > 1e6 else None)
+    assert not axis.status().in_motion
+
+
+@pytest.mark.parametrize("what", [KeyboardInterrupt, ZeroDivisionError])
+@pytest.mark.parametrize("motion", ["home", "move"])
+def test_whatever_interrupts_the_wait_brings_the_axis_to_rest_first(what, motion):
+    fake, node, axis = homed_stage()
+
+    def interrupt(status):
+        if status.state in ("homing", "moving"):
+            raise what
+    with pytest.raises(what):
+        axis.home(progress=interrupt) if motion == "home" else axis.move(mm=10, progress=interrupt)
+    assert node.executed.count("stop") == 1
+    assert node.axes[0].kind is None and node.axes[0].ended == "stopped" and node.axes[0].enabled
+
+
+def test_ctrl_c_in_the_middle_of_an_exchange_stops_the_axis_too():
+    for place in range(40):
+        fake, node, axis = homed_stage()
+        seen = []
+
+        def interrupt(word, place=place, seen=seen):
+            seen.append(word)
+            if len(seen) == place + 1:
+                raise KeyboardInterrupt
+            return [word]
+        fake.to_node = interrupt
+        with pytest.raises(KeyboardInterrupt):
+            axis.move(mm=10)
+        assert node.axes[0].kind is None, place
+        assert axis.move(mm=1).position_nm == 1_000_000            # and the line is in order again
+
+
+def test_an_axis_that_cannot_be_told_to_stop_is_said():
+    fake, node, axis = homed_stage()
+
+    def cut_and_interrupt(status):
+        fake.to_node = lambda word: []
+        raise KeyboardInterrupt
+
+    with pytest.raises(LineError, match="axis 0 of node 1 could not be told to stop, its watchdog has to: nobody answers"):
+        axis.move(mm=10, progress=cut_and_interrupt)
+
+
+def test_waiting_talks_often_enough_for_the_watchdog():
+    fake, node, axis = homed_stage()
+    times = []
+    node.do_status = lambda inside, told=node.do_status: times.append(fake.now()) or told(inside)
+    began = fake.now()
+    axis.let_pass(1.0)
+    assert 1.0 <= fake.now() - began < 1.2
+    assert max(b - a for a, b in zip(times, times[1:])) < 0.1
+
+
+# ------------------------------------------------------------------ parameters
+
+def test_parameters_are_in_real_units():
+    fake, node, axis = stage()
+    velocity = axis.get_parameter("velocity")
+    assert (velocity.value, velocity.unit, velocity.counts, velocity.range_words) == (Fraction(24, 5), "mm/s", 6000, "800nm/s to 800mm/s")
+    assert axis.get_parameter("acceleration").written() == "100mm/s2" and axis.get_parameter("jerk").written() == "10000mm/s3"
+    assert axis.get_parameter("period").written() == "800nm" and axis.get_parameter("home_distance").written() == "1mm"
+    assert axis.get_parameter("settle_time").written() == "20ms" and axis.get_parameter("deglitch").written() == "10us"
+    assert axis.get_parameter("pwm_frequency").written() == "20kHz" and axis.get_parameter("counts_per_period").written() == "160"
+    assert axis.get_parameter("settle_window").written(4) == "20nm"
+    assert axis.set_parameter("velocity", "5mm/s").value == 5 and node.axes[0].parameters[5] == 6250
+    assert axis.set_parameter("velocity", 4).counts == 5000
+    assert axis.set_parameter("kp", 0.25).counts == 16384
+
+
+@pytest.mark.parametrize("name", list(PARAMETERS))
+def test_both_ends_of_each_parameter_are_taken_and_what_is_beyond_is_not_sent(name):
+    fake, node, axis = stage()
+    known = PARAMETERS[name]
+    value = axis.get_parameter(name)
+    one = (value.maximum - value.minimum) / (known.max - known.min)
+    for end, beyond, counts in ((value.minimum, -one, known.min), (value.maximum, one, known.max)):
+        if name == "period":
+            fake, node, axis = stage()
+        assert axis.set_parameter(name, end).counts == counts == node.axes[0].parameters[known.id]
+        written = len(node.axes[0].writes)
+        if name != "period":
+            with pytest.raises(OutOfRange, match=f"{name} allows .* to .*, not "):
+                axis.set_parameter(name, end + beyond)
+        assert len(node.axes[0].writes) == written
+
+
+def test_wrong_values_say_what_is_allowed():
+    fake, node, axis = stage()
+    with pytest.raises(OutOfRange, match="velocity allows 800nm/s to 800mm/s, not 900mm/s"):
+        axis.set_parameter("velocity", "900mm/s")
+    with pytest.raises(OutOfRange, match="period allows 1pm to 4mm, not 5mm"):
+        axis.set_parameter("period", "5mm")
+    with pytest.raises(OutOfRange, match="counts_per_period takes whole numbers, not 160.5"):
+        axis.set_parameter("counts_per_period", "160.5")
+    with pytest.raises(UnitError, match="'5mm' is no speed"):
+        axis.set_parameter("velocity", "5mm")
+    with pytest.raises(UnknownName, match="there is no parameter 'speed': known are period, counts_per_period"):
+        axis.get_parameter("speed")
+    node.do_set_parameter = lambda *_, **__: ("out_of_range", {})
+    with pytest.raises(Refused, match=r"outside what this parameter allows \(velocity 5mm/s\)"):
+        axis.set_parameter("velocity", "5mm/s")
+    assert node.axes[0].writes == []
+
+
+def test_saved_parameters_come_back_to_the_last_bit():
+    print("SEED", SEED)
+    source = random.Random(SEED)
+    for _ in range(10):
+        fake, node, axis = stage()
+        wanted = {known.id: source.choice([known.min, known.max, source.randint(known.min, known.max)]) for known in PARAMETERS.values()}
+        node.axes[0].parameters.update(wanted)
+        axis.period_nm = axis.read_period()
+        saved = axis.save_parameters()
+        _, other, fresh = stage()
+        assert len(fresh.load_parameters(saved)) == len(PARAMETERS)
+        assert other.axes[0].parameters == wanted and other.axes[0].writes[0] == "period"
+        assert fresh.period_nm == Fraction(wanted[1], 1000)
+
+
+def test_a_file_with_one_wrong_value_writes_nothing():
+    fake, node, axis = stage()
+    for wrong in ({"kp": "0.5", "velocity": "900mm/s"}, {"kp": "0.5", "speed": "1mm/s"}, {"kp": "0.5", "jerk": "x"}):
+        with pytest.raises((OutOfRange, UnknownName, UnitError)):
+            axis.load_parameters(wrong)
+    assert node.axes[0].writes == []

@@ -1,0 +1,401 @@
+# SPDX-License-Identifier: Apache-2.0
+"""command_line: sequences, exit codes, JSON, files, the shell, and that every error is one sentence that says what is allowed."""
+import io
+import json
+import sys
+
+import pytest
+from fake_node import CAUSE, ESTOP, FakeLine, FakeNode
+
+from moire import command_line
+from moire.errors import PortError
+from moire.line_tables import PARAMETERS
+
+
+class Call:
+    """One call of `moire` against a fake line."""
+
+    def __init__(self, text, *nodes, line=None):
+        self.line = line or FakeLine(*(nodes or [FakeNode()]))
+        self.options, out, err = None, io.StringIO(), io.StringIO()
+
+        def open_transport(options):
+            self.options = options
+            return self.line
+        arguments = text.split() if isinstance(text, str) else text
+        self.code = command_line.main(arguments, open_transport, out, err)
+        self.out, self.err = out.getvalue(), err.getvalue()
+
+    @property
+    def told(self):
+        return [json.loads(row) for row in self.out.splitlines()]
+
+
+def sentence(call, code):
+    """The one line that was complained."""
+    assert call.code == code and call.err.count("\n") == 1 and call.err.startswith("moire: "), call.err
+    return call.err
+
+
+# ------------------------------------------------------------------ what it does
+
+def test_home_move_status_in_one_call_and_the_drive_is_off_at_its_end():
+    node = FakeNode()
+    call = Call("home -- move 1mm -- move -200um --by -- status", node)
+    assert call.code == 0 and call.err == ""
+    assert "at 1.000000 mm, error 0.0 nm" in call.out
+    assert "holding position, zero known\n  position  0.800000 mm   160000 counts" in call.out
+    assert not node.axes[0].enabled and node.axes[0].faults == 0 and call.line.closed
+
+
+def test_a_drive_that_was_on_before_is_left_to_its_owner():
+    node = FakeNode()
+    node.axes[0].enabled = node.axes[0].homed = True
+    assert Call("status", node).code == 0 and node.axes[0].enabled
+    assert Call("disable", node).code == 0 and not node.axes[0].enabled
+
+
+def test_drives_are_switched_off_after_an_error_too():
+    node = FakeNode()
+    assert Call("enable -- move 1mm", node).code == 1
+    assert not node.axes[0].enabled
+
+
+def test_options_of_the_first_command_hold_for_all_and_may_be_given_again():
+    nodes = FakeNode(1), FakeNode(2, axes=2)
+    call = Call("--address 2 home --axis 1 -- status -- status --axis 0 -- status --address 1 --axis 0 --json", *nodes)
+    assert [(told["address"], told["axis"]) for told in call.told] == [(2, 1), (2, 1), (2, 0), (1, 0)]
+    assert nodes[1].axes[1].homed and not nodes[1].axes[0].homed
+
+
+def test_find_lists_the_nodes_and_marks_those_of_another_build():
+    call = Call("find 1 3", FakeNode(1), FakeNode(3, map_crc=1, axes=2))
+    assert call.code == 0
+    assert call.out.splitlines()[0].startswith("node 1: 1 axis, clock 4 MHz, servo 4 kHz, samples 100 kHz, made from the same sources")
+    assert "node 3: 2 axes" in call.out and "MADE FROM OTHER SOURCES" in call.out
+    assert [node["matches"] for node in Call("find --json", FakeNode(1), FakeNode(3, map_crc=1)).told[0]["nodes"]] == [True, False]
+
+
+def test_enable_wait_stop_reset_encoder_counters():
+    call = Call("enable -- wait 0.5s -- stop -- disable -- reset -- encoder -- counters")
+    assert call.code == 0 and call.line.clock > 0.5
+    assert "drive on" in call.out and "no fault is latched" in call.out
+    assert "margin 50 %" in call.out and "frames_good" in call.out and "no_answer" in call.out
+
+
+def test_registers_by_address_and_by_name():
+    node = FakeNode()
+    node.registers = {0x110: 258, 0x400: 5}
+    call = Call("register 0x110 272 line.frames_good axis.control", node)
+    assert call.code == 0
+    assert "0x110 = 0x00000102 258\n272 = 0x00000102 258\nline.frames_good: value = 258\naxis.control: enable = 1" in call.out
+    assert "axis.position" in Call("register").out
+    assert Call("register 0x110 --json", node).told[0]["registers"] == {"0x110": 258}
+
+
+def test_parameters_are_listed_set_and_read_back():
+    node = FakeNode()
+    call = Call("params set velocity 5mm/s -- params get velocity kp -- params list", node)
+    assert call.code == 0 and node.axes[0].parameters[PARAMETERS["velocity"].id] == 6250
+    rows = call.out.splitlines()
+    assert rows[0].split()[:2] == ["velocity", "5mm/s"] and "800nm/s to 800mm/s" in rows[0]
+    assert len(rows) == 1 + 2 + len(PARAMETERS)
+    assert Call("params set travel_low -1.5mm", node).code == 0 and node.axes[0].parameters[3] == -1875 * 65536
+    assert Call("params get period --json", node).told[0]["parameters"][0]["value"] == 800
+
+
+def test_parameters_are_saved_and_loaded(tmp_path):
+    node, file = FakeNode(), str(tmp_path / "stage.json")
+    node.axes[0].parameters[PARAMETERS["settle_window"].id] = 1639
+    assert Call(["params", "save", file], node).out == f"{len(PARAMETERS)} parameters saved in {file}\n"
+    assert json.loads(open(file).read())["parameters"]["acceleration"] == "100mm/s2"
+    other = FakeNode()
+    assert Call(["params", "load", file], other).code == 0 and other.axes[0].parameters == node.axes[0].parameters
+
+
+# ------------------------------------------------------------------ JSON
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "find",
+        "status",
+        "enable",
+        "disable",
+        "home",
+        "home -- move 1mm",
+        "stop",
+        "wait 1ms",
+        "reset",
+        "counters",
+        "encoder",
+        "register",
+        "register 0x400",
+        "params list",
+        "params get kp",
+        "params set kp 0.1",
+    ],
+)
+def test_every_command_tells_one_json_object_a_line(text):
+    node = FakeNode()
+    node.axes[0].enabled = True
+    for arguments in (text + " --json", "--json " + text):
+        call = Call(arguments, node)
+        assert call.code == 0 and call.err == ""
+        assert [told["command"] for told in call.told] == [part.split()[0] for part in text.split(" -- ")]
+        node.axes[0].enabled = True
+
+
+def test_status_in_json_has_numbers_and_words():
+    node = FakeNode()
+    node.axes[0].standing = node.axes[0].faults = ESTOP
+    told = Call("status --json", node).told[0]
+    assert told["faults"] == ["estop"] and told["fault_words"] == "emergency stop" and told["state"] == "faulted"
+    assert told["position_nm"] == pytest.approx(123456 / 65536 * 800) and told["homed"] is False
+
+
+def test_errors_are_json_too():
+    assert Call("move 1mm --json").told == [
+        {
+            "command": "move",
+            "error": "Refused",
+            "message": "node 1 refused 'move': the axis has no zero yet: home it first",
+            "exit_code": 1,
+            "cause": "not_homed",
+        }
+    ]
+    told = Call("move 1 --json").told[0]
+    assert told["error"] == "UsageError" and told["exit_code"] == 2 and "such as 1.5mm" in told["message"]
+
+
+# ------------------------------------------------------------------ errors and exit codes
+
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        ("", "a command is missing"),
+        ("status --", "a command is missing beside --"),
+        ("-- status", "a command is missing beside --"),
+        ("fly", "invalid choice: 'fly' (choose from"),
+        ("move 1", "'1' has no unit: write a number with pm nm um mm cm m"),
+        ("move fast", "'fast' is no length"),
+        ("move", "required: LENGTH"),
+        ("wait 5mm", "'5mm' is no time: write a number with ns us ms s min, such as 20ms"),
+        ("wait -1s", "in the past"),
+        ("status --address 16", "'16' is no address: allowed are 1 to 15"),
+        ("status --address x", "allowed are 1 to 15"),
+        ("find 0", "allowed are 1 to 15"),
+        ("status --axis -1", "'-1' is no axis: the first is 0"),
+        ("status --baud 0", "'0' is no whole number above 0"),
+        ("status --parity even", "invalid choice: 'even'"),
+        ("params", "required: ACTION"),
+        ("params get speed", "invalid choice: 'speed' (choose from"),
+        ("params set velocity", "required: VALUE"),
+        ("params set velocity 900mm/s", "velocity allows 800nm/s to 800mm/s, not 900mm/s"),
+        ("params set velocity 5mm", "'5mm' is no speed"),
+        ("params set kp x", "'x' is no number: write a plain number, such as 0.5"),
+        ("register axis.speed", "there is no register 'axis.speed'"),
+        ("register 0x401", "multiples of 4"),
+        ("register 0xg", "'0xg' is no register address"),
+        ("params load /no/such/file", "the file /no/such/file cannot be read: No such file"),
+        ("params save /no/such/file", "cannot be written"),
+        ("run /no/such/file", "cannot be read"),
+        ("status -- shell", "'shell' stands alone"),
+    ],
+)
+def test_wrong_usage_is_one_sentence_and_exit_code_2(text, said):
+    node = FakeNode()
+    node.registers = {}
+    assert said in sentence(Call(text, node), 2)
+    assert "set_parameter" not in node.executed
+
+
+def test_nothing_moves_when_a_later_command_is_wrong():
+    node = FakeNode()
+    sentence(Call("home -- move 1mm -- move 2", node), 2)
+    assert node.executed == []
+
+
+def test_a_refusal_is_exit_code_1():
+    assert "home it first" in sentence(Call("move 1mm"), 1)
+    assert "outside the travel (target 1000mm, allowed -800um to 119.6mm)" in sentence_of_last("home -- move 1m", 1)
+    assert "no such axis" not in sentence(Call("status --axis 3"), 1)
+
+
+def sentence_of_last(text, code):
+    return sentence(Call(text), code)
+
+
+def test_a_motion_that_ends_badly_is_exit_code_1():
+    node = FakeNode()
+    node.axes[0].end_as = "no_switch"
+    assert "no limit switch was found within the travel" in sentence(Call("home", node), 1)
+    told = Call("home --json", node).told[-1]
+    assert (told["error"], told["cause"]) == ("MotionFailed", "no_switch") and CAUSE["no_switch"] == 15
+
+
+def test_silence_and_noise_are_exit_code_3():
+    assert "nobody answers at address 5, asked 5 times" in sentence(Call("status --address 5"), 3)
+    assert "nobody answers at the addresses 3, 4" in sentence(Call("find 3 4"), 3)
+    line = FakeLine(FakeNode())
+    line.from_node = lambda word: [word ^ 1]
+    assert "garbled" in sentence(Call("status", line=line), 3)
+
+
+def test_ports_are_exit_code_4(monkeypatch):
+    monkeypatch.delenv("MOIRE_PORT", raising=False)
+    err = io.StringIO()
+    assert command_line.main(["status"], err=err) == 4 and "write --port /dev/ttyUSB0, or --port twin" in err.getvalue()
+    monkeypatch.setenv("MOIRE_PORT", "/dev/no_such_port")
+    err = io.StringIO()
+    assert command_line.main(["status"], err=err) == 4 and err.getvalue() == "moire: there is no port /dev/no_such_port\n"
+
+
+def test_a_twin_that_is_not_there_is_exit_code_4(monkeypatch):
+    monkeypatch.setitem(sys.modules, "twin", None)
+    err = io.StringIO()
+    assert command_line.main(["--port", "twin", "status"], err=err) == 4
+    assert err.getvalue().startswith("moire: the simulated stage is not here: use the checkout of Moire")
+
+
+def test_a_twin_that_does_not_build_is_exit_code_4(monkeypatch):
+    class Broken:
+        BuildError, TwinTransport = RuntimeError, None
+
+        @staticmethod
+        def Twin(**_):
+            raise RuntimeError("g++ is missing")
+    monkeypatch.setitem(sys.modules, "twin", Broken)
+    err = io.StringIO()
+    assert command_line.main(["--port", "twin", "status"], err=err) == 4
+    assert err.getvalue() == "moire: the simulated stage cannot be built: g++ is missing\n"
+
+
+def test_another_build_is_exit_code_5():
+    assert "0000BEEF in the node" in sentence(Call("status", FakeNode(map_crc=0xBEEF)), 5)
+
+
+def test_ctrl_c_stops_the_axis_and_is_exit_code_130():
+    node = FakeNode()
+    line = FakeLine(node)
+
+    def interrupt():
+        raise KeyboardInterrupt
+    line.at.append((0.5, interrupt))
+    call = Call("home", line=line)
+    assert "interrupted; what moved was stopped under control" in sentence(call, 130)
+    assert "stop" in node.executed and node.axes[0].kind is None and not node.axes[0].enabled and line.closed
+
+
+def test_baud_and_parity_reach_the_port():
+    call = Call("status --baud 9600 --parity odd --port COM3")
+    assert (call.options.port, call.options.baud, call.options.parity) == ("COM3", 9600, "odd")
+    call = Call("status -- status --baud 9600")
+    assert call.options.baud == 9600
+
+
+def test_help_names_every_command_and_gives_examples(capsys):
+    for arguments, said in (
+        (["--help"], "moire --port twin home -- move 1mm -- status"),
+        (["move", "--help"], "example: moire"),
+        (["params", "set", "--help"], "velocity 5mm/s"),
+    ):
+        with pytest.raises(SystemExit) as left:
+            command_line.main(arguments)
+        assert left.value.code == 0 and said in capsys.readouterr().out
+
+
+# ------------------------------------------------------------------ files and the shell
+
+def test_a_file_of_commands_is_carried_out(tmp_path):
+    node, file = FakeNode(), tmp_path / "warm up.txt"
+    file.write_text("# to the zero\nhome\n\nmove 1mm   # there\nmove -0.5mm --by -- status\n")
+    call = Call(["run", str(file), "--json"], node)
+    assert call.code == 0 and [told["command"] for told in call.told] == ["home", "move", "move", "status"]
+    assert call.told[-1]["position_nm"] == 500_000 and not node.axes[0].enabled
+
+
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        ("home\nmove 1\n", "line 2 of"),
+        ("shell\n", "cannot stand inside a file"),
+        ("status --baud 9600\n", "--baud holds for the whole call"),
+        ("move '1mm\n", "cannot be read: No closing quotation"),
+    ],
+)
+def test_a_file_with_a_wrong_line_moves_nothing(tmp_path, text, said):
+    node, file = FakeNode(), tmp_path / "wrong.txt"
+    file.write_text(text)
+    assert said in sentence(Call(["run", str(file)], node), 2)
+    assert node.executed == []
+
+
+@pytest.mark.parametrize("text", ["{", '"x"', "{}", '{"parameters": {"kp": 1}}', '{"parameters": []}'])
+def test_a_file_without_parameters_is_refused(tmp_path, text):
+    node, file = FakeNode(), tmp_path / "wrong.json"
+    file.write_text(text)
+    sentence(Call(["params", "load", str(file)], node), 2)
+    assert "set_parameter" not in node.executed
+
+
+def test_the_shell_keeps_the_drive_on_between_commands(monkeypatch):
+    node = FakeNode()
+    monkeypatch.setattr(sys, "stdin", io.StringIO("home\nmove 1mm\nstatus\nquit\nfly\n"))
+    call = Call("shell", node)
+    assert call.code == 0 and "holding position, zero known" in call.out
+    assert node.executed.count("enable") == 2 and not node.axes[0].enabled           # on once, off once at the end
+
+
+def test_json_may_be_asked_for_a_single_line(monkeypatch):
+    monkeypatch.setattr(sys, "stdin", io.StringIO("enable\nstatus --json\ndisable\n"))
+    rows = Call("shell").out.splitlines()
+    assert rows[0].endswith("drive on") and json.loads(rows[1])["state"] == "holding" and rows[2].endswith("drive off")
+
+
+def test_commands_from_a_pipe_end_at_the_first_error(monkeypatch):
+    node = FakeNode()
+    monkeypatch.setattr(sys, "stdin", io.StringIO("home\nfly\nmove 1mm\n"))
+    assert "'fly'" in sentence(Call("shell", node), 2)
+    assert "move" not in node.executed
+
+
+def test_a_person_may_mistype_in_the_shell(monkeypatch):
+    class Keyboard(io.StringIO):
+        def isatty(self):
+            return True
+    node = FakeNode()
+    monkeypatch.setattr(sys, "stdin", Keyboard("fly\nmove --help\nhome\nmove 1\nmove 1mm\n"))
+    call = Call("shell", node)
+    assert call.code == 0 and node.axes[0].position == 1250 * 65536
+    assert "'fly'" in call.err and "'1' has no unit" in call.err and "moire> " in call.err
+
+
+def test_a_waiting_shell_talks_on_a_line_whose_time_runs(monkeypatch):
+    class Keyboard:
+        """Waits until the shell has talked for itself."""
+
+        def isatty(self):
+            return False
+
+        def __iter__(self):
+            yield "enable\n"
+            for _ in range(500):
+                if node.executed.count("status") >= 2:
+                    break
+                threading.Event().wait(0.01)
+            yield "quit\n"
+    import threading
+    node = FakeNode()
+    line = FakeLine(node)
+    line.time_stands = False
+    monkeypatch.setattr(sys, "stdin", Keyboard())
+    monkeypatch.setattr(command_line, "KEEP_COMPANY_S", 0.01)
+    assert Call("shell", line=line).code == 0 and node.executed.count("status") >= 2
+
+
+def test_a_port_that_does_not_open_ends_the_shell_at_once(monkeypatch):
+    def refuse(_):
+        raise PortError("there is no port COM9")
+    monkeypatch.setattr(sys, "stdin", io.StringIO("status\n"))
+    assert command_line.main(["shell"], refuse, io.StringIO(), io.StringIO()) == 4

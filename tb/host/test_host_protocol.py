@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: Apache-2.0
+"""protocol: known bytes, every way in which an exchange can fail, and random noise against the node in fake_node.py."""
+import random
+
+import pytest
+from fake_node import FakeLine, FakeNode, spoil
+
+from bench import seed
+from moire.client import Line
+from moire.errors import LineError, LineGarbled, NobodyAnswers, OutOfRange
+from moire.line_tables import LONGEST_BODY, OPERATIONS
+from moire.protocol import Exchange, State, Timing, command_byte, frame, layout, parse_reply, request_body
+
+SEED = seed()
+ENABLE = request_body("enable", 7, axis=0, on=1)
+
+
+def reply_words(first=0x51, sequence=7, operation=3, cause=0):
+    return [first] + list(frame(first, bytes([sequence, operation, cause])))
+
+
+def test_the_bytes_of_a_known_exchange():
+    # the worked example of docs/protocol.md, its CRC-32 by a bitwise program
+    exchange = Exchange(1, ENABLE)
+    assert exchange.words_to_send() == [0x121] and exchange.words_to_send() == []
+    exchange.feed([0x61])
+    assert exchange.words_to_send() == [0x04, 0x07, 0x03, 0x00, 0x01, 0x86, 0x67, 0x24, 0x60, 0x111]
+    exchange.feed([0x51, 0x03, 0x07, 0x03, 0x00, 0xCE, 0xFB, 0x86, 0xFF])
+    assert exchange.finished and exchange.result() == (7, 3, 0, {}) and exchange.events == []
+
+
+def test_crc_is_that_of_ethernet():
+    def by_definition(several):
+        register = 0xFFFFFFFF
+        for byte in several:
+            register ^= byte
+            for _ in range(8):
+                register = register >> 1 ^ (0xEDB88320 if register & 1 else 0)
+        return register ^ 0xFFFFFFFF
+
+    assert by_definition(b"123456789") == 0xCBF43926
+    assert frame(0x21, bytes([7, 1]))[-4:] == by_definition([0x21, 2, 7, 1]).to_bytes(4, "little")
+
+
+def test_command_bytes_are_those_of_the_8031_stage():
+    assert command_byte(1, 1) == 0b0001_0001 and command_byte(2, 2) == 0b0010_0010
+    for address in (0, 16, -1):
+        with pytest.raises(OutOfRange, match="1 to 15"):
+            command_byte(address, 1)
+
+
+def test_negative_positions_are_two_complement_little_endian():
+    assert request_body("move", 1, axis=0, target=-2) == bytes([1, 5, 0, 0xFE]) + b"\xFF" * 7
+
+
+def test_values_that_do_not_fit_are_refused_before_sending():
+    with pytest.raises(OutOfRange, match="axis u8, target i64"):
+        request_body("move", 1, axis=0, target=1 << 63)
+    with pytest.raises(TypeError):
+        request_body("move", 1, axis=0, target=0, speed=1)
+
+
+def test_every_body_fits_the_longest():
+    for operation in OPERATIONS.values():
+        assert 2 + layout(operation.request).size <= LONGEST_BODY and 3 + layout(operation.reply).size <= LONGEST_BODY
+    for length in (0, LONGEST_BODY + 1):
+        with pytest.raises(OutOfRange):
+            frame(0x21, bytes(length))
+    assert len(frame(0x21, bytes(LONGEST_BODY))) == LONGEST_BODY + 5
+
+
+def test_a_reply_of_the_wrong_length_is_none():
+    assert parse_reply(b"\x01\x03") is None
+    assert parse_reply(b"\x01\x03\x00\x00") is None
+    assert parse_reply(b"\x01\x03\x05\x00") is None
+    assert parse_reply(b"\x01\x63\x05").cause == 5
+
+
+def test_silence_is_nobody_answers_after_all_tries():
+    exchange = Exchange(9, ENABLE, tries=3)
+    for _ in range(20):
+        if exchange.finished:
+            break
+        exchange.words_to_send()
+        exchange.silence()
+    assert exchange.attempts == 3 and exchange.events == ["no answer"] * 3
+    with pytest.raises(NobodyAnswers, match="nobody answers at address 9, asked 3 times") as caught:
+        exchange.result()
+    assert caught.value.address == 9
+
+
+@pytest.mark.parametrize("words, reason", [
+    ([0x62], "62 came instead of 61"),                              # another node
+    ([0x161], "9th bit"),
+    ([0x61, 0x61], "61 came instead of 51"),
+    ([0x61, 0x51, 0], "length of 0"),
+    ([0x61, 0x51, LONGEST_BODY + 1], "length of 65"),
+    ([0x61] + reply_words()[:-1] + [reply_words()[-1] ^ 1], "wrong CRC-32"),
+    ([0x61, 0x51] + list(frame(0x51, b"\x07\x03")), "wrong length"),
+    ([0x61, 0x51] + list(frame(0x52, b"\x07\x03\x00")), "wrong CRC-32"),
+])
+def test_each_garbled_answer_is_named(words, reason):
+    exchange = Exchange(1, ENABLE, tries=1)
+    exchange.feed(words)
+    assert exchange.state == State.FAILED
+    with pytest.raises(LineGarbled, match=reason):
+        exchange.result()
+
+
+def test_an_answer_that_breaks_off_is_garbled_and_not_nobody():
+    exchange = Exchange(1, ENABLE, tries=1)
+    exchange.feed([0x61, 0x51, 3, 7])
+    exchange.silence()
+    with pytest.raises(LineGarbled, match="broke off"):
+        exchange.result()
+
+
+def test_an_old_reply_repeats_the_same_words_at_once():
+    exchange = Exchange(1, ENABLE, tries=2)
+    exchange.words_to_send()
+    exchange.feed([0x61])
+    first = exchange.words_to_send()
+    exchange.feed(reply_words(sequence=6))
+    assert exchange.events == ["old reply"] and exchange.words_to_send() == [0x121]
+    exchange.feed([0x61])
+    assert exchange.words_to_send() == first
+    exchange.feed(reply_words(sequence=7, operation=2, cause=3))         # right number, another operation: old too
+    with pytest.raises(LineGarbled, match="never received the request whole"):
+        exchange.result()
+
+
+def test_after_nonsense_the_line_is_left_quiet_before_the_repetition():
+    exchange = Exchange(1, ENABLE)
+    exchange.words_to_send()
+    exchange.feed([0x55])
+    assert exchange.words_to_send() == [] and exchange.state == State.QUIET and exchange.timeout_s == Timing().quiet
+    exchange.feed([0x61, 0x51, 0x100])                                   # the rest of the nonsense
+    assert exchange.words_to_send() == []
+    exchange.silence()
+    assert exchange.words_to_send() == [0x121]
+
+
+def test_a_line_that_never_falls_silent_is_given_up():
+    exchange = Exchange(1, ENABLE, tries=3)
+    for _ in range(3 * Exchange.LONGEST_NOISE):
+        exchange.words_to_send()
+        exchange.feed([0xAA])
+    with pytest.raises(LineGarbled):
+        exchange.result()
+
+
+def test_patience_grows_with_what_is_awaited():
+    exchange = Exchange(1, ENABLE, timing=Timing(character=0.001, answer=0.1, quiet=0.01))
+    assert exchange.timeout_s == pytest.approx(0.101) and exchange.wanted == 1
+    exchange.feed([0x61, 0x51, 3])
+    assert exchange.wanted == 7 and exchange.timeout_s == pytest.approx(0.107)
+    exchange.feed([7, 3, 0])
+    assert exchange.wanted == 4
+
+
+# ------------------------------------------------------------------ with a node at the other end
+
+def test_a_lost_word_at_any_place_is_repeated_and_acted_on_once():
+    for to_node in (True, False):
+        for place in range(60):
+            node = FakeNode()
+            fake, seen = FakeLine(node), []
+
+            def lose(word, place=place, seen=seen):
+                seen.append(word)
+                return [] if len(seen) == place + 1 else [word]
+            setattr(fake, "to_node" if to_node else "from_node", lose)
+            line = Line(fake, random_source=random.Random(1))
+            line.request(1, "enable", axis=0, on=1)
+            line.request(1, "set_parameter", axis=0, parameter=15, value=4)
+            assert node.executed == ["enable", "set_parameter"], place
+            assert node.axes[0].writes == ["kp"]
+            if place >= len(seen):
+                break
+        assert place > 5
+
+
+def test_a_repeated_request_is_counted_by_node_and_host():
+    node = FakeNode()
+    fake = FakeLine(node)
+    dropped = iter([True])
+    fake.from_node = lambda word: [] if word == 0x51 and next(dropped, False) else [word]
+    line = Line(fake)
+    line.request(1, "enable", axis=0, on=1)
+    assert node.counters["repeated"] == 1 and node.executed == ["enable"]
+    assert line.statistics.repeats == 1 and line.statistics.garbled == 1
+
+
+def test_any_noise_ends_in_the_right_reply_or_in_a_line_error():
+    print("SEED", SEED)
+    source = random.Random(SEED)
+    done = failed = 0
+    for _ in range(150):
+        node = FakeNode()
+        fake = FakeLine(node)
+        share = source.choice([0.001, 0.01, 0.05, 0.3])
+        fake.to_node, fake.from_node = spoil(source, share), spoil(source, share)
+        line = Line(fake, random_source=source)
+        for _ in range(8):
+            value = source.randrange(0, 16777216)
+            before = len(node.axes[0].writes)
+            try:
+                line.request(1, "set_parameter", axis=0, parameter=15, value=value)
+                assert node.axes[0].parameters[15] == value and len(node.axes[0].writes) == before + 1
+                done += 1
+            except LineError:
+                assert len(node.axes[0].writes) <= before + 1
+                failed += 1
+        # when the noise is over the line works again
+        fake.to_node = fake.from_node = lambda word: [word]
+        assert line.request(1, "get_parameter", axis=0, parameter=15)["value"] == node.axes[0].parameters[15]
+    assert done > 300 and failed > 50
+
+
+def test_sequence_numbers_begin_at_random_and_wrap():
+    node = FakeNode()
+    line = Line(FakeLine(node), random_source=random.Random(SEED))
+    numbers = []
+    for _ in range(300):
+        line.request(1, "enable", axis=0, on=0)
+        numbers.append(node.last[0])
+    assert all((b - a) % 256 == 1 for a, b in zip(numbers, numbers[1:])) and 0 in numbers
+    assert node.counters["repeated"] == 0
+    firsts = set()
+    for number in range(20):
+        other = Line(FakeLine(node), random_source=random.Random(number))
+        other.request(1, "enable", axis=0, on=0)
+        firsts.add(node.last[0])
+    assert len(firsts) > 10
+
+
+def test_a_new_host_with_the_number_of_the_last_one_still_gets_fresh_answers():
+    node = FakeNode()
+    fake = FakeLine(node)
+
+    class Always5(random.Random):
+        def randrange(self, *_):
+            return 5
+
+    axis = Line(fake, random_source=Always5()).axis()
+    before = axis.status().position_nm
+    node.axes[0].position += 65536
+    axis = Line(fake, random_source=Always5()).axis()        # identify is the repetition, and its answer is the same anyway
+    assert axis.status().position_nm == pytest.approx(before + 800)

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: Apache-2.0
+"""transport: the parity of each byte, and what a port that does not open says."""
+import errno
+import os
+
+import pytest
+import serial
+from fake_node import FakeNode
+
+from moire.client import Line
+from moire.errors import PortError
+from moire.protocol import ODD_ADDRESSES
+from moire.transport import SerialLine
+
+
+class FakePort:
+    """Stands for serial.Serial: turns bytes and parity into words for a node, as the wire would."""
+
+    def __init__(self, name="fake", mark=True, node=None, **settings):
+        self.settings, self.node, self.mark = settings, node or FakeNode(), mark
+        self.held, self.timeout, self.words, self.answers, self.is_open = "N", 0, [], bytearray(), True
+
+    @property
+    def parity(self):
+        return self.held
+
+    @parity.setter
+    def parity(self, value):
+        if value in "MS" and not self.mark:
+            raise ValueError(f"Invalid parity: {value!r}")
+        self.held = value
+
+    def write(self, data):
+        for byte in data:
+            ones = byte.bit_count() & 1
+            ninth = {"M": 1, "S": 0, "E": ones, "O": ones ^ 1}[self.held]
+            self.words.append(byte | ninth << 8)
+            self.answers += bytes(self.node.hear(self.words[-1]))
+
+    def flush(self):
+        pass
+
+    def reset_input_buffer(self):
+        self.answers.clear()
+
+    @property
+    def in_waiting(self):
+        return len(self.answers)
+
+    def read(self, count):
+        taken, self.answers = bytes(self.answers[:count]), self.answers[count:]
+        return taken
+
+    def fileno(self):
+        raise OSError("no descriptor")
+
+    def close(self):
+        self.is_open = False
+
+
+def serial_line(parity="auto", **port):
+    made = []
+
+    def open_port(name, **settings):
+        made.append(FakePort(name, **port, **settings))
+        return made[0]
+    return SerialLine("COM7", 1_000_000, parity, open_port), made[0]
+
+
+@pytest.mark.parametrize("mark, parity", [(True, "auto"), (True, "odd"), (False, "auto"), (False, "odd"), (True, "mark")])
+def test_an_exchange_has_the_ninth_bit_on_command_bytes_only(mark, parity):
+    line, port = serial_line(parity, mark=mark, node=FakeNode(address=7))
+    assert Line(line).axis(address=7).status().state == "off"
+    assert [word for word in port.words if word >> 8] == [0x127, 0x117] * 3
+    assert port.node.counters["frames_bad"] == 0 and port.node.counters["frames_good"] == 3
+    assert port.settings["baudrate"] == 1_000_000 and port.settings["stopbits"] == 1
+
+
+@pytest.mark.parametrize("mark", [True, False])
+def test_every_byte_goes_out_with_the_bit_that_is_wanted(mark):
+    line, port = serial_line(mark=mark)
+    line.send(range(256))
+    assert port.words == list(range(256))
+
+
+def test_mark_reaches_all_addresses_and_odd_parity_eight():
+    line, port = serial_line(mark=True)
+    assert all(line.reaches(address) for address in range(1, 16))
+    line.send([0x123])
+    assert port.words == [0x123]
+    line, port = serial_line(mark=False)
+    assert tuple(address for address in range(1, 16) if line.reaches(address)) == ODD_ADDRESSES == (1, 2, 4, 7, 8, 11, 13, 14)
+    with pytest.raises(PortError, match="odd parity reaches only the addresses 1, 2, 4, 7, 8, 11, 13, 14"):
+        line.send([0x123])
+    assert port.words == []
+
+
+def test_find_asks_only_whom_odd_parity_reaches():
+    line, port = serial_line(mark=False, node=FakeNode(address=11))
+    client = Line(line)
+    client.FIND_ANSWER_S = 0.001
+    assert [node.address for node in client.find()] == [11]
+    assert {word & 15 for word in port.words if word >> 8} == set(ODD_ADDRESSES)
+
+
+def test_mark_that_is_demanded_and_missing_is_refused():
+    with pytest.raises(PortError, match="no MARK and SPACE parity: use parity odd"):
+        serial_line("mark", mark=False)
+    with pytest.raises(PortError, match="allowed are auto, mark, odd"):
+        serial_line("even")
+
+
+@pytest.mark.parametrize(
+    "error, sentence",
+    [
+        (
+            serial.SerialException(errno.ENOENT, "could not open port COM7: [Errno 2] No such file or directory: 'COM7'"),
+            "there is no port COM7",
+        ),
+        (FileNotFoundError(errno.ENOENT, "No such file or directory"), "there is no port COM7"),
+        (serial.SerialException(errno.EBUSY, "could not open port"), "the port COM7 is in use by another program"),
+        (
+            serial.SerialException(errno.EAGAIN, "Could not exclusively lock port COM7: [Errno 11] Resource temporarily unavailable"),
+            "the port COM7 is in use by another program",
+        ),
+        (
+            serial.SerialException("could not open port 'COM7': PermissionError(13, 'Access is denied.', None, 5)"),
+            "the port COM7 is in use by another program",
+        ),
+        (
+            serial.SerialException(errno.EACCES, "could not open port COM7: [Errno 13] Permission denied: 'COM7'"),
+            "no permission to use the port COM7",
+        ),
+        (ValueError("Not a valid baudrate: -1"), "the port COM7 cannot do 1000000 baud"),
+        (OSError(errno.EIO, "Input/output error"), "the port COM7 does not open: Input/output error"),
+    ],
+)
+def test_a_port_that_does_not_open_says_why_in_one_sentence(error, sentence):
+    def open_port(*_, **__):
+        raise error
+    with pytest.raises(PortError) as caught:
+        SerialLine("COM7", 1_000_000, open_port=open_port)
+    assert str(caught.value).startswith(sentence) and "\n" not in str(caught.value)
+
+
+def test_a_missing_device_is_said_by_the_real_library_too():
+    with pytest.raises(PortError, match="there is no port /dev/no_such_port"):
+        SerialLine("/dev/no_such_port")
+
+
+def test_a_port_that_vanishes_is_a_port_error():
+    line, port = serial_line()
+
+    def gone(_):
+        raise serial.SerialException("device reports readiness to read but returned no data")
+    port.read = gone
+    with pytest.raises(PortError, match="the port COM7 failed: device reports readiness"):
+        line.receive(1, 0.1)
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no pseudo terminals")
+@pytest.mark.parametrize(
+    "parity, said", [("auto", "sends no parity bit"), ("odd", "sends no parity bit"), ("mark", "no MARK and SPACE parity")]
+)
+def test_a_port_that_drops_the_parity_bit_is_refused_and_not_trusted(parity, said):
+    # what a pseudo terminal does
+    near, far = os.openpty()
+    with pytest.raises(PortError, match=said):
+        SerialLine(os.ttyname(far), parity=parity)
+    os.close(near)
+    os.close(far)
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no pseudo terminals")
+def test_a_port_in_use_is_said_by_the_real_library_too():
+    near, far = os.openpty()
+    with serial.Serial(os.ttyname(far), exclusive=True):
+        with pytest.raises(PortError, match="is in use by another program"):
+            SerialLine(os.ttyname(far))
+    os.close(near)
+    os.close(far)
+
+
+def test_receive_ends_when_its_time_has_passed():
+    line, _ = serial_line()
+    began = line.now()
+    assert line.receive(3, 0.03) == [] and 0.02 < line.now() - began < 1

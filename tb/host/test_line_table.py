@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""tables/line.py: nothing made is stale, the made files say what line.toml says, and a wrong table is refused."""
+import importlib.util
+import re
+import shutil
+import struct
+import subprocess
+import tomllib
+import zlib
+from fractions import Fraction
+from pathlib import Path
+
+import fake_node  # noqa: F401  (puts the package on the path)
+import pytest
+
+from moire import line_tables
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE = ROOT / "tables" / "line.toml"
+TABLE = tomllib.loads(SOURCE.read_text(encoding="utf-8"))
+HEADER = (ROOT / "sw" / "firmware" / "line_protocol.h").read_text(encoding="utf-8")
+
+specification = importlib.util.spec_from_file_location("line_generator", ROOT / "tables" / "line.py")
+generator = importlib.util.module_from_spec(specification)
+specification.loader.exec_module(generator)
+
+
+def test_the_made_files_are_fresh():
+    assert generator.main(["--check"]) == 0
+
+
+def test_a_stale_file_is_found_named_and_made_again(tmp_path, monkeypatch, capsys):
+    copy = tmp_path / "sw" / "firmware" / "line_protocol.h"
+    copy.parent.mkdir(parents=True)
+    shutil.copy(generator.HEADER, copy)
+    with open(copy, "a") as file:
+        file.write("// edited\n")
+    host, page = generator.HOST.read_text(encoding="utf-8"), generator.PAGE.read_text(encoding="utf-8")
+    for name, text in (("HOST", host), ("PAGE", page)):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+        monkeypatch.setattr(generator, name, tmp_path / name)
+    monkeypatch.setattr(generator, "HEADER", copy)
+    monkeypatch.setattr(generator, "ROOT", tmp_path)
+    assert generator.main(["--check"]) == 1 and "line_protocol.h is stale" in capsys.readouterr().err
+    assert generator.main([]) == 0 and "made" in capsys.readouterr().out
+    assert generator.main(["--check"]) == 0
+
+
+def test_the_crc_is_that_of_the_source_whatever_its_line_ends():
+    text = SOURCE.read_bytes()
+    assert zlib.crc32(text) == line_tables.PROTOCOL_CRC == generator.Line(text.replace(b"\n", b"\r\n")).crc
+    assert f"#define PROTOCOL_CRC         0x{line_tables.PROTOCOL_CRC:08X}u" in HEADER
+    assert generator.Line(text + b"# one remark more\n").crc != line_tables.PROTOCOL_CRC
+
+
+def test_the_host_has_every_entry_of_the_source():
+    for name, made in (("cause", line_tables.CAUSES), ("fault", line_tables.FAULTS), ("encoder_event", line_tables.ENCODER_EVENTS),
+                       ("state", line_tables.STATES), ("flag", line_tables.FLAGS)):
+        assert made == {code: (key, words) for key, (code, words) in TABLE[name].items()}
+    assert list(line_tables.OPERATIONS) == list(TABLE["operation"]) and list(line_tables.PARAMETERS) == list(TABLE["parameter"])
+    for name, source in TABLE["operation"].items():
+        made = line_tables.OPERATIONS[name]
+        assert (made.code, [" ".join(field) for field in made.request], [" ".join(field) for field in made.reply]) == (
+            source["code"], source["request"], source["reply"])
+    for name, source in TABLE["parameter"].items():
+        made = line_tables.PARAMETERS[name]
+        assert (made.id, made.unit, made.lsb, made.min, made.max, made.default) == (
+            source["id"], source["unit"], Fraction(source["lsb"]), source["min"], source["max"], source["default"])
+
+
+def test_offsets_and_lengths_in_the_header_are_those_of_a_packed_struct():
+    formats = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i8": "b", "i16": "h", "i32": "i", "i64": "q"}
+    for name, source in TABLE["operation"].items():
+        for way, head in (("request", "BB"), ("reply", "BBB")):
+            laid = "<" + head
+            for declared in source[way]:
+                field, kind = declared.split()
+                assert f"#define LINE_{name}_{way}_{field} {struct.calcsize(laid)}u ".upper() in HEADER.upper()
+                laid += formats[kind]
+            assert re.search(f"#define LINE_{name}_{way}_LENGTH {struct.calcsize(laid)}u$".upper(), HEADER.upper(), re.MULTILINE)
+
+
+def test_a_compiler_reads_the_header_and_gets_the_same_numbers(tmp_path):
+    compiler = shutil.which("gcc") or shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler")
+    source = tmp_path / "print.c"
+    source.write_text(
+        '#include <stdio.h>\n#include <stdint.h>\n#include "line_protocol.h"\n'
+        '#define P(name, id, min, max, default) printf("%s %d %lld %lld %lld\\n", #name, id, '
+        "(long long)min, (long long)max, (long long)default);\n"
+        '#define O(name, code, request, reply) printf("%s %d %d %d\\n", #name, code, (int)request, (int)reply);\n'
+        "int main(void) { LINE_PARAMETERS(P) LINE_OPERATIONS(O) return LINE_CAUSE_NEVER - 20 + LINE_FAULT_PROFILE_UNDERRUN - 256; }\n"
+    )
+    subprocess.run([compiler, "-Wall", "-Wextra", "-Werror", "-I", ROOT / "sw" / "firmware", "-o", tmp_path / "print", source], check=True)
+    told = subprocess.run([tmp_path / "print"], check=True, capture_output=True, text=True).stdout.splitlines()
+    wanted = [f"{p.name} {p.id} {p.min} {p.max} {p.default}" for p in line_tables.PARAMETERS.values()]
+    size = {"8": 1, "16": 2, "32": 4, "64": 8}
+    wanted += [f"{o.name} {o.code} {2 + sum(size[kind[1:]] for _, kind in o.request)} {3 + sum(size[kind[1:]] for _, kind in o.reply)}"
+               for o in line_tables.OPERATIONS.values()]
+    assert told == wanted
+
+
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        (("code = 2\n", "code = 1\n"), "operation codes repeat"),
+        (("id = 2, ", "id = 1, "), "parameter ids repeat"),
+        (('"axis u8"', '"axis u9"'), "no known type"),
+        (("default = 160,", "default = 0,  "), "default of counts_per_period"),
+        (("longest_body = 64", "longest_body = 40"), "needs more than 40 bytes"),
+        (('[1,  "the node', '[2,  "the node'), "cause codes repeat"),
+    ],
+)
+def test_a_wrong_table_is_refused_by_name(change, said):
+    text = SOURCE.read_text(encoding="utf-8")
+    assert change[0] in text
+    with pytest.raises(ValueError, match=said):
+        generator.Line(text.replace(*change, 1).encode())
+
+
+def test_a_page_without_its_marks_is_refused():
+    with pytest.raises(ValueError, match="needs the marks"):
+        generator.page(generator.Line(SOURCE.read_bytes()), "# nothing")

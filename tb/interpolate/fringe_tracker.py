@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What rtl/interpolate/fringe_tracker.sv does, in integers: step(valid, phase) is one clk."""
+
+PERIOD, QUARTER = 1 << 16, 1 << 14
+
+
+def wrapped(phase):
+    """The same phase from -half a period to one LSB below half a period."""
+    return (phase + PERIOD // 2) % PERIOD - PERIOD // 2
+
+
+class FringeTracker:
+    def __init__(self):
+        self.last, self.speed, self.foreseen, self.strayed, self.moved = None, 0, 0, False, 0
+
+    def follow(self, phase):
+        """One phase; returns step, overspeed."""
+        if self.last is None:
+            self.last = phase
+            return 0, 0
+        deviation = wrapped(phase - self.last - self.foreseen)
+        step, nearest = self.foreseen + deviation, wrapped(phase - self.last)
+        fits, near = -PERIOD <= step < PERIOD, abs(deviation) < QUARTER
+        self.last = phase
+        if fits and near:
+            if not self.strayed:
+                self.speed = step
+            self.foreseen, self.strayed = self.speed, False
+            return step, 0
+        if fits and not self.strayed:
+            self.foreseen, self.strayed = self.speed - deviation, True
+            return step, 1
+        self.foreseen = self.speed = 0
+        self.strayed = False
+        return nearest, 1
+
+    def step(self, valid, phase):
+        overspeed = 0
+        if valid:
+            self.moved, overspeed = self.follow(phase)
+        return int(valid), self.moved, overspeed

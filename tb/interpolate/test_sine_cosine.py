@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From sine and cosine to position: arctan_table, fringe_tracker and unwrap in a row, driven with what a grating gives.
+
+Every disturbance has a bound on the position error from theory, and every motion is held against it: the RTL on short
+motions, the models on long ones. One period is 0.8 um, as in S0.
+"""
+import math
+from pathlib import Path
+
+import cocotb
+import numpy as np
+import pytest
+from cocotb.triggers import ClockCycles, FallingEdge
+
+from arctan_table import LATENCY, arctan, phase_of
+from bench import run, seed, start
+from fringe_tracker import FringeTracker
+from unwrap import Unwrap
+
+PERIOD_NM = 800
+AMPLITUDE = 0.84                                       # of full scale: room for what is added
+CLEAN = dict(offset=0.0, gain=0.0, phase=0.0, noise=0.0)
+DISTURBED = {                                           # offset, gain: of the amplitude; phase: degrees; noise: of full scale
+    "clean": CLEAN,
+    "offset": CLEAN | dict(offset=0.01),
+    "gain": CLEAN | dict(gain=0.01),
+    "phase": CLEAN | dict(phase=1.0),
+    "noise": CLEAN | dict(noise=0.01),
+    "all": dict(offset=0.01, gain=0.01, phase=1.0, noise=0.01),
+    "all the other way": dict(offset=-0.01, gain=-0.01, phase=-1.0, noise=0.01),
+    "ten times all": dict(offset=0.1, gain=0.04, phase=10.0, noise=0.02),
+}
+
+
+def nm(radians):
+    return radians / math.tau * PERIOD_NM
+
+
+def offset_bound(offset, amplitude=1.0):
+    """A vector of this length, added to one of this amplitude, turns it by no more."""
+    return math.asin(abs(offset) / amplitude)
+
+
+def gain_bound(gain):
+    """One leg is longer by `gain`: at worst, near 45 degrees."""
+    return math.asin(abs(gain) / (2 + gain))
+
+
+def phase_bound(degrees):
+    """The legs are off by half of it each, one forward, one back."""
+    return math.radians(abs(degrees)) / 2
+
+
+def bound(w, offset, gain, phase, noise):
+    """LSB of position. The disturbances act one after the other, so their bounds add; each shortens the vector for the next."""
+    full = 1 << w - 1
+    length = AMPLITUDE * full * math.sqrt(1 - math.sin(math.radians(abs(phase)))) * min(1, 1 + gain)
+    turn = phase_bound(phase) + gain_bound(gain)
+    for added in (AMPLITUDE * full * abs(offset), math.sqrt(2) * noise * full, math.sqrt(0.5)):     # the last: rounding
+        turn += offset_bound(added, length)
+        length -= added
+    return turn / math.tau * 65536 + arctan.BOUND
+
+
+def samples(where, w, draw, offset, gain, phase, noise):
+    """Converter words at the places `where`, in periods."""
+    full = 1 << w - 1
+    angle, half = math.tau * np.asarray(where), math.radians(phase) / 2
+    sin = AMPLITUDE * full * ((1 + gain) * np.sin(angle + half) + offset) + noise * full * draw.uniform(-1, 1, len(angle))
+    cos = AMPLITUDE * full * np.cos(angle - half) + noise * full * draw.uniform(-1, 1, len(angle))
+    words = [np.rint(leg).astype(int) for leg in (sin, cos)]
+    assert all(-full <= leg.min() and leg.max() < full for leg in words)
+    return list(zip(*(leg.tolist() for leg in words)))
+
+
+def top_acceleration(error):
+    """Largest change of speed, in periods a sample, if every phase may be wrong by `error` LSB: four of them meet."""
+    return (16384 - 4 * error - 1) / 65536
+
+
+def ramp(change, most=0.99):
+    """Speed up from standstill to `most` periods a sample, brake, and the same way back."""
+    up = np.arange(0, most, change)
+    speeds = np.concatenate([up, up[::-1], -up, -up[::-1]])
+    return 0.3 + np.concatenate([[0], np.cumsum(speeds)])
+
+
+def motions(n, error):
+    """Places in periods, at about n samples each; the first lies inside the period 0."""
+    time = np.arange(n)
+    return {
+        "creep through all phases": 0.5 + time * 1.37 / n,
+        "S0 top speed, 6250 fringes a second at 100 000 samples": 0.25 - time / 16,
+        "ramp to almost a period a sample": ramp(1.98 / (n / 2)),
+        "the hardest ramp that is followed": ramp(top_acceleration(error)),
+        "reversals inside a fringe": 0.6 + 0.3 * np.sin(time * 0.7) * np.cos(time * 0.013),
+        "reversals across the phase zero": 0.02 + 0.05 * np.sin(time * 1.1 + 0.1),
+    }
+
+
+def counts(position, subdivision):
+    """The read-out of S0, any subdivision."""
+    return position * subdivision >> 16
+
+
+class Chain:
+    """The models in a row; follow() is one sample and returns position, overspeed."""
+
+    def __init__(self):
+        self.tracker, self.unwrap = FringeTracker(), Unwrap()
+
+    def follow(self, sin, cos):
+        phase = phase_of(sin, cos)
+        step, overspeed = self.tracker.follow(phase)
+        return self.unwrap.step(1, step, phase, 0, 0)[1], overspeed
+
+
+async def begin(dut):
+    await start(dut, valid=0, sin=0, cos=0)
+    await FallingEdge(dut.clk)
+
+
+async def again(dut):
+    dut.rst.value = 1
+    await FallingEdge(dut.clk)
+    dut.rst.value = 0
+
+
+async def follow(dut, sin, cos):
+    """One sample through the RTL; returns the position."""
+    dut.valid.value, dut.sin.value, dut.cos.value = 1, sin, cos
+    await FallingEdge(dut.clk)
+    dut.valid.value = 0
+    await ClockCycles(dut.clk, LATENCY + 1, FallingEdge)
+    assert dut.done.value == 1
+    return dut.position.value.to_signed()
+
+
+@cocotb.test()
+async def latency_is_25_from_sample_to_position(dut):
+    await begin(dut)
+    dut.valid.value, dut.sin.value, dut.cos.value = 1, 50, 0
+    for clk in range(1, 26):
+        await FallingEdge(dut.clk)
+        dut.valid.value = 0
+        assert int(dut.done.value) == (clk == 25)
+    assert dut.position.value == 16384
+
+
+@cocotb.test()
+async def every_motion_stays_within_the_bound_of_every_disturbance(dut):
+    await begin(dut)
+    w, draw = int(dut.W.value), np.random.default_rng(seed())
+    for disturbance, amounts in DISTURBED.items():
+        limit = bound(w, **amounts)
+        for motion, where in motions(60, limit).items():
+            await again(dut)
+            chain, worst = Chain(), 0
+            for place, (sin, cos) in zip(where, samples(where, w, draw, **amounts)):
+                position = await follow(dut, sin, cos)
+                assert (position, 0) == chain.follow(sin, cos), (disturbance, motion)
+                worst = max(worst, abs(position - place * 65536))
+            assert worst <= limit, f"{disturbance}, {motion}: {worst:.1f} LSB of {limit:.1f}"
+
+
+@cocotb.test()
+async def the_centre_of_every_count_reads_exactly(dut):
+    await begin(dut)
+    w, draw = int(dut.W.value), np.random.default_rng(seed())
+    for subdivision in (1, 7, 160):
+        await again(dut)
+        steps = max(subdivision, 16)                    # a sample a count, or enough for the tracker
+        where = (np.concatenate([np.arange(steps), np.arange(steps)[::-1], -1 - np.arange(steps)]) + 0.5) / steps
+        for place, (sin, cos) in zip(where, samples(where, w, draw, **CLEAN)):
+            assert counts(await follow(dut, sin, cos), subdivision) == math.floor(place * subdivision)
+
+
+@cocotb.test()
+async def too_hard_a_jerk_is_an_overspeed(dut):
+    await begin(dut)
+    w, draw = int(dut.W.value), np.random.default_rng(seed())
+    limit = bound(w, **CLEAN)
+    for direction in (1, -1):
+        await again(dut)
+        where = 0.3 + direction * np.array([0, 0, 0.25 + 4 * (limit + 1) / 65536])
+        seen = []
+        for sin, cos in samples(where, w, draw, **CLEAN):
+            dut.valid.value, dut.sin.value, dut.cos.value = 1, sin, cos
+            await FallingEdge(dut.clk)
+            dut.valid.value = 0
+            await ClockCycles(dut.clk, LATENCY, FallingEdge)
+            seen.append(int(dut.overspeed.value))
+            await FallingEdge(dut.clk)
+        assert seen == [0, 0, 1]
+
+
+def test_the_bounds_are_those_of_theory():
+    assert nm(offset_bound(0.01)) == pytest.approx(1.27, abs=0.005)
+    assert nm(gain_bound(0.01)) == pytest.approx(0.63, abs=0.005)
+    assert nm(phase_bound(1)) == pytest.approx(1.11, abs=0.005)
+
+
+def test_eight_bits_cost_no_more_than_0_683_nm():
+    angle = np.linspace(0, math.tau, 200_000, endpoint=False)
+    away = [phase_of(round(127 * s), round(127 * c)) - a / math.tau * 65536
+            for s, c, a in zip(np.sin(angle).tolist(), np.cos(angle).tolist(), angle.tolist())]
+    worst = max(abs((e + 32768) % 65536 - 32768) for e in away) / 65536 * PERIOD_NM
+    assert 0.6 < worst <= 0.683
+    assert worst <= nm(offset_bound(math.sqrt(0.5), 127)) + arctan.BOUND / 65536 * PERIOD_NM
+
+
+@pytest.mark.parametrize("disturbance", DISTURBED)
+def test_long_motions_stay_within_the_bound_and_come_near_to_it(disturbance):
+    draw, amounts = np.random.default_rng(1), DISTURBED[disturbance]
+    limit, worst = bound(8, **amounts), 0
+    for motion, where in motions(4000, limit).items():
+        chain = Chain()
+        for place, (sin, cos) in zip(where, samples(where, 8, draw, **amounts)):
+            position, overspeed = chain.follow(sin, cos)
+            worst = max(worst, abs(position - place * 65536))
+            assert not overspeed and worst <= limit, f"{motion}: {worst:.1f} LSB of {limit:.1f}"
+    assert worst > 0.6 * limit
+
+
+@pytest.mark.parametrize("subdivision", [1, 7, 160, 1000, 65536])
+def test_the_read_out_is_the_floor_of_the_place(subdivision):
+    draw, chain, w = np.random.default_rng(1), Chain(), 16
+    where = np.concatenate([np.linspace(0.5, 3, 1500), np.linspace(3, -3, 3500)])
+    away = bound(w, **CLEAN) / 65536
+    for place, (sin, cos) in zip(where, samples(where, w, draw, **CLEAN)):
+        read = counts(chain.follow(sin, cos)[0], subdivision)
+        assert math.floor((place - away) * subdivision) <= read <= math.floor((place + away) * subdivision)
+
+
+@pytest.mark.parametrize("w", [8, 12])
+def test_sine_cosine(w, monkeypatch):
+    monkeypatch.setattr("bench.source_of", lambda top: Path(__file__).with_name(f"{top}.sv"))    # a bench top is no part of rtl/
+    run("interpolator_bench", __file__, W=w)

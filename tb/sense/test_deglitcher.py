@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""deglitcher: pulses just too short and just long enough, both ends of the setting, its start, and random levels against the model."""
+import random
+
+import cocotb
+import pytest
+from cocotb.triggers import FallingEdge, RisingEdge
+
+from bench import run, start
+from deglitcher import Deglitcher
+
+
+async def begin(dut, level=0, stable=0):
+    """Reset with the pins at these levels; the model has seen the same clk."""
+    await start(dut, level=level, stable=stable)
+    model = Deglitcher(int(dut.SETTLE.value))
+    model.step(stable, level, 1)
+    return model
+
+
+async def drive(dut, model, stable, levels, rst=0):
+    """Put each level on the pin for one clk and hold the model beside the design; return (filtered, rejected) of each clk."""
+    dut.stable.value, dut.rst.value, out = stable, rst, []
+    for clk, level in enumerate(levels):
+        dut.level.value = level
+        await RisingEdge(dut.clk)
+        await FallingEdge(dut.clk)
+        got, want = (int(dut.filtered.value), int(dut.rejected.value)), model.step(stable, level, rst)
+        assert got == want, f"clk {clk}, stable {stable}: (filtered, rejected) is {got}, the model has {want}"
+        out.append(got)
+    dut.rst.value = 0
+    return out
+
+
+@cocotb.test()
+async def latency_is_stable(dut):
+    model = await begin(dut)
+    await drive(dut, model, 1, [0] * 10)
+    for stable in (0, 1, 2, 3, 7):
+        for level in (1, 0):
+            out = await drive(dut, model, stable, [level] * (stable + 2))
+            assert [filtered for filtered, _ in out].index(level) + 1 == max(1, stable)
+            assert not any(rejected for _, rejected in out)
+
+
+@cocotb.test()
+async def a_pulse_shorter_by_one_clk_is_rejected_and_reported_once(dut):
+    model = await begin(dut)
+    await drive(dut, model, 5, [0] * 10)
+    out = await drive(dut, model, 5, [1] * 4 + [0] * 8)
+    assert out == [(0, 0)] * 4 + [(0, 1)] + [(0, 0)] * 7
+    out = await drive(dut, model, 5, [1] * 5 + [0] * 8)
+    assert out == [(0, 0)] * 4 + [(1, 0)] * 5 + [(0, 0)] * 4
+
+
+@cocotb.test()
+async def a_train_of_short_pulses_never_passes(dut):
+    model = await begin(dut)
+    await drive(dut, model, 4, [0] * 10)
+    out = await drive(dut, model, 4, [1, 1, 1, 0] * 50)
+    assert out == [(0, 0), (0, 0), (0, 0), (0, 1)] * 50
+
+
+@cocotb.test()
+async def a_level_that_stands_from_power_up_makes_no_edge(dut):
+    for level in (1, 0):
+        model = await begin(dut, level=level, stable=15)
+        assert await drive(dut, model, 15, [level] * 40) == [(level, 0)] * 40
+
+
+@cocotb.test()
+async def synchronisers_that_fill_after_reset_make_no_edge_later(dut):
+    model = await begin(dut, level=0, stable=15)
+    filling = int(dut.SETTLE.value) - 1
+    out = await drive(dut, model, 15, [0] * filling + [1] * 40)
+    assert out == [(0, 0)] * filling + [(1, 0)] * 40
+
+
+@cocotb.test()
+async def the_longest_setting_passes_after_exactly_that_time(dut):
+    longest = min((1 << int(dut.W.value)) - 1, 4095)
+    model = await begin(dut)
+    await drive(dut, model, longest, [0] * 10)
+    out = await drive(dut, model, longest, [1] * longest)
+    assert [filtered for filtered, _ in out] == [0] * (longest - 1) + [1]
+    out = await drive(dut, model, longest, [0] * (longest - 1) + [1] * 2)
+    assert out[-2:] == [(1, 1), (1, 0)]
+
+
+@cocotb.test()
+async def a_smaller_setting_acts_at_once(dut):
+    model = await begin(dut)
+    await drive(dut, model, 15, [0] * 10)
+    await drive(dut, model, 15, [1] * 8)
+    assert await drive(dut, model, 3, [1]) == [(1, 0)]
+
+
+@cocotb.test()
+async def reset_in_the_middle_of_a_pulse_forgets_it(dut):
+    model = await begin(dut)
+    await drive(dut, model, 6, [0] * 10)
+    await drive(dut, model, 6, [1] * 4)
+    await drive(dut, model, 6, [0], rst=1)
+    assert await drive(dut, model, 6, [0] * 10) == [(0, 0)] * 10
+
+
+@cocotb.test()
+async def any_levels_match_the_model(dut):
+    model = await begin(dut)
+    for _ in range(300):
+        stable, pulse = random.choice([0, 1, 2, 3, 5, 8, 15]), random.choice([2, 4, 16])
+        levels = [bit for _ in range(40 // pulse) for bit in [random.getrandbits(1)] * random.randint(1, pulse)]
+        await drive(dut, model, stable, levels)
+        if random.random() < 0.05:
+            await drive(dut, model, stable, levels[:2], rst=1)
+
+
+@pytest.mark.parametrize("w, settle", [(16, 4), (4, 1)])
+def test_deglitcher(w, settle):
+    run("deglitcher", __file__, W=w, SETTLE=settle)

@@ -1,0 +1,372 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The S0 stage as shipped: RTL and firmware of both nodes, the machine around them, the host package at the end of the line."""
+import os
+import random
+
+import pytest
+
+from experiments.s0_stage import ADDRESSES, PERIOD_NM, Stage
+from moire import client
+from moire.errors import LineGarbled, MotionFailed, NobodyAnswers, Refused, WrongBuild
+from moire.protocol import request_body
+
+SEED = int(os.environ.get("SEED") or 1)
+AXIS = {name: number for number, name in enumerate(ADDRESSES)}
+BOUND_NM = 50.0                      # of the true position after a move
+
+
+@pytest.fixture(scope="module")
+def homed():
+    """One stage for the tests of this file, both axes homed."""
+    print(f"SEED={SEED}")
+    stage = Stage.power_up(SEED)
+    stage.find()
+    for name in stage.axes:
+        stage.home(name)
+    return stage
+
+
+@pytest.fixture
+def stage(homed):
+    """The homed stage with both drives on, holding. The test may leave any fault behind that a reset clears."""
+    for axis in homed.axes.values():
+        if axis.status().faults:
+            axis.reset()
+        axis.enable()
+    return homed
+
+
+def rest(stage, name):
+    """True position, told position and target: what a refused command must not change. Looks long enough to see a motion begin."""
+    stage.let_pass(0.05)
+    status = stage.axes[name].status()
+    return stage.true_nm(name), status.target_nm
+
+
+def refused(cause, call, *arguments, **named):
+    with pytest.raises(Refused) as caught:
+        call(*arguments, **named)
+    assert caught.value.cause == cause, str(caught.value)
+    return str(caught.value)
+
+
+# ------------------------------------------------------------------ the main way
+
+def test_power_up_finds_both_nodes_with_drives_off_and_no_zero():
+    stage = Stage.power_up(SEED + 1)
+    identities = stage.find()
+    assert [identity.address for identity in identities] == list(ADDRESSES.values())
+    assert all(identity.matches for identity in identities)
+    for name, axis in stage.axes.items():
+        status = axis.status()
+        assert (status.state, status.ended, status.enabled, status.homed, status.faults) == ("off", "never", False, False, ())
+        assert stage.true_nm(name, from_zero=False) != pytest.approx(status.position_nm, abs=1000), "the place at power-up is unknown"
+        refused("not_enabled", axis.move, 0)
+        axis.enable()
+        refused("not_homed", axis.move, 0)
+        assert not axis.status().in_motion
+
+
+def test_homing_takes_the_zero_at_a_phase_zero(homed):
+    for name, axis in homed.axes.items():
+        status, encoder = axis.status(), axis.encoder()
+        assert status.homed and status.state == "holding"
+        assert homed.zero_nm[name] % PERIOD_NM == 0
+        assert abs(homed.true_nm(name)) < BOUND_NM
+        apart = (encoder.phase * PERIOD_NM - status.position_nm + PERIOD_NM / 2) % PERIOD_NM - PERIOD_NM / 2
+        assert abs(apart) < 10, "the position's fraction is the phase"
+        assert encoder.home_margin > 0.2, f"the switch stands too near the middle between two phase zeros: {encoder.home_phase_nm} nm"
+
+
+def test_five_moves_reach_their_targets(stage):
+    for name, target_nm in (("X", 0.3e6), ("Y", 0.2e6), ("X", 0.3e6 + 100), ("Y", -0.05e6), ("X", 1234.5)):
+        move = stage.move(name, target_nm)
+        assert abs(move.error_nm) <= BOUND_NM, move
+        assert abs(move.reached_nm - target_nm) <= BOUND_NM, move
+
+
+def test_homing_again_finds_the_same_zero(stage):
+    zero = stage.zero_nm["X"]
+    stage.move("X", 0.1e6)
+    stage.home("X")
+    assert stage.zero_nm["X"] == zero
+
+
+def test_stop_in_mid_move_keeps_the_axis_under_control(stage):
+    axis = stage.axes["X"]
+    axis.request("move", target=axis.to_counts(1.5e6))
+    stage.let_pass(0.15)
+    before = axis.status()
+    assert before.velocity_mm_s > 1
+    axis.stop()
+    with pytest.raises(MotionFailed) as caught:
+        axis.wait(stage.keep("X"))
+    assert caught.value.cause == "stopped"
+    status = axis.status()
+    assert status.enabled and status.state == "holding" and not status.faults
+    assert before.position_nm < status.position_nm < 1.4e6
+    assert abs(stage.move("X", 0).error_nm) <= BOUND_NM
+
+
+# ------------------------------------------------------------------ faults
+
+def fault_during_move(stage, name, provoke, distance_nm=0.5e6):
+    """Begin a move, provoke a fault in its middle; returns the status soon after and the true place of the axis then."""
+    axis = stage.axes[name]
+    here = axis.status().position_nm
+    axis.request("move", target=axis.to_counts(here + distance_nm))
+    stage.let_pass(0.06)
+    provoke()
+    return axis
+
+
+def assert_stopped_by(stage, name, cause):
+    axis = stage.axes[name]
+    assert not stage.twin.truth(AXIS[name]).enabled, "the drive is off at the pins"
+    status = axis.status()
+    assert not status.enabled and status.state == "faulted" and cause in status.first_fault, status
+    refused("faulted", axis.move, 0)
+    refused("faulted", axis.enable)
+    stage.let_pass(0.1)
+    place = stage.true_nm(name)
+    stage.let_pass(0.1)
+    assert abs(stage.true_nm(name) - place) < 100, "the axis stands"
+    return status
+
+
+def assert_position_survived(stage, name):
+    status = stage.axes[name].status()
+    assert status.homed and abs(status.position_nm - stage.true_nm(name)) < BOUND_NM
+
+
+def test_limit_switch_stops_the_drive_and_lets_the_axis_leave(stage):
+    axis = stage.axes["X"]
+    stage.move("X", 0)
+    low = axis.get_parameter("travel_low")
+    axis.set_parameter("travel_low", "-1.3mm")
+    with pytest.raises(MotionFailed) as caught:
+        stage.move("X", -1.2e6)
+    assert caught.value.cause == "ended_by_fault" and "limit switch at the low end" in str(caught.value)
+    status = assert_stopped_by(stage, "X", "limit_low")
+    assert status.limit_low
+    assert_position_survived(stage, "X")
+    axis.reset()
+    axis.enable()
+    place = stage.true_nm("X")
+    axis.request("move", target=axis.to_counts(-1.29e6))          # further in: the guard lets no command pass
+    stage.let_pass(0.3)
+    assert abs(stage.true_nm("X") - place) < 100
+    axis.disable()
+    axis.reset()
+    axis.enable()
+    assert abs(stage.move("X", 0).error_nm) <= BOUND_NM
+    axis.write_parameter("travel_low", low.counts)
+    assert not axis.status().faults
+
+
+def test_emergency_stop_takes_the_drive_at_once_and_holds_until_reset(stage):
+    axis = fault_during_move(stage, "X", lambda: stage.twin.inject("estop", AXIS["X"]))
+    stage.twin.run(1e-5)
+    assert not stage.twin.truth(AXIS["X"]).enabled, "off within 10 us, whatever the soft core does"
+    assert_stopped_by(stage, "X", "estop")
+    assert "emergency stop" in refused("fault_stands", axis.reset)
+    stage.twin.clear("estop", AXIS["X"])
+    stage.let_pass(0.01)
+    refused("faulted", axis.enable)
+    axis.reset()
+    axis.enable()
+    assert_position_survived(stage, "X")
+    assert abs(stage.move("X", 0).error_nm) <= BOUND_NM
+
+
+def test_cut_cable_stops_both_drives(stage):
+    fault_during_move(stage, "X", lambda: stage.twin.inject("line_cut", "host"), distance_nm=1.5e6)
+    stage.twin.run(0.6)
+    assert not any(stage.twin.truth(AXIS[name]).enabled for name in AXIS)
+    with pytest.raises(NobodyAnswers):
+        stage.axes["X"].status()
+    stage.twin.clear("line_cut", "host")
+    for name, axis in stage.axes.items():
+        assert_stopped_by(stage, name, "line_watchdog")
+        assert_position_survived(stage, name)
+        axis.reset()
+        axis.enable()
+
+
+def test_encoder_cut_is_a_fault_and_takes_the_zero_away(stage):
+    axis = fault_during_move(stage, "Y", lambda: stage.twin.inject("encoder_cut", AXIS["Y"]))
+    stage.let_pass(0.01)
+    assert_stopped_by(stage, "Y", "encoder")
+    stage.twin.clear("encoder_cut", AXIS["Y"])
+    stage.let_pass(0.02)
+    axis.reset()
+    axis.enable()
+    refused("not_homed", axis.move, 0)
+    stage.home("Y")
+    assert abs(stage.true_nm("Y")) < BOUND_NM
+
+
+def test_jammed_motor_is_a_following_error(stage):
+    axis = fault_during_move(stage, "X", lambda: stage.twin.inject("motor_jam", AXIS["X"]))
+    stage.let_pass(0.3)
+    assert_stopped_by(stage, "X", "following_error")
+    stage.twin.clear("motor_jam", AXIS["X"])
+    axis.reset()
+    axis.enable()
+    assert_position_survived(stage, "X")
+
+
+def test_drive_fault_pin_takes_the_drive(stage):
+    axis = fault_during_move(stage, "X", lambda: stage.twin.inject("drive_fault", AXIS["X"]), distance_nm=-0.2e6)
+    stage.let_pass(0.01)
+    assert_stopped_by(stage, "X", "drive")
+    refused("fault_stands", axis.reset)
+    stage.twin.clear("drive_fault", AXIS["X"])
+    stage.let_pass(0.01)
+    axis.reset()
+
+
+# ------------------------------------------------------------------ the line
+
+def test_nonsense_on_the_line_moves_nothing_and_the_next_command_works(stage):
+    axis = stage.axes["X"]
+    before = rest(stage, "X")
+    bad = axis.node.counters()
+    for seed in range(3):
+        stage.twin.send_nonsense(400, seed=SEED + seed)
+        stage.let_pass(0.02)
+        assert stage.axes["X"].status().state == "holding"
+    after = rest(stage, "X")
+    assert after[1] == before[1] and abs(after[0] - before[0]) < BOUND_NM
+    now = axis.node.counters()
+    assert now["framing_errors"] + now["frames_bad"] + now["start_glitches"] > bad["framing_errors"] + bad["frames_bad"] + bad["start_glitches"]
+    assert abs(stage.move("X", 2000).error_nm) <= BOUND_NM
+
+
+def send_frame(stage, address, body, crc_flip=0, length=None):
+    """A write frame by hand; returns the words that came back to the command byte and to the payload."""
+    import zlib
+    command = 0x20 | address
+    payload = bytes([len(body) if length is None else length]) + body
+    crc = (zlib.crc32(bytes([command]) + payload) ^ crc_flip).to_bytes(4, "little")
+    transport = stage.line.transport
+    transport.send([0x100 | command])
+    ready = transport.receive(1, 0.005)
+    transport.send(list(payload + crc))
+    return ready, transport.receive(64, 0.005)
+
+
+def test_bad_crc_is_not_obeyed_and_counted(stage):
+    axis = stage.axes["X"]
+    before, bad = rest(stage, "X"), axis.node.counters()["frames_bad"]
+    body = request_body("move", 77, axis=0, target=axis.to_counts(0.5e6))
+    for crc_flip in (1, 0x80000000, 0xFFFFFFFF):
+        ready, more = send_frame(stage, ADDRESSES["X"], body, crc_flip=crc_flip)
+        assert ready == [0x60 | ADDRESSES["X"]] and more == [], "silent to nonsense"
+    assert axis.node.counters()["frames_bad"] == bad + 3
+    assert rest(stage, "X")[1] == before[1]
+
+
+def test_a_frame_under_another_nodes_address_is_not_obeyed(stage):
+    """Two flips turn address 1 into 2: the CRC-32 covers the command byte, so the wrong node refuses the frame."""
+    import zlib
+    body = request_body("move", 78, axis=0, target=stage.axes["X"].to_counts(0.5e6))
+    payload = bytes([len(body)]) + body
+    crc = zlib.crc32(bytes([0x20 | ADDRESSES["X"]]) + payload).to_bytes(4, "little")
+    before = rest(stage, "Y")
+    bad = stage.axes["Y"].node.counters()["frames_bad"]
+    transport = stage.line.transport
+    transport.send([0x120 | ADDRESSES["Y"]])
+    transport.receive(1, 0.005)
+    transport.send(list(payload + crc))
+    transport.wait(0.005)
+    assert stage.axes["Y"].node.counters()["frames_bad"] == bad + 1
+    assert rest(stage, "Y")[1] == before[1]
+
+
+def test_a_repeated_request_is_answered_again_and_not_acted_on_again(stage):
+    axis = stage.axes["X"]
+    stage.move("X", 0)
+    counted = axis.node.counters()["repeated"]
+    body = request_body("set_parameter", 99, axis=0, parameter=client.PARAMETERS["settle_time"].id, value=21)
+    for _ in range(3):
+        ready, _ = send_frame(stage, ADDRESSES["X"], body)
+        transport = stage.line.transport
+        transport.send([0x110 | ADDRESSES["X"]])
+        assert transport.receive(9, 0.01)[2:5] == [99, body[1], 0]
+    assert axis.node.counters()["repeated"] == counted + 2
+    axis.write_parameter("settle_time", 20)
+
+
+# ------------------------------------------------------------------ bad input
+
+def test_unknown_command_and_wrong_length_are_refused_in_words(stage, monkeypatch):
+    before = rest(stage, "X")
+    for body, words in ((bytes([41, 200]), "does not know this command"), (bytes([42, 5, 0, 1]), "wrong length"), (bytes([43]), "wrong length")):
+        send_frame(stage, ADDRESSES["X"], body)
+        transport = stage.line.transport
+        transport.send([0x110 | ADDRESSES["X"]])
+        reply = transport.receive(9, 0.01)
+        assert reply[0] == 0x50 | ADDRESSES["X"] and reply[2] == body[0]
+        assert words in client.CAUSES[reply[4]][1]
+    assert rest(stage, "X")[1] == before[1]
+    stage.axes["X"].status()
+
+
+def test_address_of_nobody_is_said(stage):
+    with pytest.raises(NobodyAnswers, match="nobody answers at address 7"):
+        stage.line.node(7)
+
+
+def test_target_outside_the_travel_is_refused_with_the_travel(stage):
+    before = rest(stage, "X")
+    for target in (-0.9e6, 119.7e6, 1e12):
+        said = refused("out_of_travel", stage.axes["X"].move, target)
+        assert "-800um to 119.6mm" in said, said
+    assert rest(stage, "X")[1] == before[1]
+
+
+def test_parameter_out_of_range_is_refused_by_host_and_node(stage):
+    axis = stage.axes["X"]
+    kept = axis.get_parameter("kp").counts
+    with pytest.raises(client.OutOfRange, match="kp allows"):
+        axis.set_parameter("kp", 1000)
+    refused("out_of_range", axis.request, "set_parameter", parameter=client.PARAMETERS["kp"].id, value=-1)
+    refused("unknown_parameter", axis.request, "get_parameter", parameter=250)
+    assert axis.get_parameter("kp").counts == kept
+
+
+def test_commands_for_another_axis_and_in_mid_move_are_refused(stage):
+    axis = stage.axes["X"]
+    refused("no_such_axis", axis.node.request, "status", axis=3)
+    refused("no_such_axis", axis.node.axis, 1)
+    here = axis.status().position_nm
+    axis.request("move", target=axis.to_counts(here + 0.3e6))
+    refused("busy", axis.request, "move", target=0)
+    refused("busy", axis.request, "home")
+    refused("busy", axis.request, "set_parameter", parameter=client.PARAMETERS["kp"].id, value=1)
+    axis.wait(stage.keep("X"))
+    assert abs(stage.true_nm("X") - here - 0.3e6) <= 2 * BOUND_NM
+
+
+def test_a_node_of_another_build_is_refused(stage, monkeypatch):
+    monkeypatch.setattr(client, "MAP_CRC", client.MAP_CRC ^ 1)
+    with pytest.raises(WrongBuild, match="register map"):
+        client.Line(stage.line.transport, random_source=random.Random(SEED)).node(ADDRESSES["X"])
+
+
+def test_a_line_with_much_noise_still_brings_every_command_through_or_says_so(stage):
+    """Spikes on the line: replies are repeated, nothing wrong is obeyed; what does not come through is an exception."""
+    axis = stage.axes["X"]
+    target = axis.status().target_nm
+    stage.twin.line_spikes(200)
+    answered = 0
+    for _ in range(15):
+        try:
+            assert axis.status().target_nm == target
+            answered += 1
+        except (LineGarbled, NobodyAnswers):
+            pass
+    stage.twin.line_spikes(0)
+    stage.let_pass(0.02)
+    assert answered >= 12
