@@ -24,7 +24,7 @@ help:             ## this list
 demo: $(SETUP) $(FIRMWARE)   ## the S0 stage: home it, move it, show where it went
 	@$(PYTHON) -m experiments.s0_stage
 
-test: $(SETUP) $(FIRMWARE)   ## all tests; K=words of a name, SIM=icarus|verilator, SEED=number|random, WAVES=1
+test: $(SETUP) $(FIRMWARE)   ## all tests; K=part of a name, SIM=icarus|verilator, SEED=number|random, WAVES=1
 	$(call say,tests$(if $K, of $K)$(if $(SIM), under $(SIM))$(if $(SEED), with SEED=$(SEED)))
 	@SIM='$(SIM)' SEED='$(SEED)' WAVES='$(WAVES)' $(PYTHON) -m pytest -q -n $(JOBS) $(if $K,-k '$K') tb
 
@@ -46,7 +46,7 @@ build/lint/%.ok: %.sv $(RTL) rtl/cpu/picorv32.vlt Makefile | $(SETUP)
 		> $@.log 2>&1 && ! grep -q . $@.log || { cat $@.log; false; }
 	@touch $@
 
-prove: $(SETUP)   ## the properties in the modules that carry any; K=words of a name
+prove: $(SETUP)   ## the properties in the modules that carry any; K=part of a path
 	$(call say,proofs)
 	@$(PYTHON) tools/prove.py $(if $K,-k '$K') -j $(JOBS)
 

@@ -22,12 +22,13 @@ BUILD = ROOT / "build" / "prove"
 SOLVER = "yices"
 DEPTH = 20
 LONGEST = 240                           # seconds for one of the three steps
-STEPS = {"base case": [], "induction": ["-i"], "covers": ["-c"]}
+SURROUNDINGS = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}       # the solver is there
+STEPS = {"base case": [], "induction": ["-i"], "cover": ["-c"]}
 
 
 def run(command, timeout=None):
     with subprocess.Popen([str(c) for c in command], cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                          text=True, start_new_session=True) as process:
+                          text=True, start_new_session=True, env=SURROUNDINGS) as process:
         try:
             text, _ = process.communicate(timeout=timeout)
         except BaseException as why:
@@ -63,7 +64,7 @@ def settings(text):
 
 def reason(text):
     """The lines of a solver's answer that a person needs."""
-    lines = [line.split("  ", 1)[-1].strip() for line in text.splitlines()]
+    lines = [re.sub(r"^(##\s*)?[\d:]+\s+", "", line).strip() for line in text.splitlines()]
     words = r"Assert failed|Unreached cover|Temporal induction failed|ERROR|no answer|unsat|trace to VCD"
     telling = [line for line in lines if re.search(words, line)]
     return "\n    ".join(telling[:8] or lines[-8:])
@@ -85,7 +86,7 @@ def prove(source, modules, again):
     smt = folder / f"{name}.smt2"
     change = f"chparam {' '.join(f'-set {n} {v}' for n, v in parameters)} {name}; " if parameters else ""
     below = " ".join(str(p.relative_to(ROOT)) for p in found if p != source)
-    code, out = run([sys.executable, ROOT / "tools" / "yosys.py", "-q", "-p",
+    code, out = run([sys.executable, ROOT / "tools" / "yosys.py",
                      (f"read_verilog -sv {below}; " if below else "") + f"read_verilog -sv -formal {source.relative_to(ROOT)}; {change}"
                      f"prep -top {name} -nordff; memory_map -rom-only; async2sync; dffunmap; write_smt2 -wires {smt.relative_to(ROOT)}"])
     if code:
@@ -112,7 +113,7 @@ def main():
     modules = {p.stem: p for p in sorted((ROOT / "rtl").rglob("*.sv"))}
     chosen = [p for p in modules.values() if "`ifdef FORMAL" in p.read_text() and options.k in str(p.relative_to(ROOT))]
     if not chosen:
-        sys.exit(f"prove: no module with properties{f' and {options.k} in its path' if options.k else ''}")
+        sys.exit(f"prove: no module with properties has `{options.k}` in its path" if options.k else "prove: no module has properties")
     wrong = 0
     with ThreadPoolExecutor(options.j) as pool:
         for source, (why, words) in zip(chosen, pool.map(lambda p: prove(p, modules, options.f), chosen)):

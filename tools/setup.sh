@@ -21,7 +21,7 @@ fi
 
 # ---- the system's tools: what is missing, and the Debian package that brings it
 
-python_is_new() { python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))'; }
+python_is_new() { python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' > /dev/null 2>&1; }
 
 has_libpython() {           # cocotb loads Python into the simulator from this library
     python3 - <<'PYTHON'

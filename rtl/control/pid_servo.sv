@@ -8,7 +8,8 @@
 // rate     one command per tick, a tick at most every 135 clk (an earlier one is ignored)
 // windup   the integral stays inside integral_limit; it does not grow in a direction in which the last command stood at
 //          its limit or the guard blocks; it rests while |e| <= dead_band and the profile stands; it is zero in open loop
-//          and while the guard blocks both directions (drive off), so that the drive comes on without a jump
+//          and while the guard blocks both directions (drive off). The first command after that is zero unless its inputs
+//          were taken since, so that the drive comes on without a jump
 // model    tb/control/pid_servo.py, equal in every bit of every cycle
 `default_nettype none
 
@@ -48,6 +49,7 @@ module pid_servo (
     logic signed [32:0] velocity_error;
     logic signed [31:0] velocity_taken, acceleration_taken;
     logic               standing;                           // no profile was being played
+    logic               stale;                              // power was missing at some clk since the inputs were taken
     logic signed [63:0] operand;                            // shifted left
     logic [23:0]        gain;                               // shifted right
     logic signed [65:0] total;                              // 2^-16 command; of the integral: 2^-24 command
@@ -63,7 +65,7 @@ module pid_servo (
     wire signed [65:0] integral_high = {27'd0, integral_limit, 24'd0};
     wire signed [65:0] new_integral  = total > integral_high ? integral_high : total < -integral_high ? -integral_high : total;
 
-    wire signed [49:0] asked    = total[65:16];             // 2^0 command
+    wire signed [49:0] asked    = stale || powerless ? '0 : total[65:16];   // 2^0 command
     wire signed [49:0] high     = {35'd0, output_limit};
     wire               too_high = asked > high;
     wire               too_low  = asked < -high;
@@ -135,6 +137,7 @@ module pid_servo (
                 if (tick) state <= SETTLE;
             end
         endcase
+        stale <= powerless || (stale && state != TAKE);
         if (powerless) integral <= '0;
         if (rst) begin
             state        <= WAIT;
@@ -144,6 +147,7 @@ module pid_servo (
             saturated    <= 1'b0;
             limited_up   <= 1'b0;
             limited_down <= 1'b0;
+            stale        <= 1'b1;
             integral     <= '0;
         end
     end

@@ -49,7 +49,8 @@ def s0_coarse_um_max():
         moves = s0_stage.random_moves(stage, 100, SEED, done=lambda move: progress.advance(task))
     errors = np.array([move.error_nm for move in moves])
     times = np.array([move.time_s for move in moves])
-    console.print(f"error of the true position: max {np.abs(errors).max():.1f} nm, rms {np.sqrt((errors**2).mean()):.1f} nm, mean {errors.mean():.1f} nm; "
+    console.print(f"error of the true position: max {np.abs(errors).max():.1f} nm, rms {np.sqrt((errors**2).mean()):.1f} nm, "
+                  f"mean {errors.mean():.1f} nm; "
                   f"time a move: median {np.median(times):.2f} s, longest {times.max():.2f} s")
     return np.abs(errors).max() / 1000
 

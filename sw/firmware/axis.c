@@ -364,6 +364,7 @@ uint8_t axis_reset_faults(unsigned n)
 {
     struct axis *a = &axes[n];
     axis_poll(n);
+    if (axis_read(n, AXIS_FAULTS) & LINE_FAULT_ENCODER) axis_write(n, AXIS_SHIFT_ORIGIN, 0);    // position and count agree from here on
     axis_write(n, AXIS_ENCODER_EVENTS, AXIS_ENCODER_FAULT_MASK_MASK);
     if (a->state != LINE_STATE_FAULTED) return LINE_CAUSE_OK;
     a->leaving = pressed(axis_read(n, AXIS_STATE));

@@ -5,9 +5,9 @@ import random
 import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
-from synchroniser import Synchroniser
 
 from bench import run, start
+from synchroniser import Synchroniser
 
 
 def model_of(dut):

@@ -5,9 +5,9 @@ import random
 import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
-from tick_divider import TickDivider
 
 from bench import run, start
+from tick_divider import TickDivider
 
 
 async def clk(dut, period, rst=0):

@@ -17,6 +17,7 @@ class PidServo:
     def reset(self):
         self.n = None                   # clk since tick, None: at rest
         self.integral = self.error = self.command = self.saturated = 0
+        self.stale = 1                  # power was missing at some clk since the inputs were taken
         self.limited = 0                # direction in which the last command stood at its limit
 
     def clk(self, rst=0, tick=0, closed_loop=0, kp=0, ki=0, kd=0, kv=0, ka=0, output_limit=0, integral_limit=0, dead_band=0,
@@ -31,6 +32,7 @@ class PidServo:
             self.n = 0 if tick else None
         else:
             self.n += 1
+        self.stale = int(bool(powerless or self.stale and self.n != TAKE))
         if self.n == TAKE:
             self.error = held(target - position, -1 << 31, (1 << 31) - 1)
             self.sum = kp * self.error + kd * (target_velocity - velocity) + kv * target_velocity
@@ -45,7 +47,7 @@ class PidServo:
             self.integral = held(self.grown, -limit, limit)
             self.sum += self.integral >> 8
         elif self.n == LATENCY:
-            self.n, valid, asked = None, 1, self.sum >> 16
+            self.n, valid, asked = None, 1, 0 if self.stale else self.sum >> 16
             self.command = held(asked, -output_limit, output_limit)
             self.limited = (asked > output_limit) - (asked < -output_limit) if closed_loop else 0
             self.saturated = int(self.limited != 0)

@@ -4,9 +4,9 @@ import random
 
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
-from pid_servo import LATENCY, PidServo
 
 from bench import run, start
+from pid_servo import LATENCY, PidServo
 
 INPUTS = ("closed_loop kp ki kd kv ka output_limit integral_limit dead_band target target_velocity target_acceleration moving "
           "position velocity open_command block_up block_down").split()
@@ -196,6 +196,24 @@ async def the_integral_is_zero_in_open_loop_and_while_the_drive_is_off(dut):
         servo.set(**off)
         assert (await servo.tick())[0] == 0
         servo.set(**on)
+
+
+@cocotb.test()
+async def a_command_whose_inputs_were_taken_without_power_is_zero(dut):
+    """The firmware holds the target here and closes the loop; a tick that still saw the old target must not kick the motor."""
+    servo = await Servo(dut).reset(kp=ONE, target=1 << 20, position=0)
+    for off, on in ((dict(closed_loop=0), dict(closed_loop=1)), (dict(block_up=1, block_down=1), dict(block_up=0, block_down=0))):
+        for wait in (0, 9, 10, 60, 133):
+            servo.set(target=1 << 20, **off)
+            await servo.clk(tick=1)
+            for _ in range(wait):
+                await servo.clk()
+            servo.set(target=5, **on)
+            out = await servo.clk()
+            while not out[0]:
+                out = await servo.clk()
+            assert out[1] == (5 if wait == 0 else 0), f"power {wait} clk after the tick"
+            assert await servo.tick() == (5, 0)
 
 
 @cocotb.test()

@@ -5,9 +5,9 @@ import random
 import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
-from profile_player import ProfilePlayer, moved, wrap
 
 from bench import run, start
+from profile_player import ProfilePlayer, moved, wrap
 
 PERIOD = 1 << 40                        # of velocity, acceleration and jerk
 LSB = 1 << 24                           # of target, in the same unit

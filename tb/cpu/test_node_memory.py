@@ -10,9 +10,9 @@ import cocotb
 import pytest
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge, RisingEdge
-from node_memory import NodeMemory
 
 from bench import ROOT, run, source_of
+from node_memory import NodeMemory
 
 BYTES = 1024
 CONTENTS = [n * 0x9E3779B1 % (1 << 32) for n in range(BYTES // 4)]      # any words, all different

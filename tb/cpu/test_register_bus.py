@@ -6,9 +6,9 @@ import cocotb
 import pytest
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge
-from register_bus import RegisterBus
 
 from bench import run
+from register_bus import RegisterBus
 
 
 async def access(dut, model, select, address):

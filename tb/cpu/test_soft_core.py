@@ -9,9 +9,9 @@ from pathlib import Path
 
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
-from soft_core import results
 
 from bench import ROOT, run, start
+from soft_core import results
 
 BYTES = 2048
 BUILD = ROOT / "build" / "soft_core"

@@ -3,10 +3,10 @@
 import random
 
 import pytest
-from fake_machine import DEFINES, FAULT, PARAMETER, PERIOD, Axis, Machine
-from planner import distance, limits
 
 from bench import seed
+from fake_machine import DEFINES, FAULT, PARAMETER, PERIOD, Axis, Machine
+from planner import distance, limits
 
 HOLD = DEFINES["AXIS_STROBES_HOLD_HERE_MASK"]
 BRAKE = DEFINES["AXIS_STROBES_BRAKE_MASK"]

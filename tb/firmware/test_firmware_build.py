@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import pytest
+
 from host_firmware import SOURCE
 
 MEMORY = 32768

@@ -4,10 +4,10 @@ import random
 import zlib
 
 import pytest
-from fake_machine import CLK_HZ, DEFINES, PARAMETER, PERIOD, TABLE, Axis, Machine
-from host_firmware import ROOT
 
 from bench import seed
+from fake_machine import CLK_HZ, DEFINES, PARAMETER, PERIOD, TABLE, Axis, Machine
+from host_firmware import ROOT
 
 COMMAND = DEFINES["LINE_RECEIVE_COMMAND_MASK"]
 GOOD = DEFINES["LINE_RECEIVE_GOOD_MASK"]

@@ -4,10 +4,10 @@ import ctypes
 import random
 
 import pytest
-from host_firmware import Plan, Segment, library
-from planner import distance, gone, limits, peaks, shortest, steps
 
 from bench import seed
+from host_firmware import Plan, Segment, library
+from planner import distance, gone, limits, peaks, shortest, steps
 
 S0 = 6000, 125_000, 12_500_000                      # the stage of S0: period/s, /s2, /s3
 LONGER_TICKS = 4                                    # a move is at most so many ticks (and four are the fewest) ...

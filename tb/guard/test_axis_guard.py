@@ -3,6 +3,8 @@
 import random
 
 import cocotb
+from cocotb.triggers import FallingEdge, ReadOnly, RisingEdge
+
 from axis_guard import (
     CPU,
     DRIVE,
@@ -16,8 +18,6 @@ from axis_guard import (
     PROFILE_UNDERRUN,
     AxisGuard,
 )
-from cocotb.triggers import FallingEdge, ReadOnly, RisingEdge
-
 from bench import run, start
 
 CAUSES = dict(limit_low=LIMIT_LOW, limit_high=LIMIT_HIGH, estop=ESTOP, encoder_fault=ENCODER, watchdog_expired=LINE_WATCHDOG,

@@ -5,9 +5,9 @@ import random
 import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge, Timer
-from line_watchdog import LineWatchdog
 
 from bench import run, start
+from line_watchdog import LineWatchdog
 
 CLK_NS = 10                             # as start() makes it
 

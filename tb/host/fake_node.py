@@ -7,7 +7,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "sw" / "host"))
 
-from moire.line_tables import CAUSES, PROTOCOL_CRC, OPERATIONS, PARAMETERS, STATES  # noqa: E402  (found through the line above)
+from moire.line_tables import CAUSES, OPERATIONS, PARAMETERS, PROTOCOL_CRC, STATES  # noqa: E402  (found through the line above)
 from moire.registers import MAP_CRC  # noqa: E402
 from moire.transport import Transport  # noqa: E402
 

@@ -4,12 +4,12 @@ import random
 from fractions import Fraction
 
 import pytest
-from fake_node import ESTOP, LIMIT_LOW, FakeLine, FakeNode
 
 from bench import seed
+from fake_node import ESTOP, LIMIT_LOW, FakeLine, FakeNode
 from moire.client import Line
 from moire.errors import LineError, LineGarbled, MotionFailed, NobodyAnswers, OutOfRange, Refused, UnitError, UnknownName, WrongBuild
-from moire.line_tables import CAUSES, PROTOCOL_CRC, PARAMETERS
+from moire.line_tables import CAUSES, PARAMETERS, PROTOCOL_CRC
 from moire.registers import FIELDS, MAP_CRC
 
 SEED = seed()

@@ -5,8 +5,8 @@ import json
 import sys
 
 import pytest
-from fake_node import CAUSE, ESTOP, FakeLine, FakeNode
 
+from fake_node import CAUSE, ESTOP, FakeLine, FakeNode
 from moire import command_line
 from moire.errors import PortError
 from moire.line_tables import PARAMETERS

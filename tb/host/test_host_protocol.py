@@ -3,9 +3,9 @@
 import random
 
 import pytest
-from fake_node import FakeLine, FakeNode, spoil
 
 from bench import seed
+from fake_node import FakeLine, FakeNode, spoil
 from moire.client import Line
 from moire.errors import LineError, LineGarbled, NobodyAnswers, OutOfRange
 from moire.line_tables import LONGEST_BODY, OPERATIONS

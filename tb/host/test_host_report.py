@@ -6,11 +6,11 @@ import io
 import math
 import re
 
-import fake_node  # noqa: F401  (puts the package on the path)
 import numpy
 import pytest
 from PIL import Image
 
+import fake_node  # noqa: F401  (puts the package on the path)
 from moire import report
 from moire.errors import BadFile, MoireError
 

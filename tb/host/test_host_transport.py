@@ -5,8 +5,8 @@ import os
 
 import pytest
 import serial
-from fake_node import FakeNode
 
+from fake_node import FakeNode
 from moire.client import Line
 from moire.errors import PortError
 from moire.protocol import ODD_ADDRESSES

@@ -3,9 +3,9 @@
 import random
 from fractions import Fraction
 
-import fake_node  # noqa: F401  (puts the package on the path)
 import pytest
 
+import fake_node  # noqa: F401  (puts the package on the path)
 from bench import seed
 from moire import units
 from moire.errors import UnitError

@@ -10,9 +10,9 @@ import zlib
 from fractions import Fraction
 from pathlib import Path
 
-import fake_node  # noqa: F401  (puts the package on the path)
 import pytest
 
+import fake_node  # noqa: F401  (puts the package on the path)
 from moire import line_tables
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -3,9 +3,9 @@
 import random
 
 import cocotb
-from address_filter import AddressFilter
 from cocotb.triggers import FallingEdge, RisingEdge
 
+from address_filter import AddressFilter
 from bench import run, start
 
 

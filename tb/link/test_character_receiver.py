@@ -4,10 +4,10 @@ import random
 from fractions import Fraction
 
 import cocotb
-from character_receiver import CharacterReceiver, character, line
 from cocotb.triggers import FallingEdge, RisingEdge
 
 from bench import run, start
+from character_receiver import CharacterReceiver, character, line
 
 BIT_TIMES = [128, 133, 256, 256 + 15, 555]      # 1/16 clk: 8 clk, …, 115 200 baud at 4 MHz
 

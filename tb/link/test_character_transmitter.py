@@ -7,11 +7,11 @@ import subprocess
 from fractions import Fraction
 
 import cocotb
-from character_receiver import CharacterReceiver, character
-from character_transmitter import CharacterTransmitter
 from cocotb.triggers import FallingEdge, RisingEdge
 
 from bench import run, start
+from character_receiver import CharacterReceiver, character
+from character_transmitter import CharacterTransmitter
 
 BIT_TIMES = [128, 133, 256, 271, 555]           # 1/16 clk: 8 clk, …, 115 200 baud at 4 MHz
 

@@ -5,9 +5,9 @@ import zlib
 
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
-from crc32_stream import Crc32Stream
 
 from bench import run, start
+from crc32_stream import Crc32Stream
 
 
 async def clk(dut, start=0, valid=0, data=0, rst=0):

@@ -6,11 +6,11 @@ import random
 from itertools import combinations
 
 import cocotb
-from address_filter import AddressFilter
 from cocotb.triggers import FallingEdge, RisingEdge
-from frame_check import FrameCheck, frame
 
+from address_filter import AddressFilter
 from bench import run, start
+from frame_check import FrameCheck, frame
 
 NODE = 5
 ERROR = "framing error"

@@ -5,9 +5,9 @@ import random
 import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
-from word_queue import WordQueue
 
 from bench import run, start
+from word_queue import WordQueue
 
 
 class Queue:

@@ -16,7 +16,7 @@ from fractions import Fraction
 
 from . import units
 from .errors import LineError, MotionFailed, NobodyAnswers, OutOfRange, Refused, UnknownName, WrongBuild
-from .line_tables import CAUSES, ENCODER_EVENTS, FAULTS, FLAGS, PROTOCOL_CRC, PARAMETERS, STATES
+from .line_tables import CAUSES, ENCODER_EVENTS, FAULTS, FLAGS, PARAMETERS, PROTOCOL_CRC, STATES
 from .protocol import ADDRESSES, Exchange, Timing, request_body
 from .registers import FIELDS, MAP_CRC
 from .transport import Transport

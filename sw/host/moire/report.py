@@ -37,7 +37,7 @@ class Trace:
     time_s: object
     target_nm: object
     position_nm: object            # by the encoder
-    true_nm: object
+    true_nm: object = None         # of the model, at the same times; None where it is not known at them
 
 
 @dataclass(frozen=True)
@@ -144,11 +144,12 @@ def trajectories(traces) -> bytes:
 
 def following_errors(traces) -> bytes:
     errors = [[target - position for target, position in zip(trace.target_nm, trace.position_nm)] for trace in traces]
-    hidden = [[target - true for target, true in zip(trace.target_nm, trace.true_nm)] for trace in traces]
-    worth, unit = length_unit(largest(errors + hidden))
+    hidden = [[target - true for target, true in zip(trace.target_nm, trace.true_nm)] if trace.true_nm is not None else [] for trace in traces]
+    worth, unit = length_unit(largest(errors + [error for error in hidden if error]))
     figure, panels = drawing(height=2.2 * len(traces) + 0.6, nrows=len(traces), sharex=True)
     for number, (panel, trace) in enumerate(zip(panels, traces)):
-        panel.plot(trace.time_s, [value / worth for value in hidden[number]], color="#999999", linewidth=0.9, label="of the true position")
+        if hidden[number]:
+            panel.plot(trace.time_s, [value / worth for value in hidden[number]], color="#999999", linewidth=0.9, label="of the true position")
         panel.plot(
             trace.time_s, [value / worth for value in errors[number]], color=colour(number), linewidth=0.9, label="seen by the encoder"
         )
