@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What every figure is made of."""
+from dataclasses import dataclass
+from typing import Callable
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+console = Console(stderr=True)       # facts and progress; the figure itself goes to standard output
+
+
+@dataclass(frozen=True)
+class Figure:
+    measure: Callable[[], float]
+    unit: str
+    what: str
+    wanted: str                      # in words, with its comparison
+    good: Callable[[float], bool]
+    digits: int = 3
+
+
+def bar(text):
+    """A progress bar for long work."""
+    return Progress(TextColumn(text), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=console)
