@@ -33,12 +33,12 @@ def homed_stage(progress):
     return stage
 
 
-def s0_coarse_um_max():
+def s0_coarse_um_max(count=100):
     with bar("homing") as progress:
         stage = homed_stage(progress)
     with bar("moves") as progress:
-        task = progress.add_task("", total=100)
-        moves = s0_stage.random_moves(stage, 100, SEED, done=lambda move: progress.advance(task))
+        task = progress.add_task("", total=count)
+        moves = s0_stage.random_moves(stage, count, SEED, done=lambda move: progress.advance(task))
     errors, times = (np.array([getattr(move, name) for move in moves]) for name in ("error_nm", "time_s"))
     console.print(f"true position - target: max {np.abs(errors).max():.1f} nm, rms {np.sqrt((errors**2).mean()):.1f} nm, "
                   f"mean {errors.mean():.1f} nm; a move takes {np.median(times):.2f} s (median), {times.max():.2f} s at most")
@@ -168,4 +168,15 @@ FIGURES = {
     "node_ecp5_mhz": Figure(node_ecp5_mhz, "MHz", "S0 node placed and routed for LFE5U-25F-6", "at least 60", lambda v: v >= 60, 1),
     "twin_realtime": Figure(twin_realtime, "s/s", "simulated seconds per second of one core, two nodes and their machines", "at least 0.3",
                             lambda v: v >= 0.3, 2),
+}
+
+
+def soaked(name, *arguments):
+    value = FIGURES[name].measure(*arguments)
+    return value, FIGURES[name].good(value)
+
+
+SOAK = {
+    "s0_moves": lambda: soaked("s0_coarse_um_max", 5000),
+    "s0_bus": lambda: soaked("s0_bus_wrong", 2_000_000),
 }
