@@ -10,13 +10,14 @@ from experiments.figures_common import Figure, bar, console
 from experiments.synthesis import synthesise
 from moire.errors import LineError
 from moire.line_tables import PARAMETERS
-from moire.protocol import Exchange, State, frame, parse_reply, read_words, request_body, write_words
+from moire.protocol import TO_NODE, Exchange, State, frame, parse_reply, read_words, ready_byte, request_body, write_words
 from twin import FrameBench, build, cells_of, realtime_factor
 from twin.twin import CLK_HZ
 
 SEED = 1
 SETTLE_TIME = PARAMETERS["settle_time"].id
 ADDRESS = 1
+READY = ready_byte(ADDRESS, TO_NODE)
 CELLS = 11                           # of a character on the line
 TURNAROUND = [1] * 3                 # cells before the master speaks again: the node's driver lets go of the line meanwhile
 ANSWER_CELLS = 100                   # of silence after which no answer comes any more
@@ -118,8 +119,11 @@ def s0_bus_wrong(frames=100_000):
             command, payload = cells_of(write_words(ADDRESS)), cells_of(list(frame(write_words(ADDRESS)[0] & 0xFF, body)))
             cells = command + payload
             sent = cells if whole else damaged(cells, source)
-            bench.exchange(TURNAROUND + sent[:len(command)], enough=1, quiet_cells=ANSWER_CELLS)
-            bench.exchange(TURNAROUND + sent[len(command):], enough=1, quiet_cells=ANSWER_CELLS // 2)
+            ready = bench.exchange(TURNAROUND + sent[:len(command)], enough=1, quiet_cells=ANSWER_CELLS)
+            if ready and ready != [READY]:               # the damage made a command to reply of it: hear the node out
+                bench.exchange(TURNAROUND, quiet_cells=ANSWER_CELLS)
+            if bench.exchange(TURNAROUND + sent[len(command):], enough=1, quiet_cells=ANSWER_CELLS // 2):
+                bench.exchange(TURNAROUND, quiet_cells=ANSWER_CELLS)
             if whole:
                 bench.idle(WORK_CELLS)
             reply, words = node_answer(bench)
@@ -133,7 +137,7 @@ def s0_bus_wrong(frames=100_000):
             if not whole:
                 progress.advance(task)
                 exchange = Exchange(ADDRESS, bytes([reply.sequence, reply.operation]), tries=1)
-                exchange.feed([0x60 | ADDRESS])
+                exchange.feed([READY])
                 exchange.feed(heard(damaged(cells_of(words), source) + [1] * CELLS))
                 wrong_host += exchange.state == State.DONE
     console.print(f"{frames} damaged requests: {wrong} accepted by the node; their replies damaged: {wrong_host} accepted by the host; "
