@@ -36,6 +36,7 @@ module axis #(
     output logic                 bridge_b,
     output logic                 drive_enable
 );
+    localparam int VELOCITY_QUANTUM = 2**(15 - W); // 2^-16 period: about what a converter of W bits can tell apart
     localparam int LIMIT_CLK = CLK_HZ / 10_000; // a limit switch must be stable for 0.1 ms
 
     // settings and strobes from the registers
@@ -76,9 +77,11 @@ module axis #(
     // decode
     wire signed [31:0] quadrature_count;
     wire signed [1:0]  quadrature_step;
+    wire               settled, stepping, heading;
     wire               illegal;
 
-    quadrature_decoder u_decoder (.clk, .rst, .a, .b, .count(quadrature_count), .step(quadrature_step), .illegal);
+    quadrature_decoder u_decoder (.clk, .rst, .mode(2'd0), .clear(1'b0), .a, .b, .settled, .stepping, .count(quadrature_count),
+                                  .step(quadrature_step), .heading, .illegal);
 
     // interpolate
     wire               phase_valid, stepped, overspeed;
@@ -92,13 +95,15 @@ module axis #(
     wire               position_valid, disagreement, zero_up, zero_down;
     wire signed [47:0] position;
     wire signed [31:0] velocity;
+    wire signed [39:0] velocity_fine;
 
     unwrap u_position (.clk, .rst, .valid(stepped), .step, .phase, .shift(shift_origin_written), .shift_periods(shift_origin),
                        .done(position_valid), .position);
     coarse_check u_coarse (.clk, .rst, .limit(disagreement_limit), .valid(position_valid), .position, .count(quadrature_count),
                            .shift(shift_origin_written), .shift_periods(shift_origin), .disagreement);
     zero_crossing u_zero (.clk, .rst, .valid(position_valid), .position, .shift(shift_origin_written), .up(zero_up), .down(zero_down));
-    velocity_estimator u_velocity (.clk, .rst, .tick, .position, .shift(shift_origin_written), .shift_periods(shift_origin), .velocity);
+    velocity_estimator u_velocity (.clk, .rst, .quantum(16'(VELOCITY_QUANTUM)), .tick, .position, .shift(shift_origin_written), .shift_periods(shift_origin), .velocity,
+                                   .fine(velocity_fine));
 
     // control
     wire signed [47:0] target;
@@ -153,7 +158,7 @@ module axis #(
         .segment_velocity, .segment_acceleration, .segment_jerk, .segment_ticks, .segment_ticks_written, .segment_ticks_last(segment_last),
         .brake_rate);
 
-    wire unused = &{1'b0, low_rejected, high_rejected, quadrature_step};
+    wire unused = &{1'b0, low_rejected, high_rejected, quadrature_step, settled, stepping, heading, velocity_fine};
 endmodule
 
 `default_nettype wire

@@ -1,22 +1,37 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/decode/quadrature_decoder.sv does: step(a, b, rst) is one clk, and returns what is on the pins after it."""
+"""What rtl/decode/quadrature_decoder.sv does: step(a, b, mode, clear, rst) is one clk, and returns what is on the pins after it."""
 
 PLACE = {(0, 0): 0, (1, 0): 1, (1, 1): 2, (0, 1): 3}      # quarter of the period
+X4, X2, X1, PULSES = range(4)
+BORDERS = {X4: {0, 1, 2, 3}, X2: {0, 2}, X1: {0}}         # quarters behind which a border counts
 
 
 class QuadratureDecoder:
     def __init__(self, w=32, settle=8):
-        self.w, self.settling, self.settle, self.place, self.count = w, settle, settle, 0, 0
+        self.w, self.settling, self.settle, self.a, self.b, self.count, self.upward = w, settle, 0, 0, 0, 0, 1
 
-    def step(self, a, b, rst=0):
-        moved = (PLACE[a, b] - self.place) % 4
-        self.place = PLACE[a, b]
-        if rst:
-            self.settle, self.count = self.settling, 0
-            return 0, 0, 0
-        if self.settle:
-            self.settle -= 1
-            moved = 0
-        step = {0: 0, 1: 1, 2: 0, 3: -1}[moved]
-        self.count = (self.count + step + (1 << self.w - 1)) % (1 << self.w) - (1 << self.w - 1)
-        return self.count, step, int(moved == 2)
+    @property
+    def settled(self):
+        return int(self.settle == 0)
+
+    def look(self, a, b, mode=X4):
+        """(heading, what count would move by, illegal) with these levels in this clk, settled or not."""
+        if mode == PULSES:
+            rise, change = a and not self.a, b != self.b
+            return 1 - b, 0 if change or not rise else 1 - 2 * b, int(rise and change)
+        before, moved = PLACE[self.a, self.b], (PLACE[a, b] - PLACE[self.a, self.b]) % 4
+        if moved == 1:
+            return 1, int(before in BORDERS[mode]), 0
+        if moved == 3:
+            return 0, -int((before - 1) % 4 in BORDERS[mode]), 0
+        return self.upward, 0, int(moved == 2)
+
+    def step(self, a, b, mode=X4, clear=0, rst=0):
+        heading, step, illegal = self.look(a, b, mode)
+        if rst or self.settle:
+            heading, step, illegal = 1, 0, 0
+        self.a, self.b, self.upward = a, b, heading
+        self.settle = self.settling if rst else max(self.settle - 1, 0)
+        total = 0 if rst or clear else self.count + step
+        self.count = (total + (1 << self.w - 1)) % (1 << self.w) - (1 << self.w - 1)
+        return self.count, step, illegal

@@ -1,41 +1,51 @@
 # SPDX-License-Identifier: Apache-2.0
-"""quadrature_decoder: a known turn, the jitter of S0, the wrap, the illegal edge, its start, and random levels against the model."""
+"""quadrature_decoder: a known turn in each mode, the jitter of S0, the wrap, the illegal edge, clearing, its start, and random levels
+against the model."""
 import random
 
 import cocotb
 import pytest
-from cocotb.triggers import FallingEdge, RisingEdge
+from cocotb.triggers import FallingEdge, ReadOnly, RisingEdge
 
 from bench import run, start
-from quadrature_decoder import QuadratureDecoder
+from quadrature_decoder import PULSES, X1, X2, X4, QuadratureDecoder
 
 TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]        # a leads b: up
 
 
-async def begin(dut, a=0, b=0, settled=True):
+async def begin(dut, a=0, b=0, mode=X4, settled=True):
     """Reset with the pins at these levels; the model has seen the same clk."""
-    await start(dut, a=a, b=b)
+    await start(dut, a=a, b=b, mode=mode, clear=0)
     model = QuadratureDecoder(int(dut.W.value), int(dut.SETTLE.value))
-    model.step(a, b, 1)
+    model.mode = mode
+    model.step(a, b, mode, 0, 1)
     if settled:
         await drive(dut, model, [(a, b)] * int(dut.SETTLE.value))
     return model
 
 
-async def drive(dut, model, levels, rst=0):
+async def drive(dut, model, levels, rst=0, clear=0):
     """Put each (a, b) on the pins for one clk and hold the model beside the design; return (count, step, illegal) of each clk."""
     out = []
-    dut.rst.value = rst
+    dut.rst.value, dut.clear.value, dut.mode.value = rst, clear, model.mode
     for clk, (a, b) in enumerate(levels):
         dut.a.value, dut.b.value = a, b
+        await ReadOnly()
+        heading, moves, _ = model.look(a, b, model.mode)
+        assert (int(dut.heading.value), int(dut.stepping.value), int(dut.settled.value)) == (heading, abs(moves), model.settled)
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
+        want = model.step(a, b, model.mode, clear, rst)
         got = dut.count.value.to_signed(), dut.step.value.to_signed(), int(dut.illegal.value)
-        want = model.step(a, b, rst)
-        assert got == want, f"clk {clk}: (count, step, illegal) is {got}, the model has {want}"
+        assert got == want, f"clk {clk}, mode {model.mode}: (count, step, illegal) is {got}, the model has {want}"
         out.append(got)
-    dut.rst.value = 0
+    dut.rst.value, dut.clear.value = 0, 0
     return out
+
+
+async def turn(dut, model, places):
+    """Visit these quarters of the period; the count after each."""
+    return [count for count, _, _ in await drive(dut, model, [TURN[place % 4] for place in places])]
 
 
 @cocotb.test()
@@ -75,6 +85,59 @@ async def s0_jitter_reversal_over_rising_edge_b_is_not_half_a_pulse_off(dut):
     for _ in range(5):                                  # past B (a rises, b low) and back over it
         assert await drive(dut, model, [(1, 0), (0, 0)]) == [(1, 1, 0), (0, -1, 0)]
     assert (await drive(dut, model, TURN[1:] + TURN[:1]))[-1][0] == 4
+
+
+@cocotb.test()
+async def x2_counts_the_edges_of_a_and_x1_those_with_b_low(dut):
+    model = await begin(dut, mode=X2)
+    assert await turn(dut, model, range(1, 9)) == [1, 1, 2, 2, 3, 3, 4, 4]
+    assert await turn(dut, model, range(7, -1, -1)) == [4, 3, 3, 2, 2, 1, 1, 0]
+    model = await begin(dut, mode=X1)
+    assert await turn(dut, model, range(1, 9)) == [1, 1, 1, 1, 2, 2, 2, 2]
+    assert await turn(dut, model, range(7, -1, -1)) == [2, 2, 2, 1, 1, 1, 1, 0]
+
+
+@cocotb.test()
+async def s0_jitter_over_any_edge_leaves_no_trace_in_x4_x2_and_x1(dut):
+    for mode in (X4, X2, X1):
+        for before in range(4):                         # S0's edge B lies behind quarter 0, its edge C behind quarter 2
+            model = await begin(dut, *TURN[before], mode=mode)
+            there, = await turn(dut, model, [before + 1])
+            for _ in range(3):
+                assert await turn(dut, model, [before, before + 1]) == [0, there]
+            assert (await turn(dut, model, [before]))[-1] == 0
+            assert (await turn(dut, model, range(before + 1, before + 5)))[-1] == 4 >> mode
+
+
+@cocotb.test()
+async def pulses_count_where_a_rises_by_the_level_of_b(dut):
+    model = await begin(dut, mode=PULSES)
+    assert await drive(dut, model, [(1, 0), (0, 0), (1, 0), (0, 0)]) == [(1, 1, 0), (1, 0, 0), (2, 1, 0), (2, 0, 0)]
+    assert await drive(dut, model, [(0, 1), (1, 1), (1, 0), (0, 1)]) == [(2, 0, 0), (1, -1, 0), (1, 0, 0), (1, 0, 0)]
+
+
+@cocotb.test()
+async def a_pulse_whose_direction_changes_with_it_is_illegal_and_not_counted(dut):
+    model = await begin(dut, mode=PULSES)
+    assert await drive(dut, model, [(1, 1), (0, 0), (0, 1), (1, 0)]) == [(0, 0, 1), (0, 0, 0), (0, 0, 0), (0, 0, 1)]
+
+
+@cocotb.test()
+async def clear_makes_zero_of_the_state_in_which_its_clk_ends(dut):
+    for here, then in ((1, 2), (2, 1), (1, 1)):
+        model = await begin(dut)
+        await turn(dut, model, [1, 2] if here == 2 else [1])
+        assert await drive(dut, model, [TURN[then]], clear=1) == [(0, then - here, 0)]
+        assert (await turn(dut, model, [then + 1, then + 2, then + 1])) == [1, 2, 1]
+
+
+@cocotb.test()
+async def a_change_of_mode_makes_no_count(dut):
+    model = await begin(dut)
+    await turn(dut, model, range(1, 7))
+    for mode in (X2, X1, PULSES, X4):
+        model.mode = mode
+        assert await turn(dut, model, [6] * 3) == [6] * 3
 
 
 @cocotb.test()
@@ -124,13 +187,15 @@ async def reset_in_the_middle_of_a_motion_makes_zero_of_where_it_is(dut):
 @cocotb.test()
 async def any_levels_match_the_model(dut):
     model = await begin(dut)
-    for _ in range(20):
-        await drive(dut, model, [(random.getrandbits(1), random.getrandbits(1)) for _ in range(250)])
+    for _ in range(16):
+        model.mode = random.choice([X4, X2, X1, PULSES])
+        await drive(dut, model, [(random.getrandbits(1), random.getrandbits(1)) for _ in range(150)])
         place, path = 0, []
-        for _ in range(250):                            # legal edges only, with pauses
+        for _ in range(150):                            # legal edges only, with pauses
             place += random.choice([-1, 0, 0, 1])
             path.append(TURN[place % 4])
         await drive(dut, model, path)
+        await drive(dut, model, path[:1], clear=1)
         if random.random() < 0.3:
             await drive(dut, model, path[:1], rst=1)
 

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+// position_compare -- a pulse at each of the points start + k * step, k = 0, 1, 2 …, passed in the direction of step.
+//
+// latency  3 clk from valid to pulse        rate  one position per clk, one pulse per pulse_length + gap_length clk
+// armed    from the clk after arm until `count` points are passed, or disarm. The first point counts only after a position before it was
+//          seen: what lies behind at the start makes no burst
+// passed   once a position has reached the next point or gone beyond. Only the next point is looked at and the farthest
+//          position is kept: going back and forth over a point passes it once, and a step over many points passes them all
+// crowded  points that are reached while a pulse or its gap is still running are passed one by one as soon as it has ended,
+//          in order, none left out: pulses then stand exactly gap_length apart, and each that had to wait is told by late
+// shift    the points stay where they are on the scale
+// model    tb/position/position_compare.py, equal in every bit of every cycle
+// proof    depth 16
+// proved   pulses and points passed are equal in number for ever; a pulse begins only when the farthest position has reached its
+//          point, and begins at once then unless one is running; every pulse has its length and its gap
+`default_nettype none
+
+module position_compare (
+    input  wire                  clk,
+    input  wire                  rst,           // disarmed, pulse falls
+    input  wire signed [47:0]    start,         // Q32.16 periods; taken by arm
+    input  wire signed [47:0]    step,          // Q32.16 periods, its sign is the direction; 0: one point, passed upwards
+    input  wire        [31:0]    count,         // points; 0: no end; taken by arm, as step
+    input  wire        [23:0]    pulse_length,  // clk; 0 acts as 1
+    input  wire        [23:0]    gap_length,    // clk that pulse is low at least; 0 acts as 1
+    input  wire                  arm,           // strobe: begin with the first point
+    input  wire                  disarm,        // strobe: no more points; a pulse under way ends at its time
+    input  wire                  valid,         // strobe: position is new
+    input  wire signed [47:0]    position,      // Q32.16 periods
+    input  wire                  shift,         // strobe: position grows by shift_periods in the next clk
+    input  wire signed [31:0]    shift_periods, // periods
+    output logic                 armed,         // level: there are points to come
+    output logic                 pulse,         // level
+    output logic                 late,          // strobe, with the first clk of a pulse that had to wait for the one before it
+    output logic       [31:0]    passed         // points since arm, wraps
+);
+    logic [31:0]        origin;                 // periods that the origin has moved since reset
+    logic               arrived;                // here is new
+    logic signed [47:0] here;                   // position from the origin of the reset; as all below mirrored if step is
+                                                // negative, so that the way of the points is always up
+    logic               ready;                  // reach is a position; it began before the first point
+    logic signed [47:0] reach, point, stride;   // farthest position; the next point; size of step
+    logic               down, single;           // step is negative, 0
+    logic [31:0]        left;                   // points to come, less one; wraps from 0, which is no end
+    logic               endless;
+    logic               resting, waited;        // the gap after a pulse; the point was reached before pulse was free
+    logic [23:0]        timer;                  // clk left of pulse or gap, less one
+
+    /* verilator lint_off UNUSEDSIGNAL */       // of a distance only its sign counts
+    wire [47:0] beyond  = reach - point;     // negative: not reached
+    wire [47:0] ahead   = here - point;        // of here
+    wire [47:0] farther = here - reach;
+    /* verilator lint_on UNUSEDSIGNAL */
+    wire        due     = armed && ready && !beyond[47];
+    wire        busy    = pulse || (resting && timer != '0);
+    wire        begins  = due && !busy && !arm && !disarm;
+
+    always_ff @(posedge clk) begin
+        if (shift) origin <= origin + shift_periods;
+        arrived <= valid && !arm;
+        here    <= {position[47:16] - origin, position[15:0]} ^ {48{down}};
+
+        if (arrived && ready && !farther[47]) reach <= here;
+        if (arrived && !ready && ahead[47]) begin
+            ready <= armed;
+            reach <= here;
+        end
+
+        late   <= begins && waited;
+        waited <= due && busy;
+        if (begins) begin
+            point  <= point + stride;
+            passed <= passed + 1'b1;
+            left   <= left - 1'b1;
+            if (single || (!endless && left == '0)) armed <= 1'b0;
+        end
+
+        timer <= timer - 1'b1;
+        if (pulse && timer == '0) begin
+            pulse   <= 1'b0;
+            resting <= 1'b1;
+            timer   <= gap_length == '0 ? '0 : gap_length - 1'b1;
+        end else if (begins) begin
+            pulse   <= 1'b1;
+            resting <= 1'b0;
+            timer   <= pulse_length == '0 ? '0 : pulse_length - 1'b1;
+        end else if (resting && timer == '0) resting <= 1'b0;
+
+        if (arm) begin
+            armed   <= 1'b1;
+            ready   <= 1'b0;
+            point   <= {start[47:16] - origin, start[15:0]} ^ {48{step[47]}};
+            stride  <= (step ^ {48{step[47]}}) + {47'b0, step[47]};
+            down    <= step[47];
+            single  <= step == '0;
+            left    <= count - 1'b1;
+            endless <= count == '0;
+            passed  <= '0;
+            waited  <= 1'b0;
+        end
+        if (disarm) armed <= 1'b0;
+        if (rst) begin
+            origin  <= '0;
+            arrived <= 1'b0;
+            ready   <= 1'b0;
+            armed   <= 1'b0;
+            waited  <= 1'b0;
+            late    <= 1'b0;
+            passed  <= '0;
+            pulse   <= 1'b0;
+            resting <= 1'b0;
+        end
+    end
+
+`ifdef FORMAL
+    logic        past = 1'b0;
+    logic        high;                          // pulse one clk ago
+    logic [31:0] pulses;                        // that began since arm
+    logic [23:0] high_for, low_for;             // clk that pulse has stood before this one, low_for stops at its end
+    wire         rises = pulse && !high;
+    wire  [31:0] pulses_now = pulses + 32'(rises);
+    always @(posedge clk) begin
+        past     <= 1'b1;
+        high     <= pulse && !rst;
+        pulses   <= rst || arm ? 0 : pulses_now;
+        high_for <= rst || !pulse ? 0 : high_for + 1'b1;
+        low_for  <= rst ? '1 : pulse ? 0 : low_for + !(&low_for);
+        if (!past) assume (rst);
+        assume (pulse_length == 3 && gap_length == 2);
+        if (past) begin
+            assert (pulses_now == passed);
+            assert (!(pulse && resting));
+            if (high && !pulse) assert (high_for == 3);
+            if (rises) assert (low_for >= 2);
+            if (pulse) assert (timer < 3 && high_for == 2 - timer && high == (timer != 2));
+            else assert (resting ? timer < 2 && low_for == 1 - timer : low_for >= 2);
+        end
+        if (past && !$past(rst)) begin
+            if (rises) begin
+                assert ($past(armed) && $past(ready) && !$past(beyond[47]));    // its point had been reached
+                assert (point == $past(point) + $past(stride) && passed == $past(passed) + 1);
+            end
+            if ($past(due) && !$past(busy) && !$past(arm) && !$past(disarm)) assert (rises);
+            if ($past(ready) && ready && !$past(arm)) begin                     // reach never comes back
+                assert (!(48'(reach - $past(reach)) >> 47));
+            end
+            cover (rises && late && passed == 2 && down);
+            cover (!armed && passed == 2 && !pulse && !$past(disarm) && !$past(arm));
+        end
+    end
+`endif
+endmodule
+
+`default_nettype wire

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What rtl/decode/incremental_encoder.sv does: its three blocks in a row, flags, and the time of the last edge."""
+from dataclasses import dataclass, field
+
+from event_filter import EventFilter
+from index_latch import IndexLatch, Settings
+from quadrature_decoder import QuadratureDecoder
+
+
+@dataclass(frozen=True)
+class Setup:
+    skip: int = 0
+    needed: int = 0
+    spare: int = 0
+    mode: int = 0
+    illegal_enable: int = 0
+    index: Settings = field(default_factory=Settings)
+
+
+class IncrementalEncoder:
+    def __init__(self, w=32, check=1):
+        self.filter, self.decoder, self.index = EventFilter(3), QuadratureDecoder(w), IndexLatch(w, check)
+        self.clean, self.edge_time, self.illegal, self.wrong = [0, 0, 0], None, 0, 0
+        self.seen = self.fault = self.revolution = 0
+
+    def step(self, setup, a, b, z, now, arm=0, clear_flags=0, rst=0):
+        """One clk; the pins after it by name. edge_time is None while it means nothing."""
+        later, decoder = self.index.later, self.decoder
+        heading, moves, _ = decoder.look(later[0], later[1], setup.mode)
+        clear = self.index.clear(setup.index, heading)
+        if moves:
+            self.edge_time = now
+        settled = decoder.settled
+        self.seen = int(self.illegal or (self.seen and not clear_flags))
+        self.fault = int(setup.illegal_enable and (self.illegal or (self.fault and not clear_flags)))
+        self.revolution = int(self.wrong or (self.revolution and not clear_flags))
+        count_before = decoder.count
+        count, step, self.illegal = decoder.step(later[0], later[1], setup.mode, clear, rst)
+        armed, found, index_count, self.wrong = self.index.step(setup.index, self.clean, settled, heading, moves if settled else 0,
+                                                                count_before, arm, rst)
+        self.clean, rejected = self.filter.step(setup.skip, setup.needed, setup.spare, [a, b, z], rst)
+        if rst:
+            self.seen = self.fault = self.revolution = 0
+        return {"count": count, "step": step, "edge_time": self.edge_time, "index_found": found, "index_armed": armed,
+                "index_count": index_count, "filtered": self.clean[0] | self.clean[1] << 1 | self.clean[2] << 2,
+                "rejected": rejected[0] | rejected[1] << 1 | rejected[2] << 2, "illegal": self.illegal,
+                "illegal_seen": self.seen, "illegal_fault": self.fault, "revolution_wrong": self.wrong,
+                "revolution_fault": self.revolution}

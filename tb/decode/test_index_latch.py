@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""index_latch alone: its latencies, clear in the clk of the edge, the wrap of the check, and random inputs against the model.
+
+What it does with a decoder before and behind it stands in test_incremental_encoder.py.
+"""
+import random
+
+import cocotb
+import pytest
+from cocotb.triggers import FallingEdge, ReadOnly, RisingEdge
+
+from bench import run, start
+from index_latch import IndexLatch, Settings
+
+PORTS = ["active_low", "gate_mask", "gate", "take_up", "take_down", "each", "clears", "counts_per_revolution"]
+
+
+async def begin(dut, levels=(0, 0, 0)):
+    idle = dict.fromkeys([*PORTS, "arm", "settled", "heading", "stepping", "count"], 0)
+    await start(dut, a=levels[0], b=levels[1], z=levels[2], **idle)
+    model = IndexLatch(int(dut.W.value), int(dut.CHECK.value))
+    for _ in range(2):
+        model.step(Settings(each=0, take_up=0, take_down=0), levels, 0, 0, 0, 0, rst=1)
+    return model
+
+
+async def clk(dut, model, settings, levels, heading=1, stepped=0, count=0, settled=1, arm=0, rst=0):
+    """One clk of both; returns (clear in this clk, armed, found, index_count, revolution_wrong after it)."""
+    for name in PORTS:
+        getattr(dut, name).value = getattr(settings, name)
+    dut.a.value, dut.b.value, dut.z.value = levels
+    dut.heading.value, dut.stepping.value, dut.count.value = heading, abs(stepped), count
+    dut.settled.value, dut.arm.value, dut.rst.value = settled, arm, rst
+    await ReadOnly()
+    clear, wanted = int(dut.clear.value), model.clear(settings, heading)
+    await RisingEdge(dut.clk)
+    await FallingEdge(dut.clk)
+    want = wanted, *model.step(settings, levels, settled, heading, stepped, count, arm, rst)
+    got = (clear, int(dut.armed.value), int(dut.found.value), dut.index_count.value.to_signed(), int(dut.revolution_wrong.value))
+    assert got == want, f"{settings}: (clear, armed, found, index_count, revolution_wrong) is {got}, the model has {want}"
+    assert (int(dut.a_later.value), int(dut.b_later.value)) == levels[:2]
+    return got
+
+
+@cocotb.test()
+async def found_comes_2_clk_after_z_and_clear_in_the_clk_before(dut):
+    model = await begin(dut)
+    settings = Settings(each=1, clears=1)
+    await clk(dut, model, settings, (0, 0, 0))
+    rows = [await clk(dut, model, settings, (1, 0, 1), stepped=int(n == 1), count=3 * (n == 1)) for n in range(4)]
+    assert [row[0] for row in rows] == [0, 1, 0, 0]
+    assert [row[2] for row in rows] == [0, 1, 0, 0]
+    assert rows[1][3] == 4
+
+
+@cocotb.test()
+async def a_wrong_revolution_comes_4_clk_after_z_and_distances_wrap(dut):
+    if not int(dut.CHECK.value):
+        return
+    top = 1 << int(dut.W.value) - 1
+    for second, wrong in ((-top + 4, 0), (-top + 5, 1)):        # from top - 1 on: 5 counts up through the wrap, and 6
+        model = await begin(dut)
+        settings = Settings(each=1, counts_per_revolution=5)
+        rows = []
+        for count in (top - 1, second):
+            await clk(dut, model, settings, (0, 0, 0))
+            rows = [await clk(dut, model, settings, (0, 0, 1), count=count) for _ in range(6)]
+        assert [row[4] for row in rows] == [0, 0, 0, wrong, 0, 0]
+
+
+@cocotb.test()
+async def an_arm_in_the_clk_of_an_index_is_kept_for_the_next(dut):
+    model = await begin(dut)
+    settings = Settings()
+    await clk(dut, model, settings, (0, 0, 0), arm=1)
+    await clk(dut, model, settings, (0, 0, 0))
+    await clk(dut, model, settings, (0, 0, 1))
+    assert (await clk(dut, model, settings, (0, 0, 1), arm=1))[1:3] == (1, 1)
+
+
+@cocotb.test()
+async def reset_in_the_middle_of_an_index_forgets_it(dut):
+    model = await begin(dut)
+    settings = Settings(each=1, clears=1)
+    await clk(dut, model, settings, (0, 0, 0))
+    await clk(dut, model, settings, (0, 0, 1), count=5)
+    await clk(dut, model, settings, (0, 0, 1), count=5, rst=1)
+    assert [(await clk(dut, model, settings, (0, 0, 1), count=5))[1:4] for _ in range(4)] == [(0, 0, 0)] * 4
+
+
+@cocotb.test()
+async def any_inputs_match_the_model(dut):
+    model, top = await begin(dut), 1 << int(dut.W.value) - 1
+    bits = random.getrandbits
+    for _ in range(80):
+        settings = Settings(bits(1), bits(2) & bits(2), bits(2), bits(1), bits(1), bits(1), bits(1), random.choice([0, 1, 5, top]))
+        change = random.choice([2, 4, 8])
+        levels = [bits(1), bits(1), bits(1)]
+        for _ in range(25):
+            levels = [level ^ (random.randrange(change) == 0) for level in levels]
+            await clk(dut, model, settings, tuple(levels), bits(1), 0, random.choice([0, 5, -1, -top, top - 1]),
+                      int(random.random() < 0.95), int(random.random() < 0.1), int(random.random() < 0.01))
+        await clk(dut, model, settings, tuple(levels), 1, 1, top - 1)
+        await clk(dut, model, settings, tuple(levels), 0, -1, -top)
+
+
+@pytest.mark.parametrize("w, check", [(32, 1), (4, 1), (16, 0)])
+def test_index_latch(w, check):
+    run("index_latch", __file__, W=w, CHECK=check)

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""sw/firmware/learner.c on this computer, and the machine around it: recorder, correction and arctan as integers."""
+import ctypes
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from ctypes import c_bool, c_int16, c_int32, c_int64, c_uint8, c_uint16, c_uint32
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE = ROOT / "sw" / "firmware" / "learner.c"
+LIBRARY = ROOT / "build" / "firmware" / "host_learner.so"
+ORDERS, POINTS, BURST, PHASES_OF_BURST, PASS, PERIODS = 10, 256, 1024, 2048, 39, 15
+NOTHING, SAMPLES, PHASES, WORK, LOADING = range(5)
+
+
+class Values(ctypes.Structure):
+    _fields_ = [("sin_offset", c_int16), ("cos_offset", c_int16), ("gain", c_int32), ("shear", c_int32),
+                ("cosine", c_int32 * ORDERS), ("sine", c_int32 * ORDERS)]
+
+    def as_dict(self):
+        return dict(sin_offset=self.sin_offset, cos_offset=self.cos_offset, gain=self.gain, shear=self.shear,
+                    cosine=tuple(self.cosine), sine=tuple(self.sine))
+
+
+class Ellipse(ctypes.Structure):
+    _fields_ = [("count", c_uint32), ("outside", c_uint32), ("sector", c_uint32 * 16), ("lowest", c_int32 * 2), ("highest", c_int32 * 2),
+                ("sum", c_int64 * 30)]
+
+
+class Learner(ctypes.Structure):
+    _fields_ = [("values", Values), ("amplitude_low", c_uint16), ("amplitude_high", c_uint16), ("scatter_limit", c_uint16),
+                ("reason", c_uint8), ("need", c_uint8), ("frozen", c_bool), ("spoiled", c_bool), ("harmonics", c_bool), ("settled", c_bool),
+                ("bursts", c_uint8), ("step", c_uint8), ("refused", c_uint32), ("accepted", c_uint32),
+                ("scatter", c_uint32), ("ellipse", Ellipse), ("taken", c_uint32), ("last", c_uint16), ("travel", c_int32),
+                ("part", c_int32), ("slowest", c_int32), ("fastest", c_int32), ("largest_step", c_int32), ("real", c_int32 * ORDERS),
+                ("imaginary", c_int32 * ORDERS), ("slow_burst", c_uint32), ("fast_burst", c_uint32), ("variance", c_int64),
+                ("candidate", Values), ("seen_cosine", c_int16 * PASS * ORDERS),
+                ("seen_sine", c_int16 * PASS * ORDERS)]
+
+
+@cache
+def library():
+    """Compile if the source is newer; gcc or clang of the system, else zig."""
+    sources = [SOURCE, SOURCE.with_suffix(".h")]
+    if not LIBRARY.exists() or LIBRARY.stat().st_mtime < max(path.stat().st_mtime for path in sources):
+        command = next(([name] for name in ("cc", "gcc", "clang") if shutil.which(name)), [sys.executable, "-m", "ziglang", "cc"])
+        LIBRARY.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=LIBRARY.parent) as folder:     # two runs at once must not meet
+            made = Path(folder) / LIBRARY.name
+            subprocess.run([*command, "-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion", "-Werror",
+                            "-fsanitize=undefined", "-fsanitize-undefined-trap-on-error", "-shared", "-fPIC", str(SOURCE), "-o", str(made)],
+                           check=True)
+            os.replace(made, LIBRARY)
+    loaded = ctypes.CDLL(str(LIBRARY))
+    loaded.learner_words.restype = ctypes.c_char_p
+    loaded.learner_restore.restype = loaded.learner_values_fit.restype = c_bool
+    loaded.learner_table_entry.restype = c_int32
+    return loaded
+
+
+class Machine:
+    """The firmware's learner; its need is served by the test."""
+
+    def __init__(self):
+        self.learner, self.loads = Learner(), 0
+        self.call("start")
+
+    def call(self, name, *arguments):
+        return getattr(library(), f"learner_{name}")(ctypes.byref(self.learner), *arguments)
+
+    @property
+    def values(self):
+        return self.learner.values.as_dict()
+
+    def idle(self):
+        """All work done and values loaded; returns what the learner needs now."""
+        while self.learner.need in (WORK, LOADING):
+            if self.learner.need == LOADING:
+                self.table = [library().learner_table_entry(ctypes.byref(self.learner.values), point) for point in range(POINTS)]
+                self.loads += 1
+                self.call("loaded")
+            else:
+                self.call("work")
+        return self.learner.need
+
+    def burst(self, words, spoiled=False):
+        """A burst of words, then all work; returns the reason."""
+        self.call("open", spoiled)
+        take, learner = library().learner_take, ctypes.byref(self.learner)
+        for word in words:
+            take(learner, c_uint32(word))
+        self.idle()
+        return self.learner.reason
+
+    def phases(self, phases, spoiled=False):
+        """The same from single phases: learner_recorder packs two into a word."""
+        return self.burst([later << 16 | earlier for earlier, later in zip(phases[::2], phases[1::2])], spoiled)
+
+    def words(self):
+        return library().learner_words(self.learner.reason).decode()

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What rtl/interpolate/signal_correction.sv does: corrected(sin, cos, ...) is a sample, SignalCorrection.step one clk."""
+from typing import NamedTuple
+
+LATENCY = 3
+
+
+class Settings(NamedTuple):
+    sin_offset: int = 0         # full scale 2^15
+    cos_offset: int = 0
+    gain: int = 1 << 16         # 1.0 = 2^16
+    shear: int = 0
+
+
+def held(leg):
+    return max(-32768, min(32767, leg))
+
+
+def corrected(sin, cos, settings, w=8):
+    """(sin_out, cos_out) of a sample of w bits."""
+    sin_leg, cos_leg = (sin << 16 - w) - settings.sin_offset, (cos << 16 - w) - settings.cos_offset
+    return held(sin_leg * settings.gain + cos_leg * settings.shear + 65536 >> 17), held(cos_leg + 1 >> 1)
+
+
+class SignalCorrection:
+    """step() returns (done, sin_out, cos_out) as they are after the clk."""
+
+    def __init__(self, w=8):
+        self.w = w
+        self.reset()
+
+    def reset(self):
+        self.settings, self.flow, self.out = Settings(), [None] * (LATENCY - 1), (0, 0)
+
+    def step(self, valid, sin, cos, load=None, rst=0):
+        """`load` is None or the Settings to take."""
+        if rst:
+            self.reset()
+            return 0, 0, 0
+        # an offset acts on the sample of its clk; the factors multiply one clk later, so they too act from that sample on
+        self.settings = load or self.settings
+        self.flow.append(corrected(sin, cos, self.settings, self.w) if valid else None)
+        ready = self.flow.pop(0)
+        self.out = ready or self.out
+        return int(ready is not None), *self.out

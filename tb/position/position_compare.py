@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What rtl/position/position_compare.sv does, in integers: step() is one clk and returns armed, pulse, late, passed."""
+
+
+def wrapped(value):
+    return (value + (1 << 47)) % (1 << 48) - (1 << 47)
+
+
+class PositionCompare:
+    def __init__(self):
+        self.origin, self.here = 0, None                # here: of the position one clk ago, if it was new
+        self.armed = self.ready = False
+        self.reach = self.point = self.stride = self.passed = self.count = 0
+        self.pulse = self.resting = self.timer = 0      # timer: clk left of pulse or gap, with this one
+        self.waited = False
+
+    def past(self, place, mark):
+        """How far place has come beyond mark in the direction of the points."""
+        return wrapped(mark - place if self.stride < 0 else place - mark)
+
+    def step(self, start=0, step=0, count=0, pulse_length=1, gap_length=1, arm=0, disarm=0, valid=0, position=0, shift=0,
+             shift_periods=0):
+        due = self.armed and self.ready and self.past(self.reach, self.point) >= 0
+        busy = self.pulse or self.resting and self.timer > 1
+        begins = due and not busy and not arm and not disarm
+        late = int(begins and self.waited)
+        self.waited = bool(due and busy)
+        if self.here is not None:
+            if self.ready:
+                self.reach = self.here if self.past(self.here, self.reach) >= 0 else self.reach
+            elif self.past(self.here, self.point) < 0:
+                self.ready, self.reach = self.armed, self.here
+        self.timer -= 1
+        if self.pulse and not self.timer:
+            self.pulse, self.resting, self.timer = 0, 1, max(gap_length, 1)
+        elif begins:
+            self.pulse, self.resting, self.timer = 1, 0, max(pulse_length, 1)
+        elif not self.timer:
+            self.resting = 0
+        if begins:
+            self.point = wrapped(self.point + self.stride)
+            self.passed += 1
+            self.armed = self.stride != 0 and self.passed != self.count
+        if arm:
+            self.armed, self.ready, self.waited, self.passed = True, False, False, 0
+            self.point, self.stride, self.count = wrapped(start - (self.origin << 16)), step, count
+        self.armed = self.armed and not disarm
+        self.here = wrapped(position - (self.origin << 16)) if valid and not arm else None
+        self.origin += shift_periods if shift else 0
+        return int(self.armed), self.pulse, late, self.passed

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fringe_tracker, unwrap and coarse_check in a row: full resolution without lag up to a quarter period a sample, and whatever makes
+the position wrong is told within two samples, or the position is right again."""
+import random
+from pathlib import Path
+
+import cocotb
+from cocotb.triggers import FallingEdge
+
+from bench import run, start
+from coarse_check import CoarseCheck
+from fringe_tracker import FringeTracker
+from unwrap import Unwrap
+
+PERIOD, QUARTER = 1 << 16, 1 << 14
+LIMIT = PERIOD // 2                                     # the quarter period between two counts, and as much for comparators and lag
+PACE = 6                                                # clk from sample to sample, as close as the check can tell them apart
+LATENCY = 5                                             # clk from phase to disagreement
+
+
+class Scale:
+    """The bench with the models beside it; sample() puts the scale at a place and returns (position, alarm of this sample)."""
+
+    def __init__(self, dut):
+        self.dut = dut
+
+    async def begin(self):
+        dut = self.dut
+        dut.rst.value, dut.valid.value, dut.limit.value = 1, 0, LIMIT
+        await FallingEdge(dut.clk)
+        dut.rst.value = 0
+        self.tracker, self.unwrap, self.coarse = FringeTracker(), Unwrap(), CoarseCheck()
+
+    async def sample(self, place, phase=None, count=None):
+        dut = self.dut
+        phase = place % PERIOD if phase is None else phase
+        dut.phase.value, dut.count.value, overspeed = phase, place // QUARTER if count is None else count, 0
+        for clk in range(PACE):
+            dut.valid.value = int(clk == 0)
+            await FallingEdge(dut.clk)
+            overspeed |= int(dut.overspeed.value)
+        step, strayed = self.tracker.follow(phase)
+        position = self.unwrap.step(1, step, phase, 0, 0)[1]
+        for clk in range(4):
+            disagreement = self.coarse.step(LIMIT, int(clk == 0), position, int(dut.count.value.to_signed()), 0, 0)
+        got = dut.position.value.to_signed(), overspeed, int(dut.disagreement.value)
+        assert got == (position, strayed, disagreement)
+        return got[0], bool(overspeed or got[2])
+
+
+async def begin(dut):
+    await start(dut, limit=LIMIT, valid=0, phase=0, count=0)
+    return Scale(dut)
+
+
+@cocotb.test()
+async def latency_from_phase_to_disagreement_is_5(dut):
+    scale = await begin(dut)
+    await scale.begin()
+    await scale.sample(100)
+    dut.count.value, dut.valid.value = 40, 1
+    for clk in range(1, LATENCY + 1):
+        await FallingEdge(dut.clk)
+        dut.valid.value = 0
+        assert int(dut.disagreement.value) == (clk == LATENCY)
+
+
+@cocotb.test()
+async def every_bit_comes_through_without_lag_up_to_a_quarter_period_a_sample(dut):
+    scale = await begin(dut)
+    for speed in (1, -1, 77, -4095, 10_007, QUARTER - 1, 1 - QUARTER):
+        await scale.begin()
+        first = random.getrandbits(16)
+        for n in range(40):                             # from standstill to full speed at once, and on
+            place = first + n * speed
+            assert await scale.sample(place) == (place, False)
+
+
+@cocotb.test()
+async def no_false_alarm_while_the_speed_changes_by_less_than_a_quarter_period_a_sample(dut):
+    scale = await begin(dut)
+    await scale.begin()
+    place = random.getrandbits(16)
+    speed, first = 0, None
+    for _ in range(1500):
+        speed = max(-PERIOD, min(PERIOD - 1, speed + random.randrange(1 - QUARTER, QUARTER)))
+        place += speed
+        position, alarm = await scale.sample(place)
+        first = position - place if first is None else first
+        assert (position - place, alarm) == (first, False)
+
+
+@cocotb.test()
+async def a_jump_that_the_phase_cannot_tell_is_told_by_the_count_at_once(dut):
+    scale = await begin(dut)
+    for periods in (1, -1, 2, -5, 1000):
+        await scale.begin()
+        for n in range(4):
+            assert await scale.sample(500 + n) == (500 + n, False)
+        position, alarm = await scale.sample(504 + periods * PERIOD)
+        assert (position, alarm) == (504, True)
+
+
+@cocotb.test()
+async def any_jump_that_makes_the_position_wrong_is_told_within_two_samples(dut):
+    scale = await begin(dut)
+    for trial in range(300):
+        await scale.begin()
+        place, speed = random.getrandbits(16), random.randrange(1 - QUARTER, QUARTER)
+        for _ in range(4):
+            place += speed
+            position, alarm = await scale.sample(place)
+            assert not alarm
+        wrong = position - place
+        place += random.choice((QUARTER, -QUARTER, PERIOD, random.randrange(-8 * PERIOD, 8 * PERIOD)))
+        told = []
+        for _ in range(2):
+            place += speed
+            position, alarm = await scale.sample(place)
+            told.append(alarm)
+        assert any(told) or position - place == wrong, f"trial {trial}"
+
+
+@cocotb.test()
+async def a_speed_above_the_limit_is_told_within_two_samples(dut):
+    scale = await begin(dut)
+    for speed in (*range(QUARTER, 4 * PERIOD, 7001), PERIOD, 2 * PERIOD):
+        for sign in (1, -1):
+            await scale.begin()
+            for _ in range(3):
+                assert not (await scale.sample(9))[1]
+            assert any([(await scale.sample(9 + sign * n * speed))[1] for n in (1, 2)])
+
+
+@cocotb.test()
+async def a_phase_that_stands_while_the_count_goes_on_is_told_within_two_samples(dut):
+    scale = await begin(dut)
+    for speed in (QUARTER, PERIOD // 2, -QUARTER, -PERIOD):         # a converter that hangs: slower, it takes 3/4 period of way
+        await scale.begin()
+        place = 20_000
+        while abs(place - 20_000) < 3 * PERIOD:                     # up to speed in steps that are followed
+            pace = min(abs(speed), abs(place - 20_000) // 4 + QUARTER // 2)
+            place += pace if speed > 0 else -pace
+            _, alarm = await scale.sample(place)
+            assert not alarm
+        stuck, alarms = place % PERIOD, []
+        for _ in range(2):
+            place += speed
+            alarms.append((await scale.sample(place, phase=stuck))[1])
+        assert any(alarms), speed
+
+
+@cocotb.test()
+async def a_count_that_stands_or_loses_is_told_when_it_is_half_a_period_off(dut):
+    scale = await begin(dut)
+    for lost in (3, -3, 4, 100):                                    # counts; with a quarter period between counts, 3 are always seen
+        await scale.begin()
+        for n in range(4):
+            assert not (await scale.sample(1000 + 99 * n))[1]
+        assert (await scale.sample(1396, count=1396 // QUARTER - lost))[1]
+
+
+def test_tracking(monkeypatch):
+    monkeypatch.setattr("bench.source_of", lambda top: Path(__file__).with_name(f"{top}.sv"))    # a bench top is no part of rtl/
+    run("tracking_bench", __file__)

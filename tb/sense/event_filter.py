@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What rtl/sense/event_filter.sv does: step(skip, needed, spare, levels, rst) is one clk, and returns the pins after it."""
+
+
+class Level:
+    """One level. A disturbance has `seen` samples of the new level, and `against` it since the first of them."""
+
+    def __init__(self):
+        self.filtered, self.seen, self.against = 0, 0, 0
+
+    def forget(self):
+        self.seen = self.against = 0
+
+    def sample(self, last, spare, level):
+        if level != self.filtered:
+            if self.seen & last == last:
+                self.filtered = level
+                self.forget()
+            else:
+                self.seen += 1
+        elif self.against & spare == spare:
+            died = self.seen > 0
+            self.forget()
+            return int(died)
+        elif self.seen:
+            self.against += 1
+        return 0
+
+
+class EventFilter:
+    def __init__(self, levels=1, settle=4):
+        self.levels, self.settling, self.settle, self.left = [Level() for _ in range(levels)], settle, 0, 0
+        self.last = 0
+
+    def step(self, skip, needed, spare, levels, rst=0):
+        """levels as a list, the lowest bit first; returns the lists filtered, rejected."""
+        rejected = [0] * len(self.levels)
+        if rst or self.settle:
+            for own, level in zip(self.levels, levels):
+                own.filtered = level
+                own.forget()
+        elif self.left == 0:
+            rejected = [own.sample(self.last, spare, level) for own, level in zip(self.levels, levels)]
+        self.last = max(needed, 1) - 1
+        self.left = 0 if rst else skip if self.left == 0 else self.left - 1
+        self.settle = self.settling if rst else max(self.settle - 1, 0)
+        return [own.filtered for own in self.levels], rejected

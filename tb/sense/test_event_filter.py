@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""event_filter: N samples in a row and N of M, the sampling divider, the bypass, both ends, random levels against the model."""
+import random
+
+import cocotb
+import pytest
+from cocotb.triggers import FallingEdge, RisingEdge
+
+from bench import run, start
+from deglitcher import Deglitcher
+from event_filter import EventFilter
+
+
+class Bench:
+    """Design and model side by side; play() gives the same levels to every line and returns (filtered, rejected) of line 0."""
+
+    @classmethod
+    async def begin(cls, dut, level=0, skip=0, needed=0, spare=0, settled=True):
+        bench = cls()
+        bench.dut, bench.lines = dut, int(dut.LEVELS.value)
+        bench.model = EventFilter(bench.lines, int(dut.SETTLE.value))
+        bench.settings = skip, needed, spare
+        await start(dut, level=bench.word([level] * bench.lines), skip=skip, needed=needed, spare=spare)
+        bench.model.step(skip, needed, spare, [level] * bench.lines, 1)
+        if settled:
+            await bench.play([level] * int(dut.SETTLE.value))
+        return bench
+
+    @staticmethod
+    def word(levels):
+        return sum(level << n for n, level in enumerate(levels))
+
+    async def set(self, skip=0, needed=0, spare=0):
+        """New settings, and the clk that they take, in which the levels stand still."""
+        self.settings = skip, needed, spare
+        await self.rows([[own.filtered for own in self.model.levels]])
+
+    async def rows(self, rows, rst=0):
+        dut, out = self.dut, []
+        dut.skip.value, dut.needed.value, dut.spare.value = self.settings
+        dut.rst.value = rst
+        for clk, levels in enumerate(rows):
+            dut.level.value = self.word(levels)
+            await RisingEdge(dut.clk)
+            await FallingEdge(dut.clk)
+            filtered, rejected = self.model.step(*self.settings, levels, rst)
+            got, want = (int(dut.filtered.value), int(dut.rejected.value)), (self.word(filtered), self.word(rejected))
+            assert got == want, f"clk {clk}, (skip, needed, spare) {self.settings}: (filtered, rejected) is {got}, the model has {want}"
+            out.append((filtered[0], rejected[0]))
+        dut.rst.value = 0
+        return out
+
+    async def play(self, levels, rst=0):
+        return await self.rows([[level] * self.lines for level in levels], rst)
+
+
+@cocotb.test()
+async def latency_of_a_clean_edge_is_needed_samples(dut):
+    bench = await Bench.begin(dut)
+    for needed in (0, 1, 2, 3, 7):
+        for spare in (0, 1, 3):
+            for level in (1, 0):
+                await bench.set(0, needed, spare)
+                out = await bench.play([level] * (needed + 2))
+                assert [filtered for filtered, _ in out].index(level) + 1 == max(1, needed)
+
+
+@cocotb.test()
+async def with_spare_0_and_skip_0_it_is_the_deglitcher(dut):
+    for needed in (0, 1, 2, 5, 8):
+        bench, other = await Bench.begin(dut, needed=needed), Deglitcher(int(dut.SETTLE.value))
+        other.step(needed, 0, 1)
+        for _ in range(int(dut.SETTLE.value)):
+            other.step(needed, 0)
+        levels = [bit for _ in range(60) for bit in [random.getrandbits(1)] * random.randint(1, 9)]
+        assert await bench.play(levels) == [other.step(needed, level) for level in levels]
+
+
+@cocotb.test()
+async def bypass_passes_every_clk(dut):
+    bench = await Bench.begin(dut)
+    levels = [random.getrandbits(1) for _ in range(60)]
+    assert await bench.play(levels) == [(level, 0) for level in levels]
+
+
+@cocotb.test()
+async def three_of_four_passes_and_two_of_four_is_rejected_and_reported_once(dut):
+    bench = await Bench.begin(dut)
+    await bench.set(0, 3, 1)
+    assert await bench.play([1, 0, 1, 1]) == [(0, 0)] * 3 + [(1, 0)]
+    assert await bench.play([1] * 4) == [(1, 0)] * 4
+    assert await bench.play([0, 1, 0, 1, 1, 1]) == [(1, 0)] * 3 + [(1, 1)] + [(1, 0)] * 2
+    assert await bench.play([0, 0, 1, 0]) == [(1, 0)] * 3 + [(0, 0)]
+
+
+@cocotb.test()
+async def a_pulse_of_too_few_samples_never_passes_at_any_setting(dut):
+    bench = await Bench.begin(dut)
+    for skip in (0, 1, 2):
+        for needed in (2, 3, 6):
+            for spare in (0, 1, 2):
+                await bench.set(skip, needed, spare)
+                await bench.play([0] * 30)
+                width = (needed - 1) * (skip + 1)
+                quiet = (spare + 2) * (skip + 1)
+                out = await bench.play(([1] * width + [0] * quiet) * 4)
+                assert not any(filtered for filtered, _ in out)
+                assert sum(rejected for _, rejected in out) == 4
+
+
+@cocotb.test()
+async def a_pulse_of_needed_sample_periods_passes_wherever_it_begins(dut):
+    for skip in (1, 2, 3):
+        for phase in range(skip + 1):
+            bench = await Bench.begin(dut, skip=skip, needed=4)
+            await bench.play([0] * (7 + phase))
+            out = await bench.play([1] * (4 * (skip + 1)) + [0] * 3)
+            assert any(filtered for filtered, _ in out)
+
+
+@cocotb.test()
+async def a_level_that_stands_from_power_up_makes_no_edge(dut):
+    for level in (1, 0):
+        bench = await Bench.begin(dut, level, 3, 7, 1, settled=False)
+        assert await bench.play([level] * 40) == [(level, 0)] * 40
+
+
+@cocotb.test()
+async def the_longest_setting_passes_after_exactly_that_many_samples(dut):
+    longest = (1 << int(dut.W.value)) - 1
+    bench = await Bench.begin(dut)
+    await bench.set(0, longest, 0)
+    assert await bench.play([1] * longest) == [(0, 0)] * (longest - 1) + [(1, 0)]
+    assert (await bench.play([0] * (longest - 1) + [1]))[-1] == (1, 1)
+
+
+@cocotb.test()
+async def lines_do_not_disturb_each_other(dut):
+    bench = await Bench.begin(dut)
+    await bench.set(0, 3, 0)
+    for line in range(bench.lines):
+        await bench.rows([[int(n == line) for n in range(bench.lines)]] * 3 + [[0] * bench.lines] * 3)
+        await bench.rows([[random.getrandbits(1) for _ in range(bench.lines)] for _ in range(200)])
+        await bench.play([0] * 10)
+
+
+@cocotb.test()
+async def reset_in_the_middle_of_a_pulse_forgets_it(dut):
+    bench = await Bench.begin(dut)
+    await bench.set(0, 6, 1)
+    await bench.play([1] * 5)
+    await bench.play([0], rst=1)
+    assert await bench.play([0] * 10) == [(0, 0)] * 10
+
+
+@cocotb.test()
+async def any_levels_and_any_change_of_settings_match_the_model(dut):
+    bench = await Bench.begin(dut)
+    for _ in range(150):
+        await bench.set(random.choice([0, 0, 1, 2, 5]), random.choice([0, 1, 2, 3, 5, 7]), random.choice([0, 0, 1, 2, 3]))
+        pulse = random.choice([1, 2, 4, 12])
+        rows = [[random.getrandbits(1) for _ in range(bench.lines)] for _ in range(40 // pulse) for _ in range(1)]
+        await bench.rows([row for row in rows for _ in range(random.randint(1, pulse))])
+        if random.random() < 0.05:
+            await bench.rows(rows[:2], rst=1)
+
+
+@pytest.mark.parametrize("levels, w, settle", [(1, 8, 4), (3, 4, 1)])
+def test_event_filter(levels, w, settle):
+    run("event_filter", __file__, LEVELS=levels, W=w, SETTLE=settle)

@@ -1,0 +1,271 @@
+# SPDX-License-Identifier: Apache-2.0
+"""signal_monitor: each fault by its name and in its time, what must not alarm, and the model in every clk."""
+import random
+from dataclasses import asdict
+
+import cocotb
+import numpy as np
+import pytest
+from cocotb.triggers import FallingEdge, RisingEdge
+
+from bench import run, start
+from signal_monitor import FAULTS, Settings, SignalMonitor
+
+CLKS = dict(enumerate([10, 10, 2, 14, 5, 2, 2, 2, 2, 2, 14, 14, 14]))      # from valid to each fault
+LATEST = max(CLKS.values())
+ALL = (1 << 13) - 1
+
+
+def names(bits):
+    return [name for n, name in enumerate(FAULTS) if bits >> n & 1]
+
+
+class Watch:
+    """The design beside its model; `seen` are all the faults since it was made, `rose` when each rose first."""
+
+    def __init__(self, dut, settings):
+        self.dut, self.settings, self.model = dut, settings, SignalMonitor()
+        self.due, self.now, self.first, self.clks, self.seen, self.rose = {}, 0, 0, 0, 0, {}
+        self.full = 1 << int(dut.W.value) - 1
+
+    async def clk(self, sample=None, phase_jump=0, lost_count=0, clear=0):
+        dut, bits = self.dut, 0
+        dut.valid.value, dut.clear.value = int(sample is not None), clear
+        dut.phase_jump.value, dut.lost_count.value = phase_jump, lost_count
+        if sample is not None:
+            dut.sin.value, dut.cos.value, dut.a.value, dut.b.value = sample
+            bits = int(self.model.sample(*(np.array([x]) for x in sample), self.settings)[0])
+            for n, lag in CLKS.items():
+                self.due.setdefault(self.clks + lag, []).append((1 << n, bits))
+        await RisingEdge(dut.clk)
+        await FallingEdge(dut.clk)
+        self.clks += 1
+        self.first = self.now if clear or not self.first else self.first
+        for mask, value in self.due.pop(self.clks, []):
+            self.now = self.now & ~mask | value & mask
+        self.now = self.now & ALL | phase_jump << 13 | lost_count << 14
+        self.rose |= {name: self.clks for name in names(self.now & ~self.seen)}
+        self.seen |= self.now
+        got = int(dut.faults.value), int(dut.first.value)
+        assert got == (self.now, self.first), f"clk {self.clks}: {names(got[0])}, first {names(got[1])}, the model has " \
+                                              f"{names(self.now)}, first {names(self.first)}"
+
+    async def sample(self, cos, sin, a=None, b=None, gap=0):
+        cos, sin = (round(min(self.full - 1, max(-self.full, leg))) for leg in (cos, sin))
+        await self.clk((sin, cos, int(cos > 0) if a is None else a, int(sin > 0) if b is None else b))
+        for _ in range(gap):
+            await self.clk()
+
+    async def turn(self, size, fringes=1.0, begin=0.0, steps=60, gap=0, distort=lambda cos, sin: (cos, sin)):
+        for n in range(round(abs(fringes) * steps)):
+            angle = 2 * np.pi * (begin + np.sign(fringes) * n / steps)
+            await self.sample(*distort(size * np.cos(angle), size * np.sin(angle)), gap=gap)
+
+    async def rest(self, clks=LATEST):
+        for _ in range(clks):
+            await self.clk()
+
+
+async def begin(dut, settings=None):
+    settings = settings or Settings()
+    await start(dut, valid=0, sin=0, cos=0, a=0, b=0, phase_jump=0, lost_count=0, clear=0, **asdict(settings))
+    return Watch(dut, settings)
+
+
+def advised(dut, **more):
+    width = int(dut.W.value)
+    return Settings(**asdict(Settings.advised(0.78 * 2 ** (width - 1), width)) | more)
+
+
+async def learnt(dut, **more):
+    """A monitor that has seen a good signal, and its amplitude."""
+    watch = await begin(dut, advised(dut, **more))
+    size = 0.78 * watch.full
+    await watch.turn(size, 2.25, steps=24)
+    await watch.turn(size, -0.25, begin=0.25)
+    await watch.rest()
+    assert int(dut.learnt.value) and not watch.seen
+    return watch, size
+
+
+@cocotb.test()
+async def latency_is_2_5_10_and_14(dut):
+    for name, lag in [("at_rail", 2), ("jump", 5), ("too_high", 10), ("off_circle", 14)]:
+        watch = await begin(dut, Settings(rail=110, jump=10, high=120, tolerance=20))
+        await watch.turn(90, 2.25, steps=80)
+        await watch.rest()
+        assert not watch.seen
+        decides = watch.clks + (name != "jump")          # the first sample of a jump, the second one of the others
+        await watch.sample(0, 126)
+        await watch.sample(0, 126)
+        await watch.rest()
+        assert watch.rose[name] == decides + lag
+    watch = await begin(dut)
+    await watch.clk(phase_jump=1, lost_count=1)
+    assert names(int(dut.faults.value)) == ["phase_jump", "lost_count"]
+
+
+@cocotb.test()
+async def amplitude_comes_9_clk_after_its_sample(dut):
+    watch = await begin(dut)
+    await watch.sample(30, 40)
+    for n in range(1, 12):
+        assert int(dut.amplitude.value) == (50 if n >= 9 else 0)
+        await watch.clk()
+
+
+@cocotb.test()
+async def with_everything_switched_off_nothing_alarms(dut):
+    watch = await begin(dut)
+    for _ in range(300):
+        await watch.sample(*(random.uniform(-1.5, 1.5) * watch.full for _ in range(2)), a=random.getrandbits(1), b=random.getrandbits(1))
+    assert not watch.seen
+
+
+@cocotb.test()
+async def a_good_signal_without_noise_raises_nothing_moving_or_at_rest(dut):
+    watch, size = await learnt(dut)
+    for steps in (200, 60, 13, 7, 5, 4.1):
+        await watch.turn(size, 2.0, steps=steps)
+    for place in (0, 3, 10):
+        await watch.turn(size, -place / 16, steps=90)
+        for _ in range(30):
+            await watch.sample(size * np.cos(place / 16 * 2 * np.pi), -size * np.sin(place / 16 * 2 * np.pi))
+        await watch.turn(size, place / 16, begin=-place / 16, steps=90)
+    assert not watch.seen & ~(1 << FAULTS.index("jump"))
+
+
+@cocotb.test()
+async def a_single_spike_is_only_a_jump(dut):
+    watch, size = await learnt(dut)
+    for n in range(60):
+        await watch.sample(size if n != 30 else 0, 0)
+    await watch.rest()
+    assert names(watch.seen) == ["jump"]
+
+
+@cocotb.test()
+async def each_fault_of_a_moving_signal_has_its_name(dut):
+    for name, distort in [
+            ("too_low", lambda cos, sin: (0.65 * cos, 0.65 * sin)), ("too_high", lambda cos, sin: (1.35 * cos, 0.9 * sin)),
+            ("at_rail", lambda cos, sin: (1.5 * cos, sin)), ("off_circle", lambda cos, sin: (cos, 0.75 * sin)),
+            ("frozen", lambda cos, sin: (cos, 5)), ("offset_drift", lambda cos, sin: (cos, sin + 0.117 * 2 ** (int(dut.W.value) - 1))),
+            ("unbalanced", lambda cos, sin: (1.1 * cos, 0.9 * sin)), ("not_square", lambda cos, sin: (cos, sin + 0.2 * cos))]:
+        watch, size = await learnt(dut)
+        await watch.turn(size, 4.0, distort=distort)
+        await watch.rest()
+        assert name in names(watch.seen), f"{name} is not among {names(watch.seen)}"
+
+
+@cocotb.test()
+async def each_fault_of_a_comparator_or_leg_has_its_name(dut):
+    for name, a in [("opposed", lambda n: n // 30 % 2), ("level_stuck", lambda n: 1)]:
+        watch, size = await learnt(dut)
+        for n in range(120):
+            angle = 2 * np.pi * n / 60
+            await watch.sample(size * np.cos(angle), size * np.sin(angle), a=a(n))
+        await watch.rest()
+        assert name in names(watch.seen)
+    watch, size = await learnt(dut)
+    for n in range(180):
+        angle = 2 * np.pi * (n + 0.5) / 60
+        await watch.sample(size, 0, a=int(np.cos(angle) > 0), b=int(np.sin(angle) > 0))
+    await watch.rest()
+    assert "leg_missing" in names(watch.seen)
+    watch, size = await learnt(dut, quiet=50)
+    for _ in range(52):
+        await watch.sample(size, 0)
+    assert names(watch.seen) == ["silent"]
+
+
+@cocotb.test()
+async def a_leg_that_opens_at_rest_is_found_at_the_second_sample(dut):
+    for place in (0.08, 0.1, 0.2, 0.4):                 # fringe; the sine goes to zero
+        watch, size = await learnt(dut)
+        await watch.turn(size, place, steps=400)
+        angle = 2 * np.pi * place
+        for _ in range(50):
+            await watch.sample(size * np.cos(angle), size * np.sin(angle))
+        assert not watch.seen
+        for _ in range(2):
+            await watch.sample(size * np.cos(angle), 0)
+        await watch.rest()
+        assert "jump" in names(watch.seen) and "off_circle" in names(watch.seen)
+
+
+@cocotb.test()
+async def the_first_fault_stands_until_it_is_cleared(dut):
+    watch = await begin(dut, Settings(rail=10, high=10))
+    for _ in range(3):
+        await watch.sample(0, 50)
+    await watch.rest()
+    assert names(int(dut.first.value)) == ["at_rail"] and names(int(dut.faults.value)) == ["too_high", "at_rail"]
+    await watch.clk(clear=1)
+    assert names(int(dut.first.value)) == ["too_high", "at_rail"]
+    for _ in range(17):
+        await watch.sample(0, 5)
+    await watch.rest()
+    assert not int(dut.faults.value) and int(dut.first.value)
+    await watch.clk(clear=1)
+    assert not int(dut.first.value)
+
+
+@cocotb.test()
+async def reset_in_mid_flow_drops_faults_and_samples(dut):
+    watch = await begin(dut, Settings(rail=10, high=10))
+    for _ in range(12):
+        await watch.sample(0, 50)
+    assert int(dut.faults.value)
+    watch = await begin(dut, Settings(rail=10, high=10))
+    await watch.rest(20)
+    assert not watch.seen
+
+
+@cocotb.test()
+async def any_signal_in_any_settings_matches_the_model_in_every_clk(dut):
+    for _ in range(8):
+        top = (1 << int(dut.W.value) - 1) - 1
+        level = lambda top=top: random.choice([0, top // 10, top // 4, top, 65535])
+        settings = random.choice([advised(dut, quiet=random.choice([0, 3])), Settings(level(), level(), level(), level(), level(),
+                                  random.choice([0, 3, 255]), level(), random.choice([0, 5]), level(), level(), level(), level())])
+        watch, angle, speed, leg = await begin(dut, settings), 0.0, 0.05, 0.0
+        for n in range(160):
+            if n % 40 == 0:
+                speed, shrink = random.choice([0, 0.02, 0.3, 1.5, -0.8]), random.choice([1, 1, 0.3, 1.4])
+                leg = random.choice([1, 1, 1, 0, -1])
+            angle += speed
+            size = 0.8 * top * shrink + random.gauss(0, 0.5)
+            upset = {"a": random.getrandbits(1)} if random.random() < 0.05 else {}
+            await watch.sample(size * np.cos(angle), leg * size * np.sin(angle), **upset)
+            for _ in range(random.choice([0, 0, 0, 1, 5])):
+                await watch.clk(phase_jump=int(random.random() < 0.02), lost_count=int(random.random() < 0.02),
+                                clear=int(random.random() < 0.05))
+
+
+def test_the_campaigns_tracker_is_that_of_the_house():
+    from coarse_check import CoarseCheck
+    from experiments.figures_faults import LOST, Tracker
+    from fringe_tracker import FringeTracker
+    source = np.random.default_rng(1)
+    lanes = 20
+    many, position = Tracker(lanes), [0] * lanes
+    each, checks = [FringeTracker() for _ in range(lanes)], [CoarseCheck() for _ in range(lanes)]
+    phase, count = np.zeros(lanes, np.int64), np.zeros(lanes, np.int64)
+    speed = source.integers(-16000, 16000, lanes)
+    for _ in range(300):
+        stray = (source.random(lanes) < 0.05) * source.integers(0, 65536, lanes)
+        phase = (phase + speed + source.integers(-300, 300, lanes) + stray) % 65536
+        count = count + source.integers(-1, 2, lanes)
+        jump, lost = many.follow(phase, count)
+        for n in range(lanes):
+            first = each[n].last is None
+            step, overspeed = each[n].follow(int(phase[n]))
+            position[n] = int(phase[n]) if first else position[n] + step
+            for valid in (1, 0, 0):
+                told = checks[n].step(LOST, valid, position[n], int(count[n]), 0, 0)
+            assert (overspeed, told) == (int(jump[n]), int(lost[n]))
+
+
+@pytest.mark.parametrize("w", [8, 16])
+def test_signal_monitor(w):
+    run("signal_monitor", __file__, W=w)

@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What rtl/sense/vector_length.sv makes of samples, in integers; of one or of arrays of them."""
+import numpy as np
+
+F = 4               # fraction bits
+
+
+def vector_length(sin, cos):
+    """(length, axis, quadrant, tilt)"""
+    sin, cos = np.asarray(sin, dtype=np.int64), np.asarray(cos, dtype=np.int64)
+    sin_size, cos_size = abs(sin), abs(cos)
+    sin_low, cos_low, steep = sin < 0, cos < 0, sin_size > cos_size
+    major, minor = np.maximum(sin_size, cos_size), np.minimum(sin_size, cos_size)
+    x, y = major << F, minor << F
+    for k in range(1, 5):
+        turn = np.where(y < 0, -1, 1)
+        x, y = x + turn * (y >> k), y - turn * (x >> k)
+    length = x - (x >> 3) - (x >> 6) + (1 << F - 1) >> F
+    axis = np.where(steep, 1 + 2 * sin_low, 2 * cos_low)
+    quadrant = 2 * sin_low + (sin_low ^ cos_low)
+    tilt = sum((8 * minor > n * major).astype(np.int64) for n in (1, 3, 5, 7))
+    return length, axis, quadrant, tilt
