@@ -70,8 +70,8 @@ figure: $(SETUP) $(FIRMWARE)   ## NAME=x measures one figure afresh; the last li
 figures: $(SETUP) $(FIRMWARE)  ## all figures, and their page
 	@$(PYTHON) -m experiments.figure --all
 
-soak: $(SETUP) $(FIRMWARE)     ## the stage for as long as you let it, under disturbance
-	@$(PYTHON) -m experiments.soak
+soak: $(SETUP) $(FIRMWARE)     ## the long campaigns, for a night: K=name of one
+	@$(PYTHON) -m experiments.soak $K
 
 clean:            ## remove what was built; the tools in build/venv stay (rm -rf build removes them too)
 	@[ ! -d build ] || find build -mindepth 1 -maxdepth 1 ! -name venv -exec rm -rf {} +

@@ -119,4 +119,5 @@ class Stage:
 
     def friction(self, coulomb, breakaway, stribeck, viscous, presliding, damping, speed, steps=20000):
         """Friction force of a body that slides evenly."""
-        return self.library.friction_slide(coulomb, breakaway, stribeck, viscous, presliding, damping, speed, self.plant["time_step"], steps)
+        return self.library.friction_slide(coulomb, breakaway, stribeck, viscous, presliding, damping, speed,
+                                           self.plant["time_step"], steps)

@@ -101,7 +101,8 @@ class Twin:
     """`nodes` are their addresses on the line. `plant` overrides parameters.toml for all axes, `plant_of` {axis: {…}} for
     one; `firmware` is a list of words or None for the one in sw/firmware; `host_baud_error` 0.02 makes the host 2 % fast."""
 
-    def __init__(self, seed=1, nodes=(1, 2), clk_hz=CLK_HZ, baud=BAUD, host_baud_error=0.0, axes=1, plant=None, plant_of=None, firmware=None):
+    def __init__(self, seed=1, nodes=(1, 2), clk_hz=CLK_HZ, baud=BAUD, host_baud_error=0.0, axes=1, plant=None, plant_of=None,
+                 firmware=None):
         self.handle = None
         self.library, self.clk_hz, self.baud, self.addresses = library(clk_hz, axes), clk_hz, baud, tuple(nodes)
         self.node_axes, self.axes = axes, axes * len(self.addresses)
@@ -352,12 +353,12 @@ class FrameBench:
 
 
 def realtime_factor(simulated_s=0.1, tries=5, nodes=(1, 2), **arguments):
-    """Simulated seconds per second of one processor, nodes and machines running; the best try, the machine may have other work."""
+    """Simulated seconds per second of one processor, nodes and machines running; the best of the tries."""
     with Twin(nodes=nodes, **arguments) as twin:
         twin.run(0.02)                                        # the firmware starts
         took = []
         for _ in range(tries):
-            start = time.perf_counter()
+            start = time.process_time()
             twin.run(simulated_s)
-            took.append(time.perf_counter() - start)
+            took.append(time.process_time() - start)
     return simulated_s / min(took)

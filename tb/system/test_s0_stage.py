@@ -238,8 +238,8 @@ def test_nonsense_on_the_line_moves_nothing_and_the_next_command_works(stage):
         assert stage.axes["X"].status().state == "holding"
     after = rest(stage, "X")
     assert after[1] == before[1] and abs(after[0] - before[0]) < BOUND_NM
-    now = axis.node.counters()
-    assert now["framing_errors"] + now["frames_bad"] + now["start_glitches"] > bad["framing_errors"] + bad["frames_bad"] + bad["start_glitches"]
+    now, kinds = axis.node.counters(), ("framing_errors", "frames_bad", "start_glitches")
+    assert sum(now[kind] for kind in kinds) > sum(bad[kind] for kind in kinds)
     assert abs(stage.move("X", 2000).error_nm) <= BOUND_NM
 
 
@@ -302,7 +302,8 @@ def test_a_repeated_request_is_answered_again_and_not_acted_on_again(stage):
 
 def test_unknown_command_and_wrong_length_are_refused_in_words(stage, monkeypatch):
     before = rest(stage, "X")
-    for body, words in ((bytes([41, 200]), "does not know this command"), (bytes([42, 5, 0, 1]), "wrong length"), (bytes([43]), "wrong length")):
+    bodies = {bytes([41, 200]): "does not know this command", bytes([42, 5, 0, 1]): "wrong length", bytes([43]): "wrong length"}
+    for body, words in bodies.items():
         send_frame(stage, ADDRESSES["X"], body)
         transport = stage.line.transport
         transport.send([0x110 | ADDRESSES["X"]])

@@ -115,7 +115,8 @@ def test_steady_sliding_gives_the_curve_of_stribeck(share):
     expected = coulomb + (static - coulomb) * math.exp(-share**2) + viscous * v
     steps = 20000 if share > 1 else 200000
     for sign in (1, -1):
-        assert Stage().friction(coulomb, static, stribeck, viscous, 1e-6, 4000.0, sign * v, steps) == pytest.approx(sign * expected, rel=1e-3)
+        force = Stage().friction(coulomb, static, stribeck, viscous, 1e-6, 4000.0, sign * v, steps)
+        assert force == pytest.approx(sign * expected, rel=1e-3)
 
 
 def test_friction_is_stable_at_any_speed():

@@ -144,12 +144,13 @@ def trajectories(traces) -> bytes:
 
 def following_errors(traces) -> bytes:
     errors = [[target - position for target, position in zip(trace.target_nm, trace.position_nm)] for trace in traces]
-    hidden = [[target - true for target, true in zip(trace.target_nm, trace.true_nm)] if trace.true_nm is not None else [] for trace in traces]
+    hidden = [[] if trace.true_nm is None else [target - true for target, true in zip(trace.target_nm, trace.true_nm)] for trace in traces]
     worth, unit = length_unit(largest(errors + [error for error in hidden if error]))
     figure, panels = drawing(height=2.2 * len(traces) + 0.6, nrows=len(traces), sharex=True)
     for number, (panel, trace) in enumerate(zip(panels, traces)):
         if hidden[number]:
-            panel.plot(trace.time_s, [value / worth for value in hidden[number]], color="#999999", linewidth=0.9, label="of the true position")
+            panel.plot(trace.time_s, [value / worth for value in hidden[number]], color="#999999", linewidth=0.9,
+                       label="of the true position")
         panel.plot(
             trace.time_s, [value / worth for value in errors[number]], color=colour(number), linewidth=0.9, label="seen by the encoder"
         )
