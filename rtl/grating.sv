@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // grating -- the measuring path of an axis: from the pins of a grating to position and velocity.
 //
-// latency  see the rooms; 24 clk from a converter word to position
+// latency  see the rooms; 34 clk from a converter word to position
 // rate     one sample per `sample_tick`, one velocity per `tick`
 // source   S0: interferometer with sine, cosine and comparator outputs; any A/B/Z scale
 // model    the models of its blocks; proved in motion by tb/system
@@ -103,13 +103,13 @@ module grating #(
     // interpolate
     wire               corrected, phase_valid, harmonics_off, stepped;
     wire signed [15:0] corrected_sin, corrected_cos;
-    wire        [15:0] plain_phase, length;
+    wire        [15:0] plain_phase;
     wire signed [16:0] step;
 
     signal_correction #(.W(W)) u_correction (.clk, .rst, .load(load_correction), .sin_offset, .cos_offset, .gain, .shear, .valid(sampled),
                                              .sin, .cos, .done(corrected), .sin_out(corrected_sin), .cos_out(corrected_cos));
-    arctan_pipelined #(.W(16)) u_arctan (.clk, .rst, .valid(corrected), .sin(corrected_sin), .cos(corrected_cos), .done(phase_valid),
-                                         .phase(plain_phase), .amplitude(length));
+    arctan_table #(.W(16)) u_arctan (.clk, .rst, .valid(corrected), .sin(corrected_sin), .cos(corrected_cos), .done(phase_valid),
+                                         .phase(plain_phase));
     harmonic_correction u_harmonics (.clk, .rst, .enable(harmonic_enable), .write(harmonic_write), .point(harmonic_at),
                                      .value(harmonic_value), .swap(swap_harmonics), .valid(phase_valid), .phase(plain_phase),
                                      .done(harmonics_off), .phase_out(phase));
@@ -166,7 +166,7 @@ module grating #(
         .compare_count, .compare_pulse(pulse_length), .compare_gap(gap_length), .compare_state_armed(armed), .compare_state_late(late),
         .compare_passed(passed), .velocity_quantum(quantum), .velocity_fine(fine));
 
-    wire unused = &{1'b0, quadrature_step, heading, illegal_seen, illegal_fault, revolution_fault, learnt, length, levels[2]};
+    wire unused = &{1'b0, quadrature_step, heading, illegal_seen, illegal_fault, revolution_fault, learnt, levels[2]};
 endmodule
 
 `default_nettype wire

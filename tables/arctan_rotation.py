@@ -6,8 +6,9 @@
     python3 tables/arctan_rotation.py --check    stop when the committed file is stale
     python3 tables/arctan_rotation.py --bound    print for each width how far a phase may be from the true one, in LSB
 
-Of the two legs of a vector the shorter becomes the angle, the longer the amplitude. Digit i turns by atan(2^-i) as long as the longer leg is turned with the shorter one, i <= TURNS. After it, q = shorter / longer
-stays below h = 2^-TURNS, and digit i means 2^-i of q: atan(q) = q - q^3/3 is met by (1 - h^2/4) q within h^3/12.
+Of the two legs of a vector the longer is turned to become the amplitude, the shorter until it is gone. Digit i turns by
+atan(2^-i) up to i = TURNS. Then q = shorter / longer is below h = 2^-TURNS, the longer leg stays, and digit i means 2^-i of q:
+atan(q) = q - q^3/3 is met by (1 - h^2/4) q within h^3/12.
 """
 import math
 import sys
@@ -21,7 +22,7 @@ LONGEST = 10                            # digits that have an angle of their own
 # width of a sample: TURNS, DIGITS, HEAD (fraction bits of the shorter leg + digits found + 1), GUARD bits below the LSB
 PIPELINED = {8: (8, 23, 19, 12), 9: (9, 27, 22, 15), 10: (10, 28, 24, 16)} | {w: (6, 22, 26 - w, 9) for w in range(11, 17)}
 # width of a sample: TURNS, DIGITS, F fraction bits of both legs, GUARD
-ITERATIVE = {8: (7, 23, 12, 14), 9: (8, 27, 12, 16), 10: (9, 29, 16, 17)} | {w: (7, 22, 10, 11) for w in range(11, 17)}
+ITERATIVE = {8: (7, 23, 12, 14), 9: (9, 27, 14, 16), 10: (9, 29, 16, 17)} | {w: (7, 22, 10, 11) for w in range(11, 17)}
 
 
 def angles_by_hand():
@@ -75,6 +76,11 @@ def bound(plan, w, radius, iterative=False):
     else:                                                           # one unit in the longer leg at each turn, half in the shorter after
         cut = 2.0 ** (1 - head) * (2 * (turns - 2) + (digits - turns - 1) / 2 + 1)
     return 0.5 + rest + cubic + table + unit * cut / (1.16 * radius)
+
+
+def amplitude_bound(radius, iterative=False):
+    """Counts from the true amplitude: cut off in eighths or halves of a count, and the rest of the gain."""
+    return (0.9 if iterative else 1.5) + 0.00015 * radius
 
 
 def quarter_bound(plans, w):

@@ -1,5 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // arctan_pipelined -- phase and amplitude of a sine and a cosine sample: 2^16 atan2(sin, cos) / 2 pi, and their length.
+//
+// latency  24, 28, 29 clk from valid to done for W = 8, 9, 10, 23 clk for wider samples; divided by STEPS, rounded up
+// rate     one sample per clk
+// accuracy phase: every sample of 8, 9 and 10 bits is correctly rounded; wider ones are within 0.548 LSB of the true phase from a
+//          quarter of full scale on (of 12 bits, all tried: 0.510). amplitude: within 1.5 counts and 0.00015 of itself.
+//          (0, 0) gives 0 and 0
+// source   CORDIC in vectoring mode, after TURNS digits as a division; the shorter leg is doubled at each digit (Y = 2^i y), so
+//          that both legs lose a bit a digit; the angles of four or five digits come from one look-up
+// model    tb/interpolate/arctan_pipelined.py, equal in every bit of every cycle; bound and angles from tables/arctan_rotation.py
 `default_nettype none
 
 module arctan_pipelined #(

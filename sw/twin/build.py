@@ -148,7 +148,7 @@ def verilate(folder, verilator, clk_hz, axes):
         f"#define NODE_MEMORY {words[0]}\n{rearm}")
 
 
-def twin_library(clk_hz=4_000_000, axes=1):
+def twin_library(clk_hz=3_000_000, axes=1):
     """libtwin.so: Verilated nodes, stages and line."""
     tool = compiler()
     verilator = package("verilator", "it makes C++ of the RTL")
