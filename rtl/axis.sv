@@ -23,8 +23,13 @@ module axis #(
     input  wire        [5:0]     word,          // 32-bit word of the block
     input  wire        [31:0]    wdata,
     output logic       [31:0]    rdata,
+    input  wire                  grating_select, // register bus, its grating
+    output logic       [31:0]    grating_rdata,
+    input  wire        [31:0]    now,           // clk
     input  wire                  encoder_a,     // pins from here on
     input  wire                  encoder_b,
+    input  wire                  encoder_z,     // index
+    input  wire        [1:0]     probe,
     input  wire                  adc_sin,       // serial data, synchronous to adc_sclk
     input  wire                  adc_cos,
     input  wire                  limit_low_open, // 1: pressed or wire cut
@@ -34,9 +39,9 @@ module axis #(
     output logic                 adc_sclk,
     output logic                 bridge_a,
     output logic                 bridge_b,
-    output logic                 drive_enable
+    output logic                 drive_enable,
+    output logic                 compare_pulse
 );
-    localparam int VELOCITY_QUANTUM = 2**(15 - W); // 2^-16 period: about what a converter of W bits can tell apart
     localparam int LIMIT_CLK = CLK_HZ / 10_000; // a limit switch must be stable for 0.1 ms
 
     // settings and strobes from the registers
@@ -54,56 +59,30 @@ module axis #(
     wire signed [15:0] open_command;
     wire signed [63:0] segment_velocity, segment_acceleration;
 
-    // sense
-    wire        pin_a, pin_b, pin_low, pin_high, pin_fault_n, a, b, a_rejected, b_rejected, limit_low, limit_high;
-    wire        low_rejected, high_rejected;
-    wire        converted, sampled, sample_rejected, too_low, too_high;
-    wire signed [W-1:0] raw_sin, raw_cos, sin, cos;
-    wire        [15:0]  amplitude;
+    // pins
+    wire        pin_a, pin_b, pin_z, pin_low, pin_high, pin_fault_n, limit_low, limit_high, low_rejected, high_rejected;
+    wire [1:0]  pin_probe;
 
-    synchroniser #(.W(5)) u_pins (.clk, .rst, .d({drive_fault_n, limit_high_open, limit_low_open, encoder_b, encoder_a}),
-                                  .q({pin_fault_n, pin_high, pin_low, pin_b, pin_a}));
-    deglitcher u_a (.clk, .rst, .stable(deglitch), .level(pin_a), .filtered(a), .rejected(a_rejected));
-    deglitcher u_b (.clk, .rst, .stable(deglitch), .level(pin_b), .filtered(b), .rejected(b_rejected));
+    synchroniser #(.W(8)) u_pins (.clk, .rst, .d({probe, drive_fault_n, limit_high_open, limit_low_open, encoder_z, encoder_b, encoder_a}),
+                                  .q({pin_probe, pin_fault_n, pin_high, pin_low, pin_z, pin_b, pin_a}));
     deglitcher u_low (.clk, .rst, .stable(16'(LIMIT_CLK)), .level(pin_low), .filtered(limit_low), .rejected(low_rejected));
     deglitcher u_high (.clk, .rst, .stable(16'(LIMIT_CLK)), .level(pin_high), .filtered(limit_high), .rejected(high_rejected));
-    dual_adc_reader #(.W(W)) u_converter (.clk, .rst, .start(sample_tick), .sdata_a(adc_sin), .sdata_b(adc_cos),
-                                          .cs_n(adc_cs_n), .sclk(adc_sclk), .valid(converted), .sin(raw_sin), .cos(raw_cos));
-    spike_limiter #(.W(W)) u_limiter (.clk, .rst, .step(spike_step), .hold(spike_hold), .valid(converted), .sin(raw_sin), .cos(raw_cos),
-                                      .done(sampled), .sin_out(sin), .cos_out(cos), .rejected(sample_rejected));
-    amplitude_monitor #(.W(W)) u_amplitude (.clk, .rst, .low(amplitude_low), .high(amplitude_high), .valid(sampled), .sin, .cos,
-                                            .amplitude, .too_low, .too_high);
 
-    // decode
-    wire signed [31:0] quadrature_count;
-    wire signed [1:0]  quadrature_step;
-    wire               settled, stepping, heading;
-    wire               illegal;
+    // measuring path
+    wire signed [W-1:0] sin, cos;
+    wire                sample_rejected, signal_fault, position_valid, zero_up, zero_down;
+    wire        [2:0]   edge_rejected;
+    wire        [15:0]  phase, amplitude;
+    wire signed [31:0]  quadrature_count, velocity;
+    wire        [4:0]   encoder_events;                         // in the order of axis_registers
+    wire signed [47:0]  position;
 
-    quadrature_decoder u_decoder (.clk, .rst, .mode(2'd0), .clear(1'b0), .a, .b, .settled, .stepping, .count(quadrature_count),
-                                  .step(quadrature_step), .heading, .illegal);
-
-    // interpolate
-    wire               phase_valid, stepped, overspeed;
-    wire        [15:0] phase;
-    wire signed [16:0] step;
-
-    arctan_table #(.W(W)) u_arctan (.clk, .rst, .valid(sampled), .sin, .cos, .done(phase_valid), .phase);
-    fringe_tracker u_tracker (.clk, .rst, .valid(phase_valid), .phase, .done(stepped), .step, .overspeed);
-
-    // position
-    wire               position_valid, disagreement, zero_up, zero_down;
-    wire signed [47:0] position;
-    wire signed [31:0] velocity;
-    wire signed [39:0] velocity_fine;
-
-    unwrap u_position (.clk, .rst, .valid(stepped), .step, .phase, .shift(shift_origin_written), .shift_periods(shift_origin),
-                       .done(position_valid), .position);
-    coarse_check u_coarse (.clk, .rst, .limit(disagreement_limit), .valid(position_valid), .position, .count(quadrature_count),
-                           .shift(shift_origin_written), .shift_periods(shift_origin), .disagreement);
+    grating #(.W(W)) u_grating (.clk, .rst, .tick, .sample_tick, .now, .select(grating_select), .write, .word, .wdata, .rdata(grating_rdata),
+        .deglitch, .spike_step, .spike_hold, .amplitude_low, .amplitude_high, .disagreement_limit, .shift(shift_origin_written),
+        .shift_periods(shift_origin), .a(pin_a), .b(pin_b), .z(pin_z), .probe(pin_probe), .adc_sin, .adc_cos, .adc_cs_n, .adc_sclk,
+        .compare_pulse, .sin, .cos, .sample_rejected, .edge_rejected, .phase, .amplitude, .quadrature_count, .events(encoder_events),
+        .signal_fault, .position_valid, .position, .velocity);
     zero_crossing u_zero (.clk, .rst, .valid(position_valid), .position, .shift(shift_origin_written), .up(zero_up), .down(zero_down));
-    velocity_estimator u_velocity (.clk, .rst, .quantum(16'(VELOCITY_QUANTUM)), .tick, .position, .shift(shift_origin_written), .shift_periods(shift_origin), .velocity,
-                                   .fine(velocity_fine));
 
     // control
     wire signed [47:0] target;
@@ -125,11 +104,10 @@ module axis #(
     wire signed [15:0] command;
     wire        [8:0]  faults, causes_now, first_fault;
     wire signed [47:0] fault_position;
-    wire        [4:0]  encoder_events = {disagreement, too_high, too_low, overspeed, illegal};   // order of axis_registers
 
     axis_guard u_guard (.clk, .rst, .enable_request(control_enable), .closed_loop(control_closed_loop), .homing(control_homing),
                         .reset_faults(strobes_reset_faults), .limit_low, .limit_high, .estop, .drive_fault(!pin_fault_n),
-                        .encoder_fault(|(encoder_events & encoder_fault_mask)), .following_limit, .error, .error_valid(commanded),
+                        .encoder_fault(signal_fault || |(encoder_events & encoder_fault_mask)), .following_limit, .error, .error_valid(commanded),
                         .watchdog_expired, .cpu_trap, .profile_underrun(underrun), .position, .valid_in(commanded), .command_in(servo_command),
                         .valid_out(passed), .command_out(command), .enabled(drive_enable), .faults, .causes_now, .first_fault,
                         .fault_position, .block_up, .block_down);
@@ -150,15 +128,15 @@ module axis #(
         .sensing_deglitch(deglitch), .sensing_spike_step(spike_step), .sensing_spike_hold(spike_hold),
         .amplitude_window_low(amplitude_low), .amplitude_window_high(amplitude_high), .disagreement_limit,
         .sample_sin(16'(sin)), .sample_cos(16'(cos)), .phase_phase(phase), .phase_amplitude(amplitude), .quadrature_count,
-        .encoder_events_illegal_edge(illegal), .encoder_events_overspeed(overspeed), .encoder_events_amplitude_low(too_low),
-        .encoder_events_amplitude_high(too_high), .encoder_events_disagreement(disagreement), .encoder_fault_mask,
-        .rejected_pulses(a_rejected | b_rejected), .rejected_samples(sample_rejected),
+        .encoder_events_illegal_edge(encoder_events[0]), .encoder_events_overspeed(encoder_events[1]),
+        .encoder_events_amplitude_low(encoder_events[2]), .encoder_events_amplitude_high(encoder_events[3]),
+        .encoder_events_disagreement(encoder_events[4]), .encoder_fault_mask, .rejected_pulses(|edge_rejected), .rejected_samples(sample_rejected),
         .kp, .ki, .kd, .kv, .ka, .servo_limits_output(output_limit), .servo_limits_integral(integral_limit), .dead_band,
         .following_error(error), .command, .open_command, .pwm_period,
         .segment_velocity, .segment_acceleration, .segment_jerk, .segment_ticks, .segment_ticks_written, .segment_ticks_last(segment_last),
         .brake_rate);
 
-    wire unused = &{1'b0, low_rejected, high_rejected, quadrature_step, settled, stepping, heading, velocity_fine};
+    wire unused = &{1'b0, low_rejected, high_rejected};
 endmodule
 
 `default_nettype wire

@@ -10,7 +10,7 @@ module node #(
     parameter int CLK_HZ = 4_000_000,           // clk frequency
     parameter int AXES = 1,                     // 1..8
     parameter int W = 8,                        // bits of a sample
-    parameter int MEMORY_BYTES = 32768,         // of the soft core, program and data
+    parameter int MEMORY_BYTES = 65536,         // of the soft core, program and data
     parameter FIRMWARE = ""                     // file of its contents at power-up
 ) (
     input  wire                  clk,
@@ -22,6 +22,8 @@ module node #(
     output logic                 line_driver_enable,
     input  wire        [AXES-1:0] encoder_a,
     input  wire        [AXES-1:0] encoder_b,
+    input  wire        [AXES-1:0] encoder_z,     // index
+    input  wire        [2*AXES-1:0] probe,       // two of each axis
     input  wire        [AXES-1:0] adc_sin,
     input  wire        [AXES-1:0] adc_cos,
     input  wire        [AXES-1:0] limit_low_open, // 1: pressed or wire cut
@@ -31,20 +33,21 @@ module node #(
     output logic       [AXES-1:0] adc_sclk,
     output logic       [AXES-1:0] bridge_a,
     output logic       [AXES-1:0] bridge_b,
-    output logic       [AXES-1:0] drive_enable
+    output logic       [AXES-1:0] drive_enable,
+    output logic       [AXES-1:0] compare_pulse
 );
     // cpu
     wire               select, write, trap, node_select, line_select;
     wire        [15:0] bus_address;
     wire        [31:0] wdata, rdata, node_rdata, line_rdata;
-    wire        [AXES-1:0]    axis_select;
-    wire        [32*AXES-1:0] axis_rdata;
+    wire        [AXES-1:0]    axis_select, grating_select;
+    wire        [32*AXES-1:0] axis_rdata, grating_rdata;
     wire        [5:0]  word = bus_address[7:2];
 
     soft_core #(.MEMORY_BYTES(MEMORY_BYTES), .FIRMWARE(FIRMWARE)) u_core (.clk, .rst, .select, .write, .address(bus_address), .wdata,
                                                                         .rdata, .trap);
     register_bus #(.AXES(AXES)) u_bus (.clk, .select, .address(bus_address), .node_rdata, .line_rdata, .axis_rdata,
-                                       .node_select, .line_select, .axis_select, .rdata);
+                                       .grating_rdata, .node_select, .line_select, .axis_select, .grating_select, .rdata);
 
     // time
     wire        [63:0] now;
@@ -104,10 +107,11 @@ module node #(
     for (genvar n = 0; n < AXES; n++) begin : g_axis
         axis #(.CLK_HZ(CLK_HZ), .W(W)) u_axis (.clk, .rst, .tick, .sample_tick, .estop, .watchdog_expired, .cpu_trap(trap),
             .select(axis_select[n]), .write, .word, .wdata, .rdata(axis_rdata[32*n +: 32]),
-            .encoder_a(encoder_a[n]), .encoder_b(encoder_b[n]), .adc_sin(adc_sin[n]), .adc_cos(adc_cos[n]),
+            .grating_select(grating_select[n]), .grating_rdata(grating_rdata[32*n +: 32]), .now(now[31:0]),
+            .encoder_a(encoder_a[n]), .encoder_b(encoder_b[n]), .encoder_z(encoder_z[n]), .probe(probe[2*n +: 2]), .adc_sin(adc_sin[n]), .adc_cos(adc_cos[n]),
             .limit_low_open(limit_low_open[n]), .limit_high_open(limit_high_open[n]), .drive_fault_n(drive_fault_n[n]),
             .adc_cs_n(adc_cs_n[n]), .adc_sclk(adc_sclk[n]), .bridge_a(bridge_a[n]), .bridge_b(bridge_b[n]),
-            .drive_enable(drive_enable[n]));
+            .drive_enable(drive_enable[n]), .compare_pulse(compare_pulse[n]));
     end
 endmodule
 

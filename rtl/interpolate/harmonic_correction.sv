@@ -46,23 +46,26 @@ module harmonic_correction (
     end
 
     always_ff @(posedge clk) begin
-        read      <= valid;
-        phase_q   <= phase;
-        acts_q    <= enable && (swapped || swap);
-
-        risen     <= read;
-        phase_qq  <= phase_q;
-        acts_qq   <= acts_q;
-        here_q    <= here;
-        rise      <= 19'(next) - 19'(here);
-
-        climbed   <= risen;
-        phase_qqq <= phase_qq;
-        acts_qqq  <= acts_qq;
-        here_qq   <= here_q;
-        climb     <= 27'(rise * $signed({1'b0, phase_qq[7:0]}));
-
-        done      <= climbed;
+        read    <= valid;
+        risen   <= read;
+        climbed <= risen;
+        done    <= climbed;
+        if (valid) begin
+            phase_q <= phase;
+            acts_q  <= enable && (swapped || swap);
+        end
+        if (read) begin
+            phase_qq <= phase_q;
+            acts_qq  <= acts_q;
+            here_q   <= here;
+            rise     <= 19'(next) - 19'(here);
+        end
+        if (risen) begin
+            phase_qqq <= phase_qq;
+            acts_qqq  <= acts_qq;
+            here_qq   <= here_q;
+            climb     <= 27'(rise * $signed({1'b0, phase_qq[7:0]}));
+        end
         if (climbed) phase_out <= phase_qqq - (acts_qqq ? 16'(change) : 16'd0);
         if (swap) begin
             page    <= !page;

@@ -44,11 +44,15 @@ module signal_correction #(
         centred    <= valid;
         multiplied <= centred;
         done       <= multiplied;
-        sin_leg    <= 17'(sin_wide) - 17'(sin_zero);
-        cos_leg    <= 17'(cos_wide) - 17'(cos_zero);
-        sin_part   <= sin_leg * sin_factor;
-        cos_part   <= cos_leg * cos_factor;
-        cos_kept   <= cos_leg;
+        if (valid) begin
+            sin_leg <= 17'(sin_wide) - 17'(sin_zero);
+            cos_leg <= 17'(cos_wide) - 17'(cos_zero);
+        end
+        if (centred) begin
+            sin_part <= sin_leg * sin_factor;
+            cos_part <= cos_leg * cos_factor;
+            cos_kept <= cos_leg;
+        end
         if (multiplied) begin
             sin_out <= sin_half[18:15] == {4{sin_half[18]}} ? sin_half[15:0] : {sin_half[18], {15{!sin_half[18]}}};
             cos_out <= cos_half[16] == cos_half[15] ? cos_half[15:0] : {cos_half[16], {15{!cos_half[16]}}};

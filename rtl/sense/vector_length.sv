@@ -46,28 +46,30 @@ module vector_length #(
     wire        [N-1:0] whole = scaled + N'(1 << (F - 1));      // plus a half
 
     always_ff @(posedge clk) begin
-        on_way   <= {on_way[6:0], valid};
-        sin_size <= sin[W-1] ? -sin : sin;
-        cos_size <= cos[W-1] ? -cos : cos;
-        sin_low  <= sin[W-1];
-        cos_low  <= cos[W-1];
+        on_way <= {on_way[6:0], valid};
+        if (valid || on_way != '0) begin
+            sin_size <= sin[W-1] ? -sin : sin;
+            cos_size <= cos[W-1] ? -cos : cos;
+            sin_low  <= sin[W-1];
+            cos_low  <= cos[W-1];
 
-        major    <= steep ? sin_size : cos_size;
-        minor    <= steep ? cos_size : sin_size;
-        place[1] <= {nearest, here, 3'b0};
+            major    <= steep ? sin_size : cos_size;
+            minor    <= steep ? cos_size : sin_size;
+            place[1] <= {nearest, here, 3'b0};
 
-        x[1]     <= x_0 + (y_0 >>> 1);
-        y[1]     <= y_0 - (x_0 >>> 1);
-        place[2] <= {place[1][6:3], slope};
+            x[1]     <= x_0 + (y_0 >>> 1);
+            y[1]     <= y_0 - (x_0 >>> 1);
+            place[2] <= {place[1][6:3], slope};
 
-        for (int k = 2; k < 5; k++) begin
-            x[k] <= y[k-1][N-1] ? x[k-1] - (y[k-1] >>> k) : x[k-1] + (y[k-1] >>> k);
-            y[k] <= y[k-1][N-1] ? y[k-1] + (x[k-1] >>> k) : y[k-1] - (x[k-1] >>> k);
+            for (int k = 2; k < 5; k++) begin
+                x[k] <= y[k-1][N-1] ? x[k-1] - (y[k-1] >>> k) : x[k-1] + (y[k-1] >>> k);
+                y[k] <= y[k-1][N-1] ? y[k-1] + (x[k-1] >>> k) : y[k-1] - (x[k-1] >>> k);
+            end
+            scaled   <= x[4] - (x[4] >>> 3) - (x[4] >>> 6);
+            for (int k = 3; k < 7; k++) place[k] <= place[k-1];
+            {axis, quadrant, tilt} <= place[6];
+            length   <= 16'(whole >> F);
         end
-        scaled   <= x[4] - (x[4] >>> 3) - (x[4] >>> 6);
-        for (int k = 3; k < 7; k++) place[k] <= place[k-1];
-        {axis, quadrant, tilt} <= place[6];
-        length   <= 16'(whole >> F);
         if (rst) on_way <= '0;
     end
     assign done = on_way[7];

@@ -20,8 +20,8 @@ ADDRESS = 1
 READY = ready_byte(ADDRESS, TO_NODE)
 CELLS = 11                           # of a character on the line
 TURNAROUND = [1] * 3                 # cells before the master speaks again: the node's driver lets go of the line meanwhile
-ANSWER_CELLS = 100                   # of silence after which no answer comes any more
-WORK_CELLS = 200                     # that a request may take, at the low clk of the bench
+ANSWER_CELLS = 150                   # of silence after which no answer comes any more
+WORK_CELLS = 400                     # that a request may take, at the low clk of the bench
 
 
 def homed_stage(progress):
@@ -109,7 +109,7 @@ def s0_bus_wrong(frames=100_000):
     """Each frame damaged on its way to the node, and the node's reply damaged on its way to the host. Every hundredth frame
     goes undamaged and must be accepted, so that the count of zero means something."""
     source, bench = random.Random(SEED), FrameBench(ADDRESS)
-    bench.idle(3000)                                     # the soft core starts
+    bench.idle(60_000)                                     # the soft core starts
     wrong = wrong_host = lost = good = 0
     last, bodies = None, requests(source)
     with bar("damaged frames") as progress:

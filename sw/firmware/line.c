@@ -8,6 +8,7 @@
 #include "line.h"
 
 #include "axis.h"
+#include "grating.h"
 #include "hardware.h"
 #include "line_protocol.h"
 #include "parameters.h"
@@ -142,14 +143,96 @@ static uint8_t encoder(unsigned axis)
     return LINE_CAUSE_OK;
 }
 
-// A block has 64 words; those without a register read 0. Reading `receive` would take a word from the line.
+static bool of_axis(uint32_t block, uint32_t base)              // axes and gratings have the same stride
+{
+    return block >= base && block < base + axes * AXIS_STRIDE;
+}
+
+// A block has 64 words; those without a register read 0. Reading `receive` would take a word from the line, `recorder_word` one
+// from the learner.
 static uint8_t read_register(void)
 {
     uint32_t address = (uint32_t)get(&asked[LINE_READ_REGISTER_REQUEST_ADDRESS], 2), block = address & ~0xFFu;
-    bool exists = block == NODE_BASE || block == LINE_BASE || (block >= AXIS_BASE && block < AXIS_BASE + axes * AXIS_STRIDE);
+    bool exists = block == NODE_BASE || block == LINE_BASE || of_axis(block, AXIS_BASE) || of_axis(block, GRATING_BASE);
     if (!exists || address % 4 || address == LINE_BASE + LINE_RECEIVE) return LINE_CAUSE_NO_SUCH_REGISTER;
+    if (block >= GRATING_BASE && !grating_may_read(address - block)) return LINE_CAUSE_NO_SUCH_REGISTER;
     put(LINE_READ_REGISTER_REPLY_VALUE, register_read(address), 4);
     reply[0] = LINE_READ_REGISTER_REPLY_LENGTH;
+    return LINE_CAUSE_OK;
+}
+
+static uint8_t write_register(void)
+{
+    uint32_t address = (uint32_t)get(&asked[LINE_WRITE_REGISTER_REQUEST_ADDRESS], 2), block = address & ~0xFFu;
+    if (!of_axis(block, GRATING_BASE)) return LINE_CAUSE_NO_SUCH_REGISTER;
+    return grating_write_register(address - block, (block - GRATING_BASE) / GRATING_STRIDE,
+                                  (uint32_t)get(&asked[LINE_WRITE_REGISTER_REQUEST_VALUE], 4));
+}
+
+static uint8_t reset_faults(unsigned axis)
+{
+    grating_clear_signal_faults(axis);
+    return axis_reset_faults(axis);
+}
+
+static uint8_t learner(unsigned axis)
+{
+    const struct learner *learner = grating_learner(axis);
+    uint8_t cause = grating_learn(axis, asked[LINE_LEARNER_REQUEST_ACTION]);
+    put(LINE_LEARNER_REPLY_REASON, grating_reason(axis), 1);
+    put(LINE_LEARNER_REPLY_SETTLED, learner->settled, 1);
+    put(LINE_LEARNER_REPLY_FROZEN, learner->frozen, 1);
+    put(LINE_LEARNER_REPLY_ACCEPTED, learner->accepted, 4);
+    put(LINE_LEARNER_REPLY_REFUSED, learner->refused, 4);
+    put(LINE_LEARNER_REPLY_SCATTER, learner->scatter, 4);
+    reply[0] = LINE_LEARNER_REPLY_LENGTH;
+    return cause;
+}
+
+static uint8_t get_correction(unsigned axis)
+{
+    const struct learner_values *values = &grating_learner(axis)->values;
+    put(LINE_GET_CORRECTION_REPLY_SIN_OFFSET, (uint64_t)values->sin_offset, 2);
+    put(LINE_GET_CORRECTION_REPLY_COS_OFFSET, (uint64_t)values->cos_offset, 2);
+    put(LINE_GET_CORRECTION_REPLY_GAIN, (uint64_t)values->gain, 4);
+    put(LINE_GET_CORRECTION_REPLY_SHEAR, (uint64_t)values->shear, 4);
+    reply[0] = LINE_GET_CORRECTION_REPLY_LENGTH;
+    return LINE_CAUSE_OK;
+}
+
+static uint8_t get_harmonic(unsigned axis)
+{
+    const struct learner_values *values = &grating_learner(axis)->values;
+    uint8_t order = asked[LINE_GET_HARMONIC_REQUEST_ORDER];
+    if (order < 1 || order > LEARNER_ORDERS) return LINE_CAUSE_OUT_OF_RANGE;
+    put(LINE_GET_HARMONIC_REPLY_COSINE, (uint64_t)values->cosine[order - 1], 4);
+    put(LINE_GET_HARMONIC_REPLY_SINE, (uint64_t)values->sine[order - 1], 4);
+    reply[0] = LINE_GET_HARMONIC_REPLY_LENGTH;
+    return LINE_CAUSE_OK;
+}
+
+static uint8_t set_correction(unsigned axis)
+{
+    uint8_t apply = asked[LINE_SET_CORRECTION_REQUEST_APPLY];
+    struct learner_values values = {.sin_offset = (int16_t)get(&asked[LINE_SET_CORRECTION_REQUEST_SIN_OFFSET], 2),
+                                    .cos_offset = (int16_t)get(&asked[LINE_SET_CORRECTION_REQUEST_COS_OFFSET], 2),
+                                    .gain = (int32_t)get(&asked[LINE_SET_CORRECTION_REQUEST_GAIN], 4),
+                                    .shear = (int32_t)get(&asked[LINE_SET_CORRECTION_REQUEST_SHEAR], 4)};
+    return apply > 1 ? LINE_CAUSE_OUT_OF_RANGE : grating_set_correction(axis, &values, apply);
+}
+
+static uint8_t set_harmonic(unsigned axis)
+{
+    return grating_set_harmonic(axis, asked[LINE_SET_HARMONIC_REQUEST_ORDER],
+                                (int32_t)get(&asked[LINE_SET_HARMONIC_REQUEST_COSINE], 4),
+                                (int32_t)get(&asked[LINE_SET_HARMONIC_REQUEST_SINE], 4));
+}
+
+static uint8_t signal(unsigned axis)
+{
+    put(LINE_SIGNAL_REPLY_FAULTS, grating_read(axis, GRATING_SIGNAL_FAULTS), 2);
+    put(LINE_SIGNAL_REPLY_FIRST, grating_read(axis, GRATING_FIRST_SIGNAL_FAULTS), 2);
+    reply[0] = LINE_SIGNAL_REPLY_LENGTH;
     return LINE_CAUSE_OK;
 }
 
@@ -165,6 +248,7 @@ static uint8_t execute(uint8_t operation, uint8_t length)
     case LINE_OPERATION_IDENTIFY: return identify();
     case LINE_OPERATION_COUNTERS: return counters();
     case LINE_OPERATION_READ_REGISTER: return read_register();
+    case LINE_OPERATION_WRITE_REGISTER: return write_register();
     default: break;
     }
     if (axis >= axes) return LINE_CAUSE_NO_SUCH_AXIS;
@@ -174,10 +258,16 @@ static uint8_t execute(uint8_t operation, uint8_t length)
     case LINE_OPERATION_HOME: return axis_home(axis);
     case LINE_OPERATION_MOVE: return move(axis);
     case LINE_OPERATION_STOP: return axis_stop(axis);
-    case LINE_OPERATION_RESET_FAULTS: return axis_reset_faults(axis);
+    case LINE_OPERATION_RESET_FAULTS: return reset_faults(axis);
     case LINE_OPERATION_GET_PARAMETER: return get_parameter(axis);
     case LINE_OPERATION_SET_PARAMETER: return set_parameter(axis);
     case LINE_OPERATION_ENCODER: return encoder(axis);
+    case LINE_OPERATION_LEARNER: return learner(axis);
+    case LINE_OPERATION_GET_CORRECTION: return get_correction(axis);
+    case LINE_OPERATION_GET_HARMONIC: return get_harmonic(axis);
+    case LINE_OPERATION_SET_CORRECTION: return set_correction(axis);
+    case LINE_OPERATION_SET_HARMONIC: return set_harmonic(axis);
+    case LINE_OPERATION_SIGNAL: return signal(axis);
     default: return LINE_CAUSE_UNKNOWN_OPERATION;
     }
 }

@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x478DAD3Cu    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x57B05458u    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -73,6 +73,44 @@ enum line_flag {    // bits
     LINE_FLAG_SATURATED = 1 << 6,    // command at its limit
 };
 
+enum line_learner_reason {
+    LINE_LEARNER_REASON_LEARNING = 0,    // learning
+    LINE_LEARNER_REASON_FROZEN = 1,    // frozen
+    LINE_LEARNER_REASON_STANDSTILL = 2,    // the scale stands still
+    LINE_LEARNER_REASON_PARTIAL_CIRCLE = 3,    // too little motion: no whole circles
+    LINE_LEARNER_REASON_AMPLITUDE = 4,    // amplitude outside its window
+    LINE_LEARNER_REASON_DISTORTED = 5,    // offset, gain or phase farther off than can be corrected
+    LINE_LEARNER_REASON_TOO_FAST = 6,    // fewer than eight samples a period
+    LINE_LEARNER_REASON_UNSTEADY = 7,    // the speed changes too much
+    LINE_LEARNER_REASON_ONE_SPEED = 8,    // all at one speed: a vibration locked to the fringe would not show
+    LINE_LEARNER_REASON_VIBRATION = 9,    // vibration locked to the fringe: the bursts disagree
+};
+
+enum line_signal_fault {    // bits
+    LINE_SIGNAL_FAULT_TOO_LOW = 1 << 0,    // signal too small
+    LINE_SIGNAL_FAULT_TOO_HIGH = 1 << 1,    // signal too large
+    LINE_SIGNAL_FAULT_AT_RAIL = 1 << 2,    // the converter is at its end
+    LINE_SIGNAL_FAULT_OFF_CIRCLE = 1 << 3,    // sine and cosine left their circle
+    LINE_SIGNAL_FAULT_JUMP = 1 << 4,    // a sudden step that no motion makes
+    LINE_SIGNAL_FAULT_FROZEN = 1 << 5,    // a leg stands while the other one moves
+    LINE_SIGNAL_FAULT_SILENT = 1 << 6,    // the same code for too long: the noise of a living converter is missing
+    LINE_SIGNAL_FAULT_OPPOSED = 1 << 7,    // comparators and samples have opposite signs
+    LINE_SIGNAL_FAULT_LEVEL_STUCK = 1 << 8,    // a leg changes sign, its comparator never does
+    LINE_SIGNAL_FAULT_LEG_MISSING = 1 << 9,    // the comparators change, a leg never changes sign
+    LINE_SIGNAL_FAULT_OFFSET_DRIFT = 1 << 10,    // offset too large
+    LINE_SIGNAL_FAULT_UNBALANCED = 1 << 11,    // amplitudes of sine and cosine too different
+    LINE_SIGNAL_FAULT_NOT_SQUARE = 1 << 12,    // sine and cosine not at right angles
+    LINE_SIGNAL_FAULT_PHASE_JUMP = 1 << 13,    // the phase jumped
+    LINE_SIGNAL_FAULT_LOST_COUNT = 1 << 14,    // interpolated position and quadrature count differ
+};
+
+enum line_learner_action {
+    LINE_LEARNER_ACTION_LOOK = 0,    // only look
+    LINE_LEARNER_ACTION_LEARN = 1,    // learn from here on
+    LINE_LEARNER_ACTION_FREEZE = 2,    // learn no more; what was learned stays in force
+    LINE_LEARNER_ACTION_FORGET = 3,    // correct nothing, begin afresh
+};
+
 enum line_operation {
     LINE_OPERATION_IDENTIFY = 1,    // who is there, and what was it built from
     LINE_OPERATION_STATUS = 2,    // state, position and faults of an axis; ended is the cause of the last motion
@@ -86,6 +124,13 @@ enum line_operation {
     LINE_OPERATION_COUNTERS = 10,    // what happened on the line
     LINE_OPERATION_ENCODER = 11,    // the sensor as it is now, and where the last homing met its phase zero
     LINE_OPERATION_READ_REGISTER = 12,    // one word of the register map, by byte address
+    LINE_OPERATION_LEARNER = 13,    // correction of the sine and cosine: what its learner does, or what it shall do; scatter is in 2^-20 period
+    LINE_OPERATION_GET_CORRECTION = 14,    // offsets in 2^-15 of full scale, factors in 2^-16: sin' = gain (sin - offset) + shear (cos - offset)
+    LINE_OPERATION_GET_HARMONIC = 15,    // phase error of order k, 1 to 10, in 2^-24 period: cosine cos k phase + sine sin k phase is subtracted
+    LINE_OPERATION_SET_CORRECTION = 16,    // as got; with apply 1 it comes into force with all harmonics set since the last time, with 0 it waits
+    LINE_OPERATION_SET_HARMONIC = 17,    // as got; waits for set_correction, and is 0 unless set
+    LINE_OPERATION_SIGNAL = 18,    // what is wrong with the sine and cosine now, and what came first since reset_faults (bits of signal_fault)
+    LINE_OPERATION_WRITE_REGISTER = 19,    // one word of the register map: only index, capture and compare of the grating blocks
 };
 
 // Lengths of whole bodies and offsets of their fields, in bytes, little endian.
@@ -166,6 +211,52 @@ enum line_operation {
 #define LINE_READ_REGISTER_REQUEST_ADDRESS 2u    // u16
 #define LINE_READ_REGISTER_REPLY_LENGTH 7u
 #define LINE_READ_REGISTER_REPLY_VALUE 3u    // u32
+#define LINE_LEARNER_REQUEST_LENGTH 4u
+#define LINE_LEARNER_REQUEST_AXIS 2u    // u8
+#define LINE_LEARNER_REQUEST_ACTION 3u    // u8
+#define LINE_LEARNER_REPLY_LENGTH 18u
+#define LINE_LEARNER_REPLY_REASON 3u    // u8
+#define LINE_LEARNER_REPLY_SETTLED 4u    // u8
+#define LINE_LEARNER_REPLY_FROZEN 5u    // u8
+#define LINE_LEARNER_REPLY_ACCEPTED 6u    // u32
+#define LINE_LEARNER_REPLY_REFUSED 10u    // u32
+#define LINE_LEARNER_REPLY_SCATTER 14u    // u32
+#define LINE_GET_CORRECTION_REQUEST_LENGTH 3u
+#define LINE_GET_CORRECTION_REQUEST_AXIS 2u    // u8
+#define LINE_GET_CORRECTION_REPLY_LENGTH 15u
+#define LINE_GET_CORRECTION_REPLY_SIN_OFFSET 3u    // i16
+#define LINE_GET_CORRECTION_REPLY_COS_OFFSET 5u    // i16
+#define LINE_GET_CORRECTION_REPLY_GAIN 7u    // i32
+#define LINE_GET_CORRECTION_REPLY_SHEAR 11u    // i32
+#define LINE_GET_HARMONIC_REQUEST_LENGTH 4u
+#define LINE_GET_HARMONIC_REQUEST_AXIS 2u    // u8
+#define LINE_GET_HARMONIC_REQUEST_ORDER 3u    // u8
+#define LINE_GET_HARMONIC_REPLY_LENGTH 11u
+#define LINE_GET_HARMONIC_REPLY_COSINE 3u    // i32
+#define LINE_GET_HARMONIC_REPLY_SINE 7u    // i32
+#define LINE_SET_CORRECTION_REQUEST_LENGTH 16u
+#define LINE_SET_CORRECTION_REQUEST_AXIS 2u    // u8
+#define LINE_SET_CORRECTION_REQUEST_SIN_OFFSET 3u    // i16
+#define LINE_SET_CORRECTION_REQUEST_COS_OFFSET 5u    // i16
+#define LINE_SET_CORRECTION_REQUEST_GAIN 7u    // i32
+#define LINE_SET_CORRECTION_REQUEST_SHEAR 11u    // i32
+#define LINE_SET_CORRECTION_REQUEST_APPLY 15u    // u8
+#define LINE_SET_CORRECTION_REPLY_LENGTH 3u
+#define LINE_SET_HARMONIC_REQUEST_LENGTH 12u
+#define LINE_SET_HARMONIC_REQUEST_AXIS 2u    // u8
+#define LINE_SET_HARMONIC_REQUEST_ORDER 3u    // u8
+#define LINE_SET_HARMONIC_REQUEST_COSINE 4u    // i32
+#define LINE_SET_HARMONIC_REQUEST_SINE 8u    // i32
+#define LINE_SET_HARMONIC_REPLY_LENGTH 3u
+#define LINE_SIGNAL_REQUEST_LENGTH 3u
+#define LINE_SIGNAL_REQUEST_AXIS 2u    // u8
+#define LINE_SIGNAL_REPLY_LENGTH 7u
+#define LINE_SIGNAL_REPLY_FAULTS 3u    // u16
+#define LINE_SIGNAL_REPLY_FIRST 5u    // u16
+#define LINE_WRITE_REGISTER_REQUEST_LENGTH 8u
+#define LINE_WRITE_REGISTER_REQUEST_ADDRESS 2u    // u16
+#define LINE_WRITE_REGISTER_REQUEST_VALUE 4u    // u32
+#define LINE_WRITE_REGISTER_REPLY_LENGTH 3u
 
 // X(name, code, length of the request body, length of the reply body if the cause is ok)
 #define LINE_OPERATIONS(X) \
@@ -180,7 +271,14 @@ enum line_operation {
     X(set_parameter, 9, 12, 3) \
     X(counters, 10, 2, 31) \
     X(encoder, 11, 3, 35) \
-    X(read_register, 12, 4, 7)
+    X(read_register, 12, 4, 7) \
+    X(learner, 13, 4, 18) \
+    X(get_correction, 14, 3, 15) \
+    X(get_harmonic, 15, 4, 11) \
+    X(set_correction, 16, 16, 3) \
+    X(set_harmonic, 17, 12, 3) \
+    X(signal, 18, 3, 7) \
+    X(write_register, 19, 8, 3)
 
 enum line_parameter {
     LINE_PARAMETER_PERIOD = 1,    // [1 pm] length of one signal period
@@ -215,8 +313,24 @@ enum line_parameter {
     LINE_PARAMETER_ENCODER_FAULT_MASK = 30,    // encoder: which events are a fault (bits of encoder_event)
     LINE_PARAMETER_PWM_FREQUENCY = 31,    // [1 Hz] drive: PWM frequency
     LINE_PARAMETER_WATCHDOG_TIME = 32,    // [0.001 s] guard: longest silence of the line while a drive is on (all axes)
+    LINE_PARAMETER_LEARNING = 33,    // correction of sine and cosine: 0 frozen, 1 learns
+    LINE_PARAMETER_DECODER_MODE = 34,    // decoder: 0 every edge, 1 every second, 2 every fourth, 3 pulses and direction; other than 0 needs disagreement_limit 0
+    LINE_PARAMETER_FILTER_SKIP = 35,    // [1e-9 s] deglitcher: time between two samples of a level; 0 every clk
+    LINE_PARAMETER_FILTER_SPARE = 36,    // deglitcher: samples of the old level that may lie between
+    LINE_PARAMETER_VELOCITY_QUANTUM = 37,    // [1/65536 period] velocity: smallest step of the position; 0 plain difference
+    LINE_PARAMETER_SIGNAL_FAULT_MASK = 38,    // signal: which faults take the drive (bits of signal_fault)
+    LINE_PARAMETER_SIGNAL_RAIL = 39,    // signal: largest good code, converter counts, as in all that follow; 65535 off
+    LINE_PARAMETER_SIGNAL_TOLERANCE = 40,    // signal: largest good distance from the circle; 65535 off
+    LINE_PARAMETER_SIGNAL_JUMP = 41,    // signal: smallest sudden step that is bad; 65535 off
+    LINE_PARAMETER_SIGNAL_QUIET = 42,    // signal: samples with the same code that are bad; 0 off. Needs noise: 1024 for 0.5 counts rms
+    LINE_PARAMETER_SIGNAL_SPAN = 43,    // signal: way of one leg in which the other must leave its band; 65535 off
+    LINE_PARAMETER_SIGNAL_BAND = 44,    // signal: noise of a leg that stands, largest deviation
+    LINE_PARAMETER_SIGNAL_DEAD = 45,    // signal: larger samples have a sure sign; 65535 off
+    LINE_PARAMETER_SIGNAL_OFFSET = 46,    // signal: largest good offset; 65535 off
+    LINE_PARAMETER_SIGNAL_BALANCE = 47,    // signal: largest good difference of the amplitudes; 65535 off
+    LINE_PARAMETER_SIGNAL_SQUARE = 48,    // signal: largest good amplitude times sine of the phase error; 65535 off
 };
-#define LINE_PARAMETER_COUNT 32u
+#define LINE_PARAMETER_COUNT 48u
 
 // X(name, id, min, max, default): all int64_t, in counts of the wire
 #define LINE_PARAMETERS(X) \
@@ -251,6 +365,22 @@ enum line_parameter {
     X(disagreement_limit, 29, 0LL, 1048575LL, 49152LL) \
     X(encoder_fault_mask, 30, 0LL, 31LL, 30LL) \
     X(pwm_frequency, 31, 1000LL, 200000LL, 20000LL) \
-    X(watchdog_time, 32, 10LL, 65535LL, 500LL)
+    X(watchdog_time, 32, 10LL, 65535LL, 500LL) \
+    X(learning, 33, 0LL, 1LL, 0LL) \
+    X(decoder_mode, 34, 0LL, 3LL, 0LL) \
+    X(filter_skip, 35, 0LL, 1000000LL, 0LL) \
+    X(filter_spare, 36, 0LL, 15LL, 0LL) \
+    X(velocity_quantum, 37, 0LL, 65535LL, 128LL) \
+    X(signal_fault_mask, 38, 0LL, 32767LL, 0LL) \
+    X(signal_rail, 39, 0LL, 65535LL, 126LL) \
+    X(signal_tolerance, 40, 0LL, 65535LL, 9LL) \
+    X(signal_jump, 41, 0LL, 65535LL, 13LL) \
+    X(signal_quiet, 42, 0LL, 65535LL, 0LL) \
+    X(signal_span, 43, 0LL, 65535LL, 80LL) \
+    X(signal_band, 44, 0LL, 255LL, 3LL) \
+    X(signal_dead, 45, 0LL, 65535LL, 20LL) \
+    X(signal_offset, 46, 0LL, 65535LL, 12LL) \
+    X(signal_balance, 47, 0LL, 65535LL, 16LL) \
+    X(signal_square, 48, 0LL, 65535LL, 16LL)
 
 #endif

@@ -33,13 +33,37 @@ static void apply_motion(unsigned axis)
     axis_write(axis, AXIS_BRAKE_RATE, held(limits[axis].acceleration >> 8, AXIS_BRAKE_RATE_MASK));
 }
 
+static uint64_t clk_of(int64_t nanoseconds)
+{
+    return (uint64_t)nanoseconds * node_read(NODE_CLK_HZ) / 1000000000u;
+}
+
+// The deglitcher counts the samples that it takes: of all clk, or with some left out between two.
 static void apply_sensing(unsigned axis)
 {
     const int64_t *p = parameters[axis];
-    uint64_t clk = (uint64_t)p[LINE_PARAMETER_DEGLITCH] * node_read(NODE_CLK_HZ) / 1000000000u;
-    axis_write(axis, AXIS_SENSING, FIELD_PUT(AXIS_SENSING_DEGLITCH, held(clk, 0xFFFF)) |
+    uint32_t skip = held(clk_of(p[LINE_PARAMETER_FILTER_SKIP]), 0xFFFF);
+    uint64_t samples = (clk_of(p[LINE_PARAMETER_DEGLITCH]) + skip) / (skip + 1u);
+    grating_write(axis, GRATING_EDGE_FILTER, FIELD_PUT(GRATING_EDGE_FILTER_SKIP, skip) |
+                                             FIELD_PUT(GRATING_EDGE_FILTER_SPARE, p[LINE_PARAMETER_FILTER_SPARE]));
+    axis_write(axis, AXIS_SENSING, FIELD_PUT(AXIS_SENSING_DEGLITCH, held(samples, 0xFFFF)) |
                                    FIELD_PUT(AXIS_SENSING_SPIKE_STEP, p[LINE_PARAMETER_SPIKE_STEP]) |
                                    FIELD_PUT(AXIS_SENSING_SPIKE_HOLD, p[LINE_PARAMETER_SPIKE_HOLD]));
+}
+
+static void apply_signal(unsigned axis)
+{
+    const int64_t *p = parameters[axis];
+    grating_write(axis, GRATING_CIRCLE_LIMITS, FIELD_PUT(GRATING_CIRCLE_LIMITS_RAIL, p[LINE_PARAMETER_SIGNAL_RAIL]) |
+                                               FIELD_PUT(GRATING_CIRCLE_LIMITS_TOLERANCE, p[LINE_PARAMETER_SIGNAL_TOLERANCE]));
+    grating_write(axis, GRATING_STEP_LIMITS, FIELD_PUT(GRATING_STEP_LIMITS_JUMP, p[LINE_PARAMETER_SIGNAL_JUMP]) |
+                                             FIELD_PUT(GRATING_STEP_LIMITS_QUIET, p[LINE_PARAMETER_SIGNAL_QUIET]));
+    grating_write(axis, GRATING_LEG_LIMITS, FIELD_PUT(GRATING_LEG_LIMITS_SPAN, p[LINE_PARAMETER_SIGNAL_SPAN]) |
+                                            FIELD_PUT(GRATING_LEG_LIMITS_BAND, p[LINE_PARAMETER_SIGNAL_BAND]));
+    grating_write(axis, GRATING_DRIFT_LIMITS, FIELD_PUT(GRATING_DRIFT_LIMITS_OFFSET, p[LINE_PARAMETER_SIGNAL_OFFSET]) |
+                                              FIELD_PUT(GRATING_DRIFT_LIMITS_BALANCE, p[LINE_PARAMETER_SIGNAL_BALANCE]));
+    grating_write(axis, GRATING_SQUARE_LIMITS, FIELD_PUT(GRATING_SQUARE_LIMITS_SQUARE, p[LINE_PARAMETER_SIGNAL_SQUARE]) |
+                                               FIELD_PUT(GRATING_SQUARE_LIMITS_DEAD, p[LINE_PARAMETER_SIGNAL_DEAD]));
 }
 
 // The registers that follow from this parameter.
@@ -65,7 +89,9 @@ static void apply(unsigned axis, uint8_t id)
     case LINE_PARAMETER_FOLLOWING_LIMIT: axis_write(axis, AXIS_FOLLOWING_LIMIT, value); break;
     case LINE_PARAMETER_DEGLITCH:
     case LINE_PARAMETER_SPIKE_STEP:
-    case LINE_PARAMETER_SPIKE_HOLD: apply_sensing(axis); break;
+    case LINE_PARAMETER_SPIKE_HOLD:
+    case LINE_PARAMETER_FILTER_SKIP:
+    case LINE_PARAMETER_FILTER_SPARE: apply_sensing(axis); break;
     case LINE_PARAMETER_AMPLITUDE_LOW:
     case LINE_PARAMETER_AMPLITUDE_HIGH:
         axis_write(axis, AXIS_AMPLITUDE_WINDOW, FIELD_PUT(AXIS_AMPLITUDE_WINDOW_LOW, p[LINE_PARAMETER_AMPLITUDE_LOW]) |
@@ -75,6 +101,19 @@ static void apply(unsigned axis, uint8_t id)
     case LINE_PARAMETER_ENCODER_FAULT_MASK: axis_write(axis, AXIS_ENCODER_FAULT_MASK, value); break;
     case LINE_PARAMETER_PWM_FREQUENCY: axis_write(axis, AXIS_PWM_PERIOD, held(node_read(NODE_CLK_HZ) / value, AXIS_PWM_PERIOD_MASK)); break;
     case LINE_PARAMETER_WATCHDOG_TIME: line_write(LINE_WATCHDOG_TIME, value); break;
+    case LINE_PARAMETER_DECODER_MODE: grating_write(axis, GRATING_DECODER_MODE, value); break;
+    case LINE_PARAMETER_VELOCITY_QUANTUM: grating_write(axis, GRATING_VELOCITY_QUANTUM, value); break;
+    case LINE_PARAMETER_SIGNAL_FAULT_MASK: grating_write(axis, GRATING_SIGNAL_FAULT_MASK, value); break;
+    case LINE_PARAMETER_SIGNAL_RAIL:
+    case LINE_PARAMETER_SIGNAL_TOLERANCE:
+    case LINE_PARAMETER_SIGNAL_JUMP:
+    case LINE_PARAMETER_SIGNAL_QUIET:
+    case LINE_PARAMETER_SIGNAL_SPAN:
+    case LINE_PARAMETER_SIGNAL_BAND:
+    case LINE_PARAMETER_SIGNAL_DEAD:
+    case LINE_PARAMETER_SIGNAL_OFFSET:
+    case LINE_PARAMETER_SIGNAL_BALANCE:
+    case LINE_PARAMETER_SIGNAL_SQUARE: apply_signal(axis); break;
     default: break;
     }
 }

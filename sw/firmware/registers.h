@@ -9,12 +9,14 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x6359f22au            // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xafc1cbccu            // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define LINE_BASE 0x100u
 #define AXIS_BASE 0x400u
 #define AXIS_STRIDE 0x100u
+#define GRATING_BASE 0xc00u
+#define GRATING_STRIDE 0x100u
 
 #define FIELD_GET(word, field) (((uint32_t)(word) & field##_MASK) >> field##_SHIFT)
 #define FIELD_GET_SIGNED(word, field) \
@@ -55,6 +57,14 @@ static inline uint64_t axis_read_wide(unsigned axis, uint32_t offset)
 { return register_read_wide(AXIS_BASE + axis * AXIS_STRIDE + offset); }
 static inline void axis_write_wide(unsigned axis, uint32_t offset, uint64_t value)
 { register_write_wide(AXIS_BASE + axis * AXIS_STRIDE + offset, value); }
+static inline uint32_t grating_read(unsigned axis, uint32_t offset)
+{ return register_read(GRATING_BASE + axis * GRATING_STRIDE + offset); }
+static inline void grating_write(unsigned axis, uint32_t offset, uint32_t value)
+{ register_write(GRATING_BASE + axis * GRATING_STRIDE + offset, value); }
+static inline uint64_t grating_read_wide(unsigned axis, uint32_t offset)
+{ return register_read_wide(GRATING_BASE + axis * GRATING_STRIDE + offset); }
+static inline void grating_write_wide(unsigned axis, uint32_t offset, uint64_t value)
+{ register_write_wide(GRATING_BASE + axis * GRATING_STRIDE + offset, value); }
 
 // node: identity, clock, health of the soft core
 #define NODE_MAP_CRC                                   0x000u  // r: CRC-32 of the register source
@@ -410,5 +420,249 @@ static inline void axis_write_wide(unsigned axis, uint32_t offset, uint64_t valu
 #define AXIS_BRAKE_RATE_MASK                           0xffffffffu
 #define AXIS_BRAKE_RATE_SHIFT                          0
 #define AXIS_BRAKE_RATE_WIDTH                          32
+
+// grating: edge filter, index, signal correction and its learner, signal faults, capture, compare
+#define GRATING_EDGE_FILTER                            0x000u  // rw: filter of a, b and index; how many equal samples it wants is axis.sensing.deglitch
+#define GRATING_EDGE_FILTER_SKIP_MASK                  0x0000ffffu  // left out between two samples [clk]
+#define GRATING_EDGE_FILTER_SKIP_SHIFT                 0
+#define GRATING_EDGE_FILTER_SKIP_WIDTH                 16
+#define GRATING_EDGE_FILTER_SPARE_MASK                 0x000f0000u  // samples of the old level that may lie between: N of N + spare
+#define GRATING_EDGE_FILTER_SPARE_SHIFT                16
+#define GRATING_EDGE_FILTER_SPARE_WIDTH                4
+#define GRATING_DECODER_MODE                           0x004u  // rw: 0 x4: every edge, 1 x2, 2 x1, 3 pulses and direction. Other than x4 needs disagreement_limit = 0
+#define GRATING_DECODER_MODE_MASK                      0x00000003u
+#define GRATING_DECODER_MODE_SHIFT                     0
+#define GRATING_DECODER_MODE_WIDTH                     2
+#define GRATING_INDEX                                  0x008u  // rw: which index counts
+#define GRATING_INDEX_ACTIVE_LOW_MASK                  0x00000001u  // 1: the index is a low level
+#define GRATING_INDEX_ACTIVE_LOW_SHIFT                 0
+#define GRATING_INDEX_ACTIVE_LOW_WIDTH                 1
+#define GRATING_INDEX_GATE_MASK_MASK                   0x00000006u  // {b, a}: 1: needs the level in gate
+#define GRATING_INDEX_GATE_MASK_SHIFT                  1
+#define GRATING_INDEX_GATE_MASK_WIDTH                  2
+#define GRATING_INDEX_GATE_MASK                        0x00000018u  // {b, a}
+#define GRATING_INDEX_GATE_SHIFT                       3
+#define GRATING_INDEX_GATE_WIDTH                       2
+#define GRATING_INDEX_UP_MASK                          0x00000020u  // met going up
+#define GRATING_INDEX_UP_SHIFT                         5
+#define GRATING_INDEX_UP_WIDTH                         1
+#define GRATING_INDEX_DOWN_MASK                        0x00000040u  // met going down
+#define GRATING_INDEX_DOWN_SHIFT                       6
+#define GRATING_INDEX_DOWN_WIDTH                       1
+#define GRATING_INDEX_EACH_MASK                        0x00000080u  // 1: every index, 0: one for each arm
+#define GRATING_INDEX_EACH_SHIFT                       7
+#define GRATING_INDEX_EACH_WIDTH                       1
+#define GRATING_COUNTS_PER_REVOLUTION                  0x00cu  // rw: edges between two indices; 0: not checked
+#define GRATING_COUNTS_PER_REVOLUTION_MASK             0xffffffffu
+#define GRATING_COUNTS_PER_REVOLUTION_SHIFT            0
+#define GRATING_COUNTS_PER_REVOLUTION_WIDTH            32
+#define GRATING_STROBES                                0x010u  // w: strobes
+#define GRATING_STROBES_ARM_INDEX_MASK                 0x00000001u  // take the next index
+#define GRATING_STROBES_ARM_INDEX_SHIFT                0
+#define GRATING_STROBES_ARM_INDEX_WIDTH                1
+#define GRATING_STROBES_LOAD_CORRECTION_MASK           0x00000002u  // take the four correction values, for all samples from here on
+#define GRATING_STROBES_LOAD_CORRECTION_SHIFT          1
+#define GRATING_STROBES_LOAD_CORRECTION_WIDTH          1
+#define GRATING_STROBES_SWAP_HARMONICS_MASK            0x00000004u  // the harmonic table just written comes into force
+#define GRATING_STROBES_SWAP_HARMONICS_SHIFT           2
+#define GRATING_STROBES_SWAP_HARMONICS_WIDTH           1
+#define GRATING_STROBES_RECORD_MASK                    0x00000008u  // record a new burst
+#define GRATING_STROBES_RECORD_SHIFT                   3
+#define GRATING_STROBES_RECORD_WIDTH                   1
+#define GRATING_STROBES_CLEAR_SIGNAL_FAULTS_MASK       0x00000010u  // forget the first signal fault
+#define GRATING_STROBES_CLEAR_SIGNAL_FAULTS_SHIFT      4
+#define GRATING_STROBES_CLEAR_SIGNAL_FAULTS_WIDTH      1
+#define GRATING_STROBES_CAPTURE_NOW_MASK               0x00000020u  // capture now
+#define GRATING_STROBES_CAPTURE_NOW_SHIFT              5
+#define GRATING_STROBES_CAPTURE_NOW_WIDTH              1
+#define GRATING_STROBES_CAPTURE_NEXT_MASK              0x00000040u  // done with the oldest capture
+#define GRATING_STROBES_CAPTURE_NEXT_SHIFT             6
+#define GRATING_STROBES_CAPTURE_NEXT_WIDTH             1
+#define GRATING_STROBES_CAPTURE_CLEAR_MASK             0x00000080u  // forget all captures
+#define GRATING_STROBES_CAPTURE_CLEAR_SHIFT            7
+#define GRATING_STROBES_CAPTURE_CLEAR_WIDTH            1
+#define GRATING_STROBES_COMPARE_ARM_MASK               0x00000100u  // begin with the first compare point
+#define GRATING_STROBES_COMPARE_ARM_SHIFT              8
+#define GRATING_STROBES_COMPARE_ARM_WIDTH              1
+#define GRATING_STROBES_COMPARE_DISARM_MASK            0x00000200u  // no more compare points
+#define GRATING_STROBES_COMPARE_DISARM_SHIFT           9
+#define GRATING_STROBES_COMPARE_DISARM_WIDTH           1
+#define GRATING_INDEX_EVENTS                           0x014u  // rw: what the index did; write 1 to clear
+#define GRATING_INDEX_EVENTS_FOUND_MASK                0x00000001u
+#define GRATING_INDEX_EVENTS_FOUND_SHIFT               0
+#define GRATING_INDEX_EVENTS_FOUND_WIDTH               1
+#define GRATING_INDEX_EVENTS_REVOLUTION_WRONG_MASK     0x00000002u  // neither 0 nor counts_per_revolution since the index before
+#define GRATING_INDEX_EVENTS_REVOLUTION_WRONG_SHIFT    1
+#define GRATING_INDEX_EVENTS_REVOLUTION_WRONG_WIDTH    1
+#define GRATING_INDEX_EVENTS_ARMED_MASK                0x00000004u
+#define GRATING_INDEX_EVENTS_ARMED_SHIFT               2
+#define GRATING_INDEX_EVENTS_ARMED_WIDTH               1
+#define GRATING_INDEX_COUNT                            0x018u  // r: quadrature count at the last index [1/4 period]
+#define GRATING_INDEX_COUNT_MASK                       0xffffffffu
+#define GRATING_INDEX_COUNT_SHIFT                      0
+#define GRATING_INDEX_COUNT_WIDTH                      32
+#define GRATING_EDGE_TIME                              0x01cu  // r: time of the last counted edge [clk]
+#define GRATING_EDGE_TIME_MASK                         0xffffffffu
+#define GRATING_EDGE_TIME_SHIFT                        0
+#define GRATING_EDGE_TIME_WIDTH                        32
+#define GRATING_CORRECTION_OFFSET                      0x020u  // rw: offsets; full scale 2^15
+#define GRATING_CORRECTION_OFFSET_SIN_MASK             0x0000ffffu
+#define GRATING_CORRECTION_OFFSET_SIN_SHIFT            0
+#define GRATING_CORRECTION_OFFSET_SIN_WIDTH            16
+#define GRATING_CORRECTION_OFFSET_COS_MASK             0xffff0000u
+#define GRATING_CORRECTION_OFFSET_COS_SHIFT            16
+#define GRATING_CORRECTION_OFFSET_COS_WIDTH            16
+#define GRATING_CORRECTION_GAIN                        0x024u  // rw: gain of the sine
+#define GRATING_CORRECTION_GAIN_MASK                   0x0001ffffu
+#define GRATING_CORRECTION_GAIN_SHIFT                  0
+#define GRATING_CORRECTION_GAIN_WIDTH                  17
+#define GRATING_CORRECTION_SHEAR                       0x028u  // rw: cosine in the sine
+#define GRATING_CORRECTION_SHEAR_MASK                  0x0001ffffu
+#define GRATING_CORRECTION_SHEAR_SHIFT                 0
+#define GRATING_CORRECTION_SHEAR_WIDTH                 17
+#define GRATING_HARMONIC_ENABLE                        0x02cu  // rw: 1: the harmonic table is subtracted
+#define GRATING_HARMONIC_ENABLE_MASK                   0x00000001u
+#define GRATING_HARMONIC_ENABLE_SHIFT                  0
+#define GRATING_HARMONIC_ENABLE_WIDTH                  1
+#define GRATING_HARMONIC_POINT                         0x030u  // rw: one point of the harmonic table that is not in force; writing puts it there
+#define GRATING_HARMONIC_POINT_MASK                    0x0003ffffu
+#define GRATING_HARMONIC_POINT_SHIFT                   0
+#define GRATING_HARMONIC_POINT_WIDTH                   18
+#define GRATING_HARMONIC_POINT_POINT_MASK              0x03fc0000u
+#define GRATING_HARMONIC_POINT_POINT_SHIFT             18
+#define GRATING_HARMONIC_POINT_POINT_WIDTH             8
+#define GRATING_RECORDER                               0x034u  // rw: what the recorder keeps
+#define GRATING_RECORDER_EVERY_MASK                    0x0000ffffu  // one of so many
+#define GRATING_RECORDER_EVERY_SHIFT                   0
+#define GRATING_RECORDER_EVERY_WIDTH                   16
+#define GRATING_RECORDER_PHASES_MASK                   0x00010000u  // 1: phases, 0: samples
+#define GRATING_RECORDER_PHASES_SHIFT                  16
+#define GRATING_RECORDER_PHASES_WIDTH                  1
+#define GRATING_RECORDER_STATE                         0x038u  // r: the burst
+#define GRATING_RECORDER_STATE_FULL_MASK               0x00000001u  // complete
+#define GRATING_RECORDER_STATE_FULL_SHIFT              0
+#define GRATING_RECORDER_STATE_FULL_WIDTH              1
+#define GRATING_RECORDER_STATE_SPOILED_MASK            0x00000002u  // the amplitude left its window meanwhile
+#define GRATING_RECORDER_STATE_SPOILED_SHIFT           1
+#define GRATING_RECORDER_STATE_SPOILED_WIDTH           1
+#define GRATING_RECORDER_WORD                          0x03cu  // r: one word of the burst; reading goes on to the next
+#define GRATING_RECORDER_WORD_MASK                     0xffffffffu
+#define GRATING_RECORDER_WORD_SHIFT                    0
+#define GRATING_RECORDER_WORD_WIDTH                    32
+#define GRATING_SIGNAL_FAULTS                          0x040u  // r: signal faults that stand now
+#define GRATING_SIGNAL_FAULTS_MASK                     0x00007fffu
+#define GRATING_SIGNAL_FAULTS_SHIFT                    0
+#define GRATING_SIGNAL_FAULTS_WIDTH                    15
+#define GRATING_FIRST_SIGNAL_FAULTS                    0x044u  // r: those that came first
+#define GRATING_FIRST_SIGNAL_FAULTS_MASK               0x00007fffu
+#define GRATING_FIRST_SIGNAL_FAULTS_SHIFT              0
+#define GRATING_FIRST_SIGNAL_FAULTS_WIDTH              15
+#define GRATING_SIGNAL_FAULT_MASK                      0x048u  // rw: which signal faults take the drive
+#define GRATING_SIGNAL_FAULT_MASK_MASK                 0x00007fffu
+#define GRATING_SIGNAL_FAULT_MASK_SHIFT                0
+#define GRATING_SIGNAL_FAULT_MASK_WIDTH                15
+#define GRATING_CIRCLE_LIMITS                          0x04cu  // rw: codes and circle
+#define GRATING_CIRCLE_LIMITS_RAIL_MASK                0x0000ffffu
+#define GRATING_CIRCLE_LIMITS_RAIL_SHIFT               0
+#define GRATING_CIRCLE_LIMITS_RAIL_WIDTH               16
+#define GRATING_CIRCLE_LIMITS_TOLERANCE_MASK           0xffff0000u
+#define GRATING_CIRCLE_LIMITS_TOLERANCE_SHIFT          16
+#define GRATING_CIRCLE_LIMITS_TOLERANCE_WIDTH          16
+#define GRATING_STEP_LIMITS                            0x050u  // rw: steps and stillness
+#define GRATING_STEP_LIMITS_JUMP_MASK                  0x0000ffffu
+#define GRATING_STEP_LIMITS_JUMP_SHIFT                 0
+#define GRATING_STEP_LIMITS_JUMP_WIDTH                 16
+#define GRATING_STEP_LIMITS_QUIET_MASK                 0xffff0000u  // samples with one code; 0: any number
+#define GRATING_STEP_LIMITS_QUIET_SHIFT                16
+#define GRATING_STEP_LIMITS_QUIET_WIDTH                16
+#define GRATING_LEG_LIMITS                             0x054u  // rw: a leg that does not move
+#define GRATING_LEG_LIMITS_SPAN_MASK                   0x0000ffffu
+#define GRATING_LEG_LIMITS_SPAN_SHIFT                  0
+#define GRATING_LEG_LIMITS_SPAN_WIDTH                  16
+#define GRATING_LEG_LIMITS_BAND_MASK                   0x00ff0000u
+#define GRATING_LEG_LIMITS_BAND_SHIFT                  16
+#define GRATING_LEG_LIMITS_BAND_WIDTH                  8
+#define GRATING_DRIFT_LIMITS                           0x058u  // rw: drifts
+#define GRATING_DRIFT_LIMITS_OFFSET_MASK               0x0000ffffu
+#define GRATING_DRIFT_LIMITS_OFFSET_SHIFT              0
+#define GRATING_DRIFT_LIMITS_OFFSET_WIDTH              16
+#define GRATING_DRIFT_LIMITS_BALANCE_MASK              0xffff0000u
+#define GRATING_DRIFT_LIMITS_BALANCE_SHIFT             16
+#define GRATING_DRIFT_LIMITS_BALANCE_WIDTH             16
+#define GRATING_SQUARE_LIMITS                          0x05cu  // rw: phase error and comparators
+#define GRATING_SQUARE_LIMITS_SQUARE_MASK              0x0000ffffu
+#define GRATING_SQUARE_LIMITS_SQUARE_SHIFT             0
+#define GRATING_SQUARE_LIMITS_SQUARE_WIDTH             16
+#define GRATING_SQUARE_LIMITS_DEAD_MASK                0xffff0000u
+#define GRATING_SQUARE_LIMITS_DEAD_SHIFT               16
+#define GRATING_SQUARE_LIMITS_DEAD_WIDTH               16
+#define GRATING_CAPTURE_SOURCES                        0x060u  // rw: sources: index, tick, software, rising probe 0, 1, falling probe 0, 1
+#define GRATING_CAPTURE_SOURCES_MASK                   0x0000007fu
+#define GRATING_CAPTURE_SOURCES_SHIFT                  0
+#define GRATING_CAPTURE_SOURCES_WIDTH                  7
+#define GRATING_CAPTURE_STATE                          0x064u  // rw: captures
+#define GRATING_CAPTURE_STATE_PRESENT_MASK             0x00000001u  // captured_* are the oldest
+#define GRATING_CAPTURE_STATE_PRESENT_SHIFT            0
+#define GRATING_CAPTURE_STATE_PRESENT_WIDTH            1
+#define GRATING_CAPTURE_STATE_FREE_MASK                0x0000003eu  // captures that still fit
+#define GRATING_CAPTURE_STATE_FREE_SHIFT               1
+#define GRATING_CAPTURE_STATE_FREE_WIDTH               5
+#define GRATING_CAPTURE_STATE_OVERRUN_MASK             0x00000040u  // an event was dropped; write 1 to clear
+#define GRATING_CAPTURE_STATE_OVERRUN_SHIFT            6
+#define GRATING_CAPTURE_STATE_OVERRUN_WIDTH            1
+#define GRATING_CAPTURED                               0x068u  // r: the oldest capture
+#define GRATING_CAPTURED_SOURCES_MASK                  0x0000007fu
+#define GRATING_CAPTURED_SOURCES_SHIFT                 0
+#define GRATING_CAPTURED_SOURCES_WIDTH                 7
+#define GRATING_CAPTURED_AGE_MASK                      0x007fff80u  // since its position came [clk]
+#define GRATING_CAPTURED_AGE_SHIFT                     7
+#define GRATING_CAPTURED_AGE_WIDTH                     16
+#define GRATING_CAPTURED_TIME                          0x06cu  // r: its time [clk]
+#define GRATING_CAPTURED_TIME_MASK                     0xffffffffu
+#define GRATING_CAPTURED_TIME_SHIFT                    0
+#define GRATING_CAPTURED_TIME_WIDTH                    32
+#define GRATING_CAPTURED_POSITION                      0x070u  // r: its position [1/65536 period]
+#define GRATING_CAPTURED_POSITION_LOW                  0x070u
+#define GRATING_CAPTURED_POSITION_HIGH                 0x074u
+#define GRATING_CAPTURED_POSITION_WIDTH                48
+#define GRATING_COMPARE_START                          0x078u  // rw: first point [1/65536 period]
+#define GRATING_COMPARE_START_LOW                      0x078u
+#define GRATING_COMPARE_START_HIGH                     0x07cu
+#define GRATING_COMPARE_START_WIDTH                    48
+#define GRATING_COMPARE_STEP                           0x080u  // rw: distance of the points; its sign is the direction [1/65536 period]
+#define GRATING_COMPARE_STEP_LOW                       0x080u
+#define GRATING_COMPARE_STEP_HIGH                      0x084u
+#define GRATING_COMPARE_STEP_WIDTH                     48
+#define GRATING_COMPARE_COUNT                          0x088u  // rw: points; 0: no end
+#define GRATING_COMPARE_COUNT_MASK                     0xffffffffu
+#define GRATING_COMPARE_COUNT_SHIFT                    0
+#define GRATING_COMPARE_COUNT_WIDTH                    32
+#define GRATING_COMPARE_PULSE                          0x08cu  // rw: pulse [clk]
+#define GRATING_COMPARE_PULSE_MASK                     0x00ffffffu
+#define GRATING_COMPARE_PULSE_SHIFT                    0
+#define GRATING_COMPARE_PULSE_WIDTH                    24
+#define GRATING_COMPARE_GAP                            0x090u  // rw: shortest gap [clk]
+#define GRATING_COMPARE_GAP_MASK                       0x00ffffffu
+#define GRATING_COMPARE_GAP_SHIFT                      0
+#define GRATING_COMPARE_GAP_WIDTH                      24
+#define GRATING_COMPARE_STATE                          0x094u  // rw: compare
+#define GRATING_COMPARE_STATE_ARMED_MASK               0x00000001u
+#define GRATING_COMPARE_STATE_ARMED_SHIFT              0
+#define GRATING_COMPARE_STATE_ARMED_WIDTH              1
+#define GRATING_COMPARE_STATE_LATE_MASK                0x00000002u  // a pulse had to wait for the one before it; write 1 to clear
+#define GRATING_COMPARE_STATE_LATE_SHIFT               1
+#define GRATING_COMPARE_STATE_LATE_WIDTH               1
+#define GRATING_COMPARE_PASSED                         0x098u  // r: points passed since arm
+#define GRATING_COMPARE_PASSED_MASK                    0xffffffffu
+#define GRATING_COMPARE_PASSED_SHIFT                   0
+#define GRATING_COMPARE_PASSED_WIDTH                   32
+#define GRATING_VELOCITY_QUANTUM                       0x09cu  // rw: what the position moves by at once; 0: velocity is the way of the tick [1/65536 period]
+#define GRATING_VELOCITY_QUANTUM_MASK                  0x0000ffffu
+#define GRATING_VELOCITY_QUANTUM_SHIFT                 0
+#define GRATING_VELOCITY_QUANTUM_WIDTH                 16
+#define GRATING_VELOCITY_FINE                          0x0a0u  // r: velocity with all its bits [2^-24 period/tick]
+#define GRATING_VELOCITY_FINE_LOW                      0x0a0u
+#define GRATING_VELOCITY_FINE_HIGH                     0x0a4u
+#define GRATING_VELOCITY_FINE_WIDTH                    40
 
 #endif

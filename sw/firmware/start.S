@@ -6,9 +6,12 @@ _start:
     la      sp, _stack_top
     la      t0, _zero_start
     la      t1, _zero_end
-1:  bgeu    t0, t1, 2f
+1:  bgeu    t0, t1, 2f                      # both are multiples of 16
     sw      zero, 0(t0)
-    addi    t0, t0, 4
+    sw      zero, 4(t0)
+    sw      zero, 8(t0)
+    sw      zero, 12(t0)
+    addi    t0, t0, 16
     j       1b
 2:  la      t0, _stack_limit
     li      t1, 0x4d6f6972                  # STACK_MARK

@@ -26,7 +26,7 @@ else:
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 BUILD = ROOT / "build" / "twin"
-MEMORY_BYTES = 32768
+MEMORY_BYTES = 65536
 CORE_PACKAGE = "pythondata_cpu_picorv32"
 COMPILE = ["-std=c++17", "-O3", "-march=native", "-fPIC", "-fno-strict-aliasing", "-fno-semantic-interposition", "-fvisibility=hidden",
            "-w", "-pthread"]
@@ -148,7 +148,7 @@ def verilate(folder, verilator, clk_hz, axes):
         f"#define NODE_MEMORY {words[0]}\n{rearm}")
 
 
-def twin_library(clk_hz=4_000_000, axes=1):
+def twin_library(clk_hz=3_000_000, axes=1):
     """libtwin.so: Verilated nodes, stages and line."""
     tool = compiler()
     verilator = package("verilator", "it makes C++ of the RTL")

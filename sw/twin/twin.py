@@ -14,7 +14,7 @@ import numpy
 from . import build, parameters
 from .stage import FAULTS, declare
 
-CLK_HZ = 4_000_000
+CLK_HZ = 3_000_000
 BAUD = 115200
 TURNAROUND_CELLS = 2             # the host hears a word half a cell before its end; the node's driver lets go half a cell after it
 CELLS = 11                       # of a character: start, eight data, 9th, stop
@@ -355,7 +355,7 @@ class FrameBench:
 def realtime_factor(simulated_s=0.1, tries=5, nodes=(1, 2), **arguments):
     """Simulated seconds per second of one processor, nodes and machines running; the best of the tries."""
     with Twin(nodes=nodes, **arguments) as twin:
-        twin.run(0.02)                                        # the firmware starts
+        twin.run(0.06)                                        # the firmware starts
         took = []
         for _ in range(tries):
             start = time.process_time()

@@ -7,17 +7,19 @@ class RegisterBus:
         self.axes, self.chosen = axes, None
 
     def selects(self, select, address):
-        """(node, line, axes as a bit mask) in the clk of the access."""
+        """(node, line, axes and gratings as bit masks) in the clk of the access."""
         block = address >> 8 if select else -1
-        return int(block == 0), int(block == 1), 1 << block - 4 if 4 <= block < 4 + self.axes else 0
+
+        def one_of(first):
+            return 1 << block - first if first <= block < first + self.axes else 0
+        return int(block == 0), int(block == 1), one_of(4), one_of(12)
 
     def step(self, select, address):
         """One clk: the block whose answer passes from now on."""
         self.chosen = self.selects(select, address)
 
-    def rdata(self, node, line, axes):
+    def rdata(self, node, line, axes, gratings):
         """What the soft core reads, given the answers of the blocks."""
-        if self.chosen is None:
-            return None
-        of_node, of_line, of_axes = self.chosen
-        return (node if of_node else 0) | (line if of_line else 0) | sum(axes[n] for n in range(self.axes) if of_axes >> n & 1)
+        of_node, of_line, of_axes, of_gratings = self.chosen
+        several = [x for n in range(self.axes) for x in (axes[n] * (of_axes >> n & 1), gratings[n] * (of_gratings >> n & 1))]
+        return node * of_node | line * of_line | sum(several)

@@ -16,14 +16,15 @@ async def access(dut, model, select, address):
     word = lambda: random.getrandbits(32)
     dut.select.value, dut.address.value = select, address
     await FallingEdge(dut.clk)
-    got = int(dut.node_select.value), int(dut.line_select.value), int(dut.axis_select.value)
+    got = int(dut.node_select.value), int(dut.line_select.value), int(dut.axis_select.value), int(dut.grating_select.value)
     assert got == model.selects(select, address), f"address {address:#x}: selects {got}"
     model.step(select, address)
-    node, line, axes = word(), word(), [word() for _ in range(model.axes)]
+    node, line, axes, gratings = word(), word(), *([word() for _ in range(model.axes)] for _ in range(2))
     dut.node_rdata.value, dut.line_rdata.value = node, line
     dut.axis_rdata.value = sum(x << 32 * n for n, x in enumerate(axes))
+    dut.grating_rdata.value = sum(x << 32 * n for n, x in enumerate(gratings))
     dut.select.value = 0
-    return node, line, axes
+    return node, line, axes, gratings
 
 
 async def check(dut, model, select, address):
@@ -38,6 +39,7 @@ async def check(dut, model, select, address):
 async def begin(dut):
     Clock(dut.clk, 10, "ns").start()
     dut.select.value, dut.address.value, dut.node_rdata.value, dut.line_rdata.value, dut.axis_rdata.value = 0, 0, 0, 0, 0
+    dut.grating_rdata.value = 0
     await FallingEdge(dut.clk)
     await FallingEdge(dut.clk)
     return RegisterBus(int(dut.AXES.value))
@@ -46,16 +48,18 @@ async def begin(dut):
 @cocotb.test()
 async def each_block_answers_at_both_ends_of_its_range(dut):
     model = await begin(dut)
-    for block, base in [(0, 0x000), (1, 0x100)] + [(2 + n, 0x400 + 0x100 * n) for n in range(model.axes)]:
+    axes = [(2 + n, 0x400 + 0x100 * n) for n in range(model.axes)]
+    gratings = [(2 + model.axes + n, 0xC00 + 0x100 * n) for n in range(model.axes)]
+    for block, base in [(0, 0x000), (1, 0x100), *axes, *gratings]:
         for address in (base, base + 0xFC):
-            value, (node, line, axes) = await check(dut, model, 1, address)
-            assert value == [node, line, *axes][block]
+            value, (of_node, of_line, of_axes, of_gratings) = await check(dut, model, 1, address)
+            assert value == [of_node, of_line, *of_axes, *of_gratings][block]
 
 
 @cocotb.test()
 async def nobody_answers_elsewhere(dut):
     model = await begin(dut)
-    for address in (0x200, 0x3FC, 0x400 + 0x100 * model.axes, 0xFFFC):
+    for address in (0x200, 0x3FC, 0x400 + 0x100 * model.axes, 0xC00 + 0x100 * model.axes, 0xFFFC):
         assert (await check(dut, model, 1, address))[0] == 0
     assert (await check(dut, model, 0, 0))[0] == 0
 
@@ -64,7 +68,7 @@ async def nobody_answers_elsewhere(dut):
 async def any_access_matches_the_model(dut):
     model = await begin(dut)
     for _ in range(500):
-        await check(dut, model, random.getrandbits(1), random.choice([random.getrandbits(11), random.getrandbits(16)]) & ~3)
+        await check(dut, model, random.getrandbits(1), random.choice([random.getrandbits(12), random.getrandbits(16)]) & ~3)
 
 
 @pytest.mark.parametrize("axes", [1, 3])

@@ -207,11 +207,55 @@ class Axis:
             self.pushed.append(segment)
 
 
+class Grating:
+    """The registers of a grating; `burst(phases, every)` gives the 1024 words of a burst, which is full after `delay` looks."""
+
+    def __init__(self):
+        self.word, self.strobes, self.records = {}, [], []
+        self.burst, self.spoiled, self.delay = None, False, 0
+        self.waiting, self.words, self.full = 0, deque(), False
+        self.points, self.written = {}, {}                              # table in force, table being written
+        self.correction, self.loads = None, 0
+
+    def read(self, offset):
+        d = DEFINES
+        if offset == d["GRATING_RECORDER_STATE"]:
+            self.waiting -= 1
+            self.full = bool(self.records) and self.burst is not None and self.waiting < 0
+            return self.full | self.spoiled << 1
+        if offset == d["GRATING_RECORDER_WORD"]:
+            assert self.full and self.words, "a word was read that is not there"
+            return self.words.popleft()
+        return self.word.get(offset, 0)
+
+    def write(self, offset, value):
+        d = DEFINES
+        self.word[offset] = value
+        if offset == d["GRATING_HARMONIC_POINT"]:
+            self.written[value >> 18 & 255] = signed(value & 0x3FFFF, 18)
+        if offset == d["GRATING_STROBES"]:
+            self.strobes.append(value)
+            if value & d["GRATING_STROBES_RECORD_MASK"]:
+                setting = self.word[d["GRATING_RECORDER"]]
+                self.records.append((bool(setting >> 16 & 1), setting & 0xFFFF))
+                self.waiting, self.full = self.delay, False
+                self.words = deque(self.burst(*self.records[-1]) if self.burst else [])
+            if value & d["GRATING_STROBES_LOAD_CORRECTION_MASK"]:
+                offsets = self.word[d["GRATING_CORRECTION_OFFSET"]]
+                self.correction = dict(sin_offset=signed(offsets & 0xFFFF, 16), cos_offset=signed(offsets >> 16, 16),
+                                       gain=self.word[d["GRATING_CORRECTION_GAIN"]],
+                                       shear=signed(self.word[d["GRATING_CORRECTION_SHEAR"]], 17))
+            if value & d["GRATING_STROBES_SWAP_HARMONICS_MASK"]:
+                assert len(self.written) == 256, "a table was taken that was not written whole"
+                self.points, self.written, self.loads = self.written, {}, self.loads + 1
+
+
 class Machine:
     """The node under the firmware; request() speaks to it as the master does."""
 
     def __init__(self, *axes, map_crc=DEFINES["MAP_CRC"], address=2):
         self.axes, self.address, self.map_crc, self.clk = list(axes) or [Axis()], address, map_crc, 0
+        self.gratings = [Grating() for _ in self.axes]
         self.received, self.sent, self.word, self.crc_bytes = deque(), [], {}, b""
         self.sequence = 0
         self.answers = READ(self.read), WRITE(self.write)               # kept alive as long as the firmware may call
@@ -221,6 +265,8 @@ class Machine:
 
     def read(self, offset):
         d = DEFINES
+        if offset >= d["GRATING_BASE"]:
+            return self.gratings[(offset - d["GRATING_BASE"]) // d["GRATING_STRIDE"]].read(offset % d["GRATING_STRIDE"])
         if offset >= d["AXIS_BASE"]:
             axis = (offset - d["AXIS_BASE"]) // d["AXIS_STRIDE"]
             return self.axes[axis].read(offset % d["AXIS_STRIDE"])
@@ -233,13 +279,15 @@ class Machine:
             if offset == d["LINE_CRC"]:
                 return zlib.crc32(self.crc_bytes)
             return self.word.get(d["LINE_BASE"] + offset, 0)
-        build = len(self.axes) | self.address << 4 | 32 << 8
+        build = len(self.axes) | self.address << 4 | 64 << 8
         return {d["NODE_MAP_CRC"]: self.map_crc, d["NODE_CLK_HZ"]: CLK_HZ, d["NODE_BUILD"]: build,
                 d["NODE_TIME_STAMP"]: self.clk & 0xFFFFFFFF}.get(offset, self.word.get(offset, 0))
 
     def write(self, offset, value):
         d = DEFINES
-        if offset >= d["AXIS_BASE"]:
+        if offset >= d["GRATING_BASE"]:
+            self.gratings[(offset - d["GRATING_BASE"]) // d["GRATING_STRIDE"]].write(offset % d["GRATING_STRIDE"], value)
+        elif offset >= d["AXIS_BASE"]:
             self.axes[(offset - d["AXIS_BASE"]) // d["AXIS_STRIDE"]].write(offset % d["AXIS_STRIDE"], value)
         elif offset == d["LINE_BASE"] + d["LINE_TRANSMIT"]:
             self.sent.append(value)

@@ -9,7 +9,7 @@ import pytest
 
 from host_firmware import SOURCE
 
-MEMORY = 32768
+MEMORY = 65536
 
 
 def build(out, *options, **environment):

@@ -33,6 +33,13 @@ class FakeAxis:
         self.begin, self.until, self.stop_until = 0.0, 0.0, None
         self.kind, self.ended, self.end_as = None, "never", "ok"
         self.writes = []
+        self.learner = dict(reason=1, settled=0, frozen=1, accepted=0, refused=0, scatter=0)
+        self.learns_in = 4             # moves while it learns; None: never
+        self.correction = dict(sin_offset=0, cos_offset=0, gain=65536, shear=0)
+        self.harmonics = {order: (0, 0) for order in range(1, 11)}
+        self.waiting = dict(self.harmonics)
+        self.signal = dict(faults=0, first=0)
+        self.speeds = []               # of moves, period/s
 
     def advance(self, now):
         """The motion as it stands at this time."""
@@ -70,6 +77,8 @@ class FakeNode:
         self.address, self.map_crc, self.protocol_crc = address, map_crc, protocol_crc
         self.axes = [FakeAxis() for _ in range(axes)]
         self.now, self.registers = 0.0, {0x400: 7}
+        self.written = []              # (address, value)
+        self.captures = []             # words of captured, captured_time and captured_position, oldest first
         self.expecting, self.payload = None, []
         self.last, self.reply = None, bytes([0, 0, 0])
         self.counters = dict.fromkeys(
@@ -202,6 +211,11 @@ class FakeNode:
             return "not_homed", {}
         if not axis.parameters[3] <= target <= axis.parameters[4]:
             return "out_of_travel", {}
+        axis.speeds.append(axis.parameters[5])
+        if not axis.learner["frozen"] and axis.learns_in is not None:
+            axis.learns_in -= 1
+            if axis.learns_in == 0:
+                axis.learner.update(settled=1, accepted=2, scatter=26)
         seconds = abs(target - axis.position) / 65536 / axis.parameters[5] + 0.05
         axis.go("moving", self.now, seconds, target)
         return "ok", {"duration_ticks": round(seconds * TICK_HZ)}
@@ -250,7 +264,50 @@ class FakeNode:
             fault_position=65536,
         )
 
+    def do_learner(self, axis, action):
+        if action > 3:
+            return "out_of_range", {}
+        if action in (1, 2):
+            axis.learner.update(frozen=action - 1, reason=action - 1)
+        if action == 3:
+            axis.learner.update(settled=0)
+        return "ok", axis.learner
+
+    def do_get_correction(self, axis):
+        return "ok", axis.correction
+
+    def do_get_harmonic(self, axis, order):
+        return "ok", dict(zip(("cosine", "sine"), axis.harmonics[order]))
+
+    def do_set_harmonic(self, axis, order, cosine, sine):
+        if max(abs(cosine), abs(sine)) > 2 << 20:
+            return "out_of_range", {}
+        axis.waiting[order] = cosine, sine
+        return "ok", {}
+
+    def do_set_correction(self, axis, apply, **values):
+        if not 32768 <= values["gain"] < 131072:
+            return "out_of_range", {}
+        axis.correction, axis.harmonics = values, dict(axis.waiting)
+        return "ok", {}
+
+    def do_signal(self, axis):
+        return "ok", axis.signal
+
+    def do_write_register(self, _, address, value):
+        if not 0xC00 <= address < 0xD00:
+            return "no_such_register", {}
+        self.written.append((address, value))
+        self.registers[address] = value
+        if address == 0xC10 and value & 1 << 6:        # done with the oldest capture
+            self.captures.pop(0)
+        return "ok", {}
+
     def do_read_register(self, _, address):
+        if address == 0xC64:
+            return "ok", {"value": bool(self.captures) | (self.registers.get(address, 0) & 64)}
+        if self.captures and 0xC68 <= address < 0xC78:
+            return "ok", {"value": self.captures[0][address - 0xC68 >> 2]}
         return ("ok", {"value": self.registers[address]}) if address in self.registers else ("no_such_register", {})
 
 

@@ -108,6 +108,44 @@ def test_stop_in_mid_move_keeps_the_axis_under_control(stage):
     assert abs(stage.move("X", 0).error_nm) <= BOUND_NM
 
 
+# ------------------------------------------------------------------ sensing
+
+def sub_division_errors(stage, name, count=12):
+    """True position less that of the encoder, in nm, at places spread over a period."""
+    errors = []
+    for n in range(count):
+        stage.move(name, 1000 * n + PERIOD_NM * n / count)
+        errors.append(stage.true_nm(name) - stage.axes[name].status().position_nm)
+    return errors
+
+
+def test_the_learner_takes_the_ellipse_off_in_motion(stage):
+    axis = stage.axes["Y"]
+    before = sub_division_errors(stage, "Y")
+    axis.learner("learn")
+    for n in range(30):
+        stage.move("Y", 0.3e6 if n % 2 else 0.7e6)
+        if axis.learner("look").accepted:
+            break
+    learner = axis.learner("freeze")
+    assert learner.accepted == 1 and learner.refused == 0, learner
+    after = sub_division_errors(stage, "Y")
+    spread = [max(errors) - min(errors) for errors in (before, after)]
+    assert spread[0] > 10 and spread[1] < 5, f"from {spread[0]:.1f} to {spread[1]:.1f} nm"
+    assert not axis.signal().faults
+
+
+def test_positions_are_captured_on_demand(stage):
+    axis = stage.axes["X"]
+    axis.capture_from("software")
+    for _ in range(3):
+        axis.capture_now()
+    captures, overrun = axis.captures()
+    axis.capture_from()
+    assert len(captures) == 3 and not overrun
+    assert all(abs(capture.position_nm - axis.status().position_nm) < BOUND_NM for capture in captures)
+
+
 # ------------------------------------------------------------------ faults
 
 def fault_during_move(stage, name, provoke, distance_nm=0.5e6):

@@ -15,8 +15,19 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from . import units
-from .errors import LineError, MotionFailed, NobodyAnswers, OutOfRange, Refused, UnknownName, WrongBuild
-from .line_tables import CAUSES, ENCODER_EVENTS, FAULTS, FLAGS, PARAMETERS, PROTOCOL_CRC, STATES
+from .errors import LineError, MoireError, MotionFailed, NobodyAnswers, NotLearned, OutOfRange, Refused, UnknownName, WrongBuild
+from .line_tables import (
+    CAUSES,
+    ENCODER_EVENTS,
+    FAULTS,
+    FLAGS,
+    LEARNER_ACTIONS,
+    LEARNER_REASONS,
+    PARAMETERS,
+    PROTOCOL_CRC,
+    SIGNAL_FAULTS,
+    STATES,
+)
 from .protocol import ADDRESSES, Exchange, Timing, request_body
 from .registers import FIELDS, MAP_CRC
 from .transport import Transport
@@ -24,6 +35,14 @@ from .transport import Transport
 COUNTS = 65536               # of the wire, in one signal period
 FULL_SCALE = 32768           # of the command
 POLL_S = 0.05                # between two looks at a motion, where a Line is not told otherwise
+
+HARMONICS = 10               # orders of phase error that are corrected
+SCATTER = 1 << 20            # of learner.scatter, in one signal period
+CORRECTION = ("sin_offset", "cos_offset", "gain", "shear")
+LEARNING_SPEEDS = (Fraction(1), Fraction(3, 5), Fraction(4, 5))        # shares of the top speed; the learner wants several
+LEARNING_SAMPLES = 20        # for one period at the top speed of learning; it wants eight
+LEARNING_WAY_S = 0.5         # for one way at the top speed: most of it is then at an even speed
+CAPTURE_SOURCES = ("index", "tick", "software", "probe_0_rising", "probe_1_rising", "probe_0_falling", "probe_1_falling")
 
 CAUSE_CODES = {name: code for code, (name, _) in CAUSES.items()}
 
@@ -128,6 +147,49 @@ class Encoder:
     home_phase_nm: float           # from where homing arrived to the phase zero that it took
     home_margin: float             # 1: arrived right on the phase zero, 0: midway between two
     fault_position_nm: float
+
+
+@dataclass(frozen=True)
+class Learner:
+    reason: str                    # "learning", or why nothing is learned just now
+    settled: bool                  # offset, gain, phase and harmonics are all known
+    frozen: bool
+    accepted: int                  # times that something was learned since power-up
+    refused: int                   # bursts and passes of bursts that were not good enough
+    scatter_nm: float              # standard error of what was learned last
+
+    @property
+    def words(self) -> str:
+        return words(LEARNER_REASONS, [self.reason])
+
+
+@dataclass(frozen=True)
+class Signal:
+    faults: tuple                  # that stand now
+    first: tuple                   # that came first since reset()
+
+    @property
+    def fault_words(self) -> str:
+        return words(SIGNAL_FAULTS, self.faults)
+
+    @property
+    def first_words(self) -> str:
+        return words(SIGNAL_FAULTS, self.first)
+
+
+@dataclass(frozen=True)
+class Capture:
+    sources: tuple                 # names of CAPTURE_SOURCES; several if they came at once
+    position_nm: float             # of the last sample before the event
+    time_clk: int                  # of the event, wraps at 2^32
+    age_s: float                   # of that sample
+
+
+@dataclass(frozen=True)
+class Compare:
+    armed: bool
+    passed: int                    # points since arm
+    late: bool                     # a pulse had to wait for the one before it
 
 
 @dataclass(frozen=True)
@@ -289,6 +351,24 @@ class Node:
             return self.request("read_register", address=address)["value"]
         except Refused as refused:
             raise with_more(refused, f"address {address:#06x}") from None
+
+    def write_register(self, address: int, value: int):
+        """Only index, capture and compare of the grating blocks may be written."""
+        if address % 4 or not 0 <= address < 65536 or not 0 <= value < 1 << 32:
+            raise OutOfRange(f"{value:#x} cannot go to {address:#x}: allowed are 32-bit words, and multiples of 4 from 0 to 0xfffc")
+        try:
+            self.request("write_register", address=address, value=value)
+        except Refused as refused:
+            raise with_more(refused, f"address {address:#06x}") from None
+
+    def write_named(self, name: str, axis: int = 0, **counts):
+        """A whole register by its fields, those not given 0; a wide one low word first."""
+        fields = {known.field: known for known in FIELDS if f"{known.block}.{known.register}" == name}
+        word = sum((count & (1 << fields[field].width) - 1) << fields[field].low for field, count in counts.items())
+        known = next(iter(fields.values()))
+        self.write_register(known.address(axis), word & 0xFFFFFFFF)
+        if known.width > 32:
+            self.write_register(known.address(axis) + 4, word >> 32)
 
     def read_named(self, name: str, axis: int = 0) -> dict:
         """Counts of the fields of a register, by name: "axis.position", "line.frames_good"."""
@@ -506,6 +586,151 @@ class Axis:
             period_nm = Fraction(self.parameter_counts("period", texts["period"]), 1000)
         counts = {name: self.parameter_counts(name, texts[name], period_nm) for name in sorted(texts, key=lambda name: name != "period")}
         return {name: self.write_parameter(name, value) for name, value in counts.items()}
+
+    # correction
+
+    def learner(self, action: str = "look") -> Learner:
+        """What the learner does; or "learn", "freeze", "forget"."""
+        actions = {name: code for code, (name, _) in LEARNER_ACTIONS.items()}
+        if action not in actions:
+            raise OutOfRange(f"the learner knows no '{action}': allowed are {', '.join(actions)}")
+        told = self.request("learner", action=actions[action])
+        return Learner(reason=named(LEARNER_REASONS, told["reason"], "reason"), settled=bool(told["settled"]), frozen=bool(told["frozen"]),
+                       accepted=told["accepted"], refused=told["refused"],
+                       scatter_nm=float(told["scatter"] * self.period_nm / SCATTER))
+
+    def learn(self, progress=None, distance="0.4mm", timeout="120s") -> Learner:
+        """Learns the correction afresh: to and fro over a distance at several speeds until it is settled, then freezes it.
+
+        The axis must be enabled and homed. It goes from where it is, to the side where there is room, and comes back. `progress` is
+        called with a Learner after each way. NotLearned says why it was not settled in time. The parameter `velocity` is set as it was.
+        """
+        stretch, patience = units.parse_length(distance), units.parse_time(timeout)
+        if stretch <= 0 or patience <= 0:
+            raise OutOfRange("distance and timeout of learning must be above zero")
+        low, high = (self.get_parameter(name).value for name in ("travel_low", "travel_high"))
+        home = Fraction(self.status().target_nm)
+        away = home + stretch if home + stretch <= high else home - stretch
+        if away < low:
+            raise OutOfRange(f"there is no room for {units.format_length(stretch)}: the travel is {units.format_length(low)} to "
+                             f"{units.format_length(high)}")
+        velocity = self.get_parameter("velocity")
+        even = stretch / self.period_nm / Fraction(LEARNING_WAY_S)
+        fastest = min(velocity.counts, self.node.identity.sample_hz // LEARNING_SAMPLES, even)
+        self.learner("forget")
+        self.learner("learn")
+        end, ways = self.transport.now() + float(patience), 0
+        try:
+            while True:
+                self.write_parameter("velocity", max(1, round(fastest * LEARNING_SPEEDS[ways // 2 % len(LEARNING_SPEEDS)])))
+                self.move(home if ways % 2 else away)
+                ways += 1
+                told = self.learner()
+                if progress is not None:
+                    progress(told)
+                if told.settled and ways % 2 == 0:
+                    return self.learner("freeze")
+                if self.transport.now() > end:
+                    sentence = f"axis {self.number} of node {self.node.address} learned no correction within {units.format_time(patience)}"
+                    raise NotLearned(told.reason, f"{sentence}: {told.words} ({told.accepted} accepted, {told.refused} refused)")
+        finally:
+            self.leave_learning(velocity)
+
+    def leave_learning(self, velocity):
+        try:
+            self.learner("freeze")
+            self.write_parameter("velocity", velocity.counts)
+        except MoireError:
+            pass        # the line is silent or the axis still moves; what ended the learning is told
+
+    def correction(self) -> dict:
+        """What is in force, in counts, ready for a JSON file."""
+        told = self.request("get_correction")
+        harmonics = [self.request("get_harmonic", order=order) for order in range(1, HARMONICS + 1)]
+        return {**told, "cosine": [harmonic["cosine"] for harmonic in harmonics], "sine": [harmonic["sine"] for harmonic in harmonics]}
+
+    def set_correction(self, values: dict):
+        """As from correction(); comes into force at once and whole, or not at all."""
+        legs = values.get("cosine"), values.get("sine")
+        right = all(whole(values.get(name)) for name in CORRECTION) and all(
+            isinstance(leg, list) and len(leg) == HARMONICS and all(map(whole, leg)) for leg in legs)
+        if not right:
+            raise OutOfRange(f"this is no correction: it has the whole numbers {', '.join(CORRECTION)} and the lists cosine and sine of "
+                             f"{HARMONICS} whole numbers each")
+        for order, (cosine, sine) in enumerate(zip(*legs), 1):
+            self.request("set_harmonic", order=order, cosine=cosine, sine=sine)
+        self.request("set_correction", **{name: values[name] for name in CORRECTION}, apply=1)
+
+    # signal
+
+    def signal(self) -> Signal:
+        """What is wrong with sine and cosine."""
+        told = self.request("signal")
+        return Signal(bits(SIGNAL_FAULTS, told["faults"]), bits(SIGNAL_FAULTS, told["first"]))
+
+    # capture and compare
+
+    def grating(self, register: str) -> dict:
+        return self.node.read_named(f"grating.{register}", self.number)
+
+    def write_grating(self, register: str, **counts):
+        self.node.write_named(f"grating.{register}", self.number, **counts)
+
+    def capture_from(self, *sources: str):
+        """From which sources positions are captured from here on; none: no more. What waits is kept."""
+        self.write_grating("capture_sources", value=sum(1 << CAPTURE_SOURCES.index(capture_source(source)) for source in set(sources)))
+        if "index" in sources:
+            self.write_grating("strobes", arm_index=1)
+
+    def capture_now(self):
+        """One capture of the source "software", if that is on."""
+        self.write_grating("strobes", capture_now=1)
+
+    def captures(self, most: int = 16) -> tuple:
+        """Takes the captures that wait, oldest first; and whether some were lost since the last time."""
+        taken, sources = [], dict(enumerate((name, name) for name in CAPTURE_SOURCES))
+        overrun = bool(self.grating("capture_state")["overrun"])
+        while len(taken) < most and self.grating("capture_state")["present"]:
+            told, clk_hz = self.grating("captured"), self.node.identity.clk_hz
+            taken.append(Capture(bits(sources, told["sources"]), self.to_nm(self.grating("captured_position")["value"]),
+                                 self.grating("captured_time")["value"], told["age"] / clk_hz))
+            self.write_grating("strobes", capture_next=1)
+        if overrun:
+            self.write_grating("capture_state", overrun=1)
+        return taken, overrun
+
+    def compare(self) -> Compare:
+        state = self.grating("compare_state")
+        return Compare(bool(state["armed"]), self.grating("compare_passed")["value"], bool(state["late"]))
+
+    def compare_from(self, start, step, count: int = 0, pulse="1us", gap="1us"):
+        """Pulses at start, start + step, …: so many, or without end for 0. A step below zero is for motion downwards."""
+        places = {"compare_start": self.to_counts(start), "compare_step": self.to_counts(step)}
+        clk_hz = self.node.identity.clk_hz
+        times = {"compare_pulse": round(units.parse_time(pulse) * clk_hz), "compare_gap": round(units.parse_time(gap) * clk_hz)}
+        if not all(-(1 << 47) <= place < 1 << 47 for place in places.values()) or places["compare_step"] == 0:
+            raise OutOfRange("start and step must be lengths inside the range of positions, the step not zero")
+        if not all(1 <= clk < 1 << 24 for clk in times.values()) or not 0 <= count < 1 << 32:
+            shortest, longest = (units.format_time(Fraction(clk, clk_hz)) for clk in (1, 2**24 - 1))
+            raise OutOfRange(f"pulse and gap allow {shortest} to {longest}, the count 0 to 2^32 - 1")
+        self.compare_off()
+        for name, value in {**places, "compare_count": count, **times}.items():
+            self.write_grating(name, value=value)
+        self.write_grating("compare_state", late=1)
+        self.write_grating("strobes", compare_arm=1)
+
+    def compare_off(self):
+        self.write_grating("strobes", compare_disarm=1)
+
+
+def whole(value) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def capture_source(name: str) -> str:
+    if name not in CAPTURE_SOURCES:
+        raise UnknownName(f"there is no capture source '{name}': known are {', '.join(CAPTURE_SOURCES)}")
+    return name
 
 
 def parameter(name: str):

@@ -13,7 +13,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from . import units
-from .client import Line, register_fields
+from .client import CAPTURE_SOURCES, Line, capture_source, register_fields
 from .errors import BadFile, LineError, MoireError, OutOfRange, PortError, TwinNotBuilt, UnitError
 from .line_tables import PARAMETERS
 from .protocol import ADDRESSES
@@ -105,6 +105,21 @@ def waiting_time(text):
     return seconds
 
 
+def positive(parse):
+    def above_zero(text):
+        value = parse(text)
+        if value <= 0:
+            raise UnitError(f"'{text.strip()}' is not above zero")
+        return value
+    return above_zero
+
+
+def group(name, text, under, common, example):
+    """A command with actions."""
+    made = under.add_parser(name, parents=[common], help=text, description=text[0].upper() + text[1:] + ".", epilog=f"example: {example}")
+    return made.add_subparsers(dest="action", metavar="ACTION", required=True, parser_class=Parser)
+
+
 def common_options() -> argparse.ArgumentParser:
     common = Parser(add_help=False, argument_default=argparse.SUPPRESS)
     group = common.add_argument_group("line")
@@ -162,6 +177,54 @@ def make_parser() -> Parser:
     command("reset", do_reset, "clear latched faults whose cause is gone; the drive stays off", "moire --port /dev/ttyUSB0 reset -- status")
     command("counters", do_counters, "what happened on the line, seen by node and host", "moire --port /dev/ttyUSB0 counters --json")
     command("encoder", do_encoder, "the sensor as it is now", "moire --port /dev/ttyUSB0 encoder")
+    command("signal", do_signal, "what is wrong with sine and cosine", "moire --port /dev/ttyUSB0 signal")
+    learn = command(
+        "learn",
+        do_learn,
+        "learn offset, gain, phase and harmonics of sine and cosine afresh, moving to and fro; then keep what was learned",
+        "moire --port /dev/ttyUSB0 home -- learn -- correction save stage.json",
+    )
+    learn.add_argument(
+        "--distance", type=checked(positive(units.parse_length)), default="0.4mm", metavar="LENGTH",
+        help="how far from here, with a unit; 0.4mm unless given",
+    )
+    learn.add_argument(
+        "--timeout", type=checked(positive(units.parse_time)), default="120s", metavar="TIME", help="given up after this; 120s unless given"
+    )
+
+    corrections = group("correction", "what was learned of sine and cosine: show, save, load, freeze, go on, forget", commands, common,
+                        "moire --port /dev/ttyUSB0 correction load stage.json -- correction show")
+    command("show", do_correction_show, "what is in force, and what the learner does", "moire --port twin correction show", corrections)
+    save = command("save", do_correction_save, "what is in force, into a JSON file", "moire --port twin correction save c.json",
+                   corrections)
+    save.add_argument("file", metavar="FILE")
+    load = command("load", do_correction_load, "from a JSON file, all or nothing", "moire --port twin correction load c.json", corrections)
+    load.add_argument("file", metavar="FILE")
+    for name, text in (("learn", "learn in every motion from here on"), ("freeze", "learn no more; what was learned stays"),
+                       ("forget", "correct nothing")):
+        command(name, do_correction_act, text, f"moire --port /dev/ttyUSB0 correction {name}", corrections)
+
+    capture = group("capture", "positions latched at events: from where, now, read", commands, common,
+                    "moire --port /dev/ttyUSB0 capture from probe_0_rising -- wait 1s -- capture read")
+    sources = command("from", do_capture_from, "switch sources on, all others off", "moire --port twin capture from software", capture)
+    sources.add_argument("sources", nargs="*", metavar="SOURCE", type=checked(capture_source), help=", ".join(CAPTURE_SOURCES))
+    command("now", do_capture_now, "capture now, where the source software is on", "moire --port twin capture from software -- capture now",
+            capture)
+    command("read", do_capture_read, "take the captures that wait, oldest first", "moire --port twin capture read --json", capture)
+
+    compare = group("compare", "pulses at positions: begin, end, look", commands, common,
+                    "moire --port /dev/ttyUSB0 compare from 1mm 10um --count 50 -- move 2mm -- compare show")
+    begin = command("from", do_compare_from, "pulses at START, START + STEP, …", "moire --port twin compare from 1mm 10um --pulse 2us",
+                    compare)
+    begin.add_argument("start", type=checked(units.parse_length), metavar="START", help="first position, with a unit")
+    begin.add_argument("step", type=checked(units.parse_length), metavar="STEP", help="to the next, with a unit; negative for motion down")
+    begin.add_argument("--count", type=positive_number, default=0, metavar="N", help="so many pulses; without end unless given")
+    begin.add_argument("--pulse", type=checked(positive(units.parse_time)), default="1us", metavar="TIME", help="length; 1us unless given")
+    begin.add_argument("--gap", type=checked(positive(units.parse_time)), default="1us", metavar="TIME",
+                       help="shortest gap; 1us unless given")
+    command("off", do_compare_off, "no more pulses", "moire --port twin compare off", compare)
+    command("show", do_compare_show, "points passed", "moire --port twin compare show", compare)
+
     register = command(
         "register", do_register, "read registers of the node, by name or by address", "moire --port twin register axis.position 0x400"
     )
@@ -447,6 +510,123 @@ def do_encoder(session, command):
     session.say({**place(command), **asdict(encoder)}, head + "".join(f"\n  {name:<12} {text}" for name, text in rows))
 
 
+def where(command) -> str:
+    return f"node {command.address} axis {command.axis}"
+
+
+def do_signal(session, command):
+    signal = session.axis(command).signal()
+    told = {**place(command), **asdict(signal), "fault_words": signal.fault_words, "first_words": signal.first_words}
+    session.say(told, f"{where(command)}: {signal.fault_words or 'nothing is wrong with the signal'}\n"
+                      f"  first since reset: {signal.first_words or 'none'}")
+
+
+def told_learner(learner) -> dict:
+    return {**asdict(learner), "words": learner.words}
+
+
+def learner_words(learner) -> str:
+    known = f"settled, known to {learner.scatter_nm:.3f} nm" if learner.settled else "not settled"
+    return f"{learner.words}; {known} ({learner.accepted} accepted, {learner.refused} refused)"
+
+
+def do_learn(session, command):
+    axis, watched = session.switch_on(command), not session.options.json and session.err.isatty()
+
+    def show(learner):
+        print(f"\r{learner_words(learner):<100}", end="", file=session.err, flush=True)
+    began = session.line.transport.now()
+    try:
+        learner = axis.learn(show if watched else None, command.distance, command.timeout)
+    finally:
+        if watched:
+            print("\r" + " " * 100 + "\r", end="", file=session.err, flush=True)
+    seconds = session.line.transport.now() - began
+    session.say({**place(command), **told_learner(learner), "time_s": seconds},
+                f"{where(command)}: correction learned in {seconds:.1f} s, known to {learner.scatter_nm:.3f} nm, frozen")
+
+
+def told_correction(command, learner, values) -> dict:
+    return {**place(command), "action": command.action, "learner": told_learner(learner), "correction": values}
+
+
+def do_correction_show(session, command):
+    axis = session.axis(command)
+    learner, values = axis.learner(), axis.correction()
+    rows = [
+        f"{where(command)}: {learner_words(learner)}",
+        f"  offset    sine {values['sin_offset'] / 327.68:.3f} %, cosine {values['cos_offset'] / 327.68:.3f} % of full scale",
+        f"  gain      {values['gain'] / 65536:.5f} of the sine",
+        f"  shear     {values['shear'] / 65536:.5f} of the cosine, added to the sine",
+        "  harmonics of the phase, nm: " + ", ".join(
+            f"{order}: {float(axis.period_nm) * (cosine**2 + sine**2) ** 0.5 / 2**24:.3f}"
+            for order, (cosine, sine) in enumerate(zip(values["cosine"], values["sine"]), 1)),
+    ]
+    session.say(told_correction(command, learner, values), "\n".join(rows))
+
+
+def do_correction_save(session, command):
+    values = session.axis(command).correction()
+    write_text(command.file, json.dumps({"correction": values}, indent=4) + "\n")
+    session.say({**place(command), "action": "save", "file": command.file}, f"correction saved in {command.file}")
+
+
+def do_correction_load(session, command):
+    told = read_json(command.file)
+    values = told.get("correction") if isinstance(told, dict) else None
+    if not isinstance(values, dict):
+        raise BadFile(f"the file {command.file} holds no correction: make one with 'moire correction save'")
+    session.axis(command).set_correction(values)
+    session.say({**place(command), "action": "load", "file": command.file}, f"correction loaded from {command.file}")
+
+
+def do_correction_act(session, command):
+    learner = session.axis(command).learner(command.action)
+    session.say({**place(command), "action": command.action, "learner": told_learner(learner)},
+                f"{where(command)}: {learner_words(learner)}")
+
+
+def do_capture_from(session, command):
+    session.axis(command).capture_from(*command.sources)
+    session.say({**place(command), "action": command.action, "sources": command.sources},
+                f"{where(command)}: captures from {', '.join(command.sources) or 'nothing'}")
+
+
+def do_capture_now(session, command):
+    session.axis(command).capture_now()
+    session.say({**place(command), "action": command.action}, f"{where(command)}: captured")
+
+
+def do_capture_read(session, command):
+    captures, lost = session.axis(command).captures()
+    rows = [f"  {capture.position_nm / 1e6:.6f} mm at clk {capture.time_clk}, its sample {capture.age_s * 1e6:.2f} us before: "
+            + ", ".join(capture.sources) for capture in captures]
+    head = f"{where(command)}: {len(captures)} captures" + (", MORE WERE LOST: read more often" if lost else "")
+    session.say({**place(command), "action": command.action, "captures": [asdict(capture) for capture in captures], "lost": lost},
+                "\n".join([head, *rows]))
+
+
+def do_compare_from(session, command):
+    axis = session.axis(command)
+    axis.compare_from(command.start, command.step, command.count, command.pulse, command.gap)
+    number = str(command.count) if command.count else "no end"
+    session.say({**place(command), "action": command.action, "start_nm": command.start, "step_nm": command.step, "count": command.count},
+                f"{where(command)}: pulses from {units.format_length(command.start)} every {units.format_length(command.step)}, "
+                f"count: {number}")
+
+
+def do_compare_off(session, command):
+    session.axis(command).compare_off()
+    session.say({**place(command), "action": command.action}, f"{where(command)}: no more pulses")
+
+
+def do_compare_show(session, command):
+    compare = session.axis(command).compare()
+    session.say({**place(command), "action": command.action, **asdict(compare)},
+                f"{where(command)}: {'under way' if compare.armed else 'off'}, {compare.passed} points passed"
+                + (", some pulses came late: the gap is too long for the speed" if compare.late else ""))
+
+
 def do_register(session, command):
     names = list(dict.fromkeys(f"{field.block}.{field.register}" for field in FIELDS if "r" in field.access))
     if not command.registers:
@@ -462,7 +642,7 @@ def do_register(session, command):
             told[name] = value
             rows.append(f"{name} = 0x{value:08X} {value}")
         else:
-            told[name] = node.read_named(name, session.axis(command).number if name.startswith("axis.") else 0)
+            told[name] = node.read_named(name, session.axis(command).number if name.startswith(("axis.", "grating.")) else 0)
             rows.append(f"{name}: " + ", ".join(f"{field} = {value}" for field, value in told[name].items()))
     session.say({**place(command), "registers": told}, "\n".join(rows))
 
@@ -503,10 +683,7 @@ def do_params_set(session, command):
 
 def do_params_save(session, command):
     saved = session.axis(command).save_parameters()
-    try:
-        Path(command.file).write_text(json.dumps({"parameters": saved}, indent=4) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise BadFile(f"the file {command.file} cannot be written: {error.strerror}") from None
+    write_text(command.file, json.dumps({"parameters": saved}, indent=4) + "\n")
     session.say(
         {**place(command), "action": "save", "file": command.file, "count": len(saved)}, f"{len(saved)} parameters saved in {command.file}"
     )
@@ -522,14 +699,25 @@ def do_params_load(session, command):
 
 
 def read_parameters(file: str) -> dict:
-    try:
-        told = json.loads(read_text(file))
-    except ValueError as error:
-        raise BadFile(f"the file {file} is no JSON: {error}") from None
+    told = read_json(file)
     texts = told.get("parameters") if isinstance(told, dict) else None
     if not isinstance(texts, dict) or not all(isinstance(text, str) for text in texts.values()):
         raise BadFile(f'the file {file} holds no parameters: it must look like {{"parameters": {{"velocity": "5mm/s"}}}}')
     return texts
+
+
+def read_json(file: str):
+    try:
+        return json.loads(read_text(file))
+    except ValueError as error:
+        raise BadFile(f"the file {file} is no JSON: {error}") from None
+
+
+def write_text(file: str, text: str):
+    try:
+        Path(file).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise BadFile(f"the file {file} cannot be written: {error.strerror}") from None
 
 
 def read_text(file: str) -> str:

@@ -97,5 +97,13 @@ class MotionFailed(MoireError):
         self.cause, self.code = cause, code
 
 
+class NotLearned(MoireError):
+    """The correction was not learned in time. `cause` is the name of the reason in line.toml."""
+
+    def __init__(self, cause: str, sentence: str):
+        super().__init__(sentence)
+        self.cause = cause
+
+
 def times(count: int) -> str:
     return "once" if count == 1 else f"{count} times"

