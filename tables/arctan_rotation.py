@@ -70,7 +70,7 @@ def bound(plan, w, radius, iterative=False):
     unit = (1 << PHASE) / math.tau                                  # LSB a radian
     rest = unit * 2.0 ** -digits                                    # what is left across
     cubic = unit * 2.0 ** (-3 * turns) / 11                         # h^3 / 12, and what stands behind it
-    table = (1 + (digits if iterative else len(groups(digits))) / 2) / (1 << guard)
+    table = (1 + (digits if iterative else len(groups(digits))) / 2) / (1 << guard)     # the made angles are rounded
     if iterative:                                                   # half a unit in the longer leg at each turn, seen by later digits
         cut = sum(2.0 ** -digit for digit in range(2, turns + 1)) / 2 * 2.0 ** -head
     else:                                                           # one unit in the longer leg at each turn, half in the shorter after
@@ -78,9 +78,9 @@ def bound(plan, w, radius, iterative=False):
     return 0.5 + rest + cubic + table + unit * cut / (1.16 * radius)
 
 
-def amplitude_bound(radius, iterative=False):
-    """Counts from the true amplitude: cut off in eighths or halves of a count, and the rest of the gain."""
-    return (0.9 if iterative else 1.5) + 0.00015 * radius
+def amplitude_bound(radius):
+    """Counts from the true amplitude: what is cut off, and the rest of the gain."""
+    return 1.5 + 0.00015 * radius
 
 
 def quarter_bound(plans, w):

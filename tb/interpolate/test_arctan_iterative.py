@@ -54,7 +54,7 @@ async def by_hand(dut):
     unit = 1 << await begin(dut) - 8
     for sin, cos, phase in ((48, 64, 6712), (64, 48, 16384 - 6712), (-48, 64, 65536 - 6712)):           # atan 0.75; 3, 4, 5
         got, size = await ask(dut, sin * unit, cos * unit)
-        assert got == phase and abs(size - 80 * unit) <= arctan_rotation.amplitude_bound(80 * unit, True)
+        assert got == phase and abs(size - 80 * unit) <= arctan_rotation.amplitude_bound(80 * unit)
     assert (await ask(dut, -unit, -100 * unit))[0] == 32768 + 104                                       # atan 0.01
     assert await ask(dut, 0, 0) == (0, 0)
 
@@ -107,7 +107,7 @@ def test_every_sample_of_8_bits_is_correctly_rounded():
     pairs = [pair for pair in product(range(-128, 128), repeat=2) if pair != (0, 0)]
     answers = [sample(8, *pair) for pair in pairs]
     assert max(abs(error(phase, *pair)) for (phase, _), pair in zip(answers, pairs)) < 0.5
-    assert all(abs(size - math.hypot(*pair)) <= arctan_rotation.amplitude_bound(math.hypot(*pair), True)
+    assert all(abs(size - math.hypot(*pair)) <= arctan_rotation.amplitude_bound(math.hypot(*pair))
                for (_, size), pair in zip(answers, pairs))
 
 
@@ -128,7 +128,7 @@ def test_any_wider_sample_is_within_the_bounds():
             if sin or cos:
                 phase, size = sample(w, sin, cos)
                 assert abs(error(phase, sin, cos)) <= arctan_rotation.bound(PLAN[w], w, radius, True)
-                assert abs(size - radius) <= arctan_rotation.amplitude_bound(radius, True)
+                assert abs(size - radius) <= arctan_rotation.amplitude_bound(radius)
 
 
 def test_the_module_has_the_plan_and_the_bounds_of_the_table():
@@ -137,7 +137,7 @@ def test_the_module_has_the_plan_and_the_bounds_of_the_table():
         assert tuple(localparam(text, name, w) for name in ("TURNS", "DIGITS", "F", "GUARD")) == PLAN[w]
     widest = max(arctan_rotation.quarter_bound(PLAN, w) for w in range(11, 17))
     assert f"within {widest:.3f} LSB" in text and widest < 0.52
-    assert "within 0.9 counts and 0.00015 of itself" in text and arctan_rotation.amplitude_bound(10000, True) == 2.4
+    assert "within 1.5 counts and 0.00015 of itself" in text and arctan_rotation.amplitude_bound(10000) == 3
 
 
 @pytest.mark.parametrize("w", [8, 10, 12, 16])
