@@ -131,7 +131,7 @@ def test_the_learner_takes_the_ellipse_off_in_motion(stage):
     assert learner.accepted == 1 and learner.refused == 0, learner
     after = sub_division_errors(stage, "Y")
     spread = [max(errors) - min(errors) for errors in (before, after)]
-    assert spread[0] > 10 and spread[1] < 5, f"from {spread[0]:.1f} to {spread[1]:.1f} nm"
+    assert spread[1] < spread[0] / 2 and spread[1] < 5, f"from {spread[0]:.1f} to {spread[1]:.1f} nm"
     assert not axis.signal().faults
 
 
