@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// axis -- one machine axis from the pins of its grating to the pins of its motor, behind one block of registers.
+// axis -- one machine axis from the pins of its grating to the pins of its motor, behind two blocks of registers.
 //
-// latency  see the rooms; sample to position 32 clk at most, position to command within one servo tick
+// latency  see the rooms; converter word to position 33 clk, position to command within one servo tick
 // rate     one sample per `sample_tick`, one command per `tick`
 // source   S0: interferometer with sine, cosine and comparator outputs, limit switches, DC motor
 // model    the models of its blocks; proved in motion by tb/system

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // grating -- the measuring path of an axis: from the pins of a grating to position and velocity.
 //
-// latency  see the rooms; 34 clk from a converter word to position
+// latency  see the rooms; 33 clk from a converter word to position
 // rate     one sample per `sample_tick`, one velocity per `tick`
 // source   S0: interferometer with sine, cosine and comparator outputs; any A/B/Z scale
 // model    the models of its blocks; proved in motion by tb/system
