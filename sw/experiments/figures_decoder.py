@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures of the incremental encoder: does it ever count wrong, how large and how fast is it on an iCE40 HX8K.
 
-    python -m experiments.figures_decoder [EDGES]       (default 1 000 000 000 edges: the soak)
+The soak of 10^9 edges is `make soak K=decoder`.
 """
 import hashlib
 import os
 import shutil
 import subprocess
-import sys
 from importlib.util import find_spec
 from pathlib import Path
 
 from experiments.figures_common import Figure, bar, console
 from experiments.synthesis import synthesise_ice40
+from twin import BuildError
 
 ROOT = Path(__file__).resolve().parents[2]
 DRIVER = Path(__file__).with_name("encoder_run.cpp")
@@ -20,10 +20,6 @@ EDGES = 10**7
 SHARE = 10**6                        # edges of one run, each with a seed of its own
 # HostMot2's encoder counter: 16-bit count, latched count and time stamp, filters up to 15 samples; no check of revolutions
 AS_HOSTMOT2 = {"W": 16, "TIME_W": 16, "FILTER_W": 4, "SPARE_W": 2, "SKIP_W": 8, "CHECK": 0}
-
-
-class BuildError(Exception):
-    """One line that says what is missing or went wrong."""
 
 
 def run(command, what, **more):
@@ -102,9 +98,4 @@ FIGURES = {
                                "> 129 (HostMot2 129)", lambda value: value > 129, 1),
 }
 
-
-if __name__ == "__main__":
-    try:
-        print(f"decoder_miscounts {miscounts(int(float(sys.argv[1])) if sys.argv[1:] else 10**9)} clk")
-    except BuildError as error:
-        sys.exit(str(error))
+SOAK = {"decoder": lambda: (wrong := miscounts(10**9), wrong == 0)}
