@@ -7,7 +7,7 @@
 `default_nettype none
 
 module node_memory #(
-    parameter int BYTES = 32768,                // a power of two
+    parameter int BYTES = 32768,                // a multiple of 1024
     parameter FIRMWARE = ""                     // file of 32-bit words, as $readmemh takes them; "": none
 ) (
     input  wire                  clk,
@@ -17,7 +17,7 @@ module node_memory #(
     input  wire        [31:0]    wdata,
     output logic       [31:0]    rdata
 );
-    if (BYTES < 1024 || BYTES != 1 << $clog2(BYTES)) begin : g_check BYTES_MUST_BE_A_POWER_OF_TWO u_error (); end
+    if (BYTES < 1024 || BYTES % 1024 != 0) begin : g_check BYTES_MUST_BE_A_MULTIPLE_OF_1024 u_error (); end
 
     logic [31:0] memory [0:BYTES/4-1];
 

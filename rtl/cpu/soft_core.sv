@@ -11,7 +11,7 @@
 `default_nettype none
 
 module soft_core #(
-    parameter int MEMORY_BYTES = 32768,         // a power of two
+    parameter int MEMORY_BYTES = 32768,         // a multiple of 1024
     parameter FIRMWARE = ""                     // file of its contents at power-up, see node_memory
 ) (
     input  wire                  clk,
@@ -33,9 +33,9 @@ module soft_core #(
     wire [3:0]  mem_wstrb, mem_la_wstrb;
     logic       answered, lost;                 // the registers have answered; an access went nowhere
 
-    wire in_memory    = mem_addr[31:A] == '0;
+    wire in_memory    = mem_addr < 32'(MEMORY_BYTES);
     wire in_registers = mem_addr[31:16] == 16'h8000 && !mem_instr && (&mem_wstrb || ~|mem_wstrb);
-    wire la_in_memory = mem_la_addr[31:A] == '0;
+    wire la_in_memory = mem_la_addr < 32'(MEMORY_BYTES);
 
     assign select  = mem_valid && in_registers && !answered;
     assign write   = mem_wstrb[0];

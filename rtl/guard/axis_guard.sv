@@ -2,8 +2,8 @@
 // axis_guard -- permission to drive: latches faults, blocks commands into a pressed limit switch. Firmware can only ask.
 //
 // latency  1 clk from a cause to faults and to enabled low, and from command_in to command_out; the following error 1 clk more
-// faults   estop, drive and cpu latch always; limit switches (unless homing), encoder, line watchdog, profile underrun and
-//          following error latch while enable is requested. Following error counts from the second error_valid
+// faults   estop, drive and cpu latch always; limit switches (unless homing), encoder, line watchdog, profile underrun, step
+//          overrun and following error latch while enable is requested. Following error counts from the second error_valid
 //          after enabled and closed_loop stand, so that no error measured before counts
 // reset    reset_faults clears the faults whose cause is gone, and only with enable_request low; nothing restarts by itself
 // model    tb/guard/axis_guard.py, equal in every bit of every cycle
@@ -27,6 +27,7 @@ module axis_guard (
     input  wire                  watchdog_expired,          // level: the line is silent
     input  wire                  cpu_trap,                  // level: the soft core stopped
     input  wire                  profile_underrun,          // strobe: the profile ran out of segments
+    input  wire                  step_overrun,              // level: more steps are owed than may be
     input  wire        [31:0]    following_limit,           // 2^-16 period, largest |error|; 0: not checked
     input  wire                  error_valid,               // strobe: error is new
     input  wire signed [31:0]    error,                     // 2^-16 period, target - position
@@ -36,28 +37,28 @@ module axis_guard (
     output logic                 valid_out,                 // strobe: command_out is new, or the guard made it zero
     output logic signed [15:0]   command_out,               // full scale 2^15; once made zero, zero until the next command_in
     output logic                 enabled,                   // level: the drive may be on
-    output logic [8:0]           faults,                    // latched; bits as in axis_registers.faults
-    output logic [8:0]           causes_now,                // standing now, same bits
-    output logic [8:0]           first_fault,               // the one that came first (of several at once the lowest bit)
+    output logic [9:0]           faults,                    // latched; bits as in axis_registers.faults
+    output logic [9:0]           causes_now,                // standing now, same bits
+    output logic [9:0]           first_fault,               // the one that came first (of several at once the lowest bit)
     output logic signed [47:0]   fault_position,            // 2^-16 period, when first_fault latched
     output logic                 block_up,                  // level: no positive command passes
     output logic                 block_down                 // level: no negative command passes
 );
-    localparam [8:0] LATCH_ALWAYS = 9'b0_1100_0100;         // cpu, drive, estop
+    localparam [9:0] LATCH_ALWAYS = 10'b00_1100_0100;         // cpu, drive, estop
 
     logic too_far;                                          // the last error that counted was beyond the limit
     logic error_counts;                                     // errors are measured with the drive on from here
 
     wire [31:0] distance = error[31] ? -error : error;
-    wire [8:0]  arrived  = causes_now & (enable_request ? '1 : LATCH_ALWAYS);
-    wire [8:0]  kept     = reset_faults && !enable_request ? faults & causes_now : faults;
-    wire [8:0]  latched  = kept | arrived;
+    wire [9:0]  arrived  = causes_now & (enable_request ? '1 : LATCH_ALWAYS);
+    wire [9:0]  kept     = reset_faults && !enable_request ? faults & causes_now : faults;
+    wire [9:0]  latched  = kept | arrived;
     wire        allowed  = enable_request && latched == '0;
 
     wire signed [15:0] asked = valid_in ? command_in : command_out;
     wire blocked = !allowed || (limit_high && asked > 0) || (limit_low && asked < 0);
 
-    assign causes_now = {profile_underrun, cpu_trap, drive_fault, watchdog_expired, encoder_fault, too_far, estop,
+    assign causes_now = {step_overrun, profile_underrun, cpu_trap, drive_fault, watchdog_expired, encoder_fault, too_far, estop,
                          limit_high && !homing, limit_low && !homing};
     assign block_up   = limit_high || !enabled;
     assign block_down = limit_low || !enabled;

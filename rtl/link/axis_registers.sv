@@ -18,6 +18,7 @@ module axis_registers (
     output logic               control_enable,                 // ask for the drive; the guard grants it only without a latched fault
     output logic               control_closed_loop,            // 1: servo commands the drive, 0: open_command does
     output logic               control_homing,                 // 1: a limit switch only blocks the way into it, 0: it is a fault
+    output logic               control_fine,                   // 1: the fine stage holds the position and the main command rests, 0: the fine stage rests in its middle
     output logic               strobes_reset_faults,           // strobe: clear latched faults whose cause is gone; needs enable = 0
     output logic               strobes_hold_here,              // strobe: target := position, profile queue emptied
     output logic               strobes_start,                  // strobe: play the queued segments
@@ -39,8 +40,9 @@ module axis_registers (
     input  wire                faults_drive,                   // latched causes: drive
     input  wire                faults_cpu,                     // latched causes: cpu
     input  wire                faults_profile_underrun,        // latched causes: profile underrun
-    input  wire  [8:0]         causes_now,                     // causes that stand now, same order as faults
-    input  wire  [8:0]         first_fault,                    // the cause that came first, same order as faults; one bit
+    input  wire                faults_step_overrun,            // latched causes: step overrun
+    input  wire  [9:0]         causes_now,                     // causes that stand now, same order as faults
+    input  wire  [9:0]         first_fault,                    // the cause that came first, same order as faults; one bit
     input  wire  signed [47:0] fault_position,                 // position when the first fault latched [1/65536 period]
     output logic [31:0]        following_limit,                // largest |target - position| while closed_loop; 0 switches the check off [1/65536 period]
     input  wire  signed [47:0] position,                       // position [1/65536 period]
@@ -110,13 +112,13 @@ module axis_registers (
     always_ff @(posedge clk) begin
         rdata <= '0;
         if (get) case (word)
-            6'h00: rdata <= {29'd0, control_homing, control_closed_loop, control_enable};
+            6'h00: rdata <= {28'd0, control_fine, control_homing, control_closed_loop, control_enable};
             6'h02: rdata <= {20'd0, state_queue_free, state_saturated, state_moving, state_drive_fault, state_estop,
                             state_limit_high, state_limit_low, state_enabled};
-            6'h03: rdata <= {23'd0, faults_profile_underrun, faults_cpu, faults_drive, faults_line_watchdog, faults_encoder,
-                            faults_following_error, faults_estop, faults_limit_high, faults_limit_low};
-            6'h04: rdata <= {23'd0, causes_now};
-            6'h05: rdata <= {23'd0, first_fault};
+            6'h03: rdata <= {22'd0, faults_step_overrun, faults_profile_underrun, faults_cpu, faults_drive, faults_line_watchdog,
+                            faults_encoder, faults_following_error, faults_estop, faults_limit_high, faults_limit_low};
+            6'h04: rdata <= {22'd0, causes_now};
+            6'h05: rdata <= {22'd0, first_fault};
             6'h06: rdata <= fault_position[31:0];
             6'h07: rdata <= {{16{fault_position_high[15]}}, fault_position_high};
             6'h08: rdata <= following_limit;
@@ -165,6 +167,7 @@ module axis_registers (
         if (put && word == 6'h00) control_enable <= wdata[0];
         if (put && word == 6'h00) control_closed_loop <= wdata[1];
         if (put && word == 6'h00) control_homing <= wdata[2];
+        if (put && word == 6'h00) control_fine <= wdata[3];
         strobes_reset_faults <= put && word == 6'h01 && wdata[0];
         strobes_hold_here <= put && word == 6'h01 && wdata[1];
         strobes_start <= put && word == 6'h01 && wdata[2];
@@ -214,6 +217,7 @@ module axis_registers (
             control_enable <= 1'b0;
             control_closed_loop <= 1'b0;
             control_homing <= 1'b0;
+            control_fine <= 1'b0;
             strobes_reset_faults <= 1'b0;
             strobes_hold_here <= 1'b0;
             strobes_start <= 1'b0;

@@ -84,7 +84,11 @@ module grating_registers (
     input  wire                compare_state_late,             // strobe, held: a pulse had to wait for the one before it; write 1 to clear
     input  wire  [31:0]        compare_passed,                 // points passed since arm
     output logic [15:0]        velocity_quantum,               // what the position moves by at once; 0: velocity is the way of the tick [1/65536 period]
-    input  wire  signed [39:0] velocity_fine                   // velocity with all its bits [2^-24 period/tick]
+    input  wire  signed [39:0] velocity_fine,                  // velocity with all its bits [2^-24 period/tick]
+    output logic               position_source_counts,         // 0: phases of sine and cosine, 1: counts of a and b, a quarter period each
+    output logic               position_source_steps,          // 1: the axis' own step and direction take the place of the pins a and b
+    output logic signed [2:0]  align,                          // with counts: move position and phase by this, -2 to 2; the target does not follow [1/4 period]
+    output logic               align_written                   // strobe: align has just been written, its new value stands
 );
     logic        index_events_found_held;
     logic        index_events_revolution_wrong_held;
@@ -143,6 +147,8 @@ module grating_registers (
             6'h27: rdata <= {16'd0, velocity_quantum};
             6'h28: rdata <= velocity_fine[31:0];
             6'h29: rdata <= {{24{velocity_fine_high[7]}}, velocity_fine_high};
+            6'h2A: rdata <= {30'd0, position_source_steps, position_source_counts};
+            6'h2B: rdata <= {{29{align[2]}}, align};
             default: rdata <= '0;
         endcase
         if (get && word == 6'h1C) captured_position_high <= captured_position[47:32];
@@ -202,6 +208,10 @@ module grating_registers (
         if (put && word == 6'h24) compare_gap <= wdata[23:0];
         compare_state_late_held <= compare_state_late || (compare_state_late_held && !(put && word == 6'h25 && wdata[1]));
         if (put && word == 6'h27) velocity_quantum <= wdata[15:0];
+        if (put && word == 6'h2A) position_source_counts <= wdata[0];
+        if (put && word == 6'h2A) position_source_steps <= wdata[1];
+        align_written <= put && word == 6'h2B;
+        if (put && word == 6'h2B) align <= wdata[2:0];
         if (rst) begin
             rdata <= '0;
             edge_filter_skip <= 16'h0000;
@@ -260,6 +270,10 @@ module grating_registers (
             compare_state_late_held <= 1'b0;
             velocity_quantum <= 16'h0000;
             velocity_fine_high <= '0;
+            position_source_counts <= 1'b0;
+            position_source_steps <= 1'b0;
+            align_written <= 1'b0;
+            align <= 3'h0;
         end
     end
 endmodule

@@ -20,6 +20,5 @@ uint8_t axis_set_parameter(unsigned n, uint8_t id, int64_t value);
 uint8_t axis_state(unsigned n);         // a line_state
 uint8_t axis_ended(unsigned n);         // a line_cause
 uint8_t axis_flags(unsigned n);         // line_flag bits
-int32_t axis_home_phase(unsigned n);    // [2^-16 period] last homing: its place above the phase zero it chose
 
 #endif

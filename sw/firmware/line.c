@@ -10,6 +10,7 @@
 #include "axis.h"
 #include "grating.h"
 #include "hardware.h"
+#include "homing.h"
 #include "line_protocol.h"
 #include "parameters.h"
 #include "planner.h"
@@ -137,7 +138,7 @@ static uint8_t encoder(unsigned axis)
     put(LINE_ENCODER_REPLY_QUADRATURE_COUNT, axis_read(axis, AXIS_QUADRATURE_COUNT), 4);
     put(LINE_ENCODER_REPLY_REJECTED_PULSES, axis_read(axis, AXIS_REJECTED_PULSES), 4);
     put(LINE_ENCODER_REPLY_REJECTED_SAMPLES, axis_read(axis, AXIS_REJECTED_SAMPLES), 4);
-    put(LINE_ENCODER_REPLY_HOME_PHASE, (uint32_t)axis_home_phase(axis), 4);
+    put(LINE_ENCODER_REPLY_HOME_PHASE, (uint32_t)homing_phase(axis), 4);
     put(LINE_ENCODER_REPLY_FAULT_POSITION, (uint64_t)axis_read_position(axis, AXIS_FAULT_POSITION), 8);
     reply[0] = LINE_ENCODER_REPLY_LENGTH;
     return LINE_CAUSE_OK;

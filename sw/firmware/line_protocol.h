@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x57B05458u    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x6E526DE5u    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -31,6 +31,7 @@ enum line_cause {
     LINE_CAUSE_ENDED_BY_FAULT = 18,    // a fault ended the motion
     LINE_CAUSE_RUNNING = 19,    // the motion is under way
     LINE_CAUSE_NEVER = 20,    // no motion was asked for yet
+    LINE_CAUSE_NO_INDEX = 21,    // no index was found within the home distance
 };
 
 enum line_fault {    // bits
@@ -41,8 +42,9 @@ enum line_fault {    // bits
     LINE_FAULT_ENCODER = 1 << 4,    // encoder fault
     LINE_FAULT_LINE_WATCHDOG = 1 << 5,    // the line fell silent
     LINE_FAULT_DRIVE = 1 << 6,    // the drive reports a fault
-    LINE_FAULT_CPU = 1 << 7,    // the soft core stopped
+    LINE_FAULT_CPU = 1 << 7,    // the soft core stopped or hangs
     LINE_FAULT_PROFILE_UNDERRUN = 1 << 8,    // the profile ran out of segments
+    LINE_FAULT_STEP_OVERRUN = 1 << 9,    // more steps were owed than may be: too fast for the step timing, or blocked
 };
 
 enum line_encoder_event {    // bits
@@ -115,7 +117,7 @@ enum line_operation {
     LINE_OPERATION_IDENTIFY = 1,    // who is there, and what was it built from
     LINE_OPERATION_STATUS = 2,    // state, position and faults of an axis; ended is the cause of the last motion
     LINE_OPERATION_ENABLE = 3,    // drive on (1) or off (0)
-    LINE_OPERATION_HOME = 4,    // find the zero: to the limit switch, away from it, nearest phase zero
+    LINE_OPERATION_HOME = 4,    // find the zero by the method of the parameter home_method
     LINE_OPERATION_MOVE = 5,    // go to a position
     LINE_OPERATION_STOP = 6,    // controlled stop; the drive stays on
     LINE_OPERATION_RESET_FAULTS = 7,    // clear latched faults whose cause is gone; the drive stays off
@@ -329,8 +331,11 @@ enum line_parameter {
     LINE_PARAMETER_SIGNAL_OFFSET = 46,    // signal: largest good offset; 65535 off
     LINE_PARAMETER_SIGNAL_BALANCE = 47,    // signal: largest good difference of the amplitudes; 65535 off
     LINE_PARAMETER_SIGNAL_SQUARE = 48,    // signal: largest good amplitude times sine of the phase error; 65535 off
+    LINE_PARAMETER_POSITION_SOURCE = 49,    // position from: 0 phases of sine and cosine, 1 counts of A/B, 2 the axis' own steps
+    LINE_PARAMETER_HOME_METHOD = 50,    // homing: CiA 402 methods 1, 2, 17, 18, 33, 34, 35, 37; -1 S0 (switch, way, phase zero), -2 S3 (index on either side)
+    LINE_PARAMETER_HOME_OFFSET = 51,    // [1 period] what the zero that homing finds is called
 };
-#define LINE_PARAMETER_COUNT 48u
+#define LINE_PARAMETER_COUNT 51u
 
 // X(name, id, min, max, default): all int64_t, in counts of the wire
 #define LINE_PARAMETERS(X) \
@@ -381,6 +386,9 @@ enum line_parameter {
     X(signal_dead, 45, 0LL, 65535LL, 20LL) \
     X(signal_offset, 46, 0LL, 65535LL, 12LL) \
     X(signal_balance, 47, 0LL, 65535LL, 16LL) \
-    X(signal_square, 48, 0LL, 65535LL, 16LL)
+    X(signal_square, 48, 0LL, 65535LL, 16LL) \
+    X(position_source, 49, 0LL, 2LL, 0LL) \
+    X(home_method, 50, -2LL, 37LL, -1LL) \
+    X(home_offset, 51, -1000000000LL, 1000000000LL, 0LL)
 
 #endif

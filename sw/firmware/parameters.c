@@ -3,7 +3,11 @@
 #include "parameters.h"
 
 #include "hardware.h"
+#include "homing.h"
 #include "line_protocol.h"
+
+enum position_source { PHASES, COUNTS, OWN_STEPS };
+#define PULSES_AND_DIRECTION 3u         // a mode of the decoder
 
 #define LIMITS(name, id, low, high, value) [id] = {low, high, value},
 
@@ -49,6 +53,14 @@ static void apply_sensing(unsigned axis)
     axis_write(axis, AXIS_SENSING, FIELD_PUT(AXIS_SENSING_DEGLITCH, held(samples, 0xFFFF)) |
                                    FIELD_PUT(AXIS_SENSING_SPIKE_STEP, p[LINE_PARAMETER_SPIKE_STEP]) |
                                    FIELD_PUT(AXIS_SENSING_SPIKE_HOLD, p[LINE_PARAMETER_SPIKE_HOLD]));
+}
+
+static void apply_source(unsigned axis)
+{
+    int64_t source = parameters[axis][LINE_PARAMETER_POSITION_SOURCE];
+    grating_write(axis, GRATING_POSITION_SOURCE, FIELD_PUT(GRATING_POSITION_SOURCE_COUNTS, source != PHASES) |
+                                                 FIELD_PUT(GRATING_POSITION_SOURCE_STEPS, source == OWN_STEPS));
+    grating_write(axis, GRATING_DECODER_MODE, source == OWN_STEPS ? PULSES_AND_DIRECTION : (uint32_t)parameters[axis][LINE_PARAMETER_DECODER_MODE]);
 }
 
 static void apply_signal(unsigned axis)
@@ -101,7 +113,8 @@ static void apply(unsigned axis, uint8_t id)
     case LINE_PARAMETER_ENCODER_FAULT_MASK: axis_write(axis, AXIS_ENCODER_FAULT_MASK, value); break;
     case LINE_PARAMETER_PWM_FREQUENCY: axis_write(axis, AXIS_PWM_PERIOD, held(node_read(NODE_CLK_HZ) / value, AXIS_PWM_PERIOD_MASK)); break;
     case LINE_PARAMETER_WATCHDOG_TIME: line_write(LINE_WATCHDOG_TIME, value); break;
-    case LINE_PARAMETER_DECODER_MODE: grating_write(axis, GRATING_DECODER_MODE, value); break;
+    case LINE_PARAMETER_POSITION_SOURCE:
+    case LINE_PARAMETER_DECODER_MODE: apply_source(axis); break;
     case LINE_PARAMETER_VELOCITY_QUANTUM: grating_write(axis, GRATING_VELOCITY_QUANTUM, value); break;
     case LINE_PARAMETER_SIGNAL_FAULT_MASK: grating_write(axis, GRATING_SIGNAL_FAULT_MASK, value); break;
     case LINE_PARAMETER_SIGNAL_RAIL:
@@ -127,6 +140,7 @@ void parameters_start(unsigned axis)
 uint8_t parameters_check(uint8_t id, int64_t value)
 {
     if (id < 1 || id > LINE_PARAMETER_COUNT) return LINE_CAUSE_UNKNOWN_PARAMETER;
+    if (id == LINE_PARAMETER_HOME_METHOD && !homing_method_exists(value)) return LINE_CAUSE_OUT_OF_RANGE;
     return value < table[id].low || value > table[id].high ? LINE_CAUSE_OUT_OF_RANGE : LINE_CAUSE_OK;
 }
 

@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0xafc1cbccu            // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xf9788670u            // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define LINE_BASE 0x100u
@@ -97,6 +97,14 @@ static inline void grating_write_wide(unsigned axis, uint32_t offset, uint64_t v
 #define NODE_SAMPLE_PERIOD_MASK                        0x0000ffffu
 #define NODE_SAMPLE_PERIOD_SHIFT                       0
 #define NODE_SAMPLE_PERIOD_WIDTH                       16
+#define NODE_ALIVE                                     0x020u  // w: sign of life of the firmware, wanted every 50 ms while a drive is on: beat
+#define NODE_ALIVE_BEAT_MASK                           0x00000001u
+#define NODE_ALIVE_BEAT_SHIFT                          0
+#define NODE_ALIVE_BEAT_WIDTH                          1
+#define NODE_START_AXES                                0x024u  // w: bit n: axis n
+#define NODE_START_AXES_MASK                           0x000000ffu
+#define NODE_START_AXES_SHIFT                          0
+#define NODE_START_AXES_WIDTH                          8
 
 // line: 9-bit UART, address filter, frame check, watchdog
 #define LINE_BIT_TIME                                  0x000u  // rw: duration of one bit [1/16 clk]
@@ -178,6 +186,9 @@ static inline void grating_write_wide(unsigned axis, uint32_t offset, uint64_t v
 #define AXIS_CONTROL_HOMING_MASK                       0x00000004u  // 1: a limit switch only blocks the way into it, 0: it is a fault
 #define AXIS_CONTROL_HOMING_SHIFT                      2
 #define AXIS_CONTROL_HOMING_WIDTH                      1
+#define AXIS_CONTROL_FINE_MASK                         0x00000008u  // 1: the fine stage holds the position and the main command rests, 0: the fine stage rests in its middle
+#define AXIS_CONTROL_FINE_SHIFT                        3
+#define AXIS_CONTROL_FINE_WIDTH                        1
 #define AXIS_STROBES                                   0x004u  // w: strobes
 #define AXIS_STROBES_RESET_FAULTS_MASK                 0x00000001u  // clear latched faults whose cause is gone; needs enable = 0
 #define AXIS_STROBES_RESET_FAULTS_SHIFT                0
@@ -244,14 +255,17 @@ static inline void grating_write_wide(unsigned axis, uint32_t offset, uint64_t v
 #define AXIS_FAULTS_PROFILE_UNDERRUN_MASK              0x00000100u
 #define AXIS_FAULTS_PROFILE_UNDERRUN_SHIFT             8
 #define AXIS_FAULTS_PROFILE_UNDERRUN_WIDTH             1
+#define AXIS_FAULTS_STEP_OVERRUN_MASK                  0x00000200u
+#define AXIS_FAULTS_STEP_OVERRUN_SHIFT                 9
+#define AXIS_FAULTS_STEP_OVERRUN_WIDTH                 1
 #define AXIS_CAUSES_NOW                                0x010u  // r: causes that stand now, same order as faults
-#define AXIS_CAUSES_NOW_MASK                           0x000001ffu
+#define AXIS_CAUSES_NOW_MASK                           0x000003ffu
 #define AXIS_CAUSES_NOW_SHIFT                          0
-#define AXIS_CAUSES_NOW_WIDTH                          9
+#define AXIS_CAUSES_NOW_WIDTH                          10
 #define AXIS_FIRST_FAULT                               0x014u  // r: the cause that came first, same order as faults; one bit
-#define AXIS_FIRST_FAULT_MASK                          0x000001ffu
+#define AXIS_FIRST_FAULT_MASK                          0x000003ffu
 #define AXIS_FIRST_FAULT_SHIFT                         0
-#define AXIS_FIRST_FAULT_WIDTH                         9
+#define AXIS_FIRST_FAULT_WIDTH                         10
 #define AXIS_FAULT_POSITION                            0x018u  // r: position when the first fault latched [1/65536 period]
 #define AXIS_FAULT_POSITION_LOW                        0x018u
 #define AXIS_FAULT_POSITION_HIGH                       0x01cu
@@ -664,5 +678,16 @@ static inline void grating_write_wide(unsigned axis, uint32_t offset, uint64_t v
 #define GRATING_VELOCITY_FINE_LOW                      0x0a0u
 #define GRATING_VELOCITY_FINE_HIGH                     0x0a4u
 #define GRATING_VELOCITY_FINE_WIDTH                    40
+#define GRATING_POSITION_SOURCE                        0x0a8u  // rw: what the position is made of
+#define GRATING_POSITION_SOURCE_COUNTS_MASK            0x00000001u  // 0: phases of sine and cosine, 1: counts of a and b, a quarter period each
+#define GRATING_POSITION_SOURCE_COUNTS_SHIFT           0
+#define GRATING_POSITION_SOURCE_COUNTS_WIDTH           1
+#define GRATING_POSITION_SOURCE_STEPS_MASK             0x00000002u  // 1: the axis' own step and direction take the place of the pins a and b
+#define GRATING_POSITION_SOURCE_STEPS_SHIFT            1
+#define GRATING_POSITION_SOURCE_STEPS_WIDTH            1
+#define GRATING_ALIGN                                  0x0acu  // rw: with counts: move position and phase by this, -2 to 2; the target does not follow [1/4 period]
+#define GRATING_ALIGN_MASK                             0x00000007u
+#define GRATING_ALIGN_SHIFT                            0
+#define GRATING_ALIGN_WIDTH                            3
 
 #endif

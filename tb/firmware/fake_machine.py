@@ -84,8 +84,8 @@ class Player:
 
 
 class Axis:
-    def __init__(self, position=0, low=None, high=None):
-        """Positions of the switches are those of the machine: the origin of the node does not move them."""
+    def __init__(self, position=0, low=None, high=None, index=()):
+        """Positions of the switches and of each index are those of the machine: the origin of the node does not move them."""
         self.word = {}
         self.machine, self.origin = position, 0                         # position = machine + origin
         self.low_at, self.high_at = low, high
@@ -97,7 +97,8 @@ class Axis:
         self.faults = self.first_fault = self.fault_position = 0
         self.causes = 0                                                 # those that the test sets
         self.enabled = self.seized = False
-        self.speed = 0
+        self.speed, self.passed = 0, None                               # passed: position of the index met in the last tick
+        self.index = index
         self.strobes = []                                               # (strobes, control) in order
         self.pushed = []
 
@@ -146,6 +147,8 @@ class Axis:
             limit = self.low_at - SLIDE if self.low_at is not None else None
             self.machine = self.machine + step if limit is None else max(self.machine + step, min(limit, self.machine))
         self.speed = self.machine - old
+        met = [place for place in self.index if min(old, self.machine) < place <= max(old, self.machine)]
+        self.passed = met[0 if self.speed > 0 else -1] + self.origin if met else None
         if self.low_at is not None:
             if self.machine <= self.low_at:
                 self.pressed_low = True
@@ -216,6 +219,11 @@ class Grating:
         self.waiting, self.words, self.full = 0, deque(), False
         self.points, self.written = {}, {}                              # table in force, table being written
         self.correction, self.loads = None, 0
+        self.armed, self.captured, self.latch = False, None, 0
+
+    def index(self, position):
+        if self.armed and self.word.get(DEFINES["GRATING_CAPTURE_SOURCES"], 0) & 1:
+            self.armed, self.captured = False, position
 
     def read(self, offset):
         d = DEFINES
@@ -226,6 +234,13 @@ class Grating:
         if offset == d["GRATING_RECORDER_WORD"]:
             assert self.full and self.words, "a word was read that is not there"
             return self.words.popleft()
+        if offset == d["GRATING_CAPTURE_STATE"]:
+            return d["GRATING_CAPTURE_STATE_PRESENT_MASK"] * (self.captured is not None)
+        if offset == d["GRATING_CAPTURED_POSITION"]:
+            self.latch = self.captured >> 32 & 0xFFFF
+            return self.captured & 0xFFFFFFFF
+        if offset == d["GRATING_CAPTURED_POSITION"] + 4:
+            return self.latch
         return self.word.get(offset, 0)
 
     def write(self, offset, value):
@@ -235,6 +250,9 @@ class Grating:
             self.written[value >> 18 & 255] = signed(value & 0x3FFFF, 18)
         if offset == d["GRATING_STROBES"]:
             self.strobes.append(value)
+            self.armed = self.armed or bool(value & d["GRATING_STROBES_ARM_INDEX_MASK"])
+            if value & d["GRATING_STROBES_CAPTURE_CLEAR_MASK"]:
+                self.captured = None
             if value & d["GRATING_STROBES_RECORD_MASK"]:
                 setting = self.word[d["GRATING_RECORDER"]]
                 self.records.append((bool(setting >> 16 & 1), setting & 0xFFFF))
@@ -286,7 +304,10 @@ class Machine:
     def write(self, offset, value):
         d = DEFINES
         if offset >= d["GRATING_BASE"]:
-            self.gratings[(offset - d["GRATING_BASE"]) // d["GRATING_STRIDE"]].write(offset % d["GRATING_STRIDE"], value)
+            axis = (offset - d["GRATING_BASE"]) // d["GRATING_STRIDE"]
+            self.gratings[axis].write(offset % d["GRATING_STRIDE"], value)
+            if offset % d["GRATING_STRIDE"] == d["GRATING_ALIGN"]:
+                self.axes[axis].origin += signed(value & 7, 3) * (PERIOD // 4)
         elif offset >= d["AXIS_BASE"]:
             self.axes[(offset - d["AXIS_BASE"]) // d["AXIS_STRIDE"]].write(offset % d["AXIS_STRIDE"], value)
         elif offset == d["LINE_BASE"] + d["LINE_TRANSMIT"]:
@@ -306,8 +327,10 @@ class Machine:
         """One poll of the firmware a millisecond, four servo ticks between; True when `until` came."""
         for _ in range(int(ms)):
             for _ in range(4):
-                for axis in self.axes:
+                for axis, grating in zip(self.axes, self.gratings, strict=True):
                     axis.tick()
+                    if axis.passed is not None:
+                        grating.index(axis.passed)
             self.clk += CLK_HZ // 1000
             self.poll()
             if until and until():

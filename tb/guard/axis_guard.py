@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rtl/guard/axis_guard.sv does, in integers: clk(...) is one clk and returns what is on the pins after it."""
 
-LIMIT_LOW, LIMIT_HIGH, ESTOP, FOLLOWING_ERROR, ENCODER, LINE_WATCHDOG, DRIVE, CPU, PROFILE_UNDERRUN = (1 << n for n in range(9))
+LIMIT_LOW, LIMIT_HIGH, ESTOP, FOLLOWING_ERROR, ENCODER, LINE_WATCHDOG, DRIVE, CPU, PROFILE_UNDERRUN, STEP_OVERRUN = (1 << n for n in range(10))
 LATCH_ALWAYS = ESTOP | DRIVE | CPU
 
 INPUTS = dict.fromkeys("""enable_request closed_loop homing reset_faults limit_low limit_high estop drive_fault encoder_fault
-    watchdog_expired cpu_trap profile_underrun following_limit error_valid error position valid_in command_in""".split(), 0)
+    watchdog_expired cpu_trap profile_underrun step_overrun following_limit error_valid error position valid_in command_in""".split(), 0)
 
 
 class AxisGuard:
@@ -18,7 +18,7 @@ class AxisGuard:
 
     def causes(self, i):
         standing = (i["limit_low"] and not i["homing"], i["limit_high"] and not i["homing"], i["estop"], self.too_far,
-                    i["encoder_fault"], i["watchdog_expired"], i["drive_fault"], i["cpu_trap"], i["profile_underrun"])
+                    i["encoder_fault"], i["watchdog_expired"], i["drive_fault"], i["cpu_trap"], i["profile_underrun"], i["step_overrun"])
         return sum(1 << n for n, cause in enumerate(standing) if cause)
 
     def clk(self, rst=0, **inputs):

@@ -16,12 +16,14 @@ from axis_guard import (
     LIMIT_LOW,
     LINE_WATCHDOG,
     PROFILE_UNDERRUN,
+    STEP_OVERRUN,
     AxisGuard,
 )
 from bench import run, start
 
 CAUSES = dict(limit_low=LIMIT_LOW, limit_high=LIMIT_HIGH, estop=ESTOP, encoder_fault=ENCODER, watchdog_expired=LINE_WATCHDOG,
-              drive_fault=DRIVE, cpu_trap=CPU, profile_underrun=PROFILE_UNDERRUN)
+              drive_fault=DRIVE, cpu_trap=CPU, profile_underrun=PROFILE_UNDERRUN,
+              step_overrun=STEP_OVERRUN)
 ALWAYS = ("estop", "drive_fault", "cpu_trap")
 SIGNED = ("command_out", "fault_position")
 HIGH, LOW = (1 << 15) - 1, -1 << 15

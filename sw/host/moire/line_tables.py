@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x57B05458
+PROTOCOL_CRC = 0x6E526DE5
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -50,6 +50,7 @@ CAUSES = {
     18: ("ended_by_fault", "a fault ended the motion"),
     19: ("running", "the motion is under way"),
     20: ("never", "no motion was asked for yet"),
+    21: ("no_index", "no index was found within the home distance"),
 }
 
 # bit: (name, words)
@@ -61,8 +62,9 @@ FAULTS = {
     4: ("encoder", "encoder fault"),
     5: ("line_watchdog", "the line fell silent"),
     6: ("drive", "the drive reports a fault"),
-    7: ("cpu", "the soft core stopped"),
+    7: ("cpu", "the soft core stopped or hangs"),
     8: ("profile_underrun", "the profile ran out of segments"),
+    9: ("step_overrun", "more steps were owed than may be: too fast for the step timing, or blocked"),
 }
 
 # bit: (name, words)
@@ -150,7 +152,7 @@ OPERATIONS = {operation.name: operation for operation in (
     Operation("enable", 3, "drive on (1) or off (0)",
               (("axis", "u8"), ("on", "u8"),),
               ()),
-    Operation("home", 4, "find the zero: to the limit switch, away from it, nearest phase zero",
+    Operation("home", 4, "find the zero by the method of the parameter home_method",
               (("axis", "u8"),),
               ()),
     Operation("move", 5, "go to a position",
@@ -350,4 +352,13 @@ PARAMETERS = {parameter.name: parameter for parameter in (
     Parameter("signal_square", 48, "", Fraction(1, 1),
               0, 65535, 16,
               "signal: largest good amplitude times sine of the phase error; 65535 off"),
+    Parameter("position_source", 49, "", Fraction(1, 1),
+              0, 2, 0,
+              "position from: 0 phases of sine and cosine, 1 counts of A/B, 2 the axis' own steps"),
+    Parameter("home_method", 50, "", Fraction(1, 1),
+              -2, 37, -1,
+              "homing: CiA 402 methods 1, 2, 17, 18, 33, 34, 35, 37; -1 S0 (switch, way, phase zero), -2 S3 (index on either side)"),
+    Parameter("home_offset", 51, "period", Fraction(1, 1),
+              -1000000000, 1000000000, 0,
+              "what the zero that homing finds is called"),
 )}

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0xAFC1CBCC          # CRC-32 of tables/registers.rdl
+MAP_CRC = 0xF9788670          # CRC-32 of tables/registers.rdl
 BLOCKS = {"node": (0x000, 0x000), "line": (0x100, 0x000), "axis": (0x400, 0x100), "grating": (0xC00, 0x100)}          # base, distance to the next one
 
 
@@ -51,6 +51,10 @@ FIELDS = (
           "servo tick of all axes"),
     Field("node", "sample_period", "value", 0x1C, 0, 16, False, "rw", "clk", Fraction(1),
           "sample rate of all converters"),
+    Field("node", "alive", "beat", 0x20, 0, 1, False, "w", "", Fraction(1),
+          "sign of life of the firmware, wanted every 50 ms while a drive is on: beat"),
+    Field("node", "start_axes", "value", 0x24, 0, 8, False, "w", "", Fraction(1),
+          "bit n: axis n"),
     Field("line", "bit_time", "value", 0x00, 0, 20, False, "rw", "clk", Fraction(1, 16),
           "duration of one bit"),
     Field("line", "receive", "data", 0x04, 0, 8, False, "r", "", Fraction(1),
@@ -93,6 +97,8 @@ FIELDS = (
           "1: servo commands the drive, 0: open_command does"),
     Field("axis", "control", "homing", 0x00, 2, 1, False, "rw", "", Fraction(1),
           "1: a limit switch only blocks the way into it, 0: it is a fault"),
+    Field("axis", "control", "fine", 0x00, 3, 1, False, "rw", "", Fraction(1),
+          "1: the fine stage holds the position and the main command rests, 0: the fine stage rests in its middle"),
     Field("axis", "strobes", "reset_faults", 0x04, 0, 1, False, "w", "", Fraction(1),
           "clear latched faults whose cause is gone; needs enable = 0"),
     Field("axis", "strobes", "hold_here", 0x04, 1, 1, False, "w", "", Fraction(1),
@@ -135,9 +141,11 @@ FIELDS = (
           "latched causes: cpu"),
     Field("axis", "faults", "profile_underrun", 0x0C, 8, 1, False, "r", "", Fraction(1),
           "latched causes: profile underrun"),
-    Field("axis", "causes_now", "value", 0x10, 0, 9, False, "r", "", Fraction(1),
+    Field("axis", "faults", "step_overrun", 0x0C, 9, 1, False, "r", "", Fraction(1),
+          "latched causes: step overrun"),
+    Field("axis", "causes_now", "value", 0x10, 0, 10, False, "r", "", Fraction(1),
           "causes that stand now, same order as faults"),
-    Field("axis", "first_fault", "value", 0x14, 0, 9, False, "r", "", Fraction(1),
+    Field("axis", "first_fault", "value", 0x14, 0, 10, False, "r", "", Fraction(1),
           "the cause that came first, same order as faults; one bit"),
     Field("axis", "fault_position", "value", 0x18, 0, 48, True, "r", "period", Fraction(1, 65536),
           "position when the first fault latched"),
@@ -365,5 +373,11 @@ FIELDS = (
           "what the position moves by at once; 0: velocity is the way of the tick"),
     Field("grating", "velocity_fine", "value", 0xA0, 0, 40, True, "r", "period/tick", Fraction(1, 16777216),
           "velocity with all its bits"),
+    Field("grating", "position_source", "counts", 0xA8, 0, 1, False, "rw", "", Fraction(1),
+          "0: phases of sine and cosine, 1: counts of a and b, a quarter period each"),
+    Field("grating", "position_source", "steps", 0xA8, 1, 1, False, "rw", "", Fraction(1),
+          "1: the axis' own step and direction take the place of the pins a and b"),
+    Field("grating", "align", "value", 0xAC, 0, 3, True, "rw", "period", Fraction(1, 4),
+          "with counts: move position and phase by this, -2 to 2; the target does not follow"),
 )
 BY_NAME = {(f.block, f.register, f.field): f for f in FIELDS}

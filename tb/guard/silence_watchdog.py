@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/guard/line_watchdog.sv does, in integers: clk(...) is one clk and returns expired after it."""
+"""What rtl/guard/silence_watchdog.sv does, in integers: clk(...) is one clk and returns expired after it."""
 
 
-class LineWatchdog:
+class SilenceWatchdog:
     def __init__(self, clk_hz):
         self.clk_ms, self.silent, self.expired = clk_hz // 1000, 0, 0          # silent in clk
 
-    def clk(self, rst=0, time_ms=0, frame_good=0, armed=0):
-        if rst or frame_good or not armed:
+    def clk(self, rst=0, time_ms=0, sign=0, armed=0):
+        if rst or sign or not armed:
             self.silent = self.expired = 0
         elif self.silent // self.clk_ms >= (time_ms or 65536):
             self.expired = 1

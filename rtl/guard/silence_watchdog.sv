@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// line_watchdog -- tells when the master has been silent for too long while a drive is on.
+// silence_watchdog -- tells when a sign of life has been missing for too long while a drive is on.
 //
-// latency  expired rises time_ms * (CLK_HZ / 1000) + 1 clk after the last frame_good, or after armed rose if that came
-//          later; it falls 1 clk after frame_good or after armed fell
-// model    tb/guard/line_watchdog.py, equal in every bit of every cycle
-// proved   expired only while armed and only without a good frame in the clk before; once up it stays until one of them
+// latency  expired rises time_ms * (CLK_HZ / 1000) + 1 clk after the last sign, or after armed rose if that came later;
+//          it falls 1 clk after a sign or after armed fell
+// used     for the master on the line (a good frame is the sign) and for the soft core (its firmware gives one each round)
+// model    tb/guard/silence_watchdog.py, equal in every bit of every cycle
+// proved   expired only while armed and only without a sign in the clk before; once up it stays until one of them
 `default_nettype none
 
-module line_watchdog #(
+module silence_watchdog #(
     parameter int CLK_HZ = 4_000_000                        // a multiple of 1000
 ) (
     input  wire                  clk,
     input  wire                  rst,
     input  wire        [15:0]    time_ms,                   // longest silence; 0: 65536 ms; a new one counts at once
-    input  wire                  frame_good,                // strobe: a right frame for this node
+    input  wire                  sign,                      // strobe: of life
     input  wire                  armed,                     // level: a drive is enabled
-    output logic                 expired                    // level: the line has been silent for time_ms
+    output logic                 expired                    // level: no sign for time_ms
 );
     if (CLK_HZ < 1000 || CLK_HZ % 1000 != 0) begin : g_check CLK_HZ_MUST_BE_A_MULTIPLE_OF_1000 u_error (); end
 
@@ -30,7 +31,7 @@ module line_watchdog #(
     wire        over    = silent >= longest;
 
     always_ff @(posedge clk) begin
-        if (frame_good || !armed || rst) begin
+        if (sign || !armed || rst) begin
             part    <= '0;
             silent  <= '0;
             expired <= 1'b0;
@@ -47,10 +48,10 @@ module line_watchdog #(
         past <= 1'b1;
         if (!past) assume (rst);
         if (past) begin
-            if (expired) assert ($past(armed) && !$past(frame_good));
-            if ($past(expired) && $past(armed) && !$past(frame_good) && !$past(rst)) assert (expired);
+            if (expired) assert ($past(armed) && !$past(sign));
+            if ($past(expired) && $past(armed) && !$past(sign) && !$past(rst)) assert (expired);
             if (expired && !$past(expired)) assert ($past(silent) >= $past(longest));
-            cover (part == 3 && $past(frame_good, 4));
+            cover (part == 3 && $past(sign, 4));
         end
     end
 `endif

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""line_watchdog: to the clk, both ends of the time, what clears it, and random events against the model."""
+"""silence_watchdog: to the clk, both ends of the time, what clears it, and random events against the model."""
 import random
 
 import cocotb
@@ -7,7 +7,7 @@ import pytest
 from cocotb.triggers import FallingEdge, RisingEdge, Timer
 
 from bench import run, start
-from line_watchdog import LineWatchdog
+from silence_watchdog import SilenceWatchdog
 
 CLK_NS = 10                             # as start() makes it
 
@@ -16,8 +16,8 @@ class Watchdog:
     """The design with the model beside it in every cycle."""
 
     def __init__(self, dut):
-        self.dut, self.model, self.clk_ms = dut, LineWatchdog(int(dut.CLK_HZ.value)), int(dut.CLK_HZ.value) // 1000
-        self.inputs = dict(time_ms=0, frame_good=0, armed=0)
+        self.dut, self.model, self.clk_ms = dut, SilenceWatchdog(int(dut.CLK_HZ.value)), int(dut.CLK_HZ.value) // 1000
+        self.inputs = dict(time_ms=0, sign=0, armed=0)
 
     async def reset(self, **inputs):
         await start(self.dut, **self.inputs)
@@ -25,9 +25,9 @@ class Watchdog:
         self.inputs.update(inputs)
         return self
 
-    async def clk(self, rst=0, frame_good=0, **inputs):
+    async def clk(self, rst=0, sign=0, **inputs):
         self.inputs.update(inputs)
-        now = dict(self.inputs, rst=rst, frame_good=frame_good)
+        now = dict(self.inputs, rst=rst, sign=sign)
         for name, level in now.items():
             getattr(self.dut, name).value = level
         await RisingEdge(self.dut.clk)
@@ -38,12 +38,12 @@ class Watchdog:
 
 
 @cocotb.test()
-async def expires_to_the_clk_after_the_last_good_frame(dut):
+async def expires_to_the_clk_after_the_last_sign(dut):
     watchdog = await Watchdog(dut).reset(time_ms=3, armed=1)
     for _ in range(5):
         await watchdog.clk()
     for _ in range(2):
-        assert not await watchdog.clk(frame_good=1)
+        assert not await watchdog.clk(sign=1)
         clk = 1
         while not await watchdog.clk():
             clk += 1
@@ -55,7 +55,7 @@ async def expires_to_the_clk_after_the_last_good_frame(dut):
 async def frames_in_time_keep_it_quiet(dut):
     watchdog = await Watchdog(dut).reset(time_ms=3, armed=1)
     for _ in range(5):
-        await watchdog.clk(frame_good=1)
+        await watchdog.clk(sign=1)
         assert sum([await watchdog.clk() for _ in range(3 * watchdog.clk_ms)]) == 0
 
 
@@ -78,7 +78,7 @@ async def a_new_time_counts_at_once(dut):
         assert not await watchdog.clk()
     assert await watchdog.clk(time_ms=5)
     assert await watchdog.clk(time_ms=1000)             # stays until a frame comes
-    assert not await watchdog.clk(frame_good=1)
+    assert not await watchdog.clk(sign=1)
 
 
 @cocotb.test()
@@ -87,10 +87,10 @@ async def time_0_is_65536_ms_and_65535_is_one_less(dut):
     if watchdog.clk_ms > 1:
         return                                          # it takes long, and the fastest build tells as much
     for time_ms, ms in ((65535, 65535), (0, 65536)):
-        dut.time_ms.value, dut.armed.value, dut.frame_good.value, dut.rst.value = time_ms, 1, 1, 0
+        dut.time_ms.value, dut.armed.value, dut.sign.value, dut.rst.value = time_ms, 1, 1, 0
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
-        dut.frame_good.value = 0
+        dut.sign.value = 0
         await Timer(ms * CLK_NS, "ns")
         assert not dut.expired.value
         await RisingEdge(dut.clk)
@@ -112,10 +112,10 @@ async def reset_in_mid_flow(dut):
 async def any_events_match_the_model(dut):
     watchdog = await Watchdog(dut).reset()
     for _ in range(6000):
-        await watchdog.clk(rst=random.randrange(500) == 0, frame_good=int(random.randrange(40) == 0),
+        await watchdog.clk(rst=random.randrange(500) == 0, sign=int(random.randrange(40) == 0),
                            armed=int(random.randrange(60) > 0), time_ms=random.choice((0, 1, 2, 3, 8)))
 
 
 @pytest.mark.parametrize("clk_hz", [1000, 3000])
-def test_line_watchdog(clk_hz):
-    run("line_watchdog", __file__, CLK_HZ=clk_hz)
+def test_silence_watchdog(clk_hz):
+    run("silence_watchdog", __file__, CLK_HZ=clk_hz)

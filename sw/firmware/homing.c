@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+// homing -- find the zero of an axis.
+//
+// method  zero
+//   1, 2  first index after the switch at the low, high end has opened
+//  17, 18 place where the switch at the low, high end opens
+//  33, 34 first index going down, going up
+//  35, 37 here
+//  -1     S0: home_distance away from the place where the switch at home_end opens
+//  -2     S3: index within home_distance on either side, always met going up
+//
+// A position between two phase zeros is never zero: with an interpolated scale the nearest phase zero is taken, with a counted
+// one the count itself. All but 17, 18, 35 and 37 end at the zero. Where it is called is home_offset.
+#include "homing.h"
+
+#include "clock.h"
+#include "hardware.h"
+#include "line_protocol.h"
+#include "motion.h"
+#include "parameters.h"
+
+#define S0_METHOD (-1)
+#define S3_METHOD (-2)
+#define STAND_MS 4u             // an axis that was caught by a switch stands when in this time
+#define STAND_DISTANCE 8192     // it moved less than an eighth of a period
+#define LONGEST_SEARCH (1LL << 46)
+#define CAPTURE_INDEX 1u        // bit of capture_sources
+
+enum home_step { APPROACH, CATCH, LEAVE, RELEASE, DEPART, SEEK, SEEK_CAUGHT, MET, RETURN, FIRST_SETTLE, ZERO, SECOND_SETTLE };
+
+static struct homing {
+    uint8_t step;               // home_step
+    bool up;                    // direction of the search
+    bool second;                // S3: the first side had no index
+    uint32_t mark_ms;
+    int64_t mark;               // position then
+    int64_t place;              // where the zero is to be
+    int32_t phase;
+} homings[HARDWARE_AXES];
+
+static int64_t method_of(unsigned n)
+{
+    return parameters_get(n, LINE_PARAMETER_HOME_METHOD);
+}
+
+static int64_t distance_of(unsigned n)
+{
+    return parameters_get(n, LINE_PARAMETER_HOME_DISTANCE);
+}
+
+bool homing_method_exists(int64_t method)
+{
+    return method == 1 || method == 2 || method == 17 || method == 18 || method == 33 || method == 34 || method == 35 || method == 37 ||
+           method == S0_METHOD || method == S3_METHOD;
+}
+
+static bool at_high_end(unsigned n)
+{
+    int64_t method = method_of(n);
+    return method == S0_METHOD ? parameters_get(n, LINE_PARAMETER_HOME_END) : method == 2 || method == 18;
+}
+
+static bool home_pressed(unsigned n, uint32_t state)
+{
+    return state & (at_high_end(n) ? AXIS_STATE_LIMIT_HIGH_MASK : AXIS_STATE_LIMIT_LOW_MASK);
+}
+
+static int64_t towards_switch(unsigned n, int64_t distance)
+{
+    return at_high_end(n) ? distance : -distance;
+}
+
+static uint8_t go(unsigned n, enum home_step step)
+{
+    homings[n].step = step;
+    motion_settle_begin(n);
+    return LINE_CAUSE_RUNNING;
+}
+
+// Each step that drives begins here; what the planner refuses ends the homing.
+static uint8_t drive(unsigned n, enum home_step step, int64_t distance, uint8_t velocity_id)
+{
+    return motion_play(n, distance, velocity_id) ? go(n, step) : LINE_CAUSE_OUT_OF_RANGE;
+}
+
+// A switch stops the axis and the guard lets it go no farther: the target follows it until it stands.
+static uint8_t catch_it(unsigned n, enum home_step step)
+{
+    struct homing *h = &homings[n];
+    motion_hold_here(n);
+    h->mark = axis_read_position(n, AXIS_POSITION);
+    h->mark_ms = clock_ms();
+    return go(n, step);
+}
+
+// running, ok when it stands, not_settled.
+static uint8_t stands(unsigned n)
+{
+    struct homing *h = &homings[n];
+    motion_hold_here(n);
+    if (motion_overdue(n)) return LINE_CAUSE_NOT_SETTLED;
+    if (clock_ms() - h->mark_ms < STAND_MS) return LINE_CAUSE_RUNNING;
+    int64_t position = axis_read_position(n, AXIS_POSITION), moved = position - h->mark;
+    h->mark = position;
+    h->mark_ms = clock_ms();
+    return moved < STAND_DISTANCE && moved > -STAND_DISTANCE ? LINE_CAUSE_OK : LINE_CAUSE_RUNNING;
+}
+
+static void arm(unsigned n, bool up)
+{
+    homings[n].up = up;
+    grating_write(n, GRATING_CAPTURE_SOURCES, CAPTURE_INDEX);
+    grating_write(n, GRATING_STROBES, GRATING_STROBES_CAPTURE_CLEAR_MASK | GRATING_STROBES_ARM_INDEX_MASK);
+}
+
+static uint8_t seek(unsigned n, bool up, int64_t distance)
+{
+    arm(n, up);
+    return drive(n, SEEK, up ? distance : -distance, LINE_PARAMETER_HOME_VELOCITY);
+}
+
+static uint8_t not_met(unsigned n)
+{
+    struct homing *h = &homings[n];
+    if (method_of(n) != S3_METHOD || h->second) return LINE_CAUSE_NO_INDEX;
+    h->second = true;
+    return seek(n, false, 2 * distance_of(n));
+}
+
+// The axis stands. Its origin moves so that `place` is called home_offset.
+static void zero(unsigned n)
+{
+    struct homing *h = &homings[n];
+    int32_t periods = (int32_t)((h->place + 32768) >> 16), quarters = 0;
+    if (parameters_get(n, LINE_PARAMETER_POSITION_SOURCE) != 0) {
+        int32_t counts = (int32_t)((h->place + 8192) >> 14);
+        quarters = counts - 4 * periods;                                    // -2 .. 2
+    }
+    h->phase = (int32_t)(h->place - (int64_t)periods * 65536 - quarters * 16384);
+    if (quarters) grating_write(n, GRATING_ALIGN, (uint32_t)-quarters);
+    axis_write(n, AXIS_SHIFT_ORIGIN, (uint32_t)((int32_t)parameters_get(n, LINE_PARAMETER_HOME_OFFSET) - periods));
+    if (quarters) motion_hold_here(n);
+}
+
+uint8_t homing_begin(unsigned n)
+{
+    struct homing *h = &homings[n];
+    int64_t method = method_of(n), search = distance_of(n);
+    int64_t low = parameters_get(n, LINE_PARAMETER_TRAVEL_LOW), high = parameters_get(n, LINE_PARAMETER_TRAVEL_HIGH);
+    uint8_t begun;
+    h->second = false;
+    switch (method) {
+    case 35:
+    case 37:
+        h->place = axis_read_position(n, AXIS_POSITION);
+        zero(n);
+        begun = go(n, SECOND_SETTLE);
+        break;
+    case 33:
+    case 34:
+    case S3_METHOD: begun = seek(n, method != 33, search); break;
+    default:
+        if (high > low) search += high - low;
+        if (search > LONGEST_SEARCH) search = LONGEST_SEARCH;
+        begun = home_pressed(n, axis_read(n, AXIS_STATE)) ? catch_it(n, CATCH)
+                                                          : drive(n, APPROACH, towards_switch(n, search), LINE_PARAMETER_HOME_VELOCITY);
+        break;
+    }
+    return begun == LINE_CAUSE_RUNNING ? LINE_CAUSE_OK : begun;
+}
+
+static uint8_t opened(unsigned n)
+{
+    struct homing *h = &homings[n];
+    if (method_of(n) == 1 || method_of(n) == 2) {                           // on as before, now with an eye on the index
+        arm(n, !at_high_end(n));
+        return go(n, SEEK);
+    }
+    h->place = axis_read_position(n, AXIS_POSITION);
+    motion_brake(n);
+    return go(n, RELEASE);
+}
+
+static uint8_t released(unsigned n)
+{
+    struct homing *h = &homings[n];
+    if (method_of(n) != S0_METHOD) return go(n, FIRST_SETTLE);
+    h->place -= towards_switch(n, distance_of(n));
+    return drive(n, DEPART, h->place - axis_read_position(n, AXIS_TARGET), LINE_PARAMETER_HOME_VELOCITY);
+}
+
+static uint8_t seek_poll(unsigned n, uint32_t state)
+{
+    struct homing *h = &homings[n];
+    if (FIELD_GET(grating_read(n, GRATING_CAPTURE_STATE), GRATING_CAPTURE_STATE_PRESENT)) {
+        h->place = (int64_t)(grating_read_wide(n, GRATING_CAPTURED_POSITION) << 16) >> 16;
+        grating_write(n, GRATING_CAPTURE_SOURCES, 0);
+        grating_write(n, GRATING_STROBES, GRATING_STROBES_CAPTURE_CLEAR_MASK);
+        motion_brake(n);
+        return go(n, MET);
+    }
+    if (state & (h->up ? AXIS_STATE_LIMIT_HIGH_MASK : AXIS_STATE_LIMIT_LOW_MASK)) return catch_it(n, SEEK_CAUGHT);
+    return motion_played(n) ? not_met(n) : LINE_CAUSE_RUNNING;
+}
+
+uint8_t homing_poll(unsigned n, uint32_t state)
+{
+    struct homing *h = &homings[n];
+    int64_t distance = distance_of(n), target = axis_read_position(n, AXIS_TARGET);
+    uint8_t caught;
+
+    switch (h->step) {
+    case APPROACH:
+        if (home_pressed(n, state)) return catch_it(n, CATCH);
+        return motion_played(n) ? LINE_CAUSE_NO_SWITCH : LINE_CAUSE_RUNNING;
+    case CATCH:
+        caught = stands(n);
+        if (caught != LINE_CAUSE_OK) return caught;
+        if (home_pressed(n, state)) return drive(n, LEAVE, -towards_switch(n, distance), LINE_PARAMETER_HOME_CREEP);
+        return drive(n, APPROACH, towards_switch(n, distance), LINE_PARAMETER_HOME_CREEP);     // bounced off
+    case LEAVE:
+        if (!home_pressed(n, state)) return opened(n);
+        return motion_played(n) ? LINE_CAUSE_SWITCH_STUCK : LINE_CAUSE_RUNNING;
+    case RELEASE: return motion_played(n) ? released(n) : LINE_CAUSE_RUNNING;
+    case DEPART: return motion_played(n) ? go(n, FIRST_SETTLE) : LINE_CAUSE_RUNNING;
+    case SEEK: return seek_poll(n, state);
+    case SEEK_CAUGHT:
+        caught = stands(n);
+        return caught == LINE_CAUSE_OK ? not_met(n) : caught;
+    case MET:
+        if (!motion_played(n)) return LINE_CAUSE_RUNNING;
+        if (method_of(n) != S3_METHOD || h->up) return go(n, FIRST_SETTLE);
+        return drive(n, RETURN, h->place - distance / 8 - target, LINE_PARAMETER_HOME_VELOCITY);
+    case RETURN: return motion_played(n) ? seek(n, true, distance / 4) : LINE_CAUSE_RUNNING;
+    case FIRST_SETTLE:
+        caught = motion_settle(n);
+        if (caught != LINE_CAUSE_OK) return caught;
+        zero(n);
+        if (method_of(n) == 17 || method_of(n) == 18) return LINE_CAUSE_OK;
+        return drive(n, ZERO, parameters_get(n, LINE_PARAMETER_HOME_OFFSET) * 65536 - axis_read_position(n, AXIS_TARGET),
+                     LINE_PARAMETER_HOME_CREEP);
+    case ZERO: return motion_played(n) ? go(n, SECOND_SETTLE) : LINE_CAUSE_RUNNING;
+    default: return motion_settle(n);
+    }
+}
+
+int32_t homing_phase(unsigned n)
+{
+    return homings[n].phase;
+}

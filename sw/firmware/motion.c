@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+// motion -- one motion at a time of an axis.
+#include "motion.h"
+
+#include "clock.h"
+#include "hardware.h"
+#include "line_protocol.h"
+#include "parameters.h"
+#include "planner.h"
+
+static struct motion {
+    struct plan plan;
+    bool inside;                // the error has been inside the window since inside_ms
+    uint32_t inside_ms;
+    uint32_t since_ms;          // start of settling
+} motions[HARDWARE_AXES];
+
+static void forget(struct plan *plan)
+{
+    plan->next = plan->count;
+}
+
+void motion_hold_here(unsigned n)
+{
+    forget(&motions[n].plan);
+    axis_write(n, AXIS_STROBES, AXIS_STROBES_HOLD_HERE_MASK);
+}
+
+void motion_brake(unsigned n)
+{
+    forget(&motions[n].plan);
+    axis_write(n, AXIS_STROBES, AXIS_STROBES_BRAKE_MASK);
+}
+
+void motion_feed(unsigned n)
+{
+    struct plan *plan = &motions[n].plan;
+    struct planner_segment piece;
+    bool last;
+    if (plan->next >= plan->count) return;
+    uint32_t room = FIELD_GET(axis_read(n, AXIS_STATE), AXIS_STATE_QUEUE_FREE);
+    while (room-- && planner_take(plan, &piece, &last)) {
+        axis_write_wide(n, AXIS_SEGMENT_VELOCITY, (uint64_t)piece.velocity);
+        axis_write_wide(n, AXIS_SEGMENT_ACCELERATION, (uint64_t)piece.acceleration);
+        axis_write(n, AXIS_SEGMENT_JERK, (uint32_t)piece.jerk);
+        axis_write(n, AXIS_SEGMENT_TICKS, piece.ticks | (last ? AXIS_SEGMENT_TICKS_LAST_MASK : 0));
+    }
+}
+
+bool motion_play(unsigned n, int64_t distance, uint8_t velocity_id)
+{
+    struct plan *plan = &motions[n].plan;
+    struct planner_limits limits = parameters_limits(n, velocity_id);
+    if (!planner_move(plan, &limits, distance)) return false;
+    if (plan->count == 0) return true;
+    motion_feed(n);
+    axis_write(n, AXIS_STROBES, AXIS_STROBES_START_MASK);
+    return true;
+}
+
+bool motion_played(unsigned n)
+{
+    const struct plan *plan = &motions[n].plan;
+    return plan->next >= plan->count && !(axis_read(n, AXIS_STATE) & AXIS_STATE_MOVING_MASK);
+}
+
+uint32_t motion_ticks(unsigned n)
+{
+    return motions[n].plan.ticks;
+}
+
+bool motion_inside_window(unsigned n)
+{
+    int64_t error = (int32_t)axis_read(n, AXIS_FOLLOWING_ERROR), window = parameters_get(n, LINE_PARAMETER_SETTLE_WINDOW);
+    return error <= window && error >= -window;
+}
+
+void motion_settle_begin(unsigned n)
+{
+    motions[n].inside = false;
+    motions[n].since_ms = clock_ms();
+}
+
+bool motion_overdue(unsigned n)
+{
+    return clock_ms() - motions[n].since_ms >= (uint32_t)parameters_get(n, LINE_PARAMETER_SETTLE_TIMEOUT);
+}
+
+uint8_t motion_settle(unsigned n)
+{
+    struct motion *m = &motions[n];
+    uint32_t now = clock_ms();
+    bool inside = motion_inside_window(n);
+    if (inside && !m->inside) m->inside_ms = now;
+    m->inside = inside;
+    if (inside && now - m->inside_ms >= (uint32_t)parameters_get(n, LINE_PARAMETER_SETTLE_TIME)) return LINE_CAUSE_OK;
+    return motion_overdue(n) ? LINE_CAUSE_NOT_SETTLED : LINE_CAUSE_RUNNING;
+}

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// motion -- one motion at a time of an axis: plan it, feed the player, know when it has been played and has settled.
+#ifndef MOIRE_MOTION_H
+#define MOIRE_MOTION_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+void motion_hold_here(unsigned n);      // target := position, standing, nothing queued
+void motion_brake(unsigned n);          // controlled stop
+void motion_feed(unsigned n);           // to be called often while something is played
+
+// The player must stand. A distance of zero plays nothing. false: the planner refuses it.
+bool motion_play(unsigned n, int64_t distance, uint8_t velocity_id);
+bool motion_played(unsigned n);
+uint32_t motion_ticks(unsigned n);      // duration of the motion planned last
+
+// ok, not_settled, or running as long as neither is decided.
+void motion_settle_begin(unsigned n);
+uint8_t motion_settle(unsigned n);
+bool motion_overdue(unsigned n);        // settle_timeout has passed since motion_settle_begin
+bool motion_inside_window(unsigned n);
+
+#endif
