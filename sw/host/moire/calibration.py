@@ -88,7 +88,8 @@ class Harmonics:
     def words(self) -> str:
         aliases = ", ".join(f"{self.places - order} as {order}" for order in range(1, min(self.orders, 3) + 1))
         noise = "not known: one revolution does not tell it" if self.noise is None else f"{self.noise:.2f} arcsec rms"
-        lines = [f"{self.orders} orders; noise of a reading {noise}", f"largest error {self.before:.2f} arcsec before, {self.left:.2f} after",
+        lines = [f"{self.orders} orders; noise of a reading {noise}",
+                 f"largest error {self.before:.2f} arcsec before, {self.left:.2f} after",
                  "order   amplitude   phase / deg   weight"]
         for order, (amplitude, cosine, sine, weight) in enumerate(zip(self.amplitude, self.cosine, self.sine, self.weight, strict=True), 1):
             phase = math.degrees(math.atan2(cosine, sine))
@@ -142,8 +143,8 @@ def read_readings(path) -> Readings:
             if abs(step) <= CLOSE and angle > CLOSE:
                 raise BadFile(f"{where}: the angle {angle:g} is there twice, also in line {lines[-1]}")
             if step < -CLOSE:
-                raise BadFile(f"{where}: the angle {angle:g} comes after {angles[-1] - 360 * turn:g} in line {lines[-1]}: not in the order of "
-                              "the motion")
+                raise BadFile(f"{where}: the angle {angle:g} comes after {angles[-1] - 360 * turn:g} in line {lines[-1]}: "
+                              "not in the order of the motion")
         angles.append(angle + 360 * turn)
         errors.append(error)
         lines.append(line)
@@ -174,7 +175,8 @@ def refuse_outliers(readings: Readings):
     worst = int(np.argmax(np.abs(rest)))
     if abs(rest[worst]) > OUTLIER * usual:
         raise BadFile(f"{readings.name}, line {readings.line[worst]}: the error {readings.error[worst]:g} arcsec at "
-                      f"{readings.angle[worst]:g} degrees is {abs(rest[worst]):.1f} off what the other readings say; they scatter by {usual:.1f}")
+                      f"{readings.angle[worst]:g} degrees is {abs(rest[worst]):.1f} off what the other readings say; "
+                      f"they scatter by {usual:.1f}")
 
 
 def design(angle, orders: int) -> np.ndarray:
