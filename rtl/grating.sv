@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // grating -- the measuring path of an axis: from the pins of a grating to position and velocity.
 //
-// latency  see the rooms; 33 clk from a converter word to position
+// latency  see the rooms; 22 clk from a converter word to position
 // rate     one sample per `sample_tick`, one velocity per `tick`
 // source   S0: interferometer with sine, cosine and comparator outputs; any A/B/Z scale
 // model    the models of its blocks; proved in motion by tb/system
@@ -103,17 +103,17 @@ module grating #(
     // interpolate
     wire               corrected, phase_valid, harmonics_off, stepped;
     wire signed [15:0] corrected_sin, corrected_cos;
-    wire        [15:0] plain_phase;
+    wire        [15:0] plain_phase, corrected_amplitude, tracked_phase;
     wire signed [16:0] step;
 
     signal_correction #(.W(W)) u_correction (.clk, .rst, .load(load_correction), .sin_offset, .cos_offset, .gain, .shear, .valid(sampled),
                                              .sin, .cos, .done(corrected), .sin_out(corrected_sin), .cos_out(corrected_cos));
-    arctan_table #(.W(16)) u_arctan (.clk, .rst, .valid(corrected), .sin(corrected_sin), .cos(corrected_cos), .done(phase_valid),
-                                         .phase(plain_phase));
+    arctan_pipelined #(.W(16), .STEPS(2)) u_arctan (.clk, .rst, .valid(corrected), .sin(corrected_sin), .cos(corrected_cos),
+                                                    .done(phase_valid), .phase(plain_phase), .amplitude(corrected_amplitude));
     harmonic_correction u_harmonics (.clk, .rst, .enable(harmonic_enable), .write(harmonic_write), .point(harmonic_at),
                                      .value(harmonic_value), .swap(swap_harmonics), .valid(phase_valid), .phase(plain_phase),
                                      .done(harmonics_off), .phase_out(phase));
-    fringe_tracker u_tracker (.clk, .rst, .valid(harmonics_off), .phase, .done(stepped), .step, .overspeed);
+    fringe_tracker u_tracker (.clk, .rst, .valid(harmonics_off), .phase, .done(stepped), .step, .phase_out(tracked_phase), .overspeed);
 
     // position
     wire               present, overrun, armed, late;
@@ -124,7 +124,7 @@ module grating #(
     wire        [4:0]  capture_free;
     wire signed [39:0] fine;
 
-    unwrap u_position (.clk, .rst, .valid(stepped), .step, .phase, .shift, .shift_periods, .done(position_valid), .position);
+    unwrap u_position (.clk, .rst, .valid(stepped), .step, .phase(tracked_phase), .shift, .shift_periods, .done(position_valid), .position);
     coarse_check u_coarse (.clk, .rst, .limit(disagreement_limit), .valid(position_valid), .position, .count(quadrature_count),
                            .shift, .shift_periods, .disagreement);
     velocity_estimator u_velocity (.clk, .rst, .quantum, .tick, .position, .shift, .shift_periods, .velocity, .fine);
@@ -166,7 +166,7 @@ module grating #(
         .compare_count, .compare_pulse(pulse_length), .compare_gap(gap_length), .compare_state_armed(armed), .compare_state_late(late),
         .compare_passed(passed), .velocity_quantum(quantum), .velocity_fine(fine));
 
-    wire unused = &{1'b0, quadrature_step, heading, illegal_seen, illegal_fault, revolution_fault, learnt, levels[2]};
+    wire unused = &{1'b0, quadrature_step, heading, illegal_seen, illegal_fault, revolution_fault, learnt, levels[2], corrected_amplitude};
 endmodule
 
 `default_nettype wire

@@ -65,9 +65,11 @@ def direct_verilator(runner):
 
 
 def run(top, test, **parameters):
-    """Build module `top` with `parameters` and run the cocotb tests in the file `test`. Files are found by name."""
+    """Build module `top` with `parameters` and run the cocotb tests in the file `test`. Files are found by name: a bench top beside
+    the test, every other module under rtl/."""
     __tracebackhide__ = True
     sim, waves, here = os.environ.get("SIM") or "icarus", bool(os.environ.get("WAVES")), Path(test).resolve()
+    source = here.with_name(f"{top}.sv") if here.with_name(f"{top}.sv").exists() else source_of(top)
     name = os.environ.get("PYTEST_CURRENT_TEST", "run").split("::")[-1].split(" ")[0]
     values = {k: as_sv_literal(v) for k, v in parameters.items()}
     tag = "-".join([top, *(f"{k}{v}" for k, v in values.items()), *(["waves"] if waves else [])])
@@ -85,7 +87,7 @@ def run(top, test, **parameters):
         direct_verilator(runner)
     with open(shared / "lock", "w") as lock:              # parallel workers may want the same build
         fcntl.flock(lock, fcntl.LOCK_EX)
-        runner.build(sources=[*sources, source_of(top)], hdl_toplevel=top, parameters=values, always=True,
+        runner.build(sources=[*sources, source], hdl_toplevel=top, parameters=values, always=True,
                      build_args=args, build_dir=build, timescale=("1ns", "1ps"), waves=waves)
     model_path(here.parent)
     number = seed()

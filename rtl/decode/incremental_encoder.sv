@@ -63,8 +63,9 @@ module incremental_encoder #(
         (.clk, .rst, .mode, .clear, .a(a_later), .b(b_later), .settled, .stepping, .count, .step, .heading, .illegal);
     index_latch #(.W(W), .CHECK(CHECK)) u_index
         (.clk, .rst, .active_low(index_low), .gate_mask(index_gate_mask), .gate(index_gate), .take_up(index_up), .take_down(index_down),
-         .each(index_each), .clears(index_clears), .counts_per_revolution, .arm(arm_index), .settled, .heading, .stepping, .count,
-         .a(filtered[0]), .b(filtered[1]), .z(filtered[2]), .a_later, .b_later, .clear, .armed(index_armed), .found(index_found), .index_count, .revolution_wrong);
+         .each(index_each), .clears(index_clears), .counts_per_revolution, .arm(arm_index), .probe(1'b0), .settled, .heading, .stepping,
+         .count, .a(filtered[0]), .b(filtered[1]), .z(filtered[2]), .a_later, .b_later, .clear, .armed(index_armed), .found(index_found),
+         .index_count, .revolution_wrong);
 
     always_ff @(posedge clk) begin
         if (stepping) edge_time <= now;

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// index_latch -- find the index (reference mark) of a grating, latch or clear the count exactly there, check the counts between.
+// index_latch -- find the index (reference mark) of a grating, latch or clear the count exactly there, check the counts between;
+// latch it at a probe as well.
 //
 // latency  1 clk to a_later, b_later, from which the decoder counts: so clear meets the edge that it belongs to. found and
 //          index_count 2 clk after a, b, z, together with the count of the state in which the index first stands, which is
-//          zero then if it clears; revolution_wrong 4 clk after a, b, z
+//          zero then if it clears; revolution_wrong 4 clk after a, b, z. probe 1 clk: the count that stands then
 // rate     one index per 2 clk
 // source   S3: a rising edge on R latches the position and sets a flag. An index counts once, however wide it is; gated by
 //          a and b it is one quarter period wide and lies at the same count in both directions
 // model    tb/decode/index_latch.py, equal in every bit of every cycle
 // proved   found only after an edge of a, b or z into the gated index, in a wanted direction, armed or each, and never
-//          again before z has fallen; settings alone never make one; count is cleared only with found
+//          again before z has fallen; settings alone never make one; count is cleared only with found; index_count changes
+//          only with found or by probe
 // proof    W = 4
 `default_nettype none
 
@@ -28,6 +30,7 @@ module index_latch #(
     input  wire                  clears,    // 1: an index that is found clears the count
     input  wire        [W-1:0]   counts_per_revolution, // in counts of the decoder's mode; 0, or each = 0: not checked
     input  wire                  arm,       // strobe: take the next index
+    input  wire                  probe,     // strobe: latch the count
     input  wire                  settled,   // from the decoder behind a_later, b_later, as are heading, stepping, count
     input  wire                  heading,
     input  wire                  stepping,
@@ -40,7 +43,7 @@ module index_latch #(
     output logic                 clear,
     output logic                 armed,
     output logic                 found,     // strobe
-    output logic signed [W-1:0]  index_count, // count of the last index found, before it cleared
+    output logic signed [W-1:0]  index_count, // count of the last index found, before it cleared, or of a probe since then
     output logic                 revolution_wrong // strobe: neither 0 nor counts_per_revolution since the index before
 );
     logic z_later;
@@ -68,7 +71,7 @@ module index_latch #(
         armed      <= arm || (armed && !take);
         found      <= take;
         // less the reverse of the step: an adder of its own costs nothing here, that of the decoder shared costs W cells
-        if (take) index_count <= count - {{W-1{stepped && heading}}, stepped};
+        if (take || probe) index_count <= count - {{W-1{stepped && heading}}, stepped};
         if (rst) begin
             from_below  <= 1'b0;
             from_above  <= 1'b0;
@@ -80,17 +83,15 @@ module index_latch #(
     end
 
     if (CHECK != 0) begin : g_check
-        logic         known, zeroed;        // there was an index before; it cleared the count
+        logic         known, zeroed;        // there was an index before; the last one cleared the count
         logic         judge, judge_q;       // index_count, then turn, is to be judged
         logic [W-1:0] reference, turn;      // count of the index before; counts from there
 
         wire on = each && counts_per_revolution != '0;
 
         always_ff @(posedge clk) begin
-            if (take) begin
-                reference <= zeroed ? '0 : index_count;
-                zeroed    <= clears;
-            end
+            if (take)  zeroed    <= clears;
+            if (found) reference <= zeroed ? '0 : index_count;
             judge            <= take && known && on;
             turn             <= index_count - reference;
             judge_q          <= judge;
@@ -126,7 +127,8 @@ module index_latch #(
         end
         if (past && !$past(rst)) begin
             assert (found == $past(take));
-            assert (index_count == (!found ? $past(index_count) : W'($past(count) + ($past(stepped) ? $past(heading) ? 1 : -1 : 0))));
+            if (found || $past(probe)) assert (index_count == W'($past(count) + ($past(stepped) ? $past(heading) ? 1 : -1 : 0)));
+            else assert (index_count == $past(index_count));
             assert (!armed || !found || $past(arm));
             cover (found && gate_mask == 3 && !each);
             cover (found && $past(found, 2));

@@ -80,7 +80,7 @@ module arctan_pipelined #(
         /* verilator lint_on UNUSEDSIGNAL */
 
         if (t % STEPS == 0) begin : g_held
-            always_ff @(posedge clk) begin
+            always_ff @(posedge clk) if (strobes[t/STEPS-1]) begin
                 longer_q   <= longer;
                 shorter_q  <= shorter;
                 turned_q   <= turned;

@@ -21,20 +21,23 @@ module fringe_tracker (
     input  wire        [15:0]    phase,     // one signal period = 2^16
     output logic                 done,      // strobe: step is new
     output logic signed [16:0]   step,      // 2^-16 period since the phase before
+    output logic        [15:0]   phase_out, // the phase that step leads to; stands until the next
     output logic                 overspeed  // strobe, with done: a quarter period or more from where it was expected
 );
     localparam signed [15:0] QUARTER = 16'sd16384;
 
     logic               started, strayed;   // strayed: the last phase was an overspeed
-    logic        [15:0] last;
+    logic        [15:0] last, aim;          // aim: the phase that is foreseen
     logic signed [16:0] speed;              // step per sample, of the samples that did not stray
     logic signed [17:0] foreseen;           // step: speed, or what leads back to the line after a stray one
 
-    wire signed [15:0] deviation = $signed(phase - last - foreseen[15:0]);
+    wire signed [15:0] deviation = $signed(phase - aim);
     wire signed [18:0] wanted    = 19'(foreseen) + 19'(deviation);
     wire               near      = deviation > -QUARTER && deviation < QUARTER;
     wire               fits      = wanted[18:16] == {3{wanted[16]}};
     wire signed [15:0] nearest   = $signed(phase - last);
+
+    assign phase_out = last;
 
     always_ff @(posedge clk) begin
         done      <= valid;
@@ -43,17 +46,20 @@ module fringe_tracker (
             started <= 1'b1;
             strayed <= 1'b0;
             last    <= phase;
+            aim     <= phase;
             if (!started) step <= '0;
             else if (fits && near) begin
                 step <= wanted[16:0];
                 if (!strayed) speed <= wanted[16:0];
                 foreseen <= strayed ? 18'(speed) : 18'(wanted);
+                aim      <= strayed ? phase + speed[15:0] : {phase[14:0], 1'b0} - last;
             end else begin
                 overspeed <= 1'b1;
                 if (fits && !strayed) begin
                     step     <= wanted[16:0];
                     strayed  <= 1'b1;
                     foreseen <= 18'(speed) - 18'(deviation);
+                    aim      <= aim + speed[15:0];
                 end else begin
                     step     <= 17'(nearest);
                     speed    <= '0;
@@ -77,6 +83,8 @@ module fringe_tracker (
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
+        if (past && started) assert (aim == 16'(last + foreseen[15:0]));
+        if (past && !started) assert (foreseen == 0);
         if (past && !$past(rst)) begin
             assert (done == $past(valid));
             if (done) assert (last == $past(phase));

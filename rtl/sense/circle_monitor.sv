@@ -102,21 +102,24 @@ module circle_monitor #(
     wire         [R+3:0] distance = away < 0 ? -away : away;
 
     always_ff @(posedge clk) begin
-        on_way      <= {on_way[2:0], valid};
-        judge       <= {judge[2:0], learnt};
-        length_1    <= length;
-        tilt_1      <= tilt;
-        at_axis     <= lengths[0][axis * R +: R];
-        at_diagonal <= lengths[1][quadrant * R +: R];
-
-        rise    <= $signed({4'b0, at_diagonal}) - $signed({4'b0, at_axis});
-        gap_2   <= $signed({4'b0, length_1}) - $signed({4'b0, at_axis});
-        tilt_2  <= tilt_1;
-
-        climbed <= (tilt_2[2] ? rise <<< 2 : '0) + (tilt_2[1] ? rise <<< 1 : '0) + (tilt_2[0] ? rise : '0);
-        gap_3   <= gap_2;
-
-        away    <= gap_3 - (climbed >>> 2);
+        on_way <= {on_way[2:0], valid};
+        judge  <= {judge[2:0], learnt};
+        if (valid) begin
+            length_1    <= length;
+            tilt_1      <= tilt;
+            at_axis     <= lengths[0][axis * R +: R];
+            at_diagonal <= lengths[1][quadrant * R +: R];
+        end
+        if (on_way[0]) begin
+            rise    <= $signed({4'b0, at_diagonal}) - $signed({4'b0, at_axis});
+            gap_2   <= $signed({4'b0, length_1}) - $signed({4'b0, at_axis});
+            tilt_2  <= tilt_1;
+        end
+        if (on_way[1]) begin
+            climbed <= (tilt_2[2] ? rise <<< 2 : '0) + (tilt_2[1] ? rise <<< 1 : '0) + (tilt_2[0] ? rise : '0);
+            gap_3   <= gap_2;
+        end
+        if (on_way[2]) away <= gap_3 - (climbed >>> 2);
         if (rst) on_way <= '0;
     end
 
@@ -127,18 +130,26 @@ module circle_monitor #(
         logic signed [R+1:0] along, across, oval;               // twice the offset, and twice the difference of amplitudes
         logic        [R+1:0] along_size, across_size, oval_size, offset_size, oval_size_4;
         always_ff @(posedge clk) begin
-            east        <= $signed({2'b0, lengths[kind][0 +: R]});
-            north       <= $signed({2'b0, lengths[kind][R +: R]});
-            west        <= $signed({2'b0, lengths[kind][2*R +: R]});
-            south       <= $signed({2'b0, lengths[kind][3*R +: R]});
-            along       <= east - west;
-            across      <= north - south;
-            oval        <= east + west - north - south;
-            along_size  <= along < 0 ? -along : along;
-            across_size <= across < 0 ? -across : across;
-            oval_size   <= oval < 0 ? -oval : oval;
-            offset_size <= along_size > across_size ? along_size : across_size;
-            oval_size_4 <= oval_size;
+            if (valid) begin
+                east        <= $signed({2'b0, lengths[kind][0 +: R]});
+                north       <= $signed({2'b0, lengths[kind][R +: R]});
+                west        <= $signed({2'b0, lengths[kind][2*R +: R]});
+                south       <= $signed({2'b0, lengths[kind][3*R +: R]});
+            end
+            if (on_way[0]) begin
+                along       <= east - west;
+                across      <= north - south;
+                oval        <= east + west - north - south;
+            end
+            if (on_way[1]) begin
+                along_size  <= along < 0 ? -along : along;
+                across_size <= across < 0 ? -across : across;
+                oval_size   <= oval < 0 ? -oval : oval;
+            end
+            if (on_way[2]) begin
+                offset_size <= along_size > across_size ? along_size : across_size;
+                oval_size_4 <= oval_size;
+            end
         end
         wire         [15:0]  limit  = kind == 0 ? balance_limit : square_limit;
         assign uncentred[kind] = offset_limit != '1 && 19'(offset_size) > {2'b0, offset_limit, 1'b0};

@@ -43,7 +43,7 @@ module signal_monitor #(
 );
     if (W < 8 || W > 16) begin : g_check W_MUST_BE_FROM_8_TO_16 u_error (); end
 
-        // a sudden step
+    // a sudden step
     logic signed [W-1:0] last_sin, last_cos;
     logic signed [W:0]   sin_step, cos_step;
     logic        [W:0]   sin_way, cos_way, way;
@@ -60,8 +60,10 @@ module signal_monitor #(
             sin_step <= sin - last_sin;
             cos_step <= cos - last_cos;
         end
-        sin_way <= sin_step < 0 ? -sin_step : sin_step;
-        cos_way <= cos_step < 0 ? -cos_step : cos_step;
+        if (stepped[0]) begin
+            sin_way <= sin_step < 0 ? -sin_step : sin_step;
+            cos_way <= cos_step < 0 ? -cos_step : cos_step;
+        end
         if (stepped[1]) way <= sin_way > cos_way ? sin_way : cos_way;
         if (stepped[2]) begin
             lawful <= 19'({way, 1'b0}) + 19'(jump);

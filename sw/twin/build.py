@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Builds the twin's libraries: Verilator makes C++ of rtl/node.sv, g++ makes one shared library of it and the plant.
+"""Builds the twin's libraries: Verilator makes C++ of rtl/node.sv, g++ makes one shared library of it and the machines.
 
 Everything lies under build/twin/<hash of all that goes in>, so nothing is built twice. The firmware is no part of it: it
 is written into the nodes' memory when a twin is made.
@@ -30,6 +30,8 @@ MEMORY_BYTES = 65536
 CORE_PACKAGE = "pythondata_cpu_picorv32"
 COMPILE = ["-std=c++17", "-O3", "-march=native", "-fPIC", "-fno-strict-aliasing", "-fno-semantic-interposition", "-fvisibility=hidden",
            "-w", "-pthread"]
+VERILATE = ["--cc", "-O3", "--x-assign", "fast", "--x-initial", "fast", "--no-timing", "--timescale", "1ns/1ps", "-Wall"]
+VERILATED = ["-DVERILATOR=1", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TIMING=0", "-DVM_TRACE=0"]
 OWN = ["-std=c++17", "-O3", "-march=native", "-ffp-contract=off", "-fPIC", "-Wall", "-Wextra", "-Werror"]
 
 
@@ -94,16 +96,20 @@ def made_once(folder, result, make):
     return folder / result
 
 
-def stage_library():
-    """libstage.so: one stage without a node. No Verilator needed, a few seconds."""
+def machine_sources():
+    """C++ of the machines: all but the nodes and their line."""
+    return [file for file in sorted(HERE.glob("*.cpp")) if file.stem not in ("twin", "line")]
+
+
+def machine_library():
+    """libmachine.so: the machines without a node. No Verilator needed, a few seconds."""
     tool = compiler()
 
     def make(folder):
         (folder / "parameters.h").write_text(parameters.header())
-        sources = [HERE / name for name in ("stage_library.cpp", "stage.cpp", "plant.cpp", "interferometer.cpp")]
-        run([tool, *OWN, "-shared", f"-I{folder}", f"-I{HERE}", *sources, "-o", folder / "libstage.so"], "g++ of the stage")
+        run([tool, *OWN, "-shared", f"-I{folder}", f"-I{HERE}", *machine_sources(), "-o", folder / "libmachine.so"], "g++ of the machines")
 
-    return made_once(BUILD / f"stage-{digest(own_sources(), tool)}", "libstage.so", make)
+    return made_once(BUILD / f"machine-{digest(own_sources(), tool)}", "libmachine.so", make)
 
 
 def rtl_path():
@@ -126,14 +132,31 @@ def runtime(tool, verilator):
     return made_once(BUILD / f"runtime-{digest(files, tool, COMPILE)}", "libverilated.a", make)
 
 
-def verilate(folder, verilator, clk_hz, axes):
+def verilate(folder, verilator, source, prefix, values, *more):
+    """C++ of the module in a source file, as a class named by the prefix; the modules below it are found by name."""
     find = [word for path in rtl_path() for word in ("-y", path)]
-    environment = {**os.environ, "VERILATOR_ROOT": str(verilator)}
-    settings = ["-O3", "--x-assign", "fast", "--x-initial", "fast", "--no-timing", "--timescale", "1ns/1ps", "-Wall"]
-    values = [f"-GCLK_HZ={clk_hz}", f"-GAXES={axes}", f"-GMEMORY_BYTES={MEMORY_BYTES}", '-GFIRMWARE=""']
-    run([verilator / "bin" / "verilator_bin", "--cc", *settings, "--prefix", "Vnode", "--top-module", "node", *values, *find,
-         "+libext+.sv+.v", ROOT / "rtl" / "cpu" / "picorv32.vlt", ROOT / "rtl" / "node.sv", "--Mdir", folder], "verilator",
-        environment=environment)
+    run([verilator / "bin" / "verilator_bin", *VERILATE, "--prefix", prefix, "--top-module", source.stem,
+         *(f"-G{name}={value}" for name, value in values.items()), *find, "+libext+.sv+.v", *more, source, "--Mdir", folder],
+        f"verilator of {source.stem}", environment={**os.environ, "VERILATOR_ROOT": str(verilator)})
+
+
+def simulation(driver, source, **parameters):
+    """The program made of a C++ driver and the Verilated module of a source file, which the driver includes as Vtop.h."""
+    tool, verilator = compiler(), package("verilator", "it makes C++ of the RTL")
+    support, files = runtime(tool, verilator), [driver, source, *sorted((ROOT / "rtl").rglob("*.sv"))]
+
+    def make(folder):
+        verilate(folder, verilator, source, "Vtop", parameters)
+        run([tool, *COMPILE, *VERILATED, f"-I{folder}", f"-I{verilator / 'include'}", driver, *sorted(folder.glob("Vtop*.cpp")), support,
+             "-o", folder / "run"], f"g++ of {driver.name}")
+
+    name = digest(files, tool, COMPILE, VERILATE, parameters, (verilator / "bin" / "verilator_bin").stat().st_size)
+    return made_once(ROOT / "build" / "simulation" / f"{driver.stem}-{name}", "run", make)
+
+
+def verilate_node(folder, verilator, clk_hz, axes, node):
+    values = {"CLK_HZ": clk_hz, "AXES": axes, "MEMORY_BYTES": MEMORY_BYTES, "FIRMWARE": '""', **node}
+    verilate(folder, verilator, ROOT / "rtl" / "node.sv", "Vnode", values, ROOT / "rtl" / "cpu" / "picorv32.vlt")
     code = (folder / "Vnode___024root.h").read_text()
     words = [line.split()[-1].rstrip(";") for line in code.splitlines() if line.rstrip().endswith("u_memory__DOT__memory;")]
     if len(words) != 1:
@@ -148,13 +171,14 @@ def verilate(folder, verilator, clk_hz, axes):
         f"#define NODE_MEMORY {words[0]}\n{rearm}")
 
 
-def twin_library(clk_hz=3_000_000, axes=1):
-    """libtwin.so: Verilated nodes, stages and line."""
+def twin_library(clk_hz=3_000_000, axes=1, node=None):
+    """libtwin.so: Verilated nodes, machines and line. node: more parameters of rtl/node.sv, {name: value}."""
     tool = compiler()
     verilator = package("verilator", "it makes C++ of the RTL")
     sources = [*own_sources(), *sorted((ROOT / "rtl").rglob("*.sv")), *sorted((ROOT / "rtl").rglob("*.vlt")),
                package(CORE_PACKAGE, "the soft core") / "verilog" / "picorv32.v"]
-    folder = BUILD / f"twin-{digest(sources, tool, COMPILE, clk_hz, axes, (verilator / 'bin' / 'verilator_bin').stat().st_size)}"
+    tools = tool, COMPILE, (verilator / "bin" / "verilator_bin").stat().st_size
+    folder = BUILD / f"twin-{digest(sources, clk_hz, axes, node or {}, *tools)}"
     if (folder / "libtwin.so").exists():
         return folder / "libtwin.so"
     start = time.monotonic()
@@ -163,12 +187,11 @@ def twin_library(clk_hz=3_000_000, axes=1):
 
     def make(folder):
         (folder / "parameters.h").write_text(parameters.header())
-        verilate(folder, verilator, clk_hz, axes)
+        verilate_node(folder, verilator, clk_hz, axes, node or {})
         say(f"verilated after {time.monotonic() - start:.0f} s")
         include = [f"-I{folder}", f"-I{HERE}", f"-I{verilator / 'include'}"]
-        defines = ["-DVERILATOR=1", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TIMING=0", "-DVM_TRACE=0"]
-        machine = ["stage", "plant", "interferometer", "line"]
-        jobs = [("twin", [*COMPILE, *defines])] + [(name, [*OWN, "-fvisibility=hidden"]) for name in machine]
+        machine = [file.stem for file in machine_sources()] + ["line"]
+        jobs = [("twin", [*COMPILE, *VERILATED])] + [(name, [*OWN, "-fvisibility=hidden"]) for name in machine]
         with ThreadPoolExecutor(2) as pool:
             list(pool.map(lambda job: run([tool, *job[1], *include, "-c", HERE / f"{job[0]}.cpp", "-o", folder / f"{job[0]}.o"],
                                           f"g++ of {job[0]}.cpp"), jobs))
@@ -207,7 +230,7 @@ def words_of(file):
 
 if __name__ == "__main__":
     try:
-        print(stage_library().relative_to(ROOT))
+        print(machine_library().relative_to(ROOT))
         print(twin_library().relative_to(ROOT))
         firmware()
     except BuildError as error:

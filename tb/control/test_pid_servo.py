@@ -1,28 +1,34 @@
 # SPDX-License-Identifier: Apache-2.0
-"""pid_servo: each term by hand, wind-up, the dead band, the blocked directions, both ends, and random ticks against the model."""
+"""pid_servo: each term by hand, wind-up, the dead band, the blocked directions, no jump at a change of mode or gain, the filters,
+both ends, and random ticks against the model."""
 import random
 
 import cocotb
+import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
 from bench import run, start
-from pid_servo import LATENCY, PidServo
+from pid_servo import PidServo
 
 INPUTS = ("closed_loop kp ki kd kv ka output_limit integral_limit dead_band target target_velocity target_acceleration moving "
-          "position velocity open_command block_up block_down").split()
+          "position velocity open_command block_up block_down filters_in_use").split()
 ONE = 1 << 16                           # of kp, kd, kv
 HALF = 1 << 23                          # of ki
 MOST, LIMIT = (1 << 24) - 1, (1 << 15) - 1
+UNITY = 1 << 30                         # of a filter's coefficients
+STROBES = dict(gains_changed=0, coefficient_write=0, coefficient_address=0, coefficient=0)
 
 
 class Servo:
     """The design with the model beside it in every cycle; `set` holds the inputs."""
 
     def __init__(self, dut):
-        self.dut, self.model, self.inputs = dut, PidServo(), dict.fromkeys(INPUTS, 0)
+        self.dut, self.inputs = dut, dict.fromkeys(INPUTS, 0)
+        self.terms, self.biquads = dut.TERMS.value.to_signed(), dut.BIQUADS.value.to_signed()
+        self.model = PidServo(self.terms, self.biquads)
 
     async def reset(self, **inputs):
-        await start(self.dut, tick=0, **self.inputs)
+        await start(self.dut, tick=0, **STROBES, **self.inputs)
         await FallingEdge(self.dut.clk)
         self.model.reset()
         self.set(**dict(closed_loop=1, output_limit=LIMIT, integral_limit=LIMIT) | inputs)
@@ -33,11 +39,13 @@ class Servo:
         for name, level in inputs.items():
             getattr(self.dut, name).value = level
 
-    async def clk(self, tick=0, rst=0):
-        self.dut.tick.value, self.dut.rst.value = tick, rst
+    async def clk(self, **strobes):
+        strobes = dict(STROBES, tick=0, rst=0) | strobes
+        for name, level in strobes.items():
+            getattr(self.dut, name).value = level
         await RisingEdge(self.dut.clk)
         await FallingEdge(self.dut.clk)
-        want = self.model.clk(tick=tick, rst=rst, **self.inputs)
+        want = self.model.clk(**strobes, **self.inputs)
         dut = self.dut
         got = int(dut.valid.value), dut.command.value.to_signed(), dut.error.value.to_signed(), int(dut.saturated.value)
         assert got == want, f"valid, command, error, saturated are {got}, the model has {want}"
@@ -45,16 +53,38 @@ class Servo:
 
     async def tick(self, **inputs):
         """A whole tick with these inputs; returns command and saturated."""
-        self.set(**inputs)
-        out = await self.clk(tick=1)
+        out = await self.begin(**inputs)
         while not out[0]:
             out = await self.clk()
         return out[1], out[3]
+
+    async def begin(self, **inputs):
+        """A tick, when one may come."""
+        self.set(**inputs)
+        while self.biquads and not self.model.ready:
+            await self.clk()
+        return await self.clk(tick=1)
+
+    async def commands(self, count, **inputs):
+        self.set(**inputs)
+        return [(await self.tick())[0] for _ in range(count)]
+
+    async def gains(self, **gains):
+        """As the bus writes them, one a clk."""
+        for name, value in gains.items():
+            self.set(**{name: value})
+            await self.clk(gains_changed=1)
+
+    async def filter(self, section, *coefficients):
+        for number, value in enumerate(coefficients):
+            await self.clk(coefficient_write=1, coefficient_address=8 * section + number, coefficient=value)
 
 
 @cocotb.test()
 async def each_term_by_hand(dut):
     servo = await Servo(dut).reset()
+    if servo.terms < 5:
+        return
     none = dict(kp=0, kd=0, kv=0, ka=0, target=0, position=0, target_velocity=0, velocity=0, target_acceleration=0)
     assert await servo.tick(**none, ) == (0, 0)
     assert await servo.tick(**none | dict(kp=ONE, target=70, position=-30)) == (100, 0)
@@ -69,30 +99,41 @@ async def each_term_by_hand(dut):
 @cocotb.test()
 async def the_integral_grows_by_ki_each_tick(dut):
     servo = await Servo(dut).reset(ki=1 << 22, target=6)           # 6/4 of a count a tick
-    assert [(await servo.tick())[0] for _ in range(5)] == [1, 3, 4, 6, 7]
+    assert [(await servo.tick())[0] for _ in range(6)] == [0, 1, 3, 4, 6, 7]       # see bumpless
     assert [(await servo.tick(target=-6))[0] for _ in range(6)] == [6, 4, 3, 1, 0, -2]
 
 
 @cocotb.test()
-async def latency_is_135(dut):
+async def latency_is_11_clk_and_25_a_term_and_36_a_filter(dut):
     servo = await Servo(dut).reset()
     latency = 1
     out = await servo.clk(tick=1)
     while not out[0]:
         out = await servo.clk()
         latency += 1
-    assert latency == 135 == LATENCY + 1
-    for _ in range(2):                                  # and a command every 135 clk
-        assert not (await servo.clk(tick=1))[0]
-        outs = [(await servo.clk())[0] for _ in range(134)]
-        assert outs == [0] * 133 + [1]
+    assert latency == 11 + 25 * servo.terms + 36 * servo.biquads == servo.model.latency + 1
+    assert (servo.terms, servo.biquads, latency) in ((5, 2, 208), (5, 0, 136), (2, 0, 61))
+
+
+@cocotb.test()
+async def a_tick_each_10_clk_and_25_a_term_and_177_a_filter(dut):
+    servo = await Servo(dut).reset()
+    period = 10 + 25 * servo.terms + 177 * servo.biquads + (servo.biquads == 0)
+    assert (servo.terms, servo.biquads, period) in ((5, 2, 489), (5, 0, 136), (2, 0, 61))
+    for wanted in (period, period - 1):                  # one clk earlier each second tick is ignored
+        ticks = 0
+        for n in range(4 * wanted):
+            ticks += (await servo.clk(tick=n % wanted == 0))[0]
+        assert ticks == (4 if wanted == period else 2)
+        for _ in range(period):
+            await servo.clk()
 
 
 @cocotb.test()
 async def inputs_are_taken_8_clk_after_tick(dut):
     servo = await Servo(dut).reset(kp=ONE)
     for change, want in ((8, 500), (9, 0)):
-        out, n = await servo.clk(tick=1), 0
+        out, n = await servo.begin(), 0
         while not out[0]:
             n += 1
             if n == change:
@@ -105,11 +146,11 @@ async def inputs_are_taken_8_clk_after_tick(dut):
 @cocotb.test()
 async def a_tick_within_the_calculation_is_ignored(dut):
     servo = await Servo(dut).reset(kp=ONE, target=9)
-    out, n = await servo.clk(tick=1), 1
+    out, n = await servo.begin(), 1
     while not out[0]:
         out = await servo.clk(tick=1)
         n += 1
-    assert n == 135 and out[1] == 9
+    assert n == servo.model.latency + 1 and out[1] == 9
 
 
 @cocotb.test()
@@ -134,7 +175,7 @@ async def ends_of_every_range(dut):
                                                       position=position, target_velocity=rate, velocity=-1 - rate,
                                                       target_acceleration=rate, dead_band=random.getrandbits(16))
                 assert dut.error.value.to_signed() == error
-                if gains == MOST:
+                if gains == MOST and servo.terms == 5:
                     assert (command, saturated) == (LIMIT if rate > 0 else -LIMIT, 1)       # ka outweighs them all
 
 
@@ -153,6 +194,7 @@ async def the_integral_stops_at_its_limit(dut):
 async def the_integral_does_not_wind_up_while_the_command_stands_at_its_limit(dut):
     servo = await Servo(dut).reset(kp=ONE, ki=HALF, output_limit=1000)
     for sign in (1, -1):
+        assert await servo.commands(1, target=0) == [0]
         out = [await servo.tick(target=sign * 900) for _ in range(20)]
         assert out == [(sign * 1000, 1)] * 20           # 900 + 450, which the first tick could not know
         assert await servo.tick(target=sign * -100) == (sign * 300, 0)      # -100 + 450 - 50
@@ -184,28 +226,30 @@ async def the_integral_does_not_grow_into_a_blocked_direction(dut):
         servo.set(closed_loop=1, **{block: 0})
 
 
+OFF = ((dict(closed_loop=0), dict(closed_loop=1)), (dict(block_up=1, block_down=1), dict(block_up=0, block_down=0)))
+
+
 @cocotb.test()
 async def the_integral_is_zero_in_open_loop_and_while_the_drive_is_off(dut):
     servo = await Servo(dut).reset(ki=HALF, target=100)
-    for off, on in ((dict(closed_loop=0), dict(closed_loop=1)), (dict(block_up=1, block_down=1), dict(block_up=0, block_down=0))):
-        assert [(await servo.tick())[0] for _ in range(2)] == [50, 100]
+    for off, on in OFF:
+        assert await servo.commands(3) == [0, 50, 100]  # it stands for the first tick
         servo.set(**off)
         await servo.clk()                               # one clk is enough
         servo.set(**on)
-        assert (await servo.tick())[0] == 50
-        servo.set(**off)
-        assert (await servo.tick())[0] == 0
+        assert await servo.commands(2, open_command=0) == ([100, 150] if "closed_loop" in off else [0, 50])
+        assert await servo.commands(2, **off) == [0, 0]
         servo.set(**on)
 
 
 @cocotb.test()
-async def a_command_whose_inputs_were_taken_without_power_is_zero(dut):
+async def a_command_whose_inputs_were_taken_without_power_stands(dut):
     """The firmware holds the target here and closes the loop; a tick that still saw the old target must not kick the motor."""
     servo = await Servo(dut).reset(kp=ONE, target=1 << 20, position=0)
-    for off, on in ((dict(closed_loop=0), dict(closed_loop=1)), (dict(block_up=1, block_down=1), dict(block_up=0, block_down=0))):
-        for wait in (0, 9, 10, 60, 133):
-            servo.set(target=1 << 20, **off)
-            await servo.clk(tick=1)
+    for off, on in OFF:
+        for wait in (0, 9, 10, 40, servo.model.limit - 1):
+            await servo.commands(1, target=5, **off)
+            await servo.begin(target=1 << 20)
             for _ in range(wait):
                 await servo.clk()
             servo.set(target=5, **on)
@@ -214,6 +258,105 @@ async def a_command_whose_inputs_were_taken_without_power_is_zero(dut):
                 out = await servo.clk()
             assert out[1] == (5 if wait == 0 else 0), f"power {wait} clk after the tick"
             assert await servo.tick() == (5, 0)
+
+
+@cocotb.test()
+async def closing_the_loop_goes_on_from_the_open_command(dut):
+    servo = await Servo(dut).reset(kp=ONE, ki=1 << 22, closed_loop=0, open_command=3000, target=400)
+    assert await servo.commands(2) == [3000, 3000]
+    assert await servo.commands(3, closed_loop=1) == [3000, 3100, 3200]            # 400 / 4 a tick
+    assert (await servo.tick(target=410))[0] == 3200 + 10 + 102
+
+
+@cocotb.test()
+async def opening_the_loop_is_continuous_where_open_command_is_what_stood(dut):
+    servo = await Servo(dut).reset(kp=ONE, target=700)
+    assert await servo.commands(2) == [700, 700]
+    assert await servo.commands(2, closed_loop=0, open_command=700) == [700, 700]
+    assert await servo.commands(1, open_command=-20) == [-20]
+
+
+@cocotb.test()
+async def the_drive_comes_on_at_zero_however_large_the_error_is(dut):
+    servo = await Servo(dut).reset(kp=ONE, ki=1 << 20, target=6400, block_up=1, block_down=1)
+    assert await servo.commands(2) == [0, 0]
+    assert await servo.commands(3, block_up=0, block_down=0) == [0, 400, 800]
+
+
+@cocotb.test()
+async def a_change_of_gains_makes_no_jump(dut):
+    servo = await Servo(dut).reset(kp=ONE, ki=1 << 20, target=640)
+    await servo.commands(4)
+    before = (await servo.tick())[0]
+    await servo.gains(kp=3 * ONE, kv=ONE * (servo.terms == 5))
+    assert await servo.commands(3, target_velocity=5) == [before, before + 40, before + 80]
+    await servo.gains(kp=0)
+    assert await servo.commands(2) == [before + 80, before + 120]
+    await servo.gains(kp=100 * ONE)                     # more than the integral may take
+    assert await servo.commands(2, integral_limit=1000) == [before + 120, LIMIT]
+
+
+@cocotb.test()
+async def a_change_of_gains_within_a_calculation_makes_no_jump(dut):
+    servo = await Servo(dut).reset(ki=1 << 20, target=640)
+    await servo.commands(5)
+    for wait in range(0, servo.model.latency, 19):
+        before = (await servo.tick())[0]
+        await servo.begin()
+        for _ in range(wait):
+            dut.tick.value = 0
+            await RisingEdge(dut.clk)
+            await FallingEdge(dut.clk)                  # the model holds no gains that change now
+        dut.kp.value, dut.gains_changed.value = ONE * (wait % 2), 1
+        out = []
+        while len(out) < 2:
+            await RisingEdge(dut.clk)
+            await FallingEdge(dut.clk)
+            dut.gains_changed.value, dut.tick.value = 0, int(bool(dut.valid.value) and servo.biquads == 0)
+            if dut.valid.value:
+                out.append(dut.command.value.to_signed())
+            elif servo.biquads and len(out) == 1:
+                dut.tick.value = int(dut.g_filters.u_filters.ready.value)
+        assert all(abs(command - before) <= 80 for command in out), f"{out} after {before}, changed {wait} clk after tick"
+        dut.tick.value = 0
+        servo.set(kp=0)
+        await servo.clk(rst=1)
+        await servo.commands(5)
+
+
+@cocotb.test()
+async def with_ki_0_the_command_follows_the_gains_at_once(dut):
+    servo = await Servo(dut).reset(kp=ONE, target=100)
+    assert await servo.commands(2) == [100, 100]
+    await servo.gains(kp=2 * ONE)
+    assert await servo.commands(1) == [200]
+
+
+@cocotb.test()
+async def a_filter_acts_on_the_command_and_its_limits_hold(dut):
+    servo = await Servo(dut).reset(kp=ONE, target=1000)
+    if not servo.biquads:
+        return
+    await servo.filter(0, UNITY // 2, 0, 0, UNITY // 2, 0)                          # y goes half the way each tick
+    assert await servo.commands(3, filters_in_use=1) == [1000, 1000, 1000]
+    assert await servo.commands(4, target=2000) == [1500, 1750, 1875, 1937]
+    assert await servo.commands(2, target=-1 << 20, output_limit=3000) == [-532, -1766]   # 1937.5 half the way to -3000, and again
+    servo.set(filters_in_use=0)
+    assert await servo.tick(target=100) == (100, 0)
+    await servo.filter(0, UNITY, UNITY - 1, 0, 0, 0)                                # up to twice the command
+    await servo.commands(3, filters_in_use=1)
+    assert await servo.tick(target=2000, output_limit=2050) == (2050, 1)
+
+
+@cocotb.test()
+async def the_drive_comes_on_without_a_jump_through_a_filter(dut):
+    servo = await Servo(dut).reset(kp=ONE, ki=1 << 20, target=6400, filters_in_use=0)
+    if not servo.biquads:
+        return
+    await servo.filter(0, UNITY // 2, 0, 0, UNITY // 2, 0)
+    await servo.commands(3, filters_in_use=1)
+    assert await servo.commands(2, closed_loop=0, open_command=500) == [500, 500]
+    assert await servo.commands(4, closed_loop=1) == [500, 700, 1000, 1350]       # half the way to 900, 1300, 1700
 
 
 @cocotb.test()
@@ -227,15 +370,15 @@ async def open_loop_passes_open_command_and_measures_the_error(dut):
 @cocotb.test()
 async def reset_in_mid_flow(dut):
     servo = await Servo(dut).reset(kp=ONE, ki=HALF, target=100)
-    for wait in (0, 1, 8, 9, 33, 34, 35, 133, 134):
+    for wait in (0, 1, 8, 9, 33, 34, 35, servo.model.limit, servo.model.latency - 1):
         await servo.tick()
-        await servo.clk(tick=1)
+        await servo.begin()
         for _ in range(wait):
             await servo.clk()
         assert await servo.clk(rst=1) == (0, 0, 0, 0)
         for _ in range(3):
             assert (await servo.clk())[0] == 0
-        assert await servo.tick() == (150, 0)           # integral from zero: 100 + 50
+        assert await servo.commands(2) == [0, 50]       # from zero, and the integral takes what the gain asks for
 
 
 @cocotb.test()
@@ -243,13 +386,18 @@ async def any_tick_matches_the_model(dut):
     servo = await Servo(dut).reset()
     word = lambda bits: random.randrange(-1 << bits - 1, 1 << bits - 1) >> random.randrange(bits)
     gain = lambda bits: random.getrandbits(bits) >> random.randrange(bits)
-    for n in range(120):
+    for n in range(40):
         if n % 8 == 0:
+            await servo.clk(gains_changed=random.getrandbits(1))
+            for section in range(servo.biquads):
+                servo.set(filters_in_use=0)
+                await servo.filter(section, *(random.randrange(-UNITY, UNITY) for _ in range(5)))
+                servo.set(filters_in_use=random.getrandbits(servo.biquads))
             servo.set(kp=gain(24), ki=gain(24), kd=gain(24), kv=gain(24), ka=gain(24), output_limit=gain(15),
                       integral_limit=gain(15), dead_band=gain(16), closed_loop=1, block_up=0, block_down=0)
         servo.set(target=word(48), position=word(48) if n % 3 else servo.inputs["target"] - word(20) >> 1, target_velocity=word(32),
                   target_acceleration=word(32), velocity=word(32), moving=random.getrandbits(1), open_command=word(16))
-        out = await servo.clk(tick=1)
+        out = await servo.begin()
         while not out[0]:
             if random.randrange(60) == 0:               # the guard and the firmware act in any clk
                 servo.set(block_up=random.getrandbits(1), block_down=random.getrandbits(1), closed_loop=random.randrange(4) > 0)
@@ -258,5 +406,6 @@ async def any_tick_matches_the_model(dut):
             await servo.clk()
 
 
-def test_pid_servo():
-    run("pid_servo", __file__)
+@pytest.mark.parametrize("terms, biquads", [(5, 2), (5, 0), (2, 0)])
+def test_pid_servo(terms, biquads):
+    run("pid_servo", __file__, TERMS=terms, BIQUADS=biquads)

@@ -41,7 +41,7 @@ class IndexLatch:
     def clear(self, settings, heading):
         return int(self.met(heading) and self.wanted and settings.clears)
 
-    def step(self, settings, levels, settled, heading, stepped, count, arm=0, rst=0):
+    def step(self, settings, levels, settled, heading, stepped, count, arm=0, rst=0, probe=0):
         """levels (a, b, z); stepped is -1, 0, +1 of the decoder in this clk. Returns (armed, found, index_count, revolution_wrong)."""
         met = self.met(heading)
         take = int(met and self.wanted)
@@ -52,9 +52,11 @@ class IndexLatch:
         self.judge_turn, self.turn = self.judge, self.wrap(self.index_count - self.reference)
         self.judge = int(bool(take and self.known and on))
         self.known = int(bool(on and (self.known or take)))
-        if take:
+        if self.found:
             self.reference = 0 if self.zeroed else self.index_count
+        if take:
             self.zeroed = settings.clears
+        if take or probe:
             self.index_count = self.wrap(count + stepped)
         self.used = int((self.used or met) and levels[2] != settings.active_low)
         self.up, self.down = int(entering and settings.take_up), int(entering and settings.take_down)

@@ -8,10 +8,11 @@ module recorded_encoder #(
     input  wire                 clk,
     input  wire                 rst,
     input  wire  [15:0]         stable,
+    input  wire  [1:0]          mode,       // as in quadrature_decoder
     input  wire  [PAIRS-1:0]    a,
     input  wire  [PAIRS-1:0]    b,
     output wire  [32*PAIRS-1:0] counts,     // pair 0 lowest
-    output logic [32*PAIRS-1:0] edges,      // counted edges since reset, both directions added
+    output logic [32*PAIRS-1:0] edges,      // counted edges or pulses since reset, both directions added
     output logic [32*PAIRS-1:0] rejections, // pulses held back on a and on b
     output logic [PAIRS-1:0]    illegal     // an illegal edge was seen since reset
 );
@@ -22,7 +23,7 @@ module recorded_encoder #(
 
         deglitcher u_deglitcher_a (.clk, .rst, .stable, .level(a[i]), .filtered(a_filtered), .rejected(a_rejected));
         deglitcher u_deglitcher_b (.clk, .rst, .stable, .level(b[i]), .filtered(b_filtered), .rejected(b_rejected));
-        quadrature_decoder u_decoder (.clk, .rst, .mode(2'd0), .clear(1'b0), .a(a_filtered), .b(b_filtered), .settled, .stepping,
+        quadrature_decoder u_decoder (.clk, .rst, .mode, .clear(1'b0), .a(a_filtered), .b(b_filtered), .settled, .stepping,
                                       .count(counts[32*i +: 32]), .step, .heading, .illegal(skipped));
         wire unused = &{1'b0, settled, stepping, heading};
 

@@ -16,7 +16,7 @@ PORTS = ["active_low", "gate_mask", "gate", "take_up", "take_down", "each", "cle
 
 
 async def begin(dut, levels=(0, 0, 0)):
-    idle = dict.fromkeys([*PORTS, "arm", "settled", "heading", "stepping", "count"], 0)
+    idle = dict.fromkeys([*PORTS, "arm", "probe", "settled", "heading", "stepping", "count"], 0)
     await start(dut, a=levels[0], b=levels[1], z=levels[2], **idle)
     model = IndexLatch(int(dut.W.value), int(dut.CHECK.value))
     for _ in range(2):
@@ -24,18 +24,18 @@ async def begin(dut, levels=(0, 0, 0)):
     return model
 
 
-async def clk(dut, model, settings, levels, heading=1, stepped=0, count=0, settled=1, arm=0, rst=0):
+async def clk(dut, model, settings, levels, heading=1, stepped=0, count=0, settled=1, arm=0, rst=0, probe=0):
     """One clk of both; returns (clear in this clk, armed, found, index_count, revolution_wrong after it)."""
     for name in PORTS:
         getattr(dut, name).value = getattr(settings, name)
     dut.a.value, dut.b.value, dut.z.value = levels
     dut.heading.value, dut.stepping.value, dut.count.value = heading, abs(stepped), count
-    dut.settled.value, dut.arm.value, dut.rst.value = settled, arm, rst
+    dut.settled.value, dut.arm.value, dut.probe.value, dut.rst.value = settled, arm, probe, rst
     await ReadOnly()
     clear, wanted = int(dut.clear.value), model.clear(settings, heading)
     await RisingEdge(dut.clk)
     await FallingEdge(dut.clk)
-    want = wanted, *model.step(settings, levels, settled, heading, stepped, count, arm, rst)
+    want = wanted, *model.step(settings, levels, settled, heading, stepped, count, arm, rst, probe)
     got = (clear, int(dut.armed.value), int(dut.found.value), dut.index_count.value.to_signed(), int(dut.revolution_wrong.value))
     assert got == want, f"{settings}: (clear, armed, found, index_count, revolution_wrong) is {got}, the model has {want}"
     assert (int(dut.a_later.value), int(dut.b_later.value)) == levels[:2]
@@ -89,6 +89,28 @@ async def reset_in_the_middle_of_an_index_forgets_it(dut):
 
 
 @cocotb.test()
+async def a_probe_latches_the_count_with_the_step_of_its_clk_and_is_no_index(dut):
+    model = await begin(dut)
+    for stepped, want in ((0, 5), (1, 6), (-1, 4)):
+        row = await clk(dut, model, Settings(clears=1), (0, 0, 0), heading=int(stepped >= 0), stepped=stepped, count=5, probe=1)
+        assert row[:4] == (0, 0, 0, want)
+        assert (await clk(dut, model, Settings(), (0, 0, 0), count=3))[3] == want
+
+
+@cocotb.test()
+async def a_probe_between_two_indexes_leaves_the_check_of_revolutions_alone(dut):
+    if not int(dut.CHECK.value):
+        return
+    for second, wrong in ((5, 0), (6, 1)):
+        model, settings, rows = await begin(dut), Settings(each=1, counts_per_revolution=5), []
+        for count in (0, second):
+            await clk(dut, model, settings, (0, 0, 0))
+            rows = [await clk(dut, model, settings, (0, 0, 1), count=count) for _ in range(3)]
+            rows += [await clk(dut, model, settings, (0, 0, 1), count=2, probe=1) for _ in range(3)]
+        assert sum(row[4] for row in rows) == wrong
+
+
+@cocotb.test()
 async def any_inputs_match_the_model(dut):
     model, top = await begin(dut), 1 << int(dut.W.value) - 1
     bits = random.getrandbits
@@ -99,7 +121,7 @@ async def any_inputs_match_the_model(dut):
         for _ in range(25):
             levels = [level ^ (random.randrange(change) == 0) for level in levels]
             await clk(dut, model, settings, tuple(levels), bits(1), 0, random.choice([0, 5, -1, -top, top - 1]),
-                      int(random.random() < 0.95), int(random.random() < 0.1), int(random.random() < 0.01))
+                      int(random.random() < 0.95), int(random.random() < 0.1), int(random.random() < 0.01), bits(1) & bits(1))
         await clk(dut, model, settings, tuple(levels), 1, 1, top - 1)
         await clk(dut, model, settings, tuple(levels), 0, -1, -top)
 

@@ -1,43 +1,47 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Levels recorded from a real optical mouse sensor (HDNS-2000) go through deglitcher and decoder, clean and with spikes, and
-must count what a plain offline decoder counts, at every recorded edge.
+"""Levels recorded from a real optical mouse sensor (HDNS-2000), and step and direction of a real Smoothieware controller, go through
+deglitcher and decoder, clean and with spikes, and must count what a plain offline decoder counts, at every recorded edge.
 
-A recording is 3 million samples, mostly still. One sample is one clk, but a stretch without any edge is cut to STILL clk,
+A recording is millions of samples, mostly still. One sample is one clk, but a stretch without any edge is cut to STILL clk,
 eight times what the deglitcher waits; the order of the edges and every shorter distance stay as recorded.
 """
 import csv
 import os
 import random
-from itertools import accumulate, pairwise
-from pathlib import Path
+from itertools import accumulate, islice, pairwise
 
 import cocotb
 import pytest
 from cocotb.triggers import ClockCycles, FallingEdge
 
 import bench
+from quadrature_decoder import PULSES, X4
 
 CAPTURES = bench.ROOT.parent / "shared" / "captures"
-RECORDINGS = ["hdns2000_fast", "hdns2000_left_right"]
+RECORDINGS = [("hdns2000_fast", X4), ("hdns2000_left_right", X4), ("smoothieware_steps", PULSES)]
+ROWS = 5000         # of a recording, at most
 STABLE = 5          # setting of the deglitchers, clk
 STILL = 40          # longest stretch without an edge, clk
 NAMES = ["x clean", "y clean", "x with spikes", "y with spikes"]
 
 
 def recording(name):
-    """Rows of (duration in clk, xa, xb, ya, yb)."""
+    """Rows of (duration in clk, xa, xb, ya, yb); a is step, b is direction where these are recorded."""
     with open(CAPTURES / f"{name}.csv", newline="") as lines:
-        rows = [tuple(map(int, row)) for row in csv.reader(line for line in lines if line[0].isdigit())]
+        rows = [tuple(map(int, row)) for row in islice(csv.reader(line for line in lines if line[0].isdigit()), ROWS)]
     ends = [row[0] for row in rows[1:]] + [rows[-1][0] + STILL]
     return [(min(end - row[0], STILL), *row[1:]) for row, end in zip(rows, ends)]
 
 
-def offline(levels):
-    """Count after each (a, b) of a list, and the number of edges: the side that leads says the direction, nothing is filtered."""
+def offline(levels, mode):
+    """Count after each (a, b) of a list, and how much was counted: edges by the side that leads, or pulses by their direction;
+    nothing is filtered."""
     moves = []
     for (a, b), (a_now, b_now) in pairwise(levels):
         assert (a, b) == (a_now, b_now) or (a == a_now) != (b == b_now), "the recording itself has an illegal edge"
-        if a != a_now:
+        if mode == PULSES:
+            moves.append((-1 if b_now else +1) if a_now > a else 0)
+        elif a != a_now:
             moves.append(+1 if a_now != b_now else -1)
         elif b != b_now:
             moves.append(+1 if b_now == a_now else -1)
@@ -87,15 +91,15 @@ def words(value):
 
 @cocotb.test()
 async def every_count_is_that_of_the_offline_decoder_with_and_without_spikes(dut):
-    rows = recording(os.environ["RECORDING"])
+    rows, mode = recording(os.environ["RECORDING"]), int(os.environ["MODE"])
     first = rows[0]
     a, b = first[1] | first[3] << 1, first[2] | first[4] << 1
-    await bench.start(dut, stable=STABLE, a=a | a << 2, b=b | b << 2)
+    await bench.start(dut, stable=STABLE, mode=mode, a=a | a << 2, b=b | b << 2)
     await ClockCycles(dut.clk, STILL, FallingEdge)      # filters and decoders have taken the first levels
     seen, sent = await play(dut, rows)
     await ClockCycles(dut.clk, 4 * STABLE, FallingEdge)
 
-    expected = [offline([row[1:3] for row in rows]), offline([row[3:5] for row in rows])] * 2
+    expected = [offline([row[at:at + 2] for row in rows], mode) for at in (1, 3)] * 2
     for pair, (counts, edges) in enumerate(expected):
         assert edges > 20, "a recording without motion proves nothing"
         end, total, held = (words(port.value)[pair] for port in (dut.counts, dut.edges, dut.rejections))
@@ -111,10 +115,10 @@ async def every_count_is_that_of_the_offline_decoder_with_and_without_spikes(dut
     dut._log.info("edges x %d, y %d; spikes %d, %d", expected[0][1], expected[1][1], *sent)
 
 
-@pytest.mark.parametrize("name", RECORDINGS)
-def test_recordings(name, monkeypatch):
+@pytest.mark.parametrize("name, mode", RECORDINGS)
+def test_recordings(name, mode, monkeypatch):
     if not (CAPTURES / f"{name}.csv").exists():
         pytest.skip(f"no recording {name}.csv in {CAPTURES.name}/ beside the checkout")
     monkeypatch.setenv("RECORDING", name)
-    monkeypatch.setattr(bench, "source_of", lambda top: Path(__file__).with_name(f"{top}.sv"))
+    monkeypatch.setenv("MODE", str(mode))
     bench.run("recorded_encoder", __file__)

@@ -27,6 +27,7 @@ async def clock(dut, valid, phase):
     """One clk; returns done, step, overspeed."""
     dut.valid.value, dut.phase.value = valid, phase % 65536
     await FallingEdge(dut.clk)
+    assert not int(dut.done.value) or dut.phase_out.value == phase % 65536
     return int(dut.done.value), dut.step.value.to_signed(), int(dut.overspeed.value)
 
 

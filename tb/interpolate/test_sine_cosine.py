@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From sine and cosine to position: arctan_table, fringe_tracker and unwrap in a row, driven with what a grating gives.
+"""From converter words to position: the chain of grating.sv, nothing learned yet, driven with what a grating gives.
 
 Every disturbance has a bound on the position error from theory, and every motion is held against it: the RTL on short
 motions, the models on long ones. One period is 0.8 um, as in S0.
@@ -12,12 +12,16 @@ import numpy as np
 import pytest
 from cocotb.triggers import ClockCycles, FallingEdge
 
-from arctan_table import LATENCY, arctan, phase_of
+from arctan_pipelined import arctan_rotation, sample
 from bench import run, seed, start
 from fringe_tracker import FringeTracker
 from unwrap import Unwrap
 
 PERIOD_NM = 800
+LATENCY = 22                                            # clk from a converter word to its position
+ARCTAN = arctan_rotation.quarter_bound(arctan_rotation.PIPELINED, 16)       # LSB of phase; a corrected leg is half of 16 bits large
+SETTINGS = dict(spike_step=0, spike_hold=0, load=0, sin_offset=0, cos_offset=0, gain=1 << 16, shear=0, enable=0, write=0, point=0, value=0,
+                swap=0, shift=0, shift_periods=0)
 AMPLITUDE = 0.84                                       # of full scale: room for what is added
 CLEAN = dict(offset=0.0, gain=0.0, phase=0.0, noise=0.0)
 DISTURBED = {                                           # offset, gain: of the amplitude; phase: degrees; noise: of full scale
@@ -56,10 +60,11 @@ def bound(w, offset, gain, phase, noise):
     full = 1 << w - 1
     length = AMPLITUDE * full * math.sqrt(1 - math.sin(math.radians(abs(phase)))) * min(1, 1 + gain)
     turn = phase_bound(phase) + gain_bound(gain)
-    for added in (AMPLITUDE * full * abs(offset), math.sqrt(2) * noise * full, math.sqrt(0.5)):     # the last: rounding
+    halved = math.sqrt(2) if w == 16 else 0             # an odd word loses its last bit in the correction
+    for added in (AMPLITUDE * full * abs(offset), math.sqrt(2) * noise * full, math.sqrt(0.5), halved):     # from the third on: rounding
         turn += offset_bound(added, length)
         length -= added
-    return turn / math.tau * 65536 + arctan.BOUND
+    return turn / math.tau * 65536 + ARCTAN
 
 
 def samples(where, w, draw, offset, gain, phase, noise):
@@ -103,20 +108,25 @@ def counts(position, subdivision):
     return position * subdivision >> 16
 
 
+def phase_of(w, sin, cos):
+    """Of a word that the correction leaves as it is: both legs come out of it at half the size."""
+    return sample(16, *((leg << 16 - w) + 1 >> 1 for leg in (sin, cos)))[0]
+
+
 class Chain:
     """The models in a row; follow() is one sample and returns position, overspeed."""
 
-    def __init__(self):
-        self.tracker, self.unwrap = FringeTracker(), Unwrap()
+    def __init__(self, w):
+        self.w, self.tracker, self.unwrap = w, FringeTracker(), Unwrap()
 
     def follow(self, sin, cos):
-        phase = phase_of(sin, cos)
+        phase = phase_of(self.w, sin, cos)
         step, overspeed = self.tracker.follow(phase)
         return self.unwrap.step(1, step, phase, 0, 0)[1], overspeed
 
 
 async def begin(dut):
-    await start(dut, valid=0, sin=0, cos=0)
+    await start(dut, valid=0, sin=0, cos=0, **SETTINGS)
     await FallingEdge(dut.clk)
 
 
@@ -131,20 +141,59 @@ async def follow(dut, sin, cos):
     dut.valid.value, dut.sin.value, dut.cos.value = 1, sin, cos
     await FallingEdge(dut.clk)
     dut.valid.value = 0
-    await ClockCycles(dut.clk, LATENCY + 1, FallingEdge)
+    await ClockCycles(dut.clk, LATENCY, FallingEdge)                # the first clk brought it into the bench's register
     assert dut.done.value == 1
     return dut.position.value.to_signed()
 
 
 @cocotb.test()
-async def latency_is_25_from_sample_to_position(dut):
+async def latency_is_22_clk_from_converter_word_to_position(dut):
     await begin(dut)
     dut.valid.value, dut.sin.value, dut.cos.value = 1, 50, 0
-    for clk in range(1, 26):
+    for clk in range(LATENCY + 4):                      # after clk 0 the word stands in the bench's register
         await FallingEdge(dut.clk)
         dut.valid.value = 0
-        assert int(dut.done.value) == (clk == 25)
+        assert int(dut.done.value) == (clk == LATENCY)
     assert dut.position.value == 16384
+
+
+@cocotb.test()
+async def a_learned_correction_and_harmonics_act_within_the_same_latency(dut):
+    await begin(dut)
+    w = int(dut.W.value)
+    dut.load.value, dut.sin_offset.value, dut.gain.value, dut.enable.value = 1, 10 << 16 - w, 1 << 15, 1
+    for point in range(256):
+        dut.write.value, dut.point.value, dut.value.value, dut.swap.value = 1, point, 160, int(point == 255)
+        await FallingEdge(dut.clk)
+        dut.load.value = 0
+    dut.write.value, dut.swap.value = 0, 0
+    await FallingEdge(dut.clk)                          # sin (90 - 10) / 2 = 40 = cos: an eighth, less 160 / 2^20 period
+    assert await follow(dut, 90, 40) == 8192 - 10
+
+
+@cocotb.test()
+async def a_sample_every_clk_comes_out_every_clk(dut):
+    await begin(dut)
+    w, draw = int(dut.W.value), np.random.default_rng(seed())
+    words, chain, positions = samples(0.4 + np.arange(80) * 0.037, w, draw, **CLEAN), Chain(w), []
+    for sin, cos in words + [(0, 0)] * LATENCY:
+        dut.valid.value, dut.sin.value, dut.cos.value = int(len(positions) < len(words)), sin, cos
+        await FallingEdge(dut.clk)
+        positions.append(dut.position.value.to_signed())
+    assert positions[LATENCY:] == [chain.follow(*word)[0] for word in words]
+
+
+@cocotb.test()
+async def reset_in_mid_flow_leaves_no_sample_behind(dut):
+    await begin(dut)
+    for _ in range(LATENCY - 3):
+        dut.valid.value, dut.sin.value, dut.cos.value = 1, 50, 0
+        await FallingEdge(dut.clk)
+    dut.valid.value = 0
+    await again(dut)
+    for _ in range(LATENCY + 3):
+        await FallingEdge(dut.clk)
+        assert (int(dut.done.value), int(dut.position.value)) == (0, 0)
 
 
 @cocotb.test()
@@ -155,7 +204,7 @@ async def every_motion_stays_within_the_bound_of_every_disturbance(dut):
         limit = bound(w, **amounts)
         for motion, where in motions(60, limit).items():
             await again(dut)
-            chain, worst = Chain(), 0
+            chain, worst = Chain(w), 0
             for place, (sin, cos) in zip(where, samples(where, w, draw, **amounts)):
                 position = await follow(dut, sin, cos)
                 assert (position, 0) == chain.follow(sin, cos), (disturbance, motion)
@@ -188,7 +237,7 @@ async def too_hard_a_jerk_is_an_overspeed(dut):
             dut.valid.value, dut.sin.value, dut.cos.value = 1, sin, cos
             await FallingEdge(dut.clk)
             dut.valid.value = 0
-            await ClockCycles(dut.clk, LATENCY, FallingEdge)
+            await ClockCycles(dut.clk, LATENCY - 1, FallingEdge)
             seen.append(int(dut.overspeed.value))
             await FallingEdge(dut.clk)
         assert seen == [0, 0, 1]
@@ -202,11 +251,11 @@ def test_the_bounds_are_those_of_theory():
 
 def test_eight_bits_cost_no_more_than_0_683_nm():
     angle = np.linspace(0, math.tau, 200_000, endpoint=False)
-    away = [phase_of(round(127 * s), round(127 * c)) - a / math.tau * 65536
+    away = [phase_of(8, round(127 * s), round(127 * c)) - a / math.tau * 65536
             for s, c, a in zip(np.sin(angle).tolist(), np.cos(angle).tolist(), angle.tolist())]
     worst = max(abs((e + 32768) % 65536 - 32768) for e in away) / 65536 * PERIOD_NM
     assert 0.6 < worst <= 0.683
-    assert worst <= nm(offset_bound(math.sqrt(0.5), 127)) + arctan.BOUND / 65536 * PERIOD_NM
+    assert worst <= nm(offset_bound(math.sqrt(0.5), 127)) + ARCTAN / 65536 * PERIOD_NM
 
 
 @pytest.mark.parametrize("disturbance", DISTURBED)
@@ -214,7 +263,7 @@ def test_long_motions_stay_within_the_bound_and_come_near_to_it(disturbance):
     draw, amounts = np.random.default_rng(1), DISTURBED[disturbance]
     limit, worst = bound(8, **amounts), 0
     for motion, where in motions(4000, limit).items():
-        chain = Chain()
+        chain = Chain(8)
         for place, (sin, cos) in zip(where, samples(where, 8, draw, **amounts)):
             position, overspeed = chain.follow(sin, cos)
             worst = max(worst, abs(position - place * 65536))
@@ -224,7 +273,7 @@ def test_long_motions_stay_within_the_bound_and_come_near_to_it(disturbance):
 
 @pytest.mark.parametrize("subdivision", [1, 7, 160, 1000, 65536])
 def test_the_read_out_is_the_floor_of_the_place(subdivision):
-    draw, chain, w = np.random.default_rng(1), Chain(), 16
+    draw, chain, w = np.random.default_rng(1), Chain(16), 16
     where = np.concatenate([np.linspace(0.5, 3, 1500), np.linspace(3, -3, 3500)])
     away = bound(w, **CLEAN) / 65536
     for place, (sin, cos) in zip(where, samples(where, w, draw, **CLEAN)):

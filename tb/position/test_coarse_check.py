@@ -9,7 +9,8 @@ from bench import run, start
 from coarse_check import CoarseCheck
 
 IDLE = dict(limit=0, valid=0, position=0, count=0, shift=0, shift_periods=0)
-LIMIT = 49152                                           # 3/4 period, as in tables/line.toml
+LIMIT = 32768                                           # as in tables/line.toml: as far from the quarter period between two counts
+                                                        # as from the 3/4 period that a lost fringe leaves at worst
 
 
 async def begin(dut):
@@ -82,6 +83,19 @@ async def one_lost_fringe_shows_in_both_directions(dut):
         assert await rest(dut, 5000 + lost, 0)
         assert await rest(dut, 5000 + lost + 16384, 1)
         assert not await rest(dut, 5000 + 16384, 1)
+
+
+@cocotb.test()
+async def a_lost_fringe_shows_at_the_next_position_wherever_the_constant_was_learned(dut):
+    await begin(dut)
+    for learned in (0, 1, 8000, 16383):                 # place within a count
+        for place in (0, 16383):
+            for lost in (65536, -65536):
+                await again(dut)
+                await rest(dut, learned, 0)
+                assert not await rest(dut, place, 0)
+                await clock(dut, place + lost, 0)
+                assert [await clock(dut, place + lost, 0) for _ in range(2)] == [0, 1]
 
 
 @cocotb.test()

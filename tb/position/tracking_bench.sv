@@ -16,9 +16,10 @@ module tracking_bench (
 );
     wire               stepped;
     wire signed [16:0] step;
+    wire        [15:0] tracked_phase;
 
-    fringe_tracker u_tracker (.clk, .rst, .valid, .phase, .done(stepped), .step, .overspeed);
-    unwrap u_position (.clk, .rst, .valid(stepped), .step, .phase, .shift(1'b0), .shift_periods(32'sd0), .done, .position);
+    fringe_tracker u_tracker (.clk, .rst, .valid, .phase, .done(stepped), .step, .phase_out(tracked_phase), .overspeed);
+    unwrap u_position (.clk, .rst, .valid(stepped), .step, .phase(tracked_phase), .shift(1'b0), .shift_periods(32'sd0), .done, .position);
     coarse_check u_coarse (.clk, .rst, .limit, .valid(done), .position, .count, .shift(1'b0), .shift_periods(32'sd0), .disagreement);
 endmodule
 

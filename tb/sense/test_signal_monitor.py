@@ -194,6 +194,24 @@ async def a_leg_that_opens_at_rest_is_found_at_the_second_sample(dut):
 
 
 @cocotb.test()
+async def a_signal_lost_in_both_legs_is_told_at_the_second_sample_moving_or_at_rest(dut):
+    for steps in (4.1, 60, None):                       # samples a fringe; None: at rest
+        for place in (0.125, 0.77):
+            watch, size = await learnt(dut)
+            await watch.turn(size, place, steps=200)
+            for n in range(20):
+                angle = 2 * np.pi * (place + (n / steps if steps else 0))
+                await watch.sample(size * np.cos(angle), size * np.sin(angle))
+            await watch.rest()
+            assert "too_low" not in names(watch.seen)
+            second = watch.clks + 1
+            for _ in range(2):
+                await watch.sample(0, 0)
+            await watch.rest()
+            assert watch.rose["too_low"] == second + CLKS[FAULTS.index("too_low")]
+
+
+@cocotb.test()
 async def the_first_fault_stands_until_it_is_cleared(dut):
     watch = await begin(dut, Settings(rail=10, high=10))
     for _ in range(3):

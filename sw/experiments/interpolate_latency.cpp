@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// interpolate_latency: one word through the measuring path, from its converter's pins to the position; prints the clk from the word
+// standing in the converter's register to its position. Both data lines stand at 1: sin and cos are at their upper end, 45 degrees.
+#include <cstdint>
+#include <cstdio>
+#include "Vgrating.h"
+#include "Vgrating___024root.h"
+
+int main() {
+    constexpr int LONGEST = 1000;                             // clk
+    constexpr uint64_t EIGHTH = 8192;                         // 2^-16 period
+    Vgrating grating;
+    int clk = 0;
+    const auto step = [&] {
+        grating.clk = 0;
+        grating.eval();
+        grating.clk = 1;
+        grating.eval();
+        clk++;
+    };
+    grating.adc_sin = grating.adc_cos = 1;
+    grating.rst = 1;
+    step();
+    step();
+    grating.rst = 0;
+    grating.sample_tick = 1;
+    step();
+    grating.sample_tick = 0;
+    while (!grating.rootp->grating__DOT__converted && clk < LONGEST) step();
+    const int word = clk;
+    while (!grating.position_valid && clk < LONGEST) step();
+    if (clk == LONGEST || grating.position != EIGHTH) {
+        std::fprintf(stderr, "no position of an eighth within %d clk of the word: it is %lld\n", clk - word,
+                     static_cast<long long>(grating.position));
+        return 1;
+    }
+    std::printf("%d\n", clk - word);
+}

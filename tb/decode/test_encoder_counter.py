@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: Apache-2.0
+"""encoder_counter: its words by hand, latencies, flags, probe and index, and random pins and accesses against the model."""
+import random
+
+import cocotb
+import pytest
+from cocotb.triggers import FallingEdge
+
+from bench import run, start
+from encoder_counter import ARM, FOUND, ILLEGAL, PROBED, EncoderCounter
+
+TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]                 # a leads b: up
+UP, DOWN, EACH, CLEARS, PROBE, PROBE_LOW = (1 << n for n in range(10, 16))
+
+
+class Bench:
+    """Design and model side by side, the pins of a scale at `place`."""
+
+    @classmethod
+    async def begin(cls, dut, settings=0):
+        bench = cls()
+        bench.dut, bench.now, bench.z, bench.probe, bench.place = dut, 0, 0, 0, 0
+        bench.model = EncoderCounter(*(int(getattr(dut, name).value) for name in ("FILTER_W", "SPARE_W", "SKIP_W")))
+        await start(dut, select=0, write=0, word=0, wdata=0, now=0, a=0, b=0, z=0, probe=0)
+        await FallingEdge(dut.clk)
+        for _ in range(3):
+            bench.model.step(0, 0, 0, rst=1)
+        await bench.clk(rst=1)
+        await bench.wait(12)
+        await bench.write(2, settings)
+        return bench
+
+    async def clk(self, levels=None, rst=0, **access):
+        a, b = levels or TURN[self.place % 4]
+        self.now = (self.now + 1) % 65536
+        pins = dict(a=a, b=b, z=self.z, probe=self.probe, now=self.now, rst=rst, **dict(select=0, write=0, word=0, wdata=0) | access)
+        for name, value in pins.items():
+            getattr(self.dut, name).value = value
+        await FallingEdge(self.dut.clk)
+        want, got = self.model.step(**pins), self.dut.rdata.value
+        assert want is None or int(got) == want, f"word {pins['word']}: read {got}, the model has {want:08x}"
+        return want
+
+    async def wait(self, clk, **more):
+        for _ in range(clk):
+            await self.clk(**more)
+
+    async def write(self, word, wdata):
+        await self.clk(select=1, write=1, word=word, wdata=wdata)
+
+    async def read(self, word):
+        return await self.clk(select=1, word=word)
+
+    async def go(self, places, clk=1):
+        for place in places:
+            self.place = place
+            await self.wait(clk)
+
+    async def count(self):
+        return await self.read(0) & 0xFFFF
+
+    async def latched(self):
+        return await self.read(1) >> 16
+
+    async def flags(self):
+        return await self.read(1) & (FOUND | PROBED | ILLEGAL | ARM)
+
+
+@cocotb.test()
+async def count_and_the_time_of_its_last_edge_are_one_word(dut):
+    bench = await Bench.begin(dut)
+    await bench.go(range(1, 8), clk=5)
+    moved = bench.now - 4                               # the clk in which the last edge came to the pins
+    assert await bench.read(0) == moved + 3 - 1 << 16 | 7       # 3 clk to count; the time is that of the clk before
+    await bench.go(range(6, -4, -1), clk=5)
+    assert await bench.count() == 0xFFFD
+
+
+@cocotb.test()
+async def latency_is_3_clk_from_the_pins_without_filter_and_1_clk_to_rdata(dut):
+    bench = await Bench.begin(dut)
+    await bench.go(range(1, 5))                         # the time means nothing before the first step
+    await bench.wait(4)
+    bench.place = 5
+    assert [await bench.count() for _ in range(4)] == [4, 4, 4, 5]
+
+
+@cocotb.test()
+async def rdata_is_0_when_nothing_is_read_and_word_3_does_not_exist(dut):
+    bench = await Bench.begin(dut, UP | EACH)
+    await bench.go(range(1, 4))
+    assert await bench.clk(word=2) == 0 and await bench.read(3) == 0 and await bench.read(2) == UP | EACH
+
+
+@cocotb.test()
+async def settings_that_are_left_out_read_0(dut):
+    bench = await Bench.begin(dut)
+    filter_w, spare_w, skip_w = (int(getattr(dut, name).value) for name in ("FILTER_W", "SPARE_W", "SKIP_W"))
+    for value in (0xFFFFFFFF, 0, 0xA5A5A5A5):
+        await bench.write(2, value)
+        there = value & 0xFFF0 | value & 2**filter_w - 1 | value & (2**spare_w - 1) << 16 | value & (2**skip_w - 1) << 20
+        assert await bench.read(2) == there
+
+
+@cocotb.test()
+async def an_index_clears_and_latches_exactly_on_a_count_edge(dut):
+    for clears, count in ((0, 9), (CLEARS, 3)):
+        bench = await Bench.begin(dut, UP | EACH | clears)
+        for place in range(1, 10):
+            bench.z = int(place == 6)
+            await bench.go([place], clk=2)
+        bench.z = 0
+        await bench.wait(6)
+        assert await bench.count() == count and await bench.latched() == 6 and await bench.flags() == FOUND
+        await bench.write(1, FOUND)
+        assert await bench.flags() == 0 and await bench.latched() == 6
+
+
+@cocotb.test()
+async def once_takes_one_index_for_each_arm(dut):
+    bench = await Bench.begin(dut, UP)
+    for armed in (0, 1, 0):
+        if armed:
+            await bench.write(1, ARM)
+            assert await bench.flags() == ARM
+        before = await bench.flags()
+        bench.z = 1
+        await bench.go([bench.place + 1], clk=6)
+        bench.z = 0
+        await bench.wait(6)
+        assert await bench.flags() == (FOUND if armed else before & ~ARM)
+        await bench.write(1, FOUND)
+
+
+@cocotb.test()
+async def a_probe_latches_the_count_of_its_own_pins_at_its_wanted_edge(dut):
+    for low in (0, 1):
+        bench = await Bench.begin(dut, PROBE | low * PROBE_LOW)
+        for place in range(1, 13):                      # one edge a clk: latched is that of the very clk
+            bench.probe = int(4 <= place < 9)
+            await bench.go([place])
+        await bench.wait(4)
+        assert await bench.latched() == (9 if low else 4) and await bench.flags() == PROBED
+        bench.probe = 0
+        await bench.wait(4)
+        await bench.write(1, PROBED)
+        assert await bench.flags() == 0
+
+
+@cocotb.test()
+async def probe_is_3_clk_to_latched(dut):
+    bench = await Bench.begin(dut, PROBE)
+    await bench.go(range(1, 6))
+    await bench.wait(4)
+    bench.probe = 1
+    assert [await bench.latched() for _ in range(5)] == [0, 0, 0, 5, 5]
+
+
+@cocotb.test()
+async def a_probe_that_is_not_wanted_and_new_settings_latch_nothing(dut):
+    bench = await Bench.begin(dut)
+    await bench.go(range(1, 4))
+    bench.probe = 1
+    await bench.wait(4)
+    for settings in (PROBE, PROBE | PROBE_LOW, PROBE, 0, PROBE_LOW):
+        await bench.write(2, settings)
+        await bench.wait(4)
+    assert await bench.flags() == 0 and await bench.latched() == 0
+
+
+@cocotb.test()
+async def an_illegal_edge_is_not_counted_and_stands_until_told(dut):
+    bench = await Bench.begin(dut)
+    await bench.go(range(1, 3))
+    await bench.wait(4)
+    await bench.go([4], clk=5)                          # from (1, 1) to (0, 0)
+    assert await bench.count() == 2 and await bench.flags() == ILLEGAL
+    await bench.write(1, FOUND | PROBED)
+    assert await bench.flags() == ILLEGAL
+    await bench.write(1, ILLEGAL)
+    assert await bench.flags() == 0
+
+
+@cocotb.test()
+async def a_flag_that_comes_again_in_the_clk_in_which_it_is_forgotten_stays(dut):
+    bench = await Bench.begin(dut)
+    await bench.go([2])
+    for _ in range(6):                                  # one of these meets it
+        await bench.write(1, ILLEGAL)
+        bench.place += 2
+    await bench.wait(4)
+    assert await bench.flags() == ILLEGAL
+
+
+@cocotb.test()
+async def pulses_shorter_than_the_filter_never_count(dut):
+    needed = (1 << int(dut.FILTER_W.value)) - 1
+    bench = await Bench.begin(dut, needed)
+    await bench.go(range(1, 3), clk=needed + 4)
+    for _ in range(5):
+        await bench.wait(needed - 1, levels=(0, 1))
+        await bench.wait(needed + 2)
+    assert await bench.count() == 2
+    bench.place = 3
+    assert [await bench.count() for _ in range(needed + 3)].index(3) == max(needed, 1) + 2
+
+
+@cocotb.test()
+async def reset_in_mid_flow_forgets_all_but_the_pins(dut):
+    bench = await Bench.begin(dut, UP | EACH | PROBE)
+    bench.z = 1
+    await bench.go(range(1, 6), clk=2)
+    await bench.clk(rst=1)
+    await bench.wait(20)
+    assert await bench.count() == 0 and await bench.read(2) == 0 and await bench.flags() == 0 and await bench.latched() == 0
+
+
+@cocotb.test()
+async def any_pins_and_accesses_match_the_model_in_every_clk(dut):
+    bench, bits = await Bench.begin(dut), random.getrandbits
+    for _ in range(100):
+        mask = 0xFFF3FFF3 if random.random() < 0.2 else 0x0011FFF3      # short filters, or any
+        await bench.write(2, bits(32) & mask)
+        way, clk = random.choice([-1, 1]), random.choice([1, 1, 2, 6])
+        for n in range(60):
+            if n % clk == 0:
+                way = -way if random.random() < 0.1 else way
+                bench.place += way * random.choice([0, 1, 1, 1, 1, 1, 1, 2])
+                bench.z, bench.probe = int(bench.place % 12 in (0, 1)), bench.probe ^ (random.random() < 0.1)
+            told = dict(select=bits(1), write=bits(1), word=1, wdata=bits(8) & bits(8)) if random.random() < 0.2 else \
+                dict(select=bits(1), write=0, word=bits(2), wdata=bits(32))
+            await bench.clk(rst=int(random.random() < 0.002), **told)
+
+
+@pytest.mark.parametrize("filter_w, spare_w, skip_w", [(4, 0, 0), (1, 0, 0), (3, 2, 4)])
+def test_encoder_counter(filter_w, spare_w, skip_w):
+    run("encoder_counter", __file__, FILTER_W=filter_w, SPARE_W=spare_w, SKIP_W=skip_w)

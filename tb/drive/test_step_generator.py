@@ -1,0 +1,317 @@
+# SPDX-License-Identifier: Apache-2.0
+"""step_generator: edges by hand in every mode, timings on the wire, nothing lost, and random lines against the model in every cycle."""
+import random
+import shutil
+import subprocess
+from fractions import Fraction
+
+import cocotb
+import pytest
+from cocotb.triggers import FallingEdge, RisingEdge
+
+from bench import ROOT, run, start
+from step_generator import StepGenerator
+
+PERIOD_W, TIME_W, AHEAD_W = 8, 5, 4
+ONE = 1 << 16
+IDLE = dict(period=20, high_clk=1, low_clk=1, setup_clk=2, hold_clk=1, mode=0, step_low=0, direction_low=0, enable=0, load=0, tick=0,
+            target=0)
+WAVEFORM = ROOT / "build" / "step_generator.csv"
+
+
+class Generator:
+    """The design with the model beside it in every cycle; `seen` has (step, direction) of every clk."""
+
+    def __init__(self, dut):
+        self.dut, self.model, self.inputs, self.seen = dut, StepGenerator(PERIOD_W, AHEAD_W), dict(IDLE), []
+
+    async def reset(self, **inputs):
+        self.inputs.update(inputs)
+        await start(self.dut, **self.inputs)
+        await FallingEdge(self.dut.clk)
+        self.model.reset(self.inputs["target"])
+        await self.wait(10)
+        self.inputs["enable"] = 1
+        await self.clk()
+        self.seen = []
+        return self
+
+    async def clk(self, **inputs):
+        self.inputs.update(inputs)
+        once = dict(self.inputs, rst=self.inputs.pop("rst", 0))
+        for name, level in once.items():
+            getattr(self.dut, name).value = level
+        self.inputs.update(tick=0, load=0)
+        await RisingEdge(self.dut.clk)
+        await FallingEdge(self.dut.clk)
+        got = tuple(int(port.value) for port in (self.dut.step, self.dut.direction)) + (
+            self.dut.steps.value.to_signed(), int(self.dut.overrun.value))
+        want = self.model.clk(**once)
+        assert got == want, f"{once}: step, direction, steps, overrun are {got}, the model has {want}"
+        self.seen.append(got[:2])
+        return got
+
+    async def wait(self, clks):
+        for _ in range(clks):
+            got = await self.clk()
+        return got
+
+    async def line(self, target, clks=None):
+        """Tick with this target (in steps), then wait for the next; what was on the pins."""
+        first = len(self.seen)
+        await self.clk(tick=1, target=int(target * ONE))
+        if (clks or self.inputs["period"]) > 1:
+            await self.wait((clks or self.inputs["period"]) - 1)
+        return self.seen[first:]
+
+
+def rises(levels, before=0):
+    """Clk after the tick in which a level is high and was not."""
+    return [clk for clk, level in enumerate(levels, start=1) if level and not (levels[clk - 2] if clk > 1 else before)]
+
+
+@cocotb.test()
+async def by_hand(dut):
+    generator = await Generator(dut).reset(target=0, period=20)
+    await generator.line(1)                                                     # turns upward, one step at its end
+    pins = await generator.line(5) + await generator.line(5)
+    assert [clk for clk in rises([step for step, _ in pins]) if clk > 2] == [5, 7, 12, 17, 22]     # the first had to turn
+    assert all(direction for _, direction in pins[4:])
+    pins = await generator.line(3) + await generator.line(3)
+    assert rises([step for step, _ in pins]) == [6, 13]         # below 5 at 1 clk, but turns first; below 4 at 11 clk
+    assert [direction for _, direction in pins].index(0) == 3
+    assert (await generator.clk())[2] == 3
+
+
+@cocotb.test()
+async def the_edge_comes_1_clk_after_the_line_has_passed(dut):
+    for target, latency in ((Fraction(1), 20), (Fraction(2), 10), (Fraction(4), 5)):
+        generator = await Generator(dut).reset(target=0)
+        await generator.line(Fraction(1, ONE))                                  # now it heads up, or not yet
+        await generator.clk(load=1, target=0)
+        generator.model.upward or await generator.line(1)
+        await generator.wait(5)
+        await generator.clk(load=1, target=0)
+        await generator.wait(5)
+        pins = await generator.line(target) + await generator.line(target)
+        first = rises([step for step, _ in pins])[0]
+        assert first - 2 == latency, "tick, then `latency` clk of the line, then 1 clk to the pin"
+
+
+@cocotb.test()
+async def the_wire_is_at_the_floor_of_the_line_after_every_line(dut):
+    generator = await Generator(dut).reset(target=-5 * ONE // 3, period=37)
+    place, origin = Fraction(-5, 3), -2
+    for _ in range(60):
+        place = Fraction(int((place + Fraction(random.randrange(-9000, 9000), 1000)) * ONE), ONE)
+        await generator.line(place)
+        await generator.wait(12)                                # a line's last steps may have to turn first
+        got = await generator.clk()
+        assert got[2] == place // 1 - origin and not got[3]
+
+
+@cocotb.test()
+async def a_step_each_2_clk_at_most_and_the_rest_is_made_up(dut):
+    generator = await Generator(dut).reset(target=0, period=100, setup_clk=0, hold_clk=0)
+    await generator.line(49)
+    pins = await generator.line(99)
+    steps = rises([step for step, _ in pins], before=pins[0][0])
+    assert {b - a for a, b in zip(steps, steps[1:])} == {2}
+    await generator.line(157)                                                   # 58 steps in 100 clk: 8 are owed
+    assert (await generator.wait(30))[2:] == (157, 0)
+
+
+@cocotb.test()
+async def timings_are_kept_at_both_ends(dut):
+    for high, low, setup, hold in ((0, 0, 0, 0), (1, 1, 1, 1), (31, 1, 1, 1), (1, 31, 1, 1), (1, 1, 31, 1), (1, 1, 1, 31), (3, 4, 9, 7)):
+        generator = await Generator(dut).reset(target=0, period=120, high_clk=high, low_clk=low, setup_clk=setup, hold_clk=hold)
+        for target in (3, 1, 4, 4, 0, 0):
+            await generator.line(target)
+        assert (await generator.wait(300))[2:] == (0, 0)
+        since_edge = since_turn = since_gap = 1000
+        shortest = dict(high=1000, low=1000, setup=1000, hold=1000)
+        for (step, direction), (step_now, direction_now) in zip(generator.seen, generator.seen[1:]):
+            since_edge, since_turn, since_gap = since_edge + 1, since_turn + 1, since_gap + 1
+            if direction != direction_now:
+                assert not step and not step_now
+                shortest["hold"], since_turn = min(shortest["hold"], since_gap), 0
+            if step != step_now:
+                name = "high" if step else "low"
+                shortest[name] = min(shortest[name], since_edge)
+                if step:
+                    since_gap = 0
+                else:
+                    shortest["setup"] = min(shortest["setup"], since_turn)
+                since_edge = 0
+        assert shortest["high"] == max(high, 1)                 # never shorter, and no longer than it must be
+        assert shortest["low"] >= max(low, 1) and shortest["hold"] >= max(hold, 1)
+        assert shortest["setup"] == max(setup, 2)
+
+
+@cocotb.test()
+async def quadrature_has_an_edge_a_step_and_a_leads_going_up(dut):
+    generator = await Generator(dut).reset(target=0, mode=1, high_clk=2, low_clk=2, period=40)
+    gray = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    for target in (9, 4, -7, -7):
+        await generator.line(target, 80)
+    place = 0
+    stood = 100
+    for before, after in zip(generator.seen, generator.seen[1:]):
+        stood += 1
+        if before != after:
+            way = (gray.index(after) - gray.index(before)) % 4
+            assert way in (1, 3) and stood >= 4
+            place, stood = place + (1 if way == 1 else -1), 0
+    assert place == -7 == (await generator.clk())[2]
+
+
+@cocotb.test()
+async def pulses_going_up_are_on_step_and_those_going_down_on_direction(dut):
+    generator = await Generator(dut).reset(target=0, mode=2, period=40)
+    for target in (5, 5, 2, 2):
+        await generator.line(target)
+    assert len(rises([step for step, _ in generator.seen])) == 5 and len(rises([down for _, down in generator.seen])) == 3
+
+
+@cocotb.test()
+async def polarity_turns_the_pins_over(dut):
+    for mode in (0, 1, 2):
+        seen = []
+        for low in (0, 1):
+            generator = await Generator(dut).reset(target=0, mode=mode, step_low=low, direction_low=low, period=30)
+            for target in (3, 1, 1):
+                await generator.line(target)
+            seen.append(generator.seen)
+        assert seen[0] == [(1 - step, 1 - direction) for step, direction in seen[1]]
+
+
+@cocotb.test()
+async def off_finishes_the_pulse_and_on_again_does_not_jump(dut):
+    generator = await Generator(dut).reset(target=0, period=40, high_clk=6)
+    await generator.line(4)
+    while not generator.seen[-1][0]:
+        await generator.clk()
+    pins = [await generator.clk(enable=0, target=900 * ONE) for _ in range(60)]
+    assert [pin[0] for pin in pins] == [1] * 5 + [0] * 55                       # the pulse was 6 clk long
+    made = pins[-1][2]
+    await generator.clk(enable=1)
+    for target in (900, 900, 903, 903):
+        await generator.line(target)
+    assert (await generator.clk())[2] == made + 3
+
+
+@cocotb.test()
+async def load_makes_no_step(dut):
+    generator = await Generator(dut).reset(target=0, period=40)
+    for target in (3, 3):
+        await generator.line(target)
+    for target in (-2**31, 2**31 - 1, 7):
+        await generator.clk(load=1, target=target * ONE)
+        await generator.line(target)
+        assert (await generator.line(target))[-1][0] == 0 and generator.model.steps == 3
+    await generator.line(9)
+    assert (await generator.wait(10))[2] == 5
+
+
+@cocotb.test()
+async def the_shortest_way_over_the_end_of_the_range(dut):
+    generator = await Generator(dut).reset(target=(2**31 - 2) * ONE, period=40)
+    await generator.line(2**31 - 1)
+    await generator.line(-2**31)
+    await generator.line(-2**31 + 1)
+    assert (await generator.wait(10))[2:] == (3, 0)
+
+
+@cocotb.test()
+async def overrun_when_target_runs_away_and_only_load_or_off_ends_it(dut):
+    for jump in (256, -257, 30000, 2**31 - 1):                                  # 256: 2^PERIOD_W
+        generator = await Generator(dut).reset(target=0, period=40)
+        await generator.line(jump)
+        got = await generator.line(jump)
+        assert (await generator.clk())[3] and len({step for step, _ in got[4:]}) == 1
+        assert not (await generator.clk(load=1))[3]
+    generator = await Generator(dut).reset(target=0, period=200, high_clk=30)   # 2^(PERIOD_W + AHEAD_W - 2) / 200 = 5.1 steps
+    await generator.line(4)
+    assert not (await generator.wait(200))[3]
+    await generator.line(40)
+    assert (await generator.wait(50))[3]
+    assert not (await generator.clk(enable=0))[3]
+
+
+@cocotb.test()
+async def a_tick_too_soon_waits_and_nothing_is_lost(dut):
+    generator = await Generator(dut).reset(target=0, period=60)
+    target = 0
+    for _ in range(60):
+        target += random.randrange(-4, 8)
+        await generator.line(target, random.randrange(1, 90))
+    assert (await generator.wait(150))[2:] == (target, 0)
+
+
+@cocotb.test()
+async def a_period_of_0_stands(dut):
+    generator = await Generator(dut).reset(target=0, period=0)
+    for target in (0, 5, -5):
+        await generator.line(target, 20)
+    assert set(generator.seen) == {(0, 0)}
+
+
+@cocotb.test()
+async def reset_in_mid_flow(dut):
+    generator = await Generator(dut).reset(target=0, period=20, high_clk=3)
+    for wait in range(20):
+        await generator.line(generator.model.line_end // ONE + 4, 3 + wait)
+        assert await generator.clk(rst=1) == (0, 0, 0, 0)
+        assert (await generator.wait(30))[2] == 0
+
+
+@cocotb.test()
+async def any_lines_match_the_model(dut):
+    generator = await Generator(dut).reset(period=30)
+    target, speed = 0, 0
+    for _ in range(25_000):
+        inputs = {}
+        if random.randrange(generator.inputs["period"] + 2) == 0:
+            if random.randrange(4) == 0:
+                speed = random.choice((0, 1, -1, random.randrange(-ONE, ONE), random.randrange(-20 * ONE, 20 * ONE)))
+            if random.randrange(300) == 0:
+                speed = random.randrange(-2**47, 2**47)
+            target = (target + speed + 2**47) % 2**48 - 2**47
+            inputs.update(tick=1, target=target)
+        for name in ("high_clk", "low_clk", "setup_clk", "hold_clk"):
+            if random.randrange(300) == 0:
+                inputs[name] = random.choice((0, 1, 2, 31, random.randrange(8)))
+        if random.randrange(100) == 0:
+            inputs.update(mode=random.randrange(4), step_low=random.getrandbits(1), direction_low=random.getrandbits(1))
+        if random.randrange(200) == 0:
+            inputs.update(enable=int(random.randrange(3) > 0), period=random.choice((0, 1, 2, 7, 30, 30, 30, 255)))
+        if random.randrange(500) == 0:
+            inputs["load"] = 1
+        if random.randrange(3000) == 0:
+            inputs["rst"] = 1
+        await generator.clk(**inputs)
+
+
+@cocotb.test()
+async def writes_a_waveform_of_23_steps_up_and_9_down(dut):
+    """sigrok judges it below."""
+    generator = await Generator(dut).reset(target=0, period=50, high_clk=2, low_clk=3, setup_clk=4, hold_clk=3)
+    for target in (8, 16, 23, 23, 20, 14, 14):
+        await generator.line(target)
+    WAVEFORM.write_text("".join(f"{step},{direction}\n" for step, direction in generator.seen))
+
+
+def test_step_generator():
+    run("step_generator", __file__, PERIOD_W=PERIOD_W, TIME_W=TIME_W, AHEAD_W=AHEAD_W)
+
+
+def test_sigrok_counts_the_same_steps():
+    """The stepper_motor decoder of sigrok knows nothing of ours: it tells the place at every step."""
+    program = shutil.which("sigrok-cli")
+    if not program:
+        pytest.skip("no sigrok-cli")
+    run("step_generator", __file__, PERIOD_W=PERIOD_W, TIME_W=TIME_W, AHEAD_W=AHEAD_W)
+    told = subprocess.run([program, "-i", WAVEFORM, "-I", "csv:column_formats=2l:samplerate=1000000:header=no", "-P",
+                           "stepper_motor:step=0:dir=1:unit=steps", "-A", "stepper_motor=position"], capture_output=True, text=True)
+    places = [int(line.split()[1]) for line in told.stdout.splitlines()]
+    assert places == [*range(1, 24), *range(22, 14, -1)], told.stderr           # it tells a place when the next step comes: 14 is not told
