@@ -32,6 +32,8 @@ module grating #(
     input  wire                  b,
     input  wire                  z,
     input  wire        [1:0]     probe,
+    input  wire                  own_step,      // pins of the axis itself, which may take the place of a and b
+    input  wire                  own_direction,
     input  wire                  adc_sin,       // serial data, synchronous to adc_sclk
     input  wire                  adc_cos,
     output logic                 adc_cs_n,      // pins
