@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The twin: the RTL and firmware of the nodes, closed around a model of the machine. See parameters.toml for the machine."""
+"""The twin: the RTL and firmware of the nodes, closed around a model of the machine. See parameters_*.toml for the machines."""
 from .build import BuildError
-from .twin import FrameBench, LineState, Truth, Twin, TwinTransport, cells_of, realtime_factor
+from .machine import Machine
+from .ring import RotaryRing
+from .twin import Axis, FrameBench, LineState, Node, Twin, TwinTransport, cells_of, realtime_factor
 
-__all__ = ["BuildError", "FrameBench", "LineState", "Truth", "Twin", "TwinTransport", "cells_of", "realtime_factor"]
+__all__ = ["Axis", "BuildError", "FrameBench", "LineState", "Machine", "Node", "RotaryRing", "Twin", "TwinTransport", "cells_of",
+           "realtime_factor"]

@@ -6,9 +6,8 @@
 namespace twin {
 
 constexpr int LEADING_ZEROS = 2;
-constexpr uint64_t NEVER = ~uint64_t(0);
 
-Interferometer::Interferometer(const Parameters& parameters, uint64_t seed, uint64_t stream, double clk_hz)
+Interferometer::Interferometer(const StageParameters& parameters, uint64_t seed, uint64_t stream, double clk_hz)
     : p(parameters), clk_hz_(clk_hz), random_(seed, stream), spikes_a_{RandomSource(seed, stream + 1), 0, 0},
       spikes_b_{RandomSource(seed, stream + 2), 0, 0} {
     configure();
@@ -25,7 +24,7 @@ void Interferometer::configure() {
 
 void Interferometer::draw(Spikes& spikes, uint64_t after) {
     if (p.comparator_spike_rate <= 0) {
-        spikes.start = spikes.end = NEVER;
+        spikes.start = spikes.end = ~uint64_t(0);
         return;
     }
     spikes.start = after + 1 + uint64_t(spikes.random.exponential(clk_hz_ / p.comparator_spike_rate));
@@ -34,7 +33,7 @@ void Interferometer::draw(Spikes& spikes, uint64_t after) {
 }
 
 void Interferometer::analogue(double position, double& sine, double& cosine) const {
-    if (fault == SignalFault::cable_cut) {
+    if (cut) {
         sine = cosine = 0;
         return;
     }
@@ -55,9 +54,6 @@ uint64_t Interferometer::advance(uint64_t now, double position) {
     while (now >= spikes_b_.end) draw(spikes_b_, spikes_b_.end);
     a = clean_a_ ^ (now >= spikes_a_.start);
     b = clean_b_ ^ (now >= spikes_b_.start);
-    if (fault == SignalFault::a_stuck) a = stuck_level;
-    if (fault == SignalFault::b_stuck) b = stuck_level;
-    if (fault == SignalFault::cable_cut) a = b = true;                        // receivers fail safe high
     auto next = [now](const Spikes& s) { return now >= s.start ? s.end : s.start; };
     return next(spikes_a_) < next(spikes_b_) ? next(spikes_a_) : next(spikes_b_);
 }
@@ -72,7 +68,7 @@ uint32_t Interferometer::convert(double value) {
 }
 
 void Interferometer::sample(double position) {
-    if (fault == SignalFault::converter_stuck) return;
+    if (converter_stuck) return;
     double sine, cosine;
     analogue(position, sine, cosine);
     code_sin = convert(sine);

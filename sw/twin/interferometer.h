@@ -14,11 +14,9 @@
 
 namespace twin {
 
-enum class SignalFault { none, cable_cut, a_stuck, b_stuck, converter_stuck };
-
 class Interferometer {
 public:
-    Interferometer(const Parameters& parameters, uint64_t seed, uint64_t stream, double clk_hz);
+    Interferometer(const StageParameters& parameters, uint64_t seed, uint64_t stream, double clk_hz);
 
     uint64_t advance(uint64_t now, double position);          // levels at clk `now`; returns the clk of the next change of a spike
     void sample(double position);                             // conversion of both channels
@@ -37,11 +35,9 @@ public:
 
     void configure();                                         // take over changed parameters
 
-    Parameters p;
-    bool a = false, b = false;                                // levels as they reach the node
+    bool a = false, b = false;                                // levels of the comparators
     uint32_t code_sin = 0, code_cos = 0;                      // last conversion, straight binary
-    SignalFault fault = SignalFault::none;
-    bool stuck_level = false;                                 // of A or B when stuck
+    bool cut = false, converter_stuck = false;                // faults: no light, no conversion
 
 private:
     struct Spikes {
@@ -51,6 +47,7 @@ private:
     void draw(Spikes& spikes, uint64_t after);
     uint32_t convert(double value);
 
+    const StageParameters& p;
     double clk_hz_, sin_of_error_ = 0, cos_of_error_ = 1;
     int first_bit_ = 0;                                       // of the word, in the 32 bits that are shifted out
     RandomSource random_;

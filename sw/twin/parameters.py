@@ -1,49 +1,63 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The plant's parameters: parameters.toml as a dictionary, and as the C++ structure that build.py puts beside the library."""
+"""The parameters of the machines: parameters_<machine>.toml as dictionaries, and as the C++ structures that build.py puts beside
+the libraries."""
 import tomllib
+from functools import cache
 from pathlib import Path
 
-SOURCE = Path(__file__).with_name("parameters.toml")
+HERE = Path(__file__).parent
+MACHINES = tuple(sorted(file.stem.removeprefix("parameters_") for file in HERE.glob("parameters_*.toml")))
 
 
-def load():
+def source(machine):
+    if machine not in MACHINES:
+        raise KeyError(f"there is no machine {machine}; there are {', '.join(MACHINES)}")
+    return HERE / f"parameters_{machine}.toml"
+
+
+@cache
+def load(machine="stage"):
     """{name: entry}, name = section_key, entry = value, unit, why."""
-    with open(SOURCE, "rb") as file:
+    with open(source(machine), "rb") as file:
         sections = tomllib.load(file)
     return {f"{section}_{key}": entry for section, entries in sections.items() for key, entry in entries.items()}
 
 
-def values(overrides=None):
+def values(overrides=None, machine="stage"):
     """{name: value} with the overrides in place; a name that does not exist is refused."""
-    result = {name: float(entry["value"]) for name, entry in load().items()}
+    result = {name: float(entry["value"]) for name, entry in load(machine).items()}
     for name, value in (overrides or {}).items():
         if name not in result:
-            raise KeyError(f"the plant has no parameter {name}; see {SOURCE.name}")
+            raise KeyError(f"the machine {machine} has no parameter {name}; see {source(machine).name}")
         result[name] = float(value)
     return result
 
 
+def structure(machine):
+    name = "".join(word.capitalize() for word in machine.split("_")) + "Parameters"
+    fields = "\n".join(f"    double {field};    // {entry['unit']}" for field, entry in load(machine).items())
+    table = "\n".join(f'    if (!std::strcmp(name, "{field}")) return &p.{field};' for field in load(machine))
+    return f"""struct {name} {{
+{fields}
+}};
+
+inline double* find_parameter({name}& p, const char* name) {{
+{table}
+    return nullptr;
+}}
+"""
+
+
 def header():
     """Text of parameters.h."""
-    names = list(load())
-    fields = "\n".join(f"    double {name};    // {entry['unit']}" for name, entry in load().items())
-    table = "\n".join(f'    if (!std::strcmp(name, "{name}")) return p.{name} = value, true;' for name in names)
+    structures = "\n".join(structure(machine) for machine in MACHINES)
     return f"""// SPDX-License-Identifier: Apache-2.0
-// Made by sw/twin/parameters.py from parameters.toml; do not edit.
+// Made by sw/twin/parameters.py from parameters_*.toml; do not edit.
 #pragma once
 #include <cstring>
 
 namespace twin {{
 
-struct Parameters {{
-{fields}
-}};
-constexpr int PARAMETER_COUNT = {len(names)};
-
-inline bool set_parameter(Parameters& p, const char* name, double value) {{
-{table}
-    return false;
-}}
-
+{structures}
 }}  // namespace twin
 """

@@ -1,81 +1,69 @@
 // SPDX-License-Identifier: Apache-2.0
-// One axis of the machine as the node's pins see it: plant, interferometer and converters, advanced clk by clk.
+// The stage of S0: plant, and on wish a piezo on its table; interferometer and converters.
 #pragma once
-#include <algorithm>
 #include <array>
-#include <cmath>
-#include <vector>
 
+#include "dac_input.h"
 #include "interferometer.h"
+#include "machine.h"
+#include "piezo.h"
 #include "plant.h"
 
 namespace twin {
 
-// one row of a trace; the order of twin.TRACE_COLUMNS
-struct TraceRow {
-    double time, position, velocity, nut, current, voltage;
-};
-
-class Stage {
+class Stage : public Machine {
 public:
-    Stage(const Parameters& parameters, uint64_t seed, uint64_t stream, double clk_hz)
-        : plant(parameters, seed, stream), interferometer(parameters, seed, stream + 1, clk_hz), clk_hz_(clk_hz) {
-        step_clk_ = std::max<uint64_t>(1, uint64_t(std::llround(parameters.time_step * clk_hz)));
-        plant.p.time_step = double(step_clk_) / clk_hz;
-    }
+    Stage(const StageParameters& parameters, uint64_t seed, uint64_t stream, double clk_hz);
 
-    // the pins of the node after clk `now`
-    void step(uint64_t now, unsigned cs_n, unsigned sclk, unsigned bridge_a, unsigned bridge_b, unsigned drive_enable) {
-        spent_[drive_enable * (bridge_a | bridge_b << 1)]++;
-        const unsigned falling = (pins_ & ~(cs_n | sclk << 1));
-        pins_ = cs_n | sclk << 1;
-        if (falling) {
-            if (falling & 1)
-                interferometer.chip_select(position(now));
-            else if (!cs_n)
-                interferometer.next_bit();
-        }
-        if (now >= event_at_) event(now);
+    const char* faults() const override { return "limit_low limit_high drive_fault motor_jam encoder_cut a_stuck b_stuck converter_stuck"; }
+    void place(double where) override { plant.place(where); }
+    void push(double newton) override { pushed_ = newton; }
+    // position and velocity of what is measured: the table, with the piezo on it; nut: from the motor's angle; screw: on the table;
+    // codes: last conversion, straight binary
+    const char* state_names() const override {
+        return "time_s position_m velocity_m_s nut_m motor_rad_s current_a voltage_v screw_n limit_low? limit_high? a? b? enabled? "
+               "code_sin# code_cos# piezo_m dac_code# dac_bad_frames#";
     }
-    double position(uint64_t now) const { return plant.position + plant.velocity * (double(now - last_step_) / clk_hz_); }
-    bool low_open() const { return plant.low_pressed || force_low; }
-    bool high_open() const { return plant.high_pressed || force_high; }
-    bool set(const char* name, double value);
-    void trace(uint64_t every_clk) {
-        trace_every_ = every_clk ? std::max<uint64_t>(1, (every_clk + step_clk_ / 2) / step_clk_) : 0;
-        rows.clear();
-        trace_count_ = 0;
+    void state(uint64_t now, double* out) const override;
+    double position(uint64_t now) const {
+        return plant.drivetrain.position + piezo.position + velocity() * since(now);
     }
+    double velocity() const { return plant.drivetrain.velocity + piezo.velocity; }
+    uint64_t look(uint64_t now, double position) { return interferometer.advance(now, position); }
 
-    Plant plant;
-    Interferometer interferometer;
-    bool force_low = false, force_high = false, drive_fault = false;   // faults to inject
-    std::vector<TraceRow> rows;
+protected:
+    unsigned pins() const override {
+        return interferometer.a * ENCODER_A | interferometer.b * ENCODER_B | interferometer.sdata_sin() * ADC_SIN |
+               interferometer.sdata_cos() * ADC_COS | plant.switches.low_pressed * LIMIT_LOW_OPEN |
+               plant.switches.high_pressed * LIMIT_HIGH_OPEN | SENSOR_RX;
+    }
+    void drive_changed(uint64_t now, unsigned before, unsigned after) override;
+    void move(uint64_t now) override;
+    uint64_t sense(uint64_t now) override;
+    double* parameter(const char* name) override { return find_parameter(p_, name); }
+    void configure() override;
+    bool own_fault(const char* name, bool on) override;
 
 private:
     static constexpr uint64_t LEVELS_PER_STEP = 4;            // while the table moves
 
-    void event(uint64_t now) {
-        if (now >= last_step_ + step_clk_) {
-            plant.step({spent_[0], spent_[1], spent_[2], spent_[3]});
-            spent_ = {};
-            last_step_ = now;
-            if (trace_every_ && ++trace_count_ >= trace_every_) {
-                trace_count_ = 0;
-                rows.push_back({double(now) / clk_hz_, plant.position, plant.velocity, plant.nut(), plant.current, plant.voltage});
-            }
-        }
-        const uint64_t spike = interferometer.advance(now, position(now));
-        const bool moves = std::fabs(plant.velocity) * plant.p.time_step > 1e-9;
-        const uint64_t level = moves ? now + std::max<uint64_t>(1, step_clk_ / LEVELS_PER_STEP) : ~uint64_t(0);
-        event_at_ = std::min({spike, level, last_step_ + step_clk_});
+    void spend(uint64_t until, unsigned drive) {              // the clk up to here went to this state of the bridge
+        spent_[drive & DRIVE_ENABLE ? (drive & BRIDGE_A ? 1 : 0) | (drive & BRIDGE_B ? 2 : 0) : 0] += uint32_t(until - spent_until_);
+        spent_until_ = until;
     }
 
-    double clk_hz_;
-    uint64_t step_clk_, last_step_ = 0, event_at_ = 0;
+    StageParameters p_;
+
+public:
+    Plant plant;
+    Interferometer interferometer;
+    DacInput dac;
+    Piezo piezo;
+
+private:
+    double pushed_ = 0;
+    uint64_t spent_until_ = 0;
     std::array<uint32_t, 4> spent_{};                         // clk in: coast, forward, reverse, brake
-    unsigned pins_ = 3;
-    uint64_t trace_every_ = 0, trace_count_ = 0;
 };
 
 }  // namespace twin

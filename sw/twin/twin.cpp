@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nodes (the RTL, Verilated), each with its stages, on one line with a host; and their C interface.
+// Nodes (the RTL, Verilated), each with a machine at each axis, on one line with a host; and their C interface.
 //
 // All nodes share clk. A clk is: every node takes its pins and sees the rising edge, then the machine and the line take the
 // node's outputs and set the pins for the next edge. One translation unit with the Verilated code, so that all of it inlines.
+#include <algorithm>
 #include <memory>
 
 #include "line.h"
-#include "stage.h"
+#include "machine.h"
+#include "node_pins.h"
 #include "verilated_node.h"                                   // made by build.py: the Verilated sources, CLK_HZ, AXES, REARM_CLK
 
 namespace twin {
@@ -26,9 +28,10 @@ public:
         pins.address = address;
         pins.line_rx = 1;
         pins.estop_open = 0;
-        pins.encoder_a = pins.encoder_b = pins.adc_sin = pins.adc_cos = 0;
+        pins.encoder_a = pins.encoder_b = pins.encoder_z = pins.probe = pins.adc_sin = pins.adc_cos = 0;
         pins.limit_low_open = pins.limit_high_open = 0;
         pins.drive_fault_n = ALL_AXES;
+        set_sensor_rx(pins, ALL_AXES, 0);
         pins.rst = 1;
         model_->eval();
         for (int n = 0; n < firmware.count; n++) pins.NODE_MEMORY[n] = firmware.words[n];
@@ -58,44 +61,37 @@ public:
 
 class Node {
 public:
-    Node(unsigned address, const Firmware& firmware, const Parameters* parameters, uint64_t seed) : core(address, firmware) {
-        for (int n = 0; n < AXES; n++) stages.emplace_back(parameters[n], seed, uint64_t(address) << 16 | unsigned(n) << 8, CLK_HZ);
+    Node(unsigned address, const Firmware& firmware, const char* const* kinds, const double* const* parameters, uint64_t seed)
+        : core(address, firmware) {
+        for (int n = 0; n < AXES; n++)
+            machines.push_back(make_machine(kinds[n], parameters[n], seed, uint64_t(address) << 16 | unsigned(n) << 8, CLK_HZ));
     }
     void step(uint64_t now, bool line_rx) {
-        auto& pins = core.pins;
-        pins.line_rx = line_rx;
+        core.pins.line_rx = line_rx;
         core.clk();
-        uint32_t a = 0, b = 0, sin = 0, cos = 0, low = 0, high = 0, fault = 0;
-        for (int n = 0; n < AXES; n++) {
-            Stage& stage = stages[n];
-            stage.step(now, pins.adc_cs_n >> n & 1, pins.adc_sclk >> n & 1, pins.bridge_a >> n & 1, pins.bridge_b >> n & 1,
-                       pins.drive_enable >> n & 1);
-            a |= uint32_t(stage.interferometer.a) << n;
-            b |= uint32_t(stage.interferometer.b) << n;
-            sin |= stage.interferometer.sdata_sin() << n;
-            cos |= stage.interferometer.sdata_cos() << n;
-            low |= uint32_t(stage.low_open()) << n;
-            high |= uint32_t(stage.high_open()) << n;
-            fault |= uint32_t(stage.drive_fault) << n;
-        }
-        pins.encoder_a = a;
-        pins.encoder_b = b;
-        pins.adc_sin = sin;
-        pins.adc_cos = cos;
-        pins.limit_low_open = low;
-        pins.limit_high_open = high;
-        pins.drive_fault_n = ~fault & ALL_AXES;
+        bool changed = false;
+        for (int n = 0; n < AXES; n++) changed |= machines[size_t(n)]->clk(now, drive_of(core.pins, n));
+        if (changed) sense();
     }
 
     Core core;
-    std::vector<Stage> stages;
+    std::vector<std::unique_ptr<Machine>> machines;
+
+private:
+    void sense() {
+        SensePins levels;
+        for (int n = 0; n < AXES; n++) levels.add(n, machines[size_t(n)]->levels());
+        levels.set(core.pins, ALL_AXES);
+    }
 };
 
 class Twin {
 public:
-    Twin(uint64_t seed, int count, const uint8_t* addresses, const Firmware& firmware, const Parameters* parameters, double bit_clk)
+    Twin(uint64_t seed, int count, const uint8_t* addresses, const Firmware& firmware, const char* const* kinds,
+         const double* const* parameters, double bit_clk)
         : line(seed, CLK_HZ, bit_clk) {
-        for (int n = 0; n < count; n++) nodes.emplace_back(new Node(addresses[n], firmware, parameters + n * AXES, seed));
+        for (int n = 0; n < count; n++)
+            nodes.emplace_back(new Node(addresses[n], firmware, kinds + n * AXES, parameters + n * AXES, seed));
     }
     void step() {
         now++;
@@ -159,24 +155,22 @@ private:
     uint64_t now_ = 0;
 };
 
-enum Switch { LOW_SWITCH, HIGH_SWITCH, DRIVE_FAULT, MOTOR_JAM };
-
 }  // namespace twin
 
 using namespace twin;
 
 namespace {
-Stage& stage_of(Twin* t, int axis) { return t->nodes[size_t(axis / AXES)]->stages[size_t(axis % AXES)]; }
+Machine& machine_of(Twin* t, int axis) { return *t->nodes[size_t(axis / AXES)]->machines[size_t(axis % AXES)]; }
 }  // namespace
 
 #pragma GCC visibility push(default)
 extern "C" {
 
 int twin_axes() { return AXES; }
-int twin_parameter_count() { return PARAMETER_COUNT; }
 int twin_memory_words() { return MEMORY_WORDS; }
-void* twin_new(uint64_t seed, int nodes, const uint8_t* addresses, const uint32_t* firmware, int words, const Parameters* parameters, double bit_clk) {
-    return new Twin(seed, nodes, addresses, {firmware, words}, parameters, bit_clk);
+void* twin_new(uint64_t seed, int nodes, const uint8_t* addresses, const uint32_t* firmware, int words, const char* const* kinds,
+               const double* const* parameters, double bit_clk) {
+    return new Twin(seed, nodes, addresses, {firmware, words}, kinds, parameters, bit_clk);
 }
 void twin_delete(Twin* t) { delete t; }
 uint64_t twin_now(Twin* t) { return t->now; }
@@ -218,38 +212,9 @@ void twin_line_state(Twin* t, uint64_t* out) {
                               line.host.start_glitches, line.edges, line.last_driven, line.host.received.size()};
     std::copy(std::begin(state), std::end(state), out);
 }
-int twin_set(Twin* t, int axis, const char* name, double value) { return stage_of(t, axis).set(name, value); }
-void twin_place(Twin* t, int axis, double position) { stage_of(t, axis).plant.place(position); }
-void twin_push(Twin* t, int axis, double newton) { stage_of(t, axis).plant.external_force = newton; }
 void twin_estop(Twin* t, int node, int pressed) { t->nodes[size_t(node)]->core.pins.estop_open = pressed != 0; }
-void twin_switch(Twin* t, int axis, int which, int on) {
-    Stage& stage = stage_of(t, axis);
-    if (which == LOW_SWITCH) stage.force_low = on;
-    if (which == HIGH_SWITCH) stage.force_high = on;
-    if (which == DRIVE_FAULT) stage.drive_fault = on;
-    if (which == MOTOR_JAM) stage.plant.jammed = on;
-}
-void twin_signal_fault(Twin* t, int axis, int fault, int level) {
-    stage_of(t, axis).interferometer.fault = SignalFault(fault);
-    stage_of(t, axis).interferometer.stuck_level = level;
-}
-// time s, position m, velocity m/s, nut m, motor rad/s, current A, voltage V, screw force N, low, high, a, b, enabled, code sin, cos
-void twin_truth(Twin* t, int axis, double* out) {
-    const Stage& s = stage_of(t, axis);
-    const auto& pins = t->nodes[size_t(axis / AXES)]->core.pins;
-    const double truth[] = {double(t->now) / CLK_HZ, s.position(t->now), s.plant.velocity, s.plant.nut(), s.plant.speed, s.plant.current,
-                            s.plant.voltage, s.plant.screw_force(), double(s.low_open()), double(s.high_open()),
-                            double(s.interferometer.a), double(s.interferometer.b), double(pins.drive_enable >> (axis % AXES) & 1),
-                            double(s.interferometer.code_sin), double(s.interferometer.code_cos)};
-    std::copy(std::begin(truth), std::end(truth), out);
-}
-void twin_trace(Twin* t, int axis, uint64_t every_clk) { stage_of(t, axis).trace(every_clk); }
-int twin_trace_rows(Twin* t, int axis) { return int(stage_of(t, axis).rows.size()); }
-void twin_trace_take(Twin* t, int axis, TraceRow* out) {
-    auto& rows = stage_of(t, axis).rows;
-    std::copy(rows.begin(), rows.end(), out);
-    rows.clear();
-}
+// The machine of an axis; machine_library.cpp has what can be done with it.
+void* twin_machine(Twin* t, int axis) { return &machine_of(t, axis); }
 
 void* frame_bench_new(unsigned address, const uint32_t* firmware, int words, double bit_clk) {
     return new FrameBench(address, {firmware, words}, bit_clk);

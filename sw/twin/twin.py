@@ -1,42 +1,39 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The machine without hardware: nodes as they ship (RTL and firmware), stages around them, a line with a host at its end.
+"""The machine without hardware: nodes as they ship (RTL and firmware), a machine at each axis, a line with a host at its end.
 
 Time is simulated: it passes in run, run_until_words and nowhere else, and the same seed gives the same run to the last bit.
 An axis is counted through all nodes: axis = place of the node * axes a node + axis of the node.
+
+    Twin(nodes=(1, 2))                                       two nodes of one axis each, each on a stage of S0
+    Twin([Node(1, [Axis("stepper_stage", {"scale_count": 1e-7})] * 3)])      one node with three axes of S2
 """
 import ctypes
 import time
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 
 import numpy
 
-from . import build, parameters
-from .stage import FAULTS, declare
+from . import build
+from .machine import FUNCTIONS as MACHINE_FUNCTIONS
+from .machine import HANDLE, LONG, REAL, WHOLE, MachineHandle, declare, pack
 
 CLK_HZ = 3_000_000
 BAUD = 115200
 TURNAROUND_CELLS = 2             # the host hears a word half a cell before its end; the node's driver lets go half a cell after it
 CELLS = 11                       # of a character: start, eight data, 9th, stop
 CUTS = {"none": 0, "idle": 1, "break": 2}
-SWITCHES = {"limit_low": 0, "limit_high": 1, "drive_fault": 2, "motor_jam": 3}
-SIGNALS = {"encoder_cut": "cable_cut", "a_stuck": "a_stuck", "b_stuck": "b_stuck", "converter_stuck": "converter_stuck"}
-TRACE_COLUMNS = ("time_s", "position_m", "velocity_m_s", "nut_m", "current_a", "voltage_v")
 
-HANDLE, REAL, WHOLE, LONG = ctypes.c_void_p, ctypes.c_double, ctypes.c_int, ctypes.c_uint64
 FUNCTIONS = {
-    "twin_axes": (WHOLE, []), "twin_parameter_count": (WHOLE, []), "twin_memory_words": (WHOLE, []),
-    "twin_new": (HANDLE, [LONG, WHOLE, HANDLE, HANDLE, WHOLE, HANDLE, REAL]), "twin_delete": (None, [HANDLE]),
+    "twin_axes": (WHOLE, []), "twin_memory_words": (WHOLE, []),
+    "twin_new": (HANDLE, [LONG, WHOLE, HANDLE, HANDLE, WHOLE, HANDLE, HANDLE, REAL]), "twin_delete": (None, [HANDLE]),
     "twin_now": (LONG, [HANDLE]), "twin_run": (None, [HANDLE, LONG]), "twin_run_until_words": (WHOLE, [HANDLE, WHOLE, LONG]),
     "twin_send_words": (None, [HANDLE, HANDLE, WHOLE, HANDLE, WHOLE, WHOLE]), "twin_send_levels": (None, [HANDLE, HANDLE, WHOLE, REAL]),
     "twin_receive_words": (WHOLE, [HANDLE, HANDLE, WHOLE]), "twin_host_bit_time": (None, [HANDLE, REAL]),
     "twin_flip_reply": (None, [HANDLE, HANDLE, WHOLE]), "twin_line_spikes": (None, [HANDLE, REAL, REAL, REAL]),
     "twin_cut": (None, [HANDLE, WHOLE, WHOLE]), "twin_line_state": (None, [HANDLE, HANDLE]),
-    "twin_set": (WHOLE, [HANDLE, WHOLE, ctypes.c_char_p, REAL]), "twin_place": (None, [HANDLE, WHOLE, REAL]),
-    "twin_push": (None, [HANDLE, WHOLE, REAL]), "twin_estop": (None, [HANDLE, WHOLE, WHOLE]),
-    "twin_switch": (None, [HANDLE, WHOLE, WHOLE, WHOLE]), "twin_signal_fault": (None, [HANDLE, WHOLE, WHOLE, WHOLE]),
-    "twin_truth": (None, [HANDLE, WHOLE, HANDLE]), "twin_trace": (None, [HANDLE, WHOLE, LONG]),
-    "twin_trace_rows": (WHOLE, [HANDLE, WHOLE]), "twin_trace_take": (None, [HANDLE, WHOLE, HANDLE]),
+    "twin_estop": (None, [HANDLE, WHOLE, WHOLE]), "twin_machine": (HANDLE, [HANDLE, WHOLE]),
     "frame_bench_new": (HANDLE, [WHOLE, HANDLE, WHOLE, REAL]), "frame_bench_delete": (None, [HANDLE]),
     "frame_bench_idle": (None, [HANDLE, LONG]), "frame_bench_now": (LONG, [HANDLE]),
     "frame_bench_exchange": (WHOLE, [HANDLE, HANDLE, WHOLE, WHOLE, WHOLE, WHOLE, HANDLE, WHOLE]),
@@ -44,27 +41,17 @@ FUNCTIONS = {
 
 
 @dataclass(frozen=True)
-class Truth:
-    """An axis as it really is now; positions of the table, 0 = start of the working travel."""
-    time_s: float
-    position_m: float
-    velocity_m_s: float
-    nut_m: float                 # where the nut is, from the motor's angle
-    motor_rad_s: float
-    current_a: float
-    voltage_v: float             # mean of the last plant step
-    screw_n: float               # on the table
-    limit_low: bool              # pressed
-    limit_high: bool
-    a: bool                      # levels at the node's pins
-    b: bool
-    enabled: bool                # the node's drive_enable
-    code_sin: int                # last conversion, straight binary
-    code_cos: int
+class Axis:
+    """A machine by the name of its parameters_<machine>.toml, with what differs from that table."""
+    machine: str = "stage"
+    parameters: dict = field(default_factory=dict)
 
-    @property
-    def position_nm(self):
-        return self.position_m * 1e9
+
+@dataclass(frozen=True)
+class Node:
+    """A node by its address on the line, with a machine at each of its axes."""
+    address: int
+    axes: list = field(default_factory=lambda: [Axis()])
 
 
 @dataclass(frozen=True)
@@ -80,9 +67,9 @@ class LineState:
     words_waiting: int
 
 
-def library(clk_hz, axes):
-    found = ctypes.CDLL(str(build.twin_library(clk_hz, axes)))
-    declare(found, FUNCTIONS)
+def library(clk_hz, axes, node=None):
+    found = ctypes.CDLL(str(build.twin_library(clk_hz, axes, node)))
+    declare(found, {**FUNCTIONS, **MACHINE_FUNCTIONS})
     return found
 
 
@@ -98,23 +85,32 @@ def memory_image(found, words):
 
 
 class Twin:
-    """`nodes` are their addresses on the line. `plant` overrides parameters.toml for all axes, `plant_of` {axis: {…}} for
-    one; `firmware` is a list of words or None for the one in sw/firmware; `host_baud_error` 0.02 makes the host 2 % fast."""
+    """`nodes` are Nodes, or addresses of nodes with `axes` stages each. All nodes are of one build: one with fewer axes than
+    another has unconnected ones behind them. `plant` overrides parameters of all machines, `plant_of` {axis: {…}} those of one;
+    `firmware` is a list of words or None for the one in sw/firmware; `host_baud_error` 0.02 makes the host 2 % fast;
+    `node_parameters` {"W": 12} are parameters of rtl/node.sv."""
 
-    def __init__(self, seed=1, nodes=(1, 2), clk_hz=CLK_HZ, baud=BAUD, host_baud_error=0.0, axes=1, plant=None, plant_of=None,
-                 firmware=None):
+    def __init__(self, nodes=(1, 2), seed=1, clk_hz=CLK_HZ, baud=BAUD, host_baud_error=0.0, axes=1, plant=None, plant_of=None,
+                 firmware=None, node_parameters=None):
         self.handle = None
-        self.library, self.clk_hz, self.baud, self.addresses = library(clk_hz, axes), clk_hz, baud, tuple(nodes)
-        self.node_axes, self.axes = axes, axes * len(self.addresses)
-        plants = [parameters.values({**(plant or {}), **(plant_of or {}).get(n, {})}) for n in range(self.axes)]
+        nodes = [node if isinstance(node, Node) else Node(node, [Axis()] * axes) for node in nodes]
+        self.addresses, self.node_axes = tuple(node.address for node in nodes), max(len(node.axes) for node in nodes)
+        self.axes = self.node_axes * len(nodes)
         if any(n not in range(self.axes) for n in plant_of or {}):
             raise IndexError(f"plant_of names an axis that is not there: there are {self.axes}")
-        packed = array([list(values.values()) for values in plants], numpy.float64)
-        assert packed.shape[1] == self.library.twin_parameter_count()
+        fitted = [axis for node in nodes for axis in [*node.axes, *[Axis("unconnected")] * (self.node_axes - len(node.axes))]]
+        self.library, self.clk_hz, self.baud = library(clk_hz, self.node_axes, node_parameters), clk_hz, baud
+        packed = [pack(axis.machine, {**(plant or {}), **axis.parameters, **(plant_of or {}).get(n, {})}, self.library)
+                  for n, axis in enumerate(fitted)]
         image = memory_image(self.library, build.firmware() if firmware is None else firmware)
         addresses = array(self.addresses, numpy.uint8)
-        self.handle = self.library.twin_new(seed, len(addresses), addresses.ctypes.data, image.ctypes.data, len(image), packed.ctypes.data,
+        kinds = (ctypes.c_char_p * self.axes)(*(axis.machine.encode() for axis in fitted))
+        tables = (ctypes.c_void_p * self.axes)(*(ctypes.addressof(table) for table in packed))
+        self.handle = self.library.twin_new(seed, len(addresses), addresses.ctypes.data, image.ctypes.data, len(image), kinds, tables,
                                             clk_hz / baud)
+        now = partial(self.library.twin_now, self.handle)
+        self.machines = [MachineHandle(self.library, self.library.twin_machine(self.handle, n), axis.machine, clk_hz, now)
+                         for n, axis in enumerate(fitted)]
         if host_baud_error:
             self.set_host_baud(baud * (1 + host_baud_error))
 
@@ -195,12 +191,13 @@ class Twin:
         after = self.line()
         return after.edges == before.edges and after.level and not after.host_drives and not after.nodes_drive
 
-    # machine
+    # machines
 
-    def check_axis(self, axis):
+    def machine(self, axis=0):
+        """The machine of an axis: its state, parameters, faults and traces; see machine.MachineHandle."""
         if axis not in range(self.axes):
             raise IndexError(f"there is no axis {axis}: there are {self.axes}")
-        return axis
+        return self.machines[axis]
 
     def check_node(self, node):
         if node not in range(len(self.addresses)):
@@ -208,32 +205,28 @@ class Twin:
         return node
 
     def truth(self, axis=0):
-        out = (ctypes.c_double * 15)()
-        self.library.twin_truth(self.handle, self.check_axis(axis), out)
-        return Truth(*out[:8], *(bool(x) for x in out[8:13]), int(out[13]), int(out[14]))
+        """The machine of an axis as it really is now."""
+        return self.machine(axis).state
 
     def true_position_nm(self, axis=0):
         return self.truth(axis).position_nm
 
     def place(self, axis, position_m):
         """Carry the table here by hand: at rest, nothing wound up. The node sees a jump."""
-        self.library.twin_place(self.handle, self.check_axis(axis), position_m)
+        self.machine(axis).place(position_m)
 
     def push(self, axis, newton):
         """An outside force on the table, from now on."""
-        self.library.twin_push(self.handle, self.check_axis(axis), newton)
+        self.machine(axis).push(newton)
 
     def set_plant(self, axis, **plant):
         """Change parameters of a running machine."""
-        for name, value in plant.items():
-            if not self.library.twin_set(self.handle, self.check_axis(axis), name.encode(), value):
-                raise KeyError(f"the plant has no parameter {name}")
+        self.machine(axis).set(**plant)
 
-    # faults: estop of a node; limit_low, limit_high (pressed or wire cut), drive_fault, motor_jam, encoder_cut, a_stuck,
-    # b_stuck, converter_stuck of an axis; line_cut of a node or of "host"
+    # faults: estop of a node, line_cut of a node or of "host"; all others are those of the machine of an axis
 
     def inject(self, fault, where=0, level=False):
-        """`where` is the axis, for estop and line_cut the node; `level` is that of a stuck A or B, and of a cut line: true
+        """`where` is the axis, for estop and line_cut the node; `level` is that of a stuck pin, and of a cut line: true
         if the cut end hears ones, false for a break."""
         self._fault(fault, where, True, level)
 
@@ -254,24 +247,20 @@ class Twin:
         elif fault == "line_cut":
             node = -1 if where == "host" else self.check_node(where)
             self.library.twin_cut(self.handle, node, CUTS["none" if not on else "idle" if level else "break"])
-        elif fault in SWITCHES:
-            self.library.twin_switch(self.handle, self.check_axis(where), SWITCHES[fault], on)
-        elif fault in SIGNALS:
-            self.library.twin_signal_fault(self.handle, self.check_axis(where), FAULTS[SIGNALS[fault]] if on else 0, level)
+        elif on:
+            self.machine(where).inject(fault, level)
         else:
-            raise KeyError(f"there is no fault {fault}: there are estop, line_cut, {', '.join([*SWITCHES, *SIGNALS])}")
+            self.machine(where).clear(fault)
 
     # traces
 
     def trace(self, axis=0, rate_hz=10_000):
-        """Record from now on; the rate is rounded to whole plant steps (100 kHz at most); 0 ends it."""
-        self.library.twin_trace(self.handle, self.check_axis(axis), round(self.clk_hz / rate_hz) if rate_hz else 0)
+        """Record from now on; the rate is rounded to whole time steps of the machine (100 kHz at most); 0 ends it."""
+        self.machine(axis).trace(rate_hz)
 
     def take_trace(self, axis=0):
-        """{column: array} of what was recorded since the last take."""
-        rows = numpy.empty((self.library.twin_trace_rows(self.handle, self.check_axis(axis)), len(TRACE_COLUMNS)))
-        self.library.twin_trace_take(self.handle, axis, rows.ctypes.data)
-        return {name: rows[:, n].copy() for n, name in enumerate(TRACE_COLUMNS)}
+        """{name: array} of what was recorded since the last take."""
+        return self.machine(axis).take_trace()
 
 
 class TwinTransport:

