@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // grating -- the measuring path of an axis: from the pins of a grating to position and velocity.
 //
-// latency  see the rooms; 22 clk from a converter word to position
+// latency  see the rooms; 22 clk from a converter word to position, 2 clk from a count of A/B/Z
 // rate     one sample per `sample_tick`, one velocity per `tick`
 // source   S0: interferometer with sine, cosine and comparator outputs; any A/B/Z scale
 // model    the models of its blocks; proved in motion by tb/system
@@ -69,6 +69,8 @@ module grating #(
     wire        [6:0]  capture_sources;
     wire signed [47:0] compare_start, compare_step;
     wire        [23:0] pulse_length, gap_length;
+    wire               by_counts, by_steps, align_written;
+    wire signed [2:0]  align;
 
     // between the rooms
     wire        [2:0]  levels;                                  // {z, b, a}, filtered
@@ -80,7 +82,7 @@ module grating #(
     wire        [14:0] signal_faults, first_signal_faults;
     wire               learnt;
 
-    dual_adc_reader #(.W(W)) u_converter (.clk, .rst, .start(sample_tick), .sdata_a(adc_sin), .sdata_b(adc_cos),
+    dual_adc_reader #(.W(W)) u_converter (.clk, .rst, .start(sample_tick && !by_counts), .sdata_a(adc_sin), .sdata_b(adc_cos),
                                           .cs_n(adc_cs_n), .sclk(adc_sclk), .valid(converted), .sin(raw_sin), .cos(raw_cos));
     spike_limiter #(.W(W)) u_limiter (.clk, .rst, .step(spike_step), .hold(spike_hold), .valid(converted), .sin(raw_sin), .cos(raw_cos),
                                       .done(sampled), .sin_out(sin), .cos_out(cos), .rejected(sample_rejected));
@@ -98,7 +100,8 @@ module grating #(
 
     incremental_encoder #(.FILTER_W(16)) u_encoder (.clk, .rst, .filter_skip, .filter_needed(deglitch), .filter_spare, .mode, .index_low,
         .index_gate_mask(gate_mask), .index_gate(gate), .index_up, .index_down, .index_each, .index_clears(1'b0), .counts_per_revolution,
-        .illegal_enable(1'b0), .arm_index, .clear_flags(1'b0), .now, .a, .b, .z, .count(quadrature_count), .step(quadrature_step), .heading,
+        .illegal_enable(1'b0), .arm_index, .clear_flags(1'b0), .now, .a(by_steps ? own_step : a),
+        .b(by_steps ? own_direction : b), .z, .count(quadrature_count), .step(quadrature_step), .heading,
         .edge_time, .index_found, .index_armed, .index_count, .filtered(levels), .rejected(edge_rejected), .illegal, .illegal_seen, .illegal_fault,
         .revolution_wrong, .revolution_fault);
 
@@ -125,12 +128,21 @@ module grating #(
     wire signed [47:0] captured_position;
     wire        [4:0]  capture_free;
     wire signed [39:0] fine;
+    wire               counted;
+    wire signed [16:0] count_step;
+    wire        [15:0] counted_phase;
+    logic       [1:0]  index_later;                             // found, until the position of its count stands
 
-    unwrap u_position (.clk, .rst, .valid(stepped), .step, .phase(tracked_phase), .shift, .shift_periods, .done(position_valid), .position);
+    always_ff @(posedge clk) index_later <= rst ? '0 : {index_later[0], index_found};
+
+    count_phase u_counts (.clk, .rst, .tick(sample_tick), .count_step(quadrature_step), .align(align_written), .align_counts(align),
+                          .valid(counted), .step(count_step), .phase(counted_phase));
+    unwrap u_position (.clk, .rst, .valid(by_counts ? counted : stepped), .step(by_counts ? count_step : step),
+                       .phase(by_counts ? counted_phase : tracked_phase), .shift, .shift_periods, .done(position_valid), .position);
     coarse_check u_coarse (.clk, .rst, .limit(disagreement_limit), .valid(position_valid), .position, .count(quadrature_count),
                            .shift, .shift_periods, .disagreement);
     velocity_estimator u_velocity (.clk, .rst, .quantum, .tick, .position, .shift, .shift_periods, .velocity, .fine);
-    position_capture u_capture (.clk, .rst, .enabled(capture_sources), .index(index_found), .tick, .software(capture_now), .probe, .now,
+    position_capture u_capture (.clk, .rst, .enabled(capture_sources), .index(by_counts ? index_later[1] : index_found), .tick, .software(capture_now), .probe, .now,
                                 .valid(position_valid), .position, .pop(capture_next), .clear(capture_clear), .present, .captured_sources,
                                 .captured_age, .captured_time, .captured_position, .free(capture_free), .overrun);
     position_compare u_compare (.clk, .rst, .start(compare_start), .step(compare_step), .count(compare_count), .pulse_length, .gap_length,
@@ -166,9 +178,10 @@ module grating #(
         .square_limits_dead(dead), .capture_sources, .capture_state_present(present), .capture_state_free(capture_free),
         .capture_state_overrun(overrun), .captured_sources, .captured_age, .captured_time, .captured_position, .compare_start, .compare_step,
         .compare_count, .compare_pulse(pulse_length), .compare_gap(gap_length), .compare_state_armed(armed), .compare_state_late(late),
-        .compare_passed(passed), .velocity_quantum(quantum), .velocity_fine(fine));
+        .compare_passed(passed), .velocity_quantum(quantum), .velocity_fine(fine), .position_source_counts(by_counts),
+        .position_source_steps(by_steps), .align, .align_written);
 
-    wire unused = &{1'b0, quadrature_step, heading, illegal_seen, illegal_fault, revolution_fault, learnt, levels[2], corrected_amplitude};
+    wire unused = &{1'b0, heading, illegal_seen, illegal_fault, revolution_fault, learnt, levels[2], corrected_amplitude};
 endmodule
 
 `default_nettype wire

@@ -10,7 +10,9 @@ module node #(
     parameter int CLK_HZ = 4_000_000,           // clk frequency
     parameter int AXES = 1,                     // 1..8
     parameter int W = 8,                        // bits of a sample
-    parameter int MEMORY_BYTES = 65536,         // of the soft core, program and data
+    parameter int DRIVES = 15,                  // what each axis can drive, see actuator
+    parameter int FILTERS = 2,                  // of each servo, see biquad_cascade
+    parameter int MEMORY_BYTES = 98304,         // of the soft core, program and data
     parameter FIRMWARE = ""                     // file of its contents at power-up
 ) (
     input  wire                  clk,
@@ -33,6 +35,11 @@ module node #(
     output logic       [AXES-1:0] adc_sclk,
     output logic       [AXES-1:0] bridge_a,
     output logic       [AXES-1:0] bridge_b,
+    output logic       [AXES-1:0] step,
+    output logic       [AXES-1:0] direction,
+    output logic       [AXES-1:0] dac_cs_n,
+    output logic       [AXES-1:0] dac_sclk,
+    output logic       [AXES-1:0] dac_sdi,
     output logic       [AXES-1:0] drive_enable,
     output logic       [AXES-1:0] compare_pulse
 );
@@ -40,27 +47,30 @@ module node #(
     wire               select, write, trap, node_select, line_select;
     wire        [15:0] bus_address;
     wire        [31:0] wdata, rdata, node_rdata, line_rdata;
-    wire        [AXES-1:0]    axis_select, grating_select;
-    wire        [32*AXES-1:0] axis_rdata, grating_rdata;
+    wire        [AXES-1:0]    axis_select, grating_select, actuator_select;
+    wire        [32*AXES-1:0] axis_rdata, grating_rdata, actuator_rdata;
     wire        [5:0]  word = bus_address[7:2];
 
     soft_core #(.MEMORY_BYTES(MEMORY_BYTES), .FIRMWARE(FIRMWARE)) u_core (.clk, .rst, .select, .write, .address(bus_address), .wdata,
                                                                         .rdata, .trap);
     register_bus #(.AXES(AXES)) u_bus (.clk, .select, .address(bus_address), .node_rdata, .line_rdata, .axis_rdata,
-                                       .grating_rdata, .node_select, .line_select, .axis_select, .grating_select, .rdata);
+                                       .grating_rdata, .actuator_rdata, .node_select, .line_select, .axis_select, .grating_select,
+                                       .actuator_select, .rdata);
 
     // time
     wire        [63:0] now;
     wire        [23:0] tick_period;
     wire        [15:0] sample_period;
-    wire               tick, sample_tick;
+    wire               tick, sample_tick, alive, silent, start_axes_written;
+    wire        [7:0]  start_axes;
 
     time_stamp u_time (.clk, .rst, .now);
     tick_divider #(.W(24)) u_tick (.clk, .rst, .period(tick_period), .tick);
     tick_divider #(.W(16)) u_sample_tick (.clk, .rst, .period(sample_period), .tick(sample_tick));
     node_registers u_node_registers (.clk, .rst, .select(node_select), .write, .word, .wdata, .rdata(node_rdata),
         .clk_hz(32'(CLK_HZ)), .build_axes(4'(AXES)), .build_address(address), .build_memory(8'(MEMORY_BYTES / 1024)),
-        .time_stamp(now), .tick_period, .sample_period);
+        .time_stamp(now), .tick_period, .sample_period, .alive_beat(alive), .start_axes, .start_axes_written);
+    silence_watchdog #(.CLK_HZ(CLK_HZ)) u_core_watchdog (.clk, .rst, .time_ms(16'd50), .sign(alive), .armed(|drive_enable), .expired(silent));
 
     // link
     wire               rx, estop, received, ninth, framing_error, start_glitch, filtered, filtered_command;
@@ -92,7 +102,7 @@ module node #(
     character_transmitter u_transmitter (.clk, .rst, .bit_time, .valid(to_send), .ready(send_ready), .data(send_data),
                                          .ninth(send_command), .tx(line_tx), .driver_enable(line_driver_enable), .busy(sending));
     crc32_stream u_crc (.clk, .rst, .start(crc_start), .valid(crc_byte_written), .data(crc_byte), .crc);
-    line_watchdog #(.CLK_HZ(CLK_HZ)) u_watchdog (.clk, .rst, .time_ms(watchdog_time), .frame_good, .armed(|drive_enable),
+    silence_watchdog #(.CLK_HZ(CLK_HZ)) u_line_watchdog (.clk, .rst, .time_ms(watchdog_time), .sign(frame_good), .armed(|drive_enable),
                                                  .expired(watchdog_expired));
     line_registers u_line_registers (.clk, .rst, .select(line_select), .write, .word, .wdata, .rdata(line_rdata), .bit_time,
         .receive_data(receive[7:0]), .receive_command(receive[8]), .receive_good(receive[9]), .receive_present(present),
@@ -101,16 +111,19 @@ module node #(
         .framing_errors(framing_error), .start_glitches(start_glitch), .overruns(overrun), .crc_byte_data(crc_byte),
         .crc_byte_written, .crc_start_start(crc_start), .crc, .watchdog_time);
 
-    wire unused = &{1'b0, receiving, receive_free, transmit_overrun, bus_address[1:0]};
+    wire unused = &{1'b0, receiving, receive_free, transmit_overrun, bus_address[1:0], start_axes};
 
     // axes
     for (genvar n = 0; n < AXES; n++) begin : g_axis
-        axis #(.CLK_HZ(CLK_HZ), .W(W)) u_axis (.clk, .rst, .tick, .sample_tick, .estop, .watchdog_expired, .cpu_trap(trap),
+        axis #(.CLK_HZ(CLK_HZ), .W(W), .DRIVES(DRIVES), .FILTERS(FILTERS)) u_axis (.clk, .rst, .tick, .tick_period, .sample_tick,
+            .start(start_axes_written && start_axes[n]), .estop, .watchdog_expired, .cpu_stopped(trap || silent),
             .select(axis_select[n]), .write, .word, .wdata, .rdata(axis_rdata[32*n +: 32]),
-            .grating_select(grating_select[n]), .grating_rdata(grating_rdata[32*n +: 32]), .now(now[31:0]),
+            .grating_select(grating_select[n]), .grating_rdata(grating_rdata[32*n +: 32]),
+            .actuator_select(actuator_select[n]), .actuator_rdata(actuator_rdata[32*n +: 32]), .now(now[31:0]),
             .encoder_a(encoder_a[n]), .encoder_b(encoder_b[n]), .encoder_z(encoder_z[n]), .probe(probe[2*n +: 2]), .adc_sin(adc_sin[n]), .adc_cos(adc_cos[n]),
             .limit_low_open(limit_low_open[n]), .limit_high_open(limit_high_open[n]), .drive_fault_n(drive_fault_n[n]),
-            .adc_cs_n(adc_cs_n[n]), .adc_sclk(adc_sclk[n]), .bridge_a(bridge_a[n]), .bridge_b(bridge_b[n]),
+            .adc_cs_n(adc_cs_n[n]), .adc_sclk(adc_sclk[n]), .bridge_a(bridge_a[n]), .bridge_b(bridge_b[n]), .step(step[n]),
+            .direction(direction[n]), .dac_cs_n(dac_cs_n[n]), .dac_sclk(dac_sclk[n]), .dac_sdi(dac_sdi[n]),
             .drive_enable(drive_enable[n]), .compare_pulse(compare_pulse[n]));
     end
 endmodule

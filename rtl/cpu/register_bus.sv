@@ -3,7 +3,7 @@
 //
 // latency  select and write reach a block in the same clk; its answer passes in the next     rate  one access per clk
 // source   the addresses of tables/registers.rdl: node at 0x000, line at 0x100, axis n at 0x400 + n * 0x100,
-//          its grating at 0xC00 + n * 0x100
+//          its grating at 0xC00 + n * 0x100, its actuator at 0x1400 + n * 0x100
 // model    tb/cpu/register_bus.py, equal in every bit of every cycle
 `default_nettype none
 
@@ -17,16 +17,18 @@ module register_bus #(
     input  wire        [31:0]    line_rdata,
     input  wire        [32*AXES-1:0] axis_rdata, // axis n in bits 32 n + 31 .. 32 n
     input  wire        [32*AXES-1:0] grating_rdata,
+    input  wire        [32*AXES-1:0] actuator_rdata,
     output logic                 node_select,   // strobe: the access is for this block
     output logic                 line_select,
     output logic       [AXES-1:0] axis_select,
     output logic       [AXES-1:0] grating_select,
+    output logic       [AXES-1:0] actuator_select,
     output logic       [31:0]    rdata          // answer of the block selected last; 0 where there is none
 );
     if (AXES < 1 || AXES > 8) begin : g_check AXES_MUST_BE_FROM_1_TO_8 u_error (); end
 
     logic            node_q, line_q;
-    logic [AXES-1:0] axis_q, grating_q;
+    logic [AXES-1:0] axis_q, grating_q, actuator_q;
 
     wire [7:0] block = address[15:8];
 
@@ -36,13 +38,15 @@ module register_bus #(
         for (int n = 0; n < AXES; n++) begin
             axis_select[n]    = select && block == 8'(4 + n);
             grating_select[n] = select && block == 8'(12 + n);
+            actuator_select[n] = select && block == 8'(20 + n);
         end
     end
 
     always_comb begin
         rdata = ({32{node_q}} & node_rdata) | ({32{line_q}} & line_rdata);
         for (int n = 0; n < AXES; n++)
-            rdata = rdata | ({32{axis_q[n]}} & axis_rdata[32*n +: 32]) | ({32{grating_q[n]}} & grating_rdata[32*n +: 32]);
+            rdata = rdata | ({32{axis_q[n]}} & axis_rdata[32*n +: 32]) | ({32{grating_q[n]}} & grating_rdata[32*n +: 32])
+                          | ({32{actuator_q[n]}} & actuator_rdata[32*n +: 32]);
     end
 
     always_ff @(posedge clk) begin
@@ -50,6 +54,7 @@ module register_bus #(
         line_q    <= line_select;
         axis_q    <= axis_select;
         grating_q <= grating_select;
+        actuator_q <= actuator_select;
     end
 
     wire unused = &{1'b0, address[7:0]};

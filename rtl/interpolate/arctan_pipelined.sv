@@ -37,12 +37,12 @@ module arctan_pipelined #(
     localparam int Z       = 16 + GUARD;
 
     // bits behind the point of longer and of shorter when a step is done; step 1 folds, step t finds digit t - 1
-    function int fraction(input int step, input bit of_longer);
+    function int fraction(input int stage, input bit of_longer);
         int l, s, l_now;
         begin
             l = 1;
             s = 0;
-            for (int i = 2; i < step; i++) begin
+            for (int i = 2; i < stage; i++) begin
                 l_now = l;
                 if (i <= TURNS) begin
                     if (s + 2 * i - 1 > l) l = s + 2 * i - 1;
@@ -51,14 +51,14 @@ module arctan_pipelined #(
                 s = l_now > s - 1 ? l_now : s - 1;
                 if (s > HEAD - i - 1) s = HEAD - i - 1;
             end
-            if (step < 2) l = 0;
-            if (step > TURNS + 1 && l > s) l = s;
+            if (stage < 2) l = 0;
+            if (stage > TURNS + 1 && l > s) l = s;
             fraction = of_longer ? l : s;
         end
     endfunction
 
-    function int summed(input int step);    // digits whose angles are in the sum when this step is done
-        summed = step < LEAD + 2 ? 0 : step > DIGITS - 4 ? DIGITS - 5 : step > DIGITS - 9 ? DIGITS - 10 : LEAD + (step - LEAD - 2) / 4 * 4;
+    function int summed(input int stage);    // digits whose angles are in the sum when this step is done
+        summed = stage < LEAD + 2 ? 0 : stage > DIGITS - 4 ? DIGITS - 5 : stage > DIGITS - 9 ? DIGITS - 10 : LEAD + (stage - LEAD - 2) / 4 * 4;
     endfunction
 
     logic [LATENCY-1:0] coming;

@@ -22,7 +22,8 @@ module axis_registers (
     output logic               strobes_reset_faults,           // strobe: clear latched faults whose cause is gone; needs enable = 0
     output logic               strobes_hold_here,              // strobe: target := position, profile queue emptied
     output logic               strobes_start,                  // strobe: play the queued segments
-    output logic               strobes_brake,                  // strobe: controlled stop: queue emptied, the target velocity falls to zero at brake_rate
+    output logic               strobes_brake,                  // strobe: controlled stop: queue emptied, the target comes to rest within brake_rate and brake_jerk
+    output logic               strobes_arm,                    // strobe: play the queued segments when the time stamp reaches start_at
     input  wire                state_enabled,                  // the drive is on
     input  wire                state_limit_low,                // level of the switch at the low end, deglitched; 1: pressed
     input  wire                state_limit_high,               // level of the switch at the high end, deglitched; 1: pressed
@@ -31,6 +32,8 @@ module axis_registers (
     input  wire                state_moving,                   // a profile is being played
     input  wire                state_saturated,                // the command stands at its limit
     input  wire  [4:0]         state_queue_free,               // segments that may still be queued
+    input  wire                state_armed,                    // a profile waits for start_at
+    input  wire                state_fine_saturated,           // the command of the fine stage stands at its limit
     input  wire                faults_limit_low,               // latched causes: limit low
     input  wire                faults_limit_high,              // latched causes: limit high
     input  wire                faults_estop,                   // latched causes: estop
@@ -72,24 +75,37 @@ module axis_registers (
     input  wire                rejected_pulses,                // strobe, counted: pulses that the deglitcher of a or b held back; writing clears
     input  wire                rejected_samples,               // strobe, counted: samples that limit filter 1 held back; writing clears
     output logic [23:0]        kp,                             // proportional gain on the error [1/65536 command/(period/65536)]
+    output logic               kp_written,                     // strobe: kp has just been written, its new value stands
     output logic [23:0]        ki,                             // integral gain, each tick [1/16777216 command/(period/65536)]
     output logic [23:0]        kd,                             // derivative gain on the velocity error [1/65536 command/(period/65536/tick)]
+    output logic               kd_written,                     // strobe: kd has just been written, its new value stands
     output logic [23:0]        kv,                             // feed-forward of the target velocity [1/65536 command/(period/65536/tick)]
+    output logic               kv_written,                     // strobe: kv has just been written, its new value stands
     output logic [23:0]        ka,                             // feed-forward of the target acceleration [1/256 command/(period/65536/tick2)]
+    output logic               ka_written,                     // strobe: ka has just been written, its new value stands
     output logic [14:0]        servo_limits_output,            // largest |command|
     output logic [14:0]        servo_limits_integral,          // largest |integral term|
     output logic [15:0]        dead_band,                      // the integrator rests while |error| is not above this and the profile stands [1/65536 period]
     input  wire  signed [31:0] following_error,                // target - position, held inside 32 bits [1/65536 period]
     input  wire  signed [15:0] command,                        // command to the drive as the guard lets it pass
     output logic signed [15:0] open_command,                   // command while closed_loop = 0
-    output logic [15:0]        pwm_period,                     // PWM period [clk]
+    output logic [3:0]         filters_in_use,                 // bit n: section n filters, else it passes
+    output logic [4:0]         filters_address,                // of the next coefficient: section * 8 + 0: b0, 1: b1, 2: b2, 3: -a1, 4: -a2
+    output logic signed [31:0] filter_coefficient,             // coefficient; writing puts it at filters.address
+    output logic               filter_coefficient_written,     // strobe: filter_coefficient has just been written, its new value stands
     output logic signed [63:0] segment_velocity,               // velocity at the start of the segment [2^-40 period/tick]
     output logic signed [63:0] segment_acceleration,           // acceleration at the start of the segment [2^-40 period/tick2]
     output logic signed [31:0] segment_jerk,                   // jerk of the segment [2^-40 period/tick3]
     output logic [23:0]        segment_ticks,                  // duration of the segment; writing queues it [tick]
     output logic               segment_ticks_last,             // 1: the profile ends with this segment, 0: another must follow or it is an underrun
     output logic               segment_ticks_written,          // strobe: segment_ticks has just been written, its new value stands
-    output logic [31:0]        brake_rate                      // how the target velocity falls after the strobe brake [2^-32 period/tick2]
+    output logic [31:0]        brake_rate,                     // largest acceleration after the strobe brake [2^-32 period/tick2]
+    output logic [31:0]        brake_jerk,                     // largest change of the acceleration then; 0: not limited [2^-40 period/tick3]
+    output logic [16:0]        override_percent,               // of full speed, 65536 at most
+    output logic               override_pause,                 // 1: stand still in the middle of it
+    output logic [31:0]        override_slope,                 // largest change of the override; 0: at once [2^-32 1/tick]
+    output logic [31:0]        override_curve,                 // largest change of that; 0: not limited [2^-32 1/tick2]
+    output logic [31:0]        start_at                        // time stamp at which an armed profile starts [clk]
 );
     logic [15:0] fault_position_high;
     logic [15:0] position_high;
@@ -113,8 +129,8 @@ module axis_registers (
         rdata <= '0;
         if (get) case (word)
             6'h00: rdata <= {28'd0, control_fine, control_homing, control_closed_loop, control_enable};
-            6'h02: rdata <= {20'd0, state_queue_free, state_saturated, state_moving, state_drive_fault, state_estop,
-                            state_limit_high, state_limit_low, state_enabled};
+            6'h02: rdata <= {18'd0, state_fine_saturated, state_armed, state_queue_free, state_saturated, state_moving,
+                            state_drive_fault, state_estop, state_limit_high, state_limit_low, state_enabled};
             6'h03: rdata <= {22'd0, faults_step_overrun, faults_profile_underrun, faults_cpu, faults_drive, faults_line_watchdog,
                             faults_encoder, faults_following_error, faults_estop, faults_limit_high, faults_limit_low};
             6'h04: rdata <= {22'd0, causes_now};
@@ -150,7 +166,8 @@ module axis_registers (
             6'h27: rdata <= following_error;
             6'h28: rdata <= {{16{command[15]}}, command};
             6'h29: rdata <= {{16{open_command[15]}}, open_command};
-            6'h2A: rdata <= {16'd0, pwm_period};
+            6'h2A: rdata <= {23'd0, filters_address, filters_in_use};
+            6'h2B: rdata <= filter_coefficient;
             6'h2C: rdata <= segment_velocity[31:0];
             6'h2D: rdata <= segment_velocity[63:32];
             6'h2E: rdata <= segment_acceleration[31:0];
@@ -158,6 +175,11 @@ module axis_registers (
             6'h30: rdata <= segment_jerk;
             6'h31: rdata <= {7'd0, segment_ticks_last, segment_ticks};
             6'h32: rdata <= brake_rate;
+            6'h33: rdata <= brake_jerk;
+            6'h34: rdata <= {14'd0, override_pause, override_percent};
+            6'h35: rdata <= override_slope;
+            6'h36: rdata <= override_curve;
+            6'h37: rdata <= start_at;
             default: rdata <= '0;
         endcase
         if (get && word == 6'h06) fault_position_high <= fault_position[47:32];
@@ -172,6 +194,7 @@ module axis_registers (
         strobes_hold_here <= put && word == 6'h01 && wdata[1];
         strobes_start <= put && word == 6'h01 && wdata[2];
         strobes_brake <= put && word == 6'h01 && wdata[3];
+        strobes_arm <= put && word == 6'h01 && wdata[4];
         if (put && word == 6'h08) following_limit <= wdata;
         shift_origin_written <= put && word == 6'h0F;
         if (put && word == 6'h0F) shift_origin <= wdata;
@@ -193,16 +216,23 @@ module axis_registers (
         else if (!(&rejected_pulses_count)) rejected_pulses_count <= rejected_pulses_count + {31'd0, rejected_pulses};
         if (put && word == 6'h1A) rejected_samples_count <= {31'd0, rejected_samples};
         else if (!(&rejected_samples_count)) rejected_samples_count <= rejected_samples_count + {31'd0, rejected_samples};
+        kp_written <= put && word == 6'h20;
         if (put && word == 6'h20) kp <= wdata[23:0];
         if (put && word == 6'h21) ki <= wdata[23:0];
+        kd_written <= put && word == 6'h22;
         if (put && word == 6'h22) kd <= wdata[23:0];
+        kv_written <= put && word == 6'h23;
         if (put && word == 6'h23) kv <= wdata[23:0];
+        ka_written <= put && word == 6'h24;
         if (put && word == 6'h24) ka <= wdata[23:0];
         if (put && word == 6'h25) servo_limits_output <= wdata[14:0];
         if (put && word == 6'h25) servo_limits_integral <= wdata[29:15];
         if (put && word == 6'h26) dead_band <= wdata[15:0];
         if (put && word == 6'h29) open_command <= wdata[15:0];
-        if (put && word == 6'h2A) pwm_period <= wdata[15:0];
+        if (put && word == 6'h2A) filters_in_use <= wdata[3:0];
+        if (put && word == 6'h2A) filters_address <= wdata[8:4];
+        filter_coefficient_written <= put && word == 6'h2B;
+        if (put && word == 6'h2B) filter_coefficient <= wdata;
         if (put && word == 6'h2C) segment_velocity_low <= wdata;
         if (put && word == 6'h2D) segment_velocity <= {wdata, segment_velocity_low};
         if (put && word == 6'h2E) segment_acceleration_low <= wdata;
@@ -212,6 +242,12 @@ module axis_registers (
         if (put && word == 6'h31) segment_ticks <= wdata[23:0];
         if (put && word == 6'h31) segment_ticks_last <= wdata[24];
         if (put && word == 6'h32) brake_rate <= wdata;
+        if (put && word == 6'h33) brake_jerk <= wdata;
+        if (put && word == 6'h34) override_percent <= wdata[16:0];
+        if (put && word == 6'h34) override_pause <= wdata[17];
+        if (put && word == 6'h35) override_slope <= wdata;
+        if (put && word == 6'h36) override_curve <= wdata;
+        if (put && word == 6'h37) start_at <= wdata;
         if (rst) begin
             rdata <= '0;
             control_enable <= 1'b0;
@@ -222,6 +258,7 @@ module axis_registers (
             strobes_hold_here <= 1'b0;
             strobes_start <= 1'b0;
             strobes_brake <= 1'b0;
+            strobes_arm <= 1'b0;
             fault_position_high <= '0;
             following_limit <= 32'h00000000;
             position_high <= '0;
@@ -244,16 +281,23 @@ module axis_registers (
             encoder_fault_mask <= 5'h00;
             rejected_pulses_count <= '0;
             rejected_samples_count <= '0;
+            kp_written <= 1'b0;
             kp <= 24'h000000;
             ki <= 24'h000000;
+            kd_written <= 1'b0;
             kd <= 24'h000000;
+            kv_written <= 1'b0;
             kv <= 24'h000000;
+            ka_written <= 1'b0;
             ka <= 24'h000000;
             servo_limits_output <= 15'h0000;
             servo_limits_integral <= 15'h0000;
             dead_band <= 16'h0000;
             open_command <= 16'h0000;
-            pwm_period <= 16'h0000;
+            filters_in_use <= 4'h0;
+            filters_address <= 5'h00;
+            filter_coefficient_written <= 1'b0;
+            filter_coefficient <= 32'h00000000;
             segment_velocity_low <= '0;
             segment_velocity <= 64'h0000000000000000;
             segment_acceleration_low <= '0;
@@ -263,6 +307,12 @@ module axis_registers (
             segment_ticks <= 24'h000000;
             segment_ticks_last <= 1'b0;
             brake_rate <= 32'hFFFFFFFF;
+            brake_jerk <= 32'h00000000;
+            override_percent <= 17'h10000;
+            override_pause <= 1'b0;
+            override_slope <= 32'h00000000;
+            override_curve <= 32'h00000000;
+            start_at <= 32'h00000000;
         end
     end
 endmodule

@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0xf9788670u            // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xef53f39au            // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define LINE_BASE 0x100u
@@ -17,6 +17,8 @@
 #define AXIS_STRIDE 0x100u
 #define GRATING_BASE 0xc00u
 #define GRATING_STRIDE 0x100u
+#define ACTUATOR_BASE 0x1400u
+#define ACTUATOR_STRIDE 0x100u
 
 #define FIELD_GET(word, field) (((uint32_t)(word) & field##_MASK) >> field##_SHIFT)
 #define FIELD_GET_SIGNED(word, field) \
@@ -65,6 +67,14 @@ static inline uint64_t grating_read_wide(unsigned axis, uint32_t offset)
 { return register_read_wide(GRATING_BASE + axis * GRATING_STRIDE + offset); }
 static inline void grating_write_wide(unsigned axis, uint32_t offset, uint64_t value)
 { register_write_wide(GRATING_BASE + axis * GRATING_STRIDE + offset, value); }
+static inline uint32_t actuator_read(unsigned axis, uint32_t offset)
+{ return register_read(ACTUATOR_BASE + axis * ACTUATOR_STRIDE + offset); }
+static inline void actuator_write(unsigned axis, uint32_t offset, uint32_t value)
+{ register_write(ACTUATOR_BASE + axis * ACTUATOR_STRIDE + offset, value); }
+static inline uint64_t actuator_read_wide(unsigned axis, uint32_t offset)
+{ return register_read_wide(ACTUATOR_BASE + axis * ACTUATOR_STRIDE + offset); }
+static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t value)
+{ register_write_wide(ACTUATOR_BASE + axis * ACTUATOR_STRIDE + offset, value); }
 
 // node: identity, clock, health of the soft core
 #define NODE_MAP_CRC                                   0x000u  // r: CRC-32 of the register source
@@ -199,9 +209,12 @@ static inline void grating_write_wide(unsigned axis, uint32_t offset, uint64_t v
 #define AXIS_STROBES_START_MASK                        0x00000004u  // play the queued segments
 #define AXIS_STROBES_START_SHIFT                       2
 #define AXIS_STROBES_START_WIDTH                       1
-#define AXIS_STROBES_BRAKE_MASK                        0x00000008u  // controlled stop: queue emptied, the target velocity falls to zero at brake_rate
+#define AXIS_STROBES_BRAKE_MASK                        0x00000008u  // controlled stop: queue emptied, the target comes to rest within brake_rate and brake_jerk
 #define AXIS_STROBES_BRAKE_SHIFT                       3
 #define AXIS_STROBES_BRAKE_WIDTH                       1
+#define AXIS_STROBES_ARM_MASK                          0x00000010u  // play the queued segments when the time stamp reaches start_at
+#define AXIS_STROBES_ARM_SHIFT                         4
+#define AXIS_STROBES_ARM_WIDTH                         1
 #define AXIS_STATE                                     0x008u  // r: state of the axis
 #define AXIS_STATE_ENABLED_MASK                        0x00000001u  // the drive is on
 #define AXIS_STATE_ENABLED_SHIFT                       0
@@ -227,6 +240,12 @@ static inline void grating_write_wide(unsigned axis, uint32_t offset, uint64_t v
 #define AXIS_STATE_QUEUE_FREE_MASK                     0x00000f80u  // segments that may still be queued
 #define AXIS_STATE_QUEUE_FREE_SHIFT                    7
 #define AXIS_STATE_QUEUE_FREE_WIDTH                    5
+#define AXIS_STATE_ARMED_MASK                          0x00001000u  // a profile waits for start_at
+#define AXIS_STATE_ARMED_SHIFT                         12
+#define AXIS_STATE_ARMED_WIDTH                         1
+#define AXIS_STATE_FINE_SATURATED_MASK                 0x00002000u  // the command of the fine stage stands at its limit
+#define AXIS_STATE_FINE_SATURATED_SHIFT                13
+#define AXIS_STATE_FINE_SATURATED_WIDTH                1
 #define AXIS_FAULTS                                    0x00cu  // r: latched causes
 #define AXIS_FAULTS_LIMIT_LOW_MASK                     0x00000001u
 #define AXIS_FAULTS_LIMIT_LOW_SHIFT                    0
@@ -407,10 +426,17 @@ static inline void grating_write_wide(unsigned axis, uint32_t offset, uint64_t v
 #define AXIS_OPEN_COMMAND_MASK                         0x0000ffffu
 #define AXIS_OPEN_COMMAND_SHIFT                        0
 #define AXIS_OPEN_COMMAND_WIDTH                        16
-#define AXIS_PWM_PERIOD                                0x0a8u  // rw: PWM period [clk]
-#define AXIS_PWM_PERIOD_MASK                           0x0000ffffu
-#define AXIS_PWM_PERIOD_SHIFT                          0
-#define AXIS_PWM_PERIOD_WIDTH                          16
+#define AXIS_FILTERS                                   0x0a8u  // rw: filters of the servo; a section takes new coefficients only while it is out of use
+#define AXIS_FILTERS_IN_USE_MASK                       0x0000000fu  // bit n: section n filters, else it passes
+#define AXIS_FILTERS_IN_USE_SHIFT                      0
+#define AXIS_FILTERS_IN_USE_WIDTH                      4
+#define AXIS_FILTERS_ADDRESS_MASK                      0x000001f0u  // of the next coefficient: section * 8 + 0: b0, 1: b1, 2: b2, 3: -a1, 4: -a2
+#define AXIS_FILTERS_ADDRESS_SHIFT                     4
+#define AXIS_FILTERS_ADDRESS_WIDTH                     5
+#define AXIS_FILTER_COEFFICIENT                        0x0acu  // rw: coefficient; writing puts it at filters.address
+#define AXIS_FILTER_COEFFICIENT_MASK                   0xffffffffu
+#define AXIS_FILTER_COEFFICIENT_SHIFT                  0
+#define AXIS_FILTER_COEFFICIENT_WIDTH                  32
 #define AXIS_SEGMENT_VELOCITY                          0x0b0u  // rw: velocity at the start of the segment [2^-40 period/tick]
 #define AXIS_SEGMENT_VELOCITY_LOW                      0x0b0u
 #define AXIS_SEGMENT_VELOCITY_HIGH                     0x0b4u
@@ -430,10 +456,33 @@ static inline void grating_write_wide(unsigned axis, uint32_t offset, uint64_t v
 #define AXIS_SEGMENT_TICKS_LAST_MASK                   0x01000000u  // 1: the profile ends with this segment, 0: another must follow or it is an underrun
 #define AXIS_SEGMENT_TICKS_LAST_SHIFT                  24
 #define AXIS_SEGMENT_TICKS_LAST_WIDTH                  1
-#define AXIS_BRAKE_RATE                                0x0c8u  // rw: how the target velocity falls after the strobe brake [2^-32 period/tick2]
+#define AXIS_BRAKE_RATE                                0x0c8u  // rw: largest acceleration after the strobe brake [2^-32 period/tick2]
 #define AXIS_BRAKE_RATE_MASK                           0xffffffffu
 #define AXIS_BRAKE_RATE_SHIFT                          0
 #define AXIS_BRAKE_RATE_WIDTH                          32
+#define AXIS_BRAKE_JERK                                0x0ccu  // rw: largest change of the acceleration then; 0: not limited [2^-40 period/tick3]
+#define AXIS_BRAKE_JERK_MASK                           0xffffffffu
+#define AXIS_BRAKE_JERK_SHIFT                          0
+#define AXIS_BRAKE_JERK_WIDTH                          32
+#define AXIS_OVERRIDE                                  0x0d0u  // rw: how fast profiles are played
+#define AXIS_OVERRIDE_PERCENT_MASK                     0x0001ffffu  // of full speed, 65536 at most
+#define AXIS_OVERRIDE_PERCENT_SHIFT                    0
+#define AXIS_OVERRIDE_PERCENT_WIDTH                    17
+#define AXIS_OVERRIDE_PAUSE_MASK                       0x00020000u  // 1: stand still in the middle of it
+#define AXIS_OVERRIDE_PAUSE_SHIFT                      17
+#define AXIS_OVERRIDE_PAUSE_WIDTH                      1
+#define AXIS_OVERRIDE_SLOPE                            0x0d4u  // rw: largest change of the override; 0: at once [2^-32 1/tick]
+#define AXIS_OVERRIDE_SLOPE_MASK                       0xffffffffu
+#define AXIS_OVERRIDE_SLOPE_SHIFT                      0
+#define AXIS_OVERRIDE_SLOPE_WIDTH                      32
+#define AXIS_OVERRIDE_CURVE                            0x0d8u  // rw: largest change of that; 0: not limited [2^-32 1/tick2]
+#define AXIS_OVERRIDE_CURVE_MASK                       0xffffffffu
+#define AXIS_OVERRIDE_CURVE_SHIFT                      0
+#define AXIS_OVERRIDE_CURVE_WIDTH                      32
+#define AXIS_START_AT                                  0x0dcu  // rw: time stamp at which an armed profile starts [clk]
+#define AXIS_START_AT_MASK                             0xffffffffu
+#define AXIS_START_AT_SHIFT                            0
+#define AXIS_START_AT_WIDTH                            32
 
 // grating: edge filter, index, signal correction and its learner, signal faults, capture, compare
 #define GRATING_EDGE_FILTER                            0x000u  // rw: filter of a, b and index; how many equal samples it wants is axis.sensing.deglitch
@@ -689,5 +738,80 @@ static inline void grating_write_wide(unsigned axis, uint32_t offset, uint64_t v
 #define GRATING_ALIGN_MASK                             0x00000007u
 #define GRATING_ALIGN_SHIFT                            0
 #define GRATING_ALIGN_WIDTH                            3
+
+// actuator: what the command goes to, bridge, steps or converter, and the fine stage
+#define ACTUATOR_DRIVE                                 0x000u  // rw: the drive
+#define ACTUATOR_DRIVE_KIND_MASK                       0x00000003u  // 0: bridge, 1: steps, 2: converter
+#define ACTUATOR_DRIVE_KIND_SHIFT                      0
+#define ACTUATOR_DRIVE_KIND_WIDTH                      2
+#define ACTUATOR_DRIVE_BUILT_MASK                      0x0000003cu  // what was built: bit 0 bridge, 1 steps, 2 converter, 3 fine stage
+#define ACTUATOR_DRIVE_BUILT_SHIFT                     2
+#define ACTUATOR_DRIVE_BUILT_WIDTH                     4
+#define ACTUATOR_PWM_PERIOD                            0x004u  // rw: PWM period of the bridge [clk]
+#define ACTUATOR_PWM_PERIOD_MASK                       0x0000ffffu
+#define ACTUATOR_PWM_PERIOD_SHIFT                      0
+#define ACTUATOR_PWM_PERIOD_WIDTH                      16
+#define ACTUATOR_STEP_PULSE                            0x008u  // rw: shortest times of a step pulse
+#define ACTUATOR_STEP_PULSE_HIGH_MASK                  0x00003fffu
+#define ACTUATOR_STEP_PULSE_HIGH_SHIFT                 0
+#define ACTUATOR_STEP_PULSE_HIGH_WIDTH                 14
+#define ACTUATOR_STEP_PULSE_LOW_MASK                   0x0fffc000u
+#define ACTUATOR_STEP_PULSE_LOW_SHIFT                  14
+#define ACTUATOR_STEP_PULSE_LOW_WIDTH                  14
+#define ACTUATOR_STEP_DIRECTION                        0x00cu  // rw: shortest times of the direction before and after a step pulse
+#define ACTUATOR_STEP_DIRECTION_SETUP_MASK             0x00003fffu
+#define ACTUATOR_STEP_DIRECTION_SETUP_SHIFT            0
+#define ACTUATOR_STEP_DIRECTION_SETUP_WIDTH            14
+#define ACTUATOR_STEP_DIRECTION_HOLD_MASK              0x0fffc000u
+#define ACTUATOR_STEP_DIRECTION_HOLD_SHIFT             14
+#define ACTUATOR_STEP_DIRECTION_HOLD_WIDTH             14
+#define ACTUATOR_STEP_OUTPUT                           0x010u  // rw: how steps are put out; taken while the drive is off
+#define ACTUATOR_STEP_OUTPUT_MODE_MASK                 0x00000003u  // 0: step and direction, 1: quadrature, 2: pulses up and pulses down
+#define ACTUATOR_STEP_OUTPUT_MODE_SHIFT                0
+#define ACTUATOR_STEP_OUTPUT_MODE_WIDTH                2
+#define ACTUATOR_STEP_OUTPUT_STEP_LOW_MASK             0x00000004u  // 1: step is active low
+#define ACTUATOR_STEP_OUTPUT_STEP_LOW_SHIFT            2
+#define ACTUATOR_STEP_OUTPUT_STEP_LOW_WIDTH            1
+#define ACTUATOR_STEP_OUTPUT_DIRECTION_LOW_MASK        0x00000008u  // 1: direction is low going up
+#define ACTUATOR_STEP_OUTPUT_DIRECTION_LOW_SHIFT       3
+#define ACTUATOR_STEP_OUTPUT_DIRECTION_LOW_WIDTH       1
+#define ACTUATOR_STEP_OUTPUT_TRIM_MASK                 0x000000f0u  // the command moves the target by command * 2^trim LSB of position
+#define ACTUATOR_STEP_OUTPUT_TRIM_SHIFT                4
+#define ACTUATOR_STEP_OUTPUT_TRIM_WIDTH                4
+#define ACTUATOR_STEP_RATIO                            0x018u  // rw: steps in one period; the sign turns the direction [2^-32 step/period]
+#define ACTUATOR_STEP_RATIO_LOW                        0x018u
+#define ACTUATOR_STEP_RATIO_HIGH                       0x01cu
+#define ACTUATOR_STEP_RATIO_WIDTH                      48
+#define ACTUATOR_STEPS                                 0x020u  // r: steps on the wire since reset [step]
+#define ACTUATOR_STEPS_MASK                            0xffffffffu
+#define ACTUATOR_STEPS_SHIFT                           0
+#define ACTUATOR_STEPS_WIDTH                           32
+#define ACTUATOR_CONVERTER                             0x024u  // rw: frames to the converter
+#define ACTUATOR_CONVERTER_HALF_CLK_MASK               0x000000ffu  // half a period of its clock; 0 counts as 1 [clk]
+#define ACTUATOR_CONVERTER_HALF_CLK_SHIFT              0
+#define ACTUATOR_CONVERTER_HALF_CLK_WIDTH              8
+#define ACTUATOR_CONVERTER_REFRESH_MASK                0x00ffff00u  // after so long without one the last is sent again [clk]
+#define ACTUATOR_CONVERTER_REFRESH_SHIFT               8
+#define ACTUATOR_CONVERTER_REFRESH_WIDTH               16
+#define ACTUATOR_CONVERTER_TRIM                        0x028u  // rw: added to each word
+#define ACTUATOR_CONVERTER_TRIM_MASK                   0x0000ffffu
+#define ACTUATOR_CONVERTER_TRIM_SHIFT                  0
+#define ACTUATOR_CONVERTER_TRIM_WIDTH                  16
+#define ACTUATOR_FINE_KP                               0x030u  // rw: proportional gain of the fine stage [1/65536 command/(period/65536)]
+#define ACTUATOR_FINE_KP_MASK                          0x00ffffffu
+#define ACTUATOR_FINE_KP_SHIFT                         0
+#define ACTUATOR_FINE_KP_WIDTH                         24
+#define ACTUATOR_FINE_KI                               0x034u  // rw: its integral gain, each tick [1/16777216 command/(period/65536)]
+#define ACTUATOR_FINE_KI_MASK                          0x00ffffffu
+#define ACTUATOR_FINE_KI_SHIFT                         0
+#define ACTUATOR_FINE_KI_WIDTH                         24
+#define ACTUATOR_FINE_LIMIT                            0x038u  // rw: its largest |command|
+#define ACTUATOR_FINE_LIMIT_MASK                       0x00007fffu
+#define ACTUATOR_FINE_LIMIT_SHIFT                      0
+#define ACTUATOR_FINE_LIMIT_WIDTH                      15
+#define ACTUATOR_FINE_COMMAND                          0x03cu  // r: its command
+#define ACTUATOR_FINE_COMMAND_MASK                     0x0000ffffu
+#define ACTUATOR_FINE_COMMAND_SHIFT                    0
+#define ACTUATOR_FINE_COMMAND_WIDTH                    16
 
 #endif

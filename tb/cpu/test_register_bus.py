@@ -10,21 +10,24 @@ from cocotb.triggers import FallingEdge
 from bench import run
 from register_bus import RegisterBus
 
+OF_AXES = {"axis": 0x400, "grating": 0xC00, "actuator": 0x1400}         # blocks that each axis has, where the first one lies
+
 
 async def access(dut, model, select, address):
     """One clk with this access; selects and answer are compared with the model, the answer is returned."""
     word = lambda: random.getrandbits(32)
     dut.select.value, dut.address.value = select, address
     await FallingEdge(dut.clk)
-    got = int(dut.node_select.value), int(dut.line_select.value), int(dut.axis_select.value), int(dut.grating_select.value)
+    got = tuple(int(getattr(dut, f"{block}_select").value) for block in ("node", "line", *OF_AXES))
     assert got == model.selects(select, address), f"address {address:#x}: selects {got}"
     model.step(select, address)
-    node, line, axes, gratings = word(), word(), *([word() for _ in range(model.axes)] for _ in range(2))
+    node, line = word(), word()
+    several = [[word() for _ in range(model.axes)] for _ in OF_AXES]
     dut.node_rdata.value, dut.line_rdata.value = node, line
-    dut.axis_rdata.value = sum(x << 32 * n for n, x in enumerate(axes))
-    dut.grating_rdata.value = sum(x << 32 * n for n, x in enumerate(gratings))
+    for block, words in zip(OF_AXES, several, strict=True):
+        getattr(dut, f"{block}_rdata").value = sum(x << 32 * n for n, x in enumerate(words))
     dut.select.value = 0
-    return node, line, axes, gratings
+    return node, line, *several
 
 
 async def check(dut, model, select, address):
@@ -38,8 +41,8 @@ async def check(dut, model, select, address):
 
 async def begin(dut):
     Clock(dut.clk, 10, "ns").start()
-    dut.select.value, dut.address.value, dut.node_rdata.value, dut.line_rdata.value, dut.axis_rdata.value = 0, 0, 0, 0, 0
-    dut.grating_rdata.value = 0
+    for name in ("select", "address", *(f"{block}_rdata" for block in ("node", "line", *OF_AXES))):
+        getattr(dut, name).value = 0
     await FallingEdge(dut.clk)
     await FallingEdge(dut.clk)
     return RegisterBus(int(dut.AXES.value))
@@ -48,18 +51,17 @@ async def begin(dut):
 @cocotb.test()
 async def each_block_answers_at_both_ends_of_its_range(dut):
     model = await begin(dut)
-    axes = [(2 + n, 0x400 + 0x100 * n) for n in range(model.axes)]
-    gratings = [(2 + model.axes + n, 0xC00 + 0x100 * n) for n in range(model.axes)]
-    for block, base in [(0, 0x000), (1, 0x100), *axes, *gratings]:
+    bases = [0x000, 0x100, *(first + 0x100 * n for first in OF_AXES.values() for n in range(model.axes))]
+    for block, base in enumerate(bases):
         for address in (base, base + 0xFC):
-            value, (of_node, of_line, of_axes, of_gratings) = await check(dut, model, 1, address)
-            assert value == [of_node, of_line, *of_axes, *of_gratings][block]
+            value, (of_node, of_line, *several) = await check(dut, model, 1, address)
+            assert value == [of_node, of_line, *(word for words in several for word in words)][block]
 
 
 @cocotb.test()
 async def nobody_answers_elsewhere(dut):
     model = await begin(dut)
-    for address in (0x200, 0x3FC, 0x400 + 0x100 * model.axes, 0xC00 + 0x100 * model.axes, 0xFFFC):
+    for address in (0x200, 0x3FC, *(first + 0x100 * model.axes for first in OF_AXES.values()), 0xFFFC):
         assert (await check(dut, model, 1, address))[0] == 0
     assert (await check(dut, model, 0, 0))[0] == 0
 
@@ -68,7 +70,7 @@ async def nobody_answers_elsewhere(dut):
 async def any_access_matches_the_model(dut):
     model = await begin(dut)
     for _ in range(500):
-        await check(dut, model, random.getrandbits(1), random.choice([random.getrandbits(12), random.getrandbits(16)]) & ~3)
+        await check(dut, model, random.getrandbits(1), random.choice([random.getrandbits(13), random.getrandbits(16)]) & ~3)
 
 
 @pytest.mark.parametrize("axes", [1, 3])

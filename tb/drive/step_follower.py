@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What rtl/drive/step_follower.sv does, in integers: clk(…) is one clk and returns what stands after it."""
+from step_scaler import StepScaler
+
+
+def signed(value, bits):
+    return (value + (1 << bits - 1)) % (1 << bits) - (1 << bits - 1)
+
+
+class StepFollower:
+    def __init__(self):
+        self.scaler, self.wait, self.rebased, self.pending, self.done = StepScaler(), 0, 1, 1, 0
+
+    def clk(self, rst=0, ratio=0, shift=0, enable=0, rebase=0, tick=0, target=0, trim=0):
+        """go, anew and place as they stand after the clk, with the levels of enable and rebase of this clk."""
+        take = self.wait == 1
+        moved = int(rebase or not enable)
+        wanted = signed(target + (trim << shift), 48)
+        done, place = self.scaler.clk(rst=rst, ratio=ratio, valid=take, position=wanted)
+        if rst:
+            self.wait, self.rebased, self.pending = 0, 1, 1
+        else:
+            if take:
+                self.pending = self.rebased
+            self.rebased = int(moved or (self.rebased and not take))
+            self.wait = 8 if tick else max(self.wait - 1, 0)
+        fresh = self.pending or self.rebased or moved
+        return dict(go=int(done and not fresh), anew=int(done and bool(fresh)), place=place)
