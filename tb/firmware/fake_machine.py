@@ -213,7 +213,7 @@ class Grating:
     def __init__(self):
         self.word, self.strobes, self.records = {}, [], []
         self.burst, self.spoiled, self.delay = None, False, 0
-        self.waiting, self.words, self.full = 0, deque(), False
+        self.waiting, self.words, self.taken, self.full = 0, [], 0, False
         self.points, self.written = {}, {}                              # table in force, table being written
         self.correction, self.loads = None, 0
 
@@ -224,8 +224,9 @@ class Grating:
             self.full = bool(self.records) and self.burst is not None and self.waiting < 0
             return self.full | self.spoiled << 1
         if offset == d["GRATING_RECORDER_WORD"]:
-            assert self.full and self.words, "a word was read that is not there"
-            return self.words.popleft()
+            assert self.full, "a word was read that is not there"
+            self.taken += 1
+            return self.words[(self.taken - 1) % len(self.words)]
         return self.word.get(offset, 0)
 
     def write(self, offset, value):
@@ -238,8 +239,8 @@ class Grating:
             if value & d["GRATING_STROBES_RECORD_MASK"]:
                 setting = self.word[d["GRATING_RECORDER"]]
                 self.records.append((bool(setting >> 16 & 1), setting & 0xFFFF))
-                self.waiting, self.full = self.delay, False
-                self.words = deque(self.burst(*self.records[-1]) if self.burst else [])
+                self.waiting, self.taken, self.full = self.delay, 0, False
+                self.words = self.burst(*self.records[-1]) if self.burst else []
             if value & d["GRATING_STROBES_LOAD_CORRECTION_MASK"]:
                 offsets = self.word[d["GRATING_CORRECTION_OFFSET"]]
                 self.correction = dict(sin_offset=signed(offsets & 0xFFFF, 16), cos_offset=signed(offsets >> 16, 16),
