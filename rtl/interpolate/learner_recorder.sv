@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // learner_recorder -- keep a burst of samples or phases at equal times, for the firmware to learn from at its own pace.
 //
-// latency  full rises 1 clk after the last one kept; word is the first one 2 clk after full, the next one 2 clk after read
+// latency  full rises 1 clk after the last one kept; word is the first one 2 clk after full, the next one 2 clk after read; the
+//          first one again after the last
 // rate     one sample or phase per clk while it records; one word per 2 clk while it is read
 // model    tb/interpolate/learner_recorder.py, equal in every bit of every cycle
 // proof    depth 16, W = 8, DEPTH = 2

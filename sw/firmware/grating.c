@@ -2,7 +2,7 @@
 // grating -- serves the learner of each axis: bursts from learner_recorder, values into signal_correction and harmonic_correction.
 //
 // A burst is begun while the axis moves fast enough to cover LEARNER_PERIODS within LONGEST_MS, and begun again when the speed has
-// changed twofold since. It is read a few words a poll, at most about WORK_MS; only learner_work takes longer in one piece.
+// changed twofold since. It is read a few words a poll, and worked on a few pieces a poll, at most about WORK_MS.
 // New values are written beside those in force, and one strobe exchanges both the correction and the table.
 #include "grating.h"
 
@@ -12,7 +12,7 @@
 #include "line_protocol.h"
 #include "parameters.h"
 
-#define WORK_MS 1u                              // words and points of a poll
+#define WORK_MS 1u                              // words, pieces and points of a poll
 #define PIECES 16u                              // of them at most
 #define LONGEST_MS 1000u                        // of a burst
 #define LARGEST_EVERY 65535u
@@ -27,16 +27,13 @@ _Static_assert((int)LINE_LEARNER_REASON_LEARNING == LEARNER_LEARNING && (int)LIN
                (int)LINE_LEARNER_REASON_ONE_SPEED == LEARNER_ONE_SPEED && (int)LINE_LEARNER_REASON_VIBRATION == LEARNER_VIBRATION &&
                LEARNER_REASONS == 10, "the reasons of line.toml are those of the learner");
 
-enum step { IDLE, RECORDING, TAKING };          // the burst
-
 struct grating {
     struct learner learner;
     struct learner_values waiting;              // set by the host, not yet in force
-    uint8_t step;
+    bool recording;
     bool phases;                                // of the burst
     bool moving;                                // fast enough to record
     uint16_t every;
-    uint16_t left;                              // words of the burst
     uint16_t point;                             // of the table, the next one to be written
 };
 
@@ -45,7 +42,7 @@ static uint32_t work_clk;
 
 static void restart(struct grating *g)          // whatever was under way for the learner
 {
-    g->step = IDLE;
+    g->recording = false;
     g->point = 0;
 }
 
@@ -61,18 +58,23 @@ static uint32_t every_now(unsigned n, bool phases)
     return every < 1 ? 1 : every > LARGEST_EVERY ? LARGEST_EVERY : (uint32_t)every;
 }
 
+static bool near(uint32_t every, uint32_t wanted)      // within 2/3 … 2: enough periods, and samples enough of each
+{
+    return 3u * every >= 2u * wanted && every <= 2u * wanted;
+}
+
 static void record(unsigned n)
 {
     struct grating *g = &gratings[n];
+    const struct learner_pass *pass = &g->learner.pass;
     g->phases = g->learner.need == LEARNER_NEEDS_PHASES;
     uint32_t every = every_now(n, g->phases);
-    g->step = IDLE;
-    g->moving = every != 0;
+    g->moving = g->recording = every != 0;
     if (!g->moving) return;
+    if (g->phases && pass->spectra && near(pass->every, every)) every = pass->every;        // spectra of one pass are compared
     g->every = (uint16_t)every;
     grating_write(n, GRATING_RECORDER, FIELD_PUT(GRATING_RECORDER_EVERY, every) | FIELD_PUT(GRATING_RECORDER_PHASES, g->phases));
     grating_write(n, GRATING_STROBES, GRATING_STROBES_RECORD_MASK);
-    g->step = RECORDING;
 }
 
 static bool time_left(uint32_t began, uint32_t pieces)
@@ -83,28 +85,30 @@ static bool time_left(uint32_t began, uint32_t pieces)
 static void burst_poll(unsigned n)
 {
     struct grating *g = &gratings[n];
-    if (g->step != IDLE && g->phases != (g->learner.need == LEARNER_NEEDS_PHASES)) g->step = IDLE;
-    if (g->step == IDLE) {
+    if (!g->recording || g->phases != (g->learner.need == LEARNER_NEEDS_PHASES)) {
         record(n);
         return;
     }
-    if (g->step == RECORDING) {
-        uint32_t state = grating_read(n, GRATING_RECORDER_STATE), every = every_now(n, g->phases);
-        if (state & GRATING_RECORDER_STATE_FULL_MASK) {
-            learner_open(&g->learner, state & GRATING_RECORDER_STATE_SPOILED_MASK);
-            g->left = LEARNER_BURST;
-            g->step = TAKING;
-        } else if (every == 0 || every > 2u * g->every || 2u * every < g->every) {
-            record(n);
-            return;
-        } else {
-            return;
-        }
-    }
+    uint32_t state = grating_read(n, GRATING_RECORDER_STATE), every = every_now(n, g->phases);
+    if (state & GRATING_RECORDER_STATE_FULL_MASK)
+        g->recording = !learner_open(&g->learner, g->every, state & GRATING_RECORDER_STATE_SPOILED_MASK);
+    else if (every == 0 || every > 2u * g->every || 2u * every < g->every)
+        record(n);
+}
+
+static void words_poll(unsigned n)
+{
+    struct learner *learner = &gratings[n].learner;
     uint32_t began = node_read(NODE_TIME_STAMP_LOW);
-    for (uint32_t pieces = 0; g->left && time_left(began, pieces); pieces++, g->left--)
-        learner_take(&g->learner, grating_read(n, GRATING_RECORDER_WORD));
-    if (g->left == 0) g->step = IDLE;
+    for (uint32_t pieces = 0; learner->need == LEARNER_NEEDS_WORDS && time_left(began, pieces); pieces++)
+        learner_take(learner, grating_read(n, GRATING_RECORDER_WORD));
+}
+
+static void work_poll(unsigned n)
+{
+    struct learner *learner = &gratings[n].learner;
+    uint32_t began = node_read(NODE_TIME_STAMP_LOW);
+    for (uint32_t pieces = 0; learner->need == LEARNER_NEEDS_WORK && time_left(began, pieces); pieces++) learner_work(learner);
 }
 
 static void loading_poll(unsigned n)
@@ -146,7 +150,7 @@ static void follow_parameter(unsigned n)
     bool frozen = parameters_get(n, LINE_PARAMETER_LEARNING) == 0;
     if (g->learner.frozen == frozen) return;
     learner_freeze(&g->learner, frozen);
-    g->step = IDLE;
+    g->recording = false;
     g->moving = true;                           // until a look at the speed says otherwise
 }
 
@@ -157,7 +161,8 @@ void grating_poll(unsigned n)
     switch (g->learner.need) {
     case LEARNER_NEEDS_SAMPLES:
     case LEARNER_NEEDS_PHASES: burst_poll(n); break;
-    case LEARNER_NEEDS_WORK: learner_work(&g->learner); break;
+    case LEARNER_NEEDS_WORDS: words_poll(n); break;
+    case LEARNER_NEEDS_WORK: work_poll(n); break;
     case LEARNER_NEEDS_LOADING: loading_poll(n); break;
     default: break;
     }
@@ -172,7 +177,7 @@ uint8_t grating_reason(unsigned n)
 {
     const struct grating *g = &gratings[n];
     bool waits = g->learner.need == LEARNER_NEEDS_SAMPLES || g->learner.need == LEARNER_NEEDS_PHASES;
-    if (waits && !g->moving && g->step == IDLE && g->learner.reason < LEARNER_ONE_SPEED) return LEARNER_STANDSTILL;
+    if (waits && !g->moving && !g->recording && g->learner.reason < LEARNER_ONE_SPEED) return LEARNER_STANDSTILL;
     return g->learner.reason;
 }
 

@@ -3,10 +3,11 @@
 //
 // Ellipse: least squares of x^2 + y^2 on 1, x, y, x^2 - y^2, 2xy. Exact without noise for any ellipse and any spread of the
 // samples, and the equations stay well conditioned as long as the whole circle was seen.
-// Harmonics: on smooth motion every place of the period is as frequent as every other. If place = phase - c(phase), phases are as
-// frequent as 1 - c'(phase) says, and the mean of exp(-i m phase) is -i m c_m, not only for small c: the correction is read off the
-// phases as they are. A burst weighs them by a Hann window, so that it needs no whole number of periods. Each order of a pass is the
-// mean of those bursts that lie within three median distances of the median: a vibration that meets an order does so in few.
+// Harmonics: place = phase - c(phase) is smooth motion, plus one vibration, plus noise. A burst is taken twice. First: what the
+// pass knows of c is taken off, the means of 8 are fitted by place, speed and acceleration, and the spectrum of the rest shows the
+// vibration as the line that no burst of the pass is without (the lines of c move with the speed). Then, motion and vibration
+// fitted together and taken off every phase, the remainder is projected on each order. What an order shares with the vibration is
+// lost to it; so much less the burst informs of it. A burst weighs as the inverse of the power that is left in it.
 #include "learner.h"
 
 #define UNIT ((int64_t)1 << 28)             // 1 of the equations
@@ -17,10 +18,59 @@
 #define SCATTER_LIMIT 64                    // 4 LSB of a 16-bit phase
 #define PARTS 16                            // of a burst, for its steadiness
 #define FEWEST_PERIODS 8                    // in a burst of phases
+#define BLOCKS 256u                         // of a burst; their means are what motion is fitted to
+#define BLOCK (LEARNER_PHASES / BLOCKS)     // 8: see dimmed
+#define BINS 128u                           // of a period
+#define LARGEST_REST 32767                  // of a phase from smooth motion: 1/32 period
+#define QUIET (1 << 20)                     // mean square below which a burst has full weight, 2^-40 period^2
+#define FIRST_LINE 2u                       // slower vibration is motion
+#define FEWEST_SPECTRA 3u                   // that show which line stays
+#define FEWEST_BURSTS 4u                    // from which on the candidate is believed
+#define LEAST_INFORMATION 256               // 2^-15 burst
 
 const struct learner_values learner_identity = {.gain = 65536};
 
 static uint16_t quarter[257];               // sine of the first quarter, 1.0 = 2^15
+
+enum stage { UPDATE, TABLE, FIRST_READING, FIT, SOLVE, REST, TRANSFORM, SPECTRUM, SECOND_READING, PROJECT, ELLIPSE };
+
+struct equations {                          // symmetric and positive; column 5 is the right side
+    int64_t m[5][6];
+    int64_t solution[5];
+    bool back;                              // eliminated: the unknowns are next
+    uint32_t size;
+    uint32_t row, column;                   // what comes next
+};
+
+static struct {
+    const struct learner *owner;            // none: free
+    enum stage stage;
+    uint32_t next;                          // block, butterfly, line, bin: what comes next of the stage
+    uint16_t every;
+    struct learner_values candidate;        // what the pass says so far
+
+    uint32_t taken;                         // samples or phases of this reading
+    uint16_t last;                          // phase
+    int32_t travel;                         // 2^-16 period
+    int32_t part;                           // travel at the start of this 16th of the burst
+    int32_t slowest, fastest;               // travel of a 16th
+    int32_t largest_step;
+
+    int32_t table[BINS];                    // c in the middle of each bin, 2^-20 period
+    int32_t block[BLOCKS];                  // place, 2^-20 period
+    int32_t slope;                          // of the straight line through the burst, 2^-32 period a phase
+    uint32_t vibration;                     // 2^-16 cycle a burst
+    int64_t dimmed;                         // of the vibration in the mean of a block, 1.0 = 2^15
+    struct equations fit;
+    union {
+        struct { int32_t real[BLOCKS], imaginary[BLOCKS]; };    // of the spectrum
+        int32_t seen[3][BINS];              // by phase: window times rest, cosine and sine of the vibration, by 2^5
+    };
+    int64_t power;                          // of the rest, 2^-30 (window) 2^-20 period squared
+    int64_t weight;                         // of the burst, 1.0 = 2^15
+    uint32_t order;
+    int64_t projected[3][2];                // of the order at hand, cosine and sine
+} work;
 
 static void fill_quarter(void)
 {
@@ -94,11 +144,12 @@ void learner_ellipse_take(struct learner_ellipse *ellipse, const struct learner 
     int32_t low = learner->amplitude_low >> 3, high = learner->amplitude_high >> 3;
     int32_t base[6] = {1, x, y, x * x - y * y, 2 * x * y, x * x + y * y};
     int32_t leg[2] = {x, y};
+    int64_t *sum = ellipse->sum;
     for (int i = 0; i < 5; i++)
-        for (int j = i; j < 6; j++) ellipse->sum[i][j] += (int64_t)base[i] * base[j];
+        for (int j = i; j < 6; j++) *sum++ += (int64_t)base[i] * base[j];
     for (int i = 0; i < 2; i++) {
-        if (leg[i] < ellipse->lowest[i]) ellipse->lowest[i] = leg[i];
-        if (leg[i] > ellipse->highest[i]) ellipse->highest[i] = leg[i];
+        if (leg[i] < ellipse->lowest[i]) ellipse->lowest[i] = (int16_t)leg[i];
+        if (leg[i] > ellipse->highest[i]) ellipse->highest[i] = (int16_t)leg[i];
     }
     if (base[5] < low * low || base[5] > (int64_t)high * high) ellipse->outside++;
     x = cosine - learner->values.cos_offset;
@@ -109,54 +160,72 @@ void learner_ellipse_take(struct learner_ellipse *ellipse, const struct learner 
     ellipse->count++;
 }
 
-// Elimination without exchange of rows: symmetric and positive. false: not well conditioned.
-static bool solve(int64_t m[5][6], int64_t solution[5])
+static void begin_equations(struct equations *e, uint32_t size)
 {
-    for (int i = 0; i < 5; i++) {
-        if (m[i][i] < SMALLEST) return false;
-        for (int j = i + 1; j < 5; j++) {
-            int64_t factor = m[i][j] * UNIT / m[i][i];
-            if (factor > STEEPEST || factor < -STEEPEST) return false;
-            for (int k = j; k < 6; k++) m[j][k] -= (factor * m[i][k]) >> 28;
-        }
-    }
-    for (int i = 4; i >= 0; i--) {
-        int64_t rest = m[i][5];
-        for (int j = i + 1; j < 5; j++) rest -= (m[i][j] * solution[j]) >> 28;
-        solution[i] = rest * 16 / m[i][i] * (UNIT / 16);                    // coarse, then the remainder: both fit 64 bits
-        solution[i] += (rest * 16 % m[i][i]) * (UNIT / 16) / m[i][i];
-        if (solution[i] > STEEPEST || solution[i] < -STEEPEST) return false;
-    }
-    return true;
+    *e = (struct equations){.size = size, .column = 1};
 }
 
-enum learner_reason learner_ellipse_fit(const struct learner_ellipse *ellipse, struct learner_values *values)
+enum solving { BUSY, SOLVED, ILL };
+
+// One factor of the elimination, without exchange of rows, or one unknown.
+static enum solving solve(struct equations *e)
+{
+    uint32_t i = e->row, j = e->column;
+    int64_t pivot = e->m[i][i];
+    if (e->back) {
+        int64_t rest = e->m[i][5];
+        for (j = i + 1; j < e->size; j++) rest -= (e->m[i][j] * e->solution[j]) >> 28;
+        int64_t coarse = rest * 16 / pivot;                                 // then the remainder: both fit 64 bits
+        e->solution[i] = coarse * (UNIT / 16) + (rest * 16 - coarse * pivot) * (UNIT / 16) / pivot;
+        if (e->solution[i] > STEEPEST || e->solution[i] < -STEEPEST) return ILL;
+        if (i == 0) return SOLVED;
+        e->row--;
+    } else if (pivot < SMALLEST) {
+        return ILL;
+    } else if (j < e->size) {
+        int64_t factor = e->m[i][j] * UNIT / pivot;
+        if (factor > STEEPEST || factor < -STEEPEST) return ILL;
+        for (uint32_t k = j; k < e->size; k++) e->m[j][k] -= (factor * e->m[i][k]) >> 28;
+        e->m[j][5] -= (factor * e->m[i][5]) >> 28;
+        e->column++;
+    } else if (i + 1 < e->size) {
+        e->row++;
+        e->column = e->row + 1;
+    } else {
+        e->back = true;
+    }
+    return BUSY;
+}
+
+// Whether the samples are fit to be learned from, and their equations.
+static enum learner_reason judge_ellipse(const struct learner_ellipse *ellipse, struct equations *e)
 {
     static const uint8_t degree[6] = {0, 1, 1, 2, 2, 2};
-    int64_t m[5][6] = {{0}}, s[5];
+    begin_equations(e, 5);
     int64_t count = ellipse->count;
+    uint32_t shift = 0;
     if (count == 0) return LEARNER_PARTIAL_CIRCLE;
+    while (count >> shift > 1) shift++;                                     // the sums by 1 to 2 counts: what is solved does not change
+    const int64_t *sum = ellipse->sum;
     for (int i = 0; i < 5; i++)
-        for (int j = i; j < 6; j++) {                                       // the mean, full scale 1
-            int64_t sum = ellipse->sum[i][j];
-            switch (degree[i] + degree[j]) {
-            case 0: sum *= UNIT; break;
-            case 1: sum *= 1 << 16; break;
-            case 2: sum *= 1 << 4; break;
-            case 3: sum >>= 8; break;
-            default: sum >>= 20; break;
-            }
-            m[i][j] = sum / count;
+        for (int j = i; j < 6; j++) {                                       // full scale 1
+            int up = 28 - 12 * (degree[i] + degree[j]);
+            int64_t scaled = up > 0 ? *sum * (INT64_C(1) << up) : *sum >> -up;
+            e->m[i][j] = scaled >> shift;
+            sum++;
         }
-    int64_t mean_square = m[0][5];
+    int64_t mean_square = e->m[0][5] * UNIT / e->m[0][0];
     if (ellipse->outside * 16 > ellipse->count || mean_square > LOUDEST) return LEARNER_AMPLITUDE;
     int64_t eighth = root_of(mean_square * UNIT) >> 19;                     // of the amplitude, in units of x
     if (ellipse->highest[0] - ellipse->lowest[0] < eighth && ellipse->highest[1] - ellipse->lowest[1] < eighth) return LEARNER_STANDSTILL;
     for (int n = 0; n < 16; n++)
         if (ellipse->sector[n] < ellipse->count / 128 || (ellipse->sector[n] + ellipse->sector[n ^ 8]) * 64 < ellipse->count)
             return LEARNER_PARTIAL_CIRCLE;
-    if (!solve(m, s)) return LEARNER_PARTIAL_CIRCLE;
+    return LEARNER_LEARNING;
+}
 
+static enum learner_reason take_ellipse(const int64_t s[5], struct learner_values *values)
+{
     int64_t b = s[1], c = s[2], p = UNIT - s[3], q = UNIT + s[3], e = s[4];  // p x^2 + q y^2 - 2 e xy - b x - c y = s[0]
     if (p < UNIT / 4 || q < UNIT / 4) return LEARNER_DISTORTED;
     int64_t determinant = (p * q - e * e) >> 28;
@@ -173,6 +242,17 @@ enum learner_reason learner_ellipse_fit(const struct learner_ellipse *ellipse, s
     return LEARNER_LEARNING;
 }
 
+enum learner_reason learner_ellipse_fit(const struct learner_ellipse *ellipse, struct learner_values *values)
+{
+    struct equations e;
+    enum learner_reason reason = judge_ellipse(ellipse, &e);
+    if (reason != LEARNER_LEARNING) return reason;
+    enum solving state = BUSY;
+    while (state == BUSY) state = solve(&e);
+    if (state == ILL) return LEARNER_PARTIAL_CIRCLE;
+    return take_ellipse(e.solution, values);
+}
+
 // ---- the harmonics
 
 int32_t learner_table_entry(const struct learner_values *values, uint32_t point)
@@ -185,104 +265,217 @@ int32_t learner_table_entry(const struct learner_values *values, uint32_t point)
     return clamp((sum + (1 << 18)) >> 19, LARGEST_CORRECTION);
 }
 
-static void begin_burst(struct learner *learner)
+static void begin_reading(void)
 {
-    learner->taken = 0;
-    learner->travel = 0;
-    learner->part = 0;
-    learner->slowest = INT32_MAX;
-    learner->fastest = INT32_MIN;
-    learner->largest_step = 0;
-    for (uint32_t k = 0; k < LEARNER_ORDERS; k++) learner->real[k] = learner->imaginary[k] = 0;
+    work.taken = 0;
+    work.travel = 0;
+    work.part = 0;
+    work.slowest = INT32_MAX;
+    work.fastest = INT32_MIN;
+    work.largest_step = 0;
 }
 
-static void take_phase(struct learner *learner, uint16_t phase)
+static void begin_stage(enum stage stage)
 {
-    if (learner->taken) {
-        int32_t step = (int16_t)(phase - learner->last);
-        learner->travel += step;
-        if (size_of(step) > learner->largest_step) learner->largest_step = size_of(step);
-    }
-    learner->last = phase;
-    int32_t window = (32768 - cosine_of(learner->taken * (65536 / LEARNER_PHASES) + 32768 / LEARNER_PHASES)) >> 2;
-    for (uint32_t k = 0; k < LEARNER_ORDERS; k++) {
-        uint32_t multiple = (k + 1) * phase;
-        learner->real[k] += (window * cosine_of(multiple)) >> 10;
-        learner->imaginary[k] += (window * sine_of(multiple)) >> 10;
-    }
-    learner->taken++;
-    if (learner->taken % (LEARNER_PHASES / PARTS) == 0) {
-        int32_t gone = learner->travel - learner->part;
-        learner->part = learner->travel;
-        if (gone < learner->slowest) learner->slowest = gone;
-        if (gone > learner->fastest) learner->fastest = gone;
+    work.stage = stage;
+    work.next = 0;
+}
+
+// `turn` is the place in the burst, all of it being 65536.
+
+static int32_t window_of(uint32_t turn)     // Hann, 1.0 = 2^15
+{
+    return (32768 - cosine_of(turn)) >> 1;
+}
+
+static void vibration_of(uint32_t turn, int32_t wave[2])
+{
+    uint32_t phase = (uint32_t)((uint64_t)work.vibration * turn >> 16);
+    wave[0] = cosine_of(phase);
+    wave[1] = sine_of(phase);
+}
+
+static int32_t smooth_of(uint32_t turn, const int32_t wave[2])              // fitted place beside the line, 2^-20 period
+{
+    const int64_t *s = work.fit.solution;
+    int32_t time = (int32_t)turn - 32768, square = time * time >> 15;
+    return (int32_t)((s[0] * 32768 + s[1] * time + s[2] * square + s[3] * wave[0] + s[4] * wave[1]) >> 19);
+}
+
+static int32_t follow(uint16_t phase)       // place, 2^-20 period
+{
+    int32_t step = work.taken ? (int16_t)(phase - work.last) : 0;
+    if (size_of(step) > work.largest_step) work.largest_step = size_of(step);
+    work.travel += step;
+    work.last = phase;
+    return work.travel * 16 - work.table[phase / (65536 / BINS)];
+}
+
+static void take_first(uint16_t phase)
+{
+    int32_t place = follow(phase), *block = &work.block[work.taken / BLOCK];
+    *block = (work.taken % BLOCK ? *block : 0) + (place >> 3);
+    work.taken++;
+    if (work.taken % (LEARNER_PHASES / PARTS) == 0) {
+        int32_t gone = work.travel - work.part;
+        work.part = work.travel;
+        if (gone < work.slowest) work.slowest = gone;
+        if (gone > work.fastest) work.fastest = gone;
     }
 }
 
-static enum learner_reason judge_burst(const struct learner *learner)
+static void take_second(uint16_t phase)
 {
-    int32_t travel = learner->travel, slowest = learner->slowest, fastest = learner->fastest;
-    if (learner->spoiled) return LEARNER_AMPLITUDE;
-    if (learner->largest_step > 8192) return LEARNER_TOO_FAST;
+    uint32_t turn = work.taken * (65536 / LEARNER_PHASES) + 32768 / LEARNER_PHASES, bin = phase / (65536 / BINS);
+    int32_t line = (int32_t)(((int64_t)work.slope * work.taken) >> 12), wave[2];
+    int32_t place = follow(phase), window = window_of(turn) >> 5;
+    vibration_of(turn, wave);
+    int32_t rest = clamp(place - line - smooth_of(turn, wave), LARGEST_REST);
+    work.seen[0][bin] += window * rest >> 5;
+    work.seen[1][bin] += window * wave[0] >> 5;
+    work.seen[2][bin] += window * wave[1] >> 5;
+    work.power += (int64_t)window * (rest * rest);
+    work.taken++;
+}
+
+static enum learner_reason judge_burst(void)
+{
+    int32_t travel = work.travel, slowest = work.slowest, fastest = work.fastest;
+    if (work.largest_step > 8192) return LEARNER_TOO_FAST;
     if (size_of(travel) < 65536 / 4 && fastest < 65536 / 4 && slowest > -65536 / 4) return LEARNER_STANDSTILL;
     if (size_of(travel) < FEWEST_PERIODS * 65536) return LEARNER_PARTIAL_CIRCLE;
     if (travel < 0) {
-        slowest = -learner->fastest;
-        fastest = -learner->slowest;
+        slowest = -work.fastest;
+        fastest = -work.slowest;
     }
     return slowest <= 0 || fastest > 2 * slowest ? LEARNER_UNSTEADY : LEARNER_LEARNING;
 }
 
-static void keep_burst(struct learner *learner)
+static void begin_fit(uint32_t size)
 {
-    uint32_t gone = (uint32_t)size_of(learner->travel);
-    if (learner->bursts == 0 || gone < learner->slow_burst) learner->slow_burst = gone;
-    if (learner->bursts == 0 || gone > learner->fast_burst) learner->fast_burst = gone;
-    for (uint32_t k = 0; k < LEARNER_ORDERS; k++) {                         // 2 / (k + 1) radian = 2^20 / pi / (k + 1); 2^29 is 1
-        int64_t size = (int64_t)(k + 1) << 29;
-        learner->seen_cosine[k][learner->bursts] = (int16_t)clamp(learner->imaginary[k] * INT64_C(333772) / size, INT16_MAX);
-        learner->seen_sine[k][learner->bursts] = (int16_t)clamp(-(learner->real[k] * INT64_C(333772)) / size, INT16_MAX);
-    }
-    learner->bursts++;
+    uint32_t half = work.vibration / (2 * LEARNER_PHASES);                  // of the step from phase to phase
+    work.dimmed = (int64_t)cosine_of(half) * cosine_of(2 * half) * cosine_of(4 * half) >> 30;
+    begin_equations(&work.fit, size);
+    begin_stage(FIT);
 }
 
-static int64_t median(const int64_t *value, uint32_t count)
+// The least squares of one block more: 1, time, its square, and both waves of the vibration, if it is known.
+static void fit_block(uint32_t n)
 {
-    int64_t sorted[LEARNER_PASS] = {0};
-    for (uint32_t n = 0; n < count; n++) {
-        uint32_t at = n;
-        for (; at && sorted[at - 1] > value[n]; at--) sorted[at] = sorted[at - 1];
-        sorted[at] = value[n];
+    struct equations *e = &work.fit;
+    uint32_t turn = n * (65536 / BLOCKS) + 32768 / BLOCKS;
+    int32_t base[5] = {32768, (int32_t)turn - 32768}, window = window_of(turn);
+    base[2] = base[1] * base[1] >> 15;
+    vibration_of(turn, &base[3]);
+    for (uint32_t i = 3; i < e->size; i++) base[i] = (int32_t)(base[i] * work.dimmed >> 15);
+    int64_t place = work.block[n] - (((int64_t)work.slope * (2 * BLOCK * n + BLOCK - 1)) >> 13);
+    for (uint32_t i = 0; i < e->size; i++) {
+        int64_t weighed = (int64_t)window * base[i] >> 15;
+        for (uint32_t j = i; j < e->size; j++) e->m[i][j] += weighed * base[j] >> 10;
+        e->m[i][5] += weighed * place >> 19;                                // 2^-24 period
     }
-    return sorted[count / 2];
 }
 
-// What the bursts of a pass say of one order.
+static void window_block(uint32_t n)        // what the motion leaves, into the order that the transform wants
+{
+    static const int32_t still[2] = {0, 0};
+    uint32_t turn = n * (65536 / BLOCKS) + 32768 / BLOCKS, at = 0;
+    int64_t place = work.block[n] - (((int64_t)work.slope * (2 * BLOCK * n + BLOCK - 1)) >> 13);
+    for (uint32_t bit = 1; bit < BLOCKS; bit *= 2) at = at * 2 + (n & bit ? 1 : 0);
+    work.real[at] = (int32_t)(((int64_t)clamp(place - smooth_of(turn, still), 4 * LARGEST_REST) * window_of(turn)) >> 12);
+    work.imaginary[at] = 0;
+}
+
+static void butterfly(uint32_t n)
+{
+    uint32_t level = n / (BLOCKS / 2), pair = n % (BLOCKS / 2), half = 1u << level, in = pair % half;
+    uint32_t a = (pair - in) * 2 + in, b = a + half, angle = in << (15 - level);
+    int64_t cosine = cosine_of(angle), sine = sine_of(angle);
+    int32_t real = (int32_t)((cosine * work.real[b] + sine * work.imaginary[b]) >> 15);
+    int32_t imaginary = (int32_t)((cosine * work.imaginary[b] - sine * work.real[b]) >> 15);
+    work.real[b] = work.real[a] - real;
+    work.imaginary[b] = work.imaginary[a] - imaginary;
+    work.real[a] += real;
+    work.imaginary[a] += imaginary;
+}
+
+static int64_t power_of(uint32_t line)
+{
+    return (int64_t)work.real[line] * work.real[line] + (int64_t)work.imaginary[line] * work.imaginary[line];
+}
+
+static uint8_t level_of(int64_t power)      // 4 log2
+{
+    uint8_t level = 0;
+    for (; power >= 8; power >>= 1) level = (uint8_t)(level + 4);
+    return (uint8_t)(level + power);
+}
+
+static void weaken_line(struct learner_pass *pass, uint32_t n)
+{
+    uint8_t level = level_of(power_of(n));
+    if (pass->spectra == 0 || level < pass->line[n]) pass->line[n] = level;
+}
+
+// The line that stays, and where it lies in this burst: with a Hann window its neighbour is (1 + d) / (2 - d) of it at d lines off.
+static bool find_vibration(const struct learner_pass *pass)
+{
+    uint32_t at = FIRST_LINE;
+    for (uint32_t n = FIRST_LINE; n < LEARNER_LINES - 2; n++)
+        if (pass->line[n] > pass->line[at]) at = n;
+    if (power_of(at + 1) > power_of(at)) at++;
+    else if (power_of(at - 1) > power_of(at)) at--;
+    uint32_t beside = power_of(at + 1) > power_of(at - 1) ? at + 1 : at - 1;
+    int64_t unit = power_of(at) >> 16;
+    if (unit == 0) return false;
+    int64_t both = (int64_t)work.real[at] * work.real[beside] + (int64_t)work.imaginary[at] * work.imaginary[beside];
+    int64_t share = -both / unit;
+    int32_t ratio = share < 0 ? 0 : share > 65536 ? 65536 : (int32_t)share;
+    int32_t away = (2 * ratio - 65536) * 16384 / (65536 + ratio) * 4;
+    work.vibration = (uint32_t)((int32_t)(at * 65536) + (beside > at ? away : -away));
+    return true;
+}
+
+static void begin_second_reading(struct learner *learner)
+{
+    for (uint32_t n = 0; n < BINS; n++) work.seen[0][n] = work.seen[1][n] = work.seen[2][n] = 0;
+    work.power = 0;
+    begin_reading();
+    begin_stage(SECOND_READING);
+    learner->need = LEARNER_NEEDS_WORDS;
+}
+
+static void project_bin(uint32_t n)
+{
+    uint32_t phase = (work.order + 1) * (n * (65536 / BINS) + 32768 / BINS);
+    int64_t wave[2] = {cosine_of(phase), sine_of(phase)};
+    for (uint32_t i = 0; i < 3; i++)
+        for (uint32_t j = 0; j < 2; j++) work.projected[i][j] += work.seen[i][n] * wave[j];
+}
+
 static void take_order(struct learner *learner, uint32_t k)
 {
-    const uint32_t count = LEARNER_PASS;
-    uint32_t good = 0;
-    int64_t value[LEARNER_PASS] = {0}, cosine = 0, sine = 0, squares = 0;
-    for (uint32_t n = 0; n < count; n++) value[n] = learner->seen_cosine[k][n];
-    int64_t middle_cosine = median(value, count);
-    for (uint32_t n = 0; n < count; n++) value[n] = learner->seen_sine[k][n];
-    int64_t middle_sine = median(value, count);
-    for (uint32_t n = 0; n < count; n++) {
-        int64_t x = learner->seen_cosine[k][n] - middle_cosine, y = learner->seen_sine[k][n] - middle_sine;
-        value[n] = x * x + y * y;
-    }
-    int64_t farthest = 9 * median(value, count) + 4;
-    for (uint32_t n = 0; n < count; n++) {
-        if (value[n] > farthest) continue;
-        good++;
-        cosine += learner->seen_cosine[k][n];
-        sine += learner->seen_sine[k][n];
-        squares += value[n];
-    }
-    int64_t x = cosine - good * middle_cosine, y = sine - good * middle_sine;
-    learner->variance += (squares - (x * x + y * y) / good) / (good * (int64_t)(good - 1));
-    learner->candidate.cosine[k] = (int32_t)(cosine * 16 / good);
-    learner->candidate.sine[k] = (int32_t)(sine * 16 / good);
+    struct learner_pass *pass = &learner->pass;
+    int64_t lost = 0, cosine = work.projected[0][0] >> 25, sine = work.projected[0][1] >> 25;       // 2^-24 period
+    for (uint32_t i = 1; i < 3; i++)
+        for (uint32_t j = 0; j < 2; j++) lost += (work.projected[i][j] >> 30) * (work.projected[i][j] >> 30);
+    int64_t kept = 32768 - (lost >> 14);
+    if (kept < 0) kept = 0;
+    pass->information[k] += (int32_t)(work.weight * kept >> 15);
+    pass->cosine[k] += (int32_t)(work.weight * (cosine + (kept * work.candidate.cosine[k] >> 15)) >> 12);
+    pass->sine[k] += (int32_t)(work.weight * (sine + (kept * work.candidate.sine[k] >> 15)) >> 12);
+    if (pass->bursts < FEWEST_BURSTS) return;                               // still far from what it will be
+    cosine = work.weight * cosine >> 15;
+    sine = work.weight * sine >> 15;
+    pass->squares += cosine * cosine + sine * sine;
+}
+
+static void update_order(const struct learner *learner, uint32_t k, bool sine)
+{
+    const struct learner_pass *pass = &learner->pass;
+    int32_t *value = sine ? &work.candidate.sine[k] : &work.candidate.cosine[k];
+    if (pass->bursts < FEWEST_BURSTS || pass->information[k] < LEAST_INFORMATION) return;
+    *value = clamp((int64_t)(sine ? pass->sine[k] : pass->cosine[k]) * 4096 / pass->information[k], 1 << 21);
 }
 
 // ---- the whole
@@ -295,10 +488,13 @@ static void refuse(struct learner *learner, enum learner_reason reason)
 
 static void begin_pass(struct learner *learner)
 {
-    learner->candidate = learner->values;
-    learner->bursts = 0;
-    begin_burst(learner);
+    learner->pass = (struct learner_pass){0};
     learner->need = LEARNER_NEEDS_PHASES;
+}
+
+static void leave(const struct learner *learner)        // the work area
+{
+    if (work.owner == learner) work.owner = 0;
 }
 
 void learner_forget(struct learner *learner)
@@ -306,7 +502,7 @@ void learner_forget(struct learner *learner)
     learner->values = learner_identity;
     learner->harmonics = false;
     learner->settled = false;
-    learner->bursts = 0;
+    leave(learner);
     learner_ellipse_start(&learner->ellipse);
     learner->reason = learner->frozen ? LEARNER_FROZEN : LEARNER_LEARNING;
     learner->need = LEARNER_NEEDS_LOADING;
@@ -315,6 +511,7 @@ void learner_forget(struct learner *learner)
 void learner_start(struct learner *learner)
 {
     fill_quarter();
+    leave(learner);
     *learner = (struct learner){.amplitude_high = UINT16_MAX, .scatter_limit = SCATTER_LIMIT};
     learner_forget(learner);
 }
@@ -331,6 +528,7 @@ bool learner_values_fit(const struct learner_values *values)
 bool learner_restore(struct learner *learner, const struct learner_values *values)
 {
     if (!learner_values_fit(values)) return false;
+    leave(learner);
     learner->values = *values;
     learner->harmonics = true;
     learner->settled = true;
@@ -342,12 +540,12 @@ bool learner_restore(struct learner *learner, const struct learner_values *value
 // Go on with what comes after the values in force.
 static void go_on(struct learner *learner)
 {
+    leave(learner);
     if (learner->frozen) {
         learner->need = LEARNER_NEEDS_NOTHING;
     } else if (learner->harmonics) {
         begin_pass(learner);
     } else {
-        learner->bursts = 0;
         learner_ellipse_start(&learner->ellipse);
         learner->need = LEARNER_NEEDS_SAMPLES;
     }
@@ -365,81 +563,140 @@ void learner_loaded(struct learner *learner)
     if (learner->need == LEARNER_NEEDS_LOADING) go_on(learner);
 }
 
-void learner_open(struct learner *learner, bool spoiled)
+static void end_burst(struct learner *learner, enum learner_need need)
 {
-    learner->spoiled = spoiled;
-    begin_burst(learner);
+    learner->need = (uint8_t)need;
+    leave(learner);
 }
 
 static void accept(struct learner *learner)
 {
     learner->reason = LEARNER_LEARNING;
     learner->accepted++;
-    learner->need = LEARNER_NEEDS_LOADING;
+    end_burst(learner, LEARNER_NEEDS_LOADING);
+}
+
+// What was collected of the ellipse is lost with a burst that is refused; bursts of phases stand each for itself.
+static void refuse_burst(struct learner *learner, enum learner_reason reason)
+{
+    refuse(learner, reason);
+    if (!learner->harmonics) learner_ellipse_start(&learner->ellipse);
+    end_burst(learner, learner->harmonics ? LEARNER_NEEDS_PHASES : LEARNER_NEEDS_SAMPLES);
+}
+
+bool learner_open(struct learner *learner, uint16_t every, bool spoiled)
+{
+    if (work.owner && work.owner != learner) return false;
+    if (learner->need != LEARNER_NEEDS_SAMPLES && learner->need != LEARNER_NEEDS_PHASES) return false;
+    work.owner = learner;
+    work.every = every;
+    work.candidate = learner->values;
+    work.vibration = 0;
+    begin_reading();
+    begin_stage(UPDATE);
+    if (spoiled) refuse_burst(learner, LEARNER_AMPLITUDE);
+    else learner->need = learner->harmonics ? LEARNER_NEEDS_WORK : LEARNER_NEEDS_WORDS;
+    return true;
 }
 
 static void end_of_samples(struct learner *learner)
 {
-    enum learner_reason reason = LEARNER_AMPLITUDE;
-    if (!learner->spoiled && ++learner->bursts < LEARNER_ELLIPSE_BURSTS) return;
-    if (!learner->spoiled) reason = learner_ellipse_fit(&learner->ellipse, &learner->values);
-    if (reason == LEARNER_LEARNING) {
-        learner->harmonics = true;
-        accept(learner);
-    } else {
-        refuse(learner, reason);
-        learner->bursts = 0;
-        learner_ellipse_start(&learner->ellipse);
-    }
-}
-
-static void end_of_phases(struct learner *learner)
-{
-    enum learner_reason reason = judge_burst(learner);
-    if (reason != LEARNER_LEARNING) {
-        refuse(learner, reason);
+    if (learner->ellipse.count < LEARNER_ELLIPSE_BURSTS * LEARNER_BURST) {
+        end_burst(learner, LEARNER_NEEDS_SAMPLES);
         return;
     }
-    if (learner->reason < LEARNER_ONE_SPEED) learner->reason = LEARNER_LEARNING;    // what a pass was refused for stands until one is accepted
-    keep_burst(learner);
-    if (learner->bursts == LEARNER_PASS) {
-        learner->step = 0;
-        learner->variance = 0;
-        learner->need = LEARNER_NEEDS_WORK;
+    enum learner_reason reason = judge_ellipse(&learner->ellipse, &work.fit);
+    begin_stage(ELLIPSE);
+    learner->need = LEARNER_NEEDS_WORK;
+    if (reason != LEARNER_LEARNING) refuse_burst(learner, reason);
+}
+
+static void end_of_first_reading(struct learner *learner)
+{
+    enum learner_reason reason = judge_burst();
+    if (reason != LEARNER_LEARNING) {
+        refuse_burst(learner, reason);
+        return;
     }
+    work.slope = (int32_t)(work.travel * INT64_C(65536) / (LEARNER_PHASES - 1));
+    begin_fit(3);
+    learner->need = LEARNER_NEEDS_WORK;
+}
+
+static void end_of_second_reading(struct learner *learner)
+{
+    int64_t square = work.power >> 20;
+    work.weight = square <= QUIET ? 32768 : QUIET * INT64_C(32768) / square;
+    work.order = 0;
+    begin_stage(PROJECT);
+    learner->need = LEARNER_NEEDS_WORK;
 }
 
 void learner_take(struct learner *learner, uint32_t word)
 {
-    bool samples = learner->need == LEARNER_NEEDS_SAMPLES;
-    if (!samples && learner->need != LEARNER_NEEDS_PHASES) return;
-    if (samples) {
+    if (learner->need != LEARNER_NEEDS_WORDS) return;
+    if (!learner->harmonics) {
         learner_ellipse_take(&learner->ellipse, learner, word);
-        if (++learner->taken < LEARNER_BURST) return;
-        end_of_samples(learner);
+        if (++work.taken == LEARNER_BURST) end_of_samples(learner);
+    } else if (work.stage == SECOND_READING) {
+        take_second((uint16_t)word);
+        take_second((uint16_t)(word >> 16));
+        if (work.taken == LEARNER_PHASES) end_of_second_reading(learner);
     } else {
-        take_phase(learner, (uint16_t)word);
-        take_phase(learner, (uint16_t)(word >> 16));
-        if (learner->taken < LEARNER_PHASES) return;
-        end_of_phases(learner);
+        take_first((uint16_t)word);
+        take_first((uint16_t)(word >> 16));
+        if (work.taken == LEARNER_PHASES) end_of_first_reading(learner);
     }
-    begin_burst(learner);
 }
 
-// After the last order of a pass.
+static void begin_burst(struct learner *learner)
+{
+    begin_reading();
+    begin_stage(FIRST_READING);
+    learner->need = LEARNER_NEEDS_WORDS;
+}
+
+static void end_of_spectrum(struct learner *learner)
+{
+    struct learner_pass *pass = &learner->pass;
+    pass->every = work.every;
+    if (pass->spectra < UINT8_MAX) pass->spectra++;
+    if (pass->spectra >= FEWEST_SPECTRA && find_vibration(pass)) begin_fit(5);
+    else begin_second_reading(learner);
+}
+
+static void end_of_projection(struct learner *learner)
+{
+    struct learner_pass *pass = &learner->pass;
+    uint32_t gone = (uint32_t)size_of(work.travel);
+    if (learner->reason < LEARNER_ONE_SPEED) learner->reason = LEARNER_LEARNING;    // what a pass was refused for stands until one is accepted
+    if (pass->bursts == 0 || gone < pass->slowest) pass->slowest = gone;
+    if (pass->bursts == 0 || gone > pass->fastest) pass->fastest = gone;
+    begin_stage(UPDATE);
+    if (++pass->bursts < LEARNER_PASS) end_burst(learner, LEARNER_NEEDS_PHASES);
+}
+
 static void end_of_pass(struct learner *learner)
 {
-    learner->scatter = (uint32_t)root_of(learner->variance);
+    const struct learner_pass *pass = &learner->pass;
     enum learner_reason reason = LEARNER_LEARNING;
-    if (learner->scatter > learner->scatter_limit) reason = LEARNER_VIBRATION;
-    else if ((uint64_t)learner->fast_burst * 8 < (uint64_t)learner->slow_burst * 9) reason = LEARNER_ONE_SPEED;
-    else if (!learner_values_fit(&learner->candidate)) reason = LEARNER_DISTORTED;
+    int32_t most = 0, least = INT32_MAX;
+    for (uint32_t k = 0; k < LEARNER_ORDERS; k++) {
+        if (pass->information[k] > most) most = pass->information[k];
+        if (pass->information[k] < least) least = pass->information[k];
+    }
+    int64_t square = least < LEAST_INFORMATION ? INT64_MAX : pass->squares / least * (1 << 22) / least;     // 2^-40 period^2
+    learner->scatter = (uint32_t)root_of(square);
+    if ((uint64_t)pass->fastest * 8 < (uint64_t)pass->slowest * 9) reason = LEARNER_ONE_SPEED;
+    else if (least < most / 4 || learner->scatter > learner->scatter_limit) reason = LEARNER_VIBRATION;
+    else if (!learner_values_fit(&work.candidate)) reason = LEARNER_DISTORTED;
     if (reason == LEARNER_LEARNING) {
-        learner->values = learner->candidate;
+        learner->values = work.candidate;
         learner->settled = true;
         accept(learner);
     } else {
         refuse(learner, reason);
+        leave(learner);
         begin_pass(learner);
     }
 }
@@ -447,6 +704,63 @@ static void end_of_pass(struct learner *learner)
 void learner_work(struct learner *learner)
 {
     if (learner->need != LEARNER_NEEDS_WORK) return;
-    take_order(learner, learner->step);
-    if (++learner->step == LEARNER_ORDERS) end_of_pass(learner);
+    struct learner_pass *pass = &learner->pass;
+    uint32_t next = work.next++;
+    enum solving state = BUSY;
+    switch (work.stage) {
+    case UPDATE:
+        update_order(learner, next / 2, next % 2);
+        if (next < 2 * LEARNER_ORDERS - 1) break;
+        begin_stage(TABLE);
+        if (pass->bursts == LEARNER_PASS) end_of_pass(learner);
+        break;
+    case TABLE:
+        work.table[next] = learner_table_entry(&work.candidate, 2 * next + 1);
+        if (next == BINS - 1) begin_burst(learner);
+        break;
+    case FIT:
+        fit_block(next);
+        if (next == BLOCKS - 1) begin_stage(SOLVE);
+        break;
+    case SOLVE:
+        state = solve(&work.fit);
+        if (state == ILL) refuse_burst(learner, LEARNER_UNSTEADY);
+        else if (state == SOLVED && work.fit.size == 5) begin_second_reading(learner);
+        else if (state == SOLVED) begin_stage(REST);
+        break;
+    case REST:
+        window_block(next);
+        if (next == BLOCKS - 1) begin_stage(TRANSFORM);
+        break;
+    case TRANSFORM:
+        butterfly(next);
+        if (next == 4 * BLOCKS - 1) begin_stage(SPECTRUM);
+        break;
+    case SPECTRUM:
+        if (work.every != pass->every) pass->spectra = 0;
+        weaken_line(pass, next);
+        if (next == LEARNER_LINES - 1) end_of_spectrum(learner);
+        break;
+    case PROJECT:
+        if (next == 0)
+            for (uint32_t i = 0; i < 3; i++) work.projected[i][0] = work.projected[i][1] = 0;
+        project_bin(next);
+        if (next < BINS - 1) break;
+        take_order(learner, work.order++);
+        begin_stage(PROJECT);
+        if (work.order == LEARNER_ORDERS) end_of_projection(learner);
+        break;
+    case ELLIPSE:
+        state = solve(&work.fit);
+        if (state == BUSY) break;
+        enum learner_reason reason = state == ILL ? LEARNER_PARTIAL_CIRCLE : take_ellipse(work.fit.solution, &learner->values);
+        if (reason != LEARNER_LEARNING) {
+            refuse_burst(learner, reason);
+        } else {
+            learner->harmonics = true;
+            accept(learner);
+        }
+        break;
+    default: break;
+    }
 }

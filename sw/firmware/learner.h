@@ -2,9 +2,11 @@
 // learner -- offset, gain, phase and harmonics of a sine/cosine signal, learned in motion without a reference. No hardware.
 //
 // The machine runs it like this, a few words or one piece of work a poll:
-//   LEARNER_NEEDS_SAMPLES, _PHASES   let learner_recorder fill, then learner_open, then learner_take for each word
+//   LEARNER_NEEDS_SAMPLES, _PHASES   let learner_recorder fill, then learner_open
+//   LEARNER_NEEDS_WORDS              learner_take for each word of the burst; a burst of phases is taken twice
 //   LEARNER_NEEDS_WORK               learner_work
 //   LEARNER_NEEDS_LOADING            values into signal_correction, learner_table_entry 0 … 255 into harmonic_correction, learner_loaded
+// All learners share one work area: while a burst is in it, learner_open of the others answers "not yet".
 #ifndef MOIRE_LEARNER_H
 #define MOIRE_LEARNER_H
 
@@ -16,7 +18,8 @@
 #define LEARNER_BURST 1024u             // words of learner_recorder
 #define LEARNER_PHASES 2048u            // phases in them
 #define LEARNER_ELLIPSE_BURSTS 2u
-#define LEARNER_PASS 39u                // bursts of phases; odd, so that a median is one of them
+#define LEARNER_PASS 39u                // bursts of phases
+#define LEARNER_LINES 128u              // of the spectrum of a burst: 0 … 127 cycles in it
 #define LEARNER_PERIODS 15u             // what a burst should cover; 8 at least
 
 enum learner_reason {                   // why nothing is learned just now
@@ -37,6 +40,7 @@ enum learner_need {
     LEARNER_NEEDS_NOTHING,              // frozen
     LEARNER_NEEDS_SAMPLES,              // a burst of {cos, sin}, 16 bits each, full scale 2^15
     LEARNER_NEEDS_PHASES,               // a burst of phases before harmonic_correction, two a word, the earlier one low
+    LEARNER_NEEDS_WORDS,                // the burst that was opened, from its first word to its last
     LEARNER_NEEDS_WORK,
     LEARNER_NEEDS_LOADING               // there are new values
 };
@@ -51,12 +55,24 @@ struct learner_values {                 // all that is learned: to be read, stor
 };
 
 struct learner_ellipse {                // sums over samples
-    uint32_t count;
-    uint32_t outside;                   // samples outside the amplitude window
-    uint32_t sector[16];                // samples in each, about equal, of the circle
-    int32_t lowest[2];                  // cos, sin
-    int32_t highest[2];
-    int64_t sum[5][6];                  // of products of 1, x, y, x^2 - y^2, 2xy with themselves and x^2 + y^2; x = cos, y = sin
+    uint16_t count;                     // at most 4096
+    uint16_t outside;                   // samples outside the amplitude window
+    uint16_t sector[16];                // samples in each, about equal, of the circle
+    int16_t lowest[2];                  // cos, sin; 13 bits
+    int16_t highest[2];
+    int64_t sum[20];                    // of products of 1, x, y, x^2 - y^2, 2xy with those from itself on and x^2 + y^2, in
+};                                      // that order; x = cos, y = sin
+
+struct learner_pass {                   // sums over bursts
+    uint32_t slowest, fastest;          // |travel| of a burst, 2^-16 period
+    uint16_t every;                     // setting of the recorder, for which `line` holds
+    uint8_t bursts;
+    uint8_t spectra;                    // in `line`
+    uint8_t line[LEARNER_LINES];        // weakest power of that line in any burst, 4 log2
+    int32_t information[LEARNER_ORDERS];            // 2^-15 burst
+    int32_t cosine[LEARNER_ORDERS];                 // what each burst says times what it informs: 2^-27 period
+    int32_t sine[LEARNER_ORDERS];
+    int64_t squares;                    // of weight times what a burst added, all orders, 2^-48 period^2
 };
 
 struct learner {
@@ -67,30 +83,15 @@ struct learner {
     uint8_t reason;                     // a learner_reason: of the last burst or pass
     uint8_t need;                       // a learner_need
     bool frozen;
-    bool spoiled;                       // the burst in work
     bool harmonics;                     // passes of phases; else the ellipse is being learned
     bool settled;                       // a pass has been accepted: all is learned
-    uint8_t bursts;                     // good ones of this pass
-    uint8_t step;                       // of the work at hand: the next order
     uint32_t refused;                   // bursts and passes, since start
     uint32_t accepted;                  // ellipses and passes, since start
     uint32_t scatter;                   // standard error of the last pass, 2^-20 period
-
-    struct learner_ellipse ellipse;
-
-    uint32_t taken;                     // samples or phases of this burst
-    uint16_t last;                      // phase
-    int32_t travel;                     // 2^-16 period
-    int32_t part;                       // travel at the start of this 16th of the burst
-    int32_t slowest, fastest;           // travel of a 16th
-    int32_t largest_step;
-    int32_t real[LEARNER_ORDERS], imaginary[LEARNER_ORDERS];
-    uint32_t slow_burst, fast_burst;    // |travel| of the slowest and fastest burst of this pass
-
-    int64_t variance;                   // of the pass being judged
-    struct learner_values candidate;    // what the pass says
-    int16_t seen_cosine[LEARNER_ORDERS][LEARNER_PASS];     // what each burst says, 2^-20 period
-    int16_t seen_sine[LEARNER_ORDERS][LEARNER_PASS];
+    union {
+        struct learner_ellipse ellipse;
+        struct learner_pass pass;
+    };
 };
 
 extern const struct learner_values learner_identity;            // corrects nothing
@@ -103,9 +104,10 @@ bool learner_restore(struct learner *learner, const struct learner_values *value
 void learner_freeze(struct learner *learner, bool frozen);      // what is in force stays
 bool learner_values_fit(const struct learner_values *values);
 
-void learner_open(struct learner *learner, bool spoiled);       // a burst is recorded; spoiled: its amplitude left the window
+// A burst is recorded, one of `every` samples; spoiled: its amplitude left the window. false: another learner is at work, ask again.
+bool learner_open(struct learner *learner, uint16_t every, bool spoiled);
 void learner_take(struct learner *learner, uint32_t word);
-void learner_work(struct learner *learner);                     // one piece, at most about 10 000 instructions
+void learner_work(struct learner *learner);                     // one piece: some hundred instructions, 3000 at most
 void learner_loaded(struct learner *learner);                   // the hardware has the values in force
 
 int32_t learner_table_entry(const struct learner_values *values, uint32_t point);       // 2^-20 period

@@ -216,7 +216,7 @@ class Grating:
     def __init__(self):
         self.word, self.strobes, self.records = {}, [], []
         self.burst, self.spoiled, self.delay = None, False, 0
-        self.waiting, self.words, self.full = 0, deque(), False
+        self.waiting, self.words, self.taken, self.full = 0, [], 0, False
         self.points, self.written = {}, {}                              # table in force, table being written
         self.correction, self.loads = None, 0
         self.armed, self.captured, self.latch = False, None, 0
@@ -232,8 +232,9 @@ class Grating:
             self.full = bool(self.records) and self.burst is not None and self.waiting < 0
             return self.full | self.spoiled << 1
         if offset == d["GRATING_RECORDER_WORD"]:
-            assert self.full and self.words, "a word was read that is not there"
-            return self.words.popleft()
+            assert self.full, "a word was read that is not there"
+            self.taken += 1
+            return self.words[(self.taken - 1) % len(self.words)]
         if offset == d["GRATING_CAPTURE_STATE"]:
             return d["GRATING_CAPTURE_STATE_PRESENT_MASK"] * (self.captured is not None)
         if offset == d["GRATING_CAPTURED_POSITION"]:
@@ -256,8 +257,8 @@ class Grating:
             if value & d["GRATING_STROBES_RECORD_MASK"]:
                 setting = self.word[d["GRATING_RECORDER"]]
                 self.records.append((bool(setting >> 16 & 1), setting & 0xFFFF))
-                self.waiting, self.full = self.delay, False
-                self.words = deque(self.burst(*self.records[-1]) if self.burst else [])
+                self.waiting, self.taken, self.full = self.delay, 0, False
+                self.words = self.burst(*self.records[-1]) if self.burst else []
             if value & d["GRATING_STROBES_LOAD_CORRECTION_MASK"]:
                 offsets = self.word[d["GRATING_CORRECTION_OFFSET"]]
                 self.correction = dict(sin_offset=signed(offsets & 0xFFFF, 16), cos_offset=signed(offsets >> 16, 16),
@@ -274,6 +275,7 @@ class Machine:
     def __init__(self, *axes, map_crc=DEFINES["MAP_CRC"], address=2):
         self.axes, self.address, self.map_crc, self.clk = list(axes) or [Axis()], address, map_crc, 0
         self.gratings = [Grating() for _ in self.axes]
+        self.actuators = [{DEFINES["ACTUATOR_DRIVE"]: 15 << 2} for _ in self.axes]    # words by their offset; all drives are built
         self.received, self.sent, self.word, self.crc_bytes = deque(), [], {}, b""
         self.sequence = 0
         self.answers = READ(self.read), WRITE(self.write)               # kept alive as long as the firmware may call
@@ -283,6 +285,8 @@ class Machine:
 
     def read(self, offset):
         d = DEFINES
+        if offset >= d["ACTUATOR_BASE"]:
+            return self.actuators[(offset - d["ACTUATOR_BASE"]) // d["ACTUATOR_STRIDE"]].get(offset % d["ACTUATOR_STRIDE"], 0)
         if offset >= d["GRATING_BASE"]:
             return self.gratings[(offset - d["GRATING_BASE"]) // d["GRATING_STRIDE"]].read(offset % d["GRATING_STRIDE"])
         if offset >= d["AXIS_BASE"]:
@@ -303,7 +307,9 @@ class Machine:
 
     def write(self, offset, value):
         d = DEFINES
-        if offset >= d["GRATING_BASE"]:
+        if offset >= d["ACTUATOR_BASE"]:
+            self.actuators[(offset - d["ACTUATOR_BASE"]) // d["ACTUATOR_STRIDE"]][offset % d["ACTUATOR_STRIDE"]] = value
+        elif offset >= d["GRATING_BASE"]:
             axis = (offset - d["GRATING_BASE"]) // d["GRATING_STRIDE"]
             self.gratings[axis].write(offset % d["GRATING_STRIDE"], value)
             if offset % d["GRATING_STRIDE"] == d["GRATING_ALIGN"]:

@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "sw" / "firmware"
 BRIDGE = Path(__file__).with_name("register_bridge.c")
 LIBRARY = ROOT / "build" / "firmware" / "host_firmware.so"
-SEGMENTS = 16
+SEGMENTS = 20
 
 
 class Limits(ctypes.Structure):
@@ -25,7 +25,17 @@ class Segment(ctypes.Structure):
 
 
 class Plan(ctypes.Structure):
-    _fields_ = [("ticks", ctypes.c_uint32), ("count", ctypes.c_uint8), ("next", ctypes.c_uint8), ("segment", Segment * SEGMENTS)]
+    _fields_ = [("ticks", ctypes.c_uint32), ("count", ctypes.c_uint8), ("next", ctypes.c_uint8), ("cause", ctypes.c_uint8),
+                ("stairs", ctypes.c_bool), ("into", ctypes.c_uint32), ("gone", ctypes.c_uint64), ("segment", Segment * SEGMENTS)]
+
+
+class State(ctypes.Structure):
+    _fields_ = [("gone", ctypes.c_uint64), ("velocity", ctypes.c_int64), ("acceleration", ctypes.c_int64)]
+
+
+class Stairs(ctypes.Structure):
+    _fields_ = [("first", ctypes.c_uint64), ("top", ctypes.c_uint64), ("rise", ctypes.c_uint64 * 3), ("border", ctypes.c_uint64 * 2),
+                ("ticks", ctypes.c_uint32)]
 
 
 READ = ctypes.CFUNCTYPE(ctypes.c_uint32, ctypes.c_uint32)
@@ -49,5 +59,13 @@ def library():
     loaded = ctypes.CDLL(str(LIBRARY))
     loaded.planner_limits.restype = Limits
     loaded.planner_move.restype = loaded.planner_take.restype = ctypes.c_bool
-    loaded.planner_move.argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Limits), ctypes.c_int64]
+    for name in ("planner_move", "planner_retarget"):
+        getattr(loaded, name).argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Limits), ctypes.c_int64]
+        getattr(loaded, name).restype = ctypes.c_bool
+    loaded.planner_climb.argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Stairs), ctypes.c_int64]
+    loaded.planner_climb.restype = ctypes.c_bool
+    loaded.planner_borders.argtypes, loaded.planner_borders.restype = [ctypes.POINTER(Stairs), ctypes.c_bool], None
+    loaded.planner_state_after.argtypes, loaded.planner_state_after.restype = [ctypes.POINTER(Plan), ctypes.c_uint32], State
+    loaded.planner_take_up_to.argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Segment), ctypes.POINTER(ctypes.c_bool), ctypes.c_uint32]
+    loaded.planner_take_up_to.restype = ctypes.c_bool
     return loaded

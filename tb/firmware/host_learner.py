@@ -13,8 +13,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "sw" / "firmware" / "learner.c"
 LIBRARY = ROOT / "build" / "firmware" / "host_learner.so"
-ORDERS, POINTS, BURST, PHASES_OF_BURST, PASS, PERIODS = 10, 256, 1024, 2048, 39, 15
-NOTHING, SAMPLES, PHASES, WORK, LOADING = range(5)
+ORDERS, POINTS, BURST, PHASES_OF_BURST, PASS, PERIODS, LINES = 10, 256, 1024, 2048, 39, 15, 128
+NOTHING, SAMPLES, PHASES, WORDS, WORK, LOADING = range(6)
 
 
 class Values(ctypes.Structure):
@@ -27,19 +27,25 @@ class Values(ctypes.Structure):
 
 
 class Ellipse(ctypes.Structure):
-    _fields_ = [("count", c_uint32), ("outside", c_uint32), ("sector", c_uint32 * 16), ("lowest", c_int32 * 2), ("highest", c_int32 * 2),
-                ("sum", c_int64 * 30)]
+    _fields_ = [("count", c_uint16), ("outside", c_uint16), ("sector", c_uint16 * 16), ("lowest", c_int16 * 2), ("highest", c_int16 * 2),
+                ("sum", c_int64 * 20)]
+
+
+class Pass(ctypes.Structure):
+    _fields_ = [("slowest", c_uint32), ("fastest", c_uint32), ("every", c_uint16), ("bursts", c_uint8), ("spectra", c_uint8),
+                ("line", c_uint8 * LINES), ("information", c_int32 * ORDERS), ("cosine", c_int32 * ORDERS), ("sine", c_int32 * ORDERS),
+                ("squares", c_int64)]
+
+
+class Sums(ctypes.Union):
+    _fields_ = [("ellipse", Ellipse), ("pass_", Pass)]
 
 
 class Learner(ctypes.Structure):
-    _fields_ = [("values", Values), ("amplitude_low", c_uint16), ("amplitude_high", c_uint16), ("scatter_limit", c_uint16),
-                ("reason", c_uint8), ("need", c_uint8), ("frozen", c_bool), ("spoiled", c_bool), ("harmonics", c_bool), ("settled", c_bool),
-                ("bursts", c_uint8), ("step", c_uint8), ("refused", c_uint32), ("accepted", c_uint32),
-                ("scatter", c_uint32), ("ellipse", Ellipse), ("taken", c_uint32), ("last", c_uint16), ("travel", c_int32),
-                ("part", c_int32), ("slowest", c_int32), ("fastest", c_int32), ("largest_step", c_int32), ("real", c_int32 * ORDERS),
-                ("imaginary", c_int32 * ORDERS), ("slow_burst", c_uint32), ("fast_burst", c_uint32), ("variance", c_int64),
-                ("candidate", Values), ("seen_cosine", c_int16 * PASS * ORDERS),
-                ("seen_sine", c_int16 * PASS * ORDERS)]
+    _anonymous_ = ("sums",)
+    _fields_ = [("values", Values), ("amplitude_low", c_uint16), ("amplitude_high", c_uint16),
+                ("scatter_limit", c_uint16), ("reason", c_uint8), ("need", c_uint8), ("frozen", c_bool), ("harmonics", c_bool),
+                ("settled", c_bool), ("refused", c_uint32), ("accepted", c_uint32), ("scatter", c_uint32), ("sums", Sums)]
 
 
 @cache
@@ -57,7 +63,7 @@ def library():
             os.replace(made, LIBRARY)
     loaded = ctypes.CDLL(str(LIBRARY))
     loaded.learner_words.restype = ctypes.c_char_p
-    loaded.learner_restore.restype = loaded.learner_values_fit.restype = c_bool
+    loaded.learner_restore.restype = loaded.learner_values_fit.restype = loaded.learner_open.restype = c_bool
     loaded.learner_table_entry.restype = c_int32
     return loaded
 
@@ -87,18 +93,18 @@ class Machine:
                 self.call("work")
         return self.learner.need
 
-    def burst(self, words, spoiled=False):
-        """A burst of words, then all work; returns the reason."""
-        self.call("open", spoiled)
+    def burst(self, words, spoiled=False, every=1):
+        """A burst of words, given as often as it is wanted, then all work; returns the reason."""
+        self.call("open", c_uint16(every), spoiled)
         take, learner = library().learner_take, ctypes.byref(self.learner)
-        for word in words:
-            take(learner, c_uint32(word))
-        self.idle()
+        while self.idle() == WORDS:
+            for word in words:
+                take(learner, c_uint32(word))
         return self.learner.reason
 
-    def phases(self, phases, spoiled=False):
+    def phases(self, phases, spoiled=False, every=1):
         """The same from single phases: learner_recorder packs two into a word."""
-        return self.burst([later << 16 | earlier for earlier, later in zip(phases[::2], phases[1::2])], spoiled)
+        return self.burst([later << 16 | earlier for earlier, later in zip(phases[::2], phases[1::2])], spoiled, every)
 
     def words(self):
         return library().learner_words(self.learner.reason).decode()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What sw/firmware/learner.c computes, in Python's integers: the sine, the ellipse, the table, a burst, a pass."""
+"""What sw/firmware/learner.c computes, in Python's integers: the sine, the ellipse, the table, the bursts of a pass."""
 from math import isqrt
 
-ORDERS, POINTS, PHASES, PARTS, PASS = 10, 256, 2048, 16, 39
+ORDERS, POINTS, PHASES, PARTS, PASS, BLOCKS, BINS, LINES = 10, 256, 2048, 16, 39, 256, 128, 128
 (LEARNING, FROZEN, STANDSTILL, PARTIAL_CIRCLE, AMPLITUDE, DISTORTED, TOO_FAST, UNSTEADY, ONE_SPEED, VIBRATION) = range(10)
 UNIT = 1 << 28
 DEGREE = (0, 1, 1, 2, 2, 2)
@@ -51,20 +51,21 @@ def fits(values):
 # ---- the ellipse
 
 def solve(m):
-    """The solution of 5 equations in units of 2^-28, or None."""
-    m = [row[:] for row in m]
-    for i in range(5):
+    """The solution of the equations, column 5 the right side, in units of 2^-28, or None."""
+    m, size = [row[:] for row in m], len(m)
+    columns = [*range(size), 5]
+    for i in range(size):
         if m[i][i] < UNIT >> 16:
             return None
-        for j in range(i + 1, 5):
+        for j in range(i + 1, size):
             factor = quotient(m[i][j] * UNIT, m[i][i])
             if abs(factor) > 4 * UNIT:
                 return None
-            for k in range(j, 6):
+            for k in columns[j:]:
                 m[j][k] -= factor * m[i][k] >> 28
     solution = [0] * 5
-    for i in reversed(range(5)):
-        rest = m[i][5] - sum(m[i][j] * solution[j] >> 28 for j in range(i + 1, 5))
+    for i in reversed(range(size)):
+        rest = m[i][5] - sum(m[i][j] * solution[j] >> 28 for j in range(i + 1, size))
         coarse = quotient(rest * 16, m[i][i])
         solution[i] = coarse * (UNIT // 16) + quotient((rest * 16 - coarse * m[i][i]) * (UNIT // 16), m[i][i])
         if abs(solution[i]) > 4 * UNIT:
@@ -91,11 +92,13 @@ def ellipse_fit(samples, values=IDENTITY, low=0, high=65535):
     count = len(samples)
     if not count:
         return PARTIAL_CIRCLE, values
-    scaled = {0: lambda s: s * UNIT, 1: lambda s: s << 16, 2: lambda s: s << 4, 3: lambda s: s >> 8, 4: lambda s: s >> 20}
-    m = [[quotient(scaled[DEGREE[i] + DEGREE[j]](total[i][j]), count) if j >= i else 0 for j in range(6)] for i in range(5)]
-    if outside * 16 > count or m[0][5] > UNIT + UNIT // 4:
+    scale = lambda s, up: s << up if up > 0 else s >> -up
+    shift = count.bit_length() - 1
+    m = [[scale(total[i][j], 28 - 12 * (DEGREE[i] + DEGREE[j])) >> shift if j >= i else 0 for j in range(6)] for i in range(5)]
+    mean_square = quotient(m[0][5] * UNIT, m[0][0])
+    if outside * 16 > count or mean_square > UNIT + UNIT // 4:
         return AMPLITUDE, values
-    eighth = isqrt(m[0][5] * UNIT) >> 19
+    eighth = isqrt(mean_square * UNIT) >> 19
     if all(max(leg) - min(leg) < eighth for leg in legs):
         return STANDSTILL, values
     if any(sector[n] < count // 128 or (sector[n] + sector[n ^ 8]) * 64 < count for n in range(16)):
@@ -129,52 +132,166 @@ def table_of(values):
     return [table_entry(values, point) for point in range(POINTS)]
 
 
-def burst_of(phases, spoiled=False):
-    """(reason, |travel|, cosine, sine) of PHASES phases; the last two are what they say of each order, 2^-20 period."""
-    real, imaginary = [0] * ORDERS, [0] * ORDERS
-    for n, phase in enumerate(phases):
-        window = 32768 - cosine_of(n * (65536 // PHASES) + 32768 // PHASES) >> 2
-        for k in range(ORDERS):
-            real[k] += window * cosine_of((k + 1) * phase) >> 10
-            imaginary[k] += window * sine_of((k + 1) * phase) >> 10
+def judge(phases, spoiled=False):
+    """(reason, travel) of PHASES phases."""
     steps = [(b - a + 32768 & 65535) - 32768 for a, b in zip(phases, phases[1:])]
-    gone, size = [], PHASES // PARTS
-    for part in range(PARTS):                                       # the first part is one step shorter
-        gone.append(sum(steps[max(part * size - 1, 0):(part + 1) * size - 1]))
-    travel = sum(gone)
-    slowest, fastest = min(gone), max(gone)
-    reason = LEARNING
+    size = PHASES // PARTS
+    gone = [sum(steps[max(part * size - 1, 0):(part + 1) * size - 1]) for part in range(PARTS)]     # the first part is one step shorter
+    travel, slowest, fastest = sum(gone), min(gone), max(gone)
     if spoiled:
-        reason = AMPLITUDE
-    elif max(map(abs, steps)) > 8192:
-        reason = TOO_FAST
-    elif abs(travel) < 16384 and fastest < 16384 and slowest > -16384:
-        reason = STANDSTILL
-    elif abs(travel) < 8 * 65536:
-        reason = PARTIAL_CIRCLE
-    else:
-        slowest, fastest = (-fastest, -slowest) if travel < 0 else (slowest, fastest)
-        if slowest <= 0 or fastest > 2 * slowest:
-            reason = UNSTEADY
-    cosine = [clamp(quotient(imaginary[k] * 333772, (k + 1) << 29), 32767) for k in range(ORDERS)]
-    sine = [clamp(quotient(-real[k] * 333772, (k + 1) << 29), 32767) for k in range(ORDERS)]
-    return reason, abs(travel), cosine, sine
+        return AMPLITUDE, travel
+    if max(map(abs, steps)) > 8192:
+        return TOO_FAST, travel
+    if abs(travel) < 16384 and fastest < 16384 and slowest > -16384:
+        return STANDSTILL, travel
+    if abs(travel) < 8 * 65536:
+        return PARTIAL_CIRCLE, travel
+    slowest, fastest = (-fastest, -slowest) if travel < 0 else (slowest, fastest)
+    return (UNSTEADY if slowest <= 0 or fastest > 2 * slowest else LEARNING), travel
 
 
-def order_of(cosine, sine):
-    """(cosine, sine, variance) of one order over the bursts of a pass, 2^-24 period and 2^-40 period^2."""
-    count = len(cosine)
-    x, y = sorted(cosine)[count // 2], sorted(sine)[count // 2]
-    away = [(a - x) ** 2 + (b - y) ** 2 for a, b in zip(cosine, sine)]
-    good = [n for n in range(count) if away[n] <= 9 * sorted(away)[count // 2] + 4]
-    n, a, b = len(good), sum(cosine[g] for g in good), sum(sine[g] for g in good)
-    square = (a - n * x) ** 2 + (b - n * y) ** 2
-    variance = quotient(sum(away[g] for g in good) - square // n, n * (n - 1))
-    return quotient(a * 16, n), quotient(b * 16, n), variance
+def places(phases, table):
+    """Place of each phase, 2^-20 period, from about 0."""
+    found, travel, last = [], 0, phases[0]
+    for phase in phases:
+        travel += (phase - last + 32768 & 65535) - 32768
+        last = phase
+        found.append(travel * 16 - table[phase >> 9])
+    return found
 
 
-def pass_of(bursts, values):
-    """(values, variance) after a pass of bursts (cosine, sine)."""
-    orders = [order_of([cosine[k] for cosine, _ in bursts], [sine[k] for _, sine in bursts]) for k in range(ORDERS)]
-    cosine, sine, variance = zip(*orders)
-    return values | dict(cosine=cosine, sine=sine), sum(variance)
+def window_of(turn):
+    return 32768 - cosine_of(turn) >> 1
+
+
+def waves_of(vibration, turn):
+    phase = vibration * turn >> 16
+    return cosine_of(phase), sine_of(phase)
+
+
+def base_of(turn, vibration, dimmed=32768):
+    time = turn - 32768
+    return (32768, time, time * time >> 15, *(wave * dimmed >> 15 for wave in waves_of(vibration, turn)))
+
+
+def smooth(solution, base):
+    return sum(s * b for s, b in zip(solution, base)) >> 19
+
+
+BLOCK_TURNS = [n * 256 + 128 for n in range(BLOCKS)]
+
+
+def fit(block, size, vibration):
+    """The motion, and the vibration, through the blocks; None: not well conditioned."""
+    half = vibration >> 12
+    dimmed = cosine_of(half) * cosine_of(2 * half) * cosine_of(4 * half) >> 30
+    m = [[0] * 6 for _ in range(size)]
+    for turn, place in zip(BLOCK_TURNS, block):
+        base = base_of(turn, vibration, dimmed)
+        for i in range(size):
+            weighed = window_of(turn) * base[i] >> 15
+            for j in range(i, size):
+                m[i][j] += weighed * base[j] >> 10
+            m[i][5] += weighed * place >> 19
+    return solve(m)
+
+
+def spectrum(rest):
+    """(real, imaginary) of the lines of BLOCKS numbers, by radix 2 in time."""
+    real, imaginary = [rest[int(f"{n:08b}"[::-1], 2)] for n in range(BLOCKS)], [0] * BLOCKS
+    for level in range(8):
+        half = 1 << level
+        for a in (n for n in range(BLOCKS) if not n & half):
+            b, angle = a + half, a % half << 15 - level
+            c, s = cosine_of(angle), sine_of(angle)
+            x, y = c * real[b] + s * imaginary[b] >> 15, c * imaginary[b] - s * real[b] >> 15
+            real[a], real[b], imaginary[a], imaginary[b] = real[a] + x, real[a] - x, imaginary[a] + y, imaginary[a] - y
+    return real, imaginary
+
+
+def level_of(power):
+    shifts = max(power.bit_length() - 3, 0)
+    return 4 * shifts + (power >> shifts)
+
+
+def vibration_of(line, real, imaginary):
+    """2^-16 cycle a burst of the line that stays, or None."""
+    power = [x * x + y * y for x, y in zip(real, imaginary)]
+    at = max(range(2, LINES - 2), key=lambda n: (line[n], -n))
+    at += (power[at + 1] > power[at]) or -(power[at - 1] > power[at])
+    beside = at + 1 if power[at + 1] > power[at - 1] else at - 1
+    unit = power[at] >> 16
+    if not unit:
+        return None
+    share = max(0, min(65536, quotient(-(real[at] * real[beside] + imaginary[at] * imaginary[beside]), unit)))
+    away = quotient((2 * share - 65536) * 16384, 65536 + share) * 4
+    return at * 65536 + (away if beside > at else -away)
+
+
+class Pass:
+    """A pass of bursts, none of them refused."""
+
+    def __init__(self, values=IDENTITY):
+        self.values, self.bursts, self.spectra, self.every, self.line = values, 0, 0, 0, [0] * LINES
+        self.information, self.cosine, self.sine, self.squares = [0] * ORDERS, [0] * ORDERS, [0] * ORDERS, 0
+        self.travels = []
+
+    def candidate(self):
+        legs = {}
+        for leg, sums in (("cosine", self.cosine), ("sine", self.sine)):
+            legs[leg] = tuple(clamp(quotient(total * 4096, known), 1 << 21) if self.bursts >= 4 and known >= 256 else before
+                              for total, known, before in zip(sums, self.information, self.values[leg]))
+        return self.values | legs
+
+    def take(self, phases, every=1):
+        """False: the burst is refused, since the motion could not be fitted."""
+        candidate = self.candidate()
+        _, travel = judge(phases)
+        place = places(phases, [table_entry(candidate, 2 * n + 1) for n in range(BINS)])
+        slope = quotient(travel * 65536, PHASES - 1)
+        block = [sum(p >> 3 for p in place[8 * n:8 * n + 8]) - (slope * (16 * n + 7) >> 13) for n in range(BLOCKS)]
+        vibration, solution = 0, fit(block, 3, 0)
+        if solution is None:
+            return False
+        rest = [clamp(p - smooth(solution, base_of(turn, 0)), 131068) * window_of(turn) >> 12 for turn, p in zip(BLOCK_TURNS, block)]
+        real, imaginary = spectrum(rest)
+        levels = [level_of(x * x + y * y) for x, y in zip(real[:LINES], imaginary)]
+        if every != self.every:
+            self.spectra = 0
+        self.line = list(map(min, self.line, levels)) if self.spectra else levels
+        self.every, self.spectra = every, min(self.spectra + 1, 255)
+        if self.spectra >= 3 and (found := vibration_of(self.line, real, imaginary)) is not None:
+            vibration, solution = found, fit(block, 5, found)
+            if solution is None:
+                return False
+        self.project(phases, place, slope, vibration, solution, candidate)
+        self.travels.append(abs(travel))
+        self.bursts += 1
+        return True
+
+    def project(self, phases, place, slope, vibration, solution, candidate):
+        seen, power = [[0] * BINS for _ in range(3)], 0
+        for n, (phase, p) in enumerate(zip(phases, place)):
+            turn, phase_bin = n * 32 + 16, phase >> 9
+            base, window = base_of(turn, vibration), window_of(n * 32 + 16) >> 5
+            rest = clamp(p - (slope * n >> 12) - smooth(solution, base), 32767)
+            seen[0][phase_bin] += window * rest >> 5
+            seen[1][phase_bin] += window * base[3] >> 5
+            seen[2][phase_bin] += window * base[4] >> 5
+            power += window * rest * rest
+        square = power >> 20
+        weight = 32768 if square <= 1 << 20 else (1 << 35) // square
+        for k in range(ORDERS):
+            turns = [(k + 1) * (n * 512 + 256) for n in range(BINS)]
+            waves = [cosine_of(t) for t in turns], [sine_of(t) for t in turns]
+            (x, y), *shared = [[sum(map(int.__mul__, row, wave)) >> shift for wave in waves] for row, shift in zip(seen, (25, 30, 30))]
+            kept = max(0, 32768 - (sum(leg * leg for row in shared for leg in row) >> 14))
+            self.information[k] += weight * kept >> 15
+            self.cosine[k] += weight * (x + (kept * candidate["cosine"][k] >> 15)) >> 12
+            self.sine[k] += weight * (y + (kept * candidate["sine"][k] >> 15)) >> 12
+            if self.bursts >= 4:
+                self.squares += (weight * x >> 15) ** 2 + (weight * y >> 15) ** 2
+
+    def scatter(self):
+        least = min(self.information)
+        return isqrt((self.squares // least << 22) // least)
