@@ -7,13 +7,25 @@
 #include <stdint.h>
 
 #define PLANNER_TICK_HZ 4000u
-#define PLANNER_SEGMENTS 16u            // room for the 15 instants at which a move changes
+#define PLANNER_SEGMENTS 20u            // room for the instants at which a move changes
 #define PLANNER_LONGEST_PIECE 0x800000u // ticks in one push; profile_player takes 24 bits
+#define PLANNER_ANY_JERK UINT32_MAX     // limits.jerk: trapezoid, the acceleration may step
 
 struct planner_limits {                 // 2^-40 period per tick, tick^2, tick^3
     uint64_t velocity;
     uint64_t acceleration;
     uint32_t jerk;
+};
+
+enum planner_cause {
+    PLANNER_OK,
+    PLANNER_NO_VELOCITY,                // the limit is zero in units of the player
+    PLANNER_NO_ACCELERATION,
+    PLANNER_NO_JERK,                    // below two units: no pulse of jerk can be made
+    PLANNER_TOO_LONG,                   // it would cruise for 2^30 ticks (3 days) or more, or retarget 2^22 periods or more
+    PLANNER_BORDERS,                    // stairs whose borders or steps are not in order
+    PLANNER_TOO_MANY_STAIRS,
+    PLANNER_NO_PLAN                     // no retarget inside the limits was found
 };
 
 struct planner_segment {                // values at its start
@@ -27,17 +39,50 @@ struct plan {
     uint32_t ticks;                     // of the whole move
     uint8_t count;                      // segments
     uint8_t next;                       // first segment not yet taken whole
+    uint8_t cause;                      // planner_cause: why the last request was refused
+    bool stairs;                        // a segment is `jerk` + 1 stairs of constant velocity, `acceleration` apart
+    uint32_t into;                      // ticks of this segment, or of its stair, taken so far
+    uint64_t gone;                      // 2^-40 period taken so far, modulo 2^64
     struct planner_segment segment[PLANNER_SEGMENTS];
+};
+
+struct planner_state {                  // after a tick
+    uint64_t gone;                      // 2^-40 period since the plan began, modulo 2^64
+    int64_t velocity;                   // of the next tick
+    int64_t acceleration;
+};
+
+struct planner_stairs {                 // S4: velocity in steps of constant duration, three sections up and three down
+    uint64_t first, top;                // 2^-40 period/tick
+    uint64_t rise[3];                   // of a step in sections 1, 2, 3
+    uint64_t border[2];                 // velocity at which section 2 and 3 begin
+    uint32_t ticks;                     // of a step
 };
 
 // The limits in units of the player from period/s, period/s^2, period/s^3; rounded down, and jerk held to 31 bits.
 uint64_t planner_velocity(uint32_t velocity);
 struct planner_limits planner_limits(uint32_t velocity, uint32_t acceleration, uint32_t jerk);
 
-// From rest to rest over `distance` (2^-16 period). false: it would cruise for 2^30 ticks (3 days) or more.
+// From rest to rest over `distance` (2^-16 period). false: refused, plan->cause says why.
 bool planner_move(struct plan *plan, const struct planner_limits *limits, int64_t distance);
 
-// The next piece to queue; *last tells that the plan ends with it. false: nothing is left.
+// The same with S4's seven sections.
+bool planner_climb(struct plan *plan, const struct planner_stairs *stairs, int64_t distance);
+
+// S4's borders between first and top: 1:2:3 of the climb, or as its paper prints them.
+void planner_borders(struct planner_stairs *stairs, bool as_printed);
+
+// Where the plan is when `ticks` more than those taken have been played.
+struct planner_state planner_state_after(const struct plan *plan, uint32_t ticks);
+
+// From the state behind all that was taken, which must not have been the last piece, to rest at `distance` (2^-16 period) from
+// where the plan began. false: refused, plan->cause says why, and the plan goes on as it was.
+bool planner_retarget(struct plan *plan, const struct planner_limits *limits, int64_t distance);
+
+// The next piece to queue, of so many ticks at most; *last tells that the plan ends with it. false: nothing is left.
+bool planner_take_up_to(struct plan *plan, struct planner_segment *piece, bool *last, uint32_t longest);
+
+// The same, as long as the player takes them.
 bool planner_take(struct plan *plan, struct planner_segment *piece, bool *last);
 
 #endif

@@ -1,25 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
-"""profile_player: by hand, against the closed form, at the ends of every range, and random events against the model."""
+"""profile_player: by hand, against the spline of the profile, at the ends of every range, and random events against the model."""
 import random
+from fractions import Fraction
 
 import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
 from bench import run, start
-from profile_player import ProfilePlayer, moved, wrap
+from profile_player import FULL, ProfilePlayer, moved, wrap
 
 PERIOD = 1 << 40                        # of velocity, acceleration and jerk
 LSB = 1 << 24                           # of target, in the same unit
-IDLE = dict(tick=0, push=0, segment_velocity=0, segment_acceleration=0, segment_jerk=0, segment_ticks=0, segment_last=0, start=0,
-            brake=0, brake_rate=0, hold_here=0, position=0, shift=0, shift_periods=0)
+GAP, BRAKE_GAP = 80, 220                # clk from tick to tick that the header asks for
+SETTINGS = "rate", "brake_rate", "brake_jerk"
+EVENTS = "rst", "tick", "start", "brake", "hold_here", "position", "arm", "start_at", "now"
+IDLE = dict.fromkeys(("tick", "push", "segment_velocity", "segment_acceleration", "segment_jerk", "segment_ticks", "segment_last",
+                      "start", "brake", "hold_here", "position", "shift", "shift_periods", "arm", "start_at", "now", *SETTINGS), 0)
 
 
 class Player:
     """The design with the model beside it in every cycle."""
 
     def __init__(self, dut):
-        self.dut, self.model, self.clk_count, self.brake_rate = dut, ProfilePlayer(int(dut.DEPTH.value)), 0, 0
+        self.dut, self.model, self.clk_count = dut, ProfilePlayer(int(dut.DEPTH.value)), 0
+        self.settings = dict(rate=FULL, brake_rate=0, brake_jerk=0)
 
     async def reset(self):
         await start(self.dut, **IDLE)
@@ -30,8 +35,8 @@ class Player:
     async def clk(self, **events):
         """One clk with these events (as ProfilePlayer.clk takes them); returns the pins after it."""
         dut, push, shift = self.dut, events.get("push"), events.get("shift")
-        events.setdefault("brake_rate", self.brake_rate)
-        for name in ("rst", "tick", "start", "brake", "hold_here", "position", "brake_rate"):
+        events = self.settings | events
+        for name in (*EVENTS, *SETTINGS):
             getattr(dut, name).value = events.get(name, 0)
         dut.push.value, dut.shift.value, dut.shift_periods.value = push is not None, shift is not None, shift or 0
         (dut.segment_velocity.value, dut.segment_acceleration.value, dut.segment_jerk.value, dut.segment_ticks.value,
@@ -41,82 +46,171 @@ class Player:
         self.clk_count += 1
         want = self.model.clk(**events)
         got = (dut.target.value.to_signed(), dut.target_velocity.value.to_signed(), dut.target_acceleration.value.to_signed(),
-               int(dut.moving.value), int(dut.queue_free.value), int(dut.underrun.value))
+               int(dut.moving.value), int(dut.armed.value), int(dut.queue_free.value), int(dut.underrun.value))
         assert got == want, f"clk {self.clk_count}, {events}: {got}, the model has {want}"
-        self.target, self.velocity, self.acceleration, self.moving, self.free, self.underrun = got
+        self.target, self.velocity, self.acceleration, self.moving, self.armed, self.free, self.underrun = got
         return got
 
     async def play(self, *segments):
+        """Queue them and start; the first tick, which only prepares, is over."""
         for segment in segments:
             await self.clk(push=segment)
         await self.clk(start=1)
+        await self.tick()
 
-    async def tick(self, idle=5, **events):
+    async def tick(self, gap=None, **events):
         """One tick and the clk after it; returns the underrun strobes seen."""
         strobes = (await self.clk(tick=1, **events))[-1]
-        for _ in range(idle):
+        for _ in range((gap or (BRAKE_GAP if self.model.braking and not self.model.brake else GAP)) - 1):
             strobes += (await self.clk())[-1]
         return strobes
 
     async def finish(self, most=10_000):
-        ticks = 0
+        """The targets to the end, one a tick."""
+        targets = []
         while self.moving:
             await self.tick()
-            ticks += 1
-            assert ticks <= most
-        return ticks
+            targets.append(self.target)
+            assert len(targets) <= most
+        return targets
+
+
+def positions(*segments):
+    """Those of the profile, in 2^-40 period, with the first of each segment."""
+    exact, place = [0], 0
+    for velocity, acceleration, jerk, ticks, _ in segments:
+        exact += [place + moved(velocity, acceleration, jerk, n + 1) for n in range(ticks)]
+        place = exact[-1]
+    return exact
+
+
+def spline(exact, time):
+    """The quadratic B-spline of positions that stand before and after, at a time from 0 to their number less one."""
+    k = int(time)
+    f = time - k
+    before, here, after = (exact[max(0, min(n, len(exact) - 1))] for n in (k, k + 1, k + 2))
+    # between the second and the third control point
+    return Fraction(before + here, 2) + f * (here - before) + f * f * (after - 2 * here + before) / 2
 
 
 @cocotb.test()
 async def by_hand(dut):
     player = await Player(dut).reset()
-    await player.play((PERIOD, 0, 0, 2, 0), (PERIOD, -PERIOD // 2, 0, 2, 1))        # 1, 1, 1, 1/2 period
-    targets = []
-    for _ in range(5):
-        await player.tick()
-        targets.append(player.target / 65536)
-    assert targets == [1, 2, 3, 3.5, 3.5] and not player.moving
+    await player.play((PERIOD, 0, 0, 2, 0), (PERIOD, -PERIOD // 2, 0, 2, 1))        # 1, 1, 1, 1/2 period, each step the mean of two
+    assert player.target == 0
+    assert [target / 65536 for target in await player.finish()] == [1.5, 2.5, 3.25, 3.5]
     assert (player.velocity, player.acceleration) == (0, 0)
 
 
 @cocotb.test()
-async def latency_is_3(dut):
+async def latency_is_2(dut):
     player = await Player(dut).reset()
     await player.play((PERIOD, 0, 0, 2, 1))
-    for _ in range(2):                                  # the first of a segment, and one inside it
+    for _ in range(2):                                  # inside a segment, and its last
         before, latency = player.target, 1
         await player.clk(tick=1)
         while player.target == before:
             await player.clk()
             latency += 1
-        assert latency == 3
-        await player.clk()
-        await player.clk()
+        assert latency == 2
+        for _ in range(GAP):
+            await player.clk()
 
 
 @cocotb.test()
-async def ticks_may_follow_each_other_in_5_clk(dut):
+async def ticks_may_follow_each_other_in_80_clk(dut):
+    """And in 220 from the first of a brake: with less the step would not be ready, and the tick be lost."""
     player = await Player(dut).reset()
-    await player.play((PERIOD, 0, 0, 9, 0), (PERIOD, 0, 0, 1, 1))
-    for n in range(10):
-        await player.tick(idle=4)
-        assert player.target == 65536 * (n + 1)
-    assert not player.moving
+    player.settings |= dict(rate=FULL - 1, brake_rate=1 << 20, brake_jerk=1 << 25)
+    await player.play((PERIOD, 0, 0, 9, 0), (PERIOD, 0, 0, 100, 1))
+    for _ in range(30):
+        before = player.target
+        await player.tick(GAP)
+        assert player.target != before
+    await player.clk(brake=1)
+    for n in range(20):
+        before = player.target
+        await player.tick(BRAKE_GAP if n < 2 else GAP)
+        assert player.target != before
 
 
 @cocotb.test()
 async def n_ticks_move_by_the_closed_form(dut):
     player = await Player(dut).reset()
     exact = 0                                           # 2^-40 period, the fraction carried through the profile
-    for _ in range(12):
+    for _ in range(6):
         segments = [(random.randrange(-1 << 44, 1 << 44), random.randrange(-1 << 36, 1 << 36), random.randrange(-1 << 31, 1 << 31),
                      random.randrange(1, 20), 0) for _ in range(random.randrange(1, 4))]
         segments[-1] = (*segments[-1][:4], 1)
         await player.play(*segments)
-        assert await player.finish() == sum(s[3] for s in segments)
+        assert len(await player.finish()) == sum(s[3] for s in segments)
         exact += sum(moved(*s[:4]) for s in segments)
         exact = (exact + LSB // 2) // LSB * LSB         # a half goes up
         assert player.target == exact // LSB
+
+
+@cocotb.test()
+async def slower_it_takes_the_same_way_and_lands_on_the_same_bit(dut):
+    """Against the spline in fractions: nothing of the player's own arithmetic but one rounding of each step."""
+    player = await Player(dut).reset()
+    jerk = (1 << 30) + 12345
+    segments = ((0, 0, jerk, 5, 0), (10 * jerk, 5 * jerk, -jerk, 5, 0), (25 * jerk, 0, 0, 3, 1))
+    exact = positions(*segments)
+    for rate in (FULL // 3, FULL - 1, 1 << 29):
+        await player.clk(hold_here=1, position=0)
+        player.settings["rate"] = rate
+        await player.play(*segments)
+        targets, time = await player.finish(), 0
+        for n, target in enumerate(targets):
+            time += rate
+            where = Fraction(time, FULL)
+            if where < len(exact) - 2:                  # the velocity of this profile ends in a step
+                assert abs(target + 0.5 - spline(exact, where) / LSB) <= 0.501, n
+        assert player.target == (exact[-1] + LSB // 2) // LSB
+        assert len(targets) == -(-13 * FULL // rate)
+
+
+@cocotb.test()
+async def slower_every_step_keeps_the_limits_of_the_profile(dut):
+    player = await Player(dut).reset()
+    jerk = 1 << 30
+    segments = ((0, 0, jerk, 8, 0), (28 * jerk, 8 * jerk, -jerk, 16, 0), (36 * jerk, -8 * jerk, jerk, 8, 1))     # 36 = sum at the middle
+    exact = positions(*segments)
+    steps = [0, 0, 0, *(b - a for a, b in zip(exact, exact[1:])), 0, 0, 0]
+    limits = []
+    for _ in range(3):
+        limits.append(max(map(abs, steps)))
+        steps = [b - a for a, b in zip(steps, steps[1:])]
+    for rate in (FULL, FULL // 2 + 12345, FULL // 7):
+        player.settings["rate"] = rate
+        await player.clk(hold_here=1, position=0)
+        await player.play(*segments)
+        seen = [0, 0, 0]
+        while player.moving:
+            seen.append(player.model.step)              # the one that this tick makes
+            await player.tick()
+        seen += [0, 0, 0]
+        for power, limit in enumerate(limits, start=1):
+            assert max(map(abs, seen)) <= limit * (rate / FULL) ** min(power, 2) + 8, (rate, power)
+            seen = [b - a for a, b in zip(seen, seen[1:])]
+
+
+@cocotb.test()
+async def a_pause_stands_and_goes_on_to_the_exact_end(dut):
+    player = await Player(dut).reset()
+    await player.play((PERIOD // 3, 0, 0, 20, 1))
+    for _ in range(5):
+        await player.tick()
+    player.settings["rate"] = 0
+    await player.tick()
+    await player.tick()
+    stands = player.target
+    for _ in range(5):
+        await player.tick()
+        assert (player.target, player.velocity, player.moving) == (stands, 0, 1)
+    player.settings["rate"] = FULL
+    await player.finish()
+    assert player.target == (20 * (PERIOD // 3) + LSB // 2) // LSB
 
 
 @cocotb.test()
@@ -140,14 +234,16 @@ async def the_fraction_goes_on_from_segment_to_segment_and_ends_at_the_nearest_l
 @cocotb.test()
 async def ends_of_the_range(dut):
     player = await Player(dut).reset()
-    for v in (-1 << 63, (1 << 63) - 1):
-        for a in (-1 << 63, (1 << 63) - 1):
-            for j in (-1 << 31, (1 << 31) - 1):
-                await player.play((v, a, j, 3, 1))
-                await player.tick()
-                assert player.velocity == (-1 << 31 if v < 0 else (1 << 31) - 1)         # held
-                assert player.acceleration == (-1 << 31 if a < 0 else (1 << 31) - 1)
-                await player.finish()
+    for rate in (FULL, FULL - 1, 1):
+        player.settings["rate"] = rate
+        for v in (-1 << 63, (1 << 63) - 1):
+            for a in (-1 << 63, (1 << 63) - 1):
+                for j in (-1 << 31, (1 << 31) - 1):
+                    await player.play((v, a, j, 3, 1))
+                    await player.tick()
+                    await player.tick()
+                    await player.clk(hold_here=1)
+    player.settings["rate"] = FULL
     for position in (-1 << 47, (1 << 47) - 1):
         await player.clk(hold_here=1, position=position)
         assert player.target == position
@@ -159,15 +255,20 @@ async def ends_of_the_range(dut):
             before = player.target
             await player.clk(shift=periods)
             assert player.target == wrap(before + (periods << 16), 48)
+    for velocity, shown in ((-1 << 60, -1 << 31), (1 << 60, (1 << 31) - 1)):
+        await player.play((velocity, 0, 0, 3, 1))
+        await player.tick()
+        assert player.velocity == player.acceleration == shown              # held
+        await player.finish()
 
 
 @cocotb.test()
 async def the_longest_segment_is_counted_in_24_bits(dut):
     player = await Player(dut).reset()
     await player.play((LSB, 0, 0, (1 << 24) - 1, 1))
-    for _ in range(300):
+    for _ in range(200):
         await player.tick()
-    assert player.moving and player.target == 300
+    assert player.moving and player.target == 200
 
 
 @cocotb.test()
@@ -178,8 +279,8 @@ async def a_full_queue_takes_no_more(dut):
         assert player.model.depth - len(player.model.queue) == max(0, depth - n)
         await player.clk(push=(PERIOD, 0, 0, 1, int(n >= depth - 1)))
     assert player.free == 0
-    await player.clk(start=1)
-    assert await player.finish() == depth
+    await player.play()
+    assert len(await player.finish()) == depth
     assert player.target == 65536 * depth and player.free == depth
 
 
@@ -195,62 +296,153 @@ async def start_without_a_segment_does_nothing(dut):
 
 
 @cocotb.test()
+async def an_armed_player_starts_when_its_time_has_come(dut):
+    player = await Player(dut).reset()
+    for start_at in (5, 2, 0x7FFF_FFFF, 0xFFFF_FFFF, 0):        # also across the wrap, and one that is past
+        await player.clk(push=(PERIOD, 0, 0, 1, 1))
+        time = (start_at - 4 if start_at != 2 else 100) % (1 << 32)
+        await player.clk(arm=1, start_at=start_at, now=time)
+        waited = 0
+        assert player.armed
+        while not player.moving:
+            time = (time + 1) % (1 << 32)
+            await player.clk(start_at=start_at, now=time)
+            waited += 1
+        assert time == start_at or (start_at == 2 and waited == 1)
+        assert not player.armed
+        await player.finish()
+    for event in ("brake", "hold_here"):
+        await player.clk(arm=1, start_at=1000)
+        await player.clk(**{event: 1}, start_at=1000)
+        assert not player.armed
+    await player.clk(arm=1, start_at=1000)
+    await player.clk(start_at=1000, now=1000)           # nothing to play: neither now nor later
+    await player.clk(push=(PERIOD, 0, 0, 1, 1), start_at=1000, now=1001)
+    await player.clk(start_at=1000, now=1002)
+    assert not player.moving and not player.armed
+
+
+@cocotb.test()
 async def segments_of_0_ticks_are_skipped(dut):
     player = await Player(dut).reset()
     await player.play((5 * PERIOD, 0, 0, 0, 0), (7 * PERIOD, 0, 0, 0, 0), (PERIOD, 0, 0, 2, 0), (9 * PERIOD, 0, 0, 0, 1))
-    for want in (1, 2, 2):
-        await player.tick()
-        assert player.target == 65536 * want
-    assert not player.moving
+    assert await player.finish() == [65536 * 3 // 2, 65536 * 2]
     await player.play((PERIOD, 0, 0, 0, 1))
-    assert await player.finish() == 1 and player.target == 65536 * 2
+    assert await player.finish() == [65536 * 2]
 
 
 @cocotb.test()
 async def an_underrun_strobes_once_and_brakes(dut):
     player = await Player(dut).reset()
-    player.brake_rate = 1 << 30                         # a quarter period/tick2
-    await player.play((PERIOD, 0, 0, 2, 0))
+    player.settings |= dict(brake_rate=1 << 30, brake_jerk=0)      # a quarter period/tick2, at once
+    await player.play((PERIOD, 0, 0, 4, 0))
     strobes, targets = 0, []
-    for _ in range(8):
-        strobes += await player.tick()
+    while player.moving:
+        strobes += await player.tick(BRAKE_GAP)
         targets.append(player.target / 65536)
-    assert strobes == 1 and not player.moving
-    assert targets == [1, 2, 3, 3.75, 4.25, 4.5, 4.5, 4.5]
+    assert strobes == 1 and player.free == int(dut.DEPTH.value)
+    steps = [b - a for a, b in zip([0, *targets], targets)]
+    while steps[-1] == 0:
+        steps.pop()
+    assert steps == [1.5, 1, 1, 0.75, 0.5, 0.25]
 
 
 @cocotb.test()
-async def a_segment_that_comes_before_the_next_tick_is_no_underrun(dut):
+async def a_segment_that_comes_before_its_time_is_no_underrun(dut):
     player = await Player(dut).reset()
-    await player.play((PERIOD, 0, 0, 1, 0))
-    await player.tick()
+    await player.play((PERIOD, 0, 0, 2, 0))
     await player.clk(push=(PERIOD, 0, 0, 1, 1))
-    assert await player.tick() == 0 and player.target == 2 * 65536 and not player.moving
+    assert await player.tick() == 0
+    await player.finish()
+    assert player.target == 3 * 65536
+
+
+async def stop_from(player, velocity, acceleration, rate, jerk, play_rate=FULL):
+    """The steps of a brake from about there, and the limits it had to keep."""
+    player.settings |= dict(brake_rate=rate, brake_jerk=jerk, rate=play_rate)
+    await player.clk(hold_here=1, position=0)
+    await player.play((velocity - 3 * acceleration, acceleration, 0, 100, 0), (PERIOD, 0, 0, 1, 1))
+    for _ in range(3):
+        await player.tick()
+    steps = []
+    await player.clk(brake=1)
+    assert player.free == int(player.dut.DEPTH.value) and player.moving
+    await player.clk(push=(PERIOD, 0, 0, 1, 1))
+    await player.clk(start=1)
+    assert player.free == int(player.dut.DEPTH.value)                       # not while braking
+    first = player.model.change, player.model.step - player.model.change
+    while player.moving:
+        steps.append(player.model.step)                                     # the one that this tick makes
+        await player.tick()
+    assert (player.velocity, player.acceleration) == (0, 0)
+    return first, steps
 
 
 @cocotb.test()
-async def brake_stops_at_the_rate_in_either_direction(dut):
+async def brake_ends_at_rest_within_its_limits_from_anywhere(dut):
     player = await Player(dut).reset()
-    for sign in (1, -1):
-        for velocity, rate in ((PERIOD, 1 << 30), (PERIOD + 12345, 1 << 30), (PERIOD, 0xFFFFFFFF), (PERIOD, 0), (0, 7), (LSB, 99)):
-            player.brake_rate = rate
-            await player.clk(hold_here=1, position=0)
-            await player.play((sign * velocity, 0, 0, 100, 0), (PERIOD, 0, 0, 1, 1))
-            await player.tick()
-            step = rate << 8
-            await player.clk(brake=1)
-            assert player.free == int(dut.DEPTH.value) and player.moving
-            await player.clk(push=(PERIOD, 0, 0, 1, 1))
-            await player.clk(start=1)
-            assert player.free == int(dut.DEPTH.value)                       # not while braking
-            ticks, v, exact = 0, velocity, velocity
-            while player.moving:
-                await player.tick()
-                ticks += 1
-                exact, v = exact + v, max(0, v - step) if step else 0
-            assert ticks == (max(1, -(-velocity // step)) if step else 1)
-            assert player.target == (sign * exact + LSB // 2) // LSB
-            assert (player.velocity, player.acceleration) == (0, 0)
+    for n in range(15):
+        if n == 0:
+            velocity, acceleration, rate, jerk = PERIOD >> 4, 0, 1 << 26, 1 << 31
+        elif n == 1:
+            velocity, acceleration, rate, jerk = -PERIOD >> 4, -(1 << 33), 1 << 25, 1 << 30
+        elif n == 2:
+            velocity, acceleration, rate, jerk = 1 << 31, -(1 << 34), 1 << 27, 1 << 31         # decelerates too hard: comes back
+        else:
+            jerk = int(2 ** random.uniform(20, 31.9))
+            rate = min((1 << 32) - 1, max(1, int((jerk >> 8) * 2 ** random.uniform(-2, 6))))
+            pace = min(jerk, rate << 8)
+            velocity = random.choice((1, -1)) * int(pace * 2 ** random.uniform(-2, 9))
+            acceleration = random.choice((1, -1, 0)) * int((rate << 8) * random.uniform(0, 2))
+        (before, step), steps = await stop_from(player, velocity, acceleration, rate, jerk, random.choice((FULL, FULL, FULL // 3)))
+        pace = min(jerk, rate << 8)
+        all_steps = [step - 0, *steps, 0, 0]
+        changes = [b - a for a, b in zip(all_steps, all_steps[1:])]
+        assert steps[-1] == 0
+        top = abs(before)
+        for old, new in zip(changes, changes[1:]):
+            assert abs(new - old) <= pace, f"jerk {abs(new - old)} above {pace} in run {n}"
+            assert abs(new) <= max(rate << 8, abs(old)), f"acceleration in run {n}"
+        limit = min(rate << 8, 1 << 62)
+        bound = abs(step) / limit + 2 * (limit + top) / pace + (top + 2 * (top * top / pace)) / limit + 8
+        bound += 2 * (abs(step) / pace) ** 0.5 * 2
+        assert len(steps) <= bound, f"{len(steps)} ticks, {bound} in run {n}"
+
+
+@cocotb.test()
+async def brake_takes_no_longer_than_the_best_stop_and_three_ticks(dut):
+    """From constant velocity: v/A + A/J, or 2 sqrt(v/J) where A is not reached."""
+    player = await Player(dut).reset()
+    for velocity, rate, jerk in ((PERIOD >> 4, 1 << 26, 1 << 31), (PERIOD >> 3, 1 << 30, 1 << 31), (1 << 36, 1 << 25, (1 << 32) - 1),
+                                 (-PERIOD >> 5, 1 << 25, 1 << 31)):
+        _, steps = await stop_from(player, velocity, 0, rate, jerk)
+        pace, limit = jerk, rate << 8
+        size = abs(velocity)
+        best = size / limit + limit / pace if limit * limit <= size * pace else 2 * (size / pace) ** 0.5
+        assert len(steps) <= best + 5, (len(steps), best)
+
+
+@cocotb.test()
+async def brake_at_rate_0_stops_in_one_step(dut):
+    player = await Player(dut).reset()
+    for velocity in (PERIOD, -PERIOD, 1):
+        _, steps = await stop_from(player, velocity, 0, 0, 1 << 30)
+        assert len(steps) == 2 and steps[-1] == 0       # the one that was prepared, and the stop
+
+
+@cocotb.test()
+async def brake_while_paused_ends_the_profile(dut):
+    player = await Player(dut).reset()
+    player.settings |= dict(brake_rate=1 << 30, brake_jerk=1 << 30)
+    await player.play((PERIOD, 0, 0, 100, 1))
+    await player.tick()
+    player.settings["rate"] = 0
+    for _ in range(3):
+        await player.tick()
+    stands = player.target
+    await player.clk(brake=1)
+    await player.finish(most=6)
+    assert abs(player.target - stands) <= 1
 
 
 @cocotb.test()
@@ -260,20 +452,21 @@ async def brake_at_rest_only_empties_the_queue(dut):
     await player.clk(brake=1)
     assert player.free == int(dut.DEPTH.value) and not player.moving
     await player.play((PERIOD, 0, 0, 2, 1))
-    assert await player.finish() == 2
+    assert len(await player.finish()) == 2
 
 
 @cocotb.test()
 async def hold_here_stands_at_the_position_with_an_empty_queue(dut):
     player = await Player(dut).reset()
-    await player.play((PERIOD + 5, 0, 0, 5, 0), (PERIOD, 0, 0, 1, 1))
-    for wait in range(6):                               # in every phase of a tick
-        await player.clk(tick=1)
+    for wait in (*range(8), 30, 60, 90):                # in every phase of a tick
+        for segment in ((PERIOD + 5, 0, 0, 5, 0), (PERIOD, 0, 0, 1, 1)):
+            await player.clk(push=segment)
+        await player.clk(start=1, rate=FULL // 3)
+        await player.clk(tick=1, rate=FULL // 3)
         for _ in range(wait):
-            await player.clk()
+            await player.clk(rate=FULL // 3)
         await player.clk(hold_here=1, position=-777)
         assert (player.target, player.velocity, player.moving, player.free) == (-777, 0, 0, int(dut.DEPTH.value))
-        await player.play((PERIOD + 5, 0, 0, 5, 0))
 
 
 @cocotb.test()
@@ -291,12 +484,12 @@ async def a_shift_loses_no_step_in_any_clk(dut):
 @cocotb.test()
 async def reset_in_mid_flow(dut):
     player = await Player(dut).reset()
-    for wait in range(5):
+    for wait in (*range(5), 40, 75):
         await player.play((PERIOD, 0, 0, 5, 0), (PERIOD, 0, 0, 5, 1))
         await player.tick()
-        await player.clk(tick=1)
+        await player.clk(tick=1, rate=FULL // 2)
         for _ in range(wait):
-            await player.clk()
+            await player.clk(rate=FULL // 2)
         await player.clk(rst=1)
         assert (player.target, player.moving, player.free) == (0, 0, int(dut.DEPTH.value))
 
@@ -306,24 +499,26 @@ async def any_events_match_the_model(dut):
     player = await Player(dut).reset()
     chance = lambda one_in: random.randrange(one_in) == 0
     word = lambda bits: random.randrange(-1 << bits - 1, 1 << bits - 1) >> random.randrange(bits)
-    gap = 0
-    for _ in range(8000):
-        gap -= 1
-        events = dict(brake_rate=random.getrandbits(32) >> random.randrange(32))
+    gap = now = start_at = 0
+    for _ in range(12000):
+        gap, now = gap - 1, (now + 1) % (1 << 32)
+        if chance(500):
+            player.settings |= dict(brake_rate=random.getrandbits(32) >> random.randrange(33),
+                                    brake_jerk=random.getrandbits(32) >> random.randrange(33),
+                                    rate=random.choice((FULL, FULL, 0, random.getrandbits(32))))
+        if chance(100):
+            start_at = (now + random.randrange(-20, 100)) % (1 << 32)
+        events = dict(now=now, start_at=start_at)
         if gap <= 0 and chance(3):
-            events["tick"], gap = 1, random.randrange(1, 12)
-        if chance(6):
+            events["tick"], gap = 1, random.choice((3, 80, 80, 80, 220))
+        if chance(30):
             events["push"] = (word(64), word(64), word(32), random.choice((0, 1, 1, 2, 3, 5)), int(chance(4)))
-        if chance(15):
-            events["start"] = 1
-        if chance(150):
-            events["brake"] = 1
-        if chance(300):
-            events["hold_here"], events["position"] = 1, word(48)
+        for name, one_in in (("start", 60), ("arm", 300), ("brake", 1500), ("hold_here", 2500), ("rst", 5000)):
+            if chance(one_in):
+                events[name] = 1
+        events["position"] = word(48)
         if chance(20):
             events["shift"] = word(32)
-        if chance(1000):
-            events["rst"] = 1
         await player.clk(**events)
 
 

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// profile_player_bench -- profile_player played by override_ramp, with its exact target in sight: the top of sw/experiments/profile_run.cpp.
+`default_nettype none
+
+module profile_player_bench (
+    input  wire               clk,
+    input  wire               rst,
+    input  wire        [31:0] brake_rate,
+    input  wire        [31:0] brake_jerk,
+    input  wire        [31:0] slope,
+    input  wire        [31:0] curve,
+    input  wire        [16:0] percent,
+    input  wire               pause,
+    input  wire               tick,
+    input  wire               push,
+    input  wire signed [63:0] segment_velocity,
+    input  wire signed [63:0] segment_acceleration,
+    input  wire signed [31:0] segment_jerk,
+    input  wire        [23:0] segment_ticks,
+    input  wire               segment_last,
+    input  wire               start,
+    input  wire               brake,
+    output logic       [71:0] exact,                            // 2^-40 period
+    output logic              moving,
+    output logic       [4:0]  queue_free,
+    output logic              underrun,
+    output logic       [32:0] rate
+);
+    override_ramp u_ramp (.clk, .rst, .slope, .curve, .percent, .pause, .moving, .tick, .rate);
+    /* verilator lint_off PINCONNECTEMPTY */
+    profile_player u_player (.clk, .rst, .brake_rate, .brake_jerk, .rate, .tick, .push, .segment_velocity, .segment_acceleration, .segment_jerk,
+        .segment_ticks, .segment_last, .start, .arm(1'b0), .start_at(32'd0), .now(32'd0), .brake, .hold_here(1'b0), .position(48'd0),
+        .shift(1'b0), .shift_periods(32'd0), .target(), .target_velocity(), .target_acceleration(), .moving, .armed(), .queue_free, .underrun);
+    /* verilator lint_on PINCONNECTEMPTY */
+    assign exact = u_player.exact;
+endmodule
+
+`default_nettype wire
