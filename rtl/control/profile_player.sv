@@ -10,6 +10,7 @@
 // slower   target is the quadratic B-spline of the profile's positions, read at a time that advances by `rate`. So at any
 //          rate from 0 to 100 % |velocity|, |acceleration| and |jerk| stay below those of the segments times rate,
 //          rate^2, rate^2; at 100 % each step is the mean of two of the profile. The lengths are those of the profile
+//          Where the velocity itself steps between two segments, one step below 100 % may exceed it by half of that
 // brake    from the step and the acceleration made last: the acceleration changes by brake_jerk a tick at most, a part of
 //          brake_jerk in the first and the last, is brought below brake_rate, and both end at zero (approach_law)
 // source   forward differences of a cubic; Schoenberg, Quart. Appl. Math. 4 (1946) 45

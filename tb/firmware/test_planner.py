@@ -6,7 +6,7 @@ import random
 import pytest
 
 from bench import seed
-from host_firmware import Plan, Segment, library
+from host_firmware import Plan, Segment, Stairs, library
 from planner import distance, gone, limits, peaks, shortest, steps
 
 S0 = 6000, 125_000, 12_500_000                      # the stage of S0: period/s, /s2, /s3
@@ -126,3 +126,101 @@ def test_a_plan_taken_in_pieces_is_the_same_motion():
 
 def test_a_move_of_days_is_refused():
     assert plan_of(1 << 47, (1, 1, 1)) is None
+
+
+def plan_for(length, rates):
+    made, plan = library().planner_limits(*rates), Plan()
+    assert library().planner_move(ctypes.byref(plan), ctypes.byref(made), length)
+    return plan, made
+
+
+def segments_of(plan):
+    return [(s.velocity, s.acceleration, s.jerk, s.ticks) for s in plan.segment[:plan.count]]
+
+
+def taken(plan, ticks, longest=64):
+    """Pieces for so many ticks."""
+    pieces, piece, last = [], Segment(), ctypes.c_bool()
+    while ticks and library().planner_take_up_to(ctypes.byref(plan), ctypes.byref(piece), ctypes.byref(last), min(longest, ticks)):
+        pieces.append((piece.velocity, piece.acceleration, piece.jerk, piece.ticks))
+        ticks -= piece.ticks
+    return pieces
+
+
+def test_the_state_after_some_ticks_is_that_of_the_steps():
+    plan, _ = plan_for(125 << 16, S0)
+    every = list(steps(segments_of(plan)))
+    for ticks in (0, 1, 7, 100, plan.ticks - 1, plan.ticks):
+        state = library().planner_state_after(ctypes.byref(plan), ticks)
+        assert state.gone == sum(every[:ticks]) and state.velocity == [*every, 0][ticks]
+    pieces = taken(plan, 100)
+    assert all(piece[3] <= 64 for piece in pieces) and distance(pieces) == plan.gone == sum(every[:100])
+    assert library().planner_state_after(ctypes.byref(plan), 20).gone == sum(every[:120])
+
+
+def test_a_retarget_lands_exactly_inside_the_limits():
+    draw, refused = random.Random(seed()), 0
+    for n in range(1500):
+        rates = S0 if n % 3 == 0 else (draw.randrange(100, 50_000), draw.randrange(10_000, 5_000_000), draw.randrange(10**5, 10**9))
+        length = int(2 ** (10 + draw.random() * 20)) * draw.choice((1, -1))
+        plan, made = plan_for(length, rates)
+        ticks = draw.randrange(1, plan.ticks)
+        before = taken(plan, ticks)
+        goal = length + draw.choice((1, -1)) * int(2 ** (draw.random() * 30))
+        if not library().planner_retarget(ctypes.byref(plan), ctypes.byref(made), goal):
+            assert plan.cause == 7 and distance(before) + distance(taken(plan, 1 << 31)) == length << 24      # it goes on as it was
+            refused += 1
+            continue
+        whole = before + segments_of(plan)
+        assert distance(whole) == goal << 24, (rates, length, ticks, goal)
+        for peak, limit, name in zip(peaks(whole), limits(*rates), ("velocity", "acceleration", "jerk")):
+            assert peak <= limit * (1 if name != "jerk" else 1.0011), (name, peak, limit, rates, length, ticks, goal)
+    print(f"{refused} of 1500 refused, seed {seed()}")
+    assert refused <= 15
+
+
+def test_a_trapezoid_lands_exactly_with_steps_of_acceleration():
+    made = library().planner_limits(*S0)
+    made.jerk = 0xFFFFFFFF
+    for length in (1, 100, 65536, 125 << 16, -(150_000 << 16)):
+        plan = Plan()
+        assert library().planner_move(ctypes.byref(plan), ctypes.byref(made), length)
+        segments = segments_of(plan)
+        assert distance(segments) == length << 24
+        velocity, acceleration, _ = peaks(segments)
+        assert velocity <= made.velocity and acceleration <= made.acceleration
+        best = (abs(length) << 24) / made.velocity + made.velocity / made.acceleration
+        if (abs(length) << 24) < made.velocity**2 / made.acceleration:
+            best = 2 * ((abs(length) << 24) / made.acceleration) ** 0.5
+        assert plan.ticks <= 1.001 * best + 4
+
+
+def test_impossible_limits_are_refused_with_their_cause():
+    for values, cause in (((0, 1, 9), 1), ((9, 0, 9), 2), ((9, 9, 0), 3), ((9, 9, 1), 3)):
+        made, plan = library().planner_limits(*S0), Plan()
+        made.velocity, made.acceleration, made.jerk = values
+        assert not library().planner_move(ctypes.byref(plan), ctypes.byref(made), 1000) and plan.cause == cause
+        whole, _ = plan_for(1000, S0)
+        assert not library().planner_retarget(ctypes.byref(whole), ctypes.byref(made), 10) and whole.cause == cause
+
+
+@pytest.mark.parametrize("as_printed", [False, True])
+def test_stairs_climb_by_sections_and_come_down_the_mirror(as_printed):
+    """S4: f0 = 50 Hz, steps of 50, 100, 200 Hz every 20 ms, to 2450 Hz; a period is a pulse."""
+    hertz = 2**40 // 4000
+    stairs = Stairs(first=50 * hertz, top=2450 * hertz, ticks=80)
+    stairs.rise[:] = 50 * hertz, 100 * hertz, 200 * hertz
+    library().planner_borders(ctypes.byref(stairs), as_printed)
+    assert [round(border / hertz) for border in stairs.border] == [450, 850 if as_printed else 1250]
+    for pulses in (1, 7, 100, 5000, -20000):
+        plan = Plan()
+        assert library().planner_climb(ctypes.byref(plan), ctypes.byref(stairs), pulses << 16)
+        ticks, pieces = plan.ticks, taken(plan, 1 << 31)
+        assert distance(pieces) == pulses << 40 and sum(piece[3] for piece in pieces) == ticks
+        assert all(piece[1:3] == (0, 0) for piece in pieces)
+        levels = [abs(piece[0]) for piece in pieces]
+        assert max(levels) <= stairs.top and sorted({round(level / hertz) for level in levels})[0] <= 50
+    climb = [level // hertz for level in levels[:8]]
+    assert climb[:2] == [50, 50] or climb[0] == 50
+    stairs.border[1] = stairs.border[0] - 1
+    assert not library().planner_climb(ctypes.byref(plan), ctypes.byref(stairs), 1 << 16) and plan.cause == 5

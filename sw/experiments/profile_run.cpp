@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+// profile_run -- random moves planned by the firmware's planner, played by the Verilated player, every step held against the limits.
+//
+// A move: S-curve, trapezoid or stairs; then, by chance, retargeted in flight up to three times, slowed down by overrides and
+// pauses, or stopped by a brake. An override is let in only where the plan kept a quarter of acceleration and jerk for it.
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+
+#include "Vplayer.h"
+extern "C" {
+#include "planner.h"
+}
+#include "verilated.h"
+
+namespace {
+
+constexpr uint64_t FULL = 1ULL << 32;
+constexpr int64_t ROUNDING = 8;          // 2^-40 period that the rounding of a step to 2^-40 adds to its third difference
+
+struct Random {                          // xorshift64*
+    uint64_t state;
+    uint64_t operator()() {
+        state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
+        return state * 2685821657736338717ULL;
+    }
+    bool one_in(unsigned n) { return (*this)() % n == 0; }
+    double spread(double low, double high) { return low * std::pow(high / low, double((*this)() >> 11) / 9007199254740992.0); }
+};
+
+struct Bench {
+    VerilatedContext context;
+    Vplayer pins{&context};
+    uint64_t underruns = 0;
+
+    void clk() {
+        pins.clk = 1, pins.eval();
+        underruns += pins.underrun;
+        pins.clk = 0, pins.eval();
+    }
+    __int128 exact() const {
+        unsigned __int128 value = pins.exact[2] & 0xFF;
+        value = value << 32 | pins.exact[1];
+        value = value << 32 | pins.exact[0];
+        return __int128(value << 56) >> 56;
+    }
+    void tick(unsigned clks) {
+        pins.tick = 1, clk();
+        pins.tick = 0;
+        for (unsigned n = 1; n < clks; n++) clk();
+    }
+};
+
+}  // namespace
+
+double sc_time_stamp() { return 0; }
+
+int main(int count, char **words) {
+    if (count != 3) return std::fprintf(stderr, "usage: profile_run MOVES SEED\n"), 2;
+    const uint64_t wanted = std::strtoull(words[1], nullptr, 10), seed = std::strtoull(words[2], nullptr, 10);
+    Random random{seed * 0x9E3779B97F4A7C15ULL + 1};
+    auto bench = std::make_unique<Bench>();
+    auto &pins = bench->pins;
+    pins.rst = 1, bench->clk(), bench->clk(), pins.rst = 0;
+
+    uint64_t moves = 0, misses = 0, ticks = 0, retargets = 0, refused = 0, overridden = 0, brakes = 0, landed_wrong = 0, above = 0;
+    while (moves < wanted) {
+        const unsigned kind = random() % 8;                                   // 0 stairs, 1 trapezoid, else S-curve
+        const bool slowed = kind > 0 && random.one_in(4), braked = random.one_in(5);
+        struct planner_limits limits = planner_limits(uint32_t(random.spread(10, 50000)), uint32_t(random.spread(1000, 1e7)), uint32_t(random.spread(1e5, 1e9)));
+        struct planner_limits planned = limits;
+        if (slowed) planned.acceleration -= limits.acceleration / 4, planned.jerk -= limits.jerk / 4;
+        if (kind == 1) planned.jerk = PLANNER_ANY_JERK;
+        int64_t distance = int64_t(random.spread(1, 1 << 26)) * (random.one_in(2) ? 1 : -1);
+        struct plan plan;
+        planner_stairs stairs{};
+        if (kind == 0) {
+            stairs.first = limits.velocity / 16 + 1, stairs.top = limits.velocity, stairs.ticks = 1 + random() % 40;
+            for (auto &rise : stairs.rise) rise = limits.velocity / (8 + random() % 40) + 1;
+            planner_borders(&stairs, random.one_in(2));
+            if (!planner_climb(&plan, &stairs, distance)) { refused++; continue; }
+        } else if (!planner_move(&plan, &planned, distance)) { refused++; continue; }
+        if (plan.ticks > 4000) continue;
+        moves++;
+
+        // the override's ramps take the quarter: v slope <= A/4; 3 a slope + v curve <= J/4
+        double v = double(limits.velocity), a = double(limits.acceleration), j = double(limits.jerk);
+        pins.slope = slowed ? uint32_t(std::fmax(2, std::fmin(std::fmin(a / v / 4, j / a / 24) * double(FULL), 4e9))) : 0;
+        pins.curve = slowed ? uint32_t(std::fmax(1, std::fmin(j / v / 8 * double(FULL), 4e9))) : 0;
+        pins.percent = 65536, pins.pause = 0;
+        pins.brake_rate = kind == 0 ? 0 : uint32_t(std::fmin(double(limits.acceleration >> 8), 4294967295.0));     // stairs stop in a step
+        pins.brake_jerk = kind == 1 ? 0 : limits.jerk;
+        const __int128 begin = bench->exact();
+        const uint64_t underruns = bench->underruns;
+        __int128 before = begin, step = 0, slope = 0, late = 0;              // late: a brake acts one tick after the strobe
+        unsigned brake_at = braked ? 1 + random() % (plan.ticks + 1) : 0, retargets_left = kind > 0 && !slowed ? random() % 4 : 0;
+        unsigned retarget_at = 1 + random() % (plan.ticks + 1), queued = 0, played = 0, override_left = slowed ? 3 : 0;
+        bool started = false, end_queued = false, stopped = false, bad = false, over = false;
+        int64_t goal = distance;
+        const char *why = "";
+        for (unsigned idle = 0; idle < 400000; idle++) {
+            while (!stopped && !end_queued && pins.queue_free && queued < played + 64) {
+                if (retargets_left && queued >= retarget_at) {
+                    int64_t other = random.one_in(2) ? goal + int64_t(random.spread(1, 1 << 20)) * (random.one_in(2) ? 1 : -1)
+                                                     : int64_t(random.spread(1, 1 << 26)) * (random.one_in(2) ? 1 : -1);
+                    retargets_left--, retarget_at += 1 + random() % 200;
+                    auto former = plan;
+                    if (planner_retarget(&plan, &planned, other)) {
+                        if (plan.ticks > 20000) plan = former;
+                        else goal = other, retargets++;
+                    } else refused++;
+                }
+                planner_segment piece;
+                bool last;
+                if (!planner_take_up_to(&plan, &piece, &last, 32)) break;
+                pins.segment_velocity = uint64_t(piece.velocity), pins.segment_acceleration = uint64_t(piece.acceleration);
+                pins.segment_jerk = uint32_t(piece.jerk), pins.segment_ticks = piece.ticks, pins.segment_last = last;
+                pins.push = 1, bench->clk(), pins.push = 0;
+                queued += piece.ticks, end_queued = last;
+            }
+            if (!started) started = true, pins.start = 1, bench->clk(), pins.start = 0;
+            if (!pins.moving) break;
+            if (override_left && random.one_in(100))
+                pins.percent = random() % 65537, pins.pause = random.one_in(4), override_left--, overridden++;
+            else if (slowed && random.one_in(200)) pins.percent = 65536, pins.pause = 0;
+            if (brake_at && played == brake_at && !stopped) stopped = true, brakes++, late = slope < 0 ? -slope : slope, pins.brake = 1, bench->clk(), pins.brake = 0;
+            bench->tick(stopped ? 160 : slowed ? 84 : 12), played++, ticks++;
+            __int128 now = bench->exact(), step_now = now - before, slope_now = step_now - step, bend = slope_now - slope;
+            const __int128 roundoff = pins.moving ? ROUNDING : ROUNDING + (1 << 24);          // the end is rounded
+            auto size = [](__int128 x) { return x < 0 ? -x : x; };
+            const bool steps = kind == 0;                                     // stairs have a limit of velocity only
+            if (size(step_now) > __int128(limits.velocity) + roundoff + late) over = true, why = "velocity";
+            if (!steps && size(slope_now) > __int128(limits.acceleration) + roundoff) over = true, why = "acceleration";
+            if (!steps && kind != 1 && size(bend) > __int128(limits.jerk) + roundoff) over = true, why = "jerk";
+            if (over && !bad) {
+                bad = true, above++;
+                if (above <= 5) std::fprintf(stderr, "seed %llu move %llu: %s at tick %u kind %u slowed %d stopped %d: %g %g %g of %g %g %g\n", (unsigned long long)seed,
+                    (unsigned long long)moves, why, played, kind, slowed, stopped, double(step_now), double(slope_now), double(bend), v, a, j);
+            }
+            before = now, step = step_now, slope = slope_now;
+        }
+        bool missed = pins.moving || bench->underruns != underruns || (!stopped && bench->exact() != begin + (__int128(goal) << 24));
+        if (missed) {
+            landed_wrong++;
+            if (landed_wrong <= 5) std::fprintf(stderr, "seed %llu move %llu landed wrong: kind %u slowed %d stopped %d moving %d underruns %llu\n", (unsigned long long)seed,
+                (unsigned long long)moves, kind, slowed, stopped, pins.moving, (unsigned long long)(bench->underruns - underruns));
+            pins.rst = 1, bench->clk(), pins.rst = 0;
+        }
+        misses += missed || bad;
+    }
+    std::printf("%llu misses %llu moves %llu ticks %llu retargets %llu refused %llu overrides %llu brakes %llu landed_wrong %llu above_a_limit\n",
+                (unsigned long long)misses, (unsigned long long)moves, (unsigned long long)ticks, (unsigned long long)retargets, (unsigned long long)refused,
+                (unsigned long long)overridden, (unsigned long long)brakes, (unsigned long long)landed_wrong, (unsigned long long)above);
+    return 0;
+}
