@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+// quadrature_encoder -- turn a target position into the A/B/Z of an incremental encoder, one edge at a time.
+//
+// latency  2 clk from target to the edge, if `spacing` allows it
+// rate     one edge per `spacing` clk; a target further off is made up at that rate, the way back too
+// rounding a settled position is target rounded to the nearest count, a half goes up. Around it `hysteresis` widens the band
+//          in which nothing moves to 1/2 + hysteresis each way: a target that trembles by less than twice that makes no edge
+//          but the first one
+// index    z is high while position is home_position plus any number of counts_per_turn, once home has come; it changes
+//          together with the edge. home waits for a clk without an edge
+// source   S1: A/B/Z sent on as if the relay were the encoder
+// model    tb/drive/quadrature_encoder.py, equal in every bit of every cycle
+// proved   a and b never change both in one clk, no edge sooner than `spacing` after the one before, pins and position agree
+//          for ever, a target that moves no faster than the spacing is followed within 1/2 + hysteresis + 1 count
+// proof    W = 6, F = 2, SPACING_W = 3
+`default_nettype none
+
+module quadrature_encoder #(
+    parameter int W         = 32,                   // bits of position
+    parameter int F         = 16,                   // fraction bits of target
+    parameter int SPACING_W = 16                    // bits of spacing
+) (
+    input  wire                  clk,
+    input  wire                  rst,
+    input  wire [SPACING_W-1:0]  spacing,           // clk between two edges at least; 0 is taken as 1
+    input  wire        [F-1:0]   hysteresis,        // 2^-F count
+    input  wire        [W-1:0]   counts_per_turn,   // 0: z stays low
+    input  wire                  load,              // level: position is home_position without edges: only while nobody looks
+    input  wire signed [W+F-1:0] target,            // 2^-F count; wraps
+    input  wire                  home,              // strobe: z belongs at home_position; less than a turn away
+    input  wire        [W-1:0]   home_position,     // count
+    output logic                 a,                 // pin; a leading b counts up
+    output logic                 b,                 // pin
+    output logic                 z,                 // pin
+    output logic       [W-1:0]   position,          // count that a, b stand for
+    output logic                 behind             // level: more than 4 counts from the target
+);
+    if (W < 4) begin : g_check_w W_MUST_BE_AT_LEAST_4 u_error (); end
+    if (F < 1) begin : g_check_f F_MUST_BE_AT_LEAST_1 u_error (); end
+
+    localparam logic [W-1:0]   ONE  = W'(1);
+    localparam logic [W+F-1:0] HALF = (W+F)'(1) << (F - 1);
+
+    logic [W-1:0]         reach_up, reach_down;     // the highest position that still goes up, the lowest that need not go down
+    logic                 aimed;                    // they stand
+    logic [SPACING_W-1:0] left;                     // clk until an edge is allowed
+    logic [W-1:0]         place;                    // count from the index up
+    logic                 placed, waiting;          // place is known; home has not been taken yet
+    logic [W-1:0]         home_q;
+
+    wire [W-1:0]   ahead  = reach_up - position;
+    wire [W-1:0]   back   = reach_down - position;
+    wire           free   = left == '0 && aimed && !load;
+    wire           up     = free && !ahead[W-1];
+    wire           down   = free && ahead[W-1] && back[W-1];
+    wire [W+F-1:0] band   = HALF + {{W{1'b0}}, hysteresis};
+    wire [W-1:0]   lower  = W'((target - band) >> F);
+    wire [W-1:0]   upper  = W'((target + band) >> F);
+    wire [W-1:0]   from   = position - home_q;
+    wire           take   = waiting && !up && !down;
+    wire           last   = place + ONE == counts_per_turn;
+
+    assign b = position[1];
+    assign a = position[1] ^ position[0];
+    assign z = placed && place == '0 && counts_per_turn != '0;
+
+    always_ff @(posedge clk) begin
+        reach_up   <= lower;
+        reach_down <= upper;
+        aimed      <= !load;
+        behind     <= aimed && ((!ahead[W-1] && |ahead[W-2:2]) || (back[W-1] && !(&back[W-2:2])));
+
+        if (up || down)       left <= spacing == '0 ? '0 : spacing - 1'b1;
+        else if (left != '0)  left <= left - 1'b1;
+
+        if (load)      position <= home_position;
+        else if (up)   position <= position + ONE;
+        else if (down) position <= position - ONE;
+
+        if (take)      place <= from[W-1] ? from + counts_per_turn : from;
+        else if (up)   place <= last ? '0 : place + ONE;
+        else if (down) place <= place == '0 ? counts_per_turn - ONE : place - ONE;
+
+        placed  <= placed || take;
+        waiting <= home || (waiting && !take);
+        if (home) home_q <= home_position;
+        if (rst) begin
+            position <= '0;
+            aimed    <= 1'b0;
+            behind   <= 1'b0;
+            left     <= '0;
+            placed   <= 1'b0;
+            waiting  <= 1'b0;
+        end
+    end
+
+`ifdef FORMAL
+    logic                 past = 1'b0;
+    logic                 loaded;                   // position was loaded, and nobody has looked since
+    logic [SPACING_W-1:0] stood;                    // clk since the last edge
+    always @(posedge clk) begin
+        past   <= 1'b1;
+        loaded <= rst || load;
+        stood  <= rst || load ? '1 : up || down ? '0 : stood + !(&stood);
+        if (!past) assume (rst);
+        if (past) begin
+            assert ({b, a ^ b} == position[1:0]);
+        end
+        if (past && !$past(rst) && !$past(load)) begin
+            assert (!(a != $past(a) && b != $past(b)));
+            assert (position == $past(position) || position == W'($past(position) + 1) || position == W'($past(position) - 1));
+            if (position != $past(position)) assert ((a != $past(a)) ^ (b != $past(b)));
+            if (z && !$past(z)) assert (place == 0 && placed);
+            cover (z && a != $past(a));
+            cover (behind);
+        end
+    end
+
+    // one spacing for ever: no edge comes too soon
+    logic [SPACING_W-1:0] agreed;
+    logic                 steady;
+    wire  [SPACING_W-1:0] least = agreed == '0 ? '0 : agreed - 1'b1;
+    always @(posedge clk) begin
+        steady <= rst ? 1'b1 : steady && spacing == agreed;
+        if (rst) agreed <= spacing;
+        if (past && steady) begin
+            assert (left <= least);
+            assert (stood == '1 || {1'b0, left} + {1'b0, stood} >= {1'b0, least});
+            if (up || down) assert (stood >= least);
+        end
+    end
+
+    // a target that takes one count at a time and no sooner than the spacing is never lost
+    logic           calm;                           // it has done so since the start, hysteresis at rest
+    logic [SPACING_W:0] quiet;                      // clk since it moved
+    logic [F-1:0]   hysteresis_q;
+    logic [W+F-1:0] target_q;
+    wire  signed [W+F-1:0] moved = target - target_q;
+    wire  signed [W+F-1:0] away  = target_q - {position, {F{1'b0}}};
+    wire  signed [W+F-1:0] reach = {{W{1'b0}}, hysteresis_q} + HALF;
+    wire  signed [W+F-1:0] unit  = HALF << 1;
+    wire               still = moved == 0;
+    wire               slow  = moved <= unit && moved >= -unit && quiet >= {1'b0, least};
+    always @(posedge clk) begin
+        target_q     <= target;
+        hysteresis_q <= hysteresis;
+        quiet        <= rst || load || still ? (rst || load ? '1 : quiet + !(&quiet)) : '0;
+        calm         <= rst ? 1'b0 : load ? target == {home_position, {F{1'b0}}} && steady
+                      : calm && steady && spacing == agreed && hysteresis == hysteresis_q && (still || slow);
+        if (past && calm) begin
+            assert (loaded || aimed);
+            if (!loaded) begin
+                assert (reach_up   == W'((target_q - reach) >> F));
+                assert (reach_down == W'((target_q + reach) >> F));
+            end
+            assert (away < reach + unit && away >= -reach - unit);
+            if (away >= reach || away < -reach) assert ({1'b0, quiet} + {2'b0, left} <= {2'b0, least});
+            cover (quiet == 0 && away > reach && position == 5);
+        end
+    end
+`endif
+endmodule
+
+`default_nettype wire

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""segment_table: the printed rectangle by hand, the straight line, bounds, sign in both directions, and any table against the model."""
+import random
+
+import cocotb
+from cocotb.triggers import FallingEdge, RisingEdge
+
+from bench import run, start
+from segment_table import segment_table
+
+IDLE = dict(enable=1, linear=0, origin=0, segment_length=1, segments=1, write=0, point=0, value=0, valid=0, position=0)
+FAR = 1 << 47
+
+
+class Table:
+    def __init__(self, dut):
+        self.dut = dut
+
+    async def reset(self, errors, origin=0, length=1000):
+        await start(self.dut, **IDLE)
+        await FallingEdge(self.dut.clk)
+        await self.give(errors, origin, length)
+        return self
+
+    async def give(self, errors, origin, length):
+        self.errors, self.origin, self.length = errors, origin, length
+        dut = self.dut
+        dut.origin.value, dut.segment_length.value, dut.segments.value = origin, length, len(errors) - 1
+        for n, error in enumerate(errors):
+            dut.write.value, dut.point.value, dut.value.value = 1, n, error
+            await self.clk()
+        dut.write.value = 0
+
+    async def clk(self, count=1):
+        for _ in range(count):
+            await RisingEdge(self.dut.clk)
+            await FallingEdge(self.dut.clk)
+
+    async def at(self, position, linear=0, enable=1):
+        """(corrected, outside) as the design has it, held against the model; the clk it took in self.clks."""
+        dut = self.dut
+        dut.valid.value, dut.position.value, dut.linear.value, dut.enable.value = 1, position, linear, enable
+        await self.clk()
+        dut.valid.value, self.clks = 0, 1
+        while not dut.done.value:
+            await self.clk()
+            self.clks += 1
+        got = dut.corrected.value.to_signed(), bool(dut.outside.value)
+        want = segment_table(position, self.errors, self.origin, self.length, linear, enable)
+        want = (want[0] + FAR) % (2 * FAR) - FAR, want[1]
+        assert got == want, f"{position} in {self.length} from {self.origin}, linear {linear}: {got}, the model has {want}"
+        return got
+
+
+@cocotb.test()
+async def the_rectangle_as_printed_by_hand(dut):
+    table = await Table(dut).reset([0, 10, 30, -20], origin=500)
+    for position, error in ((500, 5), (1499, 5), (1500, 20), (2499, 20), (2500, 5), (3499, 5)):
+        assert await table.at(position) == (position - error, False)
+
+
+@cocotb.test()
+async def the_straight_line_by_hand(dut):
+    table = await Table(dut).reset([0, 10, 30, -20], origin=-500)
+    for position, error in ((-500, 0), (0, 5), (500, 10), (1000, 20), (1500, 30), (2000, 5), (2499, -20)):
+        assert await table.at(position, linear=1) == (position - error, False)
+
+
+@cocotb.test()
+async def latency_is_30(dut):
+    table = await Table(dut).reset([1, 2])
+    for position in (0, 500, -1, 5000):
+        await table.at(position)
+        assert table.clks == 30
+
+
+@cocotb.test()
+async def the_sign_is_right_in_both_directions(dut):
+    errors = [100 * n for n in range(9)]                    # the scale shows 100 more with each segment
+    table = await Table(dut).reset(errors, length=10_000)
+    for linear in (0, 1):
+        for true in [*range(0, 79_000, 3950), *range(79_000, 0, -3950)]:
+            corrected, _ = await table.at(true + true // 100, linear)
+            assert abs(corrected - true) <= (60 if not linear else 10)
+
+
+@cocotb.test()
+async def beyond_its_borders_the_error_is_that_of_the_border(dut):
+    table = await Table(dut).reset([7, 0, -9], origin=-1000)
+    for linear in (0, 1):
+        for position, error in ((-1001, 7), (-FAR, 7), (1000, -9), (FAR - 1, -9)):
+            corrected, outside = await table.at(position, linear)
+            assert outside and (corrected - (position - error)) % (2 * FAR) == 0
+
+
+@cocotb.test()
+async def without_enable_the_position_passes(dut):
+    table = await Table(dut).reset([7, 8, -9])
+    assert (await table.at(1234, enable=0))[0] == 1234
+
+
+@cocotb.test()
+async def largest_errors_and_longest_tables(dut):
+    ends = -(1 << 23), (1 << 23) - 1
+    table = await Table(dut).reset([ends[n % 2] for n in range(256)], origin=-FAR // 2, length=(FAR - 1) // 256)
+    for n in (0, 1, 127, 254):
+        for linear in (0, 1):
+            for inside in (0, 1, table.length // 2, table.length - 1):
+                await table.at(table.origin + n * table.length + inside, linear)
+
+
+@cocotb.test()
+async def reset_in_mid_flow(dut):
+    table = await Table(dut).reset([3, 4, 5])
+    for wait in range(1, 30, 4):
+        dut.valid.value, dut.position.value = 1, 100
+        await table.clk()
+        dut.valid.value = 0
+        await table.clk(wait - 1)
+        dut.rst.value = 1
+        await table.clk()
+        dut.rst.value = 0
+        for _ in range(32):
+            assert not dut.done.value
+            await table.clk()
+        await table.at(1500)
+
+
+@cocotb.test()
+async def any_table_matches_the_model(dut):
+    table = await Table(dut).reset([0, 0])
+    for _ in range(25):
+        count = random.choice((1, 2, 7, 100, 255))
+        length = random.choice((1, 3, 1000, random.getrandbits(30) + 1, random.getrandbits(38) + 1))
+        await table.give([random.randrange(-1 << 23, 1 << 23) for _ in range(count + 1)], random.randrange(-1 << 40, 1 << 40), length)
+        for _ in range(12):
+            place = random.choice((random.randrange(count * length), random.randrange(count) * length, -1, count * length,
+                                   random.randrange(-length, (count + 1) * length)))
+            await table.at(table.origin + place, random.getrandbits(1))
+            await table.clk(random.choice((0, 0, 3)))
+
+
+def test_segment_table():
+    run("segment_table", __file__)

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What rtl/compensate/turn_angle.sv does, in integers: clk(...) is one clk, the state is what stands after it."""
+
+
+class TurnAngle:
+    def __init__(self, w=32):
+        self.w = w
+        self.position = self.place = self.turned = self.turns = 0
+        self.moved = self.known = self.referenced = self.missing = False
+
+    @property
+    def angle(self):
+        return self.turned >> 16
+
+    def clk(self, rst=0, counts_per_turn=0, angle_per_count=0, a=0, b=0, step=0, index=0):
+        used, known = counts_per_turn != 0, self.known
+        if rst or not (self.moved or step):
+            self.__init__(self.w)
+            self.position = b << 1 | a ^ b
+            self.known = used and not rst and (known or bool(index))
+            self.referenced = bool(index and used and not rst)
+            return
+        self.moved = True
+        self.position = (self.position + step) % (1 << self.w)
+        self.referenced, self.missing = bool(index and used), False
+        self.known = used and (known or bool(index))
+        if index:
+            self.place = self.turned = self.turns = 0
+            return
+        place = self.place + step
+        passed = -1 if place < 0 else step > 0 and place >= counts_per_turn
+        self.place = 0 if not used else 0 if passed == 1 else place + counts_per_turn if passed else place
+        self.turned = (self.turned + step * angle_per_count) % (1 << 48)
+        if passed == 1 or (step < 0 and self.place == 0 and not passed):
+            self.turned = 0
+        self.turns += passed
+        if self.turns in (1, -2):
+            self.turns, self.missing = 0, used

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What rtl/drive/quadrature_encoder.sv does, in integers: clk(...) is one clk; pins() and the state are what stands after it."""
+
+
+def signed(value, bits):
+    value &= (1 << bits) - 1
+    return value - (value >> bits - 1 << bits)
+
+
+class QuadratureEncoder:
+    def __init__(self, w=32, f=16):
+        self.w, self.f = w, f
+        self.position = 0                   # wraps at 2^w
+        self.aim = None                     # (target, half a band) as of the clk before
+        self.left = 0
+        self.place = None                   # counts from the index up
+        self.waiting = None                 # home that is not taken yet
+        self.turn = 0
+        self.behind = False
+
+    def pins(self):
+        b = self.position >> 1 & 1
+        return b ^ self.position & 1, b, int(self.place == 0 and self.turn != 0)
+
+    def clk(self, rst=0, spacing=0, hysteresis=0, counts_per_turn=0, load=0, target=0, home=0, home_position=0):
+        self.turn = counts_per_turn
+        if rst:
+            self.__init__(self.w, self.f)
+            self.turn = counts_per_turn
+            return
+        whole = 1 << self.w
+        up = down = self.behind = False
+        if self.aim:
+            aimed_at, band = self.aim
+            ahead = signed((aimed_at - band >> self.f) - self.position, self.w)
+            back = signed((aimed_at + band >> self.f) - self.position, self.w)
+            self.behind = ahead >= 4 or back < -4
+            if self.left == 0 and not load:
+                up, down = ahead >= 0, ahead < 0 and back < 0
+        if self.waiting is not None and not up and not down:
+            distance = signed(self.position - self.waiting, self.w)
+            self.place = (distance + (counts_per_turn if distance < 0 else 0)) % whole
+            self.waiting = None
+        elif self.place is not None and up:
+            self.place = 0 if (self.place + 1) % whole == counts_per_turn else (self.place + 1) % whole
+        elif self.place is not None and down:
+            self.place = (self.place or counts_per_turn) - 1
+            self.place %= whole
+        if home:
+            self.waiting = home_position
+        self.left = max(0, spacing - 1) if up or down else max(0, self.left - 1)
+        self.position = home_position if load else (self.position + up - down) % whole
+        self.aim = None if load else (target, (1 << self.f - 1) + hysteresis)

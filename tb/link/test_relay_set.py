@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""relay_set: a whole set by hand, every broken bit refused, and rows cut anywhere against the model in every cycle."""
+import random
+import zlib
+
+import cocotb
+import pytest
+from cocotb.triggers import FallingEdge, RisingEdge
+
+from bench import run, start
+from relay_set import RelaySet, image
+
+SETTINGS = "counts_per_turn", "angle_per_count", "spacing", "radians_per_count", "hysteresis", "filter_needed", "index_gate", \
+    "index_gate_mask", "index_low"
+WIDTHS = 32, 48, 16, 32, 16, 8, 2, 2, 1
+
+
+class Bytes:
+    """The design with the model beside it in every cycle."""
+
+    def __init__(self, dut):
+        self.dut, self.k = dut, int(dut.K.value)
+        self.model, self.written = RelaySet(self.k), []
+
+    async def reset(self):
+        await start(self.dut, start=0, valid=0, data=0)
+        await FallingEdge(self.dut.clk)
+        await self.clk(rst=1)
+        return self
+
+    async def clk(self, **inputs):
+        dut = self.dut
+        for name in ("rst", "start", "valid", "data"):
+            getattr(dut, name).value = inputs.get(name, 0)
+        self.model.clk(**inputs)
+        await RisingEdge(dut.clk)
+        await FallingEdge(dut.clk)
+        model = self.model
+        got = [int(x.value) for x in (dut.good, dut.swap, dut.bad, dut.loaded, dut.identity, dut.write)]
+        want = [int(x) for x in (model.good, model.good, model.bad, model.loaded, model.identity, model.write is not None)]
+        assert got == want, f"{inputs}: good, swap, bad, loaded, identity, write are {got}, the model has {want}"
+        if model.write:
+            got = tuple(int(x.value) for x in (dut.term, dut.amplitude, dut.phase))
+            assert got == model.write
+            self.written.append(got)
+        packed, place = 0, 0
+        for name, width in zip(SETTINGS, WIDTHS):
+            packed, place = packed | int(getattr(dut, name).value) << place, place + width
+        assert packed == model.settings % 2**157
+
+    async def send(self, row, gaps=False):
+        """Returns +1 if it was good, -1 if bad, 0 if neither."""
+        await self.clk(start=1)
+        verdict = 0
+        for byte in [*row, None, None, None]:
+            await self.clk(**({} if byte is None else dict(valid=1, data=byte)))
+            verdict += self.model.good - self.model.bad
+            while gaps and random.getrandbits(1):
+                await self.clk(data=random.getrandbits(8))
+                verdict += self.model.good - self.model.bad
+        return verdict
+
+
+def any_terms(k):
+    return [(random.getrandbits(32), random.getrandbits(32)) for _ in range(k)]
+
+
+@cocotb.test()
+async def by_hand(dut):
+    row = await Bytes(dut).reset()
+    terms = any_terms(row.k)
+    assert await row.send(image(terms, 1 << 15, spacing=3, hysteresis=0x1234, filter_needed=4, index_low=1, gate_mask=3, gate=2)) == 1
+    assert row.written == [(n, a, p) for n, (a, p) in enumerate(terms)]
+    assert int(dut.counts_per_turn.value) == 32768 and int(dut.angle_per_count.value) == 1 << 33 and int(dut.spacing.value) == 3
+    assert int(dut.hysteresis.value) == 0x1234 and int(dut.filter_needed.value) == 4 and int(dut.radians_per_count.value) == 210828714
+    assert (int(dut.index_low.value), int(dut.index_gate_mask.value), int(dut.index_gate.value)) == (1, 3, 2)
+
+
+@cocotb.test()
+async def latency_is_2(dut):
+    row = await Bytes(dut).reset()
+    await row.clk(start=1)
+    for byte in image(any_terms(row.k), 5000):
+        await row.clk(valid=1, data=byte)
+    assert not row.model.good
+    await row.clk()
+    assert row.model.good
+
+
+@cocotb.test()
+async def no_broken_bit_comes_into_force(dut):
+    row = await Bytes(dut).reset()
+    whole = image(any_terms(row.k), 32768)
+    assert await row.send(whole) == 1
+    for _ in range(24):
+        broken = bytearray(image(any_terms(row.k), 4000))
+        for _ in range(random.choice((1, 1, 2, 3))):
+            broken[random.randrange(len(broken))] ^= 1 << random.randrange(8)
+        assert await row.send(broken, gaps=True) == -1 or bytes(broken) == whole
+    assert int(dut.counts_per_turn.value) == 32768
+
+
+@cocotb.test()
+async def a_set_for_another_number_of_orders_is_refused(dut):
+    row = await Bytes(dut).reset()
+    other = bytearray(image(any_terms(row.k), 4000)[:-4])
+    other[0] ^= 1
+    assert await row.send(other + zlib.crc32(other).to_bytes(4, "little")) == -1
+
+
+@cocotb.test()
+async def a_row_cut_short_changes_nothing_and_the_next_is_whole(dut):
+    row = await Bytes(dut).reset()
+    for _ in range(20):
+        whole = image(any_terms(row.k), random.getrandbits(25) | 4096)
+        assert await row.send(whole[:random.randrange(len(whole))]) == 0
+        assert await row.send(whole) == 1
+        assert await row.send(b"") == 0
+
+
+@cocotb.test()
+async def reset_in_mid_flow(dut):
+    row = await Bytes(dut).reset()
+    whole = image(any_terms(row.k), 7777)
+    for _ in range(10):
+        await row.send(whole)
+        await row.send(whole[:random.randrange(len(whole))])
+        await row.clk(rst=1)
+        for byte in whole:
+            await row.clk(valid=1, data=byte)                   # without a start nothing is taken
+        assert not row.model.loaded and int(dut.counts_per_turn.value) == 0
+
+
+@cocotb.test()
+async def any_strobes_match_the_model(dut):
+    row = await Bytes(dut).reset()
+    left = []
+    for _ in range(3000):
+        left = left or list(image(any_terms(row.k), random.getrandbits(32) | 4096))
+        send = random.randrange(5) > 0
+        begin = row.model.row is None and random.randrange(8) == 0 or random.randrange(1500) == 0
+        if begin:
+            left = list(image(any_terms(row.k), random.getrandbits(32) | 4096))
+        await row.clk(start=int(begin), valid=int(send), data=left.pop(0) if send and row.model.row is not None and not begin else 7,
+                      rst=int(random.randrange(3000) == 0))
+
+
+@pytest.mark.parametrize("k", [1, 16])
+def test_relay_set(k):
+    run("relay_set", __file__, K=k)

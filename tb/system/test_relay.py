@@ -1,0 +1,280 @@
+# SPDX-License-Identifier: Apache-2.0
+"""relay, pins to pins: it passes, corrects, flags, takes sets over the line and from flash, and loses no count."""
+import math
+import random
+
+import cocotb
+from cocotb.triggers import FallingEdge, RisingEdge
+
+from bench import run, start
+from flash import Flash
+from harmonic_map import exact, term_of
+from relay_host import BEGIN_SET, CLEAR, FLASH, STATUS, Status, body_of, frame, requests_of, saves_of
+from relay_set import image
+
+K, FIRST, SECOND, BIT = 2, 4096, 8192, 8
+COUNTS = 4000
+IDLE = dict(encoder_a=0, encoder_b=0, encoder_z=0, uart_rx=1, flash_sdi=1)
+KNOWN, LOADED, CORRECTING, READING = 1, 2, 4, 8
+ILLEGAL, WRONG_TURN, MISSING, REJECTED, BEHIND, REFUSED = 1, 2, 4, 8, 16, 32
+
+
+def some_terms(largest=3.0):
+    return [term_of(largest / k, k) for k in range(1, K + 1)]
+
+
+class Relay:
+    """The pins of the relay: a ring before it, a counter behind it, a host and a flash beside it."""
+
+    def __init__(self, dut, chip=None):
+        self.dut, self.chip = dut, chip or Flash(1 << 14)
+        self.place = 0                          # of the ring, counts from its index; the index is one count wide
+        self.counted, self.levels, self.edges = 0, None, []
+        self.clks, self.index_at = 0, []
+        self.with_index = True
+
+    async def power_up(self, place=0):
+        self.place = place
+        await start(self.dut, **IDLE)
+        await FallingEdge(self.dut.clk)
+        self.show()
+        self.dut.rst.value = 1
+        await self.clk(4)
+        self.dut.rst.value = 0
+        self.counted, self.levels = place, None
+        await self.clk(16)
+        return self
+
+    def show(self):
+        b = self.place >> 1 & 1
+        self.dut.encoder_a.value, self.dut.encoder_b.value = b ^ self.place & 1, b
+        self.dut.encoder_z.value = int(self.place % COUNTS == 0 and self.with_index)
+
+    async def clk(self, count=1):
+        dut = self.dut
+        for _ in range(count):
+            await RisingEdge(dut.clk)
+            await FallingEdge(dut.clk)
+            self.clks += 1
+            dut.flash_sdi.value = self.chip.pins(int(dut.flash_chip_n.value), int(dut.flash_sclk.value), int(dut.flash_sdo.value))
+            a, b = int(dut.relay_a.value), int(dut.relay_b.value)
+            if self.levels is not None and (a, b) != self.levels:
+                assert (a != self.levels[0]) != (b != self.levels[1]), "two edges in one clk"
+                self.counted += 1 if a ^ self.levels[1] else -1
+                self.edges.append(self.clks)
+            self.levels = a, b
+            if dut.relay_z.value:
+                self.index_at.append(self.counted)
+
+    async def go(self, steps, clk_each=2):
+        for _ in range(abs(steps)):
+            self.place += 1 if steps > 0 else -1
+            self.show()
+            await self.clk(clk_each)
+
+    async def booted(self):
+        while not int(self.dut.flash_chip_n.value) or self.clks < 2 * 2048 + 2 * 65 * 60:
+            await self.clk(50)
+
+    async def tell(self, words):
+        for byte, ninth in words:
+            for level in (0, *(byte >> n & 1 for n in range(8)), ninth, 1):
+                self.dut.uart_rx.value = level
+                await self.clk(BIT)
+
+    async def listen(self, patience=6000):
+        """The words that the relay sends until it lets go of the line."""
+        words, waited = [], 0
+        while not int(self.dut.uart_driver_enable.value):
+            await self.clk()
+            waited += 1
+            if waited > patience:
+                return words
+        while int(self.dut.uart_driver_enable.value):
+            if int(self.dut.uart_tx.value):
+                await self.clk()
+                continue
+            await self.clk(BIT // 2)
+            bits = []
+            for _ in range(10):
+                await self.clk(BIT)
+                bits.append(int(self.dut.uart_tx.value))
+            words.append((sum(bit << n for n, bit in enumerate(bits[:8])), bits[8]))
+            assert bits[9] == 1
+        return words
+
+    async def ask(self, body):
+        await self.tell(frame(0x21, body))
+        return body_of(await self.listen())
+
+    async def status(self, kind=STATUS):
+        return Status.of(await self.ask(bytes([kind])))
+
+    async def give(self, whole):
+        for body in requests_of(whole):
+            assert await self.ask(body) is not None
+
+    async def save(self, whole, address):
+        for body in saves_of(whole, address):
+            await self.ask(body)
+
+
+def wanted(place, terms):
+    """The corrected position, counts."""
+    return place - exact(terms, place / COUNTS)
+
+
+@cocotb.test()
+async def until_the_index_it_passes_and_says_so_then_it_corrects(dut):
+    terms = some_terms()
+    relay = await Relay(dut).power_up(place=COUNTS - 60)
+    await relay.booted()
+    await relay.give(image(terms, COUNTS))
+    assert not int(dut.correcting.value)
+    await relay.go(50, clk_each=4)
+    await relay.clk(40)
+    assert relay.counted == relay.place and not int(dut.correcting.value)
+    assert (await relay.status()).levels == LOADED
+    await relay.go(100, clk_each=4)
+    await relay.clk(400)
+    assert int(dut.correcting.value) and not int(dut.fault.value)
+    for steps in (0, 700, -1500, 333):
+        await relay.go(steps)
+        await relay.clk(400)
+        assert abs(relay.counted - wanted(relay.place, terms)) <= 0.76, (relay.place, relay.counted)
+    status = await relay.status()
+    assert status.levels == KNOWN | LOADED | CORRECTING and status.flags == 0 and status.position == (relay.place - COUNTS + 60) % 2**32
+
+
+@cocotb.test()
+async def latency_is_10(dut):
+    relay = await Relay(dut).power_up()
+    await relay.go(8, clk_each=30)
+    relay.edges.clear()
+    for _ in range(4):
+        begin = relay.clks
+        await relay.go(1, clk_each=30)
+        assert relay.edges.pop() - begin == 10
+
+
+@cocotb.test()
+async def z_comes_once_a_turn_where_the_corrected_position_is_zero(dut):
+    terms = [term_of(4.0, math.pi / 2), (0, 0)]
+    relay = await Relay(dut).power_up(place=-20)
+    await relay.booted()
+    await relay.give(image(terms, COUNTS, hysteresis=0))
+    await relay.go(100, clk_each=4)
+    relay.index_at.clear()
+    for way in (-200, 200):
+        await relay.go(way, clk_each=4)
+        await relay.clk(30)
+    assert set(relay.index_at) == {0}
+
+
+@cocotb.test()
+async def a_missing_index_and_illegal_edges_are_flagged_until_they_are_cleared(dut):
+    relay = await Relay(dut).power_up(place=-4)
+    await relay.booted()
+    await relay.give(image(some_terms(), COUNTS))
+    await relay.go(20)
+    relay.with_index = False
+    await relay.go(COUNTS + 10)
+    assert int(dut.fault.value) and (await relay.status()).flags == MISSING
+    assert (await relay.status(CLEAR)).flags == MISSING and (await relay.status()).flags == 0
+    relay.place += 2
+    relay.show()
+    await relay.clk(30)
+    assert (await relay.status()).flags & ILLEGAL
+
+
+@cocotb.test()
+async def a_glitch_is_rejected_and_flagged(dut):
+    relay = await Relay(dut).power_up(place=-4)
+    await relay.booted()
+    await relay.give(image(some_terms(0.001), COUNTS, filter_needed=4))
+    await relay.go(20, clk_each=8)
+    dut.encoder_a.value = 1 - int(dut.encoder_a.value)
+    await relay.clk(2)
+    relay.show()
+    await relay.clk(30)
+    assert relay.counted == relay.place and (await relay.status()).flags == REJECTED
+
+
+@cocotb.test()
+async def a_broken_set_is_refused_and_the_one_in_force_stays(dut):
+    relay = await Relay(dut).power_up()
+    await relay.booted()
+    whole = image(some_terms(), COUNTS)
+    await relay.give(whole)
+    before = await relay.status(CLEAR)
+    for _ in range(3):
+        broken = bytearray(image(some_terms(9.0), COUNTS))
+        broken[random.randrange(len(broken))] ^= 1 << random.randrange(8)
+        await relay.give(broken)
+        assert (await relay.status()).flags & REFUSED
+        assert (await relay.status(CLEAR)).identity == before.identity == int.from_bytes(whole[-4:], "little")
+
+
+@cocotb.test()
+async def a_broken_request_has_no_answer_and_the_next_one_has(dut):
+    relay = await Relay(dut).power_up()
+    await relay.booted()
+    words = frame(0x21, bytes([STATUS]))
+    for n in range(len(words)):
+        broken = list(words)
+        broken[n] = broken[n][0] ^ 1 << random.randrange(8), broken[n][1]
+        await relay.tell(broken)
+        assert await relay.listen(patience=400) == []
+    assert await relay.status()
+    assert await relay.ask(bytes([99])) is None
+
+
+@cocotb.test()
+async def a_saved_set_comes_back_at_power_up_whenever_power_failed(dut):
+    old, new = (image(some_terms(size), COUNTS) for size in (1.0, 2.0))
+    chip = Flash(1 << 14)
+    for second, power, source in ((old, 4096 + 10, 1), (new, 4096 + 30, 2)):       # it failed in the second copy, in the first
+        for address in (FIRST, SECOND):
+            chip.memory[address:address + len(old)] = old
+        chip.power, chip.asleep = None, True
+        relay = await Relay(dut, chip).power_up()
+        await relay.booted()
+        if second is new:
+            chip.memory[SECOND:SECOND + len(new)] = new             # the second copy stands already
+        chip.power = power
+        await relay.save(new, SECOND if second is old else FIRST)
+        chip.power, chip.asleep = None, True
+        relay = await Relay(dut, chip).power_up()
+        await relay.booted()
+        status = await relay.status()
+        assert status.source == source and status.levels == LOADED
+        assert status.identity == int.from_bytes((new if source == 2 else old)[-4:], "little")
+
+
+@cocotb.test()
+async def flash_bytes_come_back(dut):
+    relay = await Relay(dut).power_up()
+    await relay.booted()
+    relay.chip.memory[0x3000:0x3004] = b"ring"
+    assert (await relay.ask(bytes([FLASH, 0x03, 0x00, 0x30, 0x00]) + bytes(4)))[5:] == b"ring"
+
+
+@cocotb.test()
+async def reset_in_mid_flow(dut):
+    relay = await Relay(dut).power_up(place=-4)
+    await relay.booted()
+    await relay.give(image(some_terms(), COUNTS))
+    await relay.go(30)
+    await relay.tell(frame(0x21, bytes([BEGIN_SET, 1, 2]))[:4])
+    dut.rst.value = 1
+    for n in range(24):                                     # the pins find the levels of the ring again
+        dut.rst.value, relay.levels = int(n < 3), None
+        await relay.clk()
+    assert not int(dut.correcting.value) and not int(dut.fault.value)
+    relay.clks = 0
+    await relay.booted()
+    assert (await relay.status()).levels == 0
+
+
+def test_relay():
+    run("relay", __file__, K=K, BAUD=6_000_000, FIRST=FIRST, SECOND=SECOND)
