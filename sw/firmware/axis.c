@@ -12,12 +12,19 @@
 #include "motion.h"
 #include "parameters.h"
 
+#define FINE_BUILT 8u            // bit of actuator.drive.built
+#define FINE_HYSTERESIS 4       // the fine stage lets go at so many times its reach
+#define FINE_MS 10u             // the axis is within its reach for so long before it takes over
+
 static struct axis {
     uint8_t state;              // line_state
     uint8_t ended;              // line_cause
     bool homed;
     bool homing;                // a switch only blocks, until this motion has ended
     bool leaving;               // a switch only blocks, until it is released
+    bool fine;                  // the fine stage holds the position
+    bool near;                  // the error has been within its reach since near_ms
+    uint32_t near_ms;
 } axes[HARDWARE_AXES];
 
 static bool at_work(const struct axis *a)
@@ -34,7 +41,32 @@ static void write_control(unsigned n, bool on)
 {
     const struct axis *a = &axes[n];
     uint32_t only_blocks = a->homing || a->leaving ? AXIS_CONTROL_HOMING_MASK : 0;
-    axis_write(n, AXIS_CONTROL, only_blocks | (on ? AXIS_CONTROL_ENABLE_MASK | AXIS_CONTROL_CLOSED_LOOP_MASK : 0));
+    uint32_t loop = a->fine ? AXIS_CONTROL_FINE_MASK : AXIS_CONTROL_CLOSED_LOOP_MASK;
+    axis_write(n, AXIS_CONTROL, only_blocks | (on ? AXIS_CONTROL_ENABLE_MASK | loop : 0));
+}
+
+// With a fine stage the motor brings the axis within its reach and rests; out of reach the motor takes over again.
+static void hand_over(unsigned n, bool fine)
+{
+    if (axes[n].fine == fine) return;
+    axes[n].fine = fine;
+    write_control(n, true);
+}
+
+static bool within(unsigned n, int64_t reach)
+{
+    int64_t error = (int32_t)axis_read(n, AXIS_FOLLOWING_ERROR);
+    return error <= reach && error >= -reach;
+}
+
+static void hold(unsigned n)
+{
+    struct axis *a = &axes[n];
+    int64_t reach = parameters_get(n, LINE_PARAMETER_FINE_REACH);
+    bool near = reach && within(n, a->fine ? FINE_HYSTERESIS * reach : reach);
+    if (near && !a->near) a->near_ms = clock_ms();
+    a->near = near;
+    if (!near || a->fine || clock_ms() - a->near_ms >= FINE_MS) hand_over(n, near);
 }
 
 static void finish(unsigned n, uint8_t cause)
@@ -53,7 +85,7 @@ static void fault(unsigned n, uint32_t faults)
     if (faults & LINE_FAULT_ENCODER) a->homed = false;
     if (a->state == LINE_STATE_FAULTED) return;
     a->state = LINE_STATE_FAULTED;
-    a->homing = a->leaving = false;
+    a->homing = a->leaving = a->fine = false;
     if (at_work(a)) a->ended = LINE_CAUSE_ENDED_BY_FAULT;
     write_control(n, false);
     motion_hold_here(n);
@@ -85,7 +117,9 @@ void axis_poll(unsigned n)
             motion_settle_begin(n);
         }
         break;
+    case LINE_STATE_HOLDING: hold(n); break;
     case LINE_STATE_SETTLING:
+        hold(n);
         outcome = motion_settle(n);
         if (outcome != LINE_CAUSE_RUNNING) finish(n, outcome);
         break;
@@ -112,7 +146,7 @@ uint8_t axis_enable(unsigned n, bool on)
     if (!on) {
         if (at_work(a)) a->ended = LINE_CAUSE_STOPPED;
         if (a->state != LINE_STATE_FAULTED) a->state = LINE_STATE_OFF;
-        a->homing = a->leaving = false;
+        a->homing = a->leaving = a->fine = false;
         write_control(n, false);
         motion_hold_here(n);
         return LINE_CAUSE_OK;
@@ -144,6 +178,7 @@ uint8_t axis_home(unsigned n)
     uint8_t cause = ready(n);
     if (cause != LINE_CAUSE_OK) return cause;
 
+    hand_over(n, false);
     cause = homing_begin(n);
     if (cause != LINE_CAUSE_OK) return cause;
     a->homed = false;
@@ -154,18 +189,52 @@ uint8_t axis_home(unsigned n)
     return LINE_CAUSE_OK;
 }
 
-uint8_t axis_move(unsigned n, int64_t target, uint32_t *duration_ticks)
+// What every motion to a position asks first.
+static uint8_t may_go(unsigned n, int64_t target)
 {
-    struct axis *a = &axes[n];
     uint8_t cause = ready(n);
     if (cause != LINE_CAUSE_OK) return cause;
-    if (!a->homed) return LINE_CAUSE_NOT_HOMED;
+    if (!axes[n].homed) return LINE_CAUSE_NOT_HOMED;
     if (target < parameters_get(n, LINE_PARAMETER_TRAVEL_LOW) || target > parameters_get(n, LINE_PARAMETER_TRAVEL_HIGH))
         return LINE_CAUSE_OUT_OF_TRAVEL;
-    if (!motion_play(n, target - axis_read_position(n, AXIS_TARGET), LINE_PARAMETER_VELOCITY)) return LINE_CAUSE_OUT_OF_RANGE;
+    return LINE_CAUSE_OK;
+}
+
+uint8_t axis_prepare(unsigned n, int64_t target, uint32_t *duration_ticks)
+{
+    struct axis *a = &axes[n];
+    uint8_t cause = may_go(n, target);
+    if (cause != LINE_CAUSE_OK) return cause;
+    if (!motion_prepare(n, target - axis_read_position(n, AXIS_TARGET), LINE_PARAMETER_VELOCITY)) return LINE_CAUSE_OUT_OF_RANGE;
     a->ended = LINE_CAUSE_RUNNING;
-    a->state = LINE_STATE_MOVING;
+    a->state = LINE_STATE_PREPARED;
     *duration_ticks = motion_ticks(n);
+    return LINE_CAUSE_OK;
+}
+
+static void set_off(unsigned n)
+{
+    hand_over(n, false);
+    axes[n].state = LINE_STATE_MOVING;
+}
+
+uint8_t axis_start_prepared(unsigned count, uint32_t mask)
+{
+    if (mask == 0 || mask >> count) return LINE_CAUSE_OUT_OF_RANGE;
+    for (unsigned n = 0; n < count; n++)
+        if (mask >> n & 1u && axes[n].state != LINE_STATE_PREPARED) return LINE_CAUSE_NOT_PREPARED;
+    for (unsigned n = 0; n < count; n++)
+        if (mask >> n & 1u) set_off(n);
+    node_write(NODE_START_AXES, mask);
+    return LINE_CAUSE_OK;
+}
+
+uint8_t axis_move(unsigned n, int64_t target, uint32_t *duration_ticks)
+{
+    uint8_t cause = axis_prepare(n, target, duration_ticks);
+    if (cause != LINE_CAUSE_OK) return cause;
+    set_off(n);
+    motion_start(n);
     return LINE_CAUSE_OK;
 }
 
@@ -178,6 +247,7 @@ uint8_t axis_stop(unsigned n)
         motion_brake(n);
         a->state = LINE_STATE_STOPPING;
     } else {
+        if (a->state == LINE_STATE_PREPARED) motion_hold_here(n);
         finish(n, LINE_CAUSE_STOPPED);
     }
     return LINE_CAUSE_OK;
@@ -198,14 +268,35 @@ uint8_t axis_reset_faults(unsigned n)
     return LINE_CAUSE_OK;
 }
 
+// What may change in motion, and what only with the drive off.
+static uint8_t may_set(unsigned n, uint8_t id, int64_t value)
+{
+    const struct axis *a = &axes[n];
+    bool on = a->state != LINE_STATE_OFF && a->state != LINE_STATE_FAULTED;
+    if (id == LINE_PARAMETER_OVERRIDE) return LINE_CAUSE_OK;
+    if (at_work(a)) return LINE_CAUSE_BUSY;
+    switch (id) {
+    case LINE_PARAMETER_DRIVE:
+        if (!(FIELD_GET(actuator_read(n, ACTUATOR_DRIVE), ACTUATOR_DRIVE_BUILT) >> value & 1)) return LINE_CAUSE_NOT_BUILT;
+        return on ? LINE_CAUSE_BUSY : LINE_CAUSE_OK;
+    case LINE_PARAMETER_POSITION_SOURCE:
+    case LINE_PARAMETER_STEP_OUTPUT:
+    case LINE_PARAMETER_STEP_INVERT: return on ? LINE_CAUSE_BUSY : LINE_CAUSE_OK;
+    case LINE_PARAMETER_FINE_REACH:
+        if (value && !(FIELD_GET(actuator_read(n, ACTUATOR_DRIVE), ACTUATOR_DRIVE_BUILT) & FINE_BUILT)) return LINE_CAUSE_NOT_BUILT;
+        return LINE_CAUSE_OK;
+    default: return LINE_CAUSE_OK;
+    }
+}
+
 uint8_t axis_set_parameter(unsigned n, uint8_t id, int64_t value)
 {
     uint8_t cause = parameters_check(id, value);
     if (cause != LINE_CAUSE_OK) return cause;
     axis_poll(n);
-    if (at_work(&axes[n])) return LINE_CAUSE_BUSY;
-    parameters_set(n, id, value);
-    return LINE_CAUSE_OK;
+    cause = may_set(n, id, value);
+    if (cause == LINE_CAUSE_OK) parameters_set(n, id, value);
+    return cause;
 }
 
 uint8_t axis_state(unsigned n)

@@ -13,6 +13,8 @@ void axis_poll(unsigned n);
 uint8_t axis_enable(unsigned n, bool on);
 uint8_t axis_home(unsigned n);
 uint8_t axis_move(unsigned n, int64_t target, uint32_t *duration_ticks);
+uint8_t axis_prepare(unsigned n, int64_t target, uint32_t *duration_ticks);
+uint8_t axis_start_prepared(unsigned count, uint32_t mask);     // bit n: axis n, of so many
 uint8_t axis_stop(unsigned n);
 uint8_t axis_reset_faults(unsigned n);
 uint8_t axis_set_parameter(unsigned n, uint8_t id, int64_t value);

@@ -20,7 +20,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 OUT = HERE.parents[1] / "build" / "firmware"
 FLAGS = ["-std=c11", "-O2", "-g", "-Wall", "-Wextra", "-Werror", "-ffreestanding", "-ffunction-sections",
-         "-fdata-sections", "-fomit-frame-pointer", "-static", "-Wframe-larger-than=768"]     # the stack has 2048
+         "-fdata-sections", "-fomit-frame-pointer", "-static", "-Wframe-larger-than=1536"]    # the stack has 4096
 ZIG = ["-target", "riscv32-freestanding-none", "-mcpu=generic_rv32+m-a-f-d-c", "-mabi=ilp32", "-fno-sanitize=all",
        "-fno-stack-protector"]
 GNU = ["-march=rv32im", "-misa-spec=2.2", "-mabi=ilp32", "-nostdlib", "-nostartfiles",
@@ -121,7 +121,7 @@ def build(memory, out, force):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--memory", type=int, default=65536, help="bytes of the soft core's memory (default 65536)")
+    parser.add_argument("--memory", type=int, default=98304, help="bytes of the soft core's memory (default 98304)")
     parser.add_argument("--out", type=Path, default=OUT, help="folder for what is made (default build/firmware)")
     parser.add_argument("--force", action="store_true", help="build even if nothing changed")
     options = parser.parse_args()

@@ -91,10 +91,12 @@ static uint8_t enable(unsigned axis)
     return on > 1 ? LINE_CAUSE_OUT_OF_RANGE : axis_enable(axis, on);
 }
 
-static uint8_t move(unsigned axis)
+typedef uint8_t motion_request(unsigned n, int64_t target, uint32_t *duration_ticks);
+
+static uint8_t motion(unsigned axis, motion_request *begin)     // move and prepare have the same bodies
 {
     uint32_t ticks = 0;
-    uint8_t cause = axis_move(axis, (int64_t)get(&asked[LINE_MOVE_REQUEST_TARGET], 8), &ticks);
+    uint8_t cause = begin(axis, (int64_t)get(&asked[LINE_MOVE_REQUEST_TARGET], 8), &ticks);
     put(LINE_MOVE_REPLY_DURATION_TICKS, ticks, 4);
     reply[0] = LINE_MOVE_REPLY_LENGTH;
     return cause;
@@ -144,7 +146,7 @@ static uint8_t encoder(unsigned axis)
     return LINE_CAUSE_OK;
 }
 
-static bool of_axis(uint32_t block, uint32_t base)              // axes and gratings have the same stride
+static bool of_axis(uint32_t block, uint32_t base)              // the blocks of an axis have the same stride
 {
     return block >= base && block < base + axes * AXIS_STRIDE;
 }
@@ -154,9 +156,10 @@ static bool of_axis(uint32_t block, uint32_t base)              // axes and grat
 static uint8_t read_register(void)
 {
     uint32_t address = (uint32_t)get(&asked[LINE_READ_REGISTER_REQUEST_ADDRESS], 2), block = address & ~0xFFu;
-    bool exists = block == NODE_BASE || block == LINE_BASE || of_axis(block, AXIS_BASE) || of_axis(block, GRATING_BASE);
+    bool exists = block == NODE_BASE || block == LINE_BASE || of_axis(block, AXIS_BASE) || of_axis(block, GRATING_BASE) ||
+                  of_axis(block, ACTUATOR_BASE);
     if (!exists || address % 4 || address == LINE_BASE + LINE_RECEIVE) return LINE_CAUSE_NO_SUCH_REGISTER;
-    if (block >= GRATING_BASE && !grating_may_read(address - block)) return LINE_CAUSE_NO_SUCH_REGISTER;
+    if (of_axis(block, GRATING_BASE) && !grating_may_read(address - block)) return LINE_CAUSE_NO_SUCH_REGISTER;
     put(LINE_READ_REGISTER_REPLY_VALUE, register_read(address), 4);
     reply[0] = LINE_READ_REGISTER_REPLY_LENGTH;
     return LINE_CAUSE_OK;
@@ -250,6 +253,7 @@ static uint8_t execute(uint8_t operation, uint8_t length)
     case LINE_OPERATION_COUNTERS: return counters();
     case LINE_OPERATION_READ_REGISTER: return read_register();
     case LINE_OPERATION_WRITE_REGISTER: return write_register();
+    case LINE_OPERATION_START: return axis_start_prepared(axes, asked[LINE_START_REQUEST_AXES]);
     default: break;
     }
     if (axis >= axes) return LINE_CAUSE_NO_SUCH_AXIS;
@@ -257,7 +261,8 @@ static uint8_t execute(uint8_t operation, uint8_t length)
     case LINE_OPERATION_STATUS: return status(axis);
     case LINE_OPERATION_ENABLE: return enable(axis);
     case LINE_OPERATION_HOME: return axis_home(axis);
-    case LINE_OPERATION_MOVE: return move(axis);
+    case LINE_OPERATION_MOVE: return motion(axis, axis_move);
+    case LINE_OPERATION_PREPARE: return motion(axis, axis_prepare);
     case LINE_OPERATION_STOP: return axis_stop(axis);
     case LINE_OPERATION_RESET_FAULTS: return reset_faults(axis);
     case LINE_OPERATION_GET_PARAMETER: return get_parameter(axis);

@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x6E526DE5u    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0xFD2A1B9Eu    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -32,6 +32,8 @@ enum line_cause {
     LINE_CAUSE_RUNNING = 19,    // the motion is under way
     LINE_CAUSE_NEVER = 20,    // no motion was asked for yet
     LINE_CAUSE_NO_INDEX = 21,    // no index was found within the home distance
+    LINE_CAUSE_NOT_PREPARED = 22,    // the axis has no motion prepared
+    LINE_CAUSE_NOT_BUILT = 23,    // this node was built without that
 };
 
 enum line_fault {    // bits
@@ -63,6 +65,7 @@ enum line_state {
     LINE_STATE_SETTLING = 4,    // settling
     LINE_STATE_STOPPING = 5,    // stopping
     LINE_STATE_FAULTED = 6,    // faulted
+    LINE_STATE_PREPARED = 7,    // waiting for the common start
 };
 
 enum line_flag {    // bits
@@ -133,6 +136,8 @@ enum line_operation {
     LINE_OPERATION_SET_HARMONIC = 17,    // as got; waits for set_correction, and is 0 unless set
     LINE_OPERATION_SIGNAL = 18,    // what is wrong with the sine and cosine now, and what came first since reset_faults (bits of signal_fault)
     LINE_OPERATION_WRITE_REGISTER = 19,    // one word of the register map: only index, capture and compare of the grating blocks
+    LINE_OPERATION_PREPARE = 20,    // plan to go to a position, and wait for start
+    LINE_OPERATION_START = 21,    // begin the prepared motions of these axes (bit n: axis n), all in one tick; none if one of them has none
 };
 
 // Lengths of whole bodies and offsets of their fields, in bytes, little endian.
@@ -259,6 +264,14 @@ enum line_operation {
 #define LINE_WRITE_REGISTER_REQUEST_ADDRESS 2u    // u16
 #define LINE_WRITE_REGISTER_REQUEST_VALUE 4u    // u32
 #define LINE_WRITE_REGISTER_REPLY_LENGTH 3u
+#define LINE_PREPARE_REQUEST_LENGTH 11u
+#define LINE_PREPARE_REQUEST_AXIS 2u    // u8
+#define LINE_PREPARE_REQUEST_TARGET 3u    // i64
+#define LINE_PREPARE_REPLY_LENGTH 7u
+#define LINE_PREPARE_REPLY_DURATION_TICKS 3u    // u32
+#define LINE_START_REQUEST_LENGTH 3u
+#define LINE_START_REQUEST_AXES 2u    // u8
+#define LINE_START_REPLY_LENGTH 3u
 
 // X(name, code, length of the request body, length of the reply body if the cause is ok)
 #define LINE_OPERATIONS(X) \
@@ -280,7 +293,9 @@ enum line_operation {
     X(set_correction, 16, 16, 3) \
     X(set_harmonic, 17, 12, 3) \
     X(signal, 18, 3, 7) \
-    X(write_register, 19, 8, 3)
+    X(write_register, 19, 8, 3) \
+    X(prepare, 20, 11, 7) \
+    X(start, 21, 3, 3)
 
 enum line_parameter {
     LINE_PARAMETER_PERIOD = 1,    // [1 pm] length of one signal period
@@ -334,8 +349,35 @@ enum line_parameter {
     LINE_PARAMETER_POSITION_SOURCE = 49,    // position from: 0 phases of sine and cosine, 1 counts of A/B, 2 the axis' own steps
     LINE_PARAMETER_HOME_METHOD = 50,    // homing: CiA 402 methods 1, 2, 17, 18, 33, 34, 35, 37; -1 S0 (switch, way, phase zero), -2 S3 (index on either side)
     LINE_PARAMETER_HOME_OFFSET = 51,    // [1 period] what the zero that homing finds is called
+    LINE_PARAMETER_DRIVE = 52,    // drive: 0 bridge, 1 steps, 2 converter
+    LINE_PARAMETER_STEPS_PER_PERIOD = 53,    // [1/4294967296] steps: in one period; the sign turns the direction
+    LINE_PARAMETER_STEP_HIGH = 54,    // [1e-9 s] steps: shortest pulse
+    LINE_PARAMETER_STEP_LOW = 55,    // [1e-9 s] steps: shortest gap
+    LINE_PARAMETER_STEP_SETUP = 56,    // [1e-9 s] steps: direction before a pulse
+    LINE_PARAMETER_STEP_HOLD = 57,    // [1e-9 s] steps: direction after a pulse
+    LINE_PARAMETER_STEP_OUTPUT = 58,    // steps: 0 step and direction, 1 quadrature, 2 pulses up and pulses down
+    LINE_PARAMETER_STEP_INVERT = 59,    // steps: 1 step is active low, 2 direction is low going up, 3 both
+    LINE_PARAMETER_STEP_TRIM = 60,    // steps: the servo's command moves the target by command 2^trim / 65536 period
+    LINE_PARAMETER_CONVERTER_CLOCK = 61,    // [1 Hz] converter: highest clock of its frames
+    LINE_PARAMETER_CONVERTER_TRIM = 62,    // [1/32768] converter: what puts out 0 V, of full scale
+    LINE_PARAMETER_FINE_KP = 63,    // [1/65536] fine stage: proportional gain
+    LINE_PARAMETER_FINE_KI = 64,    // [1/16777216] fine stage: integral gain per tick
+    LINE_PARAMETER_FINE_LIMIT = 65,    // [1/32768] fine stage: largest command, of full scale
+    LINE_PARAMETER_FINE_REACH = 66,    // [1/65536 period] fine stage: error inside which it takes over; 0 there is none
+    LINE_PARAMETER_OVERRIDE = 67,    // [1/65536] speed of all profiles, of full; 0 pauses; may change in motion
+    LINE_PARAMETER_FILTERS = 68,    // servo: which filters are in use, 1 the first, 2 the second, 3 both
+    LINE_PARAMETER_FILTER_1_B0 = 69,    // [1/1073741824] servo: filter 1, coefficient b0
+    LINE_PARAMETER_FILTER_1_B1 = 70,    // [1/1073741824] servo: filter 1, coefficient b1
+    LINE_PARAMETER_FILTER_1_B2 = 71,    // [1/1073741824] servo: filter 1, coefficient b2
+    LINE_PARAMETER_FILTER_1_A1 = 72,    // [1/1073741824] servo: filter 1, coefficient -a1
+    LINE_PARAMETER_FILTER_1_A2 = 73,    // [1/1073741824] servo: filter 1, coefficient -a2
+    LINE_PARAMETER_FILTER_2_B0 = 74,    // [1/1073741824] servo: filter 2, coefficient b0
+    LINE_PARAMETER_FILTER_2_B1 = 75,    // [1/1073741824] servo: filter 2, coefficient b1
+    LINE_PARAMETER_FILTER_2_B2 = 76,    // [1/1073741824] servo: filter 2, coefficient b2
+    LINE_PARAMETER_FILTER_2_A1 = 77,    // [1/1073741824] servo: filter 2, coefficient -a1
+    LINE_PARAMETER_FILTER_2_A2 = 78,    // [1/1073741824] servo: filter 2, coefficient -a2
 };
-#define LINE_PARAMETER_COUNT 51u
+#define LINE_PARAMETER_COUNT 78u
 
 // X(name, id, min, max, default): all int64_t, in counts of the wire
 #define LINE_PARAMETERS(X) \
@@ -367,7 +409,7 @@ enum line_parameter {
     X(spike_hold, 26, 0LL, 255LL, 3LL) \
     X(amplitude_low, 27, 0LL, 65535LL, 32LL) \
     X(amplitude_high, 28, 0LL, 65535LL, 160LL) \
-    X(disagreement_limit, 29, 0LL, 1048575LL, 49152LL) \
+    X(disagreement_limit, 29, 0LL, 1048575LL, 32768LL) \
     X(encoder_fault_mask, 30, 0LL, 31LL, 30LL) \
     X(pwm_frequency, 31, 1000LL, 200000LL, 20000LL) \
     X(watchdog_time, 32, 10LL, 65535LL, 500LL) \
@@ -389,6 +431,33 @@ enum line_parameter {
     X(signal_square, 48, 0LL, 65535LL, 16LL) \
     X(position_source, 49, 0LL, 2LL, 0LL) \
     X(home_method, 50, -2LL, 37LL, -1LL) \
-    X(home_offset, 51, -1000000000LL, 1000000000LL, 0LL)
+    X(home_offset, 51, -1000000000LL, 1000000000LL, 0LL) \
+    X(drive, 52, 0LL, 2LL, 0LL) \
+    X(steps_per_period, 53, -140737488355328LL, 140737488355327LL, 0LL) \
+    X(step_high, 54, 0LL, 100000LL, 2000LL) \
+    X(step_low, 55, 0LL, 100000LL, 2000LL) \
+    X(step_setup, 56, 0LL, 100000LL, 5000LL) \
+    X(step_hold, 57, 0LL, 100000LL, 5000LL) \
+    X(step_output, 58, 0LL, 2LL, 0LL) \
+    X(step_invert, 59, 0LL, 3LL, 0LL) \
+    X(step_trim, 60, 0LL, 15LL, 0LL) \
+    X(converter_clock, 61, 10000LL, 50000000LL, 1000000LL) \
+    X(converter_trim, 62, -32768LL, 32767LL, 0LL) \
+    X(fine_kp, 63, 0LL, 16777215LL, 0LL) \
+    X(fine_ki, 64, 0LL, 16777215LL, 0LL) \
+    X(fine_limit, 65, 0LL, 32767LL, 30000LL) \
+    X(fine_reach, 66, 0LL, 65536000LL, 0LL) \
+    X(override, 67, 0LL, 65536LL, 65536LL) \
+    X(filters, 68, 0LL, 3LL, 0LL) \
+    X(filter_1_b0, 69, -2147483648LL, 2147483647LL, 1073741824LL) \
+    X(filter_1_b1, 70, -2147483648LL, 2147483647LL, 0LL) \
+    X(filter_1_b2, 71, -2147483648LL, 2147483647LL, 0LL) \
+    X(filter_1_a1, 72, -2147483648LL, 2147483647LL, 0LL) \
+    X(filter_1_a2, 73, -2147483648LL, 2147483647LL, 0LL) \
+    X(filter_2_b0, 74, -2147483648LL, 2147483647LL, 1073741824LL) \
+    X(filter_2_b1, 75, -2147483648LL, 2147483647LL, 0LL) \
+    X(filter_2_b2, 76, -2147483648LL, 2147483647LL, 0LL) \
+    X(filter_2_a1, 77, -2147483648LL, 2147483647LL, 0LL) \
+    X(filter_2_a2, 78, -2147483648LL, 2147483647LL, 0LL)
 
 #endif

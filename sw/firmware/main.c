@@ -28,6 +28,7 @@ void firmware_start(void)
 void firmware_poll(void)
 {
     bool homing = false;
+    node_write(NODE_ALIVE, NODE_ALIVE_BEAT_MASK);
     line_poll();
     clock_poll();
     for (unsigned n = 0; n < axes; n++) {

@@ -47,14 +47,23 @@ void motion_feed(unsigned n)
     }
 }
 
+bool motion_prepare(unsigned n, int64_t distance, uint8_t velocity_id)
+{
+    struct planner_limits limits = parameters_limits(n, velocity_id);
+    if (!planner_move(&motions[n].plan, &limits, distance)) return false;
+    motion_feed(n);
+    return true;
+}
+
+void motion_start(unsigned n)
+{
+    axis_write(n, AXIS_STROBES, AXIS_STROBES_START_MASK);
+}
+
 bool motion_play(unsigned n, int64_t distance, uint8_t velocity_id)
 {
-    struct plan *plan = &motions[n].plan;
-    struct planner_limits limits = parameters_limits(n, velocity_id);
-    if (!planner_move(plan, &limits, distance)) return false;
-    if (plan->count == 0) return true;
-    motion_feed(n);
-    axis_write(n, AXIS_STROBES, AXIS_STROBES_START_MASK);
+    if (!motion_prepare(n, distance, velocity_id)) return false;
+    motion_start(n);
     return true;
 }
 

@@ -8,6 +8,9 @@
 
 enum position_source { PHASES, COUNTS, OWN_STEPS };
 #define PULSES_AND_DIRECTION 3u         // a mode of the decoder
+#define OVERRIDE_PART 4u                // of the acceleration and the jerk, which a change of the override may add
+#define STEP_CLK_MASK ACTUATOR_STEP_PULSE_HIGH_MASK
+#define COEFFICIENTS 5u                 // of a filter
 
 #define LIMITS(name, id, low, high, value) [id] = {low, high, value},
 
@@ -29,12 +32,25 @@ void parameters_start_node(void)
     node_write(NODE_TICK_PERIOD, held(clk_hz / PLANNER_TICK_HZ, NODE_TICK_PERIOD_MASK));
 }
 
+// part / whole in 2^-32, 1 at least.
+static uint32_t ratio(uint64_t part, uint64_t whole)
+{
+    uint32_t shift = 32;
+    while (part >> (64 - shift)) whole >>= 1, shift--;
+    if (whole == 0) return UINT32_MAX;
+    uint64_t quotient = (part << shift) / whole;
+    return quotient == 0 ? 1 : held(quotient, UINT32_MAX);
+}
+
 static void apply_motion(unsigned axis)
 {
     const int64_t *p = parameters[axis];
     limits[axis] = planner_limits((uint32_t)p[LINE_PARAMETER_VELOCITY], (uint32_t)p[LINE_PARAMETER_ACCELERATION],
                                   (uint32_t)p[LINE_PARAMETER_JERK]);
     axis_write(axis, AXIS_BRAKE_RATE, held(limits[axis].acceleration >> 8, AXIS_BRAKE_RATE_MASK));
+    axis_write(axis, AXIS_BRAKE_JERK, limits[axis].jerk);
+    axis_write(axis, AXIS_OVERRIDE_SLOPE, ratio(limits[axis].acceleration / OVERRIDE_PART, limits[axis].velocity));
+    axis_write(axis, AXIS_OVERRIDE_CURVE, ratio(limits[axis].jerk / OVERRIDE_PART, limits[axis].velocity));
 }
 
 static uint64_t clk_of(int64_t nanoseconds)
@@ -78,6 +94,46 @@ static void apply_signal(unsigned axis)
                                                FIELD_PUT(GRATING_SQUARE_LIMITS_DEAD, p[LINE_PARAMETER_SIGNAL_DEAD]));
 }
 
+static uint32_t step_clk(unsigned axis, uint8_t id)
+{
+    return held(clk_of(parameters[axis][id]) + 1u, STEP_CLK_MASK);
+}
+
+static void apply_steps(unsigned axis)
+{
+    const int64_t *p = parameters[axis];
+    actuator_write(axis, ACTUATOR_STEP_PULSE, FIELD_PUT(ACTUATOR_STEP_PULSE_HIGH, step_clk(axis, LINE_PARAMETER_STEP_HIGH)) |
+                                              FIELD_PUT(ACTUATOR_STEP_PULSE_LOW, step_clk(axis, LINE_PARAMETER_STEP_LOW)));
+    actuator_write(axis, ACTUATOR_STEP_DIRECTION, FIELD_PUT(ACTUATOR_STEP_DIRECTION_SETUP, step_clk(axis, LINE_PARAMETER_STEP_SETUP)) |
+                                                  FIELD_PUT(ACTUATOR_STEP_DIRECTION_HOLD, step_clk(axis, LINE_PARAMETER_STEP_HOLD)));
+    actuator_write(axis, ACTUATOR_STEP_OUTPUT, FIELD_PUT(ACTUATOR_STEP_OUTPUT_MODE, p[LINE_PARAMETER_STEP_OUTPUT]) |
+                                               FIELD_PUT(ACTUATOR_STEP_OUTPUT_STEP_LOW, p[LINE_PARAMETER_STEP_INVERT]) |
+                                               FIELD_PUT(ACTUATOR_STEP_OUTPUT_DIRECTION_LOW, p[LINE_PARAMETER_STEP_INVERT] >> 1) |
+                                               FIELD_PUT(ACTUATOR_STEP_OUTPUT_TRIM, p[LINE_PARAMETER_STEP_TRIM]));
+    actuator_write_wide(axis, ACTUATOR_STEP_RATIO, (uint64_t)p[LINE_PARAMETER_STEPS_PER_PERIOD]);
+}
+
+static void apply_converter(unsigned axis)
+{
+    const int64_t *p = parameters[axis];
+    uint64_t halves = 2u * (uint64_t)p[LINE_PARAMETER_CONVERTER_CLOCK], half_clk = (node_read(NODE_CLK_HZ) + halves - 1u) / halves;
+    actuator_write(axis, ACTUATOR_CONVERTER, FIELD_PUT(ACTUATOR_CONVERTER_HALF_CLK, held(half_clk, 0xFF)) |
+                                             FIELD_PUT(ACTUATOR_CONVERTER_REFRESH, 0xFFFF));
+    actuator_write(axis, ACTUATOR_CONVERTER_TRIM, (uint32_t)p[LINE_PARAMETER_CONVERTER_TRIM]);
+}
+
+// A filter takes coefficients only while it is out of use.
+static void apply_filters(unsigned axis)
+{
+    const int64_t *p = parameters[axis];
+    for (uint32_t n = 0; n < 2 * COEFFICIENTS; n++) {
+        uint32_t address = n / COEFFICIENTS * 8 + n % COEFFICIENTS;
+        axis_write(axis, AXIS_FILTERS, FIELD_PUT(AXIS_FILTERS_ADDRESS, address));
+        axis_write(axis, AXIS_FILTER_COEFFICIENT, (uint32_t)p[LINE_PARAMETER_FILTER_1_B0 + n]);
+    }
+    axis_write(axis, AXIS_FILTERS, FIELD_PUT(AXIS_FILTERS_IN_USE, p[LINE_PARAMETER_FILTERS]));
+}
+
 // The registers that follow from this parameter.
 static void apply(unsigned axis, uint8_t id)
 {
@@ -111,7 +167,7 @@ static void apply(unsigned axis, uint8_t id)
         break;
     case LINE_PARAMETER_DISAGREEMENT_LIMIT: axis_write(axis, AXIS_DISAGREEMENT_LIMIT, value); break;
     case LINE_PARAMETER_ENCODER_FAULT_MASK: axis_write(axis, AXIS_ENCODER_FAULT_MASK, value); break;
-    case LINE_PARAMETER_PWM_FREQUENCY: axis_write(axis, AXIS_PWM_PERIOD, held(node_read(NODE_CLK_HZ) / value, AXIS_PWM_PERIOD_MASK)); break;
+    case LINE_PARAMETER_PWM_FREQUENCY: actuator_write(axis, ACTUATOR_PWM_PERIOD, held(node_read(NODE_CLK_HZ) / value, ACTUATOR_PWM_PERIOD_MASK)); break;
     case LINE_PARAMETER_WATCHDOG_TIME: line_write(LINE_WATCHDOG_TIME, value); break;
     case LINE_PARAMETER_POSITION_SOURCE:
     case LINE_PARAMETER_DECODER_MODE: apply_source(axis); break;
@@ -127,7 +183,24 @@ static void apply(unsigned axis, uint8_t id)
     case LINE_PARAMETER_SIGNAL_OFFSET:
     case LINE_PARAMETER_SIGNAL_BALANCE:
     case LINE_PARAMETER_SIGNAL_SQUARE: apply_signal(axis); break;
-    default: break;
+    case LINE_PARAMETER_DRIVE: actuator_write(axis, ACTUATOR_DRIVE, FIELD_PUT(ACTUATOR_DRIVE_KIND, value)); break;
+    case LINE_PARAMETER_STEPS_PER_PERIOD:
+    case LINE_PARAMETER_STEP_HIGH:
+    case LINE_PARAMETER_STEP_LOW:
+    case LINE_PARAMETER_STEP_SETUP:
+    case LINE_PARAMETER_STEP_HOLD:
+    case LINE_PARAMETER_STEP_OUTPUT:
+    case LINE_PARAMETER_STEP_INVERT:
+    case LINE_PARAMETER_STEP_TRIM: apply_steps(axis); break;
+    case LINE_PARAMETER_CONVERTER_CLOCK:
+    case LINE_PARAMETER_CONVERTER_TRIM: apply_converter(axis); break;
+    case LINE_PARAMETER_FINE_KP: actuator_write(axis, ACTUATOR_FINE_KP, value); break;
+    case LINE_PARAMETER_FINE_KI: actuator_write(axis, ACTUATOR_FINE_KI, value); break;
+    case LINE_PARAMETER_FINE_LIMIT: actuator_write(axis, ACTUATOR_FINE_LIMIT, value); break;
+    case LINE_PARAMETER_OVERRIDE: axis_write(axis, AXIS_OVERRIDE, value); break;
+    default:
+        if (id >= LINE_PARAMETER_FILTERS && id < LINE_PARAMETER_FILTER_1_B0 + 2 * COEFFICIENTS) apply_filters(axis);
+        break;
     }
 }
 

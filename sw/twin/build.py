@@ -26,7 +26,7 @@ else:
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 BUILD = ROOT / "build" / "twin"
-MEMORY_BYTES = 65536
+MEMORY_BYTES = 98304
 CORE_PACKAGE = "pythondata_cpu_picorv32"
 COMPILE = ["-std=c++17", "-O3", "-march=native", "-fPIC", "-fno-strict-aliasing", "-fno-semantic-interposition", "-fvisibility=hidden",
            "-w", "-pthread"]

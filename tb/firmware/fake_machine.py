@@ -275,7 +275,7 @@ class Machine:
     def __init__(self, *axes, map_crc=DEFINES["MAP_CRC"], address=2):
         self.axes, self.address, self.map_crc, self.clk = list(axes) or [Axis()], address, map_crc, 0
         self.gratings = [Grating() for _ in self.axes]
-        self.actuators = [{DEFINES["ACTUATOR_DRIVE"]: 15 << 2} for _ in self.axes]    # words by their offset; all drives are built
+        self.actuators = [{DEFINES["ACTUATOR_DRIVE"]: DEFINES["ACTUATOR_DRIVE_BUILT_MASK"]} for _ in self.axes]    # words by their offset; all drives are built
         self.received, self.sent, self.word, self.crc_bytes = deque(), [], {}, b""
         self.sequence = 0
         self.answers = READ(self.read), WRITE(self.write)               # kept alive as long as the firmware may call
@@ -308,7 +308,8 @@ class Machine:
     def write(self, offset, value):
         d = DEFINES
         if offset >= d["ACTUATOR_BASE"]:
-            self.actuators[(offset - d["ACTUATOR_BASE"]) // d["ACTUATOR_STRIDE"]][offset % d["ACTUATOR_STRIDE"]] = value
+            built = d["ACTUATOR_DRIVE_BUILT_MASK"] if offset % d["ACTUATOR_STRIDE"] == d["ACTUATOR_DRIVE"] else 0
+            self.actuators[(offset - d["ACTUATOR_BASE"]) // d["ACTUATOR_STRIDE"]][offset % d["ACTUATOR_STRIDE"]] = value | built
         elif offset >= d["GRATING_BASE"]:
             axis = (offset - d["GRATING_BASE"]) // d["GRATING_STRIDE"]
             self.gratings[axis].write(offset % d["GRATING_STRIDE"], value)

@@ -9,7 +9,7 @@ import pytest
 
 from host_firmware import SOURCE
 
-MEMORY = 65536
+MEMORY = 98304
 
 
 def build(out, *options, **environment):
