@@ -36,7 +36,7 @@ def test_the_hex_is_the_program_filled_to_the_size_of_the_memory(made):
 def test_the_report_adds_up(made):
     numbers = [int(word) for word in made[1].replace(",", "").split() if word.isdigit()]
     program, data, stack, used, memory, free = numbers
-    assert memory == MEMORY and program + data + stack == used and used + free == memory and stack == 2048
+    assert memory == MEMORY and program + data + stack == used and used + free == memory and stack == 4096
     assert program == (made[0] / "firmware.bin").stat().st_size
 
 

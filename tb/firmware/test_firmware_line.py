@@ -168,14 +168,14 @@ def test_a_parameter_that_does_not_exist_is_refused(number):
 
 def test_start_writes_the_defaults_into_the_registers():
     machine = Machine()
-    word, d = machine.axes[0].word, DEFINES
+    word, actuator, d = machine.axes[0].word, machine.actuators[0], DEFINES
     default = {name: parameter["default"] for name, parameter in PARAMETER.items()}
     for name in ("kp", "ki", "kd", "kv", "ka", "dead_band", "following_limit", "disagreement_limit", "encoder_fault_mask"):
         assert word[d["AXIS_" + name.upper()]] == default[name]
     assert word[d["AXIS_SERVO_LIMITS"]] == default["output_limit"] | default["integral_limit"] << 15
     assert word[d["AXIS_AMPLITUDE_WINDOW"]] == default["amplitude_low"] | default["amplitude_high"] << 16
     assert word[d["AXIS_SENSING"]] == CLK_HZ // 100_000 | default["spike_step"] << 16 | default["spike_hold"] << 24    # 10 us
-    assert word[d["AXIS_PWM_PERIOD"]] == CLK_HZ // 20_000 and word[d["AXIS_CONTROL"]] == 0
+    assert actuator[d["ACTUATOR_PWM_PERIOD"]] == CLK_HZ // 20_000 and word[d["AXIS_CONTROL"]] == 0
     assert word[d["AXIS_BRAKE_RATE"]] == 125_000 * 2**40 // 4000**2 >> 8
     assert machine.word[d["LINE_BASE"] + d["LINE_BIT_TIME"]] == round(16 * CLK_HZ / 115_200)
     assert machine.word[d["LINE_BASE"] + d["LINE_WATCHDOG_TIME"]] == default["watchdog_time"]
@@ -226,7 +226,7 @@ def test_no_part_of_a_millisecond_is_lost():
 
 def test_the_encoder_is_shown_as_it_is():
     machine = Machine()
-    word, d = machine.axes[0].word, DEFINES
+    word, actuator, d = machine.axes[0].word, machine.actuators[0], DEFINES
     word[d["AXIS_SAMPLE"]] = (-100 & 0xFFFF) | (-32768 & 0xFFFF) << 16
     word[d["AXIS_PHASE"]] = 0xFEDC | 101 << 16
     word[d["AXIS_QUADRATURE_COUNT"]] = -5 & 0xFFFFFFFF
