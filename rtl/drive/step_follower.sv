@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // step_follower -- tell a step generator each tick where to go: the target and a trim, in motor steps, and when to begin anew there.
 //
-// latency  58 clk from tick to go or anew; target and trim are taken 8 clk after tick, when those of this tick stand
-// rate     a tick per 58 clk at least
+// latency  57 clk from tick to go or anew; target and trim are taken in the 8th clk after tick, when those of this tick stand
+// rate     a tick per 57 clk at most
 // anew     the first place after the drive came on, and after the target was moved by other than motion (rebase), is where
 //          the generator begins, without a step
 // model    tb/drive/step_follower.py, equal in every bit of every cycle
-// proved   never go and anew at once; no go with a place that was taken before a rebase or with the drive off
-// proof    depth 62
+// proved   never go and anew at once; after a rebase, or with the drive off, no go before an anew
+// proof    depth 125
 `default_nettype none
 
 module step_follower (
@@ -41,7 +41,7 @@ module step_follower (
     always_ff @(posedge clk) begin
         wait_clk <= tick ? 4'd8 : wait_clk == 4'd0 ? 4'd0 : wait_clk - 1'b1;
         rebased  <= rebase || !enable || (rebased && !take);
-        if (take) pending <= rebased;
+        pending  <= (take && rebased) || (pending && !done);
         if (rst) begin
             wait_clk <= '0;
             rebased  <= 1'b1;
@@ -50,18 +50,16 @@ module step_follower (
     end
 
 `ifdef FORMAL
-    logic       past = 1'b0;
-    logic [6:0] since_tick, since_move;         // clk; since_move: since the target was moved or the drive was off
+    logic past = 1'b0, moved = 1'b1;            // target was moved, or the drive was off, since a place was begun at
     always @(posedge clk) begin
-        past       <= 1'b1;
-        since_tick <= tick || rst ? 7'd1 : since_tick + 7'(since_tick != '1);
-        since_move <= rebase || !enable || rst ? 7'd1 : since_move + 7'(since_move != '1);
+        past  <= 1'b1;
+        moved <= rst || rebase || !enable || (moved && !anew);
         if (!past) assume (rst);
-        if (past && since_tick < 7'd58) assume (!tick);
-        if (past && !$past(rst)) begin
+        if (past) begin
             assert (!(go && anew));
-            if (go) assert (enable && !rebase && since_move > 7'd50);
-            cover (go && $past(anew, 58));
+            if (rst || rebase || !enable || moved) assert (rst || !go);
+            assert (!moved || rebased || pending);
+            cover (go && $past(anew, 60));
         end
     end
 `endif

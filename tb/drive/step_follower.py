@@ -20,9 +20,9 @@ class StepFollower:
         if rst:
             self.wait, self.rebased, self.pending = 0, 1, 1
         else:
-            if take:
-                self.pending = self.rebased
+            self.pending = int(take and self.rebased or self.pending and not self.done)
             self.rebased = int(moved or (self.rebased and not take))
             self.wait = 8 if tick else max(self.wait - 1, 0)
+        self.done = done
         fresh = self.pending or self.rebased or moved
         return dict(go=int(done and not fresh), anew=int(done and bool(fresh)), place=place)

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""step_follower: places by hand, when it begins anew, reset in mid-flow, and random inputs against the model in every clk."""
+import random
+
+import cocotb
+from cocotb.triggers import FallingEdge, ReadOnly, Timer
+
+from bench import run, start
+from step_follower import StepFollower
+
+IDLE = dict(ratio=0, shift=0, enable=0, rebase=0, tick=0, target=0, trim=0)
+ONE = 1 << 32                           # a step per period
+LATENCY = 57
+
+
+class Follower:
+    """The design with the model beside it in every cycle."""
+
+    def __init__(self, dut):
+        self.dut, self.model, self.inputs = dut, StepFollower(), dict(IDLE)
+
+    async def reset(self, **inputs):
+        await start(self.dut, **IDLE)
+        await FallingEdge(self.dut.clk)
+        self.inputs.update(inputs)
+        return self
+
+    async def clk(self, rst=0, **inputs):
+        """Strobes last for this clk, levels stay."""
+        self.inputs.update(inputs)
+        for name, level in [*self.inputs.items(), ("rst", rst)]:
+            getattr(self.dut, name).value = level
+        await FallingEdge(self.dut.clk)
+        await ReadOnly()
+        want = self.model.clk(rst, **self.inputs)
+        got = dict(go=int(self.dut.go.value), anew=int(self.dut.anew.value), place=self.dut.place.value.to_signed())
+        assert got == want, f"{self.inputs}: {got}, the model has {want}"
+        self.inputs.update(tick=0, rebase=0)
+        await Timer(1, "step")
+        return got
+
+    async def tick(self, at_clk=None, **inputs):
+        """What a tick leads to, and after how many clk; `inputs` come at clk `at_clk` after the tick."""
+        for clk in range(1, 100):
+            now = inputs if clk - 1 == at_clk else {}
+            got = await self.clk(tick=clk == 1, **now)
+            if got["go"] or got["anew"]:
+                return ("go" if got["go"] else "anew"), got["place"], clk
+        return None
+
+
+@cocotb.test()
+async def latency_is_57_and_the_place_is_target_and_trim_in_steps(dut):
+    follower = await Follower(dut).reset(enable=1, ratio=5 * ONE // 2, target=3 << 16)
+    assert await follower.tick() == ("anew", 15 << 15, LATENCY)
+    assert await follower.tick() == ("go", 15 << 15, LATENCY)
+    follower.inputs.update(target=-7, ratio=-ONE)
+    assert await follower.tick() == ("go", 7, LATENCY)
+    follower.inputs.update(trim=-32768, shift=15, target=0)
+    assert (await follower.tick())[1] == 1 << 30
+    follower.inputs.update(trim=32767, shift=0)
+    assert (await follower.tick())[1] == -32767
+
+
+@cocotb.test()
+async def target_is_taken_in_the_8th_clk_after_the_tick(dut):
+    follower = await Follower(dut).reset(enable=1, ratio=ONE, target=1)
+    assert (await follower.tick(8, target=2))[1] == 2 and (await follower.tick(9, target=3))[1] == 2
+
+
+@cocotb.test()
+async def it_begins_anew_after_a_rebase_whenever_it_comes(dut):
+    follower = await Follower(dut).reset(enable=1, ratio=ONE)
+    for at in [*range(0, LATENCY - 1), None]:
+        await follower.tick()
+        assert (await follower.tick())[0] == "go"
+        if at is None:
+            await follower.clk(rebase=1)
+        else:
+            assert (await follower.tick(at, rebase=1))[0] == "anew"
+        if at is None or at >= 8:                           # the place was taken before: the next one begins anew again
+            assert (await follower.tick())[0] == "anew"
+        assert (await follower.tick())[0] == "go"
+
+
+@cocotb.test()
+async def nothing_goes_with_the_drive_off_and_it_begins_anew_with_it_on(dut):
+    follower = await Follower(dut).reset(enable=1, ratio=ONE)
+    await follower.tick()
+    follower.inputs.update(enable=0, target=9 << 16)
+    assert [(await follower.tick())[0] for _ in range(3)] == ["anew"] * 3
+    follower.inputs.update(enable=1)
+    assert [(await follower.tick())[0] for _ in range(2)] == ["anew", "go"]
+
+
+@cocotb.test()
+async def a_reset_in_mid_flow_forgets_the_place(dut):
+    follower = await Follower(dut).reset(enable=1, ratio=ONE)
+    await follower.tick()
+    await follower.clk(tick=1)
+    for _ in range(30):
+        await follower.clk()
+    await follower.clk(1)
+    for _ in range(80):
+        got = await follower.clk()
+        assert not got["go"] and not got["anew"]
+    assert (await follower.tick())[0] == "anew"
+
+
+@cocotb.test()
+async def any_input_matches_the_model(dut):
+    follower, since = await Follower(dut).reset(), 0
+    for _ in range(6000):
+        since = 0 if since > 56 and random.random() < 0.1 else since + 1
+        follower.inputs.update(ratio=random.randrange(-1 << 47, 1 << 47), target=random.randrange(-1 << 47, 1 << 47),
+                               trim=random.randrange(-1 << 15, 1 << 15), shift=random.randrange(16))
+        await follower.clk(int(random.random() < 0.002), tick=int(since == 0), enable=int(random.random() < 0.995),
+                           rebase=int(random.random() < 0.01))
+
+
+def test_step_follower():
+    run("step_follower", __file__)
