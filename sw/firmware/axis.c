@@ -189,12 +189,14 @@ uint8_t axis_home(unsigned n)
     return LINE_CAUSE_OK;
 }
 
-// What every motion to a position asks first.
+// What every motion to a position asks first. One that only settles is over as soon as another is wanted.
 static uint8_t may_go(unsigned n, int64_t target)
 {
+    struct axis *a = &axes[n];
     uint8_t cause = ready(n);
-    if (cause != LINE_CAUSE_OK) return cause;
-    if (!axes[n].homed) return LINE_CAUSE_NOT_HOMED;
+    if (cause != LINE_CAUSE_OK && !(cause == LINE_CAUSE_BUSY && (a->state == LINE_STATE_SETTLING || a->state == LINE_STATE_MOVING)))
+        return cause;
+    if (!a->homed) return LINE_CAUSE_NOT_HOMED;
     if (target < parameters_get(n, LINE_PARAMETER_TRAVEL_LOW) || target > parameters_get(n, LINE_PARAMETER_TRAVEL_HIGH))
         return LINE_CAUSE_OUT_OF_TRAVEL;
     return LINE_CAUSE_OK;
@@ -205,6 +207,7 @@ uint8_t axis_prepare(unsigned n, int64_t target, uint32_t *duration_ticks)
     struct axis *a = &axes[n];
     uint8_t cause = may_go(n, target);
     if (cause != LINE_CAUSE_OK) return cause;
+    if (a->state == LINE_STATE_MOVING) return LINE_CAUSE_BUSY;
     if (!motion_prepare(n, target - axis_read_position(n, AXIS_TARGET), LINE_PARAMETER_VELOCITY)) return LINE_CAUSE_OUT_OF_RANGE;
     a->ended = LINE_CAUSE_RUNNING;
     a->state = LINE_STATE_PREPARED;
@@ -231,7 +234,15 @@ uint8_t axis_start_prepared(unsigned count, uint32_t mask)
 
 uint8_t axis_move(unsigned n, int64_t target, uint32_t *duration_ticks)
 {
-    uint8_t cause = axis_prepare(n, target, duration_ticks);
+    uint8_t cause;
+    axis_poll(n);
+    if (axes[n].state == LINE_STATE_MOVING) {
+        cause = may_go(n, target);
+        if (cause != LINE_CAUSE_OK) return cause;
+        *duration_ticks = 0;
+        return motion_retarget(n, target, LINE_PARAMETER_VELOCITY) ? LINE_CAUSE_OK : LINE_CAUSE_BUSY;
+    }
+    cause = axis_prepare(n, target, duration_ticks);
     if (cause != LINE_CAUSE_OK) return cause;
     set_off(n);
     motion_start(n);

@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0xFD2A1B9Eu    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0xAF711DB1u    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -121,7 +121,7 @@ enum line_operation {
     LINE_OPERATION_STATUS = 2,    // state, position and faults of an axis; ended is the cause of the last motion
     LINE_OPERATION_ENABLE = 3,    // drive on (1) or off (0)
     LINE_OPERATION_HOME = 4,    // find the zero by the method of the parameter home_method
-    LINE_OPERATION_MOVE = 5,    // go to a position
+    LINE_OPERATION_MOVE = 5,    // go to a position; also while the axis moves to another (duration_ticks is 0 then): it goes on from where it is
     LINE_OPERATION_STOP = 6,    // controlled stop; the drive stays on
     LINE_OPERATION_RESET_FAULTS = 7,    // clear latched faults whose cause is gone; the drive stays off
     LINE_OPERATION_GET_PARAMETER = 8,    // read a parameter

@@ -8,8 +8,13 @@
 #include "parameters.h"
 #include "planner.h"
 
+#define PIECE_TICKS 64u          // 16 ms: what is queued cannot be taken back when the target changes,
+#define QUEUE 16u                // segments in the player
+#define PIECES_AHEAD 4u         // so it is kept short; the firmware looks here far more often
+
 static struct motion {
     struct plan plan;
+    int64_t from;               // target when the plan began
     bool inside;                // the error has been inside the window since inside_ms
     uint32_t inside_ms;
     uint32_t since_ms;          // start of settling
@@ -38,8 +43,8 @@ void motion_feed(unsigned n)
     struct planner_segment piece;
     bool last;
     if (plan->next >= plan->count) return;
-    uint32_t room = FIELD_GET(axis_read(n, AXIS_STATE), AXIS_STATE_QUEUE_FREE);
-    while (room-- && planner_take(plan, &piece, &last)) {
+    uint32_t free = FIELD_GET(axis_read(n, AXIS_STATE), AXIS_STATE_QUEUE_FREE), queued = QUEUE - free;
+    while (queued++ < PIECES_AHEAD && planner_take_up_to(plan, &piece, &last, PIECE_TICKS)) {
         axis_write_wide(n, AXIS_SEGMENT_VELOCITY, (uint64_t)piece.velocity);
         axis_write_wide(n, AXIS_SEGMENT_ACCELERATION, (uint64_t)piece.acceleration);
         axis_write(n, AXIS_SEGMENT_JERK, (uint32_t)piece.jerk);
@@ -50,9 +55,17 @@ void motion_feed(unsigned n)
 bool motion_prepare(unsigned n, int64_t distance, uint8_t velocity_id)
 {
     struct planner_limits limits = parameters_limits(n, velocity_id);
+    motions[n].from = axis_read_position(n, AXIS_TARGET);
     if (!planner_move(&motions[n].plan, &limits, distance)) return false;
     motion_feed(n);
     return true;
+}
+
+bool motion_retarget(unsigned n, int64_t target, uint8_t velocity_id)
+{
+    struct motion *m = &motions[n];
+    struct planner_limits limits = parameters_limits(n, velocity_id);
+    return m->plan.next < m->plan.count && planner_retarget(&m->plan, &limits, target - m->from);
 }
 
 void motion_start(unsigned n)

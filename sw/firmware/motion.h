@@ -14,6 +14,10 @@ void motion_feed(unsigned n);           // to be called often while something is
 bool motion_prepare(unsigned n, int64_t distance, uint8_t velocity_id);
 void motion_start(unsigned n);
 bool motion_play(unsigned n, int64_t distance, uint8_t velocity_id);
+
+// Another target (2^-16 period) while a motion is played. false: refused, or its last piece is queued already; it goes on as it was.
+bool motion_retarget(unsigned n, int64_t target, uint8_t velocity_id);
+
 bool motion_played(unsigned n);
 uint32_t motion_ticks(unsigned n);      // duration of the motion planned last
 

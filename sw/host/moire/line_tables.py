@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0xFD2A1B9E
+PROTOCOL_CRC = 0xAF711DB1
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -158,7 +158,7 @@ OPERATIONS = {operation.name: operation for operation in (
     Operation("home", 4, "find the zero by the method of the parameter home_method",
               (("axis", "u8"),),
               ()),
-    Operation("move", 5, "go to a position",
+    Operation("move", 5, "go to a position; also while the axis moves to another (duration_ticks is 0 then): it goes on from where it is",
               (("axis", "u8"), ("target", "i64"),),
               (("duration_ticks", "u32"),)),
     Operation("stop", 6, "controlled stop; the drive stays on",
