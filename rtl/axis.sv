@@ -103,18 +103,16 @@ module axis #(
     // control
     wire signed [47:0] target;
     wire signed [31:0] target_velocity, target_acceleration, error;
-    wire        [32:0] rate;
     wire               moving, armed, underrun, commanded, saturated, block_up, block_down;
     wire        [4:0]  queue_free;
     wire signed [15:0] servo_command;
 
-    override_ramp u_override (.clk, .rst, .slope(override_slope), .curve(override_curve), .percent(override_percent), .pause(override_pause),
-                              .moving, .tick, .rate);
-    profile_player u_profile (.clk, .rst, .brake_rate, .brake_jerk, .rate, .tick, .push(segment_ticks_written), .segment_velocity,
-                              .segment_acceleration, .segment_jerk, .segment_ticks, .segment_last, .start(strobes_start || start),
-                              .arm(strobes_arm), .start_at, .now, .brake(strobes_brake), .hold_here(strobes_hold_here), .position,
-                              .shift(shift_origin_written), .shift_periods(shift_origin), .target, .target_velocity, .target_acceleration,
-                              .moving, .armed, .queue_free, .underrun);
+    profile_player u_profile (.clk, .rst, .brake_rate, .brake_jerk, .slope(override_slope), .curve(override_curve), .percent(override_percent),
+                              .pause(override_pause), .tick, .push(segment_ticks_written), .segment_velocity, .segment_acceleration,
+                              .segment_jerk, .segment_ticks, .segment_last, .start(strobes_start || start), .arm(strobes_arm), .start_at, .now,
+                              .brake(strobes_brake), .hold_here(strobes_hold_here), .position, .shift(shift_origin_written),
+                              .shift_periods(shift_origin), .target, .target_velocity, .target_acceleration, .moving, .armed, .queue_free,
+                              .underrun);
     pid_servo #(.BIQUADS(FILTERS)) u_servo (.clk, .rst, .closed_loop(control_closed_loop), .kp, .ki, .kd, .kv, .ka, .output_limit, .integral_limit,
                        .dead_band, .gains_changed(kp_written || kd_written || kv_written || ka_written), .filters_in_use,
                        .coefficient_write(filter_coefficient_written), .coefficient_address(filters_address),

@@ -1,19 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 // profile_player -- play queued segments of constant jerk, at full speed or slower, and stop within limits from anywhere.
 //
-// latency  2 clk from tick to target, which makes the step prepared after the tick before; a shift delays it by one clk.
-//          The first tick after start only prepares
-// rate     one step per tick; a tick at least 80 clk after the one before, and one more for each segment of 0 ticks in a
-//          row; 220 clk after the first of a brake
+// latency  2 clk from tick to target, target_velocity and moving, 3 to target_acceleration: the step was prepared after the
+//          tick before; a shift delays it by one clk. The first tick after start only prepares
+// rate     one step per tick; a tick at least 160 clk after the one before, and 12 more for each segment of 0 ticks in a
+//          row; 390 clk after the first of a brake. A tick that comes before its step is prepared is lost.
+//          The six words of a segment stand for 7 clk from push; a push less than 7 clk after another is lost
 // exact    a segment moves the profile by v n + a n(n-1)/2 + j n(n-1)(n-2)/6 in n ticks, in 2^-40 period. All bits are
-//          kept from segment to segment and rounded to the LSB of target (half up) when the profile ends
-// slower   target is the quadratic B-spline of the profile's positions, read at a time that advances by `rate`. So at any
+//          kept from segment to segment and rounded to the LSB of target (half up) with the last step of the profile
+// slower   target is the quadratic B-spline of the profile's positions, read at a time that advances by the rate. So at any
 //          rate from 0 to 100 % |velocity|, |acceleration| and |jerk| stay below those of the segments times rate,
-//          rate^2, rate^2; at 100 % each step is the mean of two of the profile. The lengths are those of the profile
+//          rate^2, rate^2; at 100 % each step is the mean of two of the profile. The lengths are those of the profile.
 //          Where the velocity itself steps between two segments, one step below 100 % may exceed it by half of that
+// rate's   way to `percent`: it changes by `slope` a tick at most, its change by `curve`, and it ends at the setting exactly,
+//          whatever the setting did on the way; a profile begins at the setting
 // brake    from the step and the acceleration made last: the acceleration changes by brake_jerk a tick at most, a part of
-//          brake_jerk in the first and the last, is brought below brake_rate, and both end at zero (approach_law)
-// source   forward differences of a cubic; Schoenberg, Quart. Appl. Math. 4 (1946) 45
+//          brake_jerk in the first and the last, is brought below brake_rate, and both end at zero
+// law      of both ways to zero: the slope is a whole number of paces; area is what it still adds while it falls to zero
+//          from here. It grows while what is left is enough for the larger area, falls when that is less than the area,
+//          else it stays. Less than a pace is left in the end, and is the last step
+// source   forward differences of a cubic; Schoenberg, Quart. Appl. Math. 4 (1946) 45; time-optimal control of two
+//          integrators, made discrete so that it ends at zero without chatter
+// built    one adder of 72 bits and 16 words of memory, moved by profile_program (tables/profile_program.py)
+// proved   target moves by a step, shift or hold_here only, by the whole of it; what stops moving has no velocity nor
+//          acceleration; queue_free is never above DEPTH; brake and underrun leave the queue empty
+// proof    depth 8, DEPTH = 2
 // model    tb/control/profile_player.py, equal in every bit of every cycle
 `default_nettype none
 
@@ -24,7 +35,10 @@ module profile_player #(
     input  wire                  rst,                           // target becomes zero, the queue empty
     input  wire        [31:0]    brake_rate,                    // 2^-32 period/tick2; 0: velocity is zero after one step
     input  wire        [31:0]    brake_jerk,                    // 2^-40 period/tick3; 0, or more than brake_rate: not limited
-    input  wire        [32:0]    rate,                          // 2^-32 tick of the profile per tick, 2^32 at most: override_ramp
+    input  wire        [31:0]    slope,                         // of the rate, 2^-32 per tick; 0: no limit
+    input  wire        [31:0]    curve,                         // of the rate, 2^-32 per tick2; 0: no limit but slope
+    input  wire        [16:0]    percent,                       // rate wanted, 2^-16: 65536 is 100 %, more is taken for it
+    input  wire                  pause,                         // the rate wanted is 0
     input  wire                  tick,                          // strobe: servo tick
     input  wire                  push,                          // strobe: queue the segment; lost when full or braking
     input  wire signed [63:0]    segment_velocity,              // 2^-40 period/tick, at the start of the segment
@@ -52,216 +66,208 @@ module profile_player #(
     if (DEPTH < 2 || DEPTH > 16 || (DEPTH & (DEPTH - 1)) != 0) begin : g_check DEPTH_MUST_BE_2_4_8_OR_16 u_error (); end
 
     localparam int A = $clog2(DEPTH);
-    localparam [71:0] HALF = 72'd1 << 23;
 
-    enum logic [3:0] {WAIT, MAKE, ROUND, ADVANCE, CROSS, LOAD, SCALE, SLOPE, BEND, PREPARED, DIVIDE, SUM, DECIDE, BRAKE} state;
+    // as in tables/profile_program.py
+    localparam [4:0] GOTO = 5'd1, NEGATIVE = 5'd2, POSITIVE = 5'd3, QUOTIENT = 5'd4, LOOP = 5'd5, MULTIPLY = 5'd6, FACTOR = 5'd7,
+                     COUNT_31 = 5'd8, WORD = 5'd9, POP = 5'd10, LAST = 5'd11, STARVED = 5'd12, READY = 5'd13, CROSS = 5'd14,
+                     CROSSED = 5'd15, FIRST = 5'd16, LATER = 5'd17, STOPPING = 5'd18, WIDE = 5'd19, ARRIVED = 5'd20,
+                     SET_UPWARD = 5'd21, END = 5'd22, ARRIVE = 5'd23, PREPARED = 5'd24, WAIT = 5'd25, MAKE = 5'd26, DISPATCH = 5'd27;
+    localparam [2:0] LIMIT = 3'd1, CURVE = 3'd2, SETTING = 3'd3, FULL = 3'd4, HALF = 3'd5, QUEUE_LOW = 3'd6, QUEUE_HIGH = 3'd7;
+    localparam [4:0] LOW = 5'd9;
 
-    logic [184:0]       queue [0:DEPTH-1];
-    logic [A-1:0]       write_at, read_at;
-    logic [71:0]        exact;                                  // 2^-40 period
-    logic signed [63:0] step, change;                           // to be made next, and less the one before
-    logic               ready, final_step;                      // `step` is prepared; the profile ends with it
+    logic        ready, last, final_step;                       // a step is prepared; of the segment; of the prepared step
+    logic        braking, stopping, first;                      // a brake is wanted; is what the program is at; its first step
+    logic        upward, arrived, crossed, wide, negative;
 
-    // the profile: this interval of a tick, and the place in it
-    logic signed [63:0] velocity, acceleration;                 // while braking: area and slope of approach_law
-    logic signed [31:0] jerk;
-    logic        [23:0] left;                                   // intervals of this segment
-    logic        [31:0] fraction;                               // of the interval gone
-    logic signed [63:0] offset;                                 // target less the position at the start of the interval
-    logic               last, ended, crossed;
+    // the program
+    logic [6:0]  line;
+    logic [4:0]  count;
+    logic        jump;
+    wire  [6:0]  target_line;
+    wire  [4:0]  job, place, word;
+    wire         halved, with_acc;
+    wire  [1:0]  sign;
 
-    // brake
-    logic               braking, divided, abrupt, upward, stop_last, grow;
-    logic        [39:0] pace;                                   // change of acceleration per tick
-    logic        [39:0] remainder;
-
-    // serial multiplier, and dividend of the division
-    logic signed [63:0] product;
-    logic        [31:0] multiplier;
-    logic        [5:0]  count;
-
-    wire [184:0] head   = queue[read_at];
-    wire         full   = queue_free == 5'd0;
-    wire         empty  = queue_free == 5'(DEPTH);
-    wire         put    = push && !full && !braking;
-    wire         fetch  = state == LOAD && !braking && !last && !empty;
-    wire         starve = state == LOAD && !braking && !last && empty;
-    wire         move   = state == MAKE && !shift;
-    wire         finish = state == ROUND && !shift;
+    wire         full    = queue_free == 5'd0;
+    wire         empty   = queue_free == 5'(DEPTH);
+    wire         clear   = hold_here || rst;
+    wire         ticked  = job == WAIT && tick && moving;
+    wire         make    = job == MAKE && !shift;
+    wire         pop     = job == POP && !empty && !brake;      // a brake may have emptied it on the way
+    wire         starve  = job == STARVED && !braking && empty;
     wire         reached = armed && $signed(now - start_at) >= 0;
     wire         begins  = (start || reached) && !empty && !moving && !brake;
 
-    // one adder for every cause of a new target
-    wire [71:0] base   = hold_here ? {position, 24'd0} : exact;
-    wire [71:0] growth = shift     ? {shift_periods, 40'd0} :
-                         hold_here ? 72'd0 :
-                         move      ? {{8{step[63]}}, step} : HALF;
+    always_comb begin
+        case (job)
+            GOTO, PREPARED, END, ARRIVE: jump = 1'b1;
+            NEGATIVE, QUOTIENT: jump = negative;
+            POSITIVE:           jump = !negative;
+            LOOP, MULTIPLY:     jump = count != 5'd31;
+            LAST:               jump = last && !braking;
+            STARVED:            jump = braking || empty;
+            READY:              jump = ready;
+            CROSSED:            jump = crossed;
+            FIRST:              jump = stopping && first;
+            LATER:              jump = !first;
+            STOPPING:           jump = stopping;
+            MAKE:               jump = final_step;
+            WIDE:               jump = wide;
+            ARRIVED:            jump = arrived;
+            WAIT:               jump = !ready;
+            DISPATCH:           jump = braking;
+            default:            jump = 1'b0;
+        endcase
+    end
 
-    // product = multiplicand x fraction, one bit of the fraction a clk
-    wire signed [63:0] multiplicand = state == SLOPE ? acceleration : offset;
-    wire        [64:0] addend = multiplier[0] ? {multiplicand[63], multiplicand} : 65'd0;
-    wire        [64:0] sum = {product[63], product} + addend;           // its lowest bit is below the LSB
-    wire signed [63:0] product_now = $signed(sum[64:1]);
-    wire        [32:0] time_sum = {1'b0, fraction} + rate;
-    logic signed [63:0] step_base;
-    wire signed [63:0] next_step = step_base + offset;
+    wire         stay = (job == WAIT && !ticked) || (job == MAKE && shift);
+    wire  [6:0]  next = clear ? 7'd0 : stay ? line : jump ? target_line : line + 7'd1;
 
-    // brake: quotient of |change| by pace, and the area below it, a bit at a time
-    wire        [39:0] rate_limit = {brake_rate, 8'd0};
-    wire               no_pace    = brake_jerk == 32'd0 || {8'd0, brake_jerk} > rate_limit;
-    wire        [40:0] trial      = {remainder, product[63]};
-    wire               bit_now    = trial >= {1'b0, pace};
-    wire               turn, upward_now, last_now, grow_now, fall_now;
-    wire               may_grow   = divided || !turn || remainder == 40'd0;      // from its other side it would be more than pace
-    wire signed [63:0] braking_step = upward ? acceleration : -acceleration;
+    profile_program u_program (.clk, .next, .code({target_line, job, halved, with_acc, sign, place, word}));
 
-    approach_law #(.W(64)) u_law (.change({24'd0, pace}), .limit({24'd0, rate_limit}), .value(step), .slope(acceleration), .upward,
-                                  .area(velocity), .turn, .upward_now, .last(last_now), .grow(grow_now), .fall(fall_now));
+    // the queue: seven words a segment, written and read one a clk
+    logic [32:0]  queue [0:DEPTH*8-1];
+    logic [32:0]  queue_in, queue_out, queue_word;
+    logic [A-1:0] write_at, read_at;
+    logic [2:0]   write_word, read_word;
 
-    wire step_fits   = step[63:55]   == {9{step[63]}};
-    wire change_fits = change[63:55] == {9{change[63]}};
+    wire          put   = push && !full && !braking && write_word == 3'd0;
+    wire          write = put || write_word != 3'd0;
 
-    wire unused = &{1'b0, sum[0]};
-
-    assign target = exact[71:24];
+    always_comb begin
+        case (write_word)
+            3'd0:    queue_in = {1'b0, segment_velocity[31:0]};
+            3'd1:    queue_in = {1'b0, segment_velocity[63:32]};
+            3'd2:    queue_in = {1'b0, segment_acceleration[31:0]};
+            3'd3:    queue_in = {1'b0, segment_acceleration[63:32]};
+            3'd4:    queue_in = {1'b0, segment_jerk};
+            3'd5:    queue_in = {33{segment_jerk[31]}};
+            default: queue_in = {segment_last, 8'd0, segment_ticks};
+        endcase
+    end
 
     always_ff @(posedge clk) begin
-        if (put) queue[write_at] <= {segment_last, segment_ticks, segment_jerk, segment_acceleration, segment_velocity};
-        if (put) write_at <= write_at + 1'b1;
-        if (fetch) read_at <= read_at + 1'b1;
-        if (put != fetch) queue_free <= put ? queue_free - 1'b1 : queue_free + 1'b1;
+        if (write) queue[{write_at, write_word}] <= queue_in;
+        queue_out  <= queue[{read_at, read_word}];
+        queue_word <= queue_out;
+    end
 
-        if (shift || hold_here || move || finish) exact <= base + growth;
+    // the adder and its memory
+    logic        [71:0] memory [0:15];
+    logic        [71:0] acc;
+    logic        [31:0] factor;
+    logic        [39:0] outside;
+
+    wire                from_memory = !place[4] || !place[3];
+    wire                gate      = from_memory && job != MAKE && (job != MULTIPLY || factor[0]);
+    wire         [3:0]  read_from = place[4] ? {1'b0, !stopping, place[1:0]} : place[3:0];
+    wire         [3:0]  write_to  = word[4] ? {1'b0, !stopping, word[1:0]} : word[3:0];
+    wire         [71:0] stored    = memory[read_from];
+    wire                queue_high = !from_memory && place[2:0] == QUEUE_HIGH;
+    wire         [32:0] setting   = pause ? 33'd0 : percent[16] ? 33'h1_0000_0000 : {1'b0, percent[15:0], 16'd0};
+
+    always_comb begin
+        case (place[2:0])
+            LIMIT:     outside = stopping ? {brake_rate, 8'd0} : {8'd0, slope};
+            CURVE:     outside = {8'd0, stopping ? brake_jerk : curve};
+            SETTING:   outside = {7'd0, setting};
+            FULL:      outside = 40'h1_0000_0000;
+            HALF:      outside = {16'd0, final_step, 23'd0};
+            QUEUE_LOW: outside = {8'd0, queue_word[31:0]};
+            default:   outside = '0;
+        endcase
+        if (from_memory) outside = '0;
+    end
+
+    wire         [71:0] term = (stored & {{48{gate && place != LOW}}, {24{gate}}})
+                               | {queue_high ? {{8{queue_word[31]}}, queue_word[31:0]} : {32'd0, outside[39:32]}, outside[31:0]};
+    wire                minus = sign[1] ? sign[0] == upward : sign[0];
+    wire         [71:0] sum   = (with_acc ? acc : '0) + (term ^ {72{minus}}) + 72'(minus);
+
+    // target: moved by a step or a shift, or set
+    wire  signed [47:0] from = hold_here ? position : target;
+    wire  signed [47:0] by   = shift ? {shift_periods, 16'd0} : make && !hold_here ? acc[71:24] : '0;
+
+    wire                fits = stored[71:55] == {17{stored[71]}};
+    wire  signed [31:0] held = fits ? stored[55:24] : {stored[71], {31{~stored[71]}}};
+
+    always_ff @(posedge clk) begin
+        line     <= next;
+        acc      <= halved ? {sum[71], sum[71:1]} : sum;
+        if (job == FACTOR) acc <= '0;
+        negative <= sum[71];
+        if (!word[4] || !word[3]) memory[write_to] <= sum;
+        if (job == FACTOR) factor <= sum[31:0];
+        else if (job == QUOTIENT || job == MULTIPLY) factor <= {!negative, factor[31:1]};
+        if (job == COUNT_31) count <= 5'd1;
+        else if (job == LOOP || job == MULTIPLY) count <= count + 1'b1;
+        if (job == COUNT_31) wide <= 1'b0;
+        else if (job == MULTIPLY && acc[71:68] != 4'd0) wide <= 1'b1;
+        if (job == SET_UPWARD) upward <= sum[71];
+        if (job == ARRIVED) arrived <= 1'b0;
+        else if (job == ARRIVE) arrived <= sum[71];
+        if (ticked || job == DISPATCH) stopping <= braking;
+        else if (job == STARVED && jump) stopping <= 1'b1;
+        if (job == END) final_step <= 1'b1;
+        if (job == PREPARED) begin
+            ready <= 1'b1;
+            first <= !stopping;
+        end
+
+        if (put || write_word != 3'd0) write_word <= write_word == 3'd6 ? 3'd0 : write_word + 1'b1;
+        if (write_word == 3'd6) write_at <= write_at + 1'b1;
+        if (job == WAIT) {crossed, read_word} <= '0;
+        if (job == CROSS) crossed <= 1'b1;
+        if (job == WORD || job == STARVED) read_word <= read_word + 1'b1;
+        if (job == POP) {last, read_word} <= {queue_word[32], 3'd0};
+        if (pop) read_at <= read_at + 1'b1;
+        if (put != pop) queue_free <= put ? queue_free - 1'b1 : queue_free + 1'b1;
+
+        target   <= from + by;
         underrun <= starve;
         if (arm || reached) armed <= arm;
         if (begins) moving <= 1'b1;
         if ((brake && moving) || starve) braking <= 1'b1;
-        case (state)
-            MAKE: if (move) begin
-                target_velocity     <= step_fits ? step[55:24] : {step[63], {31{~step[63]}}};
-                target_acceleration <= change_fits ? change[55:24] : {change[63], {31{~change[63]}}};
-                state               <= final_step ? ROUND : braking ? divided ? DECIDE : DIVIDE : ADVANCE;
-            end
-            ROUND: if (finish) begin
-                exact[23:0]         <= '0;
-                target_velocity     <= '0;
-                target_acceleration <= '0;
-                {moving, braking, divided, last, ended, ready, final_step} <= '0;
-                {left, fraction, offset, step, change} <= '0;
-                state               <= WAIT;
-            end
-            ADVANCE: begin                                      // the time
-                {crossed, fraction} <= time_sum;
-                step_base           <= -offset;
-                state               <= left == 24'd0 ? LOAD : time_sum[32] ? CROSS : SCALE;
-            end
-            CROSS: begin                                        // into the next interval
-                step_base    <= step_base + velocity;
-                velocity     <= velocity + acceleration;
-                acceleration <= acceleration + {{32{jerk[31]}}, jerk};
-                left         <= left - 1'b1;
-                crossed      <= 1'b0;
-                state        <= left == 24'd1 ? LOAD : SCALE;
-            end
-            LOAD: begin
-                if (fetch) {last, left, jerk, acceleration, velocity} <= head;
-                if (last) begin
-                    velocity     <= '0;
-                    acceleration <= '0;
-                    ended        <= 1'b1;
-                end
-                state <= braking || starve ? DIVIDE : last ? SCALE : head[183:160] == 24'd0 ? LOAD : crossed ? CROSS : SCALE;
-            end
-            SCALE: begin                                        // offset = v/2 + fraction (v + fraction a/2)
-                product    <= '0;
-                multiplier <= fraction;
-                count      <= '0;
-                offset     <= velocity >>> 1;
-                state      <= fraction == 32'd0 || ended ? PREPARED : SLOPE;
-            end
-            SLOPE, BEND: begin
-                product    <= product_now;
-                multiplier <= {multiplier[0], multiplier[31:1]};
-                count      <= count + 1'b1;
-                if (count == 6'd31) begin
-                    count   <= '0;
-                    product <= '0;
-                    offset  <= state == SLOPE ? velocity + (product_now >>> 1) : (velocity >>> 1) + product_now;
-                    state   <= state == SLOPE ? BEND : PREPARED;
-                end
-            end
-            PREPARED: begin
-                step       <= next_step;
-                change     <= next_step - step;
-                ready      <= 1'b1;
-                final_step <= ended;
-                state      <= WAIT;
-            end
-            DIVIDE: begin                                       // the first step of a brake: how many changes the acceleration is high
-                product      <= change[63] ? -change : change;
-                upward       <= !change[63];
-                pace         <= no_pace ? rate_limit : {8'd0, brake_jerk};
-                abrupt       <= brake_rate == 32'd0;
-                remainder    <= '0;
-                velocity     <= '0;
-                acceleration <= '0;
-                count        <= '0;
-                multiplier   <= '0;
-                state        <= SUM;
-            end
-            SUM: begin                                          // two clk for each bit, by the lowest bit of multiplier
-                multiplier[0] <= !multiplier[0];
-                if (multiplier[0]) begin
-                    velocity     <= velocity + (crossed ? {24'd0, pace} : 64'd0);
-                    acceleration <= {acceleration[62:0], 1'b0} + (crossed ? {24'd0, pace} : 64'd0);
-                    count        <= count + 1'b1;
-                    if (count == 6'd63) state <= DECIDE;
-                end else begin
-                    crossed   <= bit_now;
-                    remainder <= 40'(bit_now ? trial - {1'b0, pace} : trial);
-                    product   <= {product[62:0], 1'b0};
-                    velocity  <= {velocity[61:0], 2'b0} + (bit_now ? acceleration : -acceleration);
-                    if (velocity[63:60] != 4'd0) abrupt <= 1'b1;
-                end
-            end
-            DECIDE: begin
-                upward    <= upward_now;
-                grow      <= grow_now && may_grow;
-                stop_last <= abrupt || (last_now && divided);
-                state     <= BRAKE;
-                if (grow_now && may_grow) acceleration <= acceleration + {24'd0, pace};
-                if (fall_now && divided) begin
-                    velocity     <= velocity - acceleration;
-                    acceleration <= acceleration - {24'd0, pace};
-                end
-            end
-            BRAKE: begin
-                if (grow) velocity <= velocity + acceleration;
-                change     <= stop_last ? -step : braking_step;
-                step       <= stop_last ? '0 : step + braking_step;
-                divided    <= 1'b1;
-                ready      <= 1'b1;
-                final_step <= stop_last;
-                state      <= WAIT;
-            end
-            default: if (tick && moving) state <= ready ? MAKE : braking ? DIVIDE : ADVANCE;
-        endcase
-        if (brake || starve || hold_here || rst) begin
+        if (make) target_velocity <= final_step ? '0 : held;
+        if (make && final_step) target_acceleration <= '0;
+        else if (job == DISPATCH) target_acceleration <= held;
+
+        if (brake || starve || clear) begin
             queue_free <= 5'(DEPTH);
-            write_at   <= '0;
-            read_at    <= '0;
+            write_at   <= read_at;
+            write_word <= '0;
         end
-        if (brake || hold_here || rst) armed <= 1'b0;
-        if (hold_here || rst) begin
-            state               <= WAIT;
+        if (clear || (make && final_step)) {moving, braking, ready, last, final_step, arrived} <= '0;
+        if (clear || (make && final_step)) {first, count} <= 6'b1_00000;
+        if (brake || clear) armed <= 1'b0;
+        if (clear) begin
             underrun            <= 1'b0;
             target_velocity     <= '0;
             target_acceleration <= '0;
-            {moving, braking, divided, last, ended, ready, final_step} <= '0;
-            {left, fraction, offset, step, change} <= '0;
         end
-        if (rst) exact <= '0;
+        if (rst) {target, write_at, read_at} <= '0;
     end
+
+`ifdef FORMAL
+    logic past = 1'b0;
+    always_ff @(posedge clk) begin
+        past <= 1'b1;
+        if (!past) assume (rst);
+        if (past) begin
+            assert (queue_free <= 5'(DEPTH));
+            assert (write_word != 3'd7);
+            assert (!underrun || (queue_free == 5'(DEPTH) && braking));
+            if (!$past(rst || hold_here || shift || make)) assert (target == $past(target));
+            if ($past(shift && !hold_here && !rst)) assert (target == $past(target) + {$past(shift_periods), 16'd0});
+            if ($past(hold_here && !shift && !rst)) assert (target == $past(position));
+            if ($past(rst || hold_here)) assert (!moving && !armed && !ready && target_velocity == '0 && target_acceleration == '0 && line == '0);
+            if ($past(moving) && !moving) assert (target_velocity == '0 && target_acceleration == '0);
+            if ($past(brake) && !$past(rst)) assert (queue_free == 5'(DEPTH) && !armed);
+        end
+        cover (past && !rst && moving && armed && queue_free != 5'(DEPTH));
+        cover (past && !rst && braking && !ready);
+    end
+`endif
 endmodule
 
 `default_nettype wire

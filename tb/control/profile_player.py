@@ -2,8 +2,6 @@
 """What rtl/control/profile_player.sv does, in integers: clk(...) is one clk and returns what is on the pins after it."""
 from collections import deque
 
-from approach_law import Approach
-
 HALF = 1 << 23
 FULL = 1 << 32
 
@@ -24,6 +22,53 @@ def moved(velocity, acceleration, jerk, ticks):
     return velocity * n + acceleration * (n * (n - 1) // 2) + jerk * (n * (n - 1) * (n - 2) // 6)
 
 
+def clks(count):
+    for _ in range(count):
+        yield
+
+
+class Way:
+    """A value on its way to zero: its slope in whole paces, and what that still adds while it falls to zero."""
+
+    def __init__(self):
+        self.slope = self.area = self.pace = self.upward = 0
+
+    def decide(self, value, limit):
+        """(what to do with the slope, clk that it takes to know)."""
+        turn = self.slope == 0
+        if turn:
+            self.upward = int(value < 0)
+        left = -value if self.upward else value
+        if turn and left < self.pace:
+            return "last", 6
+        if not turn and (left < self.area or self.slope > limit):
+            return "fall", 5 if left < self.area else 7
+        clk = 6 if turn else 7
+        if left < self.area + self.slope + self.pace:
+            return "stay", clk + 4
+        return ("stay", clk + 7) if self.slope + self.pace > limit else ("grow", clk + 7)
+
+    def change(self, what):
+        """Do it; the clk that it takes."""
+        if what == "grow":
+            self.slope += self.pace
+            self.area += self.slope
+            return 2
+        if what == "fall":
+            self.area -= self.slope
+            self.slope -= self.pace
+            return 4
+        return 0
+
+    def signed(self):
+        return self.slope if self.upward else -self.slope
+
+    def choose(self, limit, curve):
+        """The pace of a new way; the clk that it takes."""
+        self.pace = limit if curve == 0 or curve > limit else curve
+        return 3 if curve > limit else 4 if curve == 0 else 5
+
+
 class ProfilePlayer:
     def __init__(self, depth=16):
         self.depth, self.exact = depth, 0
@@ -31,22 +76,22 @@ class ProfilePlayer:
         self.empty()
 
     def empty(self):
-        self.queue, self.armed = deque(), 0
+        self.queue, self.armed, self.writing = deque(), 0, 0
 
     def stand(self):
         """As at the end of a profile."""
         self.life = self.ticks()
         self.velocity = self.acceleration = self.jerk = self.left = self.last = self.fraction = self.offset = 0
-        self.step = self.change = self.ready = self.final = self.ended = 0
+        self.step = self.change = self.ready = self.final = self.arrived = self.rate = 0
         self.moving = self.braking = self.target_velocity = self.target_acceleration = 0
-        self.brake = None
+        self.ramp, self.brake = Way(), None
 
     def pins(self):
         return (wrap(self.exact >> 24, 48), self.target_velocity, self.target_acceleration, self.moving, self.armed,
                 self.depth - len(self.queue), self.underrun)
 
-    def clk(self, rst=0, tick=0, push=None, start=0, brake=0, hold_here=0, position=0, shift=None, brake_rate=0, brake_jerk=0, rate=FULL,
-            arm=0, start_at=0, now=0):
+    def clk(self, rst=0, tick=0, push=None, start=0, brake=0, hold_here=0, position=0, shift=None, brake_rate=0, brake_jerk=0,
+            slope=0, curve=0, percent=65536, pause=0, arm=0, start_at=0, now=0):
         """push: (velocity, acceleration, jerk, ticks, last) or None. shift: periods or None."""
         self.underrun = 0
         if rst or hold_here:
@@ -56,23 +101,27 @@ class ProfilePlayer:
             self.stand()
             self.empty()
             return self.pins()
-        self.tick, self.shifted, self.rate, self.brake_rate, self.brake_jerk = tick, shift is not None, rate, brake_rate, brake_jerk
-        moving, waiting, room = self.moving, bool(self.queue), len(self.queue) < self.depth and not self.braking
+        self.tick, self.shifted, self.brake_now, self.brake_rate, self.brake_jerk = tick, shift is not None, brake, brake_rate, brake_jerk
+        self.slope, self.curve, self.setting = slope, curve, 0 if pause else min(percent, 65536) << 16
+        moving, waiting = self.moving, bool(self.queue)
+        room = len(self.queue) < self.depth and not self.braking and not self.writing
         reached = self.armed and wrap(now - start_at, 32) >= 0
         if self.shifted:
             self.exact += shift << 40
-        finished = next(self.life)
-        if finished:
+        if next(self.life):
             self.stand()
         else:
             self.braking |= int(bool(brake and moving) or self.underrun)
         if (start or reached) and waiting and not moving and not brake:
             self.moving = 1
         self.armed = int((arm or (self.armed and not reached)) and not brake)
+        self.writing = max(0, self.writing - 1)
         if push and room:
             self.queue.append(push)
+            self.writing = 6
         if brake or self.underrun:
             self.queue.clear()
+            self.writing = 0
         self.exact = wrap(self.exact, 72)
         return self.pins()
 
@@ -87,78 +136,144 @@ class ProfilePlayer:
                 while self.shifted:
                     yield
                 self.exact += self.step
-                self.target_velocity, self.target_acceleration = held(self.step >> 24), held(self.change >> 24)
-                braking = self.braking
-                yield
                 if self.final:
-                    while self.shifted:
-                        yield
                     self.exact = self.exact + HALF >> 24 << 24
                     yield True
+                self.target_velocity = held(self.step >> 24)
+                yield
+                self.target_acceleration = held(self.change >> 24)
+                braking = self.braking
+                yield
+            else:
+                yield from clks(5)
             if braking or (yield from self.interval()):
                 yield from self.stop()
+            yield from clks(2)
+            self.ready = 1
+            yield
+
+    def rate_step(self):
+        """The rate, a step nearer to its setting."""
+        ramp = self.ramp
+        if not self.ready or self.slope == 0:
+            yield from clks(5 if self.ready else 3)
+            self.rate, self.arrived = self.setting, 0
+            ramp.slope = ramp.area = 0
+            return
+        yield from clks(3 + (2 + ramp.choose(self.slope, self.curve) - 1 if ramp.slope == 0 else 0) + 1)
+        distance = self.rate - self.setting
+        new = ramp.slope == 0
+        what, clk = ramp.decide(distance, self.slope)
+        if new and self.arrived:                        # a rest of one tick before the next ramp
+            yield from clks(4 + 2)
+            self.arrived = 0
+        elif what == "last":
+            yield from clks(clk + 1 + 3)
+            self.rate, self.arrived = self.setting, int(distance != 0)
+            return
+        else:
+            yield from clks(clk + ramp.change(what) + 2)
+        rate = self.rate + ramp.signed()
+        yield from clks(2 if rate < 0 else 2 if rate < FULL else 3)
+        self.rate = max(0, min(FULL, rate))
 
     def interval(self):
         """Prepare the next step of the profile; True: it is to be a brake instead."""
-        crossed, self.fraction = divmod(self.fraction + self.rate, FULL)
+        yield from self.rate_step()
         base = -self.offset
         yield
-        while self.left == 0 and not self.ended or crossed:
-            if self.left == 0:
-                if not self.braking and self.last:
-                    self.velocity = self.acceleration = crossed = 0
-                    self.ended = 1
-                elif self.braking or not self.queue:
-                    self.underrun = int(not self.braking)
-                    yield
-                    return True
-                else:
-                    self.velocity, self.acceleration, self.jerk, self.left, self.last = self.queue.popleft()
-            else:
+        if not self.ready and (yield from self.load()):
+            return True
+        if not self.final:
+            self.fraction += self.rate
+            yield from clks(4)
+            if self.fraction >= FULL:
+                self.fraction -= FULL
                 base += self.velocity
-                self.velocity, self.acceleration = wrap(self.velocity + self.acceleration), wrap(self.acceleration + self.jerk)
+                self.velocity, self.acceleration = self.velocity + self.acceleration, self.acceleration + self.jerk
                 self.left -= 1
-                crossed = 0
+                yield from clks(11)
+                if self.left == 0 and (yield from self.load()):
+                    return True
+        if self.final:
+            self.offset = 0
             yield
-        yield
-        self.offset = self.velocity >> 1
-        if self.fraction and not self.ended:
-            for _ in range(64):
-                yield
-            slope = wrap(self.velocity + (self.acceleration * self.fraction >> 33))
-            self.offset = wrap(self.offset + (slope * self.fraction >> 32))
-        step = wrap(base + self.offset)
-        self.step, self.change, self.ready, self.final = step, wrap(step - self.step), 1, self.ended
-        yield
+        else:
+            slope = self.velocity + (self.acceleration * self.fraction >> 33)
+            self.offset = (self.velocity >> 1) + (slope * self.fraction >> 32)
+            yield from clks(2 + (71 if self.fraction else 0) + 1)
+        self.change = base + self.offset - self.step
+        self.step += self.change
+        yield from clks(2)
         return False
+
+    def load(self):
+        """The next segment, or the end; True: there is none, or a brake."""
+        while True:
+            last = self.last and not self.braking
+            yield
+            if last:
+                self.final = 1
+                return False
+            if self.braking or not self.queue:
+                self.underrun = int(not self.braking)
+                yield
+                return True
+            self.velocity, self.acceleration, self.jerk, self.left, self.last = self.queue[0]
+            yield from clks(8)
+            if self.queue and not self.brake_now:
+                self.queue.popleft()
+            yield from clks(3)
+            if self.left:
+                yield
+                return False
 
     def stop(self):
         """Prepare the next step of a brake."""
-        first = self.brake is None
-        if first:
-            self.brake = self.begin_to_brake()
-            for _ in range(129):
-                yield
-        law = self.brake
-        step, self.final = law.step(self.step, law.pace, self.brake_rate << 8, first, law.above)
-        if law.abrupt:
-            step, self.final = 0, True
+        limit, first, abrupt = self.brake_rate << 8, self.brake is None, False
         yield
-        step = wrap(step)
-        self.step, self.change, self.ready = step, wrap(step - self.step), 1
+        if first:
+            self.brake = Way()
+            yield
+            abrupt = limit == 0
+            if not abrupt:
+                abrupt, what = yield from self.begin_to_brake(limit)
+        if abrupt:
+            what = "last"
+        elif not first or what is None:
+            what, clk = self.brake.decide(self.step, limit)
+            yield from clks(clk)
+            if first and what in ("last", "fall"):
+                what = "stay"
+                yield
+            elif what == "last":
+                yield from clks(2)
+            yield from clks(self.brake.change(what))
+        if what == "last":
+            self.change, self.final = -self.step, 1
+        else:
+            self.change = self.brake.signed()
+        self.step += self.change
         yield
 
-    def begin_to_brake(self):
-        """The law, with a slope of as many whole paces as the acceleration is high."""
-        law, limit, rest = Approach(), self.brake_rate << 8, 0
-        law.pace = self.brake_jerk if 0 < self.brake_jerk <= limit else limit
-        law.abrupt, law.upward = limit == 0, int(self.change >= 0)
-        for n in reversed(range(64)):
-            rest = 2 * rest + (abs(self.change) >> n & 1)
-            more = law.pace if rest >= law.pace else 0
-            law.abrupt |= law.area >> 60 > 0                # more than any velocity
-            law.area = (4 * law.area + (law.slope if rest >= law.pace else -law.slope) + more) % (1 << 64)
-            law.slope = 2 * law.slope + more
-            rest -= more
-        law.above = rest % (1 << 40)
-        return law
+    def begin_to_brake(self, limit):
+        """A slope of as many whole paces as the acceleration is high: (too fast to brake, "stay" if it must not grow at this step)."""
+        brake = self.brake
+        yield from clks(1 + brake.choose(limit, self.brake_jerk) + 1 + 3 + 31)
+        brake.upward = int(self.change > 0)
+        quotient, rest = divmod(abs(self.change), brake.pace)
+        quotient = min(quotient, (1 << 32) - 1)
+        yield from clks(32 * 5 + quotient.bit_count() + 3)
+        brake.slope, brake.area = quotient * brake.pace, quotient * brake.pace * (quotient + 1) // 2
+        if abs(self.change) - brake.slope >= brake.pace:
+            return True, None
+        yield from clks(2 + 64 + 1)
+        if brake.slope * (quotient & ~1) >= 1 << 68:
+            return True, None
+        yield from clks(3)
+        if brake.slope or not rest:                     # of no slope but a rest: from the other side it would be more than a pace
+            if not brake.slope:
+                yield
+            return False, None
+        yield
+        return False, "stay"

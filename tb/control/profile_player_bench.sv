@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// profile_player_bench -- profile_player played by override_ramp, with its exact target in sight: the top of sw/experiments/profile_run.cpp.
+// profile_player_bench -- profile_player with its exact target in sight, and whether its next step is prepared: the top of sw/experiments/profile_run.cpp.
 `default_nettype none
 
 module profile_player_bench (
@@ -20,19 +20,22 @@ module profile_player_bench (
     input  wire               segment_last,
     input  wire               start,
     input  wire               brake,
-    output logic       [71:0] exact,                            // 2^-40 period
+    output logic       [71:0] exact,                            // 2^-40 period; while prepared
     output logic              moving,
     output logic       [4:0]  queue_free,
     output logic              underrun,
-    output logic       [32:0] rate
+    output logic              prepared                          // level: a tick is taken
 );
-    override_ramp u_ramp (.clk, .rst, .slope, .curve, .percent, .pause, .moving, .tick, .rate);
     /* verilator lint_off PINCONNECTEMPTY */
-    profile_player u_player (.clk, .rst, .brake_rate, .brake_jerk, .rate, .tick, .push, .segment_velocity, .segment_acceleration, .segment_jerk,
+    profile_player u_player (.clk, .rst, .brake_rate, .brake_jerk, .slope, .curve, .percent, .pause, .tick, .push, .segment_velocity, .segment_acceleration, .segment_jerk,
         .segment_ticks, .segment_last, .start, .arm(1'b0), .start_at(32'd0), .now(32'd0), .brake, .hold_here(1'b0), .position(48'd0),
         .shift(1'b0), .shift_periods(32'd0), .target(), .target_velocity(), .target_acceleration(), .moving, .armed(), .queue_free, .underrun);
     /* verilator lint_on PINCONNECTEMPTY */
-    assign exact = u_player.exact;
+    assign prepared = u_player.job == u_player.WAIT;
+
+    // while it waits, acc is the step and the fraction that the target has below its LSB, and half an LSB at the end
+    wire [23:0] fraction = u_player.acc[23:0] - u_player.memory[3][23:0] - {u_player.final_step, 23'd0};
+    assign exact = {u_player.target, u_player.ready ? fraction : 24'd0};
 endmodule
 
 `default_nettype wire

@@ -12,8 +12,9 @@ from profile_player import FULL, ProfilePlayer, moved, wrap
 
 PERIOD = 1 << 40                        # of velocity, acceleration and jerk
 LSB = 1 << 24                           # of target, in the same unit
-GAP, BRAKE_GAP = 80, 220                # clk from tick to tick that the header asks for
-SETTINGS = "rate", "brake_rate", "brake_jerk"
+GAP, BRAKE_GAP, PUSH_GAP = 160, 350, 7                # clk from tick to tick that the header asks for
+SETTINGS = "slope", "curve", "percent", "pause", "brake_rate", "brake_jerk"
+WORDS = "segment_velocity", "segment_acceleration", "segment_jerk", "segment_ticks", "segment_last"
 EVENTS = "rst", "tick", "start", "brake", "hold_here", "position", "arm", "start_at", "now"
 IDLE = dict.fromkeys(("tick", "push", "segment_velocity", "segment_acceleration", "segment_jerk", "segment_ticks", "segment_last",
                       "start", "brake", "hold_here", "position", "shift", "shift_periods", "arm", "start_at", "now", *SETTINGS), 0)
@@ -24,7 +25,9 @@ class Player:
 
     def __init__(self, dut):
         self.dut, self.model, self.clk_count = dut, ProfilePlayer(int(dut.DEPTH.value)), 0
-        self.settings = dict(rate=FULL, brake_rate=0, brake_jerk=0)
+        self.settings = dict(slope=0, curve=0, percent=65536, pause=0, brake_rate=0, brake_jerk=0)
+        self.driven = {}
+        self.stands = -1                                # clk that the words of a segment must still stand
 
     async def reset(self):
         await start(self.dut, **IDLE)
@@ -36,11 +39,18 @@ class Player:
         """One clk with these events (as ProfilePlayer.clk takes them); returns the pins after it."""
         dut, push, shift = self.dut, events.get("push"), events.get("shift")
         events = self.settings | events
-        for name in (*EVENTS, *SETTINGS):
-            getattr(dut, name).value = events.get(name, 0)
-        dut.push.value, dut.shift.value, dut.shift_periods.value = push is not None, shift is not None, shift or 0
-        (dut.segment_velocity.value, dut.segment_acceleration.value, dut.segment_jerk.value, dut.segment_ticks.value,
-         dut.segment_last.value) = push or (random.getrandbits(63), 0, 0, 0, 0)
+        pins = dict.fromkeys(EVENTS, 0) | events | dict(push=int(push is not None), shift=int(shift is not None), shift_periods=shift or 0)
+        for name, value in pins.items():
+            if self.driven.get(name) != value:
+                getattr(dut, name).value = value
+        self.driven = pins
+        if push is not None:
+            self.stands = 7
+            for name, word in zip(WORDS, push):
+                getattr(dut, name).value = word
+        elif self.stands == 0:
+            dut.segment_velocity.value, dut.segment_ticks.value = random.getrandbits(63), random.getrandbits(24)
+        self.stands -= self.stands >= 0
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
         self.clk_count += 1
@@ -51,10 +61,16 @@ class Player:
         self.target, self.velocity, self.acceleration, self.moving, self.armed, self.free, self.underrun = got
         return got
 
+    async def push(self, segment):
+        """Queue it; its words are written when this returns."""
+        await self.clk(push=segment)
+        for _ in range(PUSH_GAP - 1):
+            await self.clk()
+
     async def play(self, *segments):
         """Queue them and start; the first tick, which only prepares, is over."""
         for segment in segments:
-            await self.clk(push=segment)
+            await self.push(segment)
         await self.clk(start=1)
         await self.tick()
 
@@ -118,10 +134,10 @@ async def latency_is_2(dut):
 
 
 @cocotb.test()
-async def ticks_may_follow_each_other_in_80_clk(dut):
-    """And in 220 from the first of a brake: with less the step would not be ready, and the tick be lost."""
+async def ticks_may_follow_each_other_in_160_clk(dut):
+    """And in 350 from the first of a brake: with less the step would not be ready, and the tick be lost."""
     player = await Player(dut).reset()
-    player.settings |= dict(rate=FULL - 1, brake_rate=1 << 20, brake_jerk=1 << 25)
+    player.settings |= dict(percent=65535, brake_rate=1 << 20, brake_jerk=1 << 25)
     await player.play((PERIOD, 0, 0, 9, 0), (PERIOD, 0, 0, 100, 1))
     for _ in range(30):
         before = player.target
@@ -156,9 +172,10 @@ async def slower_it_takes_the_same_way_and_lands_on_the_same_bit(dut):
     jerk = (1 << 30) + 12345
     segments = ((0, 0, jerk, 5, 0), (10 * jerk, 5 * jerk, -jerk, 5, 0), (25 * jerk, 0, 0, 3, 1))
     exact = positions(*segments)
-    for rate in (FULL // 3, FULL - 1, 1 << 29):
+    for percent in (21845, 65535, 8192):
+        rate = percent << 16
         await player.clk(hold_here=1, position=0)
-        player.settings["rate"] = rate
+        player.settings["percent"] = percent
         await player.play(*segments)
         targets, time = await player.finish(), 0
         for n, target in enumerate(targets):
@@ -181,8 +198,9 @@ async def slower_every_step_keeps_the_limits_of_the_profile(dut):
     for _ in range(3):
         limits.append(max(map(abs, steps)))
         steps = [b - a for a, b in zip(steps, steps[1:])]
-    for rate in (FULL, FULL // 2 + 12345, FULL // 7):
-        player.settings["rate"] = rate
+    for percent in (65536, 32768 + 123, 65536 // 3):
+        rate = percent << 16
+        player.settings["percent"] = percent
         await player.clk(hold_here=1, position=0)
         await player.play(*segments)
         seen = [0, 0, 0]
@@ -201,14 +219,14 @@ async def a_pause_stands_and_goes_on_to_the_exact_end(dut):
     await player.play((PERIOD // 3, 0, 0, 20, 1))
     for _ in range(5):
         await player.tick()
-    player.settings["rate"] = 0
+    player.settings["pause"] = 1
     await player.tick()
     await player.tick()
     stands = player.target
     for _ in range(5):
         await player.tick()
         assert (player.target, player.velocity, player.moving) == (stands, 0, 1)
-    player.settings["rate"] = FULL
+    player.settings["pause"] = 0
     await player.finish()
     assert player.target == (20 * (PERIOD // 3) + LSB // 2) // LSB
 
@@ -234,8 +252,8 @@ async def the_fraction_goes_on_from_segment_to_segment_and_ends_at_the_nearest_l
 @cocotb.test()
 async def ends_of_the_range(dut):
     player = await Player(dut).reset()
-    for rate in (FULL, FULL - 1, 1):
-        player.settings["rate"] = rate
+    for percent in (65536, 65535, 1, 131071):
+        player.settings["percent"] = percent
         for v in (-1 << 63, (1 << 63) - 1):
             for a in (-1 << 63, (1 << 63) - 1):
                 for j in (-1 << 31, (1 << 31) - 1):
@@ -243,7 +261,7 @@ async def ends_of_the_range(dut):
                     await player.tick()
                     await player.tick()
                     await player.clk(hold_here=1)
-    player.settings["rate"] = FULL
+    player.settings["percent"] = 65536
     for position in (-1 << 47, (1 << 47) - 1):
         await player.clk(hold_here=1, position=position)
         assert player.target == position
@@ -277,7 +295,7 @@ async def a_full_queue_takes_no_more(dut):
     depth = int(dut.DEPTH.value)
     for n in range(depth + 2):
         assert player.model.depth - len(player.model.queue) == max(0, depth - n)
-        await player.clk(push=(PERIOD, 0, 0, 1, int(n >= depth - 1)))
+        await player.push((PERIOD, 0, 0, 1, int(n >= depth - 1)))
     assert player.free == 0
     await player.play()
     assert len(await player.finish()) == depth
@@ -290,7 +308,7 @@ async def start_without_a_segment_does_nothing(dut):
     await player.clk(start=1)
     assert not player.moving
     assert await player.tick() == 0
-    await player.clk(push=(PERIOD, 0, 0, 1, 1))
+    await player.push((PERIOD, 0, 0, 1, 1))
     await player.tick()
     assert player.target == 0 and not player.moving     # a queued segment waits for start
 
@@ -299,7 +317,7 @@ async def start_without_a_segment_does_nothing(dut):
 async def an_armed_player_starts_when_its_time_has_come(dut):
     player = await Player(dut).reset()
     for start_at in (5, 2, 0x7FFF_FFFF, 0xFFFF_FFFF, 0):        # also across the wrap, and one that is past
-        await player.clk(push=(PERIOD, 0, 0, 1, 1))
+        await player.push((PERIOD, 0, 0, 1, 1))
         time = (start_at - 4 if start_at != 2 else 100) % (1 << 32)
         await player.clk(arm=1, start_at=start_at, now=time)
         waited = 0
@@ -351,15 +369,15 @@ async def an_underrun_strobes_once_and_brakes(dut):
 async def a_segment_that_comes_before_its_time_is_no_underrun(dut):
     player = await Player(dut).reset()
     await player.play((PERIOD, 0, 0, 2, 0))
-    await player.clk(push=(PERIOD, 0, 0, 1, 1))
+    await player.push((PERIOD, 0, 0, 1, 1))
     assert await player.tick() == 0
     await player.finish()
     assert player.target == 3 * 65536
 
 
-async def stop_from(player, velocity, acceleration, rate, jerk, play_rate=FULL):
+async def stop_from(player, velocity, acceleration, rate, jerk, percent=65536):
     """The steps of a brake from about there, and the limits it had to keep."""
-    player.settings |= dict(brake_rate=rate, brake_jerk=jerk, rate=play_rate)
+    player.settings |= dict(brake_rate=rate, brake_jerk=jerk, percent=percent)
     await player.clk(hold_here=1, position=0)
     await player.play((velocity - 3 * acceleration, acceleration, 0, 100, 0), (PERIOD, 0, 0, 1, 1))
     for _ in range(3):
@@ -367,7 +385,7 @@ async def stop_from(player, velocity, acceleration, rate, jerk, play_rate=FULL):
     steps = []
     await player.clk(brake=1)
     assert player.free == int(player.dut.DEPTH.value) and player.moving
-    await player.clk(push=(PERIOD, 0, 0, 1, 1))
+    await player.push((PERIOD, 0, 0, 1, 1))
     await player.clk(start=1)
     assert player.free == int(player.dut.DEPTH.value)                       # not while braking
     first = player.model.change, player.model.step - player.model.change
@@ -394,7 +412,7 @@ async def brake_ends_at_rest_within_its_limits_from_anywhere(dut):
             pace = min(jerk, rate << 8)
             velocity = random.choice((1, -1)) * int(pace * 2 ** random.uniform(-2, 9))
             acceleration = random.choice((1, -1, 0)) * int((rate << 8) * random.uniform(0, 2))
-        (before, step), steps = await stop_from(player, velocity, acceleration, rate, jerk, random.choice((FULL, FULL, FULL // 3)))
+        (before, step), steps = await stop_from(player, velocity, acceleration, rate, jerk, random.choice((65536, 65536, 21845)))
         pace = min(jerk, rate << 8)
         all_steps = [step - 0, *steps, 0, 0]
         changes = [b - a for a, b in zip(all_steps, all_steps[1:])]
@@ -436,7 +454,7 @@ async def brake_while_paused_ends_the_profile(dut):
     player.settings |= dict(brake_rate=1 << 30, brake_jerk=1 << 30)
     await player.play((PERIOD, 0, 0, 100, 1))
     await player.tick()
-    player.settings["rate"] = 0
+    player.settings["pause"] = 1
     for _ in range(3):
         await player.tick()
     stands = player.target
@@ -448,7 +466,7 @@ async def brake_while_paused_ends_the_profile(dut):
 @cocotb.test()
 async def brake_at_rest_only_empties_the_queue(dut):
     player = await Player(dut).reset()
-    await player.clk(push=(PERIOD, 0, 0, 1, 1))
+    await player.push((PERIOD, 0, 0, 1, 1))
     await player.clk(brake=1)
     assert player.free == int(dut.DEPTH.value) and not player.moving
     await player.play((PERIOD, 0, 0, 2, 1))
@@ -460,11 +478,14 @@ async def hold_here_stands_at_the_position_with_an_empty_queue(dut):
     player = await Player(dut).reset()
     for wait in (*range(8), 30, 60, 90):                # in every phase of a tick
         for segment in ((PERIOD + 5, 0, 0, 5, 0), (PERIOD, 0, 0, 1, 1)):
-            await player.clk(push=segment)
-        await player.clk(start=1, rate=FULL // 3)
-        await player.clk(tick=1, rate=FULL // 3)
+            await player.push(segment)
+        await player.clk(start=1, percent=21845)
+        if wait < 8:                                    # and in the clk that makes a step
+            for n in range(GAP):
+                await player.clk(tick=int(n == 0), percent=21845)
+        await player.clk(tick=1, percent=21845)
         for _ in range(wait):
-            await player.clk(rate=FULL // 3)
+            await player.clk(percent=21845)
         await player.clk(hold_here=1, position=-777)
         assert (player.target, player.velocity, player.moving, player.free) == (-777, 0, 0, int(dut.DEPTH.value))
 
@@ -487,11 +508,70 @@ async def reset_in_mid_flow(dut):
     for wait in (*range(5), 40, 75):
         await player.play((PERIOD, 0, 0, 5, 0), (PERIOD, 0, 0, 5, 1))
         await player.tick()
-        await player.clk(tick=1, rate=FULL // 2)
+        await player.clk(tick=1, percent=32768)
         for _ in range(wait):
-            await player.clk(rate=FULL // 2)
+            await player.clk(percent=32768)
         await player.clk(rst=1)
         assert (player.target, player.moving, player.free) == (0, 0, int(dut.DEPTH.value))
+
+
+async def rates(player, ticks):
+    """So many rates, off the velocity of a segment that shows them in 2^-30."""
+    seen = []
+    for _ in range(ticks):
+        await player.tick()
+        seen.append(player.velocity)
+    return seen
+
+
+ENDLESS = (1 << 54, 0, 0, (1 << 24) - 1, 1)
+
+
+@cocotb.test()
+async def the_rate_goes_to_its_setting_by_hand(dut):
+    player = await Player(dut).reset()
+    await player.play(ENDLESS)
+    await rates(player, 3)
+    player.settings |= dict(slope=1 << 29, curve=1 << 28, percent=0)
+    assert [rate * 16 >> 30 for rate in await rates(player, 12)] == [16, 15, 13, 11, 9, 7, 5, 3, 1, 0, 0, 0]
+
+
+@cocotb.test()
+async def every_way_of_the_rate_keeps_slope_and_curve_and_ends_at_the_setting(dut):
+    player = await Player(dut).reset()
+    await player.play(ENDLESS)
+    seen = (await rates(player, 3))[-1:]                # the first step is half of one
+    slope, curve = 1 << 29, 1 << 27
+    player.settings |= dict(slope=slope, curve=curve)
+    for _ in range(25):                                 # settings that change on the way make no jump
+        player.settings |= dict(percent=random.choice((0, 1, 65535, 131071, random.randrange(65536))), pause=int(random.randrange(4) == 0))
+        seen += await rates(player, random.choice((1, 2, 5, 30)))
+    seen += await rates(player, 40)
+    setting = 0 if player.settings["pause"] else min(player.settings["percent"], 65536) << 14
+    assert seen[-1] == setting
+    paces = [b - a for a, b in zip(seen, seen[1:])]
+    assert max(map(abs, paces)) <= slope + 4 >> 2 and all(abs(b - a) <= (curve >> 2) + 2 for a, b in zip(paces, paces[1:]))
+
+
+@cocotb.test()
+async def a_setting_that_changes_in_any_clk_makes_no_jump(dut):
+    """Beside the model, which takes the settings at once: the rate is judged off the pins alone."""
+    player = await Player(dut).reset()
+    await player.play(ENDLESS)
+    seen = (await rates(player, 3))[-1:]                # the first step is half of one
+    slope, curve = 1 << 29, 1 << 27
+    dut.slope.value, dut.curve.value = slope, curve
+    for _ in range(60):
+        moment = random.randrange(50)
+        for n in range(GAP):
+            dut.tick.value = int(n == 0)
+            if n == moment:
+                dut.percent.value = random.randrange(65537)
+            await RisingEdge(dut.clk)
+            await FallingEdge(dut.clk)
+        seen.append(dut.target_velocity.value.to_signed())
+    paces = [b - a for a, b in zip(seen, seen[1:])]
+    assert max(map(abs, paces)) <= slope + 4 >> 2 and all(abs(b - a) <= (curve >> 2) + 2 for a, b in zip(paces, paces[1:]))
 
 
 @cocotb.test()
@@ -499,19 +579,20 @@ async def any_events_match_the_model(dut):
     player = await Player(dut).reset()
     chance = lambda one_in: random.randrange(one_in) == 0
     word = lambda bits: random.randrange(-1 << bits - 1, 1 << bits - 1) >> random.randrange(bits)
-    gap = now = start_at = 0
+    setting = lambda bits: random.getrandbits(bits) >> random.randrange(bits + 1)
+    wait = now = start_at = 0
     for _ in range(12000):
-        gap, now = gap - 1, (now + 1) % (1 << 32)
-        if chance(500):
-            player.settings |= dict(brake_rate=random.getrandbits(32) >> random.randrange(33),
-                                    brake_jerk=random.getrandbits(32) >> random.randrange(33),
-                                    rate=random.choice((FULL, FULL, 0, random.getrandbits(32))))
+        wait, now = wait - 1, (now + 1) % (1 << 32)
         if chance(100):
             start_at = (now + random.randrange(-20, 100)) % (1 << 32)
         events = dict(now=now, start_at=start_at)
-        if gap <= 0 and chance(3):
-            events["tick"], gap = 1, random.choice((3, 80, 80, 80, 220))
-        if chance(30):
+        if wait <= 0 and chance(3):
+            if wait < -BRAKE_GAP or chance(3):          # the settings stand until the step is prepared
+                wait = BRAKE_GAP
+                player.settings |= dict(brake_rate=setting(32), brake_jerk=setting(32), slope=setting(32), curve=setting(32),
+                                        percent=random.choice((65536, 65536, 0, setting(17))), pause=int(chance(6)))
+            events["tick"], wait = 1, random.choice((GAP, GAP, BRAKE_GAP)) if chance(4) else BRAKE_GAP
+        if chance(30) and player.stands <= 0:           # the words of the last one are written
             events["push"] = (word(64), word(64), word(32), random.choice((0, 1, 1, 2, 3, 5)), int(chance(4)))
         for name, one_in in (("start", 60), ("arm", 300), ("brake", 1500), ("hold_here", 2500), ("rst", 5000)):
             if chance(one_in):
