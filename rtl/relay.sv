@@ -55,7 +55,7 @@ module relay #(
     wire        [15:0]   spacing, hysteresis;
     wire        [7:0]    filter_needed, flags;
     wire        [1:0]    index_gate_mask, index_gate, source;
-    wire                 stored_start, stored_valid, sent_start, sent_valid, pass_select, pass_valid, pass_done, reading;
+    wire                 stored_start, stored_valid, sent_start, sent_valid, pass_select, pass_ready, pass_valid, pass_done, reading;
     wire        [7:0]    stored, sent;
     wire                 unused_heading, unused_time, unused_armed, unused_seen, unused_illegal_fault, unused_revolution_fault;
     wire signed [W-1:0]  unused_count, unused_index_count;
@@ -86,7 +86,7 @@ module relay #(
          .a(relay_a), .b(relay_b), .z(relay_z), .position(relayed), .behind);
 
     relay_store #(.LENGTH(LENGTH), .FIRST(FIRST), .SECOND(SECOND)) u_store
-        (.clk, .rst, .good(set_good), .bad(set_bad), .pass_select, .pass_valid, .pass_data(sent), .start(stored_start), .valid(stored_valid),
+        (.clk, .rst, .good(set_good), .bad(set_bad), .pass_select, .pass_ready, .pass_valid, .pass_data(sent), .start(stored_start), .valid(stored_valid),
          .data(stored), .pass_done, .busy(reading), .source, .chip_n(flash_chip_n), .sclk(flash_sclk), .sdo(flash_sdo), .sdi);
     relay_set #(.K(K)) u_set
         (.clk, .rst, .start(reading ? stored_start : sent_start), .valid(reading ? stored_valid : sent_valid), .data(reading ? stored : sent),
@@ -95,8 +95,8 @@ module relay #(
     relay_bridge u_bridge
         (.clk, .rst, .bit_time(20'(BIT_TIME)), .rx, .tx(uart_tx), .driver_enable(uart_driver_enable),
          .events({2'd0, set_bad && !reading, behind, |rejected, missing, revolution_wrong, illegal}), .levels({4'd0, reading, correcting, loaded, known}),
-         .source, .identity, .position, .correction, .flags, .set_start(sent_start), .set_valid(sent_valid), .set_data(sent), .pass_select,
-         .pass_valid, .pass_done, .pass_data(stored));
+         .source, .orders(6'(K)), .identity, .position, .correction, .flags, .set_start(sent_start), .set_valid(sent_valid), .set_data(sent), .pass_select,
+         .pass_ready, .pass_valid, .pass_done, .pass_data(stored));
 endmodule
 
 `default_nettype wire

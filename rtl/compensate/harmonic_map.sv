@@ -11,6 +11,9 @@
 // source   S1: theta_1 = theta - sum C_s sin(t_s theta + phi_s); Volder, IRE Trans. EC-8 (1959) 330: rotation by atan 2^-n makes
 //          sine and cosine, and so value and slope, at once. Its gain 1.64676 is to be taken off the amplitude by who writes it
 // model    tb/compensate/harmonic_map.py, equal in every bit of every cycle
+// proved   nothing is corrected before the first swap; the set in force changes with swap only, and swap ends the round that runs;
+//          the sum changes only at the end of a round
+// proof    depth 12, K = 2, STEPS = 8
 `default_nettype none
 
 module harmonic_map #(
@@ -192,6 +195,23 @@ module harmonic_map #(
             correction <= '0;
         end
     end
+
+`ifdef FORMAL
+    logic past = 1'b0;
+    always @(posedge clk) begin
+        past <= 1'b1;
+        if (!past) assume (rst);
+        if (past && !$past(rst)) begin
+            if (!swapped) assert (state == IDLE && base == '0 && slope == '0 && offset == '0 && since == '0 && correction == '0);
+            if (page != $past(page)) assert ($past(swap));
+            if ($past(swap)) assert (state == IDLE);
+            if (refreshed) assert ($past(state) == APPLY && $past(on));
+            if (base != $past(base)) assert (refreshed || !$past(enable));
+            assert (corrected == {$past(position_q), 16'd0} - {{(W-16){$past(correction[31])}}, $past(correction)});
+            cover (state == ROTATE && count == 5'd2);
+        end
+    end
+`endif
 endmodule
 
 `default_nettype wire

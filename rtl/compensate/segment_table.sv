@@ -7,7 +7,7 @@
 //          a half goes up; linear: the straight line between them, to 2^-16 of the segment, rounded
 // bounds   before the first border and after the last the error is that of the border, and outside says so
 // source   S0: the equal-segment rectangle method, (d_i + d_i+1) / 2
-// model    tb/compensate/segment_table.py
+// model    tb/compensate/segment_table.py, equal in every bit of every cycle while the settings stand still
 // proved   what is read lies within the borders 0..segments
 `default_nettype none
 

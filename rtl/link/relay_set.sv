@@ -5,7 +5,8 @@
 // set      32-bit words, low byte first: marker 4D4F49 and K in its low byte; counts_per_turn; angle_per_count, low word; its
 //          high half and spacing above; radians_per_count; hysteresis, filter_needed from bit 16, {index_low, gate_mask, gate}
 //          from bit 24; amplitude and phase of each order from 1 up; CRC-32 of all before
-// safety   what a broken row leaves behind is never in force: settings change in one clk, together with swap
+// safety   what a broken row leaves behind is never in force: settings change in one clk, together with swap. A whole row is refused
+//          too if its counts_per_turn are not 1609 to 2^25, or if its amplitudes, without sign, are 2^29 or more together
 // model    tb/link/relay_set.py, equal in every bit of every cycle
 // proved   swap comes with good only, and settings change with it only
 // proof    K = 1
@@ -42,20 +43,25 @@ module relay_set #(
 
     localparam logic [31:0] WHOLE    = 32'h2144DF1C;    // CRC-32 of anything followed by its own CRC-32
     localparam logic [31:0] MARKER   = 32'h4D4F4900 + 32'(K);
+    localparam logic [31:0] FEWEST   = 32'd1609, MOST = 32'd1 << 25;
     localparam int          SETTINGS = 5;               // words after the marker
     localparam int          LAST     = 1 + SETTINGS + 2 * K;
 
     logic [6:0]            at;                          // word
     logic [1:0]            part;                        // byte of it
     logic [31:0]           word;
-    logic                  open, fits, ended;           // a row runs; its marker is right; it has just ended
+    logic                  open, fits, ended;           // a row runs; what it says is sensible; it has just ended
+    logic [28:0]           reach;                       // of the amplitudes together
     logic [32*SETTINGS-1:0] shadow, settings;
     wire  [31:0]           crc;
 
     wire [31:0] full   = {data, word[31:8]};
     wire        take   = valid && open;
     wire        filled = take && part == 2'd3;
+    wire        term_0 = filled && !at[0] && at > 7'(SETTINGS) && at != 7'(LAST);     // first word of a term
     wire        whole  = ended && crc == WHOLE && fits;
+    wire [32:0] sum    = 33'(reach) + {1'b0, full ^ {32{full[31]}}};
+    wire        turns  = full >= FEWEST && full <= MOST;
 
     crc32_stream u_crc (.clk, .rst, .start, .valid(take && !start), .data, .crc);
 
@@ -78,15 +84,19 @@ module relay_set #(
         end
         if (filled) begin
             at <= at + 1'b1;
-            if (at == 7'd0) fits <= full == MARKER;
+            if (at == 7'd0)                 fits <= full == MARKER;
+            else if (at == 7'd1 && !turns)  fits <= 1'b0;
+            else if (term_0 && |sum[32:29]) fits <= 1'b0;
             if (at != 7'd0 && at <= 7'(SETTINGS)) shadow <= {full, shadow[32*SETTINGS-1:32]};
             if (!at[0]) amplitude <= full;
+            if (term_0) reach <= sum[28:0];
             if (at == 7'(LAST)) open <= 1'b0;
         end
         if (start) begin
-            at   <= '0;
-            part <= '0;
-            open <= 1'b1;
+            at    <= '0;
+            part  <= '0;
+            open  <= 1'b1;
+            reach <= '0;
         end
         if (whole) begin
             settings <= shadow;

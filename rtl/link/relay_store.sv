@@ -20,7 +20,8 @@ module relay_store #(
     input  wire                  good,              // strobe: the set was whole
     input  wire                  bad,               // strobe: it was not
     input  wire                  pass_select,       // level: the chip is wanted
-    input  wire                  pass_valid,        // strobe: send pass_data; not before the answer to the byte before
+    output logic                 pass_ready,        // level: the chip is selected and waits for a byte
+    input  wire                  pass_valid,        // strobe: send pass_data; only while ready
     input  wire        [7:0]     pass_data,
     output logic                 start,             // strobe: a copy begins
     output logic                 valid,             // strobe
@@ -50,12 +51,13 @@ module relay_store #(
     wire [1:0]  place  = left[1:0];
     wire [7:0]  called = place == 2'd3 ? call[31:24] : place == 2'd2 ? call[23:16] : place == 2'd1 ? call[15:8] : call[7:0];
     wire        idle   = !shifting && !byte_done;
-    wire        send   = idle && (state == WAKE || state == ADDRESS || state == READ || (state == DONE && pass_valid && pass_select && !chip_n));
+    wire        send   = idle && (state == WAKE || state == ADDRESS || state == READ || (pass_ready && pass_valid));
 
-    assign busy = state != DONE;
-    assign sclk = shifting && bit_clk[2];
-    assign sdo  = shifted[7];
-    assign data = shifted;
+    assign busy       = state != DONE;
+    assign pass_ready = state == DONE && idle && pass_select && !chip_n;
+    assign sclk       = shifting && bit_clk[2];
+    assign sdo        = shifted[7];
+    assign data       = shifted;
 
     always_ff @(posedge clk) begin
         byte_done <= shifting && bit_clk == '1;

@@ -4,8 +4,11 @@
 //   relay_run accuracy POINTS SEED     at rest, all orders on: largest error of the correction against double precision
 //   relay_run latency SEED             clk from an edge in to the edge out, longest
 //   relay_run edges PER_SECOND COUNT SEED    edges of a clock of their own, with reversals: clks with a wrong count
+//   relay_run serve COUNTS PLACE       a ring of so many counts a turn that rests there at power-up, moved by lines of the standard
+//                                      input: `words W W ...` goes over the UART and gives the words of the answer; `go PLACE CLK`
+//                                      turns the ring, CLK a count, lets it rest, and gives the count of the output and the flag pins
 //
-// The set goes in over the UART, byte for byte, as a host sends it. At rest the output is right if it is within half a count and
+// In the first three the set goes in over the UART, byte for byte, as a host sends it. At rest the output is right if it is within half a count and
 // the hysteresis of the position that the set means for the ring; in motion, in every clk and for the place of LATENCY clk
 // before, one edge on its way and the lag that harmonic_map states are allowed besides.
 #include <algorithm>
@@ -15,6 +18,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <memory>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -83,7 +87,8 @@ struct Ring {                            // the terms, as the words that are wri
 struct Relay {
     VerilatedContext context;
     Vtop pins{&context};
-    int64_t place = -8, counted = -8;    // of the ring and of the output, counts from the index
+    const int64_t counts;                // per turn
+    int64_t place, counted;              // of the ring and of the output, counts from the index
     unsigned levels = 0;
     uint64_t clks = 0, double_edges = 0, last_edge = 0;
     bool watch = false;
@@ -91,11 +96,12 @@ struct Relay {
     std::vector<double> corrections;     // by place
     double bound = 0;                    // counts that the output may be off in motion; 0: nobody looks
     uint64_t wrong = 0;
+    uint8_t sequence = 0;
 
     double wanted(int64_t at) const { return double(at) - corrections[size_t((at % COUNTS + COUNTS) % COUNTS)]; }
     void show() {
         const unsigned b = place >> 1 & 1, a = b ^ (place & 1);
-        pins.encoder_a = a, pins.encoder_b = b, pins.encoder_z = place % COUNTS == 0;
+        pins.encoder_a = a, pins.encoder_b = b, pins.encoder_z = place % counts == 0;
     }
     void clk() {
         pins.clk = 1, pins.eval();
@@ -111,49 +117,50 @@ struct Relay {
         if (bound > 0) wrong += std::fabs(double(counted) - wanted(places[(clks + 1) % (LATENCY + 1)])) > bound;
     }
     void wait(int count) { while (count--) clk(); }
-    void send(const std::vector<uint8_t> &row) {
-        for (size_t n = 0; n < row.size(); n++)
-            for (int bit = 0; bit < 11; bit++)
-                pins.uart_rx = bit == 0 ? 0 : bit < 9 ? row[n] >> (bit - 1) & 1 : bit == 9 ? n == 0 : 1, wait(BIT);
-    }
-    std::vector<uint8_t> ask(std::vector<uint8_t> body) {                // the body of the answer
-        std::vector<uint8_t> row{0x21, uint8_t(body.size())}, answer;
-        row.insert(row.end(), body.begin(), body.end());
-        word(row, crc32(row));
-        send(row);
+    std::vector<unsigned> exchange(const std::vector<unsigned> &words) { // 9-bit words; those of the answer
+        std::vector<unsigned> answer;
+        for (unsigned sent : words)
+            for (int bit = 0; bit < 11; bit++) pins.uart_rx = bit == 0 ? 0 : bit < 10 ? sent >> (bit - 1) & 1 : 1, wait(BIT);
         for (int silent = 0; silent < 1000 && !pins.uart_driver_enable; silent++) clk();
         while (pins.uart_driver_enable) {
             if (pins.uart_tx) { clk(); continue; }
-            unsigned byte = 0;
+            unsigned heard = 0;
             wait(BIT / 2);
             for (int bit = 0; bit < 10; bit++) {
                 wait(BIT);
-                if (bit < 8) byte |= unsigned(pins.uart_tx) << bit;
+                if (bit < 9) heard |= unsigned(pins.uart_tx) << bit;
             }
-            answer.push_back(uint8_t(byte));
+            answer.push_back(heard);
         }
-        if (answer.size() < 7) std::fprintf(stderr, "relay_run: no answer\n"), std::exit(1);
-        return {answer.begin() + 2, answer.end() - 4};
+        return answer;
+    }
+    std::vector<uint8_t> ask(uint8_t kind, const uint8_t *more = nullptr, size_t size = 0) {     // the answer from flags on
+        std::vector<uint8_t> row{0x21, uint8_t(size + 2), ++sequence, kind};
+        row.insert(row.end(), more, more + size);
+        word(row, crc32(row));
+        std::vector<unsigned> words(row.begin(), row.end());
+        words[0] |= 0x100;
+        const auto answer = exchange(words);
+        if (answer.size() != 23) std::fprintf(stderr, "relay_run: no answer\n"), std::exit(1);
+        return {answer.begin() + 4, answer.end() - 4};
     }
     double correction() {
-        const auto told = ask({0});
+        const auto told = ask(0);
         int32_t value;
-        std::memcpy(&value, told.data() + 12, 4);
+        std::memcpy(&value, told.data() + 11, 4);
         return value / 65536.0;
     }
-    unsigned flags() { return ask({0})[1]; }
-    explicit Relay(const Ring &ring) {
-        for (int at = 0; at < COUNTS; at++) corrections.push_back(ring.correction(at));
+    unsigned flags() { return ask(0)[0]; }
+    Relay(int64_t counts, int64_t place) : counts(counts), place(place), counted(place) {
         pins.uart_rx = pins.flash_sdi = 1, pins.rst = 1, show(), wait(4), pins.rst = 0;
         wait(2 * (2048 + 65 * (4 * (7 + 2 * K) + 5)) + 1000);            // both copies of an empty flash
-        const auto image = ring.image();
-        for (size_t begin = 0; begin < image.size(); begin += 63) {
-            const size_t size = std::min<size_t>(63, image.size() - begin);
-            std::vector<uint8_t> request{uint8_t(begin ? 3 : 2)};
-            request.insert(request.end(), image.begin() + begin, image.begin() + begin + size);
-            ask(request);
-        }
         watch = true;
+    }
+    explicit Relay(const Ring &ring) : Relay(COUNTS, -8) {
+        for (int at = 0; at < COUNTS; at++) corrections.push_back(ring.correction(at));
+        const auto image = ring.image();
+        for (size_t begin = 0; begin < image.size(); begin += 62)
+            ask(begin ? 3 : 2, image.data() + begin, std::min<size_t>(62, image.size() - begin));
         while (place < 8) place++, show(), wait(8);
         wait(3 * ROUND);
         if (!pins.correcting) std::fprintf(stderr, "relay_run: the set was not taken, or the index not met\n"), std::exit(1);
@@ -205,13 +212,38 @@ int edges(Relay &relay, const Ring &ring, Random &random, double per_second, uin
                        (unsigned long long)rests, (unsigned long long)relay.clks, flags), 0;
 }
 
+int serve(Relay &relay) {
+    char line[4096];
+    while (std::fgets(line, sizeof line, stdin)) {
+        std::istringstream in(line);
+        std::string kind;
+        in >> kind;
+        if (kind == "words") {
+            std::vector<unsigned> words;
+            for (unsigned one; in >> one;) words.push_back(one);
+            for (unsigned heard : relay.exchange(words)) std::printf("%u ", heard);
+        } else if (kind == "go") {
+            int64_t goal = 0;
+            int each = 1;
+            in >> goal >> each;
+            while (relay.place != goal) relay.place += goal > relay.place ? 1 : -1, relay.show(), relay.wait(each);
+            relay.wait(2 * ROUND + 64);
+            std::printf("%lld %d %d", (long long)relay.counted, int(relay.pins.correcting), int(relay.pins.fault));
+        }
+        std::printf("\n"), std::fflush(stdout);
+    }
+    return 0;
+}
+
 }  // namespace
 
 double sc_time_stamp() { return 0; }
 
 int main(int count, char **words) {
     const std::string kind = count > 1 ? words[1] : "";
-    if (count < 3) return std::fprintf(stderr, "usage: relay_run accuracy POINTS SEED | latency SEED | edges PER_SECOND COUNT SEED\n"), 2;
+    if (count < 3)
+        return std::fprintf(stderr, "usage: relay_run accuracy POINTS SEED | latency SEED | edges PER_SECOND COUNT SEED | serve COUNTS PLACE\n"), 2;
+    if (kind == "serve" && count == 4) return serve(*std::make_unique<Relay>(std::atoll(words[2]), std::atoll(words[3])));
     Random random{std::strtoull(words[count - 1], nullptr, 10) * 0x9E3779B97F4A7C15ULL + 1};
     for (int n = 0; n < 8; n++) random();
     const Ring ring(random);

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/compensate/segment_table.sv does to one position, in integers."""
+"""What rtl/compensate/segment_table.sv does to one position, in integers; SegmentTable.clk(...) is one clk of it."""
 
 
 def segment_table(position, errors, origin, length, linear, enable=1, index_bits=8):
@@ -14,3 +14,24 @@ def segment_table(position, errors, origin, length, linear, enable=1, index_bits
         fraction = (rest << 16) // length
         error = low + ((high - low) * fraction + 32768 >> 16) if linear else low + high + 1 >> 1
     return position - (error if enable else 0), outside
+
+
+class SegmentTable:
+    """done, corrected and outside are what stands after a clk. Settings and table stand still while a position is under way."""
+
+    LATENCY = 30
+
+    def __init__(self):
+        self.left, self.done, self.corrected, self.outside = None, False, None, None
+
+    def clk(self, rst=0, valid=0, position=0, **settings):
+        self.done = self.left == 1 and not rst
+        if self.done:
+            corrected, self.outside = segment_table(self.position, **settings)
+            self.corrected = (corrected + 2**47) % 2**48 - 2**47
+        if rst or self.done:
+            self.left = None
+        elif self.left:
+            self.left -= 1
+        elif valid:
+            self.left, self.position = self.LATENCY - 1, position

@@ -2,13 +2,14 @@
 """harmonic_map: a sine by hand, latency and round, accuracy over the turn, staleness at speed, swaps, and any motion against the model."""
 import math
 import random
+import re
 
 import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from harmonic_map import SETTLE, HarmonicMap, exact, term_of
+from bench import ROOT, run, start
+from harmonic_map import SETTLE, STEPS, HarmonicMap, exact, term_of
 
 IDLE = dict(enable=0, radians_per_count=0, write=0, term=0, amplitude=0, phase=0, swap=0, angle=0, step=0, position=0)
 STROBES = "write", "swap", "step"
@@ -219,6 +220,15 @@ async def any_motion_matches_the_model(dut):
         await chart.clk(step=random.choice((0, way)), rst=int(random.randrange(3000) == 0), **inputs)
 
 
-@pytest.mark.parametrize("k", [1, 5, 16])
+def test_the_page_of_the_relay_says_how_far_it_lags():
+    clk_hz, page = 48e6, (ROOT / "docs" / "relay.md").read_text()
+    curve = sum(k * k * arcsec for k, arcsec in enumerate((105, 40, 12), 1)) * (2 * math.pi / COUNTS) ** 2
+    for name, rate in (("600 rev/min", 10 * COUNTS), ("3 MHz of edges", 3e6), ("24 MHz of edges", 24e6)):
+        moved = ((STEPS + 2) * 16 + SETTLE) * rate / clk_hz
+        told = re.search(rf"^\| {name}.*\| ([\d.]+)\u2033 \|$", page, re.MULTILINE).group(1)
+        assert float(told) == pytest.approx(3 * moved**2 * curve, rel=0.2)
+
+
+@pytest.mark.parametrize("k", [1, 5, 16, 32])
 def test_harmonic_map(k):
     run("harmonic_map", __file__, K=k)

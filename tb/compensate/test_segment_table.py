@@ -6,15 +6,18 @@ import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
 from bench import run, start
-from segment_table import segment_table
+from segment_table import SegmentTable
 
 IDLE = dict(enable=1, linear=0, origin=0, segment_length=1, segments=1, write=0, point=0, value=0, valid=0, position=0)
 FAR = 1 << 47
 
 
 class Table:
+    """The design with the model beside it in every clk."""
+
     def __init__(self, dut):
-        self.dut = dut
+        self.dut, self.model, self.inputs = dut, SegmentTable(), dict(rst=0, valid=0, position=0, linear=0, enable=1)
+        self.errors, self.origin, self.length = [0, 0], 0, 1
 
     async def reset(self, errors, origin=0, length=1000):
         await start(self.dut, **IDLE)
@@ -23,33 +26,36 @@ class Table:
         return self
 
     async def give(self, errors, origin, length):
-        self.errors, self.origin, self.length = errors, origin, length
         dut = self.dut
         dut.origin.value, dut.segment_length.value, dut.segments.value = origin, length, len(errors) - 1
         for n, error in enumerate(errors):
             dut.write.value, dut.point.value, dut.value.value = 1, n, error
             await self.clk()
         dut.write.value = 0
+        self.errors, self.origin, self.length = errors, origin, length
 
-    async def clk(self, count=1):
+    async def clk(self, count=1, **inputs):
+        dut, model = self.dut, self.model
+        self.inputs.update(inputs)
+        for name, level in inputs.items():
+            getattr(dut, name).value = level
         for _ in range(count):
-            await RisingEdge(self.dut.clk)
-            await FallingEdge(self.dut.clk)
+            model.clk(errors=self.errors, origin=self.origin, length=self.length, **self.inputs)
+            await RisingEdge(dut.clk)
+            await FallingEdge(dut.clk)
+            assert int(dut.done.value) == model.done
+            if model.done:
+                got, want = (dut.corrected.value.to_signed(), bool(dut.outside.value)), (model.corrected, model.outside)
+                assert got == want, f"{self.inputs} in {self.length} from {self.origin}: {got}, the model has {want}"
 
     async def at(self, position, linear=0, enable=1):
-        """(corrected, outside) as the design has it, held against the model; the clk it took in self.clks."""
-        dut = self.dut
-        dut.valid.value, dut.position.value, dut.linear.value, dut.enable.value = 1, position, linear, enable
-        await self.clk()
-        dut.valid.value, self.clks = 0, 1
-        while not dut.done.value:
-            await self.clk()
+        """(corrected, outside); the clk it took in self.clks."""
+        await self.clk(valid=1, position=position, linear=linear, enable=enable)
+        self.clks = 1
+        while not self.model.done:
+            await self.clk(valid=0)
             self.clks += 1
-        got = dut.corrected.value.to_signed(), bool(dut.outside.value)
-        want = segment_table(position, self.errors, self.origin, self.length, linear, enable)
-        want = (want[0] + FAR) % (2 * FAR) - FAR, want[1]
-        assert got == want, f"{position} in {self.length} from {self.origin}, linear {linear}: {got}, the model has {want}"
-        return got
+        return self.model.corrected, self.model.outside
 
 
 @cocotb.test()
@@ -110,19 +116,20 @@ async def largest_errors_and_longest_tables(dut):
 
 
 @cocotb.test()
+async def a_position_that_comes_too_early_is_not_taken(dut):
+    table = await Table(dut).reset([3, 4, 5])
+    for n in range(200):
+        await table.clk(valid=random.getrandbits(1), position=random.randrange(-100, 2100), enable=int(n < 150))
+
+
+@cocotb.test()
 async def reset_in_mid_flow(dut):
     table = await Table(dut).reset([3, 4, 5])
     for wait in range(1, 30, 4):
-        dut.valid.value, dut.position.value = 1, 100
-        await table.clk()
-        dut.valid.value = 0
-        await table.clk(wait - 1)
-        dut.rst.value = 1
-        await table.clk()
-        dut.rst.value = 0
-        for _ in range(32):
-            assert not dut.done.value
-            await table.clk()
+        await table.clk(valid=1, position=100)
+        await table.clk(wait - 1, valid=0)
+        await table.clk(rst=1)
+        await table.clk(32, rst=0)
         await table.at(1500)
 
 

@@ -11,7 +11,7 @@ SETTINGS = 5
 def image(terms, counts_per_turn, spacing=1, hysteresis=0x4000, filter_needed=0, index_low=0, gate_mask=0, gate=0):
     """Bytes of a set; terms are the words (amplitude, phase) of each order from 1 up."""
     angle = round(2**48 / counts_per_turn) if counts_per_turn else 0
-    radians = round(2 * math.pi * 2**40 / counts_per_turn) if counts_per_turn else 0
+    radians = round(2 * math.pi * 2**40 / counts_per_turn) % 2**32 if counts_per_turn else 0
     words = [0x4D4F4900 + len(terms), counts_per_turn, angle % 2**32, angle >> 32 | spacing << 16, radians,
              hysteresis | filter_needed << 16 | (index_low << 4 | gate_mask << 2 | gate) << 24]
     for amplitude, phase in terms:
@@ -33,8 +33,7 @@ class RelaySet:
             self.__init__(self.k)
             return
         judged, self.judged, self.write = self.judged, None, None
-        self.good = judged is not None and zlib.crc32(judged[:-4]) == int.from_bytes(judged[-4:], "little") \
-            and int.from_bytes(judged[:4], "little") == 0x4D4F4900 + self.k
+        self.good = judged is not None and zlib.crc32(judged[:-4]) == int.from_bytes(judged[-4:], "little") and self.sensible(judged)
         self.bad = judged is not None and not self.good
         if self.good:
             self.settings = int.from_bytes(judged[4:4 + 4 * SETTINGS], "little")
@@ -49,3 +48,9 @@ class RelaySet:
                 self.judged, self.row = None if start else self.row, None
         if start:
             self.row = b""
+
+    def sensible(self, row):
+        """What the CRC-32 does not tell."""
+        words = [int.from_bytes(row[n:n + 4], "little") for n in range(0, len(row), 4)]
+        amplitudes = [~word % 2**32 if word >> 31 else word for word in words[1 + SETTINGS:-1:2]]
+        return words[0] == 0x4D4F4900 + self.k and 1609 <= words[1] <= 2**25 and sum(amplitudes) < 2**29

@@ -62,7 +62,8 @@ class Bytes:
 
 
 def any_terms(k):
-    return [(random.getrandbits(32), random.getrandbits(32)) for _ in range(k)]
+    reach = 2**29 // k
+    return [(random.randrange(1 - reach, reach) % 2**32, random.getrandbits(32)) for _ in range(k)]
 
 
 @cocotb.test()
@@ -109,6 +110,29 @@ async def a_set_for_another_number_of_orders_is_refused(dut):
 
 
 @cocotb.test()
+async def counts_per_turn_outside_their_range_are_refused(dut):
+    row = await Bytes(dut).reset()
+    for counts, verdict in ((1609, 1), (1608, -1), (2**25, 1), (2**25 + 1, -1), (0, -1), (2**32 - 1, -1)):
+        assert await row.send(image(any_terms(row.k), counts)) == verdict
+
+
+@cocotb.test()
+async def amplitudes_that_may_overflow_the_map_are_refused(dut):
+    row = await Bytes(dut).reset()
+    for sign in (1, -1):
+        share, rest = divmod(2**29 - 1, row.k)
+        sizes = [share] * (row.k - 1) + [share + rest]
+        words = [size if sign > 0 else ~size % 2**32 for size in sizes]
+        assert await row.send(image([(word, 0) for word in words], 32768)) == 1
+        for n in {0, row.k - 1}:
+            more = list(words)
+            more[n] = (more[n] + sign) % 2**32
+            assert await row.send(image([(word, 0) for word in more], 32768)) == -1
+    for word in (2**31, 2**31 - 1, 2**29):
+        assert await row.send(image([(word, 0)] * row.k, 32768)) == -1
+
+
+@cocotb.test()
 async def a_row_cut_short_changes_nothing_and_the_next_is_whole(dut):
     row = await Bytes(dut).reset()
     for _ in range(20):
@@ -136,15 +160,15 @@ async def any_strobes_match_the_model(dut):
     row = await Bytes(dut).reset()
     left = []
     for _ in range(3000):
-        left = left or list(image(any_terms(row.k), random.getrandbits(32) | 4096))
+        left = left or list(image(any_terms(row.k), random.getrandbits(random.choice((25, 32))) | 4096))
         send = random.randrange(5) > 0
         begin = row.model.row is None and random.randrange(8) == 0 or random.randrange(1500) == 0
         if begin:
-            left = list(image(any_terms(row.k), random.getrandbits(32) | 4096))
+            left = list(image(any_terms(row.k), random.getrandbits(random.choice((25, 32))) | 4096))
         await row.clk(start=int(begin), valid=int(send), data=left.pop(0) if send and row.model.row is not None and not begin else 7,
                       rst=int(random.randrange(3000) == 0))
 
 
-@pytest.mark.parametrize("k", [1, 16])
+@pytest.mark.parametrize("k", [1, 16, 32])
 def test_relay_set(k):
     run("relay_set", __file__, K=k)

@@ -60,9 +60,11 @@ class Store:
         """The bytes that come back."""
         self.passed = []
         await self.clk(pass_select=1)
-        await self.clk()
         for n, byte in enumerate(row):
+            while not self.dut.pass_ready.value:
+                await self.clk()
             await self.clk(pass_valid=1, pass_data=byte)
+            assert not self.dut.pass_ready.value
             self.dut.pass_valid.value = 0
             while len(self.passed) <= n:
                 await self.clk()
@@ -100,6 +102,19 @@ async def bytes_pass_through_both_ways(dut):
     await store.send(bytes([0x02, 0x00, 0x30, 0x10]) + b"moire")
     assert store.chip.memory[0x3010:0x3015] == b"moire"
     assert (await store.send(bytes([0x03, 0x00, 0x30, 0x10]) + bytes(5)))[4:] == b"moire"
+
+
+@cocotb.test()
+async def while_it_reads_it_is_not_ready_for_other_bytes(dut):
+    store = await Store(dut, some(0), some(1)).reset()
+    await store.clk(pass_select=1)
+    while dut.busy.value:
+        assert not dut.pass_ready.value
+        await store.clk()
+    await store.clk()
+    await store.clk()
+    assert dut.pass_ready.value and not dut.chip_n.value
+    await store.clk(pass_select=0)
 
 
 @cocotb.test()

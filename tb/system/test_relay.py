@@ -9,7 +9,7 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from bench import run, start
 from flash import Flash
 from harmonic_map import exact, term_of
-from relay_host import BEGIN_SET, CLEAR, FLASH, STATUS, Status, body_of, frame, requests_of, saves_of
+from moire.relay import BEGIN_SET, CLEAR, FLASH, PIECE, SET, STATUS, Exchange, Status, identity_of
 from relay_set import image
 
 K, FIRST, SECOND, BIT = 2, 4096, 8192, 8
@@ -32,6 +32,7 @@ class Relay:
         self.counted, self.levels, self.edges = 0, None, []
         self.clks, self.index_at = 0, []
         self.with_index = True
+        self.sequence = 0
 
     async def power_up(self, place=0):
         self.place = place
@@ -77,8 +78,8 @@ class Relay:
             await self.clk(50)
 
     async def tell(self, words):
-        for byte, ninth in words:
-            for level in (0, *(byte >> n & 1 for n in range(8)), ninth, 1):
+        for word in words:
+            for level in (0, *(word >> n & 1 for n in range(9)), 1):
                 self.dut.uart_rx.value = level
                 await self.clk(BIT)
 
@@ -99,24 +100,38 @@ class Relay:
             for _ in range(10):
                 await self.clk(BIT)
                 bits.append(int(self.dut.uart_tx.value))
-            words.append((sum(bit << n for n, bit in enumerate(bits[:8])), bits[8]))
+            words.append(sum(bit << n for n, bit in enumerate(bits[:9])))
             assert bits[9] == 1
         return words
 
-    async def ask(self, body):
-        await self.tell(frame(0x21, body))
-        return body_of(await self.listen())
+    async def ask(self, kind, payload=b"", repeat=False):
+        """The answer, without sequence and kind; None if there is none."""
+        self.sequence = (self.sequence + (not repeat)) % 256
+        exchange = Exchange(bytes([self.sequence, kind]) + payload, tries=1)
+        await self.tell(exchange.words_to_send())
+        words = await self.listen()
+        if not words:
+            return None
+        exchange.feed(words)
+        return exchange.result()
 
-    async def status(self, kind=STATUS):
-        return Status.of(await self.ask(bytes([kind])))
+    async def status(self):
+        return Status.of(await self.ask(STATUS))
+
+    async def clear(self, flags=0xFF):
+        return Status.of(await self.ask(CLEAR, bytes([flags])))
 
     async def give(self, whole):
-        for body in requests_of(whole):
-            assert await self.ask(body) is not None
+        """A set, piece by piece; what the last answer tells."""
+        for n in range(0, len(whole), PIECE):
+            told = await self.ask(SET if n else BEGIN_SET, bytes(whole[n:n + PIECE]))
+        return Status.of(told)
 
     async def save(self, whole, address):
-        for body in saves_of(whole, address):
-            await self.ask(body)
+        """One copy, into an erased sector."""
+        for command, at, more in ((0x20, address, b""), *((0x02, address + n, whole[n:n + 32]) for n in range(0, len(whole), 32))):
+            await self.ask(FLASH, b"\x06")
+            await self.ask(FLASH, bytes([command]) + at.to_bytes(3, "big") + more)
 
 
 def wanted(place, terms):
@@ -143,7 +158,7 @@ async def until_the_index_it_passes_and_says_so_then_it_corrects(dut):
         await relay.clk(400)
         assert abs(relay.counted - wanted(relay.place, terms)) <= 0.76, (relay.place, relay.counted)
     status = await relay.status()
-    assert status.levels == KNOWN | LOADED | CORRECTING and status.flags == 0 and status.position == (relay.place - COUNTS + 60) % 2**32
+    assert status.levels == KNOWN | LOADED | CORRECTING and status.flags == 0 and status.position == relay.place - COUNTS + 60
 
 
 @cocotb.test()
@@ -180,7 +195,7 @@ async def a_missing_index_and_illegal_edges_are_flagged_until_they_are_cleared(d
     relay.with_index = False
     await relay.go(COUNTS + 10)
     assert int(dut.fault.value) and (await relay.status()).flags == MISSING
-    assert (await relay.status(CLEAR)).flags == MISSING and (await relay.status()).flags == 0
+    assert (await relay.clear(~MISSING & 0xFF)).flags == MISSING and (await relay.clear(MISSING)).flags == 0
     relay.place += 2
     relay.show()
     await relay.clk(30)
@@ -206,27 +221,54 @@ async def a_broken_set_is_refused_and_the_one_in_force_stays(dut):
     await relay.booted()
     whole = image(some_terms(), COUNTS)
     await relay.give(whole)
-    before = await relay.status(CLEAR)
     for _ in range(3):
         broken = bytearray(image(some_terms(9.0), COUNTS))
         broken[random.randrange(len(broken))] ^= 1 << random.randrange(8)
-        await relay.give(broken)
-        assert (await relay.status()).flags & REFUSED
-        assert (await relay.status(CLEAR)).identity == before.identity == int.from_bytes(whole[-4:], "little")
+        told = await relay.give(broken)
+        assert told.flags == REFUSED and told.identity == identity_of(whole)
+        assert (await relay.clear()).flags == 0
+
+
+@cocotb.test()
+async def a_set_whose_pieces_are_asked_for_twice_is_taken_all_the_same(dut):
+    relay = await Relay(dut).power_up()
+    await relay.booted()
+    whole = image(some_terms(), COUNTS)
+    for n in range(0, len(whole), 20):
+        for repeat in (False, True, True):
+            told = await relay.ask(SET if n else BEGIN_SET, whole[n:n + 20], repeat=repeat)
+    assert Status.of(told).identity == identity_of(whole) and Status.of(told).flags == 0
+
+
+@cocotb.test()
+async def status_tells_the_number_of_orders(dut):
+    relay = await Relay(dut).power_up()
+    assert (await relay.status()).orders == K
+
+
+@cocotb.test()
+async def flash_bytes_asked_for_while_it_boots_wait_their_turn(dut):
+    relay = await Relay(dut).power_up()
+    relay.chip.memory[0x3000:0x3002] = b"ok"
+    assert (await relay.status()).levels == READING
+    exchange = Exchange(bytes([77, FLASH, 0x03, 0x00, 0x30, 0x00, 0, 0]), tries=1)
+    await relay.tell(exchange.words_to_send())
+    exchange.feed(await relay.listen(patience=20_000))
+    assert exchange.result()[4:] == b"ok"
 
 
 @cocotb.test()
 async def a_broken_request_has_no_answer_and_the_next_one_has(dut):
     relay = await Relay(dut).power_up()
     await relay.booted()
-    words = frame(0x21, bytes([STATUS]))
+    words = Exchange(bytes([9, STATUS])).words_to_send()
     for n in range(len(words)):
         broken = list(words)
-        broken[n] = broken[n][0] ^ 1 << random.randrange(8), broken[n][1]
+        broken[n] ^= 1 << random.randrange(9)
         await relay.tell(broken)
         assert await relay.listen(patience=400) == []
     assert await relay.status()
-    assert await relay.ask(bytes([99])) is None
+    assert await relay.ask(99) is None
 
 
 @cocotb.test()
@@ -248,7 +290,7 @@ async def a_saved_set_comes_back_at_power_up_whenever_power_failed(dut):
         await relay.booted()
         status = await relay.status()
         assert status.source == source and status.levels == LOADED
-        assert status.identity == int.from_bytes((new if source == 2 else old)[-4:], "little")
+        assert status.identity == identity_of(new if source == 2 else old)
 
 
 @cocotb.test()
@@ -256,7 +298,7 @@ async def flash_bytes_come_back(dut):
     relay = await Relay(dut).power_up()
     await relay.booted()
     relay.chip.memory[0x3000:0x3004] = b"ring"
-    assert (await relay.ask(bytes([FLASH, 0x03, 0x00, 0x30, 0x00]) + bytes(4)))[5:] == b"ring"
+    assert (await relay.ask(FLASH, bytes([0x03, 0x00, 0x30, 0x00]) + bytes(4)))[4:] == b"ring"
 
 
 @cocotb.test()
@@ -265,7 +307,7 @@ async def reset_in_mid_flow(dut):
     await relay.booted()
     await relay.give(image(some_terms(), COUNTS))
     await relay.go(30)
-    await relay.tell(frame(0x21, bytes([BEGIN_SET, 1, 2]))[:4])
+    await relay.tell(Exchange(bytes([1, BEGIN_SET, 1, 2])).words_to_send()[:4])
     dut.rst.value = 1
     for n in range(24):                                     # the pins find the levels of the ring again
         dut.rst.value, relay.levels = int(n < 3), None
