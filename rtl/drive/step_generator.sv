@@ -16,7 +16,8 @@
 //          the end of the line before: the generator stands
 // model    tb/drive/step_generator.py, equal in every bit of every cycle
 // proved   whatever the inputs do, but for rst: steps moves with the pins, in every mode; high, low, set-up and hold are
-//          never shorter than set; the pins change with a step or a turn, else only at rest and out of enable
+//          never shorter than set; the pins change at the ends of a pulse and with a turn, else only in the clk that takes mode
+//          and polarity, which is at rest and out of enable
 // proof    depth 14, PERIOD_W = 3, TIME_W = 3, AHEAD_W = 3
 `default_nettype none
 
@@ -191,6 +192,8 @@ module step_generator #(
             if (wire_mode[1] && !rewired && !$past(rewired))
                 assert (steps - $past(steps) == 32'(wire_pulse[1] && !$past(wire_pulse[1])) - 32'(wire_pulse[0] && !$past(wire_pulse[0])));
             if (!$past(enable)) assert (steps == $past(steps));
+            if ({step, direction} != $past({step, direction})) assert ($past(rise || fall || turns || rewired));
+            if (rewired) assert ($past(!enable && !pulse && stood && settled));
             cover (steps == 2 && wire_mode == STEP_DIRECTION);
             cover (steps == -2 && wire_mode == QUADRATURE && step_low);
             cover (turns && !upward && steps == -1 && held == 2);

@@ -11,7 +11,7 @@
 #include <cmath>
 #include <memory>
 
-#include "Vsteps.h"
+#include "Vtop.h"
 #include "verilated.h"
 
 namespace {
@@ -32,7 +32,7 @@ struct Driver {                          // what a stepper driver sees on its tw
     int64_t count = 0, now = 0, rose = -1'000'000, fell = -1'000'000, turned = -1'000'000;
     uint64_t violations = 0, turns = 0;
     bool pulse = false, up = false, edge = false;
-    void look(bool step, bool direction, const Vsteps &asked) {
+    void look(bool step, bool direction, const Vtop &asked) {
         now++, edge = false;
         if (direction != up) {
             if (pulse || step) violations++;                                    // in a pulse
@@ -54,7 +54,7 @@ struct Driver {                          // what a stepper driver sees on its tw
 
 struct Bench {
     std::unique_ptr<VerilatedContext> context = std::make_unique<VerilatedContext>();
-    std::unique_ptr<Vsteps> pins = std::make_unique<Vsteps>(context.get());
+    std::unique_ptr<Vtop> pins = std::make_unique<Vtop>(context.get());
     Driver driver;
     void clk() {
         pins->clk = 1, pins->eval();

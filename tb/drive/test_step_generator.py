@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """step_generator: edges by hand in every mode, timings on the wire, nothing lost, and random lines against the model in every cycle."""
+import csv
 import random
 import shutil
 import subprocess
@@ -17,6 +18,9 @@ ONE = 1 << 16
 IDLE = dict(period=20, high_clk=1, low_clk=1, setup_clk=2, hold_clk=1, mode=0, step_low=0, direction_low=0, enable=0, load=0, tick=0,
             target=0)
 WAVEFORM = ROOT / "build" / "step_generator.csv"
+RECORDING = ROOT.parent / "shared" / "captures" / "smoothieware_steps.csv"
+SLOWER = 50                          # samples of the recording a clk
+RECORDED = 150                       # steps of it that are played
 
 
 class Generator:
@@ -299,6 +303,28 @@ async def writes_a_waveform_of_23_steps_up_and_9_down(dut):
     for target in (8, 16, 23, 23, 20, 14, 14):
         await generator.line(target)
     WAVEFORM.write_text("".join(f"{step},{direction}\n" for step, direction in generator.seen))
+
+
+def recorded():
+    """Place of a real machine's axis, as its controller stepped it, once a period: its first steps, and back again."""
+    with open(RECORDING, newline="") as lines:
+        rows = [tuple(map(int, row[:2])) for row in csv.reader(lines) if row[0].isdigit()]
+    edges = [sample for (_, before), (sample, step) in zip(rows, rows[1:]) if step > before][:RECORDED]
+    period = SLOWER * IDLE["period"]
+    times = range(edges[0] - period, edges[-1] + period, period)
+    places = [sum(edge <= time for edge in edges) for time in times]
+    return places + places[::-1]
+
+
+@cocotb.test(skip=not RECORDING.exists())
+async def follows_a_recorded_machine_there_and_back(dut):
+    places = recorded()
+    assert places[0] == places[-1] == 0 and max(places) == RECORDED
+    generator = await Generator(dut).reset(target=0, high_clk=2, low_clk=2, setup_clk=2, hold_clk=2)
+    for before, place in zip(places, places[1:]):
+        await generator.line(place)
+        assert min(before, place) - 1 <= generator.model.steps <= max(before, place)
+    assert (await generator.wait(30))[2:] == (0, 0)
 
 
 def test_step_generator():

@@ -185,6 +185,96 @@ def test_parameters_are_refused_while_the_axis_moves():
     machine.set(kp=1)
 
 
+# prepared motions, override
+
+def begun(machine):
+    """The axes that the node was told to start together, and started, as its hardware does."""
+    mask = machine.word.pop(DEFINES["NODE_START_AXES"], 0)
+    for n, axis in enumerate(machine.axes):
+        if mask >> n & 1:
+            axis.write(DEFINES["AXIS_STROBES"], DEFINES["AXIS_STROBES_START_MASK"])
+    return mask
+
+
+def two_homed():
+    machine = Machine(Axis(position=50 * PERIOD, low=0), Axis(position=60 * PERIOD, low=0))
+    for n in (0, 1):
+        machine.set(n, **SHORT)
+        machine.ask("enable", axis=n, on=1)
+        machine.ask("home", axis=n)
+        assert machine.run(20_000, until=lambda n=n: machine.status(n)["ended"] == "ok")
+    return machine
+
+
+def test_prepared_motions_begin_in_one_write_and_land_exactly():
+    machine = two_homed()
+    targets = 700 * PERIOD + 3, 300 * PERIOD - 5
+    for n, target in enumerate(targets):
+        assert machine.ask("prepare", axis=n, target=target)["duration_ticks"] > 0
+    before = [machine.status(n)["position"] for n in (0, 1)]
+    machine.run(50)
+    for n in (0, 1):
+        status = machine.status(n)
+        assert (status["state"], status["ended"], status["position"]) == ("prepared", "running", before[n])
+    machine.ask("start", axes=3)
+    assert begun(machine) == 3
+    assert machine.run(20_000, until=lambda: all(machine.status(n)["ended"] == "ok" for n in (0, 1)))
+    assert tuple(machine.status(n)["target"] for n in (0, 1)) == targets
+
+
+def test_none_begins_if_one_of_them_is_not_prepared():
+    machine = two_homed()
+    machine.ask("prepare", axis=1, target=9 * PERIOD)
+    assert machine.request("start", axes=3)[0] == "not_prepared" and begun(machine) == 0
+    assert machine.request("start", axes=0)[0] == machine.request("start", axes=4)[0] == "out_of_range"
+    assert machine.status(1)["state"] == "prepared"
+    machine.ask("start", axes=2)
+    assert begun(machine) == 2 and machine.request("start", axes=2)[0] == "not_prepared"
+
+
+@pytest.mark.parametrize("end", ["stop", "disable", "estop"])
+def test_a_prepared_motion_that_is_given_up_is_not_begun_later(end):
+    machine = two_homed()
+    machine.ask("prepare", axis=0, target=9 * PERIOD)
+    if end == "stop":
+        machine.ask("stop", axis=0)
+    elif end == "disable":
+        machine.ask("enable", axis=0, on=0)
+    else:
+        machine.axes[0].causes = FAULT["estop"]
+        machine.run(1)
+    assert machine.axes[0].strobes[-1][0] == HOLD
+    assert machine.request("start", axes=1)[0] == "not_prepared" and begun(machine) == 0
+    assert machine.status()["ended"] == ("ended_by_fault" if end == "estop" else "stopped")
+
+
+def test_the_override_changes_in_motion_and_nothing_else_does():
+    machine = homed()
+    machine.ask("move", axis=0, target=500 * PERIOD)
+    for share in (65536, 32768, 1, 0):
+        machine.ask("set_parameter", axis=0, parameter=PARAMETER["override"]["id"], value=share)
+        assert machine.axes[0].read(DEFINES["AXIS_OVERRIDE"]) == share
+    assert machine.request("set_parameter", axis=0, parameter=PARAMETER["override"]["id"], value=65537)[0] == "out_of_range"
+    assert machine.request("set_parameter", axis=0, parameter=PARAMETER["velocity"]["id"], value=100)[0] == "busy"
+
+
+@pytest.mark.parametrize("name, value", [("drive", 1), ("position_source", 1), ("step_output", 1), ("step_invert", 1)])
+def test_what_the_drive_is_changes_only_with_the_drive_off(name, value):
+    machine = enabled()
+    assert machine.request("set_parameter", axis=0, parameter=PARAMETER[name]["id"], value=value)[0] == "busy"
+    machine.ask("enable", axis=0, on=0)
+    machine.ask("set_parameter", axis=0, parameter=PARAMETER[name]["id"], value=value)
+    assert machine.ask("get_parameter", axis=0, parameter=PARAMETER[name]["id"])["value"] == value
+
+
+def test_a_drive_that_was_not_built_is_refused():
+    machine = Machine()
+    machine.actuators[0][DEFINES["ACTUATOR_DRIVE"]] = 0b0001 << DEFINES["ACTUATOR_DRIVE_BUILT_SHIFT"]
+    for name, value in (("drive", 1), ("drive", 2), ("fine_reach", 65536)):
+        assert machine.request("set_parameter", axis=0, parameter=PARAMETER[name]["id"], value=value)[0] == "not_built"
+    machine.ask("set_parameter", axis=0, parameter=PARAMETER["drive"]["id"], value=0)
+
+
 def test_a_move_of_days_is_refused():
     machine = homed()
     machine.set(velocity=1, travel_high=2**46)

@@ -3,6 +3,7 @@
 import binascii
 import random
 import sys
+from math import inf
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "sw" / "host"))
@@ -40,6 +41,7 @@ class FakeAxis:
         self.waiting = dict(self.harmonics)
         self.signal = dict(faults=0, first=0)
         self.speeds = []               # of moves, period/s
+        self.full_speed_s = 0.0        # left of a motion that is paused
 
     def advance(self, now):
         """The motion as it stands at this time."""
@@ -61,9 +63,21 @@ class FakeAxis:
             self.position = round(self.start + share * (self.target - self.start))
             self.begin, self.start = now, self.position
 
+    @property
+    def override(self):
+        return self.parameters[67] / 65536
+
     def go(self, kind, now, seconds, target=None):
-        self.kind, self.begin, self.until, self.ended = kind, now, now + seconds, "running"
+        self.kind, self.begin, self.ended = kind, now, "running"
         self.start, self.target = self.position, self.target if target is None else target
+        self.full_speed_s = seconds
+        self.until = now + seconds / self.override if self.override else inf
+
+    def change_override(self, now, value):
+        if self.override:
+            self.full_speed_s = (self.until - now) * self.override
+        self.parameters[67] = value
+        self.until = now + self.full_speed_s / self.override if self.override else inf
 
     @property
     def state(self):
@@ -204,19 +218,42 @@ class FakeNode:
         axis.go("homing", self.now, 0.8, 0)
         return "ok", {}
 
-    def do_move(self, axis, target):
+    def may_go(self, axis, target):
         if self.ready(axis) != "ok":
-            return self.ready(axis), {}
+            return self.ready(axis)
         if not axis.homed:
-            return "not_homed", {}
-        if not axis.parameters[3] <= target <= axis.parameters[4]:
-            return "out_of_travel", {}
+            return "not_homed"
+        return "ok" if axis.parameters[3] <= target <= axis.parameters[4] else "out_of_travel"
+
+    def seconds(self, axis, target):
+        return abs(target - axis.position) / 65536 / axis.parameters[5] + 0.05
+
+    def do_prepare(self, axis, target):
+        cause = self.may_go(axis, target)
+        if cause != "ok":
+            return cause, {}
+        axis.kind, axis.prepared, axis.until, axis.ended = "prepared", target, inf, "running"
+        return "ok", {"duration_ticks": round(self.seconds(axis, target) * TICK_HZ)}
+
+    def do_start(self, _, axes):
+        if axes == 0 or axes >> len(self.axes):
+            return "out_of_range", {}
+        chosen = [axis for n, axis in enumerate(self.axes) if axes >> n & 1]
+        if any(axis.kind != "prepared" for axis in chosen):
+            return "not_prepared", {}
+        for axis in chosen:
+            axis.go("moving", self.now, self.seconds(axis, axis.prepared), axis.prepared)
+        return "ok", {}
+
+    def do_move(self, axis, target):
+        if (cause := self.may_go(axis, target)) != "ok":
+            return cause, {}
         axis.speeds.append(axis.parameters[5])
         if not axis.learner["frozen"] and axis.learns_in is not None:
             axis.learns_in -= 1
             if axis.learns_in == 0:
                 axis.learner.update(settled=1, accepted=2, scatter=26)
-        seconds = abs(target - axis.position) / 65536 / axis.parameters[5] + 0.05
+        seconds = self.seconds(axis, target)
         axis.go("moving", self.now, seconds, target)
         return "ok", {"duration_ticks": round(seconds * TICK_HZ)}
 
@@ -240,10 +277,12 @@ class FakeNode:
         known = next((known for known in PARAMETERS.values() if known.id == parameter), None)
         if known is None:
             return "unknown_parameter", {}
-        if axis.kind:
+        if axis.kind and known.name != "override":
             return "busy", {}
         if not known.min <= value <= known.max:
             return "out_of_range", {}
+        if known.name == "override":
+            axis.change_override(self.now, value)
         axis.parameters[parameter] = value
         axis.writes.append(known.name)
         return "ok", {}

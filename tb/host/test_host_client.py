@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """client: what a node says in real units and words, every refusal with its values, motions that end well, badly and by Ctrl-C."""
 import random
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
 
 from bench import seed
 from fake_node import ESTOP, LIMIT_LOW, FakeLine, FakeNode
-from moire.client import Line
+from moire.client import CHOICES, Line
 from moire.errors import LineError, LineGarbled, MotionFailed, NobodyAnswers, OutOfRange, Refused, UnitError, UnknownName, WrongBuild
 from moire.line_tables import CAUSES, PARAMETERS, PROTOCOL_CRC
 from moire.registers import FIELDS, MAP_CRC
+from moire.tune import Tuning
 
 SEED = seed()
 
@@ -113,7 +115,7 @@ def test_registers_are_read_by_name_and_wide_ones_low_word_first():
     place = known["axis", "position"].address()
     node.registers = {place: 0xFFFF0000, place + 4: 0x0000FFFF, known["axis", "control"].address(): 0b101}
     assert axis.node.read_named("axis.position") == {"value": -65536}
-    assert axis.node.read_named("axis.control") == {"enable": 1, "closed_loop": 0, "homing": 1}
+    assert axis.node.read_named("axis.control") == {"enable": 1, "closed_loop": 0, "homing": 1, "fine": 0}
     with pytest.raises(UnknownName, match="there is no register 'axis.speed': known are node.map_crc"):
         axis.node.read_named("axis.speed")
     with pytest.raises(OutOfRange, match="line.transmit can only be written"):
@@ -273,6 +275,146 @@ def test_waiting_talks_often_enough_for_the_watchdog():
     assert max(b - a for a, b in zip(times, times[1:])) < 0.1
 
 
+# ------------------------------------------------------------------ several axes, override, drive
+
+def two_axes():
+    """A node with both axes homed."""
+    fake = FakeLine(FakeNode(axes=2))
+    node = Line(fake).node(1)
+    for number in (0, 1):
+        node.axis(number).enable()
+        node.axis(number).home()
+    return fake, node
+
+
+def test_prepared_axes_begin_together_and_end_one_after_the_other():
+    fake, node = two_axes()
+    assert node.axis(0).prepare("2mm") == pytest.approx(2500 / 6000 + 0.05, abs=1e-3)
+    node.axis(1).prepare(mm=1)
+    assert node.axis(0).status().state == "prepared" and node.axis(0).status().position_nm == 0
+    seen = []
+    ended = node.start(0, 1, progress=lambda status: seen.append([axis.kind for axis in fake.nodes[0].axes]))
+    assert [round(status.position_nm) for status in ended] == [2_000_000, 1_000_000]
+    assert seen[0] == ["moving", "moving"] and all(status.ended == "ok" for status in ended)
+
+
+def test_none_starts_if_one_was_not_prepared():
+    fake, node = two_axes()
+    node.axis(0).prepare("1mm")
+    with pytest.raises(Refused, match="the axis has no motion prepared"):
+        node.start(0, 1)
+    assert fake.nodes[0].axes[0].kind == "prepared"
+    with pytest.raises(OutOfRange, match="which axes"):
+        node.start()
+    with pytest.raises(Refused, match="node 1 has no axis 2"):
+        node.start(2)
+    node.axis(0).stop()
+    fake.wait(1)
+    assert node.axis(0).status().ended == "stopped"
+
+
+def test_an_interrupted_common_start_stops_all_of_them():
+    fake, node = two_axes()
+    for number in (0, 1):
+        node.axis(number).prepare("50mm")
+
+    def interrupt(_):
+        raise KeyboardInterrupt
+    with pytest.raises(KeyboardInterrupt):
+        node.start(0, 1, progress=interrupt)
+    assert [axis.ended for axis in fake.nodes[0].axes] == ["stopped", "stopped"]
+
+
+def test_a_prepared_move_beyond_the_travel_says_where_it_ends():
+    _, _, axis = homed_stage()
+    with pytest.raises(Refused, match="target 200mm, allowed -800um to 119.6mm"):
+        axis.prepare("200mm")
+    with pytest.raises(OutOfRange, match="a prepare needs a target"):
+        axis.prepare()
+
+
+def test_pause_stands_and_resume_goes_on_at_the_override_before():
+    fake, node, axis = homed_stage()
+    assert axis.override() == 1 and axis.override("50%") == Fraction(1, 2)
+    seconds = axis.begin_move("4.8mm")
+    assert seconds == pytest.approx(1.05, abs=0.01)
+    fake.wait(0.5)
+    axis.pause()
+    axis.pause()                                                # twice is once
+    stands = axis.status().position_nm
+    fake.wait(10)
+    assert axis.status().position_nm == stands and axis.status().in_motion and 0 < stands < 4.8e6
+    assert axis.resume() == Fraction(1, 2)
+    assert axis.motion_end().position_nm == pytest.approx(4.8e6, abs=1)
+
+
+def test_resume_of_what_another_program_paused_is_full_speed():
+    fake, _, axis = homed_stage()
+    axis.pause()
+    assert Line(fake).axis(1).resume() == 1
+
+
+@pytest.mark.parametrize("share", ["120%", "-1%", 1.5, "fast", "50 mm"])
+def test_an_override_that_is_no_share_is_refused(share):
+    fake, node, axis = homed_stage()
+    with pytest.raises(UnitError):
+        axis.override(share)
+    assert axis.override() == 1
+
+
+def test_ctrl_c_while_waiting_for_a_motion_stops_it():
+    fake, node, axis = homed_stage()
+    axis.begin_move("50mm")
+
+    def interrupt(_):
+        raise KeyboardInterrupt
+    with pytest.raises(KeyboardInterrupt):
+        axis.motion_end(interrupt)
+    assert node.axes[0].ended == "stopped"
+
+
+def test_home_keeps_the_method_that_was_asked_for():
+    _, node, axis = homed_stage()
+    for method, counts in ((35, 35), ("17", 17), ("s3", -2), ("s0", -1)):
+        assert axis.home(method=method).homed
+        assert node.axes[0].parameters[PARAMETERS["home_method"].id] == counts
+    with pytest.raises(OutOfRange, match="home_method allows -2 to 37, not 99"):
+        axis.home(method=99)
+
+
+def test_the_drive_is_told_in_words():
+    _, node, axis = homed_stage()
+    node.registers.update({0x1400: 1 | 0b1111 << 2, 0x1420: -7 & 0xFFFFFFFF, 0x143C: -16384 & 0xFFFF})
+    drive = axis.drive()
+    assert (drive.kind, drive.built, drive.steps, drive.fine_command) == ("steps", ("bridge", "steps", "converter", "fine"), -7, -0.5)
+    assert drive.override == 1
+
+
+def test_a_parameter_that_is_a_choice_takes_and_tells_its_words():
+    _, node, axis = stage()
+    for name, words in CHOICES.items():
+        known = PARAMETERS[name]
+        assert len(words) == known.max - known.min + 1 and known.min == 0
+        for counts, word in enumerate(words):
+            assert axis.set_parameter(name, word).counts == counts == axis.set_parameter(name, str(counts)).counts
+            assert axis.get_parameter(name).written() == word
+        with pytest.raises(OutOfRange, match=f"{name} is no 'sideways': allowed are {words[0]}, "):
+            axis.set_parameter(name, "sideways")
+    assert axis.set_parameter("override", "25%").value == Fraction(1, 4)
+
+
+def test_a_tuning_is_written_gain_by_gain_and_filter_by_filter():
+    _, node, axis = stage()
+    tuning = Tuning(kp=100, ki=200, kd=300, kv=400, ka=500, filters=((1, 2, 3, 4, 5),), bandwidth_hz=40, phase_margin_degree=50,
+                    gain_margin=3)
+    axis.set_tuning(tuning)
+    written = {name: node.axes[0].parameters[known.id] for name, known in PARAMETERS.items()}
+    assert [written[name] for name in ("kp", "ki", "kd", "kv", "ka", "filters")] == [100, 200, 300, 400, 500, 1]
+    assert [written[f"filter_1_{name}"] for name in ("b0", "b1", "b2", "a1", "a2")] == [1, 2, 3, 4, 5]
+    with pytest.raises(OutOfRange, match="the servo has 2 filters, the tuning 3"):
+        axis.set_tuning(replace(tuning, filters=tuning.filters * 3))
+
+
 # ------------------------------------------------------------------ parameters
 
 def test_parameters_are_in_real_units():
@@ -301,7 +443,7 @@ def test_both_ends_of_each_parameter_are_taken_and_what_is_beyond_is_not_sent(na
         assert axis.set_parameter(name, end).counts == counts == node.axes[0].parameters[known.id]
         written = len(node.axes[0].writes)
         if name != "period":
-            with pytest.raises(OutOfRange, match=f"{name} allows .* to .*, not "):
+            with pytest.raises(OutOfRange, match=f"{name} allows .*(, | to ).*, not "):
                 axis.set_parameter(name, end + beyond)
         assert len(node.axes[0].writes) == written
 

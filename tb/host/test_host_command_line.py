@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from fake_node import CAUSE, ESTOP, FakeLine, FakeNode
-from moire import command_line
+from moire import command_line, tune
 from moire.errors import PortError
 from moire.line_tables import PARAMETERS
 
@@ -113,6 +113,67 @@ def test_parameters_are_saved_and_loaded(tmp_path):
     assert Call(["params", "load", file], other).code == 0 and other.axes[0].parameters == node.axes[0].parameters
 
 
+def test_two_axes_begin_together():
+    node = FakeNode(axes=2)
+    call = Call("home -- home --axis 1 -- prepare 1mm -- prepare 2mm --axis 1 -- start 0 1", node)
+    assert call.code == 0, call.err
+    assert "node 1 axis 0: at 1.000000 mm, error 0.0 nm\nnode 1 axis 1: at 2.000000 mm, error 0.0 nm" in call.out
+    assert sentence(Call("home -- prepare 1mm -- start 0 1", FakeNode(axes=2)), 1).endswith("the axis has no motion prepared\n")
+
+
+def test_a_motion_is_slowed_paused_resumed_and_awaited():
+    node = FakeNode()
+    call = Call("home -- override 50% -- move 1mm --no-wait -- pause -- wait 20s -- resume -- finish -- override", node)
+    assert call.code == 0, call.err
+    rows = call.out.splitlines()
+    assert rows[1].endswith("50 % of full speed") and "on its way" in rows[2] and rows[3].endswith("paused")
+    assert "moving" in rows[4] and any("at 1.000000 mm, error 0.0 nm" in row for row in rows) and rows[-1].endswith("50 % of full speed")
+
+
+def test_home_takes_a_method():
+    node = FakeNode()
+    assert Call("home --method 35", node).code == 0 and node.axes[0].parameters[PARAMETERS["home_method"].id] == 35
+    assert Call("home --method s3", node).code == 0 and node.axes[0].parameters[PARAMETERS["home_method"].id] == -2
+
+
+def test_the_drive_and_choices_in_words():
+    node = FakeNode()
+    node.registers.update({0x1400: 1 | 0b0111 << 2, 0x1420: 25, 0x143C: 0})
+    call = Call("drive -- params set drive steps -- register actuator.steps", node)
+    assert call.code == 0, call.err
+    assert "drive     steps; built: bridge, steps, converter\n" in call.out and "25 on the wire" in call.out and "fine" not in call.out
+    assert "bridge, steps, converter" in call.out and node.axes[0].parameters[PARAMETERS["drive"].id] == 1
+    assert "'sideways': allowed are bridge, steps, converter" in sentence(Call("params set drive sideways", node), 2)
+
+
+def test_tune_reads_a_record_tells_gains_and_writes_them(tmp_path):
+    node, record, picture = FakeNode(), tmp_path / "record.csv", tmp_path / "tuning.png"
+    position = velocity = 0.0
+    rows = ["command,position"]
+    for command in tune.excitation(1000, 8000):
+        rows.append(f"{command},{round(position)}")
+        velocity += 0.05 * (0.2 * command - velocity)
+        position += velocity
+    record.write_text("\n".join(rows))
+    call = Call(["tune", str(record), "--bandwidth", "40Hz", "--picture", str(picture), "--json"], node)
+    assert call.code == 0, call.err
+    told = call.told[0]
+    assert told["plant"]["a"] == pytest.approx(0.95, rel=0.01) and not told["written"] and picture.read_bytes().startswith(b"\x89PNG")
+    assert node.axes[0].writes == []
+    call = Call(["tune", str(record), "--bandwidth", "40Hz", "--tick", "250us", "--write"], node)
+    assert call.code == 0 and "written to node 1 axis 0" in call.out
+    assert node.axes[0].parameters[PARAMETERS["kp"].id] == round(told["gains"]["kp"] * 65536) > 0
+
+
+@pytest.mark.parametrize("text, said", [("1,2,3\n1,2,3", "is no record"), ("1,x\n2,3", "is no record"), ("", "is no record"),
+                                        ("command,position\n1,2", "too few")])
+def test_a_file_that_is_no_record_is_refused(tmp_path, text, said):
+    record = tmp_path / "record.csv"
+    record.write_text(text)
+    call = Call(["tune", str(record), "--bandwidth", "40Hz"])
+    assert call.code in (1, 2) and said in call.err and call.err.count("\n") == 1
+
+
 # ------------------------------------------------------------------ JSON
 
 @pytest.mark.parametrize(
@@ -134,6 +195,10 @@ def test_parameters_are_saved_and_loaded(tmp_path):
         "params list",
         "params get kp",
         "params set kp 0.1",
+        "home -- move 1mm --no-wait -- pause -- resume -- finish",
+        "home -- prepare 1mm -- start 0",
+        "override",
+        "override 50%",
     ],
 )
 def test_every_command_tells_one_json_object_a_line(text):
@@ -194,6 +259,11 @@ def test_errors_are_json_too():
         ("params set velocity 900mm/s", "velocity allows 800nm/s to 800mm/s, not 900mm/s"),
         ("params set velocity 5mm", "'5mm' is no speed"),
         ("params set kp x", "'x' is no number: write a plain number, such as 0.5"),
+        ("override 120%", "'120%' is no share of full speed: write 0% to 100%, or 0 to 1"),
+        ("home --method zero", "'zero' is no method: allowed are a number of CiA 402, s0, s3"),
+        ("start", "required: AXIS"),
+        ("tune record.csv", "required: --bandwidth"),
+        ("tune /no/such/file --bandwidth 40Hz", "cannot be read"),
         ("register axis.speed", "there is no register 'axis.speed'"),
         ("register 0x401", "multiples of 4"),
         ("register 0xg", "'0xg' is no register address"),

@@ -116,3 +116,15 @@ def test_any_text_is_a_value_or_a_clear_refusal():
             units.parse_length(text)
         except UnitError as refused:
             assert "such as" in str(refused)
+
+
+@pytest.mark.parametrize("text, share", [("50%", Fraction(1, 2)), ("0%", 0), ("100 %", 1),
+                                         ("0.25", Fraction(1, 4)), (1, 1), (0.5, Fraction(1, 2))])
+def test_a_share_is_a_percentage_or_a_part_of_one(text, share):
+    assert units.parse_share(text) == share
+
+
+@pytest.mark.parametrize("text", ["101%", "-0.1", 2, "half", "%", "5mm"])
+def test_what_is_no_share_is_refused(text):
+    with pytest.raises(UnitError):
+        units.parse_share(text)

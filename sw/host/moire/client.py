@@ -11,6 +11,7 @@
 A drive stays on only while somebody talks on the line: the node's watchdog switches it off after `watchdog_time`.
 """
 import random
+import re
 from dataclasses import dataclass, field
 from fractions import Fraction
 
@@ -43,6 +44,22 @@ LEARNING_SPEEDS = (Fraction(1), Fraction(3, 5), Fraction(4, 5))        # shares 
 LEARNING_SAMPLES = 20        # for one period at the top speed of learning; it wants eight
 LEARNING_WAY_S = 0.5         # for one way at the top speed: most of it is then at an even speed
 CAPTURE_SOURCES = ("index", "tick", "software", "probe_0_rising", "probe_1_rising", "probe_0_falling", "probe_1_falling")
+
+FILTERS = 2                  # of the servo
+FILTER = ("b0", "b1", "b2", "a1", "a2")
+
+# words for the values of a parameter that is a choice, from 0 on
+CHOICES = {
+    "home_end": ("low", "high"),
+    "learning": ("frozen", "learns"),
+    "decoder_mode": ("every_edge", "every_second", "every_fourth", "pulses"),
+    "position_source": ("phases", "counts", "own_steps"),
+    "drive": ("bridge", "steps", "converter"),
+    "step_output": ("step_and_direction", "quadrature", "pulses"),
+    "step_invert": ("none", "step", "direction", "both"),
+    "filters": ("none", "first", "second", "both"),
+}
+HOME_METHODS = {"s0": -1, "s3": -2}      # beside the numbers of CiA 402
 
 CAUSE_CODES = {name: code for code, (name, _) in CAUSES.items()}
 
@@ -150,6 +167,16 @@ class Encoder:
 
 
 @dataclass(frozen=True)
+class Drive:
+    kind: str                      # what the command goes to: bridge, steps or converter
+    built: tuple                   # what this node could drive, "fine" for the fine stage
+    command: float                 # of full scale, -1…1
+    steps: int                     # on the wire since reset
+    fine_command: float            # of full scale, -1…1
+    override: Fraction             # how fast profiles are played, of full speed; 0: paused
+
+
+@dataclass(frozen=True)
 class Learner:
     reason: str                    # "learning", or why nothing is learned just now
     settled: bool                  # offset, gain, phase and harmonics are all known
@@ -206,10 +233,14 @@ class ParameterValue:
     quantity: units.Quantity = field(repr=False)
 
     def written(self, digits: int | None = None) -> str:
+        if self.name in CHOICES:
+            return CHOICES[self.name][self.counts]
         return units.with_unit(self.quantity, self.value, digits)
 
     @property
     def range_words(self) -> str:
+        if self.name in CHOICES:
+            return ", ".join(CHOICES[self.name])
         return " to ".join(units.with_unit(self.quantity, end, 6) for end in (self.minimum, self.maximum))
 
 
@@ -339,6 +370,22 @@ class Node:
             self.axes[number] = Axis(self, number)
         return self.axes[number]
 
+    def start(self, *axes: int, progress=None) -> list:
+        """Begin the prepared motions of these axes in the very same tick, or none of them; returns their Status when all have ended.
+
+        `progress` is called with a Status from time to time. Whatever interrupts the wait stops all of them under control first.
+        """
+        if not axes:
+            raise OutOfRange("which axes shall start? Give their numbers")
+        moving = [self.axis(number) for number in dict.fromkeys(axes)]
+        self.request("start", axes=sum(1 << axis.number for axis in moving))
+        try:
+            return [axis.wait(progress) for axis in moving]
+        except BaseException:
+            for axis in moving:
+                axis.stop_if_on()
+            raise
+
     def counters(self) -> dict:
         """What the node met on the line, by name."""
         return self.request("counters")
@@ -403,6 +450,7 @@ class Axis:
     def __init__(self, node: Node, number: int):
         self.node, self.number = node, number
         self.period_nm = self.read_period()
+        self.resumed_at = None         # override that resume() brings back
 
     def read_period(self) -> Fraction:
         return Fraction(self.request("get_parameter", parameter=PARAMETERS["period"].id)["value"], 1000)
@@ -463,35 +511,89 @@ class Axis:
         """Controlled stop; the drive stays on. Does not wait: see wait()."""
         self.request("stop")
 
-    def home(self, progress=None) -> Status:
-        """Find the zero; returns when it is reached. `progress` is called with a Status from time to time."""
+    def home(self, progress=None, method=None) -> Status:
+        """Find the zero; returns when it is reached. `progress` is called with a Status from time to time.
+
+        `method` is a number of CiA 402, "s0" or "s3"; the parameter home_method keeps it. Without one that parameter holds.
+        """
+        if method is not None:
+            self.set_parameter("home_method", method)
         return self.motion("home", progress)
 
     def move(self, nm=None, *, mm=None, by: bool = False, progress=None) -> Status:
         """To a position, or by a distance; returns when settled. The target is a number, or a text such as "1.5mm"."""
+        return self.to_target("move", nm, mm, by, lambda **fields: self.motion("move", progress, **fields))
+
+    def begin_move(self, nm=None, *, mm=None, by: bool = False) -> float:
+        """As move(), but returns at once, with the seconds that the motion takes at full speed. See wait(), pause() and stop()."""
+        return self.seconds(self.to_target("move", nm, mm, by, lambda **fields: self.request("move", **fields)))
+
+    def prepare(self, nm=None, *, mm=None, by: bool = False) -> float:
+        """Plan a move and let it wait for Node.start(), which begins those of several axes together. Returns its seconds."""
+        return self.seconds(self.to_target("prepare", nm, mm, by, lambda **fields: self.request("prepare", **fields)))
+
+    def seconds(self, told: dict) -> float:
+        return told["duration_ticks"] / self.node.identity.tick_hz
+
+    def to_target(self, operation: str, nm, mm, by: bool, go):
         if (nm is None) == (mm is None):
-            raise OutOfRange("a move needs a target in nm or in mm, and not both")
+            raise OutOfRange(f"a {operation} needs a target in nm or in mm, and not both")
         target_nm = units.parse_length(nm) if mm is None else Fraction(mm) * 10**6
         if by:
             target_nm += Fraction(self.status().target_nm)
         try:
-            return self.motion("move", progress, target=self.to_counts(target_nm))
+            return go(target=self.to_counts(target_nm))
         except Refused as refused:
             if refused.cause == "out_of_travel":
                 low, high = (self.get_parameter(name).written(9) for name in ("travel_low", "travel_high"))
                 raise with_more(refused, f"target {units.format_length(target_nm)}, allowed {low} to {high}") from None
             raise
 
+    def override(self, share=None) -> Fraction:
+        """How fast profiles are played, of full speed; given a share ("50%" or 0.5) it changes, in motion too."""
+        if share is not None:
+            self.resumed_at = None
+            return self.set_parameter("override", units.parse_share(share)).value
+        return self.get_parameter("override").value
+
+    def pause(self):
+        """Stand still in the middle of a motion, within its limits; resume() goes on."""
+        before = self.override()
+        if before:
+            self.override(0)
+            self.resumed_at = before
+
+    def resume(self) -> Fraction:
+        """Go on, with the override that was in force before pause(); at full speed if this program did not pause it."""
+        return self.override(self.resumed_at or 1)
+
+    def drive(self) -> Drive:
+        """What drives the axis, and what it is told just now."""
+        told = {name: self.node.read_named(f"actuator.{name}", self.number) for name in ("drive", "steps", "fine_command")}
+        kinds = CHOICES["drive"]
+        built = tuple(name for bit, name in enumerate((*kinds, "fine")) if told["drive"]["built"] >> bit & 1)
+        return Drive(kind=kinds[told["drive"]["kind"]], built=built, command=self.status().drive_command, steps=told["steps"]["value"],
+                     fine_command=told["fine_command"]["value"] / FULL_SCALE, override=self.override())
+
     def motion(self, operation: str, progress, **fields) -> Status:
         """Whatever interrupts the wait, Ctrl-C too, stops the axis under control first."""
-        try:
+        def carry_out():
             self.request(operation, **fields)
             return self.wait(progress)
+        return self.guarded(carry_out)
+
+    def guarded(self, work):
+        try:
+            return work()
         except (LineError, Refused, MotionFailed):
             raise
         except BaseException:
             self.bring_to_rest()
             raise
+
+    def motion_end(self, progress=None) -> Status:
+        """Until the motion under way has ended; whatever interrupts the wait stops the axis under control first."""
+        return self.guarded(lambda: self.wait(progress))
 
     def wait(self, progress=None) -> Status:
         """Until the motion under way has ended; MotionFailed unless it ended well."""
@@ -521,6 +623,13 @@ class Axis:
             sentence = f"axis {self.number} of node {self.node.address} could not be told to stop, its watchdog has to: {error}"
             raise LineError(self.node.address, sentence) from None
 
+    def stop_if_on(self):
+        """One of several that are to stop: what keeps it from stopping must not keep the others."""
+        try:
+            self.bring_to_rest()
+        except MoireError:
+            pass
+
     def let_pass(self, seconds: float, progress=None) -> Status:
         """Let time pass, talking often enough for the watchdog."""
         end = self.transport.now() + seconds
@@ -548,6 +657,8 @@ class Axis:
     def parameter_counts(self, name: str, value, period_nm=None) -> int:
         """What the wire carries for a value in real units; OutOfRange says what is allowed."""
         known = parameter(name)
+        if isinstance(value, str) and (chosen := choice(name, value)) is not None:
+            return chosen
         one, quantity = one_count(known, period_nm or self.period_nm), KINDS[known.unit][0]
         wanted = quantity.parse(value)
         counts = round(wanted / one)
@@ -586,6 +697,18 @@ class Axis:
             period_nm = Fraction(self.parameter_counts("period", texts["period"]), 1000)
         counts = {name: self.parameter_counts(name, texts[name], period_nm) for name in sorted(texts, key=lambda name: name != "period")}
         return {name: self.write_parameter(name, value) for name, value in counts.items()}
+
+    def set_tuning(self, tuning):
+        """Gains and filters of moire.tune, written as they are; filters that it has none of are out of use."""
+        if len(tuning.filters) > FILTERS:
+            raise OutOfRange(f"the servo has {FILTERS} filters, the tuning {len(tuning.filters)}")
+        self.write_parameter("filters", 0)
+        for name in ("kp", "ki", "kd", "kv", "ka"):
+            self.write_parameter(name, getattr(tuning, name))
+        for number, coefficients in enumerate(tuning.filters, 1):
+            for name, value in zip(FILTER, coefficients):
+                self.write_parameter(f"filter_{number}_{name}", value)
+        self.write_parameter("filters", (1 << len(tuning.filters)) - 1)
 
     # correction
 
@@ -731,6 +854,19 @@ def capture_source(name: str) -> str:
     if name not in CAPTURE_SOURCES:
         raise UnknownName(f"there is no capture source '{name}': known are {', '.join(CAPTURE_SOURCES)}")
     return name
+
+
+def choice(name: str, text: str) -> int | None:
+    """The counts that a word stands for; None where numbers may be written and this is one."""
+    if name == "home_method" and text.strip() in HOME_METHODS:
+        return HOME_METHODS[text.strip()]
+    if name == "override" and text.strip().endswith("%"):
+        return round(units.parse_share(text) / PARAMETERS[name].lsb)
+    if name not in CHOICES or re.fullmatch(r"\s*[+-]?[0-9.]+\s*", text):
+        return None
+    if text.strip() not in CHOICES[name]:
+        raise OutOfRange(f"{name} is no '{text.strip()}': allowed are {', '.join(CHOICES[name])}")
+    return CHOICES[name].index(text.strip())
 
 
 def parameter(name: str):

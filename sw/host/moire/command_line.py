@@ -13,7 +13,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from . import units
-from .client import CAPTURE_SOURCES, Line, capture_source, register_fields
+from .client import CAPTURE_SOURCES, HOME_METHODS, Line, capture_source, register_fields
 from .errors import BadFile, LineError, MoireError, OutOfRange, PortError, TwinNotBuilt, UnitError
 from .line_tables import PARAMETERS
 from .protocol import ADDRESSES
@@ -40,6 +40,7 @@ stops a moving axis under control)
 DEFAULTS = dict(port=None, baud=BAUD, parity="auto", address=1, axis=0, json=False)
 OF_THE_PORT = ("port", "baud", "parity")
 OF_THE_CALL = (*OF_THE_PORT, "json")
+OF_AN_AXIS = ("axis.", "grating.", "actuator.")      # registers
 KEEP_COMPANY_S = 0.1
 NOT_INSIDE = ("run", "shell")
 INTERRUPTED = 130
@@ -105,6 +106,12 @@ def waiting_time(text):
     return seconds
 
 
+def home_method(text):
+    if text not in HOME_METHODS and not re.fullmatch(r"[0-9]+", text):
+        raise OutOfRange(f"'{text}' is no method: allowed are a number of CiA 402, {', '.join(HOME_METHODS)}")
+    return text
+
+
 def positive(parse):
     def above_zero(text):
         value = parse(text)
@@ -162,7 +169,10 @@ def make_parser() -> Parser:
         "moire --port twin enable -- wait 1s -- status",
     )
     command("disable", do_disable, "switch the drive off", "moire --port /dev/ttyUSB0 disable")
-    command("home", do_home, "find the zero; switches the drive on where needed", "moire --port twin home -- status")
+    home = command("home", do_home, "find the zero; switches the drive on where needed", "moire --port twin home -- status")
+    home.add_argument("--method", type=checked(home_method), metavar="METHOD",
+                      help="1, 2, 17, 18, 33, 34, 35 or 37 as in CiA 402; s0: switch, way, phase zero; s3: index on either side; "
+                           "the parameter home_method unless given")
     move = command(
         "move",
         do_move,
@@ -171,6 +181,30 @@ def make_parser() -> Parser:
     )
     move.add_argument("target", type=checked(units.parse_length), metavar="LENGTH", help="where to, with a unit: 1.5mm, 200um, 50nm")
     move.add_argument("--by", action="store_true", help="LENGTH is a distance from the present target")
+    move.add_argument("--no-wait", action="store_true", help="only begin it; pause, resume, stop or finish may follow")
+    command("finish", do_finish, "wait until the motion under way has ended", "moire --port twin home -- move 1mm --no-wait -- finish")
+    prepare = command("prepare", do_prepare, "plan a move, for a common start; switches the drive on where needed",
+                      "moire --port /dev/ttyUSB0 prepare 1mm --axis 0 -- prepare 2mm --axis 1 -- start 0 1")
+    prepare.add_argument("target", type=checked(units.parse_length), metavar="LENGTH", help="where to, with a unit")
+    prepare.add_argument("--by", action="store_true", help="LENGTH is a distance from the present target")
+    begin = command("start", do_start, "begin the prepared moves of several axes of a node in the same instant, and wait for all",
+                    "moire --port /dev/ttyUSB0 start 0 1")
+    begin.add_argument("axes", nargs="+", type=axis_number, metavar="AXIS")
+    override = command("override", do_override, "how fast motions go, of full speed: tell or change, in motion too",
+                       "moire --port /dev/ttyUSB0 override 50%%")
+    override.add_argument("share", nargs="?", type=checked(units.parse_share), metavar="SHARE", help="0%% to 100%%, or 0 to 1")
+    command("pause", do_pause, "stand still in the middle of a motion", "moire --port twin home -- move 1mm --no-wait -- pause -- resume")
+    command("resume", do_resume, "go on as before the pause; at full speed if it was another call that paused",
+            "moire --port /dev/ttyUSB0 resume -- finish")
+    command("drive", do_drive, "what drives the axis: command, steps on the wire, fine stage", "moire --port /dev/ttyUSB0 drive")
+    tune = command("tune", do_tune, "gains from a record of how the axis answers to commands in open loop",
+                   "moire tune record.csv --bandwidth 40Hz --picture tuning.png")
+    tune.add_argument("file", metavar="FILE", help="a row a servo tick: command (full scale 32768), position (2^-16 period) that stood")
+    tune.add_argument("--bandwidth", required=True, type=checked(positive(units.FREQUENCY.parse)), metavar="FREQUENCY", help="such as 40Hz")
+    tune.add_argument("--margin", type=float, default=50.0, metavar="DEGREES", help="phase margin; 50 unless given")
+    tune.add_argument("--tick", type=checked(positive(units.parse_time)), metavar="TIME", help="servo tick; the node is asked unless given")
+    tune.add_argument("--picture", metavar="FILE", help="Bode plot and answer to a step, PNG")
+    tune.add_argument("--write", action="store_true", help="write gains and filters to the axis")
     command("stop", do_stop, "stop under control; the drive stays on", "moire --port /dev/ttyUSB0 stop")
     wait = command("wait", do_wait, "let time pass, drives stay on", "moire --port twin home -- wait 0.5s -- status")
     wait.add_argument("time", type=checked(waiting_time), metavar="TIME", help="how long, with a unit: 20ms, 1.5s")
@@ -460,11 +494,102 @@ def do_motion(session, command, motion):
 
 
 def do_home(session, command):
-    do_motion(session, command, lambda axis, show: axis.home(progress=show))
+    do_motion(session, command, lambda axis, show: axis.home(progress=show, method=command.method))
 
 
 def do_move(session, command):
-    do_motion(session, command, lambda axis, show: axis.move(command.target, by=command.by, progress=show))
+    if not command.no_wait:
+        do_motion(session, command, lambda axis, show: axis.move(command.target, by=command.by, progress=show))
+        return
+    seconds = session.switch_on(command).begin_move(command.target, by=command.by)
+    session.say({**place(command), "duration_s": seconds}, f"{where(command)}: on its way, {seconds:.3f} s at full speed")
+
+
+def do_finish(session, command):
+    do_motion(session, command, lambda axis, show: axis.motion_end(show))
+
+
+def do_prepare(session, command):
+    seconds = session.switch_on(command).prepare(command.target, by=command.by)
+    session.say({**place(command), "duration_s": seconds}, f"{where(command)}: prepared, {seconds:.3f} s at full speed")
+
+
+def do_start(session, command):
+    node, show = session.line.node(command.address), session.progress()
+    began = session.line.transport.now()
+    try:
+        ended = node.start(*command.axes, progress=show)
+    finally:
+        session.end_progress(show)
+    seconds = session.line.transport.now() - began
+    rows = [{"axis": axis, "position_nm": status.position_nm, "error_nm": status.target_nm - status.position_nm}
+            for axis, status in zip(dict.fromkeys(command.axes), ended)]
+    session.say({"command": "start", "address": command.address, "axes": rows, "time_s": seconds}, "\n".join(
+        f"node {command.address} axis {row['axis']}: at {row['position_nm'] / 1e6:.6f} mm, error {row['error_nm']:.1f} nm" for row in rows))
+
+
+def told_override(session, command, share):
+    session.say({**place(command), "override": share},
+                f"{where(command)}: " + (f"{units.decimal(round(100 * share, 3))} % of full speed" if share else "paused"))
+
+
+def do_override(session, command):
+    told_override(session, command, session.axis(command).override(command.share))
+
+
+def do_pause(session, command):
+    session.axis(command).pause()
+    told_override(session, command, 0)
+
+
+def do_resume(session, command):
+    told_override(session, command, session.axis(command).resume())
+
+
+def do_drive(session, command):
+    drive = session.axis(command).drive()
+    rows = [
+        ("drive", f"{drive.kind}; built: {', '.join(drive.built)}"), ("command", f"{100 * drive.command:.1f} %"),
+        ("override", f"{units.decimal(round(100 * drive.override, 3))} %"), ("steps", f"{drive.steps} on the wire since reset"),
+    ]
+    if "fine" in drive.built:
+        rows.append(("fine", f"{100 * drive.fine_command:.1f} %"))
+    session.say({**place(command), **asdict(drive)}, f"{where(command)}:" + "".join(f"\n  {name:<9} {text}" for name, text in rows))
+
+
+def do_tune(session, command):
+    from . import tune  # numpy and pictures: only where they are wanted
+
+    answers = read_record(command.file)
+    tick_s = float(command.tick or Fraction(1, session.line.node(command.address).identity.tick_hz))
+    plant = tune.identify(tune.Record(*answers, tick_s))
+    tuning = tune.propose(plant, float(command.bandwidth), command.margin)
+    if command.picture:
+        write_bytes(command.picture, tune.picture(plant, tuning))
+    if command.write:
+        session.axis(command).set_tuning(tuning)
+    gains = {name: tuning.real(name) for name in tune.SCALES}
+    rows = [
+        f"plant: {plant.gain:.4g} LSB a tick per command, time constant {1e3 * plant.time_constant_s:.3g} ms, delay {plant.delay} ticks"
+        + (f", resonance at {plant.resonance_hz:.0f} Hz" if plant.resonance_hz else "") + f", {100 * plant.unexplained:.0f} % unexplained",
+        f"loop: {tuning.bandwidth_hz:.1f} Hz, phase margin {tuning.phase_margin_degree:.0f} degrees, gain margin {tuning.gain_margin:.2f}",
+        *(f"  {name:<3} {value:.8g}" for name, value in gains.items()),
+        f"filters: {len(tuning.filters)}; " + (f"written to {where(command)}" if command.write else "not written: add --write"),
+    ]
+    session.say({**place(command), "plant": asdict(plant), "gains": gains, "filters": tuning.filters, "bandwidth_hz": tuning.bandwidth_hz,
+                 "phase_margin_degree": tuning.phase_margin_degree, "gain_margin": tuning.gain_margin, "written": command.write},
+                "\n".join(rows))
+
+
+def read_record(file: str) -> tuple:
+    """Commands and positions, from rows of two numbers; a row of words at the head is passed over."""
+    rows = [row.split(",") for row in read_text(file).splitlines() if row.strip() and not row.startswith("#")]
+    try:
+        rows = rows[1:] if rows and not re.match(r"\s*[+-]?[0-9.]", rows[0][0]) else rows
+        command, position = zip(*((float(left), float(right)) for left, right in rows))
+    except ValueError:
+        raise BadFile(f"the file {file} is no record: each row has two numbers, command and position, with a comma between") from None
+    return command, position
 
 
 def do_stop(session, command):
@@ -642,7 +767,7 @@ def do_register(session, command):
             told[name] = value
             rows.append(f"{name} = 0x{value:08X} {value}")
         else:
-            told[name] = node.read_named(name, session.axis(command).number if name.startswith(("axis.", "grating.")) else 0)
+            told[name] = node.read_named(name, session.axis(command).number if name.startswith(OF_AN_AXIS) else 0)
             rows.append(f"{name}: " + ", ".join(f"{field} = {value}" for field, value in told[name].items()))
     session.say({**place(command), "registers": told}, "\n".join(rows))
 
@@ -714,8 +839,12 @@ def read_json(file: str):
 
 
 def write_text(file: str, text: str):
+    write_bytes(file, text.encode())
+
+
+def write_bytes(file: str, content: bytes):
     try:
-        Path(file).write_text(text, encoding="utf-8")
+        Path(file).write_bytes(content)
     except OSError as error:
         raise BadFile(f"the file {file} cannot be written: {error.strerror}") from None
 

@@ -80,6 +80,15 @@ def parse_time(text) -> Fraction:
     return TIME.parse(text)
 
 
+def parse_share(text) -> Fraction:
+    """Of the whole: "50%" or 0.5."""
+    plain = text.strip() if isinstance(text, str) else text
+    share = NUMBER.parse(plain[:-1]) / 100 if isinstance(plain, str) and plain.endswith("%") else NUMBER.parse(plain)
+    if not 0 <= share <= 1:
+        raise UnitError(f"'{text}' is no share of full speed: write 0% to 100%, or 0 to 1")
+    return share
+
+
 def decimal(value) -> str:
     """Every digit of a fraction; of one without an end, 15 places."""
     value = Fraction(value)
