@@ -12,7 +12,7 @@ from dataclasses import asdict
 from fractions import Fraction
 from pathlib import Path
 
-from . import units
+from . import command_relay, units
 from .client import CAPTURE_SOURCES, HOME_METHODS, Line, capture_source, register_fields
 from .errors import BadFile, LineError, MoireError, OutOfRange, PortError, TwinNotBuilt, UnitError
 from .line_tables import PARAMETERS
@@ -258,6 +258,8 @@ def make_parser() -> Parser:
                        help="shortest gap; 1us unless given")
     command("off", do_compare_off, "no more pulses", "moire --port twin compare off", compare)
     command("show", do_compare_show, "points passed", "moire --port twin compare show", compare)
+    command_relay.add_to(group("relay", "the relay of a ring (S1): status, clear, calibrate", commands, common,
+                               "moire --port /dev/ttyUSB0 relay status"), command)
 
     register = command(
         "register", do_register, "read registers of the node, by name or by address", "moire --port twin register axis.position 0x400"

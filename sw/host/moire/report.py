@@ -68,6 +68,7 @@ class Result:
     facts: dict = field(default_factory=dict)          # whatever else a reader should know: name -> words
     summary: str = ""
     paper_error_nm: float = PAPER_ERROR_NM
+    drawn: dict = field(default_factory=dict)          # more pictures, of this experiment only: name -> (caption, PNG)
 
 
 @dataclass(frozen=True)
@@ -201,7 +202,7 @@ def histogram(moves, paper_error_nm) -> bytes:
 
 def pictures(result: Result) -> dict:
     """name -> (caption, PNG)."""
-    drawn = {}
+    drawn = dict(result.drawn)
     if result.traces:
         drawn["trajectories"] = ("Trajectories: target and position by the encoder", trajectories(result.traces))
         drawn["following_error"] = ("Following error: target minus position", following_errors(result.traces))
