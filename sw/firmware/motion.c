@@ -8,13 +8,15 @@
 #include "parameters.h"
 #include "planner.h"
 
-#define PIECE_TICKS 64u          // 16 ms: what is queued cannot be taken back when the target changes,
-#define QUEUE 16u                // segments in the player
-#define PIECES_AHEAD 4u         // so it is kept short; the firmware looks here far more often
+#define PIECE_TICKS 64u         // 16 ms
+#define QUEUED_TICKS 256u       // what is queued cannot be taken back when the target changes, so it is kept short, but pieces are
+#define QUEUE 16u               // short too where a move begins, so that it is time that counts
 
 static struct motion {
     struct plan plan;
     int64_t from;               // target when the plan began
+    uint8_t queued[QUEUE];      // ticks of the pieces queued last
+    uint8_t pieces;             // queued so far
     bool inside;                // the error has been inside the window since inside_ms
     uint32_t inside_ms;
     uint32_t since_ms;          // start of settling
@@ -39,12 +41,15 @@ void motion_brake(unsigned n)
 
 void motion_feed(unsigned n)
 {
-    struct plan *plan = &motions[n].plan;
+    struct motion *m = &motions[n];
     struct planner_segment piece;
     bool last;
-    if (plan->next >= plan->count) return;
-    uint32_t free = FIELD_GET(axis_read(n, AXIS_STATE), AXIS_STATE_QUEUE_FREE), queued = QUEUE - free;
-    while (queued++ < PIECES_AHEAD && planner_take_up_to(plan, &piece, &last, PIECE_TICKS)) {
+    if (m->plan.next >= m->plan.count) return;
+    uint32_t waiting = QUEUE - FIELD_GET(axis_read(n, AXIS_STATE), AXIS_STATE_QUEUE_FREE), ticks = 0;
+    for (uint32_t piece_back = 1; piece_back <= waiting; piece_back++) ticks += m->queued[(m->pieces - piece_back) % QUEUE];
+    while (waiting++ < QUEUE && ticks < QUEUED_TICKS && planner_take_up_to(&m->plan, &piece, &last, PIECE_TICKS)) {
+        m->queued[m->pieces++ % QUEUE] = (uint8_t)piece.ticks;
+        ticks += piece.ticks;
         axis_write_wide(n, AXIS_SEGMENT_VELOCITY, (uint64_t)piece.velocity);
         axis_write_wide(n, AXIS_SEGMENT_ACCELERATION, (uint64_t)piece.acceleration);
         axis_write(n, AXIS_SEGMENT_JERK, (uint32_t)piece.jerk);
@@ -91,9 +96,9 @@ uint32_t motion_ticks(unsigned n)
     return motions[n].plan.ticks;
 }
 
-bool motion_inside_window(unsigned n)
+bool motion_inside(unsigned n, int64_t window)
 {
-    int64_t error = (int32_t)axis_read(n, AXIS_FOLLOWING_ERROR), window = parameters_get(n, LINE_PARAMETER_SETTLE_WINDOW);
+    int64_t error = (int32_t)axis_read(n, AXIS_FOLLOWING_ERROR);
     return error <= window && error >= -window;
 }
 
@@ -108,11 +113,11 @@ bool motion_overdue(unsigned n)
     return clock_ms() - motions[n].since_ms >= (uint32_t)parameters_get(n, LINE_PARAMETER_SETTLE_TIMEOUT);
 }
 
-uint8_t motion_settle(unsigned n)
+uint8_t motion_settle(unsigned n, int64_t window)
 {
     struct motion *m = &motions[n];
     uint32_t now = clock_ms();
-    bool inside = motion_inside_window(n);
+    bool inside = motion_inside(n, window);
     if (inside && !m->inside) m->inside_ms = now;
     m->inside = inside;
     if (inside && now - m->inside_ms >= (uint32_t)parameters_get(n, LINE_PARAMETER_SETTLE_TIME)) return LINE_CAUSE_OK;

@@ -325,6 +325,9 @@ class Machine:
             self.crc_bytes += bytes([value])
         else:
             self.word[offset] = value
+            if offset == d["NODE_START_AXES"]:
+                for n, axis in enumerate(self.axes):
+                    axis.player.moving |= bool(value >> n & 1 and axis.player.queue)
 
     def poll(self, times=1):
         for _ in range(times):

@@ -188,12 +188,8 @@ def test_parameters_are_refused_while_the_axis_moves():
 # prepared motions, override
 
 def begun(machine):
-    """The axes that the node was told to start together, and started, as its hardware does."""
-    mask = machine.word.pop(DEFINES["NODE_START_AXES"], 0)
-    for n, axis in enumerate(machine.axes):
-        if mask >> n & 1:
-            axis.write(DEFINES["AXIS_STROBES"], DEFINES["AXIS_STROBES_START_MASK"])
-    return mask
+    """The axes that the node was told to start together."""
+    return machine.word.pop(DEFINES["NODE_START_AXES"], 0)
 
 
 def two_homed():
