@@ -35,6 +35,7 @@ module actuator #(
     output logic                 bridge_b,
     output logic                 step,
     output logic                 direction,
+    output logic                 upward,        // level: direction, whatever its polarity
     output logic                 dac_cs_n,
     output logic                 dac_sclk,
     output logic                 dac_sdi,
@@ -70,6 +71,7 @@ module actuator #(
     if (DRIVES[1]) begin : g_steps
         wire               go, anew;
         wire signed [47:0] place;
+        assign upward = direction ^ direction_low;
         wire               blocked = target_velocity < 0 ? block_down : target_velocity > 0 && block_up;
 
         step_follower u_follower (.clk, .rst, .ratio(step_ratio), .shift(trim_shift), .enable(enable && by_steps), .rebase, .tick, .target,
@@ -78,20 +80,25 @@ module actuator #(
                                                  .step_low, .direction_low, .enable(enable && by_steps && !blocked), .load(anew), .tick(go),
                                                  .target(place), .step, .direction, .steps, .overrun(step_overrun));
     end else begin : g_no_steps
-        assign {step, direction, step_overrun, steps} = '0;
+        assign {step, direction, upward, step_overrun, steps} = '0;
     end
 
-    // fine stage: a PI loop on the same error, its command in the middle while it rests
+    // fine stage: a PI loop on the same error; while it rests its command goes back to the middle, slowly enough for the main loop
+    // to follow, and the loop takes over from wherever it is
     wire fine_valid;
 
     if (DRIVES[3]) begin : g_fine
+        localparam signed [15:0] RETURN = 16'sd16;              // of the command, in a tick
+
         wire signed [31:0] fine_error;
+        wire signed [15:0] nearer = fine_command > RETURN ? fine_command - RETURN :
+                                    fine_command < -RETURN ? fine_command + RETURN : '0;
 
         pid_servo #(.TERMS(2), .BIQUADS(0)) u_fine (.clk, .rst, .closed_loop(fine && enable), .kp(fine_kp), .ki(fine_ki), .kd('0), .kv('0),
             .ka('0), .output_limit(fine_limit), .integral_limit(fine_limit), .dead_band('0), .gains_changed(fine_kp_written),
             .filters_in_use('0), .coefficient_write(1'b0), .coefficient_address('0), .coefficient('0), .tick, .target, .target_velocity('0),
-            .target_acceleration('0), .moving, .position, .velocity('0), .open_command('0), .block_up(!enable), .block_down(!enable),
-            .valid(fine_valid), .command(fine_command), .error(fine_error), .saturated(fine_saturated));
+            .target_acceleration('0), .moving, .position, .velocity('0), .open_command(enable ? nearer : '0), .block_up(!enable),
+            .block_down(!enable), .valid(fine_valid), .command(fine_command), .error(fine_error), .saturated(fine_saturated));
         wire unused_fine = &{1'b0, fine_error};
     end else begin : g_no_fine
         assign {fine_valid, fine_saturated, fine_command} = '0;
@@ -115,7 +122,7 @@ module actuator #(
         .step_ratio, .steps, .converter_half_clk(half_clk), .converter_refresh(refresh), .converter_trim, .fine_kp, .fine_kp_written, .fine_ki,
         .fine_limit, .fine_command);
 
-    wire unused = &{1'b0, tick_period[23:18], high_clk, low_clk, setup_clk, hold_clk, mode, step_low, direction_low, trim_shift, step_ratio,
+    wire unused = &{1'b0, tick_period, valid, high_clk, low_clk, setup_clk, hold_clk, mode, step_low, direction_low, trim_shift, step_ratio,
                     half_clk, refresh, converter_trim, fine_kp, fine_kp_written, fine_ki, fine_limit, pwm_period, block_up, block_down, rebase,
                     fine, moving, position, target, target_velocity, tick, by_bridge, by_steps, by_converter, fine_valid, fine_command};
 endmodule

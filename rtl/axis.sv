@@ -92,8 +92,10 @@ module axis #(
     wire signed [31:0]  quadrature_count, velocity;
     wire        [4:0]   encoder_events;                         // in the order of axis_registers
     wire signed [47:0]  position;
+    wire                upward;
 
-    grating #(.W(W)) u_grating (.clk, .rst, .tick, .sample_tick, .now, .own_step(step), .own_direction(direction), .select(grating_select), .write, .word, .wdata, .rdata(grating_rdata),
+    grating #(.W(W)) u_grating (.clk, .rst, .tick, .sample_tick, .now, .own_step(step), .own_direction(upward), .select(grating_select), .write,
+        .word, .wdata, .rdata(grating_rdata),
         .deglitch, .spike_step, .spike_hold, .amplitude_low, .amplitude_high, .disagreement_limit, .shift(shift_origin_written),
         .shift_periods(shift_origin), .a(pin_a), .b(pin_b), .z(pin_z), .probe(pin_probe), .adc_sin, .adc_cos, .adc_cs_n, .adc_sclk,
         .compare_pulse, .sin, .cos, .sample_rejected, .edge_rejected, .phase, .amplitude, .quadrature_count, .events(encoder_events),
@@ -135,7 +137,7 @@ module axis #(
     // drive
     actuator #(.DRIVES(DRIVES)) u_actuator (.clk, .rst, .tick, .tick_period, .select(actuator_select), .write, .word, .wdata,
         .rdata(actuator_rdata), .enable(drive_enable), .fine(control_fine), .rebase(strobes_hold_here || shift_origin_written), .block_up,
-        .block_down, .valid(passed), .command, .target, .target_velocity, .moving, .position, .bridge_a, .bridge_b, .step, .direction,
+        .block_down, .valid(passed), .command, .target, .target_velocity, .moving, .position, .bridge_a, .bridge_b, .step, .direction, .upward,
         .dac_cs_n, .dac_sclk, .dac_sdi, .fine_saturated, .step_overrun);
 
     // registers

@@ -101,7 +101,7 @@ module grating #(
     incremental_encoder #(.FILTER_W(16)) u_encoder (.clk, .rst, .filter_skip, .filter_needed(deglitch), .filter_spare, .mode, .index_low,
         .index_gate_mask(gate_mask), .index_gate(gate), .index_up, .index_down, .index_each, .index_clears(1'b0), .counts_per_revolution,
         .illegal_enable(1'b0), .arm_index, .clear_flags(1'b0), .now, .a(by_steps ? own_step : a),
-        .b(by_steps ? own_direction : b), .z, .count(quadrature_count), .step(quadrature_step), .heading,
+        .b(by_steps ? !own_direction : b), .z, .count(quadrature_count), .step(quadrature_step), .heading,
         .edge_time, .index_found, .index_armed, .index_count, .filtered(levels), .rejected(edge_rejected), .illegal, .illegal_seen, .illegal_fault,
         .revolution_wrong, .revolution_fault);
 

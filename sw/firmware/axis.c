@@ -15,6 +15,9 @@
 #define FINE_BUILT 8u            // bit of actuator.drive.built
 #define FINE_HYSTERESIS 4       // the fine stage lets go at so many times its reach
 #define FINE_MS 10u             // the axis is within its reach for so long before it takes over
+#define EASE 8                  // of the motor's command, in a millisecond, while the fine stage holds
+
+enum drive { BRIDGE, STEPS, CONVERTER };
 
 static struct axis {
     uint8_t state;              // line_state
@@ -25,6 +28,7 @@ static struct axis {
     bool fine;                  // the fine stage holds the position
     bool near;                  // the error has been within its reach since near_ms
     uint32_t near_ms;
+    uint32_t eased_ms;          // the motor's command was eased up to here
 } axes[HARDWARE_AXES];
 
 static bool at_work(const struct axis *a)
@@ -45,28 +49,43 @@ static void write_control(unsigned n, bool on)
     axis_write(n, AXIS_CONTROL, only_blocks | (on ? AXIS_CONTROL_ENABLE_MASK | loop : 0));
 }
 
-// With a fine stage the motor brings the axis within its reach and rests; out of reach the motor takes over again.
+// With a fine stage the motor brings the axis within its reach and rests; out of reach, or at the end of the fine stage's range,
+// the motor takes over again, and keeps the axis until the fine stage is back in its middle. Both ways the motor's command goes on
+// from where it stands.
 static void hand_over(unsigned n, bool fine)
 {
-    if (axes[n].fine == fine) return;
-    axes[n].fine = fine;
+    struct axis *a = &axes[n];
+    a->near = fine;
+    if (a->fine == fine) return;
+    a->fine = fine;
+    a->eased_ms = clock_ms();
+    if (fine) axis_write(n, AXIS_OPEN_COMMAND, axis_read(n, AXIS_COMMAND));
     write_control(n, true);
 }
 
-static bool within(unsigned n, int64_t reach)
+// A motor that rests springs back by what it was wound up: its command goes down slowly enough for the fine stage to follow, until
+// friction alone holds. A stepper stays where its command has put it.
+static void ease(unsigned n)
 {
-    int64_t error = (int32_t)axis_read(n, AXIS_FOLLOWING_ERROR);
-    return error <= reach && error >= -reach;
+    struct axis *a = &axes[n];
+    uint32_t now = clock_ms();
+    int32_t command = (int16_t)axis_read(n, AXIS_OPEN_COMMAND), most = EASE * (int32_t)(now - a->eased_ms);
+    a->eased_ms = now;
+    if (parameters_get(n, LINE_PARAMETER_DRIVE) == STEPS) return;
+    axis_write(n, AXIS_OPEN_COMMAND, (uint32_t)(command > most ? command - most : command < -most ? command + most : 0));
 }
 
 static void hold(unsigned n)
 {
     struct axis *a = &axes[n];
-    int64_t reach = parameters_get(n, LINE_PARAMETER_FINE_REACH);
-    bool near = reach && within(n, a->fine ? FINE_HYSTERESIS * reach : reach);
+    int64_t reach = parameters_get(n, LINE_PARAMETER_FINE_REACH), limit = parameters_get(n, LINE_PARAMETER_FINE_LIMIT);
+    int16_t command = (int16_t)actuator_read(n, ACTUATOR_FINE_COMMAND);
+    bool able = limit && (a->fine ? command < limit && command > -limit : command == 0);
+    bool near = reach && able && motion_inside(n, a->fine ? FINE_HYSTERESIS * reach : reach);
     if (near && !a->near) a->near_ms = clock_ms();
     a->near = near;
     if (!near || a->fine || clock_ms() - a->near_ms >= FINE_MS) hand_over(n, near);
+    if (a->fine) ease(n);
 }
 
 static void finish(unsigned n, uint8_t cause)
@@ -85,7 +104,7 @@ static void fault(unsigned n, uint32_t faults)
     if (faults & LINE_FAULT_ENCODER) a->homed = false;
     if (a->state == LINE_STATE_FAULTED) return;
     a->state = LINE_STATE_FAULTED;
-    a->homing = a->leaving = a->fine = false;
+    a->homing = a->leaving = a->fine = a->near = false;
     if (at_work(a)) a->ended = LINE_CAUSE_ENDED_BY_FAULT;
     write_control(n, false);
     motion_hold_here(n);
@@ -117,10 +136,11 @@ void axis_poll(unsigned n)
             motion_settle_begin(n);
         }
         break;
+    case LINE_STATE_PREPARED:
     case LINE_STATE_HOLDING: hold(n); break;
     case LINE_STATE_SETTLING:
         hold(n);
-        outcome = motion_settle(n);
+        outcome = motion_settle(n, parameters_get(n, LINE_PARAMETER_SETTLE_WINDOW));
         if (outcome != LINE_CAUSE_RUNNING) finish(n, outcome);
         break;
     case LINE_STATE_STOPPING:
@@ -146,7 +166,7 @@ uint8_t axis_enable(unsigned n, bool on)
     if (!on) {
         if (at_work(a)) a->ended = LINE_CAUSE_STOPPED;
         if (a->state != LINE_STATE_FAULTED) a->state = LINE_STATE_OFF;
-        a->homing = a->leaving = a->fine = false;
+        a->homing = a->leaving = a->fine = a->near = false;
         write_control(n, false);
         motion_hold_here(n);
         return LINE_CAUSE_OK;
@@ -289,13 +309,18 @@ static uint8_t may_set(unsigned n, uint8_t id, int64_t value)
     switch (id) {
     case LINE_PARAMETER_DRIVE:
         if (!(FIELD_GET(actuator_read(n, ACTUATOR_DRIVE), ACTUATOR_DRIVE_BUILT) >> value & 1)) return LINE_CAUSE_NOT_BUILT;
+        if (value == CONVERTER && parameters_get(n, LINE_PARAMETER_FINE_REACH)) return LINE_CAUSE_OUT_OF_RANGE;
         return on ? LINE_CAUSE_BUSY : LINE_CAUSE_OK;
-    case LINE_PARAMETER_POSITION_SOURCE:
+    case LINE_PARAMETER_POSITION_SOURCE:                    // own steps are counted as pulses and direction
+        if (value == OWN_STEPS && parameters_get(n, LINE_PARAMETER_STEP_OUTPUT)) return LINE_CAUSE_OUT_OF_RANGE;
+        return on ? LINE_CAUSE_BUSY : LINE_CAUSE_OK;
     case LINE_PARAMETER_STEP_OUTPUT:
+        if (value && parameters_get(n, LINE_PARAMETER_POSITION_SOURCE) == OWN_STEPS) return LINE_CAUSE_OUT_OF_RANGE;
+        return on ? LINE_CAUSE_BUSY : LINE_CAUSE_OK;
     case LINE_PARAMETER_STEP_INVERT: return on ? LINE_CAUSE_BUSY : LINE_CAUSE_OK;
     case LINE_PARAMETER_FINE_REACH:
         if (value && !(FIELD_GET(actuator_read(n, ACTUATOR_DRIVE), ACTUATOR_DRIVE_BUILT) & FINE_BUILT)) return LINE_CAUSE_NOT_BUILT;
-        return LINE_CAUSE_OK;
+        return value && parameters_get(n, LINE_PARAMETER_DRIVE) == CONVERTER ? LINE_CAUSE_OUT_OF_RANGE : LINE_CAUSE_OK;
     default: return LINE_CAUSE_OK;
     }
 }
@@ -329,6 +354,6 @@ uint8_t axis_flags(unsigned n)
                      (state & AXIS_STATE_LIMIT_LOW_MASK ? LINE_FLAG_LIMIT_LOW : 0) |
                      (state & AXIS_STATE_LIMIT_HIGH_MASK ? LINE_FLAG_LIMIT_HIGH : 0) |
                      (state & AXIS_STATE_ESTOP_MASK ? LINE_FLAG_ESTOP : 0) |
-                     (on && motion_inside_window(n) ? LINE_FLAG_SETTLED : 0) |
+                     (on && motion_inside(n, parameters_get(n, LINE_PARAMETER_SETTLE_WINDOW)) ? LINE_FLAG_SETTLED : 0) |
                      (state & AXIS_STATE_SATURATED_MASK ? LINE_FLAG_SATURATED : 0));
 }

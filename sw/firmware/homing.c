@@ -23,6 +23,7 @@
 #define S3_METHOD (-2)
 #define STAND_MS 4u             // an axis that was caught by a switch stands when in this time
 #define STAND_DISTANCE 8192     // it moved less than an eighth of a period
+#define CLEAR_DISTANCE 65536    // a search that met the index sooner may have begun on it
 #define LONGEST_SEARCH (1LL << 46)
 #define CAPTURE_INDEX 1u        // bit of capture_sources
 
@@ -77,6 +78,13 @@ static uint8_t go(unsigned n, enum home_step step)
     return LINE_CAUSE_RUNNING;
 }
 
+// Homing is the motor's work: with a fine stage it brings the axis within the reach of that, and no nearer.
+static int64_t settle_window(unsigned n)
+{
+    int64_t window = parameters_get(n, LINE_PARAMETER_SETTLE_WINDOW), reach = parameters_get(n, LINE_PARAMETER_FINE_REACH);
+    return reach > window ? reach : window;
+}
+
 // Each step that drives begins here; what the planner refuses ends the homing.
 static uint8_t drive(unsigned n, enum home_step step, int64_t distance, uint8_t velocity_id)
 {
@@ -106,22 +114,40 @@ static uint8_t stands(unsigned n)
     return moved < STAND_DISTANCE && moved > -STAND_DISTANCE ? LINE_CAUSE_OK : LINE_CAUSE_RUNNING;
 }
 
+// Which way the index is taken; what else the register holds is the user's.
+static void take_index(unsigned n, uint32_t ways)
+{
+    uint32_t other = grating_read(n, GRATING_INDEX) & ~(GRATING_INDEX_UP_MASK | GRATING_INDEX_DOWN_MASK);
+    grating_write(n, GRATING_INDEX, other | ways);
+}
+
+// Only the way of the search counts: an axis that rests on the edge of its mark may go back over it before it sets off.
 static void arm(unsigned n, bool up)
 {
     homings[n].up = up;
+    take_index(n, up ? GRATING_INDEX_UP_MASK : GRATING_INDEX_DOWN_MASK);
     grating_write(n, GRATING_CAPTURE_SOURCES, CAPTURE_INDEX);
     grating_write(n, GRATING_STROBES, GRATING_STROBES_CAPTURE_CLEAR_MASK | GRATING_STROBES_ARM_INDEX_MASK);
 }
 
 static uint8_t seek(unsigned n, bool up, int64_t distance)
 {
+    homings[n].mark = axis_read_position(n, AXIS_POSITION);
     arm(n, up);
     return drive(n, SEEK, up ? distance : -distance, LINE_PARAMETER_HOME_VELOCITY);
+}
+
+static void disarm(unsigned n)
+{
+    grating_write(n, GRATING_CAPTURE_SOURCES, 0);
+    grating_write(n, GRATING_STROBES, GRATING_STROBES_CAPTURE_CLEAR_MASK);
+    take_index(n, GRATING_INDEX_UP_MASK | GRATING_INDEX_DOWN_MASK);
 }
 
 static uint8_t not_met(unsigned n)
 {
     struct homing *h = &homings[n];
+    disarm(n);
     if (method_of(n) != S3_METHOD || h->second) return LINE_CAUSE_NO_INDEX;
     h->second = true;
     return seek(n, false, 2 * distance_of(n));
@@ -194,8 +220,7 @@ static uint8_t seek_poll(unsigned n, uint32_t state)
     struct homing *h = &homings[n];
     if (FIELD_GET(grating_read(n, GRATING_CAPTURE_STATE), GRATING_CAPTURE_STATE_PRESENT)) {
         h->place = (int64_t)(grating_read_wide(n, GRATING_CAPTURED_POSITION) << 16) >> 16;
-        grating_write(n, GRATING_CAPTURE_SOURCES, 0);
-        grating_write(n, GRATING_STROBES, GRATING_STROBES_CAPTURE_CLEAR_MASK);
+        disarm(n);
         motion_brake(n);
         return go(n, MET);
     }
@@ -229,18 +254,18 @@ uint8_t homing_poll(unsigned n, uint32_t state)
         return caught == LINE_CAUSE_OK ? not_met(n) : caught;
     case MET:
         if (!motion_played(n)) return LINE_CAUSE_RUNNING;
-        if (method_of(n) != S3_METHOD || h->up) return go(n, FIRST_SETTLE);
+        if (method_of(n) != S3_METHOD || (h->up && h->place - h->mark >= CLEAR_DISTANCE)) return go(n, FIRST_SETTLE);
         return drive(n, RETURN, h->place - distance / 8 - target, LINE_PARAMETER_HOME_VELOCITY);
     case RETURN: return motion_played(n) ? seek(n, true, distance / 4) : LINE_CAUSE_RUNNING;
     case FIRST_SETTLE:
-        caught = motion_settle(n);
+        caught = motion_settle(n, settle_window(n));
         if (caught != LINE_CAUSE_OK) return caught;
         zero(n);
         if (method_of(n) == 17 || method_of(n) == 18) return LINE_CAUSE_OK;
         return drive(n, ZERO, parameters_get(n, LINE_PARAMETER_HOME_OFFSET) * 65536 - axis_read_position(n, AXIS_TARGET),
                      LINE_PARAMETER_HOME_CREEP);
     case ZERO: return motion_played(n) ? go(n, SECOND_SETTLE) : LINE_CAUSE_RUNNING;
-    default: return motion_settle(n);
+    default: return motion_settle(n, settle_window(n));
     }
 }
 

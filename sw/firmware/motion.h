@@ -23,8 +23,8 @@ uint32_t motion_ticks(unsigned n);      // duration of the motion planned last
 
 // ok, not_settled, or running as long as neither is decided.
 void motion_settle_begin(unsigned n);
-uint8_t motion_settle(unsigned n);
+uint8_t motion_settle(unsigned n, int64_t window);
 bool motion_overdue(unsigned n);        // settle_timeout has passed since motion_settle_begin
-bool motion_inside_window(unsigned n);
+bool motion_inside(unsigned n, int64_t window);     // the following error is
 
 #endif

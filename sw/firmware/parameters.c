@@ -6,7 +6,6 @@
 #include "homing.h"
 #include "line_protocol.h"
 
-enum position_source { PHASES, COUNTS, OWN_STEPS };
 #define PULSES_AND_DIRECTION 3u         // a mode of the decoder
 #define OVERRIDE_PART 4u                // of the acceleration and the jerk, which a change of the override may add
 #define STEP_CLK_MASK ACTUATOR_STEP_PULSE_HIGH_MASK

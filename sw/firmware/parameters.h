@@ -10,6 +10,8 @@
 #define SAMPLE_HZ 100000u
 #define BAUD 115200u
 
+enum position_source { PHASES, COUNTS, OWN_STEPS };     // values of the parameter
+
 void parameters_start_node(void);                       // clock dividers, line speed
 void parameters_start(unsigned axis);                   // defaults, into the registers too
 uint8_t parameters_check(uint8_t id, int64_t value);    // a line_cause

@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: Apache-2.0
+"""grating with its position from counts of A/B/Z: exact at an edge every clk, at the index, through align, and of the axis' own steps."""
+import random
+
+import cocotb
+from cocotb.triggers import FallingEdge
+
+from bench import run, seed, start
+from moire.registers import FIELDS
+
+TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]                 # a leads b: up
+QUARTER = 1 << 14
+LATENCY = 5                                             # clk from the pins to position: filter 1, decoder 2, position 2
+SETTINGS = dict(deglitch=0, spike_step=0, spike_hold=0, amplitude_low=0, amplitude_high=65535, disagreement_limit=0)
+INPUTS = dict(tick=0, sample_tick=0, now=0, select=0, write=0, word=0, wdata=0, shift=0, shift_periods=0, a=0, b=0, z=0, probe=0,
+              own_step=0, own_direction=0, adc_sin=1, adc_cos=1)
+
+
+def register(name):
+    """(word, {field: its lowest bit}) of a register of the block grating."""
+    fields = [known for known in FIELDS if known.block == "grating" and known.register == name]
+    return fields[0].address(0) % 256 // 4, {known.field: known.low for known in fields}
+
+
+class Bench:
+    """A scale in front of the design; at reset it stands at `place`, in counts, which the design calls 0."""
+
+    @classmethod
+    async def begin(cls, dut, place=0, mode=0, steps=0):
+        bench = cls()
+        bench.dut, bench.place = dut, place
+        await start(dut, **SETTINGS, **{**INPUTS, **dict(zip("ab", TURN[place % 4]))})
+        for _ in range(12):                             # filter and decoder only take their levels after reset
+            await FallingEdge(dut.clk)
+        await bench.write("decoder_mode", value=mode)
+        await bench.write("position_source", counts=1, steps=steps)
+        await bench.sample()
+        assert bench.position() == 0
+        return bench
+
+    def put(self, name, **fields):
+        word, low = register(name)
+        self.dut.word.value = word
+        self.dut.wdata.value = sum(value << low[field] for field, value in fields.items()) & 0xFFFFFFFF
+        self.dut.select.value = self.dut.write.value = 1
+
+    async def write(self, name, **fields):
+        self.put(name, **fields)
+        await FallingEdge(self.dut.clk)
+        self.dut.select.value = self.dut.write.value = 0
+
+    async def read(self, name, more=0):
+        self.dut.word.value, self.dut.select.value = register(name)[0] + more, 1
+        await FallingEdge(self.dut.clk)
+        self.dut.select.value = 0
+        return int(self.dut.rdata.value)
+
+    async def sample(self):
+        self.dut.sample_tick.value = 1
+        await FallingEdge(self.dut.clk)
+        self.dut.sample_tick.value = 0
+        for _ in range(LATENCY):
+            await FallingEdge(self.dut.clk)
+
+    def pins(self, z=0):
+        self.dut.a.value, self.dut.b.value = TURN[self.place % 4]
+        self.dut.z.value = int(z)
+
+    def position(self):
+        return self.dut.position.value.to_signed()
+
+    async def go(self, steps, at_index=lambda place: False, clk=1):
+        """Each step takes so many clk; then what is on its way arrives. Returns the positions after each clk."""
+        positions = []
+        for step in steps:
+            self.place += step
+            self.pins(at_index(self.place))
+            for _ in range(clk):
+                await FallingEdge(self.dut.clk)
+                positions.append(self.position())
+        for _ in range(LATENCY):
+            await FallingEdge(self.dut.clk)
+            positions.append(self.position())
+        return positions
+
+    async def captured(self):
+        """All captures, oldest first."""
+        taken = []
+        while await self.read("capture_state") & 1:
+            low, high = await self.read("captured_position"), await self.read("captured_position", 1)
+            taken.append((high << 32 | low) - (1 << 64 if high >> 31 else 0))
+            await self.write("strobes", capture_next=1)
+            await FallingEdge(self.dut.clk)
+            await FallingEdge(self.dut.clk)
+        return taken
+
+
+@cocotb.test()
+async def position_is_exact_at_an_edge_every_clk(dut):
+    bench, source = await Bench.begin(dut), random.Random(seed())
+    steps = [1] * 40 + [-1] * 90 + [source.choice((-1, 0, 1)) for _ in range(4000)] + [1, -1] * 50
+    way, place = [], 0
+    for step in steps:
+        place += step
+        way.append(place * QUARTER)
+    got = await bench.go(steps)
+    assert got[LATENCY - 1:LATENCY - 1 + len(way)] == way
+    assert bench.position() == place * QUARTER == bench.dut.quadrature_count.value.to_signed() * QUARTER
+
+
+@cocotb.test()
+async def the_index_is_captured_at_its_count_in_both_directions_at_any_speed(dut):
+    for start_place in range(4):                        # so that the index begins with any edge of A or B, in the same clk
+        for clk in (1, 2, 3, 7):
+            bench = await Bench.begin(dut, start_place)
+            await bench.write("index", up=1, down=1, each=1)
+            await bench.write("capture_sources", value=1)
+            for heading in (1, -1, 1):
+                await bench.go([heading] * 18, lambda place, at=start_place + 9: place == at, clk)
+            assert await bench.captured() == [9 * QUARTER] * 3, (start_place, clk)
+
+
+@cocotb.test()
+async def a_wide_index_is_captured_at_the_same_count_when_gated_by_a_and_b(dut):
+    for gated, want in ((0, [8, 10, 8]), (3, [9, 9, 9])):
+        bench = await Bench.begin(dut)
+        await bench.write("index", up=1, down=1, each=1, gate_mask=gated, gate=0b01)      # place 9: a = 1, b = 0
+        await bench.write("capture_sources", value=1)
+        for heading in (1, -1, 1):
+            await bench.go([heading] * 18, lambda place: 8 <= place <= 10, 2)
+        assert await bench.captured() == [count * QUARTER for count in want]
+
+
+@cocotb.test()
+async def an_armed_index_is_captured_once(dut):
+    bench = await Bench.begin(dut)
+    await bench.write("index", up=1)
+    await bench.write("capture_sources", value=1)
+    await bench.write("strobes", arm_index=1)
+    for heading in (1, -1, 1):
+        await bench.go([heading] * 18, lambda place: place == 9)
+    assert await bench.captured() == [9 * QUARTER]
+
+
+@cocotb.test()
+async def align_moves_position_by_whole_counts_also_together_with_an_edge(dut):
+    for counts in (-2, -1, 1, 2):
+        for wait in range(LATENCY + 2):                 # the strobe meets every clk of an edge's way, and none
+            bench = await Bench.begin(dut)
+            await bench.go([1] * 6)
+            bench.place += 1
+            bench.pins()
+            for _ in range(wait):
+                await FallingEdge(dut.clk)
+            await bench.write("align", value=counts & 7)
+            await bench.go([])
+            assert bench.position() == (7 + counts) * QUARTER
+            assert dut.quadrature_count.value.to_signed() == 7
+
+
+@cocotb.test()
+async def shift_moves_the_origin_by_whole_periods_also_together_with_an_edge(dut):
+    for periods in (-(1 << 31), -3, 1, (1 << 31) - 1):
+        for wait in range(LATENCY + 2):
+            bench = await Bench.begin(dut)
+            bench.place += 1
+            bench.pins()
+            for _ in range(wait):
+                await FallingEdge(dut.clk)
+            dut.shift.value, dut.shift_periods.value = 1, periods
+            await FallingEdge(dut.clk)
+            dut.shift.value = 0
+            await bench.go([])
+            assert bench.position() == periods * 4 * QUARTER + QUARTER
+
+
+@cocotb.test()
+async def own_steps_come_back_as_counts_up_while_the_direction_is_high(dut):
+    bench = await Bench.begin(dut, mode=3, steps=1)
+    place = 0
+    for direction in (1, 0, 0, 1):
+        dut.own_direction.value = direction
+        await FallingEdge(dut.clk)                      # set-up
+        for _ in range(5):
+            for level in (1, 0):
+                dut.own_step.value = level
+                await FallingEdge(dut.clk)
+            place += 1 if direction else -1
+        await bench.go([])
+        assert bench.position() == place * QUARTER
+
+
+@cocotb.test()
+async def reset_in_mid_flow_drops_the_edge(dut):
+    bench = await Bench.begin(dut)
+    await bench.go([1] * 6)
+    bench.place += 1
+    bench.pins()
+    await FallingEdge(dut.clk)
+    dut.rst.value = 1
+    await FallingEdge(dut.clk)
+    dut.rst.value = 0
+    for _ in range(20):
+        await FallingEdge(dut.clk)
+        assert bench.position() == 0 and not int(dut.position_valid.value)
+
+
+def test_grating_counts():
+    run("grating", __file__)

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+"""S0 with its fine stage: RTL and firmware of a node, the stage with a piezo on its table, the host package."""
+import os
+
+import numpy as np
+import pytest
+
+from experiments.s0_fine import FINE, FineStage
+from moire.errors import MotionFailed
+
+SEED = int(os.environ.get("SEED") or 1)
+X = "X"
+BOUND_NM = 5.0
+ZERO_VOLT = 32768                    # code of the converter
+NEWTON = 20.0                        # pushes the table against the screw, and does not turn it
+DRIFT_NM = 1200.0
+
+
+@pytest.fixture(scope="module")
+def prepared():
+    print(f"SEED={SEED}")
+    stage = FineStage.power_up(SEED)
+    learned = stage.prepare(X)
+    assert learned.accepted == 1 and learned.refused == 0
+    return stage
+
+
+@pytest.fixture
+def stage(prepared):
+    """Fine stage holding at 0.1 mm, nothing latched."""
+    axis = prepared.axes[X]
+    if axis.status().faults:
+        axis.reset()
+    axis.enable()
+    assert abs(prepared.move(X, 1e5).error_nm) <= BOUND_NM
+    return prepared
+
+
+def converter(stage):
+    return stage.machine(X).state.dac_code
+
+
+def test_moves_end_within_5_nm(stage):
+    for target_nm in (1e5 + 100, 1e5 - 7000, 3e5 + 333, 2.5e5):
+        move = stage.move(X, target_nm)
+        assert abs(move.error_nm) <= BOUND_NM, move
+        stage.let_pass(0.15)
+        assert stage.axes[X].status().drive_command == 0, "the motor rests"
+        assert converter(stage) != ZERO_VOLT, "and the piezo holds"
+
+
+def test_it_stands_within_a_nanometre(stage):
+    stage.let_pass(0.2)
+    true = stage.watch(X, 0.5)["true_nm"]
+    assert true.std() <= 1 and abs(true.mean() - 1e5) <= BOUND_NM
+
+
+def test_neither_hand_over_throws_it(stage):
+    """Released at once, the motor springs back by 0.3 um."""
+    before = stage.machine(X).state
+    assert abs(before.piezo_m) > 30e-9, "there is something to give back"
+    move, trace = stage.watch_move(X, 1e5 + 1000)
+    error = trace["true_nm"] - move.target_nm
+    arrived = int(np.flatnonzero(np.abs(error) <= 100)[0])
+    assert np.abs(error[arrived:]).max() < 150
+    assert np.ptp(trace["true_nm"][:100]) < 150, "in the first 10 ms"
+    steps = np.abs(np.diff(trace["dac_code"]))
+    assert steps.max() <= 100, "the converter never jumps"
+
+
+def test_a_table_that_is_pushed_is_kept_by_the_piezo(stage):
+    before = stage.machine(X).state.piezo_m
+    for newton in np.linspace(0, NEWTON, 20):
+        stage.machine(X).push(newton)
+        stage.let_pass(0.02)
+    try:
+        true = stage.watch(X, 0.3)["true_nm"]
+        assert abs(true[-1000:].mean() - 1e5) <= BOUND_NM
+        assert abs(stage.machine(X).state.piezo_m - before) > 100e-9
+    finally:
+        stage.machine(X).push(0)
+        stage.let_pass(0.2)
+
+
+def drift(stage, first_nm, last_nm):
+    """The scale creeps along its machine, 10 nm at a time."""
+    for place in np.arange(first_nm, last_nm, 10.0 if last_nm > first_nm else -10.0):
+        stage.machine(X).set(grating_offset=place * 1e-9)
+        stage.let_pass(0.01)
+    stage.machine(X).set(grating_offset=last_nm * 1e-9)
+
+
+def test_beyond_its_range_the_motor_takes_over_and_hands_back(stage):
+    axis, limit = stage.axes[X], 4000                    # 0.6 um
+    axis.write_parameter("fine_limit", limit)
+    stage.machine(X).trace(10_000)
+    try:
+        drift(stage, 0, DRIFT_NM)
+        stage.let_pass(0.4)
+        trace = stage.traced(X)
+        command = np.abs(trace["dac_code"] - ZERO_VOLT)
+        spent = int(np.flatnonzero(command == limit)[0])
+        assert command[spent:].min() < limit / 2, "the piezo goes back towards its middle"
+        assert abs(trace["true_nm"][-1000:].mean() - 1e5 - DRIFT_NM) <= BOUND_NM
+        status = axis.status()
+        assert status.state == "holding" and not status.faults
+    finally:
+        axis.write_parameter("fine_limit", 30000)
+        drift(stage, DRIFT_NM, 0)
+        stage.let_pass(0.3)
+
+
+def test_homing_with_the_fine_stage_on_finds_the_same_zero(stage):
+    stage.axes[X].home(progress=stage.keep(X))
+    assert abs(stage.move(X, 0).error_nm) <= BOUND_NM
+
+
+def test_drive_off_in_a_fine_hold_puts_the_piezo_to_the_middle(stage):
+    axis = stage.axes[X]
+    assert converter(stage) != ZERO_VOLT
+    axis.disable()
+    stage.let_pass(0.01)
+    assert converter(stage) == ZERO_VOLT and not stage.machine(X).state.enabled
+    axis.enable()
+    assert converter(stage) == ZERO_VOLT, "nothing of the last hold comes back"
+
+
+def test_a_fault_in_a_fine_hold_puts_the_piezo_to_the_middle(stage):
+    axis = stage.axes[X]
+    with stage.twin.fault("estop"):
+        stage.let_pass(0.01)
+        status = axis.status()
+        assert status.state == "faulted" and status.faults == ("estop",)
+        assert converter(stage) == ZERO_VOLT and not stage.machine(X).state.enabled
+    stage.let_pass(0.01)
+    axis.reset()
+    axis.enable()
+    assert abs(stage.move(X, 1.2e5).error_nm) <= BOUND_NM
+
+
+def test_without_a_fine_stage_the_motor_cannot_settle_so_closely(stage):
+    axis = stage.axes[X]
+    axis.write_parameter("fine_reach", 0)
+    axis.set_parameter("settle_timeout", "0.3s")
+    try:
+        with pytest.raises(MotionFailed) as caught:
+            for n in range(5):
+                stage.move(X, 1e5 + 1000 * n)
+        assert caught.value.cause == "not_settled"
+    finally:
+        axis.set_parameter("settle_timeout", "2s")
+        axis.set_parameter("fine_reach", FINE["fine_reach"])
