@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// character_transmitter -- characters of a 9-bit UART onto a line that is shared: start, 8 data bits LSB first, 9th bit, stop.
+// character_transmitter -- characters of a UART onto a line that is shared: start, 8 data bits LSB first, 9th bit if any, stop.
 //
 // latency  from idle: 1 clk to driver_enable, one bit more to the start bit    rate  characters without any gap
 // source   S0: the 9th bit marks command bytes. Bit edges stand at the clk at or before n · bit_time: never a sum of roundings
@@ -9,18 +9,24 @@
 //          from bit_time = 8 clk up (less counts as 8)
 `default_nettype none
 
-module character_transmitter (
+module character_transmitter #(
+    parameter int NINTH = 1                     // 0: without the 9th bit, 8N1
+) (
     input  wire                  clk,
     input  wire                  rst,           // lets go of the line
     input  wire        [19:0]    bit_time,      // 1/16 clk
     input  wire                  valid,         // level: data and ninth stand
     output logic                 ready,         // with valid: taken in this clk
     input  wire        [7:0]     data,
-    input  wire                  ninth,         // the 9th bit
+    input  wire                  ninth,         // the 9th bit, unused without one
     output logic                 tx,            // idles high
     output logic                 driver_enable, // of the line driver
     output logic                 busy           // level: the line is driven
 );
+    if (NINTH != 0 && NINTH != 1) begin : g_check NINTH_MUST_BE_0_OR_1 u_error (); end
+
+    localparam logic [3:0] STOP = NINTH != 0 ? 4'd10 : 4'd9;
+
     typedef enum logic [1:0] {IDLE, LEAD, SEND, TRAIL} state_t;
 
     state_t      state;
@@ -43,8 +49,8 @@ module character_transmitter (
 
         if (valid && ready) begin
             tx      <= 1'b0;
-            place   <= 4'd10;
-            shifted <= {1'b1, ninth, data};
+            place   <= STOP;
+            shifted <= {1'b1, NINTH != 0 ? ninth : 1'b1, data};
             if (state == TRAIL) left <= whole - 20'd16;
         end else if (state == SEND && now) begin
             tx      <= place == 4'd0 || shifted[0];
@@ -74,7 +80,7 @@ module character_transmitter (
         if (past && !$past(rst)) begin
             if (!driver_enable) assert (tx);
             if (state != SEND) assert (tx);
-            if (state == SEND) assert (place <= 4'd10);
+            if (state == SEND) assert (place <= STOP);
             cover (state == SEND);
         end
     end

@@ -6,7 +6,8 @@ from fractions import Fraction
 
 
 class CharacterReceiver:
-    def __init__(self):
+    def __init__(self, ninth=1):
+        self.last = 9 + ninth                       # place of the stop bit
         self.state, self.left, self.bits, self.samples = "release", 0, [], []
         self.data = self.ninth = None
 
@@ -26,14 +27,15 @@ class CharacterReceiver:
         else:
             self.samples.append(rx)
             self.left += (spread if len(self.samples) < 3 else whole - 2 * spread) - 16
-            if len(self.samples) == 3 or len(self.bits) == 10 and self.samples in ([0, 0], [1, 1]):
+            if len(self.samples) == 3 or len(self.bits) == self.last and self.samples in ([0, 0], [1, 1]):
                 level, self.samples = int(sum(self.samples) >= 2), []
                 self.bits.append(level)
                 if len(self.bits) == 1 and level:
                     start_glitch, self.state = 1, "idle"
-                elif len(self.bits) == 11:
+                elif len(self.bits) == self.last + 1:
                     valid, framing_error, self.state = level, 1 - level, "idle" if level else "release"
-                    self.data, self.ninth = sum(b << n for n, b in enumerate(self.bits[1:9])), self.bits[9]
+                    self.data = sum(b << n for n, b in enumerate(self.bits[1:9]))
+                    self.ninth = self.bits[9] if self.last == 10 else 0
         if rst:
             valid = framing_error = start_glitch = 0
             self.state = "release"
@@ -41,8 +43,8 @@ class CharacterReceiver:
 
 
 def character(data, ninth, stop=1):
-    """Levels of one character, a level a bit."""
-    return [0, *(data >> n & 1 for n in range(8)), ninth, stop]
+    """Levels of one character, a level a bit; ninth is None for 8N1."""
+    return [0, *(data >> n & 1 for n in range(8)), *([] if ninth is None else [ninth]), stop]
 
 
 def line(bits, bit_clk, phase=0):

@@ -6,7 +6,8 @@ the `valid` of the next clk. Times are exact sixteenths of a clk: an edge stands
 
 
 class CharacterTransmitter:
-    def __init__(self):
+    def __init__(self, ninth=1):
+        self.has_ninth = ninth
         self.state, self.bits, self.left = "idle", [], 0
 
     def ready(self):
@@ -20,7 +21,7 @@ class CharacterTransmitter:
         if rst:
             self.state = "idle"
         elif take:
-            self.bits = [0, *(data >> n & 1 for n in range(8)), ninth, 1]
+            self.bits = [0, *(data >> n & 1 for n in range(8)), *[ninth] * self.has_ninth, 1]
             self.left = whole - 16 if self.state == "trail" else self.left + whole - 16
             self.state = "send"
         elif self.state == "idle":
