@@ -165,14 +165,15 @@ def sde_soak():
     return f"{left.max():.3f} nm, {(left > 0.1).sum()} of {len(left)} above 0.1", (left > 0.1).mean() <= 0.01
 
 
-def twin_sde_nm(correction):
-    """Sub-division error of the interferometer of the twin with these values in force."""
+def left_in_twin_nm(correction):
+    """Sub-division error of the interferometer of the twin, harmonics and all, with these values in force."""
     told = parameters.values()
     skew = np.radians(told["signal_phase_error"])
 
     def curve(turn):
-        cos = told["signal_gain_cos"] * (np.cos(turn) * np.cos(skew) - np.sin(turn) * np.sin(skew)) + told["signal_offset_cos"]
-        return cos, np.sin(turn) + told["signal_offset_sin"]
+        wave = np.exp(1j * turn) + sum(size * np.exp(1j * k * turn) for k, size in HARMONICS.items())
+        cos = told["signal_gain_cos"] * (wave.real * np.cos(skew) - wave.imag * np.sin(skew)) + told["signal_offset_cos"]
+        return cos, wave.imag + told["signal_offset_sin"]
 
     values = host_learner.Values(**{name: correction[name] for name in ("sin_offset", "cos_offset", "gain", "shear")})
     values.cosine[:], values.sine[:] = correction["cosine"], correction["sine"]
@@ -181,16 +182,28 @@ def twin_sde_nm(correction):
 
 
 def twin_pass():
-    """The firmware on its soft core learns the interferometer of the twin to and fro, from nothing to the harmonics."""
-    stage = s0_stage.Stage.power_up(1)
+    """The firmware on its soft core learns the interferometer of the twin to and fro, from nothing to the harmonics.
+    Simulated seconds, nm before, nm with the ellipse alone, nm after, and what the learner told."""
+    stage = s0_stage.Stage.power_up(1, **{f"harmonic_{'plus' if k > 0 else 'minus'}_{abs(k)}": size for k, size in HARMONICS.items()})
     stage.find()
     stage.home("X")
     axis, began = stage.axes["X"], stage.line.transport.now()
-    before = twin_sde_nm(axis.correction())
-    told = axis.learn(lambda learner: console.print(f"{stage.line.transport.now() - began:.1f} s: {learner.words}"), timeout="200s")
-    after = twin_sde_nm(axis.correction())
-    console.print(f"learned in {stage.line.transport.now() - began:.1f} s simulated; known to {told.scatter_nm:.3f} nm")
-    return f"{before:.3f} nm before, {after:.3f} nm after", after <= 0.1
+    before, ellipse = left_in_twin_nm(axis.correction()), []
+
+    def look(learner):
+        if learner.accepted == 1 and not ellipse:
+            ellipse.append((stage.line.transport.now() - began, left_in_twin_nm(axis.correction())))
+        console.print(f"{stage.line.transport.now() - began:.1f} s: {learner.words}")
+
+    told = axis.learn(look, timeout="60s")
+    took, after = stage.line.transport.now() - began, left_in_twin_nm(axis.correction())
+    console.print(f"uncorrected {before:.2f} nm; ellipse after {ellipse[0][0]:.1f} s: {ellipse[0][1]:.2f} nm; "
+                  f"harmonics after {took:.1f} s: {after:.3f} nm, known to {told.scatter_nm:.3f} nm")
+    return took, before, ellipse[0][1], after, told
+
+
+def twin_sde_nm():
+    return twin_pass()[3]
 
 
 def acquire(count, amplitude, trials):
@@ -240,6 +253,8 @@ FIGURES = {
                                 "at most 0.5", lambda v: v <= 0.5),
     "acquire_nm_p95_1024": Figure(acquire_nm_p95_1024, "nm", "sub-division error after 1024 samples, ellipse part, 95 of 100 trials",
                                   "at most 0.12", lambda v: v <= 0.12),
+    "twin_sde_nm": Figure(twin_sde_nm, "nm", "largest sub-division error of the simulated machine (harmonics +3 1 %, -3 0.6 %, +2 0.4 %, "
+                          "-5 0.3 %) after its node learned it, RTL and firmware at 3 MHz", "at most 0.3", lambda v: v <= 0.3),
 }
 
-SOAK = {"sde_nm_max": sde_soak, "learning_in_the_twin": twin_pass}
+SOAK = {"sde_nm_max": sde_soak}

@@ -15,12 +15,16 @@ import shutil
 import struct
 import subprocess
 import sys
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 OUT = HERE.parents[1] / "build" / "firmware"
-FLAGS = ["-std=c11", "-O2", "-g", "-Wall", "-Wextra", "-Werror", "-ffreestanding", "-ffunction-sections",
+FLAGS = ["-std=c11", "-g", "-Wall", "-Wextra", "-Werror", "-ffreestanding", "-ffunction-sections",
          "-fdata-sections", "-fomit-frame-pointer", "-static", "-Wframe-larger-than=1536"]    # the stack has 4096
+SMALL, FAST = "-Os", "-O2"
+HOT = ("learner.c",)                                                # it works through a burst of phases
 ZIG = ["-target", "riscv32-freestanding-none", "-mcpu=generic_rv32+m-a-f-d-c", "-mabi=ilp32", "-fno-sanitize=all",
        "-fno-stack-protector"]
 GNU = ["-march=rv32im", "-misa-spec=2.2", "-mabi=ilp32", "-nostdlib", "-nostartfiles",
@@ -86,6 +90,14 @@ def fingerprint(sources, command, memory):
     return state.hexdigest()
 
 
+def run(command):
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        said = done.stderr.splitlines() or ["the compiler failed without a word"]
+        telling = [line for line in said if re.search(r"error|undefined reference|does not fit|would not survive", line)]
+        raise BuildError((telling or said)[0].strip())
+
+
 def build(memory, out, force):
     command, libraries = compiler()
     sources = sorted(HERE.glob("*.[chS]")) + [HERE / "link.ld", HERE / "build.py"]
@@ -98,15 +110,16 @@ def build(memory, out, force):
     out.mkdir(parents=True, exist_ok=True)
     note.unlink(missing_ok=True)
 
-    inputs = [str(path) for path in sources if path.suffix in (".c", ".S")]
+    inputs = [path for path in sources if path.suffix in (".c", ".S")]
     script = out / "link.ld"                                    # zig's linker takes no --defsym
     script.write_text(f"MEMORY_BYTES = {memory};\n" + (HERE / "link.ld").read_text())
-    run = subprocess.run([*command, *FLAGS, *inputs, "-Wl,--gc-sections", f"-Wl,-T,{script}", "-o", str(elf), *libraries],
-                         capture_output=True, text=True, check=False)
-    if run.returncode:
-        said = run.stderr.splitlines() or ["the compiler failed without a word"]
-        telling = [line for line in said if re.search(r"error|undefined reference|does not fit|would not survive", line)]
-        raise BuildError((telling or said)[0].strip())
+    with tempfile.TemporaryDirectory(dir=out) as folder:
+        objects = [Path(folder) / f"{path.name}.o" for path in inputs]
+        compiled = [[*command, *FLAGS, FAST if path.name in HOT else SMALL, "-c", str(path), "-o", str(made)]
+                    for path, made in zip(inputs, objects, strict=True)]
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            list(pool.map(run, compiled))
+        run([*command, *FLAGS, *map(str, objects), "-Wl,--gc-sections", f"-Wl,-T,{script}", "-o", str(elf), *libraries])
 
     segments, symbols = load_segments(elf.read_bytes())
     content, program = image(segments, memory)

@@ -99,9 +99,12 @@ static void burst_poll(unsigned n)
 static void words_poll(unsigned n)
 {
     struct learner *learner = &gratings[n].learner;
-    uint32_t began = node_read(NODE_TIME_STAMP_LOW);
-    for (uint32_t pieces = 0; learner->need == LEARNER_NEEDS_WORDS && time_left(began, pieces); pieces++)
-        learner_take(learner, grating_read(n, GRATING_RECORDER_WORD));
+    uint32_t began = node_read(NODE_TIME_STAMP_LOW), count = gratings[n].phases ? LEARNER_WORDS : 1;
+    for (uint32_t pieces = 0; learner->need == LEARNER_NEEDS_WORDS && time_left(began, pieces); pieces++) {
+        uint32_t words[LEARNER_WORDS];
+        for (uint32_t i = 0; i < count; i++) words[i] = grating_read(n, GRATING_RECORDER_WORD);
+        learner_take(learner, words);
+    }
 }
 
 static void work_poll(unsigned n)

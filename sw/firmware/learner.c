@@ -8,35 +8,48 @@
 // vibration as the line that no burst of the pass is without (the lines of c move with the speed). Then, motion and vibration
 // fitted together and taken off every phase, the remainder is projected on each order. What an order shares with the vibration is
 // lost to it; so much less the burst informs of it. A burst weighs as the inverse of the power that is left in it.
+// All of it is in 32 bits where they hold it, and sums over the circle use its four mirrored quarters: the core takes 4 clk an
+// instruction, and a burst costs it 1.4 million clk.
 #include "learner.h"
 
 #define UNIT ((int64_t)1 << 28)             // 1 of the equations
 #define STEEPEST (4 * UNIT)                 // largest factor of an elimination
 #define SMALLEST (UNIT >> 16)               // smallest pivot
+#define LARGEST_SHAPE (4 * UNIT)            // of an ellipse
+#define LARGEST_PLACE ((int64_t)1 << 33)    // 512 periods, 2^-24 period
 #define LOUDEST (UNIT + UNIT / 4)           // mean of x^2 + y^2
 #define LARGEST_CORRECTION 0x1FFFF          // the 18 bits of harmonic_correction
 #define SCATTER_LIMIT 64                    // 4 LSB of a 16-bit phase
 #define PARTS 16                            // of a burst, for its steadiness
 #define FEWEST_PERIODS 8                    // in a burst of phases
 #define BLOCKS 256u                         // of a burst; their means are what motion is fitted to
-#define BLOCK (LEARNER_PHASES / BLOCKS)     // 8: see dimmed
+#define BLOCK (LEARNER_PHASES / BLOCKS)     // 8: see dimming
 #define BINS 128u                           // of a period
+#define QUARTER (BINS / 4)
+#define POINTS (BLOCKS / 2)                 // of the transform: two blocks in each, one real, one imaginary
+#define PAIRS (POINTS / 2)                  // of a level of the transform
+#define LEVELS 7u                           // of the transform
+#define TOGETHER 4u                         // blocks, pairs, lines, bins of one piece of work
 #define LARGEST_REST 32767                  // of a phase from smooth motion: 1/32 period
+#define LARGEST_VIBRATION (1 << 22)         // 4 periods: a slow one and the motion may nearly cancel
 #define QUIET (1 << 20)                     // mean square below which a burst has full weight, 2^-40 period^2
-#define FIRST_LINE 2u                       // slower vibration is motion
+#define FIRST_LINE 2u                       // slower vibration is motion,
+#define SLOWEST (3u << 15)                  // below 1.5 cycles a burst
 #define FEWEST_SPECTRA 3u                   // that show which line stays
 #define FEWEST_BURSTS 4u                    // from which on the candidate is believed
 #define LEAST_INFORMATION 256               // 2^-15 burst
 
 const struct learner_values learner_identity = {.gain = 65536};
 
-static uint16_t quarter[257];               // sine of the first quarter, 1.0 = 2^15
+static int16_t wave[640];                   // sine of 512 points of a circle and a quarter, 1.0 = 32767
+static int32_t motion[3][3];                // window times products of 1, time and its square, summed over the blocks
 
-enum stage { UPDATE, TABLE, FIRST_READING, FIT, SOLVE, REST, TRANSFORM, SPECTRUM, SECOND_READING, PROJECT, ELLIPSE };
+enum stage { UPDATE, TABLE, FIRST_READING, FIT, SOLVE, REST, TRANSFORM, SPECTRUM, SECOND_READING, FOLD, PROJECT, ELLIPSE };
 
 struct equations {                          // symmetric and positive; column 5 is the right side
     int64_t m[5][6];
     int64_t solution[5];
+    int64_t largest;                        // of the solution
     bool back;                              // eliminated: the unknowns are next
     uint32_t size;
     uint32_t row, column;                   // what comes next
@@ -54,50 +67,78 @@ static struct {
     int32_t travel;                         // 2^-16 period
     int32_t part;                           // travel at the start of this 16th of the burst
     int32_t slowest, fastest;               // travel of a 16th
-    int32_t largest_step;
+    int32_t least_step, largest_step;
 
     int32_t table[BINS];                    // c in the middle of each bin, 2^-20 period
     int32_t block[BLOCKS];                  // place, 2^-20 period
-    int32_t slope;                          // of the straight line through the burst, 2^-32 period a phase
     uint32_t vibration;                     // 2^-16 cycle a burst
-    int64_t dimmed;                         // of the vibration in the mean of a block, 1.0 = 2^15
+    int32_t bend;                           // of the vibration from phase to phase, 2 - 2 cos of its step, 1.0 = 2^17
+    int32_t dimmed;                         // of the vibration in the mean of a block, 1.0 = 2^15
+    int32_t across[2][5];                   // window times products of each wave of the vibration with 1, time, square and both waves
+    int64_t right[5];                       // window times place times those
     struct equations fit;
     union {
-        struct { int32_t real[BLOCKS], imaginary[BLOCKS]; };    // of the spectrum
-        int32_t seen[3][BINS];              // by phase: window times rest, cosine and sine of the vibration, by 2^5
+        struct { int32_t real[POINTS], imaginary[POINTS]; };    // of the transform
+        int32_t seen[3][BINS];              // by phase: window times rest of each phase, cosine and sine of the vibration of each block
     };
-    int64_t power;                          // of the rest, 2^-30 (window) 2^-20 period squared
+    int64_t power;                          // of the rest at the end of each block, 2^-30 (window) 2^-20 period squared
     int64_t weight;                         // of the burst, 1.0 = 2^15
     uint32_t order;
     int64_t projected[3][2];                // of the order at hand, cosine and sine
 } work;
 
-static void fill_quarter(void)
+static void fill_wave(void)
 {
     int64_t sine = 0, cosine = 1 << 30;
-    for (int n = 0; n <= 256; n++) {
-        quarter[n] = (uint16_t)((sine + (1 << 14)) >> 15);
-        int64_t next = (sine * 1073721611 + cosine * 6588356 + (1 << 29)) >> 30;        // turn by pi / 512
-        cosine = (cosine * 1073721611 - sine * 6588356 + (1 << 29)) >> 30;
+    for (int n = 0; n <= 128; n++) {
+        wave[n] = wave[256 - n] = (int16_t)((sine * 32767 + (1 << 29)) >> 30);
+        int64_t next = (sine * 1073660973 + cosine * 13176464 + (1 << 29)) >> 30;         // turn by pi / 256
+        cosine = (cosine * 1073660973 - sine * 13176464 + (1 << 29)) >> 30;
         sine = next;
     }
+    for (int n = 0; n < 256; n++) wave[256 + n] = (int16_t)-wave[n];
+    for (int n = 0; n < 128; n++) wave[512 + n] = wave[n];
 }
 
-static int32_t sine_of(uint32_t phase)      // one period = 2^16
+// Of a point of the circle, which has 512.
+
+static int32_t sine_at(uint32_t point)
 {
-    uint32_t point = (phase + 32) >> 6, in_quarter = point & 255;
-    int32_t size = quarter[point & 256 ? 256 - in_quarter : in_quarter];
-    return point & 512 ? -size : size;
+    return wave[point % 512];
+}
+
+static int32_t cosine_at(uint32_t point)
+{
+    return wave[point % 512 + 128];
+}
+
+// Of any phase, one period = 2^16: the nearest point turned by the rest.
+
+static int32_t turn_of(int32_t size, uint32_t phase)
+{
+    return (size * (int32_t)((phase + 64) % 128 - 64) * 201) >> 21;         // pi / 2^15
+}
+
+static int32_t sine_of(uint32_t phase)
+{
+    uint32_t point = (phase + 64) >> 7;
+    return sine_at(point) + turn_of(cosine_at(point), phase);
 }
 
 static int32_t cosine_of(uint32_t phase)
 {
-    return sine_of(phase + 16384);
+    uint32_t point = (phase + 64) >> 7;
+    return cosine_at(point) - turn_of(sine_at(point), phase);
 }
 
 static int32_t clamp(int64_t value, int32_t limit)
 {
     return value > limit ? limit : value < -limit ? -limit : (int32_t)value;
+}
+
+static int32_t clamp_rest(int32_t value)
+{
+    return value > LARGEST_REST ? LARGEST_REST : value < -LARGEST_REST ? -LARGEST_REST : value;
 }
 
 static int32_t size_of(int32_t value)
@@ -160,9 +201,9 @@ void learner_ellipse_take(struct learner_ellipse *ellipse, const struct learner 
     ellipse->count++;
 }
 
-static void begin_equations(struct equations *e, uint32_t size)
+static void begin_equations(struct equations *e, uint32_t size, int64_t largest)
 {
-    *e = (struct equations){.size = size, .column = 1};
+    *e = (struct equations){.size = size, .column = 1, .largest = largest};
 }
 
 enum solving { BUSY, SOLVED, ILL };
@@ -177,7 +218,7 @@ static enum solving solve(struct equations *e)
         for (j = i + 1; j < e->size; j++) rest -= (e->m[i][j] * e->solution[j]) >> 28;
         int64_t coarse = rest * 16 / pivot;                                 // then the remainder: both fit 64 bits
         e->solution[i] = coarse * (UNIT / 16) + (rest * 16 - coarse * pivot) * (UNIT / 16) / pivot;
-        if (e->solution[i] > STEEPEST || e->solution[i] < -STEEPEST) return ILL;
+        if (e->solution[i] > e->largest || e->solution[i] < -e->largest) return ILL;
         if (i == 0) return SOLVED;
         e->row--;
     } else if (pivot < SMALLEST) {
@@ -201,7 +242,7 @@ static enum solving solve(struct equations *e)
 static enum learner_reason judge_ellipse(const struct learner_ellipse *ellipse, struct equations *e)
 {
     static const uint8_t degree[6] = {0, 1, 1, 2, 2, 2};
-    begin_equations(e, 5);
+    begin_equations(e, 5, LARGEST_SHAPE);
     int64_t count = ellipse->count;
     uint32_t shift = 0;
     if (count == 0) return LEARNER_PARTIAL_CIRCLE;
@@ -255,14 +296,38 @@ enum learner_reason learner_ellipse_fit(const struct learner_ellipse *ellipse, s
 
 // ---- the harmonics
 
+// Sums of the cosines of even and odd orders, then of the sines, at a point of the circle. With a sign each they are those of the
+// three mirrored points as well.
+static void sums_at(const struct learner_values *values, uint32_t point, int64_t sum[4])
+{
+    sum[0] = sum[1] = sum[2] = sum[3] = 0;
+    for (uint32_t k = 0, at = point; k < LEARNER_ORDERS; k++, at += point) {
+        uint32_t odd = (k + 1) % 2;
+        sum[odd] += (int64_t)values->cosine[k] * cosine_at(at);
+        sum[2 + odd] += (int64_t)values->sine[k] * sine_at(at);
+    }
+}
+
+static int32_t entry_of(int64_t sum)        // 2^-20 period
+{
+    return clamp((sum + (1 << 18)) >> 19, LARGEST_CORRECTION);
+}
+
 int32_t learner_table_entry(const struct learner_values *values, uint32_t point)
 {
-    int64_t sum = 0;
-    for (uint32_t k = 0; k < LEARNER_ORDERS; k++) {
-        uint32_t phase = (k + 1) * point * (65536 / LEARNER_POINTS);
-        sum += (int64_t)values->cosine[k] * cosine_of(phase) + (int64_t)values->sine[k] * sine_of(phase);
-    }
-    return clamp((sum + (1 << 18)) >> 19, LARGEST_CORRECTION);
+    int64_t sum[4];
+    sums_at(values, point * (512 / LEARNER_POINTS), sum);
+    return entry_of(sum[0] + sum[1] + sum[2] + sum[3]);
+}
+
+static void fill_table(uint32_t n)          // four bins
+{
+    int64_t s[4];
+    sums_at(&work.candidate, n * (512 / BINS) + 256 / BINS, s);
+    work.table[n] = entry_of(s[0] + s[1] + s[2] + s[3]);
+    work.table[BINS - 1 - n] = entry_of(s[0] + s[1] - s[2] - s[3]);
+    work.table[BINS / 2 - 1 - n] = entry_of(s[0] - s[1] - s[2] + s[3]);
+    work.table[BINS / 2 + n] = entry_of(s[0] - s[1] + s[2] - s[3]);
 }
 
 static void begin_reading(void)
@@ -272,7 +337,7 @@ static void begin_reading(void)
     work.part = 0;
     work.slowest = INT32_MAX;
     work.fastest = INT32_MIN;
-    work.largest_step = 0;
+    work.least_step = work.largest_step = 0;
 }
 
 static void begin_stage(enum stage stage)
@@ -281,41 +346,77 @@ static void begin_stage(enum stage stage)
     work.next = 0;
 }
 
-// `turn` is the place in the burst, all of it being 65536.
+// Places in a burst: `turn`, all of it being 65536, or the number of a block for its middle.
 
-static int32_t window_of(uint32_t turn)     // Hann, 1.0 = 2^15
+static uint32_t turn_of_block(uint32_t n)
 {
-    return (32768 - cosine_of(turn)) >> 1;
+    return n * (65536 / BLOCKS) + 32768 / BLOCKS;
 }
 
-static void vibration_of(uint32_t turn, int32_t wave[2])
+static int32_t window_of(uint32_t n)        // Hann, 1.0 = 2^15
+{
+    return (32767 - cosine_at((2 * n + 1) * (256 / BLOCKS))) >> 1;
+}
+
+static void motion_of(uint32_t n, int32_t base[3])
+{
+    base[0] = 32768;
+    base[1] = (int32_t)turn_of_block(n) - 32768;
+    base[2] = base[1] * base[1] >> 15;
+}
+
+static void vibration_of(uint32_t turn, int32_t waves[2])
 {
     uint32_t phase = (uint32_t)((uint64_t)work.vibration * turn >> 16);
-    wave[0] = cosine_of(phase);
-    wave[1] = sine_of(phase);
+    waves[0] = cosine_of(phase);
+    waves[1] = sine_of(phase);
 }
 
-static int32_t smooth_of(uint32_t turn, const int32_t wave[2])              // fitted place beside the line, 2^-20 period
+static int32_t place_of_motion(const int32_t base[3])                       // fitted, 2^-20 period
 {
     const int64_t *s = work.fit.solution;
-    int32_t time = (int32_t)turn - 32768, square = time * time >> 15;
-    return (int32_t)((s[0] * 32768 + s[1] * time + s[2] * square + s[3] * wave[0] + s[4] * wave[1]) >> 19);
+    return (int32_t)((s[0] * base[0] + s[1] * base[1] + s[2] * base[2]) >> 19);
 }
 
-static int32_t follow(uint16_t phase)       // place, 2^-20 period
+static int32_t place_of_vibration(const int32_t waves[2])
 {
-    int32_t step = work.taken ? (int16_t)(phase - work.last) : 0;
-    if (size_of(step) > work.largest_step) work.largest_step = size_of(step);
-    work.travel += step;
-    work.last = phase;
-    return work.travel * 16 - work.table[phase / (65536 / BINS)];
+    const int64_t *s = work.fit.solution;
+    return clamp((s[3] * waves[0] + s[4] * waves[1]) >> 19, LARGEST_VIBRATION);
 }
 
-static void take_first(uint16_t phase)
+static void fill_motion(void)
 {
-    int32_t place = follow(phase), *block = &work.block[work.taken / BLOCK];
-    *block = (work.taken % BLOCK ? *block : 0) + (place >> 3);
-    work.taken++;
+    for (uint32_t i = 0; i < 3; i++) motion[i][0] = motion[i][1] = motion[i][2] = 0;
+    for (uint32_t n = 0; n < BLOCKS; n++) {
+        int32_t base[3], window = window_of(n);
+        motion_of(n, base);
+        for (uint32_t i = 0; i < 3; i++)
+            for (uint32_t j = 0; j < 3; j++) motion[i][j] += (window * base[i] >> 15) * base[j] >> 10;
+    }
+}
+
+static void take_first(const uint32_t words[BLOCK / 2])                     // a block
+{
+    int32_t travel = work.travel, travels = 0, corrections = 0;
+    uint16_t last = work.taken ? work.last : (uint16_t)words[0];
+    for (uint32_t i = 0; i < BLOCK; i++) {
+        uint16_t phase = (uint16_t)(words[i / 2] >> 16 * (i % 2));
+        int32_t step = (int16_t)(phase - last);
+        if (step > work.largest_step) work.largest_step = step;
+        if (step < work.least_step) work.least_step = step;
+        travel += step;
+        travels += travel;
+        corrections += work.table[phase / (65536 / BINS)];
+        last = phase;
+    }
+    work.travel = travel;
+    work.last = last;
+    uint32_t n = work.taken / BLOCK;
+    int32_t base[3], window = window_of(n), place = travels * 2 - (corrections >> 3);
+    motion_of(n, base);
+    work.block[n] = place;
+    for (uint32_t i = 0; i < 3; i++) work.right[i] += (int64_t)(window * base[i] >> 15) * place;
+    work.taken += BLOCK;
     if (work.taken % (LEARNER_PHASES / PARTS) == 0) {
         int32_t gone = work.travel - work.part;
         work.part = work.travel;
@@ -324,24 +425,44 @@ static void take_first(uint16_t phase)
     }
 }
 
-static void take_second(uint16_t phase)
+// Within the block motion is straight, and the vibration goes on from its first two places by its bend.
+static void take_second(const uint32_t words[BLOCK / 2])
 {
-    uint32_t turn = work.taken * (65536 / LEARNER_PHASES) + 32768 / LEARNER_PHASES, bin = phase / (65536 / BINS);
-    int32_t line = (int32_t)(((int64_t)work.slope * work.taken) >> 12), wave[2];
-    int32_t place = follow(phase), window = window_of(turn) >> 5;
-    vibration_of(turn, wave);
-    int32_t rest = clamp(place - line - smooth_of(turn, wave), LARGEST_REST);
-    work.seen[0][bin] += window * rest >> 5;
-    work.seen[1][bin] += window * wave[0] >> 5;
-    work.seen[2][bin] += window * wave[1] >> 5;
+    uint32_t n = work.taken / BLOCK, turn = n * (65536 / BLOCKS) + 32768 / LEARNER_PHASES;
+    int32_t base[3], waves[2], window = window_of(n) >> 5, rest = 0, travel = 0;
+    uint16_t last = work.taken ? work.last : (uint16_t)words[0];
+    const int64_t *s = work.fit.solution;
+    motion_of(n, base);
+    int32_t speed = (int32_t)((s[1] * 32768 + 2 * s[2] * base[1] + (1 << 28)) >> 29);         // a phase is 2^-11 of the burst
+    int32_t motion_place = place_of_motion(base) - speed * (int32_t)(BLOCK - 1) / 2 - work.travel * 16;
+    vibration_of(turn - 65536 / LEARNER_PHASES, waves);
+    int32_t before = place_of_vibration(waves);
+    vibration_of(turn, waves);
+    int32_t swing = place_of_vibration(waves), swinging = swing - before, bend = work.bend;
+    uint32_t first = (uint16_t)words[0] / (65536 / BINS);
+    work.seen[1][first] += window * waves[0] >> 5;
+    work.seen[2][first] += window * waves[1] >> 5;
+    for (uint32_t i = 0; i < BLOCK; i++) {
+        uint16_t phase = (uint16_t)(words[i / 2] >> 16 * (i % 2));
+        uint32_t bin = phase / (65536 / BINS);
+        travel += (int16_t)(phase - last);
+        last = phase;
+        rest = clamp_rest(travel * 16 - work.table[bin] - motion_place - swing);
+        work.seen[0][bin] += window * rest >> 5;
+        motion_place += speed;
+        swinging -= (int32_t)(((int64_t)bend * swing + (1 << 16)) >> 17);
+        swing += swinging;
+    }
+    work.travel += travel;
+    work.last = last;
     work.power += (int64_t)window * (rest * rest);
-    work.taken++;
+    work.taken += BLOCK;
 }
 
 static enum learner_reason judge_burst(void)
 {
     int32_t travel = work.travel, slowest = work.slowest, fastest = work.fastest;
-    if (work.largest_step > 8192) return LEARNER_TOO_FAST;
+    if (work.largest_step > 8192 || work.least_step < -8192) return LEARNER_TOO_FAST;
     if (size_of(travel) < 65536 / 4 && fastest < 65536 / 4 && slowest > -65536 / 4) return LEARNER_STANDSTILL;
     if (size_of(travel) < FEWEST_PERIODS * 65536) return LEARNER_PARTIAL_CIRCLE;
     if (travel < 0) {
@@ -351,62 +472,94 @@ static enum learner_reason judge_burst(void)
     return slowest <= 0 || fastest > 2 * slowest ? LEARNER_UNSTEADY : LEARNER_LEARNING;
 }
 
-static void begin_fit(uint32_t size)
+// Of a wave in the mean of a block, 1.0 = 2^15; by half of its step from phase to phase.
+static int32_t dimming(uint32_t half)
 {
-    uint32_t half = work.vibration / (2 * LEARNER_PHASES);                  // of the step from phase to phase
-    work.dimmed = (int64_t)cosine_of(half) * cosine_of(2 * half) * cosine_of(4 * half) >> 30;
-    begin_equations(&work.fit, size);
+    int32_t twice = cosine_of(half) * cosine_of(2 * half) >> 15;
+    return twice * cosine_of(4 * half) >> 15;
+}
+
+static void begin_fit(void)
+{
+    uint32_t half = work.vibration / (2 * LEARNER_PHASES);
+    int32_t sine = sine_of(half);
+    work.bend = sine * sine >> 11;
+    work.dimmed = dimming(half);
     begin_stage(FIT);
 }
 
-// The least squares of one block more: 1, time, its square, and both waves of the vibration, if it is known.
+// One block more of what the waves of the vibration add to the least squares.
 static void fit_block(uint32_t n)
 {
-    struct equations *e = &work.fit;
-    uint32_t turn = n * (65536 / BLOCKS) + 32768 / BLOCKS;
-    int32_t base[5] = {32768, (int32_t)turn - 32768}, window = window_of(turn);
-    base[2] = base[1] * base[1] >> 15;
-    vibration_of(turn, &base[3]);
-    for (uint32_t i = 3; i < e->size; i++) base[i] = (int32_t)(base[i] * work.dimmed >> 15);
-    int64_t place = work.block[n] - (((int64_t)work.slope * (2 * BLOCK * n + BLOCK - 1)) >> 13);
-    for (uint32_t i = 0; i < e->size; i++) {
-        int64_t weighed = (int64_t)window * base[i] >> 15;
-        for (uint32_t j = i; j < e->size; j++) e->m[i][j] += weighed * base[j] >> 10;
-        e->m[i][5] += weighed * place >> 19;                                // 2^-24 period
+    int32_t base[5], window = window_of(n), place = work.block[n];
+    motion_of(n, base);
+    vibration_of(turn_of_block(n), &base[3]);
+    for (uint32_t i = 0; i < 2; i++) base[3 + i] = base[3 + i] * work.dimmed >> 15;
+    for (uint32_t i = 0; i < 2; i++) {
+        int32_t weighed = window * base[3 + i] >> 15;
+        for (uint32_t j = 0; j < 4 + i; j++) work.across[i][j] += weighed * base[j] >> 10;
+        work.right[3 + i] += (int64_t)weighed * place;
     }
+}
+
+static void begin_solve(uint32_t size)
+{
+    struct equations *e = &work.fit;
+    begin_equations(e, size, LARGEST_PLACE);
+    for (uint32_t j = 0; j < size; j++) {
+        for (uint32_t i = 0; i <= j; i++) e->m[i][j] = j < 3 ? motion[i][j] : work.across[j - 3][i];
+        e->m[j][5] = work.right[j] >> 19;
+    }
+    begin_stage(SOLVE);
 }
 
 static void window_block(uint32_t n)        // what the motion leaves, into the order that the transform wants
 {
-    static const int32_t still[2] = {0, 0};
-    uint32_t turn = n * (65536 / BLOCKS) + 32768 / BLOCKS, at = 0;
-    int64_t place = work.block[n] - (((int64_t)work.slope * (2 * BLOCK * n + BLOCK - 1)) >> 13);
-    for (uint32_t bit = 1; bit < BLOCKS; bit *= 2) at = at * 2 + (n & bit ? 1 : 0);
-    work.real[at] = (int32_t)(((int64_t)clamp(place - smooth_of(turn, still), 4 * LARGEST_REST) * window_of(turn)) >> 12);
-    work.imaginary[at] = 0;
+    int32_t base[3];
+    uint32_t at = 0;
+    motion_of(n, base);
+    int32_t rest = clamp_rest(work.block[n] - place_of_motion(base));
+    for (uint32_t bit = 2; bit < BLOCKS; bit *= 2) at = at * 2 + (n & bit ? 1 : 0);
+    int32_t *leg = n % 2 ? work.imaginary : work.real;
+    leg[at] = (int32_t)((int64_t)rest * window_of(n) >> 16);
 }
 
-static void butterfly(uint32_t n)
+static void butterfly(uint32_t n)           // halved, so that nothing grows
 {
-    uint32_t level = n / (BLOCKS / 2), pair = n % (BLOCKS / 2), half = 1u << level, in = pair % half;
-    uint32_t a = (pair - in) * 2 + in, b = a + half, angle = in << (15 - level);
-    int64_t cosine = cosine_of(angle), sine = sine_of(angle);
-    int32_t real = (int32_t)((cosine * work.real[b] + sine * work.imaginary[b]) >> 15);
-    int32_t imaginary = (int32_t)((cosine * work.imaginary[b] - sine * work.real[b]) >> 15);
-    work.real[b] = work.real[a] - real;
-    work.imaginary[b] = work.imaginary[a] - imaginary;
-    work.real[a] += real;
-    work.imaginary[a] += imaginary;
+    uint32_t level = n / PAIRS, half = 1u << level, in = n % half;
+    uint32_t a = (n % PAIRS - in) * 2 + in, b = a + half, point = in << (8 - level);
+    int32_t cosine = cosine_at(point), sine = sine_at(point);
+    int32_t real = (cosine * work.real[b] + sine * work.imaginary[b]) >> 15;
+    int32_t imaginary = (cosine * work.imaginary[b] - sine * work.real[b]) >> 15;
+    work.real[b] = (work.real[a] - real) >> 1;
+    work.imaginary[b] = (work.imaginary[a] - imaginary) >> 1;
+    work.real[a] = (work.real[a] + real) >> 1;
+    work.imaginary[a] = (work.imaginary[a] + imaginary) >> 1;
 }
 
-static int64_t power_of(uint32_t line)
+struct line { int32_t real, imaginary; };
+
+static struct line line_of(uint32_t n)      // from the transforms of even and odd blocks
 {
-    return (int64_t)work.real[line] * work.real[line] + (int64_t)work.imaginary[line] * work.imaginary[line];
+    uint32_t m = (POINTS - n) % POINTS;
+    int32_t cosine = cosine_at(n * (512 / BLOCKS)), sine = sine_at(n * (512 / BLOCKS));
+    int32_t real = work.imaginary[n] + work.imaginary[m], imaginary = work.real[m] - work.real[n];
+    return (struct line){
+        .real = (work.real[n] + work.real[m] + ((cosine * real + sine * imaginary) >> 15)) >> 1,
+        .imaginary = (work.imaginary[n] - work.imaginary[m] + ((cosine * imaginary - sine * real) >> 15)) >> 1,
+    };
 }
 
-static uint8_t level_of(int64_t power)      // 4 log2
+static uint32_t power_of(uint32_t n)
+{
+    struct line line = line_of(n);
+    return (uint32_t)(line.real * line.real) + (uint32_t)(line.imaginary * line.imaginary);
+}
+
+static uint8_t level_of(uint32_t power)     // 4 log2
 {
     uint8_t level = 0;
+    for (; power >= 64; power >>= 3) level = (uint8_t)(level + 12);
     for (; power >= 8; power >>= 1) level = (uint8_t)(level + 4);
     return (uint8_t)(level + power);
 }
@@ -426,13 +579,15 @@ static bool find_vibration(const struct learner_pass *pass)
     if (power_of(at + 1) > power_of(at)) at++;
     else if (power_of(at - 1) > power_of(at)) at--;
     uint32_t beside = power_of(at + 1) > power_of(at - 1) ? at + 1 : at - 1;
-    int64_t unit = power_of(at) >> 16;
-    if (unit == 0) return false;
-    int64_t both = (int64_t)work.real[at] * work.real[beside] + (int64_t)work.imaginary[at] * work.imaginary[beside];
-    int64_t share = -both / unit;
+    struct line line = line_of(at), next = line_of(beside);
+    int64_t both = (int64_t)line.real * next.real + (int64_t)line.imaginary * next.imaginary, power = power_of(at);
+    if (power == 0) return false;
+    int64_t share = -both * 65536 / power;
     int32_t ratio = share < 0 ? 0 : share > 65536 ? 65536 : (int32_t)share;
     int32_t away = (2 * ratio - 65536) * 16384 / (65536 + ratio) * 4;
-    work.vibration = (uint32_t)((int32_t)(at * 65536) + (beside > at ? away : -away));
+    uint32_t vibration = (uint32_t)((int32_t)(at * 65536) + (beside > at ? away : -away));
+    if (vibration < SLOWEST) return false;
+    work.vibration = vibration;
     return true;
 }
 
@@ -445,21 +600,51 @@ static void begin_second_reading(struct learner *learner)
     learner->need = LEARNER_NEEDS_WORDS;
 }
 
-static void project_bin(uint32_t n)
+// The four mirrored bins become what the cosines of even and odd orders see of them, then the sines.
+static void fold_bins(uint32_t n)
 {
-    uint32_t phase = (work.order + 1) * (n * (65536 / BINS) + 32768 / BINS);
-    int64_t wave[2] = {cosine_of(phase), sine_of(phase)};
+    for (uint32_t i = 0; i < 3; i++) {
+        int32_t *a = &work.seen[i][n], *b = &work.seen[i][BINS / 2 - 1 - n], *c = &work.seen[i][BINS / 2 + n], *d = &work.seen[i][BINS - 1 - n];
+        int32_t even = *a + *d, uneven = *a - *d, opposite_even = *b + *c, opposite_uneven = *c - *b;
+        *a = even + opposite_even;
+        *b = even - opposite_even;
+        *c = uneven + opposite_uneven;
+        *d = uneven - opposite_uneven;
+    }
+}
+
+static void project_bins(uint32_t n)
+{
+    uint32_t order = work.order + 1, point = order * (n * (512 / BINS) + 256 / BINS);
+    uint32_t at[2] = {order % 2 ? BINS / 2 - 1 - n : n, order % 2 ? BINS - 1 - n : BINS / 2 + n};
+    int32_t waves[2] = {cosine_at(point), sine_at(point)};
     for (uint32_t i = 0; i < 3; i++)
-        for (uint32_t j = 0; j < 2; j++) work.projected[i][j] += work.seen[i][n] * wave[j];
+        for (uint32_t j = 0; j < 2; j++) work.projected[i][j] += (int64_t)work.seen[i][at[j]] * waves[j];
+}
+
+// What the vibration takes of an order: its two sidebands, each as far as it shows in the mean of a block.
+static int64_t lost_to_vibration(int32_t order)
+{
+    int32_t step = (int32_t)(work.vibration / LEARNER_PHASES), own = order * (work.travel / (int32_t)(LEARNER_PHASES - 1));
+    int64_t cosine[2], sine[2], lost = 0;
+    for (uint32_t j = 0; j < 2; j++) {
+        cosine[j] = work.projected[1][j] >> 27;
+        sine[j] = work.projected[2][j] >> 27;
+    }
+    int64_t near[2] = {cosine[0] + sine[1], sine[0] - cosine[1]}, far[2] = {cosine[0] - sine[1], sine[0] + cosine[1]};
+    int64_t near_dimmed = dimming((uint32_t)(step - own) / 2), far_dimmed = dimming((uint32_t)(step + own) / 2);
+    for (uint32_t j = 0; j < 2; j++) {
+        int64_t a = near[j] * near_dimmed >> 15, b = far[j] * far_dimmed >> 15;
+        lost += a * a + b * b;
+    }
+    return lost >> 15;
 }
 
 static void take_order(struct learner *learner, uint32_t k)
 {
     struct learner_pass *pass = &learner->pass;
-    int64_t lost = 0, cosine = work.projected[0][0] >> 25, sine = work.projected[0][1] >> 25;       // 2^-24 period
-    for (uint32_t i = 1; i < 3; i++)
-        for (uint32_t j = 0; j < 2; j++) lost += (work.projected[i][j] >> 30) * (work.projected[i][j] >> 30);
-    int64_t kept = 32768 - (lost >> 14);
+    int64_t cosine = work.projected[0][0] >> 25, sine = work.projected[0][1] >> 25;       // 2^-24 period
+    int64_t kept = 32768 - lost_to_vibration((int32_t)k + 1);
     if (kept < 0) kept = 0;
     pass->information[k] += (int32_t)(work.weight * kept >> 15);
     pass->cosine[k] += (int32_t)(work.weight * (cosine + (kept * work.candidate.cosine[k] >> 15)) >> 12);
@@ -510,7 +695,8 @@ void learner_forget(struct learner *learner)
 
 void learner_start(struct learner *learner)
 {
-    fill_quarter();
+    fill_wave();
+    fill_motion();
     leave(learner);
     *learner = (struct learner){.amplitude_high = UINT16_MAX, .scatter_limit = SCATTER_LIMIT};
     learner_forget(learner);
@@ -618,33 +804,30 @@ static void end_of_first_reading(struct learner *learner)
         refuse_burst(learner, reason);
         return;
     }
-    work.slope = (int32_t)(work.travel * INT64_C(65536) / (LEARNER_PHASES - 1));
-    begin_fit(3);
+    begin_solve(3);
     learner->need = LEARNER_NEEDS_WORK;
 }
 
 static void end_of_second_reading(struct learner *learner)
 {
-    int64_t square = work.power >> 20;
+    int64_t square = work.power >> 17;
     work.weight = square <= QUIET ? 32768 : QUIET * INT64_C(32768) / square;
     work.order = 0;
-    begin_stage(PROJECT);
+    begin_stage(FOLD);
     learner->need = LEARNER_NEEDS_WORK;
 }
 
-void learner_take(struct learner *learner, uint32_t word)
+void learner_take(struct learner *learner, const uint32_t words[LEARNER_WORDS])
 {
     if (learner->need != LEARNER_NEEDS_WORDS) return;
     if (!learner->harmonics) {
-        learner_ellipse_take(&learner->ellipse, learner, word);
+        learner_ellipse_take(&learner->ellipse, learner, words[0]);
         if (++work.taken == LEARNER_BURST) end_of_samples(learner);
     } else if (work.stage == SECOND_READING) {
-        take_second((uint16_t)word);
-        take_second((uint16_t)(word >> 16));
+        take_second(words);
         if (work.taken == LEARNER_PHASES) end_of_second_reading(learner);
     } else {
-        take_first((uint16_t)word);
-        take_first((uint16_t)(word >> 16));
+        take_first(words);
         if (work.taken == LEARNER_PHASES) end_of_first_reading(learner);
     }
 }
@@ -652,6 +835,7 @@ void learner_take(struct learner *learner, uint32_t word)
 static void begin_burst(struct learner *learner)
 {
     begin_reading();
+    for (uint32_t i = 0; i < 5; i++) work.right[i] = work.across[0][i] = work.across[1][i] = 0;
     begin_stage(FIRST_READING);
     learner->need = LEARNER_NEEDS_WORDS;
 }
@@ -661,7 +845,7 @@ static void end_of_spectrum(struct learner *learner)
     struct learner_pass *pass = &learner->pass;
     pass->every = work.every;
     if (pass->spectra < UINT8_MAX) pass->spectra++;
-    if (pass->spectra >= FEWEST_SPECTRA && find_vibration(pass)) begin_fit(5);
+    if (pass->spectra >= FEWEST_SPECTRA && find_vibration(pass)) begin_fit();
     else begin_second_reading(learner);
 }
 
@@ -715,12 +899,12 @@ void learner_work(struct learner *learner)
         if (pass->bursts == LEARNER_PASS) end_of_pass(learner);
         break;
     case TABLE:
-        work.table[next] = learner_table_entry(&work.candidate, 2 * next + 1);
-        if (next == BINS - 1) begin_burst(learner);
+        fill_table(next);
+        if (next == QUARTER - 1) begin_burst(learner);
         break;
     case FIT:
-        fit_block(next);
-        if (next == BLOCKS - 1) begin_stage(SOLVE);
+        for (uint32_t n = 0; n < TOGETHER; n++) fit_block(next * TOGETHER + n);
+        if (next == BLOCKS / TOGETHER - 1) begin_solve(5);
         break;
     case SOLVE:
         state = solve(&work.fit);
@@ -729,23 +913,27 @@ void learner_work(struct learner *learner)
         else if (state == SOLVED) begin_stage(REST);
         break;
     case REST:
-        window_block(next);
-        if (next == BLOCKS - 1) begin_stage(TRANSFORM);
+        for (uint32_t n = 0; n < TOGETHER; n++) window_block(next * TOGETHER + n);
+        if (next == BLOCKS / TOGETHER - 1) begin_stage(TRANSFORM);
         break;
     case TRANSFORM:
-        butterfly(next);
-        if (next == 4 * BLOCKS - 1) begin_stage(SPECTRUM);
+        for (uint32_t n = 0; n < TOGETHER; n++) butterfly(next * TOGETHER + n);
+        if (next == LEVELS * PAIRS / TOGETHER - 1) begin_stage(SPECTRUM);
         break;
     case SPECTRUM:
         if (work.every != pass->every) pass->spectra = 0;
-        weaken_line(pass, next);
-        if (next == LEARNER_LINES - 1) end_of_spectrum(learner);
+        for (uint32_t n = 0; n < TOGETHER; n++) weaken_line(pass, next * TOGETHER + n);
+        if (next == LEARNER_LINES / TOGETHER - 1) end_of_spectrum(learner);
+        break;
+    case FOLD:
+        fold_bins(next);
+        if (next == QUARTER - 1) begin_stage(PROJECT);
         break;
     case PROJECT:
         if (next == 0)
             for (uint32_t i = 0; i < 3; i++) work.projected[i][0] = work.projected[i][1] = 0;
-        project_bin(next);
-        if (next < BINS - 1) break;
+        for (uint32_t n = 0; n < TOGETHER; n++) project_bins(next * TOGETHER + n);
+        if (next < QUARTER / TOGETHER - 1) break;
         take_order(learner, work.order++);
         begin_stage(PROJECT);
         if (work.order == LEARNER_ORDERS) end_of_projection(learner);

@@ -3,7 +3,7 @@
 //
 // The machine runs it like this, a few words or one piece of work a poll:
 //   LEARNER_NEEDS_SAMPLES, _PHASES   let learner_recorder fill, then learner_open
-//   LEARNER_NEEDS_WORDS              learner_take for each word of the burst; a burst of phases is taken twice
+//   LEARNER_NEEDS_WORDS              learner_take for each sample of the burst, or each four words of phases; phases are taken twice
 //   LEARNER_NEEDS_WORK               learner_work
 //   LEARNER_NEEDS_LOADING            values into signal_correction, learner_table_entry 0 … 255 into harmonic_correction, learner_loaded
 // All learners share one work area: while a burst is in it, learner_open of the others answers "not yet".
@@ -16,6 +16,7 @@
 #define LEARNER_ORDERS 10u              // of phase error: order k - 1 is harmonic k, order k + 1 harmonic -k; so +-2 … +-8 are inside
 #define LEARNER_POINTS 256u             // of the table of harmonic_correction
 #define LEARNER_BURST 1024u             // words of learner_recorder
+#define LEARNER_WORDS 4u                // words of phases that are taken at once
 #define LEARNER_PHASES 2048u            // phases in them
 #define LEARNER_ELLIPSE_BURSTS 2u
 #define LEARNER_PASS 39u                // bursts of phases
@@ -106,8 +107,8 @@ bool learner_values_fit(const struct learner_values *values);
 
 // A burst is recorded, one of `every` samples; spoiled: its amplitude left the window. false: another learner is at work, ask again.
 bool learner_open(struct learner *learner, uint16_t every, bool spoiled);
-void learner_take(struct learner *learner, uint32_t word);
-void learner_work(struct learner *learner);                     // one piece: some hundred instructions, 3000 at most
+void learner_take(struct learner *learner, const uint32_t words[LEARNER_WORDS]);       // a sample is in the first one
+void learner_work(struct learner *learner);                     // one piece: some hundred instructions
 void learner_loaded(struct learner *learner);                   // the hardware has the values in force
 
 int32_t learner_table_entry(const struct learner_values *values, uint32_t point);       // 2^-20 period

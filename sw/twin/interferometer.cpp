@@ -2,6 +2,7 @@
 #include "interferometer.h"
 
 #include <cmath>
+#include <complex>
 
 namespace twin {
 
@@ -17,6 +18,16 @@ Interferometer::Interferometer(const StageParameters& parameters, uint64_t seed,
 void Interferometer::configure() {
     sin_of_error_ = std::sin(p.signal_phase_error * M_PI / 180);
     cos_of_error_ = std::cos(p.signal_phase_error * M_PI / 180);
+    const double plus[] = {p.harmonic_plus_2, p.harmonic_plus_3, p.harmonic_plus_4, p.harmonic_plus_5,
+                           p.harmonic_plus_6, p.harmonic_plus_7, p.harmonic_plus_8};
+    const double minus[] = {p.harmonic_minus_2, p.harmonic_minus_3, p.harmonic_minus_4, p.harmonic_minus_5,
+                            p.harmonic_minus_6, p.harmonic_minus_7, p.harmonic_minus_8};
+    highest_ = 0;
+    for (int k = 2; k <= HIGHEST; k++) {
+        plus_[k] = plus[k - 2];
+        minus_[k] = minus[k - 2];
+        if (plus_[k] != 0 || minus_[k] != 0) highest_ = k;
+    }
     first_bit_ = 32 - LEADING_ZEROS - int(p.signal_bits);
     draw(spikes_a_, 0);
     draw(spikes_b_, 0);
@@ -40,6 +51,13 @@ void Interferometer::analogue(double position, double& sine, double& cosine) con
     const double turns = (position - p.grating_offset) / p.grating_period, phase = 2 * M_PI * (turns - std::floor(turns));
     double s, c;
     sincos(phase, &s, &c);
+    const std::complex<double> first(c, s);
+    std::complex<double> power = first;
+    for (int k = 2; k <= highest_; k++) {
+        power *= first;
+        c += (plus_[k] + minus_[k]) * power.real();
+        s += (plus_[k] - minus_[k]) * power.imag();
+    }
     sine = p.signal_amplitude * (s + p.signal_offset_sin);
     cosine = p.signal_amplitude * (p.signal_gain_cos * (c * cos_of_error_ - s * sin_of_error_) + p.signal_offset_cos);
 }

@@ -13,7 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "sw" / "firmware" / "learner.c"
 LIBRARY = ROOT / "build" / "firmware" / "host_learner.so"
-ORDERS, POINTS, BURST, PHASES_OF_BURST, PASS, PERIODS, LINES = 10, 256, 1024, 2048, 39, 15, 128
+ORDERS, POINTS, BURST, PHASES_OF_BURST, PASS, PERIODS, LINES, WORDS_AT_ONCE = 10, 256, 1024, 2048, 39, 15, 128, 4
 NOTHING, SAMPLES, PHASES, WORDS, WORK, LOADING = range(6)
 
 
@@ -96,10 +96,11 @@ class Machine:
     def burst(self, words, spoiled=False, every=1):
         """A burst of words, given as often as it is wanted, then all work; returns the reason."""
         self.call("open", c_uint16(every), spoiled)
-        take, learner = library().learner_take, ctypes.byref(self.learner)
+        take, learner, given = library().learner_take, ctypes.byref(self.learner), (c_uint32 * len(words))(*words)
+        at_once = WORDS_AT_ONCE if self.learner.harmonics else 1
         while self.idle() == WORDS:
-            for word in words:
-                take(learner, c_uint32(word))
+            for n in range(0, len(words), at_once):
+                take(learner, ctypes.byref(given, 4 * n))
         return self.learner.reason
 
     def phases(self, phases, spoiled=False, every=1):

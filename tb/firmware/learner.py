@@ -18,25 +18,39 @@ def clamp(value, limit):
     return max(-limit, min(limit, value))
 
 
-def quarter_table():
-    table, sine, cosine = [], 0, 1 << 30
-    for _ in range(257):
-        table.append(sine + (1 << 14) >> 15)
-        sine, cosine = (sine * 1073721611 + cosine * 6588356 + (1 << 29) >> 30, cosine * 1073721611 - sine * 6588356 + (1 << 29) >> 30)
-    return table
+def circle():
+    """The sine of 512 points."""
+    quarter, sine, cosine = [], 0, 1 << 30
+    for _ in range(129):
+        quarter.append(sine * 32767 + (1 << 29) >> 30)
+        sine, cosine = (sine * 1073660973 + cosine * 13176464 + (1 << 29) >> 30, cosine * 1073660973 - sine * 13176464 + (1 << 29) >> 30)
+    half = quarter + quarter[127:0:-1]
+    return half + [-leg for leg in half]
 
 
-QUARTER = quarter_table()
+WAVE = circle()
+
+
+def sine_at(point):
+    return WAVE[point % 512]
+
+
+def cosine_at(point):
+    return WAVE[(point + 128) % 512]
+
+
+def turn_of(size, phase):
+    return size * ((phase + 64) % 128 - 64) * 201 >> 21
 
 
 def sine_of(phase):
-    point = (phase + 32 >> 6) & 1023
-    size = QUARTER[256 - (point & 255) if point & 256 else point & 255]
-    return -size if point & 512 else size
+    point = phase + 64 >> 7
+    return sine_at(point) + turn_of(cosine_at(point), phase)
 
 
 def cosine_of(phase):
-    return sine_of(phase + 16384)
+    point = phase + 64 >> 7
+    return cosine_at(point) - turn_of(sine_at(point), phase)
 
 
 IDENTITY = dict(sin_offset=0, cos_offset=0, gain=65536, shear=0, cosine=(0,) * ORDERS, sine=(0,) * ORDERS)
@@ -50,7 +64,7 @@ def fits(values):
 
 # ---- the ellipse
 
-def solve(m):
+def solve(m, largest=4 * UNIT):
     """The solution of the equations, column 5 the right side, in units of 2^-28, or None."""
     m, size = [row[:] for row in m], len(m)
     columns = [*range(size), 5]
@@ -68,7 +82,7 @@ def solve(m):
         rest = m[i][5] - sum(m[i][j] * solution[j] >> 28 for j in range(i + 1, size))
         coarse = quotient(rest * 16, m[i][i])
         solution[i] = coarse * (UNIT // 16) + quotient((rest * 16 - coarse * m[i][i]) * (UNIT // 16), m[i][i])
-        if abs(solution[i]) > 4 * UNIT:
+        if abs(solution[i]) > largest:
             return None
     return solution
 
@@ -123,7 +137,7 @@ def ellipse_fit(samples, values=IDENTITY, low=0, high=65535):
 # ---- the harmonics
 
 def table_entry(values, point):
-    total = sum(values["cosine"][k] * cosine_of((k + 1) * point * 256) + values["sine"][k] * sine_of((k + 1) * point * 256)
+    total = sum(values["cosine"][k] * cosine_at((k + 1) * point * 2) + values["sine"][k] * sine_at((k + 1) * point * 2)
                 for k in range(ORDERS))
     return clamp(total + (1 << 18) >> 19, 0x1FFFF)
 
@@ -150,18 +164,27 @@ def judge(phases, spoiled=False):
     return (UNSTEADY if slowest <= 0 or fastest > 2 * slowest else LEARNING), travel
 
 
-def places(phases, table):
-    """Place of each phase, 2^-20 period, from about 0."""
+def travels(phases):
+    """Way from the first phase to each, 2^-16 period."""
     found, travel, last = [], 0, phases[0]
     for phase in phases:
         travel += (phase - last + 32768 & 65535) - 32768
         last = phase
-        found.append(travel * 16 - table[phase >> 9])
+        found.append(travel)
     return found
 
 
-def window_of(turn):
-    return 32768 - cosine_of(turn) >> 1
+def turn_of_block(n):
+    return n * 256 + 128
+
+
+def window_of(n):
+    return 32767 - cosine_at(2 * n + 1) >> 1
+
+
+def motion_of(n):
+    time = turn_of_block(n) - 32768
+    return 32768, time, time * time >> 15
 
 
 def waves_of(vibration, turn):
@@ -169,44 +192,58 @@ def waves_of(vibration, turn):
     return cosine_of(phase), sine_of(phase)
 
 
-def base_of(turn, vibration, dimmed=32768):
-    time = turn - 32768
-    return (32768, time, time * time >> 15, *(wave * dimmed >> 15 for wave in waves_of(vibration, turn)))
-
-
-def smooth(solution, base):
+def place_of_motion(solution, base):
     return sum(s * b for s, b in zip(solution, base)) >> 19
 
 
-BLOCK_TURNS = [n * 256 + 128 for n in range(BLOCKS)]
+def place_of_vibration(solution, waves):
+    return clamp(solution[3] * waves[0] + solution[4] * waves[1] >> 19, 1 << 22)
 
 
-def fit(block, size, vibration):
-    """The motion, and the vibration, through the blocks; None: not well conditioned."""
-    half = vibration >> 12
-    dimmed = cosine_of(half) * cosine_of(2 * half) * cosine_of(4 * half) >> 30
+def dimming(half):
+    return (cosine_of(half) * cosine_of(2 * half) >> 15) * cosine_of(4 * half) >> 15
+
+
+def fit(block, vibration=None):
+    """The motion, and with it the vibration, through the blocks; None: not well conditioned."""
+    size = 3 if vibration is None else 5
     m = [[0] * 6 for _ in range(size)]
-    for turn, place in zip(BLOCK_TURNS, block):
-        base = base_of(turn, vibration, dimmed)
+    for n, place in enumerate(block):
+        base, window = motion_of(n), window_of(n)
+        if vibration is not None:
+            base += tuple(wave * dimming(vibration >> 12) >> 15 for wave in waves_of(vibration, turn_of_block(n)))
         for i in range(size):
-            weighed = window_of(turn) * base[i] >> 15
-            for j in range(i, size):
-                m[i][j] += weighed * base[j] >> 10
-            m[i][5] += weighed * place >> 19
-    return solve(m)
+            weighed = window * base[i] >> 15
+            for j in range(i + 1):                              # of two factors the later one is weighed,
+                m[j][i] += weighed * base[j] >> 10
+            m[i][5] += weighed * place
+    for i in range(3):
+        for j in range(i, 3):                                   # in the motion alone the earlier one
+            m[i][j] = sum((window_of(n) * motion_of(n)[i] >> 15) * motion_of(n)[j] >> 10 for n in range(BLOCKS))
+    for row in m:
+        row[5] >>= 19
+    return solve(m, 1 << 33)
 
 
-def spectrum(rest):
-    """(real, imaginary) of the lines of BLOCKS numbers, by radix 2 in time."""
-    real, imaginary = [rest[int(f"{n:08b}"[::-1], 2)] for n in range(BLOCKS)], [0] * BLOCKS
-    for level in range(8):
+def transform(rest):
+    """(real, imaginary) of the lines of BLOCKS real numbers: even ones real, odd ones imaginary; radix 2 in time, halved at every level."""
+    points = BLOCKS // 2
+    order = [int(f"{n:07b}"[::-1], 2) for n in range(points)]
+    real, imaginary = [rest[2 * n] for n in order], [rest[2 * n + 1] for n in order]
+    for level in range(7):
         half = 1 << level
-        for a in (n for n in range(BLOCKS) if not n & half):
-            b, angle = a + half, a % half << 15 - level
-            c, s = cosine_of(angle), sine_of(angle)
+        for a in (n for n in range(points) if not n & half):
+            b, point = a + half, a % half << 8 - level
+            c, s = cosine_at(point), sine_at(point)
             x, y = c * real[b] + s * imaginary[b] >> 15, c * imaginary[b] - s * real[b] >> 15
-            real[a], real[b], imaginary[a], imaginary[b] = real[a] + x, real[a] - x, imaginary[a] + y, imaginary[a] - y
-    return real, imaginary
+            real[a], real[b] = real[a] + x >> 1, real[a] - x >> 1
+            imaginary[a], imaginary[b] = imaginary[a] + y >> 1, imaginary[a] - y >> 1
+    lines = []
+    for n in range(points):
+        m, c, s = -n % points, cosine_at(2 * n), sine_at(2 * n)
+        x, y = imaginary[n] + imaginary[m], real[m] - real[n]
+        lines.append((real[n] + real[m] + (c * x + s * y >> 15) >> 1, imaginary[n] - imaginary[m] + (c * y - s * x >> 15) >> 1))
+    return lines
 
 
 def level_of(power):
@@ -214,18 +251,19 @@ def level_of(power):
     return 4 * shifts + (power >> shifts)
 
 
-def vibration_of(line, real, imaginary):
+def vibration_of(line, lines):
     """2^-16 cycle a burst of the line that stays, or None."""
-    power = [x * x + y * y for x, y in zip(real, imaginary)]
+    power = [x * x + y * y for x, y in lines]
     at = max(range(2, LINES - 2), key=lambda n: (line[n], -n))
     at += (power[at + 1] > power[at]) or -(power[at - 1] > power[at])
     beside = at + 1 if power[at + 1] > power[at - 1] else at - 1
-    unit = power[at] >> 16
-    if not unit:
+    if not power[at]:
         return None
-    share = max(0, min(65536, quotient(-(real[at] * real[beside] + imaginary[at] * imaginary[beside]), unit)))
+    both = sum(a * b for a, b in zip(lines[at], lines[beside]))
+    share = max(0, min(65536, quotient(-both * 65536, power[at])))
     away = quotient((2 * share - 65536) * 16384, 65536 + share) * 4
-    return at * 65536 + (away if beside > at else -away)
+    found = at * 65536 + (away if beside > at else -away)
+    return found if found >= 3 << 15 else None
 
 
 class Pass:
@@ -247,45 +285,58 @@ class Pass:
         """False: the burst is refused, since the motion could not be fitted."""
         candidate = self.candidate()
         _, travel = judge(phases)
-        place = places(phases, [table_entry(candidate, 2 * n + 1) for n in range(BINS)])
-        slope = quotient(travel * 65536, PHASES - 1)
-        block = [sum(p >> 3 for p in place[8 * n:8 * n + 8]) - (slope * (16 * n + 7) >> 13) for n in range(BLOCKS)]
-        vibration, solution = 0, fit(block, 3, 0)
+        gone, table = travels(phases), [table_entry(candidate, 2 * n + 1) for n in range(BINS)]
+        block = [sum(gone[8 * n:8 * n + 8]) * 2 - (sum(table[p >> 9] for p in phases[8 * n:8 * n + 8]) >> 3) for n in range(BLOCKS)]
+        vibration, solution = 0, fit(block)
         if solution is None:
             return False
-        rest = [clamp(p - smooth(solution, base_of(turn, 0)), 131068) * window_of(turn) >> 12 for turn, p in zip(BLOCK_TURNS, block)]
-        real, imaginary = spectrum(rest)
-        levels = [level_of(x * x + y * y) for x, y in zip(real[:LINES], imaginary)]
+        rest = [clamp(p - place_of_motion(solution, motion_of(n)), 32767) * window_of(n) >> 16 for n, p in enumerate(block)]
+        lines = transform(rest)
+        levels = [level_of(x * x + y * y) for x, y in lines]
         if every != self.every:
             self.spectra = 0
         self.line = list(map(min, self.line, levels)) if self.spectra else levels
         self.every, self.spectra = every, min(self.spectra + 1, 255)
-        if self.spectra >= 3 and (found := vibration_of(self.line, real, imaginary)) is not None:
-            vibration, solution = found, fit(block, 5, found)
+        if self.spectra >= 3 and (found := vibration_of(self.line, lines)) is not None:
+            vibration, solution = found, fit(block, found)
             if solution is None:
                 return False
-        self.project(phases, place, slope, vibration, solution, candidate)
+        self.project(phases, table, travel, vibration, solution, candidate)
         self.travels.append(abs(travel))
         self.bursts += 1
         return True
 
-    def project(self, phases, place, slope, vibration, solution, candidate):
-        seen, power = [[0] * BINS for _ in range(3)], 0
-        for n, (phase, p) in enumerate(zip(phases, place)):
-            turn, phase_bin = n * 32 + 16, phase >> 9
-            base, window = base_of(turn, vibration), window_of(n * 32 + 16) >> 5
-            rest = clamp(p - (slope * n >> 12) - smooth(solution, base), 32767)
-            seen[0][phase_bin] += window * rest >> 5
-            seen[1][phase_bin] += window * base[3] >> 5
-            seen[2][phase_bin] += window * base[4] >> 5
+    def project(self, phases, table, travel, vibration, solution, candidate):
+        seen, power, gone = [[0] * BINS for _ in range(3)], 0, travels(phases)
+        bend = sine_of(vibration >> 12) ** 2 >> 11
+        for n in range(BLOCKS):
+            base, window, turn = motion_of(n), window_of(n) >> 5, n * 256 + 16
+            speed = solution[1] * 32768 + 2 * solution[2] * base[1] + (1 << 28) >> 29
+            smooth = place_of_motion(solution, base) - quotient(speed * 7, 2)
+            waves = waves_of(vibration, turn)
+            swing = place_of_vibration(solution, waves)
+            swinging = swing - place_of_vibration(solution, waves_of(vibration, turn - 32))
+            for leg, wave in zip(seen[1:], waves):
+                leg[phases[8 * n] >> 9] += window * wave >> 5
+            for phase, travelled in zip(phases[8 * n:8 * n + 8], gone[8 * n:]):
+                rest = clamp(travelled * 16 - table[phase >> 9] - smooth - swing, 32767)
+                seen[0][phase >> 9] += window * rest >> 5
+                smooth += speed
+                swinging -= bend * swing + (1 << 16) >> 17
+                swing += swinging
             power += window * rest * rest
-        square = power >> 20
+        square = power >> 17
         weight = 32768 if square <= 1 << 20 else (1 << 35) // square
+        step, own = vibration // PHASES, quotient(travel, PHASES - 1)
         for k in range(ORDERS):
-            turns = [(k + 1) * (n * 512 + 256) for n in range(BINS)]
-            waves = [cosine_of(t) for t in turns], [sine_of(t) for t in turns]
-            (x, y), *shared = [[sum(map(int.__mul__, row, wave)) >> shift for wave in waves] for row, shift in zip(seen, (25, 30, 30))]
-            kept = max(0, 32768 - (sum(leg * leg for row in shared for leg in row) >> 14))
+            points = [(k + 1) * (4 * n + 2) for n in range(BINS)]
+            waves = [cosine_at(p) for p in points], [sine_at(p) for p in points]
+            (x, y), cosine, sine = [[sum(map(int.__mul__, row, wave)) >> shift for wave in waves]
+                                    for row, shift in zip(seen, (25, 27, 27))]
+            near, far = (cosine[0] + sine[1], sine[0] - cosine[1]), (cosine[0] - sine[1], sine[0] + cosine[1])
+            halves = [(step + side * (k + 1) * own) % (1 << 32) >> 1 for side in (-1, 1)]
+            shared = [leg * dimming(half) >> 15 for half, band in zip(halves, (near, far)) for leg in band]
+            kept = max(0, 32768 - (sum(leg * leg for leg in shared) >> 15))
             self.information[k] += weight * kept >> 15
             self.cosine[k] += weight * (x + (kept * candidate["cosine"][k] >> 15)) >> 12
             self.sine[k] += weight * (y + (kept * candidate["sine"][k] >> 15)) >> 12

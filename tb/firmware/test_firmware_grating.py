@@ -200,14 +200,14 @@ def test_nothing_is_learned_while_an_axis_homes():
 def test_values_that_were_stored_come_into_force_together():
     machine = moving(learning=False)
     grating = machine.gratings[0]
-    machine.ask("set_harmonic", axis=0, order=3, cosine=5000, sine=-7000)
+    machine.ask("set_harmonic", axis=0, order=3, cosine=5008, sine=-7000)
     machine.ask("set_correction", axis=0, apply=0, **VALUES)
     machine.poll(50)
     assert grating.loads == 1 and correction(machine) == IDENTITY
     machine.ask("set_correction", axis=0, apply=1, **VALUES)
     machine.poll(50)
     assert grating.loads == 2 and grating.correction == VALUES == correction(machine)
-    assert machine.ask("get_harmonic", axis=0, order=3) == dict(cosine=5000, sine=-7000)
+    assert machine.ask("get_harmonic", axis=0, order=3) == dict(cosine=5008, sine=-7000)
     assert grating.points[0] == 313 and look(machine)["settled"] == 1
     machine.ask("set_correction", axis=0, apply=1, **VALUES)               # harmonics are those set since the last time: none
     machine.poll(50)

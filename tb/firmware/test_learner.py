@@ -122,7 +122,7 @@ def test_any_values_give_the_table_of_the_model_held_to_18_bits():
 
 
 def test_the_sine_is_true_within_its_points():
-    assert all(abs(model.sine_of(64 * n) - 32768 * math.sin(math.tau * n / 1024)) <= 0.501 for n in range(1024))
+    assert all(abs(model.sine_of(n) - 32767 * math.sin(math.tau * n / 65536)) <= 3.5 for n in range(65536))
 
 
 # ---- what is learned
@@ -148,7 +148,7 @@ def test_a_harmonic_of_the_phase_is_found_whatever_its_size_in_one_pass():
             phase = place + 0.01 * np.sin(6 * np.pi * phase)
         machine.phases((np.rint(phase * 65536).astype(int) & 65535).tolist())
     found = np.array(machine.values["sine"]) / 2**24, np.array(machine.values["cosine"]) / 2**24
-    assert abs(found[0][2] - 0.01) < 3e-5 and np.abs(np.delete(found[0], 2)).max() < 2e-5 and np.abs(found[1]).max() < 2e-5
+    assert abs(found[0][2] - 0.01) < 3e-5 and np.abs(np.delete(found[0], 2)).max() < 4e-5 and np.abs(found[1]).max() < 2e-5
 
 
 @pytest.mark.parametrize("harmonic", [2, 5, -2, -5])
@@ -303,7 +303,7 @@ def test_a_word_that_was_not_asked_for_changes_nothing():
     machine = fresh()
     machine.call("freeze", True)
     before = bytes(machine.learner)
-    machine.call("take", ctypes.c_uint32(0x12345678))
+    machine.call("take", (ctypes.c_uint32 * 4)(0x12345678))
     machine.call("work")
     machine.call("loaded")
     assert bytes(machine.learner) == before and machine.learner.need not in (WORK, LOADING)
