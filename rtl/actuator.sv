@@ -91,15 +91,19 @@ module actuator #(
         localparam signed [15:0] RETURN = 16'sd16;              // of the command, in a tick
 
         wire signed [31:0] fine_error;
+        wire               fine_clipped;
+        wire signed [15:0] limit  = {1'b0, fine_limit};
         wire signed [15:0] nearer = fine_command > RETURN ? fine_command - RETURN :
-                                    fine_command < -RETURN ? fine_command + RETURN : '0;
+                                    fine_command < -RETURN ? fine_command + RETURN : 16'sd0;
 
-        pid_servo #(.TERMS(2), .BIQUADS(0)) u_fine (.clk, .rst, .closed_loop(fine && enable), .kp(fine_kp), .ki(fine_ki), .kd('0), .kv('0),
-            .ka('0), .output_limit(fine_limit), .integral_limit(fine_limit), .dead_band('0), .gains_changed(fine_kp_written),
-            .filters_in_use('0), .coefficient_write(1'b0), .coefficient_address('0), .coefficient('0), .tick, .target, .target_velocity('0),
-            .target_acceleration('0), .moving, .position, .velocity('0), .open_command(enable ? nearer : '0), .block_up(!enable),
-            .block_down(!enable), .valid(fine_valid), .command(fine_command), .error(fine_error), .saturated(fine_saturated));
-        wire unused_fine = &{1'b0, fine_error};
+        pid_servo #(.TERMS(2), .BIQUADS(0)) u_fine (.clk, .rst, .closed_loop(fine && enable), .kp(fine_kp), .ki(fine_ki), .kd(24'd0),
+            .kv(24'd0), .ka(24'd0), .output_limit(fine_limit), .integral_limit(fine_limit), .dead_band(16'd0), .gains_changed(fine_kp_written),
+            .filters_in_use(4'd0), .coefficient_write(1'b0), .coefficient_address(5'd0), .coefficient(32'sd0), .tick, .target,
+            .target_velocity(32'sd0), .target_acceleration(32'sd0), .moving, .position, .velocity(32'sd0),
+            .open_command(enable ? nearer : 16'sd0), .block_up(!enable), .block_down(!enable), .valid(fine_valid), .command(fine_command),
+            .error(fine_error), .saturated(fine_clipped));
+        assign fine_saturated = fine && (fine_command == limit || fine_command == -limit);
+        wire unused_fine = &{1'b0, fine_error, fine_clipped};
     end else begin : g_no_fine
         assign {fine_valid, fine_saturated, fine_command} = '0;
     end
