@@ -49,6 +49,9 @@ def check_of(path):
     if name.endswith("_rom"):                               # a made table: its generator is the model
         user = name.removesuffix("_rom")
         return Path("tables") / f"{user}.py", next((p.relative_to(ROOT) for p in (ROOT / "tb" / room).glob(f"test_{user}*.py")), None)
+    if name.endswith("_program"):                           # a made table too, of what its user does
+        user = name.removesuffix("_program")
+        return Path("tables") / f"{name}.py", next((p.relative_to(ROOT) for p in (ROOT / "tb" / room).glob(f"test_{user}*.py")), None)
     return Path("tb") / room / f"{name}.py", Path("tb") / room / f"test_{name}.py"
 
 
@@ -58,7 +61,9 @@ def row(path, wrong):
     name, facts = header(text)
     model, test = check_of(path)
     named = re.search(r"tb/[\w/]+\.\w+", facts.get("model", ""))
-    if named and model:
+    if facts.get("model", "").startswith("the models of its blocks"):        # wiring in a room
+        model, test = None, Path(named.group(0)) if named else Path("tb/system")
+    elif named and model:
         model = Path(named.group(0))
     if not text.startswith("// SPDX-License-Identifier: Apache-2.0\n"):
         wrong.append(f"{here}: the first line must be // SPDX-License-Identifier: Apache-2.0")
