@@ -11,11 +11,12 @@
 `default_nettype none
 
 module relay #(
-    parameter int K      = 16,                      // orders
-    parameter int CLK_HZ = 48_000_000,              // clk frequency
-    parameter int BAUD   = 115_200,                 // of the UART
-    parameter int FIRST  = 1048576,                 // address of the set in flash
-    parameter int SECOND = 1052672                  // of its second copy
+    parameter int K        = 16,                    // orders
+    parameter int SEGMENTS = 0,                     // of a table instead of the orders
+    parameter int CLK_HZ   = 48_000_000,            // clk frequency
+    parameter int BAUD     = 115_200,               // of the UART
+    parameter int FIRST    = 1048576,               // address of the set in flash
+    parameter int SECOND   = 1052672                // of its second copy
 ) (
     input  wire                  clk,
     input  wire                  rst,
@@ -36,7 +37,8 @@ module relay #(
     input  wire                  flash_sdi
 );
     localparam int W        = 32;
-    localparam int LENGTH   = 4 * (7 + 2 * K);
+    localparam int TERMS    = SEGMENTS == 0 ? K : (SEGMENTS + 1) / 2;
+    localparam int LENGTH   = 4 * (7 + 2 * TERMS);
     localparam int BIT_TIME = CLK_HZ / BAUD * 16 + (CLK_HZ % BAUD) * 16 / BAUD;
 
     wire                 a, b, z, rx, sdi, a_before, b_before;
@@ -78,9 +80,16 @@ module relay #(
     turn_angle #(.W(W)) u_angle
         (.clk, .rst, .counts_per_turn, .angle_per_count, .a(a_before), .b(b_before), .step, .index(index_found), .moved, .position, .angle,
          .known, .referenced, .missing);
-    harmonic_map #(.K(K), .W(W)) u_map
-        (.clk, .rst, .enable(correcting), .radians_per_count, .write, .term, .amplitude, .phase, .swap, .angle, .step, .position, .correction,
-         .corrected, .refreshed);
+    if (SEGMENTS == 0) begin : g_harmonics
+        harmonic_map #(.K(K), .W(W)) u_map
+            (.clk, .rst, .enable(correcting), .radians_per_count, .write, .term, .amplitude, .phase, .swap, .angle, .step, .position, .correction,
+             .corrected, .refreshed);
+    end else begin : g_segments
+        wire unused_words = &{1'b0, radians_per_count, amplitude[31:24], phase[31:24]};
+        segment_map #(.SEGMENTS(SEGMENTS), .W(W)) u_map
+            (.clk, .rst, .enable(correcting), .write, .term, .even(amplitude[23:0]), .odd(phase[23:0]), .swap, .angle, .position, .correction,
+             .corrected, .refreshed);
+    end
     quadrature_encoder #(.W(W)) u_output
         (.clk, .rst, .spacing, .hysteresis, .counts_per_turn, .load(!moved), .target(corrected), .home(referenced), .home_position(position),
          .a(relay_a), .b(relay_b), .z(relay_z), .position(relayed), .behind);
@@ -88,14 +97,14 @@ module relay #(
     relay_store #(.LENGTH(LENGTH), .FIRST(FIRST), .SECOND(SECOND)) u_store
         (.clk, .rst, .good(set_good), .bad(set_bad), .pass_select, .pass_ready, .pass_valid, .pass_data(sent), .start(stored_start), .valid(stored_valid),
          .data(stored), .pass_done, .busy(reading), .source, .chip_n(flash_chip_n), .sclk(flash_sclk), .sdo(flash_sdo), .sdi);
-    relay_set #(.K(K)) u_set
+    relay_set #(.K(TERMS), .SEGMENTS(SEGMENTS)) u_set
         (.clk, .rst, .start(reading ? stored_start : sent_start), .valid(reading ? stored_valid : sent_valid), .data(reading ? stored : sent),
          .write, .term, .amplitude, .phase, .swap, .good(set_good), .bad(set_bad), .loaded, .identity, .counts_per_turn, .angle_per_count,
          .spacing, .radians_per_count, .hysteresis, .filter_needed, .index_low, .index_gate_mask, .index_gate);
     relay_bridge u_bridge
         (.clk, .rst, .bit_time(20'(BIT_TIME)), .rx, .tx(uart_tx), .driver_enable(uart_driver_enable),
          .events({2'd0, set_bad && !reading, behind, |rejected, missing, revolution_wrong, illegal}), .levels({4'd0, reading, correcting, loaded, known}),
-         .source, .orders(6'(K)), .identity, .position, .correction, .flags, .set_start(sent_start), .set_valid(sent_valid), .set_data(sent), .pass_select,
+         .source, .orders(SEGMENTS == 0 ? 6'(K) : 6'd0), .identity, .position, .correction, .flags, .set_start(sent_start), .set_valid(sent_valid), .set_data(sent), .pass_select,
          .pass_ready, .pass_valid, .pass_done, .pass_data(stored));
 endmodule
 

@@ -2,7 +2,8 @@
 // harmonic_map -- take a sum of harmonics of the angle off a position: sum over k = 1..K of amplitude sin(k angle + phase).
 //
 // latency  3 clk from step to corrected                 rate  one step per clk
-// method   the whole sum is worked out again and again, each time anew for the angle of that clk, (STEPS + 2) K + 35 clk a round;
+// method   the whole sum is worked out again and again, each time anew for the angle of that clk, (STEPS + 2) K + 35 clk a round,
+//          K one more if it is odd: two terms share the rotator, one is shifted while the other is added;
 //          between two sums each step adds the slope of the last one. After T = 2 rounds at rest the correction is that of the
 //          angle to 2^-17 count plus the arithmetic; moving m counts a round it is behind by at most
 //          3 m^2 sum(k^2 amplitude) (2 pi / counts_per_turn)^2 counts, which is of second order
@@ -41,7 +42,8 @@ module harmonic_map #(
     if (STEPS < 8 || STEPS > 24)    begin : g_check_steps STEPS_MUST_BE_FROM_8_TO_24 u_error (); end
 
     localparam int V = 40;                          // a vector: 2^-24 count
-    localparam int P = $clog2(K + 1);
+    localparam int TERMS = K + K % 2;               // they come in pairs
+    localparam int P = $clog2(TERMS + 1);
 
     typedef enum logic [2:0] {IDLE, READ, LOAD, ROTATE, ADD, WEIGH, MULTIPLY, APPLY} state_t;
 
@@ -50,12 +52,15 @@ module harmonic_map #(
     logic                page, swapped;             // the set in force; there is one
 
     state_t              state;
-    logic [P-1:0]        left;                      // terms after this one, and so the term itself: the highest comes first
+    logic [P-1:0]        left;                      // term to be read, the highest comes first
+    logic                second;                    // of the pair
     logic [4:0]          count;                     // rotations, then bits of the product
     logic [31:0]         multiple;                  // of angle, for the term to come
     logic [31:0]         from;                      // angle of this round
-    logic signed [V-1:0] x, y, sum, run;            // run: sum of x so far, so that the sum of run weighs each x with its order
-    logic [31:0]         rest;                      // 2^-32 turn still to rotate
+    logic signed [V-1:0] x, y;                      // the vector of one term
+    logic signed [V-1:0] x_held, y_held, x_turn, y_turn;                    // that of the other, and what its rotation adds
+    logic signed [V-1:0] sum, run;                  // run: sum of x so far, so that the sum of run weighs each x with its order
+    logic [31:0]         rest, rest_held, rest_turn;                        // 2^-32 turn still to rotate
     logic signed [31:0]  weighted;                  // 2^-10 count
     logic signed [31:0]  high;                      // of the product
     logic [31:0]         low;                       // of the product, behind the bits of the multiplier that are left
@@ -68,9 +73,12 @@ module harmonic_map #(
     wire                 on        = enable && swapped;
     wire                 applies   = state == APPLY;
     wire                 begins    = on && (state == IDLE || applies);
-    wire [31:0]          wanted    = multiple + read[31:0];
+    wire                 rotates   = state == LOAD || state == ROTATE || state == ADD;
+    wire                 spare     = K % 2 == 1 && left == P'(K - 1) && !second;    // the term that makes an odd K even
+    wire [63:0]          given     = spare ? 64'd0 : read;
+    wire [31:0]          wanted    = multiple + given[31:0];
     wire                 backward  = wanted[31] ^ wanted[30];               // beyond a quarter turn: turn by half, start reversed
-    wire signed [V-1:0]  vector    = {read[63:32], 8'd0};
+    wire signed [V-1:0]  vector    = {given[63:32], 8'd0};
     wire signed [V-1:0]  x_shifted = x >>> count;
     wire signed [V-1:0]  y_shifted = y >>> count;
     wire signed [32:0]   partial   = {high[31], high} + (low[0] ? {weighted[31], weighted} : 33'd0);
@@ -116,31 +124,49 @@ module harmonic_map #(
         read <= terms[{page, left}];
     end
 
+    always_ff @(posedge clk)
+        if (rotates) begin                                                  // a complement is less by 1 than a negative: it saves an adder
+            x         <= x_held + x_turn;
+            y         <= y_held + y_turn;
+            rest      <= rest_held + rest_turn;
+            x_held    <= x;
+            y_held    <= y;
+            rest_held <= rest;
+            x_turn    <= y_shifted ^ {V{!rest[31]}};
+            y_turn    <= x_shifted ^ {V{rest[31]}};
+            rest_turn <= angle_of ^ {32{!rest[31]}};
+            if (state == LOAD) begin
+                x_held    <= vector ^ {V{backward}};
+                y_held    <= '0;
+                rest_held <= {wanted[31] ^ backward, wanted[30:0]};
+                x_turn    <= '0;
+                y_turn    <= '0;
+                rest_turn <= '0;
+            end
+        end
+
     always_ff @(posedge clk) begin
-        count <= state == ROTATE || state == MULTIPLY ? count + 1'b1 : '0;
+        second <= rotates && !second;
+        count  <= state == ROTATE || state == MULTIPLY ? count + 5'(second || state == MULTIPLY) : '0;
         case (state)
-            READ: state <= LOAD;
+            READ: begin
+                left  <= left - 1'b1;
+                state <= LOAD;
+            end
             LOAD: begin
-                x        <= backward ? -vector : vector;
-                y        <= '0;
-                rest     <= {wanted[31] ^ backward, wanted[30:0]};
                 multiple <= multiple - from;
-                weighted <= weighted + 32'(run >>> 14);
-                state    <= ROTATE;
+                if (second) state <= ROTATE;
+                else        left  <= left - 1'b1;
             end
-            ROTATE: begin
-                x    <= x + (y_shifted ^ {V{!rest[31]}});          // a complement is less by 1 than a negative: one adder does
-                y    <= y + (x_shifted ^ {V{rest[31]}});
-                rest <= rest + (angle_of ^ {32{!rest[31]}});
-                if (count == 5'(STEPS - 1)) begin
-                    state <= ADD;
-                    left  <= left - 1'b1;
-                end
-            end
+            ROTATE: if (second && count == 5'(STEPS - 1)) state <= ADD;
             ADD: begin
-                sum   <= sum + y;
-                run   <= run + x;
-                state <= left == '1 ? WEIGH : LOAD;
+                sum      <= sum + y;
+                run      <= run + x;
+                weighted <= weighted + 32'(run >>> 14);
+                if (second) begin
+                    left  <= left - 1'b1;
+                    state <= left == '1 ? WEIGH : LOAD;
+                end
             end
             WEIGH: begin
                 weighted <= weighted + 32'(run >>> 14);
@@ -164,9 +190,9 @@ module harmonic_map #(
         if (applies) base <= sum;
         refreshed <= applies;
         if (begins) begin
-            left     <= P'(K - 1);
+            left     <= P'(TERMS - 1);
             from     <= angle;
-            multiple <= 32'(angle * 32'(K));
+            multiple <= 32'(angle * 32'(TERMS));
             sum      <= '0;
             run      <= '0;
             weighted <= '0;

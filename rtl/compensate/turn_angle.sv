@@ -33,13 +33,14 @@ module turn_angle #(
     localparam logic [W-1:0] ONE = W'(1);
 
     logic [W-1:0]      place;                       // counts from the index, or from the start
+    logic [W-1:0]      highest;                     // that place takes
     logic [47:0]       turned;                      // 2^-48 turn
     logic signed [1:0] turns;                       // borders of a turn passed since the last index
 
     wire up      = step == 2'sd1;
     wire down    = step[1];
     wire used    = counts_per_turn != '0;
-    wire over    = up   && place + ONE >= counts_per_turn;
+    wire over    = up   && (place >= highest || !used);
     wire under   = down && place == '0;
     wire to_zero = over || (down && place == ONE);
     wire lost    = (over && turns == 2'sd0) || (under && turns == -2'sd1);
@@ -50,8 +51,9 @@ module turn_angle #(
         position   <= position + {{W-1{down}}, up || down};
         referenced <= index && used;
         missing    <= lost && !index && used;
+        highest    <= counts_per_turn - ONE;
         if (over)       place <= '0;
-        else if (under) place <= used ? counts_per_turn - ONE : '0;
+        else if (under) place <= used ? highest : '0;
         else            place <= place + {{W-1{down}}, up || down};
         if (to_zero)          turned <= '0;
         else if (up || down)  turned <= down ? turned - angle_per_count : turned + angle_per_count;

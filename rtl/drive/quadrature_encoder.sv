@@ -33,7 +33,7 @@ module quadrature_encoder #(
     output logic                 b,                 // pin
     output logic                 z,                 // pin
     output logic       [W-1:0]   position,          // count that a, b stand for
-    output logic                 behind             // level: more than 4 counts from the target
+    output logic                 behind             // level: it was more than 4 counts from the target, 2 clk before
 );
     if (W < 4) begin : g_check_w W_MUST_BE_AT_LEAST_4 u_error (); end
     if (F < 1) begin : g_check_f F_MUST_BE_AT_LEAST_1 u_error (); end
@@ -43,8 +43,11 @@ module quadrature_encoder #(
 
     logic [W-1:0]         reach_up, reach_down;     // the highest position that still goes up, the lowest that need not go down
     logic                 aimed;                    // they stand
+    logic [W-1:2]         ahead_q, back_q;          // of the clk before, for behind
+    logic                 aimed_q;
     logic [SPACING_W-1:0] left;                     // clk until an edge is allowed
     logic [W-1:0]         place;                    // count from the index up
+    logic [W-1:0]         highest;                  // that place takes
     logic                 placed, waiting;          // place is known; home has not been taken yet
     logic [W-1:0]         home_q;
 
@@ -58,7 +61,6 @@ module quadrature_encoder #(
     wire [W-1:0]   upper  = W'((target + band) >> F);
     wire [W-1:0]   from   = position - home_q;
     wire           take   = waiting && !up && !down;
-    wire           last   = place + ONE == counts_per_turn;
 
     assign b = position[1];
     assign a = position[1] ^ position[0];
@@ -68,7 +70,10 @@ module quadrature_encoder #(
         reach_up   <= lower;
         reach_down <= upper;
         aimed      <= !load;
-        behind     <= aimed && ((!ahead[W-1] && |ahead[W-2:2]) || (back[W-1] && !(&back[W-2:2])));
+        aimed_q    <= aimed;
+        ahead_q    <= ahead[W-1:2];
+        back_q     <= back[W-1:2];
+        behind     <= aimed_q && ((!ahead_q[W-1] && |ahead_q[W-2:2]) || (back_q[W-1] && !(&back_q[W-2:2])));
 
         if (up || down)       left <= spacing == '0 ? '0 : spacing - 1'b1;
         else if (left != '0)  left <= left - 1'b1;
@@ -78,15 +83,17 @@ module quadrature_encoder #(
         else if (down) position <= position - ONE;
 
         if (take)      place <= from[W-1] ? from + counts_per_turn : from;
-        else if (up)   place <= last ? '0 : place + ONE;
-        else if (down) place <= place == '0 ? counts_per_turn - ONE : place - ONE;
+        else if (up)   place <= place == highest ? '0 : place + ONE;
+        else if (down) place <= place == '0 ? highest : place - ONE;
 
+        highest <= counts_per_turn - ONE;
         placed  <= placed || take;
         waiting <= home || (waiting && !take);
         if (home) home_q <= home_position;
         if (rst) begin
             position <= '0;
             aimed    <= 1'b0;
+            aimed_q  <= 1'b0;
             behind   <= 1'b0;
             left     <= '0;
             placed   <= 1'b0;

@@ -5,15 +5,19 @@
 // set      32-bit words, low byte first: marker 4D4F49 and K in its low byte; counts_per_turn; angle_per_count, low word; its
 //          high half and spacing above; radians_per_count; hysteresis, filter_needed from bit 16, {index_low, gate_mask, gate}
 //          from bit 24; amplitude and phase of each order from 1 up; CRC-32 of all before
+// segments with SEGMENTS the map is a table: the low byte of the marker is 128 + SEGMENTS, and K = (SEGMENTS + 1) / 2 terms hold two
+//          of its points each
 // safety   what a broken row leaves behind is never in force: settings change in one clk, together with swap. A whole row is refused
-//          too if its counts_per_turn are not 1609 to 2^25, or if its amplitudes, without sign, are 2^29 or more together
+//          too if its counts_per_turn are not 1609 to 2^25, or if its amplitudes, without sign, are 2^29 or more together, or a
+//          point 2^23 or more
 // model    tb/link/relay_set.py, equal in every bit of every cycle
 // proved   swap comes with good only, and settings change with it only
 // proof    K = 1
 `default_nettype none
 
 module relay_set #(
-    parameter int K = 16                            // orders
+    parameter int K        = 16,                    // orders
+    parameter int SEGMENTS = 0                      // of a table instead of them
 ) (
     input  wire                  clk,
     input  wire                  rst,               // no set is in force: settings are zero
@@ -40,9 +44,10 @@ module relay_set #(
     output logic       [1:0]     index_gate
 );
     if (K < 1 || K > 32) begin : g_check K_MUST_BE_FROM_1_TO_32 u_error (); end
+    if (SEGMENTS != 0 && K != (SEGMENTS + 1) / 2) begin : g_check_segments K_MUST_BE_HALF_THE_SEGMENTS u_error (); end
 
     localparam logic [31:0] WHOLE    = 32'h2144DF1C;    // CRC-32 of anything followed by its own CRC-32
-    localparam logic [31:0] MARKER   = 32'h4D4F4900 + 32'(K);
+    localparam logic [31:0] MARKER   = 32'h4D4F4900 + 32'(SEGMENTS == 0 ? K : 128 + SEGMENTS);
     localparam logic [31:0] FEWEST   = 32'd1609, MOST = 32'd1 << 25;
     localparam int          SETTINGS = 5;               // words after the marker
     localparam int          LAST     = 1 + SETTINGS + 2 * K;
@@ -58,9 +63,12 @@ module relay_set #(
     wire [31:0] full   = {data, word[31:8]};
     wire        take   = valid && open;
     wire        filled = take && part == 2'd3;
-    wire        term_0 = filled && !at[0] && at > 7'(SETTINGS) && at != 7'(LAST);     // first word of a term
+    wire        terms  = filled && at > 7'(SETTINGS) && at != 7'(LAST);
+    wire        term_0 = terms && !at[0];               // first word of a term
     wire        whole  = ended && crc == WHOLE && fits;
-    wire [32:0] sum    = 33'(reach) + {1'b0, full ^ {32{full[31]}}};
+    wire [31:0] size   = full ^ {32{full[31]}};
+    wire [32:0] sum    = 33'(reach) + {1'b0, size};
+    wire        absurd = SEGMENTS == 0 ? term_0 && |sum[32:29] : terms && |size[31:23];
     wire        turns  = full >= FEWEST && full <= MOST;
 
     crc32_stream u_crc (.clk, .rst, .start, .valid(take && !start), .data, .crc);
@@ -71,7 +79,7 @@ module relay_set #(
     wire unused = &{1'b0, settings[159:157]};
 
     always_ff @(posedge clk) begin
-        write <= filled && at > 7'(SETTINGS) && at != 7'(LAST) && at[0];
+        write <= terms && at[0];
         term  <= 5'((at - 7'(SETTINGS + 2)) >> 1);
         phase <= full;
         swap  <= whole;
@@ -86,7 +94,7 @@ module relay_set #(
             at <= at + 1'b1;
             if (at == 7'd0)                 fits <= full == MARKER;
             else if (at == 7'd1 && !turns)  fits <= 1'b0;
-            else if (term_0 && |sum[32:29]) fits <= 1'b0;
+            else if (absurd)                fits <= 1'b0;
             if (at != 7'd0 && at <= 7'(SETTINGS)) shadow <= {full, shadow[32*SETTINGS-1:32]};
             if (!at[0]) amplitude <= full;
             if (term_0) reach <= sum[28:0];

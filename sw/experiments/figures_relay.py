@@ -72,7 +72,7 @@ def up5k():
     netlist = netlist_of(source_of("relay"), {"K": 16}, "ice40", 1)
     tries = [placed(netlist, "ice40", UP5K, 24, seed, "--pcf-allow-unconstrained") for seed in PLACEMENTS]
     console.print("placements: " + ", ".join(f"{mhz:.1f}" for mhz, _ in tries) + " MHz")
-    fmax, used = max(tries, key=lambda one: one[0])
+    fmax, used = min(tries, key=lambda one: one[0])
     part = {name: used[cell] for name, cell in (("lc", "ICESTORM_LC"), ("ram", "ICESTORM_RAM"), ("dsp", "ICESTORM_DSP"))}
     console.print(", ".join(f"{use['used']} of {use['available']} {name}" for name, use in part.items()) + f", {fmax:.1f} MHz")
     return {"lc": part["lc"]["used"], "lc_of": part["lc"]["available"], "fmax_mhz": fmax}
@@ -84,7 +84,7 @@ def relay_up5k_lc():
 
 
 def relay_up5k_mhz():
-    """The fastest clk that nextpnr promises for it, the best of three placements."""
+    """The fastest clk that nextpnr promises for each of three placements."""
     return up5k()["fmax_mhz"]
 
 
@@ -99,7 +99,7 @@ FIGURES = {
                                  lambda value: value == 0, 0),
     "relay_up5k_lc": Figure(relay_up5k_lc, "LC", "whole relay, K = 16, on iCE40 UP5K", "<= 5280, all there are",
                             lambda value: value <= 5280, 0),
-    "relay_up5k_mhz": Figure(relay_up5k_mhz, "MHz", "the same, highest clk, best of placement seeds 1 to 3", ">= 24",
+    "relay_up5k_mhz": Figure(relay_up5k_mhz, "MHz", "the same, highest clk, worst of placement seeds 1 to 3", ">= 24",
                              lambda value: value >= 24, 1),
 }
 

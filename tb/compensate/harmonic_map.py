@@ -29,7 +29,7 @@ def rotated(amplitude, angle, steps):
     """(x, y) of 2^-24 count: the vector of the amplitude turned by 2^-32 turns, longer by the gain."""
     x, y, rest = amplitude << 8, 0, signed(angle, 32)
     if (angle >> 31 ^ angle >> 30) & 1:
-        x, rest = -x, signed(angle ^ 1 << 31, 32)
+        x, rest = ~x, signed(angle ^ 1 << 31, 32)
     for n in range(steps):
         if rest < 0:
             x, y, rest = x + (y >> n), y + ~(x >> n), rest + ROTATIONS[n]
@@ -39,8 +39,14 @@ def rotated(amplitude, angle, steps):
     return x, y
 
 
+def round_of(k, steps=STEPS):
+    """clk of a round."""
+    return (steps + 2) * (k + k % 2) + SETTLE
+
+
 def summed(terms, angle, radians_per_count, steps):
     """(sum in 2^-24 count, slope in 2^-28 count per count)."""
+    terms = [*terms, *[(0, 0)] * (len(terms) % 2)]
     total = run = weighted = 0
     for k in range(len(terms), 0, -1):
         x, y = rotated(terms[k - 1][0], (k * angle + terms[k - 1][1]) % 2**32, steps)
@@ -80,7 +86,7 @@ class HarmonicMap:
             self.total, self.slope = summed(self.terms, self.angle, radians_per_count, self.steps)
         self.left = self.left - 1 if self.left and not ends else None
         if begins:
-            self.left, self.angle, self.terms = (self.steps + 2) * self.k + SETTLE, angle, list(self.sets[self.page])
+            self.left, self.angle, self.terms = round_of(self.k, self.steps), angle, list(self.sets[self.page])
         if write:
             self.sets[1 - self.page][term] = (amplitude, phase)
         if swap:

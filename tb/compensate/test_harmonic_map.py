@@ -9,7 +9,7 @@ import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
 from bench import ROOT, run, start
-from harmonic_map import SETTLE, STEPS, HarmonicMap, exact, term_of
+from harmonic_map import HarmonicMap, exact, round_of, term_of
 
 IDLE = dict(enable=0, radians_per_count=0, write=0, term=0, amplitude=0, phase=0, swap=0, angle=0, step=0, position=0)
 STROBES = "write", "swap", "step"
@@ -24,7 +24,7 @@ class Map:
         self.dut, self.inputs, self.place = dut, dict(IDLE), 0
         self.k = int(dut.K.value)
         self.model = HarmonicMap(self.k)
-        self.round = (self.model.steps + 2) * self.k + SETTLE
+        self.round = round_of(self.k)
 
     async def reset(self, terms=(), counts=COUNTS):
         self.counts = counts
@@ -106,7 +106,7 @@ async def a_round_is_as_long_as_the_header_says(dut):
         await chart.clk()
         if chart.model.refreshed:
             times.append(n)
-    assert {b - a for a, b in zip(times, times[1:])} == {24 * chart.k + 35}
+    assert {b - a for a, b in zip(times, times[1:])} == {24 * (chart.k + chart.k % 2) + 35}
 
 
 @cocotb.test()
@@ -224,7 +224,7 @@ def test_the_page_of_the_relay_says_how_far_it_lags():
     clk_hz, page = 48e6, (ROOT / "docs" / "relay.md").read_text()
     curve = sum(k * k * arcsec for k, arcsec in enumerate((105, 40, 12), 1)) * (2 * math.pi / COUNTS) ** 2
     for name, rate in (("600 rev/min", 10 * COUNTS), ("3 MHz of edges", 3e6), ("24 MHz of edges", 24e6)):
-        moved = ((STEPS + 2) * 16 + SETTLE) * rate / clk_hz
+        moved = round_of(16) * rate / clk_hz
         told = re.search(rf"^\| {name}.*\| ([\d.]+)\u2033 \|$", page, re.MULTILINE).group(1)
         assert float(told) == pytest.approx(3 * moved**2 * curve, rel=0.2)
 

@@ -6,6 +6,7 @@ class TurnAngle:
     def __init__(self, w=32):
         self.w = w
         self.position = self.place = self.turned = self.turns = 0
+        self.highest = 0                        # place, as of the clk before
         self.moved = self.known = self.referenced = self.missing = False
 
     @property
@@ -13,9 +14,11 @@ class TurnAngle:
         return self.turned >> 16
 
     def clk(self, rst=0, counts_per_turn=0, angle_per_count=0, a=0, b=0, step=0, index=0):
-        used, known = counts_per_turn != 0, self.known
+        used, known, highest = counts_per_turn != 0, self.known, self.highest
+        self.highest = (counts_per_turn - 1) % (1 << self.w)
         if rst or not (self.moved or step):
             self.__init__(self.w)
+            self.highest = (counts_per_turn - 1) % (1 << self.w)
             self.position = b << 1 | a ^ b
             self.known = used and not rst and (known or bool(index))
             self.referenced = bool(index and used and not rst)
@@ -28,8 +31,8 @@ class TurnAngle:
             self.place = self.turned = self.turns = 0
             return
         place = self.place + step
-        passed = -1 if place < 0 else step > 0 and place >= counts_per_turn
-        self.place = 0 if not used else 0 if passed == 1 else place + counts_per_turn if passed else place
+        passed = -1 if place < 0 else step > 0 and (self.place >= highest or not used)
+        self.place = 0 if not used else 0 if passed == 1 else highest if passed else place
         self.turned = (self.turned + step * angle_per_count) % (1 << 48)
         if passed == 1 or (step < 0 and self.place == 0 and not passed):
             self.turned = 0

@@ -15,8 +15,8 @@ class QuadratureEncoder:
         self.left = 0
         self.place = None                   # counts from the index up
         self.waiting = None                 # home that is not taken yet
-        self.turn = 0
-        self.behind = False
+        self.turn = self.highest = 0        # highest: place, as of the clk before
+        self.far = self.behind = False      # far: behind, of the clk to come
 
     def pins(self):
         b = self.position >> 1 & 1
@@ -26,15 +26,16 @@ class QuadratureEncoder:
         self.turn = counts_per_turn
         if rst:
             self.__init__(self.w, self.f)
-            self.turn = counts_per_turn
+            self.turn, self.highest = counts_per_turn, (counts_per_turn - 1) % (1 << self.w)
             return
         whole = 1 << self.w
-        up = down = self.behind = False
+        self.behind, self.far = self.far, False
+        up = down = False
         if self.aim:
             aimed_at, band = self.aim
             ahead = signed((aimed_at - band >> self.f) - self.position, self.w)
             back = signed((aimed_at + band >> self.f) - self.position, self.w)
-            self.behind = ahead >= 4 or back < -4
+            self.far = ahead >= 4 or back < -4
             if self.left == 0 and not load:
                 up, down = ahead >= 0, ahead < 0 and back < 0
         if self.waiting is not None and not up and not down:
@@ -42,10 +43,10 @@ class QuadratureEncoder:
             self.place = (distance + (counts_per_turn if distance < 0 else 0)) % whole
             self.waiting = None
         elif self.place is not None and up:
-            self.place = 0 if (self.place + 1) % whole == counts_per_turn else (self.place + 1) % whole
+            self.place = 0 if self.place == self.highest else (self.place + 1) % whole
         elif self.place is not None and down:
-            self.place = (self.place or counts_per_turn) - 1
-            self.place %= whole
+            self.place = self.place - 1 if self.place else self.highest
+        self.highest = (counts_per_turn - 1) % whole
         if home:
             self.waiting = home_position
         self.left = max(0, spacing - 1) if up or down else max(0, self.left - 1)

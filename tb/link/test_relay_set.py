@@ -20,7 +20,8 @@ class Bytes:
 
     def __init__(self, dut):
         self.dut, self.k = dut, int(dut.K.value)
-        self.model, self.written = RelaySet(self.k), []
+        self.segments = int(dut.SEGMENTS.value)
+        self.model, self.written = RelaySet(self.k, self.segments), []
 
     async def reset(self):
         await start(self.dut, start=0, valid=0, data=0)
@@ -61,7 +62,10 @@ class Bytes:
         return verdict
 
 
-def any_terms(k):
+def any_terms(row):
+    k = row.k
+    if row.segments:
+        return [(random.randrange(-2**23, 2**23) % 2**32, random.randrange(-2**23, 2**23) % 2**32) for _ in range(k)]
     reach = 2**29 // k
     return [(random.randrange(1 - reach, reach) % 2**32, random.getrandbits(32)) for _ in range(k)]
 
@@ -69,8 +73,9 @@ def any_terms(k):
 @cocotb.test()
 async def by_hand(dut):
     row = await Bytes(dut).reset()
-    terms = any_terms(row.k)
-    assert await row.send(image(terms, 1 << 15, spacing=3, hysteresis=0x1234, filter_needed=4, index_low=1, gate_mask=3, gate=2)) == 1
+    terms = any_terms(row)
+    whole = image(terms, 1 << 15, spacing=3, hysteresis=0x1234, filter_needed=4, index_low=1, gate_mask=3, gate=2, segments=row.segments)
+    assert await row.send(whole) == 1
     assert row.written == [(n, a, p) for n, (a, p) in enumerate(terms)]
     assert int(dut.counts_per_turn.value) == 32768 and int(dut.angle_per_count.value) == 1 << 33 and int(dut.spacing.value) == 3
     assert int(dut.hysteresis.value) == 0x1234 and int(dut.filter_needed.value) == 4 and int(dut.radians_per_count.value) == 210828714
@@ -81,7 +86,7 @@ async def by_hand(dut):
 async def latency_is_2(dut):
     row = await Bytes(dut).reset()
     await row.clk(start=1)
-    for byte in image(any_terms(row.k), 5000):
+    for byte in image(any_terms(row), 5000, segments=row.segments):
         await row.clk(valid=1, data=byte)
     assert not row.model.good
     await row.clk()
@@ -91,10 +96,10 @@ async def latency_is_2(dut):
 @cocotb.test()
 async def no_broken_bit_comes_into_force(dut):
     row = await Bytes(dut).reset()
-    whole = image(any_terms(row.k), 32768)
+    whole = image(any_terms(row), 32768, segments=row.segments)
     assert await row.send(whole) == 1
     for _ in range(24):
-        broken = bytearray(image(any_terms(row.k), 4000))
+        broken = bytearray(image(any_terms(row), 4000, segments=row.segments))
         for _ in range(random.choice((1, 1, 2, 3))):
             broken[random.randrange(len(broken))] ^= 1 << random.randrange(8)
         assert await row.send(broken, gaps=True) == -1 or bytes(broken) == whole
@@ -104,7 +109,7 @@ async def no_broken_bit_comes_into_force(dut):
 @cocotb.test()
 async def a_set_for_another_number_of_orders_is_refused(dut):
     row = await Bytes(dut).reset()
-    other = bytearray(image(any_terms(row.k), 4000)[:-4])
+    other = bytearray(image(any_terms(row), 4000, segments=row.segments)[:-4])
     other[0] ^= 1
     assert await row.send(other + zlib.crc32(other).to_bytes(4, "little")) == -1
 
@@ -113,12 +118,14 @@ async def a_set_for_another_number_of_orders_is_refused(dut):
 async def counts_per_turn_outside_their_range_are_refused(dut):
     row = await Bytes(dut).reset()
     for counts, verdict in ((1609, 1), (1608, -1), (2**25, 1), (2**25 + 1, -1), (0, -1), (2**32 - 1, -1)):
-        assert await row.send(image(any_terms(row.k), counts)) == verdict
+        assert await row.send(image(any_terms(row), counts, segments=row.segments)) == verdict
 
 
 @cocotb.test()
 async def amplitudes_that_may_overflow_the_map_are_refused(dut):
     row = await Bytes(dut).reset()
+    if row.segments:
+        return
     for sign in (1, -1):
         share, rest = divmod(2**29 - 1, row.k)
         sizes = [share] * (row.k - 1) + [share + rest]
@@ -133,10 +140,30 @@ async def amplitudes_that_may_overflow_the_map_are_refused(dut):
 
 
 @cocotb.test()
+async def points_of_128_counts_are_refused(dut):
+    row = await Bytes(dut).reset()
+    if not row.segments:
+        return
+    for value, verdict in ((2**23 - 1, 1), (2**23, -1), (-2**23, 1), (-2**23 - 1, -1), (2**31 - 1, -1), (-2**31, -1)):
+        for place in (0, 2 * row.k - 1):
+            words = [0] * (2 * row.k)
+            words[place] = value
+            assert await row.send(image(list(zip(words[::2], words[1::2])), 32768, segments=row.segments)) == verdict
+
+
+@cocotb.test()
+async def a_set_of_harmonics_for_segments_and_the_other_way_round_is_refused(dut):
+    row = await Bytes(dut).reset()
+    terms = [(0, 0)] * row.k
+    assert await row.send(image(terms, 4000, segments=0 if row.segments else 2 * row.k)) == -1
+    assert await row.send(image(terms, 4000, segments=row.segments)) == 1
+
+
+@cocotb.test()
 async def a_row_cut_short_changes_nothing_and_the_next_is_whole(dut):
     row = await Bytes(dut).reset()
     for _ in range(20):
-        whole = image(any_terms(row.k), random.getrandbits(25) | 4096)
+        whole = image(any_terms(row), random.getrandbits(25) | 4096, segments=row.segments)
         assert await row.send(whole[:random.randrange(len(whole))]) == 0
         assert await row.send(whole) == 1
         assert await row.send(b"") == 0
@@ -145,7 +172,7 @@ async def a_row_cut_short_changes_nothing_and_the_next_is_whole(dut):
 @cocotb.test()
 async def reset_in_mid_flow(dut):
     row = await Bytes(dut).reset()
-    whole = image(any_terms(row.k), 7777)
+    whole = image(any_terms(row), 7777, segments=row.segments)
     for _ in range(10):
         await row.send(whole)
         await row.send(whole[:random.randrange(len(whole))])
@@ -160,15 +187,15 @@ async def any_strobes_match_the_model(dut):
     row = await Bytes(dut).reset()
     left = []
     for _ in range(3000):
-        left = left or list(image(any_terms(row.k), random.getrandbits(random.choice((25, 32))) | 4096))
+        left = left or list(image(any_terms(row), random.getrandbits(random.choice((25, 32))) | 4096, segments=row.segments))
         send = random.randrange(5) > 0
         begin = row.model.row is None and random.randrange(8) == 0 or random.randrange(1500) == 0
         if begin:
-            left = list(image(any_terms(row.k), random.getrandbits(random.choice((25, 32))) | 4096))
+            left = list(image(any_terms(row), random.getrandbits(random.choice((25, 32))) | 4096, segments=row.segments))
         await row.clk(start=int(begin), valid=int(send), data=left.pop(0) if send and row.model.row is not None and not begin else 7,
                       rst=int(random.randrange(3000) == 0))
 
 
-@pytest.mark.parametrize("k", [1, 16, 32])
-def test_relay_set(k):
-    run("relay_set", __file__, K=k)
+@pytest.mark.parametrize("k, segments", [(1, 0), (16, 0), (32, 0), (1, 2), (18, 36), (32, 64)])
+def test_relay_set(k, segments):
+    run("relay_set", __file__, K=k, SEGMENTS=segments)

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+"""relay with a table of segments instead of harmonics, pins to pins: it corrects by it in both directions, and takes no other set."""
+import cocotb
+
+from bench import run
+from moire.relay import identity_of
+from relay_set import image
+from test_relay import BIT, CORRECTING, COUNTS, FIRST, KNOWN, LOADED, REFUSED, SECOND, Relay
+
+SEGMENTS = 5
+POINTS = 0.0, 3.5, -2.0, 6.25, 1.0                  # counts at the borders
+
+
+def whole_of(points):
+    words = [round(value * 65536) for value in (*points, 0)]
+    return image(list(zip(words[::2], words[1::2])), COUNTS, segments=SEGMENTS)
+
+
+def wanted(place):
+    """The corrected position, counts."""
+    n, inside = divmod(place % COUNTS * SEGMENTS / COUNTS, 1)
+    low, high = POINTS[int(n)], POINTS[(int(n) + 1) % SEGMENTS]
+    return place - low - (high - low) * inside
+
+
+@cocotb.test()
+async def it_corrects_by_the_table_in_both_directions(dut):
+    assert int(dut.BAUD.value) * BIT == int(dut.CLK_HZ.value)
+    relay = await Relay(dut).power_up(place=-20)
+    await relay.booted()
+    await relay.give(whole_of(POINTS))
+    await relay.go(40, clk_each=4)
+    for goal in (400, 800, 1000, 2000, 2300, 1200, 3999, 4100, -300, 10):
+        await relay.go(goal - relay.place)
+        await relay.clk(100)
+        assert abs(relay.counted - wanted(relay.place)) <= 0.76, (relay.place, relay.counted)
+    status = await relay.status()
+    assert status.levels == KNOWN | LOADED | CORRECTING and status.orders == 0 and not status.flags & ~16
+
+
+@cocotb.test()
+async def latency_is_10(dut):
+    relay = await Relay(dut).power_up()
+    await relay.go(8, clk_each=30)
+    relay.edges.clear()
+    for _ in range(4):
+        begin = relay.clks
+        await relay.go(1, clk_each=30)
+        assert relay.edges.pop() - begin == 10
+
+
+@cocotb.test()
+async def a_set_of_harmonics_is_refused(dut):
+    relay = await Relay(dut).power_up()
+    await relay.booted()
+    whole = whole_of(POINTS)
+    assert (await relay.give(whole)).identity == identity_of(whole)
+    told = await relay.give(image([(100, 0)] * 3, COUNTS))
+    assert told.flags == REFUSED and told.identity == identity_of(whole)
+
+
+@cocotb.test()
+async def a_saved_table_comes_back_at_power_up(dut):
+    relay = Relay(dut)
+    whole = whole_of(POINTS)
+    relay.chip.memory[SECOND:SECOND + len(whole)] = whole
+    await relay.power_up()
+    await relay.booted()
+    status = await relay.status()
+    assert status.source == 2 and status.levels == LOADED and status.identity == identity_of(whole)
+
+
+def test_relay_segments():
+    run("relay", __file__, SEGMENTS=SEGMENTS, BAUD=6_000_000, FIRST=FIRST, SECOND=SECOND)
