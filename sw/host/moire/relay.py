@@ -29,8 +29,10 @@ PIECE = LONGEST_BODY - HEAD
 
 MARKER = 0x4D4F4900
 MOST_ORDERS = 32
+MOST_SEGMENTS = 64
 COUNTS = range(1609, (1 << 25) + 1)  # per turn
 GAIN = math.prod(math.sqrt(1 + 4.0**-n) for n in range(22))      # of the rotations in the relay
+LARGEST_POINT = (1 << 23) - 1
 LARGEST = (1 << 29) - 1              # of the amplitudes, summed as they are written
 ARCSEC_PER_TURN = 1_296_000
 
@@ -78,15 +80,26 @@ def terms_of(harmonics, counts_per_turn: int, index_at: float = 0.0) -> list:
     return terms
 
 
-def make_set(terms, settings: Settings, orders: int) -> bytes:
-    """The bytes of a set for a relay of so many orders: corrected = position - sum of amplitude sin(order angle + phase)."""
-    ranged(orders, 1, MOST_ORDERS, "a number of orders")
+def packed(marker: int, settings: Settings, words) -> bytes:
+    """The bytes of a set with these words after the settings."""
     counts = ranged(settings.counts_per_turn, COUNTS[0], COUNTS[-1], "a number of counts per turn")
     ranged(settings.spacing, 0, 0xFFFF, "a spacing")
     ranged(settings.hysteresis, 0, 0xFFFF / 65536, "a hysteresis")
     ranged(settings.filter_samples, 0, 255, "a number of filter samples")
     ranged(settings.index_gate_mask, 0, 3, "an index gate mask")
     ranged(settings.index_gate, 0, 3, "an index gate")
+    angle = round(2**48 / counts)
+    gate = settings.index_low << 4 | settings.index_gate_mask << 2 | settings.index_gate
+    head = [marker, counts, angle % 2**32, angle >> 32 | settings.spacing << 16, round(math.tau * 2**40 / counts),
+            round(settings.hysteresis * 65536) | settings.filter_samples << 16 | gate << 24]
+    words = [*head, *(word % 2**32 for word in words)]
+    body = struct.pack(f"<{len(words)}I", *words)
+    return body + zlib.crc32(body).to_bytes(CRC_LENGTH, "little")
+
+
+def make_set(terms, settings: Settings, orders: int) -> bytes:
+    """The bytes of a set for a relay of so many orders: corrected = position - sum of amplitude sin(order angle + phase)."""
+    ranged(orders, 1, MOST_ORDERS, "a number of orders")
     if len(terms) > orders:
         raise OutOfRange(f"the relay has {orders} orders, the correction {len(terms)}")
     if not all(math.isfinite(value) for term in terms for value in term):
@@ -94,14 +107,16 @@ def make_set(terms, settings: Settings, orders: int) -> bytes:
     written = [(round(amplitude * 65536 / GAIN), round(phase / math.tau * 2**32) % 2**32) for amplitude, phase in terms]
     if (total := sum(abs(amplitude) for amplitude, _ in written)) > LARGEST:
         raise OutOfRange(f"the amplitudes are {total * GAIN / 65536:.0f} counts together; at most {LARGEST * GAIN / 65536:.0f} are taken")
-    angle = round(2**48 / counts)
-    gate = settings.index_low << 4 | settings.index_gate_mask << 2 | settings.index_gate
-    words = [MARKER + orders, counts, angle % 2**32, angle >> 32 | settings.spacing << 16, round(math.tau * 2**40 / counts),
-             round(settings.hysteresis * 65536) | settings.filter_samples << 16 | gate << 24]
-    for amplitude, phase in written + [(0, 0)] * (orders - len(written)):
-        words += [amplitude % 2**32, phase]
-    body = struct.pack(f"<{len(words)}I", *words)
-    return body + zlib.crc32(body).to_bytes(CRC_LENGTH, "little")
+    return packed(MARKER + orders, settings, [word for term in written + [(0, 0)] * (orders - len(written)) for word in term])
+
+
+def make_table(points, settings: Settings) -> bytes:
+    """The bytes of a set for a relay with a table: points are the errors in counts at equal distances, from the index once round."""
+    ranged(len(points), 2, MOST_SEGMENTS, "a number of segments")
+    if not all(math.isfinite(point) for point in points):
+        raise OutOfRange("a point of the table is no number")
+    words = [ranged(round(point * 65536), -LARGEST_POINT - 1, LARGEST_POINT, "a point of 2^-16 count") for point in points]
+    return packed(MARKER + 128 + len(points), settings, words + [0] * (len(words) % 2))
 
 
 def identity_of(whole: bytes) -> int:
