@@ -57,7 +57,9 @@ module node #(
                                        .grating_rdata, .actuator_rdata, .node_select, .line_select, .axis_select, .grating_select,
                                        .actuator_select, .rdata);
 
-    // time
+    // time; the watchdog of the soft core gives it as many clk however slow they are
+    localparam int CORE_SILENCE_MS = 20 + 1_200_000_000 / CLK_HZ;
+
     wire        [63:0] now;
     wire        [23:0] tick_period;
     wire        [15:0] sample_period;
@@ -70,7 +72,7 @@ module node #(
     node_registers u_node_registers (.clk, .rst, .select(node_select), .write, .word, .wdata, .rdata(node_rdata),
         .clk_hz(32'(CLK_HZ)), .build_axes(4'(AXES)), .build_address(address), .build_memory(8'(MEMORY_BYTES / 1024)),
         .time_stamp(now), .tick_period, .sample_period, .alive_beat(alive), .start_axes, .start_axes_written);
-    silence_watchdog #(.CLK_HZ(CLK_HZ)) u_core_watchdog (.clk, .rst, .time_ms(16'd50), .sign(alive), .armed(|drive_enable), .expired(silent));
+    silence_watchdog #(.CLK_HZ(CLK_HZ)) u_core_watchdog (.clk, .rst, .time_ms(16'(CORE_SILENCE_MS)), .sign(alive), .armed(|drive_enable), .expired(silent));
 
     // link
     wire               rx, estop, received, ninth, framing_error, start_glitch, filtered, filtered_command;

@@ -2,12 +2,13 @@
 // profile_run -- random moves planned by the firmware's planner, played by the Verilated player, every step held against the limits.
 //
 // A move: S-curve, trapezoid or stairs; then, by chance, retargeted in flight up to three times, slowed down by overrides and
-// pauses, or stopped by a brake. An override is let in only where the plan kept a quarter of acceleration and jerk for it.
+// pauses, or stopped by a brake. An override is let in only where the plan kept planner_reserve for it. A refusal is a miss too.
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
+#include <utility>
 
 #include "Vplayer.h"
 extern "C" {
@@ -17,7 +18,6 @@ extern "C" {
 
 namespace {
 
-constexpr uint64_t FULL = 1ULL << 32;
 constexpr int64_t ROUNDING = 8;          // 2^-40 period that the rounding of a step to 2^-40 adds to its third difference
 
 struct Random {                          // xorshift64*
@@ -46,10 +46,10 @@ struct Bench {
         value = value << 32 | pins.exact[0];
         return __int128(value << 56) >> 56;
     }
-    void tick(unsigned clks) {
+    void tick() {
         pins.tick = 1, clk();
         pins.tick = 0;
-        for (unsigned n = 1; n < clks; n++) clk();
+        do clk(); while (!pins.prepared);
     }
 };
 
@@ -69,9 +69,12 @@ int main(int count, char **words) {
     while (moves < wanted) {
         const unsigned kind = random() % 8;                                   // 0 stairs, 1 trapezoid, else S-curve
         const bool slowed = kind > 0 && random.one_in(4), braked = random.one_in(5);
-        struct planner_limits limits = planner_limits(uint32_t(random.spread(10, 50000)), uint32_t(random.spread(1000, 1e7)), uint32_t(random.spread(1e5, 1e9)));
+        const auto velocity = uint32_t(random.spread(10, 50000)), acceleration = uint32_t(random.spread(1000, 1e7));
+        const auto jerk = uint32_t(random.spread(1e5, 1e9));
+        struct planner_limits limits = planner_limits(velocity, acceleration, jerk);
         struct planner_limits planned = limits;
-        if (slowed) planned.acceleration -= limits.acceleration / 4, planned.jerk -= limits.jerk / 4;
+        uint32_t ramp = 0, curve = 0;
+        if (slowed) planned = planner_reserve(&limits, &ramp, &curve);
         if (kind == 1) planned.jerk = PLANNER_ANY_JERK;
         int64_t distance = int64_t(random.spread(1, 1 << 26)) * (random.one_in(2) ? 1 : -1);
         struct plan plan;
@@ -80,15 +83,12 @@ int main(int count, char **words) {
             stairs.first = limits.velocity / 16 + 1, stairs.top = limits.velocity, stairs.ticks = 1 + random() % 40;
             for (auto &rise : stairs.rise) rise = limits.velocity / (8 + random() % 40) + 1;
             planner_borders(&stairs, random.one_in(2));
-            if (!planner_climb(&plan, &stairs, distance)) { refused++; continue; }
-        } else if (!planner_move(&plan, &planned, distance)) { refused++; continue; }
+            if (!planner_climb(&plan, &stairs, distance)) { refused++, misses++; continue; }
+        } else if (!planner_move(&plan, &planned, distance)) { refused++, misses++; continue; }
         if (plan.ticks > 4000) continue;
         moves++;
 
-        // the override's ramps take the quarter: v slope <= A/4; 3 a slope + v curve <= J/4
-        double v = double(limits.velocity), a = double(limits.acceleration), j = double(limits.jerk);
-        pins.slope = slowed ? uint32_t(std::fmax(2, std::fmin(std::fmin(a / v / 4, j / a / 24) * double(FULL), 4e9))) : 0;
-        pins.curve = slowed ? uint32_t(std::fmax(1, std::fmin(j / v / 8 * double(FULL), 4e9))) : 0;
+        pins.slope = ramp, pins.curve = curve;
         pins.percent = 65536, pins.pause = 0;
         pins.brake_rate = kind == 0 ? 0 : uint32_t(std::fmin(double(limits.acceleration >> 8), 4294967295.0));     // stairs stop in a step
         pins.brake_jerk = kind == 1 ? 0 : limits.jerk;
@@ -97,7 +97,7 @@ int main(int count, char **words) {
         __int128 before = begin, step = 0, slope = 0, late = 0;              // late: a brake acts one tick after the strobe
         unsigned brake_at = braked ? 1 + random() % (plan.ticks + 1) : 0, retargets_left = kind > 0 && !slowed ? random() % 4 : 0;
         unsigned retarget_at = 1 + random() % (plan.ticks + 1), queued = 0, played = 0, override_left = slowed ? 3 : 0;
-        bool started = false, end_queued = false, stopped = false, bad = false, over = false;
+        bool missed = false, started = false, end_queued = false, stopped = false, bad = false, over = false;
         int64_t goal = distance;
         const char *why = "";
         for (unsigned idle = 0; idle < 400000; idle++) {
@@ -110,7 +110,7 @@ int main(int count, char **words) {
                     if (planner_retarget(&plan, &planned, other)) {
                         if (plan.ticks > 20000) plan = former;
                         else goal = other, retargets++;
-                    } else refused++;
+                    } else refused++, missed = true;
                 }
                 planner_segment piece;
                 bool last;
@@ -118,6 +118,7 @@ int main(int count, char **words) {
                 pins.segment_velocity = uint64_t(piece.velocity), pins.segment_acceleration = uint64_t(piece.acceleration);
                 pins.segment_jerk = uint32_t(piece.jerk), pins.segment_ticks = piece.ticks, pins.segment_last = last;
                 pins.push = 1, bench->clk(), pins.push = 0;
+                for (int n = 1; n < 7; n++) bench->clk();
                 queued += piece.ticks, end_queued = last;
             }
             if (!started) started = true, pins.start = 1, bench->clk(), pins.start = 0;
@@ -125,8 +126,11 @@ int main(int count, char **words) {
             if (override_left && random.one_in(100))
                 pins.percent = random() % 65537, pins.pause = random.one_in(4), override_left--, overridden++;
             else if (slowed && random.one_in(200)) pins.percent = 65536, pins.pause = 0;
-            if (brake_at && played == brake_at && !stopped) stopped = true, brakes++, late = slope < 0 ? -slope : slope, pins.brake = 1, bench->clk(), pins.brake = 0;
-            bench->tick(stopped ? 160 : slowed ? 84 : 12), played++, ticks++;
+            if (brake_at && played == brake_at && !stopped) {
+                stopped = true, brakes++, late = slope < 0 ? -slope : slope;
+                pins.brake = 1, bench->clk(), pins.brake = 0;
+            }
+            bench->tick(), played++, ticks++;
             __int128 now = bench->exact(), step_now = now - before, slope_now = step_now - step, bend = slope_now - slope;
             const __int128 roundoff = pins.moving ? ROUNDING : ROUNDING + (1 << 24);          // the end is rounded
             auto size = [](__int128 x) { return x < 0 ? -x : x; };
@@ -136,22 +140,29 @@ int main(int count, char **words) {
             if (!steps && kind != 1 && size(bend) > __int128(limits.jerk) + roundoff) over = true, why = "jerk";
             if (over && !bad) {
                 bad = true, above++;
-                if (above <= 5) std::fprintf(stderr, "seed %llu move %llu: %s at tick %u kind %u slowed %d stopped %d: %g %g %g of %g %g %g\n", (unsigned long long)seed,
-                    (unsigned long long)moves, why, played, kind, slowed, stopped, double(step_now), double(slope_now), double(bend), v, a, j);
+                if (above <= 5)
+                    std::fprintf(stderr, "seed %llu move %llu: %s at tick %u kind %u slowed %d stopped %d: %g %g %g of %g %g %g\n",
+                                 (unsigned long long)seed, (unsigned long long)moves, why, played, kind, slowed, stopped, double(step_now),
+                                 double(slope_now), double(bend), double(limits.velocity), double(limits.acceleration),
+                                 double(limits.jerk));
             }
             before = now, step = step_now, slope = slope_now;
         }
-        bool missed = pins.moving || bench->underruns != underruns || (!stopped && bench->exact() != begin + (__int128(goal) << 24));
+        missed = missed || pins.moving || bench->underruns != underruns || (!stopped && bench->exact() != begin + (__int128(goal) << 24));
         if (missed) {
             landed_wrong++;
-            if (landed_wrong <= 5) std::fprintf(stderr, "seed %llu move %llu landed wrong: kind %u slowed %d stopped %d moving %d underruns %llu\n", (unsigned long long)seed,
-                (unsigned long long)moves, kind, slowed, stopped, pins.moving, (unsigned long long)(bench->underruns - underruns));
+            if (landed_wrong <= 5)
+                std::fprintf(stderr, "seed %llu move %llu landed wrong: kind %u slowed %d stopped %d moving %d underruns %llu\n",
+                             (unsigned long long)seed, (unsigned long long)moves, kind, slowed, stopped, pins.moving,
+                             (unsigned long long)(bench->underruns - underruns));
             pins.rst = 1, bench->clk(), pins.rst = 0;
         }
         misses += missed || bad;
     }
-    std::printf("%llu misses %llu moves %llu ticks %llu retargets %llu refused %llu overrides %llu brakes %llu landed_wrong %llu above_a_limit\n",
-                (unsigned long long)misses, (unsigned long long)moves, (unsigned long long)ticks, (unsigned long long)retargets, (unsigned long long)refused,
-                (unsigned long long)overridden, (unsigned long long)brakes, (unsigned long long)landed_wrong, (unsigned long long)above);
+    const std::pair<const char *, uint64_t> totals[] = {
+        {"misses", misses}, {"moves", moves}, {"ticks", ticks}, {"retargets", retargets}, {"refused", refused},
+        {"overrides", overridden}, {"brakes", brakes}, {"landed_wrong", landed_wrong}, {"above_a_limit", above}};
+    for (const auto &[name, total] : totals) std::printf("%llu %s ", (unsigned long long)total, name);
+    std::printf("\n");
     return 0;
 }

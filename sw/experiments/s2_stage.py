@@ -26,7 +26,7 @@ from moire.errors import MoireError
 from twin import BuildError, Twin, TwinTransport
 from twin.twin import Axis, Node
 
-CLK_HZ = 1_600_000
+CLK_HZ = 3_000_000
 NODE = {"DRIVES": 2, "FILTERS": 0}
 START_S = 0.06                       # until the soft core listens
 LOOK_S = 0.02

@@ -8,9 +8,11 @@
 #include "parameters.h"
 #include "planner.h"
 
-#define PIECE_TICKS 64u         // 16 ms
-#define QUEUED_TICKS 256u       // what is queued cannot be taken back when the target changes, so it is kept short, but pieces are
-#define QUEUE 16u               // short too where a move begins, so that it is time that counts
+#define PIECE_TICKS 128u        // 32 ms
+#define QUEUE 16u
+#define QUEUED_MS 16u           // What is queued cannot be taken back when the target changes, so it is kept short: this, and what
+#define BUSY_KCLK 900u          // the firmware may be busy with before it looks here again. Pieces are short too where a move begins:
+                                // it is time that counts.
 
 static struct motion {
     struct plan plan;
@@ -39,15 +41,20 @@ void motion_brake(unsigned n)
     axis_write(n, AXIS_STROBES, AXIS_STROBES_BRAKE_MASK);
 }
 
+static uint32_t queued_ticks(void)
+{
+    return PLANNER_TICK_HZ / 1000u * (QUEUED_MS + BUSY_KCLK * 1000u / (node_read(NODE_CLK_HZ) / 1000u));
+}
+
 void motion_feed(unsigned n)
 {
     struct motion *m = &motions[n];
     struct planner_segment piece;
     bool last;
     if (m->plan.next >= m->plan.count) return;
-    uint32_t waiting = QUEUE - FIELD_GET(axis_read(n, AXIS_STATE), AXIS_STATE_QUEUE_FREE), ticks = 0;
+    uint32_t waiting = QUEUE - FIELD_GET(axis_read(n, AXIS_STATE), AXIS_STATE_QUEUE_FREE), ticks = 0, most = queued_ticks();
     for (uint32_t piece_back = 1; piece_back <= waiting; piece_back++) ticks += m->queued[(m->pieces - piece_back) % QUEUE];
-    while (waiting++ < QUEUE && ticks < QUEUED_TICKS && planner_take_up_to(&m->plan, &piece, &last, PIECE_TICKS)) {
+    while (waiting++ < QUEUE && ticks < most && planner_take_up_to(&m->plan, &piece, &last, PIECE_TICKS)) {
         m->queued[m->pieces++ % QUEUE] = (uint8_t)piece.ticks;
         ticks += piece.ticks;
         axis_write_wide(n, AXIS_SEGMENT_VELOCITY, (uint64_t)piece.velocity);

@@ -147,10 +147,16 @@ def test_counters_are_those_of_the_line():
     assert [answer[name] for name in names] == [1000, 1001, 1002, 1003, 1004]
 
 
+# own steps are counted as pulses and direction only; the converter serves the motor or the fine stage
+PARTNER = {"step_output": "position_source", "fine_reach": "drive"}
+
+
 def test_every_parameter_takes_both_ends_and_nothing_beyond():
     machine = Machine()
     for name, parameter in PARAMETER.items():
         assert machine.ask("get_parameter", axis=0, parameter=parameter["id"])["value"] == parameter["default"]
+        if name in PARTNER:
+            machine.set(**{PARTNER[name]: 0})
         for value in (parameter["min"], parameter["max"]):
             machine.set(**{name: value})
             assert machine.ask("get_parameter", axis=0, parameter=parameter["id"])["value"] == value

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0xEF53F39A          # CRC-32 of tables/registers.rdl
+MAP_CRC = 0xA9693A89          # CRC-32 of tables/registers.rdl
 BLOCKS = {"node": (0x000, 0x000), "line": (0x100, 0x000), "axis": (0x400, 0x100), "grating": (0xC00, 0x100), "actuator": (0x1400, 0x100)}          # base, distance to the next one
 
 
@@ -52,7 +52,7 @@ FIELDS = (
     Field("node", "sample_period", "value", 0x1C, 0, 16, False, "rw", "clk", Fraction(1),
           "sample rate of all converters"),
     Field("node", "alive", "beat", 0x20, 0, 1, False, "w", "", Fraction(1),
-          "sign of life of the firmware, wanted every 50 ms while a drive is on: beat"),
+          "sign of life of the firmware; while a drive is on it is wanted within 1 200 000 clk and 20 ms: beat"),
     Field("node", "start_axes", "value", 0x24, 0, 8, False, "w", "", Fraction(1),
           "bit n: axis n"),
     Field("line", "bit_time", "value", 0x00, 0, 20, False, "rw", "clk", Fraction(1, 16),
