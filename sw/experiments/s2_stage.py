@@ -71,7 +71,7 @@ class Scale:
             "encoder_fault_mask": 1, "deglitch": 0, "velocity_quantum": f"{float(self.count_um)}um",
             "steps_per_period": self.period_um / self.step_um, "step_trim": 5, "kp": 0, "kd": 0, "kv": 0, "ka": 0, "ki": 0.0004,
             "integral_limit": 0.99, "output_limit": 0.99, "dead_band": f"{float(3 * self.count_um)}um",
-            "settle_window": f"{float(4 * self.count_um)}um", "settle_time": "20ms", "following_limit": "100um",
+            "settle_window": f"{float(4 * self.count_um)}um", "settle_time": "20ms", "following_limit": "1mm",
             "travel_low": f"{float(-edge)}mm", "travel_high": f"{float(edge)}mm", "acceleration": "1m/s2", "jerk": "50m/s3",
             "velocity": f"{self.top_mm_s}mm/s", "home_method": 1, "home_velocity": "20mm/s", "home_creep": "5mm/s",
             "home_distance": "4mm"}

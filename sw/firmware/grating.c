@@ -54,7 +54,7 @@ static uint32_t every_now(unsigned n, bool phases)
     uint64_t speed = size * PLANNER_TICK_HZ;                                    // 2^-16 period/s
     if (speed * LONGEST_MS < ((uint64_t)LEARNER_PERIODS << 16) * 1000u) return 0;
     uint32_t kept = phases ? LEARNER_PHASES : LEARNER_BURST;
-    uint64_t every = ((uint64_t)SAMPLE_HZ * LEARNER_PERIODS << 16) / (speed * kept);
+    uint64_t every = ((uint64_t)parameters_sample_hz() * LEARNER_PERIODS << 16) / (speed * kept);
     return every < 1 ? 1 : every > LARGEST_EVERY ? LARGEST_EVERY : (uint32_t)every;
 }
 

@@ -61,7 +61,7 @@ static uint8_t identify(void)
     put(LINE_IDENTIFY_REPLY_AXES, axes, 1);
     put(LINE_IDENTIFY_REPLY_CLK_HZ, node_read(NODE_CLK_HZ), 4);
     put(LINE_IDENTIFY_REPLY_TICK_HZ, PLANNER_TICK_HZ, 4);
-    put(LINE_IDENTIFY_REPLY_SAMPLE_HZ, SAMPLE_HZ, 4);
+    put(LINE_IDENTIFY_REPLY_SAMPLE_HZ, parameters_sample_hz(), 4);
     reply[0] = LINE_IDENTIFY_REPLY_LENGTH;
     return LINE_CAUSE_OK;
 }

@@ -27,8 +27,13 @@ void parameters_start_node(void)
 {
     uint32_t clk_hz = node_read(NODE_CLK_HZ);
     line_write(LINE_BIT_TIME, held((16 * (uint64_t)clk_hz + BAUD / 2) / BAUD, LINE_BIT_TIME_MASK));
-    node_write(NODE_SAMPLE_PERIOD, held(clk_hz / SAMPLE_HZ, NODE_SAMPLE_PERIOD_MASK));
+    node_write(NODE_SAMPLE_PERIOD, held(clk_hz / SAMPLE_HZ < SAMPLE_CLK ? SAMPLE_CLK : clk_hz / SAMPLE_HZ, NODE_SAMPLE_PERIOD_MASK));
     node_write(NODE_TICK_PERIOD, held(clk_hz / PLANNER_TICK_HZ, NODE_TICK_PERIOD_MASK));
+}
+
+uint32_t parameters_sample_hz(void)
+{
+    return node_read(NODE_CLK_HZ) / node_read(NODE_SAMPLE_PERIOD);
 }
 
 // part / whole in 2^-32, 1 at least.

@@ -7,12 +7,14 @@
 
 #include "planner.h"
 
-#define SAMPLE_HZ 100000u
+#define SAMPLE_HZ 100000u                               // highest rate of the converters
+#define SAMPLE_CLK 30u                                  // a conversion takes 29
 #define BAUD 115200u
 
 enum position_source { PHASES, COUNTS, OWN_STEPS };     // values of the parameter
 
 void parameters_start_node(void);                       // clock dividers, line speed
+uint32_t parameters_sample_hz(void);                    // rate of the converters
 void parameters_start(unsigned axis);                   // defaults, into the registers too
 uint8_t parameters_check(uint8_t id, int64_t value);    // a line_cause
 void parameters_set(unsigned axis, uint8_t id, int64_t value);

@@ -171,7 +171,7 @@ def verilate_node(folder, verilator, clk_hz, axes, node):
         f"#define NODE_MEMORY {words[0]}\n{rearm}")
 
 
-def twin_library(clk_hz=3_000_000, axes=1, node=None):
+def twin_library(clk_hz=2_400_000, axes=1, node=None):
     """libtwin.so: Verilated nodes, machines and line. node: more parameters of rtl/node.sv, {name: value}."""
     tool = compiler()
     verilator = package("verilator", "it makes C++ of the RTL")

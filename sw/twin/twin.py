@@ -19,7 +19,8 @@ from . import build
 from .machine import FUNCTIONS as MACHINE_FUNCTIONS
 from .machine import HANDLE, LONG, REAL, WHOLE, MachineHandle, declare, pack
 
-CLK_HZ = 3_000_000
+CLK_HZ = 2_400_000
+NODE = {"DRIVES": 1, "FILTERS": 0}     # what the stage of S0 needs of rtl/node.sv
 BAUD = 115200
 TURNAROUND_CELLS = 2             # the host hears a word half a cell before its end; the node's driver lets go half a cell after it
 CELLS = 11                       # of a character: start, eight data, 9th, stop
@@ -88,10 +89,10 @@ class Twin:
     """`nodes` are Nodes, or addresses of nodes with `axes` stages each. All nodes are of one build: one with fewer axes than
     another has unconnected ones behind them. `plant` overrides parameters of all machines, `plant_of` {axis: {…}} those of one;
     `firmware` is a list of words or None for the one in sw/firmware; `host_baud_error` 0.02 makes the host 2 % fast;
-    `node_parameters` {"W": 12} are parameters of rtl/node.sv."""
+    `node_parameters` {"W": 12} are parameters of rtl/node.sv, {"DRIVES": 15} builds all that an axis can drive."""
 
     def __init__(self, nodes=(1, 2), seed=1, clk_hz=CLK_HZ, baud=BAUD, host_baud_error=0.0, axes=1, plant=None, plant_of=None,
-                 firmware=None, node_parameters=None):
+                 firmware=None, node_parameters=NODE):
         self.handle = None
         nodes = [node if isinstance(node, Node) else Node(node, [Axis()] * axes) for node in nodes]
         self.addresses, self.node_axes = tuple(node.address for node in nodes), max(len(node.axes) for node in nodes)
@@ -316,7 +317,7 @@ class FrameBench:
 
     def __init__(self, address=1, clk_hz=1_840_000, baud=BAUD, firmware=None):
         self.handle = None
-        self.library, self.clk_hz = library(clk_hz, 1), clk_hz
+        self.library, self.clk_hz = library(clk_hz, 1, NODE), clk_hz
         image = memory_image(self.library, build.firmware() if firmware is None else firmware)
         self.handle = self.library.frame_bench_new(address, image.ctypes.data, len(image), clk_hz / baud)
         self.words = numpy.empty(256, dtype=numpy.uint16)

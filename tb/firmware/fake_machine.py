@@ -275,7 +275,8 @@ class Machine:
     def __init__(self, *axes, map_crc=DEFINES["MAP_CRC"], address=2):
         self.axes, self.address, self.map_crc, self.clk = list(axes) or [Axis()], address, map_crc, 0
         self.gratings = [Grating() for _ in self.axes]
-        self.actuators = [{DEFINES["ACTUATOR_DRIVE"]: DEFINES["ACTUATOR_DRIVE_BUILT_MASK"]} for _ in self.axes]    # words by their offset; all drives are built
+        # words by their offset; all drives are built
+        self.actuators = [{DEFINES["ACTUATOR_DRIVE"]: DEFINES["ACTUATOR_DRIVE_BUILT_MASK"]} for _ in self.axes]
         self.received, self.sent, self.word, self.crc_bytes = deque(), [], {}, b""
         self.sequence = 0
         self.answers = READ(self.read), WRITE(self.write)               # kept alive as long as the firmware may call

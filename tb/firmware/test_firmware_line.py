@@ -232,7 +232,7 @@ def test_no_part_of_a_millisecond_is_lost():
 
 def test_the_encoder_is_shown_as_it_is():
     machine = Machine()
-    word, actuator, d = machine.axes[0].word, machine.actuators[0], DEFINES
+    word, d = machine.axes[0].word, DEFINES
     word[d["AXIS_SAMPLE"]] = (-100 & 0xFFFF) | (-32768 & 0xFFFF) << 16
     word[d["AXIS_PHASE"]] = 0xFEDC | 101 << 16
     word[d["AXIS_QUADRATURE_COUNT"]] = -5 & 0xFFFFFFFF

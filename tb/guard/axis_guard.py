@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rtl/guard/axis_guard.sv does, in integers: clk(...) is one clk and returns what is on the pins after it."""
 
-LIMIT_LOW, LIMIT_HIGH, ESTOP, FOLLOWING_ERROR, ENCODER, LINE_WATCHDOG, DRIVE, CPU, PROFILE_UNDERRUN, STEP_OVERRUN = (1 << n for n in range(10))
+(LIMIT_LOW, LIMIT_HIGH, ESTOP, FOLLOWING_ERROR, ENCODER, LINE_WATCHDOG, DRIVE, CPU, PROFILE_UNDERRUN,
+ STEP_OVERRUN) = (1 << n for n in range(10))
 LATCH_ALWAYS = ESTOP | DRIVE | CPU
 
 INPUTS = dict.fromkeys("""enable_request closed_loop homing reset_faults limit_low limit_high estop drive_fault encoder_fault

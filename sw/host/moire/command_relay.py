@@ -45,7 +45,7 @@ def do_clear(session, options):
 
 
 def do_calibrate(session, options):
-    from .calibration import fit, read_readings             # numpy takes longer to load than the other commands to run
+    from .calibration import fit, read_readings  # numpy takes longer to load than the other commands to run
     readings = read_readings(options.file)
     relay = None if options.dry else relay_of(session)
     orders = options.orders
