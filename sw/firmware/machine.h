@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// machine -- the wire-EDM machine: its keyboard keys start a cut, two status inputs tell whether it cuts and whether something is wrong.
+#ifndef MOIRE_MACHINE_H
+#define MOIRE_MACHINE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum machine_state { MACHINE_WATCHED, MACHINE_KEYS_WAIT, MACHINE_STARTING, MACHINE_CUTTING, MACHINE_ENDING, MACHINE_CUT, MACHINE_FAILED };
+
+void machine_start(void);
+void machine_work(void);
+void machine_begin(uint32_t start_limit_s, uint32_t cut_limit_s);   // send the keys, follow the cut
+void machine_follow(uint32_t cut_limit_s);                          // the cut that is under way
+enum machine_state machine_state(void);
+uint8_t machine_cause(void);                    // why it failed
+bool machine_built(void);
+bool machine_cuts(void);
+bool machine_alarms(void);
+bool machine_rests(void);                       // neither cutting, nor do keys of ours wait that would start it
+
+#endif
