@@ -8,4 +8,8 @@
 void line_start(unsigned axes);
 void line_poll(void);
 
+// For the parts of an image: a field of the request that is being done, and one of its reply; little endian, `at` as in line_protocol.h.
+uint64_t line_field(uint32_t at, unsigned bytes);
+void line_answer(uint32_t at, uint64_t value, unsigned bytes);
+
 #endif

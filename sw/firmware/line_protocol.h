@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0xAF711DB1u    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x281AE3D5u    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -34,6 +34,15 @@ enum line_cause {
     LINE_CAUSE_NO_INDEX = 21,    // no index was found within the home distance
     LINE_CAUSE_NOT_PREPARED = 22,    // the axis has no motion prepared
     LINE_CAUSE_NOT_BUILT = 23,    // this node was built without that
+    LINE_CAUSE_SENSOR_DEAD = 30,    // no good frame came from the angle sensor: check its power and its cable
+    LINE_CAUSE_SENSOR_STUCK = 31,    // the angle sensor sent one and the same angle while the table was turned
+    LINE_CAUSE_STICTION = 32,    // the table did not follow its steps: it sticks, or the motor lost them
+    LINE_CAUSE_WRONG_SIGN = 33,    // the table turned against its steps: turn the sign of steps_per_period
+    LINE_CAUSE_NOT_CONVERGED = 34,    // the tolerance was not reached within the allowed tries
+    LINE_CAUSE_SENSOR_DISAGREES = 35,    // angle sensor and steps disagree on how far the table turned
+    LINE_CAUSE_PEER_SILENT = 36,    // the other node does not answer: check the cable between the two and its peer_mode
+    LINE_CAUSE_NO_STATION = 37,    // the other node has no such station: write the program to both
+    LINE_CAUSE_PEER_OFF = 38,    // the peer port is not in use: see the settings peer_mode and peer_role
 };
 
 enum line_fault {    // bits
@@ -116,6 +125,22 @@ enum line_learner_action {
     LINE_LEARNER_ACTION_FORGET = 3,    // correct nothing, begin afresh
 };
 
+enum line_index_phase {
+    LINE_INDEX_PHASE_IDLE = 0,    // at rest
+    LINE_INDEX_PHASE_READING = 1,    // waiting for the table to settle, and reading its angle
+    LINE_INDEX_PHASE_GOING_BELOW = 2,    // going down, below the target
+    LINE_INDEX_PHASE_COMING_UP = 3,    // coming up on the long way
+    LINE_INDEX_PHASE_CLOSING_IN = 4,    // closing in on the target
+};
+
+enum line_peer_phase {
+    LINE_PEER_PHASE_IDLE = 0,    // nothing was asked for
+    LINE_PEER_PHASE_INDEXING = 1,    // the sub-node indexes
+    LINE_PEER_PHASE_INDEXED = 2,    // the sub-node has indexed
+    LINE_PEER_PHASE_FAILED = 3,    // the sub-node failed
+    LINE_PEER_PHASE_SILENT = 4,    // the sub-node does not answer
+};
+
 enum line_operation {
     LINE_OPERATION_IDENTIFY = 1,    // who is there, and what was it built from
     LINE_OPERATION_STATUS = 2,    // state, position and faults of an axis; ended is the cause of the last motion
@@ -138,6 +163,14 @@ enum line_operation {
     LINE_OPERATION_WRITE_REGISTER = 19,    // one word of the register map: only index, capture and compare of the grating blocks
     LINE_OPERATION_PREPARE = 20,    // plan to go to a position, and wait for start
     LINE_OPERATION_START = 21,    // begin the prepared motions of these axes (bit n: axis n), all in one tick; none if one of them has none
+    LINE_OPERATION_GET_SETTING = 40,    // read a setting of a station
+    LINE_OPERATION_SET_SETTING = 41,    // write a setting of a station
+    LINE_OPERATION_INDEX_TO = 42,    // turn the table of axis 0 to an absolute angle, 0.01 arcsec; refused while an axis moves
+    LINE_OPERATION_INDEX_STATE = 43,    // what the table does, how its last index ended, the angle of its last reading; all in 0.01 arcsec
+    LINE_OPERATION_SENSOR = 44,    // the last good frame of the angle sensor in 0.01 arcsec, its age in clk, and frames since power-up
+    LINE_OPERATION_PEER = 45,    // what the peer port does: the last index asked for or done, and what came that was not understood
+    LINE_OPERATION_PEER_STATION = 46,    // one of the stations of a sub-node in mode printed, from 0 on; the next order then goes to station 0
+    LINE_OPERATION_PEER_NEXT = 47,    // the station to which the next order goes in mode printed
 };
 
 // Lengths of whole bodies and offsets of their fields, in bytes, little endian.
@@ -272,30 +305,84 @@ enum line_operation {
 #define LINE_START_REQUEST_LENGTH 3u
 #define LINE_START_REQUEST_AXES 2u    // u8
 #define LINE_START_REPLY_LENGTH 3u
+#define LINE_GET_SETTING_REQUEST_LENGTH 3u
+#define LINE_GET_SETTING_REQUEST_SETTING 2u    // u8
+#define LINE_GET_SETTING_REPLY_LENGTH 11u
+#define LINE_GET_SETTING_REPLY_VALUE 3u    // i64
+#define LINE_SET_SETTING_REQUEST_LENGTH 11u
+#define LINE_SET_SETTING_REQUEST_SETTING 2u    // u8
+#define LINE_SET_SETTING_REQUEST_VALUE 3u    // i64
+#define LINE_SET_SETTING_REPLY_LENGTH 3u
+#define LINE_INDEX_TO_REQUEST_LENGTH 6u
+#define LINE_INDEX_TO_REQUEST_ANGLE 2u    // u32
+#define LINE_INDEX_TO_REPLY_LENGTH 3u
+#define LINE_INDEX_STATE_REQUEST_LENGTH 2u
+#define LINE_INDEX_STATE_REPLY_LENGTH 19u
+#define LINE_INDEX_STATE_REPLY_PHASE 3u    // u8
+#define LINE_INDEX_STATE_REPLY_ENDED 4u    // u8
+#define LINE_INDEX_STATE_REPLY_TRIES 5u    // u8
+#define LINE_INDEX_STATE_REPLY_OVERSHOOTS 6u    // u8
+#define LINE_INDEX_STATE_REPLY_TARGET 7u    // u32
+#define LINE_INDEX_STATE_REPLY_READING 11u    // u32
+#define LINE_INDEX_STATE_REPLY_LEFT 15u    // i32
+#define LINE_SENSOR_REQUEST_LENGTH 2u
+#define LINE_SENSOR_REPLY_LENGTH 28u
+#define LINE_SENSOR_REPLY_ANGLE 3u    // u32
+#define LINE_SENSOR_REPLY_AGE 7u    // u32
+#define LINE_SENSOR_REPLY_DEAD 11u    // u8
+#define LINE_SENSOR_REPLY_FRAMES 12u    // u32
+#define LINE_SENSOR_REPLY_WRONG_CRC 16u    // u32
+#define LINE_SENSOR_REPLY_BROKEN 20u    // u32
+#define LINE_SENSOR_REPLY_MISSED 24u    // u32
+#define LINE_PEER_REQUEST_LENGTH 2u
+#define LINE_PEER_REPLY_LENGTH 21u
+#define LINE_PEER_REPLY_PHASE 3u    // u8
+#define LINE_PEER_REPLY_ENDED 4u    // u8
+#define LINE_PEER_REPLY_STATION 5u    // u16
+#define LINE_PEER_REPLY_STATIONS 7u    // u16
+#define LINE_PEER_REPLY_HEARD 9u    // u32
+#define LINE_PEER_REPLY_GARBAGE 13u    // u32
+#define LINE_PEER_REPLY_REPEATED 17u    // u32
+#define LINE_PEER_STATION_REQUEST_LENGTH 10u
+#define LINE_PEER_STATION_REQUEST_STATION 2u    // u16
+#define LINE_PEER_STATION_REQUEST_STATIONS 4u    // u16
+#define LINE_PEER_STATION_REQUEST_ANGLE 6u    // u32
+#define LINE_PEER_STATION_REPLY_LENGTH 3u
+#define LINE_PEER_NEXT_REQUEST_LENGTH 4u
+#define LINE_PEER_NEXT_REQUEST_STATION 2u    // u16
+#define LINE_PEER_NEXT_REPLY_LENGTH 3u
 
-// X(name, code, length of the request body, length of the reply body if the cause is ok)
+// X(name, code, length of the request body, length of the reply body if the cause is ok, 1: of an axis, its first field)
 #define LINE_OPERATIONS(X) \
-    X(identify, 1, 2, 27) \
-    X(status, 2, 3, 41) \
-    X(enable, 3, 4, 3) \
-    X(home, 4, 3, 3) \
-    X(move, 5, 11, 7) \
-    X(stop, 6, 3, 3) \
-    X(reset_faults, 7, 3, 3) \
-    X(get_parameter, 8, 4, 11) \
-    X(set_parameter, 9, 12, 3) \
-    X(counters, 10, 2, 31) \
-    X(encoder, 11, 3, 35) \
-    X(read_register, 12, 4, 7) \
-    X(learner, 13, 4, 18) \
-    X(get_correction, 14, 3, 15) \
-    X(get_harmonic, 15, 4, 11) \
-    X(set_correction, 16, 16, 3) \
-    X(set_harmonic, 17, 12, 3) \
-    X(signal, 18, 3, 7) \
-    X(write_register, 19, 8, 3) \
-    X(prepare, 20, 11, 7) \
-    X(start, 21, 3, 3)
+    X(identify, 1, 2, 27, 0) \
+    X(status, 2, 3, 41, 1) \
+    X(enable, 3, 4, 3, 1) \
+    X(home, 4, 3, 3, 1) \
+    X(move, 5, 11, 7, 1) \
+    X(stop, 6, 3, 3, 1) \
+    X(reset_faults, 7, 3, 3, 1) \
+    X(get_parameter, 8, 4, 11, 1) \
+    X(set_parameter, 9, 12, 3, 1) \
+    X(counters, 10, 2, 31, 0) \
+    X(encoder, 11, 3, 35, 1) \
+    X(read_register, 12, 4, 7, 0) \
+    X(learner, 13, 4, 18, 1) \
+    X(get_correction, 14, 3, 15, 1) \
+    X(get_harmonic, 15, 4, 11, 1) \
+    X(set_correction, 16, 16, 3, 1) \
+    X(set_harmonic, 17, 12, 3, 1) \
+    X(signal, 18, 3, 7, 1) \
+    X(write_register, 19, 8, 3, 0) \
+    X(prepare, 20, 11, 7, 1) \
+    X(start, 21, 3, 3, 0) \
+    X(get_setting, 40, 3, 11, 0) \
+    X(set_setting, 41, 11, 3, 0) \
+    X(index_to, 42, 6, 3, 0) \
+    X(index_state, 43, 2, 19, 0) \
+    X(sensor, 44, 2, 28, 0) \
+    X(peer, 45, 2, 21, 0) \
+    X(peer_station, 46, 10, 3, 0) \
+    X(peer_next, 47, 4, 3, 0)
 
 enum line_parameter {
     LINE_PARAMETER_PERIOD = 1,    // [1 pm] length of one signal period
@@ -459,5 +546,46 @@ enum line_parameter {
     X(filter_2_b2, 76, -2147483648LL, 2147483647LL, 0LL) \
     X(filter_2_a1, 77, -2147483648LL, 2147483647LL, 0LL) \
     X(filter_2_a2, 78, -2147483648LL, 2147483647LL, 0LL)
+
+enum line_setting {
+    LINE_SETTING_INDEX_TOLERANCE = 1,    // [0.01 arcsec] index: it has ended when no more than this is left by the sensor
+    LINE_SETTING_INDEX_ALLOWANCE = 2,    // [0.01 arcsec] index: the long way ends so far below the target; more than the error of the worm
+    LINE_SETTING_INDEX_TAKE_UP = 3,    // [0.01 arcsec] index: shortest way up before a reading counts; more than the backlash
+    LINE_SETTING_INDEX_SHARE = 4,    // [1/100] index: each try goes this share of what is left
+    LINE_SETTING_INDEX_TRIES = 5,    // index: tries before it is given up
+    LINE_SETTING_INDEX_OVERSHOOTS = 6,    // index: how often it may back off from above the target and come again
+    LINE_SETTING_INDEX_SETTLE = 7,    // [0.001 s] index: rest before a reading; more than the latency of the sensor
+    LINE_SETTING_INDEX_FRAMES = 8,    // index: frames whose mean is a reading
+    LINE_SETTING_INDEX_DISAGREEMENT = 9,    // [0.01 arcsec] index: largest difference of sensor and steps; more than worm error and backlash
+    LINE_SETTING_INDEX_WAY = 10,    // index: 0 not through angle 0, 1 the shorter way round, 2 always up
+    LINE_SETTING_PERIODS_PER_TURN = 11,    // periods of axis 0 in a turn of the table; four steps are a period
+    LINE_SETTING_SENSOR_PATIENCE = 12,    // [0.001 s] sensor: dead when no good frame came for this long
+    LINE_SETTING_SENSOR_ZERO = 13,    // [0.01 arcsec] sensor: what it sends at angle 0
+    LINE_SETTING_READOUT_DECIMALS = 14,    // numeric display: decimals of the position in mm
+    LINE_SETTING_PEER_MODE = 15,    // peer port: 0 not in use, 1 S4's bytes as printed, 2 frames with CRC-32
+    LINE_SETTING_PEER_ROLE = 16,    // peer port: 0 this is the main node, 1 the sub-node that indexes
+    LINE_SETTING_PEER_PATIENCE = 17,    // [0.001 s] peer port: an index that takes longer has failed
+};
+#define LINE_SETTING_COUNT 17u
+
+// X(name, id, min, max, default): all int64_t, in counts of the wire
+#define LINE_SETTINGS(X) \
+    X(index_tolerance, 1, 1LL, 360000LL, 50LL) \
+    X(index_allowance, 2, 0LL, 3600000LL, 6000LL) \
+    X(index_take_up, 3, 1LL, 3600000LL, 6000LL) \
+    X(index_share, 4, 5LL, 95LL, 50LL) \
+    X(index_tries, 5, 1LL, 255LL, 40LL) \
+    X(index_overshoots, 6, 0LL, 255LL, 3LL) \
+    X(index_settle, 7, 0LL, 10000LL, 100LL) \
+    X(index_frames, 8, 1LL, 64LL, 4LL) \
+    X(index_disagreement, 9, 100LL, 16000000LL, 12000LL) \
+    X(index_way, 10, 0LL, 2LL, 0LL) \
+    X(periods_per_turn, 11, 1LL, 2147483647LL, 1800000LL) \
+    X(sensor_patience, 12, 10LL, 10000LL, 200LL) \
+    X(sensor_zero, 13, 0LL, 129599999LL, 0LL) \
+    X(readout_decimals, 14, 0LL, 6LL, 5LL) \
+    X(peer_mode, 15, 0LL, 2LL, 0LL) \
+    X(peer_role, 16, 0LL, 1LL, 0LL) \
+    X(peer_patience, 17, 100LL, 3600000LL, 300000LL)
 
 #endif

@@ -272,7 +272,7 @@ class Grating:
 class Machine:
     """The node under the firmware; request() speaks to it as the master does."""
 
-    def __init__(self, *axes, map_crc=DEFINES["MAP_CRC"], address=2):
+    def __init__(self, *axes, map_crc=DEFINES["MAP_CRC"], address=2, image="axis"):
         self.axes, self.address, self.map_crc, self.clk = list(axes) or [Axis()], address, map_crc, 0
         self.gratings = [Grating() for _ in self.axes]
         # words by their offset; all drives are built
@@ -280,7 +280,7 @@ class Machine:
         self.received, self.sent, self.word, self.crc_bytes = deque(), [], {}, b""
         self.sequence = 0
         self.answers = READ(self.read), WRITE(self.write)               # kept alive as long as the firmware may call
-        self.firmware = library()
+        self.firmware = library(image)
         self.firmware.register_bridge(*self.answers)
         self.firmware.firmware_start()
 

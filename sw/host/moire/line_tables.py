@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0xAF711DB1
+PROTOCOL_CRC = 0x281AE3D5
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -53,6 +53,15 @@ CAUSES = {
     21: ("no_index", "no index was found within the home distance"),
     22: ("not_prepared", "the axis has no motion prepared"),
     23: ("not_built", "this node was built without that"),
+    30: ("sensor_dead", "no good frame came from the angle sensor: check its power and its cable"),
+    31: ("sensor_stuck", "the angle sensor sent one and the same angle while the table was turned"),
+    32: ("stiction", "the table did not follow its steps: it sticks, or the motor lost them"),
+    33: ("wrong_sign", "the table turned against its steps: turn the sign of steps_per_period"),
+    34: ("not_converged", "the tolerance was not reached within the allowed tries"),
+    35: ("sensor_disagrees", "angle sensor and steps disagree on how far the table turned"),
+    36: ("peer_silent", "the other node does not answer: check the cable between the two and its peer_mode"),
+    37: ("no_station", "the other node has no such station: write the program to both"),
+    38: ("peer_off", "the peer port is not in use: see the settings peer_mode and peer_role"),
 }
 
 # bit: (name, words)
@@ -142,6 +151,24 @@ LEARNER_ACTIONS = {
     3: ("forget", "correct nothing, begin afresh"),
 }
 
+# code: (name, words)
+INDEX_PHASES = {
+    0: ("idle", "at rest"),
+    1: ("reading", "waiting for the table to settle, and reading its angle"),
+    2: ("going_below", "going down, below the target"),
+    3: ("coming_up", "coming up on the long way"),
+    4: ("closing_in", "closing in on the target"),
+}
+
+# code: (name, words)
+PEER_PHASES = {
+    0: ("idle", "nothing was asked for"),
+    1: ("indexing", "the sub-node indexes"),
+    2: ("indexed", "the sub-node has indexed"),
+    3: ("failed", "the sub-node failed"),
+    4: ("silent", "the sub-node does not answer"),
+}
+
 OPERATIONS = {operation.name: operation for operation in (
     Operation("identify", 1, "who is there, and what was it built from",
               (),
@@ -213,6 +240,33 @@ OPERATIONS = {operation.name: operation for operation in (
               (("duration_ticks", "u32"),)),
     Operation("start", 21, "begin the prepared motions of these axes (bit n: axis n), all in one tick; none if one of them has none",
               (("axes", "u8"),),
+              ()),
+    Operation("get_setting", 40, "read a setting of a station",
+              (("setting", "u8"),),
+              (("value", "i64"),)),
+    Operation("set_setting", 41, "write a setting of a station",
+              (("setting", "u8"), ("value", "i64"),),
+              ()),
+    Operation("index_to", 42, "turn the table of axis 0 to an absolute angle, 0.01 arcsec; refused while an axis moves",
+              (("angle", "u32"),),
+              ()),
+    Operation("index_state", 43, "what the table does, how its last index ended, the angle of its last reading; all in 0.01 arcsec",
+              (),
+              (("phase", "u8"), ("ended", "u8"), ("tries", "u8"), ("overshoots", "u8"),
+               ("target", "u32"), ("reading", "u32"), ("left", "i32"),)),
+    Operation("sensor", 44, "the last good frame of the angle sensor in 0.01 arcsec, its age in clk, and frames since power-up",
+              (),
+              (("angle", "u32"), ("age", "u32"), ("dead", "u8"), ("frames", "u32"),
+               ("wrong_crc", "u32"), ("broken", "u32"), ("missed", "u32"),)),
+    Operation("peer", 45, "what the peer port does: the last index asked for or done, and what came that was not understood",
+              (),
+              (("phase", "u8"), ("ended", "u8"), ("station", "u16"), ("stations", "u16"),
+               ("heard", "u32"), ("garbage", "u32"), ("repeated", "u32"),)),
+    Operation("peer_station", 46, "one of the stations of a sub-node in mode printed, from 0 on; the next order then goes to station 0",
+              (("station", "u16"), ("stations", "u16"), ("angle", "u32"),),
+              ()),
+    Operation("peer_next", 47, "the station to which the next order goes in mode printed",
+              (("station", "u16"),),
               ()),
 )}
 
@@ -451,4 +505,58 @@ PARAMETERS = {parameter.name: parameter for parameter in (
     Parameter("filter_2_a2", 78, "", Fraction(1, 1073741824),
               -2147483648, 2147483647, 0,
               "servo: filter 2, coefficient -a2"),
+)}
+
+SETTINGS = {parameter.name: parameter for parameter in (
+    Parameter("index_tolerance", 1, "arcsec", Fraction(1, 100),
+              1, 360000, 50,
+              "index: it has ended when no more than this is left by the sensor"),
+    Parameter("index_allowance", 2, "arcsec", Fraction(1, 100),
+              0, 3600000, 6000,
+              "index: the long way ends so far below the target; more than the error of the worm"),
+    Parameter("index_take_up", 3, "arcsec", Fraction(1, 100),
+              1, 3600000, 6000,
+              "index: shortest way up before a reading counts; more than the backlash"),
+    Parameter("index_share", 4, "", Fraction(1, 100),
+              5, 95, 50,
+              "index: each try goes this share of what is left"),
+    Parameter("index_tries", 5, "", Fraction(1, 1),
+              1, 255, 40,
+              "index: tries before it is given up"),
+    Parameter("index_overshoots", 6, "", Fraction(1, 1),
+              0, 255, 3,
+              "index: how often it may back off from above the target and come again"),
+    Parameter("index_settle", 7, "s", Fraction(1, 1000),
+              0, 10000, 100,
+              "index: rest before a reading; more than the latency of the sensor"),
+    Parameter("index_frames", 8, "", Fraction(1, 1),
+              1, 64, 4,
+              "index: frames whose mean is a reading"),
+    Parameter("index_disagreement", 9, "arcsec", Fraction(1, 100),
+              100, 16000000, 12000,
+              "index: largest difference of sensor and steps; more than worm error and backlash"),
+    Parameter("index_way", 10, "", Fraction(1, 1),
+              0, 2, 0,
+              "index: 0 not through angle 0, 1 the shorter way round, 2 always up"),
+    Parameter("periods_per_turn", 11, "", Fraction(1, 1),
+              1, 2147483647, 1800000,
+              "periods of axis 0 in a turn of the table; four steps are a period"),
+    Parameter("sensor_patience", 12, "s", Fraction(1, 1000),
+              10, 10000, 200,
+              "sensor: dead when no good frame came for this long"),
+    Parameter("sensor_zero", 13, "arcsec", Fraction(1, 100),
+              0, 129599999, 0,
+              "sensor: what it sends at angle 0"),
+    Parameter("readout_decimals", 14, "", Fraction(1, 1),
+              0, 6, 5,
+              "numeric display: decimals of the position in mm"),
+    Parameter("peer_mode", 15, "", Fraction(1, 1),
+              0, 2, 0,
+              "peer port: 0 not in use, 1 S4's bytes as printed, 2 frames with CRC-32"),
+    Parameter("peer_role", 16, "", Fraction(1, 1),
+              0, 1, 0,
+              "peer port: 0 this is the main node, 1 the sub-node that indexes"),
+    Parameter("peer_patience", 17, "s", Fraction(1, 1000),
+              100, 3600000, 300000,
+              "peer port: an index that takes longer has failed"),
 )}
