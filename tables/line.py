@@ -23,8 +23,9 @@ REQUEST_HEAD = ["sequence u8", "operation u8"]
 REPLY_HEAD = ["sequence u8", "operation u8", "cause u8"]
 AXIS = "axis u8"    # first field of what asks an axis
 LISTS = ("cause", "fault", "encoder_event", "state", "flag", "learner_reason", "signal_fault", "learner_action", "index_phase",
-         "peer_phase")
-CODES = ("cause", "state", "learner_reason", "learner_action", "index_phase", "peer_phase")     # these are numbers, the other lists are bits
+         "peer_phase", "job_state", "job_action", "job_flag")
+CODES = ("cause", "state", "learner_reason", "learner_action", "index_phase", "peer_phase", "job_state", "job_action")    # numbers, not bits
+WORDS = ("cause", "job_state")                                                # lists whose words the firmware shows on its panel
 
 
 def fields(head, declared):
@@ -99,6 +100,9 @@ def header(line: Line) -> str:
             value = str(code) if name in CODES else f"1 << {code}"
             out.append(f"    LINE_{name}_{key}".upper() + f" = {value},    // {words}")
         out += ["};", ""]
+    for name in WORDS:
+        out.append("// X(code, words)")
+        out += macro(f"LINE_{name.upper()}_WORDS", [f"    X({code}, {quoted(words)})" for code, words in line.lists[name].values()])
     out.append("enum line_operation {")
     for name, operation in line.operations.items():
         out.append(f"    LINE_OPERATION_{name.upper()} = {operation['code']},    // {operation['text']}")

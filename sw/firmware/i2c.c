@@ -81,8 +81,9 @@ static void send_next(const struct i2c_transfer *t)
     for (unsigned n = 0; n < A_POLL && asked < most && asked < command_count(t); n++) links_write(LINKS_I2C, command_at(t, asked++));
 }
 
-void i2c_start(void)
+void i2c_start(unsigned axes)
 {
+    (void)axes;
     for (unsigned n = 0; n < I2C_CLIENTS; n++) {
         transfers[n] = NULL;
         outcomes[n] = I2C_OK;

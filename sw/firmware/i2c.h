@@ -15,7 +15,7 @@ struct i2c_transfer {
     uint8_t *read;
 };
 
-void i2c_start(void);
+void i2c_start(unsigned axes);
 void i2c_work(void);
 void i2c_begin(enum i2c_client client, const struct i2c_transfer *transfer);
 enum i2c_outcome i2c_outcome(enum i2c_client client);      // of the last transfer. absent: nobody acknowledged the address

@@ -1,9 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // image_station -- a station of an indexing machine (S4), main node and sub-node alike.
+#include "i2c.h"
 #include "image.h"
+#include "job.h"
+#include "machine.h"
+#include "panel.h"
 #include "settings.h"
+#include "store.h"
 
 const struct image_part image_parts[] = {
     {settings_start, 0, settings_operation},
+    {i2c_start, i2c_work, 0},
+    {store_start, store_work, 0},
+    {machine_start, machine_work, 0},
+    {job_start, job_work, job_operation},
+    {panel_start, panel_work, 0},
 };
 const unsigned image_part_count = sizeof image_parts / sizeof *image_parts;

@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x281AE3D5u    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x4E7EB90Bu    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -43,6 +43,27 @@ enum line_cause {
     LINE_CAUSE_PEER_SILENT = 36,    // the other node does not answer: check the cable between the two and its peer_mode
     LINE_CAUSE_NO_STATION = 37,    // the other node has no such station: write the program to both
     LINE_CAUSE_PEER_OFF = 38,    // the peer port is not in use: see the settings peer_mode and peer_role
+    LINE_CAUSE_STORE_MISSING = 40,    // the EEPROM does not answer
+    LINE_CAUSE_STORE_FAILED = 41,    // the EEPROM does not keep what is written
+    LINE_CAUSE_STORE_BUSY = 42,    // the EEPROM is being read or written
+    LINE_CAUSE_NO_PROGRAM = 43,    // no program of stations is stored
+    LINE_CAUSE_PROGRAM_TORN = 44,    // the stored program is damaged
+    LINE_CAUSE_PROGRAM_INCOMPLETE = 45,    // begin a program and give all its stations
+    LINE_CAUSE_NO_STATIONS = 46,    // a program needs at least one station
+    LINE_CAUSE_TOO_MANY_STATIONS = 47,    // the EEPROM is full: it holds 360 stations
+    LINE_CAUSE_ANGLE_OUT_OF_TURN = 48,    // angles must be below 360 degrees
+    LINE_CAUSE_ANGLES_NOT_ASCENDING = 49,    // each angle must be larger than the last
+    LINE_CAUSE_JOB_ACTIVE = 50,    // a job is under way: stop it first
+    LINE_CAUSE_NOT_NOW = 51,    // the job does not wait for that now
+    LINE_CAUSE_MACHINE_BUSY = 52,    // the machine cuts, or its keys still wait
+    LINE_CAUSE_MACHINE_ALARM = 53,    // the machine reports an alarm
+    LINE_CAUSE_KEYS_NOT_TAKEN = 54,    // the machine does not take our keys
+    LINE_CAUSE_CUT_NOT_STARTED = 55,    // the cut did not start in time
+    LINE_CAUSE_CUT_NOT_ENDED = 56,    // the cut did not end in time
+    LINE_CAUSE_POWER_LOST = 57,    // the power was lost during the job
+    LINE_CAUSE_PAUSED_BY_PERSON = 58,    // paused by a person
+    LINE_CAUSE_KEY_WITHOUT_FUNCTION = 59,    // this key has no function
+    LINE_CAUSE_TABLE_UNKNOWN = 60,    // it is not known where the table stands
 };
 
 enum line_fault {    // bits
@@ -141,6 +162,119 @@ enum line_peer_phase {
     LINE_PEER_PHASE_SILENT = 4,    // the sub-node does not answer
 };
 
+enum line_job_state {
+    LINE_JOB_STATE_LOADING = 0,    // loading
+    LINE_JOB_STATE_IDLE = 1,    // ready
+    LINE_JOB_STATE_FINISHED = 2,    // all cut
+    LINE_JOB_STATE_STARTING = 3,    // starts
+    LINE_JOB_STATE_INDEXING = 4,    // table turns
+    LINE_JOB_STATE_ARRIVED = 5,    // at station
+    LINE_JOB_STATE_BEGINNING = 6,    // begins cut
+    LINE_JOB_STATE_CUTTING = 7,    // cutting
+    LINE_JOB_STATE_FOLLOWING = 8,    // cutting
+    LINE_JOB_STATE_ENDED = 9,    // cut done
+    LINE_JOB_STATE_LEAVING = 10,    // leaves
+    LINE_JOB_STATE_FINISHING = 11,    // finishing
+    LINE_JOB_STATE_PAUSED = 12,    // paused
+    LINE_JOB_STATE_UNSURE = 13,    // is it cut?
+    LINE_JOB_STATE_STOPPING = 14,    // stopping
+};
+
+enum line_job_action {
+    LINE_JOB_ACTION_START = 0,    // cut all stations from the first one on
+    LINE_JOB_ACTION_PAUSE = 1,    // stand before the next cut or the next station
+    LINE_JOB_ACTION_RESUME = 2,    // go on; if it is unsure whether a station was cut, wait for the end of the cut under way
+    LINE_JOB_ACTION_STOP = 3,    // end the job; a cut under way is left to the machine
+    LINE_JOB_ACTION_AGAIN = 4,    // cut the station again
+    LINE_JOB_ACTION_NEXT = 5,    // the station is cut: go to the next one
+};
+
+enum line_job_flag {    // bits
+    LINE_JOB_FLAG_STORE = 1 << 0,    // the EEPROM answers
+    LINE_JOB_FLAG_KEYPAD = 1 << 1,    // the key-pad answers
+    LINE_JOB_FLAG_DISPLAY = 1 << 2,    // the character display answers
+    LINE_JOB_FLAG_CUTTING = 1 << 3,    // the machine cuts
+    LINE_JOB_FLAG_ALARM = 1 << 4,    // the machine reports an alarm
+    LINE_JOB_FLAG_KEYS_WAIT = 1 << 5,    // keys for the machine wait: a person types, or it does not take them
+    LINE_JOB_FLAG_PAUSING = 1 << 6,    // a pause comes next
+    LINE_JOB_FLAG_COPY_TORN = 1 << 7,    // one copy of the program is damaged, the other one is in force
+};
+
+// X(code, words)
+#define LINE_CAUSE_WORDS(X) \
+    X(0, "done") \
+    X(1, "the node does not know this command") \
+    X(2, "the command has the wrong length") \
+    X(3, "the node has no axis of this number") \
+    X(4, "the node has no parameter of this number") \
+    X(5, "the value is outside what this parameter allows") \
+    X(6, "the target is outside the travel") \
+    X(7, "the axis has no zero yet: home it first") \
+    X(8, "the drive is off: enable it first") \
+    X(9, "a fault is latched: remove its cause and reset it first") \
+    X(10, "the cause of the fault still stands") \
+    X(11, "the axis is moving: stop it or wait") \
+    X(12, "firmware and hardware were not made for each other (register maps differ)") \
+    X(13, "the node has no register at this address") \
+    X(14, "stopped by the host") \
+    X(15, "no limit switch was found within the travel") \
+    X(16, "the limit switch did not open within the home distance") \
+    X(17, "the target was not reached within the settling time") \
+    X(18, "a fault ended the motion") \
+    X(19, "the motion is under way") \
+    X(20, "no motion was asked for yet") \
+    X(21, "no index was found within the home distance") \
+    X(22, "the axis has no motion prepared") \
+    X(23, "this node was built without that") \
+    X(30, "no good frame came from the angle sensor: check its power and its cable") \
+    X(31, "the angle sensor sent one and the same angle while the table was turned") \
+    X(32, "the table did not follow its steps: it sticks, or the motor lost them") \
+    X(33, "the table turned against its steps: turn the sign of steps_per_period") \
+    X(34, "the tolerance was not reached within the allowed tries") \
+    X(35, "angle sensor and steps disagree on how far the table turned") \
+    X(36, "the other node does not answer: check the cable between the two and its peer_mode") \
+    X(37, "the other node has no such station: write the program to both") \
+    X(38, "the peer port is not in use: see the settings peer_mode and peer_role") \
+    X(40, "the EEPROM does not answer") \
+    X(41, "the EEPROM does not keep what is written") \
+    X(42, "the EEPROM is being read or written") \
+    X(43, "no program of stations is stored") \
+    X(44, "the stored program is damaged") \
+    X(45, "begin a program and give all its stations") \
+    X(46, "a program needs at least one station") \
+    X(47, "the EEPROM is full: it holds 360 stations") \
+    X(48, "angles must be below 360 degrees") \
+    X(49, "each angle must be larger than the last") \
+    X(50, "a job is under way: stop it first") \
+    X(51, "the job does not wait for that now") \
+    X(52, "the machine cuts, or its keys still wait") \
+    X(53, "the machine reports an alarm") \
+    X(54, "the machine does not take our keys") \
+    X(55, "the cut did not start in time") \
+    X(56, "the cut did not end in time") \
+    X(57, "the power was lost during the job") \
+    X(58, "paused by a person") \
+    X(59, "this key has no function") \
+    X(60, "it is not known where the table stands")
+
+// X(code, words)
+#define LINE_JOB_STATE_WORDS(X) \
+    X(0, "loading") \
+    X(1, "ready") \
+    X(2, "all cut") \
+    X(3, "starts") \
+    X(4, "table turns") \
+    X(5, "at station") \
+    X(6, "begins cut") \
+    X(7, "cutting") \
+    X(8, "cutting") \
+    X(9, "cut done") \
+    X(10, "leaves") \
+    X(11, "finishing") \
+    X(12, "paused") \
+    X(13, "is it cut?") \
+    X(14, "stopping")
+
 enum line_operation {
     LINE_OPERATION_IDENTIFY = 1,    // who is there, and what was it built from
     LINE_OPERATION_STATUS = 2,    // state, position and faults of an axis; ended is the cause of the last motion
@@ -171,6 +305,13 @@ enum line_operation {
     LINE_OPERATION_PEER = 45,    // what the peer port does: the last index asked for or done, and what came that was not understood
     LINE_OPERATION_PEER_STATION = 46,    // one of the stations of a sub-node in mode printed, from 0 on; the next order then goes to station 0
     LINE_OPERATION_PEER_NEXT = 47,    // the station to which the next order goes in mode printed
+    LINE_OPERATION_JOB = 48,    // what the job does, at which station (from 0 on), why it waits, and for which answers (bits of job_action)
+    LINE_OPERATION_JOB_DO = 49,    // start, pause, resume or stop the job, or answer its question
+    LINE_OPERATION_JOB_PROGRAM = 50,    // the stored program: writing 1 while one is written, then how that ended, or why there is none; stations 0 if there is none
+    LINE_OPERATION_JOB_ANGLE = 51,    // angle of a station of the stored program, in 0.01 arcsec
+    LINE_OPERATION_JOB_BEGIN = 52,    // begin a new program; it comes into force when it is saved, and not while a job is under way
+    LINE_OPERATION_JOB_ADD = 53,    // give the new program a station; in their order, from 0 on, with ascending angles
+    LINE_OPERATION_JOB_SAVE = 54,    // write the new program into the EEPROM, the settings of the station with it; job_program tells when and how that ended
 };
 
 // Lengths of whole bodies and offsets of their fields, in bytes, little endian.
@@ -351,6 +492,36 @@ enum line_operation {
 #define LINE_PEER_NEXT_REQUEST_LENGTH 4u
 #define LINE_PEER_NEXT_REQUEST_STATION 2u    // u16
 #define LINE_PEER_NEXT_REPLY_LENGTH 3u
+#define LINE_JOB_REQUEST_LENGTH 2u
+#define LINE_JOB_REPLY_LENGTH 11u
+#define LINE_JOB_REPLY_STATE 3u    // u8
+#define LINE_JOB_REPLY_CAUSE 4u    // u8
+#define LINE_JOB_REPLY_STATION 5u    // u16
+#define LINE_JOB_REPLY_STATIONS 7u    // u16
+#define LINE_JOB_REPLY_ANSWERS 9u    // u8
+#define LINE_JOB_REPLY_FLAGS 10u    // u8
+#define LINE_JOB_DO_REQUEST_LENGTH 3u
+#define LINE_JOB_DO_REQUEST_ACTION 2u    // u8
+#define LINE_JOB_DO_REPLY_LENGTH 3u
+#define LINE_JOB_PROGRAM_REQUEST_LENGTH 2u
+#define LINE_JOB_PROGRAM_REPLY_LENGTH 15u
+#define LINE_JOB_PROGRAM_REPLY_WRITING 3u    // u8
+#define LINE_JOB_PROGRAM_REPLY_ENDED 4u    // u8
+#define LINE_JOB_PROGRAM_REPLY_GENERATION 5u    // u32
+#define LINE_JOB_PROGRAM_REPLY_STATIONS 9u    // u16
+#define LINE_JOB_PROGRAM_REPLY_JOURNAL 11u    // u32
+#define LINE_JOB_ANGLE_REQUEST_LENGTH 4u
+#define LINE_JOB_ANGLE_REQUEST_STATION 2u    // u16
+#define LINE_JOB_ANGLE_REPLY_LENGTH 7u
+#define LINE_JOB_ANGLE_REPLY_ANGLE 3u    // u32
+#define LINE_JOB_BEGIN_REQUEST_LENGTH 2u
+#define LINE_JOB_BEGIN_REPLY_LENGTH 3u
+#define LINE_JOB_ADD_REQUEST_LENGTH 8u
+#define LINE_JOB_ADD_REQUEST_STATION 2u    // u16
+#define LINE_JOB_ADD_REQUEST_ANGLE 4u    // u32
+#define LINE_JOB_ADD_REPLY_LENGTH 3u
+#define LINE_JOB_SAVE_REQUEST_LENGTH 2u
+#define LINE_JOB_SAVE_REPLY_LENGTH 3u
 
 // X(name, code, length of the request body, length of the reply body if the cause is ok, 1: of an axis, its first field)
 #define LINE_OPERATIONS(X) \
@@ -382,7 +553,14 @@ enum line_operation {
     X(sensor, 44, 2, 28, 0) \
     X(peer, 45, 2, 21, 0) \
     X(peer_station, 46, 10, 3, 0) \
-    X(peer_next, 47, 4, 3, 0)
+    X(peer_next, 47, 4, 3, 0) \
+    X(job, 48, 2, 11, 0) \
+    X(job_do, 49, 3, 3, 0) \
+    X(job_program, 50, 2, 15, 0) \
+    X(job_angle, 51, 4, 7, 0) \
+    X(job_begin, 52, 2, 3, 0) \
+    X(job_add, 53, 8, 3, 0) \
+    X(job_save, 54, 2, 3, 0)
 
 enum line_parameter {
     LINE_PARAMETER_PERIOD = 1,    // [1 pm] length of one signal period
@@ -565,8 +743,10 @@ enum line_setting {
     LINE_SETTING_PEER_MODE = 15,    // peer port: 0 not in use, 1 S4's bytes as printed, 2 frames with CRC-32
     LINE_SETTING_PEER_ROLE = 16,    // peer port: 0 this is the main node, 1 the sub-node that indexes
     LINE_SETTING_PEER_PATIENCE = 17,    // [0.001 s] peer port: an index that takes longer has failed
+    LINE_SETTING_JOB_START_LIMIT = 18,    // [1 s] job: longest time from the start keys to the beginning of the cut
+    LINE_SETTING_JOB_CUT_LIMIT = 19,    // [1 s] job: longest cut
 };
-#define LINE_SETTING_COUNT 17u
+#define LINE_SETTING_COUNT 19u
 
 // X(name, id, min, max, default): all int64_t, in counts of the wire
 #define LINE_SETTINGS(X) \
@@ -586,6 +766,8 @@ enum line_setting {
     X(readout_decimals, 14, 0LL, 6LL, 5LL) \
     X(peer_mode, 15, 0LL, 2LL, 0LL) \
     X(peer_role, 16, 0LL, 1LL, 0LL) \
-    X(peer_patience, 17, 100LL, 3600000LL, 300000LL)
+    X(peer_patience, 17, 100LL, 3600000LL, 300000LL) \
+    X(job_start_limit, 18, 1LL, 3600LL, 30LL) \
+    X(job_cut_limit, 19, 1LL, 1000000LL, 14400LL)
 
 #endif

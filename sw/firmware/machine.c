@@ -9,6 +9,7 @@
 #include "clock.h"
 #include "hardware.h"
 #include "line_protocol.h"
+#include "settings.h"
 
 #define QUEUE 32u                       // scan codes
 #define CUTTING 1u                      // status inputs
@@ -19,7 +20,7 @@
 static const uint8_t start_keys[] = {0x14, 0x1D, 0xF0, 0x1D, 0xF0, 0x14};       // left control and W, pressed and let go
 
 static uint8_t state, cause;
-static uint32_t since_ms, begun_ms, start_limit_ms, cut_limit_ms, typed;
+static uint32_t since_ms, begun_ms, typed;
 
 static uint32_t status(void)
 {
@@ -47,6 +48,11 @@ static void fail(uint8_t with)
 {
     cause = with;
     go(MACHINE_FAILED);
+}
+
+static uint32_t limit_ms(uint8_t setting)
+{
+    return 1000u * (uint32_t)settings_get(setting);
 }
 
 static void begun(void)
@@ -91,16 +97,15 @@ uint8_t machine_cause(void)
     return cause;
 }
 
-void machine_start(void)
+void machine_start(unsigned axes)
 {
+    (void)axes;
     cause = LINE_CAUSE_OK;
     go(MACHINE_WATCHED);
 }
 
-void machine_begin(uint32_t start_limit_s, uint32_t cut_limit_s)
+void machine_begin(void)
 {
-    start_limit_ms = 1000u * start_limit_s;
-    cut_limit_ms = 1000u * cut_limit_s;
     if (machine_alarms()) return fail(LINE_CAUSE_MACHINE_ALARM);
     if (!machine_rests()) return fail(LINE_CAUSE_MACHINE_BUSY);
     links_write(LINKS_MACHINE_STATUS, LINKS_MACHINE_STATUS_ROSE_0_MASK | LINKS_MACHINE_STATUS_FELL_0_MASK | LINKS_MACHINE_STATUS_ROSE_1_MASK);
@@ -111,9 +116,8 @@ void machine_begin(uint32_t start_limit_s, uint32_t cut_limit_s)
     go(MACHINE_KEYS_WAIT);
 }
 
-void machine_follow(uint32_t cut_limit_s)
+void machine_follow(void)
 {
-    cut_limit_ms = 1000u * cut_limit_s;
     links_write(LINKS_MACHINE_STATUS, LINKS_MACHINE_STATUS_ROSE_1_MASK);
     begun();
 }
@@ -140,11 +144,11 @@ void machine_work(void)
         break;
     case MACHINE_STARTING:
         if (seen & LINKS_MACHINE_STATUS_ROSE_0_MASK) begun();
-        else if (longer_than(start_limit_ms)) fail(LINE_CAUSE_CUT_NOT_STARTED);
+        else if (longer_than(limit_ms(LINE_SETTING_JOB_START_LIMIT))) fail(LINE_CAUSE_CUT_NOT_STARTED);
         break;
     case MACHINE_CUTTING:
         if (!(FIELD_GET(seen, LINKS_MACHINE_STATUS_INPUTS) & CUTTING)) go(MACHINE_ENDING);
-        else if (clock_ms() - begun_ms > cut_limit_ms) fail(LINE_CAUSE_CUT_NOT_ENDED);
+        else if (clock_ms() - begun_ms > limit_ms(LINE_SETTING_JOB_CUT_LIMIT)) fail(LINE_CAUSE_CUT_NOT_ENDED);
         break;
     default:
         if (FIELD_GET(seen, LINKS_MACHINE_STATUS_INPUTS) & CUTTING) go(MACHINE_CUTTING);

@@ -8,10 +8,10 @@
 
 enum machine_state { MACHINE_WATCHED, MACHINE_KEYS_WAIT, MACHINE_STARTING, MACHINE_CUTTING, MACHINE_ENDING, MACHINE_CUT, MACHINE_FAILED };
 
-void machine_start(void);
+void machine_start(unsigned axes);
 void machine_work(void);
-void machine_begin(uint32_t start_limit_s, uint32_t cut_limit_s);   // send the keys, follow the cut
-void machine_follow(uint32_t cut_limit_s);                          // the cut that is under way
+void machine_begin(void);                       // send the keys, follow the cut
+void machine_follow(void);                      // the cut that is under way
 enum machine_state machine_state(void);
 uint8_t machine_cause(void);                    // why it failed
 bool machine_built(void);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// store -- the program of stations and the journal of the job, in an EEPROM 24AA128, whole after a power cut at any moment.
+// store -- the program of stations with the settings, and the journal of the job, in an EEPROM 24AA128, whole after a power cut at any moment.
 //
 // A page that is being written when the power goes may hold anything afterwards. So there are two copies of the program, each with a
 // generation and a CRC-32, and a new one goes over the older; and each line of the journal has a page of its own, used in turn.
@@ -7,9 +7,12 @@
 // tried until it does.
 #include "store.h"
 
+#include <stddef.h>
+
 #include "clock.h"
 #include "i2c.h"
 #include "line_protocol.h"
+#include "settings.h"
 
 #define DEVICE 0x50u
 #define PAGE 64u
@@ -18,17 +21,22 @@
 #define JOURNAL 4096u                   // after the two copies
 #define JOURNAL_PAGES 64u
 #define CHECKED 16u                     // bytes of a CRC-32 done in one call
-#define HEAD_BYTES 12u                  // of a program, before its stations
+#define HEAD_BYTES ((unsigned)offsetof(struct store_program, angle))
 #define CRC_BYTES 4u
 #define RECORD_CHECKED 12u              // bytes of a record before its CRC-32
 #define PATIENCE_MS 50u                 // a write takes 5 ms
 #define RETRY_MS 1000u                  // a device that is not there is looked for again
 #define TRIES 3u                        // to write a page
-#define LONGEST_CUT_S 1000000u
 
 enum task { REST, LOAD, CHECK_LOADED, READ_JOURNAL, SEAL, WRITE, VERIFY, DEAD };
 
-static struct store_program programs[2];        // by copy
+static struct store_program {                   // as in the EEPROM, where a CRC-32 follows the last station
+    uint32_t generation;                        // each saved one has one more; 0: there is none
+    uint16_t settings;                          // so many
+    uint16_t stations;
+    int32_t setting[LINE_SETTING_COUNT];        // those of the station when it was saved
+    uint32_t angle[STORE_STATIONS + 1];         // 0.01 arcsec, ascending; one more for the CRC-32
+} programs[2];                                  // by copy
 static struct store_record last, candidate;
 static uint8_t newest;                          // copy in force
 static bool blank[2], torn, drafting;
@@ -68,7 +76,7 @@ static uint8_t *bytes_of(unsigned which)
 static unsigned program_bytes(const struct store_program *program)
 {
     unsigned stations = program->stations <= STORE_STATIONS ? program->stations : STORE_STATIONS;
-    return HEAD_BYTES + sizeof program->angle[0] * stations;
+    return HEAD_BYTES + 4u * stations;
 }
 
 static uint16_t record_place(uint32_t sequence)
@@ -131,6 +139,7 @@ static void choose(void)
     bool both_blank = blank[0] && blank[1];
     torn = (programs[0].generation == 0 && !blank[0]) || (programs[1].generation == 0 && !blank[1]);
     newest = programs[1].generation > programs[0].generation;
+    for (uint8_t id = 1; programs[newest].generation && id <= LINE_SETTING_COUNT; id++) settings_set(id, programs[newest].setting[id - 1]);
     cause = programs[newest].generation ? LINE_CAUSE_OK : both_blank ? LINE_CAUSE_NO_PROGRAM : LINE_CAUSE_PROGRAM_TORN;
     last = (struct store_record){0};
     at = 0;
@@ -151,7 +160,7 @@ static void check_loaded(void)
 {
     struct store_program *program = &programs[newest];
     if (!crc_step(program, newest)) return;
-    if (program->stations > STORE_STATIONS || program->angle[program->stations] != ~crc)
+    if (program->settings != LINE_SETTING_COUNT || program->stations > STORE_STATIONS || program->angle[program->stations] != ~crc)
         program->generation = program->stations = 0;
     newest ? choose() : load_begin(1);
 }
@@ -253,8 +262,9 @@ static void load(void)
     load_begin(0);
 }
 
-void store_start(void)
+void store_start(unsigned axes)
 {
+    (void)axes;
     cause = LINE_CAUSE_OK;
     load();
 }
@@ -294,9 +304,19 @@ bool store_torn(void)
     return torn;
 }
 
-const struct store_program *store_program(void)
+uint16_t store_stations(void)
 {
-    return &programs[newest];
+    return store_state() == STORE_LOADING ? 0 : programs[newest].stations;
+}
+
+uint32_t store_angle(unsigned station)
+{
+    return programs[newest].angle[station];
+}
+
+uint32_t store_generation(void)
+{
+    return store_state() == STORE_LOADING ? 0 : programs[newest].generation;
 }
 
 const struct store_record *store_record(void)
@@ -309,15 +329,11 @@ static uint8_t may_write(void)
     return task == REST ? LINE_CAUSE_OK : task == DEAD ? LINE_CAUSE_STORE_MISSING : LINE_CAUSE_STORE_BUSY;
 }
 
-uint8_t store_begin(uint32_t cut_limit_s, uint16_t start_limit_s)
+uint8_t store_begin(void)
 {
-    struct store_program *program = &programs[!newest];
     uint8_t refused = may_write();
     if (refused != LINE_CAUSE_OK) return refused;
-    if (cut_limit_s == 0 || cut_limit_s > LONGEST_CUT_S || start_limit_s == 0) return LINE_CAUSE_OUT_OF_RANGE;
-    program->cut_limit_s = cut_limit_s;
-    program->start_limit_s = start_limit_s;
-    program->stations = 0;
+    programs[!newest].stations = 0;
     drafting = true;
     return LINE_CAUSE_OK;
 }
@@ -349,6 +365,8 @@ uint8_t store_save(void)
     if (refused != LINE_CAUSE_OK) return refused;
     if (store_added() == 0) return LINE_CAUSE_NO_STATIONS;
     program->generation = programs[newest].generation + 1;
+    program->settings = LINE_SETTING_COUNT;
+    for (uint8_t id = 1; id <= LINE_SETTING_COUNT; id++) program->setting[id - 1] = (int32_t)settings_get(id);
     noting = false;
     tries = 0;
     at = 0;

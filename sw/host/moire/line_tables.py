@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x281AE3D5
+PROTOCOL_CRC = 0x4E7EB90B
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -62,6 +62,27 @@ CAUSES = {
     36: ("peer_silent", "the other node does not answer: check the cable between the two and its peer_mode"),
     37: ("no_station", "the other node has no such station: write the program to both"),
     38: ("peer_off", "the peer port is not in use: see the settings peer_mode and peer_role"),
+    40: ("store_missing", "the EEPROM does not answer"),
+    41: ("store_failed", "the EEPROM does not keep what is written"),
+    42: ("store_busy", "the EEPROM is being read or written"),
+    43: ("no_program", "no program of stations is stored"),
+    44: ("program_torn", "the stored program is damaged"),
+    45: ("program_incomplete", "begin a program and give all its stations"),
+    46: ("no_stations", "a program needs at least one station"),
+    47: ("too_many_stations", "the EEPROM is full: it holds 360 stations"),
+    48: ("angle_out_of_turn", "angles must be below 360 degrees"),
+    49: ("angles_not_ascending", "each angle must be larger than the last"),
+    50: ("job_active", "a job is under way: stop it first"),
+    51: ("not_now", "the job does not wait for that now"),
+    52: ("machine_busy", "the machine cuts, or its keys still wait"),
+    53: ("machine_alarm", "the machine reports an alarm"),
+    54: ("keys_not_taken", "the machine does not take our keys"),
+    55: ("cut_not_started", "the cut did not start in time"),
+    56: ("cut_not_ended", "the cut did not end in time"),
+    57: ("power_lost", "the power was lost during the job"),
+    58: ("paused_by_person", "paused by a person"),
+    59: ("key_without_function", "this key has no function"),
+    60: ("table_unknown", "it is not known where the table stands"),
 }
 
 # bit: (name, words)
@@ -169,6 +190,47 @@ PEER_PHASES = {
     4: ("silent", "the sub-node does not answer"),
 }
 
+# code: (name, words)
+JOB_STATES = {
+    0: ("loading", "loading"),
+    1: ("idle", "ready"),
+    2: ("finished", "all cut"),
+    3: ("starting", "starts"),
+    4: ("indexing", "table turns"),
+    5: ("arrived", "at station"),
+    6: ("beginning", "begins cut"),
+    7: ("cutting", "cutting"),
+    8: ("following", "cutting"),
+    9: ("ended", "cut done"),
+    10: ("leaving", "leaves"),
+    11: ("finishing", "finishing"),
+    12: ("paused", "paused"),
+    13: ("unsure", "is it cut?"),
+    14: ("stopping", "stopping"),
+}
+
+# code: (name, words)
+JOB_ACTIONS = {
+    0: ("start", "cut all stations from the first one on"),
+    1: ("pause", "stand before the next cut or the next station"),
+    2: ("resume", "go on; if it is unsure whether a station was cut, wait for the end of the cut under way"),
+    3: ("stop", "end the job; a cut under way is left to the machine"),
+    4: ("again", "cut the station again"),
+    5: ("next", "the station is cut: go to the next one"),
+}
+
+# bit: (name, words)
+JOB_FLAGS = {
+    0: ("store", "the EEPROM answers"),
+    1: ("keypad", "the key-pad answers"),
+    2: ("display", "the character display answers"),
+    3: ("cutting", "the machine cuts"),
+    4: ("alarm", "the machine reports an alarm"),
+    5: ("keys_wait", "keys for the machine wait: a person types, or it does not take them"),
+    6: ("pausing", "a pause comes next"),
+    7: ("copy_torn", "one copy of the program is damaged, the other one is in force"),
+}
+
 OPERATIONS = {operation.name: operation for operation in (
     Operation("identify", 1, "who is there, and what was it built from",
               (),
@@ -267,6 +329,29 @@ OPERATIONS = {operation.name: operation for operation in (
               ()),
     Operation("peer_next", 47, "the station to which the next order goes in mode printed",
               (("station", "u16"),),
+              ()),
+    Operation("job", 48, "what the job does, at which station (from 0 on), why it waits, and for which answers (bits of job_action)",
+              (),
+              (("state", "u8"), ("cause", "u8"), ("station", "u16"), ("stations", "u16"),
+               ("answers", "u8"), ("flags", "u8"),)),
+    Operation("job_do", 49, "start, pause, resume or stop the job, or answer its question",
+              (("action", "u8"),),
+              ()),
+    Operation("job_program", 50, "the stored program: writing 1 while one is written, then how that ended, or why there is none; stations 0 if there is none",
+              (),
+              (("writing", "u8"), ("ended", "u8"), ("generation", "u32"), ("stations", "u16"),
+               ("journal", "u32"),)),
+    Operation("job_angle", 51, "angle of a station of the stored program, in 0.01 arcsec",
+              (("station", "u16"),),
+              (("angle", "u32"),)),
+    Operation("job_begin", 52, "begin a new program; it comes into force when it is saved, and not while a job is under way",
+              (),
+              ()),
+    Operation("job_add", 53, "give the new program a station; in their order, from 0 on, with ascending angles",
+              (("station", "u16"), ("angle", "u32"),),
+              ()),
+    Operation("job_save", 54, "write the new program into the EEPROM, the settings of the station with it; job_program tells when and how that ended",
+              (),
               ()),
 )}
 
@@ -559,4 +644,10 @@ SETTINGS = {parameter.name: parameter for parameter in (
     Parameter("peer_patience", 17, "s", Fraction(1, 1000),
               100, 3600000, 300000,
               "peer port: an index that takes longer has failed"),
+    Parameter("job_start_limit", 18, "s", Fraction(1, 1),
+              1, 3600, 30,
+              "job: longest time from the start keys to the beginning of the cut"),
+    Parameter("job_cut_limit", 19, "s", Fraction(1, 1),
+              1, 1000000, 14400,
+              "job: longest cut"),
 )}
