@@ -19,8 +19,8 @@
 #define PARTS (2u * DISPLAY_LINES)
 
 static const uint8_t place[PARTS] = {0x00, 0x0A, 0x40, 0x4A, 0x14, 0x1E, 0x54, 0x5E};
-static const uint8_t wake_up[] = {0x3, 0x3, 0x3, 0x2};     // to 8 bits whatever it was in, then to 4; each on its own
-static const uint8_t set_up[] = {0x28, 0x0C, 0x06, 0x01};  // two rows, no cursor, to the right, clear
+static const uint8_t wake_up[] = {0x3, 0x3, 0x3, 0x3, 0x2};        // to 8 bits whatever it was in, one more if the first comes too soon, then to 4
+static const uint8_t set_up[] = {0x28, 0x01, 0x06, 0x0C};  // two rows, clear, to the right, on
 
 static char text[DISPLAY_LINES][DISPLAY_COLUMNS];
 static bool changed[PARTS];
@@ -54,9 +54,15 @@ static void send(void)
     last_ms = clock_ms();
 }
 
-static void set_up_step(void)
+static void begin(void)                 // RS stands before E rises
 {
     used = 0;
+    out[used++] = LIGHT;
+}
+
+static void set_up_step(void)
+{
+    begin();
     if (step < WAKE_STEPS) put_nibble(wake_up[step], 0);
     else put_byte(set_up[step - WAKE_STEPS], 0);
     send();
@@ -65,8 +71,7 @@ static void set_up_step(void)
 static void write_part(unsigned part)
 {
     const char *character = &text[part / 2u][part % 2u * PART];
-    used = 0;
-    out[used++] = LIGHT;                // RS stands before E rises
+    begin();
     put_byte(0x80u | place[part], 0);
     out[used++] = LIGHT | RS;
     for (unsigned n = 0; n < PART; n++) put_byte((uint8_t)character[n], RS);

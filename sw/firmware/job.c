@@ -220,7 +220,8 @@ uint8_t job_state(void)
 
 uint8_t job_cause(void)
 {
-    return state == LOADING && store_state() == STORE_DEAD ? LINE_CAUSE_STORE_MISSING : cause;
+    if (state == LOADING && store_state() == STORE_DEAD) return LINE_CAUSE_STORE_MISSING;
+    return state == IDLE && store_stations() == 0 ? store_cause() : cause;
 }
 
 uint16_t job_station(void)

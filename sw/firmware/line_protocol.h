@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x4E7EB90Bu    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x817B6E22u    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -35,7 +35,7 @@ enum line_cause {
     LINE_CAUSE_NOT_PREPARED = 22,    // the axis has no motion prepared
     LINE_CAUSE_NOT_BUILT = 23,    // this node was built without that
     LINE_CAUSE_SENSOR_DEAD = 30,    // no good frame came from the angle sensor: check its power and its cable
-    LINE_CAUSE_SENSOR_STUCK = 31,    // the angle sensor sent one and the same angle while the table was turned
+    LINE_CAUSE_SENSOR_STUCK = 31,    // the angle sensor stands still: it sent one and the same angle while the table was turned
     LINE_CAUSE_STICTION = 32,    // the table did not follow its steps: it sticks, or the motor lost them
     LINE_CAUSE_WRONG_SIGN = 33,    // the table turned against its steps: turn the sign of steps_per_period
     LINE_CAUSE_NOT_CONVERGED = 34,    // the tolerance was not reached within the allowed tries
@@ -227,7 +227,7 @@ enum line_job_flag {    // bits
     X(22, "the axis has no motion prepared") \
     X(23, "this node was built without that") \
     X(30, "no good frame came from the angle sensor: check its power and its cable") \
-    X(31, "the angle sensor sent one and the same angle while the table was turned") \
+    X(31, "the angle sensor stands still: it sent one and the same angle while the table was turned") \
     X(32, "the table did not follow its steps: it sticks, or the motor lost them") \
     X(33, "the table turned against its steps: turn the sign of steps_per_period") \
     X(34, "the tolerance was not reached within the allowed tries") \

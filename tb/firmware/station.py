@@ -10,7 +10,6 @@ from collections import deque
 
 from fake_machine import CLK_HZ, DEFINES, TABLE, Axis, Machine
 
-POLL_CLK = CLK_HZ // 4000
 BYTE_CLK, EDGE_CLK = CLK_HZ * 9 // 100_000, CLK_HZ // 100_000           # at 100 kHz
 STATE = {code: name for name, (code, _) in TABLE["job_state"].items()}
 CAUSE = {code: name for name, (code, _) in TABLE["cause"].items()}
@@ -84,7 +83,8 @@ class Eeprom(Device):
             start, before = self.page
             for n, old in enumerate(before):
                 self.memory[start + n] = source.choice((old, self.memory[start + n], source.randrange(256)))
-        self.busy_until, self.came = 0, []
+        torn, self.busy_until, self.came = now < self.busy_until, 0, []
+        return torn
 
 
 class Keypad(Device):
@@ -267,7 +267,9 @@ class Edm:
 
 
 class Station(Machine):
-    """The node, powered up. `absent` names what is not there: eeprom, keypad, display, links (a mask of those built)."""
+    """The node, powered up. `absent` names what is not there: eeprom, keypad, display. `built`: a mask of the links."""
+
+    CLK_HZ, POLL_CLK = CLK_HZ, CLK_HZ // 4000
 
     def __init__(self, absent=(), built=63, seed=0):
         self.source = random.Random(seed)
@@ -279,15 +281,16 @@ class Station(Machine):
         super().__init__(Axis(), image="station")
 
     def power_cut(self):
-        """Of the node and what it feeds, just now; it has power again at once."""
+        """Of the node and what it feeds, just now; it has power again at once. Whether a page of the EEPROM was being written."""
         self.bus.work(self.clk)
-        self.eeprom.power_cut(self.clk, self.source)
+        torn = self.eeprom.power_cut(self.clk, self.source)
         self.keypad.power_cut()
         self.display.power_cut(self.clk)
         self.edm.power_cut()
         self.bus.power_cut()
         self.peer_received.clear()
         self.firmware.firmware_start()
+        return torn
 
     def read(self, offset):
         d, at = DEFINES, offset - DEFINES["LINKS_BASE"]
@@ -331,7 +334,7 @@ class Station(Machine):
     def run(self, ms, until=None):
         """Four polls of the firmware a millisecond; True when `until` came."""
         for _ in range(int(ms * 4)):
-            self.clk += POLL_CLK
+            self.clk += self.POLL_CLK
             self.edm.work(self.clk)
             if self.sub_node:
                 self.peer_received.extend(self.sub_node.work(self.clk))

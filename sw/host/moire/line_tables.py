@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x4E7EB90B
+PROTOCOL_CRC = 0x817B6E22
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -54,7 +54,7 @@ CAUSES = {
     22: ("not_prepared", "the axis has no motion prepared"),
     23: ("not_built", "this node was built without that"),
     30: ("sensor_dead", "no good frame came from the angle sensor: check its power and its cable"),
-    31: ("sensor_stuck", "the angle sensor sent one and the same angle while the table was turned"),
+    31: ("sensor_stuck", "the angle sensor stands still: it sent one and the same angle while the table was turned"),
     32: ("stiction", "the table did not follow its steps: it sticks, or the motor lost them"),
     33: ("wrong_sign", "the table turned against its steps: turn the sign of steps_per_period"),
     34: ("not_converged", "the tolerance was not reached within the allowed tries"),
