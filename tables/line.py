@@ -24,7 +24,7 @@ REPLY_HEAD = ["sequence u8", "operation u8", "cause u8"]
 AXIS = "axis u8"    # first field of what asks an axis
 LISTS = ("cause", "fault", "encoder_event", "state", "flag", "learner_reason", "signal_fault", "learner_action", "index_phase",
          "peer_phase")
-CODES = ("cause", "state", "learner_reason", "learner_action", "index_phase", "peer_phase")     # these are numbers, the other lists are bits
+CODES = ("cause", "state", "learner_reason", "learner_action", "index_phase", "peer_phase")     # numbers, the other lists are bits
 
 
 def fields(head, declared):
