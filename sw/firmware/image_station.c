@@ -1,9 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // image_station -- a station of an indexing machine (S4), main node and sub-node alike.
 #include "image.h"
+#include "index.h"
+#include "peer.h"
+#include "readout.h"
+#include "sensor.h"
 #include "settings.h"
 
 const struct image_part image_parts[] = {
     {settings_start, 0, settings_operation},
+    {sensor_start, sensor_work, sensor_operation},
+    {index_start, index_work, index_operation},
+    {peer_start, peer_work, peer_operation},
+    {readout_start, readout_work, 0},
 };
 const unsigned image_part_count = sizeof image_parts / sizeof *image_parts;

@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x281AE3D5u    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x9B74E917u    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -43,6 +43,7 @@ enum line_cause {
     LINE_CAUSE_PEER_SILENT = 36,    // the other node does not answer: check the cable between the two and its peer_mode
     LINE_CAUSE_NO_STATION = 37,    // the other node has no such station: write the program to both
     LINE_CAUSE_PEER_OFF = 38,    // the peer port is not in use: see the settings peer_mode and peer_role
+    LINE_CAUSE_PEER_RESTARTED = 39,    // the other node lost its power while it indexed
 };
 
 enum line_fault {    // bits
@@ -168,7 +169,7 @@ enum line_operation {
     LINE_OPERATION_INDEX_TO = 42,    // turn the table of axis 0 to an absolute angle, 0.01 arcsec; refused while an axis moves
     LINE_OPERATION_INDEX_STATE = 43,    // what the table does, how its last index ended, the angle of its last reading; all in 0.01 arcsec
     LINE_OPERATION_SENSOR = 44,    // the last good frame of the angle sensor in 0.01 arcsec, its age in clk, and frames since power-up
-    LINE_OPERATION_PEER = 45,    // what the peer port does: the last index asked for or done, and what came that was not understood
+    LINE_OPERATION_PEER = 45,    // what the peer port does: the last index asked for; orders or frames heard, bytes or frames not understood
     LINE_OPERATION_PEER_STATION = 46,    // one of the stations of a sub-node in mode printed, from 0 on; the next order then goes to station 0
     LINE_OPERATION_PEER_NEXT = 47,    // the station to which the next order goes in mode printed
 };
@@ -564,7 +565,7 @@ enum line_setting {
     LINE_SETTING_READOUT_DECIMALS = 14,    // numeric display: decimals of the position in mm
     LINE_SETTING_PEER_MODE = 15,    // peer port: 0 not in use, 1 S4's bytes as printed, 2 frames with CRC-32
     LINE_SETTING_PEER_ROLE = 16,    // peer port: 0 this is the main node, 1 the sub-node that indexes
-    LINE_SETTING_PEER_PATIENCE = 17,    // [0.001 s] peer port: an index that takes longer has failed
+    LINE_SETTING_PEER_PATIENCE = 17,    // [0.001 s] peer port: in mode printed, an index that takes longer has failed
 };
 #define LINE_SETTING_COUNT 17u
 

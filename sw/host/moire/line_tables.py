@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x281AE3D5
+PROTOCOL_CRC = 0x9B74E917
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -62,6 +62,7 @@ CAUSES = {
     36: ("peer_silent", "the other node does not answer: check the cable between the two and its peer_mode"),
     37: ("no_station", "the other node has no such station: write the program to both"),
     38: ("peer_off", "the peer port is not in use: see the settings peer_mode and peer_role"),
+    39: ("peer_restarted", "the other node lost its power while it indexed"),
 }
 
 # bit: (name, words)
@@ -258,7 +259,7 @@ OPERATIONS = {operation.name: operation for operation in (
               (),
               (("angle", "u32"), ("age", "u32"), ("dead", "u8"), ("frames", "u32"),
                ("wrong_crc", "u32"), ("broken", "u32"), ("missed", "u32"),)),
-    Operation("peer", 45, "what the peer port does: the last index asked for or done, and what came that was not understood",
+    Operation("peer", 45, "what the peer port does: the last index asked for; orders or frames heard, bytes or frames not understood",
               (),
               (("phase", "u8"), ("ended", "u8"), ("station", "u16"), ("stations", "u16"),
                ("heard", "u32"), ("garbage", "u32"), ("repeated", "u32"),)),
@@ -558,5 +559,5 @@ SETTINGS = {parameter.name: parameter for parameter in (
               "peer port: 0 this is the main node, 1 the sub-node that indexes"),
     Parameter("peer_patience", 17, "s", Fraction(1, 1000),
               100, 3600000, 300000,
-              "peer port: an index that takes longer has failed"),
+              "peer port: in mode printed, an index that takes longer has failed"),
 )}
