@@ -21,6 +21,7 @@
 #define WAY_FROM_NODE 0x10u
 #define READY 0x40u
 #define CRC_BYTES 4u
+#define CAUSE (LINE_REPLY_HEAD - 1u)    // of a reply body
 #define WORDS_A_POLL 8u                 // then the axes have their turn
 
 #define OPERATION_SHAPE(name, code, request, reply, of_axis) [code] = {request, reply, of_axis},
@@ -32,7 +33,8 @@ static bool receiving;
 static uint8_t received;                                        // bytes in request
 static uint8_t request[1 + LINE_LONGEST_BODY + CRC_BYTES];      // length, body, CRC-32
 static uint8_t reply[1 + LINE_LONGEST_BODY + CRC_BYTES];
-static uint8_t *const asked = &request[1], *const answer = &reply[1];
+static const uint8_t *asked;                                    // bodies of what is being done
+static uint8_t *answer;
 static bool answered;                                           // there was a request, with this CRC-32:
 static uint32_t answered_crc;
 static uint32_t repeated, refused;
@@ -238,33 +240,47 @@ static uint8_t own_address(void)
     return (uint8_t)FIELD_GET(node_read(NODE_BUILD), NODE_BUILD_ADDRESS);
 }
 
+static uint32_t crc_of(const uint8_t *bytes, uint32_t count)    // of what went before, and of these
+{
+    while (count--) line_write(LINE_CRC_BYTE, *bytes++);
+    return line_read(LINE_CRC);
+}
+
+uint32_t line_crc(const uint8_t *bytes, uint32_t count)
+{
+    line_write(LINE_CRC_START, LINE_CRC_START_START_MASK);
+    return crc_of(bytes, count);
+}
+
 static void seal(void)                                          // length and CRC-32 around the body
 {
+    uint8_t command = READY | WAY_FROM_NODE | own_address();
     uint32_t length = reply[0], crc;
-    line_write(LINE_CRC_START, LINE_CRC_START_START_MASK);
-    line_write(LINE_CRC_BYTE, READY | WAY_FROM_NODE | own_address());
-    for (uint32_t n = 0; n <= length; n++) line_write(LINE_CRC_BYTE, reply[n]);
-    crc = line_read(LINE_CRC);
-    put(length, crc, CRC_BYTES);
+    line_crc(&command, 1);
+    crc = crc_of(reply, 1 + length);
+    for (uint32_t n = 0; n < CRC_BYTES; n++) reply[1 + length + n] = (uint8_t)(crc >> 8 * n);
+}
+
+uint8_t line_do(const uint8_t *request_body, uint8_t length, uint8_t *reply_body)
+{
+    asked = request_body;
+    answer = reply_body;
+    answer[0] = asked[0];
+    answer[1] = length < LINE_REQUEST_HEAD ? 0 : asked[1];
+    answer[CAUSE] = execute(answer[1], length);
+    return answer[CAUSE] == LINE_CAUSE_OK ? shapes[answer[1]].reply : LINE_REPLY_HEAD;
 }
 
 static void frame(void)
 {
-    uint8_t length = request[0], cause;
-    uint32_t crc = (uint32_t)get(&asked[length], CRC_BYTES);
-    if (answered && crc == answered_crc && asked[0] == answer[0]) {
+    uint8_t length = request[0];
+    uint32_t crc = (uint32_t)get(&request[1 + length], CRC_BYTES);
+    if (answered && crc == answered_crc && request[1] == reply[1]) {
         repeated++;
         return;
     }
-    reply[0] = LINE_REPLY_HEAD;
-    answer[0] = asked[0];
-    answer[1] = length < LINE_REQUEST_HEAD ? 0 : asked[1];
-    cause = execute(answer[1], length);
-    if (cause == LINE_CAUSE_OK)
-        reply[0] = shapes[answer[1]].reply;
-    else
-        refused++;
-    answer[2] = cause;
+    reply[0] = line_do(&request[1], length, &reply[1]);
+    if (reply[1 + CAUSE] != LINE_CAUSE_OK) refused++;
     answered = true;
     answered_crc = crc;
     seal();
@@ -293,8 +309,8 @@ void line_start(unsigned served_axes)
     receiving = answered = false;
     repeated = refused = 0;
     reply[0] = LINE_REPLY_HEAD;
-    answer[0] = answer[1] = 0;
-    answer[2] = LINE_CAUSE_OK;
+    reply[1] = reply[2] = 0;
+    reply[1 + CAUSE] = LINE_CAUSE_OK;
     seal();
 }
 

@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x817B6E22u    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0xB7E11CD8u    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -39,10 +39,11 @@ enum line_cause {
     LINE_CAUSE_STICTION = 32,    // the table did not follow its steps: it sticks, or the motor lost them
     LINE_CAUSE_WRONG_SIGN = 33,    // the table turned against its steps: turn the sign of steps_per_period
     LINE_CAUSE_NOT_CONVERGED = 34,    // the tolerance was not reached within the allowed tries
-    LINE_CAUSE_SENSOR_DISAGREES = 35,    // angle sensor and steps disagree on how far the table turned
+    LINE_CAUSE_SENSOR_DISAGREES = 35,    // angle sensor and steps disagree: they tell different ways of the table
     LINE_CAUSE_PEER_SILENT = 36,    // the other node does not answer: check the cable between the two and its peer_mode
     LINE_CAUSE_NO_STATION = 37,    // the other node has no such station: write the program to both
     LINE_CAUSE_PEER_OFF = 38,    // the peer port is not in use: see the settings peer_mode and peer_role
+    LINE_CAUSE_PEER_RESTARTED = 39,    // the other node lost its power while it indexed
     LINE_CAUSE_STORE_MISSING = 40,    // the EEPROM does not answer
     LINE_CAUSE_STORE_FAILED = 41,    // the EEPROM does not keep what is written
     LINE_CAUSE_STORE_BUSY = 42,    // the EEPROM is being read or written
@@ -231,10 +232,11 @@ enum line_job_flag {    // bits
     X(32, "the table did not follow its steps: it sticks, or the motor lost them") \
     X(33, "the table turned against its steps: turn the sign of steps_per_period") \
     X(34, "the tolerance was not reached within the allowed tries") \
-    X(35, "angle sensor and steps disagree on how far the table turned") \
+    X(35, "angle sensor and steps disagree: they tell different ways of the table") \
     X(36, "the other node does not answer: check the cable between the two and its peer_mode") \
     X(37, "the other node has no such station: write the program to both") \
     X(38, "the peer port is not in use: see the settings peer_mode and peer_role") \
+    X(39, "the other node lost its power while it indexed") \
     X(40, "the EEPROM does not answer") \
     X(41, "the EEPROM does not keep what is written") \
     X(42, "the EEPROM is being read or written") \
@@ -302,7 +304,7 @@ enum line_operation {
     LINE_OPERATION_INDEX_TO = 42,    // turn the table of axis 0 to an absolute angle, 0.01 arcsec; refused while an axis moves
     LINE_OPERATION_INDEX_STATE = 43,    // what the table does, how its last index ended, the angle of its last reading; all in 0.01 arcsec
     LINE_OPERATION_SENSOR = 44,    // the last good frame of the angle sensor in 0.01 arcsec, its age in clk, and frames since power-up
-    LINE_OPERATION_PEER = 45,    // what the peer port does: the last index asked for or done, and what came that was not understood
+    LINE_OPERATION_PEER = 45,    // what the peer port does: the last index asked for; orders or frames heard, bytes or frames not understood
     LINE_OPERATION_PEER_STATION = 46,    // one of the stations of a sub-node in mode printed, from 0 on; the next order then goes to station 0
     LINE_OPERATION_PEER_NEXT = 47,    // the station to which the next order goes in mode printed
     LINE_OPERATION_JOB = 48,    // what the job does, at which station (from 0 on), why it waits, and for which answers (bits of job_action)
@@ -742,7 +744,7 @@ enum line_setting {
     LINE_SETTING_READOUT_DECIMALS = 14,    // numeric display: decimals of the position in mm
     LINE_SETTING_PEER_MODE = 15,    // peer port: 0 not in use, 1 S4's bytes as printed, 2 frames with CRC-32
     LINE_SETTING_PEER_ROLE = 16,    // peer port: 0 this is the main node, 1 the sub-node that indexes
-    LINE_SETTING_PEER_PATIENCE = 17,    // [0.001 s] peer port: an index that takes longer has failed
+    LINE_SETTING_PEER_PATIENCE = 17,    // [0.001 s] peer port: in mode printed, an index that takes longer has failed
     LINE_SETTING_JOB_START_LIMIT = 18,    // [1 s] job: longest time from the start keys to the beginning of the cut
     LINE_SETTING_JOB_CUT_LIMIT = 19,    // [1 s] job: longest cut
 };

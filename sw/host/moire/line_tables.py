@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x817B6E22
+PROTOCOL_CRC = 0xB7E11CD8
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -58,10 +58,11 @@ CAUSES = {
     32: ("stiction", "the table did not follow its steps: it sticks, or the motor lost them"),
     33: ("wrong_sign", "the table turned against its steps: turn the sign of steps_per_period"),
     34: ("not_converged", "the tolerance was not reached within the allowed tries"),
-    35: ("sensor_disagrees", "angle sensor and steps disagree on how far the table turned"),
+    35: ("sensor_disagrees", "angle sensor and steps disagree: they tell different ways of the table"),
     36: ("peer_silent", "the other node does not answer: check the cable between the two and its peer_mode"),
     37: ("no_station", "the other node has no such station: write the program to both"),
     38: ("peer_off", "the peer port is not in use: see the settings peer_mode and peer_role"),
+    39: ("peer_restarted", "the other node lost its power while it indexed"),
     40: ("store_missing", "the EEPROM does not answer"),
     41: ("store_failed", "the EEPROM does not keep what is written"),
     42: ("store_busy", "the EEPROM is being read or written"),
@@ -320,7 +321,7 @@ OPERATIONS = {operation.name: operation for operation in (
               (),
               (("angle", "u32"), ("age", "u32"), ("dead", "u8"), ("frames", "u32"),
                ("wrong_crc", "u32"), ("broken", "u32"), ("missed", "u32"),)),
-    Operation("peer", 45, "what the peer port does: the last index asked for or done, and what came that was not understood",
+    Operation("peer", 45, "what the peer port does: the last index asked for; orders or frames heard, bytes or frames not understood",
               (),
               (("phase", "u8"), ("ended", "u8"), ("station", "u16"), ("stations", "u16"),
                ("heard", "u32"), ("garbage", "u32"), ("repeated", "u32"),)),
@@ -643,7 +644,7 @@ SETTINGS = {parameter.name: parameter for parameter in (
               "peer port: 0 this is the main node, 1 the sub-node that indexes"),
     Parameter("peer_patience", 17, "s", Fraction(1, 1000),
               100, 3600000, 300000,
-              "peer port: an index that takes longer has failed"),
+              "peer port: in mode printed, an index that takes longer has failed"),
     Parameter("job_start_limit", 18, "s", Fraction(1, 1),
               1, 3600, 30,
               "job: longest time from the start keys to the beginning of the cut"),
