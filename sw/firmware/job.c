@@ -46,7 +46,7 @@ static void say_alarm(void)       { cause = LINE_CAUSE_MACHINE_ALARM; }
 static void say_pause(void)       { cause = LINE_CAUSE_PAUSED_BY_PERSON; }
 static void say_power(void)       { cause = LINE_CAUSE_POWER_LOST; }
 static void go_on(void)           { pausing = false; cause = LINE_CAUSE_OK; }
-static void halt_table(void)      { peer_stop(); go_on(); }
+static void leave_all(void)       { peer_stop(); machine_leave(); go_on(); }
 
 static const struct transition { uint8_t from, event, to; void (*act)(void); } transitions[] = {
     {LOADING,   ALL_CUT,       FINISHING, NULL},
@@ -80,7 +80,7 @@ static const struct transition { uint8_t from, event, to; void (*act)(void); } t
     {UNSURE,    RESUME,        FOLLOWING, go_on},
     {UNSURE,    AGAIN,         INDEXING,  go_on},
     {UNSURE,    NEXT,          ENDED,     go_on},
-    {UNDER_WAY, STOP,          STOPPING,  halt_table},
+    {UNDER_WAY, STOP,          STOPPING,  leave_all},
     {STOPPING,  RECORDED,      IDLE,      NULL},
     {STOPPING,  NOT_RECORDED,  IDLE,      say_store},
 };
@@ -290,10 +290,9 @@ uint8_t job_save_program(void)
 
 static uint8_t flags(void)
 {
-    bool keys_wait = machine_built() && !machine_cuts() && !machine_rests();
     return (uint8_t)(LINE_JOB_FLAG_STORE * (store_state() != STORE_DEAD) | LINE_JOB_FLAG_KEYPAD * panel_has_keypad() |
                      LINE_JOB_FLAG_DISPLAY * panel_has_display() | LINE_JOB_FLAG_CUTTING * machine_cuts() |
-                     LINE_JOB_FLAG_ALARM * machine_alarms() | LINE_JOB_FLAG_KEYS_WAIT * keys_wait |
+                     LINE_JOB_FLAG_ALARM * machine_alarms() | LINE_JOB_FLAG_KEYS_WAIT * machine_keys_wait() |
                      LINE_JOB_FLAG_PAUSING * pausing | LINE_JOB_FLAG_COPY_TORN * store_torn());
 }
 

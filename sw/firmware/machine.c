@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // machine -- the wire-EDM machine: its keyboard keys start a cut, two status inputs tell whether it cuts and whether something is wrong.
 //
-// The keys go whole into the queue of the PS/2 pass-through, which sends them when keyboard and machine have been silent: it waits
-// while a person types. What is in that queue cannot be taken back, so nothing is put in while something is there, and until it is
-// empty the machine does not count as resting.
+// When nobody has typed for a while the keys go whole into the queue of the PS/2 pass-through, which sends them when the lines are free.
+// What is in that queue cannot be taken back, so nothing is put in while something is there, and until it is empty the machine does not
+// count as resting.
 #include "machine.h"
 
 #include "clock.h"
@@ -14,6 +14,7 @@
 #define QUEUE 32u                       // scan codes
 #define CUTTING 1u                      // status inputs
 #define ALARM 2u
+#define QUIET_MS 300u
 #define TAKE_MS 20000u                  // the machine takes the keys within this, unless a person types
 #define END_MS 300u                     // an alarm that ends a cut shows within this
 
@@ -32,7 +33,7 @@ static bool input(unsigned bit)
     return FIELD_GET(status(), LINKS_MACHINE_STATUS_INPUTS) & bit;
 }
 
-static bool keys_wait(void)
+static bool queued(void)
 {
     uint32_t ps2 = links_read(LINKS_PS2_STATE);
     return FIELD_GET(ps2, LINKS_PS2_STATE_FREE) != QUEUE || ps2 & LINKS_PS2_STATE_INJECTING_MASK;
@@ -82,9 +83,14 @@ bool machine_alarms(void)
     return input(ALARM);
 }
 
+bool machine_keys_wait(void)
+{
+    return machine_built() && (state == MACHINE_QUIET || queued());
+}
+
 bool machine_rests(void)
 {
-    return !machine_cuts() && !keys_wait();
+    return !machine_cuts() && !queued();
 }
 
 enum machine_state machine_state(void)
@@ -101,18 +107,24 @@ void machine_start(unsigned axes)
 {
     (void)axes;
     cause = LINE_CAUSE_OK;
-    go(MACHINE_WATCHED);
+    go(MACHINE_LEFT);
 }
 
 void machine_begin(void)
 {
     if (machine_alarms()) return fail(LINE_CAUSE_MACHINE_ALARM);
     if (!machine_rests()) return fail(LINE_CAUSE_MACHINE_BUSY);
-    links_write(LINKS_MACHINE_STATUS, LINKS_MACHINE_STATUS_ROSE_0_MASK | LINKS_MACHINE_STATUS_FELL_0_MASK | LINKS_MACHINE_STATUS_ROSE_1_MASK);
+    links_write(LINKS_MACHINE_STATUS, LINKS_MACHINE_STATUS_ROSE_1_MASK);
+    typed = links_read(LINKS_PS2_TYPED);
+    go(MACHINE_QUIET);
+}
+
+static void send_keys(void)
+{
+    links_write(LINKS_MACHINE_STATUS, LINKS_MACHINE_STATUS_ROSE_0_MASK);
     for (unsigned n = 0; n < sizeof start_keys; n++)
         links_write(LINKS_PS2_INJECT, FIELD_PUT(LINKS_PS2_INJECT_DATA, start_keys[n]) |
                                       FIELD_PUT(LINKS_PS2_INJECT_LAST, n + 1 == sizeof start_keys));
-    typed = links_read(LINKS_PS2_TYPED);
     go(MACHINE_KEYS_WAIT);
 }
 
@@ -120,6 +132,11 @@ void machine_follow(void)
 {
     links_write(LINKS_MACHINE_STATUS, LINKS_MACHINE_STATUS_ROSE_1_MASK);
     begun();
+}
+
+void machine_leave(void)
+{
+    go(MACHINE_LEFT);
 }
 
 static bool person_types(void)
@@ -133,12 +150,17 @@ static bool person_types(void)
 void machine_work(void)
 {
     uint32_t seen = status();
-    bool followed = state >= MACHINE_KEYS_WAIT && state <= MACHINE_ENDING;
+    bool followed = state >= MACHINE_QUIET && state <= MACHINE_ENDING;
     if (!followed) return;
     if (seen & LINKS_MACHINE_STATUS_ROSE_1_MASK || FIELD_GET(seen, LINKS_MACHINE_STATUS_INPUTS) & ALARM) return fail(LINE_CAUSE_MACHINE_ALARM);
     switch (state) {
+    case MACHINE_QUIET:
+        if (!machine_rests()) fail(LINE_CAUSE_MACHINE_BUSY);
+        else if (person_types()) since_ms = clock_ms();
+        else if (longer_than(QUIET_MS)) send_keys();
+        break;
     case MACHINE_KEYS_WAIT:
-        if (!keys_wait()) go(MACHINE_STARTING);
+        if (!queued()) go(MACHINE_STARTING);
         else if (person_types()) since_ms = clock_ms();
         else if (longer_than(TAKE_MS)) fail(LINE_CAUSE_KEYS_NOT_TAKEN);
         break;

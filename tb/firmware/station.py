@@ -269,7 +269,7 @@ class Edm:
 class Station(Machine):
     """The node, powered up. `absent` names what is not there: eeprom, keypad, display. `built`: a mask of the links."""
 
-    CLK_HZ, POLL_CLK = CLK_HZ, CLK_HZ // 4000
+    CLK_HZ, POLL_CLK = CLK_HZ, CLK_HZ // 2000
 
     def __init__(self, absent=(), built=63, seed=0):
         self.source = random.Random(seed)
@@ -332,8 +332,8 @@ class Station(Machine):
         return None
 
     def run(self, ms, until=None):
-        """Four polls of the firmware a millisecond; True when `until` came."""
-        for _ in range(int(ms * 4)):
+        """Two polls of the firmware a millisecond; True when `until` came."""
+        for _ in range(int(ms * 2)):
             self.clk += self.POLL_CLK
             self.edm.work(self.clk)
             if self.sub_node:
