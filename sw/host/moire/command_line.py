@@ -10,9 +10,10 @@ import sys
 import threading
 from dataclasses import asdict
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
-from . import command_relay, units
+from . import command_index, command_relay, units
 from .client import CAPTURE_SOURCES, HOME_METHODS, Line, capture_source, register_fields
 from .errors import BadFile, LineError, MoireError, OutOfRange, PortError, TwinNotBuilt, UnitError
 from .line_tables import PARAMETERS
@@ -260,6 +261,8 @@ def make_parser() -> Parser:
     command("show", do_compare_show, "points passed", "moire --port twin compare show", compare)
     command_relay.add_to(group("relay", "the relay of a ring (S1): status, clear, calibrate", commands, common,
                                "moire --port /dev/ttyUSB0 relay status"), command)
+
+    command_index.add_to(partial(group, under=commands, common=common), command)
 
     register = command(
         "register", do_register, "read registers of the node, by name or by address", "moire --port twin register axis.position 0x400"
