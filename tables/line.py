@@ -24,7 +24,7 @@ REPLY_HEAD = ["sequence u8", "operation u8", "cause u8"]
 AXIS = "axis u8"    # first field of what asks an axis
 LISTS = ("cause", "fault", "encoder_event", "state", "flag", "learner_reason", "signal_fault", "learner_action", "index_phase",
          "peer_phase", "job_state", "job_action", "job_flag")
-CODES = ("cause", "state", "learner_reason", "learner_action", "index_phase", "peer_phase", "job_state", "job_action")    # numbers, not bits
+CODES = ("cause", "state", "learner_reason", "learner_action", "index_phase", "peer_phase", "job_state", "job_action")   # not bits
 WORDS = ("cause", "job_state")                                                # lists whose words the firmware shows on its panel
 
 

@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0xB7E11CD8u    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x9ABBCF04u    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -49,7 +49,7 @@ enum line_cause {
     LINE_CAUSE_STORE_BUSY = 42,    // the EEPROM is being read or written
     LINE_CAUSE_NO_PROGRAM = 43,    // no program of stations is stored
     LINE_CAUSE_PROGRAM_TORN = 44,    // the stored program is damaged
-    LINE_CAUSE_PROGRAM_INCOMPLETE = 45,    // begin a program and give all its stations
+    LINE_CAUSE_PROGRAM_INCOMPLETE = 45,    // give all stations of a program in order
     LINE_CAUSE_NO_STATIONS = 46,    // a program needs at least one station
     LINE_CAUSE_TOO_MANY_STATIONS = 47,    // the EEPROM is full: it holds 360 stations
     LINE_CAUSE_ANGLE_OUT_OF_TURN = 48,    // angles must be below 360 degrees
@@ -64,7 +64,7 @@ enum line_cause {
     LINE_CAUSE_POWER_LOST = 57,    // the power was lost during the job
     LINE_CAUSE_PAUSED_BY_PERSON = 58,    // paused by a person
     LINE_CAUSE_KEY_WITHOUT_FUNCTION = 59,    // this key has no function
-    LINE_CAUSE_TABLE_UNKNOWN = 60,    // it is not known where the table stands
+    LINE_CAUSE_TABLE_UNKNOWN = 60,    // nobody knows where the table stands
 };
 
 enum line_fault {    // bits
@@ -242,7 +242,7 @@ enum line_job_flag {    // bits
     X(42, "the EEPROM is being read or written") \
     X(43, "no program of stations is stored") \
     X(44, "the stored program is damaged") \
-    X(45, "begin a program and give all its stations") \
+    X(45, "give all stations of a program in order") \
     X(46, "a program needs at least one station") \
     X(47, "the EEPROM is full: it holds 360 stations") \
     X(48, "angles must be below 360 degrees") \
@@ -257,7 +257,7 @@ enum line_job_flag {    // bits
     X(57, "the power was lost during the job") \
     X(58, "paused by a person") \
     X(59, "this key has no function") \
-    X(60, "it is not known where the table stands")
+    X(60, "nobody knows where the table stands")
 
 // X(code, words)
 #define LINE_JOB_STATE_WORDS(X) \

@@ -13,7 +13,7 @@ from fractions import Fraction
 from functools import partial
 from pathlib import Path
 
-from . import command_index, command_relay, units
+from . import command_index, command_job, command_relay, units
 from .client import CAPTURE_SOURCES, HOME_METHODS, Line, capture_source, register_fields
 from .errors import BadFile, LineError, MoireError, OutOfRange, PortError, TwinNotBuilt, UnitError
 from .line_tables import PARAMETERS
@@ -263,6 +263,7 @@ def make_parser() -> Parser:
                                "moire --port /dev/ttyUSB0 relay status"), command)
 
     command_index.add_to(partial(group, under=commands, common=common), command)
+    command_job.add_to(partial(group, under=commands, common=common), command)
 
     register = command(
         "register", do_register, "read registers of the node, by name or by address", "moire --port twin register axis.position 0x400"

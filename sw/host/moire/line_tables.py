@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0xB7E11CD8
+PROTOCOL_CRC = 0x9ABBCF04
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -68,7 +68,7 @@ CAUSES = {
     42: ("store_busy", "the EEPROM is being read or written"),
     43: ("no_program", "no program of stations is stored"),
     44: ("program_torn", "the stored program is damaged"),
-    45: ("program_incomplete", "begin a program and give all its stations"),
+    45: ("program_incomplete", "give all stations of a program in order"),
     46: ("no_stations", "a program needs at least one station"),
     47: ("too_many_stations", "the EEPROM is full: it holds 360 stations"),
     48: ("angle_out_of_turn", "angles must be below 360 degrees"),
@@ -83,7 +83,7 @@ CAUSES = {
     57: ("power_lost", "the power was lost during the job"),
     58: ("paused_by_person", "paused by a person"),
     59: ("key_without_function", "this key has no function"),
-    60: ("table_unknown", "it is not known where the table stands"),
+    60: ("table_unknown", "nobody knows where the table stands"),
 }
 
 # bit: (name, words)
