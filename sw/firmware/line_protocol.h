@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x9ABBCF04u    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x38017035u    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -309,11 +309,11 @@ enum line_operation {
     LINE_OPERATION_PEER_NEXT = 47,    // the station to which the next order goes in mode printed
     LINE_OPERATION_JOB = 48,    // what the job does, at which station (from 0 on), why it waits, and for which answers (bits of job_action)
     LINE_OPERATION_JOB_DO = 49,    // start, pause, resume or stop the job, or answer its question
-    LINE_OPERATION_JOB_PROGRAM = 50,    // the stored program: writing 1 while one is written, then how that ended, or why there is none; stations 0 if there is none
+    LINE_OPERATION_JOB_PROGRAM = 50,    // the stored program; writing 1 while it is written or read, then how that ended, or why there is none
     LINE_OPERATION_JOB_ANGLE = 51,    // angle of a station of the stored program, in 0.01 arcsec
     LINE_OPERATION_JOB_BEGIN = 52,    // begin a new program; it comes into force when it is saved, and not while a job is under way
     LINE_OPERATION_JOB_ADD = 53,    // give the new program a station; in their order, from 0 on, with ascending angles
-    LINE_OPERATION_JOB_SAVE = 54,    // write the new program into the EEPROM, the settings of the station with it; job_program tells when and how that ended
+    LINE_OPERATION_JOB_SAVE = 54,    // write the new program and the settings into the EEPROM; job_program tells when and how that ended
 };
 
 // Lengths of whole bodies and offsets of their fields, in bytes, little endian.

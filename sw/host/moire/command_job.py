@@ -15,7 +15,8 @@ ANSWERS = ("again", "next", "resume", "stop")
 
 def add_to(group, command):
     """group(name, text, example=): the sub-parsers of a new command; command(name, handler, text, example, under): one of them."""
-    job = group("job", "the job of a main node (S4): stations, cut one after the other", example="moire --port /dev/ttyUSB0 job start --wait")
+    job = group("job", "the job of a main node (S4): stations, cut one after the other",
+                example="moire --port /dev/ttyUSB0 job start --wait")
     load = command("load", do_load, "write a program of stations, and the settings with it, into the EEPROM",
                    "moire --port /dev/ttyUSB0 job load former.csv", job)
     source = load.add_mutually_exclusive_group(required=True)

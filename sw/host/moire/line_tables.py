@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x9ABBCF04
+PROTOCOL_CRC = 0x38017035
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -338,7 +338,7 @@ OPERATIONS = {operation.name: operation for operation in (
     Operation("job_do", 49, "start, pause, resume or stop the job, or answer its question",
               (("action", "u8"),),
               ()),
-    Operation("job_program", 50, "the stored program: writing 1 while one is written, then how that ended, or why there is none; stations 0 if there is none",
+    Operation("job_program", 50, "the stored program; writing 1 while it is written or read, then how that ended, or why there is none",
               (),
               (("writing", "u8"), ("ended", "u8"), ("generation", "u32"), ("stations", "u16"),
                ("journal", "u32"),)),
@@ -351,7 +351,7 @@ OPERATIONS = {operation.name: operation for operation in (
     Operation("job_add", 53, "give the new program a station; in their order, from 0 on, with ascending angles",
               (("station", "u16"), ("angle", "u32"),),
               ()),
-    Operation("job_save", 54, "write the new program into the EEPROM, the settings of the station with it; job_program tells when and how that ended",
+    Operation("job_save", 54, "write the new program and the settings into the EEPROM; job_program tells when and how that ended",
               (),
               ()),
 )}
