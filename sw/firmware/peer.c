@@ -322,6 +322,7 @@ void peer_work(void)
 
 uint8_t peer_index(uint16_t station, uint32_t angle)
 {
+    if (!(links_read(LINKS_BUILT) & LINKS_BUILT_PEER_MASK)) return LINE_CAUSE_NOT_BUILT;
     if (mode() == NOT_IN_USE || role() != MAIN) return LINE_CAUSE_PEER_OFF;
     if (peer.phase == LINE_PEER_PHASE_INDEXING) return LINE_CAUSE_BUSY;
     peer.phase = LINE_PEER_PHASE_INDEXING;

@@ -61,7 +61,7 @@ class Sensor:
     def __init__(self, random_source, table, lost=0.0, damaged=0.0, noise=0.4, wave=0.6):
         self.random, self.table, self.lost, self.damaged, self.noise, self.wave = random_source, table, lost, damaged, noise, wave
         self.ms, self.before = 0, deque([table.angle] * 3, maxlen=3)
-        self.word, self.sent_clk, self.clk = 0, 0, 0
+        self.word, self.sent_clk, self.clk, self.latched = 0, 0, 0, 0
         self.frames, self.missed, self.wrong = 0, 0, 0
         self.dead = self.stuck = False
 
@@ -88,7 +88,7 @@ class Sensor:
         if offset == d["LINKS_SENSOR_READING_LOW"]:
             self.latched = self.clk - self.sent_clk
             return self.word
-        return {d["LINKS_SENSOR_FRAMES"]: self.frames, d["LINKS_SENSOR_READING_HIGH"]: getattr(self, "latched", 0),
+        return {d["LINKS_SENSOR_FRAMES"]: self.frames, d["LINKS_SENSOR_READING_HIGH"]: self.latched,
                 d["LINKS_SENSOR_ERRORS"]: min(self.wrong, 255) << d["LINKS_SENSOR_ERRORS_CRC_SHIFT"] |
                 min(self.missed, 255) << d["LINKS_SENSOR_ERRORS_MISSED_SHIFT"]}.get(offset)
 

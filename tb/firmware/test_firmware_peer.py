@@ -453,3 +453,9 @@ def test_a_node_whose_peer_port_is_not_in_use_orders_nothing_and_obeys_nothing()
     assert node.heard() == b"" and node.peer()["phase"] == "idle"
     node = Node(PRINTED, SUB)
     assert node.order() == "peer_off"
+
+
+def test_a_node_without_a_peer_port_says_so():
+    node = Node(FRAMES, MAIN)
+    node.links.parts = [node.sensor]
+    assert node.order() == "not_built"
