@@ -5,15 +5,16 @@ The sub-division error is the noiseless answer of the corrected interpolator ove
 the undisturbed signal through the integers of signal_correction, the arc tangent and harmonic_correction.
 """
 import ctypes
+import random
 import sys
 from pathlib import Path
 
 import numpy as np
 
-from experiments import s0_stage
 from experiments.figures_common import Figure, bar, console
-from moire.client import CORRECTION
-from twin import parameters
+from experiments.s0_stage import START_S
+from moire.client import CORRECTION, Line
+from twin import Twin, TwinTransport, parameters
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path += [str(ROOT / "tb" / room) for room in ("firmware", "interpolate") if str(ROOT / "tb" / room) not in sys.path]
@@ -193,21 +194,24 @@ def left_in_twin_nm(correction):
 
 def twin_sde_nm():
     """The firmware on its soft core learns the interferometer of the twin to and fro, from nothing to the harmonics."""
-    stage = s0_stage.Stage.power_up(1, **HARMONICS_OF_TWIN)
-    stage.find()
-    stage.home("X")
-    axis, began = stage.axes["X"], stage.line.transport.now()
-    left = {}                                       # nm by what was accepted: nothing, the ellipse, the harmonics
+    left = {}                                       # nm by how much was accepted: nothing, the ellipse, the harmonics
+    with Twin(nodes=(1,), plant=HARMONICS_OF_TWIN) as twin:
+        line = Line(TwinTransport(twin), random_source=random.Random(1))
+        line.transport.wait(START_S)
+        axis = line.axis(1)
+        axis.enable()
+        axis.home()
+        began = line.transport.now()
 
-    def look(learner):
-        if learner.accepted not in left:
-            left[learner.accepted] = left_in_twin_nm(axis.correction())
-            console.print(f"{stage.line.transport.now() - began:.1f} s: {learner.words}, {learner.accepted} accepted, {learner.refused} "
-                          f"refused, {left[learner.accepted]:.3f} nm left")
+        def look(learner):
+            if learner.accepted not in left:
+                left[learner.accepted] = left_in_twin_nm(axis.correction())
+                console.print(f"{line.transport.now() - began:.1f} s: {learner.words}, {learner.accepted} accepted, {learner.refused} "
+                              f"refused, {left[learner.accepted]:.3f} nm left")
 
-    look(axis.learner())
-    told = axis.learn(look)
-    console.print(f"settled after {stage.line.transport.now() - began:.1f} s, known to {told.scatter_nm:.3f} nm")
+        look(axis.learner())
+        told = axis.learn(look)
+        console.print(f"settled after {line.transport.now() - began:.1f} s, known to {told.scatter_nm:.3f} nm")
     return left[told.accepted]
 
 

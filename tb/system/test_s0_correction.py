@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from experiments import figures_learner
+from experiments.s0_stage import START_S
 from moire.client import CORRECTION, Line
 from twin import Twin, TwinTransport, parameters
 
@@ -19,7 +20,7 @@ LOADING_S = 0.6                      # until the node has computed the table and
 def machine_and_axis():
     with Twin(nodes=(1,), plant=figures_learner.HARMONICS_OF_TWIN) as twin:
         line = Line(TwinTransport(twin), random_source=random.Random(1))
-        line.transport.wait(0.06)
+        line.transport.wait(START_S)
         yield twin.machine(), line.axis(1)
 
 
