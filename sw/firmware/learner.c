@@ -621,7 +621,7 @@ static void begin_second_reading(struct learner *learner)
 static void fold_bins(uint32_t n)
 {
     for (uint32_t i = 0; i < 3; i++) {
-        int32_t *a = &work.seen[i][n], *b = &work.seen[i][BINS / 2 - 1 - n], *c = &work.seen[i][BINS / 2 + n], *d = &work.seen[i][BINS - 1 - n];
+        int32_t *seen = work.seen[i], *a = &seen[n], *b = &seen[BINS / 2 - 1 - n], *c = &seen[BINS / 2 + n], *d = &seen[BINS - 1 - n];
         int32_t even = *a + *d, uneven = *a - *d, opposite_even = *b + *c, opposite_uneven = *c - *b;
         *a = even + opposite_even;
         *b = even - opposite_even;
@@ -880,7 +880,7 @@ static void end_of_projection(struct learner *learner)
 {
     struct learner_pass *pass = &learner->pass;
     uint32_t gone = (uint32_t)size_of(work.travel);
-    if (learner->reason < LEARNER_ONE_SPEED) learner->reason = LEARNER_LEARNING;    // what a pass was refused for stands until one is accepted
+    if (learner->reason < LEARNER_ONE_SPEED) learner->reason = LEARNER_LEARNING;    // what a pass was refused for stands until one is good
     if (pass->bursts == 0 || gone < pass->slowest) pass->slowest = gone;
     if (pass->bursts == 0 || gone > pass->fastest) pass->fastest = gone;
     begin_stage(UPDATE);
