@@ -107,7 +107,7 @@ module links #(
                 .sda_low(i2c_sda_low));
             word_queue #(.W(10), .DEPTH(128)) u_answers (.clk, .rst, .push(done), .in({result, read_data}), .pop(i2c_answer_read),
                 .present(i2c_answer_present), .out({i2c_answer_result, i2c_answer_data}), .free(answer_free), .overrun(answer_overrun));
-            assign i2c_busy = present || !command_ready;
+            assign i2c_busy = i2c_written || !i2c_state_free[7] || !command_ready || done;
             assign unused_rejected[2] = &{1'b0, overrun, answer_overrun, answer_free, unused_rejected[1:0]};
         end else begin : g_no_i2c
             assign {i2c_answer_data, i2c_answer_result, i2c_answer_present, i2c_state_free, i2c_busy, i2c_owned, scl, sda} = '0;
@@ -179,7 +179,7 @@ module links #(
                 .out(to_send), .free(display_free), .overrun);
             spi_word_sender #(.CLK_HZ(CLK_HZ)) u_sender (.clk, .rst, .valid(present), .ready, .word(to_send), .cs_n(display_cs_n),
                 .sclk(display_sclk), .sdi(display_data), .busy);
-            assign display_sending = present || busy;
+            assign display_sending = display_written || !display_free[4] || busy;
             wire unused = &{1'b0, overrun};
         end else begin : g_no_display
             assign {display_free, display_sending} = '0;

@@ -72,7 +72,7 @@ module links_registers (
     output logic        display_written,               // strobe: display has just been written, its new value stands
     input  wire  [4:0]  display_state_free,            // words that may still be queued, 16 at most
     input  wire         display_state_sending,         // state of the display: sending
-    output logic [15:0] machine_filter,                // pulses of a status input that are this long pass, those 1 ms shorter never do [0.001 s]
+    output logic [15:0] machine_filter,                // a status input must stand this long without a break; the change passes at most 1 ms later [0.001 s]
     input  wire  [1:0]  machine_status_inputs,         // bit n: level of input n
     input  wire         machine_status_rose_0,         // strobe, held: input 0 went up
     input  wire         machine_status_rose_1,         // strobe, held: input 1 went up

@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0xda0be032u            // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xcf61cb31u            // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define LINE_BASE 0x100u
@@ -370,7 +370,7 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define LINKS_DISPLAY_STATE_SENDING_MASK               0x00000020u
 #define LINKS_DISPLAY_STATE_SENDING_SHIFT              5
 #define LINKS_DISPLAY_STATE_SENDING_WIDTH              1
-#define LINKS_MACHINE_FILTER                           0x064u  // rw: pulses of a status input that are this long pass, those 1 ms shorter never do [0.001 s]
+#define LINKS_MACHINE_FILTER                           0x064u  // rw: a status input must stand this long without a break; the change passes at most 1 ms later [0.001 s]
 #define LINKS_MACHINE_FILTER_MASK                      0x0000ffffu
 #define LINKS_MACHINE_FILTER_SHIFT                     0
 #define LINKS_MACHINE_FILTER_WIDTH                     16

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0xDA0BE032          # CRC-32 of tables/registers.rdl
+MAP_CRC = 0xCF61CB31          # CRC-32 of tables/registers.rdl
 BLOCKS = {"node": (0x000, 0x000), "line": (0x100, 0x000), "links": (0x200, 0x000), "axis": (0x400, 0x100), "grating": (0xC00, 0x100), "actuator": (0x1400, 0x100)}          # base, distance to the next one
 
 
@@ -194,7 +194,7 @@ FIELDS = (
     Field("links", "display_state", "sending", 0x60, 5, 1, False, "r", "", Fraction(1),
           "state of the display: sending"),
     Field("links", "machine_filter", "value", 0x64, 0, 16, False, "rw", "s", Fraction(1, 1000),
-          "pulses of a status input that are this long pass, those 1 ms shorter never do"),
+          "a status input must stand this long without a break; the change passes at most 1 ms later"),
     Field("links", "machine_status", "inputs", 0x68, 0, 2, False, "r", "", Fraction(1),
           "bit n: level of input n"),
     Field("links", "machine_status", "rose_0", 0x68, 2, 1, False, "rw", "", Fraction(1),
