@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/link/spi_word_sender.sv does, in integers: step(...) is one clk and returns the pins after it, (ready, cs_n, sclk, sdi, busy)."""
+"""What rtl/link/spi_word_sender.sv does, in integers: step(...) is one clk and returns (ready, cs_n, sclk, sdi, busy) after it."""
 
 BITS, TAIL = 16, 3                          # halves of sclk after the bits: one of hold, two with cs_n high
 

@@ -107,7 +107,8 @@ async def any_levels_match_the_model(dut):
     contacts = await Contacts(dut).begin(0)
     for _ in range(600):
         contacts.time_ms = random.choice([0, 1, 2, 5, contacts.time_ms, contacts.time_ms])
-        await contacts.clk(*(random.getrandbits(1) for _ in range(contacts.w)), n=random.choice([1, 3, MS, 6 * MS]), rst=int(random.random() < .01))
+        levels = [random.getrandbits(1) for _ in range(contacts.w)]
+        await contacts.clk(*levels, n=random.choice([1, 3, MS, 6 * MS]), rst=int(random.random() < .01))
     assert {name for _, name in contacts.told} == {"rose", "fell"}
 
 
