@@ -29,8 +29,8 @@ public:
     }
     // Bytes onto the line beside its sender, from clk `now` on.
     void put(const uint8_t* bytes, int count, uint64_t now) {
-        for (int n = 0; n < count; n++) pending_.push_back(bytes[n]);
-        if (!disturbs()) start(now + 1);
+        if (count && !disturbs()) start(now + 1);
+        pending_.insert(pending_.end(), bytes, bytes + count);
     }
     // `rate` times a second some bytes of chance; 0 ends it.
     void garbage(double rate, uint64_t now) {

@@ -22,22 +22,20 @@ void Ps2Computer::fell(uint64_t now, bool data) {
             data_low = !(frame_ >> ++bit_ & 1);
             return;
         }
-        mode_ = LISTENS;
-        bit_ = 0;
-        if (data) return failed(now);
-        at_ = awaits_ ? now + us(ANSWER) : NEVER;
+        listen(now);
+        if (data) failed(now);
     } else if (mode_ == LISTENS) {
         if (bit_ == 0) frame_ = 0;
         frame_ |= unsigned(data) << bit_;
         at_ = now + us(FRAME);
         if (++bit_ < 11) return;
-        bit_ = 0;
-        at_ = awaits_ ? now + us(ANSWER) : NEVER;
         pause_ = now + us(PAUSE);
+        processes_at_ = now + us(LAST);                       // once the last clock is over
         const uint8_t byte = uint8_t(frame_ >> 1);
-        if (frame_ == ps2_frame(byte)) return take(now, byte);
-        damaged++;
-        again_ = true;
+        again_ = frame_ != ps2_frame(byte);
+        damaged += again_;
+        listen(now);
+        if (!again_) take(now, byte);
     }
 }
 
@@ -59,9 +57,8 @@ void Ps2Computer::take(uint64_t now, uint8_t byte) {
 void Ps2Computer::timers(uint64_t now) {
     const bool due = now >= at_;
     if (mode_ == INHIBITS && due) {
-        mode_ = LISTENS;
+        listen(now);
         clock_low = false;
-        at_ = awaits_ ? now + us(ANSWER) : NEVER;
         pause_ = now + us(PAUSE);
     } else if (mode_ == ASKS && due) {
         mode_ = SENDS;
@@ -70,45 +67,53 @@ void Ps2Computer::timers(uint64_t now) {
         clock_low = false;
         at_ = now + us(FIRST);
     } else if (mode_ == SENDS && due) {
-        mode_ = LISTENS;
-        bit_ = 0;
+        listen(now);
         data_low = false;
         failed(now);
     } else if (mode_ == LISTENS && due) {
         if (bit_) {                                           // a frame that never ended
-            bit_ = 0;
+            listen(now);
             damaged++;
-            at_ = awaits_ ? now + us(ANSWER) : NEVER;
         } else {
             failed(now);
         }
     }
     if (mode_ != LISTENS) return;
+    if (now >= processes_at_) {
+        processes_at_ = NEVER;
+        if (again_) return ask(now, 0xFE);                    // before another byte comes
+        if (processing_ > 0) return hold(now, us(processing_ * 1e6));
+    }
     if (now >= inhibit_at_) {
         if (bit_ == 10) {                                     // no device can tell a cut at its last edge
             inhibit_at_ = now + us(HOLD);
             return;
         }
         if (inhibit_at_) {
-            mode_ = INHIBITS;
-            bit_ = 0;
-            clock_low = true;
+            hold(now, us(random_.uniform(100, 2000)));
             inhibits++;
-            at_ = now + us(random_.uniform(100, 2000));
         }
         inhibit_at_ = now + uint64_t(random_.exponential(clk_hz_ / inhibits_)) + us(2000);
-    } else if (bit_ == 0 && now >= pause_) {
-        if (again_)
-            ask(now, 0xFE);
-        else if (!awaits_ && !orders_.empty())
-            ask(now, orders_.front());
+    } else if (may_order() && now >= pause_) {
+        ask(now, orders_.front());
     }
+}
+
+void Ps2Computer::hold(uint64_t now, uint64_t clk) {
+    mode_ = INHIBITS;
+    clock_low = true;
+    at_ = now + clk;
+}
+
+void Ps2Computer::listen(uint64_t now) {                      // for a new byte
+    mode_ = LISTENS;
+    bit_ = 0;
+    at_ = awaits_ || again_ ? now + us(ANSWER) : NEVER;
 }
 
 void Ps2Computer::ask(uint64_t now, uint8_t byte) {
     frame_ = ps2_frame(byte);
     awaits_ |= !again_;
-    again_ = false;
     mode_ = ASKS;
     clock_low = true;
     at_ = now + us(HOLD);
@@ -120,15 +125,14 @@ void Ps2Computer::failed(uint64_t now) {                      // the order will 
         orders_.pop_front();
         tries_ = 0;
     }
-    awaits_ = false;
+    awaits_ = again_ = false;
     at_ = NEVER;
     pause_ = now + us(PAUSE);
 }
 
 uint64_t Ps2Computer::next() const {
-    uint64_t when = std::min(at_, inhibit_at_);
-    if (mode_ == LISTENS && bit_ == 0 && (again_ || (!awaits_ && !orders_.empty()))) when = std::min(when, pause_);
-    return when;
+    const uint64_t when = std::min({at_, inhibit_at_, processes_at_});
+    return may_order() ? std::min(when, pause_) : when;
 }
 
 }  // namespace twin

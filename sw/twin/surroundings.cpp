@@ -16,7 +16,7 @@ void Surroundings::configure() {
     eeprom.write_clk = uint64_t(p_.eeprom_write_time * clk_hz_);
     display.glass.configure(clk_hz_);
     keyboard.configure(clk_hz_, p_.keyboard_self_test);
-    computer.configure(clk_hz_, p_.computer_inhibits);
+    computer.configure(clk_hz_, p_.computer_inhibits, p_.computer_processing);
     edm.configure(p_, clk_hz_);
     wake();
 }
@@ -55,9 +55,10 @@ void Surroundings::advance(uint64_t now, unsigned drive) {
         computer.keys.clear();
     }
     if (woken || now >= edm_at_) edm_at_ = std::max(now + 1, edm.step(now, table_angle));
+    const unsigned after = lines(), own = after ^ levels_ ^ changed;
+    if (own & KEYBOARD) keyboard_at_ = now + 1;               // they see their own pulls a clk later
+    if (own & MACHINE) computer_at_ = now + 1;
     event_at_ = std::min({keyboard_at_, computer_at_, edm_at_});
-    const unsigned after = lines();
-    if ((after ^ levels_ ^ changed) & (KEYBOARD | MACHINE)) event_at_ = now + 1;        // they see their own pulls a clk later
     levels_ = after | MACHINE_CUTTING * edm.cutting.level() | MACHINE_ALARM * edm.alarming.level();
 }
 

@@ -41,8 +41,9 @@ BENCH_FUNCTIONS = {
     "surroundings_bench_of": (HANDLE, [HANDLE]), "surroundings_bench_now": (LONG, [HANDLE]),
     "surroundings_bench_levels": (ctypes.c_uint, [HANDLE]), "surroundings_bench_run": (None, [HANDLE, LONG]),
     "surroundings_bench_pins": (None, [HANDLE, ctypes.c_uint, ctypes.c_uint]),
-    "surroundings_bench_watch": (None, [HANDLE, LONG, HANDLE]), "surroundings_bench_power_cut": (None, [HANDLE]),
-    "surroundings_bench_power_on": (None, [HANDLE]), "peer_line_new": (HANDLE, [LONG, REAL, REAL]), "peer_line_delete": (None, [HANDLE]),
+    "surroundings_bench_watch": (None, [HANDLE, LONG, HANDLE]), "surroundings_bench_cable": (None, [HANDLE, LONG, HANDLE]),
+    "surroundings_bench_power_cut": (None, [HANDLE]), "surroundings_bench_power_on": (None, [HANDLE]),
+    "peer_line_new": (HANDLE, [LONG, REAL, REAL]), "peer_line_delete": (None, [HANDLE]),
     "peer_line_levels": (None, [HANDLE, LONG, LONG, HANDLE, HANDLE])}
 
 # pins, in the order of surroundings.h
@@ -263,7 +264,7 @@ def machine_library():
 
 
 class SurroundingsBench(SurroundingsHandle):
-    """Surroundings without a node. Time passes in run and watch."""
+    """Surroundings without a node. Time passes in run, watch and cable."""
 
     def __init__(self, around, seed=1, clk_hz=2_000_000):
         self.bench = None
@@ -290,8 +291,15 @@ class SurroundingsBench(SurroundingsHandle):
 
     def watch(self, seconds):
         """Run; {pin: levels after each clk}."""
+        return self._levels(self.library.surroundings_bench_watch, seconds)
+
+    def cable(self, seconds):
+        """Run with the keyboard straight at the machine's port, no node between; {pin: levels after each clk}."""
+        return self._levels(self.library.surroundings_bench_cable, seconds)
+
+    def _levels(self, watch, seconds):
         out = numpy.zeros(round(seconds * self.clk_hz), dtype=numpy.uint16)
-        self.library.surroundings_bench_watch(self.bench, len(out), out.ctypes.data)
+        watch(self.bench, len(out), out.ctypes.data)
         return {name: (out & bit > 0).astype(numpy.uint8) for name, bit in SENSE.items()}
 
     def level(self, pin):

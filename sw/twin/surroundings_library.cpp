@@ -22,6 +22,14 @@ public:
         }
     }
 
+    void cable() {                                            // a clk with the keyboard straight at the machine's port, no node between
+        const Ps2Keyboard& keyboard = surroundings.keyboard;
+        const Ps2Computer& computer = surroundings.computer;
+        drive = LINK_DRIVE_IDLE | KEYBOARD_CLOCK_LOW * computer.clock_low | KEYBOARD_DATA_LOW * computer.data_low |
+                MACHINE_CLOCK_LOW * keyboard.clock_low | MACHINE_DATA_LOW * keyboard.data_low;
+        surroundings.clk(++now, drive);
+    }
+
     Surroundings surroundings;
     uint64_t now = 0;
     unsigned drive = LINK_DRIVE_IDLE;
@@ -94,6 +102,12 @@ void surroundings_bench_run(SurroundingsBench* bench, uint64_t clk) { bench->run
 void surroundings_bench_watch(SurroundingsBench* bench, uint64_t clk, uint16_t* levels) {     // the same, with the levels after each clk
     for (uint64_t n = 0; n < clk; n++) {
         bench->run(1);
+        levels[n] = uint16_t(bench->surroundings.levels());
+    }
+}
+void surroundings_bench_cable(SurroundingsBench* bench, uint64_t clk, uint16_t* levels) {
+    for (uint64_t n = 0; n < clk; n++) {
+        bench->cable();
         levels[n] = uint16_t(bench->surroundings.levels());
     }
 }
