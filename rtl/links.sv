@@ -98,8 +98,8 @@ module links #(
             wire [7:0]  answer_free;
 
             synchroniser #(.W(2), .RESET(3)) u_lines (.clk, .rst, .d({i2c_scl, i2c_sda}), .q({scl_level, sda_level}));
-            deglitcher #(.W(8)) u_scl (.clk, .rst, .stable(8'(SPIKE)), .level(scl_level), .filtered(scl), .rejected(unused_rejected[0]));
-            deglitcher #(.W(8)) u_sda (.clk, .rst, .stable(8'(SPIKE)), .level(sda_level), .filtered(sda), .rejected(unused_rejected[1]));
+            deglitcher #(.W(4)) u_scl (.clk, .rst, .stable(4'(SPIKE)), .level(scl_level), .filtered(scl), .rejected(unused_rejected[0]));
+            deglitcher #(.W(4)) u_sda (.clk, .rst, .stable(4'(SPIKE)), .level(sda_level), .filtered(sda), .rejected(unused_rejected[1]));
             word_queue #(.W(12), .DEPTH(128)) u_commands (.clk, .rst, .push(i2c_written), .in({i2c_acknowledge, i2c_command, i2c_data}),
                 .pop(command_ready), .present, .out({acknowledge, command, data}), .free(i2c_state_free), .overrun);
             i2c_master #(.CLK_HZ(CLK_HZ)) u_master (.clk, .rst, .scl, .sda, .command_valid(present), .command_ready, .command,

@@ -79,7 +79,7 @@ module links_registers (
     input  wire         machine_status_fell_0,         // strobe, held: input 0 went down
     input  wire         machine_status_fell_1          // strobe, held: input 1 went down
 );
-    logic [31:0] ps2_typed_count;
+    logic [15:0] ps2_typed_count;
     logic [7:0]  ps2_errors_keyboard_damaged_count;
     logic [7:0]  ps2_errors_command_damaged_count;
     logic [7:0]  ps2_errors_unsent_count;
@@ -88,7 +88,7 @@ module links_registers (
     logic [7:0]  peer_errors_framing_count;
     logic [7:0]  peer_errors_overruns_count;
     logic [31:0] sensor_reading_high;
-    logic [31:0] sensor_frames_count;
+    logic [15:0] sensor_frames_count;
     logic        machine_status_rose_0_held;
     logic        machine_status_rose_1_held;
     logic        machine_status_fell_0_held;
@@ -107,7 +107,7 @@ module links_registers (
             6'h03: rdata <= {20'd0, i2c_state_sda, i2c_state_scl, i2c_state_owned, i2c_state_busy, i2c_state_free};
             6'h04: rdata <= {16'd0, ps2_idle};
             6'h06: rdata <= {24'd0, ps2_state_busy, ps2_state_injecting, ps2_state_free};
-            6'h07: rdata <= ps2_typed_count;
+            6'h07: rdata <= {16'd0, ps2_typed_count};
             6'h08: rdata <= {ps2_errors_aborted_count, ps2_errors_unsent_count, ps2_errors_command_damaged_count,
                             ps2_errors_keyboard_damaged_count};
             6'h09: rdata <= {24'd0, ps2_glitches_count};
@@ -122,7 +122,7 @@ module links_registers (
             6'h13: rdata <= sensor_reading_high;
             6'h14: rdata <= {23'd0, sensor_state_stale, sensor_state_sequence_number};
             6'h15: rdata <= {8'd0, sensor_errors_missed, sensor_errors_broken, sensor_errors_crc};
-            6'h16: rdata <= sensor_frames_count;
+            6'h16: rdata <= {16'd0, sensor_frames_count};
             6'h18: rdata <= {26'd0, display_state_sending, display_state_free};
             6'h19: rdata <= {16'd0, machine_filter};
             6'h1A: rdata <= {26'd0, machine_status_fell_1_held, machine_status_fell_0_held, machine_status_rose_1_held,
@@ -139,8 +139,8 @@ module links_registers (
         ps2_inject_written <= put && word == 6'h05;
         if (put && word == 6'h05) ps2_inject_data <= wdata[7:0];
         if (put && word == 6'h05) ps2_inject_last <= wdata[8];
-        if (put && word == 6'h07) ps2_typed_count <= {31'd0, ps2_typed};
-        else if (!(&ps2_typed_count)) ps2_typed_count <= ps2_typed_count + {31'd0, ps2_typed};
+        if (put && word == 6'h07) ps2_typed_count <= {15'd0, ps2_typed};
+        else if (!(&ps2_typed_count)) ps2_typed_count <= ps2_typed_count + {15'd0, ps2_typed};
         if (put && word == 6'h08) ps2_errors_keyboard_damaged_count <= {7'd0, ps2_errors_keyboard_damaged};
         else if (!(&ps2_errors_keyboard_damaged_count)) ps2_errors_keyboard_damaged_count <= ps2_errors_keyboard_damaged_count + {7'd0, ps2_errors_keyboard_damaged};
         if (put && word == 6'h08) ps2_errors_command_damaged_count <= {7'd0, ps2_errors_command_damaged};
@@ -162,8 +162,8 @@ module links_registers (
         if (put && word == 6'h10) sensor_gap <= wdata[23:0];
         if (put && word == 6'h11) sensor_stale_after <= wdata;
         sensor_errors_clear <= put && word == 6'h15 && wdata[24];
-        if (put && word == 6'h16) sensor_frames_count <= {31'd0, sensor_frames};
-        else if (!(&sensor_frames_count)) sensor_frames_count <= sensor_frames_count + {31'd0, sensor_frames};
+        if (put && word == 6'h16) sensor_frames_count <= {15'd0, sensor_frames};
+        else if (!(&sensor_frames_count)) sensor_frames_count <= sensor_frames_count + {15'd0, sensor_frames};
         display_written <= put && word == 6'h17;
         if (put && word == 6'h17) display <= wdata[15:0];
         if (put && word == 6'h19) machine_filter <= wdata[15:0];

@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0xcf61cb31u            // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0x1f6961d1u            // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define LINE_BASE 0x100u
@@ -270,9 +270,9 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define LINKS_PS2_STATE_BUSY_SHIFT                     7
 #define LINKS_PS2_STATE_BUSY_WIDTH                     1
 #define LINKS_PS2_TYPED                                0x01cu  // rw: bytes of the keyboard that answer no command: a person types; writing clears
-#define LINKS_PS2_TYPED_MASK                           0xffffffffu
+#define LINKS_PS2_TYPED_MASK                           0x0000ffffu
 #define LINKS_PS2_TYPED_SHIFT                          0
-#define LINKS_PS2_TYPED_WIDTH                          32
+#define LINKS_PS2_TYPED_WIDTH                          16
 #define LINKS_PS2_ERRORS                               0x020u  // rw: errors of PS/2; writing clears them all
 #define LINKS_PS2_ERRORS_KEYBOARD_DAMAGED_MASK         0x000000ffu  // bytes of the keyboard that came damaged
 #define LINKS_PS2_ERRORS_KEYBOARD_DAMAGED_SHIFT        0
@@ -356,9 +356,9 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define LINKS_SENSOR_ERRORS_CLEAR_SHIFT                24
 #define LINKS_SENSOR_ERRORS_CLEAR_WIDTH                1
 #define LINKS_SENSOR_FRAMES                            0x058u  // rw: good frames; writing clears
-#define LINKS_SENSOR_FRAMES_MASK                       0xffffffffu
+#define LINKS_SENSOR_FRAMES_MASK                       0x0000ffffu
 #define LINKS_SENSOR_FRAMES_SHIFT                      0
-#define LINKS_SENSOR_FRAMES_WIDTH                      32
+#define LINKS_SENSOR_FRAMES_WIDTH                      16
 #define LINKS_DISPLAY                                  0x05cu  // w: queue a word for the display driver: register in the high byte, value in the low one
 #define LINKS_DISPLAY_MASK                             0x0000ffffu
 #define LINKS_DISPLAY_SHIFT                            0

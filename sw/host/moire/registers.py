@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0xCF61CB31          # CRC-32 of tables/registers.rdl
+MAP_CRC = 0x1F6961D1          # CRC-32 of tables/registers.rdl
 BLOCKS = {"node": (0x000, 0x000), "line": (0x100, 0x000), "links": (0x200, 0x000), "axis": (0x400, 0x100), "grating": (0xC00, 0x100), "actuator": (0x1400, 0x100)}          # base, distance to the next one
 
 
@@ -137,7 +137,7 @@ FIELDS = (
           "a sequence is under way"),
     Field("links", "ps2_state", "busy", 0x18, 7, 1, False, "r", "", Fraction(1),
           "a frame is under way on either side"),
-    Field("links", "ps2_typed", "value", 0x1C, 0, 32, False, "rw", "", Fraction(1),
+    Field("links", "ps2_typed", "value", 0x1C, 0, 16, False, "rw", "", Fraction(1),
           "bytes of the keyboard that answer no command: a person types; writing clears"),
     Field("links", "ps2_errors", "keyboard_damaged", 0x20, 0, 8, False, "rw", "", Fraction(1),
           "bytes of the keyboard that came damaged"),
@@ -185,7 +185,7 @@ FIELDS = (
           "by the gaps of the numbers, damaged ones with them"),
     Field("links", "sensor_errors", "clear", 0x54, 24, 1, False, "w", "", Fraction(1),
           "clear the three"),
-    Field("links", "sensor_frames", "value", 0x58, 0, 32, False, "rw", "", Fraction(1),
+    Field("links", "sensor_frames", "value", 0x58, 0, 16, False, "rw", "", Fraction(1),
           "good frames; writing clears"),
     Field("links", "display", "value", 0x5C, 0, 16, False, "w", "", Fraction(1),
           "queue a word for the display driver: register in the high byte, value in the low one"),
