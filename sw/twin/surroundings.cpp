@@ -86,10 +86,15 @@ bool Surroundings::fault(const char* name, bool on) {
         const char* name;
         bool* place;
         bool always;                                          // what is not there is dead
-    } known[] = {{"eeprom_dead", &eeprom.dead, !(fitted_ & FITTED_EEPROM)}, {"keypad_dead", &keypad.dead, !(fitted_ & FITTED_KEYPAD)},
-                 {"display_dead", &display.dead, !(fitted_ & FITTED_DISPLAY)}, {"keyboard_dead", &keyboard.dead, !(fitted_ & FITTED_KEYBOARD)},
-                 {"scl_low", &scl_stuck_, false}, {"sda_low", &sda_stuck_, false}, {"edm_alarm", &edm.alarm, false},
-                 {"edm_endless", &edm.endless, false}, {"edm_deaf", &edm.deaf, false}};
+    } known[] = {{"eeprom_dead", &eeprom.dead, !(fitted_ & FITTED_EEPROM)},
+                 {"keypad_dead", &keypad.dead, !(fitted_ & FITTED_KEYPAD)},
+                 {"display_dead", &display.dead, !(fitted_ & FITTED_DISPLAY)},
+                 {"keyboard_dead", &keyboard.dead, !(fitted_ & FITTED_KEYBOARD)},
+                 {"scl_low", &scl_stuck_, false},
+                 {"sda_low", &sda_stuck_, false},
+                 {"edm_alarm", &edm.alarm, false},
+                 {"edm_endless", &edm.endless, false},
+                 {"edm_deaf", &edm.deaf, false}};
     for (const auto& fault : known)
         if (!std::strcmp(fault.name, name)) {
             *fault.place = on || fault.always;
@@ -122,10 +127,10 @@ const char* Surroundings::state_names() {
 void Surroundings::state(uint64_t now, double* out) const {
     for (const double value : {double(now) / clk_hz_, double(eeprom.writes), double(eeprom.torn), double(keypad.waiting()),
                                double(display.glass.too_soon), double(display.back_light()), double(digits.cut_short),
-                               double(keyboard.waiting()), double(keyboard.sent), double(keyboard.aborts), double(keyboard.damaged_commands),
-                               double(keyboard.lights), double(computer.waiting()), double(computer.damaged), double(computer.unanswered),
-                               double(computer.inhibits), double(edm.starts), double(edm.ignored), double(edm.cutting.on()),
-                               double(edm.alarming.on())})
+                               double(keyboard.waiting()), double(keyboard.sent), double(keyboard.aborts),
+                               double(keyboard.damaged_commands), double(keyboard.lights), double(computer.waiting()),
+                               double(computer.damaged), double(computer.unanswered), double(computer.inhibits), double(edm.starts),
+                               double(edm.ignored), double(edm.cutting.on()), double(edm.alarming.on())})
         *out++ = value;
 }
 
