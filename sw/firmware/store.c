@@ -75,8 +75,7 @@ static uint8_t *bytes_of(unsigned which)
 // Bytes of a program that its CRC-32 is about.
 static unsigned program_bytes(const struct store_program *program)
 {
-    unsigned stations = program->stations <= STORE_STATIONS ? program->stations : STORE_STATIONS;
-    return HEAD_BYTES + 4u * stations;
+    return HEAD_BYTES + 4u * program->stations;
 }
 
 static uint16_t record_place(uint32_t sequence)
@@ -107,6 +106,11 @@ static void end(uint8_t with)
 
 // ---- loading: both copies, then the journal
 
+static bool laid_out(const struct store_program *program)
+{
+    return program->settings == LINE_SETTING_COUNT && program->stations <= STORE_STATIONS;
+}
+
 static void load_part(void)
 {
     transfer_begin((uint16_t)(newest * COPY_BYTES + at), 0, PART);
@@ -128,7 +132,7 @@ static void loaded_part(void)
     copy(bytes_of(newest) + at, in, at + PART <= sizeof *program ? PART : sizeof *program - at);
     at = (uint16_t)(at + PART);
     go(LOAD);
-    if (at < program_bytes(program) + CRC_BYTES) return load_part();
+    if (laid_out(program) && at < program_bytes(program) + CRC_BYTES) return load_part();
     at = 0;
     crc = UINT32_MAX;
     go(CHECK_LOADED);
@@ -159,8 +163,8 @@ static bool crc_step(const struct store_program *program, unsigned which)
 static void check_loaded(void)
 {
     struct store_program *program = &programs[newest];
-    if (!crc_step(program, newest)) return;
-    if (program->settings != LINE_SETTING_COUNT || program->stations > STORE_STATIONS || program->angle[program->stations] != ~crc)
+    if (laid_out(program) && !crc_step(program, newest)) return;
+    if (!laid_out(program) || program->angle[program->stations] != ~crc)
         program->generation = program->stations = 0;
     newest ? choose() : load_begin(1);
 }
