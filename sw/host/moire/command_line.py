@@ -220,8 +220,8 @@ def make_parser() -> Parser:
         "moire --port /dev/ttyUSB0 home -- learn -- correction save stage.json",
     )
     learn.add_argument(
-        "--distance", type=checked(positive(units.parse_length)), default="0.4mm", metavar="LENGTH",
-        help="how far from here, with a unit; 0.4mm unless given",
+        "--distance", type=checked(positive(units.parse_length)), default="1mm", metavar="LENGTH",
+        help="how far from here, with a unit; 1mm unless given",
     )
     learn.add_argument(
         "--timeout", type=checked(positive(units.parse_time)), default="120s", metavar="TIME", help="given up after this; 120s unless given"
