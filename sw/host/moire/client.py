@@ -278,32 +278,35 @@ class Line:
         self.sequences[address] = sequence
         character_s = self.transport.character_s
         timing = Timing(character_s, answer=answer_s or self.answer_s, quiet=max(0.01, 3 * character_s))
-        exchange = Exchange(address, request_body(operation, sequence, **fields), tries or self.tries, timing)
+        body = request_body(operation, sequence, **fields)
+        return self.carry(Exchange(address, body, tries or self.tries, timing, self.transport.handshake)).result()
+
+    def carry(self, exchange: Exchange) -> Exchange:
+        """Until it is finished, well or not."""
         if not self.in_order:
-            self.let_fall_silent(timing)
+            self.let_fall_silent(exchange.timing)
         self.in_order = False
         self.statistics.exchanges += 1
         try:
-            self.carry(exchange)
+            while not exchange.finished:
+                self.step(exchange)
         finally:
             self.statistics.repeats += exchange.attempts - 1
             for event in exchange.events:
                 name = event.replace(" ", "_")
                 setattr(self.statistics, name, getattr(self.statistics, name) + 1)
-        reply = exchange.result()
-        self.in_order = True
-        return reply
+        self.in_order = exchange.reply is not None
+        return exchange
 
-    def carry(self, exchange: Exchange):
-        while not exchange.finished:
-            sending = exchange.words_to_send()
-            if sending:
-                self.transport.send(sending)
-            wanted = exchange.wanted
-            received = self.transport.receive(wanted, exchange.timeout_s)
-            exchange.feed(received)
-            if len(received) < wanted:
-                exchange.silence()
+    def step(self, exchange: Exchange):
+        sending = exchange.words_to_send()
+        if sending:
+            self.transport.send(sending)
+        wanted = exchange.wanted
+        received = self.transport.receive(wanted, exchange.timeout_s)
+        exchange.feed(received)
+        if len(received) < wanted:
+            exchange.silence()
 
     def let_fall_silent(self, timing: Timing):
         for _ in range(Exchange.LONGEST_NOISE):

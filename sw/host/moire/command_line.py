@@ -12,13 +12,13 @@ from dataclasses import asdict
 from fractions import Fraction
 from pathlib import Path
 
-from . import command_relay, units
+from . import command_relay, command_twin, units
 from .client import CAPTURE_SOURCES, HOME_METHODS, Line, capture_source, register_fields
-from .errors import BadFile, LineError, MoireError, OutOfRange, PortError, TwinNotBuilt, UnitError
+from .errors import BadFile, LineError, MoireError, OutOfRange, PortError, UnitError
 from .line_tables import PARAMETERS
 from .protocol import ADDRESSES
 from .registers import FIELDS
-from .transport import BAUD, SerialLine
+from .transport import BAUD, PARITIES, open_line
 
 EXAMPLES = """\
 several commands in one call, with -- between them:
@@ -42,7 +42,7 @@ OF_THE_PORT = ("port", "baud", "parity")
 OF_THE_CALL = (*OF_THE_PORT, "json")
 OF_AN_AXIS = ("axis.", "grating.", "actuator.")      # registers
 KEEP_COMPANY_S = 0.1
-NOT_INSIDE = ("run", "shell")
+NOT_INSIDE = ("run", "shell", "twin")
 INTERRUPTED = 130
 
 
@@ -130,13 +130,14 @@ def group(name, text, under, common, example):
 def common_options() -> argparse.ArgumentParser:
     common = Parser(add_help=False, argument_default=argparse.SUPPRESS)
     group = common.add_argument_group("line")
-    group.add_argument("--port", help="serial port (/dev/ttyUSB0, COM3, rfc2217://host:port), or 'twin' for the simulated stage; "
-                                      "else the variable MOIRE_PORT")
+    group.add_argument("--port", help="serial port (/dev/ttyUSB0, COM3, rfc2217://host:port, socket://host:port), or 'twin' for the "
+                                      "simulated stage; else the variable MOIRE_PORT")
     group.add_argument("--baud", type=positive_number, help=f"baud rate of the line, {BAUD} unless given")
     group.add_argument(
         "--parity",
-        choices=("auto", "mark", "odd"),
-        help="how the 9th bit is made: auto takes mark where the port can do it; odd reaches only the addresses 1 2 4 7 8 11 13 14",
+        choices=PARITIES,
+        help="how the 9th bit is made: auto takes mark where the port can do it; odd reaches only the addresses 1 2 4 7 8 11 13 14; "
+             "none: COBS packets in 8N1, which auto takes for socket:// and pseudo terminals",
     )
     group.add_argument(
         "--address", type=address_number, metavar="N", help=f"address of the node, {ADDRESSES[0]} to {ADDRESSES[-1]}; 1 unless given"
@@ -291,6 +292,7 @@ def make_parser() -> Parser:
     )
     load.add_argument("file", metavar="FILE")
 
+    command_twin.add_to(command, address_number, checked(waiting_time))
     run = command("run", do_run, "commands from a file, one a line, # begins a remark", "moire --port twin run warm_up.txt")
     run.add_argument("file", metavar="FILE", help="- is the standard input")
     command("shell", do_shell, "commands from the keyboard, until 'quit'; drives stay on between them", "moire --port twin shell")
@@ -404,23 +406,9 @@ def open_port(options):
     if not port:
         raise PortError("no port: write --port /dev/ttyUSB0, or --port twin for the simulated stage")
     if port == "twin":
-        return open_twin(options.baud)
-    return SerialLine(port, options.baud, options.parity)
+        return command_twin.make_twin(options.baud)
+    return open_line(port, options.baud, options.parity)
 
-
-def open_twin(baud: int):
-    """The simulated S0 stage, from the search path or from the checkout that this file lies in."""
-    software = str(Path(__file__).resolve().parents[2])
-    if software not in sys.path:
-        sys.path.append(software)
-    try:
-        import twin
-    except ImportError as error:
-        raise TwinNotBuilt(f"the simulated stage is not here: use the checkout of Moire and its build/venv ({error})") from None
-    try:
-        return twin.TwinTransport(twin.Twin(baud=baud))
-    except (twin.BuildError, OSError) as error:
-        raise TwinNotBuilt(f"the simulated stage cannot be built: {str(error).strip().splitlines()[-1]}") from None
 
 
 # ------------------------------------------------------------------ commands
