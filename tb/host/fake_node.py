@@ -3,7 +3,10 @@
 import binascii
 import random
 import sys
+from functools import reduce
+from itertools import chain
 from math import inf
+from operator import and_
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "sw" / "host"))
@@ -358,6 +361,7 @@ class FakeLine(Transport):
     def __init__(self, *nodes):
         self.nodes, self.arrived, self.clock, self.closed = nodes, [], 0.0, False
         self.to_node = self.from_node = lambda word: [word]
+        self.wired_and = False         # as on the wire: what several nodes send at once is their AND; else one after the other
         self.at = []                   # (time, action), done when the time comes
 
     def pass_time(self, seconds):
@@ -374,9 +378,11 @@ class FakeLine(Transport):
         for word in words:
             self.pass_time(self.character_s)
             for heard in self.to_node(word):
-                for node in self.nodes:
-                    for answer in node.hear(heard):
-                        self.arrived += self.from_node(answer)
+                answers = [node.hear(heard) for node in self.nodes]
+                if self.wired_and:
+                    answers = [[reduce(and_, several) for several in zip(*answers)]]
+                for answer in chain(*answers):
+                    self.arrived += self.from_node(answer)
 
     def receive(self, count, timeout_s):
         taken, self.arrived = self.arrived[:count], self.arrived[count:]

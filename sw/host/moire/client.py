@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from . import units
-from .errors import LineError, MoireError, MotionFailed, NobodyAnswers, NotLearned, OutOfRange, Refused, UnknownName, WrongBuild
+from .errors import LineError, MoireError, MotionFailed, NobodyAnswers, NotLearned, OutOfRange, PortError, Refused, UnknownName, WrongBuild
 from .line_tables import (
     CAUSES,
     ENCODER_EVENTS,
@@ -622,9 +622,9 @@ class Axis:
                 self.transport.wait(self.node.line.poll_s)
         except Refused:
             pass        # the drive is off
-        except LineError as error:
-            sentence = f"axis {self.number} of node {self.node.address} could not be told to stop, its watchdog has to: {error}"
-            raise LineError(self.node.address, sentence) from None
+        except (LineError, PortError) as error:
+            error.args = (f"axis {self.number} of node {self.node.address} could not be told to stop, its watchdog has to: {error}",)
+            raise error from None
 
     def stop_if_on(self):
         """One of several that are to stop: what keeps it from stopping must not keep the others."""

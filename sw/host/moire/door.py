@@ -9,6 +9,7 @@ A client of RFC 2217 with a parity has the 9-bit line itself; one without (8N1),
 packets, for which the door does the exchange. Packets are served one after the other, and wait while an exchange of a 9-bit client is
 under way. A transport whose time stands is kept at the pace of the clock, as far as this computer can.
 """
+import errno
 import os
 import selectors
 import socket
@@ -51,7 +52,8 @@ class Door:
         try:
             listener = socket.create_server((host, port))
         except (OSError, OverflowError) as error:
-            raise PortError(f"the TCP port {port} at {host} does not open: {plain(error).lower()}; choose another, or 0 for any") from None
+            why = os.strerror(error.errno).lower() if getattr(error, "errno", 0) in errno.errorcode else plain(error)
+            raise PortError(f"the TCP port {port} at {host} does not open: {why}; choose another, or 0 for any") from None
         listener.setblocking(False)
         self.selector.register(listener, selectors.EVENT_READ, lambda: self.admit(listener, kind))
         return listener.getsockname()[1]
@@ -103,8 +105,8 @@ class Door:
         if self.ninth_client is not None:
             self.forward(self.transport.receive(RECEIVE, 0))
         if self.waiting and self.idle:
-            client, content = self.waiting.popleft()
-            client.send(self.answer(content))
+            client, address, body = self.waiting.popleft()
+            client.send(self.answer(address, body))
 
     @property
     def idle(self) -> bool:
@@ -151,15 +153,15 @@ class Door:
 
     def hear_packet(self, client, content: bytes):
         """A client that asks again has given up what it asked before."""
-        self.waiting = deque(entry for entry in self.waiting if entry[0] is not client)
-        self.waiting.append((client, content))
-
-    def answer(self, content: bytes) -> bytes:
-        """The reply to a packet, nothing where the node does not answer or the packet is none."""
         address, body = address_of(content, TO_NODE), body_of(content)
         if address is None or body is None:
             self.refused += 1
-            return b""
+            return
+        self.waiting = deque(entry for entry in self.waiting if entry[0] is not client)
+        self.waiting.append((client, address, body))
+
+    def answer(self, address: int, body: bytes) -> bytes:
+        """The reply as a packet; nothing where the node does not answer."""
         self.speak_at(self.own_baud)
         timing = Timing(self.transport.character_s, answer=ANSWER_S, quiet=max(HOLD_S, 3 * self.transport.character_s))
         exchange = self.line.carry(Exchange(address, body, tries=1, timing=timing))
