@@ -18,7 +18,7 @@ from moire.transport import Transport  # noqa: E402
 CAUSE = {name: code for code, (name, _) in CAUSES.items()}
 STATE = {name: code for code, (name, _) in STATES.items()}
 SIZE = {"u8": 1, "i8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "i64": 8, "u64": 8}
-TICK_HZ = 4000
+TICK_HZ, CLK_HZ = 4000, 4_000_000
 LIMIT_LOW, ESTOP = 1 << 0, 1 << 2
 
 
@@ -93,7 +93,7 @@ class FakeNode:
     def __init__(self, address=1, axes=1, map_crc=MAP_CRC, protocol_crc=PROTOCOL_CRC):
         self.address, self.map_crc, self.protocol_crc = address, map_crc, protocol_crc
         self.axes = [FakeAxis() for _ in range(axes)]
-        self.now, self.registers = 0.0, {0x400: 7}
+        self.now, self.registers = 0.0, {0: map_crc, 0x400: 7}
         self.written = []              # (address, value)
         self.captures = []             # words of captured, captured_time and captured_position, oldest first
         self.expecting, self.payload = None, []
@@ -177,7 +177,7 @@ class FakeNode:
             version=1,
             address=self.address,
             axes=len(self.axes),
-            clk_hz=4000000,
+            clk_hz=CLK_HZ,
             tick_hz=TICK_HZ,
             sample_hz=100000,
         )
@@ -350,6 +350,8 @@ class FakeNode:
             return "ok", {"value": bool(self.captures) | (self.registers.get(address, 0) & 64)}
         if self.captures and 0xC68 <= address < 0xC78:
             return "ok", {"value": self.captures[0][address - 0xC68 >> 2]}
+        if 0x10 <= address < 0x18:                     # time stamp
+            return "ok", {"value": round(self.now * CLK_HZ) >> 8 * (address - 0x10) & 0xFFFFFFFF}
         return ("ok", {"value": self.registers[address]}) if address in self.registers else ("no_such_register", {})
 
 

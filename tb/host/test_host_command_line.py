@@ -199,6 +199,9 @@ def test_a_file_that_is_no_record_is_refused(tmp_path, text, said):
         "home -- prepare 1mm -- start 0",
         "override",
         "override 50%",
+        "watch --for 0.3s --every 0.3s",
+        "fault",
+        "selftest",
     ],
 )
 def test_every_command_tells_one_json_object_a_line(text):
@@ -207,7 +210,7 @@ def test_every_command_tells_one_json_object_a_line(text):
     for arguments in (text + " --json", "--json " + text):
         call = Call(arguments, node)
         assert call.code == 0 and call.err == ""
-        assert [told["command"] for told in call.told] == [part.split()[0] for part in text.split(" -- ")]
+        assert list(dict.fromkeys(told["command"] for told in call.told)) == [part.split()[0] for part in text.split(" -- ")]
         node.axes[0].enabled = True
 
 
@@ -354,7 +357,21 @@ def test_ctrl_c_stops_the_axis_and_is_exit_code_130():
     line.at.append((0.5, interrupt))
     call = Call("home", line=line)
     assert "interrupted; what moved was stopped under control" in sentence(call, 130)
+    assert node.axes[0].ended == "stopped"
     assert "stop" in node.executed and node.axes[0].kind is None and not node.axes[0].enabled and line.closed
+
+
+def test_ctrl_c_in_another_command_stops_what_moves_too():
+    node = FakeNode()
+    node.axes[0].homed = True
+    line = FakeLine(node)
+
+    def interrupt():
+        raise KeyboardInterrupt
+    line.at.append((0.5, interrupt))
+    assert Call("move 100mm --no-wait -- watch --json", line=line).told[-1]["exit_code"] == 130
+    assert node.executed[-1] == "enable" and "stop" in node.executed and node.axes[0].ended == "stopped"
+    assert node.axes[0].target != 100_000_000 * 65536 // 800
 
 
 def test_baud_and_parity_reach_the_port():

@@ -144,6 +144,14 @@ class Status:
         return words(FAULTS, self.faults)
 
     @property
+    def first_fault_words(self) -> str:
+        return words(FAULTS, self.first_fault)
+
+    @property
+    def encoder_event_words(self) -> str:
+        return words(ENCODER_EVENTS, self.encoder_events)
+
+    @property
     def ended_words(self) -> str:
         return words(CAUSES, [self.ended])
 

@@ -12,7 +12,7 @@ from dataclasses import asdict
 from fractions import Fraction
 from pathlib import Path
 
-from . import command_relay, command_twin, units
+from . import command_look, command_relay, command_replay, command_twin, units
 from .client import CAPTURE_SOURCES, HOME_METHODS, Line, capture_source, register_fields
 from .errors import BadFile, LineError, MoireError, OutOfRange, PortError, UnitError
 from .line_tables import PARAMETERS
@@ -37,17 +37,22 @@ exit codes: 0 done; 1 the node refused, or a motion ended badly; 2 wrong usage, 
 line is garbled; 4 the port does not work; 5 node and host were made from different sources; 130 interrupted (Ctrl-C
 stops a moving axis under control)
 """
-DEFAULTS = dict(port=None, baud=BAUD, parity="auto", address=1, axis=0, json=False)
-OF_THE_PORT = ("port", "baud", "parity")
+DEFAULTS = dict(port=None, baud=BAUD, parity="auto", record=None, address=1, axis=0, json=False)
+OF_THE_PORT = ("port", "baud", "parity", "record")
 OF_THE_CALL = (*OF_THE_PORT, "json")
 OF_AN_AXIS = ("axis.", "grating.", "actuator.")      # registers
 KEEP_COMPANY_S = 0.1
 NOT_INSIDE = ("run", "shell", "twin")
-INTERRUPTED = 130
 
 
 class UsageError(MoireError):
     exit_code = 2
+
+
+class Interrupted(MoireError):
+    """Ctrl-C."""
+
+    exit_code = 130
 
 
 class Parser(argparse.ArgumentParser):
@@ -139,6 +144,7 @@ def common_options() -> argparse.ArgumentParser:
         help="how the 9th bit is made: auto takes mark where the port can do it; odd reaches only the addresses 1 2 4 7 8 11 13 14; "
              "none: COBS packets in 8N1, which auto takes for socket:// and pseudo terminals",
     )
+    group.add_argument("--record", metavar="FILE", help="write all that is said on the line into FILE, for 'moire replay'")
     group.add_argument(
         "--address", type=address_number, metavar="N", help=f"address of the node, {ADDRESSES[0]} to {ADDRESSES[-1]}; 1 unless given"
     )
@@ -292,6 +298,8 @@ def make_parser() -> Parser:
     )
     load.add_argument("file", metavar="FILE")
 
+    command_look.add_to(command, checked(waiting_time))
+    command_replay.add_to(command)
     command_twin.add_to(command, address_number, checked(waiting_time))
     run = command("run", do_run, "commands from a file, one a line, # begins a remark", "moire --port twin run warm_up.txt")
     run.add_argument("file", metavar="FILE", help="- is the standard input")
@@ -337,7 +345,8 @@ class Session:
 
     def open(self) -> Line:
         if self.opened is None:
-            self.opened = Line(self.open_transport(self.options))
+            transport = self.open_transport(self.options)
+            self.opened = Line(command_replay.recorded(transport, self.options.record) if self.options.record else transport)
         return self.opened
 
     @property
@@ -359,6 +368,15 @@ class Session:
         for place, axis in list(self.switched_on.items()):
             if not axis.status().enabled:
                 del self.switched_on[place]
+
+    def stop_axes(self):
+        """Under control; whatever was switched on is switched off by close()."""
+        for axis in self.switched_on.values():
+            axis.stop_if_on()
+
+    @staticmethod
+    def read_text(file: str) -> str:
+        return read_text(file)
 
     def say(self, told: dict, text: str):
         print(json.dumps(told, default=plain) if self.options.json else text, file=self.out, flush=True)
@@ -942,9 +960,13 @@ def main(arguments=None, open_transport=None, out=None, err=None) -> int:
     except MoireError as error:
         session.complain(getattr(error, "command", None), error)
         return error.exit_code
+    except BrokenPipeError:           # 'moire watch | head': nobody reads any more
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except KeyboardInterrupt:
-        print("moire: interrupted; what moved was stopped under control", file=session.err)
-        return INTERRUPTED
+        session.stop_axes()
+        session.complain(None, Interrupted("interrupted; what moved was stopped under control"))
+        return Interrupted.exit_code
     finally:
         session.close()
 
