@@ -21,8 +21,9 @@ PAGE = ROOT / "docs" / "protocol.md"
 SIZES = {"u8": 1, "i8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "u64": 8, "i64": 8}
 REQUEST_HEAD = ["sequence u8", "operation u8"]
 REPLY_HEAD = ["sequence u8", "operation u8", "cause u8"]
-LISTS = ("cause", "fault", "encoder_event", "state", "flag", "learner_reason", "signal_fault", "learner_action")
-CODES = ("cause", "state", "learner_reason", "learner_action")              # these are numbers, the other lists are bits
+LISTS = ("cause", "fault", "encoder_event", "state", "flag", "learner_reason", "signal_fault", "learner_action",
+         "scope_trigger", "scope_state")
+CODES = ("cause", "state", "learner_reason", "learner_action", "scope_trigger", "scope_state")      # numbers; the others are bits
 
 
 def fields(head, declared):
