@@ -11,12 +11,13 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "sw" / "host"))
 
-from moire.line_tables import CAUSES, OPERATIONS, PARAMETERS, PROTOCOL_CRC, STATES  # noqa: E402  (found through the line above)
+from moire.line_tables import CAUSES, OPERATIONS, PARAMETERS, PROTOCOL_CRC, SCOPE_STATES, STATES  # noqa: E402  (found through the line above)
 from moire.registers import MAP_CRC  # noqa: E402
 from moire.transport import Transport  # noqa: E402
 
 CAUSE = {name: code for code, (name, _) in CAUSES.items()}
 STATE = {name: code for code, (name, _) in STATES.items()}
+SCOPE_STATE = {name: code for code, (name, _) in SCOPE_STATES.items()}
 SIZE = {"u8": 1, "i8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "i64": 8, "u64": 8}
 TICK_HZ, CLK_HZ = 4000, 4_000_000
 LIMIT_LOW, ESTOP = 1 << 0, 1 << 2
@@ -101,6 +102,7 @@ class FakeNode:
         self.counters = dict.fromkeys(
             ("frames_good", "frames_bad", "framing_errors", "start_glitches", "overruns", "repeated", "refused"), 0
         )
+        self.scope, self.armed, self.samples = "empty", None, []       # samples: position, error, command, time
         self.executed = []             # names of the operations, without repetitions
         self.wrong_map = False
 
@@ -335,6 +337,28 @@ class FakeNode:
 
     def do_signal(self, axis):
         return "ok", axis.signal
+
+    def do_position(self, axis):
+        return "ok", {"position": axis.position}
+
+    def do_arm_scope(self, axis, **setting):
+        if setting["amplitude"] and self.ready(axis) != "ok":
+            return self.ready(axis), {}
+        self.scope, self.armed = "full" if setting["trigger"] == 0 else "waiting", setting
+        return "ok", {}
+
+    def do_scope(self, _):
+        if self.scope == "waiting" and any(axis.kind == "moving" for axis in self.axes):
+            self.scope = "full"
+        full = self.scope == "full"
+        return "ok", dict(state=SCOPE_STATE[self.scope], count=len(self.samples) * full, before=self.armed["before"] if full else 0)
+
+    def do_read_scope(self, _, first):
+        if first >= len(self.samples) or self.scope != "full":
+            return "out_of_range", {}
+        padded = self.samples[first:first + 5] + [(0, 0, 0, 0)] * 5
+        return "ok", {f"{name}_{n}": padded[n][place] for n in range(5)
+                      for place, name in enumerate(("position", "error", "command", "time"))}
 
     def do_write_register(self, _, address, value):
         if not 0xC00 <= address < 0xD00:

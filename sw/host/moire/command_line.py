@@ -12,7 +12,7 @@ from dataclasses import asdict
 from fractions import Fraction
 from pathlib import Path
 
-from . import command_look, command_relay, command_replay, command_twin, units
+from . import command_look, command_relay, command_replay, command_scope, command_twin, units
 from .client import CAPTURE_SOURCES, HOME_METHODS, Line, capture_source, register_fields
 from .errors import BadFile, LineError, MoireError, OutOfRange, PortError, UnitError
 from .line_tables import PARAMETERS
@@ -204,9 +204,17 @@ def make_parser() -> Parser:
     command("resume", do_resume, "go on as before the pause; at full speed if it was another call that paused",
             "moire --port /dev/ttyUSB0 resume -- finish")
     command("drive", do_drive, "what drives the axis: command, steps on the wire, fine stage", "moire --port /dev/ttyUSB0 drive")
-    tune = command("tune", do_tune, "gains from a record of how the axis answers to commands in open loop",
-                   "moire tune record.csv --bandwidth 40Hz --picture tuning.png")
-    tune.add_argument("file", metavar="FILE", help="a row a servo tick: command (full scale 32768), position (2^-16 period) that stood")
+    tune = command("tune", do_tune, "gains from how the axis answers to commands in open loop: from a record, or on the spot",
+                   "moire --port /dev/ttyUSB0 tune --bandwidth 40Hz --picture tuning.png")
+    tune.add_argument("file", nargs="?", metavar="FILE",
+                      help="a row a servo tick: command (full scale 32768), position (2^-16 period) that stood; "
+                           "without it the axis is switched on and driven to and fro")
+    tune.add_argument("--amplitude", type=checked(positive(units.parse_share)), default="20%", metavar="SHARE",
+                      help="of the open loop; 20%% unless given")
+    tune.add_argument("--reach", type=checked(positive(units.parse_length)), default="1mm", metavar="LENGTH",
+                      help="how far the open loop may go; 1mm unless given")
+    tune.add_argument("--every", type=checked(positive(units.parse_time)), default="2ms", metavar="TIME",
+                      help="from sample to sample on the spot; 2ms unless given")
     tune.add_argument("--bandwidth", required=True, type=checked(positive(units.FREQUENCY.parse)), metavar="FREQUENCY", help="such as 40Hz")
     tune.add_argument("--margin", type=float, default=50.0, metavar="DEGREES", help="phase margin; 50 unless given")
     tune.add_argument("--tick", type=checked(positive(units.parse_time)), metavar="TIME", help="servo tick; the node is asked unless given")
@@ -267,6 +275,10 @@ def make_parser() -> Parser:
     command("show", do_compare_show, "points passed", "moire --port twin compare show", compare)
     command_relay.add_to(group("relay", "the relay of a ring (S1): status, clear, calibrate", commands, common,
                                "moire --port /dev/ttyUSB0 relay status"), command)
+
+    command_scope.add_to(group("scope", "record position, error and command of an axis: arm, read, show", commands, common,
+                               "moire --port twin home -- scope arm --trigger motion -- move 100um -- scope read move.csv"),
+                         command, checked, write_bytes)
 
     register = command(
         "register", do_register, "read registers of the node, by name or by address", "moire --port twin register axis.position 0x400"
@@ -566,11 +578,14 @@ def do_drive(session, command):
 
 
 def do_tune(session, command):
-    from . import tune  # numpy and pictures: only where they are wanted
+    from . import scope, tune  # numpy and pictures: only where they are wanted
 
-    answers = read_record(command.file)
     tick_s = float(command.tick or Fraction(1, session.line.node(command.address).identity.tick_hz))
-    plant = tune.identify(tune.Record(*answers, tick_s))
+    if command.file is None:
+        record = scope.excite(session.switch_on(command), command.amplitude, command.every, command.reach)
+        plant = tune.identify_samples(*scope.lsb(record), tick_s)
+    else:
+        plant = tune.identify(tune.Record(*read_record(command.file), tick_s))
     tuning = tune.propose(plant, float(command.bandwidth), command.margin)
     if command.picture:
         write_bytes(command.picture, tune.picture(plant, tuning))
