@@ -10,6 +10,7 @@ import sys
 import threading
 from dataclasses import asdict
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
 
 from . import command_look, command_relay, command_replay, command_scope, command_twin, units
@@ -153,6 +154,7 @@ def common_options() -> argparse.ArgumentParser:
     return common
 
 
+@cache
 def make_parser() -> Parser:
     common = common_options()
     parser = Parser(prog="moire", parents=[common], description="Motion controllers on a multi-drop line: find, home, move, look.",

@@ -13,6 +13,7 @@ from .protocol import CRC_LENGTH, FROM_NODE, NAMES, NINTH, REQUESTS, TO_NODE, fr
 from .transport import Transport
 
 KIND = {"record": "moire line", "version": 1}
+LONGEST_S = 1e9              # of a session
 
 
 class Recorder(Transport):
@@ -58,17 +59,25 @@ def read(text: str, name: str = "text") -> list:
     """The calls of a record; BadFile unless it is one of this version, made with this protocol table."""
     try:
         head, *calls = [json.loads(row) for row in text.splitlines()]
-        known = {key: head[key] for key in KIND} == KIND
-        right = all(isinstance(call["at"], float | int) and all(0 <= word < 512 for word in call.get("send", call.get("receive")))
-                    for call in calls)
-        right = right and all("send" in call or call["wanted"] >= 0 and call["timeout_s"] >= 0 for call in calls)
-    except (ValueError, KeyError, TypeError):
-        known = right = False
-    if not known or not right:
+        right = head.items() >= KIND.items() and "protocol_crc" in head and all(map(is_call, calls))
+    except (ValueError, AttributeError):
+        right = False
+    if not right:
         raise BadFile(f"the file {name} is no record of a line: make one with 'moire --record {name} …'")
     if head["protocol_crc"] != PROTOCOL_CRC:
         raise BadFile(f"the file {name} was recorded with another protocol table (line.toml)")
     return calls
+
+
+def is_call(call) -> bool:
+    """Whether this is {at, send} or {at, receive, wanted, timeout_s}, each of its type."""
+    if not isinstance(call, dict):
+        return False
+    words = call.get("send", call.get("receive"))
+    numbers = [call.get("at")] + ([] if "send" in call else [call.get("wanted"), call.get("timeout_s")])
+    return (call.keys() <= {"at", "send"} or call.keys() == {"at", "receive", "wanted", "timeout_s"}) and isinstance(words, list) and \
+        all(type(word) is int and 0 <= word < 512 for word in words) and \
+        all(type(number) in (int, float) and 0 <= number < LONGEST_S for number in numbers) and type(call.get("wanted", 0)) is int
 
 
 # ------------------------------------------------------------------ replay
