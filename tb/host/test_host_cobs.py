@@ -2,6 +2,7 @@
 """cobs: stuffing against the published examples and its own inverse, and a reader that nothing can throw off."""
 import os
 import random
+from pathlib import Path
 
 import pytest
 
@@ -30,7 +31,10 @@ def test_stuffed_bytes_have_no_zero_and_come_back_whole():
 
 
 def test_the_packet_of_the_protocol_page():
+    page = (Path(__file__).resolve().parents[2] / "docs" / "protocol.md").read_text()
     assert cobs.packet(0x21, BODY).hex(" ") == "00 05 21 04 07 03 06 01 86 67 24 60 00"
+    for first, body, who in ((0x21, BODY, "client  "), (0x51, bytes([7, 3, 0]), "node    ")):
+        assert who + cobs.packet(first, body).hex(" ").upper() in page
     assert cobs.PacketReader().feed(cobs.packet(0x21, BODY)) == [bytes([0x21]) + frame(0x21, BODY)]
 
 

@@ -243,6 +243,10 @@ def make_parser() -> Parser:
         "--timeout", type=checked(positive(units.parse_time)), default="120s", metavar="TIME", help="given up after this; 120s unless given"
     )
 
+    calibrate = command("calibrate", do_calibrate, "home where needed, learn the correction, and save it",
+                        "moire --port /dev/ttyUSB0 calibrate stage.json")
+    calibrate.add_argument("file", metavar="FILE", help="JSON, for 'moire correction load'")
+    calibrate.set_defaults(distance="0.4mm", timeout="120s")
     corrections = group("correction", "what was learned of sine and cosine: show, save, load, freeze, go on, forget", commands, common,
                         "moire --port /dev/ttyUSB0 correction load stage.json -- correction show")
     command("show", do_correction_show, "what is in force, and what the learner does", "moire --port twin correction show", corrections)
@@ -696,6 +700,18 @@ def do_learn(session, command):
                 f"{where(command)}: correction learned in {seconds:.1f} s, known to {learner.scatter_nm:.3f} nm, frozen")
 
 
+def do_calibrate(session, command):
+    axis = session.switch_on(command)
+    if not axis.status().homed:
+        axis.home(session.progress())
+    do_learn(session, command)
+    save_correction(axis, command.file)
+
+
+def save_correction(axis, file: str):
+    write_text(file, json.dumps({"correction": axis.correction()}, indent=4) + "\n")
+
+
 def told_correction(command, learner, values) -> dict:
     return {**place(command), "action": command.action, "learner": told_learner(learner), "correction": values}
 
@@ -716,8 +732,7 @@ def do_correction_show(session, command):
 
 
 def do_correction_save(session, command):
-    values = session.axis(command).correction()
-    write_text(command.file, json.dumps({"correction": values}, indent=4) + "\n")
+    save_correction(session.axis(command), command.file)
     session.say({**place(command), "action": "save", "file": command.file}, f"correction saved in {command.file}")
 
 

@@ -25,7 +25,7 @@ from .transport import BITS, Transport, plain
 
 ANSWER_S = 0.05              # patience with a node; the client asks again
 HOLD_S = 0.01                # after the last word of a 9-bit client, before packets have their turn
-PIECE_S = 0.0005             # of the line's time between two looks at the clients
+PIECE_S = 0.00025            # of the line's time between two looks at the clients
 LARGEST_DEBT_S = 0.01        # of a line that cannot keep up: what it is behind beyond this is forgotten
 RECEIVE = 4096
 
