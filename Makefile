@@ -73,6 +73,14 @@ figures: $(SETUP) $(FIRMWARE)  ## all figures, and their page
 soak: $(SETUP) $(FIRMWARE)     ## the long campaigns, for a night: K=name of one
 	@$(PYTHON) -m experiments.soak $K
 
+BOARDS := $(patsubst constraints/%/board.mk,%,$(wildcard constraints/*/board.mk))
+
+board:            ## the bitstream for a board: BOARD=one of the folders of constraints/
+	$(if $(filter $(BOARD),$(BOARDS)),,$(error say which: make board BOARD=x, with x one of: $(BOARDS)))
+ifneq ($(filter $(BOARD),$(BOARDS)),)
+include constraints/$(BOARD)/board.mk
+endif
+
 clean:            ## remove what was built; the tools in build/venv stay (rm -rf build removes them too)
 	@[ ! -d build ] || find build -mindepth 1 -maxdepth 1 ! -name venv -exec rm -rf {} +
 	@find . -name __pycache__ -not -path './build/*' -prune -exec rm -rf {} +
@@ -81,4 +89,4 @@ clean:            ## remove what was built; the tools in build/venv stay (rm -rf
 $(SETUP): requirements.lock pyproject.toml tools/setup.sh
 	@tools/setup.sh
 
-.PHONY: help demo test check lint prove tables fresh firmware figure figures soak clean
+.PHONY: help demo test check lint prove tables fresh firmware figure figures soak board clean

@@ -54,6 +54,6 @@ def written_commands():
 
 @pytest.mark.parametrize("line", list(written_commands()))
 def test_every_command_on_a_page_is_understood(line):
-    arguments = shlex.split(line)[1:]
+    arguments = shlex.split(line, comments=True)[1:]
     if "--help" not in arguments:
         assert command_line.parse(arguments, command_line.DEFAULTS)

@@ -34,7 +34,7 @@ def test_learning_goes_to_and_fro_at_several_speeds_and_ends_frozen_where_it_beg
     told = axis.learn(seen.append)
     assert (told.settled, told.frozen, told.reason, told.words) == (True, True, "frozen", "frozen")
     assert told.scatter_nm == pytest.approx(26 / 2**20 * 800) and len(seen) == 8 and inside.position == start
-    assert inside.speeds == [1000, 1000, 600, 600, 800, 800, 1000, 1000]       # 500 periods of 800 nm in half a second
+    assert inside.speeds == [2500, 2500, 1500, 1500, 2000, 2000, 2500, 2500]       # 1250 periods of 800 nm in half a second
     assert inside.parameters[VELOCITY] == PARAMETERS["velocity"].default
 
 

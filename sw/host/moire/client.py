@@ -733,11 +733,12 @@ class Axis:
                        accepted=told["accepted"], refused=told["refused"],
                        scatter_nm=float(told["scatter"] * self.period_nm / SCATTER))
 
-    def learn(self, progress=None, distance="0.4mm", timeout="120s") -> Learner:
+    def learn(self, progress=None, distance="1mm", timeout="120s") -> Learner:
         """Learns the correction afresh: to and fro over a distance at several speeds until it is settled, then freezes it.
 
-        The axis must be enabled and homed. It goes from where it is, to the side where there is room, and comes back. `progress` is
-        called with a Learner after each way. NotLearned says why it was not settled in time. The parameter `velocity` is set as it was.
+        The axis must be enabled and homed. It goes from where it is, to the side where there is room, and comes back; the farther,
+        the faster, and fringes must come faster than the table can follow or ring. `progress` is called with a Learner after each
+        way. NotLearned says why it was not settled in time. The parameter `velocity` is set as it was.
         """
         stretch, patience = units.parse_length(distance), units.parse_time(timeout)
         if stretch <= 0 or patience <= 0:

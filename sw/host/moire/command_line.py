@@ -236,8 +236,8 @@ def make_parser() -> Parser:
         "moire --port /dev/ttyUSB0 home -- learn -- correction save stage.json",
     )
     learn.add_argument(
-        "--distance", type=checked(positive(units.parse_length)), default="0.4mm", metavar="LENGTH",
-        help="how far from here, with a unit; 0.4mm unless given",
+        "--distance", type=checked(positive(units.parse_length)), default="1mm", metavar="LENGTH",
+        help="how far from here, with a unit; 1mm unless given",
     )
     learn.add_argument(
         "--timeout", type=checked(positive(units.parse_time)), default="120s", metavar="TIME", help="given up after this; 120s unless given"
@@ -246,7 +246,6 @@ def make_parser() -> Parser:
     calibrate = command("calibrate", do_calibrate, "home where needed, learn the correction, and save it",
                         "moire --port /dev/ttyUSB0 calibrate stage.json")
     calibrate.add_argument("file", metavar="FILE", help="JSON, for 'moire correction load'")
-    calibrate.set_defaults(distance="0.4mm", timeout="120s")
     corrections = group("correction", "what was learned of sine and cosine: show, save, load, freeze, go on, forget", commands, common,
                         "moire --port /dev/ttyUSB0 correction load stage.json -- correction show")
     command("show", do_correction_show, "what is in force, and what the learner does", "moire --port twin correction show", corrections)
@@ -685,13 +684,17 @@ def learner_words(learner) -> str:
 
 
 def do_learn(session, command):
+    learn(session, command, command.distance, command.timeout)
+
+
+def learn(session, command, *how):
     axis, watched = session.switch_on(command), not session.options.json and session.err.isatty()
 
     def show(learner):
         print(f"\r{learner_words(learner):<100}", end="", file=session.err, flush=True)
     began = session.line.transport.now()
     try:
-        learner = axis.learn(show if watched else None, command.distance, command.timeout)
+        learner = axis.learn(show if watched else None, *how)
     finally:
         if watched:
             print("\r" + " " * 100 + "\r", end="", file=session.err, flush=True)
@@ -704,7 +707,7 @@ def do_calibrate(session, command):
     axis = session.switch_on(command)
     if not axis.status().homed:
         axis.home(session.progress())
-    do_learn(session, command)
+    learn(session, command)
     save_correction(axis, command.file)
 
 
