@@ -216,7 +216,7 @@ def test_no_permission_is_one_sentence(tmp_path, monkeypatch):
     assert "no permission to use the port /dev/ttyUSB0: on Linux, join the group dialout" in complaint("--port /dev/ttyUSB0 find", 4)
 
 
-@pytest.mark.parametrize("entrance", ["rfc2217", "tcp"])
+@pytest.mark.parametrize("entrance", ["rfc2217", "tcp", "terminal"])
 def test_a_port_unplugged_in_mid_move_is_one_sentence_that_says_who_stops_the_axis(entrance):
     served = Served()
     node = served.far.nodes[0]
@@ -239,6 +239,16 @@ def test_two_nodes_with_one_address_are_one_sentence(served):
     with opened(served, "rfc2217", "mark") as port:
         with pytest.raises(LineGarbled, match="wrong CRC-32, as from noise or from two nodes with the address 1"):
             Line(port).axis().status()
+
+
+def test_ctrl_c_is_the_good_end_of_a_served_twin(monkeypatch):
+    monkeypatch.setattr("moire.command_twin.make_twin", lambda baud, nodes, seed: FakeLine(*map(FakeNode, nodes)))
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+    monkeypatch.setattr(Door, "pace", interrupt)
+    err = io.StringIO()
+    assert command_line.main(["twin", "--rfc2217", "0", "--tcp", "0"], None, io.StringIO(), err) == 0 and err.getvalue() == ""
 
 
 def test_the_ports_are_told_as_json(monkeypatch, tmp_path):

@@ -52,6 +52,8 @@ def do_twin(session, command):
                     f"  {command.link or terminal:<28} COBS packets"]
             session.say({"command": "twin", "nodes": command.nodes, "rfc2217": rfc2217, "tcp": tcp, "terminal": terminal}, "\n".join(rows))
             door.serve(None if command.time is None else float(command.time))
+    except KeyboardInterrupt:
+        pass                           # how it is meant to end
     finally:
         door.close()
 
