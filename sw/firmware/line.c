@@ -14,6 +14,7 @@
 #include "line_protocol.h"
 #include "parameters.h"
 #include "planner.h"
+#include "scope.h"
 
 #define WAY_MASK 0x30u
 #define WAY_TO_NODE 0x20u
@@ -240,6 +241,43 @@ static uint8_t signal(unsigned axis)
     return LINE_CAUSE_OK;
 }
 
+static uint8_t position(unsigned axis)
+{
+    put(LINE_POSITION_REPLY_POSITION, (uint64_t)axis_read_position(axis, AXIS_POSITION), 8);
+    reply[0] = LINE_POSITION_REPLY_LENGTH;
+    return LINE_CAUSE_OK;
+}
+
+static uint8_t arm_scope(unsigned axis)
+{
+    struct scope_setting setting = {.axis = (uint8_t)axis,
+                                    .trigger = asked[LINE_ARM_SCOPE_REQUEST_TRIGGER],
+                                    .before = asked[LINE_ARM_SCOPE_REQUEST_BEFORE],
+                                    .every = (uint16_t)get(&asked[LINE_ARM_SCOPE_REQUEST_EVERY], 2),
+                                    .level = (uint32_t)get(&asked[LINE_ARM_SCOPE_REQUEST_LEVEL], 4),
+                                    .amplitude = (int16_t)get(&asked[LINE_ARM_SCOPE_REQUEST_AMPLITUDE], 2)};
+    return scope_arm(&setting);
+}
+
+static uint8_t look_at_scope(void)
+{
+    put(LINE_SCOPE_REPLY_STATE, scope_state(), 1);
+    put(LINE_SCOPE_REPLY_COUNT, scope_count(), 1);
+    put(LINE_SCOPE_REPLY_BEFORE, scope_before(), 1);
+    reply[0] = LINE_SCOPE_REPLY_LENGTH;
+    return LINE_CAUSE_OK;
+}
+
+static uint8_t read_scope(void)
+{
+    uint8_t first = asked[LINE_READ_SCOPE_REQUEST_FIRST];
+    if (first >= scope_count()) return LINE_CAUSE_OUT_OF_RANGE;
+    for (uint32_t n = 0; n < LINE_READ_SCOPE_REPLY_LENGTH - LINE_REPLY_HEAD; n++)
+        answer[LINE_REPLY_HEAD + n] = scope_byte(first, n);
+    reply[0] = LINE_READ_SCOPE_REPLY_LENGTH;
+    return LINE_CAUSE_OK;
+}
+
 static uint8_t execute(uint8_t operation, uint8_t length)
 {
     unsigned axis = asked[LINE_REQUEST_HEAD];                   // of those operations that have one
@@ -253,6 +291,8 @@ static uint8_t execute(uint8_t operation, uint8_t length)
     case LINE_OPERATION_COUNTERS: return counters();
     case LINE_OPERATION_READ_REGISTER: return read_register();
     case LINE_OPERATION_WRITE_REGISTER: return write_register();
+    case LINE_OPERATION_SCOPE: return look_at_scope();
+    case LINE_OPERATION_READ_SCOPE: return read_scope();
     case LINE_OPERATION_START: return axis_start_prepared(axes, asked[LINE_START_REQUEST_AXES]);
     default: break;
     }
@@ -274,6 +314,8 @@ static uint8_t execute(uint8_t operation, uint8_t length)
     case LINE_OPERATION_SET_CORRECTION: return set_correction(axis);
     case LINE_OPERATION_SET_HARMONIC: return set_harmonic(axis);
     case LINE_OPERATION_SIGNAL: return signal(axis);
+    case LINE_OPERATION_POSITION: return position(axis);
+    case LINE_OPERATION_ARM_SCOPE: return arm_scope(axis);
     default: return LINE_CAUSE_UNKNOWN_OPERATION;
     }
 }

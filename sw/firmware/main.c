@@ -7,6 +7,7 @@
 #include "line.h"
 #include "line_protocol.h"
 #include "parameters.h"
+#include "scope.h"
 
 static unsigned axes;                   // those that may be touched: none if the register maps differ
 static unsigned turn;                   // axis whose grating was polled last
@@ -22,6 +23,7 @@ void firmware_start(void)
         axis_start(n);
         grating_start(n);
     }
+    scope_start();
     line_start(built);
 }
 
@@ -35,6 +37,7 @@ void firmware_poll(void)
         axis_poll(n);
         homing = homing || axis_state(n) == LINE_STATE_HOMING;
         line_poll();
+        scope_poll();
     }
     if (axes == 0 || homing) return;    // homing has to see the switch in time
     turn = turn + 1 < axes ? turn + 1 : 0;
