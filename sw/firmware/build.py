@@ -25,6 +25,7 @@ OUT = HERE.parents[1] / "build" / "firmware"
 FLAGS = ["-std=c11", "-g", "-Wall", "-Wextra", "-Werror", "-ffreestanding", "-ffunction-sections",
          "-fdata-sections", "-fomit-frame-pointer", "-static", "-Wframe-larger-than=1536"]    # the stack has 4096
 IMAGES = sorted(path.stem.removeprefix("image_") for path in HERE.glob("image_*.c"))
+AXES = {"station": 2}                                               # most that an image serves, where it is not the default
 SMALL, FAST = "-Os", "-O2"
 HOT = ("planner.c",)                                    # the others wait more than they work
 ZIG = ["-target", "riscv32-freestanding-none", "-mcpu=generic_rv32+m-a-f-d-c", "-mabi=ilp32", "-fno-sanitize=all",
@@ -108,6 +109,8 @@ def run(command):
 
 def build(memory, out, force, name="axis"):
     command, libraries = compiler()
+    if name in AXES:
+        command += [f"-DHARDWARE_AXES={AXES[name]}u"]
     sources = [*sources_of(name), HERE / "link.ld", HERE / "build.py"]
     stem = "firmware" if name == "axis" else name
     elf, binary, text, note = (out / f"{stem}.{end}" for end in ("elf", "bin", "hex", "note"))

@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x9B74E917
+PROTOCOL_CRC = 0x7FCE7D6E
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -54,15 +54,36 @@ CAUSES = {
     22: ("not_prepared", "the axis has no motion prepared"),
     23: ("not_built", "this node was built without that"),
     30: ("sensor_dead", "no good frame came from the angle sensor: check its power and its cable"),
-    31: ("sensor_stuck", "the angle sensor sent one and the same angle while the table was turned"),
+    31: ("sensor_stuck", "the angle sensor stands still: it sent one and the same angle while the table was turned"),
     32: ("stiction", "the table did not follow its steps: it sticks, or the motor lost them"),
     33: ("wrong_sign", "the table turned against its steps: turn the sign of steps_per_period"),
     34: ("not_converged", "the tolerance was not reached within the allowed tries"),
-    35: ("sensor_disagrees", "angle sensor and steps disagree on how far the table turned"),
+    35: ("sensor_disagrees", "angle sensor and steps disagree: they tell different ways of the table"),
     36: ("peer_silent", "the other node does not answer: check the cable between the two and its peer_mode"),
     37: ("no_station", "the other node has no such station: write the program to both"),
     38: ("peer_off", "the peer port is not in use: see the settings peer_mode and peer_role"),
     39: ("peer_restarted", "the other node lost its power while it indexed"),
+    40: ("store_missing", "the EEPROM does not answer"),
+    41: ("store_failed", "the EEPROM does not keep what is written"),
+    42: ("store_busy", "the EEPROM is being read or written"),
+    43: ("no_program", "no program of stations is stored"),
+    44: ("program_torn", "the stored program is damaged"),
+    45: ("program_incomplete", "give all stations of a program in order"),
+    46: ("no_stations", "a program needs at least one station"),
+    47: ("too_many_stations", "the EEPROM is full: it holds 360 stations"),
+    48: ("angle_out_of_turn", "angles must be below 360 degrees"),
+    49: ("angles_not_ascending", "each angle must be larger than the last"),
+    50: ("job_active", "a job is under way: stop it first"),
+    51: ("not_now", "the job does not wait for that now"),
+    52: ("machine_busy", "the machine cuts, or its keys still wait"),
+    53: ("machine_alarm", "the machine reports an alarm"),
+    54: ("keys_not_taken", "the machine does not take our keys"),
+    55: ("cut_not_started", "the cut did not start in time"),
+    56: ("cut_not_ended", "the cut did not end in time"),
+    57: ("power_lost", "the power was lost during the job"),
+    58: ("paused_by_person", "paused by a person"),
+    59: ("key_without_function", "this key has no function"),
+    60: ("table_unknown", "nobody knows where the table stands"),
 }
 
 # bit: (name, words)
@@ -98,6 +119,7 @@ STATES = {
     5: ("stopping", "stopping"),
     6: ("faulted", "faulted"),
     7: ("prepared", "waiting for the common start"),
+    8: ("excited", "driven in open loop for a record"),
 }
 
 # bit: (name, words)
@@ -153,6 +175,23 @@ LEARNER_ACTIONS = {
 }
 
 # code: (name, words)
+SCOPE_TRIGGERS = {
+    0: ("now", "at once"),
+    1: ("motion", "the axis moves or homes"),
+    2: ("settling", "a motion has been played"),
+    3: ("error", "the error reaches the level"),
+    4: ("fault", "a fault latches"),
+}
+
+# code: (name, words)
+SCOPE_STATES = {
+    0: ("empty", "nothing was recorded"),
+    1: ("waiting", "waiting for the trigger"),
+    2: ("recording", "recording"),
+    3: ("full", "complete"),
+}
+
+# code: (name, words)
 INDEX_PHASES = {
     0: ("idle", "at rest"),
     1: ("reading", "waiting for the table to settle, and reading its angle"),
@@ -168,6 +207,47 @@ PEER_PHASES = {
     2: ("indexed", "the sub-node has indexed"),
     3: ("failed", "the sub-node failed"),
     4: ("silent", "the sub-node does not answer"),
+}
+
+# code: (name, words)
+JOB_STATES = {
+    0: ("loading", "loading"),
+    1: ("idle", "ready"),
+    2: ("finished", "all cut"),
+    3: ("starting", "starts"),
+    4: ("indexing", "table turns"),
+    5: ("arrived", "at station"),
+    6: ("beginning", "begins cut"),
+    7: ("cutting", "cutting"),
+    8: ("following", "cutting"),
+    9: ("ended", "cut done"),
+    10: ("leaving", "leaves"),
+    11: ("finishing", "finishing"),
+    12: ("paused", "paused"),
+    13: ("unsure", "is it cut?"),
+    14: ("stopping", "stopping"),
+}
+
+# code: (name, words)
+JOB_ACTIONS = {
+    0: ("start", "cut all stations from the first one on"),
+    1: ("pause", "stand before the next cut or the next station"),
+    2: ("resume", "go on; if it is unsure whether a station was cut, wait for the end of the cut under way"),
+    3: ("stop", "end the job; a cut under way is left to the machine"),
+    4: ("again", "cut the station again"),
+    5: ("next", "the station is cut: go to the next one"),
+}
+
+# bit: (name, words)
+JOB_FLAGS = {
+    0: ("store", "the EEPROM answers"),
+    1: ("keypad", "the key-pad answers"),
+    2: ("display", "the character display answers"),
+    3: ("cutting", "the machine cuts"),
+    4: ("alarm", "the machine reports an alarm"),
+    5: ("keys_wait", "keys for the machine wait: a person types, or it does not take them"),
+    6: ("pausing", "a pause comes next"),
+    7: ("copy_torn", "one copy of the program is damaged, the other one is in force"),
 }
 
 OPERATIONS = {operation.name: operation for operation in (
@@ -242,6 +322,23 @@ OPERATIONS = {operation.name: operation for operation in (
     Operation("start", 21, "begin the prepared motions of these axes (bit n: axis n), all in one tick; none if one of them has none",
               (("axes", "u8"),),
               ()),
+    Operation("position", 30, "where an axis is: the shortest answer that tells it",
+              (("axis", "u8"),),
+              (("position", "i64"),)),
+    Operation("arm_scope", 31, "record every so many ticks, from before a trigger on; an amplitude drives in open loop, to level at most",
+              (("axis", "u8"), ("trigger", "u8"), ("before", "u8"), ("every", "u16"),
+               ("level", "u32"), ("amplitude", "i16"),),
+              ()),
+    Operation("scope", 32, "how far the record is; count is 0 until it is complete",
+              (),
+              (("state", "u8"), ("count", "u8"), ("before", "u8"),)),
+    Operation("read_scope", 33, "five samples from this one on, 0 behind the end; time from sample to sample in 64 clk, position: low word",
+              (("first", "u8"),),
+              (("position_0", "i32"), ("error_0", "i32"), ("command_0", "i16"), ("time_0", "u16"),
+               ("position_1", "i32"), ("error_1", "i32"), ("command_1", "i16"), ("time_1", "u16"),
+               ("position_2", "i32"), ("error_2", "i32"), ("command_2", "i16"), ("time_2", "u16"),
+               ("position_3", "i32"), ("error_3", "i32"), ("command_3", "i16"), ("time_3", "u16"),
+               ("position_4", "i32"), ("error_4", "i32"), ("command_4", "i16"), ("time_4", "u16"),)),
     Operation("get_setting", 40, "read a setting of a station",
               (("setting", "u8"),),
               (("value", "i64"),)),
@@ -268,6 +365,29 @@ OPERATIONS = {operation.name: operation for operation in (
               ()),
     Operation("peer_next", 47, "the station to which the next order goes in mode printed",
               (("station", "u16"),),
+              ()),
+    Operation("job", 48, "what the job does, at which station (from 0 on), why it waits, and for which answers (bits of job_action)",
+              (),
+              (("state", "u8"), ("cause", "u8"), ("station", "u16"), ("stations", "u16"),
+               ("answers", "u8"), ("flags", "u8"),)),
+    Operation("job_do", 49, "start, pause, resume or stop the job, or answer its question",
+              (("action", "u8"),),
+              ()),
+    Operation("job_program", 50, "the stored program; writing 1 while it is written or read, then how that ended, or why there is none",
+              (),
+              (("writing", "u8"), ("ended", "u8"), ("generation", "u32"), ("stations", "u16"),
+               ("journal", "u32"),)),
+    Operation("job_angle", 51, "angle of a station of the stored program, in 0.01 arcsec",
+              (("station", "u16"),),
+              (("angle", "u32"),)),
+    Operation("job_begin", 52, "begin a new program; it comes into force when it is saved, and not while a job is under way",
+              (),
+              ()),
+    Operation("job_add", 53, "give the new program a station; in their order, from 0 on, with ascending angles",
+              (("station", "u16"), ("angle", "u32"),),
+              ()),
+    Operation("job_save", 54, "write the new program and the settings into the EEPROM; job_program tells when and how that ended",
+              (),
               ()),
 )}
 
@@ -560,4 +680,10 @@ SETTINGS = {parameter.name: parameter for parameter in (
     Parameter("peer_patience", 17, "s", Fraction(1, 1000),
               100, 3600000, 300000,
               "peer port: in mode printed, an index that takes longer has failed"),
+    Parameter("job_start_limit", 18, "s", Fraction(1, 1),
+              1, 3600, 30,
+              "job: longest time from the start keys to the beginning of the cut"),
+    Parameter("job_cut_limit", 19, "s", Fraction(1, 1),
+              1, 1000000, 14400,
+              "job: longest cut"),
 )}
