@@ -28,7 +28,7 @@
 #define RETRY_MS 1000u                  // a device that is not there is looked for again
 #define TRIES 3u                        // to write a page
 
-enum task { REST, LOAD, CHECK_LOADED, READ_JOURNAL, SEAL, WRITE, VERIFY, DEAD };
+enum task { REST, LOAD, CHECK_LOADED, READ_JOURNAL, SEAL, WRITE_NEXT, WRITE, VERIFY, DEAD };
 
 static struct store_program {                   // as in the EEPROM, where a CRC-32 follows the last station
     uint32_t generation;                        // each saved one has one more; 0: there is none
@@ -58,13 +58,6 @@ static uint32_t crc32(uint32_t state, const uint8_t *bytes, unsigned count)
         state = state >> 4 ^ of_nibble[state & 15];
     }
     return state;
-}
-
-static void copy(void *to, const void *from, unsigned count)
-{
-    uint8_t *t = to;
-    const uint8_t *f = from;
-    while (count--) *t++ = *f++;
 }
 
 static uint8_t *bytes_of(unsigned which)
@@ -129,7 +122,7 @@ static void loaded_part(void)
 {
     struct store_program *program = &programs[newest];
     for (unsigned n = 0; n < PART; n++) blank[newest] = blank[newest] && in[n] == 0xFF;
-    copy(bytes_of(newest) + at, in, at + PART <= sizeof *program ? PART : sizeof *program - at);
+    __builtin_memcpy(bytes_of(newest) + at, in, at + PART <= sizeof *program ? PART : sizeof *program - at);
     at = (uint16_t)(at + PART);
     go(LOAD);
     if (laid_out(program) && at < program_bytes(program) + CRC_BYTES) return load_part();
@@ -171,7 +164,7 @@ static void check_loaded(void)
 
 static void journal_read(void)
 {
-    copy(&candidate, in, sizeof candidate);
+    __builtin_memcpy(&candidate, in, sizeof candidate);
     if (candidate.sequence > last.sequence && candidate.sequence % JOURNAL_PAGES == at && ~crc32(UINT32_MAX, in, RECORD_CHECKED) == candidate.crc)
         last = candidate;
     go(READ_JOURNAL);
@@ -200,7 +193,7 @@ static uint16_t page_place(void)
 static void write_page(void)
 {
     unsigned bytes = page_bytes();
-    copy(&out[2], source(), bytes);
+    __builtin_memcpy(&out[2], source(), bytes);
     go(WRITE);
     transfer_begin(page_place(), bytes, 0);
 }
@@ -216,7 +209,7 @@ static void seal(void)
     if (!crc_step(program, !newest)) return;
     program->angle[program->stations] = ~crc;
     at = 0;
-    write_page();
+    go(WRITE_NEXT);
 }
 
 static void seal_record(void)
@@ -243,7 +236,7 @@ static void verify(void)
         return end(LINE_CAUSE_OK);
     }
     at = (uint16_t)(at + PAGE);
-    if (at < program_bytes(&programs[!newest]) + CRC_BYTES) return write_page();
+    if (at < program_bytes(&programs[!newest]) + CRC_BYTES) return go(WRITE_NEXT);
     newest = !newest;
     torn = drafting = false;
     end(LINE_CAUSE_OK);
@@ -283,6 +276,7 @@ void store_work(void)
     }
     if (task == CHECK_LOADED) return check_loaded();
     if (task == SEAL) return seal();
+    if (task == WRITE_NEXT) return write_page();
     if (outcome != I2C_OK) return again();
     switch (task) {
     case LOAD: return loaded_part();
