@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x73BC63B6u    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x5C34F538u    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -65,6 +65,7 @@ enum line_cause {
     LINE_CAUSE_PAUSED_BY_PERSON = 58,    // paused by a person
     LINE_CAUSE_KEY_WITHOUT_FUNCTION = 59,    // this key has no function
     LINE_CAUSE_TABLE_UNKNOWN = 60,    // nobody knows where the table stands
+    LINE_CAUSE_PROGRAM_CHANGED = 61,    // this is not the program of the job
 };
 
 enum line_fault {    // bits
@@ -273,7 +274,8 @@ enum line_job_flag {    // bits
     X(57, "the power was lost during the job") \
     X(58, "paused by a person") \
     X(59, "this key has no function") \
-    X(60, "nobody knows where the table stands")
+    X(60, "nobody knows where the table stands") \
+    X(61, "this is not the program of the job")
 
 // X(code, words)
 #define LINE_JOB_STATE_WORDS(X) \

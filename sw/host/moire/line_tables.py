@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x73BC63B6
+PROTOCOL_CRC = 0x5C34F538
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -84,6 +84,7 @@ CAUSES = {
     58: ("paused_by_person", "paused by a person"),
     59: ("key_without_function", "this key has no function"),
     60: ("table_unknown", "nobody knows where the table stands"),
+    61: ("program_changed", "this is not the program of the job"),
 }
 
 # bit: (name, words)
