@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x7FCE7D6Eu    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x5258B4A8u    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -660,7 +660,7 @@ enum line_parameter {
     LINE_PARAMETER_DISAGREEMENT_LIMIT = 29,    // [1/65536 period] encoder: interpolated position against quadrature count; 0 off
     LINE_PARAMETER_ENCODER_FAULT_MASK = 30,    // encoder: which events are a fault (bits of encoder_event)
     LINE_PARAMETER_PWM_FREQUENCY = 31,    // [1 Hz] drive: PWM frequency
-    LINE_PARAMETER_WATCHDOG_TIME = 32,    // [0.001 s] guard: longest silence of the line while a drive is on (all axes)
+    LINE_PARAMETER_WATCHDOG_TIME = 32,    // [0.001 s] guard: longest silence of the line while a drive is on (all axes); 0: for ever, for a machine that runs by itself
     LINE_PARAMETER_LEARNING = 33,    // correction of sine and cosine: 0 frozen, 1 learns
     LINE_PARAMETER_DECODER_MODE = 34,    // decoder: 0 every edge, 1 every second, 2 every fourth, 3 pulses and direction; other than 0 needs disagreement_limit 0
     LINE_PARAMETER_FILTER_SKIP = 35,    // [1e-9 s] deglitcher: time between two samples of a level; 0 every clk
@@ -743,7 +743,7 @@ enum line_parameter {
     X(disagreement_limit, 29, 0LL, 1048575LL, 32768LL) \
     X(encoder_fault_mask, 30, 0LL, 31LL, 30LL) \
     X(pwm_frequency, 31, 1000LL, 200000LL, 20000LL) \
-    X(watchdog_time, 32, 10LL, 65535LL, 500LL) \
+    X(watchdog_time, 32, 0LL, 65535LL, 500LL) \
     X(learning, 33, 0LL, 1LL, 0LL) \
     X(decoder_mode, 34, 0LL, 3LL, 0LL) \
     X(filter_skip, 35, 0LL, 1000000LL, 0LL) \

@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x7FCE7D6E
+PROTOCOL_CRC = 0x5258B4A8
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -486,8 +486,8 @@ PARAMETERS = {parameter.name: parameter for parameter in (
               1000, 200000, 20000,
               "drive: PWM frequency"),
     Parameter("watchdog_time", 32, "s", Fraction(1, 1000),
-              10, 65535, 500,
-              "guard: longest silence of the line while a drive is on (all axes)"),
+              0, 65535, 500,
+              "guard: longest silence of the line while a drive is on (all axes); 0: for ever, for a machine that runs by itself"),
     Parameter("learning", 33, "", Fraction(1, 1),
               0, 1, 0,
               "correction of sine and cosine: 0 frozen, 1 learns"),
