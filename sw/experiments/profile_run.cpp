@@ -81,9 +81,9 @@ int main(int count, char **words) {
         struct plan plan;
         planner_stairs stairs{};
         if (kind == 0) {
-            stairs.first = limits.velocity / 16 + 1, stairs.top = limits.velocity, stairs.ticks = 1 + random() % 40;
+            stairs.first = random.one_in(8) ? limits.velocity : limits.velocity / 16 + 1, stairs.top = limits.velocity, stairs.ticks = 1 + random() % 40;
             for (auto &rise : stairs.rise) rise = limits.velocity / (8 + random() % 40) + 1;
-            planner_borders(&stairs, random.one_in(2));
+            planner_borders(&stairs, 10923, random.one_in(2) ? 32768 : 21846);
             if (!planner_climb(&plan, &stairs, distance)) { refused++, misses++; continue; }
         } else if (!planner_move(&plan, &planned, distance)) { refused++, misses++; continue; }
         if (plan.ticks > 4000) continue;

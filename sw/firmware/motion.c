@@ -64,20 +64,40 @@ void motion_feed(unsigned n)
     }
 }
 
-bool motion_prepare(unsigned n, int64_t distance, uint8_t velocity_id)
+static uint8_t refusal(const struct plan *plan)
 {
-    struct planner_limits limits = parameters_limits(n, velocity_id);
-    motions[n].from = axis_read_position(n, AXIS_TARGET);
-    if (!planner_move(&motions[n].plan, &limits, distance)) return false;
-    motion_feed(n);
-    return true;
+    switch (plan->cause) {
+    case PLANNER_TOO_LONG: return LINE_CAUSE_TOO_LONG;
+    case PLANNER_BORDERS:
+    case PLANNER_TOO_MANY_STAIRS: return LINE_CAUSE_NO_STAIRS;
+    case PLANNER_ON_STAIRS: return LINE_CAUSE_BUSY;
+    default: return LINE_CAUSE_OUT_OF_RANGE;
+    }
 }
 
-bool motion_retarget(unsigned n, int64_t target, uint8_t velocity_id)
+uint8_t motion_prepare(unsigned n, int64_t distance, uint8_t velocity_id)
+{
+    struct plan *plan = &motions[n].plan;
+    bool planned;
+    motions[n].from = axis_read_position(n, AXIS_TARGET);
+    if (parameters_get(n, LINE_PARAMETER_PROFILE) == STAIRS) {
+        struct planner_stairs stairs = parameters_stairs(n, velocity_id);
+        planned = planner_climb(plan, &stairs, distance);
+    } else {
+        struct planner_limits limits = parameters_limits(n, velocity_id);
+        planned = planner_move(plan, &limits, distance);
+    }
+    if (!planned) return refusal(plan);
+    motion_feed(n);
+    return LINE_CAUSE_OK;
+}
+
+uint8_t motion_retarget(unsigned n, int64_t target, uint8_t velocity_id)
 {
     struct motion *m = &motions[n];
     struct planner_limits limits = parameters_limits(n, velocity_id);
-    return m->plan.next < m->plan.count && planner_retarget(&m->plan, &limits, target - m->from);
+    if (m->plan.next >= m->plan.count) return LINE_CAUSE_BUSY;
+    return planner_retarget(&m->plan, &limits, target - m->from) ? LINE_CAUSE_OK : refusal(&m->plan);
 }
 
 void motion_start(unsigned n)
@@ -85,11 +105,11 @@ void motion_start(unsigned n)
     axis_write(n, AXIS_STROBES, AXIS_STROBES_START_MASK);
 }
 
-bool motion_play(unsigned n, int64_t distance, uint8_t velocity_id)
+uint8_t motion_play(unsigned n, int64_t distance, uint8_t velocity_id)
 {
-    if (!motion_prepare(n, distance, velocity_id)) return false;
-    motion_start(n);
-    return true;
+    uint8_t cause = motion_prepare(n, distance, velocity_id);
+    if (cause == LINE_CAUSE_OK) motion_start(n);
+    return cause;
 }
 
 bool motion_played(unsigned n)

@@ -21,6 +21,7 @@
 #define ROOM_JERK 1u            // what those units may add to a peak; those of velocity and acceleration are rounded up already
 #define LONGEST_RAMP 0x10000000u
 #define LONGEST_CRUISE_BITS 30
+#define MOST_STAIRS 4096u
 #define OVERRIDE_PART 4u        // of the acceleration and the jerk
 #define LEAD 2u                 // ticks until a third difference is a step ...
 #define LEFT_OUT 1u             // ... of which the player needs one
@@ -31,16 +32,16 @@ struct durations {
     uint32_t velocity;          // >= jerk + acceleration
 };
 
-uint64_t planner_velocity(uint32_t velocity)
+uint64_t planner_velocity(uint64_t velocity)
 {
-    return ((uint64_t)velocity << 35) / 125u;                                // 2^40 / 4000   = 2^35 / 5^3
+    return (velocity << 19) / 125u;                                          // 2^24 / 4000   = 2^19 / 5^3
 }
 
 struct planner_limits planner_limits(uint32_t velocity, uint32_t acceleration, uint32_t jerk)
 {
     struct planner_limits limits;
     uint64_t wide_jerk = ((uint64_t)jerk << 25) / 1953125u;                  // 2^40 / 4000^3 = 2^25 / 5^9
-    limits.velocity = planner_velocity(velocity);
+    limits.velocity = planner_velocity((uint64_t)velocity << 16);
     limits.acceleration = ((uint64_t)acceleration << 30) / 15625u;           // 2^40 / 4000^2 = 2^30 / 5^6
     limits.jerk = wide_jerk > INT32_MAX ? INT32_MAX : (uint32_t)wide_jerk;
     return limits;
@@ -53,9 +54,9 @@ void planner_override(const struct planner_limits *limits, uint32_t *slope, uint
     if (limits->jerk != PLANNER_ANY_JERK) {
         const int64_t half = limits->jerk / (2 * OVERRIDE_PART);
         steep = least(steep, (uint64_t)ratio(half, 32, 3 * limits->acceleration | 1));
-        bend = (uint64_t)ratio(half, 32, limits->velocity | 1) | 1;
+        bend = most((uint64_t)ratio(half, 32, limits->velocity | 1), 1);
     }
-    *slope = (uint32_t)least(steep | 1, UINT32_MAX);
+    *slope = (uint32_t)least(most(steep, 1), UINT32_MAX);
     *curve = (uint32_t)least(bend, UINT32_MAX);
 }
 
@@ -244,11 +245,11 @@ bool planner_move(struct plan *plan, const struct planner_limits *limits, int64_
     return true;
 }
 
-void planner_borders(struct planner_stairs *stairs, bool as_printed)
+void planner_borders(struct planner_stairs *stairs, uint32_t second, uint32_t third)
 {
-    uint64_t climb = stairs->top - stairs->first;
-    stairs->border[0] = stairs->first + climb / 6;
-    stairs->border[1] = stairs->first + (as_printed ? climb / 3 : climb / 2);
+    const int64_t climb = (int64_t)(stairs->top - stairs->first);
+    stairs->border[0] = stairs->first + (uint64_t)product(climb, second, 16);
+    stairs->border[1] = stairs->first + (uint64_t)product(climb, third, 16);
 }
 
 bool planner_climb(struct plan *plan, const struct planner_stairs *stairs, int64_t distance)
@@ -262,20 +263,22 @@ bool planner_climb(struct plan *plan, const struct planner_stairs *stairs, int64
     plan->stairs = true;
     if (stairs->first == 0 || stairs->ticks == 0) return plan_refuse(plan, PLANNER_NO_VELOCITY);
     if (stairs->top < stairs->first || stairs->border[0] < stairs->first || stairs->border[1] < stairs->border[0] ||
-        stairs->top < stairs->border[1] || stairs->top >> 44 || !stairs->rise[0] || !stairs->rise[1] || !stairs->rise[2])
+        stairs->top < stairs->border[1] || !stairs->rise[0] || !stairs->rise[1] || !stairs->rise[2])
         return plan_refuse(plan, PLANNER_BORDERS);
     if (left == 0) return true;
     if (left >> 38) return plan_refuse(plan, PLANNER_TOO_LONG);
     left <<= 24;
+    uint64_t ramp = left / 2 / stairs->ticks;                                // sum of the velocities that still fits into half of the way
 
     // up, as long as the mirrored way down still fits
     for (; sections < 3; sections++) {
         uint64_t border = sections < 2 ? stairs->border[sections] : stairs->top, rise = stairs->rise[sections];
         up[sections] = (struct planner_segment){.velocity = (int64_t)velocity, .acceleration = (int64_t)rise, .ticks = stairs->ticks};
         uint32_t steps = 0;
-        while (velocity + rise <= border && left / 2 / stairs->ticks >= velocity && left - 2 * velocity * stairs->ticks > velocity + rise) {
-            if (++steps >> 16) return plan_refuse(plan, PLANNER_TOO_MANY_STAIRS);
+        while (velocity + rise <= border && ramp >= velocity && left - 2 * velocity * stairs->ticks > velocity + rise) {
+            if (++steps > MOST_STAIRS) return plan_refuse(plan, PLANNER_TOO_MANY_STAIRS);
             left -= 2 * velocity * stairs->ticks;
+            ramp -= velocity;
             velocity += rise;
         }
         up[sections].jerk = (int32_t)steps;
@@ -286,6 +289,7 @@ bool planner_climb(struct plan *plan, const struct planner_stairs *stairs, int64
     if (ticks >> LONGEST_CRUISE_BITS) return plan_refuse(plan, PLANNER_TOO_LONG);
     uint64_t slow = left / ticks;
     uint32_t more = (uint32_t)(left - slow * ticks);
+    plan->section[plan->count++] = (struct planner_segment){.ticks = 1};     // the player adds half of the first step to the second
     for (int n = 0; n < 3; n++)
         if (up[n].jerk) {
             up[n].jerk--;
@@ -294,7 +298,7 @@ bool planner_climb(struct plan *plan, const struct planner_stairs *stairs, int64
     if (more) plan->section[plan->count++] = (struct planner_segment){.velocity = (int64_t)slow + 1, .ticks = more};
     plan->section[plan->count++] = (struct planner_segment){.velocity = (int64_t)slow, .ticks = (uint32_t)ticks - more};
     int top = plan->count;
-    for (int n = top - 1 - (more != 0); n-- > 0;) {
+    for (int n = top - 1 - (more != 0); n-- > 1;) {
         struct planner_segment down = plan->section[n];
         down.velocity += down.acceleration * down.jerk;
         down.acceleration = -down.acceleration;

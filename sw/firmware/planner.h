@@ -10,7 +10,7 @@
 
 #define PLANNER_TICK_HZ 4000u
 #define PLANNER_EVENTS 60u              // instants at which a move changes; 57 at most
-#define PLANNER_SECTIONS 8u             // of stairs: three up, two at the top, three down
+#define PLANNER_SECTIONS 9u             // of stairs: a tick of rest, three up, two at the top, three down
 #define PLANNER_LONGEST_PIECE 0x800000u // ticks in one push; profile_player takes 24 bits
 #define PLANNER_ANY_JERK UINT32_MAX     // limits.jerk: trapezoid, the acceleration changes within three ticks
 #define PLANNER_LEAST_LIMIT 64u         // smaller limits leave a retarget no room for the units that make it exact
@@ -28,7 +28,7 @@ enum planner_cause {
     PLANNER_NO_JERK,                    // below two units: no pulse of jerk can be made
     PLANNER_TOO_LONG,                   // a cruise of 2^30 ticks (3 days), a retarget with ramps of 2^27 ticks or 2^22 periods, or more
     PLANNER_BORDERS,                    // stairs whose borders or steps are not in order
-    PLANNER_TOO_MANY_STAIRS,
+    PLANNER_TOO_MANY_STAIRS,            // above 4096
     PLANNER_ON_STAIRS,                  // stairs go on to where they were planned to go
     PLANNER_NO_PLAN                     // none inside the limits was found, even with an eighth of them kept free
 };
@@ -83,8 +83,10 @@ struct planner_stairs {                 // S4: velocity in steps of constant dur
     uint32_t ticks;                     // of a step
 };
 
-// The limits in units of the player from period/s, period/s^2, period/s^3; rounded down, and jerk held to 31 bits.
-uint64_t planner_velocity(uint32_t velocity);
+// In units of the player from 2^-16 period/s; rounded down.
+uint64_t planner_velocity(uint64_t velocity);
+
+// The limits from period/s, period/s^2, period/s^3; rounded down, and jerk held to 31 bits.
 struct planner_limits planner_limits(uint32_t velocity, uint32_t acceleration, uint32_t jerk);
 
 // How fast an override may change while a plan is played, so that this adds a quarter of acceleration and jerk at most:
@@ -97,8 +99,8 @@ bool planner_move(struct plan *plan, const struct planner_limits *limits, int64_
 // The same with S4's seven sections.
 bool planner_climb(struct plan *plan, const struct planner_stairs *stairs, int64_t distance);
 
-// S4's borders between first and top: 1:2:3 of the climb, or as its paper prints them.
-void planner_borders(struct planner_stairs *stairs, bool as_printed);
+// Where sections 2 and 3 begin, 2^-16 of the way from first to top. S4: 1/6 and 1/2, which is 1:2:3; 1/6 and 1/3 as its paper prints it.
+void planner_borders(struct planner_stairs *stairs, uint32_t second, uint32_t third);
 
 // Where the plan is when `ticks` more than those taken have been played.
 struct planner_state planner_state_after(const struct plan *plan, uint32_t ticks);

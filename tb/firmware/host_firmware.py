@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "sw" / "firmware"
 BRIDGE = Path(__file__).with_name("register_bridge.c")
 LIBRARY = ROOT / "build" / "firmware" / "host_firmware.so"
-EVENTS, SECTIONS = 60, 8
+EVENTS, SECTIONS = 60, 9
 
 
 class Limits(ctypes.Structure):
@@ -77,7 +77,7 @@ def library():
         getattr(loaded, name).restype = ctypes.c_bool
     loaded.planner_climb.argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Stairs), ctypes.c_int64]
     loaded.planner_climb.restype = ctypes.c_bool
-    loaded.planner_borders.argtypes, loaded.planner_borders.restype = [ctypes.POINTER(Stairs), ctypes.c_bool], None
+    loaded.planner_borders.argtypes, loaded.planner_borders.restype = [ctypes.POINTER(Stairs), ctypes.c_uint32, ctypes.c_uint32], None
     loaded.planner_state_after.argtypes, loaded.planner_state_after.restype = [ctypes.POINTER(Plan), ctypes.c_uint32], State
     loaded.planner_override.argtypes = [ctypes.POINTER(Limits), ctypes.POINTER(ctypes.c_uint32), ctypes.POINTER(ctypes.c_uint32)]
     loaded.planner_override.restype = None

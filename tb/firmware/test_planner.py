@@ -248,7 +248,7 @@ def test_stairs_climb_by_sections_and_come_down_the_mirror(as_printed):
     hertz = 2**40 // 4000
     stairs = Stairs(first=50 * hertz, top=2450 * hertz, ticks=80)
     stairs.rise[:] = 50 * hertz, 100 * hertz, 200 * hertz
-    library().planner_borders(ctypes.byref(stairs), as_printed)
+    library().planner_borders(ctypes.byref(stairs), 65536 // 6 + 1, 65536 // 3 + 1 if as_printed else 65536 // 2)
     assert [round(border / hertz) for border in stairs.border] == [450, 850 if as_printed else 1250]
     for pulses in (1, 7, 100, 5000, -20000):
         plan = Plan()
@@ -256,6 +256,8 @@ def test_stairs_climb_by_sections_and_come_down_the_mirror(as_printed):
         ticks, pieces = plan.ticks, taken(plan, FOREVER, LONGEST)
         assert distance(pieces) == pulses << 40 and sum(piece[3] for piece in pieces) == ticks
         assert all(piece[1:3] == (0, 0) for piece in pieces)
+        assert pieces[0] == (0, 0, 0, 1)                             # the player joins the step after it to this one
+        pieces = pieces[1:]
         levels = [abs(piece[0]) for piece in pieces]
         assert max(levels) <= stairs.top
     top = levels.index(max(levels))                                  # the longest reaches it
