@@ -89,6 +89,7 @@ def in_flight(plan):
 def timed_moves(moves):
     """(ticks, shortest) of random moves from rest, and of another target for each in flight."""
     import ruckig
+
     from host_firmware import Plan, Segment, library
     planner, draw, rest, flight = library(), random.Random(SEED), [], []
 

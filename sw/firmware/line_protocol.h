@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0xC05E713Au    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x7EBA7CE5u    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -378,7 +378,7 @@ enum line_parameter {
     LINE_PARAMETER_FILTER_2_B2 = 76,    // [1/1073741824] servo: filter 2, coefficient b2
     LINE_PARAMETER_FILTER_2_A1 = 77,    // [1/1073741824] servo: filter 2, coefficient -a1
     LINE_PARAMETER_FILTER_2_A2 = 78,    // [1/1073741824] servo: filter 2, coefficient -a2
-    LINE_PARAMETER_PROFILE = 79,    // motions: 0 S-curve (velocity, acceleration, jerk), 1 trapezoid (velocity, acceleration), 2 stairs (velocity and what follows here)
+    LINE_PARAMETER_PROFILE = 79,    // profile of motions: 0 S-curve, 1 trapezoid (jerk does not count), 2 stairs (velocity and the stairs_ parameters)
     LINE_PARAMETER_STAIRS_FIRST = 80,    // [1/65536 period/s] stairs (S4): speed of the first, f0
     LINE_PARAMETER_STAIRS_TIME = 81,    // [0.00025 s] stairs: time on each
     LINE_PARAMETER_STAIRS_RISE_1 = 82,    // [1/65536 period/s] stairs: height of those in section 1, the mirror of 7

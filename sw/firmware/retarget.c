@@ -89,13 +89,15 @@ static int64_t whole(struct motion *m, const struct problem *p, int64_t knee)
     return m->position;
 }
 
-// How far from the wanted distance the landing may be left to make up: a 2^-21st of jerk and acceleration does it.
+// How far from the wanted distance the landing may be left to make up: a 2^-21st of jerk and acceleration does it, or half of what
+// one step of time makes.
 static uint64_t tolerance(const struct motion *m, const struct problem *p)
 {
     uint64_t time = 0;
     for (int n = 0; n < m->count; n++) time += m->phase[n].time;
+    const uint64_t step = (time >> 12) * (least(time, p->steepest) >> 12);
     time >>= 16;
-    return least(time * time * time / 4, time * time * p->steepest >> 18);
+    return most(step, least(time * time * time / 4, time * time * p->steepest >> 18));
 }
 
 // Between two knees, `under` short of the distance and `over` beyond it. False position; an end that stays for a second time
@@ -103,8 +105,10 @@ static uint64_t tolerance(const struct motion *m, const struct problem *p)
 static void search(struct motion *m, const struct problem *p, int64_t low, int64_t high, int64_t under, int64_t over)
 {
     for (int stays = 0; high - low > 1;) {                                   // how often in a row low stayed; negative: high
-        int64_t knee = low + (stays > -3 && stays < 3 && under > 0 && over > 0 ?
-                              share(high - low, (uint64_t)under, (uint64_t)under + (uint64_t)over) : (high - low) / 2);
+        const uint64_t both = (uint64_t)under + (uint64_t)over;
+        int64_t knee = low + (high - low) / 2;
+        if (stays > -3 && stays < 3 && under > 0 && over > 0)
+            knee = under < over ? low + share(high - low, (uint64_t)under, both) : high - share(high - low, (uint64_t)over, both);
         if (knee <= low) knee = low + 1;
         if (knee >= high) knee = high - 1;
         const int64_t miss = whole(m, p, knee) - p->distance;
@@ -147,7 +151,16 @@ static int64_t solve(struct motion *m, struct problem *p)
         if (high == p->top) whole(m, p, high);
         return high == p->top ? high : low;
     }
-    const int64_t under = p->distance - whole(m, p, low), over = whole(m, p, high) - p->distance;
+    int64_t under = p->distance - whole(m, p, low), over = whole(m, p, high) - p->distance;
+    if (!p->relieves && (low < 0 || high == p->top)) {                       // the bracket is wide: try what would go so far from rest
+        const int64_t near = low < 0 ? high : low, miss = low < 0 ? over : under;
+        const int64_t power = 1ll << (2 * bits((uint64_t)miss) + 48) / 3, knee = low < 0 ? near - power : near + power;
+        if (knee > low && knee < high) {
+            const int64_t beyond = whole(m, p, knee) - p->distance;
+            if (beyond > 0) high = knee, over = beyond;
+            else low = knee, under = -beyond;
+        }
+    }
     search(m, p, low, high, under, over);
     return 0;
 }
@@ -277,6 +290,7 @@ static void find_join(const struct plan *plan, struct join *join)
 {
     uint8_t event = plan->next;
     join->start = plan->at;
+    join->start.jerk += join->start.landing;
     join->start.landing = 0;
     join->end = join->start;
     for (uint32_t tick = 0; tick <= JOIN; tick++) {
@@ -350,10 +364,8 @@ static struct bounds bounds_of(const struct planner_limits *limits, const struct
     const uint64_t excess = unavoidable > limits->velocity ? unavoidable - limits->velocity : 0;
     struct bounds bounds = {
         .velocity = limits->velocity + excess + least(excess, unavoidable >> 10),
-        .acceleration = most(limits->acceleration - UNIT,
-                             most(size(join->start.state.acceleration), size(join->end.state.acceleration)) + UNIT),
-        .jerk = most(limits->jerk == PLANNER_ANY_JERK ? INT64_MAX : limits->jerk - ROOM / 2,
-                     most(size(join->start.jerk), size(join->end.jerk)) + UNIT)};
+        .acceleration = most(limits->acceleration - UNIT, size(join->start.state.acceleration) + UNIT),
+        .jerk = most(limits->jerk == PLANNER_ANY_JERK ? INT64_MAX : limits->jerk - ROOM / 2, size(join->start.jerk) + UNIT)};
     return bounds;
 }
 

@@ -123,8 +123,8 @@ def test_a_trapezoid_is_at_full_acceleration_within_three_ticks_and_brakes_witho
 @pytest.mark.parametrize("border_3, sections", [(32768, (400, 1200)), (21846, (400, 800))])
 def test_stairs_climb_as_in_s4_and_come_down_the_mirror(border_3, sections):
     """f0 = 50, top 2450, rises of 50, 100, 200 period/s every 20 ms; sections 2 and 3 begin at 1/6 and 1/2, or 1/3, of the climb."""
-    rates = {name: rate * 65536 for name, rate in (("stairs_first", 50), ("stairs_rise_1", 50), ("stairs_rise_2", 100), ("stairs_rise_3", 200))}
-    machine = homed(profile=2, velocity=2450, stairs_border_3=border_3, **rates)
+    rates = {"first": 50, "rise_1": 50, "rise_2": 100, "rise_3": 200}
+    machine = homed(profile=2, velocity=2450, stairs_border_3=border_3, **{f"stairs_{name}": rate * 65536 for name, rate in rates.items()})
     axis = machine.axes[0]
     axis.pushed = []
     machine.ask("move", axis=0, target=3000 * PERIOD)

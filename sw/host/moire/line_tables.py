@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0xC05E713A
+PROTOCOL_CRC = 0x7EBA7CE5
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -455,7 +455,7 @@ PARAMETERS = {parameter.name: parameter for parameter in (
               "servo: filter 2, coefficient -a2"),
     Parameter("profile", 79, "", Fraction(1, 1),
               0, 2, 0,
-              "motions: 0 S-curve (velocity, acceleration, jerk), 1 trapezoid (velocity, acceleration), 2 stairs (velocity and what follows here)"),
+              "profile of motions: 0 S-curve, 1 trapezoid (jerk does not count), 2 stairs (velocity and the stairs_ parameters)"),
     Parameter("stairs_first", 80, "period/s", Fraction(1, 65536),
               1, 65536000000, 819200,
               "stairs (S4): speed of the first, f0"),
