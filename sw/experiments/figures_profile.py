@@ -101,7 +101,7 @@ def timed_moves(moves):
 
     for _ in range(moves):
         limits = planner.planner_limits(spread(10, 50_000), spread(1000, 10**7), spread(10**5, 10**9))
-        plan, piece, last, goal = Plan(), Segment(), c_bool(), signed(spread(1, 1 << 26))
+        plan, made, piece, last, goal = Plan(), Plan(), Segment(), c_bool(), signed(spread(1, 1 << 26))
         if not planner.planner_move(byref(plan), byref(limits), goal):
             raise RuntimeError(f"refused with cause {plan.cause}: {goal}")
         rest.append((plan.ticks, shortest(ruckig, limits, (0, 0, 0), goal, plan.ticks)))
@@ -111,9 +111,9 @@ def timed_moves(moves):
             left -= piece.ticks
         state = in_flight(plan)
         goal = goal + signed(spread(1, 1 << 20)) if draw.random() < 0.5 else signed(spread(1, 1 << 26))
-        if not planner.planner_retarget(byref(plan), byref(limits), goal):
-            raise RuntimeError(f"retarget refused with cause {plan.cause}: {goal}")
-        flight.append((plan.ticks, shortest(ruckig, limits, state, goal, plan.ticks)))
+        if not planner.planner_retarget(byref(made), byref(plan), 0, byref(limits), goal, None):
+            raise RuntimeError(f"retarget refused with cause {made.cause}: {goal}")
+        flight.append((made.ticks, shortest(ruckig, limits, state, goal, made.ticks)))
     return rest, flight
 
 

@@ -107,10 +107,9 @@ int main(int count, char **words) {
                     int64_t other = random.one_in(2) ? goal + int64_t(random.spread(1, 1 << 20)) * (random.one_in(2) ? 1 : -1)
                                                      : int64_t(random.spread(1, 1 << 26)) * (random.one_in(2) ? 1 : -1);
                     retargets_left--, retarget_at += 1 + random() % 200;
-                    auto former = plan;
-                    if (planner_retarget(&plan, &planned, other)) {
-                        if (plan.ticks > 20000) plan = former;
-                        else goal = other, retargets++;
+                    struct plan made;
+                    if (planner_retarget(&made, &plan, 0, &planned, other, nullptr)) {
+                        if (made.ticks <= 20000) plan = made, goal = other, retargets++;
                     } else refused++, missed = true;
                 }
                 planner_segment piece;

@@ -15,8 +15,8 @@ uint8_t motion_prepare(unsigned n, int64_t distance, uint8_t velocity_id);
 void motion_start(unsigned n);
 uint8_t motion_play(unsigned n, int64_t distance, uint8_t velocity_id);
 
-// Another target (2^-16 period) while a motion is played. Refused, it goes on as it was; busy: its last piece is queued already, or
-// it climbs stairs.
+// Another target (2^-16 period) while a motion is played. Refused, it goes on as it was; busy: it is too near its
+// end, or climbs stairs.
 uint8_t motion_retarget(unsigned n, int64_t target, uint8_t velocity_id);
 
 bool motion_played(unsigned n);

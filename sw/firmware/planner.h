@@ -105,9 +105,11 @@ void planner_borders(struct planner_stairs *stairs, uint32_t second, uint32_t th
 // Where the plan is when `ticks` more than those taken have been played.
 struct planner_state planner_state_after(const struct plan *plan, uint32_t ticks);
 
-// From the state behind all that was taken, which must not have been the last piece, to rest at `distance` (2^-16 period) from
-// where the plan began. false: refused, plan->cause says why, and the plan goes on as it was.
-bool planner_retarget(struct plan *plan, const struct planner_limits *limits, int64_t distance);
+// The plan that goes on from where `plan` is when `ticks` more than those taken have been played, which must not be its end, to
+// rest at `distance` (2^-16 period) from where `plan` began. false: refused, made->cause says why. It takes its time, so it calls
+// `meanwhile` now and then, if that is not null; this may take pieces of `plan`.
+bool planner_retarget(struct plan *made, const struct plan *plan, uint32_t ticks, const struct planner_limits *limits, int64_t distance,
+                      void (*meanwhile)(void));
 
 // The next piece to queue, of so many ticks at most; *last tells that the plan ends with it. false: nothing is left.
 bool planner_take_up_to(struct plan *plan, struct planner_segment *piece, bool *last, uint32_t longest);

@@ -44,6 +44,7 @@ struct problem {
     int64_t top;                                                             // limit of velocity
     uint32_t steepest;                                                       // limit of acceleration
     bool relieves;                                                           // the knee is an acceleration
+    void (*meanwhile)(void);
 };
 
 static void glide(struct motion *m, int sign, uint32_t time)
@@ -109,6 +110,7 @@ static void search(struct motion *m, const struct problem *p, int64_t low, int64
         int64_t knee = low + (high - low) / 2;
         if (stays > -3 && stays < 3 && under > 0 && over > 0)
             knee = under < over ? low + share(high - low, (uint64_t)under, both) : high - share(high - low, (uint64_t)over, both);
+        if (p->meanwhile) p->meanwhile();
         if (knee <= low) knee = low + 1;
         if (knee >= high) knee = high - 1;
         const int64_t miss = whole(m, p, knee) - p->distance;
@@ -286,10 +288,9 @@ struct measure {
     uint32_t mantissa;
 };
 
-static void find_join(const struct plan *plan, struct join *join)
+static void find_join(const struct plan *plan, const struct planner_place *from, uint8_t event, struct join *join)
 {
-    uint8_t event = plan->next;
-    join->start = plan->at;
+    join->start = *from;
     join->start.jerk += join->start.landing;
     join->start.landing = 0;
     join->end = join->start;
@@ -369,21 +370,19 @@ static struct bounds bounds_of(const struct planner_limits *limits, const struct
     return bounds;
 }
 
-// The plan that keeps 2^-part_free of the limits free. Not inlined: its stack is free again while the plan is checked.
-__attribute__((noinline)) static enum planner_cause make(struct plan *made, const struct plan *plan, const struct planner_limits *limits,
-                                                         int64_t distance, int part_free, struct bounds *bounds)
+// The plan that keeps 2^-part_free of the limits free.
+static enum planner_cause make(struct plan *made, const struct join *join, const struct planner_limits *limits, int64_t distance,
+                               int part_free, struct bounds *bounds, void (*meanwhile)(void))
 {
     const bool any_jerk = limits->jerk == PLANNER_ANY_JERK;
-    struct join join;
-    find_join(plan, &join);
-    const int64_t remaining = (int64_t)(((uint64_t)distance << 24) - join.end.state.gone);
+    const int64_t remaining = (int64_t)(((uint64_t)distance << 24) - join->end.state.gone);
 
     struct planner_limits inner = *limits;
     inner.velocity -= ROOM + (inner.velocity >> (part_free < ROOM_SHIFT ? part_free : ROOM_SHIFT));
     inner.acceleration -= ROOM + (inner.acceleration >> part_free);
     inner.jerk -= ROOM + (inner.jerk >> (part_free + 2));
     uint64_t jerk = least(any_jerk ? UINT64_MAX : inner.jerk, 4 * least(inner.acceleration, inner.velocity));
-    const int duration = duration_bits(&join, &inner, jerk, bits(size(remaining)));
+    const int duration = duration_bits(join, &inner, jerk, bits(size(remaining)));
     if (duration > LONGEST_RAMP_BITS) return PLANNER_TOO_LONG;
 
     const uint64_t rise = (uint64_t)ratio((int64_t)inner.acceleration, TIME_BITS - duration, jerk) + 1;
@@ -394,8 +393,8 @@ __attribute__((noinline)) static enum planner_cause make(struct plan *made, cons
     const int of_distance = of_velocity + in.scale - 24;
 
     // mirrored so that it goes forward when the acceleration is taken to zero
-    struct problem problem = {.velocity = ratio(join.velocity, of_velocity, in.mantissa)};
-    problem.acceleration = ratio(join.acceleration, of_acceleration, in.mantissa);             // towards zero: never above the limit
+    struct problem problem = {.velocity = ratio(join->velocity, of_velocity, in.mantissa), .meanwhile = meanwhile};
+    problem.acceleration = ratio(join->acceleration, of_acceleration, in.mantissa);             // towards zero: never above the limit
     const int64_t straight = problem.velocity + problem.acceleration * (int64_t)size(problem.acceleration) / 2;
     const int way = straight < 0 ? -1 : 1;
     problem.velocity *= way;
@@ -413,8 +412,8 @@ __attribute__((noinline)) static enum planner_cause make(struct plan *made, cons
         if (cruise >> in.scale >> LONGEST_CRUISE_BITS) return PLANNER_TOO_LONG;
     }
 
-    *bounds = bounds_of(limits, &join, size(product(straight, in.mantissa, of_velocity)));
-    place(made, &join, &motion, cruise, &in, way, product(way * problem.acceleration, in.mantissa, of_acceleration), distance);
+    *bounds = bounds_of(limits, join, size(product(straight, in.mantissa, of_velocity)));
+    place(made, join, &motion, cruise, &in, way, product(way * problem.acceleration, in.mantissa, of_acceleration), distance);
     return PLANNER_OK;
 }
 
@@ -445,17 +444,24 @@ static bool inside(const struct plan *plan, const struct bounds *bounds, int64_t
     return at.state.gone == (uint64_t)distance << 24;
 }
 
-bool planner_retarget(struct plan *plan, const struct planner_limits *limits, int64_t distance)
+bool planner_retarget(struct plan *made, const struct plan *plan, uint32_t ticks, const struct planner_limits *limits, int64_t distance,
+                      void (*meanwhile)(void))
 {
     static const uint8_t parts_free[] = {19, 15, 11, 7, 3};
-    struct plan made;
+    struct planner_place from = plan->at;
+    struct planner_segment piece;
     struct bounds bounds;
+    struct join join;
+    uint8_t next = plan->next;
+    bool last;
     enum planner_cause cause = plan->stairs ? PLANNER_ON_STAIRS : size(distance) >= LONGEST_WAY ? PLANNER_TOO_LONG : judge(limits);
+    if (cause) return plan_refuse(made, cause);
+    for (; ticks && plan_walk(plan, &from, &next, &piece, &last, ticks); ticks -= piece.ticks) {}
+    find_join(plan, &from, next, &join);
     for (unsigned n = 0; n < sizeof parts_free && !cause; n++) {
-        cause = make(&made, plan, limits, distance, parts_free[n], &bounds);
-        if (cause || !inside(&made, &bounds, distance)) continue;
-        *plan = made;
-        return true;
+        cause = make(made, &join, limits, distance, parts_free[n], &bounds, meanwhile);
+        if (!cause && inside(made, &bounds, distance)) return true;
+        if (meanwhile) meanwhile();
     }
-    return plan_refuse(plan, cause ? cause : PLANNER_NO_PLAN);
+    return plan_refuse(made, cause ? cause : PLANNER_NO_PLAN);
 }

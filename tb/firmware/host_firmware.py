@@ -72,9 +72,10 @@ def library():
     loaded = ctypes.CDLL(str(LIBRARY))
     loaded.planner_limits.restype = Limits
     loaded.planner_move.restype = loaded.planner_take.restype = ctypes.c_bool
-    for name in ("planner_move", "planner_retarget"):
-        getattr(loaded, name).argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Limits), ctypes.c_int64]
-        getattr(loaded, name).restype = ctypes.c_bool
+    loaded.planner_move.argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Limits), ctypes.c_int64]
+    loaded.planner_retarget.argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Plan), ctypes.c_uint32, ctypes.POINTER(Limits),
+                                        ctypes.c_int64, ctypes.c_void_p]
+    loaded.planner_move.restype = loaded.planner_retarget.restype = ctypes.c_bool
     loaded.planner_climb.argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Stairs), ctypes.c_int64]
     loaded.planner_climb.restype = ctypes.c_bool
     loaded.planner_borders.argtypes, loaded.planner_borders.restype = [ctypes.POINTER(Stairs), ctypes.c_uint32, ctypes.c_uint32], None

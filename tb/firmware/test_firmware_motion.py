@@ -31,7 +31,7 @@ def finish(machine, axis=0, ms=20_000):
 
 # feeding
 
-def test_what_is_queued_lasts_16_ms_and_900_000_clk_and_a_piece():
+def test_what_is_queued_lasts_16_ms_and_150_000_clk_and_a_piece():
     machine = homed()
     axis = machine.axes[0]
     axis.pushed = []
@@ -40,7 +40,7 @@ def test_what_is_queued_lasts_16_ms_and_900_000_clk_and_a_piece():
     while machine.status()["state"] == "moving":
         machine.run(1)
         most = max(most, sum(segment[3] for segment in axis.player.queue))
-    assert 4 * (16 + 225) - 16 < most < 4 * (16 + 225) + 128
+    assert 4 * (16 + 37.5) - 16 < most < 4 * (16 + 37.5) + 128
     lengths = [segment[3] for segment in axis.pushed]
     assert sum(lengths) == ticks and max(lengths) <= 128
     assert [segment[4] for segment in axis.pushed] == [0] * (len(axis.pushed) - 1) + [1]

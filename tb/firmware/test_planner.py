@@ -150,6 +150,16 @@ def taken(plan, ticks, longest=64):
     return pieces
 
 
+def retargeted(plan, made, goal, ticks=0):
+    """Whether the plan was changed; if not, it holds the cause."""
+    new = Plan()
+    done = library().planner_retarget(ctypes.byref(new), ctypes.byref(plan), ticks, ctypes.byref(made), goal, None)
+    if done:
+        ctypes.pointer(plan)[0] = new
+    plan.cause = new.cause
+    return done
+
+
 def test_the_state_after_some_ticks_is_that_of_the_steps():
     plan, _ = plan_for(125 << 16, S0)
     every = list(steps(plan_of(125 << 16)[0]))
@@ -174,7 +184,7 @@ def test_retargets_land_exactly_inside_the_limits():
                 break
             played += taken(plan, draw.randrange(1, min(plan.ticks - plan.at.tick, draw.choice((6, 1 << 30)))))
             goal += draw.choice((1, -1)) * int(2 ** (draw.random() * 30))
-            assert library().planner_retarget(ctypes.byref(plan), ctypes.byref(made), goal)
+            assert retargeted(plan, made, goal)
         whole = played + segments_of(plan)
         assert distance(whole) == goal << 24, (rates, goal)
         for peak, limit, name in zip(peaks(whole), limits(*rates), ("velocity", "acceleration", "jerk")):
@@ -185,7 +195,7 @@ def test_limits_lowered_in_motion_are_kept_from_then_on():
     plan, made = plan_for(2000 << 16, S0)
     played = taken(plan, 600)                                        # it cruises
     lower = library().planner_limits(*(rate // 2 for rate in S0))
-    assert library().planner_retarget(ctypes.byref(plan), ctypes.byref(lower), 3000 << 16)
+    assert retargeted(plan, lower, 3000 << 16)
     rest = segments_of(plan)
     every = list(steps(rest))
     assert distance(played + rest) == 3000 << 40
@@ -194,10 +204,21 @@ def test_limits_lowered_in_motion_are_kept_from_then_on():
     assert max(map(abs, slopes)) <= lower.acceleration and max(abs(b - a) for a, b in zip(slopes, slopes[1:])) <= lower.jerk
 
 
+def test_a_retarget_may_begin_some_ticks_ahead():
+    for ticks in (1, 37, 300):
+        plan, made = plan_for(2000 << 16, S0)
+        taken(plan, 50)
+        soon, _ = plan_for(2000 << 16, S0)
+        played_soon = taken(soon, 50 + ticks)
+        assert retargeted(plan, made, -300 << 16, ticks) and retargeted(soon, made, -300 << 16)
+        rest = segments_of(soon)
+        assert segments_of(plan) == rest and distance(played_soon + rest) == -300 << 40
+
+
 def test_a_refused_retarget_leaves_the_plan_as_it_was():
     plan, made = plan_for(125 << 16, S0)
     played = taken(plan, 50)
-    assert not library().planner_retarget(ctypes.byref(plan), ctypes.byref(made), 1 << 38) and plan.cause == 4
+    assert not retargeted(plan, made, 1 << 38) and plan.cause == 4
     assert distance(played) + distance(segments_of(plan)) == 125 << 40
 
 
@@ -205,7 +226,7 @@ def test_a_retarget_to_the_same_place_ends_at_the_same_time():
     for ticks in (1, 40, 200):
         plan, made = plan_for(125 << 16, S0)
         whole, played = plan.ticks, taken(plan, ticks)
-        assert library().planner_retarget(ctypes.byref(plan), ctypes.byref(made), 125 << 16)
+        assert retargeted(plan, made, 125 << 16)
         assert abs(ticks + plan.ticks - whole) <= 2 and distance(played + segments_of(plan)) == 125 << 40
 
 
@@ -239,7 +260,7 @@ def test_impossible_limits_are_refused_with_their_cause():
         made.velocity, made.acceleration, made.jerk = values
         assert not library().planner_move(ctypes.byref(plan), ctypes.byref(made), 1000) and plan.cause == cause
         whole, _ = plan_for(1000, S0)
-        assert not library().planner_retarget(ctypes.byref(whole), ctypes.byref(made), 10) and whole.cause == cause
+        assert not retargeted(whole, made, 10) and whole.cause == cause
 
 
 @pytest.mark.parametrize("as_printed", [False, True])
