@@ -13,7 +13,7 @@
 #define QUEUED_MS 16u           // What is queued cannot be taken back when the target changes, so it is kept short: this, and what
 #define BUSY_KCLK 150u          // the firmware may be busy with before it looks here again. Pieces are short too where a move begins:
                                 // it is time that counts.
-static const uint16_t plan_kclk[] = {300, 900};     // what another target is given to be planned; rarely more than the first
+static const uint16_t plan_kclk[] = {300, 800};     // what another target is given to be planned, and half of what is queued
 
 static struct motion {
     struct plan plan;
@@ -29,6 +29,7 @@ static struct {                 // a way to another target, which follows when t
     struct plan plan;
     unsigned axis;
     uint32_t join;              // tick of the old plan; 0: there is none
+    bool ready;                 // it is planned
 } next;
 
 static bool joins(unsigned n)
@@ -59,6 +60,11 @@ static uint32_t ticks_of(uint32_t kclk)
     return PLANNER_TICK_HZ * kclk / (node_read(NODE_CLK_HZ) / 1000u);
 }
 
+static bool at_join(unsigned n)
+{
+    return joins(n) && motions[n].plan.at.tick == next.join;
+}
+
 // One piece into the queue, which has room for it. Its ticks; 0: nothing is left.
 static uint32_t push(unsigned n)
 {
@@ -66,8 +72,8 @@ static uint32_t push(unsigned n)
     struct planner_segment piece;
     bool last;
     uint32_t longest = PIECE_TICKS;
-    if (joins(n) && next.join == m->plan.at.tick) {
-        m->plan = next.plan;
+    if (at_join(n)) {
+        if (next.ready) m->plan = next.plan;
         next.join = 0;
     }
     if (joins(n) && next.join - m->plan.at.tick < longest) longest = next.join - m->plan.at.tick;
@@ -87,7 +93,11 @@ void motion_feed(unsigned n)
     uint32_t pieces = QUEUE - FIELD_GET(axis_read(n, AXIS_STATE), AXIS_STATE_QUEUE_FREE), ticks = 0;
     uint32_t most = PLANNER_TICK_HZ / 1000u * QUEUED_MS + ticks_of(BUSY_KCLK);
     for (uint32_t piece_back = 1; piece_back <= pieces; piece_back++) ticks += m->queued[(m->pieces - piece_back) % QUEUE];
-    for (uint32_t more = 1; more && pieces < QUEUE && (ticks < most || joins(n)); pieces++) ticks += more = push(n);
+    for (uint32_t more = 1; more && pieces < QUEUE; pieces++) {
+        if (!joins(n) && ticks >= most) break;
+        if (at_join(n) && !next.ready && ticks >= most / 2) break;           // wait for the new way as long as that may be
+        ticks += more = push(n);
+    }
 }
 
 static void feed_all(void)
@@ -132,10 +142,15 @@ uint8_t motion_retarget(unsigned n, int64_t target, uint8_t velocity_id)
     for (unsigned trial = 0; trial < sizeof plan_kclk / sizeof plan_kclk[0]; trial++) {
         const uint32_t ticks = ticks_of(plan_kclk[trial]), join = old->at.tick + ticks;
         if (old->stairs || old->next >= old->count || join >= old->ticks) break;
-        if (!planner_retarget(&next.plan, old, ticks, &limits, target - motions[n].from, feed_all)) return refusal(&next.plan);
-        if (old->at.tick > join) continue;
         next.axis = n;
         next.join = join;
+        next.ready = false;
+        if (!planner_retarget(&next.plan, old, ticks, &limits, target - motions[n].from, feed_all)) {
+            next.join = 0;
+            return refusal(&next.plan);
+        }
+        if (next.join == 0) continue;                                        // the old one had to be fed beyond
+        next.ready = true;
         motion_feed(n);
         return LINE_CAUSE_OK;
     }

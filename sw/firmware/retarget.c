@@ -320,7 +320,7 @@ static int duration_bits(const struct join *join, const struct planner_limits *l
 
 // The events of a motion whose middle cruises.
 static void place(struct plan *plan, const struct join *join, const struct motion *motion, uint64_t cruise, const struct measure *in,
-                  int way, int64_t acceleration, int64_t distance)
+                  int way, int64_t acceleration, int64_t distance, void (*meanwhile)(void))
 {
     const int64_t jerk = (int64_t)((uint64_t)in->mantissa << in->exponent);
     struct planner_place end = join->start;
@@ -341,6 +341,7 @@ static void place(struct plan *plan, const struct join *join, const struct motio
     int64_t before = join->end.jerk;
     time = 0;
     for (int n = 0; n <= motion->count; n++) {
+        if (meanwhile) meanwhile();
         const int64_t after = n == motion->count ? 0 : way * motion->phase[n].sign * jerk;
         if (n == motion->cruise && cruise) {
             turn(plan, &lacks, time, in->scale, -before);
@@ -413,7 +414,8 @@ static enum planner_cause make(struct plan *made, const struct join *join, const
     }
 
     *bounds = bounds_of(limits, join, size(product(straight, in.mantissa, of_velocity)));
-    place(made, join, &motion, cruise, &in, way, product(way * problem.acceleration, in.mantissa, of_acceleration), distance);
+    place(made, join, &motion, cruise, &in, way, product(way * problem.acceleration, in.mantissa, of_acceleration), distance,
+          meanwhile);
     return PLANNER_OK;
 }
 
@@ -430,13 +432,14 @@ static uint64_t fastest_of(const struct planner_segment *piece, const struct pla
 }
 
 // Whether the plan ends at `distance` and never leaves the bounds.
-static bool inside(const struct plan *plan, const struct bounds *bounds, int64_t distance)
+static bool inside(const struct plan *plan, const struct bounds *bounds, int64_t distance, void (*meanwhile)(void))
 {
     struct planner_place at = plan->at;
     struct planner_segment piece;
     uint8_t next = plan->next;
     bool last;
     while (plan_walk(plan, &at, &next, &piece, &last, PLANNER_LONGEST_PIECE)) {
+        if (meanwhile && next % 8 == 0) meanwhile();
         if (size(at.jerk + at.landing) > bounds->jerk) return false;
         if (most(size(piece.acceleration), size(at.state.acceleration)) > bounds->acceleration) return false;
         if (fastest_of(&piece, &at.state) > bounds->velocity) return false;
@@ -460,8 +463,7 @@ bool planner_retarget(struct plan *made, const struct plan *plan, uint32_t ticks
     find_join(plan, &from, next, &join);
     for (unsigned n = 0; n < sizeof parts_free && !cause; n++) {
         cause = make(made, &join, limits, distance, parts_free[n], &bounds, meanwhile);
-        if (!cause && inside(made, &bounds, distance)) return true;
-        if (meanwhile) meanwhile();
+        if (!cause && inside(made, &bounds, distance, meanwhile)) return true;
     }
     return plan_refuse(made, cause ? cause : PLANNER_NO_PLAN);
 }

@@ -93,7 +93,7 @@ def test_targets_that_change_in_flight_leave_the_queue_filled(stage):
         began = transport.now()
         axis.request("move", target=axis.to_counts(target_nm))
         longest = max(longest, transport.now() - began)
-        stage.let_pass(0.1)
+        stage.let_pass(0.02)
     axis.wait(stage.keep("X"))
     status = axis.status()
     assert not status.faults and abs(status.target_nm - targets[-1]) < 1 and abs(stage.true_nm("X") - targets[-1]) <= BOUND_NM
