@@ -50,8 +50,9 @@ prove: $(SETUP)   ## the properties in the modules that carry any; K=part of a p
 	$(call say,proofs)
 	@$(PYTHON) tools/prove.py $(if $K,-k '$K') -j $(JOBS)
 
+LATE := tables/commands.py tables/modules.py    # they read what the others make
 tables: $(SETUP)  ## write the made files again: registers, line, tables of numbers, the list of modules
-	@for table in $(filter-out tables/modules.py,$(sort $(wildcard tables/*.py))) tables/modules.py; do $(PYTHON) $$table || exit 1; done
+	@for table in $(filter-out $(LATE),$(sort $(wildcard tables/*.py))) $(LATE); do $(PYTHON) $$table || exit 1; done
 
 fresh: $(SETUP)
 	$(call say,made files are fresh)
@@ -73,6 +74,14 @@ figures: $(SETUP) $(FIRMWARE)  ## all figures, and their page
 soak: $(SETUP) $(FIRMWARE)     ## the long campaigns, for a night: K=name of one
 	@$(PYTHON) -m experiments.soak $K
 
+BOARDS := $(patsubst constraints/%/board.mk,%,$(wildcard constraints/*/board.mk))
+
+board:            ## the bitstream for a board: BOARD=one of the folders of constraints/
+	$(if $(filter $(BOARD),$(BOARDS)),,$(error say which: make board BOARD=x, with x one of: $(BOARDS)))
+ifneq ($(filter $(BOARD),$(BOARDS)),)
+include constraints/$(BOARD)/board.mk
+endif
+
 clean:            ## remove what was built; the tools in build/venv stay (rm -rf build removes them too)
 	@[ ! -d build ] || find build -mindepth 1 -maxdepth 1 ! -name venv -exec rm -rf {} +
 	@find . -name __pycache__ -not -path './build/*' -prune -exec rm -rf {} +
@@ -81,4 +90,4 @@ clean:            ## remove what was built; the tools in build/venv stay (rm -rf
 $(SETUP): requirements.lock pyproject.toml tools/setup.sh
 	@tools/setup.sh
 
-.PHONY: help demo test check lint prove tables fresh firmware figure figures soak clean
+.PHONY: help demo test check lint prove tables fresh firmware figure figures soak board clean

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// node -- a complete motion controller on a multi-drop line: soft core, line, axes.
+// node -- a complete motion controller on a multi-drop line: soft core, line, axes, links to other things.
 //
 // latency  see axis and the rooms link and cpu     rate  see there
 // source   S0: one slave computer per axis, many on one line; here one node may have several axes
@@ -12,6 +12,7 @@ module node #(
     parameter int W = 8,                        // bits of a sample
     parameter int DRIVES = 15,                  // what each axis can drive, see actuator
     parameter int FILTERS = 2,                  // of each servo, see biquad_cascade
+    parameter int LINKS = 0,                    // what else it speaks to, see links
     parameter int MEMORY_BYTES = 98304,         // of the soft core, program and data
     parameter FIRMWARE = ""                     // file of its contents at power-up
 ) (
@@ -41,21 +42,40 @@ module node #(
     output logic       [AXES-1:0] dac_sclk,
     output logic       [AXES-1:0] dac_sdi,
     output logic       [AXES-1:0] drive_enable,
-    output logic       [AXES-1:0] compare_pulse
+    output logic       [AXES-1:0] compare_pulse,
+    input  wire                  i2c_scl,       // links from here on: levels of the lines; without links all are idle
+    input  wire                  i2c_sda,
+    output logic                 i2c_scl_low,   // pull the lines low
+    output logic                 i2c_sda_low,
+    input  wire                  keyboard_clock,
+    input  wire                  keyboard_data,
+    output logic                 keyboard_clock_low,
+    output logic                 keyboard_data_low,
+    input  wire                  machine_clock, // PS/2, where the node is the keyboard
+    input  wire                  machine_data,
+    output logic                 machine_clock_low,
+    output logic                 machine_data_low,
+    input  wire                  peer_rx,       // idles high
+    output logic                 peer_tx,
+    input  wire                  sensor_rx,
+    output logic                 display_cs_n,
+    output logic                 display_sclk,
+    output logic                 display_data,
+    input  wire        [1:0]     machine_status
 );
     // cpu
-    wire               select, write, trap, node_select, line_select;
+    wire               select, write, trap, node_select, line_select, links_select;
     wire        [15:0] bus_address;
-    wire        [31:0] wdata, rdata, node_rdata, line_rdata;
+    wire        [31:0] wdata, rdata, node_rdata, line_rdata, links_rdata;
     wire        [AXES-1:0]    axis_select, grating_select, actuator_select;
     wire        [32*AXES-1:0] axis_rdata, grating_rdata, actuator_rdata;
     wire        [5:0]  word = bus_address[7:2];
 
     soft_core #(.MEMORY_BYTES(MEMORY_BYTES), .FIRMWARE(FIRMWARE)) u_core (.clk, .rst, .select, .write, .address(bus_address), .wdata,
                                                                         .rdata, .trap);
-    register_bus #(.AXES(AXES)) u_bus (.clk, .select, .address(bus_address), .node_rdata, .line_rdata, .axis_rdata,
-                                       .grating_rdata, .actuator_rdata, .node_select, .line_select, .axis_select, .grating_select,
-                                       .actuator_select, .rdata);
+    register_bus #(.AXES(AXES)) u_bus (.clk, .select, .address(bus_address), .node_rdata, .line_rdata, .links_rdata,
+                                       .axis_rdata, .grating_rdata, .actuator_rdata, .node_select, .line_select, .links_select,
+                                       .axis_select, .grating_select, .actuator_select, .rdata);
 
     // time; the watchdog of the soft core gives it as many clk however slow they are
     localparam int CORE_SILENCE_MS = 20 + 1_200_000_000 / CLK_HZ;
@@ -114,6 +134,12 @@ module node #(
         .crc_byte_written, .crc_start_start(crc_start), .crc, .watchdog_time);
 
     wire unused = &{1'b0, receiving, receive_free, transmit_overrun, bus_address[1:0], start_axes};
+
+    // links
+    links #(.CLK_HZ(CLK_HZ), .LINKS(LINKS)) u_links (.clk, .rst, .select(links_select), .write, .word, .wdata, .rdata(links_rdata),
+        .i2c_scl, .i2c_sda, .i2c_scl_low, .i2c_sda_low, .keyboard_clock, .keyboard_data, .keyboard_clock_low, .keyboard_data_low,
+        .machine_clock, .machine_data, .machine_clock_low, .machine_data_low, .peer_rx, .peer_tx, .sensor_rx,
+        .display_cs_n, .display_sclk, .display_data, .machine_status);
 
     // axes
     for (genvar n = 0; n < AXES; n++) begin : g_axis

@@ -2,7 +2,7 @@
 // register_bus -- send each access of the soft core to the register block that holds the address.
 //
 // latency  select and write reach a block in the same clk; its answer passes in the next     rate  one access per clk
-// source   the addresses of tables/registers.rdl: node at 0x000, line at 0x100, axis n at 0x400 + n * 0x100,
+// source   the addresses of tables/registers.rdl: node at 0x000, line at 0x100, links at 0x200, axis n at 0x400 + n * 0x100,
 //          its grating at 0xC00 + n * 0x100, its actuator at 0x1400 + n * 0x100
 // model    tb/cpu/register_bus.py, equal in every bit of every cycle
 `default_nettype none
@@ -15,11 +15,13 @@ module register_bus #(
     input  wire        [15:0]    address,       // byte address inside the register map
     input  wire        [31:0]    node_rdata,    // answer of each block, the clk after its select
     input  wire        [31:0]    line_rdata,
+    input  wire        [31:0]    links_rdata,
     input  wire        [32*AXES-1:0] axis_rdata, // axis n in bits 32 n + 31 .. 32 n
     input  wire        [32*AXES-1:0] grating_rdata,
     input  wire        [32*AXES-1:0] actuator_rdata,
     output logic                 node_select,   // strobe: the access is for this block
     output logic                 line_select,
+    output logic                 links_select,
     output logic       [AXES-1:0] axis_select,
     output logic       [AXES-1:0] grating_select,
     output logic       [AXES-1:0] actuator_select,
@@ -27,7 +29,7 @@ module register_bus #(
 );
     if (AXES < 1 || AXES > 8) begin : g_check AXES_MUST_BE_FROM_1_TO_8 u_error (); end
 
-    logic            node_q, line_q;
+    logic            node_q, line_q, links_q;
     logic [AXES-1:0] axis_q, grating_q, actuator_q;
 
     wire [7:0] block = address[15:8];
@@ -35,6 +37,7 @@ module register_bus #(
     always_comb begin
         node_select = select && block == 8'd0;
         line_select = select && block == 8'd1;
+        links_select = select && block == 8'd2;
         for (int n = 0; n < AXES; n++) begin
             axis_select[n]    = select && block == 8'(4 + n);
             grating_select[n] = select && block == 8'(12 + n);
@@ -43,7 +46,7 @@ module register_bus #(
     end
 
     always_comb begin
-        rdata = ({32{node_q}} & node_rdata) | ({32{line_q}} & line_rdata);
+        rdata = ({32{node_q}} & node_rdata) | ({32{line_q}} & line_rdata) | ({32{links_q}} & links_rdata);
         for (int n = 0; n < AXES; n++)
             rdata = rdata | ({32{axis_q[n]}} & axis_rdata[32*n +: 32]) | ({32{grating_q[n]}} & grating_rdata[32*n +: 32])
                           | ({32{actuator_q[n]}} & actuator_rdata[32*n +: 32]);
@@ -52,6 +55,7 @@ module register_bus #(
     always_ff @(posedge clk) begin
         node_q    <= node_select;
         line_q    <= line_select;
+        links_q   <= links_select;
         axis_q    <= axis_select;
         grating_q <= grating_select;
         actuator_q <= actuator_select;

@@ -23,6 +23,7 @@ module ps2_arbiter #(
     input  wire  [7:0]   inject,
     input  wire          inject_last,       // of its sequence
     output logic         injecting,         // level: a sequence is under way
+    output logic         typed,             // strobe: a byte of the keyboard that answers no command
 
     input  wire          keyboard_valid,    // ps2_host
     output logic         keyboard_ready,
@@ -84,6 +85,7 @@ module ps2_arbiter #(
     assign send            = again ? injected : keyboard_valid ? keyboard : inject;
     assign send_damaged    = !again && keyboard_valid && keyboard_damaged;
     assign keyboard_ready  = send_ready && !again;
+    assign typed           = arrived && !keyboard_damaged && awaited == '0;
     assign inject_ready    = send_ready && !again && !keyboard_valid;
 
     always_ff @(posedge clk) begin

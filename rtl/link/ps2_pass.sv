@@ -29,6 +29,7 @@ module ps2_pass #(
     input  wire  [7:0]   inject,
     input  wire          inject_last,       // of its sequence
     output logic         injecting,         // level: a sequence is under way, the keyboard is held
+    output logic         typed,             // strobe: a byte of the keyboard that answers no command
     output logic         keyboard_damaged,  // strobe: a byte of the keyboard came damaged
     output logic         command_damaged,   // strobe: a command of the host came damaged
     output logic         command_unsent,    // strobe: the keyboard did not take a command
@@ -58,7 +59,7 @@ module ps2_pass #(
         .sent, .unsent(command_unsent), .held, .busy(keyboard_busy), .clock_low(keyboard_clock_low), .data_low(keyboard_data_low));
 
     ps2_arbiter #(.CLK_HZ(CLK_HZ)) u_arbiter (
-        .clk, .rst, .idle_ms, .inject_valid, .inject_ready, .inject, .inject_last, .injecting,
+        .clk, .rst, .idle_ms, .inject_valid, .inject_ready, .inject, .inject_last, .injecting, .typed,
         .keyboard_valid(received_valid), .keyboard_ready(received_ready), .keyboard(received), .keyboard_damaged(received_damaged),
         .keyboard_busy, .keyboard_held(held), .keyboard_hold(hold),
         .command_valid, .command_ready, .command, .command_damaged(damaged), .command_sent(sent), .command_unsent,

@@ -28,7 +28,7 @@ from twin.twin import Axis, Node
 
 CLK_HZ = 3_000_000
 NODE = {"DRIVES": 2, "FILTERS": 0}
-START_S = 0.06                       # until the soft core listens
+START_S = 0.1                        # until the soft core listens
 LOOK_S = 0.02
 SLOW_MM_S = 0.5                      # the paper's top speed, 30 mm/min
 WORD = 1 << 16                       # counts of the paper's counter
@@ -144,14 +144,14 @@ class Stage:
         return self.together(lambda name, axis: axis.request("home"), self.axes)
 
     def both(self, name):
-        """(counts of the scale, counts of the node, true place in um), while no edge passes."""
-        number = self.number(name)
+        """(counts of the scale, counts of the node, true place in um), once the table has stopped: the same twice in a row."""
+        number, seen = self.number(name), None
         while True:
-            before = self.twin.truth(number)
             counts = self.axes[name].status().counts
-            after = self.twin.truth(number)
-            if before.scale_counts == after.scale_counts:
-                return after.scale_counts, counts, after.position_m * 1e6
+            truth = self.twin.truth(number)
+            if seen == (truth.scale_counts, counts):
+                return *seen, truth.position_m * 1e6
+            seen = truth.scale_counts, counts
 
     def move(self, what, targets_um, speed_mm_s=None):
         """All named axes at once; speed None: the top speed of each."""

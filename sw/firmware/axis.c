@@ -23,6 +23,7 @@ static struct axis {
     uint8_t state;              // line_state
     uint8_t ended;              // line_cause
     bool homed;
+    uint8_t orders;             // off, home, move, prepare, stop since start; wraps
     bool homing;                // a switch only blocks, until this motion has ended
     bool leaving;               // a switch only blocks, until it is released
     bool fine;                  // the fine stage holds the position
@@ -45,7 +46,7 @@ static void write_control(unsigned n, bool on)
 {
     const struct axis *a = &axes[n];
     uint32_t only_blocks = a->homing || a->leaving ? AXIS_CONTROL_HOMING_MASK : 0;
-    uint32_t loop = a->fine ? AXIS_CONTROL_FINE_MASK : AXIS_CONTROL_CLOSED_LOOP_MASK;
+    uint32_t loop = a->state == LINE_STATE_EXCITED ? 0 : a->fine ? AXIS_CONTROL_FINE_MASK : AXIS_CONTROL_CLOSED_LOOP_MASK;
     axis_write(n, AXIS_CONTROL, only_blocks | (on ? AXIS_CONTROL_ENABLE_MASK | loop : 0));
 }
 
@@ -162,6 +163,7 @@ void axis_start(unsigned n)
 uint8_t axis_enable(unsigned n, bool on)
 {
     struct axis *a = &axes[n];
+    a->orders += !on;
     axis_poll(n);
     if (!on) {
         if (at_work(a)) a->ended = LINE_CAUSE_STOPPED;
@@ -195,6 +197,7 @@ static uint8_t ready(unsigned n)
 uint8_t axis_home(unsigned n)
 {
     struct axis *a = &axes[n];
+    a->orders++;
     uint8_t cause = ready(n);
     if (cause != LINE_CAUSE_OK) return cause;
 
@@ -213,6 +216,7 @@ uint8_t axis_home(unsigned n)
 static uint8_t may_go(unsigned n, int64_t target)
 {
     struct axis *a = &axes[n];
+    a->orders++;
     uint8_t cause = ready(n);
     if (cause != LINE_CAUSE_OK && !(cause == LINE_CAUSE_BUSY && (a->state == LINE_STATE_SETTLING || a->state == LINE_STATE_MOVING)))
         return cause;
@@ -270,18 +274,50 @@ uint8_t axis_move(unsigned n, int64_t target, uint32_t *duration_ticks)
     return LINE_CAUSE_OK;
 }
 
+uint8_t axis_go(unsigned n, int64_t distance, uint8_t velocity_id)
+{
+    uint8_t cause = ready(n);
+    if (cause != LINE_CAUSE_OK) return cause;
+    cause = motion_prepare(n, distance, velocity_id);
+    if (cause != LINE_CAUSE_OK) return cause;
+    axes[n].ended = LINE_CAUSE_RUNNING;
+    set_off(n);
+    motion_start(n);
+    return LINE_CAUSE_OK;
+}
+
 uint8_t axis_stop(unsigned n)
 {
     struct axis *a = &axes[n];
+    a->orders++;
     axis_poll(n);
     if (!at_work(a) || a->state == LINE_STATE_STOPPING) return LINE_CAUSE_OK;
     if (axis_read(n, AXIS_STATE) & AXIS_STATE_MOVING_MASK) {
         motion_brake(n);
         a->state = LINE_STATE_STOPPING;
     } else {
-        if (a->state == LINE_STATE_PREPARED) motion_hold_here(n);
+        if (a->state == LINE_STATE_PREPARED || a->state == LINE_STATE_EXCITED) motion_hold_here(n);
         finish(n, LINE_CAUSE_STOPPED);
     }
+    return LINE_CAUSE_OK;
+}
+
+uint8_t axis_excite(unsigned n, bool on)
+{
+    struct axis *a = &axes[n];
+    if (!on) {
+        if (a->state != LINE_STATE_EXCITED) return LINE_CAUSE_OK;
+        motion_hold_here(n);
+        finish(n, LINE_CAUSE_OK);
+        return LINE_CAUSE_OK;
+    }
+    uint8_t cause = ready(n);
+    if (cause != LINE_CAUSE_OK) return cause;
+    hand_over(n, false);
+    axis_write(n, AXIS_OPEN_COMMAND, axis_read(n, AXIS_COMMAND));
+    a->ended = LINE_CAUSE_RUNNING;
+    a->state = LINE_STATE_EXCITED;
+    write_control(n, true);
     return LINE_CAUSE_OK;
 }
 
@@ -339,6 +375,11 @@ uint8_t axis_set_parameter(unsigned n, uint8_t id, int64_t value)
 uint8_t axis_state(unsigned n)
 {
     return axes[n].state;
+}
+
+uint8_t axis_orders(unsigned n)
+{
+    return axes[n].orders;
 }
 
 uint8_t axis_ended(unsigned n)

@@ -13,7 +13,7 @@
 #include "parameters.h"
 
 #define WORK_MS 1u                              // words, pieces and points of a poll
-#define PIECES 16u                              // of them at most
+#define PIECES 32u                              // of them at most
 #define LONGEST_MS 1000u                        // of a burst
 #define LARGEST_EVERY 65535u
 #define USER_STROBES (GRATING_STROBES_ARM_INDEX_MASK | GRATING_STROBES_CAPTURE_NOW_MASK | GRATING_STROBES_CAPTURE_NEXT_MASK | \

@@ -29,7 +29,7 @@
 #define POINTS (BLOCKS / 2)                 // of the transform: two blocks in each, one real, one imaginary
 #define PAIRS (POINTS / 2)                  // of a level of the transform
 #define LEVELS 7u                           // of the transform
-#define TOGETHER 4u                         // blocks, pairs, lines, bins of one piece of work
+#define TOGETHER 2u                         // blocks, pairs, lines, bins of one piece of work
 #define LARGEST_REST 32767                  // of a phase from smooth motion: 1/32 period
 #define LARGEST_VIBRATION (1 << 22)         // 4 periods: a slow one and the motion may nearly cancel
 #define QUIET (1 << 20)                     // mean square below which a burst has full weight, 2^-40 period^2
@@ -44,11 +44,14 @@ const struct learner_values learner_identity = {.gain = 65536};
 static int16_t wave[640];                   // sine of 512 points of a circle and a quarter, 1.0 = 32767
 static int32_t motion[3][3];                // window times products of 1, time and its square, summed over the blocks
 
-enum stage { UPDATE, TABLE, FIRST_READING, FIT, SOLVE, REST, TRANSFORM, SPECTRUM, SECOND_READING, FOLD, PROJECT, ELLIPSE };
+enum stage {
+    UPDATE, TABLE, FIRST_READING, FIT, SOLVE, REST, TRANSFORM, SPECTRUM, FIND, CLEAR, SECOND_READING, FOLD, PROJECT,
+    SOLVE_ELLIPSE, TAKE_ELLIPSE
+};
 
 struct equations {                          // symmetric and positive; column 5 is the right side
-    int64_t m[5][6];
-    int64_t solution[5];
+    int64_t m[5][6];                        // on and right of its diagonal
+    int64_t solution[5];                    // 0 beyond size
     int64_t largest;                        // of the solution
     bool back;                              // eliminated: the unknowns are next
     uint32_t size;
@@ -71,6 +74,7 @@ static struct {
 
     int32_t table[BINS];                    // c in the middle of each bin, 2^-20 period
     int32_t block[BLOCKS];                  // place, 2^-20 period
+    uint32_t strongest;                     // line of the pass
     uint32_t vibration;                     // 2^-16 cycle a burst
     int32_t bend;                           // of the vibration from phase to phase, 2 - 2 cos of its step, 1.0 = 2^17
     int32_t dimmed;                         // of the vibration in the mean of a block, 1.0 = 2^15
@@ -148,10 +152,13 @@ static int32_t size_of(int32_t value)
 
 static int64_t root_of(int64_t square)
 {
-    uint64_t root = 0;
-    for (uint64_t bit = (uint64_t)1 << 31; bit; bit >>= 1)
-        if ((root + bit) * (root + bit) <= (uint64_t)square) root += bit;
-    return (int64_t)root;
+    int64_t root = 0;
+    for (int64_t bit = INT64_C(1) << 62; bit; bit >>= 2) {
+        bool fits = square >= root + bit;
+        if (fits) square -= root + bit;
+        root = (root >> 1) + (fits ? bit : 0);
+    }
+    return root;
 }
 
 const char *learner_words(enum learner_reason reason)
@@ -203,24 +210,35 @@ void learner_ellipse_take(struct learner_ellipse *ellipse, const struct learner 
 
 static void begin_equations(struct equations *e, uint32_t size, int64_t largest)
 {
-    *e = (struct equations){.size = size, .column = 1, .largest = largest};
+    e->size = size;
+    for (uint32_t i = 0; i < 5; i++) e->solution[i] = 0;
+    e->largest = largest;
+    e->back = false;
+    e->row = 0;
+    e->column = 1;
 }
 
 enum solving { BUSY, SOLVED, ILL };
 
-// One factor of the elimination, without exchange of rows, or one unknown.
+// One factor of the elimination, without exchange of rows, or half an unknown: a division takes the core 2500 clk.
 static enum solving solve(struct equations *e)
 {
     uint32_t i = e->row, j = e->column;
     int64_t pivot = e->m[i][i];
     if (e->back) {
-        int64_t rest = e->m[i][5];
-        for (j = i + 1; j < e->size; j++) rest -= (e->m[i][j] * e->solution[j]) >> 28;
-        int64_t coarse = rest * 16 / pivot;                                 // then the remainder: both fit 64 bits
-        e->solution[i] = coarse * (UNIT / 16) + (rest * 16 - coarse * pivot) * (UNIT / 16) / pivot;
-        if (e->solution[i] > e->largest || e->solution[i] < -e->largest) return ILL;
+        int64_t *rest = &e->m[i][5], *solution = &e->solution[i];
+        if (j == 0) {                                                       // first coarsely, then the remainder: both fit 64 bits
+            for (j = i + 1; j < e->size; j++) *rest -= (e->m[i][j] * e->solution[j]) >> 28;
+            *solution = *rest * 16 / pivot;
+            *rest = *rest * 16 - *solution * pivot;
+            e->column = 1;
+            return BUSY;
+        }
+        *solution = *solution * (UNIT / 16) + *rest * (UNIT / 16) / pivot;
+        if (*solution > e->largest || *solution < -e->largest) return ILL;
         if (i == 0) return SOLVED;
         e->row--;
+        e->column = 0;
     } else if (pivot < SMALLEST) {
         return ILL;
     } else if (j < e->size) {
@@ -234,6 +252,7 @@ static enum solving solve(struct equations *e)
         e->column = e->row + 1;
     } else {
         e->back = true;
+        e->column = 0;
     }
     return BUSY;
 }
@@ -568,14 +587,13 @@ static void weaken_line(struct learner_pass *pass, uint32_t n)
 {
     uint8_t level = level_of(power_of(n));
     if (pass->spectra == 0 || level < pass->line[n]) pass->line[n] = level;
+    if (n == FIRST_LINE || (n > FIRST_LINE && n < LEARNER_LINES - 2 && pass->line[n] > pass->line[work.strongest])) work.strongest = n;
 }
 
 // The line that stays, and where it lies in this burst: with a Hann window its neighbour is (1 + d) / (2 - d) of it at d lines off.
-static bool find_vibration(const struct learner_pass *pass)
+static bool find_vibration(void)
 {
-    uint32_t at = FIRST_LINE;
-    for (uint32_t n = FIRST_LINE; n < LEARNER_LINES - 2; n++)
-        if (pass->line[n] > pass->line[at]) at = n;
+    uint32_t at = work.strongest;
     if (power_of(at + 1) > power_of(at)) at++;
     else if (power_of(at - 1) > power_of(at)) at--;
     uint32_t beside = power_of(at + 1) > power_of(at - 1) ? at + 1 : at - 1;
@@ -593,7 +611,6 @@ static bool find_vibration(const struct learner_pass *pass)
 
 static void begin_second_reading(struct learner *learner)
 {
-    for (uint32_t n = 0; n < BINS; n++) work.seen[0][n] = work.seen[1][n] = work.seen[2][n] = 0;
     work.power = 0;
     begin_reading();
     begin_stage(SECOND_READING);
@@ -604,7 +621,7 @@ static void begin_second_reading(struct learner *learner)
 static void fold_bins(uint32_t n)
 {
     for (uint32_t i = 0; i < 3; i++) {
-        int32_t *a = &work.seen[i][n], *b = &work.seen[i][BINS / 2 - 1 - n], *c = &work.seen[i][BINS / 2 + n], *d = &work.seen[i][BINS - 1 - n];
+        int32_t *seen = work.seen[i], *a = &seen[n], *b = &seen[BINS / 2 - 1 - n], *c = &seen[BINS / 2 + n], *d = &seen[BINS - 1 - n];
         int32_t even = *a + *d, uneven = *a - *d, opposite_even = *b + *c, opposite_uneven = *c - *b;
         *a = even + opposite_even;
         *b = even - opposite_even;
@@ -792,7 +809,7 @@ static void end_of_samples(struct learner *learner)
         return;
     }
     enum learner_reason reason = judge_ellipse(&learner->ellipse, &work.fit);
-    begin_stage(ELLIPSE);
+    begin_stage(SOLVE_ELLIPSE);
     learner->need = LEARNER_NEEDS_WORK;
     if (reason != LEARNER_LEARNING) refuse_burst(learner, reason);
 }
@@ -832,6 +849,17 @@ void learner_take(struct learner *learner, const uint32_t words[LEARNER_WORDS])
     }
 }
 
+static void end_of_ellipse(struct learner *learner)
+{
+    enum learner_reason reason = take_ellipse(work.fit.solution, &learner->values);
+    if (reason == LEARNER_LEARNING) {
+        learner->harmonics = true;
+        accept(learner);
+    } else {
+        refuse_burst(learner, reason);
+    }
+}
+
 static void begin_burst(struct learner *learner)
 {
     begin_reading();
@@ -845,15 +873,14 @@ static void end_of_spectrum(struct learner *learner)
     struct learner_pass *pass = &learner->pass;
     pass->every = work.every;
     if (pass->spectra < UINT8_MAX) pass->spectra++;
-    if (pass->spectra >= FEWEST_SPECTRA && find_vibration(pass)) begin_fit();
-    else begin_second_reading(learner);
+    begin_stage(pass->spectra >= FEWEST_SPECTRA ? FIND : CLEAR);
 }
 
 static void end_of_projection(struct learner *learner)
 {
     struct learner_pass *pass = &learner->pass;
     uint32_t gone = (uint32_t)size_of(work.travel);
-    if (learner->reason < LEARNER_ONE_SPEED) learner->reason = LEARNER_LEARNING;    // what a pass was refused for stands until one is accepted
+    if (learner->reason < LEARNER_ONE_SPEED) learner->reason = LEARNER_LEARNING;    // what a pass was refused for stands until one is good
     if (pass->bursts == 0 || gone < pass->slowest) pass->slowest = gone;
     if (pass->bursts == 0 || gone > pass->fastest) pass->fastest = gone;
     begin_stage(UPDATE);
@@ -909,8 +936,7 @@ void learner_work(struct learner *learner)
     case SOLVE:
         state = solve(&work.fit);
         if (state == ILL) refuse_burst(learner, LEARNER_UNSTEADY);
-        else if (state == SOLVED && work.fit.size == 5) begin_second_reading(learner);
-        else if (state == SOLVED) begin_stage(REST);
+        else if (state == SOLVED) begin_stage(work.fit.size == 3 ? REST : CLEAR);
         break;
     case REST:
         for (uint32_t n = 0; n < TOGETHER; n++) window_block(next * TOGETHER + n);
@@ -925,6 +951,15 @@ void learner_work(struct learner *learner)
         for (uint32_t n = 0; n < TOGETHER; n++) weaken_line(pass, next * TOGETHER + n);
         if (next == LEARNER_LINES / TOGETHER - 1) end_of_spectrum(learner);
         break;
+    case FIND:
+        if (find_vibration()) begin_fit();
+        else begin_stage(CLEAR);
+        break;
+    case CLEAR:
+        for (uint32_t i = 0; i < 3; i++)
+            for (uint32_t n = 0; n < TOGETHER; n++) work.seen[i][next * TOGETHER + n] = 0;
+        if (next == BINS / TOGETHER - 1) begin_second_reading(learner);
+        break;
     case FOLD:
         fold_bins(next);
         if (next == QUARTER - 1) begin_stage(PROJECT);
@@ -938,17 +973,12 @@ void learner_work(struct learner *learner)
         begin_stage(PROJECT);
         if (work.order == LEARNER_ORDERS) end_of_projection(learner);
         break;
-    case ELLIPSE:
+    case SOLVE_ELLIPSE:
         state = solve(&work.fit);
-        if (state == BUSY) break;
-        enum learner_reason reason = state == ILL ? LEARNER_PARTIAL_CIRCLE : take_ellipse(work.fit.solution, &learner->values);
-        if (reason != LEARNER_LEARNING) {
-            refuse_burst(learner, reason);
-        } else {
-            learner->harmonics = true;
-            accept(learner);
-        }
+        if (state == ILL) refuse_burst(learner, LEARNER_PARTIAL_CIRCLE);
+        else if (state == SOLVED) begin_stage(TAKE_ELLIPSE);
         break;
+    case TAKE_ELLIPSE: end_of_ellipse(learner); break;
     default: break;
     }
 }

@@ -9,10 +9,11 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0xa9693a89u            // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0x1f6961d1u            // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define LINE_BASE 0x100u
+#define LINKS_BASE 0x200u
 #define AXIS_BASE 0x400u
 #define AXIS_STRIDE 0x100u
 #define GRATING_BASE 0xc00u
@@ -51,6 +52,12 @@ static inline uint32_t line_read(uint32_t offset)
 { return register_read(LINE_BASE + offset); }
 static inline void line_write(uint32_t offset, uint32_t value)
 { register_write(LINE_BASE + offset, value); }
+static inline uint32_t links_read(uint32_t offset)
+{ return register_read(LINKS_BASE + offset); }
+static inline void links_write(uint32_t offset, uint32_t value)
+{ register_write(LINKS_BASE + offset, value); }
+static inline uint64_t links_read_wide(uint32_t offset)
+{ return register_read_wide(LINKS_BASE + offset); }
 static inline uint32_t axis_read(unsigned axis, uint32_t offset)
 { return register_read(AXIS_BASE + axis * AXIS_STRIDE + offset); }
 static inline void axis_write(unsigned axis, uint32_t offset, uint32_t value)
@@ -184,6 +191,205 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define LINE_WATCHDOG_TIME_MASK                        0x0000ffffu
 #define LINE_WATCHDOG_TIME_SHIFT                       0
 #define LINE_WATCHDOG_TIME_WIDTH                       16
+
+// links: I2C, PS/2 pass-through, peer port, angle sensor, numeric display, status inputs
+#define LINKS_BUILT                                    0x000u  // r: 1: it was built, 0: its pins are idle, its registers do nothing
+#define LINKS_BUILT_I2C_MASK                           0x00000001u
+#define LINKS_BUILT_I2C_SHIFT                          0
+#define LINKS_BUILT_I2C_WIDTH                          1
+#define LINKS_BUILT_PS2_MASK                           0x00000002u
+#define LINKS_BUILT_PS2_SHIFT                          1
+#define LINKS_BUILT_PS2_WIDTH                          1
+#define LINKS_BUILT_PEER_MASK                          0x00000004u
+#define LINKS_BUILT_PEER_SHIFT                         2
+#define LINKS_BUILT_PEER_WIDTH                         1
+#define LINKS_BUILT_SENSOR_MASK                        0x00000008u
+#define LINKS_BUILT_SENSOR_SHIFT                       3
+#define LINKS_BUILT_SENSOR_WIDTH                       1
+#define LINKS_BUILT_DISPLAY_MASK                       0x00000010u
+#define LINKS_BUILT_DISPLAY_SHIFT                      4
+#define LINKS_BUILT_DISPLAY_WIDTH                      1
+#define LINKS_BUILT_MACHINE_MASK                       0x00000020u
+#define LINKS_BUILT_MACHINE_SHIFT                      5
+#define LINKS_BUILT_MACHINE_WIDTH                      1
+#define LINKS_I2C                                      0x004u  // w: queue a command
+#define LINKS_I2C_DATA_MASK                            0x000000ffu  // of a write
+#define LINKS_I2C_DATA_SHIFT                           0
+#define LINKS_I2C_DATA_WIDTH                           8
+#define LINKS_I2C_COMMAND_MASK                         0x00000700u  // 0 start, also repeated; 1 stop, 2 write, 3 read, 4 recover: clock a stuck device free
+#define LINKS_I2C_COMMAND_SHIFT                        8
+#define LINKS_I2C_COMMAND_WIDTH                        3
+#define LINKS_I2C_ACKNOWLEDGE_MASK                     0x00000800u  // of a read: more is wanted
+#define LINKS_I2C_ACKNOWLEDGE_SHIFT                    11
+#define LINKS_I2C_ACKNOWLEDGE_WIDTH                    1
+#define LINKS_I2C_ANSWER                               0x008u  // r: the oldest result; reading takes it from the queue
+#define LINKS_I2C_ANSWER_DATA_MASK                     0x000000ffu  // of a read
+#define LINKS_I2C_ANSWER_DATA_SHIFT                    0
+#define LINKS_I2C_ANSWER_DATA_WIDTH                    8
+#define LINKS_I2C_ANSWER_RESULT_MASK                   0x00000300u  // 0 ok, 1 not acknowledged, 2 bus lost or not ours, 3 no bus: a line stays low
+#define LINKS_I2C_ANSWER_RESULT_SHIFT                  8
+#define LINKS_I2C_ANSWER_RESULT_WIDTH                  2
+#define LINKS_I2C_ANSWER_PRESENT_MASK                  0x00000400u  // 0: the queue was empty, nothing was taken
+#define LINKS_I2C_ANSWER_PRESENT_SHIFT                 10
+#define LINKS_I2C_ANSWER_PRESENT_WIDTH                 1
+#define LINKS_I2C_STATE                                0x00cu  // r: state of the bus
+#define LINKS_I2C_STATE_FREE_MASK                      0x000000ffu  // commands that may still be queued, 128 at most; as many results wait, more are lost
+#define LINKS_I2C_STATE_FREE_SHIFT                     0
+#define LINKS_I2C_STATE_FREE_WIDTH                     8
+#define LINKS_I2C_STATE_BUSY_MASK                      0x00000100u  // a command is under way or waits
+#define LINKS_I2C_STATE_BUSY_SHIFT                     8
+#define LINKS_I2C_STATE_BUSY_WIDTH                     1
+#define LINKS_I2C_STATE_OWNED_MASK                     0x00000200u  // the bus is ours, from start to stop
+#define LINKS_I2C_STATE_OWNED_SHIFT                    9
+#define LINKS_I2C_STATE_OWNED_WIDTH                    1
+#define LINKS_I2C_STATE_SCL_MASK                       0x00000400u  // level of the line
+#define LINKS_I2C_STATE_SCL_SHIFT                      10
+#define LINKS_I2C_STATE_SCL_WIDTH                      1
+#define LINKS_I2C_STATE_SDA_MASK                       0x00000800u  // level of the line
+#define LINKS_I2C_STATE_SDA_SHIFT                      11
+#define LINKS_I2C_STATE_SDA_WIDTH                      1
+#define LINKS_PS2_IDLE                                 0x010u  // rw: silence of keyboard and machine before an injection; less than 20 counts as 20 [0.001 s]
+#define LINKS_PS2_IDLE_MASK                            0x0000ffffu
+#define LINKS_PS2_IDLE_SHIFT                           0
+#define LINKS_PS2_IDLE_WIDTH                           16
+#define LINKS_PS2_INJECT                               0x014u  // w: queue a scan code to inject; a sequence holds the keyboard from its first byte to its last: queue it whole
+#define LINKS_PS2_INJECT_DATA_MASK                     0x000000ffu  // a scan code to inject
+#define LINKS_PS2_INJECT_DATA_SHIFT                    0
+#define LINKS_PS2_INJECT_DATA_WIDTH                    8
+#define LINKS_PS2_INJECT_LAST_MASK                     0x00000100u  // of its sequence
+#define LINKS_PS2_INJECT_LAST_SHIFT                    8
+#define LINKS_PS2_INJECT_LAST_WIDTH                    1
+#define LINKS_PS2_STATE                                0x018u  // r: state of PS/2; all that was queued has been sent when free is 32 and neither injecting nor busy stands
+#define LINKS_PS2_STATE_FREE_MASK                      0x0000003fu  // scan codes that may still be queued, 32 at most
+#define LINKS_PS2_STATE_FREE_SHIFT                     0
+#define LINKS_PS2_STATE_FREE_WIDTH                     6
+#define LINKS_PS2_STATE_INJECTING_MASK                 0x00000040u  // a sequence is under way
+#define LINKS_PS2_STATE_INJECTING_SHIFT                6
+#define LINKS_PS2_STATE_INJECTING_WIDTH                1
+#define LINKS_PS2_STATE_BUSY_MASK                      0x00000080u  // a frame is under way on either side
+#define LINKS_PS2_STATE_BUSY_SHIFT                     7
+#define LINKS_PS2_STATE_BUSY_WIDTH                     1
+#define LINKS_PS2_TYPED                                0x01cu  // rw: bytes of the keyboard that answer no command: a person types; writing clears
+#define LINKS_PS2_TYPED_MASK                           0x0000ffffu
+#define LINKS_PS2_TYPED_SHIFT                          0
+#define LINKS_PS2_TYPED_WIDTH                          16
+#define LINKS_PS2_ERRORS                               0x020u  // rw: errors of PS/2; writing clears them all
+#define LINKS_PS2_ERRORS_KEYBOARD_DAMAGED_MASK         0x000000ffu  // bytes of the keyboard that came damaged
+#define LINKS_PS2_ERRORS_KEYBOARD_DAMAGED_SHIFT        0
+#define LINKS_PS2_ERRORS_KEYBOARD_DAMAGED_WIDTH        8
+#define LINKS_PS2_ERRORS_COMMAND_DAMAGED_MASK          0x0000ff00u  // commands of the machine that came damaged
+#define LINKS_PS2_ERRORS_COMMAND_DAMAGED_SHIFT         8
+#define LINKS_PS2_ERRORS_COMMAND_DAMAGED_WIDTH         8
+#define LINKS_PS2_ERRORS_UNSENT_MASK                   0x00ff0000u  // commands that the keyboard did not take
+#define LINKS_PS2_ERRORS_UNSENT_SHIFT                  16
+#define LINKS_PS2_ERRORS_UNSENT_WIDTH                  8
+#define LINKS_PS2_ERRORS_ABORTED_MASK                  0xff000000u  // frames that the machine cut short
+#define LINKS_PS2_ERRORS_ABORTED_SHIFT                 24
+#define LINKS_PS2_ERRORS_ABORTED_WIDTH                 8
+#define LINKS_PS2_GLITCHES                             0x024u  // rw: pulses of less than 1 us on the lines; writing clears
+#define LINKS_PS2_GLITCHES_MASK                        0x000000ffu
+#define LINKS_PS2_GLITCHES_SHIFT                       0
+#define LINKS_PS2_GLITCHES_WIDTH                       8
+#define LINKS_PEER_BIT_TIME                            0x028u  // rw: duration of one bit of the peer port [1/16 clk]
+#define LINKS_PEER_BIT_TIME_MASK                       0x000fffffu
+#define LINKS_PEER_BIT_TIME_SHIFT                      0
+#define LINKS_PEER_BIT_TIME_WIDTH                      20
+#define LINKS_PEER_RECEIVE                             0x02cu  // r: one received byte; reading takes it from the queue of 64
+#define LINKS_PEER_RECEIVE_DATA_MASK                   0x000000ffu
+#define LINKS_PEER_RECEIVE_DATA_SHIFT                  0
+#define LINKS_PEER_RECEIVE_DATA_WIDTH                  8
+#define LINKS_PEER_RECEIVE_PRESENT_MASK                0x00000100u  // 0: the queue was empty, nothing was taken
+#define LINKS_PEER_RECEIVE_PRESENT_SHIFT               8
+#define LINKS_PEER_RECEIVE_PRESENT_WIDTH               1
+#define LINKS_PEER_TRANSMIT                            0x030u  // w: one byte to send
+#define LINKS_PEER_TRANSMIT_MASK                       0x000000ffu
+#define LINKS_PEER_TRANSMIT_SHIFT                      0
+#define LINKS_PEER_TRANSMIT_WIDTH                      8
+#define LINKS_PEER_STATE                               0x034u  // r: state of the peer port
+#define LINKS_PEER_STATE_TRANSMIT_FREE_MASK            0x0000007fu  // bytes that may still be queued, 64 at most
+#define LINKS_PEER_STATE_TRANSMIT_FREE_SHIFT           0
+#define LINKS_PEER_STATE_TRANSMIT_FREE_WIDTH           7
+#define LINKS_PEER_STATE_SENDING_MASK                  0x00000080u
+#define LINKS_PEER_STATE_SENDING_SHIFT                 7
+#define LINKS_PEER_STATE_SENDING_WIDTH                 1
+#define LINKS_PEER_ERRORS                              0x038u  // rw: errors of the peer port; writing clears them all
+#define LINKS_PEER_ERRORS_FRAMING_MASK                 0x000000ffu  // characters without a stop bit
+#define LINKS_PEER_ERRORS_FRAMING_SHIFT                0
+#define LINKS_PEER_ERRORS_FRAMING_WIDTH                8
+#define LINKS_PEER_ERRORS_OVERRUNS_MASK                0x0000ff00u  // bytes lost because the receive queue was full
+#define LINKS_PEER_ERRORS_OVERRUNS_SHIFT               8
+#define LINKS_PEER_ERRORS_OVERRUNS_WIDTH               8
+#define LINKS_SENSOR_BIT_TIME                          0x03cu  // rw: duration of one bit of the sensor [1/16 clk]
+#define LINKS_SENSOR_BIT_TIME_MASK                     0x000fffffu
+#define LINKS_SENSOR_BIT_TIME_SHIFT                    0
+#define LINKS_SENSOR_BIT_TIME_WIDTH                    20
+#define LINKS_SENSOR_GAP                               0x040u  // rw: longest pause between the ends of two bytes of a frame [clk]
+#define LINKS_SENSOR_GAP_MASK                          0x00ffffffu
+#define LINKS_SENSOR_GAP_SHIFT                         0
+#define LINKS_SENSOR_GAP_WIDTH                         24
+#define LINKS_SENSOR_STALE_AFTER                       0x044u  // rw: time without a good frame after which the sensor is stale; 0: never [clk]
+#define LINKS_SENSOR_STALE_AFTER_MASK                  0xffffffffu
+#define LINKS_SENSOR_STALE_AFTER_SHIFT                 0
+#define LINKS_SENSOR_STALE_AFTER_WIDTH                 32
+#define LINKS_SENSOR_READING                           0x048u  // r: of the last good frame. Low word: angle, 2^32 a turn. High word: its age then, in clk; stops at its end
+#define LINKS_SENSOR_READING_LOW                       0x048u
+#define LINKS_SENSOR_READING_HIGH                      0x04cu
+#define LINKS_SENSOR_READING_WIDTH                     64
+#define LINKS_SENSOR_STATE                             0x050u  // r: the last good frame
+#define LINKS_SENSOR_STATE_SEQUENCE_NUMBER_MASK        0x000000ffu  // its number, each frame one more; read it before sensor_reading
+#define LINKS_SENSOR_STATE_SEQUENCE_NUMBER_SHIFT       0
+#define LINKS_SENSOR_STATE_SEQUENCE_NUMBER_WIDTH       8
+#define LINKS_SENSOR_STATE_STALE_MASK                  0x00000100u  // none yet, or older than sensor_stale_after
+#define LINKS_SENSOR_STATE_STALE_SHIFT                 8
+#define LINKS_SENSOR_STATE_STALE_WIDTH                 1
+#define LINKS_SENSOR_ERRORS                            0x054u  // rw: frames that did not come; each count stops at its end
+#define LINKS_SENSOR_ERRORS_CRC_MASK                   0x000000ffu  // with a wrong CRC-16
+#define LINKS_SENSOR_ERRORS_CRC_SHIFT                  0
+#define LINKS_SENSOR_ERRORS_CRC_WIDTH                  8
+#define LINKS_SENSOR_ERRORS_BROKEN_MASK                0x0000ff00u  // with a pause or a framing error within
+#define LINKS_SENSOR_ERRORS_BROKEN_SHIFT               8
+#define LINKS_SENSOR_ERRORS_BROKEN_WIDTH               8
+#define LINKS_SENSOR_ERRORS_MISSED_MASK                0x00ff0000u  // by the gaps of the numbers, damaged ones with them
+#define LINKS_SENSOR_ERRORS_MISSED_SHIFT               16
+#define LINKS_SENSOR_ERRORS_MISSED_WIDTH               8
+#define LINKS_SENSOR_ERRORS_CLEAR_MASK                 0x01000000u  // clear the three
+#define LINKS_SENSOR_ERRORS_CLEAR_SHIFT                24
+#define LINKS_SENSOR_ERRORS_CLEAR_WIDTH                1
+#define LINKS_SENSOR_FRAMES                            0x058u  // rw: good frames; writing clears
+#define LINKS_SENSOR_FRAMES_MASK                       0x0000ffffu
+#define LINKS_SENSOR_FRAMES_SHIFT                      0
+#define LINKS_SENSOR_FRAMES_WIDTH                      16
+#define LINKS_DISPLAY                                  0x05cu  // w: queue a word for the display driver: register in the high byte, value in the low one
+#define LINKS_DISPLAY_MASK                             0x0000ffffu
+#define LINKS_DISPLAY_SHIFT                            0
+#define LINKS_DISPLAY_WIDTH                            16
+#define LINKS_DISPLAY_STATE                            0x060u  // r: state of the display
+#define LINKS_DISPLAY_STATE_FREE_MASK                  0x0000001fu  // words that may still be queued, 16 at most
+#define LINKS_DISPLAY_STATE_FREE_SHIFT                 0
+#define LINKS_DISPLAY_STATE_FREE_WIDTH                 5
+#define LINKS_DISPLAY_STATE_SENDING_MASK               0x00000020u
+#define LINKS_DISPLAY_STATE_SENDING_SHIFT              5
+#define LINKS_DISPLAY_STATE_SENDING_WIDTH              1
+#define LINKS_MACHINE_FILTER                           0x064u  // rw: a status input must stand this long without a break; the change passes at most 1 ms later [0.001 s]
+#define LINKS_MACHINE_FILTER_MASK                      0x0000ffffu
+#define LINKS_MACHINE_FILTER_SHIFT                     0
+#define LINKS_MACHINE_FILTER_WIDTH                     16
+#define LINKS_MACHINE_STATUS                           0x068u  // rw: status inputs, filtered; a change since they were last cleared: write 1 to clear
+#define LINKS_MACHINE_STATUS_INPUTS_MASK               0x00000003u  // bit n: level of input n
+#define LINKS_MACHINE_STATUS_INPUTS_SHIFT              0
+#define LINKS_MACHINE_STATUS_INPUTS_WIDTH              2
+#define LINKS_MACHINE_STATUS_ROSE_0_MASK               0x00000004u  // input 0 went up
+#define LINKS_MACHINE_STATUS_ROSE_0_SHIFT              2
+#define LINKS_MACHINE_STATUS_ROSE_0_WIDTH              1
+#define LINKS_MACHINE_STATUS_ROSE_1_MASK               0x00000008u  // input 1 went up
+#define LINKS_MACHINE_STATUS_ROSE_1_SHIFT              3
+#define LINKS_MACHINE_STATUS_ROSE_1_WIDTH              1
+#define LINKS_MACHINE_STATUS_FELL_0_MASK               0x00000010u  // input 0 went down
+#define LINKS_MACHINE_STATUS_FELL_0_SHIFT              4
+#define LINKS_MACHINE_STATUS_FELL_0_WIDTH              1
+#define LINKS_MACHINE_STATUS_FELL_1_MASK               0x00000020u  // input 1 went down
+#define LINKS_MACHINE_STATUS_FELL_1_SHIFT              5
+#define LINKS_MACHINE_STATUS_FELL_1_WIDTH              1
 
 // axis: sensor, position, servo, profile, drive, guard
 #define AXIS_CONTROL                                   0x000u  // rw: requests; the guard decides

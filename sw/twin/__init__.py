@@ -3,7 +3,8 @@
 from .build import BuildError
 from .machine import Machine
 from .ring import RotaryRing
+from .surroundings import EdmCut, PeerLineBench, Surroundings, SurroundingsBench
 from .twin import Axis, FrameBench, LineState, Node, Twin, TwinTransport, cells_of, realtime_factor
 
-__all__ = ["Axis", "BuildError", "FrameBench", "LineState", "Machine", "Node", "RotaryRing", "Twin", "TwinTransport", "cells_of",
-           "realtime_factor"]
+__all__ = ["Axis", "BuildError", "EdmCut", "FrameBench", "LineState", "Machine", "Node", "PeerLineBench", "RotaryRing", "Surroundings",
+           "SurroundingsBench", "Twin", "TwinTransport", "cells_of", "realtime_factor"]

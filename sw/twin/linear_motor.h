@@ -38,7 +38,7 @@ protected:
     bool own_fault(const char* name, bool on) override;
 
 private:
-    double position(uint64_t now) const { return position_ + velocity_ * since(now); }
+    double position(uint64_t now) const final { return position_ + velocity_ * since(now); }
 
     LinearMotorParameters p_;
     RandomSource random_;

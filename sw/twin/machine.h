@@ -36,6 +36,7 @@ enum Sense : unsigned {                                       // pins that the m
     SENSOR_RX = 1 << 8,                                       // serial frames of an absolute sensor; 1: idle, or no sensor
 };
 constexpr unsigned SENSE_PINS = 9;
+constexpr unsigned DRIVE_IDLE = ADC_CS_N | ADC_SCLK | DAC_CS_N;
 
 class Machine {
 public:
@@ -57,6 +58,7 @@ public:
     virtual const char* faults() const = 0;                   // their names
     virtual void place(double position) = 0;                  // carry it there by hand: at rest, nothing wound up
     virtual void push(double force) = 0;                      // from outside, from now on
+    virtual double position(uint64_t) const { return NAN; }   // m or rad, true; NAN: it has none to tell
 
     // names of the values of state(), the first time_s; a last ? marks a truth value, # a whole number
     virtual const char* state_names() const = 0;
@@ -86,7 +88,7 @@ private:
 
     double clk_hz_;
     uint64_t step_clk_, last_step_ = 0, event_at_ = 0;
-    unsigned drive_ = ADC_CS_N | ADC_SCLK | DAC_CS_N;
+    unsigned drive_ = DRIVE_IDLE;
     unsigned forced_ = 0, forced_high_ = 0;                   // levels that faults hold
     std::vector<std::pair<unsigned, unsigned>> wire_faults_;  // pins, of them high
     uint64_t trace_every_ = 0, trace_count_ = 0;

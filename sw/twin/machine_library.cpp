@@ -29,7 +29,7 @@ public:
     uint32_t phase = 0;                                       // clk within the PWM period
 
 private:
-    unsigned drive_ = ADC_CS_N | ADC_SCLK | DAC_CS_N;
+    unsigned drive_ = DRIVE_IDLE;
 };
 
 }  // namespace

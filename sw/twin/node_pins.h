@@ -1,36 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// Between the pins of a Verilated node, vectors over its axes, and those of the machines, one word an axis. A pin that the node was
-// not built with is left out: it stays idle for the machine.
+// Between the pins of a Verilated node and those of what is around it: vectors over its axes, one word a machine, and its links.
 #pragma once
 #include <cstdint>
 
 #include "machine.h"
+#include "surroundings.h"
 
 namespace twin {
-
-#define OPTIONAL_OUTPUT(name, idle)                                                                          \
-    template <class Pins>                                                                                    \
-    auto name##_of(const Pins& pins, int n, int) -> decltype(unsigned(pins.name)) { return pins.name >> n & 1; } \
-    template <class Pins>                                                                                    \
-    unsigned name##_of(const Pins&, int, long) { return idle; }
-OPTIONAL_OUTPUT(step, 0)
-OPTIONAL_OUTPUT(direction, 0)
-OPTIONAL_OUTPUT(dac_cs_n, 1)
-OPTIONAL_OUTPUT(dac_sclk, 0)
-OPTIONAL_OUTPUT(dac_sdi, 0)
-#undef OPTIONAL_OUTPUT
-
-template <class Pins>
-auto set_sensor_rx(Pins& pins, uint32_t levels, int) -> decltype(pins.sensor_rx = 0, void()) { pins.sensor_rx = levels; }
-template <class Pins>
-void set_sensor_rx(Pins&, uint32_t, long) {}
 
 template <class Pins>
 unsigned drive_of(const Pins& pins, int n) {                  // Drive of axis n
     return (pins.adc_cs_n >> n & 1) * ADC_CS_N | (pins.adc_sclk >> n & 1) * ADC_SCLK | (pins.bridge_a >> n & 1) * BRIDGE_A |
-           (pins.bridge_b >> n & 1) * BRIDGE_B | (pins.drive_enable >> n & 1) * DRIVE_ENABLE | step_of(pins, n, 0) * STEP |
-           direction_of(pins, n, 0) * DIRECTION | dac_cs_n_of(pins, n, 0) * DAC_CS_N | dac_sclk_of(pins, n, 0) * DAC_SCLK |
-           dac_sdi_of(pins, n, 0) * DAC_SDI;
+           (pins.bridge_b >> n & 1) * BRIDGE_B | (pins.drive_enable >> n & 1) * DRIVE_ENABLE | (pins.step >> n & 1) * STEP |
+           (pins.direction >> n & 1) * DIRECTION | (pins.dac_cs_n >> n & 1) * DAC_CS_N | (pins.dac_sclk >> n & 1) * DAC_SCLK |
+           (pins.dac_sdi >> n & 1) * DAC_SDI;
 }
 
 class SensePins {
@@ -48,7 +31,7 @@ public:
         pins.limit_low_open = of(LIMIT_LOW_OPEN);
         pins.limit_high_open = of(LIMIT_HIGH_OPEN);
         pins.drive_fault_n = ~of(DRIVE_FAULT) & all;
-        set_sensor_rx(pins, of(SENSOR_RX), 0);
+        pins.sensor_rx = of(SENSOR_RX) & 1;                   // the node has one, that of its first axis
     }
 
 private:
@@ -56,5 +39,24 @@ private:
 
     uint32_t vectors_[SENSE_PINS] = {};
 };
+
+template <class Pins>
+unsigned link_drive_of(const Pins& pins) {                    // LinkDrive
+    return pins.i2c_scl_low * I2C_SCL_LOW | pins.i2c_sda_low * I2C_SDA_LOW | pins.keyboard_clock_low * KEYBOARD_CLOCK_LOW |
+           pins.keyboard_data_low * KEYBOARD_DATA_LOW | pins.machine_clock_low * MACHINE_CLOCK_LOW |
+           pins.machine_data_low * MACHINE_DATA_LOW | pins.display_cs_n * DISPLAY_CS_N | pins.display_sclk * DISPLAY_SCLK |
+           pins.display_data * DISPLAY_DATA;
+}
+
+template <class Pins>
+void set_link_pins(Pins& pins, unsigned levels) {             // LinkSense
+    pins.i2c_scl = (levels & I2C_SCL) != 0;
+    pins.i2c_sda = (levels & I2C_SDA) != 0;
+    pins.keyboard_clock = (levels & KEYBOARD_CLOCK) != 0;
+    pins.keyboard_data = (levels & KEYBOARD_DATA) != 0;
+    pins.machine_clock = (levels & MACHINE_CLOCK) != 0;
+    pins.machine_data = (levels & MACHINE_DATA) != 0;
+    pins.machine_status = bool(levels & MACHINE_CUTTING) | bool(levels & MACHINE_ALARM) << 1;
+}
 
 }  // namespace twin

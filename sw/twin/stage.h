@@ -25,7 +25,7 @@ public:
                "code_sin# code_cos# piezo_m dac_code# dac_bad_frames#";
     }
     void state(uint64_t now, double* out) const override;
-    double position(uint64_t now) const {
+    double position(uint64_t now) const final {
         return plant.drivetrain.position + piezo.position + velocity() * since(now);
     }
     double velocity() const { return plant.drivetrain.velocity + piezo.velocity; }

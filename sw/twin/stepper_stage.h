@@ -36,7 +36,7 @@ protected:
     bool own_fault(const char* name, bool on) override;
 
 private:
-    double position(uint64_t now) const { return drivetrain_.position + drivetrain_.velocity * since(now); }
+    double position(uint64_t now) const final { return drivetrain_.position + drivetrain_.velocity * since(now); }
 
     StepperStageParameters p_;
     RandomSource random_;

@@ -4,11 +4,14 @@
 // All nodes share clk. A clk is: every node takes its pins and sees the rising edge, then the machine and the line take the
 // node's outputs and set the pins for the next edge. One translation unit with the Verilated code, so that all of it inlines.
 #include <algorithm>
+#include <deque>
 #include <memory>
+#include <optional>
 
 #include "line.h"
 #include "machine.h"
 #include "node_pins.h"
+#include "peer_line.h"
 #include "verilated_node.h"                                   // made by build.py: the Verilated sources, CLK_HZ, AXES, REARM_CLK
 
 namespace twin {
@@ -16,10 +19,7 @@ namespace twin {
 constexpr int RESET_CLK = 16;
 constexpr uint32_t ALL_AXES = (1u << AXES) - 1;
 
-struct Firmware {
-    const uint32_t* words;
-    int count;
-};
+using Firmware = std::vector<uint32_t>;
 
 class Core {                                                  // a Verilated node and its clk
 public:
@@ -31,10 +31,11 @@ public:
         pins.encoder_a = pins.encoder_b = pins.encoder_z = pins.probe = pins.adc_sin = pins.adc_cos = 0;
         pins.limit_low_open = pins.limit_high_open = 0;
         pins.drive_fault_n = ALL_AXES;
-        set_sensor_rx(pins, ALL_AXES, 0);
+        pins.sensor_rx = pins.peer_rx = 1;
+        set_link_pins(pins, LINK_SENSE_IDLE);
         pins.rst = 1;
         model_->eval();
-        for (int n = 0; n < firmware.count; n++) pins.NODE_MEMORY[n] = firmware.words[n];
+        std::copy(firmware.begin(), firmware.end(), &pins.NODE_MEMORY[0]);
         for (int n = 0; n < RESET_CLK; n++) clk();
         pins.rst = 0;
     }
@@ -62,52 +63,101 @@ public:
 class Node {
 public:
     Node(unsigned address, const Firmware& firmware, const char* const* kinds, const double* const* parameters, uint64_t seed)
-        : core(address, firmware) {
+        : address_(address), firmware_(firmware), core_(std::in_place, address, firmware) {
         for (int n = 0; n < AXES; n++)
             machines.push_back(make_machine(kinds[n], parameters[n], seed, uint64_t(address) << 16 | unsigned(n) << 8, CLK_HZ));
     }
     void step(uint64_t now, bool line_rx) {
-        core.pins.line_rx = line_rx;
-        core.clk();
         bool changed = false;
-        for (int n = 0; n < AXES; n++) changed |= machines[size_t(n)]->clk(now, drive_of(core.pins, n));
-        if (changed) sense();
+        if (core_) {
+            auto& pins = core_->pins;
+            pins.line_rx = line_rx;
+            core_->clk();
+            for (int n = 0; n < AXES; n++) changed |= machines[size_t(n)]->clk(now, drive_of(pins, n));
+            if (changed) sense();
+            if (surroundings && surroundings->clk(now, link_drive_of(pins))) set_link_pins(pins, surroundings->levels());
+            line_drives = pins.line_driver_enable;
+            line_level = pins.line_tx;
+        } else {                                              // nothing is driven, the machines go on
+            for (auto& machine : machines) machine->clk(now, DRIVE_IDLE);
+            if (surroundings) surroundings->clk(now, LINK_DRIVE_IDLE);
+        }
+    }
+    bool peer_tx() const { return !core_ || core_->pins.peer_tx; }
+    void hear_peer(bool level) {
+        if (core_) core_->pins.peer_rx = level;
+    }
+    void press_estop(bool pressed) {
+        estop_ = pressed;
+        if (core_) core_->pins.estop_open = pressed;
+    }
+    void power(uint64_t now, bool on) {                       // on again, it starts from its image as it did at first
+        if (on == core_.has_value()) return;
+        if (on) {
+            core_.emplace(address_, firmware_);
+            core_->pins.estop_open = estop_;
+            sense();
+            if (surroundings) {
+                surroundings->power_on(now);
+                set_link_pins(core_->pins, surroundings->levels());
+            }
+        } else {
+            core_.reset();
+            line_drives = false;
+            line_level = true;
+            if (surroundings) surroundings->power_cut(now);
+        }
     }
 
-    Core core;
     std::vector<std::unique_ptr<Machine>> machines;
+    std::unique_ptr<Surroundings> surroundings;
+    bool line_drives = false, line_level = true;              // its driver and what that is told, after this clk
 
 private:
     void sense() {
         SensePins levels;
         for (int n = 0; n < AXES; n++) levels.add(n, machines[size_t(n)]->levels());
-        levels.set(core.pins, ALL_AXES);
+        levels.set(core_->pins, ALL_AXES);
     }
+
+    unsigned address_;
+    const Firmware& firmware_;
+    std::optional<Core> core_;                                // without power there is none
+    bool estop_ = false;
+};
+
+struct PeerDirection {
+    int from, to;
+    PeerLine line;
 };
 
 class Twin {
 public:
     Twin(uint64_t seed, int count, const uint8_t* addresses, const Firmware& firmware, const char* const* kinds,
          const double* const* parameters, double bit_clk)
-        : line(seed, CLK_HZ, bit_clk) {
+        : line(seed, CLK_HZ, bit_clk), firmware_(firmware) {
         for (int n = 0; n < count; n++)
-            nodes.emplace_back(new Node(addresses[n], firmware, kinds + n * AXES, parameters + n * AXES, seed));
+            nodes.emplace_back(new Node(addresses[n], firmware_, kinds + n * AXES, parameters + n * AXES, seed));
     }
     void step() {
         now++;
         uint32_t driving = 0, levels = 0;
         for (size_t n = 0; n < nodes.size(); n++) {
-            auto& pins = nodes[n]->core.pins;
-            nodes[n]->step(now, line.heard_by(int(n), pins.line_driver_enable));
-            driving |= uint32_t(pins.line_driver_enable) << n;
-            levels |= uint32_t(pins.line_tx) << n;
+            nodes[n]->step(now, line.heard_by(int(n), nodes[n]->line_drives));
+            driving |= uint32_t(nodes[n]->line_drives) << n;
+            levels |= uint32_t(nodes[n]->line_level) << n;
         }
         line.step(now, driving, levels);
+        for (auto& peer : peers) nodes[size_t(peer.to)]->hear_peer(peer.line.step(now, nodes[size_t(peer.from)]->peer_tx()));
     }
 
     uint64_t now = 0;
     Line line;
     std::vector<std::unique_ptr<Node>> nodes;
+    std::deque<PeerDirection> peers;                          // at fixed addresses
+
+private:
+    const Firmware firmware_;
 };
 
 // One node without a machine, fed with the levels of a line as they are: for campaigns of many damaged frames.
@@ -161,6 +211,7 @@ using namespace twin;
 
 namespace {
 Machine& machine_of(Twin* t, int axis) { return *t->nodes[size_t(axis / AXES)]->machines[size_t(axis % AXES)]; }
+Firmware image(const uint32_t* words, int count) { return {words, words + count}; }
 }  // namespace
 
 #pragma GCC visibility push(default)
@@ -170,7 +221,7 @@ int twin_axes() { return AXES; }
 int twin_memory_words() { return MEMORY_WORDS; }
 void* twin_new(uint64_t seed, int nodes, const uint8_t* addresses, const uint32_t* firmware, int words, const char* const* kinds,
                const double* const* parameters, double bit_clk) {
-    return new Twin(seed, nodes, addresses, {firmware, words}, kinds, parameters, bit_clk);
+    return new Twin(seed, nodes, addresses, image(firmware, words), kinds, parameters, bit_clk);
 }
 void twin_delete(Twin* t) { delete t; }
 uint64_t twin_now(Twin* t) { return t->now; }
@@ -206,18 +257,31 @@ void twin_cut(Twin* t, int node, int cut) {                   // node -1: the ho
 // level, host drives, nodes that drive, collisions, framing errors, start glitches, edges, clk of last drive, words waiting
 void twin_line_state(Twin* t, uint64_t* out) {
     uint64_t driving = 0;
-    for (size_t n = 0; n < t->nodes.size(); n++) driving |= uint64_t(t->nodes[n]->core.pins.line_driver_enable) << n;
+    for (size_t n = 0; n < t->nodes.size(); n++) driving |= uint64_t(t->nodes[n]->line_drives) << n;
     const Line& line = t->line;
     const uint64_t state[] = {line.at_nodes, line.host.drives(), driving, line.collisions, line.host.framing_errors,
                               line.host.start_glitches, line.edges, line.last_driven, line.host.received.size()};
     std::copy(std::begin(state), std::end(state), out);
 }
-void twin_estop(Twin* t, int node, int pressed) { t->nodes[size_t(node)]->core.pins.estop_open = pressed != 0; }
+void twin_estop(Twin* t, int node, int pressed) { t->nodes[size_t(node)]->press_estop(pressed != 0); }
 // The machine of an axis; machine_library.cpp has what can be done with it.
 void* twin_machine(Twin* t, int axis) { return &machine_of(t, axis); }
+// What stands around a node; surroundings_library.cpp has what can be done with it. The angle at each cut is that of a worm table.
+void* twin_surround(Twin* t, int node, const SurroundingsParameters* parameters, unsigned fitted, uint64_t seed, int table) {
+    auto& around = t->nodes[size_t(node)]->surroundings;
+    around = std::make_unique<Surroundings>(*parameters, fitted, seed, 0x5EED00u + unsigned(node) * 16, CLK_HZ);
+    if (table >= 0) around->table_angle = [t, &machine = machine_of(t, table)] { return machine.position(t->now); };
+    return around.get();
+}
+// The serial line between two nodes, one direction; peer_line_* have what can be done with it.
+void* twin_join_peers(Twin* t, int from, int to, uint64_t seed, double baud) {
+    t->peers.push_back({from, to, PeerLine(seed, 0x9EE2u + unsigned(from), CLK_HZ, baud)});
+    return &t->peers.back().line;
+}
+void twin_power(Twin* t, int node, int on) { t->nodes[size_t(node)]->power(t->now, on); }
 
 void* frame_bench_new(unsigned address, const uint32_t* firmware, int words, double bit_clk) {
-    return new FrameBench(address, {firmware, words}, bit_clk);
+    return new FrameBench(address, image(firmware, words), bit_clk);
 }
 void frame_bench_delete(FrameBench* bench) { delete bench; }
 void frame_bench_idle(FrameBench* bench, uint64_t clk) { bench->idle(clk); }

@@ -6,6 +6,8 @@ An axis is counted through all nodes: axis = place of the node * axes a node + a
 
     Twin(nodes=(1, 2))                                       two nodes of one axis each, each on a stage of S0
     Twin([Node(1, [Axis("stepper_stage", {"scale_count": 1e-7})] * 3)])      one node with three axes of S2
+    Twin([Node(1, [], Surroundings(eeprom=True, keypad=True, display=True, keyboard=True, edm=True, table=1)),
+          Node(2, [Axis("worm_table")])], peers=(0, 1))                      S4: two nodes, a serial line between them
 """
 import ctypes
 import time
@@ -18,12 +20,17 @@ import numpy
 from . import build
 from .machine import FUNCTIONS as MACHINE_FUNCTIONS
 from .machine import HANDLE, LONG, REAL, WHOLE, MachineHandle, declare, pack
+from .surroundings import FUNCTIONS as SURROUNDINGS_FUNCTIONS
+from .surroundings import PEER_FUNCTIONS, PeerLineHandle, Surroundings, SurroundingsHandle
+from .surroundings import pack as pack_surroundings
 
 CLK_HZ = 2_400_000
 NODE = {"DRIVES": 1, "FILTERS": 0}     # what the stage of S0 needs of rtl/node.sv
 BAUD = 115200
 TURNAROUND_CELLS = 2             # the host hears a word half a cell before its end; the node's driver lets go half a cell after it
 CELLS = 11                       # of a character: start, eight data, 9th, stop
+PEER_BAUD = 9600                 # between nodes
+ALL_LINKS = 63                   # of rtl/links.sv
 CUTS = {"none": 0, "idle": 1, "break": 2}
 
 FUNCTIONS = {
@@ -35,6 +42,8 @@ FUNCTIONS = {
     "twin_flip_reply": (None, [HANDLE, HANDLE, WHOLE]), "twin_line_spikes": (None, [HANDLE, REAL, REAL, REAL]),
     "twin_cut": (None, [HANDLE, WHOLE, WHOLE]), "twin_line_state": (None, [HANDLE, HANDLE]),
     "twin_estop": (None, [HANDLE, WHOLE, WHOLE]), "twin_machine": (HANDLE, [HANDLE, WHOLE]),
+    "twin_surround": (HANDLE, [HANDLE, WHOLE, HANDLE, ctypes.c_uint, LONG, WHOLE]),
+    "twin_join_peers": (HANDLE, [HANDLE, WHOLE, WHOLE, LONG, REAL]), "twin_power": (None, [HANDLE, WHOLE, WHOLE]),
     "frame_bench_new": (HANDLE, [WHOLE, HANDLE, WHOLE, REAL]), "frame_bench_delete": (None, [HANDLE]),
     "frame_bench_idle": (None, [HANDLE, LONG]), "frame_bench_now": (LONG, [HANDLE]),
     "frame_bench_exchange": (WHOLE, [HANDLE, HANDLE, WHOLE, WHOLE, WHOLE, WHOLE, HANDLE, WHOLE]),
@@ -50,9 +59,10 @@ class Axis:
 
 @dataclass(frozen=True)
 class Node:
-    """A node by its address on the line, with a machine at each of its axes."""
+    """A node by its address on the line, with a machine at each of its axes, and what stands around it besides."""
     address: int
     axes: list = field(default_factory=lambda: [Axis()])
+    surroundings: Surroundings | None = None
 
 
 @dataclass(frozen=True)
@@ -70,7 +80,7 @@ class LineState:
 
 def library(clk_hz, axes, node=None):
     found = ctypes.CDLL(str(build.twin_library(clk_hz, axes, node)))
-    declare(found, {**FUNCTIONS, **MACHINE_FUNCTIONS})
+    declare(found, {**FUNCTIONS, **MACHINE_FUNCTIONS, **SURROUNDINGS_FUNCTIONS, **PEER_FUNCTIONS})
     return found
 
 
@@ -89,16 +99,19 @@ class Twin:
     """`nodes` are Nodes, or addresses of nodes with `axes` stages each. All nodes are of one build: one with fewer axes than
     another has unconnected ones behind them. `plant` overrides parameters of all machines, `plant_of` {axis: {…}} those of one;
     `firmware` is a list of words or None for the one in sw/firmware; `host_baud_error` 0.02 makes the host 2 % fast;
-    `node_parameters` {"W": 12} are parameters of rtl/node.sv, {"DRIVES": 15} builds all that an axis can drive."""
+    `node_parameters` {"W": 12} are parameters of rtl/node.sv, {"DRIVES": 15} builds all that an axis can drive. Nodes have all
+    links (LINKS = 63) if one of them has surroundings or peers; `peers` are two places of nodes, joined by a serial line."""
 
     def __init__(self, nodes=(1, 2), seed=1, clk_hz=CLK_HZ, baud=BAUD, host_baud_error=0.0, axes=1, plant=None, plant_of=None,
-                 firmware=None, node_parameters=NODE):
+                 firmware=None, node_parameters=NODE, peers=None, peer_baud=PEER_BAUD):
         self.handle = None
         nodes = [node if isinstance(node, Node) else Node(node, [Axis()] * axes) for node in nodes]
         self.addresses, self.node_axes = tuple(node.address for node in nodes), max(len(node.axes) for node in nodes)
         self.axes = self.node_axes * len(nodes)
         if any(n not in range(self.axes) for n in plant_of or {}):
             raise IndexError(f"plant_of names an axis that is not there: there are {self.axes}")
+        if peers or any(node.surroundings for node in nodes):
+            node_parameters = {"LINKS": ALL_LINKS, **node_parameters}
         fitted = [axis for node in nodes for axis in [*node.axes, *[Axis("unconnected")] * (self.node_axes - len(node.axes))]]
         self.library, self.clk_hz, self.baud = library(clk_hz, self.node_axes, node_parameters), clk_hz, baud
         packed = [pack(axis.machine, {**(plant or {}), **axis.parameters, **(plant_of or {}).get(n, {})}, self.library)
@@ -112,6 +125,11 @@ class Twin:
         now = partial(self.library.twin_now, self.handle)
         self.machines = [MachineHandle(self.library, self.library.twin_machine(self.handle, n), axis.machine, clk_hz, now)
                          for n, axis in enumerate(fitted)]
+        self.around = [self._surround(n, node.surroundings or Surroundings(), seed, now) for n, node in enumerate(nodes)
+                       if node_parameters.get("LINKS")]
+        pairs = [(self.check_node(peers[0]), self.check_node(peers[1])), (peers[1], peers[0])] if peers else []
+        self.peer_lines = {pair: PeerLineHandle(self.library, self.library.twin_join_peers(self.handle, *pair, seed, peer_baud), now)
+                           for pair in pairs}
         if host_baud_error:
             self.set_host_baud(baud * (1 + host_baud_error))
 
@@ -128,6 +146,14 @@ class Twin:
         if self.handle:
             self.library.twin_delete(self.handle)
         self.handle = None
+
+    def _surround(self, node, around, seed, now):
+        if around.table is not None and around.table not in range(self.axes):
+            raise IndexError(f"there is no axis {around.table} to be the table: there are {self.axes}")
+        packed = pack_surroundings(around.parameters, self.library)
+        handle = self.library.twin_surround(self.handle, node, ctypes.addressof(packed), around.fitted, seed,
+                                            -1 if around.table is None else around.table)
+        return SurroundingsHandle(self.library, handle, self.clk_hz, now)
 
     # time
 
@@ -224,6 +250,30 @@ class Twin:
         """Change parameters of a running machine."""
         self.machine(axis).set(**plant)
 
+    # links
+
+    def surroundings(self, node=0):
+        """What stands around a node besides its axes; see surroundings.SurroundingsHandle."""
+        if not self.around:
+            raise LookupError("no node has surroundings: give a Node some, or build with LINKS")
+        return self.around[self.check_node(node)]
+
+    def peer_line(self, sender, receiver):
+        """One direction of the serial line between two nodes; see surroundings.PeerLineHandle."""
+        if (sender, receiver) not in self.peer_lines:
+            raise LookupError(f"no serial line leads from node {sender} to node {receiver}")
+        return self.peer_lines[sender, receiver]
+
+    # power
+
+    def power_cut(self, node=0):
+        """A node loses its power, and with it its panel, its drives' enable and its memory; the machines keep their state, the
+        EEPROM what was written to its end."""
+        self.library.twin_power(self.handle, self.check_node(node), False)
+
+    def power_on(self, node=0):
+        self.library.twin_power(self.handle, self.check_node(node), True)
+
     # faults: estop of a node, line_cut of a node or of "host"; all others are those of the machine of an axis
 
     def inject(self, fault, where=0, level=False):
@@ -267,7 +317,7 @@ class Twin:
 class TwinTransport:
     """The transport that the host package asks for, over a twin; time passes only as far as needed."""
 
-    time_stands = True
+    time_stands = handshake = True
 
     def __init__(self, twin):
         self.twin, self.character_s = twin, CELLS / twin.baud
@@ -290,6 +340,10 @@ class TwinTransport:
 
     def reaches(self, address):
         return True
+
+    def set_baud(self, baud):
+        self.twin.set_host_baud(baud)
+        self.character_s = CELLS / baud
 
     def close(self):
         self.twin.close()
@@ -345,7 +399,7 @@ class FrameBench:
 def realtime_factor(simulated_s=0.1, tries=5, nodes=(1, 2), **arguments):
     """Simulated seconds per second of one processor, nodes and machines running; the best of the tries."""
     with Twin(nodes=nodes, **arguments) as twin:
-        twin.run(0.06)                                        # the firmware starts
+        twin.run(0.1)                                         # the firmware starts
         took = []
         for _ in range(tries):
             start = time.process_time()

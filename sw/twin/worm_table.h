@@ -15,6 +15,7 @@ public:
 
     const char* faults() const override { return "drive_fault motor_jam sensor_cut sensor_stuck"; }
     void place(double where) override;
+    double position(uint64_t now) const final { return drivetrain_.position + drivetrain_.velocity * since(now); }
     void push(double newton_metre) override { drivetrain_.external_force = newton_metre; }
     // nut: where the worm would put the table without backlash, its error included; lost: microsteps behind the field, in whole slips
     const char* state_names() const override {
@@ -33,7 +34,6 @@ protected:
     bool own_fault(const char* name, bool on) override;
 
 private:
-    double position(uint64_t now) const { return drivetrain_.position + drivetrain_.velocity * since(now); }
     double worm_error(double angle) const;                    // of the table, at this angle of the worm
 
     WormTableParameters p_;

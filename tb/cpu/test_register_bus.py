@@ -10,6 +10,7 @@ from cocotb.triggers import FallingEdge
 from bench import run
 from register_bus import RegisterBus
 
+ALONE = {"node": 0x000, "line": 0x100, "links": 0x200}                                 # blocks of which there is one
 OF_AXES = {"axis": 0x400, "grating": 0xC00, "actuator": 0x1400}         # blocks that each axis has, where the first one lies
 
 
@@ -18,16 +19,17 @@ async def access(dut, model, select, address):
     word = lambda: random.getrandbits(32)
     dut.select.value, dut.address.value = select, address
     await FallingEdge(dut.clk)
-    got = tuple(int(getattr(dut, f"{block}_select").value) for block in ("node", "line", *OF_AXES))
+    got = tuple(int(getattr(dut, f"{block}_select").value) for block in (*ALONE, *OF_AXES))
     assert got == model.selects(select, address), f"address {address:#x}: selects {got}"
     model.step(select, address)
-    node, line = word(), word()
+    alone = [word() for _ in ALONE]
     several = [[word() for _ in range(model.axes)] for _ in OF_AXES]
-    dut.node_rdata.value, dut.line_rdata.value = node, line
+    for block, answer in zip(ALONE, alone, strict=True):
+        getattr(dut, f"{block}_rdata").value = answer
     for block, words in zip(OF_AXES, several, strict=True):
         getattr(dut, f"{block}_rdata").value = sum(x << 32 * n for n, x in enumerate(words))
     dut.select.value = 0
-    return node, line, *several
+    return *alone, *several
 
 
 async def check(dut, model, select, address):
@@ -41,7 +43,7 @@ async def check(dut, model, select, address):
 
 async def begin(dut):
     Clock(dut.clk, 10, "ns").start()
-    for name in ("select", "address", *(f"{block}_rdata" for block in ("node", "line", *OF_AXES))):
+    for name in ("select", "address", *(f"{block}_rdata" for block in (*ALONE, *OF_AXES))):
         getattr(dut, name).value = 0
     await FallingEdge(dut.clk)
     await FallingEdge(dut.clk)
@@ -51,17 +53,18 @@ async def begin(dut):
 @cocotb.test()
 async def each_block_answers_at_both_ends_of_its_range(dut):
     model = await begin(dut)
-    bases = [0x000, 0x100, *(first + 0x100 * n for first in OF_AXES.values() for n in range(model.axes))]
+    bases = [*ALONE.values(), *(first + 0x100 * n for first in OF_AXES.values() for n in range(model.axes))]
     for block, base in enumerate(bases):
         for address in (base, base + 0xFC):
-            value, (of_node, of_line, *several) = await check(dut, model, 1, address)
-            assert value == [of_node, of_line, *(word for words in several for word in words)][block]
+            value, answers = await check(dut, model, 1, address)
+            alone, several = answers[:len(ALONE)], answers[len(ALONE):]
+            assert value == [*alone, *(word for words in several for word in words)][block]
 
 
 @cocotb.test()
 async def nobody_answers_elsewhere(dut):
     model = await begin(dut)
-    for address in (0x200, 0x3FC, *(first + 0x100 * model.axes for first in OF_AXES.values()), 0xFFFC):
+    for address in (0x300, 0x3FC, *(first + 0x100 * model.axes for first in OF_AXES.values()), 0xFFFC):
         assert (await check(dut, model, 1, address))[0] == 0
     assert (await check(dut, model, 0, 0))[0] == 0
 

@@ -135,7 +135,7 @@ def compiled():
     here, command, libraries = Path(__file__).parent, *firmware.compiler()
     BUILD.mkdir(parents=True, exist_ok=True)
     elf, words = BUILD / "program.elf", BUILD / "program.hex"
-    subprocess.run([*command, *firmware.FLAGS, f"-DMEMORY_BYTES={BYTES}", f"-Wl,-T,{here / 'program.ld'}", "-o", str(elf),
+    subprocess.run([*command, *firmware.FLAGS, firmware.FAST, f"-DMEMORY_BYTES={BYTES}", f"-Wl,-T,{here / 'program.ld'}", "-o", str(elf),
                     str(here / "program.c"), *libraries], check=True, timeout=300)
     content, _ = firmware.image(firmware.load_segments(elf.read_bytes())[0], BYTES)
     words.write_text("".join(f"{word:08x}\n" for (word,) in struct.iter_unpack("<I", content)))

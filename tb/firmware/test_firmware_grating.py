@@ -170,7 +170,7 @@ def test_a_poll_takes_no_more_words_than_fit_its_time():
     grating = machine.gratings[0]
     before = grating.taken
     machine.poll()
-    assert grating.taken - before == 16
+    assert grating.taken - before == 32
     plain = machine.read
 
     def read(offset):           # a word takes 0.4 ms

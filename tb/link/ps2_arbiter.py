@@ -38,18 +38,23 @@ class Ps2Arbiter:
         may = bool(i.inject and not self.injecting and not self.left and not is_open and self.quiet >= i.idle_ms and not self.again)
         return resend, active, is_open, may
 
+    def arrived(self, i):
+        """The byte of the keyboard that stands since this clk, if it is sound."""
+        return i.keyboard[0] if i.keyboard and not self.stood and not i.keyboard[1] else None
+
     def wires(self, i):
-        """(keyboard_hold, command, host_ready, send, keyboard_ready, inject_ready, injecting); a byte is None without its valid."""
+        """(keyboard_hold, command, host_ready, send, keyboard_ready, inject_ready, injecting, typed); a byte is None without its valid."""
         resend, _, is_open, may = self.conditions(i)
         send = ((self.injected, 0) if self.again else i.keyboard if i.keyboard else
                 (i.inject[0], 0) if self.injecting and i.inject and not is_open else None)
         return (int(not self.awaited if self.injecting else may), i.host if i.host and not resend else None, int(resend or i.command_ready),
-                send, int(i.send_ready and not self.again), int(i.send_ready and not self.again and not i.keyboard), self.injecting)
+                send, int(i.send_ready and not self.again), int(i.send_ready and not self.again and not i.keyboard), self.injecting,
+                int(self.arrived(i) is not None and not self.awaited))
 
     def step(self, i, rst=0):
         resend, active, _, may = self.conditions(i)
-        _, command, _, _, _, injected, _ = self.wires(i)
-        arrived = i.keyboard[0] if i.keyboard and not self.stood and not i.keyboard[1] else None
+        _, command, _, _, _, injected, *_ = self.wires(i)
+        arrived = self.arrived(i)
         given_up = self.quiet >= LONGEST
         end = self.part == self.ms - 1
         self.stood = int(bool(i.keyboard))

@@ -25,10 +25,14 @@ class Ps2Pass:
         command = self.arbiter.wires(seen)[1]
         return seen._replace(keyboard_held=int(self.host.rested() and command is None))
 
+    def typed(self):
+        """Whether a byte of the keyboard that answers no command came with the last clk."""
+        return self.arbiter.wires(self.inputs(0, None))[7]
+
     def step(self, lines, idle_ms, inject, rst=0):
         """lines: keyboard clock and data, host clock and data."""
         seen = self.inputs(idle_ms, inject)
-        hold, command, host_ready, send, keyboard_ready, injected, _ = self.arbiter.wires(seen)
+        hold, command, host_ready, send, keyboard_ready, injected, *_ = self.arbiter.wires(seen)
         self.host.step(*self.lines[:2], hold, keyboard_ready, *(command or (None, 0)), rst)
         self.device.step(*self.lines[2:], *(send or (None, 0)), host_ready, rst)
         self.arbiter.step(seen, rst)

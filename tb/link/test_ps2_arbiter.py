@@ -40,7 +40,7 @@ class Side:
             await Timer(1, "ns")
             got = (int(d.keyboard_hold.value), (int(d.command.value), int(d.command_damaged.value)) if d.command_valid.value else None,
                    int(d.host_ready.value), (int(d.send.value), int(d.send_damaged.value)) if d.send_valid.value else None,
-                   int(d.keyboard_ready.value), int(d.inject_ready.value), int(d.injecting.value))
+                   int(d.keyboard_ready.value), int(d.inject_ready.value), int(d.injecting.value), int(d.typed.value))
             want = self.model.wires(i)
             assert got == want, f"{i}: {got} where the model has {want}"
             self.model.step(i, rst)
@@ -151,6 +151,21 @@ async def a_resend_after_an_injected_byte_is_answered_here(dut):
 
 
 @cocotb.test()
+async def what_is_typed_is_told_from_answers(dut):
+    side = await Side(dut).begin()
+    assert (await side.clk(keyboard=(0x1C, 0)))[7] == 1
+    assert (await side.clk(keyboard=(0x1C, 0), send_ready=1))[7] == 0      # once
+    await side.clk()
+    assert (await side.clk(keyboard=(0x1C, 1), send_ready=1))[7] == 0      # damaged
+    await side.order(0xFF)
+    for answer in (0xFA, 0xAA):
+        await side.clk()
+        assert (await side.clk(keyboard=(answer, 0), send_ready=1))[7] == 0
+    await side.clk()
+    assert (await side.clk(keyboard=(0xF0, 0), send_ready=1))[7] == 1
+
+
+@cocotb.test()
 async def reset_ends_an_injection(dut):
     side = await Side(dut).begin()
     await side.wait_for_injection(30)
@@ -162,6 +177,8 @@ async def reset_ends_an_injection(dut):
 @cocotb.test()
 async def any_bytes_match_the_model(dut):
     side = await Side(dut).begin()
+    for order in (0xED, 0x02):                                             # reset does not forget the last two
+        await side.order(order)
     some = [0xE0, 0xE1, 0xF0, 0xFA, 0xFE, 0xFC, 0xFF, 0xAA, 0xF2, 0x00, 0x1C, 0x83]
     for _ in range(4000):
         i = dict(idle_ms=random.choice([0, 20, 25]), inject=random.choice([None, (0x14, 0), (0x14, 1)]),

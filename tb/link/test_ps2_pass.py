@@ -27,6 +27,7 @@ class Wires:
         self.dut, self.model = dut, Ps2Pass(CLK_HZ)
         self.keyboard, self.host = keyboard or Keyboard(CLK_HZ), host or Host(CLK_HZ)
         self.idle_ms, self.inject, self.pulls = 20, [], (0, 0, 0, 0)
+        self.typed = 0
         self.samples, self.edges, self.lines = bytearray(), {"keyboard": [], "host": []}, (1, 1, 1, 1)
 
     async def begin(self):
@@ -59,6 +60,9 @@ class Wires:
             await FallingEdge(d.clk)
             pulls = tuple(int(p.value) for p in (d.keyboard_clock_low, d.keyboard_data_low, d.host_clock_low, d.host_data_low))
             assert pulls == want, f"pulls {pulls} where the model has {want}"
+            typed = int(d.typed.value)
+            assert typed == self.model.typed()
+            self.typed += typed
             if taken:
                 self.inject.pop(0)
             if pulls[2] > self.pulls[2]:
@@ -86,7 +90,7 @@ async def what_is_typed_arrives_untouched_within_200_us(dut):
         await wires.run(6 * MS)
         delay = (wires.edges["host"][10] - wires.edges["keyboard"][10]) / wires.host.us - 10 * 80
         assert 0 < delay <= 200, delay
-    assert wires.host.heard == keys and wires.host.damaged == 0
+    assert wires.host.heard == keys and wires.host.damaged == 0 and wires.typed == len(keys)
 
 
 @cocotb.test()
@@ -98,7 +102,7 @@ async def commands_reach_the_keyboard_and_their_answers_the_host(dut):
         wires.host.orders = [order]
         await wires.run(until=lambda answered=answered: len(wires.host.heard) > answered)
         await wires.run(12 * MS)
-    assert wires.keyboard.commands == orders and wires.host.unanswered == 0
+    assert wires.keyboard.commands == orders and wires.host.unanswered == 0 and wires.typed == 0
     assert wires.host.heard == [0xFA] * 4 + [0xEE] + [0xFA, 0xAB, 0x83] + [0xFA, 0xAA]
 
 

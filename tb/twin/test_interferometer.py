@@ -5,6 +5,7 @@ import math
 import numpy
 import pytest
 
+from experiments import figures_learner
 from twin.stage import Stage
 
 PERIOD = 0.8e-6
@@ -35,6 +36,25 @@ def test_offset_gain_and_phase_error_are_as_stated():
     spectrum = numpy.fft.fft(points, axis=0)[1] / 180
     assert abs(spectrum[1] / spectrum[0]) == pytest.approx(1.03)
     assert math.degrees(numpy.angle(spectrum[1] / spectrum[0])) == pytest.approx(90 + 2)
+
+
+def vector(stage, count=64):
+    """cos + i sin, of an amplitude of 1, at so many points of a period."""
+    points = numpy.array([stage.analogue(n / count * PERIOD) for n in range(count)]) / 0.85
+    return points[:, 1] + 1j * points[:, 0]
+
+
+@pytest.mark.parametrize("harmonic", [*range(-8, -1), *range(2, 9)])
+def test_a_harmonic_of_the_vector_is_that_one_and_no_other(harmonic):
+    stage = Stage(**IDEAL, **{f"harmonic_{'plus' if harmonic > 0 else 'minus'}_{abs(harmonic)}": 0.01})
+    wanted = numpy.zeros(64)
+    wanted[1], wanted[harmonic] = 1, 0.01
+    assert numpy.abs(numpy.fft.fft(vector(stage)) / 64 - wanted).max() < 1e-9
+
+
+def test_harmonics_come_before_gain_phase_and_offset_as_the_figures_take_them():
+    cos, sin = figures_learner.curve_of_twin()(2 * numpy.pi * numpy.arange(64) / 64)
+    assert numpy.abs(vector(Stage(**figures_learner.HARMONICS_OF_TWIN)) - (cos + 1j * sin)).max() < 1e-9
 
 
 def test_codes_by_hand():

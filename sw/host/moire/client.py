@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from . import units
-from .errors import LineError, MoireError, MotionFailed, NobodyAnswers, NotLearned, OutOfRange, Refused, UnknownName, WrongBuild
+from .errors import LineError, MoireError, MotionFailed, NobodyAnswers, NotLearned, OutOfRange, PortError, Refused, UnknownName, WrongBuild
 from .line_tables import (
     CAUSES,
     ENCODER_EVENTS,
@@ -48,7 +48,7 @@ CAPTURE_SOURCES = ("index", "tick", "software", "probe_0_rising", "probe_1_risin
 FILTERS = 2                  # of the servo
 FILTER = ("b0", "b1", "b2", "a1", "a2")
 
-# words for the values of a parameter that is a choice, from 0 on
+# words for the values of a parameter or setting that is a choice, from 0 on
 CHOICES = {
     "home_end": ("low", "high"),
     "learning": ("frozen", "learns"),
@@ -58,6 +58,9 @@ CHOICES = {
     "step_output": ("step_and_direction", "quadrature", "pulses"),
     "step_invert": ("none", "step", "direction", "both"),
     "filters": ("none", "first", "second", "both"),
+    "index_way": ("direct", "shorter", "up"),
+    "peer_mode": ("off", "printed", "frames"),
+    "peer_role": ("main", "sub"),
 }
 HOME_METHODS = {"s0": -1, "s3": -2}      # beside the numbers of CiA 402
 
@@ -72,6 +75,7 @@ KINDS = {
     "period/s3": (units.JERK, Fraction(1, 10**6), True),
     "s": (units.TIME, Fraction(1), False),
     "Hz": (units.FREQUENCY, Fraction(1), False),
+    "arcsec": (units.ANGLE, Fraction(1), False),
     "": (units.NUMBER, Fraction(1), False),
 }
 
@@ -142,6 +146,14 @@ class Status:
     @property
     def fault_words(self) -> str:
         return words(FAULTS, self.faults)
+
+    @property
+    def first_fault_words(self) -> str:
+        return words(FAULTS, self.first_fault)
+
+    @property
+    def encoder_event_words(self) -> str:
+        return words(ENCODER_EVENTS, self.encoder_events)
 
     @property
     def ended_words(self) -> str:
@@ -278,32 +290,35 @@ class Line:
         self.sequences[address] = sequence
         character_s = self.transport.character_s
         timing = Timing(character_s, answer=answer_s or self.answer_s, quiet=max(0.01, 3 * character_s))
-        exchange = Exchange(address, request_body(operation, sequence, **fields), tries or self.tries, timing)
+        body = request_body(operation, sequence, **fields)
+        return self.carry(Exchange(address, body, tries or self.tries, timing, self.transport.handshake)).result()
+
+    def carry(self, exchange: Exchange) -> Exchange:
+        """Until it is finished, well or not."""
         if not self.in_order:
-            self.let_fall_silent(timing)
+            self.let_fall_silent(exchange.timing)
         self.in_order = False
         self.statistics.exchanges += 1
         try:
-            self.carry(exchange)
+            while not exchange.finished:
+                self.step(exchange)
         finally:
             self.statistics.repeats += exchange.attempts - 1
             for event in exchange.events:
                 name = event.replace(" ", "_")
                 setattr(self.statistics, name, getattr(self.statistics, name) + 1)
-        reply = exchange.result()
-        self.in_order = True
-        return reply
+        self.in_order = exchange.reply is not None
+        return exchange
 
-    def carry(self, exchange: Exchange):
-        while not exchange.finished:
-            sending = exchange.words_to_send()
-            if sending:
-                self.transport.send(sending)
-            wanted = exchange.wanted
-            received = self.transport.receive(wanted, exchange.timeout_s)
-            exchange.feed(received)
-            if len(received) < wanted:
-                exchange.silence()
+    def step(self, exchange: Exchange):
+        sending = exchange.words_to_send()
+        if sending:
+            self.transport.send(sending)
+        wanted = exchange.wanted
+        received = self.transport.receive(wanted, exchange.timeout_s)
+        exchange.feed(received)
+        if len(received) < wanted:
+            exchange.silence()
 
     def let_fall_silent(self, timing: Timing):
         for _ in range(Exchange.LONGEST_NOISE):
@@ -619,9 +634,9 @@ class Axis:
                 self.transport.wait(self.node.line.poll_s)
         except Refused:
             pass        # the drive is off
-        except LineError as error:
-            sentence = f"axis {self.number} of node {self.node.address} could not be told to stop, its watchdog has to: {error}"
-            raise LineError(self.node.address, sentence) from None
+        except (LineError, PortError) as error:
+            error.args = (f"axis {self.number} of node {self.node.address} could not be told to stop, its watchdog has to: {error}",)
+            raise error from None
 
     def stop_if_on(self):
         """One of several that are to stop: what keeps it from stopping must not keep the others."""
@@ -722,11 +737,12 @@ class Axis:
                        accepted=told["accepted"], refused=told["refused"],
                        scatter_nm=float(told["scatter"] * self.period_nm / SCATTER))
 
-    def learn(self, progress=None, distance="0.4mm", timeout="120s") -> Learner:
+    def learn(self, progress=None, distance="1mm", timeout="120s") -> Learner:
         """Learns the correction afresh: to and fro over a distance at several speeds until it is settled, then freezes it.
 
-        The axis must be enabled and homed. It goes from where it is, to the side where there is room, and comes back. `progress` is
-        called with a Learner after each way. NotLearned says why it was not settled in time. The parameter `velocity` is set as it was.
+        The axis must be enabled and homed. It goes from where it is, to the side where there is room, and comes back; the farther,
+        the faster, and fringes must come faster than the table can follow or ring. `progress` is called with a Learner after each
+        way. NotLearned says why it was not settled in time. The parameter `velocity` is set as it was.
         """
         stretch, patience = units.parse_length(distance), units.parse_time(timeout)
         if stretch <= 0 or patience <= 0:

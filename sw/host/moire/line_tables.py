@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x7EBA7CE5
+PROTOCOL_CRC = 0xB81966DC
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -55,6 +55,37 @@ CAUSES = {
     23: ("not_built", "this node was built without that"),
     24: ("too_long", "the motion would take days, or go too far for a change of target"),
     25: ("no_stairs", "the stairs of this profile are not in order, or too many"),
+    30: ("sensor_dead", "no good frame came from the angle sensor: check its power and its cable"),
+    31: ("sensor_stuck", "the angle sensor stands still: it sent one and the same angle while the table was turned"),
+    32: ("stiction", "the table did not follow its steps: it sticks, or the motor lost them"),
+    33: ("wrong_sign", "the table turned against its steps: turn the sign of steps_per_period"),
+    34: ("not_converged", "the tolerance was not reached within the allowed tries"),
+    35: ("sensor_disagrees", "angle sensor and steps disagree: they tell different ways of the table"),
+    36: ("peer_silent", "the other node does not answer: check the cable between the two and its peer_mode"),
+    37: ("no_station", "the other node has no such station: write the program to both"),
+    38: ("peer_off", "the peer port is not in use: see the settings peer_mode and peer_role"),
+    39: ("peer_restarted", "the other node lost its power while it indexed"),
+    40: ("store_missing", "the EEPROM does not answer"),
+    41: ("store_failed", "the EEPROM does not keep what is written"),
+    42: ("store_busy", "the EEPROM is being read or written"),
+    43: ("no_program", "no program of stations is stored"),
+    44: ("program_torn", "the stored program is damaged"),
+    45: ("program_incomplete", "give all stations of a program in order"),
+    46: ("no_stations", "a program needs at least one station"),
+    47: ("too_many_stations", "the EEPROM is full: it holds 360 stations"),
+    48: ("angle_out_of_turn", "angles must be below 360 degrees"),
+    49: ("angles_not_ascending", "each angle must be larger than the last"),
+    50: ("job_active", "a job is under way: stop it first"),
+    51: ("not_now", "the job does not wait for that now"),
+    52: ("machine_busy", "the machine cuts, or its keys still wait"),
+    53: ("machine_alarm", "the machine reports an alarm"),
+    54: ("keys_not_taken", "the machine does not take our keys"),
+    55: ("cut_not_started", "the cut did not start in time"),
+    56: ("cut_not_ended", "the cut did not end in time"),
+    57: ("power_lost", "the power was lost during the job"),
+    58: ("paused_by_person", "paused by a person"),
+    59: ("key_without_function", "this key has no function"),
+    60: ("table_unknown", "nobody knows where the table stands"),
 }
 
 # bit: (name, words)
@@ -90,6 +121,7 @@ STATES = {
     5: ("stopping", "stopping"),
     6: ("faulted", "faulted"),
     7: ("prepared", "waiting for the common start"),
+    8: ("excited", "driven in open loop for a record"),
 }
 
 # bit: (name, words)
@@ -142,6 +174,82 @@ LEARNER_ACTIONS = {
     1: ("learn", "learn from here on"),
     2: ("freeze", "learn no more; what was learned stays in force"),
     3: ("forget", "correct nothing, begin afresh"),
+}
+
+# code: (name, words)
+SCOPE_TRIGGERS = {
+    0: ("now", "at once"),
+    1: ("motion", "the axis moves or homes"),
+    2: ("settling", "a motion has been played"),
+    3: ("error", "the error reaches the level"),
+    4: ("fault", "a fault latches"),
+}
+
+# code: (name, words)
+SCOPE_STATES = {
+    0: ("empty", "nothing was recorded"),
+    1: ("waiting", "waiting for the trigger"),
+    2: ("recording", "recording"),
+    3: ("full", "complete"),
+}
+
+# code: (name, words)
+INDEX_PHASES = {
+    0: ("idle", "at rest"),
+    1: ("reading", "waiting for the table to settle, and reading its angle"),
+    2: ("going_below", "going down, below the target"),
+    3: ("coming_up", "coming up on the long way"),
+    4: ("closing_in", "closing in on the target"),
+}
+
+# code: (name, words)
+PEER_PHASES = {
+    0: ("idle", "nothing was asked for"),
+    1: ("indexing", "the sub-node indexes"),
+    2: ("indexed", "the sub-node has indexed"),
+    3: ("failed", "the sub-node failed"),
+    4: ("silent", "the sub-node does not answer"),
+}
+
+# code: (name, words)
+JOB_STATES = {
+    0: ("loading", "loading"),
+    1: ("idle", "ready"),
+    2: ("finished", "all cut"),
+    3: ("starting", "starts"),
+    4: ("indexing", "table turns"),
+    5: ("arrived", "at station"),
+    6: ("beginning", "begins cut"),
+    7: ("cutting", "cutting"),
+    8: ("following", "cutting"),
+    9: ("ended", "cut done"),
+    10: ("leaving", "leaves"),
+    11: ("finishing", "finishing"),
+    12: ("paused", "paused"),
+    13: ("unsure", "is it cut?"),
+    14: ("stopping", "stopping"),
+}
+
+# code: (name, words)
+JOB_ACTIONS = {
+    0: ("start", "cut all stations from the first one on"),
+    1: ("pause", "stand before the next cut or the next station"),
+    2: ("resume", "go on; if it is unsure whether a station was cut, wait for the end of the cut under way"),
+    3: ("stop", "end the job; a cut under way is left to the machine"),
+    4: ("again", "cut the station again"),
+    5: ("next", "the station is cut: go to the next one"),
+}
+
+# bit: (name, words)
+JOB_FLAGS = {
+    0: ("store", "the EEPROM answers"),
+    1: ("keypad", "the key-pad answers"),
+    2: ("display", "the character display answers"),
+    3: ("cutting", "the machine cuts"),
+    4: ("alarm", "the machine reports an alarm"),
+    5: ("keys_wait", "keys for the machine wait: a person types, or it does not take them"),
+    6: ("pausing", "a pause comes next"),
+    7: ("copy_torn", "one copy of the program is damaged, the other one is in force"),
 }
 
 OPERATIONS = {operation.name: operation for operation in (
@@ -215,6 +323,73 @@ OPERATIONS = {operation.name: operation for operation in (
               (("duration_ticks", "u32"),)),
     Operation("start", 21, "begin the prepared motions of these axes (bit n: axis n), all in one tick; none if one of them has none",
               (("axes", "u8"),),
+              ()),
+    Operation("position", 30, "where an axis is: the shortest answer that tells it",
+              (("axis", "u8"),),
+              (("position", "i64"),)),
+    Operation("arm_scope", 31, "record every so many ticks, from before a trigger on; an amplitude drives in open loop, to level at most",
+              (("axis", "u8"), ("trigger", "u8"), ("before", "u8"), ("every", "u16"),
+               ("level", "u32"), ("amplitude", "i16"),),
+              ()),
+    Operation("scope", 32, "how far the record is; count is 0 until it is complete",
+              (),
+              (("state", "u8"), ("count", "u8"), ("before", "u8"),)),
+    Operation("read_scope", 33, "five samples from this one on, 0 behind the end; time from sample to sample in 64 clk, position: low word",
+              (("first", "u8"),),
+              (("position_0", "i32"), ("error_0", "i32"), ("command_0", "i16"), ("time_0", "u16"),
+               ("position_1", "i32"), ("error_1", "i32"), ("command_1", "i16"), ("time_1", "u16"),
+               ("position_2", "i32"), ("error_2", "i32"), ("command_2", "i16"), ("time_2", "u16"),
+               ("position_3", "i32"), ("error_3", "i32"), ("command_3", "i16"), ("time_3", "u16"),
+               ("position_4", "i32"), ("error_4", "i32"), ("command_4", "i16"), ("time_4", "u16"),)),
+    Operation("get_setting", 40, "read a setting of a station",
+              (("setting", "u8"),),
+              (("value", "i64"),)),
+    Operation("set_setting", 41, "write a setting of a station",
+              (("setting", "u8"), ("value", "i64"),),
+              ()),
+    Operation("index_to", 42, "turn the table of axis 0 to an absolute angle, 0.01 arcsec; refused while an axis moves",
+              (("angle", "u32"),),
+              ()),
+    Operation("index_state", 43, "what the table does, how its last index ended, the angle of its last reading; all in 0.01 arcsec",
+              (),
+              (("phase", "u8"), ("ended", "u8"), ("tries", "u8"), ("overshoots", "u8"),
+               ("target", "u32"), ("reading", "u32"), ("left", "i32"),)),
+    Operation("sensor", 44, "the last good frame of the angle sensor in 0.01 arcsec, its age in clk, and frames since power-up",
+              (),
+              (("angle", "u32"), ("age", "u32"), ("dead", "u8"), ("frames", "u32"),
+               ("wrong_crc", "u32"), ("broken", "u32"), ("missed", "u32"),)),
+    Operation("peer", 45, "what the peer port does: the last index asked for; orders or frames heard, bytes or frames not understood",
+              (),
+              (("phase", "u8"), ("ended", "u8"), ("station", "u16"), ("stations", "u16"),
+               ("heard", "u32"), ("garbage", "u32"), ("repeated", "u32"),)),
+    Operation("peer_station", 46, "one of the stations of a sub-node in mode printed, from 0 on; the next order then goes to station 0",
+              (("station", "u16"), ("stations", "u16"), ("angle", "u32"),),
+              ()),
+    Operation("peer_next", 47, "the station to which the next order goes in mode printed",
+              (("station", "u16"),),
+              ()),
+    Operation("job", 48, "what the job does, at which station (from 0 on), why it waits, and for which answers (bits of job_action)",
+              (),
+              (("state", "u8"), ("cause", "u8"), ("station", "u16"), ("stations", "u16"),
+               ("answers", "u8"), ("flags", "u8"),)),
+    Operation("job_do", 49, "start, pause, resume or stop the job, or answer its question",
+              (("action", "u8"),),
+              ()),
+    Operation("job_program", 50, "the stored program; writing 1 while it is written or read, then how that ended, or why there is none",
+              (),
+              (("writing", "u8"), ("ended", "u8"), ("generation", "u32"), ("stations", "u16"),
+               ("journal", "u32"),)),
+    Operation("job_angle", 51, "angle of a station of the stored program, in 0.01 arcsec",
+              (("station", "u16"),),
+              (("angle", "u32"),)),
+    Operation("job_begin", 52, "begin a new program; it comes into force when it is saved, and not while a job is under way",
+              (),
+              ()),
+    Operation("job_add", 53, "give the new program a station; in their order, from 0 on, with ascending angles",
+              (("station", "u16"), ("angle", "u32"),),
+              ()),
+    Operation("job_save", 54, "write the new program and the settings into the EEPROM; job_program tells when and how that ended",
+              (),
               ()),
 )}
 
@@ -477,4 +652,64 @@ PARAMETERS = {parameter.name: parameter for parameter in (
     Parameter("stairs_border_3", 86, "", Fraction(1, 65536),
               0, 65536, 32768,
               "stairs: where section 3 begins: 1/2 is 1:2:3, S4 prints 1/3"),
+)}
+
+SETTINGS = {parameter.name: parameter for parameter in (
+    Parameter("index_tolerance", 1, "arcsec", Fraction(1, 100),
+              1, 360000, 50,
+              "index: it has ended when no more than this is left by the sensor"),
+    Parameter("index_allowance", 2, "arcsec", Fraction(1, 100),
+              0, 3600000, 6000,
+              "index: the long way ends so far below the target; more than the error of the worm"),
+    Parameter("index_take_up", 3, "arcsec", Fraction(1, 100),
+              1, 3600000, 6000,
+              "index: shortest way up before a reading counts; more than the backlash"),
+    Parameter("index_share", 4, "", Fraction(1, 100),
+              5, 95, 50,
+              "index: each try goes this share of what is left"),
+    Parameter("index_tries", 5, "", Fraction(1, 1),
+              1, 255, 40,
+              "index: tries before it is given up"),
+    Parameter("index_overshoots", 6, "", Fraction(1, 1),
+              0, 255, 3,
+              "index: how often it may back off from above the target and come again"),
+    Parameter("index_settle", 7, "s", Fraction(1, 1000),
+              0, 10000, 100,
+              "index: rest before a reading; more than the latency of the sensor"),
+    Parameter("index_frames", 8, "", Fraction(1, 1),
+              1, 64, 4,
+              "index: frames whose mean is a reading"),
+    Parameter("index_disagreement", 9, "arcsec", Fraction(1, 100),
+              100, 16000000, 12000,
+              "index: largest difference of sensor and steps; more than worm error and backlash"),
+    Parameter("index_way", 10, "", Fraction(1, 1),
+              0, 2, 0,
+              "index: 0 not through angle 0, 1 the shorter way round, 2 always up"),
+    Parameter("periods_per_turn", 11, "", Fraction(1, 1),
+              1, 2147483647, 1800000,
+              "periods of axis 0 in a turn of the table; four steps are a period"),
+    Parameter("sensor_patience", 12, "s", Fraction(1, 1000),
+              10, 10000, 200,
+              "sensor: dead when no good frame came for this long"),
+    Parameter("sensor_zero", 13, "arcsec", Fraction(1, 100),
+              0, 129599999, 0,
+              "sensor: what it sends at angle 0"),
+    Parameter("readout_decimals", 14, "", Fraction(1, 1),
+              0, 6, 5,
+              "numeric display: decimals of the position in mm"),
+    Parameter("peer_mode", 15, "", Fraction(1, 1),
+              0, 2, 0,
+              "peer port: 0 not in use, 1 S4's bytes as printed, 2 frames with CRC-32"),
+    Parameter("peer_role", 16, "", Fraction(1, 1),
+              0, 1, 0,
+              "peer port: 0 this is the main node, 1 the sub-node that indexes"),
+    Parameter("peer_patience", 17, "s", Fraction(1, 1000),
+              100, 3600000, 300000,
+              "peer port: in mode printed, an index that takes longer has failed"),
+    Parameter("job_start_limit", 18, "s", Fraction(1, 1),
+              1, 3600, 30,
+              "job: longest time from the start keys to the beginning of the cut"),
+    Parameter("job_cut_limit", 19, "s", Fraction(1, 1),
+              1, 1000000, 14400,
+              "job: longest cut"),
 )}

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The correction on its way from the learner to the position: the firmware's learner on this computer learns the interferometer, the
+node is told the values over the line, and its positions are held against the true place of the table."""
+import random
+
+import numpy as np
+import pytest
+
+from experiments import figures_learner
+from experiments.s0_stage import START_S
+from moire.client import CORRECTION, Line
+from twin import Twin, TwinTransport, parameters
+
+PLACES = 16                          # of a period
+LOOKS = 8                            # at each: the noise of one is 0.7 nm
+LOADING_S = 0.6                      # until the node has computed the table and taken it over
+
+
+@pytest.fixture(scope="module")
+def machine_and_axis():
+    with Twin(nodes=(1,), plant=figures_learner.HARMONICS_OF_TWIN) as twin:
+        line = Line(TwinTransport(twin), random_source=random.Random(1))
+        line.transport.wait(START_S)
+        yield twin.machine(), line.axis(1)
+
+
+@pytest.fixture(scope="module")
+def learned():
+    machine, *_ = figures_learner.learn(1, 0, 0, curve=figures_learner.curve_of_twin(), amplitude=parameters.values()["signal_amplitude"])
+    assert machine.learner.settled
+    return {**machine.values, "cosine": list(machine.values["cosine"]), "sine": list(machine.values["sine"])}
+
+
+def left_nm(machine, axis, correction):
+    """Largest difference of the node's position from the true one over a period with this correction, the mean taken off. The table
+    stands at each place."""
+    axis.set_correction(correction)
+    axis.node.line.transport.wait(LOADING_S)
+    away = []
+    for n in range(PLACES):
+        machine.place(n * 0.8e-6 / PLACES)
+        axis.node.line.transport.wait(0.001)
+        away.append(np.mean([axis.status().position_nm - machine.state.position_nm for _ in range(LOOKS)]))
+    return np.abs(np.array(away) - np.mean(away)).max()
+
+
+def test_harmonics_that_were_learned_come_off_every_position(machine_and_axis, learned):
+    machine, axis = machine_and_axis
+    flat = {"cosine": [0] * 10, "sine": [0] * 10}
+    uncorrected = left_nm(machine, axis, {**dict.fromkeys(CORRECTION, 0), "gain": 65536, **flat})
+    ellipse = left_nm(machine, axis, {**learned, **flat})
+    harmonics = left_nm(machine, axis, learned)
+    assert uncorrected > 6 and ellipse > 3 and harmonics < 1, f"{uncorrected:.2f}, {ellipse:.2f}, {harmonics:.2f} nm"
