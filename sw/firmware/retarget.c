@@ -105,10 +105,10 @@ static uint64_t tolerance(const struct motion *m, const struct problem *p)
 // weighs less (Anderson and Bjorck, BIT 13 (1973) 253), and where that does not help the middle is taken.
 static void search(struct motion *m, const struct problem *p, int64_t low, int64_t high, int64_t under, int64_t over)
 {
-    for (int stays = 0; high - low > 1;) {                                   // how often in a row low stayed; negative: high
+    for (int kept = 0; high - low > 1;) {                                   // how often in a row low stayed; negative: high
         const uint64_t both = (uint64_t)under + (uint64_t)over;
         int64_t knee = low + (high - low) / 2;
-        if (stays > -3 && stays < 3 && under > 0 && over > 0)
+        if (kept > -3 && kept < 3 && under > 0 && over > 0)
             knee = under < over ? low + share(high - low, (uint64_t)under, both) : high - share(high - low, (uint64_t)over, both);
         if (p->meanwhile) p->meanwhile();
         if (knee <= low) knee = low + 1;
@@ -116,13 +116,13 @@ static void search(struct motion *m, const struct problem *p, int64_t low, int64
         const int64_t miss = whole(m, p, knee) - p->distance;
         if (size(miss) <= tolerance(m, p)) return;
         if (miss > 0) {
-            stays = stays > 0 ? stays + 1 : 1;
-            if (stays > 1) under = over > miss ? share(under, (uint64_t)(over - miss), (uint64_t)over) : under / 2;
+            kept = kept > 0 ? kept + 1 : 1;
+            if (kept > 1) under = over > miss ? share(under, (uint64_t)(over - miss), (uint64_t)over) : under / 2;
             high = knee;
             over = miss;
         } else {
-            stays = stays < 0 ? stays - 1 : -1;
-            if (stays < -1) over = under > -miss ? share(over, (uint64_t)(under + miss), (uint64_t)under) : over / 2;
+            kept = kept < 0 ? kept - 1 : -1;
+            if (kept < -1) over = under > -miss ? share(over, (uint64_t)(under + miss), (uint64_t)under) : over / 2;
             low = knee;
             under = -miss;
         }
