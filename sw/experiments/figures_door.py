@@ -21,6 +21,7 @@ from moire.protocol import parse_reply, request_body
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "sw" / "firmware"
 READ_S = 10
+START_S = 3                  # the firmware starts, and loads its tables
 FUZZ_S = 600
 SANITIZED = ["-std=gnu11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined", "-fno-sanitize-recover=all",
              "-DMOIRE_REGISTER_ACCESS"]
@@ -41,7 +42,7 @@ def rfc2217_reads_per_s(seconds=READ_S):
             raise NotMeasured(f"the twin is not served: {told.strip()}")
         try:
             with serial.serial_for_url(json.loads(told)["rfc2217"], timeout=1) as port:
-                read_positions(port, 0.5)                        # the firmware starts
+                read_positions(port, START_S)
                 return read_positions(port, seconds)
         finally:
             twin.terminate()

@@ -2,6 +2,7 @@
 // firmware_fuzz -- coverage-guided fuzzing of the whole firmware on this computer: words of the line, registers and time as they come.
 //
 //     firmware_fuzz SECONDS SEED      prints `runs edges corpus`; a sanitizer or the time limit ends it with the input on standard error
+//     firmware_fuzz INPUT             plays that input again
 //
 // An input is a script: what the line receives, what registers hold, how time goes on. The compiler calls trace_pc at every edge; an
 // input that reaches a new edge, or one a new order of magnitude of times, joins the corpus that the next inputs are made of.
@@ -22,6 +23,7 @@
 #define QUEUE 256u
 #define AXES 2u
 #define CLK 4000000u
+#define SEGMENTS 16u                    // that the queue of a profile player takes
 #define RUN_SECONDS 30                  // of one input: more is a hang
 
 void firmware_start(void);
@@ -52,15 +54,24 @@ void __sanitizer_cov_trace_pc(void)
 
 // ------------------------------------------------------------------ the hardware
 
+static bool is_axis_register(uint32_t offset, uint32_t which)
+{
+    return offset >= AXIS_BASE && offset < AXIS_BASE + AXES * AXIS_STRIDE && (offset - AXIS_BASE) % AXIS_STRIDE == which;
+}
+
+// Anything that a register can hold; what the hardware promises of one holds here too.
 uint32_t register_read(uint32_t offset)
 {
+    uint32_t held = map[offset / 4 % MAP_WORDS];
+    if (is_axis_register(offset, AXIS_STATE) && FIELD_GET(held, AXIS_STATE_QUEUE_FREE) > SEGMENTS)
+        held = (held & ~AXIS_STATE_QUEUE_FREE_MASK) | FIELD_PUT(AXIS_STATE_QUEUE_FREE, SEGMENTS);
     switch (offset) {
     case NODE_MAP_CRC: return MAP_CRC;
     case NODE_CLK_HZ: return CLK;
     case NODE_BUILD: return AXES | 1u << 4 | 64u << 8;
     case NODE_TIME_STAMP_LOW: return clk += 10;
     case LINE_BASE + LINE_RECEIVE: return taken < queued ? queue[taken++ % QUEUE] | LINE_RECEIVE_PRESENT_MASK : 0;
-    default: return map[offset / 4 % MAP_WORDS];
+    default: return held;
     }
 }
 
@@ -211,16 +222,29 @@ static bool new_ground(void)
     return found;
 }
 
+static void parse(const char *text)                             // bytes in hexadecimal, with spaces or without
+{
+    int taken_here;
+    for (unsigned byte; trial.length < LONGEST && sscanf(text, "%2x%n", &byte, &taken_here) == 1; text += taken_here)
+        trial.bytes[trial.length++] = (uint8_t)byte;
+}
+
 int main(int count, char **words)
 {
+    signal(SIGABRT, die);
+    signal(SIGALRM, die);
+    if (count == 2) {
+        parse(words[1]);
+        alarm(RUN_SECONDS);
+        play(&trial);
+        return 0;
+    }
     if (count != 3) return 2;
     double seconds = atof(words[1]);
     random_state = strtoull(words[2], NULL, 10) * 0x9E3779B97F4A7C15u + 1u;
     unsigned long runs = 0, edges = 0;
     struct timespec began, now;
     clock_gettime(CLOCK_MONOTONIC, &began);
-    signal(SIGABRT, die);
-    signal(SIGALRM, die);
     corpus_size = 1;                                            // the empty input
     do {
         trial = corpus[draw(corpus_size)];
