@@ -21,9 +21,12 @@ PAGE = ROOT / "docs" / "protocol.md"
 SIZES = {"u8": 1, "i8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "u64": 8, "i64": 8}
 REQUEST_HEAD = ["sequence u8", "operation u8"]
 REPLY_HEAD = ["sequence u8", "operation u8", "cause u8"]
-LISTS = ("cause", "fault", "encoder_event", "state", "flag", "learner_reason", "signal_fault", "learner_action",
-         "scope_trigger", "scope_state")
-CODES = ("cause", "state", "learner_reason", "learner_action", "scope_trigger", "scope_state")      # numbers; the others are bits
+AXIS = "axis u8"    # first field of what asks an axis
+LISTS = ("cause", "fault", "encoder_event", "state", "flag", "learner_reason", "signal_fault", "learner_action", "scope_trigger",
+         "scope_state", "index_phase", "peer_phase", "job_state", "job_action", "job_flag")
+CODES = ("cause", "state", "learner_reason", "learner_action", "scope_trigger", "scope_state", "index_phase", "peer_phase",
+         "job_state", "job_action")                                           # numbers; the others are bits
+WORDS = ("cause", "job_state")                                                # lists whose words the firmware shows on its panel
 
 
 def fields(head, declared):
@@ -50,7 +53,7 @@ class Line:
         self.longest_body = table["longest_body"]
         self.lists = {name: {key: tuple(value) for key, value in table[name].items()} for name in LISTS}
         self.operations = table["operation"]
-        self.parameters = table["parameter"]
+        self.parameters, self.settings = table["parameter"], table["setting"]
         self.layouts = {}
         for name, operation in self.operations.items():
             self.layouts[name] = (fields(REQUEST_HEAD, operation["request"]), fields(REPLY_HEAD, operation["reply"]))
@@ -61,10 +64,11 @@ class Line:
             once(f"{name} codes", [code for code, _ in entries.values()])
         once("operation codes", [operation["code"] for operation in self.operations.values()])
         once("parameter ids", [parameter["id"] for parameter in self.parameters.values()])
+        once("setting ids", [setting["id"] for setting in self.settings.values()])
         for name, (request, reply) in self.layouts.items():
             if max(request[1], reply[1]) > self.longest_body:
                 raise ValueError(f"line.toml: operation {name} needs more than {self.longest_body} bytes")
-        for name, parameter in self.parameters.items():
+        for name, parameter in {**self.parameters, **self.settings}.items():
             if not parameter["min"] <= parameter["default"] <= parameter["max"]:
                 raise ValueError(f"line.toml: the default of {name} is outside its range")
             Fraction(parameter["lsb"])
@@ -97,6 +101,9 @@ def header(line: Line) -> str:
             value = str(code) if name in CODES else f"1 << {code}"
             out.append(f"    LINE_{name}_{key}".upper() + f" = {value},    // {words}")
         out += ["};", ""]
+    for name in WORDS:
+        out.append("// X(code, words)")
+        out += macro(f"LINE_{name.upper()}_WORDS", [f"    X({code}, {quoted(words)})" for code, words in line.lists[name].values()])
     out.append("enum line_operation {")
     for name, operation in line.operations.items():
         out.append(f"    LINE_OPERATION_{name.upper()} = {operation['code']},    // {operation['text']}")
@@ -108,20 +115,26 @@ def header(line: Line) -> str:
             for field, kind, offset in laid[head:]:
                 out.append(f"#define LINE_{name.upper()}_{way}_{field.upper()} {offset}u    // {kind}")
     out.append("")
-    out.append("// X(name, code, length of the request body, length of the reply body if the cause is ok)")
-    rows = [f"    X({name}, {operation['code']}, {line.layouts[name][0][1]}, {line.layouts[name][1][1]})"
+    out.append("// X(name, code, length of the request body, length of the reply body if the cause is ok, 1: of an axis, its first field)")
+    rows = [f"    X({name}, {operation['code']}, {line.layouts[name][0][1]}, {line.layouts[name][1][1]}, "
+            f"{int(operation['request'][:1] == [AXIS])})"
             for name, operation in line.operations.items()]
     out += macro("LINE_OPERATIONS", rows)
-    out.append("enum line_parameter {")
-    for name, parameter in line.parameters.items():
-        out.append(f"    LINE_PARAMETER_{name.upper()} = {parameter['id']},    // {of_one_count(parameter)}{parameter['text']}")
-    out += ["};", f"#define LINE_PARAMETER_COUNT {len(line.parameters)}u", ""]
-    out.append("// X(name, id, min, max, default): all int64_t, in counts of the wire")
-    rows = [f"    X({name}, {parameter['id']}, {parameter['min']}LL, {parameter['max']}LL, {parameter['default']}LL)"
-            for name, parameter in line.parameters.items()]
-    out += macro("LINE_PARAMETERS", rows)
+    out += values("parameter", line.parameters) + values("setting", line.settings)
     out += ["#endif", ""]
     return "\n".join(out)
+
+
+def values(kind, parameters):
+    """Numbers and ranges of the parameters of an axis, or of the settings of a station."""
+    out = [f"enum line_{kind} {{"]
+    for name, parameter in parameters.items():
+        out.append(f"    LINE_{kind}_{name}".upper() + f" = {parameter['id']},    // {of_one_count(parameter)}{parameter['text']}")
+    out += ["};", f"#define LINE_{kind.upper()}_COUNT {len(parameters)}u", ""]
+    out.append("// X(name, id, min, max, default): all int64_t, in counts of the wire")
+    rows = [f"    X({name}, {parameter['id']}, {parameter['min']}LL, {parameter['max']}LL, {parameter['default']}LL)"
+            for name, parameter in parameters.items()]
+    return out + macro(f"LINE_{kind.upper()}S", rows)
 
 
 def of_one_count(parameter):
@@ -180,14 +193,15 @@ def host(line: Line) -> str:
         out.append(f"              {pairs(request)},")
         out.append(f"              {pairs(reply)}),")
     out += [")}", ""]
-    out.append("PARAMETERS = {parameter.name: parameter for parameter in (")
-    for name, parameter in line.parameters.items():
-        lsb = Fraction(parameter["lsb"])
-        value = f"Fraction({lsb.numerator}, {lsb.denominator})"
-        out.append(f"    Parameter({quoted(name)}, {parameter['id']}, {quoted(parameter['unit'])}, {value},")
-        out.append(f"              {parameter['min']}, {parameter['max']}, {parameter['default']},")
-        out.append(f"              {quoted(parameter['text'])}),")
-    out += [")}", ""]
+    for table, parameters in (("PARAMETERS", line.parameters), ("SETTINGS", line.settings)):
+        out.append(f"{table} = {{parameter.name: parameter for parameter in (")
+        for name, parameter in parameters.items():
+            lsb = Fraction(parameter["lsb"])
+            value = f"Fraction({lsb.numerator}, {lsb.denominator})"
+            out.append(f"    Parameter({quoted(name)}, {parameter['id']}, {quoted(parameter['unit'])}, {value},")
+            out.append(f"              {parameter['min']}, {parameter['max']}, {parameter['default']},")
+            out.append(f"              {quoted(parameter['text'])}),")
+        out += [")}", ""]
     return "\n".join(out)
 
 
@@ -241,12 +255,13 @@ def page_parts(line: Line) -> dict:
     for name, entries in line.lists.items():
         rows = [(code, f"`{key}`", words) for key, (code, words) in entries.items()]
         parts[name + "s"] = table(("code" if name in CODES else "bit", "name", "words"), rows)
-    rows = []
-    for name, parameter in line.parameters.items():
-        lsb = Fraction(parameter["lsb"])
-        rows.append((parameter["id"], f"`{name}`", parameter["unit"] or "–", parameter["lsb"],
-                     *(decimal(parameter[key] * lsb) for key in ("min", "max", "default")), parameter["text"]))
-    parts["parameters"] = table(("id", "parameter", "unit", "one count", "min", "max", "default", "purpose"), rows)
+    for kind, parameters in (("parameter", line.parameters), ("setting", line.settings)):
+        rows = []
+        for name, parameter in parameters.items():
+            lsb = Fraction(parameter["lsb"])
+            rows.append((parameter["id"], f"`{name}`", parameter["unit"] or "–", parameter["lsb"],
+                         *(decimal(parameter[key] * lsb) for key in ("min", "max", "default")), parameter["text"]))
+        parts[kind + "s"] = table(("id", kind, "unit", "one count", "min", "max", "default", "purpose"), rows)
     parts["example"] = example(line)
     parts["packets"] = packets(line)
     return parts

@@ -23,6 +23,7 @@ static struct axis {
     uint8_t state;              // line_state
     uint8_t ended;              // line_cause
     bool homed;
+    uint8_t orders;             // off, home, move, prepare, stop since start; wraps
     bool homing;                // a switch only blocks, until this motion has ended
     bool leaving;               // a switch only blocks, until it is released
     bool fine;                  // the fine stage holds the position
@@ -162,6 +163,7 @@ void axis_start(unsigned n)
 uint8_t axis_enable(unsigned n, bool on)
 {
     struct axis *a = &axes[n];
+    a->orders += !on;
     axis_poll(n);
     if (!on) {
         if (at_work(a)) a->ended = LINE_CAUSE_STOPPED;
@@ -195,6 +197,7 @@ static uint8_t ready(unsigned n)
 uint8_t axis_home(unsigned n)
 {
     struct axis *a = &axes[n];
+    a->orders++;
     uint8_t cause = ready(n);
     if (cause != LINE_CAUSE_OK) return cause;
 
@@ -213,6 +216,7 @@ uint8_t axis_home(unsigned n)
 static uint8_t may_go(unsigned n, int64_t target)
 {
     struct axis *a = &axes[n];
+    a->orders++;
     uint8_t cause = ready(n);
     if (cause != LINE_CAUSE_OK && !(cause == LINE_CAUSE_BUSY && (a->state == LINE_STATE_SETTLING || a->state == LINE_STATE_MOVING)))
         return cause;
@@ -269,9 +273,21 @@ uint8_t axis_move(unsigned n, int64_t target, uint32_t *duration_ticks)
     return LINE_CAUSE_OK;
 }
 
+uint8_t axis_go(unsigned n, int64_t distance, uint8_t velocity_id)
+{
+    uint8_t cause = ready(n);
+    if (cause != LINE_CAUSE_OK) return cause;
+    if (!motion_prepare(n, distance, velocity_id)) return LINE_CAUSE_OUT_OF_RANGE;
+    axes[n].ended = LINE_CAUSE_RUNNING;
+    set_off(n);
+    motion_start(n);
+    return LINE_CAUSE_OK;
+}
+
 uint8_t axis_stop(unsigned n)
 {
     struct axis *a = &axes[n];
+    a->orders++;
     axis_poll(n);
     if (!at_work(a) || a->state == LINE_STATE_STOPPING) return LINE_CAUSE_OK;
     if (axis_read(n, AXIS_STATE) & AXIS_STATE_MOVING_MASK) {
@@ -357,6 +373,11 @@ uint8_t axis_set_parameter(unsigned n, uint8_t id, int64_t value)
 uint8_t axis_state(unsigned n)
 {
     return axes[n].state;
+}
+
+uint8_t axis_orders(unsigned n)
+{
+    return axes[n].orders;
 }
 
 uint8_t axis_ended(unsigned n)

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Build the firmware: build/firmware/firmware.elf, .bin and .hex.
+"""Build the firmware: build/firmware/firmware.elf, .bin and .hex; another image than `axis` under its own name.
 
+An image is what its image_NAME.c lists; the linker drops whatever that does not reach.
 The compiler is zig (PyPI ziglang, from the running Python), or GNU with CROSS=riscv64-unknown-elf- in the environment.
 The .hex is for $readmemh: one 32-bit word a line, little endian in memory, filled with zeros to the size of the memory.
 Nothing is done if nothing changed. Ends with 1 and one line if a tool is missing, the source is wrong or it does not fit.
@@ -23,6 +24,8 @@ HERE = Path(__file__).resolve().parent
 OUT = HERE.parents[1] / "build" / "firmware"
 FLAGS = ["-std=c11", "-g", "-Wall", "-Wextra", "-Werror", "-ffreestanding", "-ffunction-sections",
          "-fdata-sections", "-fomit-frame-pointer", "-static", "-Wframe-larger-than=1536"]    # the stack has 4096
+IMAGES = sorted(path.stem.removeprefix("image_") for path in HERE.glob("image_*.c"))
+AXES = {"station": 2}                                               # most that an image serves, where it is not the default
 SMALL, FAST = "-Os", "-O2"
 HOT = ("planner.c",)                                    # the others wait more than they work
 ZIG = ["-target", "riscv32-freestanding-none", "-mcpu=generic_rv32+m-a-f-d-c", "-mabi=ilp32", "-fno-sanitize=all",
@@ -83,6 +86,12 @@ def image(segments, memory):
     return bytes(words), used
 
 
+def sources_of(name):
+    """All of the folder but the lists of the other images."""
+    others = {path for path in HERE.glob("image_*.c") if path.name != f"image_{name}.c"}
+    return sorted(set(HERE.glob("*.[chS]")) - others)
+
+
 def fingerprint(sources, command, memory):
     state = hashlib.sha256(repr((command, memory)).encode())
     for source in sources:
@@ -98,10 +107,13 @@ def run(command):
         raise BuildError((telling or said)[0].strip())
 
 
-def build(memory, out, force):
+def build(memory, out, force, name="axis"):
     command, libraries = compiler()
-    sources = sorted(HERE.glob("*.[chS]")) + [HERE / "link.ld", HERE / "build.py"]
-    elf, binary, text, note = (out / f"firmware.{end}" for end in ("elf", "bin", "hex", "note"))
+    if name in AXES:
+        command += [f"-DHARDWARE_AXES={AXES[name]}u"]
+    sources = [*sources_of(name), HERE / "link.ld", HERE / "build.py"]
+    stem = "firmware" if name == "axis" else name
+    elf, binary, text, note = (out / f"{stem}.{end}" for end in ("elf", "bin", "hex", "note"))
     mark = fingerprint(sources, command, memory)
     if not force and all(path.exists() for path in (elf, binary, text, note)):
         old_mark, _, report = note.read_text().partition("\n")
@@ -111,7 +123,7 @@ def build(memory, out, force):
     note.unlink(missing_ok=True)
 
     inputs = [path for path in sources if path.suffix in (".c", ".S")]
-    script = out / "link.ld"                                    # zig's linker takes no --defsym
+    script = out / f"{stem}.ld"                                 # zig's linker takes no --defsym
     script.write_text(f"MEMORY_BYTES = {memory};\n" + (HERE / "link.ld").read_text())
     with tempfile.TemporaryDirectory(dir=out) as folder:
         objects = [Path(folder) / f"{path.name}.o" for path in inputs]
@@ -126,7 +138,7 @@ def build(memory, out, force):
     used, stack = symbols["_zero_end"], symbols["_stack_top"] - symbols["_stack_limit"]
     binary.write_bytes(content[:program])
     text.write_text("".join(f"{word:08x}\n" for (word,) in struct.iter_unpack("<I", content)))
-    report = (f"firmware: {program} bytes program + {used - program} data + {stack} stack = {used + stack} of {memory}, "
+    report = (f"{stem}: {program} bytes program + {used - program} data + {stack} stack = {used + stack} of {memory}, "
               f"{memory - used - stack} free")
     note.write_text(f"{mark}\n{report}\n")
     return report
@@ -134,12 +146,13 @@ def build(memory, out, force):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--image", choices=IMAGES, default="axis", help="what the node is for (default axis)")
     parser.add_argument("--memory", type=int, default=98304, help="bytes of the soft core's memory (default 98304)")
     parser.add_argument("--out", type=Path, default=OUT, help="folder for what is made (default build/firmware)")
     parser.add_argument("--force", action="store_true", help="build even if nothing changed")
     options = parser.parse_args()
     try:
-        print(build(options.memory, options.out, options.force))
+        print(build(options.memory, options.out, options.force, options.image))
     except BuildError as error:
         sys.exit(f"firmware: {error}")
 

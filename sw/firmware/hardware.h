@@ -10,7 +10,9 @@
 #include "registers.h"
 
 
-#define HARDWARE_AXES 8u                // the most a node has
+#ifndef HARDWARE_AXES
+#define HARDWARE_AXES 8u                // the most that are served
+#endif
 
 // A position of 48 bits.
 static inline int64_t axis_read_position(unsigned axis, uint32_t offset)

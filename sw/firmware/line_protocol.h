@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x51397806u    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x7FCE7D6Eu    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -34,6 +34,37 @@ enum line_cause {
     LINE_CAUSE_NO_INDEX = 21,    // no index was found within the home distance
     LINE_CAUSE_NOT_PREPARED = 22,    // the axis has no motion prepared
     LINE_CAUSE_NOT_BUILT = 23,    // this node was built without that
+    LINE_CAUSE_SENSOR_DEAD = 30,    // no good frame came from the angle sensor: check its power and its cable
+    LINE_CAUSE_SENSOR_STUCK = 31,    // the angle sensor stands still: it sent one and the same angle while the table was turned
+    LINE_CAUSE_STICTION = 32,    // the table did not follow its steps: it sticks, or the motor lost them
+    LINE_CAUSE_WRONG_SIGN = 33,    // the table turned against its steps: turn the sign of steps_per_period
+    LINE_CAUSE_NOT_CONVERGED = 34,    // the tolerance was not reached within the allowed tries
+    LINE_CAUSE_SENSOR_DISAGREES = 35,    // angle sensor and steps disagree: they tell different ways of the table
+    LINE_CAUSE_PEER_SILENT = 36,    // the other node does not answer: check the cable between the two and its peer_mode
+    LINE_CAUSE_NO_STATION = 37,    // the other node has no such station: write the program to both
+    LINE_CAUSE_PEER_OFF = 38,    // the peer port is not in use: see the settings peer_mode and peer_role
+    LINE_CAUSE_PEER_RESTARTED = 39,    // the other node lost its power while it indexed
+    LINE_CAUSE_STORE_MISSING = 40,    // the EEPROM does not answer
+    LINE_CAUSE_STORE_FAILED = 41,    // the EEPROM does not keep what is written
+    LINE_CAUSE_STORE_BUSY = 42,    // the EEPROM is being read or written
+    LINE_CAUSE_NO_PROGRAM = 43,    // no program of stations is stored
+    LINE_CAUSE_PROGRAM_TORN = 44,    // the stored program is damaged
+    LINE_CAUSE_PROGRAM_INCOMPLETE = 45,    // give all stations of a program in order
+    LINE_CAUSE_NO_STATIONS = 46,    // a program needs at least one station
+    LINE_CAUSE_TOO_MANY_STATIONS = 47,    // the EEPROM is full: it holds 360 stations
+    LINE_CAUSE_ANGLE_OUT_OF_TURN = 48,    // angles must be below 360 degrees
+    LINE_CAUSE_ANGLES_NOT_ASCENDING = 49,    // each angle must be larger than the last
+    LINE_CAUSE_JOB_ACTIVE = 50,    // a job is under way: stop it first
+    LINE_CAUSE_NOT_NOW = 51,    // the job does not wait for that now
+    LINE_CAUSE_MACHINE_BUSY = 52,    // the machine cuts, or its keys still wait
+    LINE_CAUSE_MACHINE_ALARM = 53,    // the machine reports an alarm
+    LINE_CAUSE_KEYS_NOT_TAKEN = 54,    // the machine does not take our keys
+    LINE_CAUSE_CUT_NOT_STARTED = 55,    // the cut did not start in time
+    LINE_CAUSE_CUT_NOT_ENDED = 56,    // the cut did not end in time
+    LINE_CAUSE_POWER_LOST = 57,    // the power was lost during the job
+    LINE_CAUSE_PAUSED_BY_PERSON = 58,    // paused by a person
+    LINE_CAUSE_KEY_WITHOUT_FUNCTION = 59,    // this key has no function
+    LINE_CAUSE_TABLE_UNKNOWN = 60,    // nobody knows where the table stands
 };
 
 enum line_fault {    // bits
@@ -132,6 +163,136 @@ enum line_scope_state {
     LINE_SCOPE_STATE_FULL = 3,    // complete
 };
 
+enum line_index_phase {
+    LINE_INDEX_PHASE_IDLE = 0,    // at rest
+    LINE_INDEX_PHASE_READING = 1,    // waiting for the table to settle, and reading its angle
+    LINE_INDEX_PHASE_GOING_BELOW = 2,    // going down, below the target
+    LINE_INDEX_PHASE_COMING_UP = 3,    // coming up on the long way
+    LINE_INDEX_PHASE_CLOSING_IN = 4,    // closing in on the target
+};
+
+enum line_peer_phase {
+    LINE_PEER_PHASE_IDLE = 0,    // nothing was asked for
+    LINE_PEER_PHASE_INDEXING = 1,    // the sub-node indexes
+    LINE_PEER_PHASE_INDEXED = 2,    // the sub-node has indexed
+    LINE_PEER_PHASE_FAILED = 3,    // the sub-node failed
+    LINE_PEER_PHASE_SILENT = 4,    // the sub-node does not answer
+};
+
+enum line_job_state {
+    LINE_JOB_STATE_LOADING = 0,    // loading
+    LINE_JOB_STATE_IDLE = 1,    // ready
+    LINE_JOB_STATE_FINISHED = 2,    // all cut
+    LINE_JOB_STATE_STARTING = 3,    // starts
+    LINE_JOB_STATE_INDEXING = 4,    // table turns
+    LINE_JOB_STATE_ARRIVED = 5,    // at station
+    LINE_JOB_STATE_BEGINNING = 6,    // begins cut
+    LINE_JOB_STATE_CUTTING = 7,    // cutting
+    LINE_JOB_STATE_FOLLOWING = 8,    // cutting
+    LINE_JOB_STATE_ENDED = 9,    // cut done
+    LINE_JOB_STATE_LEAVING = 10,    // leaves
+    LINE_JOB_STATE_FINISHING = 11,    // finishing
+    LINE_JOB_STATE_PAUSED = 12,    // paused
+    LINE_JOB_STATE_UNSURE = 13,    // is it cut?
+    LINE_JOB_STATE_STOPPING = 14,    // stopping
+};
+
+enum line_job_action {
+    LINE_JOB_ACTION_START = 0,    // cut all stations from the first one on
+    LINE_JOB_ACTION_PAUSE = 1,    // stand before the next cut or the next station
+    LINE_JOB_ACTION_RESUME = 2,    // go on; if it is unsure whether a station was cut, wait for the end of the cut under way
+    LINE_JOB_ACTION_STOP = 3,    // end the job; a cut under way is left to the machine
+    LINE_JOB_ACTION_AGAIN = 4,    // cut the station again
+    LINE_JOB_ACTION_NEXT = 5,    // the station is cut: go to the next one
+};
+
+enum line_job_flag {    // bits
+    LINE_JOB_FLAG_STORE = 1 << 0,    // the EEPROM answers
+    LINE_JOB_FLAG_KEYPAD = 1 << 1,    // the key-pad answers
+    LINE_JOB_FLAG_DISPLAY = 1 << 2,    // the character display answers
+    LINE_JOB_FLAG_CUTTING = 1 << 3,    // the machine cuts
+    LINE_JOB_FLAG_ALARM = 1 << 4,    // the machine reports an alarm
+    LINE_JOB_FLAG_KEYS_WAIT = 1 << 5,    // keys for the machine wait: a person types, or it does not take them
+    LINE_JOB_FLAG_PAUSING = 1 << 6,    // a pause comes next
+    LINE_JOB_FLAG_COPY_TORN = 1 << 7,    // one copy of the program is damaged, the other one is in force
+};
+
+// X(code, words)
+#define LINE_CAUSE_WORDS(X) \
+    X(0, "done") \
+    X(1, "the node does not know this command") \
+    X(2, "the command has the wrong length") \
+    X(3, "the node has no axis of this number") \
+    X(4, "the node has no parameter of this number") \
+    X(5, "the value is outside what this parameter allows") \
+    X(6, "the target is outside the travel") \
+    X(7, "the axis has no zero yet: home it first") \
+    X(8, "the drive is off: enable it first") \
+    X(9, "a fault is latched: remove its cause and reset it first") \
+    X(10, "the cause of the fault still stands") \
+    X(11, "the axis is moving: stop it or wait") \
+    X(12, "firmware and hardware were not made for each other (register maps differ)") \
+    X(13, "the node has no register at this address") \
+    X(14, "stopped by the host") \
+    X(15, "no limit switch was found within the travel") \
+    X(16, "the limit switch did not open within the home distance") \
+    X(17, "the target was not reached within the settling time") \
+    X(18, "a fault ended the motion") \
+    X(19, "the motion is under way") \
+    X(20, "no motion was asked for yet") \
+    X(21, "no index was found within the home distance") \
+    X(22, "the axis has no motion prepared") \
+    X(23, "this node was built without that") \
+    X(30, "no good frame came from the angle sensor: check its power and its cable") \
+    X(31, "the angle sensor stands still: it sent one and the same angle while the table was turned") \
+    X(32, "the table did not follow its steps: it sticks, or the motor lost them") \
+    X(33, "the table turned against its steps: turn the sign of steps_per_period") \
+    X(34, "the tolerance was not reached within the allowed tries") \
+    X(35, "angle sensor and steps disagree: they tell different ways of the table") \
+    X(36, "the other node does not answer: check the cable between the two and its peer_mode") \
+    X(37, "the other node has no such station: write the program to both") \
+    X(38, "the peer port is not in use: see the settings peer_mode and peer_role") \
+    X(39, "the other node lost its power while it indexed") \
+    X(40, "the EEPROM does not answer") \
+    X(41, "the EEPROM does not keep what is written") \
+    X(42, "the EEPROM is being read or written") \
+    X(43, "no program of stations is stored") \
+    X(44, "the stored program is damaged") \
+    X(45, "give all stations of a program in order") \
+    X(46, "a program needs at least one station") \
+    X(47, "the EEPROM is full: it holds 360 stations") \
+    X(48, "angles must be below 360 degrees") \
+    X(49, "each angle must be larger than the last") \
+    X(50, "a job is under way: stop it first") \
+    X(51, "the job does not wait for that now") \
+    X(52, "the machine cuts, or its keys still wait") \
+    X(53, "the machine reports an alarm") \
+    X(54, "the machine does not take our keys") \
+    X(55, "the cut did not start in time") \
+    X(56, "the cut did not end in time") \
+    X(57, "the power was lost during the job") \
+    X(58, "paused by a person") \
+    X(59, "this key has no function") \
+    X(60, "nobody knows where the table stands")
+
+// X(code, words)
+#define LINE_JOB_STATE_WORDS(X) \
+    X(0, "loading") \
+    X(1, "ready") \
+    X(2, "all cut") \
+    X(3, "starts") \
+    X(4, "table turns") \
+    X(5, "at station") \
+    X(6, "begins cut") \
+    X(7, "cutting") \
+    X(8, "cutting") \
+    X(9, "cut done") \
+    X(10, "leaves") \
+    X(11, "finishing") \
+    X(12, "paused") \
+    X(13, "is it cut?") \
+    X(14, "stopping")
+
 enum line_operation {
     LINE_OPERATION_IDENTIFY = 1,    // who is there, and what was it built from
     LINE_OPERATION_STATUS = 2,    // state, position and faults of an axis; ended is the cause of the last motion
@@ -158,6 +319,21 @@ enum line_operation {
     LINE_OPERATION_ARM_SCOPE = 31,    // record every so many ticks, from before a trigger on; an amplitude drives in open loop, to level at most
     LINE_OPERATION_SCOPE = 32,    // how far the record is; count is 0 until it is complete
     LINE_OPERATION_READ_SCOPE = 33,    // five samples from this one on, 0 behind the end; time from sample to sample in 64 clk, position: low word
+    LINE_OPERATION_GET_SETTING = 40,    // read a setting of a station
+    LINE_OPERATION_SET_SETTING = 41,    // write a setting of a station
+    LINE_OPERATION_INDEX_TO = 42,    // turn the table of axis 0 to an absolute angle, 0.01 arcsec; refused while an axis moves
+    LINE_OPERATION_INDEX_STATE = 43,    // what the table does, how its last index ended, the angle of its last reading; all in 0.01 arcsec
+    LINE_OPERATION_SENSOR = 44,    // the last good frame of the angle sensor in 0.01 arcsec, its age in clk, and frames since power-up
+    LINE_OPERATION_PEER = 45,    // what the peer port does: the last index asked for; orders or frames heard, bytes or frames not understood
+    LINE_OPERATION_PEER_STATION = 46,    // one of the stations of a sub-node in mode printed, from 0 on; the next order then goes to station 0
+    LINE_OPERATION_PEER_NEXT = 47,    // the station to which the next order goes in mode printed
+    LINE_OPERATION_JOB = 48,    // what the job does, at which station (from 0 on), why it waits, and for which answers (bits of job_action)
+    LINE_OPERATION_JOB_DO = 49,    // start, pause, resume or stop the job, or answer its question
+    LINE_OPERATION_JOB_PROGRAM = 50,    // the stored program; writing 1 while it is written or read, then how that ended, or why there is none
+    LINE_OPERATION_JOB_ANGLE = 51,    // angle of a station of the stored program, in 0.01 arcsec
+    LINE_OPERATION_JOB_BEGIN = 52,    // begin a new program; it comes into force when it is saved, and not while a job is under way
+    LINE_OPERATION_JOB_ADD = 53,    // give the new program a station; in their order, from 0 on, with ascending angles
+    LINE_OPERATION_JOB_SAVE = 54,    // write the new program and the settings into the EEPROM; job_program tells when and how that ended
 };
 
 // Lengths of whole bodies and offsets of their fields, in bytes, little endian.
@@ -332,34 +508,125 @@ enum line_operation {
 #define LINE_READ_SCOPE_REPLY_ERROR_4 55u    // i32
 #define LINE_READ_SCOPE_REPLY_COMMAND_4 59u    // i16
 #define LINE_READ_SCOPE_REPLY_TIME_4 61u    // u16
+#define LINE_GET_SETTING_REQUEST_LENGTH 3u
+#define LINE_GET_SETTING_REQUEST_SETTING 2u    // u8
+#define LINE_GET_SETTING_REPLY_LENGTH 11u
+#define LINE_GET_SETTING_REPLY_VALUE 3u    // i64
+#define LINE_SET_SETTING_REQUEST_LENGTH 11u
+#define LINE_SET_SETTING_REQUEST_SETTING 2u    // u8
+#define LINE_SET_SETTING_REQUEST_VALUE 3u    // i64
+#define LINE_SET_SETTING_REPLY_LENGTH 3u
+#define LINE_INDEX_TO_REQUEST_LENGTH 6u
+#define LINE_INDEX_TO_REQUEST_ANGLE 2u    // u32
+#define LINE_INDEX_TO_REPLY_LENGTH 3u
+#define LINE_INDEX_STATE_REQUEST_LENGTH 2u
+#define LINE_INDEX_STATE_REPLY_LENGTH 19u
+#define LINE_INDEX_STATE_REPLY_PHASE 3u    // u8
+#define LINE_INDEX_STATE_REPLY_ENDED 4u    // u8
+#define LINE_INDEX_STATE_REPLY_TRIES 5u    // u8
+#define LINE_INDEX_STATE_REPLY_OVERSHOOTS 6u    // u8
+#define LINE_INDEX_STATE_REPLY_TARGET 7u    // u32
+#define LINE_INDEX_STATE_REPLY_READING 11u    // u32
+#define LINE_INDEX_STATE_REPLY_LEFT 15u    // i32
+#define LINE_SENSOR_REQUEST_LENGTH 2u
+#define LINE_SENSOR_REPLY_LENGTH 28u
+#define LINE_SENSOR_REPLY_ANGLE 3u    // u32
+#define LINE_SENSOR_REPLY_AGE 7u    // u32
+#define LINE_SENSOR_REPLY_DEAD 11u    // u8
+#define LINE_SENSOR_REPLY_FRAMES 12u    // u32
+#define LINE_SENSOR_REPLY_WRONG_CRC 16u    // u32
+#define LINE_SENSOR_REPLY_BROKEN 20u    // u32
+#define LINE_SENSOR_REPLY_MISSED 24u    // u32
+#define LINE_PEER_REQUEST_LENGTH 2u
+#define LINE_PEER_REPLY_LENGTH 21u
+#define LINE_PEER_REPLY_PHASE 3u    // u8
+#define LINE_PEER_REPLY_ENDED 4u    // u8
+#define LINE_PEER_REPLY_STATION 5u    // u16
+#define LINE_PEER_REPLY_STATIONS 7u    // u16
+#define LINE_PEER_REPLY_HEARD 9u    // u32
+#define LINE_PEER_REPLY_GARBAGE 13u    // u32
+#define LINE_PEER_REPLY_REPEATED 17u    // u32
+#define LINE_PEER_STATION_REQUEST_LENGTH 10u
+#define LINE_PEER_STATION_REQUEST_STATION 2u    // u16
+#define LINE_PEER_STATION_REQUEST_STATIONS 4u    // u16
+#define LINE_PEER_STATION_REQUEST_ANGLE 6u    // u32
+#define LINE_PEER_STATION_REPLY_LENGTH 3u
+#define LINE_PEER_NEXT_REQUEST_LENGTH 4u
+#define LINE_PEER_NEXT_REQUEST_STATION 2u    // u16
+#define LINE_PEER_NEXT_REPLY_LENGTH 3u
+#define LINE_JOB_REQUEST_LENGTH 2u
+#define LINE_JOB_REPLY_LENGTH 11u
+#define LINE_JOB_REPLY_STATE 3u    // u8
+#define LINE_JOB_REPLY_CAUSE 4u    // u8
+#define LINE_JOB_REPLY_STATION 5u    // u16
+#define LINE_JOB_REPLY_STATIONS 7u    // u16
+#define LINE_JOB_REPLY_ANSWERS 9u    // u8
+#define LINE_JOB_REPLY_FLAGS 10u    // u8
+#define LINE_JOB_DO_REQUEST_LENGTH 3u
+#define LINE_JOB_DO_REQUEST_ACTION 2u    // u8
+#define LINE_JOB_DO_REPLY_LENGTH 3u
+#define LINE_JOB_PROGRAM_REQUEST_LENGTH 2u
+#define LINE_JOB_PROGRAM_REPLY_LENGTH 15u
+#define LINE_JOB_PROGRAM_REPLY_WRITING 3u    // u8
+#define LINE_JOB_PROGRAM_REPLY_ENDED 4u    // u8
+#define LINE_JOB_PROGRAM_REPLY_GENERATION 5u    // u32
+#define LINE_JOB_PROGRAM_REPLY_STATIONS 9u    // u16
+#define LINE_JOB_PROGRAM_REPLY_JOURNAL 11u    // u32
+#define LINE_JOB_ANGLE_REQUEST_LENGTH 4u
+#define LINE_JOB_ANGLE_REQUEST_STATION 2u    // u16
+#define LINE_JOB_ANGLE_REPLY_LENGTH 7u
+#define LINE_JOB_ANGLE_REPLY_ANGLE 3u    // u32
+#define LINE_JOB_BEGIN_REQUEST_LENGTH 2u
+#define LINE_JOB_BEGIN_REPLY_LENGTH 3u
+#define LINE_JOB_ADD_REQUEST_LENGTH 8u
+#define LINE_JOB_ADD_REQUEST_STATION 2u    // u16
+#define LINE_JOB_ADD_REQUEST_ANGLE 4u    // u32
+#define LINE_JOB_ADD_REPLY_LENGTH 3u
+#define LINE_JOB_SAVE_REQUEST_LENGTH 2u
+#define LINE_JOB_SAVE_REPLY_LENGTH 3u
 
-// X(name, code, length of the request body, length of the reply body if the cause is ok)
+// X(name, code, length of the request body, length of the reply body if the cause is ok, 1: of an axis, its first field)
 #define LINE_OPERATIONS(X) \
-    X(identify, 1, 2, 27) \
-    X(status, 2, 3, 41) \
-    X(enable, 3, 4, 3) \
-    X(home, 4, 3, 3) \
-    X(move, 5, 11, 7) \
-    X(stop, 6, 3, 3) \
-    X(reset_faults, 7, 3, 3) \
-    X(get_parameter, 8, 4, 11) \
-    X(set_parameter, 9, 12, 3) \
-    X(counters, 10, 2, 31) \
-    X(encoder, 11, 3, 35) \
-    X(read_register, 12, 4, 7) \
-    X(learner, 13, 4, 18) \
-    X(get_correction, 14, 3, 15) \
-    X(get_harmonic, 15, 4, 11) \
-    X(set_correction, 16, 16, 3) \
-    X(set_harmonic, 17, 12, 3) \
-    X(signal, 18, 3, 7) \
-    X(write_register, 19, 8, 3) \
-    X(prepare, 20, 11, 7) \
-    X(start, 21, 3, 3) \
-    X(position, 30, 3, 11) \
-    X(arm_scope, 31, 13, 3) \
-    X(scope, 32, 2, 6) \
-    X(read_scope, 33, 3, 63)
+    X(identify, 1, 2, 27, 0) \
+    X(status, 2, 3, 41, 1) \
+    X(enable, 3, 4, 3, 1) \
+    X(home, 4, 3, 3, 1) \
+    X(move, 5, 11, 7, 1) \
+    X(stop, 6, 3, 3, 1) \
+    X(reset_faults, 7, 3, 3, 1) \
+    X(get_parameter, 8, 4, 11, 1) \
+    X(set_parameter, 9, 12, 3, 1) \
+    X(counters, 10, 2, 31, 0) \
+    X(encoder, 11, 3, 35, 1) \
+    X(read_register, 12, 4, 7, 0) \
+    X(learner, 13, 4, 18, 1) \
+    X(get_correction, 14, 3, 15, 1) \
+    X(get_harmonic, 15, 4, 11, 1) \
+    X(set_correction, 16, 16, 3, 1) \
+    X(set_harmonic, 17, 12, 3, 1) \
+    X(signal, 18, 3, 7, 1) \
+    X(write_register, 19, 8, 3, 0) \
+    X(prepare, 20, 11, 7, 1) \
+    X(start, 21, 3, 3, 0) \
+    X(position, 30, 3, 11, 1) \
+    X(arm_scope, 31, 13, 3, 1) \
+    X(scope, 32, 2, 6, 0) \
+    X(read_scope, 33, 3, 63, 0) \
+    X(get_setting, 40, 3, 11, 0) \
+    X(set_setting, 41, 11, 3, 0) \
+    X(index_to, 42, 6, 3, 0) \
+    X(index_state, 43, 2, 19, 0) \
+    X(sensor, 44, 2, 28, 0) \
+    X(peer, 45, 2, 21, 0) \
+    X(peer_station, 46, 10, 3, 0) \
+    X(peer_next, 47, 4, 3, 0) \
+    X(job, 48, 2, 11, 0) \
+    X(job_do, 49, 3, 3, 0) \
+    X(job_program, 50, 2, 15, 0) \
+    X(job_angle, 51, 4, 7, 0) \
+    X(job_begin, 52, 2, 3, 0) \
+    X(job_add, 53, 8, 3, 0) \
+    X(job_save, 54, 2, 3, 0)
 
 enum line_parameter {
     LINE_PARAMETER_PERIOD = 1,    // [1 pm] length of one signal period
@@ -523,5 +790,50 @@ enum line_parameter {
     X(filter_2_b2, 76, -2147483648LL, 2147483647LL, 0LL) \
     X(filter_2_a1, 77, -2147483648LL, 2147483647LL, 0LL) \
     X(filter_2_a2, 78, -2147483648LL, 2147483647LL, 0LL)
+
+enum line_setting {
+    LINE_SETTING_INDEX_TOLERANCE = 1,    // [0.01 arcsec] index: it has ended when no more than this is left by the sensor
+    LINE_SETTING_INDEX_ALLOWANCE = 2,    // [0.01 arcsec] index: the long way ends so far below the target; more than the error of the worm
+    LINE_SETTING_INDEX_TAKE_UP = 3,    // [0.01 arcsec] index: shortest way up before a reading counts; more than the backlash
+    LINE_SETTING_INDEX_SHARE = 4,    // [1/100] index: each try goes this share of what is left
+    LINE_SETTING_INDEX_TRIES = 5,    // index: tries before it is given up
+    LINE_SETTING_INDEX_OVERSHOOTS = 6,    // index: how often it may back off from above the target and come again
+    LINE_SETTING_INDEX_SETTLE = 7,    // [0.001 s] index: rest before a reading; more than the latency of the sensor
+    LINE_SETTING_INDEX_FRAMES = 8,    // index: frames whose mean is a reading
+    LINE_SETTING_INDEX_DISAGREEMENT = 9,    // [0.01 arcsec] index: largest difference of sensor and steps; more than worm error and backlash
+    LINE_SETTING_INDEX_WAY = 10,    // index: 0 not through angle 0, 1 the shorter way round, 2 always up
+    LINE_SETTING_PERIODS_PER_TURN = 11,    // periods of axis 0 in a turn of the table; four steps are a period
+    LINE_SETTING_SENSOR_PATIENCE = 12,    // [0.001 s] sensor: dead when no good frame came for this long
+    LINE_SETTING_SENSOR_ZERO = 13,    // [0.01 arcsec] sensor: what it sends at angle 0
+    LINE_SETTING_READOUT_DECIMALS = 14,    // numeric display: decimals of the position in mm
+    LINE_SETTING_PEER_MODE = 15,    // peer port: 0 not in use, 1 S4's bytes as printed, 2 frames with CRC-32
+    LINE_SETTING_PEER_ROLE = 16,    // peer port: 0 this is the main node, 1 the sub-node that indexes
+    LINE_SETTING_PEER_PATIENCE = 17,    // [0.001 s] peer port: in mode printed, an index that takes longer has failed
+    LINE_SETTING_JOB_START_LIMIT = 18,    // [1 s] job: longest time from the start keys to the beginning of the cut
+    LINE_SETTING_JOB_CUT_LIMIT = 19,    // [1 s] job: longest cut
+};
+#define LINE_SETTING_COUNT 19u
+
+// X(name, id, min, max, default): all int64_t, in counts of the wire
+#define LINE_SETTINGS(X) \
+    X(index_tolerance, 1, 1LL, 360000LL, 50LL) \
+    X(index_allowance, 2, 0LL, 3600000LL, 6000LL) \
+    X(index_take_up, 3, 1LL, 3600000LL, 6000LL) \
+    X(index_share, 4, 5LL, 95LL, 50LL) \
+    X(index_tries, 5, 1LL, 255LL, 40LL) \
+    X(index_overshoots, 6, 0LL, 255LL, 3LL) \
+    X(index_settle, 7, 0LL, 10000LL, 100LL) \
+    X(index_frames, 8, 1LL, 64LL, 4LL) \
+    X(index_disagreement, 9, 100LL, 16000000LL, 12000LL) \
+    X(index_way, 10, 0LL, 2LL, 0LL) \
+    X(periods_per_turn, 11, 1LL, 2147483647LL, 1800000LL) \
+    X(sensor_patience, 12, 10LL, 10000LL, 200LL) \
+    X(sensor_zero, 13, 0LL, 129599999LL, 0LL) \
+    X(readout_decimals, 14, 0LL, 6LL, 5LL) \
+    X(peer_mode, 15, 0LL, 2LL, 0LL) \
+    X(peer_role, 16, 0LL, 1LL, 0LL) \
+    X(peer_patience, 17, 100LL, 3600000LL, 300000LL) \
+    X(job_start_limit, 18, 1LL, 3600LL, 30LL) \
+    X(job_cut_limit, 19, 1LL, 1000000LL, 14400LL)
 
 #endif

@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// main -- start, then poll for ever: line, clock, axes, gratings. There are no interrupts; nothing waits.
+// main -- start, then poll for ever: line, clock, axes, and the parts of the image. There are no interrupts; nothing waits.
 #include "axis.h"
 #include "clock.h"
-#include "grating.h"
 #include "hardware.h"
+#include "image.h"
 #include "line.h"
-#include "line_protocol.h"
 #include "parameters.h"
-#include "scope.h"
 
 static unsigned axes;                   // those that may be touched: none if the register maps differ
-static unsigned turn;                   // axis whose grating was polled last
 
 void firmware_start(void)
 {
@@ -19,29 +16,27 @@ void firmware_start(void)
     axes = hardware_map_fits() ? built : 0;
     clock_start();
     parameters_start_node();
-    for (unsigned n = 0; n < axes; n++) {
-        axis_start(n);
-        grating_start(n);
-    }
-    scope_start();
+    for (unsigned n = 0; n < axes; n++) axis_start(n);
+    for (unsigned part = 0; part < image_part_count; part++)
+        if (image_parts[part].start) image_parts[part].start(axes);
     line_start(built);
 }
 
 void firmware_poll(void)
 {
-    bool homing = false;
     node_write(NODE_ALIVE, NODE_ALIVE_BEAT_MASK);
     line_poll();
     clock_poll();
     for (unsigned n = 0; n < axes; n++) {
         axis_poll(n);
-        homing = homing || axis_state(n) == LINE_STATE_HOMING;
         line_poll();
-        scope_poll();
     }
-    if (axes == 0 || homing) return;    // homing has to see the switch in time
-    turn = turn + 1 < axes ? turn + 1 : 0;
-    grating_poll(turn);
+    if (axes == 0) return;
+    for (unsigned part = 0; part < image_part_count; part++) {
+        if (!image_parts[part].work) continue;
+        image_parts[part].work();
+        line_poll();
+    }
 }
 
 int main(void)

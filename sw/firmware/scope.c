@@ -4,6 +4,7 @@
 
 #include "axis.h"
 #include "hardware.h"
+#include "line.h"
 #include "line_protocol.h"
 #include "planner.h"
 
@@ -11,9 +12,25 @@
 #define LONGEST_EVERY 200u              // ticks: 50 ms, so that a time fits its 16 bits up to a clk of 80 MHz
 #define HOLDS 16u                       // of the open loop: a command stays for 1 to so many samples, then its mirror as long
 
+struct setting {
+    uint8_t axis;
+    uint8_t trigger;                        // line_scope_trigger
+    uint8_t before;                         // samples kept from before the trigger
+    uint16_t every;                         // ticks from sample to sample, at least
+    uint32_t level;                         // of the error; with an amplitude: how far the axis may go. LSB of position
+    int16_t amplitude;                      // of the open loop, 0: none
+};
+
+struct sample {                             // as on the line
+    int32_t position;                       // low word
+    int32_t error;
+    int16_t command;
+    uint16_t time;
+};
+
 static struct scope {
-    struct scope_setting setting;
-    struct scope_sample samples[SAMPLES];
+    struct setting setting;
+    struct sample samples[SAMPLES];
     uint32_t every, due, last;              // clk
     uint32_t random;
     int32_t from;                           // position when it was armed
@@ -24,31 +41,10 @@ static struct scope {
     bool mirrored;
 } scope;
 
-void scope_start(void)
+void scope_start(unsigned axes)
 {
+    (void)axes;
     scope.state = LINE_SCOPE_STATE_EMPTY;
-}
-
-uint8_t scope_state(void)
-{
-    return scope.state;
-}
-
-uint8_t scope_count(void)
-{
-    return scope.state == LINE_SCOPE_STATE_FULL ? scope.taken : 0;
-}
-
-uint8_t scope_before(void)
-{
-    return scope.before;
-}
-
-uint8_t scope_byte(uint8_t first, uint32_t n)
-{
-    uint32_t number = first + n / sizeof(struct scope_sample);
-    const struct scope_sample *sample = &scope.samples[(scope.next + SAMPLES - scope.taken + number) % SAMPLES];
-    return number < scope.taken ? ((const uint8_t *)sample)[n % sizeof *sample] : 0;
 }
 
 static void end(void)
@@ -57,7 +53,7 @@ static void end(void)
     if (scope.setting.amplitude) axis_excite(scope.setting.axis, false);
 }
 
-uint8_t scope_arm(const struct scope_setting *setting)
+static uint8_t arm(const struct setting *setting)
 {
     bool right = setting->trigger <= LINE_SCOPE_TRIGGER_FAULT && setting->before < SAMPLES && setting->every >= 1 &&
                  setting->every <= LONGEST_EVERY && setting->amplitude >= 0 &&
@@ -92,7 +88,7 @@ static bool triggered(unsigned n, int32_t error)
 
 static void take(unsigned n)
 {
-    struct scope_sample *s = &scope.samples[scope.next];
+    struct sample *s = &scope.samples[scope.next];
     uint32_t now = node_read(NODE_TIME_STAMP_LOW);
     s->position = (int32_t)axis_read(n, AXIS_POSITION);
     s->error = (int32_t)axis_read(n, AXIS_FOLLOWING_ERROR);
@@ -129,7 +125,7 @@ static void excite(unsigned n)
     axis_write(n, AXIS_OPEN_COMMAND, (uint32_t)(up ? scope.setting.amplitude : -scope.setting.amplitude));
 }
 
-void scope_poll(void)
+void scope_work(void)
 {
     unsigned n = scope.setting.axis;
     if (scope.state != LINE_SCOPE_STATE_WAITING && scope.state != LINE_SCOPE_STATE_RECORDING) return;
@@ -147,4 +143,43 @@ void scope_poll(void)
             excite(n);
     }
     if (scope.left == 0) end();
+}
+
+static uint8_t byte_of(uint32_t first, uint32_t n)               // of the samples from this one on, 0 behind the last; the oldest is 0
+{
+    uint32_t number = first + n / sizeof(struct sample);
+    const struct sample *sample = &scope.samples[(scope.next + SAMPLES - scope.taken + number) % SAMPLES];
+    return number < scope.taken ? ((const uint8_t *)sample)[n % sizeof *sample] : 0;
+}
+
+static uint8_t read_samples(uint8_t first)
+{
+    if (scope.state != LINE_SCOPE_STATE_FULL || first >= scope.taken) return LINE_CAUSE_OUT_OF_RANGE;
+    for (uint32_t n = 0; n < LINE_READ_SCOPE_REPLY_LENGTH - LINE_READ_SCOPE_REPLY_POSITION_0; n++)
+        line_answer(LINE_READ_SCOPE_REPLY_POSITION_0 + n, byte_of(first, n), 1);
+    return LINE_CAUSE_OK;
+}
+
+static uint8_t tell(void)
+{
+    line_answer(LINE_SCOPE_REPLY_STATE, scope.state, 1);
+    line_answer(LINE_SCOPE_REPLY_COUNT, scope.state == LINE_SCOPE_STATE_FULL ? scope.taken : 0, 1);
+    line_answer(LINE_SCOPE_REPLY_BEFORE, scope.before, 1);
+    return LINE_CAUSE_OK;
+}
+
+uint8_t scope_operation(uint8_t operation)
+{
+    switch (operation) {
+    case LINE_OPERATION_SCOPE: return tell();
+    case LINE_OPERATION_READ_SCOPE: return read_samples((uint8_t)line_field(LINE_READ_SCOPE_REQUEST_FIRST, 1));
+    case LINE_OPERATION_ARM_SCOPE:
+        return arm(&(struct setting){.axis = (uint8_t)line_field(LINE_ARM_SCOPE_REQUEST_AXIS, 1),
+                                     .trigger = (uint8_t)line_field(LINE_ARM_SCOPE_REQUEST_TRIGGER, 1),
+                                     .before = (uint8_t)line_field(LINE_ARM_SCOPE_REQUEST_BEFORE, 1),
+                                     .every = (uint16_t)line_field(LINE_ARM_SCOPE_REQUEST_EVERY, 2),
+                                     .level = (uint32_t)line_field(LINE_ARM_SCOPE_REQUEST_LEVEL, 4),
+                                     .amplitude = (int16_t)line_field(LINE_ARM_SCOPE_REQUEST_AMPLITUDE, 2)});
+    default: return LINE_CAUSE_NOT_BUILT;
+    }
 }

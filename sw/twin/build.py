@@ -203,16 +203,16 @@ def twin_library(clk_hz=2_400_000, axes=1, node=None):
     return library
 
 
-def firmware():
-    """The firmware's words, built first when it is not fresh."""
+def firmware(image="axis"):
+    """The words of an image of the firmware, built first when it is not fresh."""
     script = ROOT / "sw" / "firmware" / "build.py"
     if not script.exists():
         raise BuildError("sw/firmware/build.py is missing: the twin has no firmware to run")
     BUILD.mkdir(parents=True, exist_ok=True)
     with open(BUILD / "firmware.lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        run([sys.executable, script, "--memory", MEMORY_BYTES], "the firmware's build")
-        return words_of(ROOT / "build" / "firmware" / "firmware.hex")
+        run([sys.executable, script, "--image", image, "--memory", MEMORY_BYTES], "the firmware's build")
+        return words_of(ROOT / "build" / "firmware" / f"{'firmware' if image == 'axis' else image}.hex")
 
 
 def words_of(file):

@@ -272,15 +272,16 @@ class Grating:
 class Machine:
     """The node under the firmware; request() speaks to it as the master does."""
 
-    def __init__(self, *axes, map_crc=DEFINES["MAP_CRC"], address=2):
+    def __init__(self, *axes, map_crc=DEFINES["MAP_CRC"], address=2, image="axis", links=None):
         self.axes, self.address, self.map_crc, self.clk = list(axes) or [Axis()], address, map_crc, 0
         self.gratings = [Grating() for _ in self.axes]
         # words by their offset; all drives are built
         self.actuators = [{DEFINES["ACTUATOR_DRIVE"]: DEFINES["ACTUATOR_DRIVE_BUILT_MASK"]} for _ in self.axes]
+        self.links = links
         self.received, self.sent, self.word, self.crc_bytes = deque(), [], {}, b""
         self.sequence = 0
         self.answers = READ(self.read), WRITE(self.write)               # kept alive as long as the firmware may call
-        self.firmware = library()
+        self.firmware = library(image)
         self.firmware.register_bridge(*self.answers)
         self.firmware.firmware_start()
 
@@ -293,6 +294,8 @@ class Machine:
         if offset >= d["AXIS_BASE"]:
             axis = (offset - d["AXIS_BASE"]) // d["AXIS_STRIDE"]
             return self.axes[axis].read(offset % d["AXIS_STRIDE"])
+        if offset >= d["LINKS_BASE"]:
+            return self.links.read(offset - d["LINKS_BASE"]) if self.links else 0
         if offset >= d["LINE_BASE"]:
             offset -= d["LINE_BASE"]
             if offset == d["LINE_RECEIVE"]:
@@ -318,6 +321,9 @@ class Machine:
                 self.axes[axis].origin += signed(value & 7, 3) * (PERIOD // 4)
         elif offset >= d["AXIS_BASE"]:
             self.axes[(offset - d["AXIS_BASE"]) // d["AXIS_STRIDE"]].write(offset % d["AXIS_STRIDE"], value)
+        elif offset >= d["LINKS_BASE"]:
+            if self.links:
+                self.links.write(offset - d["LINKS_BASE"], value)
         elif offset == d["LINE_BASE"] + d["LINE_TRANSMIT"]:
             self.sent.append(value)
         elif offset == d["LINE_BASE"] + d["LINE_CRC_START"]:
@@ -343,6 +349,8 @@ class Machine:
                     if axis.passed is not None:
                         grating.index(axis.passed)
             self.clk += CLK_HZ // 1000
+            if self.links:
+                self.links.millisecond(self)
             self.poll()
             if until and until():
                 return True

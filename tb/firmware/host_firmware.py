@@ -12,7 +12,6 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "sw" / "firmware"
 BRIDGE = Path(__file__).with_name("register_bridge.c")
-LIBRARY = ROOT / "build" / "firmware" / "host_firmware.so"
 SEGMENTS = 20
 
 
@@ -43,20 +42,22 @@ WRITE = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32)
 
 
 @cache
-def library():
+def library(image="axis"):
     """Compile if a source is newer; gcc or clang of the system, else zig."""
-    sources = [*sorted(SOURCE.glob("*.[ch]")), BRIDGE]
-    if not LIBRARY.exists() or LIBRARY.stat().st_mtime < max(path.stat().st_mtime for path in sources):
+    others = {path for path in SOURCE.glob("image_*.c") if path.name != f"image_{image}.c"}
+    sources = [*sorted(set(SOURCE.glob("*.[ch]")) - others), BRIDGE]
+    result = ROOT / "build" / "firmware" / f"host_firmware_{image}.so"
+    if not result.exists() or result.stat().st_mtime < max(path.stat().st_mtime for path in sources):
         command = next(([name] for name in ("cc", "gcc", "clang", "g++") if shutil.which(name)), [sys.executable, "-m", "ziglang", "cc"])
-        LIBRARY.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=LIBRARY.parent) as folder:     # two runs at once must not meet
-            made = Path(folder) / LIBRARY.name
+        result.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=result.parent) as folder:     # two runs at once must not meet
+            made = Path(folder) / result.name
             subprocess.run([*command, "-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion", "-Werror",
                             "-fsanitize=undefined", "-fsanitize-undefined-trap-on-error",      # undefined behaviour ends the test
                             "-shared", "-fPIC", "-DMOIRE_REGISTER_ACCESS", f"-I{SOURCE}",
                             *(str(path) for path in sources if path.suffix == ".c"), "-o", str(made)], check=True)
-            os.replace(made, LIBRARY)
-    loaded = ctypes.CDLL(str(LIBRARY))
+            os.replace(made, result)
+    loaded = ctypes.CDLL(str(result))
     loaded.planner_limits.restype = Limits
     loaded.planner_move.restype = loaded.planner_take.restype = ctypes.c_bool
     for name in ("planner_move", "planner_retarget"):

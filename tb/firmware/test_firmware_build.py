@@ -4,6 +4,7 @@ import os
 import struct
 import subprocess
 import sys
+from importlib.util import module_from_spec, spec_from_file_location
 
 import pytest
 
@@ -15,6 +16,13 @@ MEMORY = 98304
 def build(out, *options, **environment):
     return subprocess.run([sys.executable, SOURCE / "build.py", "--out", out, *options], capture_output=True, text=True, check=False,
                           env={**os.environ, **environment})
+
+
+def functions(elf):
+    found = spec_from_file_location("firmware_build", SOURCE / "build.py")
+    tools = module_from_spec(found)
+    found.loader.exec_module(tools)
+    return set(tools.load_segments(elf.read_bytes())[1])
 
 
 @pytest.fixture(scope="module")
@@ -54,3 +62,11 @@ def test_what_cannot_be_made_is_said_in_one_line(tmp_path, options, environment,
     run = build(tmp_path, *options, **environment)
     assert run.returncode == 1 and words in run.stderr and run.stderr.count("\n") == 1 and run.stdout == ""
     assert not (tmp_path / "firmware.hex").exists()
+
+
+def test_each_image_is_made_beside_the_others(made, tmp_path):
+    run = build(tmp_path, "--image", "station")
+    assert run.returncode == 0 and run.stdout.startswith("station: "), run.stderr
+    station, axis = functions(tmp_path / "station.elf"), functions(made[0] / "firmware.elf")
+    assert "settings_operation" in station and not {"correction_work", "learner_work"} & station
+    assert "settings_operation" not in axis and {"correction_work", "learner_work"} <= axis

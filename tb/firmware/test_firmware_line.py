@@ -200,13 +200,15 @@ def test_the_watchdog_time_is_one_for_all_axes():
     assert machine.ask("get_parameter", axis=0, parameter=PARAMETER["watchdog_time"]["id"])["value"] == 77
 
 
-def test_registers_are_read_by_address_but_never_the_receive_queue():
+def test_registers_are_read_by_address_but_never_a_queue():
     machine = Machine()
     assert machine.ask("read_register", address=DEFINES["NODE_MAP_CRC"])["value"] == DEFINES["MAP_CRC"]
     machine.axes[0].word[DEFINES["AXIS_KI"]] = 0xDEADBEEF
     assert machine.ask("read_register", address=DEFINES["AXIS_BASE"] + DEFINES["AXIS_KI"])["value"] == 0xDEADBEEF
-    for address in (1, 2, 3, 0x200, 0x3FC, DEFINES["AXIS_BASE"] + DEFINES["AXIS_STRIDE"], 0xFFFC, 0xFFFF,
-                    DEFINES["LINE_BASE"] + DEFINES["LINE_RECEIVE"]):
+    assert machine.ask("read_register", address=DEFINES["LINKS_BASE"] + DEFINES["LINKS_BUILT"])["value"] == 0
+    for address in (1, 2, 3, 0x300, 0x3FC, DEFINES["AXIS_BASE"] + DEFINES["AXIS_STRIDE"], 0xFFFC, 0xFFFF,
+                    DEFINES["LINE_BASE"] + DEFINES["LINE_RECEIVE"], DEFINES["LINKS_BASE"] + DEFINES["LINKS_I2C_ANSWER"],
+                    DEFINES["LINKS_BASE"] + DEFINES["LINKS_PEER_RECEIVE"]):
         assert machine.request("read_register", address=address)[0] == "no_such_register", hex(address)
 
 

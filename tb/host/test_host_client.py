@@ -392,8 +392,10 @@ def test_the_drive_is_told_in_words():
 
 def test_a_parameter_that_is_a_choice_takes_and_tells_its_words():
     _, node, axis = stage()
-    for name, words in CHOICES.items():
-        known = PARAMETERS[name]
+    for name, known in PARAMETERS.items():
+        if name not in CHOICES:
+            continue
+        words = CHOICES[name]
         assert len(words) == known.max - known.min + 1 and known.min == 0
         for counts, word in enumerate(words):
             assert axis.set_parameter(name, word).counts == counts == axis.set_parameter(name, str(counts)).counts

@@ -64,8 +64,9 @@ def test_the_host_has_every_entry_of_the_source():
         made = line_tables.OPERATIONS[name]
         assert (made.code, [" ".join(field) for field in made.request], [" ".join(field) for field in made.reply]) == (
             source["code"], source["request"], source["reply"])
-    for name, source in TABLE["parameter"].items():
-        made = line_tables.PARAMETERS[name]
+    assert list(line_tables.SETTINGS) == list(TABLE["setting"])
+    for name, source in {**TABLE["parameter"], **TABLE["setting"]}.items():
+        made = {**line_tables.PARAMETERS, **line_tables.SETTINGS}[name]
         assert (made.id, made.unit, made.lsb, made.min, made.max, made.default) == (
             source["id"], source["unit"], Fraction(source["lsb"]), source["min"], source["max"], source["default"])
 
@@ -91,14 +92,17 @@ def test_a_compiler_reads_the_header_and_gets_the_same_numbers(tmp_path):
         '#include <stdio.h>\n#include <stdint.h>\n#include "line_protocol.h"\n'
         '#define P(name, id, min, max, default) printf("%s %d %lld %lld %lld\\n", #name, id, '
         "(long long)min, (long long)max, (long long)default);\n"
-        '#define O(name, code, request, reply) printf("%s %d %d %d\\n", #name, code, (int)request, (int)reply);\n'
-        "int main(void) { LINE_PARAMETERS(P) LINE_OPERATIONS(O) return LINE_CAUSE_NEVER - 20 + LINE_FAULT_PROFILE_UNDERRUN - 256; }\n"
+        '#define O(name, code, request, reply, of_axis) printf("%s %d %d %d %d\\n", #name, code, (int)request, (int)reply, of_axis);\n'
+        "int main(void) { LINE_PARAMETERS(P) LINE_SETTINGS(P) LINE_OPERATIONS(O) "
+        "return LINE_CAUSE_NEVER - 20 + LINE_FAULT_PROFILE_UNDERRUN - 256; }\n"
     )
     subprocess.run([compiler, "-Wall", "-Wextra", "-Werror", "-I", ROOT / "sw" / "firmware", "-o", tmp_path / "print", source], check=True)
     told = subprocess.run([tmp_path / "print"], check=True, capture_output=True, text=True).stdout.splitlines()
-    wanted = [f"{p.name} {p.id} {p.min} {p.max} {p.default}" for p in line_tables.PARAMETERS.values()]
+    wanted = [f"{p.name} {p.id} {p.min} {p.max} {p.default}" for table in (line_tables.PARAMETERS, line_tables.SETTINGS)
+              for p in table.values()]
     size = {"8": 1, "16": 2, "32": 4, "64": 8}
-    wanted += [f"{o.name} {o.code} {2 + sum(size[kind[1:]] for _, kind in o.request)} {3 + sum(size[kind[1:]] for _, kind in o.reply)}"
+    wanted += [f"{o.name} {o.code} {2 + sum(size[kind[1:]] for _, kind in o.request)} {3 + sum(size[kind[1:]] for _, kind in o.reply)} "
+               f"{int(('axis', 'u8') in o.request)}"
                for o in line_tables.OPERATIONS.values()]
     assert told == wanted
 

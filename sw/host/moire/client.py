@@ -48,7 +48,7 @@ CAPTURE_SOURCES = ("index", "tick", "software", "probe_0_rising", "probe_1_risin
 FILTERS = 2                  # of the servo
 FILTER = ("b0", "b1", "b2", "a1", "a2")
 
-# words for the values of a parameter that is a choice, from 0 on
+# words for the values of a parameter or setting that is a choice, from 0 on
 CHOICES = {
     "home_end": ("low", "high"),
     "learning": ("frozen", "learns"),
@@ -58,6 +58,9 @@ CHOICES = {
     "step_output": ("step_and_direction", "quadrature", "pulses"),
     "step_invert": ("none", "step", "direction", "both"),
     "filters": ("none", "first", "second", "both"),
+    "index_way": ("direct", "shorter", "up"),
+    "peer_mode": ("off", "printed", "frames"),
+    "peer_role": ("main", "sub"),
 }
 HOME_METHODS = {"s0": -1, "s3": -2}      # beside the numbers of CiA 402
 
@@ -72,6 +75,7 @@ KINDS = {
     "period/s3": (units.JERK, Fraction(1, 10**6), True),
     "s": (units.TIME, Fraction(1), False),
     "Hz": (units.FREQUENCY, Fraction(1), False),
+    "arcsec": (units.ANGLE, Fraction(1), False),
     "": (units.NUMBER, Fraction(1), False),
 }
 

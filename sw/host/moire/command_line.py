@@ -10,10 +10,10 @@ import sys
 import threading
 from dataclasses import asdict
 from fractions import Fraction
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
-from . import command_look, command_relay, command_replay, command_scope, command_twin, units
+from . import command_index, command_job, command_look, command_relay, command_replay, command_scope, command_twin, units
 from .client import CAPTURE_SOURCES, HOME_METHODS, Line, capture_source, register_fields
 from .errors import BadFile, LineError, MoireError, OutOfRange, PortError, UnitError
 from .line_tables import PARAMETERS
@@ -284,6 +284,8 @@ def make_parser() -> Parser:
     command_scope.add_to(group("scope", "record position, error and command of an axis: arm, read, show", commands, common,
                                "moire --port twin home -- scope arm --trigger motion -- move 100um -- scope read move.csv"),
                          command, checked, write_bytes)
+    command_index.add_to(partial(group, under=commands, common=common), command)
+    command_job.add_to(partial(group, under=commands, common=common), command)
 
     register = command(
         "register", do_register, "read registers of the node, by name or by address", "moire --port twin register axis.position 0x400"

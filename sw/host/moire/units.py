@@ -17,6 +17,7 @@ LENGTHS = {
     "m": Fraction(10**9),
 }
 TIMES = {"ns": Fraction(1, 10**9), "us": Fraction(1, 10**6), "ms": Fraction(1, 1000), "s": Fraction(1), "min": Fraction(60)}
+ANGLES = {"arcsec": Fraction(1), "arcmin": Fraction(60), "deg": Fraction(3600)}
 FREQUENCIES = {"Hz": Fraction(1), "kHz": Fraction(1000), "MHz": Fraction(10**6)}
 
 
@@ -62,6 +63,7 @@ ACCELERATION = Quantity("acceleration", "mm/s2", over_seconds("s2"), "100mm/s2")
 JERK = Quantity("jerk", "mm/s3", over_seconds("s3"), "10000mm/s3")
 TIME = Quantity("time", "s", TIMES, "20ms")
 FREQUENCY = Quantity("frequency", "Hz", FREQUENCIES, "20kHz")
+ANGLE = Quantity("angle", "arcsec", ANGLES, "12.5deg or 0.5arcsec")
 NUMBER = Quantity("number", "", {}, "0.5")
 
 
@@ -73,6 +75,11 @@ def parse_length(text) -> Fraction:
 def parse_speed(text) -> Fraction:
     """In mm/s."""
     return SPEED.parse(text)
+
+
+def parse_angle(text) -> Fraction:
+    """In arcsec."""
+    return ANGLE.parse(text)
 
 
 def parse_time(text) -> Fraction:

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figure of the job's memory (S4): what is in the EEPROM after the power went at any moment.
+
+The firmware runs on this computer around a model of the EEPROM, in which a page that is being written when the power goes holds a
+mixture of what was there, what was to be there, and noise.
+"""
+import random
+import sys
+from pathlib import Path
+
+from experiments.figures_common import Figure, bar, console
+
+ROOT = Path(__file__).resolve().parents[2]
+FIRMWARE_TESTS = str(ROOT / "tb" / "firmware")
+CUTS = 1000
+JOURNAL_SHARE = 0.25                 # of the cuts; the others fall into the writing of a program
+SPARE = 1.1                          # some cuts come when all has been written
+STORE_STOPPED = 6                    # a step of the journal that leaves no job open
+
+
+def begin(station, angles):
+    """Begins to write a program."""
+    station.ask("job_begin")
+    for n, angle in enumerate(angles):
+        station.ask("job_add", station=n, angle=angle)
+    station.ask("job_save")
+
+
+def writing_ms(station):
+    """A function of the count of stations: how long a program is written."""
+    began = []
+    for count in (1, 361 // 2):
+        begin(station, range(count))
+        start = station.clk
+        station.saved()
+        began.append((count, (station.clk - start) * 1000 / station.CLK_HZ))
+    (low, short), (high, long) = began
+    return lambda count: short + (long - short) * (count - low) / (high - low)
+
+
+def torn(cuts=CUTS, seed=1):
+    """Power cuts of so many after which program or journal was neither that of before nor the new one, whole."""
+    sys.path += [path for path in (FIRMWARE_TESTS, str(ROOT / "tb")) if path not in sys.path]
+    from station import TURN, Station
+    source, station = random.Random(seed), Station(seed=seed)
+    station.ready()
+    duration, invalid, found, pages = writing_ms(station), 0, {"old": 0, "new": 0}, 0
+    program, line = station.program(), station.ask("job_program")["journal"]
+    with bar(f"{cuts} power cuts") as progress:
+        for _ in progress.track(range(cuts)):
+            new_program, new_line = program, line
+            if source.random() < JOURNAL_SHARE:
+                new_line = line + 1
+                assert station.firmware.store_note(source.randrange(len(program)), STORE_STOPPED) == 0
+                span = duration(1) / 2
+            else:
+                new_program = sorted(source.sample(range(TURN), source.randrange(1, 361)))
+                begin(station, new_program)
+                span = duration(len(new_program))
+            station.run(source.uniform(0, SPARE * span))
+            station.clk += source.randrange(station.POLL_CLK)
+            pages += station.power_cut()
+            station.ready()
+            kept = station.program(), station.ask("job_program")["journal"]
+            whole = kept in ((program, line), (new_program, new_line)) and kept[0] != []
+            invalid += not whole
+            found["new" if kept == (new_program, new_line) else "old"] += whole
+            program, line = kept
+    console.print(f"{pages} pages torn; {found['old']} times as before, {found['new']} times the new one, {invalid} times neither")
+    return float(invalid)
+
+
+FIGURES = {
+    "eeprom_torn": Figure(torn, "programs", f"invalid program or journal after a power cut at each of {CUTS} random moments", "0",
+                          lambda value: value == 0, 0),
+}

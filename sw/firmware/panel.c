@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: Apache-2.0
+// panel -- key-pad and character display: what the job does, in words, and its program and answers by key. Either may be missing.
+//
+//      7  8  9  START   PAUSE  RESUME  STOP
+//      4  5  6  AGAIN   NEXT   UP      DOWN       up, down: look through the stored stations
+//      1  2  3  DIVIDE  LIST   LIMIT              divide: so many equal parts of a turn; list: angle by angle; limit: longest cut
+//      0  .     ENTER   CLEAR
+//
+// An empty entry ends a list. The keys that are left have no function.
+#include "panel.h"
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "clock.h"
+#include "display.h"
+#include "job.h"
+#include "keypad.h"
+#include "line_protocol.h"
+#include "settings.h"
+#include "store.h"
+
+#define NOTICE_MS 3000u
+#define REFRESH_MS 100u
+#define ENTRY 11u                       // characters
+#define DEGREE 360000u                  // in 0.01 arcsec
+#define DECIMALS 5u                     // of a shown angle
+
+enum mode { SHOW, DIVIDE, LIST, LIMIT, DIVIDING, SAVING };      // what is shown and asked for
+enum key { NONE, UP = 128, DOWN, TO_DIVIDE, TO_LIST, TO_LIMIT, ENTER, CLEAR, ACTION };     // others: the character; ACTION and up: a job_action
+
+#define OF(action) (ACTION + LINE_JOB_ACTION_##action)
+static const uint8_t layout[KEYPAD_KEYS] = {
+    '7', '8', '9', OF(START),  OF(PAUSE), OF(RESUME), OF(STOP),
+    '4', '5', '6', OF(AGAIN),  OF(NEXT),  UP,         DOWN,
+    '1', '2', '3', TO_DIVIDE,  TO_LIST,   TO_LIMIT,   NONE,
+    '0', '.',      ENTER,      CLEAR,
+};
+
+static const char *const titles[] = {"", "stations in a turn", "angle, degrees", "longest cut, s", "writing", "writing"};
+static const char *const action_keys[] = {"START", "PAUSE", "RESUME", "STOP", "AGAIN", "NEXT"};
+
+#define WORDS(code, words) [code] = words,
+static const char *const cause_words[] = {LINE_CAUSE_WORDS(WORDS)};
+static const char *const state_words[] = {LINE_JOB_STATE_WORDS(WORDS)};
+
+static uint8_t mode, notice;            // notice: a cause, shown for a while
+static char entry[ENTRY + 1];
+static uint8_t entered;
+static uint16_t looked_at, parts;       // parts: of the turn that is being divided
+static uint32_t noticed_ms, shown_ms;
+static uint8_t line;                    // that is rendered next
+static char rows[DISPLAY_LINES][DISPLAY_COLUMNS + 1];
+
+// ---- text
+
+static unsigned put(char *row, unsigned at, const char *text)
+{
+    while (*text && at < DISPLAY_COLUMNS) row[at++] = *text++;
+    return at;
+}
+
+// A number with at least so many digits, the last one left of `end`.
+static void put_number(char *row, unsigned end, uint32_t number, unsigned digits)
+{
+    for (unsigned n = 0; n < digits || number; n++) {
+        row[--end] = (char)('0' + number % 10u);
+        number /= 10u;
+    }
+}
+
+static void put_angle(char *row, unsigned end, uint32_t angle)
+{
+    uint32_t part = (uint32_t)((uint64_t)(angle % DEGREE) * 100000u / DEGREE);
+    put_number(row, end, part, DECIMALS);
+    row[end - DECIMALS - 1] = '.';
+    put_number(row, end - DECIMALS - 1, angle / DEGREE, 1);
+}
+
+// Words up to a colon, from this row on; returns the row after them.
+static unsigned put_words(unsigned row, const char *text)
+{
+    unsigned column = 0;
+    while (*text && *text != ':') {
+        unsigned length = 0;
+        while (text[length] && text[length] != ' ' && text[length] != ':') length++;
+        if (column && column + 1 + length > DISPLAY_COLUMNS) {
+            column = 0;
+            row++;
+        }
+        if (row == DISPLAY_LINES) return row;
+        if (column) column++;
+        for (unsigned n = 0; n < length && column < DISPLAY_COLUMNS; n++) rows[row][column++] = text[n];
+        text += length;
+        while (*text == ' ') text++;
+    }
+    return row + (column > 0);
+}
+
+static uint8_t shown_cause(void)
+{
+    if (notice != LINE_CAUSE_OK && clock_ms() - noticed_ms > NOTICE_MS) notice = LINE_CAUSE_OK;
+    return notice != LINE_CAUSE_OK ? notice : mode == SHOW ? job_cause() : LINE_CAUSE_OK;
+}
+
+static void compose_station(unsigned station)
+{
+    unsigned stations = store_stations();
+    if (stations == 0) return;
+    put_number(rows[0], DISPLAY_COLUMNS, stations, 3);
+    rows[0][DISPLAY_COLUMNS - 4] = '/';
+    put_number(rows[0], DISPLAY_COLUMNS - 4, station < stations ? station + 1u : stations, 3);
+}
+
+static void compose_hints(unsigned row)
+{
+    uint8_t answers = job_answers();
+    unsigned at = 0;
+    for (unsigned action = 0; action < sizeof action_keys / sizeof *action_keys; action++) {
+        if (!(answers >> action & 1u)) continue;
+        if (at) at++;
+        at = put(rows[row], at, action_keys[action]);
+    }
+}
+
+static void compose(void)
+{
+    uint8_t cause = shown_cause();
+    bool shows = mode == SHOW, looks = shows && looked_at < store_stations();
+    for (unsigned row = 0; row < DISPLAY_LINES; row++)
+        for (unsigned column = 0; column < DISPLAY_COLUMNS; column++) rows[row][column] = ' ';
+    put(rows[0], 0, looks ? "station" : shows ? state_words[job_state()] : titles[mode]);
+    if (shows) compose_station(looks ? looked_at : job_station());
+    if (mode == LIST) put_number(rows[0], DISPLAY_COLUMNS, store_added() + 1u, 3);
+    unsigned row = 1;
+    if (!shows) {
+        unsigned at = put(rows[row], 0, entry);
+        if (mode <= LIMIT) put(rows[row], at, "_");
+        row++;
+    }
+    if (cause != LINE_CAUSE_OK) {
+        row = put_words(row, cause_words[cause]);
+    } else if (shows && store_stations()) {
+        unsigned station = looks ? looked_at : job_station();
+        if (station < store_stations()) put_angle(rows[row++], DISPLAY_COLUMNS, store_angle(station));
+    }
+    if (row < DISPLAY_LINES && shows) compose_hints(DISPLAY_LINES - 1);
+}
+
+// ---- keys
+
+static void say(uint8_t cause)
+{
+    notice = cause;
+    noticed_ms = clock_ms();
+}
+
+static void clear_entry(void)
+{
+    entered = 0;
+    entry[0] = 0;
+}
+
+static void go(enum mode to)
+{
+    mode = (uint8_t)to;
+    clear_entry();
+}
+
+// The entry in parts of 1 / scale; false if it is none, or out of every range.
+static bool value_of_entry(uint32_t scale, uint32_t *value)
+{
+    uint64_t number = 0, decimals = 1;
+    bool point = false;
+    for (unsigned n = 0; n < entered; n++) {
+        if (entry[n] == '.') {
+            if (point || scale == 1) return false;
+            point = true;
+            continue;
+        }
+        number = number * 10u + (uint64_t)(entry[n] - '0');
+        if (point) decimals *= 10u;
+    }
+    number = (number * scale + decimals / 2) / decimals;
+    *value = (uint32_t)number;
+    return entered > point && number <= INT32_MAX;
+}
+
+static void save(void)
+{
+    uint8_t cause = job_save_program();
+    say(cause);
+    go(cause == LINE_CAUSE_OK ? SAVING : SHOW);
+}
+
+static void begin(enum mode to)         // of a new program
+{
+    uint8_t cause = job_begin_program();
+    say(cause);
+    if (cause == LINE_CAUSE_OK) go(to);
+}
+
+static void entered_list(void)
+{
+    uint32_t angle;
+    if (entered == 0) return save();
+    say(value_of_entry(DEGREE, &angle) ? store_add(angle) : LINE_CAUSE_OUT_OF_RANGE);
+    clear_entry();
+}
+
+static void entered_parts(void)
+{
+    uint32_t count;
+    uint8_t cause = !value_of_entry(1, &count) ? LINE_CAUSE_OUT_OF_RANGE : count == 0 ? LINE_CAUSE_NO_STATIONS :
+                    count > STORE_STATIONS ? LINE_CAUSE_TOO_MANY_STATIONS : LINE_CAUSE_OK;
+    clear_entry();
+    say(cause);
+    if (cause != LINE_CAUSE_OK) return;
+    parts = (uint16_t)count;
+    go(DIVIDING);
+}
+
+static void entered_limit(void)
+{
+    uint32_t limit;
+    uint8_t cause = value_of_entry(1, &limit) ? settings_set(LINE_SETTING_JOB_CUT_LIMIT, limit) : LINE_CAUSE_OUT_OF_RANGE;
+    say(cause);
+    if (cause == LINE_CAUSE_OK) go(SHOW);
+    else clear_entry();
+}
+
+static void enter_key(void)
+{
+    switch (mode) {
+    case DIVIDE: return entered_parts();
+    case LIST: return entered_list();
+    case LIMIT: return entered_limit();
+    default: return say(LINE_CAUSE_KEY_WITHOUT_FUNCTION);
+    }
+}
+
+static void character_key(char character)
+{
+    if (mode < DIVIDE || mode > LIMIT) return say(LINE_CAUSE_KEY_WITHOUT_FUNCTION);
+    if (entered == ENTRY) return say(LINE_CAUSE_OUT_OF_RANGE);
+    say(LINE_CAUSE_OK);
+    entry[entered++] = character;
+    entry[entered] = 0;
+}
+
+static void clear_key(void)             // first what was entered, then out
+{
+    say(LINE_CAUSE_OK);
+    looked_at = STORE_STATIONS;
+    if (entered) clear_entry();
+    else go(SHOW);
+}
+
+static void look(bool up)
+{
+    uint16_t stations = store_stations();
+    if (mode != SHOW || stations == 0) return say(LINE_CAUSE_KEY_WITHOUT_FUNCTION);
+    if (looked_at >= stations) looked_at = job_station() < stations ? job_station() : 0;
+    else looked_at = (uint16_t)((looked_at + (up ? 1u : stations - 1u)) % stations);
+}
+
+static void key_pressed(uint8_t key)
+{
+    if (mode > LIMIT) return say(LINE_CAUSE_STORE_BUSY);
+    if (key >= ACTION) {
+        go(SHOW);
+        looked_at = STORE_STATIONS;
+        return say(job_do(key - ACTION));
+    }
+    switch (key) {
+    case NONE: return say(LINE_CAUSE_KEY_WITHOUT_FUNCTION);
+    case UP: return look(true);
+    case DOWN: return look(false);
+    case TO_DIVIDE: return begin(DIVIDE);
+    case TO_LIST: return begin(LIST);
+    case TO_LIMIT: return go(LIMIT);
+    case ENTER: return enter_key();
+    case CLEAR: return clear_key();
+    default: return character_key((char)key);
+    }
+}
+
+// ---- work
+
+static void divide_on(void)
+{
+    uint32_t n = store_added();
+    if (n == parts) return save();
+    uint8_t cause = store_add((uint32_t)(((uint64_t)n * STORE_TURN + parts / 2u) / parts));
+    if (cause == LINE_CAUSE_OK) return;
+    say(cause);
+    go(SHOW);
+}
+
+static void saved(void)
+{
+    if (store_state() == STORE_WRITING) return;
+    say(store_cause());
+    go(SHOW);
+}
+
+void panel_start(unsigned axes)
+{
+    keypad_start(axes);
+    display_start(axes);
+    looked_at = STORE_STATIONS;
+    notice = LINE_CAUSE_OK;
+    line = DISPLAY_LINES;
+    shown_ms = clock_ms();
+    go(SHOW);
+}
+
+void panel_work(void)
+{
+    uint8_t key = keypad_take();
+    keypad_work();
+    display_work();
+    if (key != KEYPAD_NONE) return key_pressed(layout[key]);
+    if (mode == DIVIDING) return divide_on();
+    if (mode == SAVING) saved();
+    if (line < DISPLAY_LINES) {
+        display_show(line, rows[line]);
+        line++;
+    } else if (clock_ms() - shown_ms >= REFRESH_MS && display_present()) {
+        shown_ms = clock_ms();
+        compose();
+        line = 0;
+    }
+}
+
+bool panel_has_keypad(void)
+{
+    return keypad_present();
+}
+
+bool panel_has_display(void)
+{
+    return display_present();
+}

@@ -1,0 +1,399 @@
+// SPDX-License-Identifier: Apache-2.0
+// peer -- 115200 baud, 8N1. Two modes:
+//
+//   printed   S4's bytes: FF FF AA "cutting done, index to the next station", FF FF 55 "indexing done". Found amid any other bytes.
+//             The sub-node has the list of stations and counts them. Nothing is ever said twice, so what is lost is told by time.
+//   frames    00 · COBS of body and its CRC-32 · 00. The bodies are those of the line: the main node asks, the sub-node does what the
+//             line does. What is not answered is asked again; a request that comes again is answered again and not acted on again.
+#include "peer.h"
+
+#include "clock.h"
+#include "hardware.h"
+#include "index.h"
+#include "line.h"
+#include "line_protocol.h"
+#include "sensor.h"
+#include "settings.h"
+
+#define BAUD 115200u
+#define STATIONS 360u
+#define BYTES_A_POLL 16u
+#define CRC_BYTES 4u
+#define LONGEST_PART (1u + LINE_LONGEST_BODY + CRC_BYTES)       // between the zeros of a frame
+#define ANSWER_MS 100u                  // then a request is sent again
+#define SENDINGS 20u                    // then the sub-node is silent
+#define PAUSE_MS 50u                    // between two looks at an index
+#define BEGIN_MS 10000u                 // for a sub-node that is still at work to stop
+
+enum mode { NOT_IN_USE, PRINTED, FRAMES };
+enum role { MAIN, SUB };
+enum printed { HEAD = 0xFF, DONE = 0x55, NEXT = 0xAA };         // twice the head, then one of the others
+enum step { RESTING, LOOKING, CLEARING, ORDERING, WATCHING, STOPPING };     // what a main node waits to be answered
+
+static struct peer {
+    uint8_t phase;                      // line_peer_phase
+    uint8_t ended;                      // line_cause
+    uint16_t station;
+    uint32_t angle;
+    uint32_t since_ms;                  // the index was asked for
+    uint32_t heard, garbage, repeated;
+} peer;
+
+static struct requests {                // of a main node, frames
+    uint8_t step;
+    uint8_t body[LINE_REQUEST_HEAD + 4];
+    uint8_t length;
+    uint8_t sendings;
+    bool answered;                      // the next look waits for PAUSE_MS
+    uint32_t sent_ms;
+} requests;
+
+static struct replies {                 // of a sub-node, frames
+    bool any;
+    uint32_t request_crc;
+    uint8_t body[LINE_LONGEST_BODY];
+    uint8_t length;
+} replies;
+
+static struct incoming {
+    uint8_t heads;                      // of a printed order, two at most
+    uint8_t bytes[LONGEST_PART];        // of a frame
+    uint32_t count;                     // more than there is room for: it is too long
+} incoming;
+
+static uint32_t stations[STATIONS];     // of a sub-node, printed
+static uint16_t stations_given, station_count, next_station;   // count: 0 until all are given
+
+static uint8_t mode(void)
+{
+    return (uint8_t)settings_get(LINE_SETTING_PEER_MODE);
+}
+
+static uint8_t role(void)
+{
+    return (uint8_t)settings_get(LINE_SETTING_PEER_ROLE);
+}
+
+static void end(uint8_t phase, uint8_t cause)
+{
+    peer.phase = phase;
+    peer.ended = cause;
+    requests.step = RESTING;
+}
+
+// printed
+
+static void say(uint8_t what)
+{
+    const uint8_t bytes[] = {HEAD, HEAD, what};
+    for (uint32_t n = 0; n < sizeof bytes; n++) links_write(LINKS_PEER_TRANSMIT, bytes[n]);
+}
+
+static void next_ordered(void)
+{
+    uint8_t cause;
+    if (peer.phase == LINE_PEER_PHASE_INDEXING) return;
+    peer.station = next_station;
+    if (next_station >= station_count) {
+        end(LINE_PEER_PHASE_FAILED, LINE_CAUSE_NO_STATION);
+        return;
+    }
+    peer.angle = stations[next_station];
+    cause = index_to(peer.angle);
+    end(cause == LINE_CAUSE_OK ? LINE_PEER_PHASE_INDEXING : LINE_PEER_PHASE_FAILED, cause == LINE_CAUSE_OK ? LINE_CAUSE_RUNNING : cause);
+}
+
+static void index_watched(void)         // by a sub-node
+{
+    uint8_t ended = index_ended();
+    if (peer.phase != LINE_PEER_PHASE_INDEXING || ended == LINE_CAUSE_RUNNING) return;
+    end(ended == LINE_CAUSE_OK ? LINE_PEER_PHASE_INDEXED : LINE_PEER_PHASE_FAILED, ended);
+    if (ended != LINE_CAUSE_OK) return;
+    next_station++;
+    say(DONE);
+}
+
+static void printed_byte(uint8_t byte)
+{
+    if (byte == HEAD) {
+        if (incoming.heads == 2) peer.garbage++;
+        if (incoming.heads < 2) incoming.heads++;
+        return;
+    }
+    bool whole = incoming.heads == 2 && byte == (role() == SUB ? NEXT : DONE);
+    peer.garbage += whole ? 0 : 1u + incoming.heads;
+    peer.heard += whole;
+    incoming.heads = 0;
+    if (!whole) return;
+    if (role() == SUB)
+        next_ordered();
+    else if (peer.phase == LINE_PEER_PHASE_INDEXING)
+        end(LINE_PEER_PHASE_INDEXED, LINE_CAUSE_OK);
+}
+
+static void printed_work(void)
+{
+    if (role() == SUB)
+        index_watched();
+    else if (peer.phase == LINE_PEER_PHASE_INDEXING && clock_ms() - peer.since_ms > (uint32_t)settings_get(LINE_SETTING_PEER_PATIENCE))
+        end(LINE_PEER_PHASE_SILENT, LINE_CAUSE_PEER_SILENT);
+}
+
+// frames
+
+static void send_frame(const uint8_t *body, uint32_t length)
+{
+    uint8_t part[LONGEST_PART];
+    uint32_t crc = line_crc(body, length), whole = length + CRC_BYTES, code = 0;
+    if (FIELD_GET(links_read(LINKS_PEER_STATE), LINKS_PEER_STATE_TRANSMIT_FREE) < whole + 3u) return;      // silence, rather than half of it
+    for (uint32_t n = 0; n < whole; n++) {
+        uint8_t byte = (uint8_t)(n < length ? body[n] : crc >> 8 * (n - length));
+        part[n + 1] = byte;
+        if (byte) continue;
+        part[code] = (uint8_t)(n + 1 - code);
+        code = n + 1;
+    }
+    part[code] = (uint8_t)(whole + 1 - code);
+    links_write(LINKS_PEER_TRANSMIT, 0);
+    for (uint32_t n = 0; n <= whole; n++) links_write(LINKS_PEER_TRANSMIT, part[n]);
+    links_write(LINKS_PEER_TRANSMIT, 0);
+}
+
+// In place, from the second byte on; the length of body and CRC-32, 0 if the codes do not lead to the end.
+static uint32_t decode(uint8_t *part, uint32_t count)
+{
+    uint32_t at = 0;
+    while (at < count && part[at]) {
+        uint32_t code = part[at];
+        if (at) part[at] = 0;
+        at += code;
+    }
+    return at == count ? count - 1 : 0;
+}
+
+static void repeat_request(void)
+{
+    requests.sendings++;
+    requests.sent_ms = clock_ms();
+    send_frame(requests.body, requests.length);
+}
+
+static void ask(uint8_t step, uint8_t operation, uint32_t field, uint8_t field_bytes)
+{
+    requests.step = step;
+    requests.body[0]++;                                                     // sequence
+    requests.body[1] = operation;
+    for (uint32_t n = 0; n < field_bytes; n++) requests.body[LINE_REQUEST_HEAD + n] = (uint8_t)(field >> 8 * n);
+    requests.length = LINE_REQUEST_HEAD + field_bytes;
+    requests.sendings = 0;
+    requests.answered = false;
+    repeat_request();
+}
+
+// Looking before an order also makes the order differ from the last request, should this node have begun its sequence anew.
+static void look(uint8_t step)
+{
+    ask(step, LINE_OPERATION_INDEX_STATE, 0, 0);
+}
+
+static void stop(uint8_t step)
+{
+    ask(step, LINE_OPERATION_STOP, 0, 1);
+}
+
+static void watched(const uint8_t *reply)
+{
+    uint8_t ended = reply[LINE_INDEX_STATE_REPLY_ENDED];
+    uint32_t target = 0;
+    for (uint32_t n = 0; n < 4; n++) target |= (uint32_t)reply[LINE_INDEX_STATE_REPLY_TARGET + n] << 8 * n;
+    if (ended == LINE_CAUSE_NEVER || target != peer.angle)
+        end(LINE_PEER_PHASE_FAILED, LINE_CAUSE_PEER_RESTARTED);
+    else if (ended != LINE_CAUSE_RUNNING)
+        end(ended == LINE_CAUSE_OK ? LINE_PEER_PHASE_INDEXED : LINE_PEER_PHASE_FAILED, ended);
+}
+
+static void reply_heard(const uint8_t *reply, uint32_t length)
+{
+    bool ours = requests.step != RESTING && !requests.answered && length >= LINE_REPLY_HEAD && reply[0] == requests.body[0] &&
+                reply[1] == requests.body[1];
+    uint8_t cause = ours ? reply[2] : LINE_CAUSE_OK;
+    if (!ours || (cause == LINE_CAUSE_OK && reply[1] == LINE_OPERATION_INDEX_STATE && length != LINE_INDEX_STATE_REPLY_LENGTH)) {
+        peer.garbage++;
+        return;
+    }
+    peer.heard++;
+    requests.answered = true;
+    requests.sent_ms = clock_ms();
+    if (requests.step == LOOKING && cause == LINE_CAUSE_OK && reply[LINE_INDEX_STATE_REPLY_PHASE] != LINE_INDEX_PHASE_IDLE)
+        cause = LINE_CAUSE_BUSY;
+    if (cause == LINE_CAUSE_BUSY && clock_ms() - peer.since_ms < BEGIN_MS)
+        stop(CLEARING);
+    else if (cause != LINE_CAUSE_OK)
+        end(LINE_PEER_PHASE_FAILED, cause);
+    else if (requests.step == LOOKING)
+        ask(ORDERING, LINE_OPERATION_INDEX_TO, peer.angle, 4);
+    else if (requests.step == WATCHING)
+        watched(reply);
+}
+
+static void request_heard(const uint8_t *request, uint32_t length, uint32_t crc)
+{
+    peer.heard++;
+    if (replies.any && replies.request_crc == crc && replies.body[0] == request[0]) {
+        peer.repeated++;
+    } else {
+        replies.any = true;
+        replies.request_crc = crc;
+        replies.length = line_do(request, (uint8_t)length, replies.body);
+    }
+    send_frame(replies.body, replies.length);
+}
+
+static void frame_ended(void)
+{
+    uint32_t count = incoming.count, whole, length, crc = 0;
+    uint8_t *body = &incoming.bytes[1];
+    incoming.count = 0;
+    if (count == 0) return;
+    whole = count > LONGEST_PART ? 0 : decode(incoming.bytes, count);
+    length = whole - CRC_BYTES;
+    if (whole > CRC_BYTES)
+        for (uint32_t n = 0; n < CRC_BYTES; n++) crc |= (uint32_t)body[length + n] << 8 * n;
+    if (whole <= CRC_BYTES || crc != line_crc(body, length))
+        peer.garbage++;
+    else if (role() == SUB)
+        request_heard(body, length, crc);
+    else
+        reply_heard(body, length);
+}
+
+static void frame_byte(uint8_t byte)
+{
+    if (byte == 0) {
+        frame_ended();
+        return;
+    }
+    if (incoming.count < LONGEST_PART) incoming.bytes[incoming.count] = byte;
+    if (incoming.count <= LONGEST_PART) incoming.count++;
+}
+
+static void frames_work(void)
+{
+    if (requests.step == RESTING || clock_ms() - requests.sent_ms < (requests.answered ? PAUSE_MS : ANSWER_MS)) return;
+    if (!requests.answered && requests.sendings == SENDINGS)
+        end(LINE_PEER_PHASE_SILENT, LINE_CAUSE_PEER_SILENT);
+    else if (!requests.answered)
+        repeat_request();
+    else
+        look(requests.step == CLEARING ? LOOKING : WATCHING);
+}
+
+void peer_start(unsigned axes)
+{
+    uint64_t sixteenths = 16 * (uint64_t)node_read(NODE_CLK_HZ);
+    (void)axes;
+    peer = (struct peer){.phase = LINE_PEER_PHASE_IDLE, .ended = LINE_CAUSE_NEVER};
+    requests = (struct requests){.step = RESTING};
+    replies.any = false;
+    incoming.heads = 0;
+    incoming.count = 0;
+    stations_given = station_count = next_station = 0;
+    links_write(LINKS_PEER_BIT_TIME, (uint32_t)((sixteenths + BAUD / 2) / BAUD));
+}
+
+void peer_work(void)
+{
+    uint8_t used = mode();
+    if (used == NOT_IN_USE) return;
+    for (uint32_t n = 0; n < BYTES_A_POLL; n++) {
+        uint32_t received = links_read(LINKS_PEER_RECEIVE);
+        if (!(received & LINKS_PEER_RECEIVE_PRESENT_MASK)) break;
+        uint8_t byte = (uint8_t)FIELD_GET(received, LINKS_PEER_RECEIVE_DATA);
+        if (used == PRINTED)
+            printed_byte(byte);
+        else
+            frame_byte(byte);
+    }
+    if (used == PRINTED)
+        printed_work();
+    else if (role() == MAIN)
+        frames_work();
+}
+
+uint8_t peer_index(uint16_t station, uint32_t angle)
+{
+    if (!(links_read(LINKS_BUILT) & LINKS_BUILT_PEER_MASK)) return LINE_CAUSE_NOT_BUILT;
+    if (mode() == NOT_IN_USE || role() != MAIN) return LINE_CAUSE_PEER_OFF;
+    if (peer.phase == LINE_PEER_PHASE_INDEXING) return LINE_CAUSE_BUSY;
+    peer.phase = LINE_PEER_PHASE_INDEXING;
+    peer.ended = LINE_CAUSE_RUNNING;
+    peer.station = station;
+    peer.angle = angle;
+    peer.since_ms = clock_ms();
+    if (mode() == PRINTED)
+        say(NEXT);
+    else
+        look(LOOKING);
+    return LINE_CAUSE_OK;
+}
+
+uint8_t peer_stop(void)
+{
+    if (peer.phase != LINE_PEER_PHASE_INDEXING || role() != MAIN) return LINE_CAUSE_OK;
+    if (mode() == FRAMES)
+        stop(STOPPING);
+    else
+        end(LINE_PEER_PHASE_FAILED, LINE_CAUSE_STOPPED);
+    return LINE_CAUSE_OK;
+}
+
+uint8_t peer_state(void)
+{
+    return peer.phase;
+}
+
+uint8_t peer_cause(void)
+{
+    return peer.ended;
+}
+
+static uint8_t take_station(void)
+{
+    uint32_t station = (uint32_t)line_field(LINE_PEER_STATION_REQUEST_STATION, 2);
+    uint32_t count = (uint32_t)line_field(LINE_PEER_STATION_REQUEST_STATIONS, 2), angle = (uint32_t)line_field(LINE_PEER_STATION_REQUEST_ANGLE, 4);
+    if (peer.phase == LINE_PEER_PHASE_INDEXING) return LINE_CAUSE_BUSY;
+    if (count == 0 || count > STATIONS || station >= count || angle >= SENSOR_TURN) return LINE_CAUSE_OUT_OF_RANGE;
+    if (station && (station != stations_given || angle <= stations[station - 1])) return LINE_CAUSE_OUT_OF_RANGE;
+    stations[station] = angle;
+    stations_given = (uint16_t)(station + 1);
+    station_count = stations_given == count ? stations_given : 0;
+    next_station = 0;
+    return LINE_CAUSE_OK;
+}
+
+static uint8_t take_next(void)
+{
+    uint32_t station = (uint32_t)line_field(LINE_PEER_NEXT_REQUEST_STATION, 2);
+    if (station >= station_count) return LINE_CAUSE_NO_STATION;
+    if (peer.phase == LINE_PEER_PHASE_INDEXING) return LINE_CAUSE_BUSY;
+    next_station = (uint16_t)station;
+    return LINE_CAUSE_OK;
+}
+
+uint8_t peer_operation(uint8_t operation)
+{
+    switch (operation) {
+    case LINE_OPERATION_PEER_STATION: return take_station();
+    case LINE_OPERATION_PEER_NEXT: return take_next();
+    case LINE_OPERATION_PEER: break;
+    default: return LINE_CAUSE_NOT_BUILT;
+    }
+    line_answer(LINE_PEER_REPLY_PHASE, peer.phase, 1);
+    line_answer(LINE_PEER_REPLY_ENDED, peer.ended, 1);
+    line_answer(LINE_PEER_REPLY_STATION, peer.station, 2);
+    line_answer(LINE_PEER_REPLY_STATIONS, station_count, 2);
+    line_answer(LINE_PEER_REPLY_HEARD, peer.heard, 4);
+    line_answer(LINE_PEER_REPLY_GARBAGE, peer.garbage, 4);
+    line_answer(LINE_PEER_REPLY_REPEATED, peer.repeated, 4);
+    return LINE_CAUSE_OK;
+}

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// peer -- main node and sub-node speak to each other: index to a station, indexed. docs/indexing.md
+#ifndef MOIRE_PEER_H
+#define MOIRE_PEER_H
+
+#include <stdint.h>
+
+void peer_start(unsigned axes);
+void peer_work(void);
+uint8_t peer_operation(uint8_t operation);
+
+// Of a main node. The first two return a line_cause at once. The angle (0.01 arcsec) goes with frames only: in mode printed the sub-node
+// counts its own stations.
+uint8_t peer_index(uint16_t station, uint32_t angle);
+uint8_t peer_stop(void);                // in mode printed it is not heard: the table turns on to its station
+uint8_t peer_state(void);               // a line_peer_phase
+uint8_t peer_cause(void);               // why it failed, a line_cause
+
+#endif

@@ -1,0 +1,389 @@
+// SPDX-License-Identifier: Apache-2.0
+// store -- the program of stations with the settings, and the journal of the job, in an EEPROM 24AA128, whole after a power cut at any moment.
+//
+// A page that is being written when the power goes may hold anything afterwards. So there are two copies of the program, each with a
+// generation and a CRC-32, and a new one goes over the older; and each line of the journal has a page of its own, used in turn.
+// What was written is read back before it counts. While a page is being written the device does not acknowledge: reading it back is
+// tried until it does.
+#include "store.h"
+
+#include <stddef.h>
+
+#include "clock.h"
+#include "i2c.h"
+#include "line_protocol.h"
+#include "settings.h"
+
+#define DEVICE 0x50u
+#define PAGE 64u
+#define PART 32u                        // bytes read at a time
+#define COPY_BYTES 2048u
+#define JOURNAL 4096u                   // after the two copies
+#define JOURNAL_PAGES 64u
+#define CHECKED 16u                     // bytes of a CRC-32 done in one call
+#define HEAD_BYTES ((unsigned)offsetof(struct store_program, angle))
+#define CRC_BYTES 4u
+#define RECORD_CHECKED 12u              // bytes of a record before its CRC-32
+#define PATIENCE_MS 50u                 // a write takes 5 ms
+#define RETRY_MS 1000u                  // a device that is not there is looked for again
+#define TRIES 3u                        // to write a page
+
+enum task { REST, LOAD, CHECK_LOADED, READ_JOURNAL, SEAL, WRITE, VERIFY, DEAD };
+
+static struct store_program {                   // as in the EEPROM, where a CRC-32 follows the last station
+    uint32_t generation;                        // each saved one has one more; 0: there is none
+    uint16_t settings;                          // so many
+    uint16_t stations;
+    int32_t setting[LINE_SETTING_COUNT];        // those of the station when it was saved
+    uint32_t angle[STORE_STATIONS + 1];         // 0.01 arcsec, ascending; one more for the CRC-32
+} programs[2];                                  // by copy
+static struct store_record last, candidate;
+static uint8_t newest;                          // copy in force
+static bool blank[2], torn, drafting;
+static uint8_t task, cause;
+static bool noting;                             // what is written: a record, else a program
+static uint16_t at;                             // byte of the program, or page of the journal
+static uint32_t crc, since_ms;
+static uint8_t tries;
+static uint8_t out[2 + PAGE], in[PAGE];
+static struct i2c_transfer transfer;
+
+static uint32_t crc32(uint32_t state, const uint8_t *bytes, unsigned count)
+{
+    static const uint32_t of_nibble[16] = {0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4, 0x4db26158, 0x5005713c,
+                                           0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c, 0x9b64c2b0, 0x86d3d2d4, 0xa00ae278, 0xbdbdf21c};
+    while (count--) {
+        state ^= *bytes++;
+        state = state >> 4 ^ of_nibble[state & 15];
+        state = state >> 4 ^ of_nibble[state & 15];
+    }
+    return state;
+}
+
+static void copy(void *to, const void *from, unsigned count)
+{
+    uint8_t *t = to;
+    const uint8_t *f = from;
+    while (count--) *t++ = *f++;
+}
+
+static uint8_t *bytes_of(unsigned which)
+{
+    return (uint8_t *)&programs[which];
+}
+
+// Bytes of a program that its CRC-32 is about.
+static unsigned program_bytes(const struct store_program *program)
+{
+    unsigned stations = program->stations <= STORE_STATIONS ? program->stations : STORE_STATIONS;
+    return HEAD_BYTES + 4u * stations;
+}
+
+static uint16_t record_place(uint32_t sequence)
+{
+    return (uint16_t)(JOURNAL + sequence % JOURNAL_PAGES * PAGE);
+}
+
+static void transfer_begin(uint16_t place, unsigned write_count, unsigned read_count)
+{
+    out[0] = (uint8_t)(place >> 8);
+    out[1] = (uint8_t)place;
+    transfer = (struct i2c_transfer){.address = DEVICE, .write = out, .write_count = (uint8_t)(2 + write_count),
+                                     .read = in, .read_count = (uint8_t)read_count};
+    i2c_begin(I2C_STORE, &transfer);
+}
+
+static void go(enum task to)
+{
+    task = (uint8_t)to;
+    since_ms = clock_ms();
+}
+
+static void end(uint8_t with)
+{
+    cause = with;
+    go(with == LINE_CAUSE_STORE_MISSING ? DEAD : REST);
+}
+
+// ---- loading: both copies, then the journal
+
+static void load_part(void)
+{
+    transfer_begin((uint16_t)(newest * COPY_BYTES + at), 0, PART);
+}
+
+static void load_begin(unsigned which)          // `newest` is the copy being loaded until both are there
+{
+    newest = (uint8_t)which;
+    blank[which] = true;
+    at = 0;
+    go(LOAD);
+    load_part();
+}
+
+static void loaded_part(void)
+{
+    struct store_program *program = &programs[newest];
+    for (unsigned n = 0; n < PART; n++) blank[newest] = blank[newest] && in[n] == 0xFF;
+    copy(bytes_of(newest) + at, in, at + PART <= sizeof *program ? PART : sizeof *program - at);
+    at = (uint16_t)(at + PART);
+    go(LOAD);
+    if (at < program_bytes(program) + CRC_BYTES) return load_part();
+    at = 0;
+    crc = UINT32_MAX;
+    go(CHECK_LOADED);
+}
+
+static void choose(void)
+{
+    bool both_blank = blank[0] && blank[1];
+    torn = (programs[0].generation == 0 && !blank[0]) || (programs[1].generation == 0 && !blank[1]);
+    newest = programs[1].generation > programs[0].generation;
+    for (uint8_t id = 1; programs[newest].generation && id <= LINE_SETTING_COUNT; id++) settings_set(id, programs[newest].setting[id - 1]);
+    cause = programs[newest].generation ? LINE_CAUSE_OK : both_blank ? LINE_CAUSE_NO_PROGRAM : LINE_CAUSE_PROGRAM_TORN;
+    last = (struct store_record){0};
+    at = 0;
+    go(READ_JOURNAL);
+    transfer_begin(record_place(at), 0, sizeof candidate);
+}
+
+// The CRC-32 goes on by a few bytes; true when all are in it.
+static bool crc_step(const struct store_program *program, unsigned which)
+{
+    unsigned left = program_bytes(program) - at, now = left < CHECKED ? left : CHECKED;
+    crc = crc32(crc, bytes_of(which) + at, now);
+    at = (uint16_t)(at + now);
+    return now == left;
+}
+
+static void check_loaded(void)
+{
+    struct store_program *program = &programs[newest];
+    if (!crc_step(program, newest)) return;
+    if (program->settings != LINE_SETTING_COUNT || program->stations > STORE_STATIONS || program->angle[program->stations] != ~crc)
+        program->generation = program->stations = 0;
+    newest ? choose() : load_begin(1);
+}
+
+static void journal_read(void)
+{
+    copy(&candidate, in, sizeof candidate);
+    if (candidate.sequence > last.sequence && candidate.sequence % JOURNAL_PAGES == at && ~crc32(UINT32_MAX, in, RECORD_CHECKED) == candidate.crc)
+        last = candidate;
+    go(READ_JOURNAL);
+    if (++at == JOURNAL_PAGES) return end(cause);
+    transfer_begin(record_place(at), 0, sizeof candidate);
+}
+
+// ---- writing: a page, and read back
+
+static const uint8_t *source(void)
+{
+    return noting ? (const uint8_t *)&candidate : bytes_of(!newest) + at;
+}
+
+static unsigned page_bytes(void)
+{
+    unsigned left = program_bytes(&programs[!newest]) + CRC_BYTES - at;
+    return noting ? sizeof candidate : left < PAGE ? left : PAGE;
+}
+
+static uint16_t page_place(void)
+{
+    return noting ? record_place(candidate.sequence) : (uint16_t)(!newest * COPY_BYTES + at);
+}
+
+static void write_page(void)
+{
+    unsigned bytes = page_bytes();
+    copy(&out[2], source(), bytes);
+    go(WRITE);
+    transfer_begin(page_place(), bytes, 0);
+}
+
+static void read_back(void)
+{
+    transfer_begin(page_place(), 0, page_bytes());
+}
+
+static void seal(void)
+{
+    struct store_program *program = &programs[!newest];
+    if (!crc_step(program, !newest)) return;
+    program->angle[program->stations] = ~crc;
+    at = 0;
+    write_page();
+}
+
+static void seal_record(void)
+{
+    candidate.crc = ~crc32(UINT32_MAX, (const uint8_t *)&candidate, RECORD_CHECKED);
+}
+
+static void verify(void)
+{
+    const uint8_t *wanted = source();
+    unsigned bytes = page_bytes();
+    for (unsigned n = 0; n < bytes; n++) {
+        if (in[n] == wanted[n]) continue;
+        if (++tries == TRIES) return end(LINE_CAUSE_STORE_FAILED);
+        if (noting) {                           // on the next page
+            candidate.sequence++;
+            seal_record();
+        }
+        return write_page();
+    }
+    tries = 0;
+    if (noting) {
+        last = candidate;
+        return end(LINE_CAUSE_OK);
+    }
+    at = (uint16_t)(at + PAGE);
+    if (at < program_bytes(&programs[!newest]) + CRC_BYTES) return write_page();
+    newest = !newest;
+    torn = drafting = false;
+    end(LINE_CAUSE_OK);
+}
+
+// ---- the rest
+
+// A transfer that failed is done again until patience ends.
+static void again(void)
+{
+    if (clock_ms() - since_ms > PATIENCE_MS) return end(LINE_CAUSE_STORE_MISSING);
+    i2c_begin(I2C_STORE, &transfer);
+}
+
+static void load(void)
+{
+    for (unsigned which = 0; which < 2; which++) programs[which].generation = programs[which].stations = 0;
+    last = (struct store_record){0};
+    torn = drafting = false;
+    load_begin(0);
+}
+
+void store_start(unsigned axes)
+{
+    (void)axes;
+    cause = LINE_CAUSE_OK;
+    load();
+}
+
+void store_work(void)
+{
+    enum i2c_outcome outcome = i2c_outcome(I2C_STORE);
+    if (task == REST || outcome == I2C_BUSY) return;
+    if (task == DEAD) {
+        if (clock_ms() - since_ms > RETRY_MS) load();
+        return;
+    }
+    if (task == CHECK_LOADED) return check_loaded();
+    if (task == SEAL) return seal();
+    if (outcome != I2C_OK) return again();
+    switch (task) {
+    case LOAD: return loaded_part();
+    case READ_JOURNAL: return journal_read();
+    case WRITE: go(VERIFY); return read_back();
+    default: return verify();
+    }
+}
+
+enum store_state store_state(void)
+{
+    if (task == DEAD) return STORE_DEAD;
+    return task == REST ? STORE_READY : task <= READ_JOURNAL ? STORE_LOADING : STORE_WRITING;
+}
+
+uint8_t store_cause(void)
+{
+    return cause;
+}
+
+bool store_torn(void)
+{
+    return torn;
+}
+
+uint16_t store_stations(void)
+{
+    return store_state() == STORE_LOADING ? 0 : programs[newest].stations;
+}
+
+uint32_t store_angle(unsigned station)
+{
+    return programs[newest].angle[station];
+}
+
+uint32_t store_generation(void)
+{
+    return store_state() == STORE_LOADING ? 0 : programs[newest].generation;
+}
+
+const struct store_record *store_record(void)
+{
+    return &last;
+}
+
+static uint8_t may_write(void)
+{
+    return task == REST ? LINE_CAUSE_OK : task == DEAD ? LINE_CAUSE_STORE_MISSING : LINE_CAUSE_STORE_BUSY;
+}
+
+uint8_t store_begin(void)
+{
+    uint8_t refused = may_write();
+    if (refused != LINE_CAUSE_OK) return refused;
+    programs[!newest].stations = 0;
+    drafting = true;
+    return LINE_CAUSE_OK;
+}
+
+uint8_t store_add(uint32_t angle)
+{
+    struct store_program *program = &programs[!newest];
+    uint8_t refused = may_write();
+    unsigned n = program->stations;
+    if (refused != LINE_CAUSE_OK) return refused;
+    if (!drafting) return LINE_CAUSE_PROGRAM_INCOMPLETE;
+    if (n == STORE_STATIONS) return LINE_CAUSE_TOO_MANY_STATIONS;
+    if (angle >= STORE_TURN) return LINE_CAUSE_ANGLE_OUT_OF_TURN;
+    if (n > 0 && angle <= program->angle[n - 1]) return LINE_CAUSE_ANGLES_NOT_ASCENDING;
+    program->angle[n] = angle;
+    program->stations++;
+    return LINE_CAUSE_OK;
+}
+
+uint16_t store_added(void)
+{
+    return drafting ? programs[!newest].stations : 0;
+}
+
+uint8_t store_save(void)
+{
+    struct store_program *program = &programs[!newest];
+    uint8_t refused = may_write();
+    if (refused != LINE_CAUSE_OK) return refused;
+    if (store_added() == 0) return LINE_CAUSE_NO_STATIONS;
+    program->generation = programs[newest].generation + 1;
+    program->settings = LINE_SETTING_COUNT;
+    for (uint8_t id = 1; id <= LINE_SETTING_COUNT; id++) program->setting[id - 1] = (int32_t)settings_get(id);
+    noting = false;
+    tries = 0;
+    at = 0;
+    crc = UINT32_MAX;
+    go(SEAL);
+    return LINE_CAUSE_OK;
+}
+
+uint8_t store_note(uint16_t station, enum store_step step)
+{
+    uint8_t refused = may_write();
+    if (refused != LINE_CAUSE_OK) return refused;
+    candidate = (struct store_record){.sequence = last.sequence + 1, .generation = programs[newest].generation,
+                                      .station = station, .step = (uint16_t)step};
+    seal_record();
+    noting = true;
+    tries = 0;
+    write_page();
+    return LINE_CAUSE_OK;
+}

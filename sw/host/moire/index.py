@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The table of a station: turned to absolute angles of its sensor (S4). Angles in arcsec, or texts such as "12.5deg".
+
+    table = Table(line.node(2))
+    table.index("10deg")                                    turns, waits, returns its TableState
+    table.sensor().angle
+    table.stations(["0deg", "10deg", "20deg"])              for a sub-node in mode printed
+"""
+from dataclasses import dataclass
+from fractions import Fraction
+
+from . import units
+from .client import CAUSE_CODES, named, words
+from .errors import MotionFailed, OutOfRange
+from .line_tables import CAUSES, INDEX_PHASES, PEER_PHASES
+
+TURN = 360 * 3600                # arcsec
+COUNTS = 100                     # of the wire in an arcsec
+MOST_STATIONS = 360
+
+
+@dataclass(frozen=True)
+class TableState:
+    phase: str
+    ended: str                   # cause of the last index
+    tries: int
+    overshoots: int
+    target: Fraction             # arcsec, as the next two
+    reading: Fraction            # last angle read at rest
+    left: Fraction               # to the target
+
+    @property
+    def words(self) -> str:
+        return words(INDEX_PHASES, [self.phase])
+
+    @property
+    def ended_words(self) -> str:
+        return words(CAUSES, [self.ended])
+
+
+@dataclass(frozen=True)
+class SensorState:
+    angle: Fraction              # arcsec, of the last good frame
+    age_s: Fraction              # of it
+    dead: bool
+    frames: int                  # good ones since power-up
+    wrong_crc: int
+    broken: int
+    missed: int                  # by the gaps of their numbers
+
+
+@dataclass(frozen=True)
+class PeerState:
+    phase: str
+    ended: str
+    station: int                 # from 0 on
+    stations: int                # that a sub-node in mode printed was given
+    heard: int                   # orders or frames
+    garbage: int                 # bytes or frames not understood
+    repeated: int                # requests answered again
+
+    @property
+    def words(self) -> str:
+        return words(PEER_PHASES, [self.phase])
+
+    @property
+    def ended_words(self) -> str:
+        return words(CAUSES, [self.ended])
+
+
+def angle_counts(angle) -> int:
+    """What the wire carries for an angle in arcsec or with a unit."""
+    wanted = units.parse_angle(angle)
+    counts = round(wanted * COUNTS)
+    if not 0 <= counts < TURN * COUNTS:
+        raise OutOfRange(f"an angle is 0deg or more and below 360deg, not {units.with_unit(units.ANGLE, wanted, 9)}")
+    return counts
+
+
+def arcsec(counts: int) -> Fraction:
+    return Fraction(counts, COUNTS)
+
+
+class Table:
+    def __init__(self, node):
+        self.node = node
+
+    def state(self) -> TableState:
+        told = self.node.request("index_state")
+        return TableState(named(INDEX_PHASES, told["phase"], "phase"), named(CAUSES, told["ended"], "cause"), told["tries"],
+                          told["overshoots"], *(arcsec(told[name]) for name in ("target", "reading", "left")))
+
+    def sensor(self) -> SensorState:
+        told = self.node.request("sensor")
+        return SensorState(arcsec(told["angle"]), Fraction(told["age"], self.node.identity.clk_hz), bool(told["dead"]),
+                           *(told[name] for name in ("frames", "wrong_crc", "broken", "missed")))
+
+    def begin(self, angle):
+        """Returns at once. A drive that is off is switched on."""
+        self.node.request("index_to", angle=angle_counts(angle))
+
+    def index(self, angle, progress=None) -> TableState:
+        """Turns to an angle and waits; MotionFailed says why it did not get there. Whatever interrupts the wait stops the table."""
+        self.begin(angle)
+        try:
+            state = self.wait(progress)
+        except BaseException:
+            self.stop()
+            raise
+        if state.ended != "ok":
+            raise MotionFailed(state.ended, CAUSE_CODES[state.ended], f"the table of node {self.node.address} is not at "
+                               f"{units.with_unit(units.ANGLE, state.target, 9)}: {state.ended_words}")
+        return state
+
+    def wait(self, progress=None) -> TableState:
+        while (state := self.state()).phase != "idle":
+            if progress:
+                progress(state)
+            self.node.line.transport.wait(self.node.line.poll_s)
+        return state
+
+    def stop(self):
+        self.node.request("stop", axis=0)
+
+    def peer(self) -> PeerState:
+        told = self.node.request("peer")
+        return PeerState(**{**told, "phase": named(PEER_PHASES, told["phase"], "phase"), "ended": named(CAUSES, told["ended"], "cause")})
+
+    def stations(self, angles):
+        """The program of a sub-node in mode printed; its next order goes to the first of them."""
+        counts = [angle_counts(angle) for angle in angles]
+        if not 1 <= len(counts) <= MOST_STATIONS:
+            raise OutOfRange(f"a program has 1 to {MOST_STATIONS} stations, not {len(counts)}")
+        for number, (before, after) in enumerate(zip(counts, counts[1:], strict=False), 1):
+            if after <= before:
+                place = units.with_unit(units.ANGLE, arcsec(after), 9)
+                raise OutOfRange(f"station {number} at {place} does not lie above the one before it")
+        for number, count in enumerate(counts):
+            self.node.request("peer_station", station=number, stations=len(counts), angle=count)
+
+    def next_station(self, number: int):
+        """To which the next order in mode printed goes, from 0 on."""
+        self.node.request("peer_next", station=number)

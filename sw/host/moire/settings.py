@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The settings of a station: one set a node, in a node whose firmware is the image `station`.
+
+    settings = Settings(node)
+    settings.get("index_tolerance").value                  Fraction(1, 2), arcsec
+    settings.set("index_tolerance", "0.3arcsec")
+"""
+from fractions import Fraction
+
+from . import units
+from .client import KINDS, ParameterValue, choice
+from .errors import OutOfRange, UnknownName
+from .line_tables import SETTINGS
+
+
+def known(name: str):
+    if name not in SETTINGS:
+        raise UnknownName(f"there is no setting '{name}': known are {', '.join(SETTINGS)}")
+    return SETTINGS[name]
+
+
+def one_count(setting) -> Fraction:
+    return setting.lsb * KINDS[setting.unit][1]
+
+
+def setting_value(name: str, counts: int) -> ParameterValue:
+    setting = known(name)
+    one, quantity = one_count(setting), KINDS[setting.unit][0]
+    low, high, default = (count * one for count in (setting.min, setting.max, setting.default))
+    return ParameterValue(name, setting.id, counts, counts * one, quantity.base, low, high, default, setting.text, quantity)
+
+
+def setting_counts(name: str, value) -> int:
+    """What the wire carries; OutOfRange says what is allowed."""
+    setting = known(name)
+    if isinstance(value, str) and (chosen := choice(name, value)) is not None:
+        return chosen
+    quantity = KINDS[setting.unit][0]
+    wanted = quantity.parse(value)
+    counts = round(wanted / one_count(setting))
+    if not setting.min <= counts <= setting.max:
+        allowed = setting_value(name, setting.default).range_words
+        raise OutOfRange(f"{name} allows {allowed}, not {units.with_unit(quantity, wanted, 6)}")
+    if setting.lsb == 1 and not setting.unit and wanted != counts:
+        raise OutOfRange(f"{name} takes whole numbers, not {units.decimal(wanted)}")
+    return counts
+
+
+class Settings:
+    def __init__(self, node):
+        self.node = node
+
+    def get(self, name: str) -> ParameterValue:
+        return setting_value(name, self.node.request("get_setting", setting=known(name).id)["value"])
+
+    def set(self, name: str, value) -> ParameterValue:
+        """`value` is a number in the unit of get(), or a text with a unit. Returns what was set: the nearest count."""
+        counts = setting_counts(name, value)
+        self.node.request("set_setting", setting=known(name).id, value=counts)
+        return setting_value(name, counts)
+
+    def all(self) -> dict:
+        return {name: self.get(name) for name in SETTINGS}
+
+    def save(self) -> dict:
+        """All as exact texts, ready for a JSON file."""
+        return {name: value.written() for name, value in self.all().items()}
+
+    def load(self, texts: dict) -> dict:
+        """Some or all, as saved; every one is checked before the first is written."""
+        for name, text in texts.items():
+            setting_counts(name, text)
+        return {name: self.set(name, text) for name, text in texts.items()}

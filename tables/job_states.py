@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The picture of the job's states in docs/job.md, made of the table of transitions in sw/firmware/job.c; and the rules it keeps.
+
+python tables/job_states.py            writes the picture when it is stale
+python tables/job_states.py --check    writes nothing; exit code 1 when it is stale
+"""
+import argparse
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+SOURCE = ROOT / "sw" / "firmware" / "job.c"
+LINE = ROOT / "tables" / "line.toml"
+PAGE = ROOT / "docs" / "job.md"
+BEGIN, END = "<!-- made by tables/job_states.py -->", "<!-- end of job_states -->"
+UNDER_WAY = "UNDER_WAY"                     # in the table: from any state in which a job is under way
+FIRST = "LOADING"
+TABLE = tomllib.loads(LINE.read_text(encoding="utf-8"))
+ACTIONS = {name.upper() for name in TABLE["job_action"]}
+
+
+def transitions(text):
+    """[(from, event, to)] in their order."""
+    table = re.search(r"transitions\[\] = \{\n(.*?)\n\};", text, re.DOTALL)
+    if not table:
+        raise ValueError("job.c has no table of transitions")
+    found = []
+    for line in table[1].splitlines():
+        row = re.fullmatch(r"\s*\{(\w+),\s*(\w+),\s*(\w+),\s*\w+\},", line)
+        if not row:
+            raise ValueError(f"job.c: '{line.strip()}' is no transition")
+        found.append(row.groups())
+    return found
+
+
+def check(rows, states):
+    """Every state is in line.toml, can be reached and left; what waits for a person goes on by a person only."""
+    used = {row[0] for row in rows if row[0] != UNDER_WAY} | {row[2] for row in rows}
+    if used != states:
+        raise ValueError(f"job.c and the job_state of line.toml differ: {', '.join(sorted(used ^ states))}")
+    reached = {FIRST}
+    while more := {to for start, _, to in rows if start in reached | {UNDER_WAY}} - reached:
+        reached |= more
+    if states - reached:
+        raise ValueError(f"job.c: {', '.join(sorted(states - reached))} cannot be reached")
+    for state in states:
+        events = {event for start, event, _ in rows if start == state}
+        if not events:
+            raise ValueError(f"job.c: {state} has no way out")
+        if state in ("PAUSED", "UNSURE", "IDLE", "FINISHED") and not events <= ACTIONS:
+            raise ValueError(f"job.c: {state} ends without a person")
+
+
+def picture(rows):
+    """Mermaid; a person's actions in capitals."""
+    out = ["```mermaid", "stateDiagram-v2", "    direction TB", f"    [*] --> {FIRST.lower()}"]
+    joined = {}
+    for start, event, to in rows:
+        if start != UNDER_WAY:
+            joined.setdefault((start, to), []).append(event)
+    for (start, to), events in joined.items():
+        out.append(f"    {start.lower()} --> {to.lower()} : {', '.join(label(event) for event in events)}")
+    return [*out, "```"]
+
+
+def label(event):
+    return event if event in ACTIONS else event.lower().replace("_", " ")
+
+
+def from_anywhere(rows):
+    return [f"From every state in which a job is under way {event} leads to {to.lower()}." for start, event, to in rows
+            if start == UNDER_WAY]
+
+
+def made():
+    rows = transitions(SOURCE.read_text(encoding="utf-8"))
+    check(rows, {name.upper() for name in TABLE["job_state"]})
+    text = PAGE.read_text(encoding="utf-8")
+    if text.count(BEGIN) != 1 or text.count(END) != 1:
+        raise ValueError(f"docs/job.md needs the marks '{BEGIN}' and '{END}' exactly once")
+    before, after = text.split(BEGIN)[0], text.split(END)[1]
+    return before + "\n".join([BEGIN, "", *picture(rows), "", *from_anywhere(rows), "", END]) + after
+
+
+def main(arguments=None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--check", action="store_true", help="write nothing, exit with 1 when the picture is stale")
+    only_check, text = parser.parse_args(arguments).check, made()
+    if PAGE.read_text(encoding="utf-8") == text:
+        return 0
+    if only_check:
+        print("docs/job.md is stale: run python tables/job_states.py", file=sys.stderr)
+        return 1
+    PAGE.write_text(text, encoding="utf-8", newline="\n")
+    print("made docs/job.md")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

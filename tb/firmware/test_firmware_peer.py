@@ -1,0 +1,461 @@
+# SPDX-License-Identifier: Apache-2.0
+"""peer.c: two nodes over a line that adds, loses and damages bytes; the main node's side is that which job.c will call."""
+import ctypes
+import random
+import zlib
+
+import pytest
+
+from bench import seed
+from fake_links import Links, PeerPort, Sensor, Table
+from fake_machine import CAUSE, TABLE, Axis, Machine
+
+OPERATION = {name: operation["code"] for name, operation in TABLE["operation"].items()}
+PHASE = {code: name for name, (code, _) in TABLE["peer_phase"].items()}
+SETTING = TABLE["setting"]
+PRINTED, FRAMES = 1, 2
+MAIN, SUB = 0, 1
+ORDER, DONE = b"\xFF\xFF\xAA", b"\xFF\xFF\x55"
+ARCSEC = 100
+AXIS = {"position_source": 2, "velocity": 30000, "acceleration": 500000, "jerk": 50000000, "home_creep": 300, "following_limit": 2**31 - 1}
+
+
+class Node(Machine):
+    """The firmware has one set of variables: so this is one of the two, the test speaks for the other."""
+
+    def __init__(self, mode, role):
+        self.random = random.Random(seed())
+        self.table = Table(self.random)
+        self.sensor, self.port = Sensor(self.random, self.table), PeerPort()
+        super().__init__(Axis(), image="station", links=Links(self.sensor, self.port))
+        self.set(**AXIS)
+        self.tell(peer_mode=mode, peer_role=role)
+        self.run(50)
+
+    def tell(self, **settings):
+        for name, value in settings.items():
+            self.ask("set_setting", setting=SETTING[name]["id"], value=value)
+
+    def say(self, data):
+        self.port.received.extend(data)
+
+    def peer(self):
+        peer = self.ask("peer")
+        return {**peer, "phase": PHASE[peer["phase"]], "ended": CAUSE[peer["ended"]]}
+
+    def heard(self, ms=20):
+        """What it sends meanwhile."""
+        self.other = self.port.other = PeerPort()
+        self.run(ms)
+        return bytes(self.other.received)
+
+    def order(self, station=0, arcsec=0):
+        return CAUSE[self.firmware.peer_index(station, ctypes.c_uint32(round(arcsec * ARCSEC)))]
+
+
+def stations(node, *arcsec):
+    for number, place in enumerate(arcsec):
+        node.ask("peer_station", station=number, stations=len(arcsec), angle=place * ARCSEC)
+
+
+# ------------------------------------------------------------------ frames, by hand
+
+def frame(body):
+    data, out = body + zlib.crc32(body).to_bytes(4, "little"), b""
+    for part in data.split(b"\0"):
+        assert len(part) < 254
+        out += bytes([len(part) + 1]) + part
+    return b"\0" + out + b"\0"
+
+
+def bodies(data):
+    """Of all good frames."""
+    found = []
+    for part in data.split(b"\0"):
+        whole, at = b"", 0
+        while at < len(part):
+            whole += (b"\0" if at else b"") + part[at + 1:at + part[at]]
+            at += part[at]
+        if len(whole) > 4 and zlib.crc32(whole[:-4]) == int.from_bytes(whole[-4:], "little"):
+            found.append(whole[:-4])
+    return found
+
+
+def index_to(sequence, arcsec):
+    return bytes([sequence, OPERATION["index_to"]]) + round(arcsec * ARCSEC).to_bytes(4, "little")
+
+
+def look(sequence):
+    return bytes([sequence, OPERATION["index_state"]])
+
+
+# ------------------------------------------------------------------ the sub-node, printed
+
+def test_the_order_as_printed_indexes_to_the_next_station_and_is_answered_as_printed():
+    node = Node(PRINTED, SUB)
+    stations(node, 600, 900, 1500)
+    for place in (600, 900, 1500):
+        node.say(ORDER)
+        assert node.heard(200) == b"" and node.peer()["phase"] == "indexing"
+        node.port.other = PeerPort()
+        assert node.run(60_000, until=lambda: node.port.other.received and not node.port.sent)
+        assert bytes(node.port.other.received) == DONE and node.peer()["phase"] == "indexed"
+        assert abs(node.table.angle - place) <= 2
+    node.say(ORDER)
+    assert node.heard(3000) == b""
+    assert (node.peer()["phase"], node.peer()["ended"]) == ("failed", "no_station")
+
+
+@pytest.mark.parametrize("before", [b"", b"\xFF", b"\xFF\xFF\xFF", b"\xFF\xAA", b"\xFF\xFF\x55", b"\xFF\xFF\x00\xFF", b"\xAA\xAA",
+                                    bytes(range(256))])
+def test_an_order_is_found_after_any_garbage(before):
+    node = Node(PRINTED, SUB)
+    stations(node, 600)
+    for byte in before:
+        node.say([byte])
+        node.run(1)
+    assert node.peer()["phase"] == "idle"
+    node.say(ORDER)
+    node.run(20)
+    assert node.peer()["phase"] == "indexing" and node.peer()["garbage"] == len(before) and node.peer()["heard"] == 1
+
+
+def test_a_node_that_hears_nothing_but_garbage_for_long_still_hears_an_order():
+    node, source = Node(PRINTED, SUB), random.Random(seed())
+    stations(node, 600)
+    sent = 0
+    for _ in range(500):
+        part = bytes(source.choice((0xFF, 0xFF, 0x55, 0x00, source.randrange(256))) for _ in range(20)).replace(ORDER, b"")
+        sent += len(part)
+        node.say(part + b"\0")
+        node.run(3)
+    assert node.peer()["phase"] == "idle" and node.peer()["garbage"] == sent + 500
+    node.say(ORDER)
+    node.run(20)
+    assert node.peer()["phase"] == "indexing"
+
+
+def test_an_index_that_fails_is_not_answered_and_the_next_order_goes_there_again():
+    node = Node(PRINTED, SUB)
+    stations(node, 3600, 7200)
+    node.say(ORDER)
+    node.run(500)
+    node.sensor.dead = True
+    assert node.heard(2000) == b"" and node.peer()["ended"] == "sensor_dead" and node.peer()["phase"] == "failed"
+    node.sensor.dead = False
+    node.run(50)
+    node.say(ORDER)
+    assert node.run(60_000, until=lambda: node.peer()["phase"] == "indexed") and abs(node.table.angle - 3600) <= 2
+
+
+def test_a_second_order_while_it_indexes_is_nothing():
+    node = Node(PRINTED, SUB)
+    stations(node, 600, 1200)
+    node.say(ORDER)
+    node.run(100)
+    node.say(ORDER)
+    assert node.run(60_000, until=lambda: node.peer()["phase"] == "indexed")
+    node.run(500)
+    assert abs(node.table.angle - 600) <= 2 and node.peer()["phase"] == "indexed"
+
+
+def test_stations_come_in_their_order_and_count_when_all_are_there():
+    node = Node(PRINTED, SUB)
+
+    def give(station, count, angle):
+        return node.request("peer_station", station=station, stations=count, angle=angle)[0]
+
+    assert give(0, 0, 0) == give(0, 361, 0) == give(3, 3, 0) == give(0, 3, 129_600_000) == "out_of_range"
+    assert give(1, 3, 5) == "out_of_range"                      # the first one is missing
+    assert give(0, 3, 100) == "ok" and give(2, 3, 300) == "out_of_range" and give(1, 3, 100) == "out_of_range"
+    assert node.request("peer_next", station=0)[0] == "no_station" and give(1, 3, 101) == "ok" and node.peer()["stations"] == 0
+    assert give(2, 3, 102) == "ok" and node.peer()["stations"] == 3
+    assert node.request("peer_next", station=3)[0] == "no_station" and node.request("peer_next", station=2)[0] == "ok"
+    assert all(give(n, 360, n) == "ok" for n in range(360)) and node.peer()["stations"] == 360
+
+
+def test_the_next_station_can_be_told():
+    node = Node(PRINTED, SUB)
+    stations(node, 600, 900, 1500)
+    node.ask("peer_next", station=2)
+    node.say(ORDER)
+    assert node.run(60_000, until=lambda: node.peer()["phase"] == "indexed") and abs(node.table.angle - 1500) <= 2
+
+
+# ------------------------------------------------------------------ the main node, printed
+
+def test_the_main_node_orders_as_printed_and_waits_for_the_answer():
+    node = Node(PRINTED, MAIN)
+    assert node.order(3) == "ok" and node.heard() == ORDER
+    assert node.peer()["phase"] == "indexing" and node.order(4) == "busy"
+    node.say(b"\xFF\x55\xFF\xFF\xFF\x55")
+    node.run(5)
+    assert node.peer()["phase"] == "indexed" and node.peer()["station"] == 3
+    assert PHASE[node.firmware.peer_state()] == "indexed" and CAUSE[node.firmware.peer_cause()] == "ok"
+
+
+def test_an_answer_that_never_comes_is_told_by_time_and_one_that_nobody_waits_for_is_nothing():
+    node = Node(PRINTED, MAIN)
+    node.say(DONE)
+    node.run(5)
+    assert node.peer()["phase"] == "idle"
+    node.tell(peer_patience=500)
+    node.order()
+    node.run(490)
+    assert node.peer()["phase"] == "indexing"
+    node.run(20)
+    assert (node.peer()["phase"], node.peer()["ended"]) == ("silent", "peer_silent")
+    node.say(DONE)
+    node.run(5)
+    assert node.peer()["phase"] == "silent"
+
+
+def test_a_stopped_order_is_over_for_the_main_node():
+    node = Node(PRINTED, MAIN)
+    node.order()
+    node.firmware.peer_stop()
+    assert (node.peer()["phase"], node.peer()["ended"]) == ("failed", "stopped")
+
+
+# ------------------------------------------------------------------ the sub-node, frames
+
+def test_a_frame_is_done_and_answered_with_the_body_of_the_line():
+    node = Node(FRAMES, SUB)
+    node.say(frame(index_to(7, 600)))
+    assert bodies(node.heard()) == [bytes([7, OPERATION["index_to"], 0])]
+    node.say(frame(look(8)))
+    reply = bodies(node.heard())[0]
+    assert reply[:3] == bytes([8, OPERATION["index_state"], 0]) and int.from_bytes(reply[7:11], "little") == 60_000
+    assert node.run(60_000, until=lambda: node.ask("index_state")["phase"] == 0) and abs(node.table.angle - 600) <= 2
+
+
+def test_a_request_that_comes_again_is_answered_again_and_not_acted_on_again():
+    node = Node(FRAMES, SUB)
+    node.say(frame(index_to(1, 600)))
+    first = bodies(node.heard())
+    node.run(30_000, until=lambda: node.ask("index_state")["phase"] == 0)
+    node.say(frame(bytes([2, OPERATION["stop"], 0])))
+    node.heard()
+    node.say(frame(index_to(1, 300)))
+    node.run(30_000, until=lambda: node.ask("index_state")["phase"] == 0)
+    pushed = len(node.axes[0].pushed)
+    node.say(frame(index_to(1, 300)))
+    assert bodies(node.heard(200)) == first and len(node.axes[0].pushed) == pushed
+    assert node.peer()["repeated"] == 1
+    node.say(frame(index_to(2, 600)))
+    node.heard(500)
+    assert len(node.axes[0].pushed) > pushed                    # another one is
+
+
+def test_what_is_refused_is_answered_with_its_cause():
+    node = Node(FRAMES, SUB)
+    for sequence, (body, cause) in enumerate([(b"\xC8", "unknown_operation"), (bytes([OPERATION["index_to"]]), "wrong_length"),
+                                              (index_to(0, 1296000)[1:], "out_of_range")]):
+        node.say(frame(bytes([sequence]) + body))
+        assert [CAUSE[reply[2]] for reply in bodies(node.heard())] == [cause]
+
+
+def test_damaged_frames_are_counted_and_not_answered_and_the_next_one_is():
+    node, source = Node(FRAMES, SUB), random.Random(seed())
+    good = bytes([9, OPERATION["identify"]])
+    for _ in range(200):
+        whole = bytearray(frame(look(source.randrange(256))))
+        kind = source.randrange(4)
+        if kind == 0:
+            whole[source.randrange(1, len(whole) - 1)] ^= 1 << source.randrange(8)
+        elif kind == 1:
+            del whole[source.randrange(1, len(whole) - 1)]
+        elif kind == 2:
+            whole.insert(source.randrange(1, len(whole)), source.randrange(256))
+        else:
+            whole = bytearray(source.randbytes(source.randrange(64)))
+        before = node.peer()["heard"]
+        node.say(whole + b"\0")
+        told = node.heard(8)
+        assert bodies(told) == [] and told == b"" or kind == 2 and node.peer()["heard"] == before + 1     # a zero between frames is none
+    node.say(frame(good))
+    assert len(bodies(node.heard())) == 1 and node.peer()["garbage"] > 150
+
+
+def test_a_frame_without_an_end_does_not_hang_the_port():
+    node = Node(FRAMES, SUB)
+    for _ in range(100):
+        node.say(b"\x55" * 50)
+        node.run(5)
+    node.say(frame(look(1)))
+    assert len(bodies(node.heard())) == 1
+
+
+# ------------------------------------------------------------------ the main node, frames
+
+class Answering:
+    """The sub-node: answers what the main node asks, if `hears` says so."""
+
+    def __init__(self, node):
+        self.node, self.asked, self.phase, self.ended, self.target, self.cause = node, [], 0, "never", 0, "ok"
+        self.answers, self.last = True, None
+        node.port.other = self.port = PeerPort()
+
+    def millisecond(self):
+        data = bytes(self.port.received)
+        if data.count(0) < 2 or data[-1]:
+            return
+        self.port.received.clear()
+        for body in bodies(data):
+            self.asked.append(body)
+            if self.answers:
+                self.node.say(frame(self.reply(body)))
+
+    def reply(self, body):
+        cause = "ok"
+        if body[1] == OPERATION["index_to"] and body != self.last:
+            cause = self.cause
+            if cause == "ok":
+                self.phase, self.ended, self.target = 1, "running", int.from_bytes(body[2:6], "little")
+        elif body[1] == OPERATION["stop"]:
+            self.phase, self.ended = 0, "stopped"
+        code = next(number for number, name in CAUSE.items() if name == cause)
+        fields = b""
+        if body[1] == OPERATION["index_state"]:
+            ended = next(number for number, name in CAUSE.items() if name == self.ended)
+            fields = bytes([self.phase, ended, 0, 0]) + self.target.to_bytes(4, "little") + bytes(8)
+        self.last = body
+        return body[:2] + bytes([code]) + fields
+
+    def run(self, ms, until=lambda: False):
+        for _ in range(ms):
+            self.node.run(1)
+            self.millisecond()
+            if until():
+                return True
+        return False
+
+    def operations(self):
+        names = {code: name for name, code in OPERATION.items()}
+        return [names[body[1]] for body in self.asked]
+
+
+def test_the_main_node_looks_orders_and_watches_until_the_table_has_indexed():
+    node = Node(FRAMES, MAIN)
+    sub = Answering(node)
+    assert node.order(5, 600) == "ok"
+    sub.run(500)
+    assert sub.operations()[:2] == ["index_state", "index_to"] and set(sub.operations()[2:]) == {"index_state"}
+    assert len({body[0] for body in sub.asked}) == len(sub.asked) and 5 <= len(sub.asked) <= 14
+    assert sub.target == 60_000 and node.peer()["phase"] == "indexing"
+    sub.phase, sub.ended = 0, "ok"
+    sub.run(100)
+    assert (node.peer()["phase"], node.peer()["ended"], node.peer()["station"]) == ("indexed", "ok", 5)
+    count = len(sub.asked)
+    sub.run(500)
+    assert len(sub.asked) == count                              # then it is quiet
+
+
+@pytest.mark.parametrize("ended", ["sensor_dead", "stiction", "ended_by_fault"])
+def test_the_cause_of_the_sub_node_is_that_of_the_main_node(ended):
+    node = Node(FRAMES, MAIN)
+    sub = Answering(node)
+    node.order(0, 600)
+    sub.run(200)
+    sub.phase, sub.ended = 0, ended
+    sub.run(200)
+    assert (node.peer()["phase"], node.peer()["ended"]) == ("failed", ended)
+
+
+def test_an_order_that_is_refused_has_failed():
+    node = Node(FRAMES, MAIN)
+    sub = Answering(node)
+    sub.cause = "faulted"
+    node.order(0, 600)
+    sub.run(200)
+    assert (node.peer()["phase"], node.peer()["ended"]) == ("failed", "faulted")
+
+
+@pytest.mark.parametrize("after", [0, 200])
+def test_a_silent_sub_node_is_told_after_two_seconds_of_asking(after):
+    node = Node(FRAMES, MAIN)
+    sub = Answering(node)
+    sub.answers = after > 0
+    node.order(0, 600)
+    sub.run(after)
+    sub.answers = False
+    sub.run(1900)
+    assert node.peer()["phase"] == "indexing"
+    sub.run(250)
+    assert (node.peer()["phase"], node.peer()["ended"]) == ("silent", "peer_silent")
+    assert len({body[0] for body in sub.asked[-20:]}) == 1      # the same request each time
+
+
+def test_a_sub_node_that_lost_its_power_is_told():
+    node = Node(FRAMES, MAIN)
+    sub = Answering(node)
+    node.order(0, 600)
+    sub.run(200)
+    sub.phase, sub.ended, sub.target = 0, "never", 0
+    sub.run(200)
+    assert (node.peer()["phase"], node.peer()["ended"]) == ("failed", "peer_restarted")
+
+
+def test_a_sub_node_that_still_turns_is_stopped_first():
+    node = Node(FRAMES, MAIN)
+    sub = Answering(node)
+    sub.phase, sub.ended, sub.target = 3, "running", 5
+    node.order(0, 600)
+    sub.run(500)
+    assert sub.operations()[:4] == ["index_state", "stop", "index_state", "index_to"] and node.peer()["phase"] == "indexing"
+
+
+def test_a_sub_node_that_never_comes_to_rest_is_busy():
+    node = Node(FRAMES, MAIN)
+    sub = Answering(node)
+    sub.cause = "busy"
+    node.order(0, 600)
+    assert sub.run(11_000, until=lambda: node.peer()["phase"] == "failed") and node.peer()["ended"] == "busy"
+
+
+def test_stop_reaches_the_sub_node():
+    node = Node(FRAMES, MAIN)
+    sub = Answering(node)
+    node.order(0, 600)
+    sub.run(200)
+    node.firmware.peer_stop()
+    sub.run(200)
+    assert sub.operations().count("stop") == 1 and (node.peer()["phase"], node.peer()["ended"]) == ("failed", "stopped")
+
+
+def test_a_noisy_line_costs_repetitions_and_nothing_else():
+    node, source = Node(FRAMES, MAIN), random.Random(seed())
+    sub = Answering(node)
+
+    def spoil(data):
+        kept = [byte for byte in data if source.random() > 0.01]
+        return [byte ^ (1 << source.randrange(8)) if source.random() < 0.01 else byte for byte in kept]
+
+    node.port.spoil, answer = spoil, node.say
+    node.say = lambda data: answer(spoil(data))
+    for station in range(10):
+        assert node.order(station, 100 + station) == "ok"
+        before, place = sub.target, (100 + station) * ARCSEC
+        assert sub.run(3000, until=lambda before=before: sub.target != before) and sub.target == place
+        sub.phase, sub.ended = 0, "ok"
+        assert sub.run(3000, until=lambda: node.peer()["phase"] == "indexed")
+    assert node.peer()["garbage"] > 0 and 10 < sub.operations().count("index_to") < 30
+
+
+# ------------------------------------------------------------------ not in use
+
+def test_a_node_whose_peer_port_is_not_in_use_orders_nothing_and_obeys_nothing():
+    node = Node(0, MAIN)
+    assert node.order() == "peer_off" and node.heard() == b""
+    node = Node(0, SUB)
+    stations(node, 600)
+    node.say(ORDER + frame(look(1)))
+    assert node.heard() == b"" and node.peer()["phase"] == "idle"
+    node = Node(PRINTED, SUB)
+    assert node.order() == "peer_off"
+
+
+def test_a_node_without_a_peer_port_says_so():
+    node = Node(FRAMES, MAIN)
+    node.links.parts = [node.sensor]
+    assert node.order() == "not_built"

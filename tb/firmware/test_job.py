@@ -1,0 +1,428 @@
+# SPDX-License-Identifier: Apache-2.0
+"""job.c with machine.c: whole jobs between a sub-node and the machine, every failure provoked, and no station ever cut twice."""
+import random
+
+import pytest
+
+from bench import seed
+from station import TURN, Station, SubNode, ms
+
+STATIONS = 4
+ANGLES = [n * TURN // STATIONS for n in range(STATIONS)]
+FRAMES, PRINTED = 2, 1
+
+
+def node(frames=True, angles=ANGLES, panel=False, **options):
+    """A main node with a sub-node and a program."""
+    station = Station(absent=() if panel else ("keypad", "display"), **options)
+    station.sub_node = SubNode(frames=frames)
+    station.setting(peer_mode=FRAMES if frames else PRINTED, job_start_limit=2, job_cut_limit=5, peer_patience=3000)
+    station.ready()
+    assert station.load(angles) == "ok"
+    station.run(2500 if panel else 0)                       # it is found
+    return station
+
+
+def start(station, *states):
+    assert station.do("start") == "ok"
+    return station.until(*states or ["finished"])
+
+
+def cuts(station):
+    return len(station.edm.cuts)
+
+
+@pytest.mark.parametrize("frames", [True, False])
+def test_a_job_cuts_every_station_once_and_in_order(frames):
+    station = node(frames)
+    job = start(station, "finished", "paused", "unsure")
+    assert job["state"] == "finished" and job["cause"] == "ok" and cuts(station) == STATIONS
+    assert station.sub_node.angles == (ANGLES if frames else [None] * STATIONS)
+    assert station.edm.heard == station.edm.START * STATIONS
+    assert station.do("start") == "ok"                      # and again, from the first station on
+    station.until("finished")
+    assert cuts(station) == 2 * STATIONS
+
+
+def test_the_table_turns_only_while_the_machine_rests():
+    station = node()
+    assert station.do("start") == "ok"
+    while station.job()["state"] != "finished":
+        station.run(5)
+        assert not (station.edm.inputs & 1 and station.sub_node.there_at is not None)
+
+
+def test_every_cut_is_in_the_journal_before_the_keys_are_sent():
+    station = node()
+    start(station, "indexing")
+    for n in range(STATIONS):
+        station.until("cutting")
+        record = station.eeprom.memory[4096:4096 + 64 * 64]
+        newest = max((record[at:at + 12] for at in range(0, len(record), 64) if record[at:at + 4] != b"\xff" * 4),
+                     key=lambda line: int.from_bytes(line[:4], "little"))
+        assert (newest[8], newest[10]) == (n, 3)            # station, cut begun
+        station.until("ended", "leaving", "indexing", "finishing")
+
+
+# a person
+
+def test_pause_stands_before_the_next_cut_and_resume_goes_on():
+    station = node()
+    start(station, "cutting")
+    assert station.do("pause") == "ok" and "pausing" in station.job()["flags"]
+    job = station.until("paused")
+    assert job["cause"] == "paused_by_person" and job["station"] == 1 and cuts(station) == 1 and job["answers"] == {"resume", "stop"}
+    station.run(3000)
+    assert cuts(station) == 1
+    assert station.do("resume") == "ok"
+    station.until("finished")
+    assert cuts(station) == STATIONS
+
+
+def test_pause_while_the_table_turns_stands_before_the_cut():
+    station = node()
+    start(station, "indexing")
+    station.do("pause")
+    assert station.until("paused")["station"] == 0 and cuts(station) == 0
+    station.do("resume")
+    station.until("finished")
+    assert cuts(station) == STATIONS
+
+
+@pytest.mark.parametrize("at", ["indexing", "cutting", "paused"])
+def test_stop_ends_the_job_wherever_it_is(at):
+    station = node()
+    start(station, "indexing")
+    if at == "paused":
+        station.do("pause")
+    station.until(at)
+    assert station.do("stop") == "ok"
+    station.until("idle")
+    begun = cuts(station)
+    station.run(3000)
+    assert cuts(station) == begun and station.sub_node.there_at is None
+    station.power_cut()
+    assert station.ready()["state"] == "idle"               # nothing is left of it
+
+
+@pytest.mark.parametrize(("action", "cause"), [("resume", "not_now"), ("again", "not_now"), ("next", "not_now"), ("stop", "not_now"),
+                                               ("pause", "not_now")])
+def test_answers_that_nobody_waits_for_are_refused(action, cause):
+    station = node()
+    assert station.do(action) == cause and station.job()["answers"] == {"start"}
+    assert station.request("job_do", action=6)[0] == "out_of_range"
+
+
+def test_a_program_is_not_changed_while_a_job_is_under_way():
+    station = node()
+    start(station, "cutting")
+    for operation, fields in (("job_begin", {}), ("job_save", {})):
+        assert station.request(operation, **fields)[0] == "job_active"
+    assert station.do("start") == "job_active"
+    station.until("finished")
+    assert station.load([5]) == "ok"
+
+
+def test_the_keys_wait_while_a_person_types():
+    station = node()
+    station.edm.types_until = station.clk + ms(25_000)
+    start(station, "cutting")
+    station.run(15_000)
+    assert cuts(station) == 0 and "keys_wait" in station.job()["flags"] and station.edm.heard == b""
+    station.until("finished")
+    assert cuts(station) == STATIONS and station.edm.heard == station.edm.START * STATIONS
+
+
+# the machine
+
+def test_a_cut_that_does_not_start_is_asked_about_and_no_key_is_sent_again():
+    station = node()
+    station.edm.deaf = True
+    job = start(station, "unsure")
+    assert job["cause"] == "cut_not_started" and job["answers"] == {"again", "next", "stop"}
+    station.run(10_000)
+    assert station.edm.heard == station.edm.START
+    station.edm.deaf = False
+    assert station.do("again") == "ok"
+    station.until("finished")
+    assert cuts(station) == STATIONS
+
+
+def test_next_takes_the_station_for_cut():
+    station = node()
+    station.edm.deaf = True
+    start(station, "unsure")
+    station.edm.deaf = False
+    station.do("next")
+    station.until("finished")
+    assert cuts(station) == STATIONS - 1 and station.sub_node.angles == ANGLES
+
+
+def test_a_cut_that_does_not_end_is_asked_about_and_may_be_followed():
+    station = node()
+    station.edm.endless = True
+    job = start(station, "unsure")
+    assert job["cause"] == "cut_not_ended" and job["answers"] == {"resume", "next", "stop"}
+    assert station.do("again") == "machine_busy"            # it would cut twice
+    assert station.do("resume") == "ok"
+    station.until("following")
+    station.edm.endless = False
+    station.until("finished")
+    assert cuts(station) == STATIONS
+
+
+def test_next_waits_until_the_machine_rests():
+    station = node()
+    station.edm.endless = True
+    start(station, "unsure")
+    station.do("next")
+    station.run(3000)
+    assert station.job()["state"] == "leaving" and station.sub_node.requests == 1
+    station.edm.endless = False
+    station.until("finished")
+    assert cuts(station) == STATIONS
+
+
+def test_an_alarm_in_the_cut_is_asked_about_with_its_words():
+    station = node(panel=True)
+    start(station, "cutting")
+    assert station.run(2000, until=lambda: station.edm.inputs & 1)
+    station.edm.alarm()
+    job = station.until("unsure")
+    assert job["cause"] == "machine_alarm" and {"alarm"} <= job["flags"] and job["answers"] == {"next", "stop"}
+    assert station.shown()[1:3] == ["the machine reports", "an alarm"]
+    assert station.do("again") == "machine_alarm"
+    station.edm.alarm(False)
+    assert station.do("again") == "ok"
+    station.until("finished")
+    assert cuts(station) == STATIONS + 1                    # the person said so
+
+
+def test_an_alarm_that_comes_a_little_after_the_end_of_the_cut_counts():
+    station = node()
+    start(station, "cutting")
+    assert station.run(2000, until=lambda: station.edm.inputs & 1)
+    assert station.run(2000, until=lambda: not station.edm.inputs & 1)
+    station.run(100)
+    station.edm.alarm()
+    assert station.until("unsure")["cause"] == "machine_alarm"
+
+
+def test_an_alarm_before_the_cut_pauses():
+    station = node()
+    start(station, "indexing")
+    station.edm.alarm()
+    job = station.until("paused")
+    assert job["cause"] == "machine_alarm" and station.do("resume") == "machine_alarm" and station.edm.heard == b""
+    station.edm.alarm(False)
+    station.do("resume")
+    station.until("finished")
+    assert cuts(station) == STATIONS
+
+
+def test_a_cut_of_a_few_milliseconds_is_seen():
+    station = node()
+    station.edm.cut_ms = 0.1
+    start(station)
+    assert cuts(station) == STATIONS
+
+
+def test_a_machine_that_takes_no_keys_is_named_and_never_gets_them_twice():
+    station = node()
+    station.edm.takes_nothing = True
+    job = start(station, "unsure")
+    assert job["cause"] == "keys_not_taken" and station.do("again") == "machine_busy" and "keys_wait" in job["flags"]
+    station.edm.takes_nothing = False
+    assert station.run(3000, until=lambda: station.edm.inputs & 1)
+    assert station.do("resume") == "ok"
+    station.until("finished")
+    assert cuts(station) == STATIONS and station.edm.heard == station.edm.START * STATIONS
+
+
+def test_a_machine_that_cuts_or_alarms_is_not_started():
+    station = node()
+    station.edm.set(1)
+    assert station.do("start") == "machine_busy"
+    station.edm.set(2)
+    assert station.do("start") == "machine_alarm"
+
+
+@pytest.mark.parametrize("missing", [2, 32])
+def test_a_node_without_keyboard_or_status_inputs_does_no_job(missing):
+    assert node(built=63 & ~missing).do("start") == "not_built"
+
+
+# the sub-node
+
+@pytest.mark.parametrize("cause", ["sensor_dead", "not_converged", "sensor_disagrees", "stiction"])
+def test_what_the_sub_node_failed_of_is_told_and_resume_tries_again(cause):
+    station = node()
+    station.sub_node.fault = cause
+    job = start(station, "paused")
+    assert job["cause"] == cause and cuts(station) == 0
+    station.sub_node.fault = None
+    station.do("resume")
+    station.until("finished")
+    assert cuts(station) == STATIONS
+
+
+def test_a_sub_node_that_is_silent_is_named():
+    station = node()
+    station.sub_node.dead = True
+    assert start(station, "paused")["cause"] == "peer_silent"
+    station.sub_node.dead = False
+    station.do("resume")
+    station.until("finished")
+    assert cuts(station) == STATIONS
+
+
+def test_a_peer_port_that_is_not_in_use_is_named():
+    station = node()
+    station.setting(peer_mode=0)
+    assert start(station, "paused")["cause"] == "peer_off"
+
+
+def test_a_sub_node_that_counts_is_never_sent_on_when_its_place_is_not_known():
+    station = node(frames=False)
+    station.sub_node.fault = "never"
+    assert start(station, "paused")["cause"] == "peer_silent"
+    assert station.job()["answers"] == {"stop"} and station.do("resume") == "table_unknown" and station.sub_node.requests == 1
+    station.do("stop")
+    station.until("idle")
+
+
+def test_a_sub_node_that_counts_is_not_told_twice_to_go_to_a_station():
+    station = node(frames=False)
+    station.edm.deaf = True
+    start(station, "unsure")
+    station.power_cut()
+    assert station.ready()["state"] == "unsure"
+    station.edm.deaf = False
+    station.do("again")
+    station.until("finished")
+    assert station.sub_node.requests == STATIONS and cuts(station) == STATIONS
+
+
+# power
+
+def test_after_a_power_cut_in_the_cut_a_person_is_asked():
+    station = node()
+    station.edm.cut_ms = 4000
+    start(station, "cutting")
+    assert station.run(2000, until=lambda: station.edm.inputs & 1)
+    station.power_cut()
+    job = station.ready()
+    assert (job["state"], job["cause"], job["station"]) == ("unsure", "power_lost", 0) and "again" not in job["answers"]
+    assert station.do("resume") == "ok"                     # it still cuts: follow it
+    station.until("finished")
+    assert cuts(station) == STATIONS
+
+
+@pytest.mark.parametrize("answer", ["again", "next"])
+def test_a_cut_that_ended_without_power_is_cut_again_only_if_a_person_says_so(answer):
+    station = node(panel=True)
+    start(station, "cutting")
+    assert station.run(2000, until=lambda: station.edm.inputs & 1)
+    station.power_cut()
+    station.run(5000)
+    job = station.job()
+    assert job["state"] == "unsure" and job["answers"] == {"again", "next", "stop"} and cuts(station) == 1
+    station.run(2500)
+    assert station.shown() == ["is it cut?   001/004", "the power was lost", "during the job", "STOP AGAIN NEXT"]
+    station.press(answer.upper())
+    station.until("finished")
+    assert cuts(station) == STATIONS + (answer == "again")
+
+
+def test_a_job_whose_power_went_between_the_cuts_waits_for_resume_and_misses_none():
+    station = node()
+    start(station, "cutting")
+    station.until("indexing")
+    station.power_cut()
+    job = station.ready()
+    assert (job["state"], job["cause"], job["station"]) == ("paused", "power_lost", 1) and job["answers"] == {"resume", "stop"}
+    station.run(3000)
+    assert cuts(station) == 1
+    station.do("resume")
+    station.until("finished")
+    assert cuts(station) == STATIONS
+
+
+def test_power_cuts_at_any_moment_leave_no_station_uncut_and_cut_none_twice():
+    """A person who looks at the work answers: the cut that was begun was made, or it was not."""
+    source = random.Random(seed())
+    station = node()
+    for _ in range(6):
+        station.edm.cuts.clear()
+        station.sub_node.angles.clear()
+        station.do("start")
+        cut_at = []
+        for _ in range(source.randrange(1, 4)):
+            station.run(source.uniform(0, 4000))
+            station.power_cut()
+            station.run(1200)
+            station.ready()
+            station.run(1500)                               # a cut that was under way has ended
+            job = station.job()
+            if job["state"] == "unsure":
+                begun = bool(station.edm.cuts) and station.sub_node.angles[-1] == ANGLES[job["station"]] and len(
+                    station.edm.cuts) == job["station"] + 1
+                assert station.do("next" if begun else "again") == "ok"
+            elif job["state"] == "paused":
+                assert station.do("resume") == "ok"
+            cut_at.append(job["state"])
+        if station.job()["state"] != "idle":
+            station.until("finished")
+            assert len(station.edm.cuts) == STATIONS, cut_at
+
+
+def test_a_job_of_another_program_is_not_resumed():
+    station = node(angles=[1, 2])
+    assert station.load(ANGLES) == "ok"                     # over the older copy, the first
+    start(station, "cutting")
+    station.eeprom.memory[90] ^= 1
+    station.power_cut()
+    job = station.ready()
+    assert job["state"] == "idle" and station.program() == [1, 2] and "copy_torn" in job["flags"]
+
+
+# the EEPROM in the job
+
+def test_no_cut_begins_that_is_not_in_the_journal():
+    station = node()
+    start(station, "indexing")
+    station.bus.devices.pop(0x50)
+    job = station.until("paused")
+    assert job["cause"] == "store_missing" and station.edm.heard == b"" and station.do("resume") == "store_missing"
+    station.bus.devices[0x50] = station.eeprom
+    station.run(4000)
+    assert station.do("resume") == "ok"
+    station.until("finished")
+    assert cuts(station) == STATIONS
+
+
+def test_a_cut_whose_end_cannot_be_noted_is_asked_about():
+    station = node()
+    start(station, "cutting")
+    station.bus.devices.pop(0x50)
+    job = station.until("unsure")
+    assert job["cause"] == "store_missing"
+    station.bus.devices[0x50] = station.eeprom
+    station.run(4000)
+    assert station.do("next") == "ok"
+    station.until("finished")
+    assert cuts(station) == STATIONS
+
+
+def test_the_panel_runs_a_job_by_its_keys():
+    station = node(panel=True)
+    station.press("START")
+    station.until("cutting")
+    station.press("PAUSE")
+    station.until("paused")
+    assert station.shown() == ["paused       002/004", "paused by a person", "", "RESUME STOP"]
+    station.press("NEXT")
+    assert station.shown()[1:3] == ["the job does not", "wait for that now"]
+    station.press("RESUME")
+    station.until("finished")
+    assert cuts(station) == STATIONS and station.shown()[0] == "all cut      004/004"

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""panel.c with keypad.c and display.c: programs entered by key, everything said in words, and parts that are missing."""
+import pytest
+
+from station import KEYS, SETTING, TABLE, TURN, Station
+
+
+@pytest.fixture
+def station():
+    made = Station()
+    made.ready()
+    made.run(2500)                                          # the panel is found
+    return made
+
+
+def test_a_node_without_a_program_says_so(station):
+    assert station.shown() == ["ready", "no program of", "stations is stored", ""]
+    assert {"keypad", "display", "store"} <= station.job()["flags"]
+
+
+def test_the_display_gets_nothing_too_soon_and_rs_stands_before_e(station):
+    station.press("DIVIDE", "6", "ENTER")
+    station.run(3000)
+    assert station.display.too_soon == 0 and station.display.rs_moved == 0 and station.display.port & 8
+
+
+def test_a_turn_is_divided_by_its_count(station):
+    station.press("DIVIDE", "7")
+    assert station.shown()[:2] == ["stations in a turn", "7_"]
+    station.press("ENTER")
+    assert station.saved() == "ok"
+    assert station.program() == [(n * TURN + 3) // 7 for n in range(7)]
+    assert station.shown() == ["ready        001/007", "             0.00000", "", "START"]
+
+
+def test_a_list_is_entered_angle_by_angle(station):
+    station.press("LIST", *"12.5", "ENTER")
+    assert station.shown()[0] == "angle, degrees   002"
+    station.press(*"359.99999", "ENTER", "ENTER")
+    assert station.saved() == "ok" and station.program() == [4_500_000, 129_599_996]
+
+
+def test_stations_are_looked_through_with_up_and_down(station):
+    station.load([0, 360_000, 45 * 360_000 + 180_000])
+    station.press("UP", "UP", "UP")
+    assert station.shown()[:2] == ["station      003/003", "            45.50000"]
+    station.press("UP", "DOWN", "DOWN")
+    assert station.shown()[:2] == ["station      002/003", "             1.00000"]
+    station.press("CLEAR")
+    assert station.shown()[0] == "ready        001/003"
+
+
+def test_the_longest_cut_is_a_setting(station):
+    station.press("LIMIT", *"900", "ENTER")
+    assert station.ask("get_setting", setting=SETTING["job_cut_limit"])["value"] == 900
+
+
+@pytest.mark.parametrize(("keys", "words"), [
+    (["DIVIDE", "0", "ENTER"], ["a program needs at", "least one station"]),
+    (["DIVIDE", *"361", "ENTER"], ["the EEPROM is full:", "it holds 360"][:1]),
+    (["DIVIDE", *"3.5", "ENTER"], ["the value is outside"]),
+    (["DIVIDE", "ENTER"], ["the value is outside"]),
+    (["LIST", *"360", "ENTER"], ["angles must be below", "360 degrees"]),
+    (["LIST", *"10", "ENTER", *"10", "ENTER"], ["each angle must be", "larger than the last"]),
+    (["LIST", ".", "ENTER"], ["the value is outside"]),
+    (["LIST", *"1.2.3", "ENTER"], ["the value is outside"]),
+    (["LIST", "ENTER"], ["a program needs at", "least one station"]),
+    (["LIST", *"99999999999", "9"], ["the value is outside"]),
+    (["LIMIT", "0", "ENTER"], ["the value is outside"]),
+])
+def test_what_cannot_be_is_said_in_words(station, keys, words):
+    station.press(*keys)
+    shown = station.shown()
+    at = next((n for n, line in enumerate(shown) if line == words[0] or words[0].startswith(line) and len(line) > 15), None)
+    assert at is not None and shown[at + 1:at + len(words)] == words[1:], shown
+    assert station.program() == []
+
+
+@pytest.mark.parametrize("key", [*range(25, 34), 20, "5", ".", "ENTER"])
+def test_a_key_that_means_nothing_now_says_so(station, key):
+    station.press(key)
+    shown = station.shown()
+    assert shown[1:3] == ["this key has no", "function"], shown
+    station.run(3500)
+    assert station.shown()[1:3] == ["no program of", "stations is stored"]
+
+
+def test_clear_takes_back_the_entry_and_then_leaves(station):
+    station.press("LIST", *"12")
+    station.press("CLEAR")
+    assert station.shown()[1] == "_"
+    station.press("CLEAR")
+    assert station.shown()[0] == "ready"
+
+
+def test_every_cause_of_a_station_fits_the_panel():
+    for code, words in TABLE["cause"].values():
+        if code < 30:
+            continue
+        rows, said = [""], words.split(":")[0].split()
+        for word in said:
+            if rows[-1] and len(rows[-1]) + 1 + len(word) > 20:
+                rows.append("")
+            rows[-1] += " " * bool(rows[-1]) + word
+        assert len(rows) <= (3 if code < 40 else 2) and max(map(len, rows)) <= 20, words
+    assert all(len(words) <= 12 for _, words in TABLE["job_state"].values())
+
+
+@pytest.mark.parametrize("absent", [["keypad"], ["display"], ["keypad", "display"]])
+def test_a_node_without_its_panel_works_and_tells_what_is_missing(absent):
+    station = Station(absent=absent)
+    station.ready()
+    station.run(2500)
+    assert station.load([1, 2]) == "ok"
+    assert not set(absent) & station.job()["flags"] and len({"keypad", "display"} & station.job()["flags"]) == 2 - len(absent)
+
+
+def test_a_panel_that_comes_later_is_found_and_what_was_pressed_before_does_not_count():
+    station = Station(absent=["keypad", "display"])
+    station.ready()
+    station.keypad.registers[0x1D:0x1F] = b"\x1f\x7f"      # set up by the node before a reset
+    station.keypad.press("DIVIDE")
+    station.bus.devices[0x34], station.bus.devices[0x27] = station.keypad, station.display
+    station.run(2500)
+    assert station.shown()[0] == "ready"
+    station.press("DIVIDE")
+    assert station.shown()[0] == "stations in a turn"
+
+
+def test_a_display_that_lost_its_power_is_set_up_again_when_it_is_back(station):
+    device = station.bus.devices.pop(0x27)
+    station.run(1500)
+    assert "display" not in station.job()["flags"]
+    device.power_cut(station.clk)
+    station.bus.devices[0x27] = device
+    station.run(2500)
+    assert station.shown()[0] == "ready" and device.too_soon <= 1       # only the first byte, which is sent once more than needed
+
+
+def test_every_key_of_the_layout_reaches_its_function():
+    assert len(KEYS) == 25 and [KEYS[n] for n in (0, 3, 21, 24)] == ["7", "START", "0", "CLEAR"]

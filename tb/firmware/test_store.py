@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: Apache-2.0
+"""store.c: program and journal in the EEPROM, kept through power cuts, and every failure named."""
+import random
+
+import pytest
+
+from bench import seed
+from station import SETTING, TURN, Eeprom, Station, ms
+
+EVENLY = [n * TURN // 36 for n in range(36)]
+
+
+def powered(**options):
+    station = Station(**options)
+    station.ready()
+    return station
+
+
+def test_a_program_is_read_back_as_written_and_after_a_power_cut():
+    station = powered()
+    assert station.load(EVENLY) == "ok" and station.program() == EVENLY
+    station.power_cut()
+    station.ready()
+    assert station.program() == EVENLY and station.ask("job_program")["generation"] == 1
+
+
+def test_each_new_program_goes_over_the_older_copy():
+    station = powered()
+    for generation in range(1, 5):
+        angles = [generation, 2 * generation + 5]
+        assert station.load(angles) == "ok"
+        copies = {int.from_bytes(station.eeprom.memory[at:at + 4], "little") for at in (0, 2048)}
+        assert copies == {generation, generation - 1 or 0xFFFFFFFF}
+        assert station.program() == angles
+
+
+def test_as_many_stations_as_fit_are_kept_and_one_more_is_refused():
+    station = powered()
+    angles = [n * TURN // 360 for n in range(360)]
+    station.ask("job_begin")
+    for n, angle in enumerate(angles):
+        station.ask("job_add", station=n, angle=angle)
+    assert station.request("job_add", station=360, angle=TURN - 1)[0] == "too_many_stations"
+    station.ask("job_save")
+    assert station.saved() == "ok" and station.program() == angles
+    station.power_cut()
+    station.ready()
+    assert station.program() == angles
+
+
+@pytest.mark.parametrize(("angles", "cause"), [
+    ([TURN], "angle_out_of_turn"), ([0xFFFFFFFF], "angle_out_of_turn"), ([5, 5], "angles_not_ascending"), ([5, 4], "angles_not_ascending")])
+def test_an_angle_that_cannot_be_is_named_and_not_taken(angles, cause):
+    station = powered()
+    station.ask("job_begin")
+    for n, angle in enumerate(angles[:-1]):
+        station.ask("job_add", station=n, angle=angle)
+    assert station.request("job_add", station=len(angles) - 1, angle=angles[-1])[0] == cause
+    station.ask("job_add", station=len(angles) - 1, angle=TURN - 1)     # the others are still there
+    station.ask("job_save")
+    assert station.saved() == "ok" and station.program() == [*angles[:-1], TURN - 1]
+
+
+def test_what_is_no_whole_program_is_refused():
+    station = powered()
+    assert station.request("job_save")[0] == "no_stations"
+    assert station.request("job_add", station=0, angle=0)[0] == "program_incomplete"
+    station.ask("job_begin")
+    assert station.request("job_save")[0] == "no_stations"
+    assert station.request("job_add", station=1, angle=0)[0] == "program_incomplete"
+    assert station.ask("job_program")["stations"] == 0
+    assert station.request("job_angle", station=0)[0] == "out_of_range"
+
+
+def test_settings_are_kept_with_the_program():
+    station = powered()
+    station.setting(job_cut_limit=77, peer_mode=2)
+    assert station.load(EVENLY) == "ok"
+    station.power_cut()
+    station.ready()
+    assert [station.ask("get_setting", setting=SETTING[name])["value"] for name in ("job_cut_limit", "peer_mode")] == [77, 2]
+
+
+def test_a_blank_eeprom_has_no_program():
+    station = powered()
+    assert station.ask("job_program") == {"writing": 0, "ended": 43, "generation": 0, "stations": 0, "journal": 0}
+    assert station.do("start") == "no_program"
+
+
+@pytest.mark.parametrize("copies", [1, 2])
+def test_a_damaged_copy_is_told_and_the_other_one_is_in_force(copies):
+    station = powered()
+    station.load([1, 2, 3])
+    station.load([4, 5, 6])                                 # over copy 0
+    for at in (90, 2048 + 90)[:copies]:
+        station.eeprom.memory[at] ^= 4
+    station.power_cut()
+    job = station.ready()
+    assert "copy_torn" in job["flags"]
+    if copies == 1:
+        assert station.program() == [1, 2, 3]
+        assert station.load([7]) == "ok" and "copy_torn" not in station.job()["flags"]
+    else:
+        assert station.program() == [] and station.do("start") == "program_torn"
+
+
+def test_a_missing_eeprom_is_named_and_found_when_it_comes():
+    station = Station(absent=["eeprom"])
+    station.run(2000)
+    job = station.job()
+    assert (job["state"], job["cause"]) == ("loading", "store_missing") and "store" not in job["flags"]
+    assert station.do("start") == "store_missing" and station.request("job_begin")[0] == "store_missing"
+    station.bus.devices[0x50] = station.eeprom
+    station.ready()
+    assert station.load(EVENLY) == "ok"
+
+
+def test_a_stuck_bus_is_named_and_forgotten_when_it_is_free():
+    station = Station()
+    station.bus.stuck = True
+    station.run(2000)
+    assert station.job()["cause"] == "store_missing"
+    station.bus.stuck = False
+    station.ready()
+
+
+def test_a_node_without_the_link_says_so():
+    station = Station(built=0)
+    station.run(500)
+    assert station.job()["cause"] == "store_missing"
+
+
+def test_a_worn_page_of_the_program_is_named_and_the_old_program_stays():
+    station = powered()
+    station.load([1, 2, 3])
+    station.eeprom.worn[2048 + 90] = 0xA5
+    station.eeprom.worn[90] = 0xA5
+    assert station.load(EVENLY) == "store_failed" and station.program() == [1, 2, 3]
+
+
+def test_a_write_that_the_device_never_ends_is_named():
+    station = powered()
+    station.eeprom.WRITE = ms(10_000)
+    assert station.load(EVENLY) == "store_missing"
+
+
+def test_a_program_cut_off_at_any_moment_is_the_old_one_or_the_new_one_whole():
+    source, station = random.Random(seed()), powered()
+    old, seen = [], set()
+    for _ in range(40):
+        new = sorted(source.sample(range(TURN), source.randrange(1, 40)))
+        station.ask("job_begin")
+        for n, angle in enumerate(new):
+            station.ask("job_add", station=n, angle=angle)
+        station.ask("job_save")
+        station.run(source.uniform(0, 260))
+        station.power_cut()
+        station.ready()
+        found = station.program()
+        assert found in (old, new)
+        seen.add(found == new)
+        old = found
+    assert seen == {True, False}
+
+
+def test_writes_are_spread_over_the_pages_of_the_journal():
+    station, pages = powered(), []
+    stopped = Eeprom.stopped
+
+    def noticed(eeprom, now):
+        if len(eeprom.came) > 2:
+            pages.append(eeprom.pointer // 64)
+        stopped(eeprom, now)
+
+    station.load([1])
+    station.eeprom.stopped = lambda now: noticed(station.eeprom, now)
+    for _ in range(130):
+        assert station.firmware.store_note(0, 1) == 0
+        station.saved()
+    assert len(pages) == 130 and set(pages) == set(range(64, 128)) and max(map(pages.count, pages)) == 3
+    station.power_cut()
+    station.ready()
+    assert station.ask("job_program")["journal"] == 130
+
+
+def test_a_worn_page_of_the_journal_is_passed_over():
+    station = powered()
+    station.load([1])
+    station.eeprom.worn[4096 + 64 * 1 + 3] = 0x5A          # where the first line goes
+    assert station.firmware.store_note(0, 1) == 0 and station.saved() == "ok"
+    assert station.ask("job_program")["journal"] == 2
