@@ -44,6 +44,13 @@ def test_a_job_cuts_every_station_once_and_in_order(frames):
     assert cuts(station) == 2 * STATIONS
 
 
+def test_the_sub_node_is_told_the_speed_before_each_station():
+    station = node()
+    station.setting(job_speed=50)
+    start(station)
+    assert station.sub_node.speeds == [32768] * STATIONS
+
+
 def test_the_table_turns_only_while_the_machine_rests():
     station = node()
     assert station.do("start") == "ok"
@@ -397,6 +404,23 @@ def test_no_cut_begins_that_is_not_in_the_journal():
     station.bus.devices[0x50] = station.eeprom
     station.run(4000)
     assert station.do("resume") == "ok"
+    station.until("finished")
+    assert cuts(station) == STATIONS
+
+
+def test_another_eeprom_in_the_middle_of_a_job_is_refused():
+    other = node(angles=[1, 2]).eeprom
+    station = node()
+    start(station, "indexing")
+    mine = station.bus.devices.pop(0x50)
+    station.until("paused")
+    station.bus.devices[0x50] = other
+    station.run(4000)
+    assert station.do("resume") == "program_changed" and station.job()["answers"] == {"stop"} and cuts(station) == 0
+    station.bus.devices.pop(0x50)
+    station.power_cut()
+    station.bus.devices[0x50] = mine
+    assert station.ready()["state"] == "paused" and station.do("resume") == "ok"
     station.until("finished")
     assert cuts(station) == STATIONS
 

@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0xE757E8FD
+PROTOCOL_CRC = 0x692B6460
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -86,6 +86,7 @@ CAUSES = {
     58: ("paused_by_person", "paused by a person"),
     59: ("key_without_function", "this key has no function"),
     60: ("table_unknown", "nobody knows where the table stands"),
+    61: ("program_changed", "this is not the program of the job"),
 }
 
 # bit: (name, words)
@@ -712,4 +713,7 @@ SETTINGS = {parameter.name: parameter for parameter in (
     Parameter("job_cut_limit", 19, "s", Fraction(1, 1),
               1, 1000000, 14400,
               "job: longest cut"),
+    Parameter("job_speed", 20, "", Fraction(1, 100),
+              1, 100, 100,
+              "job: speed of the table, of full; told to the sub-node with each order, in mode frames"),
 )}
