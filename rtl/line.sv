@@ -27,7 +27,8 @@ module line #(
     wire               checked, command, good, frame_good, frame_bad, present, overrun, receive_read;
     wire        [7:0]  received_data, filtered_data, data, receive_free;
     wire        [9:0]  receive;
-    wire               to_send, send_ready, send_command, sending, transmit_command, transmit_written, transmit_overrun;
+    wire               line_break, to_send, send_ready, send_command, sending, driver_wanted, tx, driver_cut, transmit_command, transmit_written,
+                       transmit_overrun;
     wire        [7:0]  send_data, transmit_data, transmit_free, crc_byte;
     wire               crc_byte_written, crc_start;
     wire        [19:0] bit_time;
@@ -38,6 +39,7 @@ module line #(
     synchroniser #(.RESET(1)) u_pin (.clk, .rst, .d(line_rx | line_driver_enable), .q(rx));
     character_receiver u_receiver (.clk, .rst, .bit_time, .rx, .valid(received), .data(received_data), .ninth, .framing_error,
                                    .start_glitch, .busy(receiving));
+    break_detector #(.CLK_HZ(CLK_HZ)) u_break (.clk, .rst, .rx, .found(line_break));
     address_filter u_filter (.clk, .rst, .address, .valid_in(received), .data_in(received_data), .ninth, .valid(filtered),
                              .data(filtered_data), .command(filtered_command));
     frame_check u_check (.clk, .rst, .valid_in(filtered), .data_in(filtered_data), .command_in(filtered_command), .framing_error,
@@ -52,7 +54,10 @@ module line #(
                                                 .pop(send_ready), .present(to_send), .out({send_command, send_data}),
                                                 .free(transmit_free), .overrun(transmit_overrun));
     character_transmitter u_transmitter (.clk, .rst, .bit_time, .valid(to_send), .ready(send_ready), .data(send_data),
-                                         .ninth(send_command), .tx(line_tx), .driver_enable(line_driver_enable), .busy(sending));
+                                         .ninth(send_command), .tx, .driver_enable(driver_wanted), .busy(sending));
+    driver_cutoff u_cutoff (.clk, .rst, .bit_time, .wanted(driver_wanted), .driver_enable(line_driver_enable), .cut(driver_cut));
+    assign line_tx = tx || !line_driver_enable;
+
     crc32_stream u_crc (.clk, .rst, .start(crc_start), .valid(crc_byte_written), .data(crc_byte), .crc);
 
     line_registers u_registers (.clk, .rst, .select, .write, .word, .wdata, .rdata, .bit_time,
@@ -60,7 +65,7 @@ module line #(
         .receive_read, .transmit_data, .transmit_written, .transmit_command,
         .state_transmit_free(transmit_free), .state_sending(sending), .frames_good(frame_good), .frames_bad(frame_bad),
         .framing_errors(framing_error), .start_glitches(start_glitch), .overruns(overrun), .crc_byte_data(crc_byte),
-        .crc_byte_written, .crc_start_start(crc_start), .crc, .watchdog_time);
+        .crc_byte_written, .crc_start_start(crc_start), .crc, .watchdog_time, .breaks(line_break), .driver_cuts(driver_cut));
 
     wire unused = &{1'b0, receiving, receive_free, transmit_overrun};
 endmodule

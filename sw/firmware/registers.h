@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x420f3daau            // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xd86641ffu            // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define LINE_BASE 0x100u
@@ -191,6 +191,14 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define LINE_WATCHDOG_TIME_MASK                        0x0000ffffu
 #define LINE_WATCHDOG_TIME_SHIFT                       0
 #define LINE_WATCHDOG_TIME_WIDTH                       16
+#define LINE_BREAKS                                    0x034u  // rw: breaks: the line was low for 2 ms; writing clears
+#define LINE_BREAKS_MASK                               0xffffffffu
+#define LINE_BREAKS_SHIFT                              0
+#define LINE_BREAKS_WIDTH                              32
+#define LINE_DRIVER_CUTS                               0x038u  // rw: the own driver was on for 1024 bits and has been cut off; writing clears
+#define LINE_DRIVER_CUTS_MASK                          0xffffffffu
+#define LINE_DRIVER_CUTS_SHIFT                         0
+#define LINE_DRIVER_CUTS_WIDTH                         32
 
 // links: I2C, PS/2 pass-through, peer port, angle sensor, numeric display, status inputs
 #define LINKS_BUILT                                    0x000u  // r: 1: it was built, 0: its pins are idle, its registers do nothing
