@@ -44,7 +44,7 @@ static uint8_t *answer;
 static bool answered;                                           // there was a request, with this CRC-32:
 static uint32_t answered_crc;
 static uint32_t repeated, refused;
-static uint8_t followed = NO_AXIS;                              // whose position each reply tells afresh
+static uint8_t followed;                                        // whose position each reply tells afresh
 static uint32_t baud, next_baud;                                // next: 0, or what comes after this reply
 static bool reply_sent;                                         // it is in the queue at least
 static uint32_t called_ms, breaks;                              // when the master called last, and the breaks before this baud rate

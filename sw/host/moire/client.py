@@ -31,10 +31,11 @@ from .line_tables import (
 )
 from .protocol import ADDRESSES, Exchange, Timing, request_body
 from .registers import FIELDS, MAP_CRC
-from .transport import Transport
+from .transport import BAUD, Transport
 
 COUNTS = 65536               # of the wire, in one signal period
 FULL_SCALE = 32768           # of the command
+BAUD_CHANGE_S = 0.005        # a node changes when the reply is out, and no more than this later
 POLL_S = 0.05                # between two looks at a motion, where a Line is not told otherwise
 
 HARMONICS = 10               # orders of phase error that are corrected
@@ -282,6 +283,7 @@ class Line:
         self.sequences, self.nodes = {}, {}
         self.statistics = Statistics()
         self.in_order = True           # false while words of a broken exchange may still be on the way
+        self.baud = BAUD               # of the nodes, as far as this host has changed it
 
     def exchange(self, address: int, operation: str, /, tries=None, answer_s=None, **fields):
         """One request, repeated where needed; returns the reply whatever its cause."""
@@ -351,6 +353,30 @@ class Line:
             except NobodyAnswers:
                 continue
         return found
+
+    def set_baud(self, baud: int, addresses):
+        """This host and these nodes, all that anyone speaks to, at another baud rate. A node goes back to the first one after a break,
+        and by itself when nobody called it for 5 s; all do when one of them does not follow."""
+        if not self.transport.handshake:
+            raise LineError(0, "the baud rate of the nodes can only be changed on their own line, not through a door to it")
+        try:
+            for address in addresses:
+                self.request(address, "set_baud", baud=baud)
+            self.transport.wait(BAUD_CHANGE_S)
+            self.transport.set_baud(baud)
+            for address in addresses:
+                self.identify(address)
+        except BaseException:
+            self.first_baud()
+            raise
+        self.baud = baud
+
+    def first_baud(self):
+        """All nodes, and this host, at the baud rate that they have after power-up."""
+        self.transport.send_break()
+        self.transport.set_baud(BAUD)
+        self.transport.wait(BAUD_CHANGE_S)
+        self.baud = BAUD
 
     def node(self, address: int = 1) -> "Node":
         """Connects at the first time: identifies the node and refuses one of another build."""
