@@ -283,7 +283,7 @@ class Line:
         self.sequences, self.nodes = {}, {}
         self.statistics = Statistics()
         self.in_order = True           # false while words of a broken exchange may still be on the way
-        self.baud = BAUD               # of the nodes, as far as this host has changed it
+        self.baud_changed = False      # by this host, from the one after power-up
 
     def exchange(self, address: int, operation: str, /, tries=None, answer_s=None, **fields):
         """One request, repeated where needed; returns the reply whatever its cause."""
@@ -369,14 +369,14 @@ class Line:
         except BaseException:
             self.first_baud()
             raise
-        self.baud = baud
+        self.baud_changed = True
 
     def first_baud(self):
         """All nodes, and this host, at the baud rate that they have after power-up."""
         self.transport.send_break()
         self.transport.set_baud(BAUD)
         self.transport.wait(BAUD_CHANGE_S)
-        self.baud = BAUD
+        self.baud_changed = False
 
     def node(self, address: int = 1) -> "Node":
         """Connects at the first time: identifies the node and refuses one of another build."""

@@ -227,6 +227,10 @@ def make_parser() -> Parser:
     wait.add_argument("time", type=checked(waiting_time), metavar="TIME", help="how long, with a unit: 20ms, 1.5s")
     command("reset", do_reset, "clear latched faults whose cause is gone; the drive stays off", "moire --port /dev/ttyUSB0 reset -- status")
     command("counters", do_counters, "what happened on the line, seen by node and host", "moire --port /dev/ttyUSB0 counters --json")
+    baud = command("baud", do_baud, "speak at another baud rate for the rest of this call; name all nodes that anyone speaks to",
+                   "moire --port /dev/ttyUSB0 baud 1000000 1 2 -- watch")
+    baud.add_argument("rate", type=positive_number, metavar="RATE", help="9600 to 3000000, and at most an eighth of the nodes' clock")
+    baud.add_argument("addresses", nargs="+", type=address_number, metavar="ADDRESS", help="of all nodes")
     command("encoder", do_encoder, "the sensor as it is now", "moire --port /dev/ttyUSB0 encoder")
     command("signal", do_signal, "what is wrong with sine and cosine", "moire --port /dev/ttyUSB0 signal")
     learn = command(
@@ -431,6 +435,11 @@ class Session:
                 axis.disable()
             except MoireError:
                 pass        # the watchdog of the node does it
+        if self.opened.baud_changed:
+            try:
+                self.opened.first_baud()
+            except MoireError:
+                pass        # the nodes do it after a while
         self.opened.transport.close()
 
 
@@ -650,6 +659,12 @@ def do_counters(session, command):
     rows = [f"node {command.address}:", *(f"  {name:<15} {value}" for name, value in node.items()),
             "seen by this host in this call:", *(f"  {name:<15} {value}" for name, value in host.items())]
     session.say({"command": "counters", "address": command.address, "node": node, "host": host}, "\n".join(rows))
+
+
+def do_baud(session, command):
+    session.line.set_baud(command.rate, command.addresses)
+    session.say({"command": "baud", "baud": command.rate, "addresses": command.addresses},
+                f"{len(command.addresses)} node{'s' * (len(command.addresses) > 1)} and this host: {command.rate} baud until the end of this call")
 
 
 def do_encoder(session, command):
