@@ -19,6 +19,8 @@ module line #(
     output logic       [31:0]    rdata,
     input  wire                  armed,         // level: a drive is enabled
     output logic                 watchdog_expired,
+    output logic                 mark,          // strobe: the same moment for all nodes of the line
+    output logic       [7:0]     mark_axes,     // that start then
     input  wire                  line_rx,       // pins: idles high
     output logic                 line_tx,
     output logic                 line_driver_enable
@@ -43,7 +45,7 @@ module line #(
     address_filter u_filter (.clk, .rst, .address, .valid_in(received), .data_in(received_data), .ninth, .valid(filtered),
                              .data(filtered_data), .command(filtered_command));
     frame_check u_check (.clk, .rst, .valid_in(filtered), .data_in(filtered_data), .command_in(filtered_command), .framing_error,
-                         .valid(checked), .data, .command, .good, .frame_good, .frame_bad);
+                         .valid(checked), .data, .command, .good, .frame_good, .frame_bad, .mark);
     word_queue #(.W(10), .DEPTH(128)) u_received (.clk, .rst, .push(checked), .in({good, command, data}), .pop(receive_read),
                                                  .present, .out(receive), .free(receive_free), .overrun);
     silence_watchdog #(.CLK_HZ(CLK_HZ)) u_watchdog (.clk, .rst, .time_ms(watchdog_time), .sign(frame_good), .armed,
@@ -65,7 +67,7 @@ module line #(
         .receive_read, .transmit_data, .transmit_written, .transmit_command,
         .state_transmit_free(transmit_free), .state_sending(sending), .frames_good(frame_good), .frames_bad(frame_bad),
         .framing_errors(framing_error), .start_glitches(start_glitch), .overruns(overrun), .crc_byte_data(crc_byte),
-        .crc_byte_written, .crc_start_start(crc_start), .crc, .watchdog_time, .breaks(line_break), .driver_cuts(driver_cut));
+        .crc_byte_written, .crc_start_start(crc_start), .crc, .watchdog_time, .breaks(line_break), .driver_cuts(driver_cut), .marks(mark), .mark_axes);
 
     wire unused = &{1'b0, receiving, receive_free, transmit_overrun};
 endmodule

@@ -95,13 +95,14 @@ module node #(
     silence_watchdog #(.CLK_HZ(CLK_HZ)) u_core_watchdog (.clk, .rst, .time_ms(16'(CORE_SILENCE_MS)), .sign(alive), .armed(|drive_enable), .expired(silent));
 
     // line
-    wire               estop, watchdog_expired;
+    wire               estop, watchdog_expired, mark;
+    wire        [7:0]  mark_axes;
 
     synchroniser #(.RESET(1)) u_estop (.clk, .rst, .d(estop_open), .q(estop));
     line #(.CLK_HZ(CLK_HZ)) u_line (.clk, .rst, .address, .select(line_select), .write, .word, .wdata, .rdata(line_rdata),
-                                    .armed(|drive_enable), .watchdog_expired, .line_rx, .line_tx, .line_driver_enable);
+                                    .armed(|drive_enable), .watchdog_expired, .mark, .mark_axes, .line_rx, .line_tx, .line_driver_enable);
 
-    wire unused = &{1'b0, bus_address[1:0], start_axes};
+    wire unused = &{1'b0, bus_address[1:0], start_axes, mark_axes};
 
     // links
     links #(.CLK_HZ(CLK_HZ), .LINKS(LINKS)) u_links (.clk, .rst, .select(links_select), .write, .word, .wdata, .rdata(links_rdata),
@@ -112,7 +113,7 @@ module node #(
     // axes
     for (genvar n = 0; n < AXES; n++) begin : g_axis
         axis #(.CLK_HZ(CLK_HZ), .W(W), .DRIVES(DRIVES), .FILTERS(FILTERS)) u_axis (.clk, .rst, .tick, .tick_period, .sample_tick,
-            .start(start_axes_written && start_axes[n]), .estop, .watchdog_expired, .cpu_stopped(trap || silent),
+            .start((start_axes_written && start_axes[n]) || (mark && mark_axes[n])), .mark, .estop, .watchdog_expired, .cpu_stopped(trap || silent),
             .select(axis_select[n]), .write, .word, .wdata, .rdata(axis_rdata[32*n +: 32]),
             .grating_select(grating_select[n]), .grating_rdata(grating_rdata[32*n +: 32]),
             .actuator_select(actuator_select[n]), .actuator_rdata(actuator_rdata[32*n +: 32]), .now(now[31:0]),

@@ -17,6 +17,7 @@
 #include "parameters.h"
 #include "planner.h"
 
+#define ADDRESS_MASK 0x0Fu
 #define WAY_MASK 0x30u
 #define WAY_TO_NODE 0x20u
 #define WAY_FROM_NODE 0x10u
@@ -46,6 +47,7 @@ static uint32_t answered_crc;
 static uint32_t repeated, refused;
 static uint8_t followed;                                        // whose position each reply tells afresh
 static uint32_t baud, next_baud;                                // next: 0, or what comes after this reply
+static uint32_t marked_axes, marks;                             // those that the next mark starts, and the marks before
 static bool reply_sent;                                         // it is in the queue at least
 static uint32_t called_ms, breaks;                              // when the master called last, and the breaks before this baud rate
 
@@ -147,6 +149,7 @@ static uint8_t counters(void)
     put(LINE_COUNTERS_REPLY_REFUSED, refused, 4);
     put(LINE_COUNTERS_REPLY_BREAKS, line_read(LINE_BREAKS), 4);
     put(LINE_COUNTERS_REPLY_DRIVER_CUTS, line_read(LINE_DRIVER_CUTS), 4);
+    put(LINE_COUNTERS_REPLY_MARKS, line_read(LINE_MARKS), 4);
     return LINE_CAUSE_OK;
 }
 
@@ -223,6 +226,25 @@ static uint8_t set_baud(void)
     return LINE_CAUSE_OK;
 }
 
+// The hardware starts them; the firmware learns it from the count of marks.
+static uint8_t start_at_mark(uint32_t mask)
+{
+    uint8_t cause = mask ? axis_may_start(axes, mask) : LINE_CAUSE_OK;
+    if (cause != LINE_CAUSE_OK) return cause;
+    marks = line_read(LINE_MARKS);
+    line_write(LINE_MARK_AXES, mask);
+    marked_axes = mask;
+    return LINE_CAUSE_OK;
+}
+
+static void look_for_mark(void)
+{
+    if (!marked_axes || line_read(LINE_MARKS) == marks) return;
+    line_write(LINE_MARK_AXES, 0);
+    axis_started(axes, marked_axes);
+    marked_axes = 0;
+}
+
 static uint8_t operation_of_the_image(uint8_t operation)
 {
     uint8_t cause = LINE_CAUSE_NOT_BUILT;
@@ -246,6 +268,7 @@ static uint8_t execute(uint8_t operation, uint8_t length)
     case LINE_OPERATION_READ_REGISTER: return read_register();
     case LINE_OPERATION_WRITE_REGISTER: return write_register();
     case LINE_OPERATION_START: return axis_start_prepared(axes, asked[LINE_START_REQUEST_AXES]);
+    case LINE_OPERATION_START_AT_MARK: return start_at_mark(asked[LINE_START_AT_MARK_REQUEST_AXES]);
     case LINE_OPERATION_STATUS: return status(axis);
     case LINE_OPERATION_ENABLE: return enable(axis);
     case LINE_OPERATION_HOME: return axis_home(axis);
@@ -327,6 +350,8 @@ static void command_byte(uint8_t data)
 {
     uint32_t bytes = 1;
     called_ms = clock_ms();
+    receiving = false;
+    if ((data & ADDRESS_MASK) == 0) return;                     // a mark for all nodes: the hardware took it
     receiving = (data & WAY_MASK) == WAY_TO_NODE;
     received = 0;
     if (!receiving) bytes += 1 + reply[0] + CRC_BYTES;
@@ -347,6 +372,8 @@ void line_start(unsigned served_axes)
     wrong_map = !hardware_map_fits();
     receiving = answered = reply_sent = false;
     followed = NO_AXIS;
+    line_write(LINE_MARK_AXES, 0);
+    marked_axes = 0;
     baud = BAUD;
     next_baud = 0;
     repeated = refused = 0;
@@ -374,6 +401,7 @@ static void keep_baud(void)
 void line_poll(void)
 {
     keep_baud();
+    look_for_mark();
     for (uint32_t words = 0; words < WORDS_A_POLL; words++) {
         uint32_t word = line_read(LINE_RECEIVE);
         if (!FIELD_GET(word, LINE_RECEIVE_PRESENT)) return;

@@ -44,8 +44,8 @@ def test_a_known_exchange_byte_by_byte():
     crc = zlib.crc32(b"\x22" + frame).to_bytes(4, "little")
     assert machine.hear([*frame, *crc[:3], crc[3] | GOOD]) == b""
     answer = machine.hear([0x12 | COMMAND])
-    body = bytes([7, OPERATION["counters"], 0]) + bytes(36)
-    assert answer == b"\x52" + bytes([39]) + body + zlib.crc32(b"\x52" + bytes([39]) + body).to_bytes(4, "little")
+    body = bytes([7, OPERATION["counters"], 0]) + bytes(40)
+    assert answer == b"\x52" + bytes([43]) + body + zlib.crc32(b"\x52" + bytes([43]) + body).to_bytes(4, "little")
 
 
 def test_identify_tells_what_was_built():
@@ -140,11 +140,11 @@ def test_refusals_are_counted():
 
 def test_counters_are_those_of_the_line():
     machine = Machine()
-    names = "frames_good", "frames_bad", "framing_errors", "start_glitches", "overruns", "breaks", "driver_cuts"
+    names = "frames_good", "frames_bad", "framing_errors", "start_glitches", "overruns", "breaks", "driver_cuts", "marks"
     for n, name in enumerate(names):
         machine.word[DEFINES["LINE_BASE"] + DEFINES["LINE_" + name.upper()]] = 1000 + n
     answer = machine.ask("counters")
-    assert [answer[name] for name in names] == [*range(1000, 1007)]
+    assert [answer[name] for name in names] == [*range(1000, 1008)]
 
 
 # own steps are counted as pulses and direction only; the converter serves the motor or the fine stage

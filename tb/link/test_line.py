@@ -164,6 +164,24 @@ async def a_glitch_is_no_start_bit_and_a_lost_stop_bit_ends_the_frame(dut):
 
 
 @cocotb.test()
+async def a_frame_for_all_nodes_is_a_mark_in_the_middle_of_its_last_stop_bit(dut):
+    line = await Line(dut).begin()
+    await line.write("mark_axes", 0x5)
+    assert int(dut.mark_axes.value) == 5
+    words, at = frame(0x20, b"\x07"), []
+    levels = [level for data, ninth in words for level in character(data, ninth)]
+    for n, level in enumerate(levels + [1] * 4):
+        for part in range(BIT):
+            await line.clk(level)
+            at += [n * BIT + part] * int(dut.mark.value)
+    assert len(at) == 1 and abs(at[0] - (len(levels) * BIT - BIT // 2)) <= BIT
+    assert await line.read("marks") == 1 and await line.read("frames_good") == 1
+    await line.words(frame(0x20 | ADDRESS, b"\x08"))
+    await line.levels([1] * 4)
+    assert await line.read("marks") == 1 and await line.read("frames_good") == 2
+
+
+@cocotb.test()
 async def random_frames_are_good_when_they_are_whole_and_for_this_node(dut):
     line, good = await Line(dut).begin(), 0
     for _ in range(40):
