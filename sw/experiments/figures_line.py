@@ -23,7 +23,7 @@ DRIVER = Path(__file__).with_name("line_run.cpp")
 FRAMES = 10                              # that line_run knows
 RANDOM = 10**6
 DISTURBANCES = 10**5
-SHARE = 50_000                           # of one run, each with a seed of its own
+SHARE = 10_000                           # of one run, each with a seed of its own
 BIT_CLK = (16, 17.36, 20, 20.83, 34.72)  # 3 M baud at 60 MHz is 20, 115200 at 2.4 MHz is 20.83
 CLK_HZ = 60_000_000
 BAUD = 1_000_000
@@ -72,7 +72,7 @@ def line_wrong_accepted():
 
 
 def line_resync_failures(count=DISTURBANCES):
-    told = together([("disturb", min(SHARE // 10, count - first), seed) for seed, first in enumerate(range(0, count, SHARE // 10), start=1)])
+    told = together([("disturb", min(SHARE, count - first), seed) for seed, first in enumerate(range(0, count, SHARE), start=1)])
     console.print(f"{sum(tried for tried, _ in told):.0f} disturbances, each followed by a character of silence and a good exchange")
     return sum(refused for _, refused in told)
 

@@ -156,7 +156,8 @@ def simulation(driver, source, firmware=None, **parameters):
         objects = []
         for file in own:
             objects.append(folder / f"{file.stem}.o")
-            run([tool, "-x", "c", "-std=c11", "-O2", "-Dmain=firmware_main", *include, "-c", file, "-o", objects[-1]], f"g++ of {file.name}")
+            run([tool, "-x", "c", "-std=c11", "-O2", "-Dmain=firmware_main", *include, "-c", file, "-o", objects[-1]],
+                f"g++ of {file.name}")
         run([tool, *COMPILE, *VERILATED, *include, f"-I{folder}", f"-I{verilator / 'include'}", driver, *sorted(folder.glob("Vtop*.cpp")),
              *objects, support, "-o", folder / "run"], f"g++ of {driver.name}")
 
