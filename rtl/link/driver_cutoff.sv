@@ -54,7 +54,6 @@ module driver_cutoff #(
         if (past && !$past(rst)) begin
             if (cut) assert (!driver_enable);
             if ($past(wanted) && !$past(driver_enable) && wanted) assert (!driver_enable);
-            cover (wanted && !driver_enable && spent == 0);
             cover (driver_enable && spent == 3);
         end
     end

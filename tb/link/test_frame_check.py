@@ -84,7 +84,7 @@ async def latency_is_1_and_good_comes_with_the_last_byte(dut):
         assert not (await line.clk(1, *word))[3]
     assert (await line.clk())[0] == 0
     assert await line.clk(1, *last) == (1, last[0], 0, 1, 1, 0, 0)
-    assert await line.clk() == (0, 0, 0, 0, 0, 0)
+    assert await line.clk() == (0, 0, 0, 0, 0, 0, 0)
 
 
 @cocotb.test()
