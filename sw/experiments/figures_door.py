@@ -9,6 +9,7 @@ import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import NamedTuple
 
 import serial
 
@@ -92,17 +93,22 @@ def images(firmware=FIRMWARE):
     return sorted(path.stem.removeprefix("image_") for path in Path(firmware).glob("image_*.c"))
 
 
-def fuzz_firmware(seconds, image, seed=1, firmware=FIRMWARE):
-    """(runs, what a sanitizer said or None)"""
+class Outcome(NamedTuple):
+    image: str
+    runs: int
+    edges: int
+    kept: int
+    said: str | None                     # by a sanitizer, or about an input that took too long
+
+
+def fuzz_firmware(seconds, image, seed=1, firmware=FIRMWARE) -> Outcome:
     with tempfile.TemporaryDirectory() as folder:
         program = build_firmware_fuzz(Path(folder), image, firmware)
         done = subprocess.run([program, str(seconds), str(seed)], capture_output=True, text=True, check=False,
                               env={**os.environ, "ASAN_OPTIONS": "detect_leaks=0:abort_on_error=1", "UBSAN_OPTIONS": "abort_on_error=1"})
     if done.returncode:
-        return 0, done.stderr
-    runs, edges, corpus = map(int, done.stdout.split())
-    console.print(f"firmware, image {image}: {runs} scripts, {edges} edges, {corpus} kept")
-    return runs, None
+        return Outcome(image, 0, 0, 0, done.stderr)
+    return Outcome(image, *map(int, done.stdout.split()), None)
 
 
 def host_parser_crashes(seconds=FUZZ_S, seed=1):
@@ -113,10 +119,11 @@ def host_parser_crashes(seconds=FUZZ_S, seed=1):
         targets = parser_fuzz.fuzz(seconds, seed)
         outcomes = firmware.result()
     crashes = 0
-    for _, said in outcomes:
-        if said is not None:
+    for outcome in outcomes:
+        console.print(f"firmware, image {outcome.image}: {outcome.runs} scripts, {outcome.edges} edges, {outcome.kept} kept")
+        if outcome.said is not None:
             crashes += 1
-            console.print(said, markup=False)
+            console.print(outcome.said, markup=False)
     for target in targets:
         console.print(f"{target.parse.__name__}: {target.runs} inputs, {len(target.seen)} pairs of lines, {len(target.corpus)} kept")
         for where, data in target.crashes.items():

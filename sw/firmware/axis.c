@@ -119,12 +119,12 @@ void axis_poll(unsigned n)
 
     if (faults) fault(n, faults);
     if (a->state == LINE_STATE_OFF || a->state == LINE_STATE_FAULTED) return;
-    state = axis_read(n, AXIS_STATE);
+    motion_feed(n);
+    state = axis_read(n, AXIS_STATE);                       // what homing looks at comes right before it looks
     if (a->leaving && !pressed(state)) {
         a->leaving = false;
         write_control(n, true);
     }
-    motion_feed(n);
     switch (a->state) {
     case LINE_STATE_HOMING:
         outcome = homing_poll(n, state);
