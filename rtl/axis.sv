@@ -19,6 +19,7 @@ module axis #(
     input  wire        [23:0]    tick_period,   // clk
     input  wire                  sample_tick,   // strobe: start a conversion
     input  wire                  start,         // strobe: play the queued segments, with other axes
+    input  wire                  mark,          // strobe: a moment of all nodes of the line, captured
     input  wire                  estop,         // level: 1 pressed
     input  wire                  watchdog_expired, // level: the line is silent
     input  wire                  cpu_stopped,   // level: the soft core has stopped or hangs
@@ -94,7 +95,7 @@ module axis #(
     wire signed [47:0]  position;
     wire                upward;
 
-    grating #(.W(W)) u_grating (.clk, .rst, .tick, .sample_tick, .now, .own_step(step), .own_direction(upward), .select(grating_select), .write,
+    grating #(.W(W)) u_grating (.clk, .rst, .tick, .sample_tick, .mark, .now, .own_step(step), .own_direction(upward), .select(grating_select), .write,
         .word, .wdata, .rdata(grating_rdata),
         .deglitch, .spike_step, .spike_hold, .amplitude_low, .amplitude_high, .disagreement_limit, .shift(shift_origin_written),
         .shift_periods(shift_origin), .a(pin_a), .b(pin_b), .z(pin_z), .probe(pin_probe), .adc_sin, .adc_cos, .adc_cs_n, .adc_sclk,

@@ -14,6 +14,7 @@ module grating #(
     input  wire                  rst,
     input  wire                  tick,          // strobe: servo tick
     input  wire                  sample_tick,   // strobe: start a conversion
+    input  wire                  mark,          // strobe: captured as one of software is
     input  wire        [31:0]    now,           // clk
     input  wire                  select,        // register bus, this grating
     input  wire                  write,
@@ -142,7 +143,7 @@ module grating #(
     coarse_check u_coarse (.clk, .rst, .limit(disagreement_limit), .valid(position_valid), .position, .count(quadrature_count),
                            .shift, .shift_periods, .disagreement);
     velocity_estimator u_velocity (.clk, .rst, .quantum, .tick, .position, .shift, .shift_periods, .velocity, .fine);
-    position_capture u_capture (.clk, .rst, .enabled(capture_sources), .index(by_counts ? index_later[1] : index_found), .tick, .software(capture_now), .probe, .now,
+    position_capture u_capture (.clk, .rst, .enabled(capture_sources), .index(by_counts ? index_later[1] : index_found), .tick, .software(capture_now || mark), .probe, .now,
                                 .valid(position_valid), .position, .pop(capture_next), .clear(capture_clear), .present, .captured_sources,
                                 .captured_age, .captured_time, .captured_position, .free(capture_free), .overrun);
     position_compare u_compare (.clk, .rst, .start(compare_start), .step(compare_step), .count(compare_count), .pulse_length, .gap_length,

@@ -94,46 +94,15 @@ module node #(
         .time_stamp(now), .tick_period, .sample_period, .alive_beat(alive), .start_axes, .start_axes_written);
     silence_watchdog #(.CLK_HZ(CLK_HZ)) u_core_watchdog (.clk, .rst, .time_ms(16'(CORE_SILENCE_MS)), .sign(alive), .armed(|drive_enable), .expired(silent));
 
-    // link
-    wire               rx, estop, received, ninth, framing_error, start_glitch, filtered, filtered_command;
-    wire               checked, command, good, frame_good, frame_bad, present, overrun, receive_read;
-    wire        [7:0]  received_data, filtered_data, data, transmit_data, crc_byte;
-    wire        [9:0]  receive;
-    wire        [7:0]  receive_free;
-    wire               receiving, transmit_overrun;
-    wire               sending, transmit_command, transmit_written, crc_byte_written, crc_start;
-    wire               to_send, send_ready, send_command;
-    wire        [7:0]  transmit_free, send_data;
-    wire        [19:0] bit_time;
-    wire        [15:0] watchdog_time;
-    wire        [31:0] crc;
-    wire               watchdog_expired;
+    // line
+    wire               estop, watchdog_expired, mark;
+    wire        [7:0]  mark_axes;
 
-    synchroniser #(.W(2), .RESET(3)) u_line_pins (.clk, .rst, .d({estop_open, line_rx | line_driver_enable}), .q({estop, rx}));
-    character_receiver u_receiver (.clk, .rst, .bit_time, .rx, .valid(received), .data(received_data), .ninth, .framing_error,
-                                   .start_glitch, .busy(receiving));
-    address_filter u_filter (.clk, .rst, .address, .valid_in(received), .data_in(received_data), .ninth, .valid(filtered),
-                             .data(filtered_data), .command(filtered_command));
-    frame_check u_check (.clk, .rst, .valid_in(filtered), .data_in(filtered_data), .command_in(filtered_command), .framing_error,
-                         .valid(checked), .data, .command, .good, .frame_good, .frame_bad);
-    word_queue #(.W(10), .DEPTH(128)) u_received (.clk, .rst, .push(checked), .in({good, command, data}), .pop(receive_read),
-                                                 .present, .out(receive), .free(receive_free), .overrun);
-    word_queue #(.W(9), .DEPTH(128)) u_to_send (.clk, .rst, .push(transmit_written), .in({transmit_command, transmit_data}),
-                                                .pop(send_ready), .present(to_send), .out({send_command, send_data}),
-                                                .free(transmit_free), .overrun(transmit_overrun));
-    character_transmitter u_transmitter (.clk, .rst, .bit_time, .valid(to_send), .ready(send_ready), .data(send_data),
-                                         .ninth(send_command), .tx(line_tx), .driver_enable(line_driver_enable), .busy(sending));
-    crc32_stream u_crc (.clk, .rst, .start(crc_start), .valid(crc_byte_written), .data(crc_byte), .crc);
-    silence_watchdog #(.CLK_HZ(CLK_HZ)) u_line_watchdog (.clk, .rst, .time_ms(watchdog_time), .sign(frame_good), .armed(|drive_enable),
-                                                 .expired(watchdog_expired));
-    line_registers u_line_registers (.clk, .rst, .select(line_select), .write, .word, .wdata, .rdata(line_rdata), .bit_time,
-        .receive_data(receive[7:0]), .receive_command(receive[8]), .receive_good(receive[9]), .receive_present(present),
-        .receive_read, .transmit_data, .transmit_written, .transmit_command,
-        .state_transmit_free(transmit_free), .state_sending(sending), .frames_good(frame_good), .frames_bad(frame_bad),
-        .framing_errors(framing_error), .start_glitches(start_glitch), .overruns(overrun), .crc_byte_data(crc_byte),
-        .crc_byte_written, .crc_start_start(crc_start), .crc, .watchdog_time);
+    synchroniser #(.RESET(1)) u_estop (.clk, .rst, .d(estop_open), .q(estop));
+    line #(.CLK_HZ(CLK_HZ)) u_line (.clk, .rst, .address, .select(line_select), .write, .word, .wdata, .rdata(line_rdata),
+                                    .armed(|drive_enable), .watchdog_expired, .mark, .mark_axes, .line_rx, .line_tx, .line_driver_enable);
 
-    wire unused = &{1'b0, receiving, receive_free, transmit_overrun, bus_address[1:0], start_axes};
+    wire unused = &{1'b0, bus_address[1:0], start_axes, mark_axes};
 
     // links
     links #(.CLK_HZ(CLK_HZ), .LINKS(LINKS)) u_links (.clk, .rst, .select(links_select), .write, .word, .wdata, .rdata(links_rdata),
@@ -144,7 +113,7 @@ module node #(
     // axes
     for (genvar n = 0; n < AXES; n++) begin : g_axis
         axis #(.CLK_HZ(CLK_HZ), .W(W), .DRIVES(DRIVES), .FILTERS(FILTERS)) u_axis (.clk, .rst, .tick, .tick_period, .sample_tick,
-            .start(start_axes_written && start_axes[n]), .estop, .watchdog_expired, .cpu_stopped(trap || silent),
+            .start((start_axes_written && start_axes[n]) || (mark && mark_axes[n])), .mark, .estop, .watchdog_expired, .cpu_stopped(trap || silent),
             .select(axis_select[n]), .write, .word, .wdata, .rdata(axis_rdata[32*n +: 32]),
             .grating_select(grating_select[n]), .grating_rdata(grating_rdata[32*n +: 32]),
             .actuator_select(actuator_select[n]), .actuator_rdata(actuator_rdata[32*n +: 32]), .now(now[31:0]),

@@ -3,7 +3,8 @@
 //
 // latency  1 clk                           rate  one word per clk
 // source   S0: multiprocessor mode of the 8031 (SM2). A word with the 9th bit set is looked at by all nodes: `00 D5D4 address`
-//          with D5D4 01 or 10 and the own address passes and opens the gate for the words that follow; any other closes it
+//          with D5D4 01 or 10 and the own address passes and opens the gate for the words that follow; `00 10 0000` is for all nodes;
+//          any other closes it
 // model    tb/link/address_filter.py, equal in every bit of every cycle
 // proved   nothing passes but own commands, and data words after one with no other command between
 `default_nettype none
@@ -21,7 +22,7 @@ module address_filter (
 );
     logic open;
 
-    wire own = data_in[7:6] == 2'b00 && (data_in[5] ^ data_in[4]) && data_in[3:0] == address;
+    wire own = (data_in[7:6] == 2'b00 && (data_in[5] ^ data_in[4]) && data_in[3:0] == address) || data_in == 8'h20;
 
     always_ff @(posedge clk) begin
         valid   <= valid_in && (ninth ? own : open);
@@ -41,13 +42,13 @@ module address_filter (
         past <= 1'b1;
         if (!past) assume (rst);
         if (rst) called <= 1'b0;
-        else if (valid_in && ninth) called <= data_in == {4'h1, address} || data_in == {4'h2, address};
+        else if (valid_in && ninth) called <= data_in == {4'h1, address} || data_in == {4'h2, address} || data_in == 8'h20;
         if (past && !$past(rst)) begin
             assert (open == called);
             if (valid) begin
                 assert ($past(valid_in) && data == $past(data_in) && command == $past(ninth));
                 if (command) assert (data[7:4] == 4'h1 || data[7:4] == 4'h2);
-                if (command) assert (data[3:0] == $past(address));
+                if (command) assert (data[3:0] == $past(address) || data == 8'h20);
                 else assert ($past(called));
             end
             cover (valid && command);

@@ -25,7 +25,8 @@ module frame_check #(
     output logic                 command,
     output logic                 good,          // with valid: length and CRC-32 of the frame that ends here are right
     output logic                 frame_good,    // strobe: the same
-    output logic                 frame_bad      // strobe: wrong length, wrong CRC-32, or interrupted
+    output logic                 frame_bad,     // strobe: wrong length, wrong CRC-32, or interrupted
+    output logic                 mark           // strobe: a good one that is for all nodes
 );
     if (LONGEST < 1 || LONGEST > 124) begin : g_check LONGEST_MUST_BE_FROM_1_TO_124 u_error (); end
 
@@ -37,6 +38,7 @@ module frame_check #(
     logic [6:0]  left;                          // bytes of body and CRC-32 still to come, less 1
     logic        ended;                         // data is the last byte of a payload
     logic        broken;
+    logic        to_all;                        // the command byte had address 0
     wire  [31:0] crc;
 
     wire listening = state != IDLE && !framing_error;
@@ -48,6 +50,7 @@ module frame_check #(
 
     assign good       = ended && crc == WHOLE;
     assign frame_good = good;
+    assign mark       = good && to_all;
     assign frame_bad  = broken || (ended && !good);
 
     always_ff @(posedge clk) begin
@@ -57,6 +60,7 @@ module frame_check #(
         ended   <= word && state == PAYLOAD && left == 7'd0;
         broken  <= (state != IDLE && (framing_error || call)) || (word && state == LENGTH && misfit);
 
+        if (call) to_all <= data_in[3:0] == 4'd0;
         if (call)               state <= data_in[5] ? LENGTH : IDLE;
         else if (framing_error) state <= IDLE;
         else if (word && state == LENGTH) begin
@@ -98,6 +102,7 @@ module frame_check #(
             assert (!(frame_good && frame_bad));
             if (good) assert (valid && !command && taken == length + 8'd5);
             if (frame_good) assert ($past(running) && !running);
+            if (mark) assert (frame_good && to_all);
             if (frame_bad) assert ($past(running));
             if ($past(running) && !running) assert (frame_good || frame_bad);
             cover (frame_good);

@@ -67,7 +67,7 @@ module grating_registers (
     output logic [15:0]        drift_limits_balance,           // drifts: balance
     output logic [15:0]        square_limits_square,           // phase error and comparators: square
     output logic [15:0]        square_limits_dead,             // phase error and comparators: dead
-    output logic [6:0]         capture_sources,                // sources: index, tick, software, rising probe 0, 1, falling probe 0, 1
+    output logic [6:0]         capture_sources,                // sources: index, tick, software or a mark of the line, rising probe 0, 1, falling probe 0, 1
     input  wire                capture_state_present,          // captured_* are the oldest
     input  wire  [4:0]         capture_state_free,             // captures that still fit
     input  wire                capture_state_overrun,          // strobe, held: an event was dropped; write 1 to clear

@@ -35,13 +35,20 @@ module line_registers (
     output logic        crc_byte_written,     // strobe: crc_byte has just been written, its new value stands
     output logic        crc_start_start,      // strobe: start the CRC-32 afresh: start
     input  wire  [31:0] crc,                  // the CRC-32 so far, final inversion done
-    output logic [15:0] watchdog_time         // longest silence of the master while a drive is enabled; 0: for ever [0.001 s]
+    output logic [15:0] watchdog_time,        // longest silence of the master while a drive is enabled; 0: for ever [0.001 s]
+    input  wire         breaks,               // strobe, counted: breaks: the line was low for 2 ms; writing clears
+    input  wire         driver_cuts,          // strobe, counted: the own driver was on for 1024 bits and has been cut off; writing clears
+    input  wire         marks,                // strobe, counted: marks: good frames for all nodes; writing clears
+    output logic [7:0]  mark_axes             // play the queued segments of these axes from the next mark on; bit n: axis n
 );
     logic [31:0] frames_good_count;
     logic [31:0] frames_bad_count;
     logic [31:0] framing_errors_count;
     logic [31:0] start_glitches_count;
     logic [31:0] overruns_count;
+    logic [31:0] breaks_count;
+    logic [31:0] driver_cuts_count;
+    logic [31:0] marks_count;
 
     wire get = select && !write;
     wire put = select && write;
@@ -61,6 +68,10 @@ module line_registers (
             6'h08: rdata <= overruns_count;
             6'h0B: rdata <= crc;
             6'h0C: rdata <= {16'd0, watchdog_time};
+            6'h0D: rdata <= breaks_count;
+            6'h0E: rdata <= driver_cuts_count;
+            6'h0F: rdata <= marks_count;
+            6'h10: rdata <= {24'd0, mark_axes};
             default: rdata <= '0;
         endcase
 
@@ -82,6 +93,13 @@ module line_registers (
         if (put && word == 6'h09) crc_byte_data <= wdata[7:0];
         crc_start_start <= put && word == 6'h0A && wdata[0];
         if (put && word == 6'h0C) watchdog_time <= wdata[15:0];
+        if (put && word == 6'h0D) breaks_count <= {31'd0, breaks};
+        else if (!(&breaks_count)) breaks_count <= breaks_count + {31'd0, breaks};
+        if (put && word == 6'h0E) driver_cuts_count <= {31'd0, driver_cuts};
+        else if (!(&driver_cuts_count)) driver_cuts_count <= driver_cuts_count + {31'd0, driver_cuts};
+        if (put && word == 6'h0F) marks_count <= {31'd0, marks};
+        else if (!(&marks_count)) marks_count <= marks_count + {31'd0, marks};
+        if (put && word == 6'h10) mark_axes <= wdata[7:0];
         if (rst) begin
             rdata <= '0;
             bit_time <= 20'h0022B;
@@ -97,6 +115,10 @@ module line_registers (
             crc_byte_data <= 8'h00;
             crc_start_start <= 1'b0;
             watchdog_time <= 16'h03E8;
+            breaks_count <= '0;
+            driver_cuts_count <= '0;
+            marks_count <= '0;
+            mark_axes <= 8'h00;
         end
     end
 endmodule

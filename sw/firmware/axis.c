@@ -246,13 +246,25 @@ static void set_off(unsigned n)
     axes[n].state = LINE_STATE_MOVING;
 }
 
-uint8_t axis_start_prepared(unsigned count, uint32_t mask)
+uint8_t axis_may_start(unsigned count, uint32_t mask)
 {
     if (mask == 0 || mask >> count) return LINE_CAUSE_OUT_OF_RANGE;
     for (unsigned n = 0; n < count; n++)
         if (mask >> n & 1u && axes[n].state != LINE_STATE_PREPARED) return LINE_CAUSE_NOT_PREPARED;
+    return LINE_CAUSE_OK;
+}
+
+void axis_started(unsigned count, uint32_t mask)
+{
     for (unsigned n = 0; n < count; n++)
-        if (mask >> n & 1u) set_off(n);
+        if (mask >> n & 1u && axes[n].state == LINE_STATE_PREPARED) set_off(n);
+}
+
+uint8_t axis_start_prepared(unsigned count, uint32_t mask)
+{
+    uint8_t cause = axis_may_start(count, mask);
+    if (cause != LINE_CAUSE_OK) return cause;
+    axis_started(count, mask);
     node_write(NODE_START_AXES, mask);
     return LINE_CAUSE_OK;
 }

@@ -15,6 +15,8 @@ uint8_t axis_home(unsigned n);
 uint8_t axis_move(unsigned n, int64_t target, uint32_t *duration_ticks);
 uint8_t axis_prepare(unsigned n, int64_t target, uint32_t *duration_ticks);
 uint8_t axis_start_prepared(unsigned count, uint32_t mask);     // bit n: axis n, of so many
+uint8_t axis_may_start(unsigned count, uint32_t mask);          // whether all of them wait for it
+void axis_started(unsigned count, uint32_t mask);               // by the hardware
 uint8_t axis_stop(unsigned n);
 uint8_t axis_excite(unsigned n, bool on);                       // open loop: whoever asked for it writes open_command
 uint8_t axis_go(unsigned n, int64_t distance, uint8_t velocity_id);     // for what measures by itself: no zero, no travel

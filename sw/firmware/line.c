@@ -8,6 +8,7 @@
 #include "line.h"
 
 #include "axis.h"
+#include "clock.h"
 #include "grating.h"
 #include "hardware.h"
 #include "homing.h"
@@ -16,6 +17,7 @@
 #include "parameters.h"
 #include "planner.h"
 
+#define ADDRESS_MASK 0x0Fu
 #define WAY_MASK 0x30u
 #define WAY_TO_NODE 0x20u
 #define WAY_FROM_NODE 0x10u
@@ -23,6 +25,11 @@
 #define CRC_BYTES 4u
 #define CAUSE (LINE_REPLY_HEAD - 1u)    // of a reply body
 #define WORDS_A_POLL 8u                 // then the axes have their turn
+#define LOWEST_BAUD 9600u
+#define HIGHEST_BAUD 3000000u
+#define SHORTEST_BIT_CLK 8u             // that receiver and transmitter can do
+#define BAUD_PATIENCE_MS 5000u          // of a master at another baud rate than the first
+#define NO_AXIS 0xFFu
 
 #define OPERATION_SHAPE(name, code, request, reply, of_axis) [code] = {request, reply, of_axis},
 static const struct { uint8_t request, reply; bool of_axis; } shapes[] = {LINE_OPERATIONS(OPERATION_SHAPE)};
@@ -38,6 +45,11 @@ static uint8_t *answer;
 static bool answered;                                           // there was a request, with this CRC-32:
 static uint32_t answered_crc;
 static uint32_t repeated, refused;
+static uint8_t followed;                                        // whose position each reply tells afresh
+static uint32_t baud, next_baud;                                // next: 0, or what comes after this reply
+static uint32_t marked_axes, marks;                             // those that the next mark starts, and the marks before
+static bool reply_sent;                                         // it is in the queue at least
+static uint32_t called_ms, breaks;                              // when the master called last, and the breaks before this baud rate
 
 static uint64_t get(const uint8_t *from, unsigned bytes)
 {
@@ -135,6 +147,9 @@ static uint8_t counters(void)
     put(LINE_COUNTERS_REPLY_OVERRUNS, line_read(LINE_OVERRUNS), 4);
     put(LINE_COUNTERS_REPLY_REPEATED, repeated, 4);
     put(LINE_COUNTERS_REPLY_REFUSED, refused, 4);
+    put(LINE_COUNTERS_REPLY_BREAKS, line_read(LINE_BREAKS), 4);
+    put(LINE_COUNTERS_REPLY_DRIVER_CUTS, line_read(LINE_DRIVER_CUTS), 4);
+    put(LINE_COUNTERS_REPLY_MARKS, line_read(LINE_MARKS), 4);
     return LINE_CAUSE_OK;
 }
 
@@ -200,8 +215,34 @@ static uint8_t signal(unsigned axis)
 static uint8_t position(unsigned axis)
 {
     put(LINE_POSITION_REPLY_POSITION, (uint64_t)axis_read_position(axis, AXIS_POSITION), 8);
-    reply[0] = LINE_POSITION_REPLY_LENGTH;
     return LINE_CAUSE_OK;
+}
+
+static uint8_t set_baud(void)
+{
+    uint32_t wanted = (uint32_t)get(&asked[LINE_SET_BAUD_REQUEST_BAUD], 4);
+    if (wanted < LOWEST_BAUD || wanted > HIGHEST_BAUD || wanted > node_read(NODE_CLK_HZ) / SHORTEST_BIT_CLK) return LINE_CAUSE_OUT_OF_RANGE;
+    next_baud = wanted;
+    return LINE_CAUSE_OK;
+}
+
+// The hardware starts them; the firmware learns it from the count of marks.
+static uint8_t start_at_mark(uint32_t mask)
+{
+    uint8_t cause = mask ? axis_may_start(axes, mask) : LINE_CAUSE_OK;
+    if (cause != LINE_CAUSE_OK) return cause;
+    marks = line_read(LINE_MARKS);
+    line_write(LINE_MARK_AXES, mask);
+    marked_axes = mask;
+    return LINE_CAUSE_OK;
+}
+
+static void look_for_mark(void)
+{
+    if (!marked_axes || line_read(LINE_MARKS) == marks) return;
+    line_write(LINE_MARK_AXES, 0);
+    axis_started(axes, marked_axes);
+    marked_axes = 0;
 }
 
 static uint8_t operation_of_the_image(uint8_t operation)
@@ -227,6 +268,7 @@ static uint8_t execute(uint8_t operation, uint8_t length)
     case LINE_OPERATION_READ_REGISTER: return read_register();
     case LINE_OPERATION_WRITE_REGISTER: return write_register();
     case LINE_OPERATION_START: return axis_start_prepared(axes, asked[LINE_START_REQUEST_AXES]);
+    case LINE_OPERATION_START_AT_MARK: return start_at_mark(asked[LINE_START_AT_MARK_REQUEST_AXES]);
     case LINE_OPERATION_STATUS: return status(axis);
     case LINE_OPERATION_ENABLE: return enable(axis);
     case LINE_OPERATION_HOME: return axis_home(axis);
@@ -238,7 +280,9 @@ static uint8_t execute(uint8_t operation, uint8_t length)
     case LINE_OPERATION_SET_PARAMETER: return set_parameter(axis);
     case LINE_OPERATION_ENCODER: return encoder(axis);
     case LINE_OPERATION_SIGNAL: return signal(axis);
-    case LINE_OPERATION_POSITION: return position(axis);
+    case LINE_OPERATION_POSITION:
+    case LINE_OPERATION_FOLLOW: return position(axis);          // the same bodies
+    case LINE_OPERATION_SET_BAUD: return set_baud();
     default: return operation_of_the_image(operation);
     }
 }
@@ -287,8 +331,11 @@ static void frame(void)
         repeated++;
         return;
     }
+    next_baud = 0;
     reply[0] = line_do(&request[1], length, &reply[1]);
     if (reply[1 + CAUSE] != LINE_CAUSE_OK) refused++;
+    followed = reply[2] == LINE_OPERATION_FOLLOW && reply[1 + CAUSE] == LINE_CAUSE_OK ? request[1 + LINE_REQUEST_HEAD] : NO_AXIS;
+    reply_sent = false;
     answered = true;
     answered_crc = crc;
     seal();
@@ -302,11 +349,20 @@ static void send(uint8_t data)
 static void command_byte(uint8_t data)
 {
     uint32_t bytes = 1;
+    called_ms = clock_ms();
+    receiving = false;
+    if ((data & ADDRESS_MASK) == 0) return;                     // a mark for all nodes: the hardware took it
     receiving = (data & WAY_MASK) == WAY_TO_NODE;
     received = 0;
     if (!receiving) bytes += 1 + reply[0] + CRC_BYTES;
     if (FIELD_GET(line_read(LINE_STATE), LINE_STATE_TRANSMIT_FREE) < bytes) return;    // silence, rather than half an answer
     send(READY | (data & 0x3F));
+    if (!receiving && followed != NO_AXIS) {                    // while the ready byte is under way
+        answer = &reply[1];
+        position(followed);
+        seal();
+    }
+    reply_sent = !receiving;
     for (uint32_t n = 0; n + 1 < bytes; n++) send(reply[n]);
 }
 
@@ -314,7 +370,12 @@ void line_start(unsigned served_axes)
 {
     axes = served_axes;
     wrong_map = !hardware_map_fits();
-    receiving = answered = false;
+    receiving = answered = reply_sent = false;
+    followed = NO_AXIS;
+    line_write(LINE_MARK_AXES, 0);
+    marked_axes = 0;
+    baud = BAUD;
+    next_baud = 0;
     repeated = refused = 0;
     reply[0] = LINE_REPLY_HEAD;
     reply[1] = reply[2] = 0;
@@ -322,8 +383,25 @@ void line_start(unsigned served_axes)
     seal();
 }
 
+static void speak_at(uint32_t wanted)
+{
+    parameters_set_baud(wanted);
+    baud = wanted;
+    next_baud = 0;
+    called_ms = clock_ms();
+    breaks = line_read(LINE_BREAKS);
+}
+
+static void keep_baud(void)
+{
+    if (next_baud && reply_sent && !FIELD_GET(line_read(LINE_STATE), LINE_STATE_SENDING)) speak_at(next_baud);
+    else if (baud != BAUD && (clock_ms() - called_ms > BAUD_PATIENCE_MS || line_read(LINE_BREAKS) != breaks)) speak_at(BAUD);
+}
+
 void line_poll(void)
 {
+    keep_baud();
+    look_for_mark();
     for (uint32_t words = 0; words < WORDS_A_POLL; words++) {
         uint32_t word = line_read(LINE_RECEIVE);
         if (!FIELD_GET(word, LINE_RECEIVE_PRESENT)) return;

@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x692B6460u    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0xA7BFE8C3u    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -322,6 +322,9 @@ enum line_operation {
     LINE_OPERATION_PREPARE = 20,    // plan to go to a position, and wait for start
     LINE_OPERATION_START = 21,    // begin the prepared motions of these axes (bit n: axis n), all in one tick; none if one of them has none
     LINE_OPERATION_POSITION = 30,    // where an axis is: the shortest answer that tells it
+    LINE_OPERATION_FOLLOW = 34,    // from here to the next request each command to send is answered with the position at that moment
+    LINE_OPERATION_SET_BAUD = 35,    // another baud rate, once this reply has been sent; 115200 again after a break, or 5 s without a request
+    LINE_OPERATION_START_AT_MARK = 36,    // as start, but at the next mark, which all nodes of the line hear at once; 0 takes it back
     LINE_OPERATION_ARM_SCOPE = 31,    // record every so many ticks, from before a trigger on; an amplitude drives in open loop, to level at most
     LINE_OPERATION_SCOPE = 32,    // how far the record is; count is 0 until it is complete
     LINE_OPERATION_READ_SCOPE = 33,    // five samples from this one on, 0 behind the end; time from sample to sample in 64 clk, position: low word
@@ -396,7 +399,7 @@ enum line_operation {
 #define LINE_SET_PARAMETER_REQUEST_VALUE 4u    // i64
 #define LINE_SET_PARAMETER_REPLY_LENGTH 3u
 #define LINE_COUNTERS_REQUEST_LENGTH 2u
-#define LINE_COUNTERS_REPLY_LENGTH 31u
+#define LINE_COUNTERS_REPLY_LENGTH 43u
 #define LINE_COUNTERS_REPLY_FRAMES_GOOD 3u    // u32
 #define LINE_COUNTERS_REPLY_FRAMES_BAD 7u    // u32
 #define LINE_COUNTERS_REPLY_FRAMING_ERRORS 11u    // u32
@@ -404,6 +407,9 @@ enum line_operation {
 #define LINE_COUNTERS_REPLY_OVERRUNS 19u    // u32
 #define LINE_COUNTERS_REPLY_REPEATED 23u    // u32
 #define LINE_COUNTERS_REPLY_REFUSED 27u    // u32
+#define LINE_COUNTERS_REPLY_BREAKS 31u    // u32
+#define LINE_COUNTERS_REPLY_DRIVER_CUTS 35u    // u32
+#define LINE_COUNTERS_REPLY_MARKS 39u    // u32
 #define LINE_ENCODER_REQUEST_LENGTH 3u
 #define LINE_ENCODER_REQUEST_AXIS 2u    // u8
 #define LINE_ENCODER_REPLY_LENGTH 35u
@@ -478,6 +484,16 @@ enum line_operation {
 #define LINE_POSITION_REQUEST_AXIS 2u    // u8
 #define LINE_POSITION_REPLY_LENGTH 11u
 #define LINE_POSITION_REPLY_POSITION 3u    // i64
+#define LINE_FOLLOW_REQUEST_LENGTH 3u
+#define LINE_FOLLOW_REQUEST_AXIS 2u    // u8
+#define LINE_FOLLOW_REPLY_LENGTH 11u
+#define LINE_FOLLOW_REPLY_POSITION 3u    // i64
+#define LINE_SET_BAUD_REQUEST_LENGTH 6u
+#define LINE_SET_BAUD_REQUEST_BAUD 2u    // u32
+#define LINE_SET_BAUD_REPLY_LENGTH 3u
+#define LINE_START_AT_MARK_REQUEST_LENGTH 3u
+#define LINE_START_AT_MARK_REQUEST_AXES 2u    // u8
+#define LINE_START_AT_MARK_REPLY_LENGTH 3u
 #define LINE_ARM_SCOPE_REQUEST_LENGTH 13u
 #define LINE_ARM_SCOPE_REQUEST_AXIS 2u    // u8
 #define LINE_ARM_SCOPE_REQUEST_TRIGGER 3u    // u8
@@ -602,7 +618,7 @@ enum line_operation {
     X(reset_faults, 7, 3, 3, 1) \
     X(get_parameter, 8, 4, 11, 1) \
     X(set_parameter, 9, 12, 3, 1) \
-    X(counters, 10, 2, 31, 0) \
+    X(counters, 10, 2, 43, 0) \
     X(encoder, 11, 3, 35, 1) \
     X(read_register, 12, 4, 7, 0) \
     X(learner, 13, 4, 18, 1) \
@@ -615,6 +631,9 @@ enum line_operation {
     X(prepare, 20, 11, 7, 1) \
     X(start, 21, 3, 3, 0) \
     X(position, 30, 3, 11, 1) \
+    X(follow, 34, 3, 11, 1) \
+    X(set_baud, 35, 6, 3, 0) \
+    X(start_at_mark, 36, 3, 3, 0) \
     X(arm_scope, 31, 13, 3, 1) \
     X(scope, 32, 2, 6, 0) \
     X(read_scope, 33, 3, 63, 0) \

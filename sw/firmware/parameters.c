@@ -22,10 +22,15 @@ static uint32_t held(uint64_t value, uint32_t mask)
     return value > mask ? mask : (uint32_t)value;
 }
 
+void parameters_set_baud(uint32_t baud)
+{
+    line_write(LINE_BIT_TIME, held((16 * (uint64_t)node_read(NODE_CLK_HZ) + baud / 2) / baud, LINE_BIT_TIME_MASK));
+}
+
 void parameters_start_node(void)
 {
     uint32_t clk_hz = node_read(NODE_CLK_HZ);
-    line_write(LINE_BIT_TIME, held((16 * (uint64_t)clk_hz + BAUD / 2) / BAUD, LINE_BIT_TIME_MASK));
+    parameters_set_baud(BAUD);
     node_write(NODE_SAMPLE_PERIOD, held(clk_hz / SAMPLE_HZ < SAMPLE_CLK ? SAMPLE_CLK : clk_hz / SAMPLE_HZ, NODE_SAMPLE_PERIOD_MASK));
     node_write(NODE_TICK_PERIOD, held(clk_hz / PLANNER_TICK_HZ, NODE_TICK_PERIOD_MASK));
 }

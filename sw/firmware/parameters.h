@@ -15,6 +15,7 @@ enum profile { S_CURVE, TRAPEZOID, STAIRS };            // values of the paramet
 enum position_source { PHASES, COUNTS, OWN_STEPS };
 
 void parameters_start_node(void);                       // clock dividers, line speed
+void parameters_set_baud(uint32_t baud);                // of the line, until the next start
 uint32_t parameters_sample_hz(void);                    // rate of the converters
 void parameters_start(unsigned axis);                   // defaults, into the registers too
 uint8_t parameters_check(uint8_t id, int64_t value);    // a line_cause

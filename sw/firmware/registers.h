@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x420f3daau            // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0x45685b4bu            // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define LINE_BASE 0x100u
@@ -191,6 +191,22 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define LINE_WATCHDOG_TIME_MASK                        0x0000ffffu
 #define LINE_WATCHDOG_TIME_SHIFT                       0
 #define LINE_WATCHDOG_TIME_WIDTH                       16
+#define LINE_BREAKS                                    0x034u  // rw: breaks: the line was low for 2 ms; writing clears
+#define LINE_BREAKS_MASK                               0xffffffffu
+#define LINE_BREAKS_SHIFT                              0
+#define LINE_BREAKS_WIDTH                              32
+#define LINE_DRIVER_CUTS                               0x038u  // rw: the own driver was on for 1024 bits and has been cut off; writing clears
+#define LINE_DRIVER_CUTS_MASK                          0xffffffffu
+#define LINE_DRIVER_CUTS_SHIFT                         0
+#define LINE_DRIVER_CUTS_WIDTH                         32
+#define LINE_MARKS                                     0x03cu  // rw: marks: good frames for all nodes; writing clears
+#define LINE_MARKS_MASK                                0xffffffffu
+#define LINE_MARKS_SHIFT                               0
+#define LINE_MARKS_WIDTH                               32
+#define LINE_MARK_AXES                                 0x040u  // rw: play the queued segments of these axes from the next mark on; bit n: axis n
+#define LINE_MARK_AXES_MASK                            0x000000ffu
+#define LINE_MARK_AXES_SHIFT                           0
+#define LINE_MARK_AXES_WIDTH                           8
 
 // links: I2C, PS/2 pass-through, peer port, angle sensor, numeric display, status inputs
 #define LINKS_BUILT                                    0x000u  // r: 1: it was built, 0: its pins are idle, its registers do nothing
@@ -865,7 +881,7 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define GRATING_SQUARE_LIMITS_DEAD_MASK                0xffff0000u
 #define GRATING_SQUARE_LIMITS_DEAD_SHIFT               16
 #define GRATING_SQUARE_LIMITS_DEAD_WIDTH               16
-#define GRATING_CAPTURE_SOURCES                        0x060u  // rw: sources: index, tick, software, rising probe 0, 1, falling probe 0, 1
+#define GRATING_CAPTURE_SOURCES                        0x060u  // rw: sources: index, tick, software or a mark of the line, rising probe 0, 1, falling probe 0, 1
 #define GRATING_CAPTURE_SOURCES_MASK                   0x0000007fu
 #define GRATING_CAPTURE_SOURCES_SHIFT                  0
 #define GRATING_CAPTURE_SOURCES_WIDTH                  7

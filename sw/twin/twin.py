@@ -27,6 +27,7 @@ from .surroundings import pack as pack_surroundings
 CLK_HZ = 2_400_000
 NODE = {"DRIVES": 1, "FILTERS": 0}     # what the stage of S0 needs of rtl/node.sv
 BAUD = 115200
+BREAK_S = 0.003                  # the line low; nodes want 2 ms
 TURNAROUND_CELLS = 2             # the host hears a word half a cell before its end; the node's driver lets go half a cell after it
 CELLS = 11                       # of a character: start, eight data, 9th, stop
 PEER_BAUD = 9600                 # between nodes
@@ -344,6 +345,10 @@ class TwinTransport:
     def set_baud(self, baud):
         self.twin.set_host_baud(baud)
         self.character_s = CELLS / baud
+
+    def send_break(self):
+        self.twin.send_levels([0], BREAK_S)
+        self.twin.run(BREAK_S + 2 * self.character_s)
 
     def close(self):
         self.twin.close()

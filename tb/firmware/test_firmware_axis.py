@@ -228,6 +228,41 @@ def test_none_begins_if_one_of_them_is_not_prepared():
     assert begun(machine) == 2 and machine.request("start", axes=2)[0] == "not_prepared"
 
 
+def mark(machine):
+    """As the hardware does it: counts, and plays the queued segments of the axes that wait."""
+    line = DEFINES["LINE_BASE"]
+    machine.word[line + DEFINES["LINE_MARKS"]] = machine.word.get(line + DEFINES["LINE_MARKS"], 0) + 1
+    for n, axis in enumerate(machine.axes):
+        axis.player.moving |= bool(machine.word[line + DEFINES["LINE_MARK_AXES"]] >> n & 1 and axis.player.queue)
+    return machine.hear([0x20 | DEFINES["LINE_RECEIVE_COMMAND_MASK"], 1, 7, 0, 0, 0, DEFINES["LINE_RECEIVE_GOOD_MASK"]])
+
+
+def test_a_mark_starts_the_axes_that_wait_for_it_and_no_other_and_is_not_answered():
+    machine = two_homed()
+    for n in (0, 1):
+        machine.ask("prepare", axis=n, target=100 * PERIOD)
+    machine.ask("start_at_mark", axes=2)
+    machine.run(20)
+    assert [machine.status(n)["state"] for n in (0, 1)] == ["prepared", "prepared"]
+    assert mark(machine) == b""
+    assert [machine.status(n)["state"] for n in (0, 1)] == ["prepared", "moving"]
+    assert machine.run(20_000, until=lambda: machine.status(1)["ended"] == "ok") and machine.status(1)["target"] == 100 * PERIOD
+    mark(machine)
+    machine.run(20)
+    assert machine.status(0)["state"] == "prepared"
+
+
+def test_what_waits_for_a_mark_can_be_taken_back_and_what_is_not_prepared_cannot_wait():
+    machine = two_homed()
+    machine.ask("prepare", axis=0, target=100 * PERIOD)
+    assert machine.request("start_at_mark", axes=3)[0] == "not_prepared" and machine.request("start_at_mark", axes=4)[0] == "out_of_range"
+    machine.ask("start_at_mark", axes=1)
+    machine.ask("start_at_mark", axes=0)
+    mark(machine)
+    machine.run(20)
+    assert machine.status()["state"] == "prepared"
+
+
 @pytest.mark.parametrize("end", ["stop", "disable", "estop"])
 def test_a_prepared_motion_that_is_given_up_is_not_begun_later(end):
     machine = two_homed()

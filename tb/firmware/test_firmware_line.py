@@ -44,8 +44,8 @@ def test_a_known_exchange_byte_by_byte():
     crc = zlib.crc32(b"\x22" + frame).to_bytes(4, "little")
     assert machine.hear([*frame, *crc[:3], crc[3] | GOOD]) == b""
     answer = machine.hear([0x12 | COMMAND])
-    body = bytes([7, OPERATION["counters"], 0]) + bytes(28)
-    assert answer == b"\x52" + bytes([31]) + body + zlib.crc32(b"\x52" + bytes([31]) + body).to_bytes(4, "little")
+    body = bytes([7, OPERATION["counters"], 0]) + bytes(40)
+    assert answer == b"\x52" + bytes([43]) + body + zlib.crc32(b"\x52" + bytes([43]) + body).to_bytes(4, "little")
 
 
 def test_identify_tells_what_was_built():
@@ -140,11 +140,11 @@ def test_refusals_are_counted():
 
 def test_counters_are_those_of_the_line():
     machine = Machine()
-    names = "frames_good", "frames_bad", "framing_errors", "start_glitches", "overruns"
+    names = "frames_good", "frames_bad", "framing_errors", "start_glitches", "overruns", "breaks", "driver_cuts", "marks"
     for n, name in enumerate(names):
         machine.word[DEFINES["LINE_BASE"] + DEFINES["LINE_" + name.upper()]] = 1000 + n
     answer = machine.ask("counters")
-    assert [answer[name] for name in names] == [1000, 1001, 1002, 1003, 1004]
+    assert [answer[name] for name in names] == [*range(1000, 1008)]
 
 
 # own steps are counted as pulses and direction only; the converter serves the motor or the fine stage
@@ -230,6 +230,73 @@ def test_no_part_of_a_millisecond_is_lost():
     machine.clk += 5 * CLK_HZ                               # a long wait
     machine.poll()
     assert machine.firmware.clock_ms() - start == 5700
+
+
+def test_a_followed_position_is_told_afresh_at_each_reading_until_the_next_request():
+    machine = Machine(Axis(), Axis(1000))
+    assert machine.ask("follow", axis=1)["position"] == 1000
+    for position in (7, -1, 2**47 - 1):
+        machine.axes[1].machine = position
+        body = machine.reply()
+        assert body[:3] == bytes([machine.sequence, OPERATION["follow"], 0]) and int.from_bytes(body[3:], "little", signed=True) == position
+    machine.ask("position", axis=1)
+    before = machine.reply()
+    machine.axes[1].machine = 55
+    assert machine.reply() == before
+
+
+def bit_time(machine):
+    return machine.word[DEFINES["LINE_BASE"] + DEFINES["LINE_BIT_TIME"]]
+
+
+def bit_time_of(baud):
+    return (16 * CLK_HZ + baud // 2) // baud
+
+
+def test_the_baud_rate_changes_only_when_the_reply_has_been_sent():
+    machine = Machine()
+    body = example("set_baud", baud=500_000)
+    machine.send(body)
+    machine.run(10)
+    assert bit_time(machine) == bit_time_of(115_200)
+    assert machine.reply()[2] == 0
+    machine.poll()
+    assert bit_time(machine) == bit_time_of(500_000)
+
+
+@pytest.mark.parametrize("baud", [0, 9599, CLK_HZ // 8 + 1, 3_000_001, 2**32 - 1])
+def test_a_baud_rate_out_of_range_is_refused(baud):
+    machine = Machine()
+    assert machine.request("set_baud", baud=baud)[0] == "out_of_range"
+    machine.run(10)
+    assert bit_time(machine) == bit_time_of(115_200)
+
+
+def test_a_break_or_a_silence_of_five_seconds_brings_the_first_baud_rate_back():
+    machine, breaks = Machine(), DEFINES["LINE_BASE"] + DEFINES["LINE_BREAKS"]
+    for _ in range(2):
+        machine.ask("set_baud", baud=9600)
+        machine.run(4999)
+        assert bit_time(machine) == bit_time_of(9600)
+        machine.reply()                                     # a mere reading is a sign of the master too
+        machine.run(4999)
+        assert bit_time(machine) == bit_time_of(9600)
+        machine.run(3)
+        assert bit_time(machine) == bit_time_of(115_200)
+    machine.ask("set_baud", baud=9600)
+    machine.run(5)
+    machine.word[breaks] = machine.word.get(breaks, 0) + 1
+    machine.poll()
+    assert bit_time(machine) == bit_time_of(115_200)
+
+
+def test_another_request_before_the_reply_was_read_takes_the_baud_rate_back():
+    machine = Machine()
+    machine.send(example("set_baud", baud=9600))
+    machine.send(bytes([10, OPERATION["identify"]]))
+    machine.reply()
+    machine.poll(3)
+    assert bit_time(machine) == bit_time_of(115_200)
 
 
 def test_the_encoder_is_shown_as_it_is():

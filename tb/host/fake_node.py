@@ -100,8 +100,10 @@ class FakeNode:
         self.expecting, self.payload = None, []
         self.last, self.reply = None, bytes([0, 0, 0])
         self.counters = dict.fromkeys(
-            ("frames_good", "frames_bad", "framing_errors", "start_glitches", "overruns", "repeated", "refused"), 0
+            ("frames_good", "frames_bad", "framing_errors", "start_glitches", "overruns", "repeated", "refused", "breaks", "driver_cuts",
+             "marks"), 0
         )
+        self.marked = 0                # mask of the axes that the next mark starts
         self.scope, self.armed, self.samples = "empty", None, []       # samples: position, error, command, time
         self.executed = []             # names of the operations, without repetitions
         self.wrong_map = False
@@ -117,6 +119,9 @@ class FakeNode:
             if word & 0xFF == 0x20 | self.address:
                 self.expecting = word & 0xFF
                 return [0x60 | self.address]
+            if word & 0xFF == 0x20:
+                self.expecting = 0x20
+                return []
             if word & 0xFF == 0x10 | self.address:
                 inside = bytes([0x50 | self.address, len(self.reply)]) + self.reply
                 return list(inside + binascii.crc32(inside).to_bytes(4, "little"))
@@ -139,6 +144,11 @@ class FakeNode:
             self.counters["frames_bad"] += 1
             return
         self.counters["frames_good"] += 1
+        if self.expecting == 0x20:
+            self.counters["marks"] += 1
+            self.do_start(None, self.marked)
+            self.marked = 0
+            return
         if self.last == (inside[1], crc):
             self.counters["repeated"] += 1
             return
@@ -249,6 +259,15 @@ class FakeNode:
         for axis in chosen:
             axis.go("moving", self.now, self.seconds(axis, axis.prepared), axis.prepared)
         return "ok", {}
+
+    def do_start_at_mark(self, _, axes):
+        if any(axis.kind != "prepared" for n, axis in enumerate(self.axes) if axes >> n & 1):
+            return "not_prepared", {}
+        self.marked = axes
+        return "ok", {}
+
+    def do_set_baud(self, _, baud):
+        return ("ok" if 9600 <= baud <= 3_000_000 else "out_of_range"), {}
 
     def do_move(self, axis, target):
         if (cause := self.may_go(axis, target)) != "ok":

@@ -298,6 +298,68 @@ def test_prepared_axes_begin_together_and_end_one_after_the_other():
     assert seen[0] == ["moving", "moving"] and all(status.ended == "ok" for status in ended)
 
 
+def two_nodes():
+    fake = FakeLine(FakeNode(1), FakeNode(2, axes=2))
+    line = Line(fake)
+    for axis in (line.axis(1), line.axis(2), line.axis(2, 1)):
+        axis.enable()
+        axis.home()
+    return fake, line
+
+
+def test_axes_of_two_nodes_begin_at_one_mark():
+    fake, line = two_nodes()
+    chosen = [line.axis(1), line.axis(2, 1)]
+    for axis in chosen:
+        axis.prepare(mm=1)
+    seen = []
+    ended = line.start(*chosen, progress=lambda status: seen.append([axis.kind for node in fake.nodes for axis in node.axes]))
+    assert seen[0][0] == seen[0][2] == "moving" != seen[0][1] and [round(status.position_nm) for status in ended] == [1_000_000] * 2
+    assert [node.counters["marks"] for node in fake.nodes] == [1, 1]
+
+
+def test_none_of_two_nodes_starts_if_one_was_not_prepared():
+    fake, line = two_nodes()
+    line.axis(1).prepare(mm=1)
+    with pytest.raises(Refused, match="the axis has no motion prepared"):
+        line.start(line.axis(1), line.axis(2))
+    line.mark()
+    assert fake.nodes[0].axes[0].kind == "prepared"
+
+
+def test_a_node_that_does_not_hear_the_mark_is_named_and_the_others_are_stopped():
+    fake, line = two_nodes()
+    for axis in (line.axis(1), line.axis(2)):
+        axis.prepare(mm=1)
+    deaf, hears = fake.nodes[1], fake.nodes[1].hear
+    deaf.hear = lambda word: [] if deaf.marked and word == 0x120 else hears(word)
+    with pytest.raises(LineError, match="the node did not hear the mark"):
+        line.start(line.axis(1), line.axis(2))
+    fake.wait(1)
+    assert line.axis(1).status().ended == "stopped" and not deaf.marked
+
+
+def test_another_baud_rate_is_that_of_all_nodes_or_of_none():
+    fake, line = two_nodes()
+    line.set_baud(1_000_000, [1, 2])
+    assert line.baud_changed and fake.character_s == pytest.approx(11e-6)
+    line.first_baud()
+    assert not line.baud_changed and fake.character_s == pytest.approx(11 / 115_200)
+    with pytest.raises(Refused, match="set_baud"):
+        line.set_baud(5_000_000, [1, 2])
+    with pytest.raises(NobodyAnswers):
+        line.set_baud(1_000_000, [1, 3])
+    assert fake.character_s == pytest.approx(11 / 115_200)
+
+
+def test_what_needs_the_own_line_is_refused_through_a_door():
+    fake, line = two_nodes()
+    fake.handshake = False
+    for action in (line.mark, lambda: line.set_baud(9600, [1]), lambda: line.start(line.axis(1))):
+        with pytest.raises(LineError, match="the nodes' own line"):
+            action()
+
+
 def test_none_starts_if_one_was_not_prepared():
     fake, node = two_axes()
     node.axis(0).prepare("1mm")

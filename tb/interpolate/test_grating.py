@@ -8,7 +8,7 @@ from bench import run, start
 
 LATENCY = 22                                            # clk from a converter word to its position
 SETTINGS = dict(deglitch=0, spike_step=0, spike_hold=0, amplitude_low=0, amplitude_high=65535, disagreement_limit=0)
-INPUTS = dict(tick=0, sample_tick=0, now=0, select=0, write=0, word=0, wdata=0, shift=0, shift_periods=0, a=0, b=0, z=0, probe=0,
+INPUTS = dict(tick=0, sample_tick=0, mark=0, now=0, select=0, write=0, word=0, wdata=0, shift=0, shift_periods=0, a=0, b=0, z=0, probe=0,
               adc_sin=1, adc_cos=1)
 
 

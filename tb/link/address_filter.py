@@ -10,7 +10,7 @@ class AddressFilter:
         if rst:
             self.open = 0
             return 0, data, ninth
-        own = data in (0x10 | address, 0x20 | address)
+        own = data in (0x10 | address, 0x20 | address, 0x20)
         passed = int(bool(valid and (own if ninth else self.open)))
         if valid and ninth:
             self.open = int(own)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/link/frame_check.sv does: step(…) is one clk and returns (valid, data, command, good, frame_good, frame_bad) after it.
+"""What rtl/link/frame_check.sv does: step(…) is one clk and returns (valid, data, command, good, frame_good, frame_bad, mark)
+after it.
 
 It keeps the bytes of the frame and asks zlib at its end."""
 import zlib
@@ -18,8 +19,8 @@ class FrameCheck:
     def step(self, valid, data, command, framing_error, rst=0):
         if rst:
             self.bytes = None
-            return 0, data, command, 0, 0, 0
-        good = bad = passed = 0
+            return 0, data, command, 0, 0, 0, 0
+        good = bad = passed = mark = 0
         if self.bytes is not None and framing_error:
             self.bytes, bad = None, 1
         if valid and command:
@@ -32,5 +33,6 @@ class FrameCheck:
                 self.bytes, bad = None, 1
             elif len(self.bytes) == length + 6:
                 good = int(zlib.crc32(self.bytes[:-4]) == int.from_bytes(self.bytes[-4:], "little"))
+                mark = int(good and not self.bytes[0] & 15)
                 self.bytes, bad = None, 1 - good
-        return passed, data, command, good, good, int(bad)
+        return passed, data, command, good, good, int(bad), mark

@@ -30,10 +30,10 @@ class Line:
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
         self.clks += 1
-        got = tuple(int(x.value) for x in (dut.valid, dut.data, dut.command, dut.good, dut.frame_good, dut.frame_bad))
+        got = tuple(int(x.value) for x in (dut.valid, dut.data, dut.command, dut.good, dut.frame_good, dut.frame_bad, dut.mark))
         want = self.model.step(*inputs)
         assert got[0] == want[0] and got[3:] == want[3:] and (not got[0] or got == want), \
-            f"clk {self.clks}: (valid, data, command, good, frame_good, frame_bad) is {got}, the model has {want}"
+            f"clk {self.clks}: (valid, data, command, good, frame_good, frame_bad, mark) is {got}, the model has {want}"
         return got
 
     async def hear(self, words):
@@ -51,6 +51,16 @@ async def begin(dut):
     line = Line(dut)
     await line.clk(rst=1)
     return line
+
+
+@cocotb.test()
+async def just_a_good_frame_for_all_nodes_is_a_mark(dut):
+    line = await begin(dut)
+    for command, spoil, marks in ((0x20, 0, 1), (0x20, 1, 0), (0x20 | NODE, 0, 0), (0x20, 0, 1)):
+        words = frame(command, b"\x07")
+        words[-1] = (words[-1][0] ^ spoil, 0)
+        seen = [(await line.clk(*line.filter.step(NODE, 1, *word)))[6] for word in words]
+        assert sum(seen) == marks == seen[-1]
 
 
 def marked(words, good=1):
@@ -73,8 +83,8 @@ async def latency_is_1_and_good_comes_with_the_last_byte(dut):
     for word in most:
         assert not (await line.clk(1, *word))[3]
     assert (await line.clk())[0] == 0
-    assert await line.clk(1, *last) == (1, last[0], 0, 1, 1, 0)
-    assert await line.clk() == (0, 0, 0, 0, 0, 0)
+    assert await line.clk(1, *last) == (1, last[0], 0, 1, 1, 0, 0)
+    assert await line.clk() == (0, 0, 0, 0, 0, 0, 0)
 
 
 @cocotb.test()
@@ -147,7 +157,7 @@ async def a_read_has_no_payload_and_words_outside_a_payload_are_dropped(dut):
 @cocotb.test()
 async def frames_for_other_nodes_leave_no_trace(dut):
     line = await begin(dut)
-    for address in range(16):
+    for address in range(1, 16):
         if address != NODE:
             assert await line.hear([*frame(0x20 | address, [1, 2, 3]), (0x10 | address, 1)]) == ([], 0, 0)
     assert (await line.hear(frame(0x25, [1, 2, 3])))[1:] == (1, 0)

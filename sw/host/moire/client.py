@@ -29,12 +29,14 @@ from .line_tables import (
     SIGNAL_FAULTS,
     STATES,
 )
-from .protocol import ADDRESSES, Exchange, Timing, request_body
+from .protocol import ADDRESSES, Exchange, Timing, mark_words, request_body
 from .registers import FIELDS, MAP_CRC
-from .transport import Transport
+from .transport import BAUD, Transport
 
 COUNTS = 65536               # of the wire, in one signal period
 FULL_SCALE = 32768           # of the command
+MARK_S = 0.002               # after it, firmware too knows what the mark began
+BAUD_CHANGE_S = 0.005        # a node changes when the reply is out, and no more than this later
 POLL_S = 0.05                # between two looks at a motion, where a Line is not told otherwise
 
 HARMONICS = 10               # orders of phase error that are corrected
@@ -282,6 +284,8 @@ class Line:
         self.sequences, self.nodes = {}, {}
         self.statistics = Statistics()
         self.in_order = True           # false while words of a broken exchange may still be on the way
+        self.marks = 0                 # of this host
+        self.baud_changed = False      # by this host, from the one after power-up
 
     def exchange(self, address: int, operation: str, /, tries=None, answer_s=None, **fields):
         """One request, repeated where needed; returns the reply whatever its cause."""
@@ -351,6 +355,66 @@ class Line:
             except NobodyAnswers:
                 continue
         return found
+
+    def own_line(self):
+        if not self.transport.handshake:
+            raise LineError(0, "this needs the nodes' own line: it cannot be asked for through a door to it")
+
+    def mark(self):
+        """The same moment at all nodes, to within a microsecond: an axis that captures from "software" keeps its position, a motion
+        that waits for a mark begins. Nobody answers; the nodes count marks."""
+        self.own_line()
+        self.marks += 1
+        self.transport.send(mark_words(self.marks))
+        self.transport.wait(MARK_S)
+
+    def start(self, *axes: "Axis", progress=None) -> list:
+        """Begin the prepared motions of these axes, of several nodes, within a microsecond, or none of them; returns their Status when
+        all have ended. Whatever interrupts the wait stops all of them under control first."""
+        if not axes:
+            raise OutOfRange("which axes shall start?")
+        self.own_line()
+        masks, begun = {}, False
+        for axis in dict.fromkeys(axes):
+            masks[axis.node.address] = masks.get(axis.node.address, 0) | 1 << axis.number
+        try:
+            for address, mask in masks.items():
+                self.request(address, "start_at_mark", axes=mask)
+            begun = True
+            self.mark()
+            for axis in axes:
+                if axis.status().state == "prepared":
+                    raise LineError(axis.node.address, "the node did not hear the mark at which its motion should begin")
+            return [axis.wait(progress) for axis in axes]
+        except BaseException:
+            for address in masks:
+                self.request(address, "start_at_mark", axes=0)
+            for axis in axes if begun else ():
+                axis.stop_if_on()
+            raise
+
+    def set_baud(self, baud: int, addresses):
+        """This host and these nodes, all that anyone speaks to, at another baud rate. A node goes back to the first one after a break,
+        and by itself when nobody called it for 5 s; all do when one of them does not follow."""
+        self.own_line()
+        try:
+            for address in addresses:
+                self.request(address, "set_baud", baud=baud)
+            self.transport.wait(BAUD_CHANGE_S)
+            self.transport.set_baud(baud)
+            for address in addresses:
+                self.identify(address)
+        except BaseException:
+            self.first_baud()
+            raise
+        self.baud_changed = True
+
+    def first_baud(self):
+        """All nodes, and this host, at the baud rate that they have after power-up."""
+        self.transport.send_break()
+        self.transport.set_baud(BAUD)
+        self.transport.wait(BAUD_CHANGE_S)
+        self.baud_changed = False
 
     def node(self, address: int = 1) -> "Node":
         """Connects at the first time: identifies the node and refuses one of another build."""

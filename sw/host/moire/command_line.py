@@ -95,6 +95,11 @@ def positive_number(text):
     return number
 
 
+def axis_of_a_node(text):
+    address, dot, axis = text.rpartition(".")
+    return (address_number(address) if dot else None), axis_number(axis)
+
+
 def axis_number(text):
     try:
         number = int(text)
@@ -196,9 +201,10 @@ def make_parser() -> Parser:
                       "moire --port /dev/ttyUSB0 prepare 1mm --axis 0 -- prepare 2mm --axis 1 -- start 0 1")
     prepare.add_argument("target", type=checked(units.parse_length), metavar="LENGTH", help="where to, with a unit")
     prepare.add_argument("--by", action="store_true", help="LENGTH is a distance from the present target")
-    begin = command("start", do_start, "begin the prepared moves of several axes of a node in the same instant, and wait for all",
+    begin = command("start", do_start, "begin the prepared moves of several axes in the same instant, and wait for all",
                     "moire --port /dev/ttyUSB0 start 0 1")
-    begin.add_argument("axes", nargs="+", type=axis_number, metavar="AXIS")
+    begin.add_argument("axes", nargs="+", type=axis_of_a_node, metavar="AXIS",
+                       help="a number, or as 2.0 that of a node and of its axis: several nodes begin within a microsecond")
     override = command("override", do_override, "how fast motions go, of full speed: tell or change, in motion too",
                        "moire --port /dev/ttyUSB0 override 50%%")
     override.add_argument("share", nargs="?", type=checked(units.parse_share), metavar="SHARE", help="0%% to 100%%, or 0 to 1")
@@ -227,6 +233,10 @@ def make_parser() -> Parser:
     wait.add_argument("time", type=checked(waiting_time), metavar="TIME", help="how long, with a unit: 20ms, 1.5s")
     command("reset", do_reset, "clear latched faults whose cause is gone; the drive stays off", "moire --port /dev/ttyUSB0 reset -- status")
     command("counters", do_counters, "what happened on the line, seen by node and host", "moire --port /dev/ttyUSB0 counters --json")
+    baud = command("baud", do_baud, "speak at another baud rate for the rest of this call; name all nodes that anyone speaks to",
+                   "moire --port /dev/ttyUSB0 baud 1000000 1 2 -- watch")
+    baud.add_argument("rate", type=positive_number, metavar="RATE", help="9600 to 3000000, and at most an eighth of the nodes' clock")
+    baud.add_argument("addresses", nargs="+", type=address_number, metavar="ADDRESS", help="of all nodes")
     command("encoder", do_encoder, "the sensor as it is now", "moire --port /dev/ttyUSB0 encoder")
     command("signal", do_signal, "what is wrong with sine and cosine", "moire --port /dev/ttyUSB0 signal")
     learn = command(
@@ -431,6 +441,11 @@ class Session:
                 axis.disable()
             except MoireError:
                 pass        # the watchdog of the node does it
+        if self.opened.baud_changed:
+            try:
+                self.opened.first_baud()
+            except MoireError:
+                pass        # the nodes do it after a while
         self.opened.transport.close()
 
 
@@ -542,17 +557,21 @@ def do_prepare(session, command):
 
 
 def do_start(session, command):
-    node, show = session.line.node(command.address), session.progress()
-    began = session.line.transport.now()
+    line, show = session.line, session.progress()
+    places = list(dict.fromkeys((address or command.address, axis) for address, axis in command.axes))
+    began = line.transport.now()
     try:
-        ended = node.start(*command.axes, progress=show)
+        if len({address for address, _ in places}) == 1:
+            ended = line.node(places[0][0]).start(*(axis for _, axis in places), progress=show)
+        else:
+            ended = line.start(*(line.axis(*place) for place in places), progress=show)
     finally:
         session.end_progress(show)
-    seconds = session.line.transport.now() - began
-    rows = [{"axis": axis, "position_nm": status.position_nm, "error_nm": status.target_nm - status.position_nm}
-            for axis, status in zip(dict.fromkeys(command.axes), ended)]
-    session.say({"command": "start", "address": command.address, "axes": rows, "time_s": seconds}, "\n".join(
-        f"node {command.address} axis {row['axis']}: at {row['position_nm'] / 1e6:.6f} mm, error {row['error_nm']:.1f} nm" for row in rows))
+    seconds = line.transport.now() - began
+    rows = [{"address": address, "axis": axis, "position_nm": status.position_nm, "error_nm": status.target_nm - status.position_nm}
+            for (address, axis), status in zip(places, ended)]
+    session.say({"command": "start", "axes": rows, "time_s": seconds}, "\n".join(
+        f"node {row['address']} axis {row['axis']}: at {row['position_nm'] / 1e6:.6f} mm, error {row['error_nm']:.1f} nm" for row in rows))
 
 
 def told_override(session, command, share):
@@ -650,6 +669,12 @@ def do_counters(session, command):
     rows = [f"node {command.address}:", *(f"  {name:<15} {value}" for name, value in node.items()),
             "seen by this host in this call:", *(f"  {name:<15} {value}" for name, value in host.items())]
     session.say({"command": "counters", "address": command.address, "node": node, "host": host}, "\n".join(rows))
+
+
+def do_baud(session, command):
+    session.line.set_baud(command.rate, command.addresses)
+    session.say({"command": "baud", "baud": command.rate, "addresses": command.addresses},
+                f"{command.rate} baud until the end of this call")
 
 
 def do_encoder(session, command):

@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x692B6460
+PROTOCOL_CRC = 0xA7BFE8C3
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -287,7 +287,8 @@ OPERATIONS = {operation.name: operation for operation in (
     Operation("counters", 10, "what happened on the line",
               (),
               (("frames_good", "u32"), ("frames_bad", "u32"), ("framing_errors", "u32"), ("start_glitches", "u32"),
-               ("overruns", "u32"), ("repeated", "u32"), ("refused", "u32"),)),
+               ("overruns", "u32"), ("repeated", "u32"), ("refused", "u32"), ("breaks", "u32"),
+               ("driver_cuts", "u32"), ("marks", "u32"),)),
     Operation("encoder", 11, "the sensor as it is now, and where the last homing met its phase zero",
               (("axis", "u8"),),
               (("sin", "i16"), ("cos", "i16"), ("phase", "u16"), ("amplitude", "u16"),
@@ -328,6 +329,15 @@ OPERATIONS = {operation.name: operation for operation in (
     Operation("position", 30, "where an axis is: the shortest answer that tells it",
               (("axis", "u8"),),
               (("position", "i64"),)),
+    Operation("follow", 34, "from here to the next request each command to send is answered with the position at that moment",
+              (("axis", "u8"),),
+              (("position", "i64"),)),
+    Operation("set_baud", 35, "another baud rate, once this reply has been sent; 115200 again after a break, or 5 s without a request",
+              (("baud", "u32"),),
+              ()),
+    Operation("start_at_mark", 36, "as start, but at the next mark, which all nodes of the line hear at once; 0 takes it back",
+              (("axes", "u8"),),
+              ()),
     Operation("arm_scope", 31, "record every so many ticks, from before a trigger on; an amplitude drives in open loop, to level at most",
               (("axis", "u8"), ("trigger", "u8"), ("before", "u8"), ("every", "u16"),
                ("level", "u32"), ("amplitude", "i16"),),

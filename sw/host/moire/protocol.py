@@ -92,6 +92,11 @@ def read_words(address: int) -> list:
     return [command_byte(address, FROM_NODE) | NINTH]
 
 
+def mark_words(number: int) -> list:
+    """A frame for all nodes, which nobody answers: its end is the same moment for all of them."""
+    return [TO_NODE << 4 | NINTH, *frame(TO_NODE << 4, bytes([number % 256]))]
+
+
 def ready_byte(address: int, way: int) -> int:
     return READY | command_byte(address, way)
 

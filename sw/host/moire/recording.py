@@ -46,6 +46,9 @@ class Recorder(Transport):
     def reaches(self, address):
         return self.transport.reaches(address)
 
+    def send_break(self):
+        self.transport.send_break()
+
     def set_baud(self, baud):
         self.transport.set_baud(baud)
         self.character_s = self.transport.character_s

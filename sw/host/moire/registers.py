@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0x420F3DAA          # CRC-32 of tables/registers.rdl
+MAP_CRC = 0x45685B4B          # CRC-32 of tables/registers.rdl
 BLOCKS = {"node": (0x000, 0x000), "line": (0x100, 0x000), "links": (0x200, 0x000), "axis": (0x400, 0x100), "grating": (0xC00, 0x100), "actuator": (0x1400, 0x100)}          # base, distance to the next one
 
 
@@ -91,6 +91,14 @@ FIELDS = (
           "the CRC-32 so far, final inversion done"),
     Field("line", "watchdog_time", "value", 0x30, 0, 16, False, "rw", "s", Fraction(1, 1000),
           "longest silence of the master while a drive is enabled; 0: for ever"),
+    Field("line", "breaks", "value", 0x34, 0, 32, False, "rw", "", Fraction(1),
+          "breaks: the line was low for 2 ms; writing clears"),
+    Field("line", "driver_cuts", "value", 0x38, 0, 32, False, "rw", "", Fraction(1),
+          "the own driver was on for 1024 bits and has been cut off; writing clears"),
+    Field("line", "marks", "value", 0x3C, 0, 32, False, "rw", "", Fraction(1),
+          "marks: good frames for all nodes; writing clears"),
+    Field("line", "mark_axes", "value", 0x40, 0, 8, False, "rw", "", Fraction(1),
+          "play the queued segments of these axes from the next mark on; bit n: axis n"),
     Field("links", "built", "i2c", 0x00, 0, 1, False, "r", "", Fraction(1),
           "1: it was built, 0: its pins are idle, its registers do nothing: i2c"),
     Field("links", "built", "ps2", 0x00, 1, 1, False, "r", "", Fraction(1),
@@ -474,7 +482,7 @@ FIELDS = (
     Field("grating", "square_limits", "dead", 0x5C, 16, 16, False, "rw", "", Fraction(1),
           "phase error and comparators: dead"),
     Field("grating", "capture_sources", "value", 0x60, 0, 7, False, "rw", "", Fraction(1),
-          "sources: index, tick, software, rising probe 0, 1, falling probe 0, 1"),
+          "sources: index, tick, software or a mark of the line, rising probe 0, 1, falling probe 0, 1"),
     Field("grating", "capture_state", "present", 0x64, 0, 1, False, "r", "", Fraction(1),
           "captured_* are the oldest"),
     Field("grating", "capture_state", "free", 0x64, 1, 5, False, "r", "", Fraction(1),

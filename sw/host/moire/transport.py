@@ -24,6 +24,7 @@ BAUD = 115200
 BITS = 11                    # start, eight data, 9th, stop
 CMSPAR_OF_LINUX = 0o10000000000
 LOOK_S = 0.005               # one wait for a byte; pyserial sets the whole port again when its time-out changes, so this stays
+BREAK_S = 0.01               # nodes want 2 ms
 NETWORK_S = 0.1              # what a network may add to an answer, and to the gaps in it
 PARITIES = ("auto", "mark", "odd", "none")
 PARITY_OF_RFC2217 = {"O": b"\x02", "E": b"\x03", "M": b"\x04", "S": b"\x05"}
@@ -59,6 +60,9 @@ class Transport(abc.ABC):
     def set_baud(self, baud: int):
         """From here on at this rate."""
         self.character_s = BITS / baud
+
+    def send_break(self):
+        """The line low for BREAK_S: every node is at the first baud rate again. Nothing where no line of nodes is at the other end."""
 
     def close(self):
         """After this the transport is of no use any more."""
@@ -186,6 +190,9 @@ class SerialLine(PortLine):
 
     def reaches(self, address):
         return self.mark or address in ODD_ADDRESSES
+
+    def send_break(self):
+        self.guarded(self.port.send_break, BREAK_S)
 
     def parity_for(self, word: int) -> str:
         """The parity setting that sends the 9th bit of this word."""
