@@ -59,7 +59,7 @@ def powered_up(source, firmware=None):
     """A twin of one node and its axis with the drive on."""
     twin = Twin([Node(1, [Axis("stage")])], seed=source.randrange(1 << 31), clk_hz=CLK_HZ, node_parameters={"FILTERS": 0},
                 firmware=firmware)
-    twin.run(0.06)
+    twin.run(0.1)
     axis = Line(TwinTransport(twin)).axis(1)
     axis.enable()
     return twin, axis

@@ -7,7 +7,7 @@ import pytest
 
 from twin import Axis, BuildError, FrameBench, Node, Twin, TwinTransport, build, cells_of
 
-START_S = 0.08                   # the firmware starts
+START_S = 0.1                    # the firmware starts
 ASK = {1: 0x111, 2: 0x112}       # "slave, send data": 00 01 address, 9th bit 1
 
 
