@@ -50,8 +50,9 @@ prove: $(SETUP)   ## the properties in the modules that carry any; K=part of a p
 	$(call say,proofs)
 	@$(PYTHON) tools/prove.py $(if $K,-k '$K') -j $(JOBS)
 
+LATE := tables/commands.py tables/modules.py    # they read what the others make
 tables: $(SETUP)  ## write the made files again: registers, line, tables of numbers, the list of modules
-	@for table in $(filter-out tables/modules.py,$(sort $(wildcard tables/*.py))) tables/modules.py; do $(PYTHON) $$table || exit 1; done
+	@for table in $(filter-out $(LATE),$(sort $(wildcard tables/*.py))) $(LATE); do $(PYTHON) $$table || exit 1; done
 
 fresh: $(SETUP)
 	$(call say,made files are fresh)

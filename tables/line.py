@@ -22,9 +22,10 @@ SIZES = {"u8": 1, "i8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "u64": 8, "i6
 REQUEST_HEAD = ["sequence u8", "operation u8"]
 REPLY_HEAD = ["sequence u8", "operation u8", "cause u8"]
 AXIS = "axis u8"    # first field of what asks an axis
-LISTS = ("cause", "fault", "encoder_event", "state", "flag", "learner_reason", "signal_fault", "learner_action", "index_phase",
-         "peer_phase", "job_state", "job_action", "job_flag")
-CODES = ("cause", "state", "learner_reason", "learner_action", "index_phase", "peer_phase", "job_state", "job_action")   # not bits
+LISTS = ("cause", "fault", "encoder_event", "state", "flag", "learner_reason", "signal_fault", "learner_action", "scope_trigger",
+         "scope_state", "index_phase", "peer_phase", "job_state", "job_action", "job_flag")
+CODES = ("cause", "state", "learner_reason", "learner_action", "scope_trigger", "scope_state", "index_phase", "peer_phase",
+         "job_state", "job_action")                                           # numbers; the others are bits
 WORDS = ("cause", "job_state")                                                # lists whose words the firmware shows on its panel
 
 
@@ -262,20 +263,37 @@ def page_parts(line: Line) -> dict:
                          *(decimal(parameter[key] * lsb) for key in ("min", "max", "default")), parameter["text"]))
         parts[kind + "s"] = table(("id", kind, "unit", "one count", "min", "max", "default", "purpose"), rows)
     parts["example"] = example(line)
+    parts["packets"] = packets(line)
     return parts
 
 
-def example(line: Line) -> list:
-    """`enable` of axis 0 at address 1, byte by byte."""
+def enable_frames(line: Line) -> tuple:
+    """Payloads of `enable` of axis 0 at address 1 and of its reply."""
     code, ok = line.operations["enable"]["code"], line.lists["cause"]["ok"][0]
 
     def frame(first, *body):
         inside = bytes([first, len(body), *body])
-        return (inside[1:] + zlib.crc32(inside).to_bytes(4, "little")).hex(" ").upper()
+        return inside[1:] + zlib.crc32(inside).to_bytes(4, "little")
 
+    return frame(0x21, 7, code, 0, 1), frame(0x51, 7, code, ok)
+
+
+def example(line: Line) -> list:
+    """`enable`, byte by byte."""
+    request, reply = (payload.hex(" ").upper() for payload in enable_frames(line))
     return ["`enable` of axis 0 of the node with address 1, sequence number 7:", "", "```",
-            "master  21*", "node    61", f"master  {frame(0x21, 7, code, 0, 1)}",
-            "master  11*", f"node    51 {frame(0x51, 7, code, ok)}", "```", "", "`*` has the 9th bit set."]
+            "master  21*", "node    61", f"master  {request}",
+            "master  11*", f"node    51 {reply}", "```", "", "`*` has the 9th bit set."]
+
+
+def packets(line: Line) -> list:
+    """The same as packets; none of them is long enough for a run of 254."""
+    def packet(content):
+        return b"".join(bytes([len(part) + 1]) + part for part in content.split(b"\0")) + b"\0"
+
+    request, reply = enable_frames(line)
+    return ["The same `enable` as packets:", "", "```", f"client  00 {packet(bytes([0x21]) + request).hex(' ').upper()}",
+            f"node    00 {packet(bytes([0x51]) + reply).hex(' ').upper()}", "```"]
 
 
 def decimal(value: Fraction) -> str:

@@ -46,7 +46,7 @@ static void write_control(unsigned n, bool on)
 {
     const struct axis *a = &axes[n];
     uint32_t only_blocks = a->homing || a->leaving ? AXIS_CONTROL_HOMING_MASK : 0;
-    uint32_t loop = a->fine ? AXIS_CONTROL_FINE_MASK : AXIS_CONTROL_CLOSED_LOOP_MASK;
+    uint32_t loop = a->state == LINE_STATE_EXCITED ? 0 : a->fine ? AXIS_CONTROL_FINE_MASK : AXIS_CONTROL_CLOSED_LOOP_MASK;
     axis_write(n, AXIS_CONTROL, only_blocks | (on ? AXIS_CONTROL_ENABLE_MASK | loop : 0));
 }
 
@@ -294,9 +294,28 @@ uint8_t axis_stop(unsigned n)
         motion_brake(n);
         a->state = LINE_STATE_STOPPING;
     } else {
-        if (a->state == LINE_STATE_PREPARED) motion_hold_here(n);
+        if (a->state == LINE_STATE_PREPARED || a->state == LINE_STATE_EXCITED) motion_hold_here(n);
         finish(n, LINE_CAUSE_STOPPED);
     }
+    return LINE_CAUSE_OK;
+}
+
+uint8_t axis_excite(unsigned n, bool on)
+{
+    struct axis *a = &axes[n];
+    if (!on) {
+        if (a->state != LINE_STATE_EXCITED) return LINE_CAUSE_OK;
+        motion_hold_here(n);
+        finish(n, LINE_CAUSE_OK);
+        return LINE_CAUSE_OK;
+    }
+    uint8_t cause = ready(n);
+    if (cause != LINE_CAUSE_OK) return cause;
+    hand_over(n, false);
+    axis_write(n, AXIS_OPEN_COMMAND, axis_read(n, AXIS_COMMAND));
+    a->ended = LINE_CAUSE_RUNNING;
+    a->state = LINE_STATE_EXCITED;
+    write_control(n, true);
     return LINE_CAUSE_OK;
 }
 

@@ -16,6 +16,7 @@ uint8_t axis_move(unsigned n, int64_t target, uint32_t *duration_ticks);
 uint8_t axis_prepare(unsigned n, int64_t target, uint32_t *duration_ticks);
 uint8_t axis_start_prepared(unsigned count, uint32_t mask);     // bit n: axis n, of so many
 uint8_t axis_stop(unsigned n);
+uint8_t axis_excite(unsigned n, bool on);                       // open loop: whoever asked for it writes open_command
 uint8_t axis_go(unsigned n, int64_t distance, uint8_t velocity_id);     // for what measures by itself: no zero, no travel
 uint8_t axis_orders(unsigned n);        // changes when the axis is told off, home, move, prepare or stop
 uint8_t axis_reset_faults(unsigned n);

@@ -8,6 +8,7 @@
 #include "panel.h"
 #include "peer.h"
 #include "readout.h"
+#include "scope.h"
 #include "sensor.h"
 #include "settings.h"
 #include "store.h"
@@ -23,5 +24,6 @@ const struct image_part image_parts[] = {
     {job_start, job_work, job_operation},
     {panel_start, panel_work, 0},
     {readout_start, readout_work, 0},
+    {scope_start, scope_work, scope_operation},
 };
 const unsigned image_part_count = sizeof image_parts / sizeof *image_parts;

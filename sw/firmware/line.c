@@ -197,6 +197,13 @@ static uint8_t signal(unsigned axis)
     return LINE_CAUSE_OK;
 }
 
+static uint8_t position(unsigned axis)
+{
+    put(LINE_POSITION_REPLY_POSITION, (uint64_t)axis_read_position(axis, AXIS_POSITION), 8);
+    reply[0] = LINE_POSITION_REPLY_LENGTH;
+    return LINE_CAUSE_OK;
+}
+
 static uint8_t operation_of_the_image(uint8_t operation)
 {
     uint8_t cause = LINE_CAUSE_NOT_BUILT;
@@ -231,6 +238,7 @@ static uint8_t execute(uint8_t operation, uint8_t length)
     case LINE_OPERATION_SET_PARAMETER: return set_parameter(axis);
     case LINE_OPERATION_ENCODER: return encoder(axis);
     case LINE_OPERATION_SIGNAL: return signal(axis);
+    case LINE_OPERATION_POSITION: return position(axis);
     default: return operation_of_the_image(operation);
     }
 }

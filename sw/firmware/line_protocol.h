@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x38017035u    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x7FCE7D6Eu    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -97,6 +97,7 @@ enum line_state {
     LINE_STATE_STOPPING = 5,    // stopping
     LINE_STATE_FAULTED = 6,    // faulted
     LINE_STATE_PREPARED = 7,    // waiting for the common start
+    LINE_STATE_EXCITED = 8,    // driven in open loop for a record
 };
 
 enum line_flag {    // bits
@@ -145,6 +146,21 @@ enum line_learner_action {
     LINE_LEARNER_ACTION_LEARN = 1,    // learn from here on
     LINE_LEARNER_ACTION_FREEZE = 2,    // learn no more; what was learned stays in force
     LINE_LEARNER_ACTION_FORGET = 3,    // correct nothing, begin afresh
+};
+
+enum line_scope_trigger {
+    LINE_SCOPE_TRIGGER_NOW = 0,    // at once
+    LINE_SCOPE_TRIGGER_MOTION = 1,    // the axis moves or homes
+    LINE_SCOPE_TRIGGER_SETTLING = 2,    // a motion has been played
+    LINE_SCOPE_TRIGGER_ERROR = 3,    // the error reaches the level
+    LINE_SCOPE_TRIGGER_FAULT = 4,    // a fault latches
+};
+
+enum line_scope_state {
+    LINE_SCOPE_STATE_EMPTY = 0,    // nothing was recorded
+    LINE_SCOPE_STATE_WAITING = 1,    // waiting for the trigger
+    LINE_SCOPE_STATE_RECORDING = 2,    // recording
+    LINE_SCOPE_STATE_FULL = 3,    // complete
 };
 
 enum line_index_phase {
@@ -299,6 +315,10 @@ enum line_operation {
     LINE_OPERATION_WRITE_REGISTER = 19,    // one word of the register map: only index, capture and compare of the grating blocks
     LINE_OPERATION_PREPARE = 20,    // plan to go to a position, and wait for start
     LINE_OPERATION_START = 21,    // begin the prepared motions of these axes (bit n: axis n), all in one tick; none if one of them has none
+    LINE_OPERATION_POSITION = 30,    // where an axis is: the shortest answer that tells it
+    LINE_OPERATION_ARM_SCOPE = 31,    // record every so many ticks, from before a trigger on; an amplitude drives in open loop, to level at most
+    LINE_OPERATION_SCOPE = 32,    // how far the record is; count is 0 until it is complete
+    LINE_OPERATION_READ_SCOPE = 33,    // five samples from this one on, 0 behind the end; time from sample to sample in 64 clk, position: low word
     LINE_OPERATION_GET_SETTING = 40,    // read a setting of a station
     LINE_OPERATION_SET_SETTING = 41,    // write a setting of a station
     LINE_OPERATION_INDEX_TO = 42,    // turn the table of axis 0 to an absolute angle, 0.01 arcsec; refused while an axis moves
@@ -448,6 +468,46 @@ enum line_operation {
 #define LINE_START_REQUEST_LENGTH 3u
 #define LINE_START_REQUEST_AXES 2u    // u8
 #define LINE_START_REPLY_LENGTH 3u
+#define LINE_POSITION_REQUEST_LENGTH 3u
+#define LINE_POSITION_REQUEST_AXIS 2u    // u8
+#define LINE_POSITION_REPLY_LENGTH 11u
+#define LINE_POSITION_REPLY_POSITION 3u    // i64
+#define LINE_ARM_SCOPE_REQUEST_LENGTH 13u
+#define LINE_ARM_SCOPE_REQUEST_AXIS 2u    // u8
+#define LINE_ARM_SCOPE_REQUEST_TRIGGER 3u    // u8
+#define LINE_ARM_SCOPE_REQUEST_BEFORE 4u    // u8
+#define LINE_ARM_SCOPE_REQUEST_EVERY 5u    // u16
+#define LINE_ARM_SCOPE_REQUEST_LEVEL 7u    // u32
+#define LINE_ARM_SCOPE_REQUEST_AMPLITUDE 11u    // i16
+#define LINE_ARM_SCOPE_REPLY_LENGTH 3u
+#define LINE_SCOPE_REQUEST_LENGTH 2u
+#define LINE_SCOPE_REPLY_LENGTH 6u
+#define LINE_SCOPE_REPLY_STATE 3u    // u8
+#define LINE_SCOPE_REPLY_COUNT 4u    // u8
+#define LINE_SCOPE_REPLY_BEFORE 5u    // u8
+#define LINE_READ_SCOPE_REQUEST_LENGTH 3u
+#define LINE_READ_SCOPE_REQUEST_FIRST 2u    // u8
+#define LINE_READ_SCOPE_REPLY_LENGTH 63u
+#define LINE_READ_SCOPE_REPLY_POSITION_0 3u    // i32
+#define LINE_READ_SCOPE_REPLY_ERROR_0 7u    // i32
+#define LINE_READ_SCOPE_REPLY_COMMAND_0 11u    // i16
+#define LINE_READ_SCOPE_REPLY_TIME_0 13u    // u16
+#define LINE_READ_SCOPE_REPLY_POSITION_1 15u    // i32
+#define LINE_READ_SCOPE_REPLY_ERROR_1 19u    // i32
+#define LINE_READ_SCOPE_REPLY_COMMAND_1 23u    // i16
+#define LINE_READ_SCOPE_REPLY_TIME_1 25u    // u16
+#define LINE_READ_SCOPE_REPLY_POSITION_2 27u    // i32
+#define LINE_READ_SCOPE_REPLY_ERROR_2 31u    // i32
+#define LINE_READ_SCOPE_REPLY_COMMAND_2 35u    // i16
+#define LINE_READ_SCOPE_REPLY_TIME_2 37u    // u16
+#define LINE_READ_SCOPE_REPLY_POSITION_3 39u    // i32
+#define LINE_READ_SCOPE_REPLY_ERROR_3 43u    // i32
+#define LINE_READ_SCOPE_REPLY_COMMAND_3 47u    // i16
+#define LINE_READ_SCOPE_REPLY_TIME_3 49u    // u16
+#define LINE_READ_SCOPE_REPLY_POSITION_4 51u    // i32
+#define LINE_READ_SCOPE_REPLY_ERROR_4 55u    // i32
+#define LINE_READ_SCOPE_REPLY_COMMAND_4 59u    // i16
+#define LINE_READ_SCOPE_REPLY_TIME_4 61u    // u16
 #define LINE_GET_SETTING_REQUEST_LENGTH 3u
 #define LINE_GET_SETTING_REQUEST_SETTING 2u    // u8
 #define LINE_GET_SETTING_REPLY_LENGTH 11u
@@ -548,6 +608,10 @@ enum line_operation {
     X(write_register, 19, 8, 3, 0) \
     X(prepare, 20, 11, 7, 1) \
     X(start, 21, 3, 3, 0) \
+    X(position, 30, 3, 11, 1) \
+    X(arm_scope, 31, 13, 3, 1) \
+    X(scope, 32, 2, 6, 0) \
+    X(read_scope, 33, 3, 63, 0) \
     X(get_setting, 40, 3, 11, 0) \
     X(set_setting, 41, 11, 3, 0) \
     X(index_to, 42, 6, 3, 0) \

@@ -317,7 +317,7 @@ class Twin:
 class TwinTransport:
     """The transport that the host package asks for, over a twin; time passes only as far as needed."""
 
-    time_stands = True
+    time_stands = handshake = True
 
     def __init__(self, twin):
         self.twin, self.character_s = twin, CELLS / twin.baud
@@ -340,6 +340,10 @@ class TwinTransport:
 
     def reaches(self, address):
         return True
+
+    def set_baud(self, baud):
+        self.twin.set_host_baud(baud)
+        self.character_s = CELLS / baud
 
     def close(self):
         self.twin.close()

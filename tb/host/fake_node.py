@@ -3,19 +3,23 @@
 import binascii
 import random
 import sys
+from functools import reduce
+from itertools import chain
 from math import inf
+from operator import and_
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "sw" / "host"))
 
-from moire.line_tables import CAUSES, OPERATIONS, PARAMETERS, PROTOCOL_CRC, STATES  # noqa: E402  (found through the line above)
+from moire.line_tables import CAUSES, OPERATIONS, PARAMETERS, PROTOCOL_CRC, SCOPE_STATES, STATES  # noqa: E402  (found through the line above)
 from moire.registers import MAP_CRC  # noqa: E402
 from moire.transport import Transport  # noqa: E402
 
 CAUSE = {name: code for code, (name, _) in CAUSES.items()}
 STATE = {name: code for code, (name, _) in STATES.items()}
+SCOPE_STATE = {name: code for code, (name, _) in SCOPE_STATES.items()}
 SIZE = {"u8": 1, "i8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "i64": 8, "u64": 8}
-TICK_HZ = 4000
+TICK_HZ, CLK_HZ = 4000, 4_000_000
 LIMIT_LOW, ESTOP = 1 << 0, 1 << 2
 
 
@@ -90,7 +94,7 @@ class FakeNode:
     def __init__(self, address=1, axes=1, map_crc=MAP_CRC, protocol_crc=PROTOCOL_CRC):
         self.address, self.map_crc, self.protocol_crc = address, map_crc, protocol_crc
         self.axes = [FakeAxis() for _ in range(axes)]
-        self.now, self.registers = 0.0, {0x400: 7}
+        self.now, self.registers = 0.0, {0: map_crc, 0x400: 7}
         self.written = []              # (address, value)
         self.captures = []             # words of captured, captured_time and captured_position, oldest first
         self.expecting, self.payload = None, []
@@ -98,6 +102,7 @@ class FakeNode:
         self.counters = dict.fromkeys(
             ("frames_good", "frames_bad", "framing_errors", "start_glitches", "overruns", "repeated", "refused"), 0
         )
+        self.scope, self.armed, self.samples = "empty", None, []       # samples: position, error, command, time
         self.executed = []             # names of the operations, without repetitions
         self.wrong_map = False
 
@@ -174,7 +179,7 @@ class FakeNode:
             version=1,
             address=self.address,
             axes=len(self.axes),
-            clk_hz=4000000,
+            clk_hz=CLK_HZ,
             tick_hz=TICK_HZ,
             sample_hz=100000,
         )
@@ -333,6 +338,28 @@ class FakeNode:
     def do_signal(self, axis):
         return "ok", axis.signal
 
+    def do_position(self, axis):
+        return "ok", {"position": axis.position}
+
+    def do_arm_scope(self, axis, **setting):
+        if setting["amplitude"] and self.ready(axis) != "ok":
+            return self.ready(axis), {}
+        self.scope, self.armed = "full" if setting["trigger"] == 0 else "waiting", setting
+        return "ok", {}
+
+    def do_scope(self, _):
+        if self.scope == "waiting" and any(axis.kind == "moving" for axis in self.axes):
+            self.scope = "full"
+        full = self.scope == "full"
+        return "ok", dict(state=SCOPE_STATE[self.scope], count=len(self.samples) * full, before=self.armed["before"] if full else 0)
+
+    def do_read_scope(self, _, first):
+        if first >= len(self.samples) or self.scope != "full":
+            return "out_of_range", {}
+        padded = self.samples[first:first + 5] + [(0, 0, 0, 0)] * 5
+        return "ok", {f"{name}_{n}": padded[n][place] for n in range(5)
+                      for place, name in enumerate(("position", "error", "command", "time"))}
+
     def do_write_register(self, _, address, value):
         if not 0xC00 <= address < 0xD00:
             return "no_such_register", {}
@@ -347,6 +374,8 @@ class FakeNode:
             return "ok", {"value": bool(self.captures) | (self.registers.get(address, 0) & 64)}
         if self.captures and 0xC68 <= address < 0xC78:
             return "ok", {"value": self.captures[0][address - 0xC68 >> 2]}
+        if 0x10 <= address < 0x18:                     # time stamp
+            return "ok", {"value": round(self.now * CLK_HZ) >> 8 * (address - 0x10) & 0xFFFFFFFF}
         return ("ok", {"value": self.registers[address]}) if address in self.registers else ("no_such_register", {})
 
 
@@ -358,6 +387,7 @@ class FakeLine(Transport):
     def __init__(self, *nodes):
         self.nodes, self.arrived, self.clock, self.closed = nodes, [], 0.0, False
         self.to_node = self.from_node = lambda word: [word]
+        self.wired_and = False         # as on the wire: what several nodes send at once is their AND; else one after the other
         self.at = []                   # (time, action), done when the time comes
 
     def pass_time(self, seconds):
@@ -374,9 +404,11 @@ class FakeLine(Transport):
         for word in words:
             self.pass_time(self.character_s)
             for heard in self.to_node(word):
-                for node in self.nodes:
-                    for answer in node.hear(heard):
-                        self.arrived += self.from_node(answer)
+                answers = [node.hear(heard) for node in self.nodes]
+                if self.wired_and:
+                    answers = [[reduce(and_, several) for several in zip(*answers)]]
+                for answer in chain(*answers):
+                    self.arrived += self.from_node(answer)
 
     def receive(self, count, timeout_s):
         taken, self.arrived = self.arrived[:count], self.arrived[count:]

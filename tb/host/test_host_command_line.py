@@ -199,6 +199,10 @@ def test_a_file_that_is_no_record_is_refused(tmp_path, text, said):
         "home -- prepare 1mm -- start 0",
         "override",
         "override 50%",
+        "scope arm -- scope show",
+        "watch --for 0s",
+        "fault",
+        "selftest",
     ],
 )
 def test_every_command_tells_one_json_object_a_line(text):
@@ -354,7 +358,21 @@ def test_ctrl_c_stops_the_axis_and_is_exit_code_130():
     line.at.append((0.5, interrupt))
     call = Call("home", line=line)
     assert "interrupted; what moved was stopped under control" in sentence(call, 130)
+    assert node.axes[0].ended == "stopped"
     assert "stop" in node.executed and node.axes[0].kind is None and not node.axes[0].enabled and line.closed
+
+
+def test_ctrl_c_in_another_command_stops_what_moves_too():
+    node = FakeNode()
+    node.axes[0].homed = True
+    line = FakeLine(node)
+
+    def interrupt():
+        raise KeyboardInterrupt
+    line.at.append((0.5, interrupt))
+    assert Call("move 100mm --no-wait -- watch --json", line=line).told[-1]["exit_code"] == 130
+    assert node.executed[-1] == "enable" and "stop" in node.executed and node.axes[0].ended == "stopped"
+    assert node.axes[0].target != 100_000_000 * 65536 // 800
 
 
 def test_baud_and_parity_reach_the_port():

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Learning, correction, signal faults, capture and compare, through the client and through the command line."""
 import io
+import json
 
 import pytest
 
@@ -35,6 +36,18 @@ def test_learning_goes_to_and_fro_at_several_speeds_and_ends_frozen_where_it_beg
     assert told.scatter_nm == pytest.approx(26 / 2**20 * 800) and len(seen) == 8 and inside.position == start
     assert inside.speeds == [2500, 2500, 1500, 1500, 2000, 2000, 2500, 2500]       # 1250 periods of 800 nm in half a second
     assert inside.parameters[VELOCITY] == PARAMETERS["velocity"].default
+
+
+def test_calibrate_homes_learns_and_saves(tmp_path):
+    node, file = FakeNode(), tmp_path / "stage.json"
+    node.axes[0].correction["gain"] = 65000
+    call = Call(["calibrate", str(file), "--json"], node)
+    assert call.code == 0, call.err
+    assert call.told[0]["command"] == "calibrate" and call.told[0]["settled"] and call.told[0]["frozen"]
+    assert node.axes[0].homed and json.loads(file.read_text())["correction"]["gain"] == 65000
+    before = node.executed.count("home")
+    node.axes[0].learns_in = 4
+    assert Call(["calibrate", str(file)], node).code == 0 and node.executed.count("home") == before
 
 
 def test_what_is_not_learned_in_time_is_told_with_its_reason():

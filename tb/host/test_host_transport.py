@@ -2,6 +2,7 @@
 """transport: the parity of each byte, and what a port that does not open says."""
 import errno
 import os
+import time
 
 import pytest
 import serial
@@ -185,3 +186,19 @@ def test_receive_ends_when_its_time_has_passed():
     line, _ = serial_line()
     began = line.now()
     assert line.receive(3, 0.03) == [] and 0.02 < line.now() - began < 1
+
+
+def test_an_answer_with_gaps_is_read_whole_and_its_end_is_still_seen():
+    """As from a USB adapter that hands over its bytes every 16 ms: each gap is longer than the time that the answer should take."""
+    line, port = serial_line()
+    began, chunks = time.monotonic(), [bytes([n]) * 3 for n in range(5)]
+
+    def read(count):
+        if chunks and time.monotonic() > began + 0.016 * (6 - len(chunks)):
+            port.answers += chunks.pop(0)
+        taken, port.answers = bytes(port.answers[:count]), port.answers[count:]
+        time.sleep(0.0005)
+        return taken
+    port.read = read
+    assert line.receive(100, 0.02) == [n for n in range(5) for _ in range(3)]
+    assert time.monotonic() - began < 0.016 * 6 + line.GAP_S + 0.1

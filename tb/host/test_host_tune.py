@@ -40,6 +40,39 @@ def test_a_plant_is_found_again(plant, kind):
     assert found.resonance_hz is None
 
 
+def sampled(time_constant_s, gain, delay_s, noise=0.0, seed=1, count=128):
+    """Times, commands and positions of a continuous plant, sampled unevenly; written apart from the code under test, in small steps."""
+    draw, step = numpy.random.default_rng(seed), 5e-6
+    lengths = numpy.round((0.002 + 0.0008 * draw.random(count)) / step).astype(int)
+    commands = numpy.repeat(numpy.where(draw.random(count // 4 + 1) < 0.5, 6000, -6000), 4)[:count]
+    given = numpy.concatenate([numpy.zeros(round(delay_s / step)), numpy.repeat(commands, lengths)])[:lengths.sum()]
+    position = velocity = 0.0
+    track = []
+    for command in given:
+        track.append(position)
+        velocity += (gain * command - velocity) * step / time_constant_s
+        position += velocity * step
+    at = numpy.concatenate([[0], numpy.cumsum(lengths)[:-1]])
+    return at * step, commands, numpy.round(numpy.array(track)[at] + noise * draw.standard_normal(count))
+
+
+@pytest.mark.parametrize("time_constant_s, gain, delay_s", [(0.008, 50.0, 0.0), (0.008, 5.0, 0.0005), (0.03, 200.0, 0.001)])
+def test_a_plant_is_found_from_few_uneven_samples(time_constant_s, gain, delay_s):
+    plant = tune.identify_samples(*sampled(time_constant_s, gain, delay_s, noise=1.0), TICK)
+    assert plant.time_constant_s == pytest.approx(time_constant_s, rel=0.05)
+    assert plant.gain == pytest.approx(gain * TICK, rel=0.05) and plant.delay * TICK == pytest.approx(delay_s, abs=1.01 * TICK)
+    assert plant.unexplained < 0.05
+
+
+@pytest.mark.parametrize("change, said", [
+    (dict(count=20), "20 samples are too few"), (dict(noise=1e4), "too noisy"), (dict(gain=0.0), "no motion"),
+    (dict(gain=-50.0), "moves the axis down"),
+])
+def test_samples_that_tell_nothing_are_refused(change, said):
+    with pytest.raises(tune.NotTuned, match=said):
+        tune.identify_samples(*sampled(**{**dict(time_constant_s=0.008, gain=50.0, delay_s=0.0), **change}), TICK)
+
+
 def test_a_gain_by_hand():
     plant = tune.Plant(0.9, 0.5, 0, TICK)
     assert plant.gain == pytest.approx(5.0)

@@ -56,7 +56,8 @@ def test_the_crc_is_that_of_the_source_whatever_its_line_ends():
 def test_the_host_has_every_entry_of_the_source():
     for name, made in (("cause", line_tables.CAUSES), ("fault", line_tables.FAULTS), ("encoder_event", line_tables.ENCODER_EVENTS),
                        ("state", line_tables.STATES), ("flag", line_tables.FLAGS), ("learner_reason", line_tables.LEARNER_REASONS),
-                       ("signal_fault", line_tables.SIGNAL_FAULTS), ("learner_action", line_tables.LEARNER_ACTIONS)):
+                       ("signal_fault", line_tables.SIGNAL_FAULTS), ("learner_action", line_tables.LEARNER_ACTIONS),
+                       ("scope_trigger", line_tables.SCOPE_TRIGGERS), ("scope_state", line_tables.SCOPE_STATES)):
         assert made == {code: (key, words) for key, (code, words) in TABLE[name].items()}
     assert list(line_tables.OPERATIONS) == list(TABLE["operation"]) and list(line_tables.PARAMETERS) == list(TABLE["parameter"])
     for name, source in TABLE["operation"].items():

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from . import units
-from .errors import LineError, MoireError, MotionFailed, NobodyAnswers, NotLearned, OutOfRange, Refused, UnknownName, WrongBuild
+from .errors import LineError, MoireError, MotionFailed, NobodyAnswers, NotLearned, OutOfRange, PortError, Refused, UnknownName, WrongBuild
 from .line_tables import (
     CAUSES,
     ENCODER_EVENTS,
@@ -146,6 +146,14 @@ class Status:
     @property
     def fault_words(self) -> str:
         return words(FAULTS, self.faults)
+
+    @property
+    def first_fault_words(self) -> str:
+        return words(FAULTS, self.first_fault)
+
+    @property
+    def encoder_event_words(self) -> str:
+        return words(ENCODER_EVENTS, self.encoder_events)
 
     @property
     def ended_words(self) -> str:
@@ -282,32 +290,35 @@ class Line:
         self.sequences[address] = sequence
         character_s = self.transport.character_s
         timing = Timing(character_s, answer=answer_s or self.answer_s, quiet=max(0.01, 3 * character_s))
-        exchange = Exchange(address, request_body(operation, sequence, **fields), tries or self.tries, timing)
+        body = request_body(operation, sequence, **fields)
+        return self.carry(Exchange(address, body, tries or self.tries, timing, self.transport.handshake)).result()
+
+    def carry(self, exchange: Exchange) -> Exchange:
+        """Until it is finished, well or not."""
         if not self.in_order:
-            self.let_fall_silent(timing)
+            self.let_fall_silent(exchange.timing)
         self.in_order = False
         self.statistics.exchanges += 1
         try:
-            self.carry(exchange)
+            while not exchange.finished:
+                self.step(exchange)
         finally:
             self.statistics.repeats += exchange.attempts - 1
             for event in exchange.events:
                 name = event.replace(" ", "_")
                 setattr(self.statistics, name, getattr(self.statistics, name) + 1)
-        reply = exchange.result()
-        self.in_order = True
-        return reply
+        self.in_order = exchange.reply is not None
+        return exchange
 
-    def carry(self, exchange: Exchange):
-        while not exchange.finished:
-            sending = exchange.words_to_send()
-            if sending:
-                self.transport.send(sending)
-            wanted = exchange.wanted
-            received = self.transport.receive(wanted, exchange.timeout_s)
-            exchange.feed(received)
-            if len(received) < wanted:
-                exchange.silence()
+    def step(self, exchange: Exchange):
+        sending = exchange.words_to_send()
+        if sending:
+            self.transport.send(sending)
+        wanted = exchange.wanted
+        received = self.transport.receive(wanted, exchange.timeout_s)
+        exchange.feed(received)
+        if len(received) < wanted:
+            exchange.silence()
 
     def let_fall_silent(self, timing: Timing):
         for _ in range(Exchange.LONGEST_NOISE):
@@ -623,9 +634,9 @@ class Axis:
                 self.transport.wait(self.node.line.poll_s)
         except Refused:
             pass        # the drive is off
-        except LineError as error:
-            sentence = f"axis {self.number} of node {self.node.address} could not be told to stop, its watchdog has to: {error}"
-            raise LineError(self.node.address, sentence) from None
+        except (LineError, PortError) as error:
+            error.args = (f"axis {self.number} of node {self.node.address} could not be told to stop, its watchdog has to: {error}",)
+            raise error from None
 
     def stop_if_on(self):
         """One of several that are to stop: what keeps it from stopping must not keep the others."""

@@ -10,16 +10,16 @@ import sys
 import threading
 from dataclasses import asdict
 from fractions import Fraction
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
-from . import command_index, command_job, command_relay, units
+from . import command_index, command_job, command_look, command_relay, command_replay, command_scope, command_twin, units
 from .client import CAPTURE_SOURCES, HOME_METHODS, Line, capture_source, register_fields
-from .errors import BadFile, LineError, MoireError, OutOfRange, PortError, TwinNotBuilt, UnitError
+from .errors import BadFile, LineError, MoireError, OutOfRange, PortError, UnitError
 from .line_tables import PARAMETERS
 from .protocol import ADDRESSES
 from .registers import FIELDS
-from .transport import BAUD, SerialLine
+from .transport import BAUD, PARITIES, open_line
 
 EXAMPLES = """\
 several commands in one call, with -- between them:
@@ -38,17 +38,22 @@ exit codes: 0 done; 1 the node refused, or a motion ended badly; 2 wrong usage, 
 line is garbled; 4 the port does not work; 5 node and host were made from different sources; 130 interrupted (Ctrl-C
 stops a moving axis under control)
 """
-DEFAULTS = dict(port=None, baud=BAUD, parity="auto", address=1, axis=0, json=False)
-OF_THE_PORT = ("port", "baud", "parity")
+DEFAULTS = dict(port=None, baud=BAUD, parity="auto", record=None, address=1, axis=0, json=False)
+OF_THE_PORT = ("port", "baud", "parity", "record")
 OF_THE_CALL = (*OF_THE_PORT, "json")
 OF_AN_AXIS = ("axis.", "grating.", "actuator.")      # registers
 KEEP_COMPANY_S = 0.1
-NOT_INSIDE = ("run", "shell")
-INTERRUPTED = 130
+NOT_INSIDE = ("run", "shell", "twin")
 
 
 class UsageError(MoireError):
     exit_code = 2
+
+
+class Interrupted(MoireError):
+    """Ctrl-C."""
+
+    exit_code = 130
 
 
 class Parser(argparse.ArgumentParser):
@@ -131,14 +136,16 @@ def group(name, text, under, common, example):
 def common_options() -> argparse.ArgumentParser:
     common = Parser(add_help=False, argument_default=argparse.SUPPRESS)
     group = common.add_argument_group("line")
-    group.add_argument("--port", help="serial port (/dev/ttyUSB0, COM3, rfc2217://host:port), or 'twin' for the simulated stage; "
-                                      "else the variable MOIRE_PORT")
+    group.add_argument("--port", help="serial port (/dev/ttyUSB0, COM3, rfc2217://host:port, socket://host:port), or 'twin' for the "
+                                      "simulated stage; else the variable MOIRE_PORT")
     group.add_argument("--baud", type=positive_number, help=f"baud rate of the line, {BAUD} unless given")
     group.add_argument(
         "--parity",
-        choices=("auto", "mark", "odd"),
-        help="how the 9th bit is made: auto takes mark where the port can do it; odd reaches only the addresses 1 2 4 7 8 11 13 14",
+        choices=PARITIES,
+        help="how the 9th bit is made: auto takes mark where the port can do it; odd reaches only the addresses 1 2 4 7 8 11 13 14; "
+             "none: COBS packets in 8N1, which auto takes for socket:// and pseudo terminals",
     )
+    group.add_argument("--record", metavar="FILE", help="write all that is said on the line into FILE, for 'moire replay'")
     group.add_argument(
         "--address", type=address_number, metavar="N", help=f"address of the node, {ADDRESSES[0]} to {ADDRESSES[-1]}; 1 unless given"
     )
@@ -147,6 +154,7 @@ def common_options() -> argparse.ArgumentParser:
     return common
 
 
+@cache
 def make_parser() -> Parser:
     common = common_options()
     parser = Parser(prog="moire", parents=[common], description="Motion controllers on a multi-drop line: find, home, move, look.",
@@ -198,9 +206,17 @@ def make_parser() -> Parser:
     command("resume", do_resume, "go on as before the pause; at full speed if it was another call that paused",
             "moire --port /dev/ttyUSB0 resume -- finish")
     command("drive", do_drive, "what drives the axis: command, steps on the wire, fine stage", "moire --port /dev/ttyUSB0 drive")
-    tune = command("tune", do_tune, "gains from a record of how the axis answers to commands in open loop",
-                   "moire tune record.csv --bandwidth 40Hz --picture tuning.png")
-    tune.add_argument("file", metavar="FILE", help="a row a servo tick: command (full scale 32768), position (2^-16 period) that stood")
+    tune = command("tune", do_tune, "gains from how the axis answers to commands in open loop: from a record, or on the spot",
+                   "moire --port /dev/ttyUSB0 tune --bandwidth 40Hz --picture tuning.png")
+    tune.add_argument("file", nargs="?", metavar="FILE",
+                      help="a row a servo tick: command (full scale 32768), position (2^-16 period) that stood; "
+                           "without it the axis is switched on and driven to and fro")
+    tune.add_argument("--amplitude", type=checked(positive(units.parse_share)), default="20%", metavar="SHARE",
+                      help="of the open loop; 20%% unless given")
+    tune.add_argument("--reach", type=checked(positive(units.parse_length)), default="1mm", metavar="LENGTH",
+                      help="how far the open loop may go; 1mm unless given")
+    tune.add_argument("--every", type=checked(positive(units.parse_time)), default="2ms", metavar="TIME",
+                      help="from sample to sample on the spot; 2ms unless given")
     tune.add_argument("--bandwidth", required=True, type=checked(positive(units.FREQUENCY.parse)), metavar="FREQUENCY", help="such as 40Hz")
     tune.add_argument("--margin", type=float, default=50.0, metavar="DEGREES", help="phase margin; 50 unless given")
     tune.add_argument("--tick", type=checked(positive(units.parse_time)), metavar="TIME", help="servo tick; the node is asked unless given")
@@ -227,6 +243,9 @@ def make_parser() -> Parser:
         "--timeout", type=checked(positive(units.parse_time)), default="120s", metavar="TIME", help="given up after this; 120s unless given"
     )
 
+    calibrate = command("calibrate", do_calibrate, "home where needed, learn the correction, and save it",
+                        "moire --port /dev/ttyUSB0 calibrate stage.json")
+    calibrate.add_argument("file", metavar="FILE", help="JSON, for 'moire correction load'")
     corrections = group("correction", "what was learned of sine and cosine: show, save, load, freeze, go on, forget", commands, common,
                         "moire --port /dev/ttyUSB0 correction load stage.json -- correction show")
     command("show", do_correction_show, "what is in force, and what the learner does", "moire --port twin correction show", corrections)
@@ -262,6 +281,9 @@ def make_parser() -> Parser:
     command_relay.add_to(group("relay", "the relay of a ring (S1): status, clear, calibrate", commands, common,
                                "moire --port /dev/ttyUSB0 relay status"), command)
 
+    command_scope.add_to(group("scope", "record position, error and command of an axis: arm, read, show", commands, common,
+                               "moire --port twin home -- scope arm --trigger motion -- move 100um -- scope read move.csv"),
+                         command, checked, write_bytes)
     command_index.add_to(partial(group, under=commands, common=common), command)
     command_job.add_to(partial(group, under=commands, common=common), command)
 
@@ -295,6 +317,9 @@ def make_parser() -> Parser:
     )
     load.add_argument("file", metavar="FILE")
 
+    command_look.add_to(command, checked(waiting_time))
+    command_replay.add_to(command)
+    command_twin.add_to(command, address_number, checked(waiting_time))
     run = command("run", do_run, "commands from a file, one a line, # begins a remark", "moire --port twin run warm_up.txt")
     run.add_argument("file", metavar="FILE", help="- is the standard input")
     command("shell", do_shell, "commands from the keyboard, until 'quit'; drives stay on between them", "moire --port twin shell")
@@ -339,7 +364,8 @@ class Session:
 
     def open(self) -> Line:
         if self.opened is None:
-            self.opened = Line(self.open_transport(self.options))
+            transport = self.open_transport(self.options)
+            self.opened = Line(command_replay.recorded(transport, self.options.record) if self.options.record else transport)
         return self.opened
 
     @property
@@ -361,6 +387,15 @@ class Session:
         for place, axis in list(self.switched_on.items()):
             if not axis.status().enabled:
                 del self.switched_on[place]
+
+    def stop_axes(self):
+        """Under control; whatever was switched on is switched off by close()."""
+        for axis in self.switched_on.values():
+            axis.stop_if_on()
+
+    @staticmethod
+    def read_text(file: str) -> str:
+        return read_text(file)
 
     def say(self, told: dict, text: str):
         print(json.dumps(told, default=plain) if self.options.json else text, file=self.out, flush=True)
@@ -408,23 +443,9 @@ def open_port(options):
     if not port:
         raise PortError("no port: write --port /dev/ttyUSB0, or --port twin for the simulated stage")
     if port == "twin":
-        return open_twin(options.baud)
-    return SerialLine(port, options.baud, options.parity)
+        return command_twin.make_twin(options.baud)
+    return open_line(port, options.baud, options.parity)
 
-
-def open_twin(baud: int):
-    """The simulated S0 stage, from the search path or from the checkout that this file lies in."""
-    software = str(Path(__file__).resolve().parents[2])
-    if software not in sys.path:
-        sys.path.append(software)
-    try:
-        import twin
-    except ImportError as error:
-        raise TwinNotBuilt(f"the simulated stage is not here: use the checkout of Moire and its build/venv ({error})") from None
-    try:
-        return twin.TwinTransport(twin.Twin(baud=baud))
-    except (twin.BuildError, OSError) as error:
-        raise TwinNotBuilt(f"the simulated stage cannot be built: {str(error).strip().splitlines()[-1]}") from None
 
 
 # ------------------------------------------------------------------ commands
@@ -564,11 +585,14 @@ def do_drive(session, command):
 
 
 def do_tune(session, command):
-    from . import tune  # numpy and pictures: only where they are wanted
+    from . import scope, tune  # numpy and pictures: only where they are wanted
 
-    answers = read_record(command.file)
     tick_s = float(command.tick or Fraction(1, session.line.node(command.address).identity.tick_hz))
-    plant = tune.identify(tune.Record(*answers, tick_s))
+    if command.file is None:
+        record = scope.excite(session.switch_on(command), command.amplitude, command.every, command.reach)
+        plant = tune.identify_samples(*scope.lsb(record), tick_s)
+    else:
+        plant = tune.identify(tune.Record(*read_record(command.file), tick_s))
     tuning = tune.propose(plant, float(command.bandwidth), command.margin)
     if command.picture:
         write_bytes(command.picture, tune.picture(plant, tuning))
@@ -662,19 +686,35 @@ def learner_words(learner) -> str:
 
 
 def do_learn(session, command):
+    learn(session, command, command.distance, command.timeout)
+
+
+def learn(session, command, *how):
     axis, watched = session.switch_on(command), not session.options.json and session.err.isatty()
 
     def show(learner):
         print(f"\r{learner_words(learner):<100}", end="", file=session.err, flush=True)
     began = session.line.transport.now()
     try:
-        learner = axis.learn(show if watched else None, command.distance, command.timeout)
+        learner = axis.learn(show if watched else None, *how)
     finally:
         if watched:
             print("\r" + " " * 100 + "\r", end="", file=session.err, flush=True)
     seconds = session.line.transport.now() - began
     session.say({**place(command), **told_learner(learner), "time_s": seconds},
                 f"{where(command)}: correction learned in {seconds:.1f} s, known to {learner.scatter_nm:.3f} nm, frozen")
+
+
+def do_calibrate(session, command):
+    axis = session.switch_on(command)
+    if not axis.status().homed:
+        axis.home(session.progress())
+    learn(session, command)
+    save_correction(axis, command.file)
+
+
+def save_correction(axis, file: str):
+    write_text(file, json.dumps({"correction": axis.correction()}, indent=4) + "\n")
 
 
 def told_correction(command, learner, values) -> dict:
@@ -697,8 +737,7 @@ def do_correction_show(session, command):
 
 
 def do_correction_save(session, command):
-    values = session.axis(command).correction()
-    write_text(command.file, json.dumps({"correction": values}, indent=4) + "\n")
+    save_correction(session.axis(command), command.file)
     session.say({**place(command), "action": "save", "file": command.file}, f"correction saved in {command.file}")
 
 
@@ -958,9 +997,13 @@ def main(arguments=None, open_transport=None, out=None, err=None) -> int:
     except MoireError as error:
         session.complain(getattr(error, "command", None), error)
         return error.exit_code
+    except BrokenPipeError:           # 'moire watch | head': nobody reads any more
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except KeyboardInterrupt:
-        print("moire: interrupted; what moved was stopped under control", file=session.err)
-        return INTERRUPTED
+        session.stop_axes()
+        session.complain(None, Interrupted("interrupted; what moved was stopped under control"))
+        return Interrupted.exit_code
     finally:
         session.close()
 

@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x38017035
+PROTOCOL_CRC = 0x7FCE7D6E
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -119,6 +119,7 @@ STATES = {
     5: ("stopping", "stopping"),
     6: ("faulted", "faulted"),
     7: ("prepared", "waiting for the common start"),
+    8: ("excited", "driven in open loop for a record"),
 }
 
 # bit: (name, words)
@@ -171,6 +172,23 @@ LEARNER_ACTIONS = {
     1: ("learn", "learn from here on"),
     2: ("freeze", "learn no more; what was learned stays in force"),
     3: ("forget", "correct nothing, begin afresh"),
+}
+
+# code: (name, words)
+SCOPE_TRIGGERS = {
+    0: ("now", "at once"),
+    1: ("motion", "the axis moves or homes"),
+    2: ("settling", "a motion has been played"),
+    3: ("error", "the error reaches the level"),
+    4: ("fault", "a fault latches"),
+}
+
+# code: (name, words)
+SCOPE_STATES = {
+    0: ("empty", "nothing was recorded"),
+    1: ("waiting", "waiting for the trigger"),
+    2: ("recording", "recording"),
+    3: ("full", "complete"),
 }
 
 # code: (name, words)
@@ -304,6 +322,23 @@ OPERATIONS = {operation.name: operation for operation in (
     Operation("start", 21, "begin the prepared motions of these axes (bit n: axis n), all in one tick; none if one of them has none",
               (("axes", "u8"),),
               ()),
+    Operation("position", 30, "where an axis is: the shortest answer that tells it",
+              (("axis", "u8"),),
+              (("position", "i64"),)),
+    Operation("arm_scope", 31, "record every so many ticks, from before a trigger on; an amplitude drives in open loop, to level at most",
+              (("axis", "u8"), ("trigger", "u8"), ("before", "u8"), ("every", "u16"),
+               ("level", "u32"), ("amplitude", "i16"),),
+              ()),
+    Operation("scope", 32, "how far the record is; count is 0 until it is complete",
+              (),
+              (("state", "u8"), ("count", "u8"), ("before", "u8"),)),
+    Operation("read_scope", 33, "five samples from this one on, 0 behind the end; time from sample to sample in 64 clk, position: low word",
+              (("first", "u8"),),
+              (("position_0", "i32"), ("error_0", "i32"), ("command_0", "i16"), ("time_0", "u16"),
+               ("position_1", "i32"), ("error_1", "i32"), ("command_1", "i16"), ("time_1", "u16"),
+               ("position_2", "i32"), ("error_2", "i32"), ("command_2", "i16"), ("time_2", "u16"),
+               ("position_3", "i32"), ("error_3", "i32"), ("command_3", "i16"), ("time_3", "u16"),
+               ("position_4", "i32"), ("error_4", "i32"), ("command_4", "i16"), ("time_4", "u16"),)),
     Operation("get_setting", 40, "read a setting of a station",
               (("setting", "u8"),),
               (("value", "i64"),)),

@@ -121,13 +121,14 @@ class Exchange:
 
     The owner sends what `words_to_send()` gives, then receives at most `wanted` words for at most `timeout_s`, tells
     them with `feed(words)`, and tells with `silence()` when fewer came; until `finished`. Then `result()` has the reply
-    or raises. `events` tells what went wrong on the way: "no answer", "garbled", "old reply".
+    or raises. `events` tells what went wrong on the way: "no answer", "garbled", "old reply". Without `handshake` the request
+    does not wait for the node's ready byte.
     """
 
     LONGEST_NOISE = 1000           # words thrown away in one QUIET
 
-    def __init__(self, address: int, body: bytes, tries: int = 5, timing: Timing = Timing()):
-        self.address, self.body, self.tries, self.timing = address, body, tries, timing
+    def __init__(self, address: int, body: bytes, tries: int = 5, timing: Timing = Timing(), handshake: bool = True):
+        self.address, self.body, self.tries, self.timing, self.handshake = address, body, tries, timing, handshake
         self.payload = list(frame(command_byte(address, TO_NODE), body))
         self.events = []
         self.attempts = 0
@@ -188,6 +189,12 @@ class Exchange:
         self.attempts += 1
         self.state, self.received, self.noise = State.AWAIT_READY, [], 0
         self.outgoing = write_words(self.address)
+        if not self.handshake:
+            self.send_request()
+
+    def send_request(self):
+        self.outgoing += self.payload + read_words(self.address)
+        self.state = State.AWAIT_READING
 
     def take(self, word: int):
         if self.state == State.QUIET:
@@ -200,8 +207,7 @@ class Exchange:
             self.fail("garbled", "a byte with the 9th bit set came back")
         elif self.state == State.AWAIT_READY:
             if self.expect(word, TO_NODE):
-                self.outgoing = self.payload + read_words(self.address)
-                self.state = State.AWAIT_READING
+                self.send_request()
         elif self.state == State.AWAIT_READING:
             if self.expect(word, FROM_NODE):
                 self.received, self.state = [word], State.AWAIT_LENGTH
@@ -219,17 +225,17 @@ class Exchange:
     def expect(self, word: int, way: int) -> bool:
         ready = ready_byte(self.address, way)
         if word != ready:
-            self.fail("garbled", f"{word:02X} came instead of {ready:02X}")
+            self.fail("garbled", f"{word:02X} came instead of {ready:02X}, as with a wrong baud rate or two masters")
         return word == ready
 
     def judge(self):
         first, body = self.received[0], bytes(self.received[2:-CRC_LENGTH])
         reply = parse_reply(body)
         if list(frame(first, body)) != self.received[1:]:
-            self.fail("garbled", "the reply has a wrong CRC-32")
+            self.fail("garbled", f"the reply has a wrong CRC-32, as from noise or from two nodes with the address {self.address}")
         elif reply is None:
             self.fail("garbled", "the reply has a wrong length")
-        elif (reply.sequence, reply.operation) != (self.body[0], self.body[1]):
+        elif (reply.sequence, reply.operation) != (self.body[0], self.body[1] if len(self.body) > 1 else 0):
             # the node did not hear this request: the line is in order, so repeat at once
             self.fail("old reply", "the node hears, but it never received the request whole", State.AWAIT_READY)
         else:

@@ -22,6 +22,7 @@ MOST = (1 << 24) - 1
 COEFFICIENT = 1 << 30                   # of biquad_cascade
 LONGEST_DELAY = 12                      # ticks tried
 SHORTEST_RECORD = 200                   # ticks
+SHORTEST_SAMPLES = 60                   # of a record at any times
 MOVED = 20                              # LSB; less is no motion
 UNEXPLAINED = 0.35                      # of the velocity's rms; more is too noisy, or not such a plant
 SATURATED = 0.05                        # of the samples at full scale
@@ -194,6 +195,54 @@ def identify(record) -> Plant:
     if b <= 0:
         raise NotTuned("a positive command moves the axis down: swap the motor's wires or the direction of the grating")
     return Plant(a, b, delay, record.tick_s, unexplained, frequency)
+
+
+def identify_samples(time_s, command, position, tick_s) -> Plant:
+    """As identify(), from samples at any times and few of them, such as those of moire.scope: each command holds from its time to the
+    next. The plant is the continuous one that answers so, at the servo's tick."""
+    time, command, position = (numpy.asarray(values, float) for values in (time_s, command, position))
+    if not len(time) == len(command) == len(position) or len(time) < SHORTEST_SAMPLES:
+        raise NotTuned(f"{len(time)} samples are too few to tell anything: at least {SHORTEST_SAMPLES}")
+    if numpy.ptp(command[:-1]) == 0:
+        raise NotTuned("the command did not change: give an excitation")
+    if numpy.mean(abs(command) >= FULL_SCALE - 1) > SATURATED:
+        raise NotTuned("the command stood at full scale: use a smaller amplitude")
+    if numpy.ptp(position) < MOVED:
+        raise NotTuned(f"no motion: the position moved by {numpy.ptp(position):.0f} LSB; is the amplitude above friction?")
+    ways, lengths = numpy.diff(position), numpy.diff(time)
+    best = None
+    for delay in numpy.arange(0.0, lengths.min(), tick_s / 2):
+        def left(log_time, delay=delay):
+            return fitted_ways(lengths, command, ways, math.exp(log_time), delay)[0]
+
+        log_time = golden(left, math.log(tick_s / 4), math.log(time[-1] - time[0]))
+        squares, gain = fitted_ways(lengths, command, ways, math.exp(log_time), delay)
+        if best is None or squares < best[0] * (1 - 1e-9):
+            best = squares, gain, math.exp(log_time), delay
+    squares, gain, time_constant, delay = best
+    unexplained = math.sqrt(squares / max(float(numpy.sum((ways - ways.mean()) ** 2)), 1e-30))
+    if unexplained > UNEXPLAINED:
+        raise NotTuned(f"too noisy: {100 * unexplained:.0f} % of the motion is not an answer to the command; use a larger amplitude")
+    if gain <= 0:
+        raise NotTuned("a positive command moves the axis down: swap the motor's wires or the direction of the grating")
+    a = math.exp(-tick_s / time_constant)
+    return Plant(a, gain * tick_s * (1 - a), math.ceil(delay / tick_s), tick_s, unexplained)
+
+
+def fitted_ways(lengths, command, ways, time_constant, delay):
+    """(squares left, gain): least squares of the ways between samples over those of a first-order velocity of gain 1, and a drift."""
+    velocity, before, out = 0.0, 0.0, []
+    for length, now in zip(lengths, command):
+        way = 0.0
+        for given, part in ((before, delay), (now, length - delay)):
+            decay = math.exp(-part / time_constant)
+            way += given * part + (velocity - given) * time_constant * (1 - decay)
+            velocity = given + (velocity - given) * decay
+        before = now
+        out.append(way)
+    matrix = numpy.column_stack([out, lengths])
+    solution, *_ = numpy.linalg.lstsq(matrix, ways, rcond=None)
+    return float(numpy.sum((ways - matrix @ solution) ** 2)), float(solution[0])
 
 
 # ------------------------------------------------------------------ filters

@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Coverage-guided fuzzing of all that the host package reads: bytes of the line and of clients, files, words on the command line.
+
+    python -m experiments.parser_fuzz SECONDS [SEED]
+
+Whatever a parser is given it answers, or refuses by a MoireError; any other exception, and anything that takes long, is a crash. An input
+that reaches a pair of lines that was not reached before joins the corpus that the next inputs are made of.
+"""
+import io
+import random
+import signal
+import sys
+import time
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+
+from moire import calibration, cobs, command_line, protocol, recording, relay, rfc2217, units
+from moire.client import Axis
+from moire.errors import MoireError
+from moire.line_tables import OPERATIONS, PARAMETERS
+from moire.transport import Transport
+
+PACKAGE = str(Path(protocol.__file__).parent)
+LONGEST = 600
+HANG_S = 10
+
+
+# ------------------------------------------------------------------ what is fuzzed
+
+def packets(data):
+    reader = cobs.PacketReader()
+    for content in reader.feed(data[:len(data) // 2]) + reader.feed(data[len(data) // 2:]):
+        cobs.address_of(content, protocol.TO_NODE), cobs.address_of(content, protocol.FROM_NODE)
+        if body := cobs.body_of(content):
+            protocol.parse_reply(body)
+    protocol.parse_reply(data)
+
+
+def telnet(data):
+    server = rfc2217.Server(115200)
+    for character in server.feed(data):
+        assert character.ninth in (0, 1)
+    server.take_answers()
+
+
+def words_of(data):
+    return [data[n] | (data[n + 1] & 1) << 8 for n in range(0, len(data) - 1, 2)]
+
+
+def fed(exchange, data):
+    """An exchange that hears these words, with a silence after each that has bit 1 of its second byte."""
+    for n, word in enumerate(words_of(data)):
+        if exchange.finished:
+            break
+        exchange.words_to_send()
+        exchange.feed([word] if exchange.wanted else [])
+        if data[2 * n + 1] & 2:
+            exchange.silence()
+    while not exchange.finished:
+        exchange.silence()
+    exchange.result()
+
+
+def exchange(data):
+    fed(protocol.Exchange(1, protocol.request_body("status", 7, axis=0), tries=3), data)
+
+
+def relay_exchange(data):
+    fed(relay.Exchange(bytes([7, relay.STATUS]), tries=3), data)
+
+
+class Silent(Transport):
+    time_stands = True
+
+    def send(self, words):
+        assert all(0 <= word < 512 for word in words)
+
+    def receive(self, count, timeout_s):
+        return []
+
+    def now(self):
+        return 0.0
+
+    def wait(self, seconds):
+        pass
+
+
+def text_of(data):
+    return data.decode("latin-1")
+
+
+def record(data):
+    calls = recording.read(text_of(data))
+    recording.listing(calls)
+    recording.replay(calls, Silent())
+
+
+def quantities(data):
+    for parse in (units.parse_length, units.parse_speed, units.parse_time, units.parse_share):
+        try:
+            parse(text_of(data))
+        except MoireError:
+            pass
+
+
+def command(data):
+    options = command_line.argparse.Namespace(**command_line.DEFAULTS)
+    try:
+        command_line.parse_line(text_of(data), options)
+    except SystemExit as end:
+        assert end.code == 0, "only --help ends the program here"
+
+
+@contextmanager
+def standard_input(data):
+    before, sys.stdin = sys.stdin, io.StringIO(text_of(data))
+    try:
+        yield "-"
+    finally:
+        sys.stdin = before
+
+
+def parameters(data):
+    axis = object.__new__(Axis)
+    axis.period_nm = Fraction(800)
+    with standard_input(data) as file:
+        texts = command_line.read_parameters(file)
+    for name, text in texts.items():
+        axis.parameter_counts(name, text)
+
+
+def tuning_record(data):
+    with standard_input(data) as file:
+        command_line.read_record(file)
+
+
+def readings(data):
+    path = Path("/dev/shm/moire_readings.csv") if Path("/dev/shm").is_dir() else Path("build/readings.csv")
+    path.write_bytes(data)
+    calibration.read_readings(path)
+
+
+def good_reply():
+    body = bytes([7, OPERATIONS["status"].code, 11])
+    words = [0x61, 0x51, *protocol.frame(0x51, body)]
+    return bytes(byte for word in words for byte in (word, 0))
+
+
+HEAD = '{"record": "moire line", "version": 1, "protocol_crc": %d}\n' % recording.PROTOCOL_CRC
+SEEDS = {
+    packets: [cobs.packet(0x51, bytes([7, 2, 3])), cobs.packet(0x21, protocol.request_body("identify", 1))],
+    telnet: [bytes([255, 253, 44, 255, 250, 44, 3, 4, 255, 240, 33]), bytes([255, 250, 44, 1, 0, 0, 37, 128, 255, 240, 255, 255])],
+    exchange: [good_reply()],
+    relay_exchange: [good_reply()],
+    record: [(HEAD + '{"at": 0.5, "send": [289]}\n{"at": 0.6, "receive": [97], "wanted": 1, "timeout_s": 0.1}').encode()],
+    quantities: [b"1.5mm", b"-2e3 nm/s", b"20ms", b"50%"],
+    command: [b"move 1mm --by -- status --json", b"params set kp 0.1", b"compare from 1mm 10um --count 5", b"scope arm --trigger motion"],
+    parameters: [b'{"parameters": {"velocity": "5mm/s", "kp": "0.5", "home_end": "low"}}'],
+    tuning_record: [b"command,position\n1,2\n-3,4.5"],
+    readings: [b"angle,error\n0,1\n90,-2\n180,0.5\n270,1"],
+}
+WORDS = [b"0", b"-1", b"1e999", b"nan", b"1/0", b'"', b"{}", b"[]", b"null", b"\n", b",", b"--", b"--help", b"\0",
+         b"\xff\xfa\x2c", b"\xff\xf0", *(name.encode() for name in [*OPERATIONS, *PARAMETERS, "mm", "deg", "period"])]
+
+
+# ------------------------------------------------------------------ how
+
+@dataclass
+class Target:
+    parse: object
+    corpus: list
+    seen: set = field(default_factory=set)
+    runs: int = 0
+    seconds: float = 0.0
+    crashes: dict = field(default_factory=dict)          # where: input
+
+
+class Pairs:
+    """Pairs of lines of the package, one after the other, while it is switched on."""
+
+    def __init__(self):
+        self.found, self.last = set(), None
+
+    def call(self, frame, event, _):
+        return self.line if frame.f_code.co_filename.startswith(PACKAGE) else None
+
+    def line(self, frame, event, _):
+        here = frame.f_code, frame.f_lineno
+        self.found.add((self.last, here))
+        self.last = here
+        return self.line
+
+
+def mutated(draw, target):
+    data = bytearray(draw.choice(target.corpus))
+    for _ in range(draw.randrange(1, 6)):
+        at, kind = draw.randrange(len(data) + 1), draw.randrange(6)
+        if kind == 0 and data:
+            data[at % len(data)] ^= 1 << draw.randrange(8)
+        elif kind == 1 and data:
+            data[at % len(data)] = draw.randrange(256)
+        elif kind == 2:
+            data[at:at] = draw.randbytes(draw.randrange(1, 9))
+        elif kind == 3:
+            data[at:at] = draw.choice(WORDS)
+        elif kind == 4:
+            del data[at:at + draw.randrange(1, 20)]
+        else:
+            other = draw.choice(target.corpus)
+            begin = draw.randrange(len(other) + 1)
+            data[at:at] = other[begin:begin + draw.randrange(1, 60)]
+    return bytes(data[:LONGEST])
+
+
+class Hang(Exception):
+    pass
+
+
+def hang(*_):
+    raise Hang
+
+
+def attempt(target, data):
+    """One input; whether it reached anything new."""
+    pairs, where, began = Pairs(), None, time.perf_counter()
+    signal.setitimer(signal.ITIMER_REAL, HANG_S)
+    sys.settrace(pairs.call)
+    try:
+        target.parse(data)
+    except MoireError:
+        pass
+    except (Exception, SystemExit) as error:
+        sys.settrace(None)
+        at = error.__traceback__
+        while at.tb_next:
+            at = at.tb_next
+        where = f"{type(error).__name__} at {Path(at.tb_frame.f_code.co_filename).name}:{at.tb_lineno}: {error}"
+    finally:
+        sys.settrace(None)
+        signal.setitimer(signal.ITIMER_REAL, 0)
+    target.runs, target.seconds = target.runs + 1, target.seconds + time.perf_counter() - began
+    if where:
+        target.crashes.setdefault(where, data)
+    new = pairs.found - target.seen
+    target.seen |= new
+    return bool(new)
+
+
+def fuzz(seconds, seed=1, parsers=tuple(SEEDS), first=False):
+    """Targets, after so many seconds over all of them; with `first` the first crash ends it."""
+    draw, targets = random.Random(seed), [Target(parse, list(SEEDS.get(parse, [b""]))) for parse in parsers]
+    before = signal.signal(signal.SIGALRM, hang)
+    end, nowhere = time.monotonic() + seconds, io.StringIO()
+    try:
+        with redirect_stdout(nowhere), redirect_stderr(nowhere):
+            for target in targets:
+                for data in target.corpus:
+                    attempt(target, data)
+            while time.monotonic() < end and not (first and any(target.crashes for target in targets)):
+                target = min(targets, key=lambda target: target.seconds)      # each has the same time
+                data = mutated(draw, target)
+                if attempt(target, data):
+                    target.corpus.append(data)
+                if nowhere.tell():
+                    nowhere.seek(0)
+                    nowhere.truncate()
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    return targets
+
+
+def main():
+    targets = fuzz(float(sys.argv[1]), int((sys.argv[2:] or ["1"])[0]))
+    for target in targets:
+        print(f"{target.parse.__name__:16} {target.runs:8} runs {len(target.corpus):5} inputs kept {len(target.seen):6} pairs of lines "
+              f"{len(target.crashes)} crashes")
+        for where, data in target.crashes.items():
+            print(f"    {where}\n    {data!r}")
+    return 1 if any(target.crashes for target in targets) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

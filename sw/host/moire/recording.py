@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A session written down as it happens on the line, and given again to the same or another line.
+
+A record is a text of JSON objects, one a line: first what it is, then each call of the transport with its time in seconds:
+{"at": 0.31, "send": [289]} and {"at": 0.32, "receive": [97], "wanted": 1, "timeout_s": 0.1}. Words are 9-bit.
+"""
+import json
+from dataclasses import dataclass
+
+from .errors import BadFile, MoireError
+from .line_tables import CAUSES, OPERATIONS, PROTOCOL_CRC
+from .protocol import CRC_LENGTH, FROM_NODE, NAMES, NINTH, REQUESTS, TO_NODE, frame, parse_reply, ready_byte
+from .transport import Transport
+
+KIND = {"record": "moire line", "version": 1}
+LONGEST_S = 1e9              # of a session
+
+
+class Recorder(Transport):
+    """Passes everything on to a transport, and writes it to a file that is open for text."""
+
+    def __init__(self, transport: Transport, file):
+        self.transport, self.file = transport, file
+        self.character_s, self.time_stands, self.handshake = transport.character_s, transport.time_stands, transport.handshake
+        self.began = transport.now()
+        self.write({**KIND, "protocol_crc": PROTOCOL_CRC})
+
+    def write(self, told: dict):
+        self.file.write(json.dumps(told) + "\n")
+
+    def send(self, words):
+        self.write({"at": self.now() - self.began, "send": list(words)})
+        self.transport.send(words)
+
+    def receive(self, count, timeout_s):
+        at, words = self.now() - self.began, self.transport.receive(count, timeout_s)
+        self.write({"at": at, "receive": list(words), "wanted": count, "timeout_s": timeout_s})
+        return words
+
+    def now(self):
+        return self.transport.now()
+
+    def wait(self, seconds):
+        self.transport.wait(seconds)
+
+    def reaches(self, address):
+        return self.transport.reaches(address)
+
+    def set_baud(self, baud):
+        self.transport.set_baud(baud)
+        self.character_s = self.transport.character_s
+
+    def close(self):
+        self.file.close()
+        self.transport.close()
+
+
+def read(text: str, name: str = "text") -> list:
+    """The calls of a record; BadFile unless it is one of this version, made with this protocol table."""
+    try:
+        head, *calls = [json.loads(row) for row in text.splitlines()]
+        right = head.items() >= KIND.items() and "protocol_crc" in head and all(map(is_call, calls))
+    except (ValueError, AttributeError):
+        right = False
+    if not right:
+        raise BadFile(f"the file {name} is no record of a line: make one with 'moire --record {name} …'")
+    if head["protocol_crc"] != PROTOCOL_CRC:
+        raise BadFile(f"the file {name} was recorded with another protocol table (line.toml)")
+    return calls
+
+
+def is_call(call) -> bool:
+    """Whether this is {at, send} or {at, receive, wanted, timeout_s}, each of its type."""
+    if not isinstance(call, dict):
+        return False
+    words = call.get("send", call.get("receive"))
+    numbers = [call.get("at")] + ([] if "send" in call else [call.get("wanted"), call.get("timeout_s")])
+    return (call.keys() <= {"at", "send"} or call.keys() == {"at", "receive", "wanted", "timeout_s"}) and isinstance(words, list) and \
+        all(type(word) is int and 0 <= word < 512 for word in words) and \
+        all(type(number) in (int, float) and 0 <= number < LONGEST_S for number in numbers) and type(call.get("wanted", 0)) is int
+
+
+# ------------------------------------------------------------------ replay
+
+class ReplayDiffers(MoireError):
+    """A line answered otherwise than the record has it."""
+
+
+@dataclass
+class Comparison:
+    """Answers, counted: the very same bytes; the same operation and cause, but other values; anything else."""
+
+    same: int = 0
+    other_values: int = 0
+    different: int = 0
+    first: str = ""                # difference, in words
+
+    @property
+    def words(self) -> str:
+        total = self.same + self.other_values + self.different
+        return f"{total} answers: {self.same} the same, {self.other_values} with other values, {self.different} different"
+
+
+def replay(calls: list, transport: Transport) -> Comparison:
+    """Sends what was sent, at the same times, and compares what comes back."""
+    result, began, old, new = Comparison(), transport.now(), [], []
+    for call in calls:
+        transport.wait(call["at"] - (transport.now() - began))
+        if "send" in call:
+            compare(result, old, new, call["at"])
+            old, new = [], []
+            transport.send(call["send"])
+        else:
+            old += call["receive"]
+            new += transport.receive(call["wanted"], call["timeout_s"])
+    compare(result, old, new, calls[-1]["at"] if calls else 0.0)
+    return result
+
+
+def compare(result: Comparison, old: list, new: list, at: float):
+    if old == new:
+        result.same += bool(old)
+    elif outcome(old) is not None and outcome(old) == outcome(new):
+        result.other_values += 1
+    else:
+        result.different += 1
+        result.first = result.first or f"at {at:.3f} s {hexadecimal(new)} came instead of {hexadecimal(old)}"
+
+
+def outcome(words: list):
+    """Sequence, operation and cause of a whole reply, else None."""
+    if len(words) < 2 + CRC_LENGTH or words[1:] != list(frame(words[0] & 0xFF, bytes(word & 0xFF for word in words[2:-CRC_LENGTH]))):
+        return None
+    return words[2:5]
+
+
+def hexadecimal(words: list) -> str:
+    return " ".join(f"{word & 0xFF:02X}" + ("*" if word & NINTH else "") for word in words) or "nothing"
+
+
+# ------------------------------------------------------------------ in words
+
+def listing(calls: list) -> list:
+    """Requests and replies in the order of the line, one a row, by name and value."""
+    rows, answer, address = [], [], 0
+    for call in calls:
+        if "receive" in call:
+            answer += call["receive"]
+            continue
+        rows += told_answer(answer)
+        answer, request = [], []
+        for word in call["send"]:
+            if word & NINTH:
+                address = word & 0xF
+            else:
+                request.append(word)
+        if request:
+            rows.append(f"{call['at']:9.4f} s  node {address}: {told_request(bytes(request))}")
+    return rows + told_answer(answer)
+
+
+def told_request(payload: bytes) -> str:
+    body = payload[1:-CRC_LENGTH]
+    name = NAMES.get(body[1]) if len(body) > 1 else None
+    if name is None or len(body) != 2 + REQUESTS[name].size:
+        return f"unknown request {body.hex(' ')}"
+    fields = zip((field for field, _ in OPERATIONS[name].request), REQUESTS[name].unpack(body[2:]))
+    return f"{name} " + " ".join(f"{field}={value}" for field, value in fields)
+
+
+def told_answer(words: list) -> list:
+    if outcome(words) is None:
+        ready = len(words) == 1 and words[0] == ready_byte(words[0] & 0xF or 1, TO_NODE)
+        return [] if not words or ready else [f"{'':12}no right reply: {hexadecimal(words)}"]
+    reply = parse_reply(bytes(words[2:-CRC_LENGTH]))
+    if reply is None or words[0] != ready_byte(words[0] & 0xF or 1, FROM_NODE):
+        return [f"{'':12}no right reply: {hexadecimal(words)}"]
+    cause = CAUSES.get(reply.cause, (str(reply.cause),))[0]
+    return [f"{'':12}{cause} " + " ".join(f"{field}={value}" for field, value in reply.fields.items())]

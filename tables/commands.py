@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Makes docs/commands, one page a command of `moire`, of the parser of the command line.
+
+python tables/commands.py            writes what is stale
+python tables/commands.py --check    writes nothing; exit code 1 when something is stale
+"""
+import argparse
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = ROOT / "docs" / "commands"
+sys.path.insert(0, str(ROOT / "sw" / "host"))
+
+from moire.command_line import EXAMPLES, common_options, make_parser  # noqa: E402  (found through the line above)
+
+HEAD = ["<!-- SPDX-License-Identifier: Apache-2.0 -->", "<!-- Made by tables/commands.py of the parser in sw/host/moire: do not edit. -->"]
+COMMON = {option for action in common_options()._actions for option in action.option_strings}
+
+
+def below(parser) -> dict:
+    """Parsers of the commands, or of the actions of a command, by name."""
+    found = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
+    return found[0].choices if found else {}
+
+
+def words(text: str) -> str:
+    return text.replace("%%", "%").replace("|", "\\|")
+
+
+def name_of(action) -> str:
+    value = action.metavar or (",".join(map(str, action.choices)) if action.choices else action.dest.upper())
+    if not action.option_strings:
+        return value + {"*": " …", "+": " …"}.get(action.nargs, "")
+    return action.option_strings[-1] + ("" if action.nargs == 0 else f" {value}" + (" …" if action.nargs == "+" else ""))
+
+
+def arguments(actions) -> list:
+    """A table of them; what is in brackets may be left out."""
+    rows = []
+    for action in actions:
+        may_miss = action.option_strings and not action.required or action.nargs in ("?", "*")
+        rows.append(f"| `{f'[{name_of(action)}]' if may_miss else name_of(action)}` | {words(action.help or '')} |")
+    return ["", "| argument | |", "| --- | --- |", *rows] if rows else []
+
+
+def own(parser) -> list:
+    return [action for action in parser._actions
+            if not isinstance(action, argparse._SubParsersAction) and not COMMON & set(action.option_strings) and action.dest != "help"]
+
+
+def section(parser) -> list:
+    out = [parser.description]
+    if parser.epilog:
+        out += ["", "    " + words(parser.epilog).removeprefix("example: ")]
+    return out + arguments(own(parser))
+
+
+def page(name: str, parser) -> str:
+    out = [*HEAD, f"# moire {name}", "", *section(parser)]
+    for action, part in below(parser).items():
+        out += ["", f"## {name} {action}", "", *section(part)]
+    return "\n".join([*out, ""])
+
+
+def first_page(parser) -> str:
+    rows = [f"| [`{name}`]({name}.md) | {words(made.description)} |" for name, made in below(parser).items()]
+    common = [action for action in common_options()._actions if action.option_strings]
+    return "\n".join([*HEAD, "# The commands of moire", "", parser.description, "", "| command | |", "| --- | --- |", *rows, "",
+                      "## With every command", *arguments(common), "", "## How they go together", "", "```", EXAMPLES.strip(), "```", ""])
+
+
+def pages() -> dict:
+    parser = make_parser()
+    return {PAGES / "README.md": first_page(parser), **{PAGES / f"{name}.md": page(name, made) for name, made in below(parser).items()}}
+
+
+def main(words_given=None) -> int:
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--check", action="store_true", help="write nothing, exit with 1 when a page is stale")
+    check, stale, made = options.parse_args(words_given).check, 0, pages()
+    old = set(PAGES.glob("*.md")) - set(made)
+    for path, text in [*made.items(), *((path, None) for path in sorted(old))]:
+        if path.exists() and path.read_text(encoding="utf-8") == text:
+            continue
+        stale += 1
+        name = path.relative_to(ROOT)
+        if check:
+            print(f"{name} is stale: run python tables/commands.py", file=sys.stderr)
+        elif text is None:
+            path.unlink()
+            print(f"removed {name}")
+        else:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8", newline="\n")
+            print(f"made {name}")
+    return 1 if check and stale else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""tables/commands.py and the pages that people copy from: nothing made is stale, and every command written there is understood."""
+import importlib.util
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+import fake_node  # noqa: F401  (puts the package on the path)
+from moire import command_line
+
+ROOT = Path(__file__).resolve().parents[2]
+specification = importlib.util.spec_from_file_location("commands_generator", ROOT / "tables" / "commands.py")
+generator = importlib.util.module_from_spec(specification)
+specification.loader.exec_module(generator)
+
+
+def test_the_made_pages_are_fresh_and_there_is_one_for_each_command():
+    assert generator.main(["--check"]) == 0
+    names = set(generator.below(command_line.make_parser()))
+    assert {path.stem for path in generator.PAGES.glob("*.md")} == names | {"README"}
+    assert names >= {"find", "status", "home", "move", "watch", "scope", "tune", "calibrate", "params", "fault", "reset", "selftest"}
+
+
+def test_a_stale_page_and_one_of_no_command_are_found_and_put_right(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(generator, "ROOT", tmp_path)
+    monkeypatch.setattr(generator, "PAGES", tmp_path / "commands")
+    assert generator.main([]) == 0 and generator.main(["--check"]) == 0
+    (tmp_path / "commands" / "move.md").write_text("edited")
+    (tmp_path / "commands" / "fly.md").write_text("gone")
+    capsys.readouterr()
+    assert generator.main(["--check"]) == 1
+    said = capsys.readouterr().err
+    assert "commands/move.md is stale" in said and "commands/fly.md is stale" in said and said.count("\n") == 2
+    assert generator.main([]) == 0 and generator.main(["--check"]) == 0 and not (tmp_path / "commands" / "fly.md").exists()
+
+
+def test_every_argument_of_every_command_is_on_its_page():
+    for name, parser in generator.below(command_line.make_parser()).items():
+        text = (generator.PAGES / f"{name}.md").read_text()
+        for part in [parser, *generator.below(parser).values()]:
+            assert part.description in text
+            for action in generator.own(part):
+                assert f"`{generator.name_of(action)}`" in text or f"`[{generator.name_of(action)}]`" in text
+
+
+def written_commands():
+    pages = [ROOT / "README.md", ROOT / "docs" / "tutorial.md", *sorted((ROOT / "docs" / "commands").glob("*.md"))]
+    for path in pages:
+        for line in re.findall(r"^ +(?:build/venv/bin/)?(moire (?!twin --help).*)$", path.read_text(), re.MULTILINE):
+            yield pytest.param(line, id=f"{path.stem}: {line}")
+
+
+@pytest.mark.parametrize("line", list(written_commands()))
+def test_every_command_on_a_page_is_understood(line):
+    arguments = shlex.split(line, comments=True)[1:]
+    if "--help" not in arguments:
+        assert command_line.parse(arguments, command_line.DEFAULTS)

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""recording, selftest and the commands that only look: a session is written down whole and given again; what is wrong is found."""
+import json
+
+import pytest
+
+from fake_node import ESTOP, FakeLine, FakeNode
+from moire import recording
+from moire.client import Line
+from moire.errors import BadFile
+from moire.line_tables import PARAMETERS
+from test_host_command_line import Call, sentence
+
+
+def recorded(tmp_path, text="home -- move 1mm -- status", node=None):
+    file = tmp_path / "session.jsonl"
+    assert Call(f"--record {file} {text}", node or FakeNode()).code == 0
+    return file
+
+
+# ------------------------------------------------------------------ record and replay
+
+def test_a_session_replays_to_the_same_machine_with_the_same_bytes(tmp_path):
+    file, node = recorded(tmp_path), FakeNode()
+    call = Call(f"replay {file}", node)
+    assert call.code == 0 and call.out.endswith("the same, 0 with other values, 0 different\n")
+    assert int(call.out.split()[0]) > 20
+    assert [name for name in node.executed if name not in ("status", "identify", "get_parameter")] == ["enable", "home", "move", "enable"]
+    assert node.axes[0].position == 1_000_000 * 65536 // 800
+
+
+def test_other_values_are_told_apart_from_other_outcomes(tmp_path):
+    file, other, broken = recorded(tmp_path, "status"), FakeNode(), FakeNode()
+    other.axes[0].position += 1
+    told = Call(f"replay {file} --json", other).told[0]
+    assert (told["same"], told["other_values"], told["different"]) == (5, 1, 0)
+    broken.wrong_map = True
+    said = sentence(Call(f"replay {file}", broken), 1)
+    assert "answers differ from the record: at 0." in said and "came instead of" in said
+
+
+def test_a_node_that_does_not_answer_differs(tmp_path):
+    assert "nothing came instead of 61" in sentence(Call(f"replay {recorded(tmp_path, 'status')}", FakeNode(2)), 1)
+
+
+def test_a_record_is_told_in_words_without_a_port(tmp_path):
+    rows = Call(f"replay --show {recorded(tmp_path)}").out.splitlines()
+    assert rows[0].split()[2:] == ["node", "1:", "identify"] and rows[1].strip().startswith("ok map_crc=")
+    assert any("move axis=0 target=81920000" in row for row in rows) and sum("no right reply" in row for row in rows) == 0
+
+
+def test_what_went_wrong_on_the_line_is_in_the_record(tmp_path):
+    line = FakeLine(FakeNode())
+    broken = [True]
+    line.from_node = lambda word: [word ^ broken.pop()] if broken else [word]
+    with open(tmp_path / "bad.jsonl", "w") as file:
+        Line(recording.Recorder(line, file)).identify(1)
+    rows = recording.listing(recording.read((tmp_path / "bad.jsonl").read_text()))
+    assert [row.strip() for row in rows if "no right" in row] == ["no right reply: 60"]
+
+
+def test_a_recorder_hides_nothing_of_its_transport():
+    class Deep(FakeLine):
+        handshake, character_s = False, 0.125
+
+        def reaches(self, address):
+            return address == 3
+
+        def set_baud(self, baud):
+            self.character_s = 1 / baud
+    line = recording.Recorder(Deep(), open("/dev/null", "w"))
+    assert (line.handshake, line.time_stands, line.character_s, line.reaches(3), line.reaches(4)) == (False, True, 0.125, True, False)
+    line.set_baud(4)
+    assert line.character_s == 0.25
+
+
+@pytest.mark.parametrize("text", [
+    "", "{}", "no json", '{"record": "moire line", "version": 2, "protocol_crc": 0}',
+    json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + '\n{"at": 1}',
+    json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + '\n{"at": 1, "send": [512]}',
+    json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + '\n{"at": 1, "receive": [1], "wanted": 1}',
+])
+def test_a_file_that_is_no_record_is_refused(tmp_path, text):
+    (tmp_path / "no.jsonl").write_text(text)
+    assert "is no record of a line: make one with" in sentence(Call(f"replay {tmp_path / 'no.jsonl'}"), 2)
+
+
+def test_a_record_of_another_protocol_is_refused():
+    with pytest.raises(BadFile, match="recorded with another protocol table"):
+        recording.read(json.dumps({**recording.KIND, "protocol_crc": 1}))
+
+
+def test_a_record_that_cannot_be_written_is_one_sentence(tmp_path):
+    call = Call(f"--record {tmp_path}/no/such.jsonl status")
+    assert "such.jsonl cannot be written" in sentence(call, 2) and call.line.closed
+
+
+# ------------------------------------------------------------------ look
+
+def test_watch_tells_the_state_as_often_as_asked_and_ends_in_time():
+    call = Call("watch --every 0.1s --for 0.5s --json")
+    assert [round(told["time_s"], 1) for told in call.told] == [0.0, 0.1, 0.2, 0.3, 0.4, 0.5] and call.told[0]["state"] == "off"
+    assert "drive off" in Call("watch --for 0s").out
+
+
+def test_watch_talks_often_enough_for_the_watchdog():
+    node = FakeNode()
+    Call("watch --every 10s --for 20s", node)
+    assert node.executed.count("status") > 100
+
+
+def test_fault_tells_cause_place_and_what_to_do():
+    assert "no fault is latched" in Call("fault").out
+    node = FakeNode()
+    node.axes[0].standing = node.axes[0].faults = ESTOP
+    node.axes[0].events, node.axes[0].signal = 4, dict(faults=0, first=1)
+    out = Call("fault", node).out
+    assert out.startswith("node 1 axis 0: emergency stop\n  first     emergency stop, at 800nm\n") and "signal too small" in out
+    assert "remove the cause, then 'moire reset', then 'moire home'" in out
+    assert Call("fault --json", node).told[0]["first_fault"] == ["estop"]
+
+
+def test_selftest_passes_a_sound_node():
+    call = Call("selftest", FakeNode(axes=2))
+    assert call.code == 0 and call.out.count("passed") == 3 + 2 * 5 and "axis 1 sensor" in call.out
+
+
+def spoil_estop(node):
+    node.axes[0].standing = ESTOP
+
+
+def spoil_limits(node):
+    node.axes[0].parameters[PARAMETERS["amplitude_low"].id] = 200
+
+
+def spoil_signal(node):
+    node.axes[0].signal = dict(faults=2, first=2)
+
+
+def spoil_parameter(node):
+    node.axes[0].parameters[PARAMETERS["pwm_frequency"].id] = 1
+
+
+def spoil_register(node):
+    node.registers[0] = 5
+
+
+@pytest.mark.parametrize("spoil, name, said", [
+    (spoil_estop, "axis 0 guard", "emergency stop pressed"), (spoil_limits, "axis 0 sensor", "amplitude 103, allowed 200 to 160"),
+    (spoil_signal, "axis 0 sensor", "signal too large"), (spoil_parameter, "axis 0 parameters", "out of range: pwm_frequency"),
+    (spoil_register, "line", "wrong_values 50"),
+])
+def test_selftest_finds_and_names_what_is_wrong(spoil, name, said):
+    node = FakeNode()
+    spoil(node)
+    call = Call("selftest", node)
+    assert f"FAILED   {name}" in call.out and said in call.out
+    assert f"node 1 failed 1 of 8 checks: {name}" in sentence(call, 1)
+    told = Call("selftest --json", node).told
+    assert told[0]["passed"] is False and [check["name"] for check in told[0]["checks"] if not check["passed"]] == [name]
+    assert told[1]["error"] == "SelfTestFailed"
+
+
+def test_selftest_counts_what_is_wrong_on_the_line():
+    line, count = FakeLine(FakeNode()), [0]
+
+    def every_hundredth(word):
+        count[0] += 1
+        return [word ^ 1] if count[0] % 100 == 0 and count[0] > 300 else [word]
+    line.to_node = every_hundredth
+    call = Call("selftest", line=line)
+    assert "FAILED   line" in call.out and "frames_bad" in call.out and "repeats" in call.out

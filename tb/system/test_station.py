@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A sub-node of S4 as it ships, image `station` on the RTL: its worm table in the twin goes to angles of its sensor."""
+import math
+import random
+
+import pytest
+
+from bench import seed
+from moire.client import Line
+from moire.index import TURN, Table
+from moire.settings import Settings
+from test_firmware_peer import OPERATION, bodies, frame, index_to, look
+from twin import Twin, TwinTransport, build
+from twin.twin import Axis, Node
+
+SUB, MAIN = 0, 1                 # places
+NODE = {"DRIVES": 2, "FILTERS": 0}
+AXIS = {"period": "1um", "drive": "steps", "position_source": "own_steps", "steps_per_period": 4, "counts_per_period": 4,
+        "disagreement_limit": 0, "encoder_fault_mask": 0, "deglitch": 0, "kp": 0, "ki": 0, "kd": 0, "kv": 0, "ka": 0,
+        "following_limit": "10mm", "velocity": "20mm/s", "acceleration": "100mm/s2", "jerk": "1000mm/s3", "home_creep": "0.2mm/s",
+        "settle_window": "1um", "settle_time": "5ms", "watchdog_time": "60s"}
+QUICK = {"index_allowance": "40arcsec", "index_take_up": "40arcsec", "index_share": "0.7", "index_settle": "50ms"}
+
+
+class Station:
+    def __init__(self):
+        table = Axis("worm_table", {"sensor_dropped": 0.005, "sensor_corrupt": 0.005})
+        self.twin = Twin([Node(1, [table]), Node(2, [])], seed=seed() % 1000, node_parameters=NODE, firmware=build.firmware("station"),
+                         peers=(SUB, MAIN), peer_baud=115200)
+        line = Line(TwinTransport(self.twin), random_source=random.Random(seed()), poll_s=0.1)
+        line.transport.wait(0.1)
+        node, axis = line.node(1), line.axis(1)
+        for name, value in AXIS.items():
+            axis.set_parameter(name, value)
+        self.settings, self.table = Settings(node), Table(node)
+        self.settings.load(QUICK)
+        self.to_sub, self.from_sub = self.twin.peer_lines[MAIN, SUB], self.twin.peer_lines[SUB, MAIN]
+
+    def beside(self, arcsec):
+        """An angle so far from where the table stands."""
+        return round(self.table.sensor().angle + arcsec) % TURN
+
+    def error(self, target):
+        true = math.degrees(self.twin.truth(SUB).position_rad) * 3600
+        return (true - target + TURN / 2) % TURN - TURN / 2
+
+    def ask(self, body):
+        """Bodies of what the sub-node answers."""
+        self.to_sub.put(frame(body))
+        self.twin.run(0.1)
+        return bodies(self.from_sub.take_heard())
+
+
+@pytest.fixture(scope="module")
+def station():
+    made = Station()
+    yield made
+    made.twin.close()
+
+
+def test_a_target_below_is_reached_from_below_within_two_arcsec_of_the_truth(station):
+    target = station.beside(-100)
+    state = station.table.index(target)
+    assert abs(state.left) <= 0.5 and abs(station.error(target)) <= 2
+    told = station.twin.truth(SUB)
+    assert told.lost_steps == 0 and told.step_timing_errors == 0
+
+
+def test_a_frame_from_the_peer_turns_the_table_amid_garbage(station):
+    station.settings.set("peer_role", "sub")
+    station.settings.set("peer_mode", "frames")
+    target = station.beside(200)
+    station.to_sub.garbage(20)
+    assert any(station.ask(index_to(7, target)) == [bytes([7, OPERATION["index_to"], 0])] for _ in range(10))
+    assert any(reply[:3] == bytes([8 + n, OPERATION["index_state"], 0]) for n in range(10) for reply in station.ask(look(8 + n)))
+    station.to_sub.garbage(0)
+    assert station.table.wait().ended == "ok" and abs(station.error(target)) <= 2
+    assert station.table.peer().garbage > 0
+
+
+def test_the_bytes_as_printed_turn_the_table_to_its_next_station(station):
+    station.settings.set("peer_role", "sub")
+    station.settings.set("peer_mode", "printed")
+    target = station.beside(200)
+    station.table.stations([target])
+    station.from_sub.take_heard()
+    station.to_sub.put(b"\xFF\xFF\xAA")
+    station.twin.run(0.1)
+    assert station.table.peer().phase == "indexing" and station.table.wait().ended == "ok"
+    station.twin.run(0.01)
+    assert bytes(station.from_sub.take_heard()) == b"\xFF\xFF\x55" and abs(station.error(target)) <= 2
