@@ -45,6 +45,9 @@ def check(rows, states):
         reached |= more
     if states - reached:
         raise ValueError(f"job.c: {', '.join(sorted(states - reached))} cannot be reached")
+    in_order = [start for n, (start, _, _) in enumerate(rows) if n == 0 or rows[n - 1][0] != start]
+    if len(set(in_order)) != len(in_order):
+        raise ValueError("job.c: the transitions of a state do not follow each other")
     for state in states:
         events = {event for start, event, _ in rows if start == state}
         if not events:

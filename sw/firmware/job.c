@@ -86,6 +86,8 @@ static const struct transition { uint8_t from, event, to; void (*act)(void); } t
 };
 #define TRANSITIONS (sizeof transitions / sizeof *transitions)
 
+static uint8_t first_row[UNDER_WAY + 1];        // of each state; its rows follow each other
+
 static bool loaded(void)
 {
     return store_state() == STORE_READY;
@@ -173,12 +175,17 @@ static bool under_way(void)
     return (state >= STARTING && state <= LEAVING) || state == PAUSED || state == UNSURE;
 }
 
+static const struct transition *row_of(uint8_t from, uint8_t event)
+{
+    for (unsigned n = first_row[from]; n < TRANSITIONS && transitions[n].from == from; n++)
+        if (transitions[n].event == event) return &transitions[n];
+    return NULL;
+}
+
 static const struct transition *transition_of(uint8_t event)
 {
-    for (unsigned n = 0; n < TRANSITIONS; n++)
-        if (transitions[n].event == event && (transitions[n].from == state || (transitions[n].from == UNDER_WAY && under_way())))
-            return &transitions[n];
-    return NULL;
+    const struct transition *row = row_of(state, event);
+    return row || !under_way() ? row : row_of(UNDER_WAY, event);
 }
 
 static void take(const struct transition *t)
@@ -200,6 +207,7 @@ void job_start(unsigned axes)
     to_note = STORE_NOTHING;
     note_refused = order_refused = LINE_CAUSE_OK;
     at_first();
+    for (unsigned n = TRANSITIONS; n-- > 0;) first_row[transitions[n].from] = (uint8_t)n;
     ordered = true;                     // perhaps, before the power went
     enter(LOADING);
 }
@@ -209,8 +217,8 @@ void job_work(void)
     if (state == LOADING && open_until(STORE_CUT_DONE))
         station = (uint16_t)(store_record()->station + (store_record()->step == STORE_CUT_DONE));
     write_note();
-    for (unsigned n = 0; n < TRANSITIONS; n++)
-        if (transitions[n].from == state && happened(transitions[n].event)) return take(&transitions[n]);
+    for (unsigned n = first_row[state]; n < TRANSITIONS && transitions[n].from == state; n++)
+        if (happened(transitions[n].event)) return take(&transitions[n]);
 }
 
 uint8_t job_state(void)

@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x7FCE7D6Eu    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x73BC63B6u    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -811,8 +811,9 @@ enum line_setting {
     LINE_SETTING_PEER_PATIENCE = 17,    // [0.001 s] peer port: in mode printed, an index that takes longer has failed
     LINE_SETTING_JOB_START_LIMIT = 18,    // [1 s] job: longest time from the start keys to the beginning of the cut
     LINE_SETTING_JOB_CUT_LIMIT = 19,    // [1 s] job: longest cut
+    LINE_SETTING_JOB_SPEED = 20,    // [1/100] job: speed of the table, of full; told to the sub-node with each order, in mode frames
 };
-#define LINE_SETTING_COUNT 19u
+#define LINE_SETTING_COUNT 20u
 
 // X(name, id, min, max, default): all int64_t, in counts of the wire
 #define LINE_SETTINGS(X) \
@@ -834,6 +835,7 @@ enum line_setting {
     X(peer_role, 16, 0LL, 1LL, 0LL) \
     X(peer_patience, 17, 100LL, 3600000LL, 300000LL) \
     X(job_start_limit, 18, 1LL, 3600LL, 30LL) \
-    X(job_cut_limit, 19, 1LL, 1000000LL, 14400LL)
+    X(job_cut_limit, 19, 1LL, 1000000LL, 14400LL) \
+    X(job_speed, 20, 1LL, 100LL, 100LL)
 
 #endif

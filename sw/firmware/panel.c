@@ -3,10 +3,10 @@
 //
 //      7  8  9  START   PAUSE  RESUME  STOP
 //      4  5  6  AGAIN   NEXT   UP      DOWN       up, down: look through the stored stations
-//      1  2  3  DIVIDE  LIST   LIMIT              divide: so many equal parts of a turn; list: angle by angle; limit: longest cut
+//      1  2  3  DIVIDE  LIST   LIMIT   SPEED      divide: so many equal parts of a turn; list: angle by angle
 //      0  .     ENTER   CLEAR
 //
-// An empty entry ends a list. The keys that are left have no function.
+// An empty entry ends a list. Limit is the longest cut, speed that of the table in percent of full. The keys that are left have no function.
 #include "panel.h"
 
 #include <stddef.h>
@@ -26,18 +26,18 @@
 #define DEGREE 360000u                  // in 0.01 arcsec
 #define DECIMALS 5u                     // of a shown angle
 
-enum mode { SHOW, DIVIDE, LIST, LIMIT, DIVIDING, SAVING };      // what is shown and asked for
-enum key { NONE, UP = 128, DOWN, TO_DIVIDE, TO_LIST, TO_LIMIT, ENTER, CLEAR, ACTION };     // others: the character; ACTION and up: a job_action
+enum mode { SHOW, DIVIDE, LIST, LIMIT, SPEED, LAST_ENTRY = SPEED, DIVIDING, SAVING };      // what is shown and asked for
+enum key { NONE, UP = 128, DOWN, TO_DIVIDE, TO_LIST, TO_LIMIT, TO_SPEED, ENTER, CLEAR, ACTION };     // others: the character; ACTION and up: a job_action
 
 #define OF(action) (ACTION + LINE_JOB_ACTION_##action)
 static const uint8_t layout[KEYPAD_KEYS] = {
     '7', '8', '9', OF(START),  OF(PAUSE), OF(RESUME), OF(STOP),
     '4', '5', '6', OF(AGAIN),  OF(NEXT),  UP,         DOWN,
-    '1', '2', '3', TO_DIVIDE,  TO_LIST,   TO_LIMIT,   NONE,
+    '1', '2', '3', TO_DIVIDE,  TO_LIST,   TO_LIMIT,   TO_SPEED,
     '0', '.',      ENTER,      CLEAR,
 };
 
-static const char *const titles[] = {"", "stations in a turn", "angle, degrees", "longest cut, s", "writing", "writing"};
+static const char *const titles[] = {"", "stations in a turn", "angle, degrees", "longest cut, s", "table speed, percent", "writing", "writing"};
 static const char *const action_keys[] = {"START", "PAUSE", "RESUME", "STOP", "AGAIN", "NEXT"};
 
 #define WORDS(code, words) [code] = words,
@@ -49,8 +49,10 @@ static char entry[ENTRY + 1];
 static uint8_t entered;
 static uint16_t looked_at, parts;       // parts: of the turn that is being divided
 static uint32_t noticed_ms, shown_ms;
-static uint8_t line;                    // that is rendered next
-static char rows[DISPLAY_LINES][DISPLAY_COLUMNS + 1];
+static uint8_t line;                    // that is composed next
+static bool composed;                   // it waits to be shown
+static char text[DISPLAY_COLUMNS + 1];
+static const char *rest;                // words that are still to be said
 
 // ---- text
 
@@ -77,24 +79,20 @@ static void put_angle(char *row, unsigned end, uint32_t angle)
     put_number(row, end - DECIMALS - 1, angle / DEGREE, 1);
 }
 
-// Words up to a colon, from this row on; returns the row after them.
-static unsigned put_words(unsigned row, const char *text)
+// As many words as fit, up to a colon; returns the rest, a null pointer after the last one.
+static const char *put_words(char *row, const char *text)
 {
     unsigned column = 0;
-    while (*text && *text != ':') {
+    for (;;) {
         unsigned length = 0;
         while (text[length] && text[length] != ' ' && text[length] != ':') length++;
-        if (column && column + 1 + length > DISPLAY_COLUMNS) {
-            column = 0;
-            row++;
-        }
-        if (row == DISPLAY_LINES) return row;
+        if (column && column + 1 + length > DISPLAY_COLUMNS) return text;
         if (column) column++;
-        for (unsigned n = 0; n < length && column < DISPLAY_COLUMNS; n++) rows[row][column++] = text[n];
+        for (unsigned n = 0; n < length && column < DISPLAY_COLUMNS; n++) row[column++] = text[n];
         text += length;
-        while (*text == ' ') text++;
+        if (*text != ' ') return NULL;
+        text++;
     }
-    return row + (column > 0);
 }
 
 static uint8_t shown_cause(void)
@@ -103,48 +101,66 @@ static uint8_t shown_cause(void)
     return notice != LINE_CAUSE_OK ? notice : mode == SHOW ? job_cause() : LINE_CAUSE_OK;
 }
 
-static void compose_station(unsigned station)
+static void put_station(char *row, unsigned station)
 {
     unsigned stations = store_stations();
     if (stations == 0) return;
-    put_number(rows[0], DISPLAY_COLUMNS, stations, 3);
-    rows[0][DISPLAY_COLUMNS - 4] = '/';
-    put_number(rows[0], DISPLAY_COLUMNS - 4, station < stations ? station + 1u : stations, 3);
+    put_number(row, DISPLAY_COLUMNS, stations, 3);
+    row[DISPLAY_COLUMNS - 4] = '/';
+    put_number(row, DISPLAY_COLUMNS - 4, station < stations ? station + 1u : stations, 3);
 }
 
-static void compose_hints(unsigned row)
+static void put_hints(char *row)
 {
     uint8_t answers = job_answers();
     unsigned at = 0;
     for (unsigned action = 0; action < sizeof action_keys / sizeof *action_keys; action++) {
         if (!(answers >> action & 1u)) continue;
         if (at) at++;
-        at = put(rows[row], at, action_keys[action]);
+        at = put(row, at, action_keys[action]);
     }
 }
 
-static void compose(void)
+static void put_title(char *row)
 {
-    uint8_t cause = shown_cause();
-    bool shows = mode == SHOW, looks = shows && looked_at < store_stations();
-    for (unsigned row = 0; row < DISPLAY_LINES; row++)
-        for (unsigned column = 0; column < DISPLAY_COLUMNS; column++) rows[row][column] = ' ';
-    put(rows[0], 0, looks ? "station" : shows ? state_words[job_state()] : titles[mode]);
-    if (shows) compose_station(looks ? looked_at : job_station());
-    if (mode == LIST) put_number(rows[0], DISPLAY_COLUMNS, store_added() + 1u, 3);
-    unsigned row = 1;
-    if (!shows) {
-        unsigned at = put(rows[row], 0, entry);
-        if (mode <= LIMIT) put(rows[row], at, "_");
-        row++;
+    bool looks = looked_at < store_stations();
+    if (mode == SHOW) {
+        put(row, 0, looks ? "station" : state_words[job_state()]);
+        put_station(row, looks ? looked_at : job_station());
+    } else {
+        put(row, 0, titles[mode]);
+        if (mode == LIST) put_number(row, DISPLAY_COLUMNS, store_added() + 1u, 3);
     }
-    if (cause != LINE_CAUSE_OK) {
-        row = put_words(row, cause_words[cause]);
-    } else if (shows && store_stations()) {
-        unsigned station = looks ? looked_at : job_station();
-        if (station < store_stations()) put_angle(rows[row++], DISPLAY_COLUMNS, store_angle(station));
+}
+
+static void put_station_angle(char *row)
+{
+    unsigned stations = store_stations(), station = looked_at < stations ? looked_at : job_station();
+    if (station < stations) put_angle(row, DISPLAY_COLUMNS, store_angle(station));
+}
+
+static void put_entry(char *row)
+{
+    unsigned at = put(row, 0, entry);
+    if (mode <= LAST_ENTRY) put(row, at, "_");
+}
+
+// One line at a time, from the first to the last; what is said goes on over several lines.
+static void compose(unsigned n)
+{
+    for (unsigned column = 0; column < DISPLAY_COLUMNS; column++) text[column] = ' ';
+    if (n == 0) {
+        uint8_t cause = shown_cause();
+        rest = cause != LINE_CAUSE_OK ? cause_words[cause] : NULL;
+        put_title(text);
+    } else if (n == 1 && mode != SHOW) {
+        put_entry(text);
+    } else if (rest) {
+        rest = put_words(text, rest);
+    } else if (mode == SHOW) {
+        if (n == 1) put_station_angle(text);
+        if (n == DISPLAY_LINES - 1) put_hints(text);
     }
-    if (row < DISPLAY_LINES && shows) compose_hints(DISPLAY_LINES - 1);
 }
 
 // ---- keys
@@ -220,10 +236,10 @@ static void entered_parts(void)
     go(DIVIDING);
 }
 
-static void entered_limit(void)
+static void entered_setting(uint8_t setting)
 {
-    uint32_t limit;
-    uint8_t cause = value_of_entry(1, &limit) ? settings_set(LINE_SETTING_JOB_CUT_LIMIT, limit) : LINE_CAUSE_OUT_OF_RANGE;
+    uint32_t value;
+    uint8_t cause = value_of_entry(1, &value) ? settings_set(setting, value) : LINE_CAUSE_OUT_OF_RANGE;
     say(cause);
     if (cause == LINE_CAUSE_OK) go(SHOW);
     else clear_entry();
@@ -234,14 +250,15 @@ static void enter_key(void)
     switch (mode) {
     case DIVIDE: return entered_parts();
     case LIST: return entered_list();
-    case LIMIT: return entered_limit();
+    case LIMIT: return entered_setting(LINE_SETTING_JOB_CUT_LIMIT);
+    case SPEED: return entered_setting(LINE_SETTING_JOB_SPEED);
     default: return say(LINE_CAUSE_KEY_WITHOUT_FUNCTION);
     }
 }
 
 static void character_key(char character)
 {
-    if (mode < DIVIDE || mode > LIMIT) return say(LINE_CAUSE_KEY_WITHOUT_FUNCTION);
+    if (mode < DIVIDE || mode > LAST_ENTRY) return say(LINE_CAUSE_KEY_WITHOUT_FUNCTION);
     if (entered == ENTRY) return say(LINE_CAUSE_OUT_OF_RANGE);
     say(LINE_CAUSE_OK);
     entry[entered++] = character;
@@ -266,7 +283,7 @@ static void look(bool up)
 
 static void key_pressed(uint8_t key)
 {
-    if (mode > LIMIT) return say(LINE_CAUSE_STORE_BUSY);
+    if (mode > LAST_ENTRY) return say(LINE_CAUSE_STORE_BUSY);
     if (key >= ACTION) {
         go(SHOW);
         looked_at = STORE_STATIONS;
@@ -279,6 +296,7 @@ static void key_pressed(uint8_t key)
     case TO_DIVIDE: return begin(DIVIDE);
     case TO_LIST: return begin(LIST);
     case TO_LIMIT: return go(LIMIT);
+    case TO_SPEED: return go(SPEED);
     case ENTER: return enter_key();
     case CLEAR: return clear_key();
     default: return character_key((char)key);
@@ -311,6 +329,7 @@ void panel_start(unsigned axes)
     looked_at = STORE_STATIONS;
     notice = LINE_CAUSE_OK;
     line = DISPLAY_LINES;
+    composed = false;
     shown_ms = clock_ms();
     go(SHOW);
 }
@@ -323,12 +342,14 @@ void panel_work(void)
     if (key != KEYPAD_NONE) return key_pressed(layout[key]);
     if (mode == DIVIDING) return divide_on();
     if (mode == SAVING) saved();
-    if (line < DISPLAY_LINES) {
-        display_show(line, rows[line]);
-        line++;
+    if (composed) {
+        display_show(line++, text);
+        composed = false;
+    } else if (line < DISPLAY_LINES) {
+        compose(line);
+        composed = true;
     } else if (clock_ms() - shown_ms >= REFRESH_MS && display_present()) {
         shown_ms = clock_ms();
-        compose();
         line = 0;
     }
 }

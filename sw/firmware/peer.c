@@ -28,7 +28,7 @@
 enum mode { NOT_IN_USE, PRINTED, FRAMES };
 enum role { MAIN, SUB };
 enum printed { HEAD = 0xFF, DONE = 0x55, NEXT = 0xAA };         // twice the head, then one of the others
-enum step { RESTING, LOOKING, CLEARING, ORDERING, WATCHING, STOPPING };     // what a main node waits to be answered
+enum step { RESTING, LOOKING, CLEARING, SETTING_SPEED, ORDERING, WATCHING, STOPPING };     // what a main node waits to be answered
 
 static struct peer {
     uint8_t phase;                      // line_peer_phase
@@ -41,7 +41,7 @@ static struct peer {
 
 static struct requests {                // of a main node, frames
     uint8_t step;
-    uint8_t body[LINE_REQUEST_HEAD + 4];
+    uint8_t body[LINE_SET_PARAMETER_REQUEST_LENGTH];            // the longest one
     uint8_t length;
     uint8_t sendings;
     bool answered;                      // the next look waits for PAUSE_MS
@@ -178,16 +178,23 @@ static void repeat_request(void)
     send_frame(requests.body, requests.length);
 }
 
-static void ask(uint8_t step, uint8_t operation, uint32_t field, uint8_t field_bytes)
+static void ask(uint8_t step, uint8_t operation, uint64_t fields, uint8_t field_bytes)
 {
     requests.step = step;
     requests.body[0]++;                                                     // sequence
     requests.body[1] = operation;
-    for (uint32_t n = 0; n < field_bytes; n++) requests.body[LINE_REQUEST_HEAD + n] = (uint8_t)(field >> 8 * n);
+    for (uint32_t n = 0; n < field_bytes; n++, fields >>= 8) requests.body[LINE_REQUEST_HEAD + n] = (uint8_t)fields;
     requests.length = LINE_REQUEST_HEAD + field_bytes;
     requests.sendings = 0;
     requests.answered = false;
     repeat_request();
+}
+
+static void set_speed(void)
+{
+    uint64_t override = 65536u * (uint32_t)settings_get(LINE_SETTING_JOB_SPEED) / 100u;
+    ask(SETTING_SPEED, LINE_OPERATION_SET_PARAMETER, override << 16 | LINE_PARAMETER_OVERRIDE << 8,
+        LINE_SET_PARAMETER_REQUEST_LENGTH - LINE_REQUEST_HEAD);             // of axis 0
 }
 
 // Looking before an order also makes the order differ from the last request, should this node have begun its sequence anew.
@@ -231,6 +238,8 @@ static void reply_heard(const uint8_t *reply, uint32_t length)
     else if (cause != LINE_CAUSE_OK)
         end(LINE_PEER_PHASE_FAILED, cause);
     else if (requests.step == LOOKING)
+        set_speed();
+    else if (requests.step == SETTING_SPEED)
         ask(ORDERING, LINE_OPERATION_INDEX_TO, peer.angle, 4);
     else if (requests.step == WATCHING)
         watched(reply);

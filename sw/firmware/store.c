@@ -28,7 +28,7 @@
 #define RETRY_MS 1000u                  // a device that is not there is looked for again
 #define TRIES 3u                        // to write a page
 
-enum task { REST, LOAD, CHECK_LOADED, READ_JOURNAL, SEAL, WRITE, VERIFY, DEAD };
+enum task { REST, LOAD, CHECK_LOADED, READ_JOURNAL, SEAL, WRITE_NEXT, WRITE, VERIFY, DEAD };
 
 static struct store_program {                   // as in the EEPROM, where a CRC-32 follows the last station
     uint32_t generation;                        // each saved one has one more; 0: there is none
@@ -60,13 +60,6 @@ static uint32_t crc32(uint32_t state, const uint8_t *bytes, unsigned count)
     return state;
 }
 
-static void copy(void *to, const void *from, unsigned count)
-{
-    uint8_t *t = to;
-    const uint8_t *f = from;
-    while (count--) *t++ = *f++;
-}
-
 static uint8_t *bytes_of(unsigned which)
 {
     return (uint8_t *)&programs[which];
@@ -75,8 +68,7 @@ static uint8_t *bytes_of(unsigned which)
 // Bytes of a program that its CRC-32 is about.
 static unsigned program_bytes(const struct store_program *program)
 {
-    unsigned stations = program->stations <= STORE_STATIONS ? program->stations : STORE_STATIONS;
-    return HEAD_BYTES + 4u * stations;
+    return HEAD_BYTES + 4u * program->stations;
 }
 
 static uint16_t record_place(uint32_t sequence)
@@ -107,6 +99,11 @@ static void end(uint8_t with)
 
 // ---- loading: both copies, then the journal
 
+static bool laid_out(const struct store_program *program)
+{
+    return program->settings == LINE_SETTING_COUNT && program->stations <= STORE_STATIONS;
+}
+
 static void load_part(void)
 {
     transfer_begin((uint16_t)(newest * COPY_BYTES + at), 0, PART);
@@ -125,10 +122,10 @@ static void loaded_part(void)
 {
     struct store_program *program = &programs[newest];
     for (unsigned n = 0; n < PART; n++) blank[newest] = blank[newest] && in[n] == 0xFF;
-    copy(bytes_of(newest) + at, in, at + PART <= sizeof *program ? PART : sizeof *program - at);
+    __builtin_memcpy(bytes_of(newest) + at, in, at + PART <= sizeof *program ? PART : sizeof *program - at);
     at = (uint16_t)(at + PART);
     go(LOAD);
-    if (at < program_bytes(program) + CRC_BYTES) return load_part();
+    if (laid_out(program) && at < program_bytes(program) + CRC_BYTES) return load_part();
     at = 0;
     crc = UINT32_MAX;
     go(CHECK_LOADED);
@@ -159,15 +156,15 @@ static bool crc_step(const struct store_program *program, unsigned which)
 static void check_loaded(void)
 {
     struct store_program *program = &programs[newest];
-    if (!crc_step(program, newest)) return;
-    if (program->settings != LINE_SETTING_COUNT || program->stations > STORE_STATIONS || program->angle[program->stations] != ~crc)
+    if (laid_out(program) && !crc_step(program, newest)) return;
+    if (!laid_out(program) || program->angle[program->stations] != ~crc)
         program->generation = program->stations = 0;
     newest ? choose() : load_begin(1);
 }
 
 static void journal_read(void)
 {
-    copy(&candidate, in, sizeof candidate);
+    __builtin_memcpy(&candidate, in, sizeof candidate);
     if (candidate.sequence > last.sequence && candidate.sequence % JOURNAL_PAGES == at && ~crc32(UINT32_MAX, in, RECORD_CHECKED) == candidate.crc)
         last = candidate;
     go(READ_JOURNAL);
@@ -196,7 +193,7 @@ static uint16_t page_place(void)
 static void write_page(void)
 {
     unsigned bytes = page_bytes();
-    copy(&out[2], source(), bytes);
+    __builtin_memcpy(&out[2], source(), bytes);
     go(WRITE);
     transfer_begin(page_place(), bytes, 0);
 }
@@ -212,7 +209,7 @@ static void seal(void)
     if (!crc_step(program, !newest)) return;
     program->angle[program->stations] = ~crc;
     at = 0;
-    write_page();
+    go(WRITE_NEXT);
 }
 
 static void seal_record(void)
@@ -239,7 +236,7 @@ static void verify(void)
         return end(LINE_CAUSE_OK);
     }
     at = (uint16_t)(at + PAGE);
-    if (at < program_bytes(&programs[!newest]) + CRC_BYTES) return write_page();
+    if (at < program_bytes(&programs[!newest]) + CRC_BYTES) return go(WRITE_NEXT);
     newest = !newest;
     torn = drafting = false;
     end(LINE_CAUSE_OK);
@@ -279,6 +276,7 @@ void store_work(void)
     }
     if (task == CHECK_LOADED) return check_loaded();
     if (task == SEAL) return seal();
+    if (task == WRITE_NEXT) return write_page();
     if (outcome != I2C_OK) return again();
     switch (task) {
     case LOAD: return loaded_part();

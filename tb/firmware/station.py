@@ -19,7 +19,7 @@ SETTING = {name: setting["id"] for name, setting in TABLE["setting"].items()}
 OPERATION = {name: operation["code"] for name, operation in TABLE["operation"].items()}
 OK, NOT_ACKNOWLEDGED, NO_BUS = 0, 1, 3
 KEYS = ["7", "8", "9", "START", "PAUSE", "RESUME", "STOP", "4", "5", "6", "AGAIN", "NEXT", "UP", "DOWN", "1", "2", "3", "DIVIDE", "LIST",
-        "LIMIT", None, "0", ".", "ENTER", "CLEAR"]
+        "LIMIT", "SPEED", "0", ".", "ENTER", "CLEAR"]
 TURN = 129_600_000
 
 
@@ -399,6 +399,7 @@ class SubNode:
         self.angles, self.came, self.to_send, self.heads = [], bytearray(), deque(), 0
         self.target, self.there_at, self.ended, self.fault, self.dead, self.requests = 0, None, CAUSE_CODE["never"], None, False, 0
         self.last_request = self.last_reply = None
+        self.speeds = []                                                # override that came before each order
 
     def hear(self, now, byte):
         if self.dead:
@@ -428,6 +429,8 @@ class SubNode:
         operation = body[1]
         if operation == OPERATION["index_to"]:
             self.begin(now, int.from_bytes(body[2:6], "little"))
+        elif operation == OPERATION["set_parameter"]:
+            self.speeds.append(int.from_bytes(body[4:], "little"))
         elif operation == OPERATION["stop"]:
             self.there_at, self.ended = None, CAUSE_CODE["stopped"]
         reply = bytes([body[0], operation, 0])

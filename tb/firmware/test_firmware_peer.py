@@ -8,7 +8,7 @@ import pytest
 
 from bench import seed
 from fake_links import Links, PeerPort, Sensor, Table
-from fake_machine import CAUSE, TABLE, Axis, Machine
+from fake_machine import CAUSE, PARAMETER, TABLE, Axis, Machine
 
 OPERATION = {name: operation["code"] for name, operation in TABLE["operation"].items()}
 PHASE = {code: name for name, (code, _) in TABLE["peer_phase"].items()}
@@ -340,7 +340,7 @@ def test_the_main_node_looks_orders_and_watches_until_the_table_has_indexed():
     sub = Answering(node)
     assert node.order(5, 600) == "ok"
     sub.run(500)
-    assert sub.operations()[:2] == ["index_state", "index_to"] and set(sub.operations()[2:]) == {"index_state"}
+    assert sub.operations()[:3] == ["index_state", "set_parameter", "index_to"] and set(sub.operations()[3:]) == {"index_state"}
     assert len({body[0] for body in sub.asked}) == len(sub.asked) and 5 <= len(sub.asked) <= 14
     assert sub.target == 60_000 and node.peer()["phase"] == "indexing"
     sub.phase, sub.ended = 0, "ok"
@@ -360,6 +360,16 @@ def test_the_cause_of_the_sub_node_is_that_of_the_main_node(ended):
     sub.phase, sub.ended = 0, ended
     sub.run(200)
     assert (node.peer()["phase"], node.peer()["ended"]) == ("failed", ended)
+
+
+def test_the_speed_goes_before_each_order():
+    node = Node(FRAMES, MAIN)
+    sub = Answering(node)
+    node.tell(job_speed=25)
+    node.order(0, 600)
+    sub.run(200)
+    told = next(body for body in sub.asked if body[1] == OPERATION["set_parameter"])
+    assert told[2:4] == bytes([0, PARAMETER["override"]["id"]]) and int.from_bytes(told[4:], "little") == 65536 // 4
 
 
 def test_an_order_that_is_refused_has_failed():
@@ -402,7 +412,7 @@ def test_a_sub_node_that_still_turns_is_stopped_first():
     sub.phase, sub.ended, sub.target = 3, "running", 5
     node.order(0, 600)
     sub.run(500)
-    assert sub.operations()[:4] == ["index_state", "stop", "index_state", "index_to"] and node.peer()["phase"] == "indexing"
+    assert sub.operations()[:5] == ["index_state", "stop", "index_state", "set_parameter", "index_to"] and node.peer()["phase"] == "indexing"
 
 
 def test_a_sub_node_that_never_comes_to_rest_is_busy():
@@ -439,7 +449,7 @@ def test_a_noisy_line_costs_repetitions_and_nothing_else():
         assert sub.run(3000, until=lambda before=before: sub.target != before) and sub.target == place
         sub.phase, sub.ended = 0, "ok"
         assert sub.run(3000, until=lambda: node.peer()["phase"] == "indexed")
-    assert node.peer()["garbage"] > 0 and 10 < sub.operations().count("index_to") < 30
+    assert node.peer()["garbage"] > 0 and len(set(sub.asked)) < len(sub.asked) and 10 <= sub.operations().count("index_to") < 30
 
 
 # ------------------------------------------------------------------ not in use

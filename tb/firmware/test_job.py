@@ -44,6 +44,13 @@ def test_a_job_cuts_every_station_once_and_in_order(frames):
     assert cuts(station) == 2 * STATIONS
 
 
+def test_the_sub_node_is_told_the_speed_before_each_station():
+    station = node()
+    station.setting(job_speed=50)
+    start(station)
+    assert station.sub_node.speeds == [32768] * STATIONS
+
+
 def test_the_table_turns_only_while_the_machine_rests():
     station = node()
     assert station.do("start") == "ok"

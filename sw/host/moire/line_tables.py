@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x7FCE7D6E
+PROTOCOL_CRC = 0x73BC63B6
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -686,4 +686,7 @@ SETTINGS = {parameter.name: parameter for parameter in (
     Parameter("job_cut_limit", 19, "s", Fraction(1, 1),
               1, 1000000, 14400,
               "job: longest cut"),
+    Parameter("job_speed", 20, "", Fraction(1, 100),
+              1, 100, 100,
+              "job: speed of the table, of full; told to the sub-node with each order, in mode frames"),
 )}
