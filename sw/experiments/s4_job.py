@@ -32,7 +32,7 @@ from twin import Axis, BuildError, Node, Surroundings, Twin, TwinTransport, buil
 
 MAIN, SUB = 0, 1                     # places of the nodes
 ADDRESSES = (1, 2)
-CLK_HZ = 1_840_000
+CLK_HZ = 1_200_000
 PEER_BAUD = 115200
 NODE = {"DRIVES": 2, "FILTERS": 0}
 AXIS = {"drive": "steps", "position_source": "own_steps", "steps_per_period": 4, "counts_per_period": 4, "period": "1um",
@@ -44,9 +44,10 @@ CUT_S = 0.3
 START_S = 0.1                        # until the soft core listens
 LOOK_S = 0.1
 KEY_S = 0.06                         # a key is down, and up again, so long
+SHOWN_S = 0.6                        # until the display tells it
 ANSWER_S = 1.0                       # a person looks before answering
 DARK_S = 0.5                         # a power cut
-STATION_S = 12                       # none takes longer, with trouble and answers
+STATION_S, MORE_S = 12, 90           # a job takes no longer: a station, and all ways, trouble and answers
 ABOUT = 5                            # degrees: the table stands anywhere from 0 on to this before the job
 NEAR = 60                            # arcsec: a cut farther away from every station is a stray
 TABLE = {"index_settle": "40ms"}
@@ -253,7 +254,7 @@ class IndexingMachine:
         begun, dark, types_at = self.twin.time(), trouble.power_cut_s, self.twin.time()
         self.press("START")
         outcome = Outcome(self.stations, [], self.job.state(), 0.0)
-        while outcome.seconds < STATION_S * len(self.stations):
+        while outcome.seconds < MORE_S + STATION_S * len(self.stations):
             self.twin.run(LOOK_S)
             if trouble.typing and self.twin.time() >= types_at:
                 self.type()
@@ -265,7 +266,9 @@ class IndexingMachine:
             state, outcome.seconds = self.job.state(), self.twin.time() - begun
             if watch and state.station != outcome.state.station:
                 watch(state)
-            outcome.state, outcome.displays[state.state] = state, self.panel.lines
+            if state.state == outcome.state.state:              # then the display has had time to tell it
+                outcome.displays[state.state] = self.panel.lines
+            outcome.state = state
             table = self.table.state()                          # each look is heard by the watchdog of the table's drive
             if state.state == "cutting":
                 outcome.tries[state.station] = table.tries
@@ -276,7 +279,7 @@ class IndexingMachine:
                 key = self.answer(state)
                 outcome.answers.append((outcome.seconds, f"{state.state}: {state.cause_words}", key))
                 self.press(key)
-        self.twin.run(LOOK_S)
+        self.twin.run(SHOWN_S)
         outcome.displays[outcome.state.state] = self.panel.lines
         outcome.cuts = self.cuts()
         return outcome
