@@ -11,7 +11,7 @@ from experiments.s4_job import CALM, IndexingMachine, random_stations, random_wo
 PROCESSES = 2
 JOBS = 20
 STATIONS = 36
-TROUBLED_STATIONS, TROUBLED_PART = 12, 0.1          # of a turn
+TROUBLED_STATIONS, TROUBLED_PART = 8, 0.06          # of a turn
 TROUBLED_STATION_S = 3                              # of one, about; the power goes within the job
 
 

@@ -195,6 +195,17 @@ class IndexingMachine:
         self.job.ready()
         self._programmed(equal_parts(count))
 
+    def enter(self, degrees):
+        """The program, by the panel, angle by angle as they are written."""
+        self.wait_for_panel()
+        self.press("LIST")
+        for angle in degrees:
+            self.press(*angle, "ENTER")
+        self.press("ENTER")
+        self.twin.run(LOOK_S)
+        self.job.ready()
+        self._programmed([float(angle) * 3600 for angle in degrees])
+
     def load(self, angles):
         """The program, by the host."""
         self.job.load(angles)
@@ -292,7 +303,7 @@ def some_trouble(seconds, source):
 
 # ------------------------------------------------------------------ the experiment
 
-HEAD = ("station", "wanted / deg", "true angle at the cut / deg", "error / arcsec", "tries", "cut after / s")
+HEAD = ("station", "wanted / deg", "true angle at the cut / deg", "error / arcsec", "tries", "cut at / s")
 
 
 def rows(outcome):

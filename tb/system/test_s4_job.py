@@ -24,14 +24,14 @@ def test_amid_trouble_and_through_a_power_cut_of_both_nodes_each_station_is_cut_
     assert outcome.answers and [cut.station for cut in outcome.cuts] == [0, 1]
 
 
-def test_a_turn_divided_on_the_panel_is_cut_by_the_bytes_as_printed_with_nobody_touching_it():
+def test_a_list_entered_on_the_panel_is_cut_by_the_bytes_as_printed_with_nobody_touching_it():
     with IndexingMachine(SEED, "printed") as machine:
-        machine.divide(1)
+        machine.enter(["0.25", "1"])
         outcome = machine.run()
         peer = machine.table.peer()
-    assert not outcome.failed and not outcome.answers and outcome.stations == [0]
-    assert peer.heard == 1 and outcome.tries[0] > 2
-    assert outcome.displays["finished"][0].split() == ["all", "cut", "001/001"]
+    assert not outcome.failed and not outcome.answers and outcome.stations == [900, 3600]
+    assert peer.heard == 2 and min(outcome.tries.values()) > 2
+    assert outcome.displays["finished"][0].split() == ["all", "cut", "002/002"]
 
 
 # ------------------------------------------------------------------ how it is judged
