@@ -13,7 +13,7 @@ module silence_watchdog #(
 ) (
     input  wire                  clk,
     input  wire                  rst,
-    input  wire        [15:0]    time_ms,                   // longest silence; 0: 65536 ms; a new one counts at once
+    input  wire        [15:0]    time_ms,                   // longest silence; 0: for ever; a new one counts at once
     input  wire                  sign,                      // strobe: of life
     input  wire                  armed,                     // level: a drive is enabled
     output logic                 expired                    // level: no sign for time_ms
@@ -24,11 +24,11 @@ module silence_watchdog #(
     localparam int P      = CLK_MS > 1 ? $clog2(CLK_MS) : 1;
 
     logic [P-1:0]  part;                                    // clk of the running millisecond
-    logic [16:0]   silent;                                  // ms
+    logic [15:0]   silent;                                  // ms, stops at its end
 
-    wire [16:0] longest = {time_ms == 16'd0, time_ms};
-    wire        whole   = part == P'(CLK_MS - 1);
-    wire        over    = silent >= longest;
+    wire whole = part == P'(CLK_MS - 1);
+    wire over  = silent >= time_ms && time_ms != '0;
+    wire full  = silent == '1;
 
     always_ff @(posedge clk) begin
         if (sign || !armed || rst) begin
@@ -36,8 +36,8 @@ module silence_watchdog #(
             silent  <= '0;
             expired <= 1'b0;
         end else begin
-            if (!over) part <= whole ? '0 : part + 1'b1;
-            if (!over && whole) silent <= silent + 1'b1;
+            if (!over && !full) part <= whole ? '0 : part + 1'b1;
+            if (!over && !full && whole) silent <= silent + 1'b1;
             if (over) expired <= 1'b1;
         end
     end
@@ -50,7 +50,7 @@ module silence_watchdog #(
         if (past) begin
             if (expired) assert ($past(armed) && !$past(sign));
             if ($past(expired) && $past(armed) && !$past(sign) && !$past(rst)) assert (expired);
-            if (expired && !$past(expired)) assert ($past(silent) >= $past(longest));
+            if (expired && !$past(expired)) assert ($past(time_ms) != 0 && $past(silent) >= $past(time_ms));
             cover (part == 3 && $past(sign, 4));
         end
     end

@@ -35,7 +35,7 @@ module line_registers (
     output logic        crc_byte_written,     // strobe: crc_byte has just been written, its new value stands
     output logic        crc_start_start,      // strobe: start the CRC-32 afresh: start
     input  wire  [31:0] crc,                  // the CRC-32 so far, final inversion done
-    output logic [15:0] watchdog_time         // longest silence of the master while a drive is enabled; 0 reads as the longest [0.001 s]
+    output logic [15:0] watchdog_time         // longest silence of the master while a drive is enabled; 0: for ever [0.001 s]
 );
     logic [31:0] frames_good_count;
     logic [31:0] frames_bad_count;

@@ -9,6 +9,7 @@ import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import NamedTuple
 
 import serial
 
@@ -21,6 +22,7 @@ from moire.protocol import parse_reply, request_body
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "sw" / "firmware"
 READ_S = 10
+START_S = 3                  # the firmware starts, and loads its tables
 FUZZ_S = 600
 SANITIZED = ["-std=gnu11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined", "-fno-sanitize-recover=all",
              "-DMOIRE_REGISTER_ACCESS"]
@@ -41,7 +43,7 @@ def rfc2217_reads_per_s(seconds=READ_S):
             raise NotMeasured(f"the twin is not served: {told.strip()}")
         try:
             with serial.serial_for_url(json.loads(told)["rfc2217"], timeout=1) as port:
-                read_positions(port, 0.5)                        # the firmware starts
+                read_positions(port, START_S)
                 return read_positions(port, seconds)
         finally:
             twin.terminate()
@@ -66,12 +68,13 @@ def read_positions(port, seconds):
 
 # ------------------------------------------------------------------ fuzzing
 
-def build_firmware_fuzz(folder: Path, firmware=FIRMWARE) -> Path:
-    """The firmware of this folder and its fuzzer as a program of this computer, by gcc with its sanitizers."""
+def build_firmware_fuzz(folder: Path, image, firmware=FIRMWARE) -> Path:
+    """An image of the firmware of this folder and its fuzzer as a program of this computer, by gcc with its sanitizers."""
     if shutil.which("gcc") is None:
         raise NotMeasured("gcc is missing: fuzzing the firmware needs its sanitizers")
     traced = ["-Dmain=firmware_main", "-fsanitize-coverage=trace-pc"]
-    jobs = [(path, traced) for path in sorted(Path(firmware).glob("*.c"))] + [(ROOT / "sw" / "experiments" / "firmware_fuzz.c", [])]
+    sources = set(Path(firmware).glob("*.c")) - set(Path(firmware).glob("image_*.c")) | {Path(firmware) / f"image_{image}.c"}
+    jobs = [(path, traced) for path in sorted(sources)] + [(ROOT / "sw" / "experiments" / "firmware_fuzz.c", [])]
     objects = []
     for path, more in jobs:
         objects.append(folder / f"{path.stem}.o")
@@ -86,29 +89,41 @@ def run(command):
         raise NotMeasured(f"the fuzzer does not build: {(done.stderr.splitlines() or ['no word'])[0]}")
 
 
-def fuzz_firmware(seconds, seed=1, firmware=FIRMWARE):
-    """(runs, what a sanitizer said or None)"""
+def images(firmware=FIRMWARE):
+    return sorted(path.stem.removeprefix("image_") for path in Path(firmware).glob("image_*.c"))
+
+
+class Outcome(NamedTuple):
+    image: str
+    runs: int
+    edges: int
+    kept: int
+    said: str | None                     # by a sanitizer, or about an input that took too long
+
+
+def fuzz_firmware(seconds, image, seed=1, firmware=FIRMWARE) -> Outcome:
     with tempfile.TemporaryDirectory() as folder:
-        program = build_firmware_fuzz(Path(folder), firmware)
+        program = build_firmware_fuzz(Path(folder), image, firmware)
         done = subprocess.run([program, str(seconds), str(seed)], capture_output=True, text=True, check=False,
                               env={**os.environ, "ASAN_OPTIONS": "detect_leaks=0:abort_on_error=1", "UBSAN_OPTIONS": "abort_on_error=1"})
     if done.returncode:
-        return 0, done.stderr
-    runs, edges, corpus = map(int, done.stdout.split())
-    console.print(f"firmware: {runs} scripts, {edges} edges, {corpus} kept")
-    return runs, None
+        return Outcome(image, 0, 0, 0, done.stderr)
+    return Outcome(image, *map(int, done.stdout.split()), None)
 
 
 def host_parser_crashes(seconds=FUZZ_S, seed=1):
     """Both at once, each on a processor of its own."""
     with ThreadPoolExecutor(1) as beside:
-        firmware = beside.submit(fuzz_firmware, seconds, seed)
+        names = images()
+        firmware = beside.submit(lambda: [fuzz_firmware(seconds / len(names), image, seed) for image in names])
         targets = parser_fuzz.fuzz(seconds, seed)
-        _, said = firmware.result()
+        outcomes = firmware.result()
     crashes = 0
-    if said is not None:
-        crashes += 1
-        console.print(said, markup=False)
+    for outcome in outcomes:
+        console.print(f"firmware, image {outcome.image}: {outcome.runs} scripts, {outcome.edges} edges, {outcome.kept} kept")
+        if outcome.said is not None:
+            crashes += 1
+            console.print(outcome.said, markup=False)
     for target in targets:
         console.print(f"{target.parse.__name__}: {target.runs} inputs, {len(target.seen)} pairs of lines, {len(target.corpus)} kept")
         for where, data in target.crashes.items():

@@ -2,6 +2,7 @@
 // firmware_fuzz -- coverage-guided fuzzing of the whole firmware on this computer: words of the line, registers and time as they come.
 //
 //     firmware_fuzz SECONDS SEED      prints `runs edges corpus`; a sanitizer or the time limit ends it with the input on standard error
+//     firmware_fuzz INPUT             plays that input again
 //
 // An input is a script: what the line receives, what registers hold, how time goes on. The compiler calls trace_pc at every edge; an
 // input that reaches a new edge, or one a new order of magnitude of times, joins the corpus that the next inputs are made of.
@@ -22,6 +23,7 @@
 #define QUEUE 256u
 #define AXES 2u
 #define CLK 4000000u
+#define SEGMENTS 16u                    // that the queue of a profile player takes
 #define RUN_SECONDS 30                  // of one input: more is a hang
 
 void firmware_start(void);
@@ -38,8 +40,10 @@ static struct input corpus[CORPUS], trial;
 static unsigned corpus_size;
 static uint64_t random_state;
 static uint32_t map[MAP_WORDS], clk;
-static uint16_t queue[QUEUE];
-static unsigned queued, taken;
+static struct queue {
+    uint16_t words[QUEUE];
+    unsigned put, taken;
+} line_words, peer_bytes;
 
 void __sanitizer_cov_trace_pc(void);
 void __sanitizer_cov_trace_pc(void)
@@ -52,15 +56,37 @@ void __sanitizer_cov_trace_pc(void)
 
 // ------------------------------------------------------------------ the hardware
 
+static bool is_axis_register(uint32_t offset, uint32_t which)
+{
+    return offset >= AXIS_BASE && offset < AXIS_BASE + AXES * AXIS_STRIDE && (offset - AXIS_BASE) % AXIS_STRIDE == which;
+}
+
+static void put(struct queue *queue, unsigned word)
+{
+    if (queue->put - queue->taken < QUEUE) queue->words[queue->put++ % QUEUE] = (uint16_t)word;
+}
+
+static uint32_t take(struct queue *queue, uint32_t present)
+{
+    return queue->taken < queue->put ? queue->words[queue->taken++ % QUEUE] | present : 0;
+}
+
+// Anything that a register can hold; what the hardware promises of one holds here too.
 uint32_t register_read(uint32_t offset)
 {
+    uint32_t held = map[offset / 4 % MAP_WORDS];
+    if (is_axis_register(offset, AXIS_STATE) && FIELD_GET(held, AXIS_STATE_QUEUE_FREE) > SEGMENTS)
+        held = (held & ~AXIS_STATE_QUEUE_FREE_MASK) | FIELD_PUT(AXIS_STATE_QUEUE_FREE, SEGMENTS);
     switch (offset) {
     case NODE_MAP_CRC: return MAP_CRC;
     case NODE_CLK_HZ: return CLK;
     case NODE_BUILD: return AXES | 1u << 4 | 64u << 8;
     case NODE_TIME_STAMP_LOW: return clk += 10;
-    case LINE_BASE + LINE_RECEIVE: return taken < queued ? queue[taken++ % QUEUE] | LINE_RECEIVE_PRESENT_MASK : 0;
-    default: return map[offset / 4 % MAP_WORDS];
+    case LINE_BASE + LINE_RECEIVE: return take(&line_words, LINE_RECEIVE_PRESENT_MASK);
+    case LINE_BASE + LINE_CRC: return 0;                        // of anything: so every CRC-32 of zeros is right
+    case LINKS_BASE + LINKS_BUILT: return ~0u;
+    case LINKS_BASE + LINKS_PEER_RECEIVE: return take(&peer_bytes, LINKS_PEER_RECEIVE_PRESENT_MASK);
+    default: return held;
     }
 }
 
@@ -71,7 +97,7 @@ void register_write(uint32_t offset, uint32_t value)
 
 static void receive(unsigned word)
 {
-    if (queued - taken < QUEUE) queue[queued++ % QUEUE] = (uint16_t)word;
+    put(&line_words, word);
 }
 
 static void receive_frame(const uint8_t *body, unsigned length)
@@ -85,14 +111,15 @@ static void receive_frame(const uint8_t *body, unsigned length)
 
 // ------------------------------------------------------------------ an input, played
 
-enum { POLL, WORD, FRAME, REGISTER, TIME, KINDS };
+enum { POLL, WORD, FRAME, PEER, REGISTER, TIME, KINDS };
 
 static void play(const struct input *input)
 {
     unsigned at = 0;
 #define NEXT (at < input->length ? input->bytes[at++] : 0u)
     memset(map, 0, sizeof map);
-    clk = queued = taken = 0;
+    clk = 0;
+    line_words = peer_bytes = (struct queue){0};
     srand(1);
     firmware_start();
     while (at < input->length) {
@@ -113,6 +140,10 @@ static void play(const struct input *input)
             for (unsigned n = 0; n < 16; n++) firmware_poll();
             break;
         }
+        case PEER:
+            for (unsigned n = NEXT; n && at < input->length; n--) put(&peer_bytes, NEXT);
+            for (unsigned n = 0; n < 16; n++) firmware_poll();
+            break;
         case REGISTER: {
             unsigned place = NEXT, value = 0;
             place = (place | NEXT << 8) % MAP_WORDS;
@@ -152,7 +183,7 @@ static uint32_t draw(uint32_t below)
     return (uint32_t)((random_state >> 33) % below);
 }
 
-#define OPERATION(name, code, request, reply) {code, request},
+#define OPERATION(name, code, request, ...) {code, request},
 static const uint8_t operations[][2] = {LINE_OPERATIONS(OPERATION)};
 
 static void insert(struct input *input, const uint8_t *bytes, unsigned length)
@@ -164,12 +195,36 @@ static void insert(struct input *input, const uint8_t *bytes, unsigned length)
     input->length = (uint16_t)(input->length + length);
 }
 
-static void insert_request(struct input *input)                 // of the right length; its values are anything
+static unsigned request(uint8_t *body)                          // of the right length; its values are anything
 {
     const uint8_t *operation = operations[draw(sizeof operations / sizeof *operations)];
-    uint8_t bytes[2 + LINE_LONGEST_BODY] = {FRAME, operation[1], (uint8_t)draw(256), operation[0], (uint8_t)draw(3)};
-    for (unsigned n = 5; n < 2u + operation[1]; n++) bytes[n] = (uint8_t)(draw(3) ? draw(4) - 1u : draw(256));
-    insert(input, bytes, 2u + operation[1]);
+    unsigned length = operation[1];
+    body[0] = (uint8_t)draw(256);
+    body[1] = operation[0];
+    for (unsigned n = 2; n < length; n++) body[n] = (uint8_t)(draw(3) ? draw(4) - (draw(4) == 0) : draw(256));
+    return length;
+}
+
+static void insert_request(struct input *input)
+{
+    uint8_t bytes[2 + LINE_LONGEST_BODY] = {FRAME};
+    bytes[1] = (uint8_t)request(&bytes[2]);
+    insert(input, bytes, 2u + bytes[1]);
+}
+
+static void insert_peer_frame(struct input *input)              // COBS of a request and its CRC-32, zeros around it
+{
+    uint8_t bytes[4 + LINE_LONGEST_BODY + 5] = {PEER}, content[LINE_LONGEST_BODY + 4] = {0};
+    unsigned length = request(content) + 4u, code = 3;
+    for (unsigned n = 0; n < length; n++) {
+        bytes[4 + n] = content[n];
+        if (content[n]) continue;
+        bytes[code] = (uint8_t)(4 + n - code);
+        code = 4 + n;
+    }
+    bytes[code] = (uint8_t)(4 + length - code);
+    bytes[1] = (uint8_t)(length + 3u);
+    insert(input, bytes, 5u + length);
 }
 
 static void mutate(struct input *input)
@@ -177,7 +232,7 @@ static void mutate(struct input *input)
     uint8_t some[8];
     unsigned at = input->length ? draw(input->length) : 0, length;
     for (unsigned n = 0; n < sizeof some; n++) some[n] = (uint8_t)draw(256);
-    switch (draw(8)) {
+    switch (draw(9)) {
     case 0: if (input->length) input->bytes[at] ^= (uint8_t)(1u << draw(8)); break;
     case 1: if (input->length) input->bytes[at] = some[0]; break;
     case 2: if (input->length) input->bytes[at] = (uint8_t)(draw(2) ? 0xFF : 0x80 >> draw(8)); break;
@@ -195,6 +250,7 @@ static void mutate(struct input *input)
         break;
     }
     case 6: some[0] = draw(2) ? TIME : POLL; insert(input, some, 3); break;
+    case 7: insert_peer_frame(input); break;
     default: insert_request(input); break;
     }
 }
@@ -211,16 +267,29 @@ static bool new_ground(void)
     return found;
 }
 
+static void parse(const char *text)                             // bytes in hexadecimal, with spaces or without
+{
+    int taken_here;
+    for (unsigned byte; trial.length < LONGEST && sscanf(text, "%2x%n", &byte, &taken_here) == 1; text += taken_here)
+        trial.bytes[trial.length++] = (uint8_t)byte;
+}
+
 int main(int count, char **words)
 {
+    signal(SIGABRT, die);
+    signal(SIGALRM, die);
+    if (count == 2) {
+        parse(words[1]);
+        alarm(RUN_SECONDS);
+        play(&trial);
+        return 0;
+    }
     if (count != 3) return 2;
     double seconds = atof(words[1]);
     random_state = strtoull(words[2], NULL, 10) * 0x9E3779B97F4A7C15u + 1u;
     unsigned long runs = 0, edges = 0;
     struct timespec began, now;
     clock_gettime(CLOCK_MONOTONIC, &began);
-    signal(SIGABRT, die);
-    signal(SIGALRM, die);
     corpus_size = 1;                                            // the empty input
     do {
         trial = corpus[draw(corpus_size)];

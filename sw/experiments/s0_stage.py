@@ -25,7 +25,7 @@ from twin import BuildError, Twin, TwinTransport
 ROOT = Path(__file__).resolve().parents[2]
 ADDRESSES = {"X": 1, "Y": 2}         # on the line; the order is that of the axes in the twin
 PERIOD_NM = 800.0
-START_S = 0.1                        # until the soft cores listen
+START_S = 0.15                       # until the soft cores listen
 LOOK_S = 0.005                       # between two looks at a motion
 MOVES = 24
 

@@ -28,7 +28,7 @@ from twin.twin import Axis, Node
 
 CLK_HZ = 3_000_000
 NODE = {"DRIVES": 2, "FILTERS": 0}
-START_S = 0.1                        # until the soft core listens
+START_S = 0.15                       # until the soft core listens
 LOOK_S = 0.02
 SLOW_MM_S = 0.5                      # the paper's top speed, 30 mm/min
 WORD = 1 << 16                       # counts of the paper's counter

@@ -26,7 +26,7 @@ from twin.twin import Axis, Node
 
 CLK_HZ = 1_600_000                   # enough for a count in 20 clk at the top speed
 NODE = {"DRIVES": 4, "FILTERS": 0}
-START_S = 0.1                        # until the soft core listens
+START_S = 0.15                       # until the soft core listens
 LOOK_S = 0.01                        # between two looks at a search
 SEARCHES = 10                        # of the paper's table 1
 RANGE_M = 1e-3                       # the mover rests this near to the mark

@@ -119,12 +119,12 @@ void axis_poll(unsigned n)
 
     if (faults) fault(n, faults);
     if (a->state == LINE_STATE_OFF || a->state == LINE_STATE_FAULTED) return;
-    state = axis_read(n, AXIS_STATE);
+    motion_feed(n);
+    state = axis_read(n, AXIS_STATE);                       // what homing looks at comes right before it looks
     if (a->leaving && !pressed(state)) {
         a->leaving = false;
         write_control(n, true);
     }
-    motion_feed(n);
     switch (a->state) {
     case LINE_STATE_HOMING:
         outcome = homing_poll(n, state);
@@ -232,7 +232,8 @@ uint8_t axis_prepare(unsigned n, int64_t target, uint32_t *duration_ticks)
     uint8_t cause = may_go(n, target);
     if (cause != LINE_CAUSE_OK) return cause;
     if (a->state == LINE_STATE_MOVING) return LINE_CAUSE_BUSY;
-    if (!motion_prepare(n, target - axis_read_position(n, AXIS_TARGET), LINE_PARAMETER_VELOCITY)) return LINE_CAUSE_OUT_OF_RANGE;
+    cause = motion_prepare(n, target - axis_read_position(n, AXIS_TARGET), LINE_PARAMETER_VELOCITY);
+    if (cause != LINE_CAUSE_OK) return cause;
     a->ended = LINE_CAUSE_RUNNING;
     a->state = LINE_STATE_PREPARED;
     *duration_ticks = motion_ticks(n);
@@ -264,7 +265,7 @@ uint8_t axis_move(unsigned n, int64_t target, uint32_t *duration_ticks)
         cause = may_go(n, target);
         if (cause != LINE_CAUSE_OK) return cause;
         *duration_ticks = 0;
-        return motion_retarget(n, target, LINE_PARAMETER_VELOCITY) ? LINE_CAUSE_OK : LINE_CAUSE_BUSY;
+        return motion_retarget(n, target, LINE_PARAMETER_VELOCITY);
     }
     cause = axis_prepare(n, target, duration_ticks);
     if (cause != LINE_CAUSE_OK) return cause;
@@ -277,7 +278,8 @@ uint8_t axis_go(unsigned n, int64_t distance, uint8_t velocity_id)
 {
     uint8_t cause = ready(n);
     if (cause != LINE_CAUSE_OK) return cause;
-    if (!motion_prepare(n, distance, velocity_id)) return LINE_CAUSE_OUT_OF_RANGE;
+    cause = motion_prepare(n, distance, velocity_id);
+    if (cause != LINE_CAUSE_OK) return cause;
     axes[n].ended = LINE_CAUSE_RUNNING;
     set_off(n);
     motion_start(n);

@@ -27,7 +27,7 @@ FLAGS = ["-std=c11", "-g", "-Wall", "-Wextra", "-Werror", "-ffreestanding", "-ff
 IMAGES = sorted(path.stem.removeprefix("image_") for path in HERE.glob("image_*.c"))
 AXES = {"station": 2}                                               # most that an image serves, where it is not the default
 SMALL, FAST = "-Os", "-O2"
-HOT = ("planner.c",)                                    # the others wait more than they work
+HOT = ("arithmetic.c",)                                 # the others wait more than they work
 ZIG = ["-target", "riscv32-freestanding-none", "-mcpu=generic_rv32+m-a-f-d-c", "-mabi=ilp32", "-fno-sanitize=all",
        "-fno-stack-protector"]
 GNU = ["-march=rv32im", "-misa-spec=2.2", "-mabi=ilp32", "-nostdlib", "-nostartfiles",

@@ -88,7 +88,8 @@ static int64_t settle_window(unsigned n)
 // Each step that drives begins here; what the planner refuses ends the homing.
 static uint8_t drive(unsigned n, enum home_step step, int64_t distance, uint8_t velocity_id)
 {
-    return motion_play(n, distance, velocity_id) ? go(n, step) : LINE_CAUSE_OUT_OF_RANGE;
+    uint8_t cause = motion_play(n, distance, velocity_id);
+    return cause == LINE_CAUSE_OK ? go(n, step) : cause;
 }
 
 // A switch stops the axis and the guard lets it go no farther: the target follows it until it stands.

@@ -9,8 +9,8 @@
 
 #include "hardware.h"
 
-#define AHEAD 8u                        // commands in the queue
-#define A_POLL 4u                       // commands, and answers, of one call
+#define AHEAD 16u                       // commands in the queue
+#define A_POLL 8u                       // commands, and answers, of one call
 
 enum { START, STOP, WRITE, READ, RECOVER };                     // commands
 enum { DONE, NOT_ACKNOWLEDGED };                                // answers; others: the bus was lost, or stays low

@@ -32,12 +32,13 @@ enum state { STATE(LOADING), STATE(IDLE), STATE(FINISHED), STATE(STARTING), STAT
 
 static uint8_t state, cause;
 static uint16_t station;
+static uint32_t program;                // by its identity
 static bool pausing;
 static uint8_t to_note, note_refused;   // a line of the journal that waits for the store, and how the store took the last one
 static bool ordered;                    // the table was told to go to a station, and did not say that it is there
 static uint8_t order_refused;
 
-static void at_first(void)        { station = 0; pausing = ordered = false; cause = LINE_CAUSE_OK; }
+static void at_first(void)        { program = store_identity(); station = 0; pausing = ordered = false; cause = LINE_CAUSE_OK; }
 static void at_next(void)         { station++; }
 static void say_store(void)       { cause = note_refused != LINE_CAUSE_OK ? note_refused : store_cause(); }
 static void say_table(void)       { cause = order_refused != LINE_CAUSE_OK ? order_refused : peer_cause(); }
@@ -97,7 +98,7 @@ static bool loaded(void)
 static bool open_until(enum store_step most)
 {
     const struct store_record *last = store_record();
-    return loaded() && last->generation == store_generation() && last->station < store_stations() &&
+    return loaded() && last->program == store_identity() && last->station < store_stations() &&
            last->step >= STORE_STARTED && last->step <= most;
 }
 
@@ -214,8 +215,10 @@ void job_start(unsigned axes)
 
 void job_work(void)
 {
-    if (state == LOADING && open_until(STORE_CUT_DONE))
+    if (state == LOADING && open_until(STORE_CUT_DONE)) {
+        program = store_identity();
         station = (uint16_t)(store_record()->station + (store_record()->step == STORE_CUT_DONE));
+    }
     write_note();
     for (unsigned n = first_row[state]; n < TRANSITIONS && transitions[n].from == state; n++)
         if (happened(transitions[n].event)) return take(&transitions[n]);
@@ -243,6 +246,7 @@ static uint8_t refusal(uint8_t action)
     if (action == STOP || action == PAUSE) return LINE_CAUSE_OK;
     if (store_state() == STORE_DEAD) return LINE_CAUSE_STORE_MISSING;
     if (store_state() != STORE_READY) return LINE_CAUSE_STORE_BUSY;
+    if (action != START && program != store_identity()) return LINE_CAUSE_PROGRAM_CHANGED;
     if (action == NEXT) return LINE_CAUSE_OK;
     if (action == RESUME && state == UNSURE) return machine_cuts() ? LINE_CAUSE_OK : LINE_CAUSE_NOT_NOW;
     if (action != START && sub_node_counts() && ordered && !table_is_there()) return LINE_CAUSE_TABLE_UNKNOWN;
@@ -269,6 +273,7 @@ uint8_t job_do(uint8_t action)
 {
     if (action >= ACTIONS) return LINE_CAUSE_OUT_OF_RANGE;
     if (action == START && under_way()) return LINE_CAUSE_JOB_ACTIVE;
+    if (action != START && !known(action)) return LINE_CAUSE_NOT_NOW;
     uint8_t refused = refusal(action);
     if (refused != LINE_CAUSE_OK) return refused;
     if (!known(action)) return LINE_CAUSE_NOT_NOW;

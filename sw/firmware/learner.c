@@ -712,8 +712,10 @@ void learner_forget(struct learner *learner)
 
 void learner_start(struct learner *learner)
 {
-    fill_wave();
-    fill_motion();
+    if (wave[128] == 0) {                       // once for all axes
+        fill_wave();
+        fill_motion();
+    }
     leave(learner);
     *learner = (struct learner){.amplitude_high = UINT16_MAX, .scatter_limit = SCATTER_LIMIT};
     learner_forget(learner);

@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x73BC63B6u    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x692B6460u    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -34,6 +34,8 @@ enum line_cause {
     LINE_CAUSE_NO_INDEX = 21,    // no index was found within the home distance
     LINE_CAUSE_NOT_PREPARED = 22,    // the axis has no motion prepared
     LINE_CAUSE_NOT_BUILT = 23,    // this node was built without that
+    LINE_CAUSE_TOO_LONG = 24,    // the motion would take days, or go too far for a change of target
+    LINE_CAUSE_NO_STAIRS = 25,    // the stairs of this profile are not in order, or too many
     LINE_CAUSE_SENSOR_DEAD = 30,    // no good frame came from the angle sensor: check its power and its cable
     LINE_CAUSE_SENSOR_STUCK = 31,    // the angle sensor stands still: it sent one and the same angle while the table was turned
     LINE_CAUSE_STICTION = 32,    // the table did not follow its steps: it sticks, or the motor lost them
@@ -65,6 +67,7 @@ enum line_cause {
     LINE_CAUSE_PAUSED_BY_PERSON = 58,    // paused by a person
     LINE_CAUSE_KEY_WITHOUT_FUNCTION = 59,    // this key has no function
     LINE_CAUSE_TABLE_UNKNOWN = 60,    // nobody knows where the table stands
+    LINE_CAUSE_PROGRAM_CHANGED = 61,    // this is not the program of the job
 };
 
 enum line_fault {    // bits
@@ -243,6 +246,8 @@ enum line_job_flag {    // bits
     X(21, "no index was found within the home distance") \
     X(22, "the axis has no motion prepared") \
     X(23, "this node was built without that") \
+    X(24, "the motion would take days, or go too far for a change of target") \
+    X(25, "the stairs of this profile are not in order, or too many") \
     X(30, "no good frame came from the angle sensor: check its power and its cable") \
     X(31, "the angle sensor stands still: it sent one and the same angle while the table was turned") \
     X(32, "the table did not follow its steps: it sticks, or the motor lost them") \
@@ -273,7 +278,8 @@ enum line_job_flag {    // bits
     X(57, "the power was lost during the job") \
     X(58, "paused by a person") \
     X(59, "this key has no function") \
-    X(60, "nobody knows where the table stands")
+    X(60, "nobody knows where the table stands") \
+    X(61, "this is not the program of the job")
 
 // X(code, words)
 #define LINE_JOB_STATE_WORDS(X) \
@@ -660,7 +666,7 @@ enum line_parameter {
     LINE_PARAMETER_DISAGREEMENT_LIMIT = 29,    // [1/65536 period] encoder: interpolated position against quadrature count; 0 off
     LINE_PARAMETER_ENCODER_FAULT_MASK = 30,    // encoder: which events are a fault (bits of encoder_event)
     LINE_PARAMETER_PWM_FREQUENCY = 31,    // [1 Hz] drive: PWM frequency
-    LINE_PARAMETER_WATCHDOG_TIME = 32,    // [0.001 s] guard: longest silence of the line while a drive is on (all axes)
+    LINE_PARAMETER_WATCHDOG_TIME = 32,    // [0.001 s] guard: longest silence of the line while a drive is on (all axes); 0: for ever, for a machine that runs by itself
     LINE_PARAMETER_LEARNING = 33,    // correction of sine and cosine: 0 frozen, 1 learns
     LINE_PARAMETER_DECODER_MODE = 34,    // decoder: 0 every edge, 1 every second, 2 every fourth, 3 pulses and direction; other than 0 needs disagreement_limit 0
     LINE_PARAMETER_FILTER_SKIP = 35,    // [1e-9 s] deglitcher: time between two samples of a level; 0 every clk
@@ -707,8 +713,16 @@ enum line_parameter {
     LINE_PARAMETER_FILTER_2_B2 = 76,    // [1/1073741824] servo: filter 2, coefficient b2
     LINE_PARAMETER_FILTER_2_A1 = 77,    // [1/1073741824] servo: filter 2, coefficient -a1
     LINE_PARAMETER_FILTER_2_A2 = 78,    // [1/1073741824] servo: filter 2, coefficient -a2
+    LINE_PARAMETER_PROFILE = 79,    // profile of motions: 0 S-curve, 1 trapezoid (jerk does not count), 2 stairs (velocity and the stairs_ parameters)
+    LINE_PARAMETER_STAIRS_FIRST = 80,    // [1/65536 period/s] stairs (S4): speed of the first, f0
+    LINE_PARAMETER_STAIRS_TIME = 81,    // [0.00025 s] stairs: time on each
+    LINE_PARAMETER_STAIRS_RISE_1 = 82,    // [1/65536 period/s] stairs: height of those in section 1, the mirror of 7
+    LINE_PARAMETER_STAIRS_RISE_2 = 83,    // [1/65536 period/s] stairs: height in section 2, the mirror of 6
+    LINE_PARAMETER_STAIRS_RISE_3 = 84,    // [1/65536 period/s] stairs: height in section 3, the mirror of 5
+    LINE_PARAMETER_STAIRS_BORDER_2 = 85,    // [1/65536] stairs: where section 2 begins, of the way from stairs_first to velocity
+    LINE_PARAMETER_STAIRS_BORDER_3 = 86,    // [1/65536] stairs: where section 3 begins: 1/2 is 1:2:3, S4 prints 1/3
 };
-#define LINE_PARAMETER_COUNT 78u
+#define LINE_PARAMETER_COUNT 86u
 
 // X(name, id, min, max, default): all int64_t, in counts of the wire
 #define LINE_PARAMETERS(X) \
@@ -743,7 +757,7 @@ enum line_parameter {
     X(disagreement_limit, 29, 0LL, 1048575LL, 32768LL) \
     X(encoder_fault_mask, 30, 0LL, 31LL, 30LL) \
     X(pwm_frequency, 31, 1000LL, 200000LL, 20000LL) \
-    X(watchdog_time, 32, 10LL, 65535LL, 500LL) \
+    X(watchdog_time, 32, 0LL, 65535LL, 500LL) \
     X(learning, 33, 0LL, 1LL, 0LL) \
     X(decoder_mode, 34, 0LL, 3LL, 0LL) \
     X(filter_skip, 35, 0LL, 1000000LL, 0LL) \
@@ -789,7 +803,15 @@ enum line_parameter {
     X(filter_2_b1, 75, -2147483648LL, 2147483647LL, 0LL) \
     X(filter_2_b2, 76, -2147483648LL, 2147483647LL, 0LL) \
     X(filter_2_a1, 77, -2147483648LL, 2147483647LL, 0LL) \
-    X(filter_2_a2, 78, -2147483648LL, 2147483647LL, 0LL)
+    X(filter_2_a2, 78, -2147483648LL, 2147483647LL, 0LL) \
+    X(profile, 79, 0LL, 2LL, 0LL) \
+    X(stairs_first, 80, 1LL, 65536000000LL, 819200LL) \
+    X(stairs_time, 81, 1LL, 400000LL, 80LL) \
+    X(stairs_rise_1, 82, 1LL, 65536000000LL, 819200LL) \
+    X(stairs_rise_2, 83, 1LL, 65536000000LL, 1638400LL) \
+    X(stairs_rise_3, 84, 1LL, 65536000000LL, 3276800LL) \
+    X(stairs_border_2, 85, 0LL, 65536LL, 10923LL) \
+    X(stairs_border_3, 86, 0LL, 65536LL, 32768LL)
 
 enum line_setting {
     LINE_SETTING_INDEX_TOLERANCE = 1,    // [0.01 arcsec] index: it has ended when no more than this is left by the sensor

@@ -11,8 +11,9 @@
 #define PIECE_TICKS 128u        // 32 ms
 #define QUEUE 16u
 #define QUEUED_MS 16u           // What is queued cannot be taken back when the target changes, so it is kept short: this, and what
-#define BUSY_KCLK 900u          // the firmware may be busy with before it looks here again. Pieces are short too where a move begins:
+#define BUSY_KCLK 150u          // the firmware may be busy with before it looks here again. Pieces are short too where a move begins:
                                 // it is time that counts.
+static const uint16_t plan_kclk[] = {300, 800};     // what another target is given to be planned, and half of what is queued
 
 static struct motion {
     struct plan plan;
@@ -24,60 +25,136 @@ static struct motion {
     uint32_t since_ms;          // start of settling
 } motions[HARDWARE_AXES];
 
-static void forget(struct plan *plan)
+static struct {                 // a way to another target, which follows when the old one has been fed so far
+    struct plan plan;
+    unsigned axis;
+    uint32_t join;              // tick of the old plan; 0: there is none
+    bool ready;                 // it is planned
+} next;
+
+static bool joins(unsigned n)
 {
-    plan->next = plan->count;
+    return next.join && next.axis == n;
+}
+
+static void forget(unsigned n)
+{
+    motions[n].plan.next = motions[n].plan.count;
+    if (joins(n)) next.join = 0;
 }
 
 void motion_hold_here(unsigned n)
 {
-    forget(&motions[n].plan);
+    forget(n);
     axis_write(n, AXIS_STROBES, AXIS_STROBES_HOLD_HERE_MASK);
 }
 
 void motion_brake(unsigned n)
 {
-    forget(&motions[n].plan);
+    forget(n);
     axis_write(n, AXIS_STROBES, AXIS_STROBES_BRAKE_MASK);
 }
 
-static uint32_t queued_ticks(void)
+static uint32_t ticks_of(uint32_t kclk)
 {
-    return PLANNER_TICK_HZ / 1000u * (QUEUED_MS + BUSY_KCLK * 1000u / (node_read(NODE_CLK_HZ) / 1000u));
+    return PLANNER_TICK_HZ * kclk / (node_read(NODE_CLK_HZ) / 1000u);
+}
+
+static bool at_join(unsigned n)
+{
+    return joins(n) && motions[n].plan.at.tick == next.join;
+}
+
+// One piece into the queue, which has room for it. Its ticks; 0: nothing is left.
+static uint32_t push(unsigned n)
+{
+    struct motion *m = &motions[n];
+    struct planner_segment piece;
+    bool last;
+    uint32_t longest = PIECE_TICKS;
+    if (at_join(n)) {
+        if (next.ready) m->plan = next.plan;
+        next.join = 0;
+    }
+    if (joins(n) && next.join - m->plan.at.tick < longest) longest = next.join - m->plan.at.tick;
+    if (!planner_take_up_to(&m->plan, &piece, &last, longest)) return 0;
+    m->queued[m->pieces++ % QUEUE] = (uint8_t)piece.ticks;
+    axis_write_wide(n, AXIS_SEGMENT_VELOCITY, (uint64_t)piece.velocity);
+    axis_write_wide(n, AXIS_SEGMENT_ACCELERATION, (uint64_t)piece.acceleration);
+    axis_write(n, AXIS_SEGMENT_JERK, (uint32_t)piece.jerk);
+    axis_write(n, AXIS_SEGMENT_TICKS, piece.ticks | (last ? AXIS_SEGMENT_TICKS_LAST_MASK : 0));
+    return piece.ticks;
 }
 
 void motion_feed(unsigned n)
 {
     struct motion *m = &motions[n];
-    struct planner_segment piece;
-    bool last;
     if (m->plan.next >= m->plan.count) return;
-    uint32_t waiting = QUEUE - FIELD_GET(axis_read(n, AXIS_STATE), AXIS_STATE_QUEUE_FREE), ticks = 0, most = queued_ticks();
-    for (uint32_t piece_back = 1; piece_back <= waiting; piece_back++) ticks += m->queued[(m->pieces - piece_back) % QUEUE];
-    while (waiting++ < QUEUE && ticks < most && planner_take_up_to(&m->plan, &piece, &last, PIECE_TICKS)) {
-        m->queued[m->pieces++ % QUEUE] = (uint8_t)piece.ticks;
-        ticks += piece.ticks;
-        axis_write_wide(n, AXIS_SEGMENT_VELOCITY, (uint64_t)piece.velocity);
-        axis_write_wide(n, AXIS_SEGMENT_ACCELERATION, (uint64_t)piece.acceleration);
-        axis_write(n, AXIS_SEGMENT_JERK, (uint32_t)piece.jerk);
-        axis_write(n, AXIS_SEGMENT_TICKS, piece.ticks | (last ? AXIS_SEGMENT_TICKS_LAST_MASK : 0));
+    uint32_t pieces = QUEUE - FIELD_GET(axis_read(n, AXIS_STATE), AXIS_STATE_QUEUE_FREE), ticks = 0;
+    uint32_t most = PLANNER_TICK_HZ / 1000u * QUEUED_MS + ticks_of(BUSY_KCLK);
+    for (uint32_t piece_back = 1; piece_back <= pieces; piece_back++) ticks += m->queued[(m->pieces - piece_back) % QUEUE];
+    for (uint32_t more = 1; more && pieces < QUEUE; pieces++) {
+        if (!joins(n) && ticks >= most) break;
+        if (at_join(n) && !next.ready && ticks >= most / 2) break;           // wait for the new way as long as that may be
+        ticks += more = push(n);
     }
 }
 
-bool motion_prepare(unsigned n, int64_t distance, uint8_t velocity_id)
+static void feed_all(void)
 {
-    struct planner_limits limits = parameters_limits(n, velocity_id);
-    motions[n].from = axis_read_position(n, AXIS_TARGET);
-    if (!planner_move(&motions[n].plan, &limits, distance)) return false;
-    motion_feed(n);
-    return true;
+    for (unsigned n = 0; n < HARDWARE_AXES; n++) motion_feed(n);
 }
 
-bool motion_retarget(unsigned n, int64_t target, uint8_t velocity_id)
+static uint8_t refusal(const struct plan *plan)
 {
-    struct motion *m = &motions[n];
-    struct planner_limits limits = parameters_limits(n, velocity_id);
-    return m->plan.next < m->plan.count && planner_retarget(&m->plan, &limits, target - m->from);
+    switch (plan->cause) {
+    case PLANNER_TOO_LONG: return LINE_CAUSE_TOO_LONG;
+    case PLANNER_BORDERS:
+    case PLANNER_TOO_MANY_STAIRS: return LINE_CAUSE_NO_STAIRS;
+    case PLANNER_ON_STAIRS: return LINE_CAUSE_BUSY;
+    default: return LINE_CAUSE_OUT_OF_RANGE;
+    }
+}
+
+uint8_t motion_prepare(unsigned n, int64_t distance, uint8_t velocity_id)
+{
+    struct plan *plan = &motions[n].plan;
+    bool planned;
+    motions[n].from = axis_read_position(n, AXIS_TARGET);
+    if (parameters_get(n, LINE_PARAMETER_PROFILE) == STAIRS) {
+        struct planner_stairs stairs = parameters_stairs(n, velocity_id);
+        planned = planner_climb(plan, &stairs, distance);
+    } else {
+        struct planner_limits limits = parameters_limits(n, velocity_id);
+        planned = planner_move(plan, &limits, distance);
+    }
+    if (!planned) return refusal(plan);
+    motion_feed(n);
+    return LINE_CAUSE_OK;
+}
+
+// The new way begins so far ahead that the old one can be fed while it is planned. Where that took too long, once more with more.
+uint8_t motion_retarget(unsigned n, int64_t target, uint8_t velocity_id)
+{
+    const struct plan *old = &motions[n].plan;
+    const struct planner_limits limits = parameters_limits(n, velocity_id);
+    if (next.join) return LINE_CAUSE_BUSY;
+    for (unsigned trial = 0; trial < sizeof plan_kclk / sizeof plan_kclk[0]; trial++) {
+        const uint32_t ticks = ticks_of(plan_kclk[trial]), join = old->at.tick + ticks;
+        if (old->stairs || old->next >= old->count || join >= old->ticks) break;
+        next.axis = n;
+        next.join = join;
+        next.ready = false;
+        if (!planner_retarget(&next.plan, old, ticks, &limits, target - motions[n].from, feed_all)) {
+            next.join = 0;
+            return refusal(&next.plan);
+        }
+        if (next.join == 0) continue;                                        // the old one had to be fed beyond
+        next.ready = true;
+        motion_feed(n);
+        return LINE_CAUSE_OK;
+    }
+    return LINE_CAUSE_BUSY;
 }
 
 void motion_start(unsigned n)
@@ -85,11 +162,11 @@ void motion_start(unsigned n)
     axis_write(n, AXIS_STROBES, AXIS_STROBES_START_MASK);
 }
 
-bool motion_play(unsigned n, int64_t distance, uint8_t velocity_id)
+uint8_t motion_play(unsigned n, int64_t distance, uint8_t velocity_id)
 {
-    if (!motion_prepare(n, distance, velocity_id)) return false;
-    motion_start(n);
-    return true;
+    uint8_t cause = motion_prepare(n, distance, velocity_id);
+    if (cause == LINE_CAUSE_OK) motion_start(n);
+    return cause;
 }
 
 bool motion_played(unsigned n)

@@ -10,13 +10,14 @@ void motion_hold_here(unsigned n);      // target := position, standing, nothing
 void motion_brake(unsigned n);          // controlled stop
 void motion_feed(unsigned n);           // to be called often while something is played
 
-// The player must stand. A distance of zero plays nothing. false: the planner refuses it. motion_play starts at once.
-bool motion_prepare(unsigned n, int64_t distance, uint8_t velocity_id);
+// The player must stand. A distance of zero plays nothing. ok, or why the planner refuses it. motion_play starts at once.
+uint8_t motion_prepare(unsigned n, int64_t distance, uint8_t velocity_id);
 void motion_start(unsigned n);
-bool motion_play(unsigned n, int64_t distance, uint8_t velocity_id);
+uint8_t motion_play(unsigned n, int64_t distance, uint8_t velocity_id);
 
-// Another target (2^-16 period) while a motion is played. false: refused, or its last piece is queued already; it goes on as it was.
-bool motion_retarget(unsigned n, int64_t target, uint8_t velocity_id);
+// Another target (2^-16 period) while a motion is played. Refused, it goes on as it was; busy: it is too near its
+// end, or climbs stairs.
+uint8_t motion_retarget(unsigned n, int64_t target, uint8_t velocity_id);
 
 bool motion_played(unsigned n);
 uint32_t motion_ticks(unsigned n);      // duration of the motion planned last

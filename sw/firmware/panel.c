@@ -334,24 +334,28 @@ void panel_start(unsigned axes)
     go(SHOW);
 }
 
+static bool refreshed(void)             // a line at a time
+{
+    if (composed) display_show(line++, text);
+    else if (line < DISPLAY_LINES) compose(line);
+    else return false;
+    composed = !composed;
+    return true;
+}
+
 void panel_work(void)
 {
     uint8_t key = keypad_take();
-    keypad_work();
-    display_work();
     if (key != KEYPAD_NONE) return key_pressed(layout[key]);
     if (mode == DIVIDING) return divide_on();
     if (mode == SAVING) saved();
-    if (composed) {
-        display_show(line++, text);
-        composed = false;
-    } else if (line < DISPLAY_LINES) {
-        compose(line);
-        composed = true;
-    } else if (clock_ms() - shown_ms >= REFRESH_MS && display_present()) {
+    if (refreshed()) return;
+    if (clock_ms() - shown_ms >= REFRESH_MS && display_present()) {
         shown_ms = clock_ms();
         line = 0;
     }
+    keypad_work();
+    display_work();
 }
 
 bool panel_has_keypad(void)

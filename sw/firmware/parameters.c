@@ -7,7 +7,6 @@
 #include "line_protocol.h"
 
 #define PULSES_AND_DIRECTION 3u         // a mode of the decoder
-#define OVERRIDE_PART 4u                // of the acceleration and the jerk, which a change of the override may add
 #define STEP_CLK_MASK ACTUATOR_STEP_PULSE_HIGH_MASK
 #define COEFFICIENTS 5u                 // of a filter
 
@@ -36,25 +35,18 @@ uint32_t parameters_sample_hz(void)
     return node_read(NODE_CLK_HZ) / node_read(NODE_SAMPLE_PERIOD);
 }
 
-// part / whole in 2^-32, 1 at least.
-static uint32_t ratio(uint64_t part, uint64_t whole)
-{
-    uint32_t shift = 32;
-    while (part >> (64 - shift)) whole >>= 1, shift--;
-    if (whole == 0) return UINT32_MAX;
-    uint64_t quotient = (part << shift) / whole;
-    return quotient == 0 ? 1 : held(quotient, UINT32_MAX);
-}
-
 static void apply_motion(unsigned axis)
 {
     const int64_t *p = parameters[axis];
+    uint32_t slope, curve;
     limits[axis] = planner_limits((uint32_t)p[LINE_PARAMETER_VELOCITY], (uint32_t)p[LINE_PARAMETER_ACCELERATION],
                                   (uint32_t)p[LINE_PARAMETER_JERK]);
+    if (p[LINE_PARAMETER_PROFILE] == TRAPEZOID) limits[axis].jerk = PLANNER_ANY_JERK;
+    planner_override(&limits[axis], &slope, &curve);
     axis_write(axis, AXIS_BRAKE_RATE, held(limits[axis].acceleration >> 8, AXIS_BRAKE_RATE_MASK));
-    axis_write(axis, AXIS_BRAKE_JERK, limits[axis].jerk);
-    axis_write(axis, AXIS_OVERRIDE_SLOPE, ratio(limits[axis].acceleration / OVERRIDE_PART, limits[axis].velocity));
-    axis_write(axis, AXIS_OVERRIDE_CURVE, ratio(limits[axis].jerk / OVERRIDE_PART, limits[axis].velocity));
+    axis_write(axis, AXIS_BRAKE_JERK, limits[axis].jerk == PLANNER_ANY_JERK ? 0 : limits[axis].jerk);
+    axis_write(axis, AXIS_OVERRIDE_SLOPE, slope);
+    axis_write(axis, AXIS_OVERRIDE_CURVE, curve);
 }
 
 static uint64_t clk_of(int64_t nanoseconds)
@@ -146,7 +138,8 @@ static void apply(unsigned axis, uint8_t id)
     switch (id) {
     case LINE_PARAMETER_VELOCITY:
     case LINE_PARAMETER_ACCELERATION:
-    case LINE_PARAMETER_JERK: apply_motion(axis); break;
+    case LINE_PARAMETER_JERK:
+    case LINE_PARAMETER_PROFILE: apply_motion(axis); break;
     case LINE_PARAMETER_KP: axis_write(axis, AXIS_KP, value); break;
     case LINE_PARAMETER_KI: axis_write(axis, AXIS_KI, value); break;
     case LINE_PARAMETER_KD: axis_write(axis, AXIS_KD, value); break;
@@ -237,6 +230,17 @@ int64_t parameters_get(unsigned axis, uint8_t id)
 struct planner_limits parameters_limits(unsigned axis, uint8_t velocity_id)
 {
     struct planner_limits made = limits[axis];
-    if (velocity_id != LINE_PARAMETER_VELOCITY) made.velocity = planner_velocity((uint32_t)parameters[axis][velocity_id]);
+    if (velocity_id != LINE_PARAMETER_VELOCITY) made.velocity = planner_velocity((uint64_t)parameters[axis][velocity_id] << 16);
+    return made;
+}
+
+// A velocity below the first stair is that of all of them.
+struct planner_stairs parameters_stairs(unsigned axis, uint8_t velocity_id)
+{
+    const int64_t *p = parameters[axis];
+    uint64_t top = planner_velocity((uint64_t)p[velocity_id] << 16), first = planner_velocity((uint64_t)p[LINE_PARAMETER_STAIRS_FIRST]);
+    struct planner_stairs made = {.first = first < top ? first : top, .top = top, .ticks = (uint32_t)p[LINE_PARAMETER_STAIRS_TIME]};
+    for (unsigned n = 0; n < 3; n++) made.rise[n] = planner_velocity((uint64_t)p[LINE_PARAMETER_STAIRS_RISE_1 + n]);
+    planner_borders(&made, (uint32_t)p[LINE_PARAMETER_STAIRS_BORDER_2], (uint32_t)p[LINE_PARAMETER_STAIRS_BORDER_3]);
     return made;
 }

@@ -11,7 +11,8 @@
 #define SAMPLE_CLK 30u                                  // a conversion takes 29
 #define BAUD 115200u
 
-enum position_source { PHASES, COUNTS, OWN_STEPS };     // values of the parameter
+enum profile { S_CURVE, TRAPEZOID, STAIRS };            // values of the parameters
+enum position_source { PHASES, COUNTS, OWN_STEPS };
 
 void parameters_start_node(void);                       // clock dividers, line speed
 uint32_t parameters_sample_hz(void);                    // rate of the converters
@@ -20,5 +21,6 @@ uint8_t parameters_check(uint8_t id, int64_t value);    // a line_cause
 void parameters_set(unsigned axis, uint8_t id, int64_t value);
 int64_t parameters_get(unsigned axis, uint8_t id);
 struct planner_limits parameters_limits(unsigned axis, uint8_t velocity_id);
+struct planner_stairs parameters_stairs(unsigned axis, uint8_t velocity_id);
 
 #endif

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// planner -- a move as segments of constant jerk for profile_player, in exact integers. No hardware, no state.
+// planner -- a move as segments of constant jerk for profile_player, landing exactly. No hardware, no state, no floating point.
+//
+// Limits and moves: planner.c. Another target in flight: retarget.c. What a plan is, and taking it piece by piece: plan.c.
 #ifndef MOIRE_PLANNER_H
 #define MOIRE_PLANNER_H
 
@@ -7,9 +9,11 @@
 #include <stdint.h>
 
 #define PLANNER_TICK_HZ 4000u
-#define PLANNER_SEGMENTS 20u            // room for the instants at which a move changes
+#define PLANNER_EVENTS 60u              // instants at which a move changes; 57 at most
+#define PLANNER_SECTIONS 9u             // of stairs: a tick of rest, three up, two at the top, three down
 #define PLANNER_LONGEST_PIECE 0x800000u // ticks in one push; profile_player takes 24 bits
-#define PLANNER_ANY_JERK UINT32_MAX     // limits.jerk: trapezoid, the acceleration may step
+#define PLANNER_ANY_JERK UINT32_MAX     // limits.jerk: trapezoid, the acceleration changes within three ticks
+#define PLANNER_LEAST_LIMIT 64u         // smaller limits leave a retarget no room for the units that make it exact
 
 struct planner_limits {                 // 2^-40 period per tick, tick^2, tick^3
     uint64_t velocity;
@@ -19,13 +23,14 @@ struct planner_limits {                 // 2^-40 period per tick, tick^2, tick^3
 
 enum planner_cause {
     PLANNER_OK,
-    PLANNER_NO_VELOCITY,                // the limit is zero in units of the player
+    PLANNER_NO_VELOCITY,                // the limit is zero in units of the player; for a retarget, below PLANNER_LEAST_LIMIT
     PLANNER_NO_ACCELERATION,
     PLANNER_NO_JERK,                    // below two units: no pulse of jerk can be made
-    PLANNER_TOO_LONG,                   // it would cruise for 2^30 ticks (3 days) or more, or retarget 2^22 periods or more
+    PLANNER_TOO_LONG,                   // a cruise of 2^30 ticks (3 days), a retarget with ramps of 2^27 ticks or 2^22 periods, or more
     PLANNER_BORDERS,                    // stairs whose borders or steps are not in order
-    PLANNER_TOO_MANY_STAIRS,
-    PLANNER_NO_PLAN                     // no retarget inside the limits was found
+    PLANNER_TOO_MANY_STAIRS,            // above 4096
+    PLANNER_ON_STAIRS,                  // stairs go on to where they were planned to go
+    PLANNER_NO_PLAN                     // none inside the limits was found, even with an eighth of them kept free
 };
 
 struct planner_segment {                // values at its start
@@ -35,21 +40,40 @@ struct planner_segment {                // values at its start
     uint32_t ticks;
 };
 
-struct plan {
-    uint32_t ticks;                     // of the whole move
-    uint8_t count;                      // segments
-    uint8_t next;                       // first segment not yet taken whole
-    uint8_t cause;                      // planner_cause: why the last request was refused
-    bool stairs;                        // a segment is `jerk` + 1 stairs of constant velocity, `acceleration` apart
-    uint32_t into;                      // ticks of this segment, or of its stair, taken so far
-    uint64_t gone;                      // 2^-40 period taken so far, modulo 2^64
-    struct planner_segment segment[PLANNER_SEGMENTS];
+struct planner_event {                  // what is added at one instant
+    int64_t jerk;
+    uint32_t tick;
+    int8_t velocity;
+    int8_t acceleration;
+    uint8_t place;                      // 0..3: of the events of one change of jerk; PLANNER_LANDING: it makes the landing exact
 };
+
+#define PLANNER_LANDING 4u
 
 struct planner_state {                  // after a tick
     uint64_t gone;                      // 2^-40 period since the plan began, modulo 2^64
     int64_t velocity;                   // of the next tick
     int64_t acceleration;
+};
+
+struct planner_place {                  // how far a plan was taken
+    struct planner_state state;
+    int64_t jerk;
+    int64_t landing;                    // jerk of the events that make the landing exact
+    uint32_t tick;                      // since the plan was made or retargeted, or of this section of stairs
+};
+
+struct plan {
+    uint32_t ticks;                     // of the whole move, from where it was made or retargeted
+    uint8_t count;                      // events, or sections of stairs
+    uint8_t next;                       // first of them not yet taken; `count`: nothing is left
+    uint8_t cause;                      // planner_cause: why the last request was refused
+    bool stairs;
+    struct planner_place at;
+    union {
+        struct planner_event event[PLANNER_EVENTS];
+        struct planner_segment section[PLANNER_SECTIONS];   // `jerk` + 1 stairs of constant velocity, `acceleration` apart
+    };
 };
 
 struct planner_stairs {                 // S4: velocity in steps of constant duration, three sections up and three down
@@ -59,9 +83,15 @@ struct planner_stairs {                 // S4: velocity in steps of constant dur
     uint32_t ticks;                     // of a step
 };
 
-// The limits in units of the player from period/s, period/s^2, period/s^3; rounded down, and jerk held to 31 bits.
-uint64_t planner_velocity(uint32_t velocity);
+// In units of the player from 2^-16 period/s; rounded down.
+uint64_t planner_velocity(uint64_t velocity);
+
+// The limits from period/s, period/s^2, period/s^3; rounded down, and jerk held to 31 bits.
 struct planner_limits planner_limits(uint32_t velocity, uint32_t acceleration, uint32_t jerk);
+
+// How fast an override may change while a plan is played, so that this adds a quarter of acceleration and jerk at most:
+// 2^-32 per tick, and per tick^2 (0: not limited).
+void planner_override(const struct planner_limits *limits, uint32_t *slope, uint32_t *curve);
 
 // From rest to rest over `distance` (2^-16 period). false: refused, plan->cause says why.
 bool planner_move(struct plan *plan, const struct planner_limits *limits, int64_t distance);
@@ -69,15 +99,17 @@ bool planner_move(struct plan *plan, const struct planner_limits *limits, int64_
 // The same with S4's seven sections.
 bool planner_climb(struct plan *plan, const struct planner_stairs *stairs, int64_t distance);
 
-// S4's borders between first and top: 1:2:3 of the climb, or as its paper prints them.
-void planner_borders(struct planner_stairs *stairs, bool as_printed);
+// Where sections 2 and 3 begin, 2^-16 of the way from first to top. S4: 1/6 and 1/2, which is 1:2:3; 1/6 and 1/3 as its paper prints it.
+void planner_borders(struct planner_stairs *stairs, uint32_t second, uint32_t third);
 
 // Where the plan is when `ticks` more than those taken have been played.
 struct planner_state planner_state_after(const struct plan *plan, uint32_t ticks);
 
-// From the state behind all that was taken, which must not have been the last piece, to rest at `distance` (2^-16 period) from
-// where the plan began. false: refused, plan->cause says why, and the plan goes on as it was.
-bool planner_retarget(struct plan *plan, const struct planner_limits *limits, int64_t distance);
+// The plan that goes on from where `plan` is when `ticks` more than those taken have been played, which must not be its end, to
+// rest at `distance` (2^-16 period) from where `plan` began. false: refused, made->cause says why. It takes its time, so it calls
+// `meanwhile` now and then, if that is not null; this may take pieces of `plan`.
+bool planner_retarget(struct plan *made, const struct plan *plan, uint32_t ticks, const struct planner_limits *limits, int64_t distance,
+                      void (*meanwhile)(void));
 
 // The next piece to queue, of so many ticks at most; *last tells that the plan ends with it. false: nothing is left.
 bool planner_take_up_to(struct plan *plan, struct planner_segment *piece, bool *last, uint32_t longest);

@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x1f6961d1u            // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0x420f3daau            // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define LINE_BASE 0x100u
@@ -187,7 +187,7 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define LINE_CRC_MASK                                  0xffffffffu
 #define LINE_CRC_SHIFT                                 0
 #define LINE_CRC_WIDTH                                 32
-#define LINE_WATCHDOG_TIME                             0x030u  // rw: longest silence of the master while a drive is enabled; 0 reads as the longest [0.001 s]
+#define LINE_WATCHDOG_TIME                             0x030u  // rw: longest silence of the master while a drive is enabled; 0: for ever [0.001 s]
 #define LINE_WATCHDOG_TIME_MASK                        0x0000ffffu
 #define LINE_WATCHDOG_TIME_SHIFT                       0
 #define LINE_WATCHDOG_TIME_WIDTH                       16

@@ -317,6 +317,11 @@ uint32_t store_generation(void)
     return store_state() == STORE_LOADING ? 0 : programs[newest].generation;
 }
 
+uint32_t store_identity(void)
+{
+    return store_stations() ? programs[newest].angle[programs[newest].stations] : 0;
+}
+
 const struct store_record *store_record(void)
 {
     return &last;
@@ -377,7 +382,7 @@ uint8_t store_note(uint16_t station, enum store_step step)
 {
     uint8_t refused = may_write();
     if (refused != LINE_CAUSE_OK) return refused;
-    candidate = (struct store_record){.sequence = last.sequence + 1, .generation = programs[newest].generation,
+    candidate = (struct store_record){.sequence = last.sequence + 1, .program = store_identity(),
                                       .station = station, .step = (uint16_t)step};
     seal_record();
     noting = true;

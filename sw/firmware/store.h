@@ -13,7 +13,7 @@ enum store_step { STORE_NOTHING, STORE_STARTED, STORE_INDEXED, STORE_CUT_BEGUN, 
 
 struct store_record {                   // a line of the journal, as in the EEPROM
     uint32_t sequence;                  // each has one more; 0: the journal is empty
-    uint32_t generation;                // of the program
+    uint32_t program;                   // store_identity then
     uint16_t station;
     uint16_t step;                      // store_step
     uint32_t crc;
@@ -31,6 +31,7 @@ bool store_torn(void);                  // one copy of the program was found dam
 uint16_t store_stations(void);
 uint32_t store_angle(unsigned station); // 0.01 arcsec
 uint32_t store_generation(void);
+uint32_t store_identity(void);          // its CRC-32
 
 const struct store_record *store_record(void);             // the last line of the journal
 

@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from experiments import parser_fuzz
-from experiments.figures_door import FIRMWARE, fuzz_firmware
+from experiments.figures_door import FIRMWARE, fuzz_firmware, images
 from moire.errors import BadFile
 
 
@@ -46,9 +46,10 @@ needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="the firmware
 
 
 @needs_gcc
-def test_the_firmware_stands_a_short_fuzz():
-    runs, said = fuzz_firmware(5)
-    assert said is None and runs > 500
+@pytest.mark.parametrize("image", images())
+def test_the_firmware_stands_a_short_fuzz(image):
+    outcome = fuzz_firmware(5, image)
+    assert outcome.said is None and outcome.runs > 500
 
 
 @needs_gcc
@@ -59,5 +60,5 @@ def test_a_missing_bound_in_the_firmware_is_found(tmp_path):
     wrong = right.replace("if (!receiving || received == sizeof request) continue;", "if (!receiving) continue;")
     assert wrong != right
     (copy / "line.c").write_text(wrong)
-    _, said = fuzz_firmware(60, firmware=copy)
+    said = fuzz_firmware(60, "axis", firmware=copy).said
     assert said is not None and "index 69 out of bounds" in said and "input:" in said, said

@@ -12,7 +12,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "sw" / "firmware"
 BRIDGE = Path(__file__).with_name("register_bridge.c")
-SEGMENTS = 20
+EVENTS, SECTIONS = 60, 9
 
 
 class Limits(ctypes.Structure):
@@ -23,13 +23,26 @@ class Segment(ctypes.Structure):
     _fields_ = [("velocity", ctypes.c_int64), ("acceleration", ctypes.c_int64), ("jerk", ctypes.c_int32), ("ticks", ctypes.c_uint32)]
 
 
-class Plan(ctypes.Structure):
-    _fields_ = [("ticks", ctypes.c_uint32), ("count", ctypes.c_uint8), ("next", ctypes.c_uint8), ("cause", ctypes.c_uint8),
-                ("stairs", ctypes.c_bool), ("into", ctypes.c_uint32), ("gone", ctypes.c_uint64), ("segment", Segment * SEGMENTS)]
-
-
 class State(ctypes.Structure):
     _fields_ = [("gone", ctypes.c_uint64), ("velocity", ctypes.c_int64), ("acceleration", ctypes.c_int64)]
+
+
+class Event(ctypes.Structure):
+    _fields_ = [("jerk", ctypes.c_int64), ("tick", ctypes.c_uint32), ("velocity", ctypes.c_int8), ("acceleration", ctypes.c_int8),
+                ("place", ctypes.c_uint8)]
+
+
+class Place(ctypes.Structure):
+    _fields_ = [("state", State), ("jerk", ctypes.c_int64), ("landing", ctypes.c_int64), ("tick", ctypes.c_uint32)]
+
+
+class Steps(ctypes.Union):
+    _fields_ = [("event", Event * EVENTS), ("section", Segment * SECTIONS)]
+
+
+class Plan(ctypes.Structure):
+    _fields_ = [("ticks", ctypes.c_uint32), ("count", ctypes.c_uint8), ("next", ctypes.c_uint8), ("cause", ctypes.c_uint8),
+                ("stairs", ctypes.c_bool), ("at", Place), ("steps", Steps)]
 
 
 class Stairs(ctypes.Structure):
@@ -60,13 +73,16 @@ def library(image="axis"):
     loaded = ctypes.CDLL(str(result))
     loaded.planner_limits.restype = Limits
     loaded.planner_move.restype = loaded.planner_take.restype = ctypes.c_bool
-    for name in ("planner_move", "planner_retarget"):
-        getattr(loaded, name).argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Limits), ctypes.c_int64]
-        getattr(loaded, name).restype = ctypes.c_bool
+    loaded.planner_move.argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Limits), ctypes.c_int64]
+    loaded.planner_retarget.argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Plan), ctypes.c_uint32, ctypes.POINTER(Limits),
+                                        ctypes.c_int64, ctypes.c_void_p]
+    loaded.planner_move.restype = loaded.planner_retarget.restype = ctypes.c_bool
     loaded.planner_climb.argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Stairs), ctypes.c_int64]
     loaded.planner_climb.restype = ctypes.c_bool
-    loaded.planner_borders.argtypes, loaded.planner_borders.restype = [ctypes.POINTER(Stairs), ctypes.c_bool], None
+    loaded.planner_borders.argtypes, loaded.planner_borders.restype = [ctypes.POINTER(Stairs), ctypes.c_uint32, ctypes.c_uint32], None
     loaded.planner_state_after.argtypes, loaded.planner_state_after.restype = [ctypes.POINTER(Plan), ctypes.c_uint32], State
+    loaded.planner_override.argtypes = [ctypes.POINTER(Limits), ctypes.POINTER(ctypes.c_uint32), ctypes.POINTER(ctypes.c_uint32)]
+    loaded.planner_override.restype = None
     loaded.planner_take_up_to.argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Segment), ctypes.POINTER(ctypes.c_bool), ctypes.c_uint32]
     loaded.planner_take_up_to.restype = ctypes.c_bool
     return loaded

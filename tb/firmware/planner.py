@@ -33,7 +33,7 @@ def peaks(plan):
     """Largest |step| and its largest first and second difference, from and to rest.
 
     Inside a segment the second difference is constant and the first is monotone, so three steps at either end of each tell all,
-    as long as the first difference keeps its sign; where it does not, every step is looked at.
+    and those where the first difference changes its sign.
     """
     peak = [0, 0, 0]
     before = [0, 0]                                             # the two steps before
@@ -41,7 +41,8 @@ def peaks(plan):
     for segment in [*plan, rest]:
         velocity, acceleration, jerk, ticks = segment
         turns = acceleration * (acceleration + jerk * (ticks - 1)) < 0
-        near = range(ticks) if turns or ticks <= 6 else [0, 1, 2, ticks - 3, ticks - 2, ticks - 1]
+        turn = abs(acceleration // jerk) if turns else 0
+        near = sorted({n for middle in (1, turn, ticks - 2) for n in range(middle - 2, middle + 3) if 0 <= n < ticks})
         last = -1
         for n in near:
             if n != last + 1:                                   # a gap: start the differences afresh

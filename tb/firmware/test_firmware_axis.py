@@ -274,7 +274,7 @@ def test_a_drive_that_was_not_built_is_refused():
 def test_a_move_of_days_is_refused():
     machine = homed()
     machine.set(velocity=1, travel_high=2**46)
-    assert machine.request("move", axis=0, target=2**46)[0] == "out_of_range"
+    assert machine.request("move", axis=0, target=2**46)[0] == "too_long"
     assert machine.status()["state"] == "holding"
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from bench import seed
 from fake_machine import DEFINES, PARAMETER, PERIOD, Axis, Machine
+from planner import limits, steps
 
 TRAVEL = {"travel_low": -5000 * PERIOD, "travel_high": 20_000 * PERIOD, "home_method": 37, "position_source": 1}
 FINE = DEFINES["AXIS_CONTROL_FINE_MASK"]
@@ -30,7 +31,7 @@ def finish(machine, axis=0, ms=20_000):
 
 # feeding
 
-def test_what_is_queued_lasts_16_ms_and_900_000_clk_and_a_piece():
+def test_what_is_queued_lasts_16_ms_and_150_000_clk_and_a_piece():
     machine = homed()
     axis = machine.axes[0]
     axis.pushed = []
@@ -39,7 +40,7 @@ def test_what_is_queued_lasts_16_ms_and_900_000_clk_and_a_piece():
     while machine.status()["state"] == "moving":
         machine.run(1)
         most = max(most, sum(segment[3] for segment in axis.player.queue))
-    assert 4 * (16 + 225) - 16 < most < 4 * (16 + 225) + 128
+    assert 4 * (16 + 37.5) - 16 < most < 4 * (16 + 37.5) + 128
     lengths = [segment[3] for segment in axis.pushed]
     assert sum(lengths) == ticks and max(lengths) <= 128
     assert [segment[4] for segment in axis.pushed] == [0] * (len(axis.pushed) - 1) + [1]
@@ -83,14 +84,92 @@ def test_a_move_that_settles_gives_way_to_the_next_one():
 
 # override
 
-def test_a_change_of_the_override_adds_no_more_than_a_quarter_of_the_acceleration():
-    machine = homed()
+@pytest.mark.parametrize("jerk", [10**6, 12_500_000, 10**9])
+def test_a_change_of_the_override_adds_no_more_than_a_quarter_of_acceleration_and_jerk(jerk):
+    machine = homed(jerk=jerk)
     machine.ask("move", axis=0, target=3000 * PERIOD)
     machine.set(override=32768)
-    assert machine.axes[0].word[DEFINES["AXIS_OVERRIDE"]] == 32768
-    slope = machine.axes[0].word[DEFINES["AXIS_OVERRIDE_SLOPE"]]
+    word = machine.axes[0].word
+    assert word[DEFINES["AXIS_OVERRIDE"]] == 32768
+    slope, curve = word[DEFINES["AXIS_OVERRIDE_SLOPE"]] / 2**32 * 4000, word[DEFINES["AXIS_OVERRIDE_CURVE"]] / 2**32 * 4000**2
     velocity, acceleration = (PARAMETER[name]["default"] for name in ("velocity", "acceleration"))
-    assert abs(slope / 2**32 * 4000 * velocity / (acceleration / 4) - 1) < 1e-3       # a quarter of the acceleration, no more
+    of_acceleration, of_jerk = velocity * slope / acceleration, (3 * acceleration * slope + velocity * curve) / jerk
+    assert max(of_acceleration, of_jerk) <= 0.25 and (of_acceleration > 0.2499 or of_jerk > 0.2499)
+
+
+# profiles
+
+def played_steps(axis):
+    """The step of each tick, 2^-40 period, of all pieces pushed."""
+    return [step for velocity, acceleration, jerk, ticks, _ in axis.pushed for step in steps([(velocity, acceleration, jerk, ticks)])]
+
+
+def test_a_trapezoid_is_at_full_acceleration_within_three_ticks_and_brakes_without_a_limit_of_jerk():
+    machine = homed(profile=1)
+    axis = machine.axes[0]
+    axis.pushed = []
+    ticks = machine.ask("move", axis=0, target=700 * PERIOD)["duration_ticks"]
+    assert finish(machine) == "ok" and axis.target == 700 * PERIOD
+    velocity, acceleration, _ = limits(*(PARAMETER[name]["default"] for name in ("velocity", "acceleration", "jerk")))
+    every = [0, *played_steps(axis), 0]
+    slopes = [b - a for a, b in zip(every, every[1:])]
+    assert max(map(abs, slopes)) <= acceleration and max(every) <= velocity and slopes[4] > 0.99 * acceleration
+    assert ticks <= (700 << 40) / velocity + velocity / acceleration + 4 + 1e-3 * len(every)
+    assert axis.word[DEFINES["AXIS_BRAKE_JERK"]] == 0
+    machine.set(profile=0)
+    assert axis.word[DEFINES["AXIS_BRAKE_JERK"]] == limits(1, 1, PARAMETER["jerk"]["default"])[2]
+
+
+@pytest.mark.parametrize("border_3, sections", [(32768, (400, 1200)), (21846, (400, 800))])
+def test_stairs_climb_as_in_s4_and_come_down_the_mirror(border_3, sections):
+    """f0 = 50, top 2450, rises of 50, 100, 200 period/s every 20 ms; sections 2 and 3 begin at 1/6 and 1/2, or 1/3, of the climb."""
+    rates = {"first": 50, "rise_1": 50, "rise_2": 100, "rise_3": 200}
+    machine = homed(profile=2, velocity=2450, stairs_border_3=border_3, **{f"stairs_{name}": rate * 65536 for name, rate in rates.items()})
+    axis = machine.axes[0]
+    axis.pushed = []
+    machine.ask("move", axis=0, target=3000 * PERIOD)
+    assert finish(machine) == "ok" and axis.target == 3000 * PERIOD
+    every = played_steps(axis)[1:]                                   # the first is that of rest
+    climb = [round(step * 4000 / 2**40) for step in every[:len(every) // 2:80]]
+    wanted = [50]
+    while wanted[-1] < 2450:
+        wanted.append(wanted[-1] + (50 if wanted[-1] < 50 + sections[0] else 100 if wanted[-1] < 50 + sections[1] else 200))
+    wanted = [step for step in wanted if step <= 2450]
+    assert climb[:len(wanted) - 1] == wanted[:-1]
+    assert all(len(set(every[n:n + 80])) == 1 for n in range(0, 80 * (len(wanted) - 1), 80))
+    down = every[::-1]
+    assert [round(step * 4000 / 2**40) for step in down[:80 * (len(wanted) - 1):80]] == wanted[:-1]
+    assert all(piece[1:3] == (0, 0) for piece in axis.pushed)
+
+
+def test_stairs_go_on_to_where_they_were_going():
+    machine = homed(profile=2, velocity=2450)
+    machine.ask("move", axis=0, target=3000 * PERIOD)
+    machine.run(100)
+    assert machine.request("move", axis=0, target=100 * PERIOD)[0] == "busy"
+    assert machine.request("set_parameter", axis=0, parameter=PARAMETER["profile"]["id"], value=0)[0] == "busy"
+    assert finish(machine) == "ok" and machine.axes[0].target == 3000 * PERIOD
+
+
+def test_a_short_way_on_stairs_and_a_low_velocity_keep_their_speed():
+    machine = homed(profile=2, velocity=2450)
+    axis = machine.axes[0]
+    for velocity, way in ((2450, PERIOD // 4), (5, 3 * PERIOD)):
+        machine.set(velocity=velocity)
+        axis.pushed = []
+        machine.ask("move", axis=0, target=axis.target + way)
+        assert finish(machine) == "ok"
+        every = played_steps(axis)[1:]
+        assert max(every) - min(every) <= 1 and max(every) <= min(12.5, velocity) * 2**40 / 4000
+
+
+@pytest.mark.parametrize("wrong", [{"stairs_border_2": 40_000}, {"stairs_rise_1": 1, "stairs_rise_2": 1, "stairs_rise_3": 1}])
+def test_stairs_that_cannot_be_climbed_are_refused_with_their_cause(wrong):
+    machine = homed(profile=2, velocity=2450, **wrong)
+    assert machine.request("move", axis=0, target=15_000 * PERIOD)[0] == "no_stairs"
+    machine.set(profile=0)
+    machine.ask("move", axis=0, target=15_000 * PERIOD)
+    assert finish(machine) == "ok"
 
 
 # fine stage

@@ -412,7 +412,8 @@ def test_a_sub_node_that_still_turns_is_stopped_first():
     sub.phase, sub.ended, sub.target = 3, "running", 5
     node.order(0, 600)
     sub.run(500)
-    assert sub.operations()[:5] == ["index_state", "stop", "index_state", "set_parameter", "index_to"] and node.peer()["phase"] == "indexing"
+    assert sub.operations()[:5] == ["index_state", "stop", "index_state", "set_parameter", "index_to"]
+    assert node.peer()["phase"] == "indexing"
 
 
 def test_a_sub_node_that_never_comes_to_rest_is_busy():

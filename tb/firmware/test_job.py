@@ -408,6 +408,23 @@ def test_no_cut_begins_that_is_not_in_the_journal():
     assert cuts(station) == STATIONS
 
 
+def test_another_eeprom_in_the_middle_of_a_job_is_refused():
+    other = node(angles=[1, 2]).eeprom
+    station = node()
+    start(station, "indexing")
+    mine = station.bus.devices.pop(0x50)
+    station.until("paused")
+    station.bus.devices[0x50] = other
+    station.run(4000)
+    assert station.do("resume") == "program_changed" and station.job()["answers"] == {"stop"} and cuts(station) == 0
+    station.bus.devices.pop(0x50)
+    station.power_cut()
+    station.bus.devices[0x50] = mine
+    assert station.ready()["state"] == "paused" and station.do("resume") == "ok"
+    station.until("finished")
+    assert cuts(station) == STATIONS
+
+
 def test_a_cut_whose_end_cannot_be_noted_is_asked_about():
     station = node()
     start(station, "cutting")

@@ -9,8 +9,8 @@ class SilenceWatchdog:
     def clk(self, rst=0, time_ms=0, sign=0, armed=0):
         if rst or sign or not armed:
             self.silent = self.expired = 0
-        elif self.silent // self.clk_ms >= (time_ms or 65536):
+        elif time_ms and self.silent >= time_ms * self.clk_ms:
             self.expired = 1
-        else:
+        elif self.silent < 65535 * self.clk_ms:
             self.silent += 1
         return self.expired

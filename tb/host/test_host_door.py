@@ -9,9 +9,11 @@ import random
 import socket
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 import serial
+import serial.rfc2217
 
 from fake_node import FakeLine, FakeNode
 from moire import cobs, command_line
@@ -23,6 +25,7 @@ from moire.transport import CobsLine, SerialLine, open_line
 
 pytestmark = pytest.mark.filterwarnings("ignore:set(Daemon|Name).. is deprecated:DeprecationWarning")      # in pyserial
 SEED = int(os.environ.get("SEED") or 1)
+HANG_S = 60                      # what has not come by then never will
 
 
 class Served:
@@ -34,14 +37,20 @@ class Served:
         host = "127.0.0.1"
         self.ports = {"rfc2217": f"rfc2217://{host}:{self.door.open_rfc2217(host, 0)}",
                       "tcp": f"socket://{host}:{self.door.open_tcp(host, 0)}", "terminal": self.door.open_pty()}
-        self.ending = False
+        self.ending, self.looked = False, threading.Condition()
         self.thread = threading.Thread(target=self.run)
         self.thread.start()
 
     def run(self):
         while not self.ending:
             self.door.look(self.door.pace())
+            with self.looked:
+                self.looked.notify_all()
         self.door.close()
+
+    def wait_until(self, true):
+        with self.looked:
+            assert self.looked.wait_for(true, HANG_S), "waited in vain"
 
     def end(self):
         self.ending = True
@@ -91,24 +100,22 @@ def test_every_byte_arrives_with_the_ninth_bit_it_was_sent_with(served):
     sent = [source.randrange(512) for _ in range(60)] + [0xFF, 0x1FF, 0xF0, 0x1FA]
     with opened(served, "rfc2217", "mark") as port:
         port.send(sent)
-        wait_until(lambda: len(words) == len(sent))
+        served.wait_until(lambda: len(words) == len(sent))
     assert words == sent
 
 
-def wait_until(true, seconds=5):
-    end = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.002)
-
-
-def test_a_change_of_parity_over_rfc2217_costs_no_time(served):
+def test_a_change_of_parity_over_rfc2217_waits_for_nothing(served, monkeypatch):
+    """pyserial's own setter sleeps until the far end has agreed."""
+    def sleep(seconds):
+        raise AssertionError(f"slept {seconds} s")
     with opened(served, "rfc2217", "mark") as port:
-        port.LATENCY_S = 0.0
-        axis, began = Line(port).axis(), time.monotonic()
-        for _ in range(20):                   # four changes each; pyserial's own setter takes 0.15 s for one
-            axis.status()
-        assert time.monotonic() - began < 20 * 0.15
+        axis = Line(port).axis()
+        with monkeypatch.context() as patch:
+            patch.setattr(serial.rfc2217, "time", SimpleNamespace(time=time.time, sleep=sleep))
+            for _ in range(20):               # four changes each
+                axis.status()
+            with pytest.raises(AssertionError, match="slept"):
+                port.port.parity = serial.PARITY_ODD
 
 
 def test_the_stock_client_alone_reads_a_position_in_8n1(served):
@@ -178,7 +185,7 @@ def test_a_client_that_goes_is_forgotten(served):
     for _ in range(3):
         with opened(served, "tcp") as port:
             Line(port).node()
-    wait_until(lambda: len(served.door.clients) == 1)       # the terminal stays
+    served.wait_until(lambda: len(served.door.clients) == 1)       # the terminal stays
 
 
 # ------------------------------------------------------------------ what can be wrong
@@ -221,7 +228,7 @@ def test_a_port_unplugged_in_mid_move_is_one_sentence_that_says_who_stops_the_ax
     served = Served()
     node = served.far.nodes[0]
     node.axes[0].homed = True
-    threading.Thread(target=lambda: (wait_until(lambda: "move" in node.executed), served.end())).start()
+    threading.Thread(target=lambda: (served.wait_until(lambda: "move" in node.executed), served.end())).start()
     said = complaint(f"--port {served.ports[entrance]} move 100mm", 4)
     assert served.ports[entrance] in said and "axis 0 of node 1 could not be told to stop, its watchdog has to" in said
 

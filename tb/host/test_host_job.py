@@ -10,7 +10,7 @@ from moire import command_line
 from moire.client import Line
 from moire.errors import BadFile, OutOfRange, Refused
 from moire.job import Job, equal_parts, read_stations
-from station import Station, SubNode
+from station import OPERATION, Station, SubNode
 
 ADDRESS = 2
 
@@ -106,6 +106,17 @@ def test_a_question_is_told_and_answered():
     workshop.station.edm.deaf = False
     assert workshop.call("job answer again")[0] == 0
     assert workshop.call("job wait")[0] == 0 and len(workshop.station.edm.cuts) == 2
+
+
+def test_waiting_asks_the_table_too():
+    workshop, operations = Workshop(), []
+    workshop.call("job load --equal 2")
+    hear = workshop.station.hear
+    workshop.station.hear = lambda words: operations.append(words[2] if len(words) > 2 else None) or hear(words)
+    assert workshop.call("job start --wait")[0] == 0 and OPERATION["status"] not in operations
+    assert workshop.call("job start --wait --table 2")[0] == 0 and operations.count(OPERATION["status"]) > 20
+    code, _, complained = workshop.call("job wait --table 3")
+    assert code == 3 and "address 3" in complained
 
 
 def test_pause_resume_and_stop_from_the_command_line():

@@ -2,12 +2,12 @@
 """transport: the parity of each byte, and what a port that does not open says."""
 import errno
 import os
-import time
 
 import pytest
 import serial
 
 from fake_node import FakeNode
+from moire import transport
 from moire.client import Line
 from moire.errors import PortError
 from moire.protocol import ODD_ADDRESSES
@@ -188,17 +188,33 @@ def test_receive_ends_when_its_time_has_passed():
     assert line.receive(3, 0.03) == [] and 0.02 < line.now() - began < 1
 
 
-def test_an_answer_with_gaps_is_read_whole_and_its_end_is_still_seen():
-    """As from a USB adapter that hands over its bytes every 16 ms: each gap is longer than the time that the answer should take."""
+class Clock:
+    """Stands for the module time: passes only where it is told to."""
+
+    def __init__(self):
+        self.now = 0.0
+
+    def monotonic(self):
+        return self.now
+
+    def sleep(self, seconds):
+        self.now += seconds
+
+
+def test_an_answer_with_gaps_is_read_whole_and_its_end_is_still_seen(monkeypatch):
+    """As from a USB adapter that hands over its bytes every 16 ms: all gaps together are longer than the answer may take."""
     line, port = serial_line()
-    began, chunks = time.monotonic(), [bytes([n]) * 3 for n in range(5)]
+    clock, chunks = Clock(), [bytes([n]) * 3 for n in range(5)]
+    monkeypatch.setattr(transport, "time", clock)
 
     def read(count):
-        if chunks and time.monotonic() > began + 0.016 * (6 - len(chunks)):
+        if chunks and clock.now > 0.016 * (6 - len(chunks)):
             port.answers += chunks.pop(0)
+        if not port.answers:
+            clock.sleep(0.001)
         taken, port.answers = bytes(port.answers[:count]), port.answers[count:]
-        time.sleep(0.0005)
         return taken
     port.read = read
     assert line.receive(100, 0.02) == [n for n in range(5) for _ in range(3)]
-    assert time.monotonic() - began < 0.016 * 6 + line.GAP_S + 0.1
+    assert clock.now == pytest.approx(0.016 * 5 + line.GAP_S, abs=0.005)
+    assert line.receive(1, 0.02) == [] and clock.now == pytest.approx(0.016 * 5 + line.GAP_S + 0.02, abs=0.006)

@@ -85,6 +85,22 @@ def test_five_moves_reach_their_targets(stage):
         assert abs(move.reached_nm - target_nm) <= BOUND_NM, move
 
 
+def test_targets_that_change_in_flight_leave_the_queue_filled(stage):
+    """The soft core goes on feeding while it plans: the profile never runs out, and the axis ends at the last target."""
+    axis, transport = stage.axes["X"], stage.line.transport
+    targets, longest = (3e6, 3.000_01e6, 1e6, 2.5e6, -0.02e6), 0.0
+    for target_nm in targets:
+        began = transport.now()
+        axis.request("move", target=axis.to_counts(target_nm))
+        longest = max(longest, transport.now() - began)
+        stage.let_pass(0.02)
+    axis.wait(stage.keep("X"))
+    status = axis.status()
+    assert not status.faults and abs(status.target_nm - targets[-1]) < 1 and abs(stage.true_nm("X") - targets[-1]) <= BOUND_NM
+    print(f"answered within {longest * axis.node.identity.clk_hz / 1e3:.0f} 000 clk")
+    assert longest * axis.node.identity.clk_hz < 900_000
+
+
 def test_homing_again_finds_the_same_zero(stage):
     zero = stage.zero_nm["X"]
     stage.move("X", 0.1e6)

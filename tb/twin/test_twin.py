@@ -7,7 +7,7 @@ import pytest
 
 from twin import Axis, BuildError, FrameBench, Node, Twin, TwinTransport, build, cells_of
 
-START_S = 0.1                    # the firmware starts
+START_S = 0.15                  # the firmware starts
 ASK = {1: 0x111, 2: 0x112}       # "slave, send data": 00 01 address, 9th bit 1
 
 
@@ -203,9 +203,9 @@ def test_a_node_drives_any_machine():
 
 def test_axes_of_one_node_have_machines_of_their_own():
     with Twin([Node(1, [Axis("stage"), Axis("worm_table")]), Node(2)], seed=1) as twin:
-        twin.run(0.15)                                         # a second axis takes the firmware longer to start
+        twin.run(0.25)                                         # a second axis takes the firmware longer to start
         assert [machine.kind for machine in twin.machines] == ["stage", "worm_table", "stage", "unconnected"]
-        assert twin.truth(1).sensor_frames == 15 and twin.truth(3).time_s == twin.time()
+        assert twin.truth(1).sensor_frames == 25 and twin.truth(3).time_s == twin.time()
         assert ask(twin, 1) == empty_reply(1) and ask(twin, 2) == empty_reply(2)
         twin.push(0, 30.0)
         before = [twin.truth(n).position_m for n in (0, 2)]
@@ -246,7 +246,7 @@ def test_a_firmware_file_is_read_with_its_addresses(tmp_path):
 
 def test_the_frame_bench_gives_the_answers_of_the_twin():
     bench = FrameBench(address=1)
-    bench.idle(60_000)                   # the firmware starts
+    bench.idle(120_000)                  # the firmware starts
     question = cells_of([ASK[1]])
     assert bench.exchange(question) == empty_reply(1)
     for cell in range(1, 10):

@@ -27,7 +27,11 @@ def add_to(group, command):
     command("status", do_status, "what the job does, why it waits, and for which answers", "moire --port /dev/ttyUSB0 job status", job)
     start = command("start", do_start, "cut all stations from the first one on", "moire --port /dev/ttyUSB0 job start --wait", job)
     start.add_argument("--wait", action="store_true", help="until all are cut; ends with 1 when a person has to answer")
-    command("wait", do_wait, "until all are cut; ends with 1 when a person has to answer", "moire --port /dev/ttyUSB0 job wait", job)
+    wait = command("wait", do_wait, "until all are cut; ends with 1 when a person has to answer",
+                   "moire --port /dev/ttyUSB0 job wait --table 2", job)
+    for waits in (start, wait):
+        waits.add_argument("--table", type=int, metavar="N", help="address of the sub-node: it is asked too, so that its line watchdog "
+                                                                  "leaves its drive on")
     for name, text in (("pause", "stand before the next cut"), ("resume", "go on"), ("stop", "end the job; a cut under way goes on")):
         command(name, do_action, text, f"moire --port /dev/ttyUSB0 job {name}", job)
     answer = command("answer", do_answer, "what to do with a station of which it is not known whether it was cut",
@@ -75,7 +79,8 @@ def do_start(session, options):
 
 
 def do_wait(session, options):
-    state = job_of(session, options).wait()
+    table = None if options.table is None else session.line.axis(options.table)
+    state = job_of(session, options).wait(table and (lambda state: table.status()))
     say_state(session, state)
     if state.cause != "ok":
         raise MotionFailed(state.cause, CAUSE_CODES[state.cause], f"the job waits: {state.cause_words}")

@@ -20,11 +20,12 @@ from . import rfc2217
 from .client import Line
 from .cobs import PacketReader, address_of, body_of, sealed
 from .errors import PortError
-from .protocol import NINTH, TO_NODE, Exchange, Timing
+from .protocol import CRC_LENGTH, FROM_NODE, NINTH, TO_NODE, Exchange, Timing
 from .transport import BITS, Transport, plain
 
 ANSWER_S = 0.05              # patience with a node; the client asks again
-HOLD_S = 0.01                # after the last word of a 9-bit client, before packets have their turn
+HOLD_S = 0.1                 # of the clock, that packets wait for a 9-bit client in the middle of an exchange
+REPLY_S = 0.01               # of the line's time, that a 9-bit client's words are answered in; it may run ahead of the clock for so long
 PIECE_S = 0.00025            # of the line's time between two looks at the clients
 LARGEST_DEBT_S = 0.01        # of a line that cannot keep up: what it is behind beyond this is forgotten
 RECEIVE = 4096
@@ -34,7 +35,8 @@ class Door:
     def __init__(self, transport: Transport):
         self.transport, self.line = transport, Line(transport)
         self.selector, self.clients, self.waiting = selectors.DefaultSelector(), [], deque()
-        self.ninth_client, self.busy_until = None, 0.0
+        self.ninth_client, self.reply = None, None     # the 9-bit client that spoke last, and its reply as far as it has come
+        self.held_until = self.ahead_until = 0.0
         self.refused = 0               # packets that were none, or no request
         self.origin = time.monotonic() - transport.now()
         self.own_baud = self.baud = round(BITS / transport.character_s)
@@ -89,7 +91,7 @@ class Door:
             self.selector.unregister(client.stream)
             client.stream.close()
         if client is self.ninth_client:
-            self.ninth_client = None
+            self.ninth_client, self.held_until = None, 0.0
 
     # service
 
@@ -111,18 +113,19 @@ class Door:
     @property
     def idle(self) -> bool:
         """No exchange of a 9-bit client is under way."""
-        return self.transport.now() >= self.busy_until
+        return time.monotonic() >= self.held_until
 
     def pace(self) -> float:
         """Lets the line live as long as the clock went on; returns how long it may rest then."""
         if not self.transport.time_stands:
             return PIECE_S
-        behind = time.monotonic() - self.origin - self.transport.now()
+        now = self.transport.now()
+        behind, ahead = time.monotonic() - self.origin - now, now < self.ahead_until and not self.idle
         if behind > LARGEST_DEBT_S:
             self.origin += behind - LARGEST_DEBT_S
-        if behind > 0 or not self.idle:
+        if behind > 0 or ahead:
             self.transport.wait(PIECE_S)
-        return 0 if behind > PIECE_S or self.waiting or not self.idle else PIECE_S
+        return 0 if behind > PIECE_S or ahead or self.waiting and self.idle else PIECE_S
 
     def close(self):
         for client in list(self.clients):
@@ -142,14 +145,27 @@ class Door:
     def hear_words(self, client, words: list, baud: int):
         """Words of a 9-bit client, straight to the line; what comes back is for who spoke last."""
         self.ninth_client = client
+        if any(word & NINTH for word in words):
+            asks = words[-1] & NINTH and words[-1] >> 4 & 3 == FROM_NODE
+            self.reply = [] if asks else None
         self.speak_at(baud)
         self.transport.send(words)
-        self.busy_until = self.transport.now() + HOLD_S
+        self.hold()
+
+    def hold(self):
+        self.held_until = time.monotonic() + HOLD_S
+        self.ahead_until = self.transport.now() + REPLY_S
 
     def forward(self, words: list):
-        if words:
-            self.busy_until = self.transport.now() + HOLD_S
-            self.ninth_client.send(bytes(word & 0xFF for word in words))
+        """To the 9-bit client; a whole reply ends its exchange."""
+        if not words:
+            return
+        self.ninth_client.send(bytes(word & 0xFF for word in words))
+        self.hold()
+        if self.reply is not None:
+            self.reply += words
+            if len(self.reply) > 1 and len(self.reply) >= 2 + self.reply[1] + CRC_LENGTH:
+                self.reply, self.held_until = None, 0.0
 
     def hear_packet(self, client, content: bytes):
         """A client that asks again has given up what it asked before."""
@@ -163,7 +179,7 @@ class Door:
     def answer(self, address: int, body: bytes) -> bytes:
         """The reply as a packet; nothing where the node does not answer."""
         self.speak_at(self.own_baud)
-        timing = Timing(self.transport.character_s, answer=ANSWER_S, quiet=max(HOLD_S, 3 * self.transport.character_s))
+        timing = Timing(self.transport.character_s, answer=ANSWER_S, quiet=max(REPLY_S, 3 * self.transport.character_s))
         exchange = self.line.carry(Exchange(address, body, tries=1, timing=timing))
         return sealed(bytes(exchange.received)) if exchange.reply else b""
 

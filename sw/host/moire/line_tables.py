@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x73BC63B6
+PROTOCOL_CRC = 0x692B6460
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -53,6 +53,8 @@ CAUSES = {
     21: ("no_index", "no index was found within the home distance"),
     22: ("not_prepared", "the axis has no motion prepared"),
     23: ("not_built", "this node was built without that"),
+    24: ("too_long", "the motion would take days, or go too far for a change of target"),
+    25: ("no_stairs", "the stairs of this profile are not in order, or too many"),
     30: ("sensor_dead", "no good frame came from the angle sensor: check its power and its cable"),
     31: ("sensor_stuck", "the angle sensor stands still: it sent one and the same angle while the table was turned"),
     32: ("stiction", "the table did not follow its steps: it sticks, or the motor lost them"),
@@ -84,6 +86,7 @@ CAUSES = {
     58: ("paused_by_person", "paused by a person"),
     59: ("key_without_function", "this key has no function"),
     60: ("table_unknown", "nobody knows where the table stands"),
+    61: ("program_changed", "this is not the program of the job"),
 }
 
 # bit: (name, words)
@@ -486,8 +489,8 @@ PARAMETERS = {parameter.name: parameter for parameter in (
               1000, 200000, 20000,
               "drive: PWM frequency"),
     Parameter("watchdog_time", 32, "s", Fraction(1, 1000),
-              10, 65535, 500,
-              "guard: longest silence of the line while a drive is on (all axes)"),
+              0, 65535, 500,
+              "guard: longest silence of the line while a drive is on (all axes); 0: for ever, for a machine that runs by itself"),
     Parameter("learning", 33, "", Fraction(1, 1),
               0, 1, 0,
               "correction of sine and cosine: 0 frozen, 1 learns"),
@@ -626,6 +629,30 @@ PARAMETERS = {parameter.name: parameter for parameter in (
     Parameter("filter_2_a2", 78, "", Fraction(1, 1073741824),
               -2147483648, 2147483647, 0,
               "servo: filter 2, coefficient -a2"),
+    Parameter("profile", 79, "", Fraction(1, 1),
+              0, 2, 0,
+              "profile of motions: 0 S-curve, 1 trapezoid (jerk does not count), 2 stairs (velocity and the stairs_ parameters)"),
+    Parameter("stairs_first", 80, "period/s", Fraction(1, 65536),
+              1, 65536000000, 819200,
+              "stairs (S4): speed of the first, f0"),
+    Parameter("stairs_time", 81, "s", Fraction(1, 4000),
+              1, 400000, 80,
+              "stairs: time on each"),
+    Parameter("stairs_rise_1", 82, "period/s", Fraction(1, 65536),
+              1, 65536000000, 819200,
+              "stairs: height of those in section 1, the mirror of 7"),
+    Parameter("stairs_rise_2", 83, "period/s", Fraction(1, 65536),
+              1, 65536000000, 1638400,
+              "stairs: height in section 2, the mirror of 6"),
+    Parameter("stairs_rise_3", 84, "period/s", Fraction(1, 65536),
+              1, 65536000000, 3276800,
+              "stairs: height in section 3, the mirror of 5"),
+    Parameter("stairs_border_2", 85, "", Fraction(1, 65536),
+              0, 65536, 10923,
+              "stairs: where section 2 begins, of the way from stairs_first to velocity"),
+    Parameter("stairs_border_3", 86, "", Fraction(1, 65536),
+              0, 65536, 32768,
+              "stairs: where section 3 begins: 1/2 is 1:2:3, S4 prints 1/3"),
 )}
 
 SETTINGS = {parameter.name: parameter for parameter in (

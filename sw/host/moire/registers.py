@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0x1F6961D1          # CRC-32 of tables/registers.rdl
+MAP_CRC = 0x420F3DAA          # CRC-32 of tables/registers.rdl
 BLOCKS = {"node": (0x000, 0x000), "line": (0x100, 0x000), "links": (0x200, 0x000), "axis": (0x400, 0x100), "grating": (0xC00, 0x100), "actuator": (0x1400, 0x100)}          # base, distance to the next one
 
 
@@ -90,7 +90,7 @@ FIELDS = (
     Field("line", "crc", "value", 0x2C, 0, 32, False, "r", "", Fraction(1),
           "the CRC-32 so far, final inversion done"),
     Field("line", "watchdog_time", "value", 0x30, 0, 16, False, "rw", "s", Fraction(1, 1000),
-          "longest silence of the master while a drive is enabled; 0 reads as the longest"),
+          "longest silence of the master while a drive is enabled; 0: for ever"),
     Field("links", "built", "i2c", 0x00, 0, 1, False, "r", "", Fraction(1),
           "1: it was built, 0: its pins are idle, its registers do nothing: i2c"),
     Field("links", "built", "ps2", 0x00, 1, 1, False, "r", "", Fraction(1),
