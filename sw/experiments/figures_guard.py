@@ -24,7 +24,7 @@ CLK_HZ = 1_500_000
 TICK_S = 1 / 4000
 WATCHDOG_S = 0.04
 ANSWER_S = 0.01                                        # that the longest answer takes on the line, after its request
-CORE_SILENCE_S = 0.05                                  # the node's watchdog of its soft core
+CORE_SILENCE_S = 0.02 + 1_200_000 / CLK_HZ             # the node's watchdog of its soft core
 ROUND_S = 0.005                                        # a request on the line, and the round of the firmware that finds it
 FORGIVEN_NM = {"encoder_cut": 400}                     # between the position told last and that of the fault: a cut signal has any phase
 HELD_NM = 100                                          # while the axis holds and its scale is sound
@@ -59,7 +59,7 @@ def powered_up(source, firmware=None):
     """A twin of one node and its axis with the drive on."""
     twin = Twin([Node(1, [Axis("stage")])], seed=source.randrange(1 << 31), clk_hz=CLK_HZ, node_parameters={"FILTERS": 0},
                 firmware=firmware)
-    twin.run(0.1)
+    twin.run(0.15)
     axis = Line(TwinTransport(twin)).axis(1)
     axis.enable()
     return twin, axis
@@ -142,6 +142,7 @@ def spoilt_firmware(instruction):
 
 def core_fault(twin, axis, kind):
     """What was wrong with a soft core that stops, None if nothing was."""
+    axis.set_parameter("watchdog_time", f"{2 * CORE_SILENCE_S:.1f}s")     # that of the line is not to be the first
     begun = twin.time()
     if answers(axis, "reset_faults"):
         return "the soft core still answers"
