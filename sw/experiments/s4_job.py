@@ -32,13 +32,13 @@ from twin import Axis, BuildError, Node, Surroundings, Twin, TwinTransport, buil
 
 MAIN, SUB = 0, 1                     # places of the nodes
 ADDRESSES = (1, 2)
-CLK_HZ = 1_200_000
+CLK_HZ = 1_840_000
 PEER_BAUD = 115200
 NODE = {"DRIVES": 2, "FILTERS": 0}
 AXIS = {"drive": "steps", "position_source": "own_steps", "steps_per_period": 4, "counts_per_period": 4, "period": "1um",
-        "velocity": "50mm/s", "acceleration": "400mm/s2", "jerk": "8000mm/s3", "home_creep": "0.4mm/s", "following_limit": "10mm",
+        "velocity": "50mm/s", "acceleration": "200mm/s2", "jerk": "1000mm/s3", "home_creep": "0.4mm/s", "following_limit": "10mm",
         "disagreement_limit": 0, "encoder_fault_mask": 0, "deglitch": 0, "kp": 0, "ki": 0, "kd": 0, "kv": 0, "ka": 0,
-        "settle_window": "1um", "settle_time": "5ms", "step_high": "1us", "step_low": "1us", "watchdog_time": "60s"}
+        "settle_window": "1um", "settle_time": "5ms", "step_high": "1us", "step_low": "1us", "watchdog_time": 0}
 WORM = {"worm_error": (4, 12), "worm_second_error": (0, 4), "worm_wheel_error": (5, 25), "worm_backlash": (5, 40)}     # arcsec
 CUT_S = 0.3
 START_S = 0.1                        # until the soft core listens
@@ -280,7 +280,7 @@ class IndexingMachine:
             if state.state == outcome.state.state:              # then the display has had time to tell it
                 outcome.displays[state.state] = self.panel.lines
             outcome.state = state
-            table = self.table.state()                          # each look is heard by the watchdog of the table's drive
+            table = self.table.state()
             if state.state == "cutting":
                 outcome.tries[state.station] = table.tries
             if state.state in ("finished", "idle"):
