@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""S4's unattended job as experiments.s4_job runs it: small ones, and how it judges them."""
+import math
+import os
+import random
+
+import pytest
+
+from experiments.s4_job import MAIN, SUB, TOLERANCE, Cut, IndexingMachine, Outcome, Trouble, apart, random_stations, random_worm
+from moire.job import JobState
+
+SEED = int(os.environ.get("SEED") or 1)
+NEAR_BY = 0.004                      # of a turn: stations 0.7 degree apart
+
+
+def test_amid_trouble_and_through_a_power_cut_of_both_nodes_each_station_is_cut_once():
+    print(f"SEED={SEED}")
+    source = random.Random(SEED)
+    with IndexingMachine(SEED, "frames", random_worm(source)) as machine:
+        machine.load(random_stations(2, source, NEAR_BY))
+        outcome = machine.run(Trouble(0.01, 2.0, True, source.uniform(0.5, 4.5), (MAIN, SUB)))
+        assert machine.twin.truth(SUB).lost_steps == 0 and machine.table.sensor().frames > 100
+    assert outcome.whole and outcome.worst <= TOLERANCE, (outcome.words, outcome.answers)
+    assert outcome.answers and [cut.station for cut in outcome.cuts] == [0, 1]
+
+
+def test_a_list_entered_on_the_panel_is_cut_by_the_bytes_as_printed_with_nobody_touching_it():
+    with IndexingMachine(SEED, "printed") as machine:
+        machine.enter(["0.25", "1"])
+        outcome = machine.run()
+        peer = machine.table.peer()
+    assert not outcome.failed and not outcome.answers and outcome.stations == [900, 3600]
+    assert peer.heard == 2 and min(outcome.tries.values()) > 2
+    assert outcome.displays["finished"][0].split() == ["all", "cut", "002/002"]
+
+
+# ------------------------------------------------------------------ how it is judged
+
+def outcome_of(*cuts, stations=(0.0, 3600.0), state="finished"):
+    made = [Cut(station, stations[station] if station is not None else 0.0, 0.0, error, 0.0, whole) for station, error, whole in cuts]
+    return Outcome(list(stations), made, JobState(state, "ok", len(stations), len(stations), (), ()), 1.0)
+
+
+@pytest.mark.parametrize("outcome, uncut, twice, strays", [
+    (outcome_of((0, 0.1, True), (1, -0.4, True)), [], [], 0),
+    (outcome_of((0, 0.1, True)), [1], [], 0),
+    (outcome_of((0, 0.1, True), (1, 0.1, False)), [1], [], 0),
+    (outcome_of((0, 0.1, True), (0, 0.1, True), (1, 0.1, True)), [], [0], 0),
+    (outcome_of((0, 0.1, False), (0, 0.1, True), (1, 0.1, True)), [], [0], 0),
+    (outcome_of((0, 0.1, True), (1, 0.1, True), (None, 900.0, True)), [], [], 1),
+])
+def test_a_job_is_whole_when_each_station_was_cut_once(outcome, uncut, twice, strays):
+    assert (outcome.uncut, outcome.twice, len(outcome.strays)) == (uncut, twice, strays)
+    assert outcome.whole == (not uncut and not twice and not strays)
+
+
+def test_a_job_fails_beyond_the_tolerance_or_without_an_end():
+    assert not outcome_of((0, 2.0, True), (1, -2.0, True)).failed
+    assert outcome_of((0, 0.0, True), (1, -2.01, True)).failed
+    assert outcome_of((0, 0.0, True), (1, 0.0, True), state="unsure").failed
+    assert outcome_of().worst == math.inf
+
+
+def test_angles_are_apart_the_short_way_round():
+    assert apart(1, 1296000 - 1) == 2 and apart(1296000 - 1, 1) == -2 and apart(3600, 3599.5) == 0.5
+
+
+def test_random_stations_ascend_within_a_turn():
+    stations = random_stations(36, random.Random(SEED))
+    assert len(stations) == 36 and stations == sorted(stations) and 0 <= stations[0] and stations[-1] < 1296000
