@@ -177,8 +177,13 @@ class IndexingMachine:
     # a person
 
     def wait_for_panel(self):
-        while not {"keypad", "display"} <= set((state := self.job.state()).flags) or state.state == "loading":
+        """As a person does, who looks at the display before typing."""
+        while not {"keypad", "display"} <= set((state := self.job.state()).flags) or state.state == "loading" or not self.shown:
             self.twin.run(LOOK_S)
+
+    @property
+    def shown(self):
+        return "".join(self.panel.lines).strip()
 
     def press(self, *keys):
         for key in keys:
