@@ -13,7 +13,7 @@ from pathlib import Path
 from experiments.figures_common import Figure, bar, console
 from moire import Line
 from moire.errors import LineError, Refused
-from twin import Axis, Node, Twin, TwinTransport, build
+from twin import START_S, Axis, Node, Twin, TwinTransport, build
 
 ROOT = Path(__file__).resolve().parents[2]
 DRIVER = Path(__file__).with_name("guard_run.cpp")
@@ -59,7 +59,7 @@ def powered_up(source, firmware=None):
     """A twin of one node and its axis with the drive on."""
     twin = Twin([Node(1, [Axis("stage")])], seed=source.randrange(1 << 31), clk_hz=CLK_HZ, node_parameters={"FILTERS": 0},
                 firmware=firmware)
-    twin.run(0.15)
+    twin.run(START_S)
     axis = Line(TwinTransport(twin)).axis(1)
     axis.enable()
     return twin, axis

@@ -12,9 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from experiments.figures_common import Figure, bar, console
-from experiments.s0_stage import START_S
 from moire.client import CORRECTION, Line
-from twin import Twin, TwinTransport, parameters
+from twin import START_S, Twin, TwinTransport, parameters
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path += [str(ROOT / "tb" / room) for room in ("firmware", "interpolate") if str(ROOT / "tb" / room) not in sys.path]

@@ -5,7 +5,6 @@ import html
 from pathlib import Path
 
 from moire import report
-from moire.errors import BadFile
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -23,10 +22,4 @@ def page(path, title, summary, parts, facts):
         f"<style>\n{report.STYLE}</style></head>", f"<body><main><h1>{html.escape(title)}</h1>",
         f'<p class="summary">{html.escape(summary)}</p>', *parts, "<h2>How it was measured</h2>",
         report.table(("", ""), facts.items(), text_columns=2), "</main></body></html>", ""])
-    path = Path(path)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise BadFile(f"the report {path} cannot be written: {error.strerror}") from None
-    return path
+    return report.write_text(Path(path), text)

@@ -20,11 +20,11 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from experiments.s0_stage import ADDRESSES, LOOK_S, ROOT, START_S, Stage, random_moves, table
+from experiments.s0_stage import ADDRESSES, LOOK_S, ROOT, Stage, random_moves, table
 from moire import report
 from moire.client import Line
 from moire.errors import MoireError
-from twin import BuildError, Twin, TwinTransport
+from twin import START_S, BuildError, Twin, TwinTransport
 
 AIM_NM = 10.0                        # of the paper
 NODE = {"DRIVES": 0b1101, "FILTERS": 0}          # bridge, converter and fine stage

@@ -20,12 +20,11 @@ from rich.table import Table
 from moire import report
 from moire.client import Line
 from moire.errors import MoireError
-from twin import BuildError, Twin, TwinTransport
+from twin import START_S, BuildError, Twin, TwinTransport
 
 ROOT = Path(__file__).resolve().parents[2]
 ADDRESSES = {"X": 1, "Y": 2}         # on the line; the order is that of the axes in the twin
 PERIOD_NM = 800.0
-START_S = 0.15                       # until the soft cores listen
 LOOK_S = 0.005                       # between two looks at a motion
 MOVES = 24
 

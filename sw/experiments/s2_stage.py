@@ -23,12 +23,11 @@ from experiments.report_page import ROOT, page, picture
 from moire import report
 from moire.client import Line
 from moire.errors import MoireError
-from twin import BuildError, Twin, TwinTransport
+from twin import START_S, BuildError, Twin, TwinTransport
 from twin.twin import Axis, Node
 
 CLK_HZ = 3_000_000
 NODE = {"DRIVES": 2, "FILTERS": 0}
-START_S = 0.15                       # until the soft core listens
 LOOK_S = 0.02
 SLOW_MM_S = 0.5                      # the paper's top speed, 30 mm/min
 WORD = 1 << 16                       # counts of the paper's counter

@@ -21,12 +21,11 @@ from experiments.report_page import ROOT, page, picture
 from moire import report
 from moire.client import Line
 from moire.errors import MoireError
-from twin import BuildError, Twin, TwinTransport, parameters
+from twin import START_S, BuildError, Twin, TwinTransport, parameters
 from twin.twin import Axis, Node
 
 CLK_HZ = 1_600_000                   # enough for a count in 20 clk at the top speed
 NODE = {"DRIVES": 4, "FILTERS": 0}
-START_S = 0.15                       # until the soft core listens
 LOOK_S = 0.01                        # between two looks at a search
 SEARCHES = 10                        # of the paper's table 1
 RANGE_M = 1e-3                       # the mover rests this near to the mark

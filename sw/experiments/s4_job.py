@@ -28,7 +28,7 @@ from moire.errors import MoireError
 from moire.index import TURN, Table
 from moire.job import Job, equal_parts
 from moire.settings import Settings
-from twin import Axis, BuildError, Node, Surroundings, Twin, TwinTransport, build
+from twin import START_S, Axis, BuildError, Node, Surroundings, Twin, TwinTransport, build
 
 MAIN, SUB = 0, 1                     # places of the nodes
 ADDRESSES = (1, 2)
@@ -41,7 +41,6 @@ AXIS = {"drive": "steps", "position_source": "own_steps", "steps_per_period": 4,
         "settle_window": "1um", "settle_time": "5ms", "step_high": "1us", "step_low": "1us", "watchdog_time": 0}
 WORM = {"worm_error": (4, 12), "worm_second_error": (0, 4), "worm_wheel_error": (5, 25), "worm_backlash": (5, 40)}     # arcsec
 CUT_S = 0.3
-START_S = 0.1                        # until the soft core listens
 LOOK_S = 0.1
 KEY_S = 0.06                         # a key is down, and up again, so long
 SHOWN_S = 0.6                        # until the display tells it

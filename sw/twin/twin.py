@@ -25,6 +25,7 @@ from .surroundings import PEER_FUNCTIONS, PeerLineHandle, Surroundings, Surround
 from .surroundings import pack as pack_surroundings
 
 CLK_HZ = 2_400_000
+START_S = 0.15                   # until the soft core of a node with one axis listens
 NODE = {"DRIVES": 1, "FILTERS": 0}     # what the stage of S0 needs of rtl/node.sv
 BAUD = 115200
 BREAK_S = 0.003                  # the line low; nodes want 2 ms

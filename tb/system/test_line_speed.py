@@ -8,7 +8,7 @@ from bench import seed
 from moire.client import Line
 from moire.errors import NobodyAnswers
 from moire.protocol import FROM_NODE, command_byte, parse_reply, read_words
-from twin import Twin, TwinTransport
+from twin import START_S, Twin, TwinTransport
 
 BAUD = 300_000                     # an eighth of the clk of the twin, the highest that it can do
 CLK_HZ = 2_400_000
@@ -19,7 +19,7 @@ NOISE = 1000                       # of a position of 8-bit samples, 2^-16 perio
 def line():
     with Twin(nodes=(1, 2), clk_hz=CLK_HZ, seed=seed() % 1000) as twin:
         made = Line(TwinTransport(twin), random_source=random.Random(seed()))
-        twin.run(0.15)
+        twin.run(START_S)
         yield made
 
 

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from experiments import figures_learner
-from experiments.s0_stage import START_S
 from moire.client import CORRECTION, Line
-from twin import Twin, TwinTransport, parameters
+from twin import START_S, Twin, TwinTransport, parameters
 
 PLACES = 16                          # of a period
 LOOKS = 8                            # at each: the noise of one is 0.7 nm

@@ -5,9 +5,8 @@ import zlib
 import numpy
 import pytest
 
-from twin import Axis, BuildError, FrameBench, Node, Twin, TwinTransport, build, cells_of
+from twin import START_S, Axis, BuildError, FrameBench, Node, Twin, TwinTransport, build, cells_of
 
-START_S = 0.15                  # the firmware starts
 ASK = {1: 0x111, 2: 0x112}       # "slave, send data": 00 01 address, 9th bit 1
 
 

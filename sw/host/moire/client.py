@@ -725,10 +725,7 @@ class Axis:
 
     def parameter_value(self, name: str, counts: int, period_nm=None) -> ParameterValue:
         known = parameter(name)
-        one = one_count(known, period_nm or self.period_nm)
-        quantity = KINDS[known.unit][0]
-        return ParameterValue(name, known.id, counts, counts * one, quantity.base, known.min * one, known.max * one, known.default * one,
-                              known.text, quantity)
+        return value_of(known, counts, one_count(known, period_nm or self.period_nm))
 
     def get_parameter(self, name: str) -> ParameterValue:
         return self.parameter_value(name, self.request("get_parameter", parameter=parameter(name).id)["value"])
@@ -736,17 +733,7 @@ class Axis:
     def parameter_counts(self, name: str, value, period_nm=None) -> int:
         """What the wire carries for a value in real units; OutOfRange says what is allowed."""
         known = parameter(name)
-        if isinstance(value, str) and (chosen := choice(name, value)) is not None:
-            return chosen
-        one, quantity = one_count(known, period_nm or self.period_nm), KINDS[known.unit][0]
-        wanted = quantity.parse(value)
-        counts = round(wanted / one)
-        if not known.min <= counts <= known.max:
-            allowed = self.parameter_value(name, known.default, period_nm).range_words
-            raise OutOfRange(f"{name} allows {allowed}, not {units.with_unit(quantity, wanted, 6)}")
-        if known.lsb == 1 and not known.unit and wanted != counts:
-            raise OutOfRange(f"{name} takes whole numbers, not {units.decimal(wanted)}")
-        return counts
+        return counts_of(known, value, one_count(known, period_nm or self.period_nm))
 
     def set_parameter(self, name: str, value) -> ParameterValue:
         """`value` is a number in the unit of get_parameter(), or a text with a unit. Returns what was set: the nearest count."""
@@ -958,4 +945,26 @@ def parameter(name: str):
 def one_count(known, period_nm: Fraction) -> Fraction:
     _, worth, periodic = KINDS[known.unit]
     return known.lsb * worth * (period_nm if periodic else 1)
+
+
+def value_of(known, counts: int, one: Fraction) -> ParameterValue:
+    """Of a parameter or a setting, one count of which is worth so much."""
+    quantity = KINDS[known.unit][0]
+    return ParameterValue(known.name, known.id, counts, counts * one, quantity.base, known.min * one, known.max * one,
+                          known.default * one, known.text, quantity)
+
+
+def counts_of(known, value, one: Fraction) -> int:
+    """What the wire carries for a value in real units; OutOfRange says what is allowed."""
+    if isinstance(value, str) and (chosen := choice(known.name, value)) is not None:
+        return chosen
+    quantity = KINDS[known.unit][0]
+    wanted = quantity.parse(value)
+    counts = round(wanted / one)
+    if not known.min <= counts <= known.max:
+        allowed = value_of(known, known.default, one).range_words
+        raise OutOfRange(f"{known.name} allows {allowed}, not {units.with_unit(quantity, wanted, 6)}")
+    if known.lsb == 1 and not known.unit and wanted != counts:
+        raise OutOfRange(f"{known.name} takes whole numbers, not {units.decimal(wanted)}")
+    return counts
 

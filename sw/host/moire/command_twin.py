@@ -13,7 +13,7 @@ RFC2217_PORT, TCP_PORT = 2217, 2218
 
 def add_to(command, address_number, waiting_time):
     """command(name, handler, text, example): makes the parser."""
-    twin = command("twin", do_twin, "serve the simulated stage to any client, until Ctrl-C", "moire twin --nodes 1 2 --link /tmp/moire")
+    twin = command("twin", do_twin, "serve the simulated stage to any client, until Ctrl-C", "moire twin --nodes 1 2 --link moire.tty")
     twin.add_argument("--nodes", nargs="+", type=address_number, default=[1, 2], metavar="N", help="their addresses; 1 2 unless given")
     twin.add_argument("--bind", default="127.0.0.1", metavar="HOST", help="who may come in: 127.0.0.1, this computer only, unless given")
     twin.add_argument("--rfc2217", type=int, default=RFC2217_PORT, metavar="PORT",

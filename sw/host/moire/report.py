@@ -303,8 +303,10 @@ def page(result: Result) -> str:
 
 def write(result: Result, folder="build/report") -> Path:
     """Makes index.html in the folder; returns its path."""
-    path = Path(folder) / "index.html"
-    text = page(result)
+    return write_text(Path(folder) / "index.html", page(result))
+
+
+def write_text(path: Path, text: str) -> Path:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")

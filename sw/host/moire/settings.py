@@ -7,11 +7,11 @@
 """
 from fractions import Fraction
 
-from . import units
-from .client import KINDS, ParameterValue, choice
-from .errors import OutOfRange, UnknownName
+from .client import ParameterValue, counts_of, one_count, value_of
+from .errors import UnknownName
 from .line_tables import SETTINGS
 
+NO_PERIOD = Fraction(1)          # no setting is counted in periods
 
 def known(name: str):
     if name not in SETTINGS:
@@ -19,31 +19,15 @@ def known(name: str):
     return SETTINGS[name]
 
 
-def one_count(setting) -> Fraction:
-    return setting.lsb * KINDS[setting.unit][1]
-
-
 def setting_value(name: str, counts: int) -> ParameterValue:
     setting = known(name)
-    one, quantity = one_count(setting), KINDS[setting.unit][0]
-    low, high, default = (count * one for count in (setting.min, setting.max, setting.default))
-    return ParameterValue(name, setting.id, counts, counts * one, quantity.base, low, high, default, setting.text, quantity)
+    return value_of(setting, counts, one_count(setting, NO_PERIOD))
 
 
 def setting_counts(name: str, value) -> int:
     """What the wire carries; OutOfRange says what is allowed."""
     setting = known(name)
-    if isinstance(value, str) and (chosen := choice(name, value)) is not None:
-        return chosen
-    quantity = KINDS[setting.unit][0]
-    wanted = quantity.parse(value)
-    counts = round(wanted / one_count(setting))
-    if not setting.min <= counts <= setting.max:
-        allowed = setting_value(name, setting.default).range_words
-        raise OutOfRange(f"{name} allows {allowed}, not {units.with_unit(quantity, wanted, 6)}")
-    if setting.lsb == 1 and not setting.unit and wanted != counts:
-        raise OutOfRange(f"{name} takes whole numbers, not {units.decimal(wanted)}")
-    return counts
+    return counts_of(setting, value, one_count(setting, NO_PERIOD))
 
 
 class Settings:
