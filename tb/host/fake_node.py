@@ -91,9 +91,10 @@ class FakeAxis:
 
 
 class FakeNode:
-    def __init__(self, address=1, axes=1, map_crc=MAP_CRC, protocol_crc=PROTOCOL_CRC):
+    def __init__(self, address=1, axes=1, map_crc=MAP_CRC, protocol_crc=PROTOCOL_CRC, sine=True):
         self.address, self.map_crc, self.protocol_crc = address, map_crc, protocol_crc
         self.axes = [FakeAxis() for _ in range(axes)]
+        self.sine = sine
         self.now, self.registers = 0.0, {0: map_crc, 0x400: 7}
         self.written = []              # (address, value)
         self.captures = []             # words of captured, captured_time and captured_position, oldest first
@@ -355,6 +356,8 @@ class FakeNode:
         return "ok", {}
 
     def do_signal(self, axis):
+        if not self.sine:
+            return "not_built", {}
         return "ok", axis.signal
 
     def do_position(self, axis):
@@ -393,6 +396,8 @@ class FakeNode:
             return "ok", {"value": bool(self.captures) | (self.registers.get(address, 0) & 64)}
         if self.captures and 0xC68 <= address < 0xC78:
             return "ok", {"value": self.captures[0][address - 0xC68 >> 2]}
+        if address & 0xFF == 0xA8 and 0xC00 <= address < 0x1400:       # position_source.sine
+            return "ok", {"value": self.sine << 2}
         if 0x10 <= address < 0x18:                     # time stamp
             return "ok", {"value": round(self.now * CLK_HZ) >> 8 * (address - 0x10) & 0xFFFFFFFF}
         return ("ok", {"value": self.registers[address]}) if address in self.registers else ("no_such_register", {})

@@ -83,6 +83,16 @@ def test_enable_wait_stop_reset_encoder_counters():
     assert "margin 50 %" in call.out and "frames_good" in call.out and "no_answer" in call.out
 
 
+def test_a_node_without_sine_and_cosine_says_so():
+    node = FakeNode(sine=False)
+    call = Call("status -- encoder", node)
+    assert call.out.count("counts only: built without sine and cosine") == 2 and "converter counts" not in call.out
+    assert [told["sine"] for told in Call("status -- encoder --json", node).told] == [False, False]
+    assert "built without that" in sentence(Call("signal", node), 1)
+    call = Call("status -- encoder")
+    assert "without" not in call.out and "converter counts" in call.out
+
+
 def test_registers_by_address_and_by_name():
     node = FakeNode()
     node.registers = {0x110: 258, 0x400: 5}

@@ -25,7 +25,8 @@ def test_a_session_replays_to_the_same_machine_with_the_same_bytes(tmp_path):
     call = Call(f"replay {file}", node)
     assert call.code == 0 and call.out.endswith("the same, 0 with other values, 0 different\n")
     assert int(call.out.split()[0]) > 20
-    assert [name for name in node.executed if name not in ("status", "identify", "get_parameter")] == ["enable", "home", "move", "enable"]
+    done = [name for name in node.executed if name not in ("status", "identify", "get_parameter")]
+    assert done == ["enable", "home", "move", "read_register", "enable"]
     assert node.axes[0].position == 1_000_000 * 65536 // 800
 
 
@@ -33,7 +34,7 @@ def test_other_values_are_told_apart_from_other_outcomes(tmp_path):
     file, other, broken = recorded(tmp_path, "status"), FakeNode(), FakeNode()
     other.axes[0].position += 1
     told = Call(f"replay {file} --json", other).told[0]
-    assert (told["same"], told["other_values"], told["different"]) == (5, 1, 0)
+    assert (told["same"], told["other_values"], told["different"]) == (7, 1, 0)
     broken.wrong_map = True
     said = sentence(Call(f"replay {file}", broken), 1)
     assert "answers differ from the record: at 0." in said and "came instead of" in said
@@ -123,6 +124,21 @@ def test_fault_tells_cause_place_and_what_to_do():
 def test_selftest_passes_a_sound_node():
     call = Call("selftest", FakeNode(axes=2))
     assert call.code == 0 and call.out.count("passed") == 3 + 2 * 5 and "axis 1 sensor" in call.out
+
+
+def test_selftest_passes_a_sound_node_without_sine_and_cosine():
+    node = FakeNode(sine=False)
+    node.axes[0].parameters[PARAMETERS["position_source"].id] = 1
+    call = Call("selftest", node)
+    assert call.code == 0 and "passed   axis 0 sensor      no illegal edge; built without sine and cosine\n" in call.out
+    node.axes[0].events = 1
+    assert "FAILED   axis 0 sensor      both quadrature levels changed at once" in Call("selftest", node).out
+
+
+def test_fault_of_a_node_without_sine_and_cosine_tells_what_there_is():
+    node = FakeNode(sine=False)
+    node.axes[0].standing = node.axes[0].faults = ESTOP
+    assert "emergency stop" in Call("fault", node).out and "signal" not in Call("fault", node).out
 
 
 def spoil_estop(node):

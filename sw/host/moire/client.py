@@ -853,6 +853,10 @@ class Axis:
 
     # signal
 
+    def has_sine(self) -> bool:
+        """Whether sine and cosine were built; without, the position is made of counts, and what needs them is refused."""
+        return bool(self.grating("position_source")["sine"])
+
     def signal(self) -> Signal:
         """What is wrong with sine and cosine."""
         told = self.request("signal")

@@ -43,6 +43,7 @@ OF_THE_PORT = ("port", "baud", "parity", "record")
 OF_THE_CALL = (*OF_THE_PORT, "json")
 OF_AN_AXIS = ("axis.", "grating.", "actuator.")      # registers
 KEEP_COMPANY_S = 0.1
+WITHOUT_SINE = "counts only: built without sine and cosine"
 NOT_INSIDE = ("run", "shell", "twin")
 
 
@@ -469,8 +470,9 @@ def place(command) -> dict:
     return {"command": command.command, "address": command.address, "axis": command.axis}
 
 
-def told_status(session, command, status):
-    told = {**place(command), **asdict(status), "words": status.words, "fault_words": status.fault_words, "ended_words": status.ended_words}
+def told_status(session, command, status, **built):
+    told = {**place(command), **asdict(status), **built,
+            "words": status.words, "fault_words": status.fault_words, "ended_words": status.ended_words}
     possible = ((status.limit_low, "low end pressed"), (status.limit_high, "high end pressed"), (status.estop, "emergency stop pressed"))
     switches = [text for pressed, text in possible if pressed]
     rows = [
@@ -483,6 +485,8 @@ def told_status(session, command, status):
     ]
     if status.encoder_events:
         rows.append(("encoder", ", ".join(status.encoder_events)))
+    if not built.get("sine", True):
+        rows.append(("sensor", WITHOUT_SINE))
     head = f"node {command.address} axis {command.axis}: {status.words}, {'zero known' if status.homed else 'not homed'}"
     session.say(told, head + "".join(f"\n  {name:<9} {text}" for name, text in rows))
 
@@ -504,7 +508,8 @@ def identity_words(node) -> str:
 
 
 def do_status(session, command):
-    told_status(session, command, session.axis(command).status())
+    axis = session.axis(command)
+    told_status(session, command, axis.status(), sine=axis.has_sine())
 
 
 def do_enable(session, command):
@@ -678,16 +683,20 @@ def do_baud(session, command):
 
 
 def do_encoder(session, command):
-    encoder = session.axis(command).encoder()
+    axis = session.axis(command)
+    encoder, sine = axis.encoder(), axis.has_sine()
     rows = [
         ("sine, cosine", f"{encoder.sin} {encoder.cos} converter counts"), ("phase", f"{360 * encoder.phase:.3f} degrees"),
-        ("amplitude", f"{encoder.amplitude} converter counts"), ("quadrature", f"{encoder.quadrature_count} quarter periods"),
+        ("amplitude", f"{encoder.amplitude} converter counts"),
+    ] if sine else [("sensor", WITHOUT_SINE)]
+    rows += [
+        ("quadrature", f"{encoder.quadrature_count} quarter periods"),
         ("rejected", f"{encoder.rejected_pulses} pulses, {encoder.rejected_samples} samples"),
         ("home phase", f"{encoder.home_phase_nm:.1f} nm from the phase zero taken, margin {100 * encoder.home_margin:.0f} %"),
         ("first fault", f"at {encoder.fault_position_nm / 1e6:.6f} mm"),
     ]
     head = f"node {command.address} axis {command.axis}:"
-    session.say({**place(command), **asdict(encoder)}, head + "".join(f"\n  {name:<12} {text}" for name, text in rows))
+    session.say({**place(command), **asdict(encoder), "sine": sine}, head + "".join(f"\n  {name:<12} {text}" for name, text in rows))
 
 
 def where(command) -> str:
