@@ -244,10 +244,12 @@ static void reset_fault(void)
     ask(RESETTING, LINE_OPERATION_RESET_FAULTS, 0, 1);
 }
 
-static void faults_told(const uint8_t *reply)
+static void faults_told(const uint8_t *reply, uint8_t cause)
 {
-    uint32_t first = field_of(reply, LINE_STATUS_REPLY_FIRST_FAULT, 2);
-    peer.faults = (uint16_t)(first ? first : field_of(reply, LINE_STATUS_REPLY_FAULTS, 2));
+    if (cause == LINE_CAUSE_OK) {
+        uint32_t first = field_of(reply, LINE_STATUS_REPLY_FIRST_FAULT, 2);
+        peer.faults = (uint16_t)(first ? first : field_of(reply, LINE_STATUS_REPLY_FAULTS, 2));
+    }
     end(LINE_PEER_PHASE_FAILED, peer.failure);
 }
 
@@ -280,10 +282,10 @@ static void reply_heard(const uint8_t *reply, uint32_t length)
         cause = LINE_CAUSE_BUSY;
     if (cause == LINE_CAUSE_BUSY && clock_ms() - peer.since_ms < BEGIN_MS)
         stop(CLEARING);
+    else if (requests.step == ASKING_FAULT)
+        faults_told(reply, cause);
     else if (cause != LINE_CAUSE_OK)
         fail(cause);
-    else if (requests.step == ASKING_FAULT)
-        faults_told(reply);
     else if (requests.step == LOOKING && peer.resets)
         reset_fault();
     else if (requests.step == LOOKING || requests.step == RESETTING)
