@@ -31,6 +31,7 @@
 #define RECORD_CHECKED 12u              // bytes of a record before its CRC-32
 #define PATIENCE_MS 50u                 // a write takes 5 ms
 #define RETRY_MS 1000u                  // a device that is not there is looked for again
+#define LOOKED_AT 8u                    // values in one call
 #define TRIES 3u                        // to write a page
 
 enum task { REST, READ_KEPT, TAKE_KEPT, LOAD, CHECK_LOADED, READ_JOURNAL, SEAL, GATHER, WRITE_NEXT, WRITE, VERIFY, DEAD };
@@ -62,6 +63,7 @@ static uint8_t filled;
 static bool final;                              // it is the last one
 static uint32_t crc, since_ms;
 static uint8_t tries;
+static unsigned blank_pages;                    // of the journal, in turn
 static uint8_t out[2 + PAGE], in[PAGE];
 static struct i2c_transfer transfer;
 
@@ -75,6 +77,13 @@ static uint32_t crc32(uint32_t state, const uint8_t *bytes, unsigned count)
         state = state >> 4 ^ of_nibble[state & 15];
     }
     return state;
+}
+
+static bool never_written(unsigned count)       // so many bytes that came
+{
+    while (count--)
+        if (in[count] != 0xFF) return false;
+    return true;
 }
 
 static uint8_t *bytes_of(unsigned which)
@@ -118,9 +127,9 @@ static void end(uint8_t with)
 
 // ---- what is kept of the values: both copies are checked, then the newer one is taken
 
-static void read_value(void)
+static void read_value(void)            // a page at a time
 {
-    transfer_begin(KEPT + kept_copy * KEPT_BYTES + at, 0, VALUE);
+    if (at % PAGE == 0) transfer_begin(KEPT + kept_copy * KEPT_BYTES + at, 0, PAGE);
 }
 
 static void read_kept(enum task with, unsigned copy)
@@ -178,13 +187,12 @@ static void checked_copy(bool whole)
 static void check_value(const struct keep_value *value)
 {
     if (at == 0) {
-        kept_blank = true;
-        for (unsigned n = 0; n < VALUE; n++) kept_blank = kept_blank && in[n] == 0xFF;
+        kept_blank = never_written(VALUE);
         kept_generation[kept_copy] = (uint32_t)value->value;
         if (value->of != KEEP_HEAD) return checked_copy(false);
     }
     if (value->of == KEEP_END) return checked_copy((uint32_t)value->value == ~crc);
-    crc = crc32(crc, in, VALUE);
+    crc = crc32(crc, (const uint8_t *)value, VALUE);
     at = (uint16_t)(at + VALUE);
     if (at == KEPT_BYTES) return checked_copy(false);
     go(READ_KEPT);
@@ -194,7 +202,7 @@ static void check_value(const struct keep_value *value)
 static void value_read(void)
 {
     struct keep_value value;
-    __builtin_memcpy(&value, in, VALUE);
+    __builtin_memcpy(&value, &in[at % PAGE], VALUE);
     task == READ_KEPT ? check_value(&value) : take_value(&value);
 }
 
@@ -222,7 +230,7 @@ static void load_begin(unsigned which)          // `newest` is the copy being lo
 static void loaded_part(void)
 {
     struct store_program *program = &programs[newest];
-    for (unsigned n = 0; n < PART; n++) blank[newest] = blank[newest] && in[n] == 0xFF;
+    blank[newest] = blank[newest] && never_written(PART);
     __builtin_memcpy(bytes_of(newest) + at, in, at + PART <= sizeof *program ? PART : sizeof *program - at);
     at = (uint16_t)(at + PART);
     go(LOAD);
@@ -264,13 +272,15 @@ static void check_loaded(void)
     newest ? choose() : load_begin(1);
 }
 
+// A line passes over fewer than TRIES worn pages, so behind so many blank ones there is none.
 static void journal_read(void)
 {
+    blank_pages = at && never_written(sizeof candidate) ? blank_pages + 1u : 0;
     __builtin_memcpy(&candidate, in, sizeof candidate);
     if (candidate.sequence > last.sequence && candidate.sequence % JOURNAL_PAGES == at && ~crc32(UINT32_MAX, in, RECORD_CHECKED) == candidate.crc)
         last = candidate;
     go(READ_JOURNAL);
-    if (++at == JOURNAL_PAGES) return end(cause);
+    if (++at == JOURNAL_PAGES || blank_pages == TRIES) return end(cause);
     transfer_begin(record_place(at), 0, sizeof candidate);
 }
 
@@ -313,11 +323,18 @@ static void seal(void)
     go(WRITE_NEXT);
 }
 
+static bool next_value(struct keep_value *value)
+{
+    for (unsigned n = 0; n < LOOKED_AT; n++)
+        if (keep_next(&gathered, value)) return true;
+    return false;
+}
+
 // One value more for the page; those at their defaults are left out.
 static void gather(void)
 {
     struct keep_value value = {(int64_t)((uint64_t)keep_build() << 32 | kept.generation), KEEP_HEAD, 0};
-    if ((at || filled) && !keep_next(&gathered, &value)) return;
+    if ((at || filled) && !next_value(&value)) return;
     if (value.of == KEEP_END) value.value = ~crc;
     else crc = crc32(crc, (const uint8_t *)&value, VALUE);
     __builtin_memcpy(&out[2 + filled], &value, VALUE);
