@@ -231,12 +231,18 @@ uint8_t job_state(void)
     return state;
 }
 
+static uint8_t kept_trouble(void)       // why the values of this node are not in force
+{
+    uint8_t told = store_kept()->cause;
+    return told >= LINE_CAUSE_KEPT_DAMAGED && told <= LINE_CAUSE_KEPT_NOT_TAKEN ? told : LINE_CAUSE_OK;
+}
+
 uint8_t job_cause(void)
 {
     if (state == LOADING && store_state() == STORE_DEAD) return LINE_CAUSE_STORE_MISSING;
     if (state != IDLE || cause != LINE_CAUSE_OK) return cause;
     if (store_stations() == 0) return store_cause();
-    return store_kept()->cause == LINE_CAUSE_NOTHING_KEPT ? LINE_CAUSE_OK : store_kept()->cause;
+    return kept_trouble();
 }
 
 uint16_t job_station(void)

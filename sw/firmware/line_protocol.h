@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0xEC0A6E47u    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x07418B73u    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -73,6 +73,7 @@ enum line_cause {
     LINE_CAUSE_KEPT_DAMAGED = 68,    // the kept values are damaged: the defaults are in force
     LINE_CAUSE_KEPT_OTHER = 69,    // the kept values are of another build: the defaults are in force
     LINE_CAUSE_KEPT_REFUSED = 70,    // not all kept values are allowed: the others are in force
+    LINE_CAUSE_KEPT_NOT_TAKEN = 71,    // the kept values were not taken: the EEPROM did not answer at power-up, the defaults are in force
 };
 
 enum line_fault {    // bits
@@ -294,7 +295,8 @@ enum line_job_flag {    // bits
     X(67, "no values are kept") \
     X(68, "the kept values are damaged") \
     X(69, "the kept values are of another build") \
-    X(70, "not all kept values are allowed")
+    X(70, "not all kept values are allowed") \
+    X(71, "the kept values were not taken")
 
 // X(code, words), up to a colon
 #define LINE_FAULT_WORDS(X) \
@@ -361,17 +363,17 @@ enum line_operation {
     LINE_OPERATION_INDEX_TO = 42,    // turn the table of axis 0 to an absolute angle, 0.01 arcsec; refused while an axis moves
     LINE_OPERATION_INDEX_STATE = 43,    // what the table does, how its last index ended, the angle of its last reading; all in 0.01 arcsec
     LINE_OPERATION_SENSOR = 44,    // the last good frame of the angle sensor in 0.01 arcsec, its age in clk, and frames since power-up
-    LINE_OPERATION_PEER = 45,    // what the peer port does: the last index asked for; in mode printed the stations of this sub-node and the next one; what was heard
+    LINE_OPERATION_PEER = 45,    // what the peer port does: the last index asked for, the stations of a sub-node that counts them, what was heard
     LINE_OPERATION_PEER_NEXT = 47,    // the station of its program to which the next order goes in mode printed; kept in the EEPROM
-    LINE_OPERATION_JOB = 48,    // what the job does, at which station (from 0 on), why it waits, for which answers (bits of job_action), and for which faults of the sub-node (bits of fault)
+    LINE_OPERATION_JOB = 48,    // what the job does, at which station (from 0 on), why it waits, for which answers; bits of job_action, job_flag, fault
     LINE_OPERATION_JOB_DO = 49,    // start, pause, resume or stop the job, or answer its question
     LINE_OPERATION_JOB_PROGRAM = 50,    // the stored program; writing 1 while it is written or read, then how that ended, or why there is none
     LINE_OPERATION_JOB_ANGLE = 51,    // angle of a station of the stored program, in 0.01 arcsec
     LINE_OPERATION_JOB_BEGIN = 52,    // begin a new program; it comes into force when it is saved, and not while a job is under way
     LINE_OPERATION_JOB_ADD = 53,    // give the new program a station; in their order, from 0 on, with ascending angles
     LINE_OPERATION_JOB_SAVE = 54,    // write the new program and the settings into the EEPROM; job_program tells when and how that ended
-    LINE_OPERATION_KEEP = 58,    // keep the parameters of all axes and the settings in the EEPROM, or forget them; kept tells when and how that ended
-    LINE_OPERATION_KEPT = 59,    // what is kept: writing 1 while the EEPROM is written or read, then what it was good for; torn 1: one copy was damaged
+    LINE_OPERATION_KEEP = 58,    // keep parameters and settings in the EEPROM, or forget them; kept tells when and how that ended
+    LINE_OPERATION_KEPT = 59,    // what is kept, or why not; writing 1 while the EEPROM is written or read; torn 1: one copy was damaged
 };
 
 // Lengths of whole bodies and offsets of their fields, in bytes, little endian.

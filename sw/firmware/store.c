@@ -172,7 +172,7 @@ static void choose_kept(void)
     bool none = !kept_generation[0] && !kept_generation[1];
     kept_copy = kept_generation[1] > kept_generation[0];
     kept.generation = kept_generation[kept_copy];
-    if (!starting) return end_kept();
+    if (!starting && !none) return end_kept();
     kept.cause = !none ? LINE_CAUSE_OK : kept.torn ? LINE_CAUSE_KEPT_DAMAGED : LINE_CAUSE_NOTHING_KEPT;
     none ? end_kept() : read_kept(TAKE_KEPT, kept_copy);
 }
@@ -392,7 +392,7 @@ void store_start(unsigned axes)
 {
     (void)axes;
     cause = LINE_CAUSE_OK;
-    kept = (struct store_kept){.cause = LINE_CAUSE_STORE_MISSING};
+    kept = (struct store_kept){.cause = LINE_CAUSE_KEPT_NOT_TAKEN};
     starting = true;
     load();
 }

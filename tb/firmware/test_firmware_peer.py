@@ -27,7 +27,8 @@ class Node(Machine):
     def __init__(self, mode, role):
         self.random = random.Random(seed())
         self.table = Table(self.random)
-        self.sensor, self.port, self.i2c, self.told = Sensor(self.random, self.table), PeerPort(), I2c(), {"peer_mode": mode, "peer_role": role}
+        self.sensor, self.port, self.i2c = Sensor(self.random, self.table), PeerPort(), I2c()
+        self.told = {"peer_mode": mode, "peer_role": role}
         super().__init__(Axis(), image="station", links=Links(self.sensor, self.port, self.i2c))
         self.begin()
 

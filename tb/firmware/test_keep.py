@@ -196,10 +196,10 @@ def test_a_missing_eeprom_is_named_and_what_it_keeps_is_taken_at_power_up_only()
     station.bus.devices.pop(0x50)
     station.power_cut()
     station.run(500)
-    assert station.kept()["cause"] == "store_missing" and station.request("keep", action=0)[0] == "store_missing"
+    assert station.kept()["cause"] == "kept_not_taken" and station.request("keep", action=0)[0] == "store_missing"
     station.bus.devices[0x50] = station.eeprom
     station.ready()
-    assert parameters(station, "kp") == {"kp": PARAMETER["kp"]["default"]} and station.kept()["cause"] == "store_missing"
+    assert parameters(station, "kp") == {"kp": PARAMETER["kp"]["default"]} and station.kept()["cause"] == "kept_not_taken"
     assert restarted(station) == "ok" and parameters(station, "kp") == {"kp": 1}
 
 
@@ -251,3 +251,12 @@ def test_a_power_cut_at_any_moment_of_keeping_leaves_the_old_values_or_the_new_o
 def test_the_image_of_the_axes_keeps_nothing():
     machine = Machine()
     assert machine.request("keep", action=0)[0] == machine.request("kept")[0] == "not_built"
+
+
+def test_a_blank_eeprom_that_comes_late_keeps_nothing():
+    station = Station(absent=["eeprom"])
+    station.run(500)
+    assert station.kept()["cause"] == "kept_not_taken"
+    station.bus.devices[0x50] = station.eeprom
+    station.ready()
+    assert station.kept()["cause"] == "nothing_kept" and station.load([1]) == "ok" and station.job()["cause"] == "ok"

@@ -72,7 +72,8 @@ def do_status(session, options):
         f"table   {state.words}; target {said(state.target)}, read {said(state.reading)}; the last index: {state.ended_words}",
         f"sensor  {'dead' if sensor.dead else 'alive'}; {said(sensor.angle)}, {sensor.frames} frames, {sensor.wrong_crc} with a wrong CRC, "
         f"{sensor.broken} broken, {sensor.missed} missed",
-        f"peer    {peer.words}; station {peer.station}, next {peer.next} of {peer.stations}; {peer.heard} heard, {peer.garbage} not understood; {peer.ended_words}")))
+        f"peer    {peer.words}; station {peer.station}, next {peer.next} of {peer.stations}; {peer.heard} heard, "
+        f"{peer.garbage} not understood; {peer.ended_words}")))
 
 
 def do_next(session, options):

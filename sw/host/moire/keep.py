@@ -25,8 +25,8 @@ class KeptState:
 
     @property
     def words(self) -> str:
-        told = ("1 value is kept" if self.values == 1 else f"{self.values} values are kept") if self.cause == "ok" else words(CAUSES, [self.cause])
-        return told + "; one copy of them was damaged" * self.torn
+        kept = "1 value is kept" if self.values == 1 else f"{self.values} values are kept"
+        return (kept if self.cause == "ok" else words(CAUSES, [self.cause])) + "; one copy of them was damaged" * self.torn
 
 
 class Kept:
@@ -55,5 +55,6 @@ class Kept:
         self.node.request("keep", action=ACTIONS[action])
         state = self.state()
         if state.cause not in good:
-            raise MotionFailed(state.cause, CAUSE_CODES[state.cause], f"node {self.node.address} did not {action} its values: {state.words}")
+            raise MotionFailed(state.cause, CAUSE_CODES[state.cause],
+                               f"node {self.node.address} did not {action} its values: {state.words}")
         return state

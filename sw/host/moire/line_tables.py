@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0xEC0A6E47
+PROTOCOL_CRC = 0x07418B73
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -92,6 +92,7 @@ CAUSES = {
     68: ("kept_damaged", "the kept values are damaged: the defaults are in force"),
     69: ("kept_other", "the kept values are of another build: the defaults are in force"),
     70: ("kept_refused", "not all kept values are allowed: the others are in force"),
+    71: ("kept_not_taken", "the kept values were not taken: the EEPROM did not answer at power-up, the defaults are in force"),
 }
 
 # bit: (name, words)
@@ -380,14 +381,14 @@ OPERATIONS = {operation.name: operation for operation in (
               (),
               (("angle", "u32"), ("age", "u32"), ("dead", "u8"), ("frames", "u32"),
                ("wrong_crc", "u32"), ("broken", "u32"), ("missed", "u32"),)),
-    Operation("peer", 45, "what the peer port does: the last index asked for; in mode printed the stations of this sub-node and the next one; what was heard",
+    Operation("peer", 45, "what the peer port does: the last index asked for, the stations of a sub-node that counts them, what was heard",
               (),
               (("phase", "u8"), ("ended", "u8"), ("station", "u16"), ("stations", "u16"),
                ("next", "u16"), ("heard", "u32"), ("garbage", "u32"), ("repeated", "u32"),)),
     Operation("peer_next", 47, "the station of its program to which the next order goes in mode printed; kept in the EEPROM",
               (("station", "u16"),),
               ()),
-    Operation("job", 48, "what the job does, at which station (from 0 on), why it waits, for which answers (bits of job_action), and for which faults of the sub-node (bits of fault)",
+    Operation("job", 48, "what the job does, at which station (from 0 on), why it waits, for which answers; bits of job_action, job_flag, fault",
               (),
               (("state", "u8"), ("cause", "u8"), ("station", "u16"), ("stations", "u16"),
                ("answers", "u8"), ("flags", "u8"), ("table_faults", "u16"),)),
@@ -410,10 +411,10 @@ OPERATIONS = {operation.name: operation for operation in (
     Operation("job_save", 54, "write the new program and the settings into the EEPROM; job_program tells when and how that ended",
               (),
               ()),
-    Operation("keep", 58, "keep the parameters of all axes and the settings in the EEPROM, or forget them; kept tells when and how that ended",
+    Operation("keep", 58, "keep parameters and settings in the EEPROM, or forget them; kept tells when and how that ended",
               (("action", "u8"),),
               ()),
-    Operation("kept", 59, "what is kept: writing 1 while the EEPROM is written or read, then what it was good for; torn 1: one copy was damaged",
+    Operation("kept", 59, "what is kept, or why not; writing 1 while the EEPROM is written or read; torn 1: one copy was damaged",
               (),
               (("writing", "u8"), ("cause", "u8"), ("torn", "u8"), ("generation", "u32"),
                ("values", "u16"),)),
