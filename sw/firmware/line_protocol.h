@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x07418B73u    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x93ABC8A7u    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -365,7 +365,7 @@ enum line_operation {
     LINE_OPERATION_SENSOR = 44,    // the last good frame of the angle sensor in 0.01 arcsec, its age in clk, and frames since power-up
     LINE_OPERATION_PEER = 45,    // what the peer port does: the last index asked for, the stations of a sub-node that counts them, what was heard
     LINE_OPERATION_PEER_NEXT = 47,    // the station of its program to which the next order goes in mode printed; kept in the EEPROM
-    LINE_OPERATION_JOB = 48,    // what the job does, at which station (from 0 on), why it waits, for which answers; bits of job_action, job_flag, fault
+    LINE_OPERATION_JOB = 48,    // what the job does, at which station (from 0 on), why it waits, for which answers: bits of job_action
     LINE_OPERATION_JOB_DO = 49,    // start, pause, resume or stop the job, or answer its question
     LINE_OPERATION_JOB_PROGRAM = 50,    // the stored program; writing 1 while it is written or read, then how that ended, or why there is none
     LINE_OPERATION_JOB_ANGLE = 51,    // angle of a station of the stored program, in 0.01 arcsec

@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x07418B73
+PROTOCOL_CRC = 0x93ABC8A7
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -388,7 +388,7 @@ OPERATIONS = {operation.name: operation for operation in (
     Operation("peer_next", 47, "the station of its program to which the next order goes in mode printed; kept in the EEPROM",
               (("station", "u16"),),
               ()),
-    Operation("job", 48, "what the job does, at which station (from 0 on), why it waits, for which answers; bits of job_action, job_flag, fault",
+    Operation("job", 48, "what the job does, at which station (from 0 on), why it waits, for which answers: bits of job_action",
               (),
               (("state", "u8"), ("cause", "u8"), ("station", "u16"), ("stations", "u16"),
                ("answers", "u8"), ("flags", "u8"), ("table_faults", "u16"),)),
