@@ -23,10 +23,10 @@ REQUEST_HEAD = ["sequence u8", "operation u8"]
 REPLY_HEAD = ["sequence u8", "operation u8", "cause u8"]
 AXIS = "axis u8"    # first field of what asks an axis
 LISTS = ("cause", "fault", "encoder_event", "state", "flag", "learner_reason", "signal_fault", "learner_action", "scope_trigger",
-         "scope_state", "index_phase", "peer_phase", "job_state", "job_action", "job_flag")
+         "scope_state", "index_phase", "peer_phase", "job_state", "job_action", "keep_action", "job_flag")
 CODES = ("cause", "state", "learner_reason", "learner_action", "scope_trigger", "scope_state", "index_phase", "peer_phase",
-         "job_state", "job_action")                                           # numbers; the others are bits
-WORDS = ("cause", "job_state")                                                # lists whose words the firmware shows on its panel
+         "job_state", "job_action", "keep_action")                                           # numbers; the others are bits
+WORDS = ("cause", "fault", "job_state")                                            # lists whose words the firmware shows on its panel
 
 
 def fields(head, declared):
@@ -54,6 +54,8 @@ class Line:
         self.lists = {name: {key: tuple(value) for key, value in table[name].items()} for name in LISTS}
         self.operations = table["operation"]
         self.parameters, self.settings = table["parameter"], table["setting"]
+        self.values_crc = zlib.crc32(repr([(name, value["id"], value["unit"], value["lsb"], value["default"])
+                                           for name, value in [*self.parameters.items(), *self.settings.items()]]).encode())
         self.layouts = {}
         for name, operation in self.operations.items():
             self.layouts[name] = (fields(REQUEST_HEAD, operation["request"]), fields(REPLY_HEAD, operation["reply"]))
@@ -104,8 +106,9 @@ def header(line: Line) -> str:
             out.append(f"    LINE_{name}_{key}".upper() + f" = {value},    // {words}")
         out += ["};", ""]
     for name in WORDS:
-        out.append("// X(code, words)")
-        out += macro(f"LINE_{name.upper()}_WORDS", [f"    X({code}, {quoted(words)})" for code, words in line.lists[name].values()])
+        out.append("// X(code, words), up to a colon")
+        out += macro(f"LINE_{name.upper()}_WORDS",
+                     [f"    X({code}, {quoted(words.partition(':')[0])})" for code, words in line.lists[name].values()])
     out.append("enum line_operation {")
     for name, operation in line.operations.items():
         out.append(f"    LINE_OPERATION_{name.upper()} = {operation['code']},    // {operation['text']}")
@@ -123,6 +126,7 @@ def header(line: Line) -> str:
             for name, operation in line.operations.items()]
     out += macro("LINE_OPERATIONS", rows)
     out += values("parameter", line.parameters) + values("setting", line.settings)
+    out += [f"#define LINE_VALUES_CRC 0x{line.values_crc:08X}u     // of all of both: what a kept number means", ""]
     out += ["#endif", ""]
     return "\n".join(out)
 

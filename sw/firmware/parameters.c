@@ -240,6 +240,11 @@ void parameters_set(unsigned axis, uint8_t id, int64_t value)
     apply(axis, id);
 }
 
+int64_t parameters_default(uint8_t id)
+{
+    return table[id].value;
+}
+
 int64_t parameters_get(unsigned axis, uint8_t id)
 {
     return parameters[axis][id];

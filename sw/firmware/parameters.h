@@ -21,6 +21,7 @@ void parameters_start(unsigned axis);                   // defaults, into the re
 uint8_t parameters_check(unsigned axis, uint8_t id, int64_t value);     // a line_cause
 void parameters_set(unsigned axis, uint8_t id, int64_t value);
 int64_t parameters_get(unsigned axis, uint8_t id);
+int64_t parameters_default(uint8_t id);
 struct planner_limits parameters_limits(unsigned axis, uint8_t velocity_id);
 struct planner_stairs parameters_stairs(unsigned axis, uint8_t velocity_id);
 

@@ -13,7 +13,7 @@ from fractions import Fraction
 from functools import cache, partial
 from pathlib import Path
 
-from . import command_index, command_job, command_look, command_relay, command_replay, command_scope, command_twin, units
+from . import command_index, command_job, command_keep, command_look, command_relay, command_replay, command_scope, command_twin, units
 from .client import CAPTURE_SOURCES, HOME_METHODS, Line, capture_source, register_fields
 from .errors import BadFile, LineError, MoireError, OutOfRange, PortError, UnitError
 from .line_tables import PARAMETERS
@@ -305,7 +305,7 @@ def make_parser() -> Parser:
 
     params = commands.add_parser(
         "params",
-        help="parameters of an axis: list, get, set, save, load",
+        help="parameters of an axis: list, get, set, save, load, keep, forget, kept",
         description="Parameters of an axis.",
         epilog="example: moire --port /dev/ttyUSB0 params set velocity 5mm/s -- params save stage.json",
         parents=[common],
@@ -327,6 +327,7 @@ def make_parser() -> Parser:
         actions,
     )
     load.add_argument("file", metavar="FILE")
+    command_keep.add_to(actions, command)
 
     command_look.add_to(command, checked(waiting_time))
     command_replay.add_to(command)

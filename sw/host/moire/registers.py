@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0xAFA3B3E3          # CRC-32 of tables/registers.rdl
+MAP_CRC = 0x18EB521C          # CRC-32 of tables/registers.rdl
 BLOCKS = {"node": (0x000, 0x000), "line": (0x100, 0x000), "links": (0x200, 0x000), "axis": (0x400, 0x100), "grating": (0xC00, 0x100), "actuator": (0x1400, 0x100)}          # base, distance to the next one
 
 
@@ -145,6 +145,8 @@ FIELDS = (
           "a sequence is under way"),
     Field("links", "ps2_state", "busy", 0x18, 7, 1, False, "r", "", Fraction(1),
           "a frame is under way on either side"),
+    Field("links", "ps2_state", "drop", 0x18, 8, 1, False, "w", "", Fraction(1),
+          "take back what is queued; a sequence that is under way is finished whole"),
     Field("links", "ps2_typed", "value", 0x1C, 0, 16, False, "rw", "", Fraction(1),
           "bytes of the keyboard that answer no command: a person types; writing clears"),
     Field("links", "ps2_errors", "keyboard_damaged", 0x20, 0, 8, False, "rw", "", Fraction(1),
