@@ -94,6 +94,7 @@ class FakeNode:
     def __init__(self, address=1, axes=1, map_crc=MAP_CRC, protocol_crc=PROTOCOL_CRC):
         self.address, self.map_crc, self.protocol_crc = address, map_crc, protocol_crc
         self.axes = [FakeAxis() for _ in range(axes)]
+        self.powered_up = 0.0
         self.now, self.registers = 0.0, {0: map_crc, 0x400: 7}
         self.written = []              # (address, value)
         self.captures = []             # words of captured, captured_time and captured_position, oldest first
@@ -400,7 +401,7 @@ class FakeNode:
         if self.captures and 0xC68 <= address < 0xC78:
             return "ok", {"value": self.captures[0][address - 0xC68 >> 2]}
         if 0x10 <= address < 0x18:                     # time stamp
-            return "ok", {"value": round(self.now * CLK_HZ) >> 8 * (address - 0x10) & 0xFFFFFFFF}
+            return "ok", {"value": round((self.now - self.powered_up) * CLK_HZ) >> 8 * (address - 0x10) & 0xFFFFFFFF}
         return ("ok", {"value": self.registers[address]}) if address in self.registers else ("no_such_register", {})
 
 

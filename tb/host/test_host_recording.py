@@ -111,7 +111,7 @@ def test_a_record_with_another_baud_rate_is_not_replayed_through_a_door(tmp_path
     json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + '\n{"at": 1, "send": [512]}',
     json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + '\n{"at": 1, "receive": [1], "wanted": 1}',
     *(json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + f'\n{{"at": 1, {call}}}' for call in
-      ('"baud": 0', '"baud": "fast"', '"baud": 1e9', '"baud": true', '"break": 1', '"break": true, "baud": 9600', '"send": [1], "baud": 9600')),
+      ('"baud": 0', '"baud": "fast"', '"baud": 1e9', '"baud": true', '"break": 1', '"break": true, "baud": 9600')),
 ])
 def test_a_file_that_is_no_record_is_refused(tmp_path, text):
     (tmp_path / "no.jsonl").write_text(text)

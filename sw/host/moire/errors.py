@@ -42,7 +42,7 @@ class PortError(MoireError):
 
 
 class TwinNotBuilt(PortError):
-    """The simulated stage cannot be loaded."""
+    """The simulated machine cannot be loaded."""
 
 
 class LineError(MoireError):
