@@ -328,6 +328,12 @@ def test_silence_and_noise_are_exit_code_3():
     assert "garbled" in sentence(Call("status", line=line), 3)
 
 
+def test_two_nodes_with_one_address_are_exit_code_3():
+    line = FakeLine(FakeNode(), FakeNode())
+    line.wired_and, line.nodes[1].powered_up = True, 0.3
+    assert "two nodes with the address 1" in sentence(Call("find", line=line), 3)
+
+
 def test_ports_are_exit_code_4(monkeypatch):
     monkeypatch.delenv("MOIRE_PORT", raising=False)
     err = io.StringIO()

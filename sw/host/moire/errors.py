@@ -66,7 +66,8 @@ class LineGarbled(LineError):
     """Words came back, but no right reply."""
 
     def __init__(self, address: int, reason: str, tries: int = 1):
-        super().__init__(address, f"the line to address {address} is garbled, tried {times(tries)}: {reason}")
+        super().__init__(address, f"the line to address {address} is garbled, tried {times(tries)}: {reason}; as from noise, a wrong baud "
+                                  f"rate, two masters or two nodes with the address {address}")
         self.reason = reason
 
 
