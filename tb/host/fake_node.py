@@ -94,12 +94,12 @@ class FakeNode:
     def __init__(self, address=1, axes=1, map_crc=MAP_CRC, protocol_crc=PROTOCOL_CRC):
         self.address, self.map_crc, self.protocol_crc = address, map_crc, protocol_crc
         self.axes = [FakeAxis() for _ in range(axes)]
-        self.powered_up = 0.0
         self.now, self.registers = 0.0, {0: map_crc, 0x400: 7}
         self.written = []              # (address, value)
         self.captures = []             # words of captured, captured_time and captured_position, oldest first
         self.expecting, self.payload = None, []
         self.baud = self.next_baud = BAUD
+        self.powered_up = 0.0          # when its time stamp was zero
         self.last, self.reply = None, bytes([0, 0, 0])
         self.counters = dict.fromkeys(
             ("frames_good", "frames_bad", "framing_errors", "start_glitches", "overruns", "repeated", "refused", "breaks", "driver_cuts",
