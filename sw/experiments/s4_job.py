@@ -140,6 +140,13 @@ def random_stations(count, source, share=1.0):
     return [round((n + source.uniform(0.1, 0.9)) * part, 2) for n in range(count)]
 
 
+def set_up_table(node, **settings):
+    for name, value in {**TABLE, **settings}.items():
+        Settings(node).set(name, value)
+    for name, value in AXIS.items():
+        node.line.axis(node.address).set_parameter(name, value)
+
+
 class IndexingMachine:
     """The simulated machine with its two nodes, the host on their line, and a person at the panel."""
 
@@ -157,10 +164,7 @@ class IndexingMachine:
         self.twin.run(START_S)
         for name, value in {"peer_mode": mode, "peer_role": "main", "job_cut_limit": "20s", "job_start_limit": "5s"}.items():
             Settings(self.nodes[MAIN]).set(name, value)         # the next program takes them into the EEPROM
-        for name, value in {**TABLE, "peer_mode": mode, "peer_role": "sub"}.items():
-            Settings(self.nodes[SUB]).set(name, value)
-        for name, value in AXIS.items():
-            self.line.axis(ADDRESSES[SUB]).set_parameter(name, value)
+        set_up_table(self.nodes[SUB], peer_mode=mode, peer_role="sub")
         Kept(self.nodes[SUB]).keep()                            # from here on they are there after a power cut
 
     def __enter__(self):
