@@ -73,6 +73,8 @@ class Line:
         for name, parameter in {**self.parameters, **self.settings}.items():
             if not parameter["min"] <= parameter["default"] <= parameter["max"]:
                 raise ValueError(f"line.toml: the default of {name} is outside its range")
+            if parameter.get("needs", "SINE") != "SINE":
+                raise ValueError(f"line.toml: {name} can need nothing but SINE")
             Fraction(parameter["lsb"])
 
 
@@ -138,7 +140,11 @@ def values(kind, parameters):
     out.append("// X(name, id, min, max, default): all int64_t, in counts of the wire")
     rows = [f"    X({name}, {parameter['id']}, {parameter['min']}LL, {parameter['max']}LL, {parameter['default']}LL)"
             for name, parameter in parameters.items()]
-    return out + macro(f"LINE_{kind.upper()}S", rows)
+    out += macro(f"LINE_{kind.upper()}S", rows)
+    if needy := [parameter["id"] for parameter in parameters.values() if "needs" in parameter]:
+        out += [f"// {kind}s of which a node without sine and cosine takes only 0 and the default",
+                f"#define LINE_{kind.upper()}S_OF_SINE {', '.join(map(str, needy))}", ""]
+    return out
 
 
 def of_one_count(parameter):
@@ -264,7 +270,8 @@ def page_parts(line: Line) -> dict:
         for name, parameter in parameters.items():
             lsb = Fraction(parameter["lsb"])
             rows.append((parameter["id"], f"`{name}`", parameter["unit"] or "–", parameter["lsb"],
-                         *(decimal(parameter[key] * lsb) for key in ("min", "max", "default")), parameter["text"]))
+                         *(decimal(parameter[key] * lsb) for key in ("min", "max", "default")),
+                         parameter["text"] + (f"; needs {parameter['needs']}" if "needs" in parameter else "")))
         parts[kind + "s"] = table(("id", kind, "unit", "one count", "min", "max", "default", "purpose"), rows)
     parts["example"] = example(line)
     parts["packets"] = packets(line)

@@ -35,7 +35,7 @@ MAIN, SUB = 0, 1                     # places of the nodes
 ADDRESSES = (1, 2)
 CLK_HZ = 1_840_000
 PEER_BAUD = 115200
-NODE = {"DRIVES": 2, "FILTERS": 0}
+NODE = {"DRIVES": 2, "FILTERS": 0, "SINE": 0}
 AXIS = {"drive": "steps", "position_source": "own_steps", "steps_per_period": 4, "counts_per_period": 4, "period": "1um",
         "velocity": "50mm/s", "acceleration": "200mm/s2", "jerk": "1000mm/s3", "home_creep": "0.4mm/s", "following_limit": "10mm",
         "disagreement_limit": 0, "encoder_fault_mask": 0, "deglitch": 0, "kp": 0, "ki": 0, "kd": 0, "kv": 0, "ka": 0,

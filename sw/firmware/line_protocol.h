@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x93ABC8A7u    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0xF9A6A247u    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -741,7 +741,7 @@ enum line_parameter {
     LINE_PARAMETER_SIGNAL_OFFSET = 46,    // signal: largest good offset; 65535 off
     LINE_PARAMETER_SIGNAL_BALANCE = 47,    // signal: largest good difference of the amplitudes; 65535 off
     LINE_PARAMETER_SIGNAL_SQUARE = 48,    // signal: largest good amplitude times sine of the phase error; 65535 off
-    LINE_PARAMETER_POSITION_SOURCE = 49,    // position from: 0 phases of sine and cosine, 1 counts of A/B, 2 the axis' own steps
+    LINE_PARAMETER_POSITION_SOURCE = 49,    // position from: 0 phases of sine and cosine (needs SINE, else 1 is the default), 1 counts of A/B, 2 the axis' own steps
     LINE_PARAMETER_HOME_METHOD = 50,    // homing: CiA 402 methods 1, 2, 17, 18, 33, 34, 35, 37; -1 S0 (switch, way, phase zero), -2 S3 (index on either side)
     LINE_PARAMETER_HOME_OFFSET = 51,    // [1 period] what the zero that homing finds is called
     LINE_PARAMETER_DRIVE = 52,    // drive: 0 bridge, 1 steps, 2 converter
@@ -870,6 +870,9 @@ enum line_parameter {
     X(stairs_rise_3, 84, 1LL, 65536000000LL, 3276800LL) \
     X(stairs_border_2, 85, 0LL, 65536LL, 10923LL) \
     X(stairs_border_3, 86, 0LL, 65536LL, 32768LL)
+
+// parameters of which a node without sine and cosine takes only 0 and the default
+#define LINE_PARAMETERS_OF_SINE 25, 26, 27, 28, 29, 33, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48
 
 enum line_setting {
     LINE_SETTING_INDEX_TOLERANCE = 1,    // [0.01 arcsec] index: it has ended when no more than this is left by the sensor

@@ -18,7 +18,7 @@ void parameters_start_node(void);                       // clock dividers, line 
 void parameters_set_baud(uint32_t baud);                // of the line, until the next start
 uint32_t parameters_sample_hz(void);                    // rate of the converters
 void parameters_start(unsigned axis);                   // defaults, into the registers too
-uint8_t parameters_check(uint8_t id, int64_t value);    // a line_cause
+uint8_t parameters_check(unsigned axis, uint8_t id, int64_t value);     // a line_cause
 void parameters_set(unsigned axis, uint8_t id, int64_t value);
 int64_t parameters_get(unsigned axis, uint8_t id);
 int64_t parameters_default(uint8_t id);

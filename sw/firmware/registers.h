@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0xa5fd0e4du            // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0x18eb521cu            // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define LINE_BASE 0x100u
@@ -959,6 +959,9 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define GRATING_POSITION_SOURCE_STEPS_MASK             0x00000002u  // 1: the axis' own step and direction take the place of the pins a and b
 #define GRATING_POSITION_SOURCE_STEPS_SHIFT            1
 #define GRATING_POSITION_SOURCE_STEPS_WIDTH            1
+#define GRATING_POSITION_SOURCE_SINE_MASK              0x00000004u  // 1: sine and cosine were built, 0: the position is made of counts whatever `counts` says
+#define GRATING_POSITION_SOURCE_SINE_SHIFT             2
+#define GRATING_POSITION_SOURCE_SINE_WIDTH             1
 #define GRATING_ALIGN                                  0x0acu  // rw: with counts: move position and phase by this, -2 to 2; the target does not follow [1/4 period]
 #define GRATING_ALIGN_MASK                             0x00000007u
 #define GRATING_ALIGN_SHIFT                            0

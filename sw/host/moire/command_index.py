@@ -24,7 +24,8 @@ def angle(text):
 
 def add_to(group, command):
     """group(name, text, example=): the sub-parsers of a new command; command(name, handler, text, example, under): one of them."""
-    index = group("index", "the table of a station (S4): turn it, look at it and its sensor", example="moire --port twin index to 12.5deg")
+    index = group("index", "the table of a station (S4): turn it, look at it and its sensor",
+                  example="moire --port twin:s4 --address 2 index to 0.5deg")
     to = command("to", do_to, "turn the table to an angle of its sensor, and wait", "moire --port /dev/ttyUSB0 index to 12.5deg", index)
     to.add_argument("angle", type=angle, metavar="ANGLE", help="with a unit: 12.5deg, 30arcmin, 0.5arcsec")
     command("status", do_status, "what the table, its sensor and its peer port do", "moire --port /dev/ttyUSB0 index status", index)

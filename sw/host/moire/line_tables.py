@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x93ABC8A7
+PROTOCOL_CRC = 0xF9A6A247
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -567,7 +567,7 @@ PARAMETERS = {parameter.name: parameter for parameter in (
               "signal: largest good amplitude times sine of the phase error; 65535 off"),
     Parameter("position_source", 49, "", Fraction(1, 1),
               0, 2, 0,
-              "position from: 0 phases of sine and cosine, 1 counts of A/B, 2 the axis' own steps"),
+              "position from: 0 phases of sine and cosine (needs SINE, else 1 is the default), 1 counts of A/B, 2 the axis' own steps"),
     Parameter("home_method", 50, "", Fraction(1, 1),
               -2, 37, -1,
               "homing: CiA 402 methods 1, 2, 17, 18, 33, 34, 35, 37; -1 S0 (switch, way, phase zero), -2 S3 (index on either side)"),
