@@ -363,7 +363,7 @@ void peer_start(unsigned axes)
 void peer_work(void)
 {
     uint8_t used = mode();
-    if (used == NOT_IN_USE) return;
+    if (used == NOT_IN_USE || (used == PRINTED && store_state() == STORE_LOADING)) return;     // what comes waits in its queue
     for (uint32_t n = 0; n < BYTES_A_POLL; n++) {
         uint32_t received = links_read(LINKS_PEER_RECEIVE);
         if (!(received & LINKS_PEER_RECEIVE_PRESENT_MASK)) break;

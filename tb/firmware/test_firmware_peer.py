@@ -212,6 +212,18 @@ def test_a_sub_node_goes_on_with_its_list_after_a_power_cut_at_any_moment():
     assert node.peer()["stations"] == len(places)
 
 
+def test_an_order_that_comes_while_the_eeprom_is_read_is_done_when_the_list_is_there():
+    node = Node(PRINTED, SUB)
+    stations(node, 300)
+    node.i2c.power_cut(node.random)
+    node.firmware.firmware_start()
+    node.say(ORDER)
+    node.tell(**node.told)
+    node.set(**AXIS)
+    assert node.peer()["stations"] == 0 and node.peer()["heard"] == 0
+    assert node.run(60_000, until=lambda: node.peer()["phase"] == "indexed") and abs(node.table.angle - 300) <= 2
+
+
 def test_done_is_said_only_when_the_count_is_in_the_journal():
     node = Node(PRINTED, SUB)
     stations(node, 300)
