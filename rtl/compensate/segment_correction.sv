@@ -14,7 +14,7 @@
 // model    tb/compensate/segment_correction.py, equal in every bit of every cycle
 // proved   between two positions corrected moves by moved_by only, and it is never farther from position than error: out of force it is
 //          the position
-// proof    depth 30, INDEX = 2
+// proof    depth 28, INDEX = 2
 `default_nettype none
 
 module segment_correction #(
@@ -92,6 +92,7 @@ module segment_correction #(
             error    <= '0;
         end
         if (rst) begin
+            first     <= '0;
             asked     <= 1'b0;
             done      <= 1'b0;
             moved     <= 1'b0;

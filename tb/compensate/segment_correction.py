@@ -12,14 +12,14 @@ class SegmentCorrection:
 
     def __init__(self, index=8):
         self.index, self.round = index, index + 22              # clk of the table
-        self.points, self.first = [0] * (1 << index), 0
+        self.points = [0] * (1 << index)
         self.moved_by = self.stored = self.looked = 0
         self.off = True
         self.reset()
 
     def reset(self):
         self.done = self.moved = self.asked = self.looking = self.known = False
-        self.corrected = 0
+        self.corrected = self.first = 0
         self.stop()
 
     def stop(self):
