@@ -266,7 +266,7 @@ async def with_a_segment_table_positions_captures_and_compare_points_are_on_the_
         await bench.write("strobes", capture_now=1, compare_arm=1 - pulses)
         await bench.sample()
         assert await bench.read("compare_passed") == pulses
-    assert await bench.captured() == [15 * QUARTER - 787, 16 * QUARTER - 900]
+    assert await bench.captured() == [15 * QUARTER - 788, 16 * QUARTER - 900]
 
 
 @cocotb.test()
