@@ -49,7 +49,7 @@ static uint8_t reason(unsigned n)
 
 static void put_in_force(unsigned n, uint8_t use)
 {
-    int64_t first = parameters_get(n, LINE_PARAMETER_SEGMENT_FIRST) + ((int64_t)homing_zero(n) << 16);
+    int64_t first = parameters_get(n, LINE_PARAMETER_SEGMENT_FIRST) + (int64_t)homing_zero(n) * 65536;
     tables[n].use = use;
     grating_write_wide(n, GRATING_SEGMENT_ORIGIN, (uint64_t)first);
     grating_write_wide(n, GRATING_SEGMENT_LENGTH, (uint64_t)parameters_get(n, LINE_PARAMETER_SEGMENT_LENGTH));
