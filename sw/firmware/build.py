@@ -129,7 +129,8 @@ def build(memory, out, force, name="axis"):
     script.write_text(f"MEMORY_BYTES = {memory};\n" + (HERE / "link.ld").read_text())
     with tempfile.TemporaryDirectory(dir=out) as folder:
         objects = [Path(folder) / f"{path.name}.o" for path in inputs]
-        compiled = [[*command, *FLAGS, FAST if path.name in HOT else SMALL, *(slim if path.name in SLIM else []), "-c", str(path), "-o", str(made)]
+        compiled = [[*command, *FLAGS, FAST if path.name in HOT else SMALL, *(slim if path.name in SLIM else []), "-c", str(path),
+                     "-o", str(made)]
                     for path, made in zip(inputs, objects, strict=True)]
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             list(pool.map(run, compiled))

@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x161E047Cu    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x2E04DFF8u    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -325,8 +325,8 @@ enum line_operation {
     LINE_OPERATION_WRITE_REGISTER = 19,    // one word of the register map: only index, capture and compare of the grating blocks
     LINE_OPERATION_PREPARE = 20,    // plan to go to a position, and wait for start
     LINE_OPERATION_START = 21,    // begin the prepared motions of these axes (bit n: axis n), all in one tick; none if one of them has none
-    LINE_OPERATION_SEGMENTS = 22,    // the segment table: points that are loaded, the use in force (as the parameter segments), and why not the one that is wanted
-    LINE_OPERATION_SET_SEGMENTS = 23,    // its points from this border on, position there less the true one, in their order; border 0 begins a new table
+    LINE_OPERATION_SEGMENTS = 22,    // the segment table: points loaded, the use in force (as the parameter segments), why not the one wanted
+    LINE_OPERATION_SET_SEGMENTS = 23,    // its points from this border on, in order: position there less the true one; border 0 begins a new table
     LINE_OPERATION_GET_SEGMENTS = 24,    // its points from this border on
     LINE_OPERATION_POSITION = 30,    // where an axis is: the shortest answer that tells it
     LINE_OPERATION_FOLLOW = 34,    // from here to the next request each command to send is answered with the position at that moment
@@ -789,10 +789,10 @@ enum line_parameter {
     LINE_PARAMETER_STAIRS_RISE_3 = 84,    // [1/65536 period/s] stairs: height in section 3, the mirror of 5
     LINE_PARAMETER_STAIRS_BORDER_2 = 85,    // [1/65536] stairs: where section 2 begins, of the way from stairs_first to velocity
     LINE_PARAMETER_STAIRS_BORDER_3 = 86,    // [1/65536] stairs: where section 3 begins: 1/2 is 1:2:3, S4 prints 1/3
-    LINE_PARAMETER_SEGMENTS = 87,    // segment table: 0 off, 1 a segment has the mean of its borders (S0), 2 straight lines; in force from homing on
-    LINE_PARAMETER_SEGMENT_COUNT = 88,    // segment table: its segments
-    LINE_PARAMETER_SEGMENT_LENGTH = 89,    // [1/65536 period] segment table: length of a segment
-    LINE_PARAMETER_SEGMENT_FIRST = 90,    // [1/65536 period] segment table: first border, from the place that homing finds
+    LINE_PARAMETER_SEGMENT_COUNT = 87,    // segment table: its segments
+    LINE_PARAMETER_SEGMENT_LENGTH = 88,    // [1/65536 period] segment table: length of a segment
+    LINE_PARAMETER_SEGMENT_FIRST = 89,    // [1/65536 period] segment table: first border, from the place that homing finds
+    LINE_PARAMETER_SEGMENTS = 90,    // segment table: 0 off, 1 a segment has the mean of its borders (S0), 2 straight lines; in force from homing on
 };
 #define LINE_PARAMETER_COUNT 90u
 
@@ -884,10 +884,10 @@ enum line_parameter {
     X(stairs_rise_3, 84, 1LL, 65536000000LL, 3276800LL) \
     X(stairs_border_2, 85, 0LL, 65536LL, 10923LL) \
     X(stairs_border_3, 86, 0LL, 65536LL, 32768LL) \
-    X(segments, 87, 0LL, 2LL, 0LL) \
-    X(segment_count, 88, 1LL, 255LL, 120LL) \
-    X(segment_length, 89, 1LL, 70368744177664LL, 81920000LL) \
-    X(segment_first, 90, -70368744177664LL, 70368744177664LL, 0LL)
+    X(segment_count, 87, 1LL, 255LL, 120LL) \
+    X(segment_length, 88, 1LL, 70368744177664LL, 81920000LL) \
+    X(segment_first, 89, -70368744177664LL, 70368744177664LL, 0LL) \
+    X(segments, 90, 0LL, 2LL, 0LL)
 
 enum line_setting {
     LINE_SETTING_INDEX_TOLERANCE = 1,    // [0.01 arcsec] index: it has ended when no more than this is left by the sensor

@@ -50,7 +50,7 @@ class Scale:
             await RisingEdge(dut.clk)
             await FallingEdge(dut.clk)
             for name in FLAGS:
-                assert bool(getattr(dut, name).value) == getattr(model, name), f"{self.inputs}: {name}, the model has {getattr(model, name)}"
+                assert bool(getattr(dut, name).value) == getattr(model, name), f"{self.inputs}: {name} is not as the model's"
             names = SIGNED if model.moved else ("corrected", "error")
             for name in (*names, "stored") if model.known else names:
                 got, want = getattr(dut, name).value.to_signed(), getattr(model, name)

@@ -10,8 +10,9 @@ LENGTH, FIRST = 1000 * PERIOD, -2000 * PERIOD
 
 def table(machine, points=POINTS, **more):
     for border in range(0, len(points), 12):
-        block = [*points[border:border + 12], *[0] * 12][:12]
-        machine.ask("set_segments", axis=0, border=border, points=len(points[border:border + 12]), **{f"point_{n}": p for n, p in enumerate(block)})
+        block = points[border:border + 12]
+        filled = {f"point_{n}": point for n, point in enumerate([*block, *[0] * 12][:12])}
+        machine.ask("set_segments", axis=0, border=border, points=len(block), **filled)
     machine.set(segment_count=len(points) - 1, segment_length=LENGTH, segment_first=FIRST, **more)
 
 

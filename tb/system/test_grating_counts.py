@@ -244,7 +244,8 @@ async def with_a_segment_table_positions_captures_and_compare_points_are_on_the_
         if int(dut.moved.value):
             moved.append(dut.moved_by.value.to_signed())
         await FallingEdge(dut.clk)
-    assert moved == [-450] and bench.position() == 12 * QUARTER - 450 and await bench.read("segment_state") == 0x5FF      # known, in force, 255
+    assert moved == [-450] and bench.position() == 12 * QUARTER - 450
+    assert await bench.read("segment_state") == 0x5FF   # known, in force, 255
     for step in (1, -1):                                # sign right in both directions
         for _ in range(12 if step > 0 else 30):
             await bench.go([step])

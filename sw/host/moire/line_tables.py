@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x161E047C
+PROTOCOL_CRC = 0x2E04DFF8
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -328,10 +328,10 @@ OPERATIONS = {operation.name: operation for operation in (
     Operation("start", 21, "begin the prepared motions of these axes (bit n: axis n), all in one tick; none if one of them has none",
               (("axes", "u8"),),
               ()),
-    Operation("segments", 22, "the segment table: points that are loaded, the use in force (as the parameter segments), and why not the one that is wanted",
+    Operation("segments", 22, "the segment table: points loaded, the use in force (as the parameter segments), why not the one wanted",
               (("axis", "u8"),),
               (("loaded", "u16"), ("in_force", "u8"), ("reason", "u8"),)),
-    Operation("set_segments", 23, "its points from this border on, position there less the true one, in their order; border 0 begins a new table",
+    Operation("set_segments", 23, "its points from this border on, in order: position there less the true one; border 0 begins a new table",
               (("axis", "u8"), ("border", "u8"), ("points", "u8"), ("point_0", "i32"),
                ("point_1", "i32"), ("point_2", "i32"), ("point_3", "i32"), ("point_4", "i32"),
                ("point_5", "i32"), ("point_6", "i32"), ("point_7", "i32"), ("point_8", "i32"),
@@ -679,18 +679,18 @@ PARAMETERS = {parameter.name: parameter for parameter in (
     Parameter("stairs_border_3", 86, "", Fraction(1, 65536),
               0, 65536, 32768,
               "stairs: where section 3 begins: 1/2 is 1:2:3, S4 prints 1/3"),
-    Parameter("segments", 87, "", Fraction(1, 1),
-              0, 2, 0,
-              "segment table: 0 off, 1 a segment has the mean of its borders (S0), 2 straight lines; in force from homing on"),
-    Parameter("segment_count", 88, "", Fraction(1, 1),
+    Parameter("segment_count", 87, "", Fraction(1, 1),
               1, 255, 120,
               "segment table: its segments"),
-    Parameter("segment_length", 89, "period", Fraction(1, 65536),
+    Parameter("segment_length", 88, "period", Fraction(1, 65536),
               1, 70368744177664, 81920000,
               "segment table: length of a segment"),
-    Parameter("segment_first", 90, "period", Fraction(1, 65536),
+    Parameter("segment_first", 89, "period", Fraction(1, 65536),
               -70368744177664, 70368744177664, 0,
               "segment table: first border, from the place that homing finds"),
+    Parameter("segments", 90, "", Fraction(1, 1),
+              0, 2, 0,
+              "segment table: 0 off, 1 a segment has the mean of its borders (S0), 2 straight lines; in force from homing on"),
 )}
 
 SETTINGS = {parameter.name: parameter for parameter in (
