@@ -171,7 +171,10 @@ module grating #(
             .look_at(segment_look_at[INDEX-1:0]), .valid(placed), .position(place), .shift, .shift_periods, .done(position_valid),
             .corrected(position), .moved, .moved_by, .in_force(segment_in_force), .outside(segment_outside), .error(segment_error),
             .known(segment_known), .stored(segment_stored));
-        always_ff @(posedge clk) {shifted, shifted_periods} <= {shift && !rst, shift_periods};
+        always_ff @(posedge clk) begin
+            shifted <= shift && !rst;
+            if (shift) shifted_periods <= shift_periods;
+        end
     end else begin : g_no_segments
         assign {position_valid, position} = {placed, place};
         assign {moved, moved_by} = {shift, shift_periods, 16'd0};

@@ -14,7 +14,7 @@
 // model    tb/compensate/segment_correction.py, equal in every bit of every cycle
 // proved   between two positions corrected moves by moved_by only, and it is never farther from position than error: out of force it is
 //          the position
-// proof    depth 28, INDEX = 2
+// proof    depth 12, INDEX = 2
 `default_nettype none
 
 module segment_correction #(
@@ -74,11 +74,11 @@ module segment_correction #(
         asked    <= asking || (asked && !told && !off);
         answered <= (told || (answered && !valid)) && in_force;
         if (told) outside <= beyond;
-        error    <= begins ? answer : fresh;
+        if (begins || (valid && answered)) error <= answer;
         if (begins) in_force <= 1'b1;
 
         moved    <= shift || begins || ends;
-        moved_by <= (shift ? $signed({shift_periods, 16'd0}) : '0) + step;
+        if (shift || begins || ends) moved_by <= (shift ? $signed({shift_periods, 16'd0}) : '0) + step;
         done     <= valid;
         if (valid || moved) corrected <= position - 48'(fresh);
 
@@ -114,7 +114,7 @@ module segment_correction #(
         if (past && !in_force) assert (error == '0 && !answered);
         if (past && !$past(rst) && error != $past(error)) assert ($past(valid) || (moved && in_force != $past(in_force)));
         if (past && !$past(rst) && !$past(valid)) assert (corrected == $past(corrected) + ($past(moved) ? $past(moved_by) : 48'sd0));
-        cover (past && moved && in_force && $past(shift) && error < 0);
+        cover (past && moved && asked && $past(shift) && corrected < 0);
     end
 `endif
 endmodule

@@ -49,7 +49,6 @@ module segment_table #(
     logic                  below, beyond;          // the first border, the longest table
     logic signed [40:0]    slice, line;             // 2^-32 period: rise of half a segment, a quarter …; error above first
 
-    wire signed [48:0]     distance = 49'(position) - 49'(origin);
     wire                   after    = beyond || index >= segments;
     wire                   away     = below || after;
     wire [INDEX-1:0]       border   = below ? '0 : after ? segments : index;
@@ -63,7 +62,7 @@ module segment_table #(
 
     always_ff @(posedge clk) begin
         if (write) errors[point] <= value;
-        looked <= errors[read_at];
+        if (state != DIVIDE && state != LINE) looked <= errors[read_at];
     end
 
     always_ff @(posedge clk) begin
@@ -73,8 +72,8 @@ module segment_table #(
             IDLE:
                 if (valid) begin
                     here   <= position;
-                    below  <= distance < 0;
-                    rest   <= V'(distance[47:0]);
+                    below  <= position < origin;
+                    rest   <= V'(48'(position - origin));
                     part   <= V'(segment_length) << INDEX;
                     state  <= DIVIDE;
                 end

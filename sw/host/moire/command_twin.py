@@ -35,7 +35,7 @@ def make_twin(baud: int, **settings):
     except ImportError as error:
         raise TwinNotBuilt(f"the simulated stage is not here: use the checkout of Moire and its build/venv ({error})") from None
     try:
-        return twin.TwinTransport(twin.Twin(baud=baud, **settings))
+        return twin.TwinTransport(twin.Twin(baud=baud, **{"node_parameters": twin.WITH_SEGMENTS, **settings}))
     except (twin.BuildError, OSError) as error:
         raise TwinNotBuilt(f"the simulated stage cannot be built: {str(error).strip().splitlines()[-1]}") from None
 

@@ -125,8 +125,8 @@ def read_table(path) -> SegmentTable:
             raise BadFile(f"{where}: {format_length(places[n])} is no border of equal segments of {format_length(usual)} from "
                           f"{format_length(places[0])} on")
         if abs(errors[n] - errors[n - 1]) > STEEPEST * usual:
-            raise BadFile(f"{where}: an error of {format_length(errors[n])} after {format_length(errors[n - 1])} is absurd: no scale is off "
-                          f"by {float(STEEPEST):.0%} of a segment")
+            raise BadFile(f"{where}: an error of {format_length(errors[n])} after {format_length(errors[n - 1])} is absurd: no scale is "
+                          f"off by {float(STEEPEST):.0%} of a segment")
     return SegmentTable(places[0], (places[-1] - places[0]) / (len(places) - 1), tuple(errors))
 
 
