@@ -12,7 +12,8 @@ module axis #(
     parameter int W = 8,                        // bits of a sample
     parameter int DRIVES = 15,                  // see actuator
     parameter int FILTERS = 2,                  // of the servo, see biquad_cascade
-    parameter int SEGMENTS = 255                // most segments of the scale's table, see grating
+    parameter int SEGMENTS = 255,               // most segments of the scale's table, see grating
+    parameter int SINE = 1                      // see grating
 ) (
     input  wire                  clk,
     input  wire                  rst,
@@ -98,7 +99,7 @@ module axis #(
     wire signed [47:0]  moved_by;
     wire                upward;
 
-    grating #(.W(W), .SEGMENTS(SEGMENTS)) u_grating (.clk, .rst, .tick, .sample_tick, .mark, .now, .own_step(step), .own_direction(upward), .select(grating_select), .write,
+    grating #(.W(W), .SINE(SINE), .SEGMENTS(SEGMENTS)) u_grating (.clk, .rst, .tick, .sample_tick, .mark, .now, .own_step(step), .own_direction(upward), .select(grating_select), .write,
         .word, .wdata, .rdata(grating_rdata),
         .deglitch, .spike_step, .spike_hold, .amplitude_low, .amplitude_high, .disagreement_limit, .shift(shift_origin_written),
         .shift_periods(shift_origin), .a(pin_a), .b(pin_b), .z(pin_z), .probe(pin_probe), .adc_sin, .adc_cos, .adc_cs_n, .adc_sclk,
@@ -145,7 +146,7 @@ module axis #(
         .dac_cs_n, .dac_sclk, .dac_sdi, .fine_saturated, .step_overrun);
 
     // registers
-    axis_registers u_registers (.clk, .rst, .select, .write, .word, .wdata, .rdata,
+    axis_registers #(.SINE(SINE)) u_registers (.clk, .rst, .select, .write, .word, .wdata, .rdata,
         .control_enable, .control_closed_loop, .control_homing, .control_fine,
         .strobes_reset_faults, .strobes_hold_here, .strobes_start, .strobes_brake, .strobes_arm,
         .state_enabled(drive_enable), .state_limit_low(limit_low), .state_limit_high(limit_high), .state_estop(estop),

@@ -9,7 +9,8 @@
 
 module grating #(
     parameter int W = 8,                        // bits of a sample
-    parameter int SEGMENTS = 255                // most segments of its table; 0: there is none
+    parameter int SEGMENTS = 255,               // most segments of its table; 0: there is none
+    parameter int SINE = 1                      // 0: nothing of sine and cosine is built, the position is made of counts
 ) (
     input  wire                  clk,
     input  wire                  rst,
@@ -75,7 +76,8 @@ module grating #(
     wire        [6:0]  capture_sources;
     wire signed [47:0] compare_start, compare_step;
     wire        [23:0] pulse_length, gap_length;
-    wire               by_counts, by_steps, align_written;
+    wire               counts_chosen, by_steps, align_written;
+    wire               by_counts = counts_chosen || SINE == 0;
     wire signed [2:0]  align;
     wire               segment_enable, segment_linear, segment_origin_written, segment_point_written, segment_look;
     wire        [7:0]  segments, segment_border, segment_look_at;
@@ -83,26 +85,8 @@ module grating #(
     wire        [47:0] segment_length;
     wire signed [23:0] segment_point;
 
-    // between the rooms
-    wire        [2:0]  levels;                                  // {z, b, a}, filtered
-    wire               overspeed, disagreement;
-
-    // sense
-    wire               converted, sampled;
-    wire signed [W-1:0] raw_sin, raw_cos;
-    wire        [14:0] signal_faults, first_signal_faults;
-    wire               learnt;
-
-    dual_adc_reader #(.W(W)) u_converter (.clk, .rst, .start(sample_tick && !by_counts), .sdata_a(adc_sin), .sdata_b(adc_cos),
-                                          .cs_n(adc_cs_n), .sclk(adc_sclk), .valid(converted), .sin(raw_sin), .cos(raw_cos));
-    spike_limiter #(.W(W)) u_limiter (.clk, .rst, .step(spike_step), .hold(spike_hold), .valid(converted), .sin(raw_sin), .cos(raw_cos),
-                                      .done(sampled), .sin_out(sin), .cos_out(cos), .rejected(sample_rejected));
-    signal_monitor #(.W(W)) u_monitor (.clk, .rst, .clear(clear_signal_faults), .low(amplitude_low), .high(amplitude_high), .rail, .tolerance,
-                                       .jump, .band, .span, .quiet, .dead, .offset_limit, .balance_limit, .square_limit, .valid(sampled),
-                                       .sin, .cos, .a(levels[0]), .b(levels[1]), .phase_jump(overspeed),
-                                       .lost_count(disagreement), .amplitude, .learnt, .faults(signal_faults), .first(first_signal_faults));
-
     // decode
+    wire        [2:0]  levels;                                  // {z, b, a}, filtered
     wire signed [31:0] index_count;
     wire        [31:0] edge_time;
     wire               index_found, index_armed, illegal, revolution_wrong;
@@ -116,20 +100,50 @@ module grating #(
         .edge_time, .index_found, .index_armed, .index_count, .filtered(levels), .rejected(edge_rejected), .illegal, .illegal_seen, .illegal_fault,
         .revolution_wrong, .revolution_fault);
 
-    // interpolate
-    wire               corrected, phase_valid, harmonics_off, stepped;
-    wire signed [15:0] corrected_sin, corrected_cos;
-    wire        [15:0] plain_phase, corrected_amplitude, tracked_phase;
+    // sine and cosine: sense, interpolate, learn
+    wire        [14:0] signal_faults, first_signal_faults;
+    wire               overspeed, disagreement, stepped, full, spoiled;
+    wire        [15:0] tracked_phase;
     wire signed [16:0] step;
+    wire        [31:0] recorded;
+    wire               placed;
+    wire signed [47:0] place;                                   // of the scale, its fraction is the phase
 
-    signal_correction #(.W(W)) u_correction (.clk, .rst, .load(load_correction), .sin_offset, .cos_offset, .gain, .shear, .valid(sampled),
-                                             .sin, .cos, .done(corrected), .sin_out(corrected_sin), .cos_out(corrected_cos));
-    arctan_pipelined #(.W(16), .STEPS(2)) u_arctan (.clk, .rst, .valid(corrected), .sin(corrected_sin), .cos(corrected_cos),
-                                                    .done(phase_valid), .phase(plain_phase), .amplitude(corrected_amplitude));
-    harmonic_correction u_harmonics (.clk, .rst, .enable(harmonic_enable), .write(harmonic_write), .point(harmonic_at),
-                                     .value(harmonic_value), .swap(swap_harmonics), .valid(phase_valid), .phase(plain_phase),
-                                     .done(harmonics_off), .phase_out(phase));
-    fringe_tracker u_tracker (.clk, .rst, .valid(harmonics_off), .phase, .done(stepped), .step, .phase_out(tracked_phase), .overspeed);
+    if (SINE != 0) begin : g_sine
+        wire               converted, sampled, learnt, corrected, phase_valid, harmonics_off;
+        wire signed [W-1:0] raw_sin, raw_cos;
+        wire signed [15:0] corrected_sin, corrected_cos;
+        wire        [15:0] plain_phase, corrected_amplitude;
+
+        dual_adc_reader #(.W(W)) u_converter (.clk, .rst, .start(sample_tick && !by_counts), .sdata_a(adc_sin), .sdata_b(adc_cos),
+                                              .cs_n(adc_cs_n), .sclk(adc_sclk), .valid(converted), .sin(raw_sin), .cos(raw_cos));
+        spike_limiter #(.W(W)) u_limiter (.clk, .rst, .step(spike_step), .hold(spike_hold), .valid(converted), .sin(raw_sin), .cos(raw_cos),
+                                          .done(sampled), .sin_out(sin), .cos_out(cos), .rejected(sample_rejected));
+        signal_monitor #(.W(W)) u_monitor (.clk, .rst, .clear(clear_signal_faults), .low(amplitude_low), .high(amplitude_high), .rail, .tolerance,
+                                           .jump, .band, .span, .quiet, .dead, .offset_limit, .balance_limit, .square_limit, .valid(sampled),
+                                           .sin, .cos, .a(levels[0]), .b(levels[1]), .phase_jump(overspeed),
+                                           .lost_count(disagreement), .amplitude, .learnt, .faults(signal_faults), .first(first_signal_faults));
+
+        signal_correction #(.W(W)) u_correction (.clk, .rst, .load(load_correction), .sin_offset, .cos_offset, .gain, .shear, .valid(sampled),
+                                                 .sin, .cos, .done(corrected), .sin_out(corrected_sin), .cos_out(corrected_cos));
+        arctan_pipelined #(.W(16), .STEPS(2)) u_arctan (.clk, .rst, .valid(corrected), .sin(corrected_sin), .cos(corrected_cos),
+                                                        .done(phase_valid), .phase(plain_phase), .amplitude(corrected_amplitude));
+        harmonic_correction u_harmonics (.clk, .rst, .enable(harmonic_enable), .write(harmonic_write), .point(harmonic_at),
+                                         .value(harmonic_value), .swap(swap_harmonics), .valid(phase_valid), .phase(plain_phase),
+                                         .done(harmonics_off), .phase_out(phase));
+        fringe_tracker u_tracker (.clk, .rst, .valid(harmonics_off), .phase, .done(stepped), .step, .phase_out(tracked_phase), .overspeed);
+
+        coarse_check u_coarse (.clk, .rst, .limit(disagreement_limit), .valid(placed), .position(place), .count(quadrature_count),
+                               .shift, .shift_periods, .disagreement);
+        learner_recorder #(.W(W)) u_recorder (.clk, .rst, .start(record), .phases, .every, .sampled(converted), .sin(raw_sin), .cos(raw_cos),
+                                              .phase_valid, .phase(plain_phase), .disturbed(|signal_faults[1:0] || overspeed), .read(recorder_read),
+                                              .word(recorded), .full, .spoiled);
+        wire unused_sine = &{1'b0, learnt, corrected_amplitude};
+    end else begin : g_no_sine
+        assign {adc_cs_n, adc_sclk} = 2'b11;
+        assign {sin, cos, sample_rejected, phase, amplitude, signal_faults, first_signal_faults, overspeed, disagreement, stepped, step,
+                tracked_phase, recorded, full, spoiled} = '0;
+    end
 
     // position
     wire               present, overrun, armed, late;
@@ -142,8 +156,6 @@ module grating #(
     wire               counted;
     wire signed [16:0] count_step;
     wire        [15:0] counted_phase;
-    wire               placed;
-    wire signed [47:0] place;                                   // of the scale, its fraction is the phase
     logic       [2:0]  index_later;                             // found, until the position of its count stands
 
     always_ff @(posedge clk) index_later <= rst ? '0 : {index_later[1:0], index_found};
@@ -152,8 +164,6 @@ module grating #(
                           .valid(counted), .step(count_step), .phase(counted_phase));
     unwrap u_position (.clk, .rst, .valid(by_counts ? counted : stepped), .step(by_counts ? count_step : step),
                        .phase(by_counts ? counted_phase : tracked_phase), .shift, .shift_periods, .done(placed), .position(place));
-    coarse_check u_coarse (.clk, .rst, .limit(disagreement_limit), .valid(placed), .position(place), .count(quadrature_count),
-                           .shift, .shift_periods, .disagreement);
     velocity_estimator u_velocity (.clk, .rst, .quantum, .tick, .position(place), .shift, .shift_periods, .velocity, .fine);
 
     // compensate
@@ -191,19 +201,11 @@ module grating #(
                                 .shift_periods(shifted_periods),
                                 .armed, .pulse(compare_pulse), .late, .passed);
 
-    // learn
-    wire        [31:0] recorded;
-    wire               full, spoiled;
-
-    learner_recorder #(.W(W)) u_recorder (.clk, .rst, .start(record), .phases, .every, .sampled(converted), .sin(raw_sin), .cos(raw_cos),
-                                          .phase_valid, .phase(plain_phase), .disturbed(|signal_faults[1:0] || overspeed), .read(recorder_read),
-                                          .word(recorded), .full, .spoiled);
-
     // registers
     assign events       = {disagreement, signal_faults[1], signal_faults[0], overspeed, illegal};
     assign signal_fault = |(signal_faults & signal_fault_mask);
 
-    grating_registers u_registers (.clk, .rst, .select, .write, .word, .wdata, .rdata,
+    grating_registers #(.SINE(SINE)) u_registers (.clk, .rst, .select, .write, .word, .wdata, .rdata,
         .edge_filter_skip(filter_skip), .edge_filter_spare(filter_spare), .decoder_mode(mode), .index_active_low(index_low),
         .index_gate_mask(gate_mask), .index_gate(gate), .index_up, .index_down, .index_each, .counts_per_revolution,
         .strobes_arm_index(arm_index), .strobes_load_correction(load_correction), .strobes_swap_harmonics(swap_harmonics),
@@ -220,16 +222,20 @@ module grating #(
         .square_limits_dead(dead), .capture_sources, .capture_state_present(present), .capture_state_free(capture_free),
         .capture_state_overrun(overrun), .captured_sources, .captured_age, .captured_time, .captured_position, .compare_start, .compare_step,
         .compare_count, .compare_pulse(pulse_length), .compare_gap(gap_length), .compare_state_armed(armed), .compare_state_late(late),
-        .compare_passed(passed), .velocity_quantum(quantum), .velocity_fine(fine), .position_source_counts(by_counts),
-        .position_source_steps(by_steps), .align, .align_written, .segment_use_enable(segment_enable), .segment_use_linear(segment_linear),
+        .compare_passed(passed), .velocity_quantum(quantum), .velocity_fine(fine), .position_source_counts(counts_chosen),
+        .position_source_steps(by_steps), .position_source_sine(SINE != 0), .align, .align_written,
+        .segment_use_enable(segment_enable), .segment_use_linear(segment_linear),
         .segment_use_segments(segments), .segment_state_built(8'(SEGMENTS)), .segment_state_in_force(segment_in_force),
         .segment_state_outside(segment_outside), .segment_state_known(segment_known), .segment_origin, .segment_origin_written, .segment_length,
         .segment_point, .segment_point_border(segment_border), .segment_point_written, .segment_look_border(segment_look_at),
         .segment_look_written(segment_look), .segment_stored, .segment_error);
 
-    wire unused = &{1'b0, heading, illegal_seen, illegal_fault, revolution_fault, learnt, levels[2], corrected_amplitude, index_later, segment_enable, segment_linear,
-                    segments, segment_origin, segment_origin_written, segment_length, segment_point, segment_border, segment_point_written,
-                    segment_look, segment_look_at};
+    wire unused = &{1'b0, heading, illegal_seen, illegal_fault, revolution_fault, levels, adc_sin, adc_cos, spike_step, spike_hold,
+                    amplitude_low, amplitude_high, disagreement_limit, rail, tolerance, jump, band, span, quiet, dead, offset_limit,
+                    balance_limit, square_limit, clear_signal_faults, load_correction, sin_offset, cos_offset, gain, shear, harmonic_enable,
+                    harmonic_write, harmonic_at, harmonic_value, swap_harmonics, record, phases, every, recorder_read, step, tracked_phase,
+                    index_later, segment_enable, segment_linear, segments, segment_origin, segment_origin_written, segment_length,
+                    segment_point, segment_border, segment_point_written, segment_look, segment_look_at};
 endmodule
 
 `default_nettype wire

@@ -54,7 +54,7 @@ module links #(
         wire [1:0]  i2c_answer_result;
         wire        i2c_acknowledge, i2c_written, i2c_answer_present, i2c_answer_read, i2c_busy, i2c_owned, scl, sda;
         wire [15:0] ps2_idle, display, machine_filter;
-        wire        ps2_inject_last, ps2_inject_written, ps2_injecting, ps2_busy, ps2_typed, ps2_glitch;
+        wire        ps2_inject_last, ps2_inject_written, ps2_drop, ps2_injecting, ps2_busy, ps2_typed, ps2_glitch;
         wire        keyboard_damaged, command_damaged, command_unsent, aborted;
         wire [5:0]  ps2_free;
         wire [19:0] peer_bit_time, sensor_bit_time;
@@ -74,9 +74,9 @@ module links #(
             .i2c_answer_read, .i2c_state_free, .i2c_state_busy(i2c_busy), .i2c_state_owned(i2c_owned), .i2c_state_scl(scl),
             .i2c_state_sda(sda),
             .ps2_idle, .ps2_inject_data, .ps2_inject_last, .ps2_inject_written, .ps2_state_free(ps2_free),
-            .ps2_state_injecting(ps2_injecting), .ps2_state_busy(ps2_busy), .ps2_typed, .ps2_errors_keyboard_damaged(keyboard_damaged),
-            .ps2_errors_command_damaged(command_damaged), .ps2_errors_unsent(command_unsent), .ps2_errors_aborted(aborted),
-            .ps2_glitches(ps2_glitch),
+            .ps2_state_injecting(ps2_injecting), .ps2_state_busy(ps2_busy), .ps2_state_drop(ps2_drop), .ps2_typed,
+            .ps2_errors_keyboard_damaged(keyboard_damaged), .ps2_errors_command_damaged(command_damaged),
+            .ps2_errors_unsent(command_unsent), .ps2_errors_aborted(aborted), .ps2_glitches(ps2_glitch),
             .peer_bit_time, .peer_receive_data, .peer_receive_present, .peer_receive_read, .peer_transmit,
             .peer_transmit_written(peer_written), .peer_state_transmit_free(peer_free), .peer_state_sending(peer_sending),
             .peer_errors_framing(peer_framing_error), .peer_errors_overruns(peer_overrun),
@@ -116,22 +116,22 @@ module links #(
         end
 
         if (LINKS[1]) begin : g_ps2
-            wire       present, inject_ready, last, overrun;
+            wire       inject_valid, inject_ready, inject_last;
             wire [7:0] inject;
 
-            word_queue #(.W(9), .DEPTH(32)) u_inject (.clk, .rst, .push(ps2_inject_written), .in({ps2_inject_last, ps2_inject_data}),
-                .pop(inject_ready), .present, .out({last, inject}), .free(ps2_free), .overrun);
+            ps2_inject_queue #(.DEPTH(32)) u_inject (.clk, .rst, .push(ps2_inject_written), .in(ps2_inject_data), .in_last(ps2_inject_last),
+                .drop(ps2_drop), .valid(inject_valid), .ready(inject_ready), .out(inject), .last(inject_last), .injecting(ps2_injecting),
+                .free(ps2_free));
             ps2_pass #(.CLK_HZ(CLK_HZ)) u_pass (.clk, .rst, .idle_ms(ps2_idle), .keyboard_clock, .keyboard_data, .keyboard_clock_low,
                 .keyboard_data_low, .host_clock(machine_clock), .host_data(machine_data), .host_clock_low(machine_clock_low),
-                .host_data_low(machine_data_low), .inject_valid(present), .inject_ready, .inject, .inject_last(last),
+                .host_data_low(machine_data_low), .inject_valid, .inject_ready, .inject, .inject_last,
                 .injecting(ps2_injecting), .typed(ps2_typed), .keyboard_damaged, .command_damaged, .command_unsent, .aborted,
                 .glitch(ps2_glitch), .busy(ps2_busy));
-            wire unused = &{1'b0, overrun};
         end else begin : g_no_ps2
             assign {ps2_free, ps2_injecting, ps2_busy, ps2_typed, ps2_glitch, keyboard_damaged, command_damaged, command_unsent, aborted} = '0;
             assign {keyboard_clock_low, keyboard_data_low, machine_clock_low, machine_data_low} = '0;
-            wire unused = &{1'b0, ps2_idle, ps2_inject_data, ps2_inject_last, ps2_inject_written, keyboard_clock, keyboard_data,
-                            machine_clock, machine_data};
+            wire unused = &{1'b0, ps2_idle, ps2_inject_data, ps2_inject_last, ps2_inject_written, ps2_drop, keyboard_clock,
+                            keyboard_data, machine_clock, machine_data};
         end
 
         if (LINKS[2]) begin : g_peer

@@ -13,6 +13,7 @@ module node #(
     parameter int DRIVES = 15,                  // what each axis can drive, see actuator
     parameter int FILTERS = 2,                  // of each servo, see biquad_cascade
     parameter int SEGMENTS = 255,               // most segments of each scale's table, see grating
+    parameter int SINE = 1,                     // of each grating: 0 for A/B/Z only, see grating
     parameter int LINKS = 0,                    // what else it speaks to, see links
     parameter int MEMORY_BYTES = 98304,         // of the soft core, program and data
     parameter FIRMWARE = ""                     // file of its contents at power-up
@@ -78,26 +79,25 @@ module node #(
                                        .axis_rdata, .grating_rdata, .actuator_rdata, .node_select, .line_select, .links_select,
                                        .axis_select, .grating_select, .actuator_select, .rdata);
 
-    // time; the watchdog of the soft core gives it as many clk however slow they are
+    // time; the watchdog of the soft core gives it as many clk however slow they are. Nodes that start at a mark tick together from there on
     localparam int CORE_SILENCE_MS = 20 + 1_200_000_000 / CLK_HZ;
 
     wire        [63:0] now;
     wire        [23:0] tick_period;
     wire        [15:0] sample_period;
-    wire               tick, sample_tick, alive, silent, start_axes_written;
-    wire        [7:0]  start_axes;
+    wire               tick, sample_tick, alive, silent, start_axes_written, mark;
+    wire        [7:0]  start_axes, mark_axes;
 
     time_stamp u_time (.clk, .rst, .now);
-    tick_divider #(.W(24)) u_tick (.clk, .rst, .period(tick_period), .tick);
-    tick_divider #(.W(16)) u_sample_tick (.clk, .rst, .period(sample_period), .tick(sample_tick));
+    tick_divider #(.W(24)) u_tick (.clk, .rst, .period(tick_period), .restart(mark && |mark_axes), .tick);
+    tick_divider #(.W(16)) u_sample_tick (.clk, .rst, .period(sample_period), .restart(1'b0), .tick(sample_tick));
     node_registers u_node_registers (.clk, .rst, .select(node_select), .write, .word, .wdata, .rdata(node_rdata),
         .clk_hz(32'(CLK_HZ)), .build_axes(4'(AXES)), .build_address(address), .build_memory(8'(MEMORY_BYTES / 1024)),
         .time_stamp(now), .tick_period, .sample_period, .alive_beat(alive), .start_axes, .start_axes_written);
     silence_watchdog #(.CLK_HZ(CLK_HZ)) u_core_watchdog (.clk, .rst, .time_ms(16'(CORE_SILENCE_MS)), .sign(alive), .armed(|drive_enable), .expired(silent));
 
     // line
-    wire               estop, watchdog_expired, mark;
-    wire        [7:0]  mark_axes;
+    wire               estop, watchdog_expired;
 
     synchroniser #(.RESET(1)) u_estop (.clk, .rst, .d(estop_open), .q(estop));
     line #(.CLK_HZ(CLK_HZ)) u_line (.clk, .rst, .address, .select(line_select), .write, .word, .wdata, .rdata(line_rdata),
@@ -113,7 +113,7 @@ module node #(
 
     // axes
     for (genvar n = 0; n < AXES; n++) begin : g_axis
-        axis #(.CLK_HZ(CLK_HZ), .W(W), .DRIVES(DRIVES), .FILTERS(FILTERS), .SEGMENTS(SEGMENTS)) u_axis (.clk, .rst, .tick, .tick_period, .sample_tick,
+        axis #(.CLK_HZ(CLK_HZ), .W(W), .DRIVES(DRIVES), .FILTERS(FILTERS), .SINE(SINE), .SEGMENTS(SEGMENTS)) u_axis (.clk, .rst, .tick, .tick_period, .sample_tick,
             .start((start_axes_written && start_axes[n]) || (mark && mark_axes[n])), .mark, .estop, .watchdog_expired, .cpu_stopped(trap || silent),
             .select(axis_select[n]), .write, .word, .wdata, .rdata(axis_rdata[32*n +: 32]),
             .grating_select(grating_select[n]), .grating_rdata(grating_rdata[32*n +: 32]),

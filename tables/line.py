@@ -23,10 +23,10 @@ REQUEST_HEAD = ["sequence u8", "operation u8"]
 REPLY_HEAD = ["sequence u8", "operation u8", "cause u8"]
 AXIS = "axis u8"    # first field of what asks an axis
 LISTS = ("cause", "fault", "encoder_event", "state", "flag", "learner_reason", "signal_fault", "learner_action", "scope_trigger",
-         "scope_state", "index_phase", "peer_phase", "job_state", "job_action", "job_flag")
+         "scope_state", "index_phase", "peer_phase", "job_state", "job_action", "keep_action", "job_flag")
 CODES = ("cause", "state", "learner_reason", "learner_action", "scope_trigger", "scope_state", "index_phase", "peer_phase",
-         "job_state", "job_action")                                           # numbers; the others are bits
-WORDS = ("cause", "job_state")                                                # lists whose words the firmware shows on its panel
+         "job_state", "job_action", "keep_action")                                           # numbers; the others are bits
+WORDS = ("cause", "fault", "job_state")                                            # lists whose words the firmware shows on its panel
 
 
 def fields(head, declared):
@@ -54,6 +54,8 @@ class Line:
         self.lists = {name: {key: tuple(value) for key, value in table[name].items()} for name in LISTS}
         self.operations = table["operation"]
         self.parameters, self.settings = table["parameter"], table["setting"]
+        self.values_crc = zlib.crc32(repr([(name, value["id"], value["unit"], value["lsb"], value["default"])
+                                           for name, value in [*self.parameters.items(), *self.settings.items()]]).encode())
         self.layouts = {}
         for name, operation in self.operations.items():
             self.layouts[name] = (fields(REQUEST_HEAD, operation["request"]), fields(REPLY_HEAD, operation["reply"]))
@@ -71,6 +73,8 @@ class Line:
         for name, parameter in {**self.parameters, **self.settings}.items():
             if not parameter["min"] <= parameter["default"] <= parameter["max"]:
                 raise ValueError(f"line.toml: the default of {name} is outside its range")
+            if parameter.get("needs", "SINE") != "SINE":
+                raise ValueError(f"line.toml: {name} can need nothing but SINE")
             Fraction(parameter["lsb"])
 
 
@@ -102,8 +106,9 @@ def header(line: Line) -> str:
             out.append(f"    LINE_{name}_{key}".upper() + f" = {value},    // {words}")
         out += ["};", ""]
     for name in WORDS:
-        out.append("// X(code, words)")
-        out += macro(f"LINE_{name.upper()}_WORDS", [f"    X({code}, {quoted(words)})" for code, words in line.lists[name].values()])
+        out.append("// X(code, words), up to a colon")
+        out += macro(f"LINE_{name.upper()}_WORDS",
+                     [f"    X({code}, {quoted(words.partition(':')[0])})" for code, words in line.lists[name].values()])
     out.append("enum line_operation {")
     for name, operation in line.operations.items():
         out.append(f"    LINE_OPERATION_{name.upper()} = {operation['code']},    // {operation['text']}")
@@ -121,6 +126,7 @@ def header(line: Line) -> str:
             for name, operation in line.operations.items()]
     out += macro("LINE_OPERATIONS", rows)
     out += values("parameter", line.parameters) + values("setting", line.settings)
+    out += [f"#define LINE_VALUES_CRC 0x{line.values_crc:08X}u     // of all of both: what a kept number means", ""]
     out += ["#endif", ""]
     return "\n".join(out)
 
@@ -134,7 +140,11 @@ def values(kind, parameters):
     out.append("// X(name, id, min, max, default): all int64_t, in counts of the wire")
     rows = [f"    X({name}, {parameter['id']}, {parameter['min']}LL, {parameter['max']}LL, {parameter['default']}LL)"
             for name, parameter in parameters.items()]
-    return out + macro(f"LINE_{kind.upper()}S", rows)
+    out += macro(f"LINE_{kind.upper()}S", rows)
+    if needy := [parameter["id"] for parameter in parameters.values() if "needs" in parameter]:
+        out += [f"// {kind}s of which a node without sine and cosine takes only 0 and the default",
+                f"#define LINE_{kind.upper()}S_OF_SINE {', '.join(map(str, needy))}", ""]
+    return out
 
 
 def of_one_count(parameter):
@@ -260,7 +270,8 @@ def page_parts(line: Line) -> dict:
         for name, parameter in parameters.items():
             lsb = Fraction(parameter["lsb"])
             rows.append((parameter["id"], f"`{name}`", parameter["unit"] or "–", parameter["lsb"],
-                         *(decimal(parameter[key] * lsb) for key in ("min", "max", "default")), parameter["text"]))
+                         *(decimal(parameter[key] * lsb) for key in ("min", "max", "default")),
+                         parameter["text"] + (f"; needs {parameter['needs']}" if "needs" in parameter else "")))
         parts[kind + "s"] = table(("id", kind, "unit", "one count", "min", "max", "default", "purpose"), rows)
     parts["example"] = example(line)
     parts["packets"] = packets(line)

@@ -35,6 +35,7 @@ class Field:
     text: str
     on_write: bool                      # swmod: a strobe follows a write
     on_read: bool                       # swacc: a strobe goes with a read
+    needs: str                          # parameter of the block without which a setting has no bits and reads 0
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,10 @@ class Block:
     def fields(self):
         return [(r, f) for r in self.registers for f in r.fields]
 
+    @property
+    def parameters(self):
+        return sorted({f.needs for _, f in self.fields if f.needs})
+
 
 class Refused(Exception):
     pass
@@ -113,12 +118,14 @@ def field_of(node, register):
         raise Refused(f"{name}: this mixture of properties is not supported")
     if kind != "setting" and get("swmod"):
         raise Refused(f"{name}: swmod is only for what software sets")
-    wide = register.get_property("regwidth") == 64
+    wide, needs = register.get_property("regwidth") == 64, get("needs") or register.get_property("needs") or ""
+    if needs and (kind != "setting" or wide):
+        raise Refused(f"{name}: only a setting of 32 bits or fewer may need a parameter")
     if not wide and node.high > 31 or wide and (node.inst_name != "value" or node.width <= 32 or kind not in ("input", "setting")):
         raise Refused(f"{name}: a field of more than 32 bits must be the `value` of a register of 64")
     return Field(node.inst_name, node.low, node.width, kind, bool(get("two_complement")), sw, int(get("reset") or 0),
                  get("unit") or "", get("lsb") or "", words(get("desc")),
-                 bool(get("swmod")), bool(get("swacc")))
+                 bool(get("swmod")), bool(get("swacc")), needs)
 
 
 def read(axes=1, source=SOURCE):
@@ -227,7 +234,9 @@ def verilog(block, constant):
     table = fixed + ports(block)
     shape_width = max(len(s) for _, s, _, _ in table)
     name_width = max(len(n) for _, _, n, _ in table) + 1
-    lines = ["// SPDX-License-Identifier: Apache-2.0", *head, "`default_nettype none", "", f"module {name} ("]
+    chosen = [f"    parameter int {p} = 1{' ' * 16}// 0: the settings that need it have no bits and read 0" for p in block.parameters]
+    opened = [f"module {name} #(", *(f"{p}," for p in chosen[:-1]), chosen[-1], ") ("] if chosen else [f"module {name} ("]
+    lines = ["// SPDX-License-Identifier: Apache-2.0", *head, "`default_nettype none", "", *opened]
     for i, (kind, shape, port, text) in enumerate(table):
         declared = f"{port}{',' if i + 1 < len(table) else ''}"
         lines.append(f"    {kind} {shape:<{shape_width}} {declared:<{name_width}}{'  // ' + text if text else ''}".rstrip())
@@ -301,8 +310,9 @@ def verilog(block, constant):
                 lines.append(f"        if (put && word == 6'h{r.word + 1:02X}) {port} <= {{{top}, {port}_low}};")
                 reset += [f"            {port}_low <= '0;", f"            {port} <= {literal(f.width, f.reset)};"]
             elif f.kind == "setting":
-                lines.append(f"        if ({hit}) {port} <= {bits};")
-                reset.append(f"            {port} <= {literal(f.width, f.reset)};")
+                there, first = f"{f.needs} != 0", literal(f.width, f.reset)
+                lines.append(f"        if ({f'{there} && ' if f.needs else ''}{hit}) {port} <= {bits};")
+                reset.append(f"            {port} <= {f'{there} ? {first} : {chr(39)}0' if f.needs and f.reset else first};")
             elif f.kind == "input" and r.wide:
                 reset.append(f"            {port}_high <= '0;")
     if lines[-1] == "":
@@ -480,6 +490,9 @@ Map CRC-32 `0x{constant:08X}`. The soft core sees the map at `0x{base:08X}`; the
 Of a register of 64 bits the low word comes first: reading the low word latches the high one, writing the high word commits
 both. A signed value alone in its register reads sign-extended to the register's full width. The value in the unit is the
 count times the LSB.
+
+What needs `SINE` reads 0 in a node that was built without (`SINE = 0` in `rtl/node.sv`), whatever is written to it; `position_source.sine`
+of a grating tells.
 """
 COLUMNS = ["offset", "register", "bits", "field", "access", "first value", "unit", "LSB", "meaning"]
 
@@ -498,7 +511,7 @@ def page(blocks, constant):
                 name = "" if f.name == "value" else f"`{f.name}`"
                 head = (f"`0x{r.offset:02X}`", f"`{r.name}`") if i == 0 else ("", "")
                 own = f.text or (r.text if len(r.fields) == 1 else "")
-                text = (own[0].upper() + own[1:] + ". " if own else "") + HOW[f.kind]
+                text = (own[0].upper() + own[1:] + ". " if own else "") + HOW[f.kind] + (f"Needs `{f.needs}`." if f.needs else "")
                 if i == 0 and len(r.fields) > 1:
                     text = f"**{r.text[0].upper() + r.text[1:]}.** {text}"
                 out.append("| " + " | ".join([*head, bits + (", signed" if f.signed else ""), name, f.access, first, f.unit,

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // tick_divider -- a strobe every `period` clk.
 //
-// latency  the first tick comes `period` clk after reset   rate  one tick each `period` clk, exactly
+// latency  the first tick comes `period` clk after reset or restart   rate  one tick each `period` clk, exactly
 // model    tb/common/tick_divider.py, equal in every bit of every cycle
-// proved   two ticks are never nearer than the shortest period in force between them; no tick while period is 0
+// proved   two ticks are never nearer than the shortest period in force between them, nor to a restart; no tick while period is 0
 `default_nettype none
 
 module tick_divider #(
@@ -12,6 +12,7 @@ module tick_divider #(
     input  wire                  clk,
     input  wire                  rst,
     input  wire        [W-1:0]   period,        // clk; 0: no ticks. A shorter one counts at once
+    input  wire                  restart,       // strobe: a period begins here; a tick that is due now is left out
     output logic                 tick           // strobe
 );
     logic [W-1:0] elapsed;                      // clk since the last tick
@@ -20,8 +21,8 @@ module tick_divider #(
     wire due = elapsed >= period - 1'b1;
 
     always_ff @(posedge clk) begin
-        tick    <= on && due;
-        elapsed <= on && !due ? elapsed + 1'b1 : '0;
+        tick    <= on && due && !restart;
+        elapsed <= on && !due && !restart ? elapsed + 1'b1 : '0;
         if (rst) begin
             tick    <= 1'b0;
             elapsed <= '0;
@@ -34,8 +35,8 @@ module tick_divider #(
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
-        if (rst || tick) begin
-            since    <= W'(1);
+        if (rst || tick || restart) begin
+            since    <= W'(!restart);
             shortest <= period;
         end else begin
             if (!(&since)) since <= since + 1'b1;
@@ -48,6 +49,7 @@ module tick_divider #(
             if (tick) assert (since >= shortest || shortest == 0);
             cover (tick && $past(tick));
             cover (tick && shortest == 5);
+            cover (tick && $past(restart, 3));
         end
     end
 `endif

@@ -7,7 +7,9 @@
 // made     by tables/registers.py, never by hand
 `default_nettype none
 
-module axis_registers (
+module axis_registers #(
+    parameter int SINE = 1                // 0: the settings that need it have no bits and read 0
+) (
     input  wire                clk,
     input  wire                rst,                            // every setting takes its first value, what was counted or held is cleared
     input  wire                select,                         // an access to this block
@@ -201,11 +203,11 @@ module axis_registers (
         zero_crossing_up_held <= zero_crossing_up || (zero_crossing_up_held && !(put && word == 6'h10 && wdata[0]));
         zero_crossing_down_held <= zero_crossing_down || (zero_crossing_down_held && !(put && word == 6'h10 && wdata[1]));
         if (put && word == 6'h11) sensing_deglitch <= wdata[15:0];
-        if (put && word == 6'h11) sensing_spike_step <= wdata[23:16];
-        if (put && word == 6'h11) sensing_spike_hold <= wdata[31:24];
-        if (put && word == 6'h12) amplitude_window_low <= wdata[15:0];
-        if (put && word == 6'h12) amplitude_window_high <= wdata[31:16];
-        if (put && word == 6'h13) disagreement_limit <= wdata[19:0];
+        if (SINE != 0 && put && word == 6'h11) sensing_spike_step <= wdata[23:16];
+        if (SINE != 0 && put && word == 6'h11) sensing_spike_hold <= wdata[31:24];
+        if (SINE != 0 && put && word == 6'h12) amplitude_window_low <= wdata[15:0];
+        if (SINE != 0 && put && word == 6'h12) amplitude_window_high <= wdata[31:16];
+        if (SINE != 0 && put && word == 6'h13) disagreement_limit <= wdata[19:0];
         encoder_events_illegal_edge_held <= encoder_events_illegal_edge || (encoder_events_illegal_edge_held && !(put && word == 6'h17 && wdata[0]));
         encoder_events_overspeed_held <= encoder_events_overspeed || (encoder_events_overspeed_held && !(put && word == 6'h17 && wdata[1]));
         encoder_events_amplitude_low_held <= encoder_events_amplitude_low || (encoder_events_amplitude_low_held && !(put && word == 6'h17 && wdata[2]));
@@ -269,9 +271,9 @@ module axis_registers (
             zero_crossing_down_held <= 1'b0;
             sensing_deglitch <= 16'h0010;
             sensing_spike_step <= 8'h00;
-            sensing_spike_hold <= 8'h03;
+            sensing_spike_hold <= SINE != 0 ? 8'h03 : '0;
             amplitude_window_low <= 16'h0000;
-            amplitude_window_high <= 16'hFFFF;
+            amplitude_window_high <= SINE != 0 ? 16'hFFFF : '0;
             disagreement_limit <= 20'h00000;
             encoder_events_illegal_edge_held <= 1'b0;
             encoder_events_overspeed_held <= 1'b0;

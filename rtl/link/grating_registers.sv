@@ -7,7 +7,9 @@
 // made     by tables/registers.py, never by hand
 `default_nettype none
 
-module grating_registers (
+module grating_registers #(
+    parameter int SINE = 1                // 0: the settings that need it have no bits and read 0
+) (
     input  wire                clk,
     input  wire                rst,                            // every setting takes its first value, what was counted or held is cleared
     input  wire                select,                         // an access to this block
@@ -87,6 +89,7 @@ module grating_registers (
     input  wire  signed [39:0] velocity_fine,                  // velocity with all its bits [2^-24 period/tick]
     output logic               position_source_counts,         // 0: phases of sine and cosine, 1: counts of a and b, a quarter period each
     output logic               position_source_steps,          // 1: the axis' own step and direction take the place of the pins a and b
+    input  wire                position_source_sine,           // 1: sine and cosine were built, 0: the position is made of counts whatever `counts` says
     output logic signed [2:0]  align,                          // with counts: move position and phase by this, -2 to 2; the target does not follow [1/4 period]
     output logic               align_written,                  // strobe: align has just been written, its new value stands
     output logic               segment_use_enable,             // 1: positions are corrected
@@ -166,7 +169,7 @@ module grating_registers (
             6'h27: rdata <= {16'd0, velocity_quantum};
             6'h28: rdata <= velocity_fine[31:0];
             6'h29: rdata <= {{24{velocity_fine_high[7]}}, velocity_fine_high};
-            6'h2A: rdata <= {30'd0, position_source_steps, position_source_counts};
+            6'h2A: rdata <= {29'd0, position_source_sine, position_source_steps, position_source_counts};
             6'h2B: rdata <= {{29{align[2]}}, align};
             6'h2D: rdata <= {21'd0, segment_state_known, segment_state_outside, segment_state_in_force, segment_state_built};
             6'h34: rdata <= {{8{segment_stored[23]}}, segment_stored};
@@ -198,27 +201,27 @@ module grating_registers (
         strobes_compare_disarm <= put && word == 6'h04 && wdata[9];
         index_events_found_held <= index_events_found || (index_events_found_held && !(put && word == 6'h05 && wdata[0]));
         index_events_revolution_wrong_held <= index_events_revolution_wrong || (index_events_revolution_wrong_held && !(put && word == 6'h05 && wdata[1]));
-        if (put && word == 6'h08) correction_offset_sin <= wdata[15:0];
-        if (put && word == 6'h08) correction_offset_cos <= wdata[31:16];
-        if (put && word == 6'h09) correction_gain <= wdata[16:0];
-        if (put && word == 6'h0A) correction_shear <= wdata[16:0];
-        if (put && word == 6'h0B) harmonic_enable <= wdata[0];
+        if (SINE != 0 && put && word == 6'h08) correction_offset_sin <= wdata[15:0];
+        if (SINE != 0 && put && word == 6'h08) correction_offset_cos <= wdata[31:16];
+        if (SINE != 0 && put && word == 6'h09) correction_gain <= wdata[16:0];
+        if (SINE != 0 && put && word == 6'h0A) correction_shear <= wdata[16:0];
+        if (SINE != 0 && put && word == 6'h0B) harmonic_enable <= wdata[0];
         harmonic_point_written <= put && word == 6'h0C;
-        if (put && word == 6'h0C) harmonic_point <= wdata[17:0];
-        if (put && word == 6'h0C) harmonic_point_point <= wdata[25:18];
-        if (put && word == 6'h0D) recorder_every <= wdata[15:0];
-        if (put && word == 6'h0D) recorder_phases <= wdata[16];
-        if (put && word == 6'h12) signal_fault_mask <= wdata[14:0];
-        if (put && word == 6'h13) circle_limits_rail <= wdata[15:0];
-        if (put && word == 6'h13) circle_limits_tolerance <= wdata[31:16];
-        if (put && word == 6'h14) step_limits_jump <= wdata[15:0];
-        if (put && word == 6'h14) step_limits_quiet <= wdata[31:16];
-        if (put && word == 6'h15) leg_limits_span <= wdata[15:0];
-        if (put && word == 6'h15) leg_limits_band <= wdata[23:16];
-        if (put && word == 6'h16) drift_limits_offset <= wdata[15:0];
-        if (put && word == 6'h16) drift_limits_balance <= wdata[31:16];
-        if (put && word == 6'h17) square_limits_square <= wdata[15:0];
-        if (put && word == 6'h17) square_limits_dead <= wdata[31:16];
+        if (SINE != 0 && put && word == 6'h0C) harmonic_point <= wdata[17:0];
+        if (SINE != 0 && put && word == 6'h0C) harmonic_point_point <= wdata[25:18];
+        if (SINE != 0 && put && word == 6'h0D) recorder_every <= wdata[15:0];
+        if (SINE != 0 && put && word == 6'h0D) recorder_phases <= wdata[16];
+        if (SINE != 0 && put && word == 6'h12) signal_fault_mask <= wdata[14:0];
+        if (SINE != 0 && put && word == 6'h13) circle_limits_rail <= wdata[15:0];
+        if (SINE != 0 && put && word == 6'h13) circle_limits_tolerance <= wdata[31:16];
+        if (SINE != 0 && put && word == 6'h14) step_limits_jump <= wdata[15:0];
+        if (SINE != 0 && put && word == 6'h14) step_limits_quiet <= wdata[31:16];
+        if (SINE != 0 && put && word == 6'h15) leg_limits_span <= wdata[15:0];
+        if (SINE != 0 && put && word == 6'h15) leg_limits_band <= wdata[23:16];
+        if (SINE != 0 && put && word == 6'h16) drift_limits_offset <= wdata[15:0];
+        if (SINE != 0 && put && word == 6'h16) drift_limits_balance <= wdata[31:16];
+        if (SINE != 0 && put && word == 6'h17) square_limits_square <= wdata[15:0];
+        if (SINE != 0 && put && word == 6'h17) square_limits_dead <= wdata[31:16];
         if (put && word == 6'h18) capture_sources <= wdata[6:0];
         capture_state_overrun_held <= capture_state_overrun || (capture_state_overrun_held && !(put && word == 6'h19 && wdata[6]));
         if (put && word == 6'h1E) compare_start_low <= wdata;
@@ -273,25 +276,25 @@ module grating_registers (
             index_events_revolution_wrong_held <= 1'b0;
             correction_offset_sin <= 16'h0000;
             correction_offset_cos <= 16'h0000;
-            correction_gain <= 17'h10000;
+            correction_gain <= SINE != 0 ? 17'h10000 : '0;
             correction_shear <= 17'h00000;
-            harmonic_enable <= 1'b1;
+            harmonic_enable <= SINE != 0 ? 1'b1 : '0;
             harmonic_point_written <= 1'b0;
             harmonic_point <= 18'h00000;
             harmonic_point_point <= 8'h00;
-            recorder_every <= 16'h0001;
+            recorder_every <= SINE != 0 ? 16'h0001 : '0;
             recorder_phases <= 1'b0;
             signal_fault_mask <= 15'h0000;
-            circle_limits_rail <= 16'hFFFF;
-            circle_limits_tolerance <= 16'hFFFF;
-            step_limits_jump <= 16'hFFFF;
+            circle_limits_rail <= SINE != 0 ? 16'hFFFF : '0;
+            circle_limits_tolerance <= SINE != 0 ? 16'hFFFF : '0;
+            step_limits_jump <= SINE != 0 ? 16'hFFFF : '0;
             step_limits_quiet <= 16'h0000;
-            leg_limits_span <= 16'hFFFF;
+            leg_limits_span <= SINE != 0 ? 16'hFFFF : '0;
             leg_limits_band <= 8'h00;
-            drift_limits_offset <= 16'hFFFF;
-            drift_limits_balance <= 16'hFFFF;
-            square_limits_square <= 16'hFFFF;
-            square_limits_dead <= 16'hFFFF;
+            drift_limits_offset <= SINE != 0 ? 16'hFFFF : '0;
+            drift_limits_balance <= SINE != 0 ? 16'hFFFF : '0;
+            square_limits_square <= SINE != 0 ? 16'hFFFF : '0;
+            square_limits_dead <= SINE != 0 ? 16'hFFFF : '0;
             capture_sources <= 7'h00;
             capture_state_overrun_held <= 1'b0;
             captured_position_high <= '0;

@@ -41,6 +41,7 @@ module links_registers (
     input  wire  [5:0]  ps2_state_free,                // scan codes that may still be queued, 32 at most
     input  wire         ps2_state_injecting,           // a sequence is under way
     input  wire         ps2_state_busy,                // a frame is under way on either side
+    output logic        ps2_state_drop,                // strobe: take back what is queued; a sequence that is under way is finished whole
     input  wire         ps2_typed,                     // strobe, counted: bytes of the keyboard that answer no command: a person types; writing clears
     input  wire         ps2_errors_keyboard_damaged,   // strobe, counted: bytes of the keyboard that came damaged
     input  wire         ps2_errors_command_damaged,    // strobe, counted: commands of the machine that came damaged
@@ -139,6 +140,7 @@ module links_registers (
         ps2_inject_written <= put && word == 6'h05;
         if (put && word == 6'h05) ps2_inject_data <= wdata[7:0];
         if (put && word == 6'h05) ps2_inject_last <= wdata[8];
+        ps2_state_drop <= put && word == 6'h06 && wdata[8];
         if (put && word == 6'h07) ps2_typed_count <= {15'd0, ps2_typed};
         else if (!(&ps2_typed_count)) ps2_typed_count <= ps2_typed_count + {15'd0, ps2_typed};
         if (put && word == 6'h08) ps2_errors_keyboard_damaged_count <= {7'd0, ps2_errors_keyboard_damaged};
@@ -181,6 +183,7 @@ module links_registers (
             ps2_inject_written <= 1'b0;
             ps2_inject_data <= 8'h00;
             ps2_inject_last <= 1'b0;
+            ps2_state_drop <= 1'b0;
             ps2_typed_count <= '0;
             ps2_errors_keyboard_damaged_count <= '0;
             ps2_errors_command_damaged_count <= '0;

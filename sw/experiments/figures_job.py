@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figure of the job's memory (S4): what is in the EEPROM after the power went at any moment.
+"""Figure of a station's memory (S4): what is in the EEPROM after the power went at any moment.
 
 The firmware runs on this computer around a model of the EEPROM, in which a page that is being written when the power goes holds a
 mixture of what was there, what was to be there, and noise.
@@ -13,9 +13,10 @@ from experiments.figures_common import Figure, bar, console
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE_TESTS = str(ROOT / "tb" / "firmware")
 CUTS = 1000
-JOURNAL_SHARE = 0.25                 # of the cuts; the others fall into the writing of a program
+JOURNAL_SHARE, KEPT_SHARE = 0.2, 0.3  # of the cuts, into a line and into the keeping of values; the others fall into that of a program
 SPARE = 1.1                          # some cuts come when all has been written
 STORE_STOPPED = 6                    # a step of the journal that leaves no job open
+VALUE_STATIONS = 4                   # a kept value takes as long as so many stations: 16 bytes
 
 
 def begin(station, angles):
@@ -39,20 +40,37 @@ def writing_ms(station):
 
 
 def torn(cuts=CUTS, seed=1):
-    """Power cuts of so many after which program or journal was neither that of before nor the new one, whole."""
+    """Power cuts of so many after which program, journal or values were neither those of before nor the new ones, whole."""
     sys.path += [path for path in (FIRMWARE_TESTS, str(ROOT / "tb")) if path not in sys.path]
+    from fake_machine import PARAMETER
     from station import TURN, Station
+
+    def values():
+        return [station.ask("get_parameter", axis=0, parameter=number)["value"] for number in kept_numbers]
+
+    def state():
+        return station.program(), station.ask("job_program")["journal"], values()
+
+    kept_numbers = [PARAMETER[f"filter_{n}_{name}"]["id"] for n in (1, 2) for name in ("b0", "b1", "b2", "a1", "a2")]
     source, station = random.Random(seed), Station(seed=seed)
     station.ready()
     duration, invalid, found, pages = writing_ms(station), 0, {"old": 0, "new": 0}, 0
-    program, line = station.program(), station.ask("job_program")["journal"]
+    station.keep()
+    program, line, kept = state()
     with bar(f"{cuts} power cuts") as progress:
         for _ in progress.track(range(cuts)):
-            new_program, new_line = program, line
-            if source.random() < JOURNAL_SHARE:
+            new_program, new_line, new_kept = program, line, kept
+            what = source.random()
+            if what < JOURNAL_SHARE:
                 new_line = line + 1
                 assert station.firmware.store_note(source.randrange(len(program)), STORE_STOPPED) == 0
                 span = duration(1) / 2
+            elif what < JOURNAL_SHARE + KEPT_SHARE:
+                for number in source.sample(kept_numbers, source.randrange(1, len(kept_numbers))):
+                    station.ask("set_parameter", axis=0, parameter=number, value=source.randrange(2**30))
+                new_kept = values()
+                station.ask("keep", action=0)
+                span = duration(len(kept_numbers) * VALUE_STATIONS)
             else:
                 new_program = sorted(source.sample(range(TURN), source.randrange(1, 361)))
                 begin(station, new_program)
@@ -61,16 +79,16 @@ def torn(cuts=CUTS, seed=1):
             station.clk += source.randrange(station.POLL_CLK)
             pages += station.power_cut()
             station.ready()
-            kept = station.program(), station.ask("job_program")["journal"]
-            whole = kept in ((program, line), (new_program, new_line)) and kept[0] != []
+            now, new = state(), (new_program, new_line, new_kept)
+            whole = now in ((program, line, kept), new) and now[0] != []
             invalid += not whole
-            found["new" if kept == (new_program, new_line) else "old"] += whole
-            program, line = kept
+            found["new" if now == new else "old"] += whole
+            program, line, kept = now
     console.print(f"{pages} pages torn; {found['old']} times as before, {found['new']} times the new one, {invalid} times neither")
     return float(invalid)
 
 
 FIGURES = {
-    "eeprom_torn": Figure(torn, "programs", f"invalid program or journal after a power cut at each of {CUTS} random moments", "0",
+    "eeprom_torn": Figure(torn, "programs", f"invalid program, journal or values after a power cut at each of {CUTS} random moments", "0",
                           lambda value: value == 0, 0),
 }

@@ -27,7 +27,7 @@ from twin import START_S, BuildError, Twin, TwinTransport
 from twin.twin import Axis, Node
 
 CLK_HZ = 3_000_000
-NODE = {"DRIVES": 2, "FILTERS": 0}
+NODE = {"DRIVES": 2, "FILTERS": 0, "SINE": 0}
 LOOK_S = 0.02
 SLOW_MM_S = 0.5                      # the paper's top speed, 30 mm/min
 WORD = 1 << 16                       # counts of the paper's counter

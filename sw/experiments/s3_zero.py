@@ -25,7 +25,7 @@ from twin import START_S, BuildError, Twin, TwinTransport, parameters
 from twin.twin import Axis, Node
 
 CLK_HZ = 1_600_000                   # enough for a count in 20 clk at the top speed
-NODE = {"DRIVES": 4, "FILTERS": 0}
+NODE = {"DRIVES": 4, "FILTERS": 0, "SINE": 0}
 LOOK_S = 0.01                        # between two looks at a search
 SEARCHES = 10                        # of the paper's table 1
 RANGE_M = 1e-3                       # the mover rests this near to the mark

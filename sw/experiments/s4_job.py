@@ -27,6 +27,7 @@ from moire.client import Line
 from moire.errors import MoireError
 from moire.index import TURN, Table
 from moire.job import Job, equal_parts
+from moire.keep import Kept
 from moire.settings import Settings
 from twin import START_S, Axis, BuildError, Node, Surroundings, Twin, TwinTransport, build
 
@@ -34,7 +35,7 @@ MAIN, SUB = 0, 1                     # places of the nodes
 ADDRESSES = (1, 2)
 CLK_HZ = 1_840_000
 PEER_BAUD = 115200
-NODE = {"DRIVES": 2, "FILTERS": 0}
+NODE = {"DRIVES": 2, "FILTERS": 0, "SINE": 0}
 AXIS = {"drive": "steps", "position_source": "own_steps", "steps_per_period": 4, "counts_per_period": 4, "period": "1um",
         "velocity": "50mm/s", "acceleration": "200mm/s2", "jerk": "1000mm/s3", "home_creep": "0.4mm/s", "following_limit": "10mm",
         "disagreement_limit": 0, "encoder_fault_mask": 0, "deglitch": 0, "kp": 0, "ki": 0, "kd": 0, "kv": 0, "ka": 0,
@@ -145,8 +146,9 @@ class IndexingMachine:
     def __init__(self, seed=1, mode=MODES[0], worm=None):
         around = Surroundings(eeprom=True, keypad=True, display=True, keyboard=True, edm=True, table=SUB,
                               parameters={"edm_cut_time": CUT_S})
-        self.twin = Twin([Node(ADDRESSES[MAIN], [], around), Node(ADDRESSES[SUB], [Axis("worm_table", worm or {})])], seed=seed,
-                         clk_hz=CLK_HZ, node_parameters=NODE, firmware=build.firmware("station"), peers=(MAIN, SUB), peer_baud=PEER_BAUD)
+        table = Node(ADDRESSES[SUB], [Axis("worm_table", worm or {})], Surroundings(eeprom=True))
+        self.twin = Twin([Node(ADDRESSES[MAIN], [], around), table], seed=seed, clk_hz=CLK_HZ, node_parameters=NODE,
+                         firmware=build.firmware("station"), peers=(MAIN, SUB), peer_baud=PEER_BAUD)
         self.line = Line(TwinTransport(self.twin), random_source=random.Random(seed), poll_s=LOOK_S)
         self.nodes = [self.line.node(address) for address in ADDRESSES]
         self.job, self.table = Job(self.nodes[MAIN]), Table(self.nodes[SUB])
@@ -155,23 +157,17 @@ class IndexingMachine:
         self.twin.run(START_S)
         for name, value in {"peer_mode": mode, "peer_role": "main", "job_cut_limit": "20s", "job_start_limit": "5s"}.items():
             Settings(self.nodes[MAIN]).set(name, value)         # the next program takes them into the EEPROM
-        self.set_up_table()
+        for name, value in {**TABLE, "peer_mode": mode, "peer_role": "sub"}.items():
+            Settings(self.nodes[SUB]).set(name, value)
+        for name, value in AXIS.items():
+            self.line.axis(ADDRESSES[SUB]).set_parameter(name, value)
+        Kept(self.nodes[SUB]).keep()                            # from here on they are there after a power cut
 
     def __enter__(self):
         return self
 
     def __exit__(self, *_):
         self.twin.close()
-
-    def set_up_table(self):
-        """The sub-node keeps nothing without power."""
-        axis = self.line.axis(ADDRESSES[SUB])
-        for name, value in AXIS.items():
-            axis.set_parameter(name, value)
-        for name, value in {**TABLE, "peer_mode": self.mode, "peer_role": "sub"}.items():
-            Settings(self.nodes[SUB]).set(name, value)
-        if self.mode == "printed" and self.stations:
-            self.table.stations(self.stations)
 
     # a person
 
@@ -218,7 +214,7 @@ class IndexingMachine:
     def _programmed(self, angles):
         self.stations = [float(angle) for angle in angles]
         if self.mode == "printed":
-            self.table.stations(self.stations)
+            Job(self.nodes[SUB]).load(self.stations)
 
     def answer(self, state):
         """What a person does who sees the display and the work piece."""
@@ -258,8 +254,6 @@ class IndexingMachine:
         for node in dark:
             self.twin.power_on(node)
         self.twin.run(START_S)
-        if SUB in dark:
-            self.set_up_table()
 
     def run(self, trouble=CALM, watch=None):
         """The job of the program, from START to its end."""

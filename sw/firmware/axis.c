@@ -383,7 +383,7 @@ static uint8_t may_set(unsigned n, uint8_t id, int64_t value)
 
 uint8_t axis_set_parameter(unsigned n, uint8_t id, int64_t value)
 {
-    uint8_t cause = parameters_check(id, value);
+    uint8_t cause = parameters_check(n, id, value);
     if (cause != LINE_CAUSE_OK) return cause;
     axis_poll(n);
     cause = may_set(n, id, value);

@@ -28,10 +28,10 @@ IMAGES = sorted(path.stem.removeprefix("image_") for path in HERE.glob("image_*.
 AXES = {"station": 2}                                               # most that an image serves, where it is not the default
 SMALL, FAST = "-Os", "-O2"
 HOT = ("arithmetic.c",)                                 # the others wait more than they work
-SLIM = ("correction.c", "learner.c", "parameters.c", "scope.c", "segments.c")        # and these have time to spare
+SLIM = ("learner", "parameters")                        # and these, as the parts of an image, have time to spare
+SHORT = ["-mllvm", "-inline-threshold=0", "-mllvm", "-enable-machine-outliner=always"]      # of them with zig: what repeats stands once
 ZIG = ["-target", "riscv32-freestanding-none", "-mcpu=generic_rv32+m-a-f-d-c", "-mabi=ilp32", "-fno-sanitize=all",
        "-fno-stack-protector"]
-ZIG_SLIM = ["-mllvm", "-inline-threshold=0", "-mllvm", "-enable-machine-outliner=always"]    # what repeats stands once
 GNU = ["-march=rv32im", "-misa-spec=2.2", "-mabi=ilp32", "-nostdlib", "-nostartfiles",
        "-fno-tree-loop-distribute-patterns"]                        # else memset would call itself
 
@@ -41,16 +41,16 @@ class BuildError(Exception):
 
 
 def compiler():
-    """The command with the flags of its kind, those for SLIM files besides, and the libraries for the end."""
+    """The command with the flags of its kind, and the libraries for the end."""
     cross = os.environ.get("CROSS")
     if cross:
         command = f"{cross}gcc"
         if shutil.which(command) is None:
             raise BuildError(f"{command} was not found (CROSS={cross})")
-        return [command, *GNU], [], ["-lgcc"]
+        return [command, *GNU], ["-lgcc"]
     if importlib.util.find_spec("ziglang") is None:
         raise BuildError("no compiler: install ziglang (pip) or set CROSS=riscv64-unknown-elf-")
-    return [sys.executable, "-m", "ziglang", "cc", *ZIG], ZIG_SLIM, []
+    return [sys.executable, "-m", "ziglang", "cc", *ZIG], []
 
 
 def load_segments(elf):
@@ -94,6 +94,17 @@ def sources_of(name):
     return sorted(set(HERE.glob("*.[chS]")) - others)
 
 
+def parts_of(name):
+    """What the list of an image names."""
+    return set(re.findall(r'#include "(\w+)\.h"', (HERE / f"image_{name}.c").read_text()))
+
+
+def flags_of(path, parts):
+    if path.name in HOT:
+        return [FAST]
+    return [SMALL, *SHORT] if (path.stem in parts or path.stem in SLIM) and not os.environ.get("CROSS") else [SMALL]
+
+
 def fingerprint(sources, command, memory):
     state = hashlib.sha256(repr((command, memory)).encode())
     for source in sources:
@@ -110,7 +121,7 @@ def run(command):
 
 
 def build(memory, out, force, name="axis"):
-    command, slim, libraries = compiler()
+    command, libraries = compiler()
     if name in AXES:
         command += [f"-DHARDWARE_AXES={AXES[name]}u"]
     sources = [*sources_of(name), HERE / "link.ld", HERE / "build.py"]
@@ -129,8 +140,8 @@ def build(memory, out, force, name="axis"):
     script.write_text(f"MEMORY_BYTES = {memory};\n" + (HERE / "link.ld").read_text())
     with tempfile.TemporaryDirectory(dir=out) as folder:
         objects = [Path(folder) / f"{path.name}.o" for path in inputs]
-        compiled = [[*command, *FLAGS, FAST if path.name in HOT else SMALL, *(slim if path.name in SLIM else []), "-c", str(path),
-                     "-o", str(made)]
+        parts = parts_of(name)
+        compiled = [[*command, *FLAGS, *flags_of(path, parts), "-c", str(path), "-o", str(made)]
                     for path, made in zip(inputs, objects, strict=True)]
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             list(pool.map(run, compiled))

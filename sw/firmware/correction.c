@@ -4,6 +4,7 @@
 
 #include "axis.h"
 #include "grating.h"
+#include "hardware.h"
 #include "line.h"
 #include "line_protocol.h"
 
@@ -79,6 +80,7 @@ static uint8_t set_harmonic(unsigned axis)
 uint8_t correction_operation(uint8_t operation)
 {
     unsigned axis = (unsigned)line_field(LINE_REQUEST_HEAD, 1);
+    if (axis < axes && !hardware_has_sine(axis)) return LINE_CAUSE_NOT_BUILT;
     switch (operation) {
     case LINE_OPERATION_LEARNER: return learner(axis);
     case LINE_OPERATION_GET_CORRECTION: return get_correction(axis);

@@ -20,6 +20,11 @@ static inline int64_t axis_read_position(unsigned axis, uint32_t offset)
     return (int64_t)(axis_read_wide(axis, offset) << 16) >> 16;
 }
 
+static inline bool hardware_has_sine(unsigned axis)
+{
+    return grating_read(axis, GRATING_POSITION_SOURCE) & GRATING_POSITION_SOURCE_SINE_MASK;
+}
+
 static inline bool hardware_map_fits(void)
 {
     return node_read(NODE_MAP_CRC) == MAP_CRC;

@@ -19,6 +19,7 @@
 #include "store.h"
 
 #define PRINTED 1                       // a peer_mode
+#define SUB 1                           // a peer_role
 
 enum event {                            // a person's actions, then what happens
     START = LINE_JOB_ACTION_START, PAUSE = LINE_JOB_ACTION_PAUSE, RESUME = LINE_JOB_ACTION_RESUME, STOP = LINE_JOB_ACTION_STOP,
@@ -47,6 +48,7 @@ static void say_alarm(void)       { cause = LINE_CAUSE_MACHINE_ALARM; }
 static void say_pause(void)       { cause = LINE_CAUSE_PAUSED_BY_PERSON; }
 static void say_power(void)       { cause = LINE_CAUSE_POWER_LOST; }
 static void go_on(void)           { pausing = false; cause = LINE_CAUSE_OK; }
+static void reset_and_go_on(void) { peer_reset_fault(); go_on(); }
 static void leave_all(void)       { peer_stop(); machine_leave(); go_on(); }
 
 static const struct transition { uint8_t from, event, to; void (*act)(void); } transitions[] = {
@@ -77,7 +79,7 @@ static const struct transition { uint8_t from, event, to; void (*act)(void); } t
     {LEAVING,   MACHINE_RESTS, INDEXING,  NULL},
     {FINISHING, RECORDED,      FINISHED,  NULL},
     {FINISHING, NOT_RECORDED,  FINISHED,  say_store},
-    {PAUSED,    RESUME,        INDEXING,  go_on},
+    {PAUSED,    RESUME,        INDEXING,  reset_and_go_on},
     {UNSURE,    RESUME,        FOLLOWING, go_on},
     {UNSURE,    AGAIN,         INDEXING,  go_on},
     {UNSURE,    NEXT,          ENDED,     go_on},
@@ -229,10 +231,18 @@ uint8_t job_state(void)
     return state;
 }
 
+static uint8_t kept_trouble(void)       // why the values of this node are not in force
+{
+    uint8_t told = store_kept()->cause;
+    return told >= LINE_CAUSE_KEPT_DAMAGED && told <= LINE_CAUSE_KEPT_NOT_TAKEN ? told : LINE_CAUSE_OK;
+}
+
 uint8_t job_cause(void)
 {
     if (state == LOADING && store_state() == STORE_DEAD) return LINE_CAUSE_STORE_MISSING;
-    return state == IDLE && store_stations() == 0 ? store_cause() : cause;
+    if (state != IDLE || cause != LINE_CAUSE_OK) return cause;
+    if (store_stations() == 0) return store_cause();
+    return kept_trouble();
 }
 
 uint16_t job_station(void)
@@ -246,6 +256,7 @@ static uint8_t refusal(uint8_t action)
     if (action == STOP || action == PAUSE) return LINE_CAUSE_OK;
     if (store_state() == STORE_DEAD) return LINE_CAUSE_STORE_MISSING;
     if (store_state() != STORE_READY) return LINE_CAUSE_STORE_BUSY;
+    if (settings_get(LINE_SETTING_PEER_ROLE) == SUB) return LINE_CAUSE_PEER_OFF;        // its journal is its count of stations
     if (action != START && program != store_identity()) return LINE_CAUSE_PROGRAM_CHANGED;
     if (action == NEXT) return LINE_CAUSE_OK;
     if (action == RESUME && state == UNSURE) return machine_cuts() ? LINE_CAUSE_OK : LINE_CAUSE_NOT_NOW;
@@ -284,6 +295,7 @@ uint8_t job_do(uint8_t action)
 
 static uint8_t may_change_program(void)
 {
+    if (peer_state() == LINE_PEER_PHASE_INDEXING) return LINE_CAUSE_BUSY;
     return state == IDLE || state == FINISHED || state == LOADING ? LINE_CAUSE_OK : LINE_CAUSE_JOB_ACTIVE;
 }
 
@@ -317,6 +329,7 @@ static uint8_t tell_job(void)
     line_answer(LINE_JOB_REPLY_STATIONS, store_stations(), 2);
     line_answer(LINE_JOB_REPLY_ANSWERS, job_answers(), 1);
     line_answer(LINE_JOB_REPLY_FLAGS, flags(), 1);
+    line_answer(LINE_JOB_REPLY_TABLE_FAULTS, peer_faults(), 2);
     return LINE_CAUSE_OK;
 }
 

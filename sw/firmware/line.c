@@ -127,7 +127,7 @@ static uint8_t motion(unsigned axis, motion_request *begin)     // move and prep
 static uint8_t get_parameter(unsigned axis)
 {
     uint8_t id = asked[LINE_GET_PARAMETER_REQUEST_PARAMETER];
-    if (parameters_check(id, 0) == LINE_CAUSE_UNKNOWN_PARAMETER) return LINE_CAUSE_UNKNOWN_PARAMETER;
+    if (parameters_check(axis, id, 0) == LINE_CAUSE_UNKNOWN_PARAMETER) return LINE_CAUSE_UNKNOWN_PARAMETER;
     put(LINE_GET_PARAMETER_REPLY_VALUE, (uint64_t)parameters_get(axis, id), 8);
     return LINE_CAUSE_OK;
 }
@@ -207,6 +207,7 @@ static uint8_t reset_faults(unsigned axis)
 
 static uint8_t signal(unsigned axis)
 {
+    if (!hardware_has_sine(axis)) return LINE_CAUSE_NOT_BUILT;
     put(LINE_SIGNAL_REPLY_FAULTS, grating_read(axis, GRATING_SIGNAL_FAULTS), 2);
     put(LINE_SIGNAL_REPLY_FIRST, grating_read(axis, GRATING_FIRST_SIGNAL_FAULTS), 2);
     return LINE_CAUSE_OK;

@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x2E04DFF8u    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x700C8F8Au    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -70,6 +70,12 @@ enum line_cause {
     LINE_CAUSE_KEY_WITHOUT_FUNCTION = 59,    // this key has no function
     LINE_CAUSE_TABLE_UNKNOWN = 60,    // nobody knows where the table stands
     LINE_CAUSE_PROGRAM_CHANGED = 61,    // this is not the program of the job
+    LINE_CAUSE_LOOK_AT_SUB_NODE = 66,    // look at the sub-node: it did not say that it has indexed; its faults are told and reset there
+    LINE_CAUSE_NOTHING_KEPT = 67,    // no values are kept: the defaults are in force
+    LINE_CAUSE_KEPT_DAMAGED = 68,    // the kept values are damaged: the defaults are in force
+    LINE_CAUSE_KEPT_OTHER = 69,    // the kept values are of another build: the defaults are in force
+    LINE_CAUSE_KEPT_REFUSED = 70,    // not all kept values are allowed: the others are in force
+    LINE_CAUSE_KEPT_NOT_TAKEN = 71,    // the kept values were not taken: the EEPROM did not answer at power-up, the defaults are in force
 };
 
 enum line_fault {    // bits
@@ -211,6 +217,11 @@ enum line_job_action {
     LINE_JOB_ACTION_NEXT = 5,    // the station is cut: go to the next one
 };
 
+enum line_keep_action {
+    LINE_KEEP_ACTION_KEEP = 0,    // keep what differs from the defaults, for the next power-up
+    LINE_KEEP_ACTION_FORGET = 1,    // begin with the defaults at the next power-up
+};
+
 enum line_job_flag {    // bits
     LINE_JOB_FLAG_STORE = 1 << 0,    // the EEPROM answers
     LINE_JOB_FLAG_KEYPAD = 1 << 1,    // the key-pad answers
@@ -222,7 +233,7 @@ enum line_job_flag {    // bits
     LINE_JOB_FLAG_COPY_TORN = 1 << 7,    // one copy of the program is damaged, the other one is in force
 };
 
-// X(code, words)
+// X(code, words), up to a colon
 #define LINE_CAUSE_WORDS(X) \
     X(0, "done") \
     X(1, "the node does not know this command") \
@@ -231,11 +242,11 @@ enum line_job_flag {    // bits
     X(4, "the node has no parameter of this number") \
     X(5, "the value is outside what this parameter allows") \
     X(6, "the target is outside the travel") \
-    X(7, "the axis has no zero yet: home it first") \
-    X(8, "the drive is off: enable it first") \
-    X(9, "a fault is latched: remove its cause and reset it first") \
+    X(7, "the axis has no zero yet") \
+    X(8, "the drive is off") \
+    X(9, "a fault is latched") \
     X(10, "the cause of the fault still stands") \
-    X(11, "the axis is moving: stop it or wait") \
+    X(11, "the axis is moving") \
     X(12, "firmware and hardware were not made for each other (register maps differ)") \
     X(13, "the node has no register at this address") \
     X(14, "stopped by the host") \
@@ -251,16 +262,16 @@ enum line_job_flag {    // bits
     X(24, "the motion would take days, or go too far for a change of target") \
     X(25, "the stairs of this profile are not in order, or too many") \
     X(26, "no whole segment table is loaded") \
-    X(27, "the segment table is in use: switch it off first") \
-    X(30, "no good frame came from the angle sensor: check its power and its cable") \
-    X(31, "the angle sensor stands still: it sent one and the same angle while the table was turned") \
-    X(32, "the table did not follow its steps: it sticks, or the motor lost them") \
-    X(33, "the table turned against its steps: turn the sign of steps_per_period") \
+    X(27, "the segment table is in use") \
+    X(30, "no good frame came from the angle sensor") \
+    X(31, "the angle sensor stands still") \
+    X(32, "the table did not follow its steps") \
+    X(33, "the table turned against its steps") \
     X(34, "the tolerance was not reached within the allowed tries") \
-    X(35, "angle sensor and steps disagree: they tell different ways of the table") \
-    X(36, "the other node does not answer: check the cable between the two and its peer_mode") \
-    X(37, "the other node has no such station: write the program to both") \
-    X(38, "the peer port is not in use: see the settings peer_mode and peer_role") \
+    X(35, "angle sensor and steps disagree") \
+    X(36, "the other node does not answer") \
+    X(37, "the other node has no such station") \
+    X(38, "the peer port is not in use") \
     X(39, "the other node lost its power while it indexed") \
     X(40, "the EEPROM does not answer") \
     X(41, "the EEPROM does not keep what is written") \
@@ -269,10 +280,10 @@ enum line_job_flag {    // bits
     X(44, "the stored program is damaged") \
     X(45, "give all stations of a program in order") \
     X(46, "a program needs at least one station") \
-    X(47, "the EEPROM is full: it holds 360 stations") \
+    X(47, "the EEPROM is full") \
     X(48, "angles must be below 360 degrees") \
     X(49, "each angle must be larger than the last") \
-    X(50, "a job is under way: stop it first") \
+    X(50, "a job is under way") \
     X(51, "the job does not wait for that now") \
     X(52, "the machine cuts, or its keys still wait") \
     X(53, "the machine reports an alarm") \
@@ -283,9 +294,28 @@ enum line_job_flag {    // bits
     X(58, "paused by a person") \
     X(59, "this key has no function") \
     X(60, "nobody knows where the table stands") \
-    X(61, "this is not the program of the job")
+    X(61, "this is not the program of the job") \
+    X(66, "look at the sub-node") \
+    X(67, "no values are kept") \
+    X(68, "the kept values are damaged") \
+    X(69, "the kept values are of another build") \
+    X(70, "not all kept values are allowed") \
+    X(71, "the kept values were not taken")
 
-// X(code, words)
+// X(code, words), up to a colon
+#define LINE_FAULT_WORDS(X) \
+    X(0, "limit switch at the low end") \
+    X(1, "limit switch at the high end") \
+    X(2, "emergency stop") \
+    X(3, "following error too large") \
+    X(4, "encoder fault") \
+    X(5, "the line fell silent") \
+    X(6, "the drive reports a fault") \
+    X(7, "the soft core stopped or hangs") \
+    X(8, "the profile ran out of segments") \
+    X(9, "more steps were owed than may be")
+
+// X(code, words), up to a colon
 #define LINE_JOB_STATE_WORDS(X) \
     X(0, "loading") \
     X(1, "ready") \
@@ -340,16 +370,17 @@ enum line_operation {
     LINE_OPERATION_INDEX_TO = 42,    // turn the table of axis 0 to an absolute angle, 0.01 arcsec; refused while an axis moves
     LINE_OPERATION_INDEX_STATE = 43,    // what the table does, how its last index ended, the angle of its last reading; all in 0.01 arcsec
     LINE_OPERATION_SENSOR = 44,    // the last good frame of the angle sensor in 0.01 arcsec, its age in clk, and frames since power-up
-    LINE_OPERATION_PEER = 45,    // what the peer port does: the last index asked for; orders or frames heard, bytes or frames not understood
-    LINE_OPERATION_PEER_STATION = 46,    // one of the stations of a sub-node in mode printed, from 0 on; the next order then goes to station 0
-    LINE_OPERATION_PEER_NEXT = 47,    // the station to which the next order goes in mode printed
-    LINE_OPERATION_JOB = 48,    // what the job does, at which station (from 0 on), why it waits, and for which answers (bits of job_action)
+    LINE_OPERATION_PEER = 45,    // what the peer port does: the last index asked for, the stations of a sub-node that counts them, what was heard
+    LINE_OPERATION_PEER_NEXT = 47,    // the station of its program to which the next order goes in mode printed; kept in the EEPROM
+    LINE_OPERATION_JOB = 48,    // what the job does, at which station (from 0 on), why it waits, for which answers: bits of job_action
     LINE_OPERATION_JOB_DO = 49,    // start, pause, resume or stop the job, or answer its question
     LINE_OPERATION_JOB_PROGRAM = 50,    // the stored program; writing 1 while it is written or read, then how that ended, or why there is none
     LINE_OPERATION_JOB_ANGLE = 51,    // angle of a station of the stored program, in 0.01 arcsec
     LINE_OPERATION_JOB_BEGIN = 52,    // begin a new program; it comes into force when it is saved, and not while a job is under way
     LINE_OPERATION_JOB_ADD = 53,    // give the new program a station; in their order, from 0 on, with ascending angles
     LINE_OPERATION_JOB_SAVE = 54,    // write the new program and the settings into the EEPROM; job_program tells when and how that ended
+    LINE_OPERATION_KEEP = 58,    // keep parameters and settings in the EEPROM, or forget them; kept tells when and how that ended
+    LINE_OPERATION_KEPT = 59,    // what is kept, or why not; writing 1 while the EEPROM is written or read; torn 1: one copy was damaged
 };
 
 // Lengths of whole bodies and offsets of their fields, in bytes, little endian.
@@ -606,30 +637,27 @@ enum line_operation {
 #define LINE_SENSOR_REPLY_BROKEN 20u    // u32
 #define LINE_SENSOR_REPLY_MISSED 24u    // u32
 #define LINE_PEER_REQUEST_LENGTH 2u
-#define LINE_PEER_REPLY_LENGTH 21u
+#define LINE_PEER_REPLY_LENGTH 23u
 #define LINE_PEER_REPLY_PHASE 3u    // u8
 #define LINE_PEER_REPLY_ENDED 4u    // u8
 #define LINE_PEER_REPLY_STATION 5u    // u16
 #define LINE_PEER_REPLY_STATIONS 7u    // u16
-#define LINE_PEER_REPLY_HEARD 9u    // u32
-#define LINE_PEER_REPLY_GARBAGE 13u    // u32
-#define LINE_PEER_REPLY_REPEATED 17u    // u32
-#define LINE_PEER_STATION_REQUEST_LENGTH 10u
-#define LINE_PEER_STATION_REQUEST_STATION 2u    // u16
-#define LINE_PEER_STATION_REQUEST_STATIONS 4u    // u16
-#define LINE_PEER_STATION_REQUEST_ANGLE 6u    // u32
-#define LINE_PEER_STATION_REPLY_LENGTH 3u
+#define LINE_PEER_REPLY_NEXT 9u    // u16
+#define LINE_PEER_REPLY_HEARD 11u    // u32
+#define LINE_PEER_REPLY_GARBAGE 15u    // u32
+#define LINE_PEER_REPLY_REPEATED 19u    // u32
 #define LINE_PEER_NEXT_REQUEST_LENGTH 4u
 #define LINE_PEER_NEXT_REQUEST_STATION 2u    // u16
 #define LINE_PEER_NEXT_REPLY_LENGTH 3u
 #define LINE_JOB_REQUEST_LENGTH 2u
-#define LINE_JOB_REPLY_LENGTH 11u
+#define LINE_JOB_REPLY_LENGTH 13u
 #define LINE_JOB_REPLY_STATE 3u    // u8
 #define LINE_JOB_REPLY_CAUSE 4u    // u8
 #define LINE_JOB_REPLY_STATION 5u    // u16
 #define LINE_JOB_REPLY_STATIONS 7u    // u16
 #define LINE_JOB_REPLY_ANSWERS 9u    // u8
 #define LINE_JOB_REPLY_FLAGS 10u    // u8
+#define LINE_JOB_REPLY_TABLE_FAULTS 11u    // u16
 #define LINE_JOB_DO_REQUEST_LENGTH 3u
 #define LINE_JOB_DO_REQUEST_ACTION 2u    // u8
 #define LINE_JOB_DO_REPLY_LENGTH 3u
@@ -652,6 +680,16 @@ enum line_operation {
 #define LINE_JOB_ADD_REPLY_LENGTH 3u
 #define LINE_JOB_SAVE_REQUEST_LENGTH 2u
 #define LINE_JOB_SAVE_REPLY_LENGTH 3u
+#define LINE_KEEP_REQUEST_LENGTH 3u
+#define LINE_KEEP_REQUEST_ACTION 2u    // u8
+#define LINE_KEEP_REPLY_LENGTH 3u
+#define LINE_KEPT_REQUEST_LENGTH 2u
+#define LINE_KEPT_REPLY_LENGTH 12u
+#define LINE_KEPT_REPLY_WRITING 3u    // u8
+#define LINE_KEPT_REPLY_CAUSE 4u    // u8
+#define LINE_KEPT_REPLY_TORN 5u    // u8
+#define LINE_KEPT_REPLY_GENERATION 6u    // u32
+#define LINE_KEPT_REPLY_VALUES 10u    // u16
 
 // X(name, code, length of the request body, length of the reply body if the cause is ok, 1: of an axis, its first field)
 #define LINE_OPERATIONS(X) \
@@ -691,16 +729,17 @@ enum line_operation {
     X(index_to, 42, 6, 3, 0) \
     X(index_state, 43, 2, 19, 0) \
     X(sensor, 44, 2, 28, 0) \
-    X(peer, 45, 2, 21, 0) \
-    X(peer_station, 46, 10, 3, 0) \
+    X(peer, 45, 2, 23, 0) \
     X(peer_next, 47, 4, 3, 0) \
-    X(job, 48, 2, 11, 0) \
+    X(job, 48, 2, 13, 0) \
     X(job_do, 49, 3, 3, 0) \
     X(job_program, 50, 2, 15, 0) \
     X(job_angle, 51, 4, 7, 0) \
     X(job_begin, 52, 2, 3, 0) \
     X(job_add, 53, 8, 3, 0) \
-    X(job_save, 54, 2, 3, 0)
+    X(job_save, 54, 2, 3, 0) \
+    X(keep, 58, 3, 3, 0) \
+    X(kept, 59, 2, 12, 0)
 
 enum line_parameter {
     LINE_PARAMETER_PERIOD = 1,    // [1 pm] length of one signal period
@@ -751,7 +790,7 @@ enum line_parameter {
     LINE_PARAMETER_SIGNAL_OFFSET = 46,    // signal: largest good offset; 65535 off
     LINE_PARAMETER_SIGNAL_BALANCE = 47,    // signal: largest good difference of the amplitudes; 65535 off
     LINE_PARAMETER_SIGNAL_SQUARE = 48,    // signal: largest good amplitude times sine of the phase error; 65535 off
-    LINE_PARAMETER_POSITION_SOURCE = 49,    // position from: 0 phases of sine and cosine, 1 counts of A/B, 2 the axis' own steps
+    LINE_PARAMETER_POSITION_SOURCE = 49,    // position from: 0 phases of sine and cosine (needs SINE, else 1 is the default), 1 counts of A/B, 2 the axis' own steps
     LINE_PARAMETER_HOME_METHOD = 50,    // homing: CiA 402 methods 1, 2, 17, 18, 33, 34, 35, 37; -1 S0 (switch, way, phase zero), -2 S3 (index on either side)
     LINE_PARAMETER_HOME_OFFSET = 51,    // [1 period] what the zero that homing finds is called
     LINE_PARAMETER_DRIVE = 52,    // drive: 0 bridge, 1 steps, 2 converter
@@ -889,6 +928,9 @@ enum line_parameter {
     X(segment_first, 89, -70368744177664LL, 70368744177664LL, 0LL) \
     X(segments, 90, 0LL, 2LL, 0LL)
 
+// parameters of which a node without sine and cosine takes only 0 and the default
+#define LINE_PARAMETERS_OF_SINE 25, 26, 27, 28, 29, 33, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48
+
 enum line_setting {
     LINE_SETTING_INDEX_TOLERANCE = 1,    // [0.01 arcsec] index: it has ended when no more than this is left by the sensor
     LINE_SETTING_INDEX_ALLOWANCE = 2,    // [0.01 arcsec] index: the long way ends so far below the target; more than the error of the worm
@@ -935,5 +977,7 @@ enum line_setting {
     X(job_start_limit, 18, 1LL, 3600LL, 30LL) \
     X(job_cut_limit, 19, 1LL, 1000000LL, 14400LL) \
     X(job_speed, 20, 1LL, 100LL, 100LL)
+
+#define LINE_VALUES_CRC 0xE16D7519u     // of all of both: what a kept number means
 
 #endif

@@ -2,8 +2,8 @@
 // machine -- the wire-EDM machine: its keyboard keys start a cut, two status inputs tell whether it cuts and whether something is wrong.
 //
 // When nobody has typed for a while the keys go whole into the queue of the PS/2 pass-through, which sends them when the lines are free.
-// What is in that queue cannot be taken back, so nothing is put in while something is there, and until it is empty the machine does not
-// count as resting.
+// What still waits there is taken back when the machine is left or has failed, a sequence that is under way is finished. Nothing is put
+// in while something is there, and until it is empty the machine does not count as resting.
 #include "machine.h"
 
 #include "clock.h"
@@ -45,8 +45,14 @@ static void go(enum machine_state to)
     since_ms = clock_ms();
 }
 
+static void take_keys_back(void)
+{
+    links_write(LINKS_PS2_STATE, LINKS_PS2_STATE_DROP_MASK);
+}
+
 static void fail(uint8_t with)
 {
+    take_keys_back();
     cause = with;
     go(MACHINE_FAILED);
 }
@@ -136,6 +142,7 @@ void machine_follow(void)
 
 void machine_leave(void)
 {
+    take_keys_back();
     go(MACHINE_LEFT);
 }
 

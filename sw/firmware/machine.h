@@ -12,7 +12,7 @@ void machine_start(unsigned axes);
 void machine_work(void);
 void machine_begin(void);                       // send the keys, follow the cut
 void machine_follow(void);                      // the cut that is under way
-void machine_leave(void);                       // keys that are not yet in the queue stay out of it
+void machine_leave(void);                       // keys that are not yet under way are taken back
 enum machine_state machine_state(void);
 uint8_t machine_cause(void);                    // why it failed
 bool machine_built(void);

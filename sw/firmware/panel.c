@@ -17,6 +17,7 @@
 #include "job.h"
 #include "keypad.h"
 #include "line_protocol.h"
+#include "peer.h"
 #include "settings.h"
 #include "store.h"
 
@@ -24,6 +25,7 @@
 #define REFRESH_MS 100u
 #define ENTRY 11u                       // characters
 #define DEGREE 360000u                  // in 0.01 arcsec
+#define TURN_MS 2048u                   // cause and fault are shown in turn, each so long
 #define DECIMALS 5u                     // of a shown angle
 
 enum mode { SHOW, DIVIDE, LIST, LIMIT, SPEED, LAST_ENTRY = SPEED, DIVIDING, SAVING };      // what is shown and asked for
@@ -42,6 +44,7 @@ static const char *const action_keys[] = {"START", "PAUSE", "RESUME", "STOP", "A
 
 #define WORDS(code, words) [code] = words,
 static const char *const cause_words[] = {LINE_CAUSE_WORDS(WORDS)};
+static const char *const fault_words[] = {LINE_FAULT_WORDS(WORDS)};
 static const char *const state_words[] = {LINE_JOB_STATE_WORDS(WORDS)};
 
 static uint8_t mode, notice;            // notice: a cause, shown for a while
@@ -79,13 +82,13 @@ static void put_angle(char *row, unsigned end, uint32_t angle)
     put_number(row, end - DECIMALS - 1, angle / DEGREE, 1);
 }
 
-// As many words as fit, up to a colon; returns the rest, a null pointer after the last one.
+// As many words as fit; returns the rest, a null pointer after the last one.
 static const char *put_words(char *row, const char *text)
 {
     unsigned column = 0;
     for (;;) {
         unsigned length = 0;
-        while (text[length] && text[length] != ' ' && text[length] != ':') length++;
+        while (text[length] && text[length] != ' ') length++;
         if (column && column + 1 + length > DISPLAY_COLUMNS) return text;
         if (column) column++;
         for (unsigned n = 0; n < length && column < DISPLAY_COLUMNS; n++) row[column++] = text[n];
@@ -99,6 +102,16 @@ static uint8_t shown_cause(void)
 {
     if (notice != LINE_CAUSE_OK && clock_ms() - noticed_ms > NOTICE_MS) notice = LINE_CAUSE_OK;
     return notice != LINE_CAUSE_OK ? notice : mode == SHOW ? job_cause() : LINE_CAUSE_OK;
+}
+
+// Why it waits; a fault of the sub-node in its own words too.
+static const char *words_of(uint8_t shown)
+{
+    unsigned faults = peer_faults(), fault = 0;
+    if (shown == LINE_CAUSE_OK) return NULL;
+    if (!faults || shown != job_cause() || clock_ms() % (2u * TURN_MS) < TURN_MS) return cause_words[shown];
+    while (!(faults >> fault & 1u)) fault++;
+    return fault_words[fault];
 }
 
 static void put_station(char *row, unsigned station)
@@ -150,8 +163,7 @@ static void compose(unsigned n)
 {
     for (unsigned column = 0; column < DISPLAY_COLUMNS; column++) text[column] = ' ';
     if (n == 0) {
-        uint8_t cause = shown_cause();
-        rest = cause != LINE_CAUSE_OK ? cause_words[cause] : NULL;
+        rest = words_of(shown_cause());
         put_title(text);
     } else if (n == 1 && mode != SHOW) {
         put_entry(text);

@@ -14,6 +14,8 @@
 
 static const struct { int64_t low, high, value; } table[LINE_PARAMETER_COUNT + 1] = {LINE_PARAMETERS(LIMITS)};
 
+static const uint8_t of_sine[] = {LINE_PARAMETERS_OF_SINE};
+
 static int64_t parameters[HARDWARE_AXES][LINE_PARAMETER_COUNT + 1];
 static struct planner_limits limits[HARDWARE_AXES];     // velocity: that of a move
 
@@ -209,14 +211,25 @@ static void apply(unsigned axis, uint8_t id)
 void parameters_start(unsigned axis)
 {
     for (uint8_t id = 1; id <= LINE_PARAMETER_COUNT; id++) parameters[axis][id] = table[id].value;
+    if (!hardware_has_sine(axis)) parameters[axis][LINE_PARAMETER_POSITION_SOURCE] = COUNTS;
     for (uint8_t id = 1; id <= LINE_PARAMETER_COUNT; id++) apply(axis, id);
 }
 
-uint8_t parameters_check(uint8_t id, int64_t value)
+static bool asks_for_sine(uint8_t id, int64_t value)
+{
+    if (id == LINE_PARAMETER_POSITION_SOURCE) return value == PHASES;
+    if (value == 0 || value == table[id].value) return false;
+    for (unsigned n = 0; n < sizeof of_sine; n++)
+        if (of_sine[n] == id) return true;
+    return false;
+}
+
+uint8_t parameters_check(unsigned axis, uint8_t id, int64_t value)
 {
     if (id < 1 || id > LINE_PARAMETER_COUNT) return LINE_CAUSE_UNKNOWN_PARAMETER;
     if (id == LINE_PARAMETER_HOME_METHOD && !homing_method_exists(value)) return LINE_CAUSE_OUT_OF_RANGE;
-    return value < table[id].low || value > table[id].high ? LINE_CAUSE_OUT_OF_RANGE : LINE_CAUSE_OK;
+    if (value < table[id].low || value > table[id].high) return LINE_CAUSE_OUT_OF_RANGE;
+    return asks_for_sine(id, value) && !hardware_has_sine(axis) ? LINE_CAUSE_NOT_BUILT : LINE_CAUSE_OK;
 }
 
 void parameters_set(unsigned axis, uint8_t id, int64_t value)
@@ -225,6 +238,11 @@ void parameters_set(unsigned axis, uint8_t id, int64_t value)
     if (id == LINE_PARAMETER_WATCHDOG_TIME)                             // there is one line for all axes
         for (unsigned other = 0; other < HARDWARE_AXES; other++) parameters[other][id] = value;
     apply(axis, id);
+}
+
+int64_t parameters_default(uint8_t id)
+{
+    return table[id].value;
 }
 
 int64_t parameters_get(unsigned axis, uint8_t id)

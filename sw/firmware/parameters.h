@@ -18,9 +18,10 @@ void parameters_start_node(void);                       // clock dividers, line 
 void parameters_set_baud(uint32_t baud);                // of the line, until the next start
 uint32_t parameters_sample_hz(void);                    // rate of the converters
 void parameters_start(unsigned axis);                   // defaults, into the registers too
-uint8_t parameters_check(uint8_t id, int64_t value);    // a line_cause
+uint8_t parameters_check(unsigned axis, uint8_t id, int64_t value);     // a line_cause
 void parameters_set(unsigned axis, uint8_t id, int64_t value);
 int64_t parameters_get(unsigned axis, uint8_t id);
+int64_t parameters_default(uint8_t id);
 struct planner_limits parameters_limits(unsigned axis, uint8_t velocity_id);
 struct planner_stairs parameters_stairs(unsigned axis, uint8_t velocity_id);
 

@@ -2,9 +2,11 @@
 // peer -- 115200 baud, 8N1. Two modes:
 //
 //   printed   S4's bytes: FF FF AA "cutting done, index to the next station", FF FF 55 "indexing done". Found amid any other bytes.
-//             The sub-node has the list of stations and counts them. Nothing is ever said twice, so what is lost is told by time.
+//             The sub-node has a program of stations and counts them, in its EEPROM: where it is to go next is known after a power cut
+//             too. Nothing is ever said twice, so what is lost is told by time.
 //   frames    00 · COBS of body and its CRC-32 · 00. The bodies are those of the line: the main node asks, the sub-node does what the
 //             line does. What is not answered is asked again; a request that comes again is answered again and not acted on again.
+//             Where a fault of the sub-node is the cause, it is asked which; it is reset only where a person wants it.
 #include "peer.h"
 
 #include "clock.h"
@@ -14,9 +16,9 @@
 #include "line_protocol.h"
 #include "sensor.h"
 #include "settings.h"
+#include "store.h"
 
 #define BAUD 115200u
-#define STATIONS 360u
 #define BYTES_A_POLL 16u
 #define CRC_BYTES 4u
 #define LONGEST_PART (1u + LINE_LONGEST_BODY + CRC_BYTES)       // between the zeros of a frame
@@ -28,7 +30,7 @@
 enum mode { NOT_IN_USE, PRINTED, FRAMES };
 enum role { MAIN, SUB };
 enum printed { HEAD = 0xFF, DONE = 0x55, NEXT = 0xAA };         // twice the head, then one of the others
-enum step { RESTING, LOOKING, CLEARING, SETTING_SPEED, ORDERING, WATCHING, STOPPING };     // what a main node waits to be answered
+enum step { RESTING, LOOKING, CLEARING, RESETTING, SETTING_SPEED, ORDERING, WATCHING, STOPPING, ASKING_FAULT };    // that was asked last
 
 static struct peer {
     uint8_t phase;                      // line_peer_phase
@@ -37,6 +39,10 @@ static struct peer {
     uint32_t angle;
     uint32_t since_ms;                  // the index was asked for
     uint32_t heard, garbage, repeated;
+    uint16_t faults;                    // of the sub-node
+    uint8_t failure;                    // cause, while it is asked for them
+    bool resets;                        // a person wants them reset
+    bool noting;                        // a sub-node in mode printed writes its count
 } peer;
 
 static struct requests {                // of a main node, frames
@@ -61,9 +67,6 @@ static struct incoming {
     uint32_t count;                     // more than there is room for: it is too long
 } incoming;
 
-static uint32_t stations[STATIONS];     // of a sub-node, printed
-static uint16_t stations_given, station_count, next_station;   // count: 0 until all are given
-
 static uint8_t mode(void)
 {
     return (uint8_t)settings_get(LINE_SETTING_PEER_MODE);
@@ -78,6 +81,7 @@ static void end(uint8_t phase, uint8_t cause)
 {
     peer.phase = phase;
     peer.ended = cause;
+    peer.resets = peer.noting = false;
     requests.step = RESTING;
 }
 
@@ -89,27 +93,37 @@ static void say(uint8_t what)
     for (uint32_t n = 0; n < sizeof bytes; n++) links_write(LINKS_PEER_TRANSMIT, bytes[n]);
 }
 
+// Of this sub-node: what was indexed last is in the journal.
+static uint16_t next_station(void)
+{
+    const struct store_record *record = store_record();
+    return record->step == STORE_NEXT && record->program == store_identity() ? record->station : 0;
+}
+
 static void next_ordered(void)
 {
-    uint8_t cause;
+    uint8_t cause = LINE_CAUSE_NO_STATION;
     if (peer.phase == LINE_PEER_PHASE_INDEXING) return;
-    peer.station = next_station;
-    if (next_station >= station_count) {
-        end(LINE_PEER_PHASE_FAILED, LINE_CAUSE_NO_STATION);
-        return;
+    peer.station = next_station();
+    if (peer.station < store_stations()) {
+        peer.angle = store_angle(peer.station);
+        cause = index_to(peer.angle);
     }
-    peer.angle = stations[next_station];
-    cause = index_to(peer.angle);
     end(cause == LINE_CAUSE_OK ? LINE_PEER_PHASE_INDEXING : LINE_PEER_PHASE_FAILED, cause == LINE_CAUSE_OK ? LINE_CAUSE_RUNNING : cause);
 }
 
+// The count is in the journal before the main node hears of it.
 static void index_watched(void)         // by a sub-node
 {
     uint8_t ended = index_ended();
-    if (peer.phase != LINE_PEER_PHASE_INDEXING || ended == LINE_CAUSE_RUNNING) return;
-    end(ended == LINE_CAUSE_OK ? LINE_PEER_PHASE_INDEXED : LINE_PEER_PHASE_FAILED, ended);
-    if (ended != LINE_CAUSE_OK) return;
-    next_station++;
+    if (peer.phase != LINE_PEER_PHASE_INDEXING || ended == LINE_CAUSE_RUNNING || store_state() == STORE_WRITING) return;
+    if (ended == LINE_CAUSE_OK) ended = peer.noting ? store_cause() : store_note((uint16_t)(peer.station + 1u), STORE_NEXT);
+    if (ended != LINE_CAUSE_OK) return end(LINE_PEER_PHASE_FAILED, ended);
+    if (!peer.noting) {
+        peer.noting = true;
+        return;
+    }
+    end(LINE_PEER_PHASE_INDEXED, LINE_CAUSE_OK);
     say(DONE);
 }
 
@@ -136,7 +150,7 @@ static void printed_work(void)
     if (role() == SUB)
         index_watched();
     else if (peer.phase == LINE_PEER_PHASE_INDEXING && clock_ms() - peer.since_ms > (uint32_t)settings_get(LINE_SETTING_PEER_PATIENCE))
-        end(LINE_PEER_PHASE_SILENT, LINE_CAUSE_PEER_SILENT);
+        end(LINE_PEER_PHASE_SILENT, LINE_CAUSE_LOOK_AT_SUB_NODE);
 }
 
 // frames
@@ -208,15 +222,46 @@ static void stop(uint8_t step)
     ask(step, LINE_OPERATION_STOP, 0, 1);
 }
 
+// An order has failed. Where a fault is the cause, it is asked which.
+static void fail(uint8_t cause)
+{
+    if (cause != LINE_CAUSE_FAULTED && cause != LINE_CAUSE_ENDED_BY_FAULT && cause != LINE_CAUSE_FAULT_STANDS)
+        return end(LINE_PEER_PHASE_FAILED, cause);
+    peer.failure = cause;
+    ask(ASKING_FAULT, LINE_OPERATION_STATUS, 0, 1);
+}
+
+static uint32_t field_of(const uint8_t *reply, uint32_t at, uint32_t bytes)
+{
+    uint32_t value = 0;
+    while (bytes--) value = value << 8 | reply[at + bytes];
+    return value;
+}
+
+static void reset_fault(void)
+{
+    peer.resets = false;
+    ask(RESETTING, LINE_OPERATION_RESET_FAULTS, 0, 1);
+}
+
+static void faults_told(const uint8_t *reply, uint8_t cause)
+{
+    if (cause == LINE_CAUSE_OK) {
+        uint32_t first = field_of(reply, LINE_STATUS_REPLY_FIRST_FAULT, 2);
+        peer.faults = (uint16_t)(first ? first : field_of(reply, LINE_STATUS_REPLY_FAULTS, 2));
+    }
+    end(LINE_PEER_PHASE_FAILED, peer.failure);
+}
+
 static void watched(const uint8_t *reply)
 {
     uint8_t ended = reply[LINE_INDEX_STATE_REPLY_ENDED];
-    uint32_t target = 0;
-    for (uint32_t n = 0; n < 4; n++) target |= (uint32_t)reply[LINE_INDEX_STATE_REPLY_TARGET + n] << 8 * n;
-    if (ended == LINE_CAUSE_NEVER || target != peer.angle)
-        end(LINE_PEER_PHASE_FAILED, LINE_CAUSE_PEER_RESTARTED);
+    if (ended == LINE_CAUSE_NEVER || field_of(reply, LINE_INDEX_STATE_REPLY_TARGET, 4) != peer.angle)
+        fail(LINE_CAUSE_PEER_RESTARTED);
+    else if (ended == LINE_CAUSE_OK)
+        end(LINE_PEER_PHASE_INDEXED, LINE_CAUSE_OK);
     else if (ended != LINE_CAUSE_RUNNING)
-        end(ended == LINE_CAUSE_OK ? LINE_PEER_PHASE_INDEXED : LINE_PEER_PHASE_FAILED, ended);
+        fail(ended);
 }
 
 static void reply_heard(const uint8_t *reply, uint32_t length)
@@ -224,7 +269,9 @@ static void reply_heard(const uint8_t *reply, uint32_t length)
     bool ours = requests.step != RESTING && !requests.answered && length >= LINE_REPLY_HEAD && reply[0] == requests.body[0] &&
                 reply[1] == requests.body[1];
     uint8_t cause = ours ? reply[2] : LINE_CAUSE_OK;
-    if (!ours || (cause == LINE_CAUSE_OK && reply[1] == LINE_OPERATION_INDEX_STATE && length != LINE_INDEX_STATE_REPLY_LENGTH)) {
+    uint32_t wanted = reply[1] == LINE_OPERATION_INDEX_STATE ? LINE_INDEX_STATE_REPLY_LENGTH :
+                      reply[1] == LINE_OPERATION_STATUS ? LINE_STATUS_REPLY_LENGTH : LINE_REPLY_HEAD;
+    if (!ours || (cause == LINE_CAUSE_OK && length != wanted)) {
         peer.garbage++;
         return;
     }
@@ -235,9 +282,13 @@ static void reply_heard(const uint8_t *reply, uint32_t length)
         cause = LINE_CAUSE_BUSY;
     if (cause == LINE_CAUSE_BUSY && clock_ms() - peer.since_ms < BEGIN_MS)
         stop(CLEARING);
+    else if (requests.step == ASKING_FAULT)
+        faults_told(reply, cause);
     else if (cause != LINE_CAUSE_OK)
-        end(LINE_PEER_PHASE_FAILED, cause);
-    else if (requests.step == LOOKING)
+        fail(cause);
+    else if (requests.step == LOOKING && peer.resets)
+        reset_fault();
+    else if (requests.step == LOOKING || requests.step == RESETTING)
         set_speed();
     else if (requests.step == SETTING_SPEED)
         ask(ORDERING, LINE_OPERATION_INDEX_TO, peer.angle, 4);
@@ -306,7 +357,6 @@ void peer_start(unsigned axes)
     replies.any = false;
     incoming.heads = 0;
     incoming.count = 0;
-    stations_given = station_count = next_station = 0;
     links_write(LINKS_PEER_BIT_TIME, (uint32_t)((sixteenths + BAUD / 2) / BAUD));
 }
 
@@ -339,6 +389,7 @@ uint8_t peer_index(uint16_t station, uint32_t angle)
     peer.station = station;
     peer.angle = angle;
     peer.since_ms = clock_ms();
+    peer.faults = 0;
     if (mode() == PRINTED)
         say(NEXT);
     else
@@ -366,33 +417,28 @@ uint8_t peer_cause(void)
     return peer.ended;
 }
 
-static uint8_t take_station(void)
+uint16_t peer_faults(void)
 {
-    uint32_t station = (uint32_t)line_field(LINE_PEER_STATION_REQUEST_STATION, 2);
-    uint32_t count = (uint32_t)line_field(LINE_PEER_STATION_REQUEST_STATIONS, 2), angle = (uint32_t)line_field(LINE_PEER_STATION_REQUEST_ANGLE, 4);
-    if (peer.phase == LINE_PEER_PHASE_INDEXING) return LINE_CAUSE_BUSY;
-    if (count == 0 || count > STATIONS || station >= count || angle >= SENSOR_TURN) return LINE_CAUSE_OUT_OF_RANGE;
-    if (station && (station != stations_given || angle <= stations[station - 1])) return LINE_CAUSE_OUT_OF_RANGE;
-    stations[station] = angle;
-    stations_given = (uint16_t)(station + 1);
-    station_count = stations_given == count ? stations_given : 0;
-    next_station = 0;
-    return LINE_CAUSE_OK;
+    return peer.faults;
+}
+
+void peer_reset_fault(void)
+{
+    peer.resets = peer.faults != 0;
 }
 
 static uint8_t take_next(void)
 {
-    uint32_t station = (uint32_t)line_field(LINE_PEER_NEXT_REQUEST_STATION, 2);
-    if (station >= station_count) return LINE_CAUSE_NO_STATION;
+    uint16_t station = (uint16_t)line_field(LINE_PEER_NEXT_REQUEST_STATION, 2);
+    if (role() != SUB) return LINE_CAUSE_PEER_OFF;
+    if (station >= store_stations()) return LINE_CAUSE_NO_STATION;
     if (peer.phase == LINE_PEER_PHASE_INDEXING) return LINE_CAUSE_BUSY;
-    next_station = (uint16_t)station;
-    return LINE_CAUSE_OK;
+    return store_note(station, STORE_NEXT);
 }
 
 uint8_t peer_operation(uint8_t operation)
 {
     switch (operation) {
-    case LINE_OPERATION_PEER_STATION: return take_station();
     case LINE_OPERATION_PEER_NEXT: return take_next();
     case LINE_OPERATION_PEER: break;
     default: return LINE_CAUSE_NOT_BUILT;
@@ -400,7 +446,8 @@ uint8_t peer_operation(uint8_t operation)
     line_answer(LINE_PEER_REPLY_PHASE, peer.phase, 1);
     line_answer(LINE_PEER_REPLY_ENDED, peer.ended, 1);
     line_answer(LINE_PEER_REPLY_STATION, peer.station, 2);
-    line_answer(LINE_PEER_REPLY_STATIONS, station_count, 2);
+    line_answer(LINE_PEER_REPLY_STATIONS, store_stations(), 2);
+    line_answer(LINE_PEER_REPLY_NEXT, next_station(), 2);
     line_answer(LINE_PEER_REPLY_HEARD, peer.heard, 4);
     line_answer(LINE_PEER_REPLY_GARBAGE, peer.garbage, 4);
     line_answer(LINE_PEER_REPLY_REPEATED, peer.repeated, 4);

@@ -15,5 +15,7 @@ uint8_t peer_index(uint16_t station, uint32_t angle);
 uint8_t peer_stop(void);                // in mode printed it is not heard: the table turns on to its station
 uint8_t peer_state(void);               // a line_peer_phase
 uint8_t peer_cause(void);               // why it failed, a line_cause
+uint16_t peer_faults(void);             // of the sub-node, if they were that: line_fault bits, the first one alone where it is known
+void peer_reset_fault(void);            // a person wants it: the next index begins by resetting the fault that was told
 
 #endif

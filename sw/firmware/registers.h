@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x39be858du            // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xc60e00c6u            // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define LINE_BASE 0x100u
@@ -275,7 +275,7 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define LINKS_PS2_INJECT_LAST_MASK                     0x00000100u  // of its sequence
 #define LINKS_PS2_INJECT_LAST_SHIFT                    8
 #define LINKS_PS2_INJECT_LAST_WIDTH                    1
-#define LINKS_PS2_STATE                                0x018u  // r: state of PS/2; all that was queued has been sent when free is 32 and neither injecting nor busy stands
+#define LINKS_PS2_STATE                                0x018u  // rw: state of PS/2; all that was queued has been sent when free is 32 and neither injecting nor busy stands
 #define LINKS_PS2_STATE_FREE_MASK                      0x0000003fu  // scan codes that may still be queued, 32 at most
 #define LINKS_PS2_STATE_FREE_SHIFT                     0
 #define LINKS_PS2_STATE_FREE_WIDTH                     6
@@ -285,6 +285,9 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define LINKS_PS2_STATE_BUSY_MASK                      0x00000080u  // a frame is under way on either side
 #define LINKS_PS2_STATE_BUSY_SHIFT                     7
 #define LINKS_PS2_STATE_BUSY_WIDTH                     1
+#define LINKS_PS2_STATE_DROP_MASK                      0x00000100u  // take back what is queued; a sequence that is under way is finished whole
+#define LINKS_PS2_STATE_DROP_SHIFT                     8
+#define LINKS_PS2_STATE_DROP_WIDTH                     1
 #define LINKS_PS2_TYPED                                0x01cu  // rw: bytes of the keyboard that answer no command: a person types; writing clears
 #define LINKS_PS2_TYPED_MASK                           0x0000ffffu
 #define LINKS_PS2_TYPED_SHIFT                          0
@@ -956,6 +959,9 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define GRATING_POSITION_SOURCE_STEPS_MASK             0x00000002u  // 1: the axis' own step and direction take the place of the pins a and b
 #define GRATING_POSITION_SOURCE_STEPS_SHIFT            1
 #define GRATING_POSITION_SOURCE_STEPS_WIDTH            1
+#define GRATING_POSITION_SOURCE_SINE_MASK              0x00000004u  // 1: sine and cosine were built, 0: the position is made of counts whatever `counts` says
+#define GRATING_POSITION_SOURCE_SINE_SHIFT             2
+#define GRATING_POSITION_SOURCE_SINE_WIDTH             1
 #define GRATING_ALIGN                                  0x0acu  // rw: with counts: move position and phase by this, -2 to 2; the target does not follow [1/4 period]
 #define GRATING_ALIGN_MASK                             0x00000007u
 #define GRATING_ALIGN_SHIFT                            0

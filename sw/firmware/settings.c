@@ -17,6 +17,11 @@ void settings_start(unsigned axes)
     for (uint8_t id = 1; id <= LINE_SETTING_COUNT; id++) settings[id] = table[id].value;
 }
 
+int64_t settings_default(uint8_t id)
+{
+    return table[id].value;
+}
+
 int64_t settings_get(uint8_t id)
 {
     return settings[id];

@@ -8,6 +8,7 @@
 void settings_start(unsigned axes);             // defaults
 uint8_t settings_operation(uint8_t operation);
 int64_t settings_get(uint8_t id);               // a line_setting
+int64_t settings_default(uint8_t id);
 uint8_t settings_set(uint8_t id, int64_t value);        // a line_cause
 
 #endif

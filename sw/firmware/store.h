@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// store -- the program of stations with the settings, and the journal of the job, in an EEPROM 24AA128, whole after a power cut at any moment.
+// store -- the program of stations, the journal of the job and what the node keeps of its values, in an EEPROM 24AA128, whole after a
+// power cut at any moment.
 #ifndef MOIRE_STORE_H
 #define MOIRE_STORE_H
 
@@ -9,7 +10,8 @@
 #define STORE_STATIONS 360u             // most
 #define STORE_TURN 129600000u           // a turn in 0.01 arcsec
 
-enum store_step { STORE_NOTHING, STORE_STARTED, STORE_INDEXED, STORE_CUT_BEGUN, STORE_CUT_DONE, STORE_FINISHED, STORE_STOPPED };
+enum store_step { STORE_NOTHING, STORE_STARTED, STORE_INDEXED, STORE_CUT_BEGUN, STORE_CUT_DONE, STORE_FINISHED, STORE_STOPPED,
+                  STORE_NEXT };         // of a sub-node that counts: its next station
 
 struct store_record {                   // a line of the journal, as in the EEPROM
     uint32_t sequence;                  // each has one more; 0: the journal is empty
@@ -30,7 +32,7 @@ bool store_torn(void);                  // one copy of the program was found dam
 // The program in force; nothing of it while it is loaded, or if there is none.
 uint16_t store_stations(void);
 uint32_t store_angle(unsigned station); // 0.01 arcsec
-uint32_t store_generation(void);
+uint32_t store_generation(void);          // each saved one has a higher one; 0: there is none
 uint32_t store_identity(void);          // its CRC-32
 
 const struct store_record *store_record(void);             // the last line of the journal
@@ -41,5 +43,17 @@ uint8_t store_add(uint32_t angle);
 uint16_t store_added(void);             // stations that the new program has so far
 uint8_t store_save(void);
 uint8_t store_note(uint16_t station, enum store_step step);     // a line into the journal
+
+#define STORE_VALUES 254u               // most
+
+// Values of the node: taken at power-up, settings only if the program is not newer.
+struct store_kept {
+    uint32_t generation;                // of all that is saved, programs too; 0: nothing is there
+    uint16_t values;
+    uint8_t cause;                      // what is kept, or why the defaults are in force
+    bool torn;                          // one copy was found damaged
+};
+const struct store_kept *store_kept(void);
+uint8_t store_keep(bool nothing);       // a line_cause
 
 #endif

@@ -30,7 +30,7 @@ BUILD = ROOT / "build" / "twin"
 MEMORY_BYTES = 98304
 CORE_PACKAGE = "pythondata_cpu_picorv32"
 COMPILE = ["-std=c++17", "-O3", "-march=native", "-fPIC", "-fno-strict-aliasing", "-fno-semantic-interposition", "-fvisibility=hidden",
-           "-w", "-pthread"]
+           "-fno-tree-vectorize", "-w", "-pthread"]
 VERILATE = ["--cc", "-O3", "--x-assign", "fast", "--x-initial", "fast", "--no-timing", "--timescale", "1ns/1ps", "-Wall"]
 VERILATED = ["-DVERILATOR=1", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TIMING=0", "-DVM_TRACE=0"]
 OWN = ["-std=c++17", "-O3", "-march=native", "-ffp-contract=off", "-fPIC", "-Wall", "-Wextra", "-Werror"]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tick_divider: exact periods at both ends of the range, a period changed under way, and random settings against the model."""
+"""tick_divider: exact periods at both ends of the range, a period changed under way, and starting anew, and random
+settings against the model."""
 import random
 
 import cocotb
@@ -10,8 +11,8 @@ from bench import run, start
 from tick_divider import TickDivider
 
 
-async def clk(dut, period, rst=0):
-    dut.period.value, dut.rst.value = period, rst
+async def clk(dut, period, restart=0, rst=0):
+    dut.period.value, dut.restart.value, dut.rst.value = period, restart, rst
     await RisingEdge(dut.clk)
     await FallingEdge(dut.clk)
     return int(dut.tick.value)
@@ -25,7 +26,7 @@ async def ticks(dut, period, n):
 @cocotb.test()
 async def a_tick_comes_each_period_and_the_first_a_period_after_reset(dut):
     longest = (1 << int(dut.W.value)) - 1
-    await start(dut, period=0)
+    await start(dut, period=0, restart=0)
     for period in (1, 2, 3, 10, min(longest, 1000)):
         await clk(dut, period, rst=1)
         assert await ticks(dut, period, 3 * period) == [period, 2 * period, 3 * period]
@@ -34,14 +35,14 @@ async def a_tick_comes_each_period_and_the_first_a_period_after_reset(dut):
 @cocotb.test()
 async def the_longest_period_is_exact(dut):
     longest = (1 << int(dut.W.value)) - 1
-    await start(dut, period=0)
+    await start(dut, period=0, restart=0)
     if longest < 1 << 10:
         assert await ticks(dut, longest, 2 * longest) == [longest, 2 * longest]
 
 
 @cocotb.test()
 async def period_0_never_ticks_and_the_next_period_begins_whole(dut):
-    await start(dut, period=5)
+    await start(dut, period=5, restart=0)
     await ticks(dut, 5, 3)
     assert await ticks(dut, 0, 100) == []
     assert await ticks(dut, 5, 10) == [5, 10]
@@ -49,21 +50,31 @@ async def period_0_never_ticks_and_the_next_period_begins_whole(dut):
 
 @cocotb.test()
 async def a_shorter_period_counts_at_once(dut):
-    await start(dut, period=0)
+    await start(dut, period=0, restart=0)
     assert await ticks(dut, 200, 50) == []
     assert await ticks(dut, 20, 41) == [1, 21, 41]
     assert await ticks(dut, 30, 30) == [30]
 
 
 @cocotb.test()
+async def a_period_begins_at_restart_wherever_the_one_before_was(dut):
+    await start(dut, period=0, restart=0)
+    for before in range(13):
+        await clk(dut, 10, rst=1)
+        await ticks(dut, 10, before)
+        assert await clk(dut, 10, restart=1) == 0                # not even where a tick was due
+        assert await ticks(dut, 10, 20) == [10, 20]
+
+
+@cocotb.test()
 async def any_setting_matches_the_model(dut):
-    await start(dut, period=0)
+    await start(dut, period=0, restart=0)
     model, period = TickDivider(), 0
     for n in range(5000):
         if random.random() < 0.05:
             period = random.choice([0, 1, 2, random.randrange(40)])
-        rst = int(random.random() < 0.01 or n == 0)
-        assert await clk(dut, period, rst) == model.step(period, rst), f"clk {n}"
+        restart, rst = int(random.random() < 0.05), int(random.random() < 0.01 or n == 0)
+        assert await clk(dut, period, restart, rst) == model.step(period, restart, rst), f"clk {n}"
 
 
 @pytest.mark.parametrize("w", [8, 24])

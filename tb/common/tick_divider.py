@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/common/tick_divider.sv does, in integers: step(period) is one clk and returns tick after it."""
+"""What rtl/common/tick_divider.sv does, in integers: step(period, restart) is one clk and returns tick after it."""
 
 
 class TickDivider:
     def __init__(self):
         self.elapsed = 0
 
-    def step(self, period, rst=0):
-        if rst or period == 0:
+    def step(self, period, restart=0, rst=0):
+        if rst or restart or period == 0:
             self.elapsed = 0
             return 0
         self.elapsed += 1

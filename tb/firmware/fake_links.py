@@ -7,6 +7,7 @@ import math
 from collections import deque
 
 from fake_machine import CLK_HZ, DEFINES, PERIOD
+from station import Bus, Eeprom
 
 TURN_ARCSEC = 360 * 3600
 CLK_MS = CLK_HZ // 1000
@@ -122,6 +123,32 @@ class PeerPort:
         if offset == DEFINES["LINKS_PEER_TRANSMIT"]:
             assert len(self.sent) < 64, "a byte was lost: the queue was full"
             self.sent.append(value)
+
+
+class I2c:
+    """The bus with an EEPROM, of station.py."""
+
+    built = "I2C"
+
+    def __init__(self):
+        self.bus, self.eeprom, self.clk = Bus(), Eeprom(), 0
+        self.bus.devices = {0x50: self.eeprom}
+
+    def power_cut(self, random_source):
+        self.bus.power_cut()
+        return self.eeprom.power_cut(self.clk, random_source)
+
+    def millisecond(self, machine):
+        self.clk = machine.clk
+
+    def read(self, offset):
+        if offset == DEFINES["LINKS_I2C_ANSWER"]:
+            return self.bus.take(self.clk)
+        return self.bus.state(self.clk) if offset == DEFINES["LINKS_I2C_STATE"] else None
+
+    def write(self, offset, value):
+        if offset == DEFINES["LINKS_I2C"]:
+            self.bus.command(self.clk, value)
 
 
 class NumericDisplay:

@@ -211,9 +211,11 @@ class Axis:
 
 
 class Grating:
-    """The registers of a grating; `burst(phases, every)` gives the 1024 words of a burst, which is full after `delay` looks."""
+    """The registers of a grating; `burst(phases, every)` gives the 1024 words of a burst, which is full after `delay` looks.
+    Without `sine` nothing of sine and cosine is built."""
 
-    def __init__(self):
+    def __init__(self, sine=True):
+        self.sine = sine
         self.word, self.strobes, self.records = {}, [], []
         self.burst, self.spoiled, self.delay = None, False, 0
         self.waiting, self.words, self.taken, self.full = 0, [], 0, False
@@ -248,6 +250,8 @@ class Grating:
                     d["GRATING_SEGMENT_STATE_KNOWN_MASK"])
         if offset == d["GRATING_SEGMENT_STORED"]:
             return self.segments.get(self.word[d["GRATING_SEGMENT_LOOK"]], 0) & 0xFFFFFFFF
+        if offset == d["GRATING_POSITION_SOURCE"]:
+            return self.word.get(offset, 0) | d["GRATING_POSITION_SOURCE_SINE_MASK"] * self.sine
         return self.word.get(offset, 0)
 
     def wide(self, name, bits):
@@ -290,9 +294,9 @@ class Grating:
 class Machine:
     """The node under the firmware; request() speaks to it as the master does."""
 
-    def __init__(self, *axes, map_crc=DEFINES["MAP_CRC"], address=2, image="axis", links=None):
+    def __init__(self, *axes, map_crc=DEFINES["MAP_CRC"], address=2, image="axis", links=None, sine=True):
         self.axes, self.address, self.map_crc, self.clk = list(axes) or [Axis()], address, map_crc, 0
-        self.gratings = [Grating() for _ in self.axes]
+        self.gratings = [Grating(sine=sine) for _ in self.axes]
         # words by their offset; all drives are built
         self.actuators = [{DEFINES["ACTUATOR_DRIVE"]: DEFINES["ACTUATOR_DRIVE_BUILT_MASK"]} for _ in self.axes]
         self.links = links

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 from functools import cache
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -55,8 +56,18 @@ WRITE = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32)
 
 
 @cache
+def tools():
+    """sw/firmware/build.py"""
+    found = spec_from_file_location("firmware_build", SOURCE / "build.py")
+    module = module_from_spec(found)
+    found.loader.exec_module(module)
+    return module
+
+
+@cache
 def library(image="axis"):
     """Compile if a source is newer; gcc or clang of the system, else zig."""
+    axes = tools().AXES.get(image)
     others = {path for path in SOURCE.glob("image_*.c") if path.name != f"image_{image}.c"}
     sources = [*sorted(set(SOURCE.glob("*.[ch]")) - others), BRIDGE]
     result = ROOT / "build" / "firmware" / f"host_firmware_{image}.so"
@@ -68,6 +79,7 @@ def library(image="axis"):
             subprocess.run([*command, "-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion", "-Werror",
                             "-fsanitize=undefined", "-fsanitize-undefined-trap-on-error",      # undefined behaviour ends the test
                             "-shared", "-fPIC", "-DMOIRE_REGISTER_ACCESS", f"-I{SOURCE}",
+                            *([f"-DHARDWARE_AXES={axes}u"] if axes else []),
                             *(str(path) for path in sources if path.suffix == ".c"), "-o", str(made)], check=True)
             os.replace(made, result)
     loaded = ctypes.CDLL(str(result))

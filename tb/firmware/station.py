@@ -239,6 +239,11 @@ class Edm:
     def power_cut(self):                                                # of the node
         self.queue, self.injecting, self.edges, self.next_key = deque(), False, 0, 0
 
+    def take_back(self):
+        """What is queued; a sequence that is under way is finished."""
+        under_way = next(n for n, (_, last) in enumerate(self.queue, 1) if last) if self.injecting else 0
+        self.queue = deque(list(self.queue)[:under_way])
+
     def set(self, inputs):
         self.edges |= (inputs & ~self.inputs) << 2 | (self.inputs & ~inputs) << 4
         self.inputs = inputs
@@ -320,6 +325,9 @@ class Station(Machine):
             return super().write(offset, value)
         if at == d["LINKS_I2C"]:
             self.bus.command(self.clk, value)
+        elif at == d["LINKS_PS2_STATE"]:
+            if value & d["LINKS_PS2_STATE_DROP_MASK"]:
+                self.edm.take_back()
         elif at == d["LINKS_PS2_INJECT"]:
             self.edm.queue.append((value & 0xFF, value >> 8 & 1))
         elif at == d["LINKS_MACHINE_STATUS"]:
@@ -347,7 +355,8 @@ class Station(Machine):
         told = self.ask("job")
         return {**told, "state": STATE[told["state"]], "cause": CAUSE[told["cause"]],
                 "answers": {name for name, code in ACTION.items() if told["answers"] >> code & 1},
-                "flags": {name for name, bit in FLAG.items() if told["flags"] & bit}}
+                "flags": {name for name, bit in FLAG.items() if told["flags"] & bit},
+                "table_faults": {name for name, (bit, _) in TABLE["fault"].items() if told["table_faults"] >> bit & 1}}
 
     def do(self, action):
         return self.request("job_do", action=ACTION[action])[0]
@@ -377,6 +386,16 @@ class Station(Machine):
         assert self.run(60_000, until=lambda: self.firmware.store_state() != 2)
         return CAUSE[self.ask("job_program")["ended"]]
 
+    def keep(self, action="keep"):
+        """How that ended."""
+        cause, _ = self.request("keep", action=TABLE["keep_action"][action][0])
+        assert cause == "ok" and self.run(60_000, until=lambda: self.firmware.store_state() != 2), cause
+        return self.kept()["cause"]
+
+    def kept(self):
+        told = self.ask("kept")
+        return {**told, "cause": CAUSE[told["cause"]]}
+
     def program(self):
         """The angles that are in force."""
         return [self.ask("job_angle", station=n)["angle"] for n in range(self.ask("job_program")["stations"])]
@@ -400,6 +419,7 @@ class SubNode:
         self.target, self.there_at, self.ended, self.fault, self.dead, self.requests = 0, None, CAUSE_CODE["never"], None, False, 0
         self.last_request = self.last_reply = None
         self.speeds = []                                                # override that came before each order
+        self.faults, self.cause_stands, self.resets = (), False, 0      # latched ones, the first one first
 
     def hear(self, now, byte):
         if self.dead:
@@ -426,20 +446,34 @@ class SubNode:
         self.requests += 1
 
     def do(self, now, body):
-        operation = body[1]
-        if operation == OPERATION["index_to"]:
+        operation, cause = body[1], "ok"
+        if operation == OPERATION["index_to"] and self.faults:
+            cause = "faulted"
+        elif operation == OPERATION["reset_faults"]:
+            cause, self.resets = "fault_stands" if self.cause_stands else "ok", self.resets + 1
+            self.faults = self.faults if self.cause_stands else ()
+        elif operation == OPERATION["index_to"]:
             self.begin(now, int.from_bytes(body[2:6], "little"))
         elif operation == OPERATION["set_parameter"]:
             self.speeds.append(int.from_bytes(body[4:], "little"))
         elif operation == OPERATION["stop"]:
             self.there_at, self.ended = None, CAUSE_CODE["stopped"]
-        reply = bytes([body[0], operation, 0])
-        if operation == OPERATION["index_state"]:
-            values = {"phase": self.there_at is not None, "ended": self.ended, "target": self.target}
-            for field in TABLE["operation"]["index_state"]["reply"]:
+        latched = [1 << TABLE["fault"][name][0] for name in self.faults]
+        values = {"phase": self.there_at is not None, "ended": self.ended, "target": self.target, "faults": sum(latched),
+                  "first_fault": latched[0] if latched else 0}
+        reply = bytes([body[0], operation, CAUSE_CODE[cause]])
+        if operation in (OPERATION["index_state"], OPERATION["status"]):
+            name = next(name for name, code in OPERATION.items() if code == operation)
+            for field in TABLE["operation"][name]["reply"]:
                 name, kind = field.split()
                 reply += int(values.get(name, 0)).to_bytes(int(kind[1:]) // 8, "little")
         return reply
+
+    def latch(self, *faults):
+        """By their names, in the order in which they came; a turning table stops."""
+        self.faults = faults
+        if self.there_at is not None:
+            self.there_at, self.ended = None, CAUSE_CODE["ended_by_fault"]
 
     def send(self, body):
         self.to_send.extend(b"\0" + cobs(body + zlib.crc32(body).to_bytes(4, "little")) + b"\0")

@@ -306,6 +306,52 @@ def test_a_drive_that_was_not_built_is_refused():
     machine.ask("set_parameter", axis=0, parameter=PARAMETER["drive"]["id"], value=0)
 
 
+SINE = [parameter for parameter in PARAMETER.values() if "needs" in parameter]
+
+
+def test_without_sine_and_cosine_a_parameter_that_needs_them_takes_what_asks_for_nothing():
+    wanted = {p["id"]: next(value for value in (p["min"] + 1, p["min"] + 2) if value != p["default"]) if p["max"] > 1 else 1 for p in SINE}
+    machine = Machine(sine=False)
+    for parameter in SINE:
+        asked = {"axis": 0, "parameter": parameter["id"]}
+        for value in (0, parameter["default"]):
+            machine.ask("set_parameter", **asked, value=value)
+            assert machine.ask("get_parameter", **asked)["value"] == value
+        assert machine.request("set_parameter", **asked, value=wanted[parameter["id"]])[0] == "not_built"
+        assert machine.request("set_parameter", **asked, value=parameter["max"] + 1)[0] == "out_of_range"
+        assert machine.ask("get_parameter", **asked)["value"] == parameter["default"]
+    machine = Machine()
+    for number, value in wanted.items():
+        machine.ask("set_parameter", axis=0, parameter=number, value=value)
+
+
+def test_without_sine_and_cosine_the_position_is_made_of_counts_from_power_up_on():
+    machine, source = Machine(sine=False), {"axis": 0, "parameter": PARAMETER["position_source"]["id"]}
+    chosen = DEFINES["GRATING_POSITION_SOURCE_COUNTS_MASK"]
+    assert machine.ask("get_parameter", **source)["value"] == 1
+    assert machine.gratings[0].word[DEFINES["GRATING_POSITION_SOURCE"]] & chosen
+    assert machine.request("set_parameter", **source, value=0)[0] == "not_built"
+    machine.ask("set_parameter", **source, value=2)
+    machine.ask("set_parameter", **source, value=1)
+    assert Machine().ask("get_parameter", **source)["value"] == 0
+
+
+def test_without_sine_and_cosine_their_operations_are_not_built_and_the_others_work():
+    operations = (("signal", {}), ("learner", {"action": 0}), ("get_correction", {}), ("get_harmonic", {"order": 1}),
+                  ("set_harmonic", {"order": 1, "cosine": 0, "sine": 0}),
+                  ("set_correction", {"sin_offset": 0, "cos_offset": 0, "gain": 65536, "shear": 0, "apply": 1}))
+    machine = Machine()
+    for operation, fields in operations:
+        machine.ask(operation, axis=0, **fields)
+    machine = Machine(sine=False)
+    for operation, fields in operations:
+        assert machine.request(operation, axis=0, **fields)[0] == "not_built"
+    machine.ask("encoder", axis=0)
+    machine.ask("arm_scope", axis=0, trigger=0, before=0, every=1, level=0, amplitude=0)
+    machine.run(50)
+    assert not machine.gratings[0].records
+
+
 def test_a_move_of_days_is_refused():
     machine = homed()
     machine.set(velocity=1, travel_high=2**46)

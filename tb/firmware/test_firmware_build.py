@@ -4,11 +4,10 @@ import os
 import struct
 import subprocess
 import sys
-from importlib.util import module_from_spec, spec_from_file_location
 
 import pytest
 
-from host_firmware import SOURCE
+from host_firmware import SOURCE, tools
 
 MEMORY = 98304
 
@@ -19,10 +18,7 @@ def build(out, *options, **environment):
 
 
 def functions(elf):
-    found = spec_from_file_location("firmware_build", SOURCE / "build.py")
-    tools = module_from_spec(found)
-    found.loader.exec_module(tools)
-    return set(tools.load_segments(elf.read_bytes())[1])
+    return set(tools().load_segments(elf.read_bytes())[1])
 
 
 @pytest.fixture(scope="module")

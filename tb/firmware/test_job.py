@@ -234,16 +234,42 @@ def test_a_cut_of_a_few_milliseconds_is_seen():
     assert cuts(station) == STATIONS
 
 
-def test_a_machine_that_takes_no_keys_is_named_and_never_gets_them_twice():
+def test_keys_that_the_machine_does_not_take_are_taken_back_and_never_come_late():
     station = node()
     station.edm.takes_nothing = True
     job = start(station, "unsure")
-    assert job["cause"] == "keys_not_taken" and station.do("again") == "machine_busy" and "keys_wait" in job["flags"]
+    assert job["cause"] == "keys_not_taken" and "keys_wait" not in job["flags"] and job["answers"] == {"again", "next", "stop"}
     station.edm.takes_nothing = False
-    assert station.run(3000, until=lambda: station.edm.inputs & 1)
+    station.run(5000)
+    assert cuts(station) == 0 and station.edm.heard == b""
+    station.do("again")
+    station.until("finished")
+    assert cuts(station) == STATIONS and station.edm.heard == station.edm.START * STATIONS
+
+
+def test_a_machine_that_takes_half_the_keys_is_named_and_gets_the_others_once():
+    station = node()
+    start(station, "cutting")
+    assert station.run(5000, until=lambda: station.edm.injecting)
+    station.edm.next_key = station.clk + ms(30_000)
+    job = station.until("unsure")
+    assert job["cause"] == "keys_not_taken" and station.do("again") == "machine_busy" and "keys_wait" in job["flags"]
+    assert station.run(30_000, until=lambda: station.edm.inputs & 1)
     assert station.do("resume") == "ok"
     station.until("finished")
     assert cuts(station) == STATIONS and station.edm.heard == station.edm.START * STATIONS
+
+
+def test_stop_takes_back_the_keys_that_wait():
+    station = node()
+    station.edm.takes_nothing = True
+    start(station, "cutting")
+    assert station.run(5000, until=lambda: station.edm.queue)
+    station.do("stop")
+    station.until("idle")
+    station.edm.takes_nothing = False
+    station.run(5000)
+    assert cuts(station) == 0 and station.edm.heard == b"" and station.do("start") == "ok"
 
 
 def test_a_machine_that_cuts_or_alarms_is_not_started():
@@ -273,6 +299,53 @@ def test_what_the_sub_node_failed_of_is_told_and_resume_tries_again(cause):
     assert cuts(station) == STATIONS
 
 
+@pytest.mark.parametrize(("fault", "words"), [("estop", ["emergency stop", ""]), ("following_error", ["following error too", "large"]),
+                                              ("step_overrun", ["more steps were owed", "than may be"])])
+def test_a_fault_of_the_sub_node_is_said_in_words_and_reset_by_resume_when_its_cause_is_gone(fault, words):
+    station = node(panel=True)
+    start(station, "indexing")
+    station.run(50)
+    station.sub_node.latch(fault, "cpu")
+    station.sub_node.cause_stands = True
+    job = station.until("paused")
+    assert job["cause"] == "ended_by_fault" and job["table_faults"] == {fault} and job["answers"] == {"resume", "stop"}
+    seen = [station.shown()[1:3] for _ in range(12)]
+    assert words in seen and ["a fault ended the", "motion"] in seen
+    station.run(5000)
+    assert station.sub_node.resets == 0                     # never by itself
+    station.press("RESUME")
+    job = station.until("paused")
+    assert job["cause"] == "fault_stands" and job["table_faults"] == {fault} and station.sub_node.resets == 1
+    station.sub_node.cause_stands = False
+    station.press("RESUME")
+    station.until("finished")
+    assert cuts(station) == STATIONS and station.sub_node.resets == 2 and station.job()["table_faults"] == set()
+
+
+def test_a_fault_of_the_sub_node_is_reset_by_resume_only():
+    station = node()
+    start(station, "cutting")
+    station.sub_node.latch("drive")
+    job = station.until("paused")
+    assert (job["cause"], job["table_faults"], job["station"]) == ("faulted", {"drive"}, 1)
+    station.do("stop")
+    station.until("idle")
+    assert station.do("start") == "ok" and station.until("paused")["cause"] == "faulted" and station.sub_node.resets == 0
+    station.do("resume")
+    station.until("finished")
+    assert station.sub_node.resets == 1 and cuts(station) == 1 + STATIONS
+
+
+def test_a_fault_that_comes_between_two_tries_is_told_before_it_is_reset():
+    station = node()
+    station.sub_node.fault = "stiction"
+    start(station, "paused")
+    station.sub_node.latch("drive")
+    station.do("resume")
+    station.until("indexing")
+    assert station.until("paused")["cause"] == "faulted" and station.sub_node.resets == 0
+
+
 def test_a_sub_node_that_is_silent_is_named():
     station = node()
     station.sub_node.dead = True
@@ -281,6 +354,12 @@ def test_a_sub_node_that_is_silent_is_named():
     station.do("resume")
     station.until("finished")
     assert cuts(station) == STATIONS
+
+
+def test_a_sub_node_starts_no_job_of_its_own():
+    station = node()
+    station.setting(peer_role=1)
+    assert station.do("start") == "peer_off" and station.ask("job_program")["journal"] == 0
 
 
 def test_a_peer_port_that_is_not_in_use_is_named():
@@ -292,7 +371,7 @@ def test_a_peer_port_that_is_not_in_use_is_named():
 def test_a_sub_node_that_counts_is_never_sent_on_when_its_place_is_not_known():
     station = node(frames=False)
     station.sub_node.fault = "never"
-    assert start(station, "paused")["cause"] == "peer_silent"
+    assert start(station, "paused")["cause"] == "look_at_sub_node"
     assert station.job()["answers"] == {"stop"} and station.do("resume") == "table_unknown" and station.sub_node.requests == 1
     station.do("stop")
     station.until("idle")

@@ -189,3 +189,27 @@ def test_a_worn_page_of_the_journal_is_passed_over():
     station.eeprom.worn[4096 + 64 * 1 + 3] = 0x5A          # where the first line goes
     assert station.firmware.store_note(0, 1) == 0 and station.saved() == "ok"
     assert station.ask("job_program")["journal"] == 2
+
+
+def test_lines_behind_worn_pages_that_stay_blank_are_found():
+    station = powered()
+    station.load([1])
+    for page in (1, 2):                                    # as many as a line passes over
+        station.eeprom.worn.update({4096 + 64 * page + n: 0xFF for n in range(64)})
+    for line in (3, 4):
+        assert station.firmware.store_note(0, 1) == 0 and station.saved() == "ok"
+        station.power_cut()
+        station.ready()
+        assert station.ask("job_program")["journal"] == line
+
+
+def test_a_journal_that_was_hardly_written_is_not_read_to_its_end():
+    station = powered()
+    for lines in (1, 20):                                  # 6: the job was stopped
+        station.load([1])
+        for _ in range(lines):
+            assert station.firmware.store_note(0, 6) == 0 and station.saved() == "ok"
+        station.power_cut()
+        begun = station.clk
+        station.ready()
+        assert station.clk - begun < ms(60 + 7 * lines)

@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "sw" / "host"))
 
 from moire.line_tables import CAUSES, OPERATIONS, PARAMETERS, PROTOCOL_CRC, SCOPE_STATES, STATES  # noqa: E402  (found through the line above)
 from moire.registers import MAP_CRC  # noqa: E402
-from moire.transport import Transport  # noqa: E402
+from moire.transport import BAUD, Transport  # noqa: E402
 
 CAUSE = {name: code for code, (name, _) in CAUSES.items()}
 STATE = {name: code for code, (name, _) in STATES.items()}
@@ -92,13 +92,16 @@ class FakeAxis:
 
 
 class FakeNode:
-    def __init__(self, address=1, axes=1, map_crc=MAP_CRC, protocol_crc=PROTOCOL_CRC):
+    def __init__(self, address=1, axes=1, map_crc=MAP_CRC, protocol_crc=PROTOCOL_CRC, sine=True):
         self.address, self.map_crc, self.protocol_crc = address, map_crc, protocol_crc
         self.axes = [FakeAxis() for _ in range(axes)]
+        self.sine = sine
         self.now, self.registers = 0.0, {0: map_crc, 0x400: 7}
         self.written = []              # (address, value)
         self.captures = []             # words of captured, captured_time and captured_position, oldest first
         self.expecting, self.payload = None, []
+        self.baud = self.next_baud = BAUD
+        self.powered_up = 0.0          # when its time stamp was zero
         self.last, self.reply = None, bytes([0, 0, 0])
         self.counters = dict.fromkeys(
             ("frames_good", "frames_bad", "framing_errors", "start_glitches", "overruns", "repeated", "refused", "breaks", "driver_cuts",
@@ -127,6 +130,7 @@ class FakeNode:
                 return []
             if word & 0xFF == 0x10 | self.address:
                 inside = bytes([0x50 | self.address, len(self.reply)]) + self.reply
+                self.baud = self.next_baud         # when it has been sent
                 return list(inside + binascii.crc32(inside).to_bytes(4, "little"))
             return []
         if self.expecting is None:
@@ -156,6 +160,7 @@ class FakeNode:
             self.counters["repeated"] += 1
             return
         self.last = (inside[1], crc)
+        self.next_baud = self.baud                 # unless this request is another set_baud
         self.reply = self.execute(inside[1:])
 
     # the firmware
@@ -270,7 +275,10 @@ class FakeNode:
         return "ok", {}
 
     def do_set_baud(self, _, baud):
-        return ("ok" if 9600 <= baud <= 3_000_000 else "out_of_range"), {}
+        if not 9600 <= baud <= 3_000_000:
+            return "out_of_range", {}
+        self.next_baud = baud
+        return "ok", {}
 
     def do_move(self, axis, target):
         if (cause := self.may_go(axis, target)) != "ok":
@@ -358,6 +366,8 @@ class FakeNode:
         return "ok", {}
 
     def do_signal(self, axis):
+        if not self.sine:
+            return "not_built", {}
         return "ok", axis.signal
 
     def do_position(self, axis):
@@ -419,8 +429,10 @@ class FakeNode:
             return "ok", {"value": self.captures[0][address - 0xC68 >> 2]}
         if address in (0xCB4, 0xCD4):                  # state and error of the segment table
             return "ok", {"value": self.most_segments if address == 0xCB4 else 0xFFFFE000}
+        if address & 0xFF == 0xA8 and 0xC00 <= address < 0x1400:       # position_source.sine
+            return "ok", {"value": self.sine << 2}
         if 0x10 <= address < 0x18:                     # time stamp
-            return "ok", {"value": round(self.now * CLK_HZ) >> 8 * (address - 0x10) & 0xFFFFFFFF}
+            return "ok", {"value": round((self.now - self.powered_up) * CLK_HZ) >> 8 * (address - 0x10) & 0xFFFFFFFF}
         return ("ok", {"value": self.registers[address]}) if address in self.registers else ("no_such_register", {})
 
 
@@ -434,6 +446,7 @@ class FakeLine(Transport):
         self.to_node = self.from_node = lambda word: [word]
         self.wired_and = False         # as on the wire: what several nodes send at once is their AND; else one after the other
         self.at = []                   # (time, action), done when the time comes
+        self.baud = BAUD
 
     def pass_time(self, seconds):
         self.clock += seconds
@@ -449,7 +462,7 @@ class FakeLine(Transport):
         for word in words:
             self.pass_time(self.character_s)
             for heard in self.to_node(word):
-                answers = [node.hear(heard) for node in self.nodes]
+                answers = [node.hear(heard) if node.baud == self.baud else [] for node in self.nodes]
                 if self.wired_and:
                     answers = [[reduce(and_, several) for several in zip(*answers)]]
                 for answer in chain(*answers):
@@ -465,6 +478,15 @@ class FakeLine(Transport):
 
     def wait(self, seconds):
         self.pass_time(seconds)
+
+    def set_baud(self, baud):
+        super().set_baud(baud)
+        self.baud = baud
+
+    def send_break(self):
+        for node in self.nodes:
+            node.baud = node.next_baud = BAUD
+            node.counters["breaks"] += 1
 
     def close(self):
         self.closed = True

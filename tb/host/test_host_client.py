@@ -9,7 +9,18 @@ import pytest
 from bench import seed
 from fake_node import ESTOP, LIMIT_LOW, FakeLine, FakeNode
 from moire.client import CHOICES, Line
-from moire.errors import LineError, LineGarbled, MotionFailed, NobodyAnswers, OutOfRange, Refused, UnitError, UnknownName, WrongBuild
+from moire.errors import (
+    LineError,
+    LineGarbled,
+    MotionFailed,
+    NobodyAnswers,
+    OutOfRange,
+    PortError,
+    Refused,
+    UnitError,
+    UnknownName,
+    WrongBuild,
+)
 from moire.line_tables import CAUSES, PARAMETERS, PROTOCOL_CRC
 from moire.registers import FIELDS, MAP_CRC
 from moire.tune import Tuning
@@ -352,10 +363,52 @@ def test_another_baud_rate_is_that_of_all_nodes_or_of_none():
     assert fake.character_s == pytest.approx(11 / 115_200)
 
 
+@pytest.mark.parametrize("rate", [115_200, 1_000_000, 9_600])
+def test_nodes_at_any_usual_baud_rate_are_found_and_the_line_stays_there(rate):
+    fake, line = two_nodes()
+    for node in fake.nodes:
+        node.baud = rate
+    found, baud = line.find_baud()
+    assert [identity.address for identity in found] == [1, 2] and baud == rate
+    assert line.axis(2).status().state == "holding"
+
+
+def test_a_rate_that_the_port_cannot_do_is_passed_over_and_a_port_that_is_gone_is_not():
+    fake, line = two_nodes()
+    fake.nodes[0].baud, able, set_baud = 9_600, {115_200, 9_600}, fake.set_baud
+
+    def choosy(baud):
+        if baud not in able:
+            raise PortError("the port COM7 failed")
+        set_baud(baud)
+    fake.nodes[1].baud, fake.set_baud = 9_600, choosy
+    assert line.find_baud()[1] == 9_600
+    able.clear()
+    with pytest.raises(PortError, match="COM7"):
+        line.find_baud()
+
+
+def test_nobody_at_any_rate_leaves_the_first_one_and_what_was_garbled_is_said():
+    fake, line = two_nodes()
+    assert line.find_baud([5], rates=(9_600,)) == ([], 115_200) and fake.baud == 115_200
+    fake.from_node = lambda word: [word ^ 1]
+    with pytest.raises(LineGarbled):
+        line.find_baud(rates=(9_600,))
+
+
+def test_find_tells_two_nodes_with_one_address_that_identify_themselves_alike():
+    fake = FakeLine(FakeNode(), FakeNode())
+    fake.wired_and = True
+    assert [identity.address for identity in Line(fake).find()] == [1]       # to the very clk the same: nothing could tell
+    fake.nodes[1].powered_up = 0.3
+    with pytest.raises(LineGarbled, match="two nodes with the address 1"):
+        Line(fake).find()
+
+
 def test_what_needs_the_own_line_is_refused_through_a_door():
     fake, line = two_nodes()
     fake.handshake = False
-    for action in (line.mark, lambda: line.set_baud(9600, [1]), lambda: line.start(line.axis(1))):
+    for action in (line.mark, lambda: line.set_baud(9600, [1]), line.find_baud, lambda: line.start(line.axis(1))):
         with pytest.raises(LineError, match="the nodes' own line"):
             action()
 

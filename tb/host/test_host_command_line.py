@@ -3,11 +3,13 @@
 import io
 import json
 import sys
+from types import SimpleNamespace
 
 import pytest
 
 from fake_node import CAUSE, ESTOP, FakeLine, FakeNode
 from moire import command_line, tune
+from moire.command_twin import MACHINES
 from moire.errors import PortError
 from moire.line_tables import PARAMETERS
 
@@ -76,11 +78,31 @@ def test_find_lists_the_nodes_and_marks_those_of_another_build():
     assert [node["matches"] for node in Call("find --json", FakeNode(1), FakeNode(3, map_crc=1)).told[0]["nodes"]] == [True, False]
 
 
+def test_find_tries_the_usual_baud_rates_and_says_which_it_is():
+    node = FakeNode(2)
+    node.baud = 1_000_000
+    assert "or try all with 'find --any-baud'" in sentence(Call("find", node), 3)
+    call = Call("find --any-baud -- status --address 2", node)
+    assert call.code == 0 and "at 1000000 baud: --baud 1000000" in call.out and "drive off" in call.out
+    assert Call("find --any-baud --json", node).told[0]["baud"] == 1_000_000
+    assert "check power and wiring; no usual baud rate is left" in sentence(Call("find 5 --any-baud", node), 3)
+
+
 def test_enable_wait_stop_reset_encoder_counters():
     call = Call("enable -- wait 0.5s -- stop -- disable -- reset -- encoder -- counters")
     assert call.code == 0 and call.line.clock > 0.5
     assert "drive on" in call.out and "no fault is latched" in call.out
     assert "margin 50 %" in call.out and "frames_good" in call.out and "no_answer" in call.out
+
+
+def test_a_node_without_sine_and_cosine_says_so():
+    node = FakeNode(sine=False)
+    call = Call("status -- encoder", node)
+    assert call.out.count("counts only: built without sine and cosine") == 2 and "converter counts" not in call.out
+    assert [told["sine"] for told in Call("status -- encoder --json", node).told] == [False, False]
+    assert "built without that" in sentence(Call("signal", node), 1)
+    call = Call("status -- encoder")
+    assert "without" not in call.out and "converter counts" in call.out
 
 
 def test_registers_by_address_and_by_name():
@@ -316,6 +338,12 @@ def test_silence_and_noise_are_exit_code_3():
     assert "garbled" in sentence(Call("status", line=line), 3)
 
 
+def test_two_nodes_with_one_address_are_exit_code_3():
+    line = FakeLine(FakeNode(), FakeNode())
+    line.wired_and, line.nodes[1].powered_up = True, 0.3
+    assert "two nodes with the address 1" in sentence(Call("find", line=line), 3)
+
+
 def test_ports_are_exit_code_4(monkeypatch):
     monkeypatch.delenv("MOIRE_PORT", raising=False)
     err = io.StringIO()
@@ -329,20 +357,28 @@ def test_a_twin_that_is_not_there_is_exit_code_4(monkeypatch):
     monkeypatch.setitem(sys.modules, "twin", None)
     err = io.StringIO()
     assert command_line.main(["--port", "twin", "status"], err=err) == 4
-    assert err.getvalue().startswith("moire: the simulated stage is not here: use the checkout of Moire")
+    assert err.getvalue().startswith("moire: the simulated machine is not here: use the checkout of Moire")
 
 
 def test_a_twin_that_does_not_build_is_exit_code_4(monkeypatch):
     class Broken:
         BuildError, TwinTransport, WITH_SEGMENTS = RuntimeError, None, {}
 
-        @staticmethod
-        def Twin(**_):
-            raise RuntimeError("g++ is missing")
+    def broken(_):
+        raise RuntimeError("g++ is missing")
     monkeypatch.setitem(sys.modules, "twin", Broken)
+    monkeypatch.setitem(sys.modules, "experiments.machines", SimpleNamespace(MACHINES={"s0": broken}))
     err = io.StringIO()
     assert command_line.main(["--port", "twin", "status"], err=err) == 4
-    assert err.getvalue() == "moire: the simulated stage cannot be built: g++ is missing\n"
+    assert err.getvalue() == "moire: the simulated machine cannot be built: g++ is missing\n"
+
+
+def test_a_simulated_machine_that_does_not_exist_is_named():
+    err = io.StringIO()
+    assert command_line.main(["--port", "twin:s9", "status"], err=err) == 2
+    assert err.getvalue() == f"moire: there is no simulated machine 's9': known are {', '.join(MACHINES)}\n"
+    assert "--nodes is for s0: the nodes of s2 have their addresses" in sentence(Call("twin --machine s2 --nodes 1"), 2)
+    assert "invalid choice: 's9'" in sentence(Call("twin --machine s9"), 2)
 
 
 def test_another_build_is_exit_code_5():

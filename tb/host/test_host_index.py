@@ -2,17 +2,20 @@
 """index, settings and their commands, against the firmware of a station with a table, a sensor and a peer port."""
 import io
 import json
+import random
 from fractions import Fraction
 
 import pytest
 
-from fake_links import Links, PeerPort
+from fake_links import I2c, Links, PeerPort, Sensor
+from fake_links import Table as Worm
 from fake_machine import Axis, Machine
 from machine_line import MachineLine
 from moire import command_line
 from moire.client import Line
 from moire.errors import MotionFailed, OutOfRange, Refused, UnknownName
 from moire.index import Table
+from moire.job import Job
 from moire.line_tables import SETTINGS
 from moire.settings import Settings
 from test_firmware_index import Station
@@ -106,16 +109,21 @@ def test_a_node_of_the_other_image_says_that_it_was_built_without():
         panel.table.begin("1deg")
 
 
-def test_stations_are_checked_before_the_first_is_written():
-    machine = Machine(Axis(), image="station", links=Links(PeerPort()))
-    panel = Panel(machine)
-    panel.table.stations(["0deg", "10deg", "350deg"])
-    assert panel.table.peer().stations == 3
+def sub_node():
+    """That counts its stations, with its EEPROM."""
+    source = random.Random(1)
+    panel = Panel(Machine(Axis(), image="station", links=Links(Sensor(source, Worm(source)), PeerPort(), I2c())))
+    panel.settings.load({"peer_role": "sub", "peer_mode": "printed"})
+    return panel
+
+
+def test_a_sub_node_counts_the_stations_of_its_program():
+    panel = sub_node()
+    Job(panel.node).load(["0deg", "10deg", "350deg"])
+    assert (panel.table.peer().stations, panel.table.peer().next) == (3, 0)
     panel.table.next_station(2)
-    for wrong in ([], ["0deg", "10deg", "10deg"], ["10deg", "5deg"], ["0deg", "360deg"], [f"{n}arcmin" for n in range(361)]):
-        with pytest.raises(OutOfRange):
-            panel.table.stations(wrong)
-    assert panel.table.peer().stations == 3
+    panel.line.transport.wait(0.1)
+    assert panel.table.peer().next == 2 and "next 2 of 3" in panel.call("index status")[1]
     with pytest.raises(Refused, match="no such station"):
         panel.table.next_station(3)
 
@@ -127,7 +135,7 @@ def test_the_commands_turn_the_table_and_say_where_it_is(tmp_path):
     assert abs(panel.machine.error(1800)) <= 2
     code, out, err = panel.call("index to 400deg")
     assert code == 2 and out == "" and err.count("\n") == 1 and "below 360deg" in err
-    code, out, _ = panel.call(f"settings set peer_mode printed -- settings save {file} -- index stations 0deg 10deg -- index next 1 --json")
+    code, out, _ = panel.call(f"settings set peer_mode printed -- settings save {file} --json")
     assert code == 0 and json.loads(file.read_text())["peer_mode"] == "printed"
     code, out, _ = panel.call(f"settings load {file} -- settings get index_tolerance")
     assert code == 0 and "0.5arcsec" in out

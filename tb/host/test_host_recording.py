@@ -25,7 +25,8 @@ def test_a_session_replays_to_the_same_machine_with_the_same_bytes(tmp_path):
     call = Call(f"replay {file}", node)
     assert call.code == 0 and call.out.endswith("the same, 0 with other values, 0 different\n")
     assert int(call.out.split()[0]) > 20
-    assert [name for name in node.executed if name not in ("status", "identify", "get_parameter")] == ["enable", "home", "move", "enable"]
+    done = [name for name in node.executed if name not in ("status", "identify", "get_parameter")]
+    assert done == ["enable", "home", "move", "read_register", "enable"]
     assert node.axes[0].position == 1_000_000 * 65536 // 800
 
 
@@ -33,7 +34,7 @@ def test_other_values_are_told_apart_from_other_outcomes(tmp_path):
     file, other, broken = recorded(tmp_path, "status"), FakeNode(), FakeNode()
     other.axes[0].position += 1
     told = Call(f"replay {file} --json", other).told[0]
-    assert (told["same"], told["other_values"], told["different"]) == (5, 1, 0)
+    assert (told["same"], told["other_values"], told["different"]) == (7, 1, 0)
     broken.wrong_map = True
     said = sentence(Call(f"replay {file}", broken), 1)
     assert "answers differ from the record: at 0." in said and "came instead of" in said
@@ -68,10 +69,41 @@ def test_a_recorder_hides_nothing_of_its_transport():
 
         def set_baud(self, baud):
             self.character_s = 1 / baud
+
+        def send_break(self):
+            self.broken = True
     line = recording.Recorder(Deep(), open("/dev/null", "w"))
     assert (line.handshake, line.time_stands, line.character_s, line.reaches(3), line.reaches(4)) == (False, True, 0.125, True, False)
     line.set_baud(4)
-    assert line.character_s == 0.25
+    line.send_break()
+    assert line.character_s == 0.25 and line.transport.broken
+
+
+def test_a_change_of_the_baud_rate_and_the_break_after_it_are_recorded_and_replayed(tmp_path):
+    file = recorded(tmp_path, "baud 1000000 1 -- home -- status")
+    said = [set(call) - {"at"} for call in recording.read(file.read_text())]
+    assert [call for call in said if call & {"baud", "break"}] == [{"baud"}, {"break"}, {"baud"}]
+    node = FakeNode()
+    assert Call(f"replay {file}", node).code == 0
+    assert node.counters["breaks"] == 1 and node.baud == 115200 and node.axes[0].homed
+    rows = Call(f"replay --show {file}").out.splitlines()
+    assert [row.split(" s  ")[1] for row in rows if " baud from" in row or row.endswith("break")] == [
+        "1000000 baud from here on", "break", "115200 baud from here on"]
+
+
+def test_a_record_that_broke_off_at_another_baud_rate_leaves_the_nodes_at_the_first_one(tmp_path):
+    file = recorded(tmp_path, "baud 1000000 1 -- status")
+    rows = file.read_text().splitlines()
+    file.write_text("\n".join(rows[:-2]))                # without the break and what follows it
+    assert recording.last_baud(recording.read(file.read_text())) == 1_000_000
+    call = Call(f"replay {file}")
+    assert call.code == 0 and call.line.nodes[0].baud == call.line.baud == 115200
+
+
+def test_a_record_with_another_baud_rate_is_not_replayed_through_a_door(tmp_path):
+    line = FakeLine(FakeNode())
+    line.handshake = False
+    assert "the nodes' own line" in sentence(Call(f"replay {recorded(tmp_path, 'baud 9600 1')}", line=line), 3)
 
 
 @pytest.mark.parametrize("text", [
@@ -79,6 +111,8 @@ def test_a_recorder_hides_nothing_of_its_transport():
     json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + '\n{"at": 1}',
     json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + '\n{"at": 1, "send": [512]}',
     json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + '\n{"at": 1, "receive": [1], "wanted": 1}',
+    *(json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + f'\n{{"at": 1, {call}}}' for call in
+      ('"baud": 0', '"baud": "fast"', '"baud": 1e9', '"baud": true', '"break": 1', '"break": true, "baud": 9600')),
 ])
 def test_a_file_that_is_no_record_is_refused(tmp_path, text):
     (tmp_path / "no.jsonl").write_text(text)
@@ -123,6 +157,21 @@ def test_fault_tells_cause_place_and_what_to_do():
 def test_selftest_passes_a_sound_node():
     call = Call("selftest", FakeNode(axes=2))
     assert call.code == 0 and call.out.count("passed") == 3 + 2 * 5 and "axis 1 sensor" in call.out
+
+
+def test_selftest_passes_a_sound_node_without_sine_and_cosine():
+    node = FakeNode(sine=False)
+    node.axes[0].parameters[PARAMETERS["position_source"].id] = 1
+    call = Call("selftest", node)
+    assert call.code == 0 and "passed   axis 0 sensor      no illegal edge; built without sine and cosine\n" in call.out
+    node.axes[0].events = 1
+    assert "FAILED   axis 0 sensor      both quadrature levels changed at once" in Call("selftest", node).out
+
+
+def test_fault_of_a_node_without_sine_and_cosine_tells_what_there_is():
+    node = FakeNode(sine=False)
+    node.axes[0].standing = node.axes[0].faults = ESTOP
+    assert "emergency stop" in Call("fault", node).out and "signal" not in Call("fault", node).out
 
 
 def spoil_estop(node):

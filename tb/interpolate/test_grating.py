@@ -19,7 +19,7 @@ async def converted(dut):
     await FallingEdge(dut.clk)
     dut.sample_tick.value = 0
     for _ in range(100):
-        if int(dut.converted.value):
+        if int(dut.g_sine.converted.value):
             return
         await FallingEdge(dut.clk)
     raise AssertionError("no word came from the converter")

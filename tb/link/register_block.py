@@ -11,14 +11,16 @@ def extend(value, width, signed, to):
 
 
 class RegisterBlock:
-    """`block` is a block of tables/registers.py, `constant` the CRC-32 that word 0 of the map shows."""
+    """`block` is a block of tables/registers.py, `constant` the CRC-32 that word 0 of the map shows. A setting that needs a
+    parameter named in `without` has no bits."""
 
-    def __init__(self, block, constant):
-        self.block, self.constant = block, constant
+    def __init__(self, block, constant, without=()):
+        self.block, self.constant, self.without = block, constant, without
         self.reset()
 
     def reset(self):
-        self.value = {r.port(f): f.reset & ((1 << f.width) - 1) for r, f in self.block.fields if f.kind in ("setting", "counter", "sticky")}
+        self.value = {r.port(f): 0 if f.needs in self.without else f.reset & ((1 << f.width) - 1)
+                      for r, f in self.block.fields if f.kind in ("setting", "counter", "sticky")}
         self.pulse = {r.port(f): 0 for r, f in self.block.fields if f.kind == "pulse"} | \
                      {f"{r.name}_written": 0 for r in self.block.registers if r.on_write}
         self.upper = {r.name: 0 for r in self.block.registers if r.wide}          # latched by a read of the low word
@@ -68,7 +70,7 @@ class RegisterBlock:
                     self.value[port] = min((0 if hit else self.value[port]) + inputs[port], (1 << f.width) - 1)
                 elif f.kind == "sticky":
                     self.value[port] = int(inputs[port] or (self.value[port] and not (hit and bits)))
-                elif f.kind == "setting" and commit:
+                elif f.kind == "setting" and commit and f.needs not in self.without:
                     self.value[port] = (wdata << 32 | self.lower[r.name]) & ((1 << f.width) - 1) if r.wide else bits
             if r.wide and hit:
                 self.lower[r.name] = wdata

@@ -197,6 +197,22 @@ async def a_person_types_and_a_cut_is_started_after_it(dut):
 
 
 @cocotb.test()
+async def keys_are_taken_back_but_for_the_sequence_that_is_under_way(dut):
+    links = await Links(dut).begin()
+    await links.write("ps2_idle", value=25)
+    for _ in range(3):
+        for n, byte in enumerate(CUT):
+            await links.write("ps2_inject", data=byte, last=int(n == len(CUT) - 1))
+    await links.until(lambda: len(links.machine.heard) == 2)
+    await links.write("ps2_state", drop=1)
+    await links.clk(4)
+    assert (await links.read("ps2_state"))["free"] <= 32 - 3 * len(CUT) + 3
+    await links.until(lambda: len(links.machine.heard) == len(CUT))
+    await links.clk(60 * MS)
+    assert links.machine.heard == CUT and await links.read("ps2_state") == dict(free=32, injecting=0, busy=0)
+
+
+@cocotb.test()
 async def errors_of_the_keyboard_are_counted_and_cleared(dut):
     links = Links(dut)
     links.keyboard = Keyboard(CLK_HZ, damage=1.0)

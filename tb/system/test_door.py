@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy
@@ -16,20 +17,26 @@ from moire.errors import LineGarbled, NobodyAnswers
 from moire.scope import Scope, excite, lsb
 from moire.transport import open_line
 from moire.tune import identify_samples
-from twin import Twin, TwinTransport
+from twin import START_S, Twin, TwinTransport
 
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.filterwarnings("ignore:set(Daemon|Name).. is deprecated:DeprecationWarning")      # in pyserial
 
 
-@pytest.fixture(scope="module")
-def ports():
-    """Where the twin is served."""
-    command = [sys.executable, "-m", "moire.command_line", "twin", "--nodes", "1", "--rfc2217", "0", "--tcp", "0", "--json"]
+@contextmanager
+def served(*arguments):
+    """`moire twin` as a program, while it runs: where it is served."""
+    command = [sys.executable, "-m", "moire.command_line", "twin", *arguments, "--rfc2217", "0", "--tcp", "0", "--json"]
     path = os.pathsep.join(map(str, (ROOT / "sw", ROOT / "sw" / "host")))
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": path}) as process:
         yield json.loads(process.stdout.readline())
         process.terminate()
+
+
+@pytest.fixture(scope="module")
+def ports():
+    with served("--nodes", "1") as told:
+        yield told
 
 
 def moire(*arguments, code=0):
@@ -60,18 +67,22 @@ def test_a_client_at_another_rate_hears_nobody_and_spoils_nothing(ports):
 
 def test_two_nodes_with_one_address_are_told_apart_from_silence():
     with TwinTransport(Twin(nodes=(1, 1))) as line:
-        line.twin.place(0, 0.01)
+        line.twin.power_cut(1)
+        line.wait(0.01)
+        line.twin.power_on(1)
+        line.wait(START_S)
         with pytest.raises(LineGarbled, match="two nodes with the address 1"):
-            axis = Line(line).axis()
-            for _ in range(20):
-                axis.status()
+            Line(line).find()
 
 
 def test_a_recorded_session_replays_on_the_twin_to_the_last_bit(tmp_path):
     file = str(tmp_path / "session.jsonl")
-    moire("--port", "twin", "--record", file, "enable", "--", "wait", "50ms", "--", "status")
+    moire("--port", "twin", "--record", file, "baud", "300000", "1", "2", "--", "enable", "--", "wait", "50ms", "--", "status")
     told = moire("--port", "twin", "replay", file)[0]
     assert told["same"] > 10 and told["other_values"] == told["different"] == 0
+    rows = moire("replay", file, "--show")[0]["said"]
+    assert [row.split("s  ")[1] for row in rows if "break" in row or "baud from" in row] == [
+        "300000 baud from here on", "break", "115200 baud from here on"]
 
 
 def test_the_scope_sees_what_the_machine_does_and_the_plant_is_found():

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""grating with its position from counts of A/B/Z: exact at an edge every clk, at the index, through align, and of the axis' own steps."""
+"""grating with its position from counts of A/B/Z, built with sine and cosine and without: exact at an edge every clk, at the index,
+through align, and of the axis' own steps."""
 import random
 
 import cocotb
@@ -292,6 +293,45 @@ async def a_shift_moves_the_segment_table_with_the_scale(dut):
     assert bench.position() == 2 * QUARTER - 600
 
 
-@pytest.mark.parametrize("segments", [0, 255])
-def test_grating_counts(segments):
-    run("grating", __file__, SEGMENTS=segments)
+@cocotb.test()
+async def the_register_tells_whether_sine_and_cosine_were_built(dut):
+    bench = await Bench.begin(dut)
+    assert await bench.read("position_source") >> 2 == int(dut.SINE.value)
+
+
+@cocotb.test()
+async def without_sine_and_cosine_the_converter_rests_and_all_that_comes_of_it_is_zero(dut):
+    if int(dut.SINE.value):
+        return
+    bench, source = await Bench.begin(dut), random.Random(seed())
+    settings = ("correction_offset", "correction_gain", "correction_shear", "recorder", "signal_fault_mask", "circle_limits", "step_limits",
+                "leg_limits", "drift_limits", "square_limits", "harmonic_point", "harmonic_enable")
+    await bench.write("position_source", counts=0)
+    for name in settings:
+        dut.word.value, dut.wdata.value = register(name)[0], 0xFFFFFFFF
+        dut.select.value = dut.write.value = 1
+        await FallingEdge(dut.clk)
+    dut.select.value = dut.write.value = 0
+    await bench.write("strobes", load_correction=1, swap_harmonics=1, record=1, clear_signal_faults=1)
+    dut.amplitude_low.value, dut.spike_step.value, dut.disagreement_limit.value = 65535, 1, 1
+    place = 0
+    for _ in range(2000):
+        step = source.choice((-1, 0, 1))
+        place += step
+        bench.place += step
+        bench.pins()
+        for pin in (dut.sample_tick, dut.adc_sin, dut.adc_cos):
+            pin.value = source.getrandbits(1)
+        await FallingEdge(dut.clk)
+        assert (int(dut.adc_cs_n.value), int(dut.adc_sclk.value)) == (1, 1)
+        for idle in (dut.sin, dut.cos, dut.sample_rejected, dut.phase, dut.amplitude, dut.signal_fault, dut.events):
+            assert int(idle.value) == 0
+    await bench.go([])
+    assert bench.position() == place * QUARTER, "counts make the position even where phases were chosen"
+    for name in (*settings, "recorder_state", "recorder_word", "signal_faults", "first_signal_faults"):
+        assert await bench.read(name) == 0, name
+
+
+@pytest.mark.parametrize("sine, segments", [(0, 0), (0, 255), (1, 255)])
+def test_grating_counts(sine, segments):
+    run("grating", __file__, SINE=sine, SEGMENTS=segments)

@@ -13,7 +13,7 @@ from twin.surroundings import Surroundings
 from twin.twin import Axis, Node
 
 MAIN, SUB = 0, 1                 # places
-NODE = {"DRIVES": 2, "FILTERS": 0}
+NODE = {"DRIVES": 2, "FILTERS": 0, "SINE": 0}
 AXIS = {"period": "1um", "drive": "steps", "position_source": "own_steps", "steps_per_period": 4, "counts_per_period": 4,
         "disagreement_limit": 0, "encoder_fault_mask": 0, "deglitch": 0, "kp": 0, "ki": 0, "kd": 0, "kv": 0, "ka": 0,
         "following_limit": "10mm", "velocity": "20mm/s", "acceleration": "100mm/s2", "jerk": "1000mm/s3", "home_creep": "0.2mm/s",

@@ -8,13 +8,16 @@ import pytest
 from bench import seed
 from moire.client import Line
 from moire.index import TURN, Table
+from moire.job import Job
+from moire.line_tables import CAUSES, FAULTS
 from moire.settings import Settings
 from test_firmware_peer import OPERATION, bodies, frame, index_to, look
-from twin import Twin, TwinTransport, build
+from twin import Surroundings, Twin, TwinTransport, build
 from twin.twin import Axis, Node
 
 SUB, MAIN = 0, 1                 # places
-NODE = {"DRIVES": 2, "FILTERS": 0}
+ESTOP = next(bit for bit, (name, _) in FAULTS.items() if name == "estop")
+NODE = {"DRIVES": 2, "FILTERS": 0, "SINE": 0}
 AXIS = {"period": "1um", "drive": "steps", "position_source": "own_steps", "steps_per_period": 4, "counts_per_period": 4,
         "disagreement_limit": 0, "encoder_fault_mask": 0, "deglitch": 0, "kp": 0, "ki": 0, "kd": 0, "kv": 0, "ka": 0,
         "following_limit": "10mm", "velocity": "20mm/s", "acceleration": "100mm/s2", "jerk": "1000mm/s3", "home_creep": "0.2mm/s",
@@ -25,14 +28,14 @@ QUICK = {"index_allowance": "40arcsec", "index_take_up": "40arcsec", "index_shar
 class Station:
     def __init__(self):
         table = Axis("worm_table", {"sensor_dropped": 0.005, "sensor_corrupt": 0.005})
-        self.twin = Twin([Node(1, [table]), Node(2, [])], seed=seed() % 1000, node_parameters=NODE, firmware=build.firmware("station"),
-                         peers=(SUB, MAIN), peer_baud=115200)
+        self.twin = Twin([Node(1, [table], Surroundings(eeprom=True)), Node(2, [])], seed=seed() % 1000, node_parameters=NODE,
+                         firmware=build.firmware("station"), peers=(SUB, MAIN), peer_baud=115200)
         line = Line(TwinTransport(self.twin), random_source=random.Random(seed()), poll_s=0.1)
         line.transport.wait(0.1)
         node, axis = line.node(1), line.axis(1)
         for name, value in AXIS.items():
             axis.set_parameter(name, value)
-        self.settings, self.table = Settings(node), Table(node)
+        self.settings, self.table, self.job = Settings(node), Table(node), Job(node)
         self.settings.load(QUICK)
         self.to_sub, self.from_sub = self.twin.peer_lines[MAIN, SUB], self.twin.peer_lines[SUB, MAIN]
 
@@ -78,11 +81,32 @@ def test_a_frame_from_the_peer_turns_the_table_amid_garbage(station):
     assert station.table.peer().garbage > 0
 
 
+def test_an_emergency_stop_is_told_to_the_peer_and_reset_by_it_when_it_is_over(station):
+    station.settings.set("peer_role", "sub")
+    station.settings.set("peer_mode", "frames")
+    causes = {code: name for code, (name, _) in CAUSES.items()}
+
+    def ask(sequence, operation, fields=b"\0"):
+        reply = station.ask(bytes([sequence, OPERATION[operation]]) + fields)[0]
+        return causes[reply[2]], reply[3:]
+
+    with station.twin.fault("estop", SUB):
+        station.ask(index_to(30, station.beside(100)))
+        assert ask(31, "index_to", b"\0" * 4)[0] == "faulted"
+        cause, fields = ask(32, "status")
+        assert cause == "ok" and int.from_bytes(fields[6:8], "little") == 1 << ESTOP
+        assert ask(33, "reset_faults")[0] == "fault_stands"
+    assert ask(34, "reset_faults")[0] == "ok"
+    target = station.beside(100)
+    assert station.ask(index_to(35, target)) == [bytes([35, OPERATION["index_to"], 0])]
+    assert station.table.wait().ended == "ok" and abs(station.error(target)) <= 2
+
+
 def test_the_bytes_as_printed_turn_the_table_to_its_next_station(station):
     station.settings.set("peer_role", "sub")
     station.settings.set("peer_mode", "printed")
     target = station.beside(200)
-    station.table.stations([target])
+    station.job.load([target])
     station.from_sub.take_heard()
     station.to_sub.put(b"\xFF\xFF\xAA")
     station.twin.run(0.1)

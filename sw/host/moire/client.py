@@ -16,7 +16,19 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from . import units
-from .errors import LineError, MoireError, MotionFailed, NobodyAnswers, NotLearned, OutOfRange, PortError, Refused, UnknownName, WrongBuild
+from .errors import (
+    LineError,
+    LineGarbled,
+    MoireError,
+    MotionFailed,
+    NobodyAnswers,
+    NotLearned,
+    OutOfRange,
+    PortError,
+    Refused,
+    UnknownName,
+    WrongBuild,
+)
 from .line_tables import (
     CAUSES,
     ENCODER_EVENTS,
@@ -37,6 +49,7 @@ COUNTS = 65536               # of the wire, in one signal period
 FULL_SCALE = 32768           # of the command
 MARK_S = 0.002               # after it, firmware too knows what the mark began
 BAUD_CHANGE_S = 0.005        # a node changes when the reply is out, and no more than this later
+RATES = (BAUD, 1_000_000, 500_000, 250_000, 3_000_000, 2_000_000, 921_600, 460_800, 230_400, 57_600, 38_400, 19_200, 9_600)
 POLL_S = 0.05                # between two looks at a motion, where a Line is not told otherwise
 
 HARMONICS = 10               # orders of phase error that are corrected
@@ -355,7 +368,30 @@ class Line:
                 found.append(self.identify(address, tries=self.FIND_TRIES, answer_s=self.FIND_ANSWER_S))
             except NobodyAnswers:
                 continue
+            if found[-1].matches:      # two nodes with one address may identify themselves as one; their times differ
+                self.request(address, "read_register", address=register_fields("node.time_stamp")[0].address(0))
         return found
+
+    def find_baud(self, addresses=ADDRESSES, rates=RATES) -> tuple:
+        """As find(), at the first of these baud rates at which somebody answers, and that rate, which then stays; with an empty list where
+        nobody does. A node that was not called for 5 s has gone back to the first rate, so that is asked at the end too."""
+        self.own_line()
+        garbled = None                 # at a wrong rate it is somebody else's words
+        for rate in (*rates, BAUD):
+            found = []
+            try:
+                self.transport.set_baud(rate)
+                found = self.find(addresses)
+            except PortError:
+                if rate == BAUD:       # which every port can do
+                    raise
+            except LineGarbled as error:
+                garbled = garbled or error
+            if found:
+                return found, rate
+        if garbled is not None:
+            raise garbled
+        return [], BAUD
 
     def own_line(self):
         if not self.transport.handshake:
@@ -856,6 +892,10 @@ class Axis:
         self.request("set_correction", **{name: values[name] for name in CORRECTION}, apply=1)
 
     # signal
+
+    def has_sine(self) -> bool:
+        """Whether sine and cosine were built; without, the position is made of counts, and what needs them is refused."""
+        return bool(self.grating("position_source")["sine"])
 
     def signal(self) -> Signal:
         """What is wrong with sine and cosine."""

@@ -24,14 +24,13 @@ def angle(text):
 
 def add_to(group, command):
     """group(name, text, example=): the sub-parsers of a new command; command(name, handler, text, example, under): one of them."""
-    index = group("index", "the table of a station (S4): turn it, look at it and its sensor", example="moire --port twin index to 12.5deg")
+    index = group("index", "the table of a station (S4): turn it, look at it and its sensor",
+                  example="moire --port twin:s4 --address 2 index to 0.5deg")
     to = command("to", do_to, "turn the table to an angle of its sensor, and wait", "moire --port /dev/ttyUSB0 index to 12.5deg", index)
     to.add_argument("angle", type=angle, metavar="ANGLE", help="with a unit: 12.5deg, 30arcmin, 0.5arcsec")
     command("status", do_status, "what the table, its sensor and its peer port do", "moire --port /dev/ttyUSB0 index status", index)
-    stations = command("stations", do_stations, "give a sub-node in mode printed its stations",
-                       "moire --port /dev/ttyUSB0 index stations 0deg 10deg 20deg", index)
-    stations.add_argument("angles", nargs="+", type=angle, metavar="ANGLE", help="ascending, with units")
-    following = command("next", do_next, "the station to which the next order in mode printed goes",
+    following = command("next", do_next, "the station, of the program that 'job load' gave this sub-node, to which the next order in mode "
+                        "printed goes",
                         "moire --port /dev/ttyUSB0 index next 3", index)
     following.add_argument("station", type=int, metavar="N", help="from 0 on")
 
@@ -74,12 +73,8 @@ def do_status(session, options):
         f"table   {state.words}; target {said(state.target)}, read {said(state.reading)}; the last index: {state.ended_words}",
         f"sensor  {'dead' if sensor.dead else 'alive'}; {said(sensor.angle)}, {sensor.frames} frames, {sensor.wrong_crc} with a wrong CRC, "
         f"{sensor.broken} broken, {sensor.missed} missed",
-        f"peer    {peer.words}; station {peer.station}; {peer.heard} heard, {peer.garbage} not understood; {peer.ended_words}")))
-
-
-def do_stations(session, options):
-    table_of(session, options).stations(options.angles)
-    session.say({"stations": len(options.angles)}, f"{len(options.angles)} stations")
+        f"peer    {peer.words}; station {peer.station}, next {peer.next} of {peer.stations}; {peer.heard} heard, "
+        f"{peer.garbage} not understood; {peer.ended_words}")))
 
 
 def do_next(session, options):

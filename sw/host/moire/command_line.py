@@ -13,7 +13,18 @@ from fractions import Fraction
 from functools import cache, partial
 from pathlib import Path
 
-from . import command_index, command_job, command_look, command_relay, command_replay, command_scope, command_segments, command_twin, units
+from . import (
+    command_index,
+    command_job,
+    command_keep,
+    command_look,
+    command_relay,
+    command_replay,
+    command_scope,
+    command_segments,
+    command_twin,
+    units,
+)
 from .client import CAPTURE_SOURCES, HOME_METHODS, Line, capture_source, register_fields, whole
 from .errors import BadFile, LineError, MoireError, OutOfRange, PortError, Refused, UnitError
 from .line_tables import PARAMETERS
@@ -29,9 +40,9 @@ several commands in one call, with -- between them:
 
 lengths are written with pm nm um mm cm m (1.5mm, 200um, 50nm), speeds as 5mm/s, times as 20ms.
 
---port twin is the built-in simulated stage. It powers up afresh in every call, so write all commands in one call, or
-use 'run FILE' or 'shell'. Options before or in the first command hold for all that follow; --address and --axis may be
-given again in each.
+--port twin is the built-in simulated stage, --port twin:s2 another machine (see: moire twin --help). It powers up afresh
+in every call, so write all commands in one call, or use 'run FILE' or 'shell'. Options before or in the first command
+hold for all that follow; --address and --axis may be given again in each.
 
 a drive stays on only while somebody talks on the line. What a call switched on it switches off at its end.
 
@@ -44,6 +55,7 @@ OF_THE_PORT = ("port", "baud", "parity", "record")
 OF_THE_CALL = (*OF_THE_PORT, "json")
 OF_AN_AXIS = ("axis.", "grating.", "actuator.")      # registers
 KEEP_COMPANY_S = 0.1
+WITHOUT_SINE = "counts only: built without sine and cosine"
 NOT_INSIDE = ("run", "shell", "twin")
 
 
@@ -143,7 +155,7 @@ def common_options() -> argparse.ArgumentParser:
     common = Parser(add_help=False, argument_default=argparse.SUPPRESS)
     group = common.add_argument_group("line")
     group.add_argument("--port", help="serial port (/dev/ttyUSB0, COM3, rfc2217://host:port, socket://host:port), or 'twin' for the "
-                                      "simulated stage; else the variable MOIRE_PORT")
+                                      "simulated stage, 'twin:s2' for another machine; else the variable MOIRE_PORT")
     group.add_argument("--baud", type=positive_number, help=f"baud rate of the line, {BAUD} unless given")
     group.add_argument(
         "--parity",
@@ -176,6 +188,8 @@ def make_parser() -> Parser:
 
     find = command("find", do_find, "who is on the line", "moire --port /dev/ttyUSB0 find")
     find.add_argument("addresses", nargs="*", type=address_number, metavar="ADDRESS", help="all 15 unless given")
+    find.add_argument("--any-baud", action="store_true",
+                      help="try the usual baud rates, up to half a minute, and stay at the one at which somebody answers")
     command("status", do_status, "state, position and faults of an axis", "moire --port /dev/ttyUSB0 status --address 2")
     command(
         "enable",
@@ -307,7 +321,7 @@ def make_parser() -> Parser:
 
     params = commands.add_parser(
         "params",
-        help="parameters of an axis: list, get, set, save, load",
+        help="parameters of an axis: list, get, set, save, load, keep, forget, kept",
         description="Parameters of an axis.",
         epilog="example: moire --port /dev/ttyUSB0 params set velocity 5mm/s -- params save stage.json",
         parents=[common],
@@ -329,6 +343,7 @@ def make_parser() -> Parser:
         actions,
     )
     load.add_argument("file", metavar="FILE")
+    command_keep.add_to(actions, command)
 
     command_look.add_to(command, checked(waiting_time))
     command_replay.add_to(command)
@@ -460,8 +475,9 @@ def open_port(options):
     port = options.port or os.environ.get("MOIRE_PORT")
     if not port:
         raise PortError("no port: write --port /dev/ttyUSB0, or --port twin for the simulated stage")
-    if port == "twin":
-        return command_twin.make_twin(options.baud)
+    machine = command_twin.machine_of(port)
+    if machine is not None:
+        return command_twin.make_twin(options.baud, machine)
     return open_line(port, options.baud, options.parity)
 
 
@@ -472,8 +488,9 @@ def place(command) -> dict:
     return {"command": command.command, "address": command.address, "axis": command.axis}
 
 
-def told_status(session, command, status):
-    told = {**place(command), **asdict(status), "words": status.words, "fault_words": status.fault_words, "ended_words": status.ended_words}
+def told_status(session, command, status, **built):
+    told = {**place(command), **asdict(status), **built,
+            "words": status.words, "fault_words": status.fault_words, "ended_words": status.ended_words}
     possible = ((status.limit_low, "low end pressed"), (status.limit_high, "high end pressed"), (status.estop, "emergency stop pressed"))
     switches = [text for pressed, text in possible if pressed]
     rows = [
@@ -486,17 +503,21 @@ def told_status(session, command, status):
     ]
     if status.encoder_events:
         rows.append(("encoder", ", ".join(status.encoder_events)))
+    if not built.get("sine", True):
+        rows.append(("sensor", WITHOUT_SINE))
     head = f"node {command.address} axis {command.axis}: {status.words}, {'zero known' if status.homed else 'not homed'}"
     session.say(told, head + "".join(f"\n  {name:<9} {text}" for name, text in rows))
 
 
 def do_find(session, command):
     wanted = command.addresses or ADDRESSES
-    found = session.line.find(wanted)
+    found, baud = session.line.find_baud(wanted) if command.any_baud else (session.line.find(wanted), None)
     if not found:
-        raise LineError(0, f"nobody answers at the addresses {', '.join(map(str, wanted))}: check power, wiring and baud rate")
-    told = {"command": "find", "nodes": [{**asdict(node), "matches": node.matches} for node in found]}
-    session.say(told, "\n".join(map(identity_words, found)))
+        check = "check power and wiring; no usual baud rate is left" if command.any_baud else \
+            "check power, wiring and baud rate, or try all with 'find --any-baud'"
+        raise LineError(0, f"nobody answers at the addresses {', '.join(map(str, wanted))}: {check}")
+    told = {"command": "find", "nodes": [{**asdict(node), "matches": node.matches} for node in found], "baud": baud}
+    session.say(told, "\n".join([*map(identity_words, found), *([f"at {baud} baud: --baud {baud}"] if baud else [])]))
 
 
 def identity_words(node) -> str:
@@ -507,7 +528,8 @@ def identity_words(node) -> str:
 
 
 def do_status(session, command):
-    told_status(session, command, session.axis(command).status())
+    axis = session.axis(command)
+    told_status(session, command, axis.status(), sine=axis.has_sine())
 
 
 def do_enable(session, command):
@@ -681,16 +703,20 @@ def do_baud(session, command):
 
 
 def do_encoder(session, command):
-    encoder = session.axis(command).encoder()
+    axis = session.axis(command)
+    encoder, sine = axis.encoder(), axis.has_sine()
     rows = [
         ("sine, cosine", f"{encoder.sin} {encoder.cos} converter counts"), ("phase", f"{360 * encoder.phase:.3f} degrees"),
-        ("amplitude", f"{encoder.amplitude} converter counts"), ("quadrature", f"{encoder.quadrature_count} quarter periods"),
+        ("amplitude", f"{encoder.amplitude} converter counts"),
+    ] if sine else [("sensor", WITHOUT_SINE)]
+    rows += [
+        ("quadrature", f"{encoder.quadrature_count} quarter periods"),
         ("rejected", f"{encoder.rejected_pulses} pulses, {encoder.rejected_samples} samples"),
         ("home phase", f"{encoder.home_phase_nm:.1f} nm from the phase zero taken, margin {100 * encoder.home_margin:.0f} %"),
         ("first fault", f"at {encoder.fault_position_nm / 1e6:.6f} mm"),
     ]
     head = f"node {command.address} axis {command.axis}:"
-    session.say({**place(command), **asdict(encoder)}, head + "".join(f"\n  {name:<12} {text}" for name, text in rows))
+    session.say({**place(command), **asdict(encoder), "sine": sine}, head + "".join(f"\n  {name:<12} {text}" for name, text in rows))
 
 
 def where(command) -> str:

@@ -4,6 +4,7 @@ from dataclasses import asdict
 from math import inf
 
 from . import selftest, units
+from .client import Signal
 
 EVERY_S = 0.2                # of watch
 
@@ -42,7 +43,7 @@ def do_watch(session, command):
 
 def do_fault(session, command):
     axis = session.axis(command)
-    status, encoder, signal = axis.status(), axis.encoder(), axis.signal()
+    status, encoder, signal = axis.status(), axis.encoder(), axis.signal() if axis.has_sine() else Signal((), ())
     told = {**place(command), "faults": status.faults, "first_fault": status.first_fault, "words": status.fault_words,
             "fault_position_nm": encoder.fault_position_nm if status.faults else None, "encoder_events": status.encoder_events,
             "signal_faults": signal.faults, "first_signal_faults": signal.first}

@@ -2,6 +2,7 @@
 """The command `moire replay`, and the option --record that makes what it takes."""
 from . import recording
 from .errors import BadFile
+from .transport import BAUD
 
 
 def add_to(command):
@@ -27,6 +28,10 @@ def do_replay(session, command):
         rows = recording.listing(calls)
         session.say({"command": "replay", "said": rows}, "\n".join(rows))
         return
+    left_at = recording.last_baud(calls)
+    if left_at is not None:
+        session.line.own_line()
+        session.line.baud_changed = left_at != BAUD         # then the end of this call brings the first rate back
     result = recording.replay(calls, session.line.transport)
     session.say({"command": "replay", "same": result.same, "other_values": result.other_values, "different": result.different,
                  "first_difference": result.first or None}, result.words)

@@ -42,7 +42,7 @@ class PortError(MoireError):
 
 
 class TwinNotBuilt(PortError):
-    """The simulated stage cannot be loaded."""
+    """The simulated machine cannot be loaded."""
 
 
 class LineError(MoireError):
@@ -66,7 +66,8 @@ class LineGarbled(LineError):
     """Words came back, but no right reply."""
 
     def __init__(self, address: int, reason: str, tries: int = 1):
-        super().__init__(address, f"the line to address {address} is garbled, tried {times(tries)}: {reason}")
+        super().__init__(address, f"the line to address {address} is garbled, tried {times(tries)}: {reason}; as from noise, a wrong baud "
+                                  f"rate, two masters or two nodes with the address {address}")
         self.reason = reason
 
 

@@ -4,7 +4,7 @@
     table = Table(line.node(2))
     table.index("10deg")                                    turns, waits, returns its TableState
     table.sensor().angle
-    table.stations(["0deg", "10deg", "20deg"])              for a sub-node in mode printed
+    table.next_station(0)                                   of the program of a sub-node in mode printed: see moire.job
 """
 from dataclasses import dataclass
 from fractions import Fraction
@@ -54,7 +54,8 @@ class PeerState:
     phase: str
     ended: str
     station: int                 # from 0 on
-    stations: int                # that a sub-node in mode printed was given
+    stations: int                # of its program, which a sub-node in mode printed counts
+    next: int                    # to which its next order goes, from 0 on
     heard: int                   # orders or frames
     garbage: int                 # bytes or frames not understood
     repeated: int                # requests answered again
@@ -126,18 +127,6 @@ class Table:
         told = self.node.request("peer")
         return PeerState(**{**told, "phase": named(PEER_PHASES, told["phase"], "phase"), "ended": named(CAUSES, told["ended"], "cause")})
 
-    def stations(self, angles):
-        """The program of a sub-node in mode printed; its next order goes to the first of them."""
-        counts = [angle_counts(angle) for angle in angles]
-        if not 1 <= len(counts) <= MOST_STATIONS:
-            raise OutOfRange(f"a program has 1 to {MOST_STATIONS} stations, not {len(counts)}")
-        for number, (before, after) in enumerate(zip(counts, counts[1:], strict=False), 1):
-            if after <= before:
-                place = units.with_unit(units.ANGLE, arcsec(after), 9)
-                raise OutOfRange(f"station {number} at {place} does not lie above the one before it")
-        for number, count in enumerate(counts):
-            self.node.request("peer_station", station=number, stations=len(counts), angle=count)
-
     def next_station(self, number: int):
-        """To which the next order in mode printed goes, from 0 on."""
+        """Of the program of a sub-node in mode printed, to which its next order goes, from 0 on."""
         self.node.request("peer_next", station=number)

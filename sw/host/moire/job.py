@@ -15,7 +15,7 @@ from . import units
 from .client import CAUSE_CODES, bits, named, words
 from .errors import BadFile, MoireError, MotionFailed, OutOfRange
 from .index import COUNTS, MOST_STATIONS, TURN, angle_counts, arcsec
-from .line_tables import CAUSES, JOB_ACTIONS, JOB_FLAGS, JOB_STATES
+from .line_tables import CAUSES, FAULTS, JOB_ACTIONS, JOB_FLAGS, JOB_STATES
 
 ACTIONS = {name: code for code, (name, _) in JOB_ACTIONS.items()}
 AT_REST = ("idle", "finished", "paused", "unsure")
@@ -30,6 +30,7 @@ class JobState:
     stations: int
     answers: tuple               # actions that it takes now
     flags: tuple
+    table_faults: tuple = ()     # of the sub-node, where that is the cause
 
     @property
     def words(self) -> str:
@@ -38,7 +39,7 @@ class JobState:
 
     @property
     def cause_words(self) -> str:
-        return words(CAUSES, [self.cause])
+        return words(CAUSES, [self.cause]) + f" ({words(FAULTS, self.table_faults)})" * bool(self.table_faults)
 
     @property
     def flag_words(self) -> str:
@@ -120,7 +121,7 @@ class Job:
         told = self.node.request("job")
         answers = tuple(name for name, code in ACTIONS.items() if told["answers"] >> code & 1)
         return JobState(named(JOB_STATES, told["state"], "state"), named(CAUSES, told["cause"], "cause"), told["station"], told["stations"],
-                        answers, bits(JOB_FLAGS, told["flags"]))
+                        answers, bits(JOB_FLAGS, told["flags"]), bits(FAULTS, told["table_faults"]))
 
     def do(self, action: str):
         """start, pause, resume, stop, again or next; Refused says why not."""

@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x2E04DFF8
+PROTOCOL_CRC = 0x700C8F8A
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -89,6 +89,12 @@ CAUSES = {
     59: ("key_without_function", "this key has no function"),
     60: ("table_unknown", "nobody knows where the table stands"),
     61: ("program_changed", "this is not the program of the job"),
+    66: ("look_at_sub_node", "look at the sub-node: it did not say that it has indexed; its faults are told and reset there"),
+    67: ("nothing_kept", "no values are kept: the defaults are in force"),
+    68: ("kept_damaged", "the kept values are damaged: the defaults are in force"),
+    69: ("kept_other", "the kept values are of another build: the defaults are in force"),
+    70: ("kept_refused", "not all kept values are allowed: the others are in force"),
+    71: ("kept_not_taken", "the kept values were not taken: the EEPROM did not answer at power-up, the defaults are in force"),
 }
 
 # bit: (name, words)
@@ -243,6 +249,12 @@ JOB_ACTIONS = {
     5: ("next", "the station is cut: go to the next one"),
 }
 
+# code: (name, words)
+KEEP_ACTIONS = {
+    0: ("keep", "keep what differs from the defaults, for the next power-up"),
+    1: ("forget", "begin with the defaults at the next power-up"),
+}
+
 # bit: (name, words)
 JOB_FLAGS = {
     0: ("store", "the EEPROM answers"),
@@ -385,20 +397,17 @@ OPERATIONS = {operation.name: operation for operation in (
               (),
               (("angle", "u32"), ("age", "u32"), ("dead", "u8"), ("frames", "u32"),
                ("wrong_crc", "u32"), ("broken", "u32"), ("missed", "u32"),)),
-    Operation("peer", 45, "what the peer port does: the last index asked for; orders or frames heard, bytes or frames not understood",
+    Operation("peer", 45, "what the peer port does: the last index asked for, the stations of a sub-node that counts them, what was heard",
               (),
               (("phase", "u8"), ("ended", "u8"), ("station", "u16"), ("stations", "u16"),
-               ("heard", "u32"), ("garbage", "u32"), ("repeated", "u32"),)),
-    Operation("peer_station", 46, "one of the stations of a sub-node in mode printed, from 0 on; the next order then goes to station 0",
-              (("station", "u16"), ("stations", "u16"), ("angle", "u32"),),
-              ()),
-    Operation("peer_next", 47, "the station to which the next order goes in mode printed",
+               ("next", "u16"), ("heard", "u32"), ("garbage", "u32"), ("repeated", "u32"),)),
+    Operation("peer_next", 47, "the station of its program to which the next order goes in mode printed; kept in the EEPROM",
               (("station", "u16"),),
               ()),
-    Operation("job", 48, "what the job does, at which station (from 0 on), why it waits, and for which answers (bits of job_action)",
+    Operation("job", 48, "what the job does, at which station (from 0 on), why it waits, for which answers: bits of job_action",
               (),
               (("state", "u8"), ("cause", "u8"), ("station", "u16"), ("stations", "u16"),
-               ("answers", "u8"), ("flags", "u8"),)),
+               ("answers", "u8"), ("flags", "u8"), ("table_faults", "u16"),)),
     Operation("job_do", 49, "start, pause, resume or stop the job, or answer its question",
               (("action", "u8"),),
               ()),
@@ -418,6 +427,13 @@ OPERATIONS = {operation.name: operation for operation in (
     Operation("job_save", 54, "write the new program and the settings into the EEPROM; job_program tells when and how that ended",
               (),
               ()),
+    Operation("keep", 58, "keep parameters and settings in the EEPROM, or forget them; kept tells when and how that ended",
+              (("action", "u8"),),
+              ()),
+    Operation("kept", 59, "what is kept, or why not; writing 1 while the EEPROM is written or read; torn 1: one copy was damaged",
+              (),
+              (("writing", "u8"), ("cause", "u8"), ("torn", "u8"), ("generation", "u32"),
+               ("values", "u16"),)),
 )}
 
 PARAMETERS = {parameter.name: parameter for parameter in (
@@ -567,7 +583,7 @@ PARAMETERS = {parameter.name: parameter for parameter in (
               "signal: largest good amplitude times sine of the phase error; 65535 off"),
     Parameter("position_source", 49, "", Fraction(1, 1),
               0, 2, 0,
-              "position from: 0 phases of sine and cosine, 1 counts of A/B, 2 the axis' own steps"),
+              "position from: 0 phases of sine and cosine (needs SINE, else 1 is the default), 1 counts of A/B, 2 the axis' own steps"),
     Parameter("home_method", 50, "", Fraction(1, 1),
               -2, 37, -1,
               "homing: CiA 402 methods 1, 2, 17, 18, 33, 34, 35, 37; -1 S0 (switch, way, phase zero), -2 S3 (index on either side)"),

@@ -230,14 +230,14 @@ class Exchange:
     def expect(self, word: int, way: int) -> bool:
         ready = ready_byte(self.address, way)
         if word != ready:
-            self.fail("garbled", f"{word:02X} came instead of {ready:02X}, as with a wrong baud rate or two masters")
+            self.fail("garbled", f"{word:02X} came instead of {ready:02X}")
         return word == ready
 
     def judge(self):
         first, body = self.received[0], bytes(self.received[2:-CRC_LENGTH])
         reply = parse_reply(body)
         if list(frame(first, body)) != self.received[1:]:
-            self.fail("garbled", f"the reply has a wrong CRC-32, as from noise or from two nodes with the address {self.address}")
+            self.fail("garbled", "the reply has a wrong CRC-32")
         elif reply is None:
             self.fail("garbled", "the reply has a wrong length")
         elif (reply.sequence, reply.operation) != (self.body[0], self.body[1] if len(self.body) > 1 else 0):

@@ -2,7 +2,8 @@
 """A session written down as it happens on the line, and given again to the same or another line.
 
 A record is a text of JSON objects, one a line: first what it is, then each call of the transport with its time in seconds:
-{"at": 0.31, "send": [289]} and {"at": 0.32, "receive": [97], "wanted": 1, "timeout_s": 0.1}. Words are 9-bit.
+{"at": 0.31, "send": [289]} and {"at": 0.32, "receive": [97], "wanted": 1, "timeout_s": 0.1}, words being 9-bit; {"at": 0.4, "break": true}
+and {"at": 0.41, "baud": 1000000}, from then on.
 """
 import json
 from dataclasses import dataclass
@@ -14,6 +15,8 @@ from .transport import Transport
 
 KIND = {"record": "moire line", "version": 1}
 LONGEST_S = 1e9              # of a session
+FASTEST_BAUD = 1e9
+KEYS = ({"at", "send"}, {"at", "receive", "wanted", "timeout_s"}, {"at", "break"}, {"at", "baud"})       # of a call
 
 
 class Recorder(Transport):
@@ -47,9 +50,11 @@ class Recorder(Transport):
         return self.transport.reaches(address)
 
     def send_break(self):
+        self.write({"at": self.now() - self.began, "break": True})
         self.transport.send_break()
 
     def set_baud(self, baud):
+        self.write({"at": self.now() - self.began, "baud": baud})
         self.transport.set_baud(baud)
         self.character_s = self.transport.character_s
 
@@ -73,14 +78,13 @@ def read(text: str, name: str = "text") -> list:
 
 
 def is_call(call) -> bool:
-    """Whether this is {at, send} or {at, receive, wanted, timeout_s}, each of its type."""
-    if not isinstance(call, dict):
+    """Whether this is one of KEYS, each value of its type."""
+    if not isinstance(call, dict) or set(call) not in KEYS:
         return False
-    words = call.get("send", call.get("receive"))
-    numbers = [call.get("at")] + ([] if "send" in call else [call.get("wanted"), call.get("timeout_s")])
-    return (call.keys() <= {"at", "send"} or call.keys() == {"at", "receive", "wanted", "timeout_s"}) and isinstance(words, list) and \
-        all(type(word) is int and 0 <= word < 512 for word in words) and \
-        all(type(number) in (int, float) and 0 <= number < LONGEST_S for number in numbers) and type(call.get("wanted", 0)) is int
+    words, numbers = call.get("send", call.get("receive", [])), [call[name] for name in ("at", "wanted", "timeout_s") if name in call]
+    return isinstance(words, list) and all(type(word) is int and 0 <= word < 512 for word in words) and \
+        all(type(number) in (int, float) and 0 <= number < LONGEST_S for number in numbers) and type(call.get("wanted", 0)) is int and \
+        type(call.get("baud", 1)) is int and 0 < call.get("baud", 1) < FASTEST_BAUD and call.get("break", True) is True
 
 
 # ------------------------------------------------------------------ replay
@@ -104,6 +108,11 @@ class Comparison:
         return f"{total} answers: {self.same} the same, {self.other_values} with other values, {self.different} different"
 
 
+def last_baud(calls: list) -> int | None:
+    """The rate at which a record leaves the line; None where it never changes."""
+    return next((call["baud"] for call in reversed(calls) if "baud" in call), None)
+
+
 def replay(calls: list, transport: Transport) -> Comparison:
     """Sends what was sent, at the same times, and compares what comes back."""
     result, began, old, new = Comparison(), transport.now(), [], []
@@ -113,6 +122,10 @@ def replay(calls: list, transport: Transport) -> Comparison:
             compare(result, old, new, call["at"])
             old, new = [], []
             transport.send(call["send"])
+        elif "break" in call:
+            transport.send_break()
+        elif "baud" in call:
+            transport.set_baud(call["baud"])
         else:
             old += call["receive"]
             new += transport.receive(call["wanted"], call["timeout_s"])
@@ -152,7 +165,11 @@ def listing(calls: list) -> list:
             continue
         rows += told_answer(answer)
         answer, request = [], []
-        for word in call["send"]:
+        if "break" in call:
+            rows.append(f"{call['at']:9.4f} s  break")
+        if "baud" in call:
+            rows.append(f"{call['at']:9.4f} s  {call['baud']} baud from here on")
+        for word in call.get("send", ()):
             if word & NINTH:
                 address = word & 0xF
             else:

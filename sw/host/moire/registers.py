@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0x39BE858D          # CRC-32 of tables/registers.rdl
+MAP_CRC = 0xC60E00C6          # CRC-32 of tables/registers.rdl
 BLOCKS = {"node": (0x000, 0x000), "line": (0x100, 0x000), "links": (0x200, 0x000), "axis": (0x400, 0x100), "grating": (0xC00, 0x100), "actuator": (0x1400, 0x100)}          # base, distance to the next one
 
 
@@ -145,6 +145,8 @@ FIELDS = (
           "a sequence is under way"),
     Field("links", "ps2_state", "busy", 0x18, 7, 1, False, "r", "", Fraction(1),
           "a frame is under way on either side"),
+    Field("links", "ps2_state", "drop", 0x18, 8, 1, False, "w", "", Fraction(1),
+          "take back what is queued; a sequence that is under way is finished whole"),
     Field("links", "ps2_typed", "value", 0x1C, 0, 16, False, "rw", "", Fraction(1),
           "bytes of the keyboard that answer no command: a person types; writing clears"),
     Field("links", "ps2_errors", "keyboard_damaged", 0x20, 0, 8, False, "rw", "", Fraction(1),
@@ -521,6 +523,8 @@ FIELDS = (
           "0: phases of sine and cosine, 1: counts of a and b, a quarter period each"),
     Field("grating", "position_source", "steps", 0xA8, 1, 1, False, "rw", "", Fraction(1),
           "1: the axis' own step and direction take the place of the pins a and b"),
+    Field("grating", "position_source", "sine", 0xA8, 2, 1, False, "r", "", Fraction(1),
+          "1: sine and cosine were built, 0: the position is made of counts whatever `counts` says"),
     Field("grating", "align", "value", 0xAC, 0, 3, True, "rw", "period", Fraction(1, 4),
           "with counts: move position and phase by this, -2 to 2; the target does not follow"),
     Field("grating", "segment_use", "enable", 0xB0, 0, 1, False, "w", "", Fraction(1),

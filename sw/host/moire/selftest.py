@@ -60,7 +60,7 @@ def clock_check(node) -> Check:
 
 
 def axis_checks(axis):
-    status, signal = axis.status(), axis.signal()
+    status = axis.status()
     yield Check("guard", not status.faults and not status.estop, ", ".join(filter(None, [
         status.fault_words, "emergency stop pressed" if status.estop else ""])) or "no fault, no emergency stop")
     both = status.limit_low and status.limit_high
@@ -71,6 +71,11 @@ def axis_checks(axis):
     yield Check("parameters", not out, f"out of range: {', '.join(out)}" if out else f"{len(values)}, all in range")
     if values["position_source"].written() == "phases":
         amplitude, low, high = axis.encoder().amplitude, values["amplitude_low"].counts, values["amplitude_high"].counts
+        signal = axis.signal()
         yield Check("sensor", low <= amplitude <= high and not signal.faults,
                     f"amplitude {amplitude}, allowed {low} to {high}; {signal.fault_words or 'signal without fault'}")
+    else:
+        illegal = "illegal_edge" in status.encoder_events
+        yield Check("sensor", not illegal, ("both quadrature levels changed at once" if illegal else "no illegal edge") +
+                    ("" if axis.has_sine() else "; built without sine and cosine"))
     yield Check("position", True, f"{units.format_length(status.position_nm)}, {'zero known' if status.homed else 'not homed'}")

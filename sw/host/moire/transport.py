@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What carries 9-bit words: a serial port with the 9th bit as parity, or any byte stream with COBS packets (plain 8N1).
-The simulated stage brings its own (twin.TwinTransport).
+A simulated machine brings its own (twin.TwinTransport).
 
     open_line("/dev/ttyUSB0")  open_line("rfc2217://host:2217")  open_line("socket://host:2218")  open_line("/dev/pts/5")
 

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Prepared moves of two nodes begin at one mark: judged by the machines, clk by clk, with nodes that did not power up together."""
+import random
+
+import pytest
+
+from bench import seed
+from experiments.s2_stage import SCALES
+from experiments.s4_job import CLK_HZ, NODE
+from moire.client import Line
+from moire.errors import LineError
+from moire.protocol import mark_words
+from twin import START_S, Node, Twin, TwinTransport
+from twin.twin import ALL_LINKS
+
+ADDRESSES = (1, 2)
+SCALE = SCALES["Z"]
+SETTINGS = {**SCALE.settings(), "position_source": 2, "period": "1um", "steps_per_period": 4, "step_trim": 0, "ki": 0, "home_method": 35,
+            "acceleration": "5m/s2", "jerk": "500m/s3"}
+MOVE = "200um"
+LONGEST_S = 0.05                   # until a table has moved
+MOVED_M = 1e-9
+
+
+@pytest.fixture(scope="module")
+def axes():
+    """Of two nodes that stand at zero; the second lost its power for a moment, so its ticks come at other moments."""
+    with Twin([Node(address, [SCALE.machine()]) for address in ADDRESSES], clk_hz=CLK_HZ, seed=seed() % 1000,
+              node_parameters={"LINKS": ALL_LINKS, **NODE}) as twin:
+        line = Line(TwinTransport(twin), random_source=random.Random(seed()))
+        twin.run(START_S)
+        twin.power_cut(1)
+        twin.run(random.Random(seed()).uniform(0.0101, 0.0102))
+        twin.power_on(1)
+        twin.run(START_S)
+        made = [line.axis(address) for address in ADDRESSES]
+        for axis in made:
+            for name, value in SETTINGS.items():
+                axis.set_parameter(name, value)
+            axis.enable()
+            axis.home()
+        yield made
+
+
+@pytest.fixture
+def prepared(axes):
+    for axis in axes:
+        if not axis.status().enabled:
+            axis.reset()
+            axis.enable()
+        axis.prepare(MOVE, by=True)
+    return axes
+
+
+def began(twin):
+    """When each table was first seen to have moved, and each driver to have taken a step: seconds, clk by clk."""
+    first = [twin.truth(n) for n in range(2)]
+    moved, stepped = {}, {}
+    while len(moved) + len(stepped) < 4 and twin.time() - first[0].time_s < LONGEST_S:
+        twin.run(1 / CLK_HZ)
+        for n, before in enumerate(first):
+            now = twin.truth(n)
+            if abs(now.position_m - before.position_m) > MOVED_M:
+                moved.setdefault(n, now.time_s)
+            if now.steps != before.steps:
+                stepped.setdefault(n, now.time_s)
+    return moved, stepped
+
+
+def test_two_tables_on_two_nodes_begin_to_move_within_a_microsecond(prepared):
+    line, twin = prepared[0].node.line, prepared[0].transport.twin
+    ticks = [line.node(address).read_named("node.time_stamp")["value"] for address in ADDRESSES]
+    assert ticks[0] - ticks[1] > START_S * CLK_HZ                    # the nodes have not begun together
+    for axis in prepared:
+        line.request(axis.node.address, "start_at_mark", axes=1)
+    line.transport.send(mark_words(1))
+    moved, stepped = began(twin)
+    assert abs(stepped[1] - stepped[0]) <= 1e-6 and abs(moved[1] - moved[0]) <= 1e-6
+    reached = [axis.wait() for axis in prepared]
+    assert all(status.position_nm == pytest.approx(200_000, abs=500) for status in reached)
+
+
+def test_a_node_that_missed_the_mark_is_reported_and_does_not_move(prepared):
+    line, twin = prepared[0].node.line, prepared[0].transport.twin
+    steps = [twin.truth(n).steps for n in range(2)]
+
+    class Deaf:
+        """The second node's cable is off while a mark is sent."""
+
+        def __getattr__(self, name):
+            return getattr(twin_line, name)
+
+        def send(self, words):
+            if words[0] == mark_words(1)[0]:
+                with twin.fault("line_cut", 1, True):
+                    twin_line.send(words)
+            else:
+                twin_line.send(words)
+
+    twin_line, line.transport = line.transport, Deaf()
+    with pytest.raises(LineError, match="the node did not hear the mark at which its motion should begin") as caught:
+        line.start(*prepared)
+    line.transport = twin_line
+    assert caught.value.address == 2
+    assert twin.truth(1).steps == steps[1] and twin.truth(0).steps != steps[0]      # the first had begun, and was stopped
+    heard, missed = (axis.status() for axis in prepared)
+    assert heard.ended == "stopped" and not heard.in_motion and missed.state != "prepared"
+    line.mark()
+    twin.run(0.02)
+    assert twin.truth(1).steps == steps[1]                           # a later mark does not begin it
