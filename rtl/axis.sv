@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // axis -- one machine axis from the pins of its grating to the pins of its motor, behind two blocks of registers.
 //
-// latency  see the rooms; converter word to position 33 clk, position to command within one servo tick
+// latency  see the rooms; converter word to position 22 clk, 23 with a segment table, position to command within one servo tick
 // rate     one sample per `sample_tick`, one command per `tick`
 // source   S0: interferometer with sine, cosine and comparator outputs, limit switches, DC motor; S2, S3: A/B/Z scales, stepper, linear motor
 // model    the models of its blocks; proved in motion by tb/system
@@ -12,6 +12,7 @@ module axis #(
     parameter int W = 8,                        // bits of a sample
     parameter int DRIVES = 15,                  // see actuator
     parameter int FILTERS = 2,                  // of the servo, see biquad_cascade
+    parameter int SEGMENTS = 255,               // most segments of the scale's table, see grating
     parameter int SINE = 1                      // see grating
 ) (
     input  wire                  clk,
@@ -94,15 +95,17 @@ module axis #(
     wire signed [31:0]  quadrature_count, velocity;
     wire        [4:0]   encoder_events;                         // in the order of axis_registers
     wire signed [47:0]  position;
+    wire                moved;                                  // shift_origin, or the segment table coming into force
+    wire signed [47:0]  moved_by;
     wire                upward;
 
-    grating #(.W(W), .SINE(SINE)) u_grating (.clk, .rst, .tick, .sample_tick, .mark, .now, .own_step(step), .own_direction(upward), .select(grating_select), .write,
+    grating #(.W(W), .SINE(SINE), .SEGMENTS(SEGMENTS)) u_grating (.clk, .rst, .tick, .sample_tick, .mark, .now, .own_step(step), .own_direction(upward), .select(grating_select), .write,
         .word, .wdata, .rdata(grating_rdata),
         .deglitch, .spike_step, .spike_hold, .amplitude_low, .amplitude_high, .disagreement_limit, .shift(shift_origin_written),
         .shift_periods(shift_origin), .a(pin_a), .b(pin_b), .z(pin_z), .probe(pin_probe), .adc_sin, .adc_cos, .adc_cs_n, .adc_sclk,
         .compare_pulse, .sin, .cos, .sample_rejected, .edge_rejected, .phase, .amplitude, .quadrature_count, .events(encoder_events),
-        .signal_fault, .position_valid, .position, .velocity);
-    zero_crossing u_zero (.clk, .rst, .valid(position_valid), .position, .shift(shift_origin_written), .up(zero_up), .down(zero_down));
+        .signal_fault, .position_valid, .position, .moved, .moved_by, .velocity);
+    zero_crossing u_zero (.clk, .rst, .valid(position_valid), .position, .shift(moved), .up(zero_up), .down(zero_down));
 
     // control
     wire signed [47:0] target;
@@ -114,8 +117,8 @@ module axis #(
     profile_player u_profile (.clk, .rst, .brake_rate, .brake_jerk, .slope(override_slope), .curve(override_curve), .percent(override_percent),
                               .pause(override_pause), .tick, .push(segment_ticks_written), .segment_velocity, .segment_acceleration,
                               .segment_jerk, .segment_ticks, .segment_last, .start(strobes_start || start), .arm(strobes_arm), .start_at, .now,
-                              .brake(strobes_brake), .hold_here(strobes_hold_here), .position, .shift(shift_origin_written),
-                              .shift_periods(shift_origin), .target, .target_velocity, .target_acceleration, .moving, .armed, .queue_free,
+                              .brake(strobes_brake), .hold_here(strobes_hold_here), .position, .shift(moved),
+                              .shift_by(moved_by), .target, .target_velocity, .target_acceleration, .moving, .armed, .queue_free,
                               .underrun);
     pid_servo #(.BIQUADS(FILTERS)) u_servo (.clk, .rst, .closed_loop(control_closed_loop), .kp, .ki, .kd, .kv, .ka, .output_limit, .integral_limit,
                        .dead_band, .gains_changed(kp_written || kd_written || kv_written || ka_written), .filters_in_use,
@@ -138,7 +141,7 @@ module axis #(
 
     // drive
     actuator #(.DRIVES(DRIVES)) u_actuator (.clk, .rst, .tick, .tick_period, .select(actuator_select), .write, .word, .wdata,
-        .rdata(actuator_rdata), .enable(drive_enable), .fine(control_fine), .rebase(strobes_hold_here || shift_origin_written), .block_up,
+        .rdata(actuator_rdata), .enable(drive_enable), .fine(control_fine), .rebase(strobes_hold_here || moved), .block_up,
         .block_down, .valid(passed), .command, .target, .target_velocity, .moving, .position, .bridge_a, .bridge_b, .step, .direction, .upward,
         .dac_cs_n, .dac_sclk, .dac_sdi, .fine_saturated, .step_overrun);
 

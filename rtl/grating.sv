@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // grating -- the measuring path of an axis: from the pins of a grating to position and velocity.
 //
-// latency  see the rooms; 22 clk from a converter word to position, 2 clk from a count of A/B/Z
+// latency  see the rooms; 22 clk from a converter word to position, 2 clk from a count of A/B/Z; 1 clk more with a segment table
 // rate     one sample per `sample_tick`, one velocity per `tick`
 // source   S0: interferometer with sine, cosine and comparator outputs; any A/B/Z scale
 // model    the models of its blocks; proved in motion by tb/system
@@ -9,6 +9,7 @@
 
 module grating #(
     parameter int W = 8,                        // bits of a sample
+    parameter int SEGMENTS = 255,               // most segments of its table; 0: there is none
     parameter int SINE = 1                      // 0: nothing of sine and cosine is built, the position is made of counts
 ) (
     input  wire                  clk,
@@ -51,9 +52,13 @@ module grating #(
     output logic       [4:0]     events,        // in the order of axis_registers.encoder_events
     output logic                 signal_fault,  // level: a masked signal fault stands
     output logic                 position_valid,
-    output logic signed [47:0]   position,      // Q32.16 periods
-    output logic signed [31:0]   velocity       // 2^-16 period/tick
+    output logic signed [47:0]   position,      // Q32.16 periods, less the error of the segment table
+    output logic                 moved,         // strobe: position grows by moved_by in the next clk, besides its motion
+    output logic signed [47:0]   moved_by,      // 2^-16 period
+    output logic signed [31:0]   velocity       // 2^-16 period/tick, of the scale itself
 );
+    if (SEGMENTS != 0 && (SEGMENTS < 3 || SEGMENTS > 255)) begin : g_check_segments SEGMENTS_MUST_BE_0_OR_FROM_3_TO_255 u_error (); end
+
     // settings and strobes from the registers
     wire        [15:0] filter_skip, every, rail, tolerance, jump, quiet, span, offset_limit, balance_limit, square_limit, dead, quantum;
     wire        [3:0]  filter_spare;
@@ -74,6 +79,11 @@ module grating #(
     wire               counts_chosen, by_steps, align_written;
     wire               by_counts = counts_chosen || SINE == 0;
     wire signed [2:0]  align;
+    wire               segment_enable, segment_linear, segment_origin_written, segment_point_written, segment_look;
+    wire        [7:0]  segments, segment_border, segment_look_at;
+    wire signed [47:0] segment_origin;
+    wire        [47:0] segment_length;
+    wire signed [23:0] segment_point;
 
     // decode
     wire        [2:0]  levels;                                  // {z, b, a}, filtered
@@ -96,6 +106,8 @@ module grating #(
     wire        [15:0] tracked_phase;
     wire signed [16:0] step;
     wire        [31:0] recorded;
+    wire               placed;
+    wire signed [47:0] place;                                   // of the scale, its fraction is the phase
 
     if (SINE != 0) begin : g_sine
         wire               converted, sampled, learnt, corrected, phase_valid, harmonics_off;
@@ -121,7 +133,7 @@ module grating #(
                                          .done(harmonics_off), .phase_out(phase));
         fringe_tracker u_tracker (.clk, .rst, .valid(harmonics_off), .phase, .done(stepped), .step, .phase_out(tracked_phase), .overspeed);
 
-        coarse_check u_coarse (.clk, .rst, .limit(disagreement_limit), .valid(position_valid), .position, .count(quadrature_count),
+        coarse_check u_coarse (.clk, .rst, .limit(disagreement_limit), .valid(placed), .position(place), .count(quadrature_count),
                                .shift, .shift_periods, .disagreement);
         learner_recorder #(.W(W)) u_recorder (.clk, .rst, .start(record), .phases, .every, .sampled(converted), .sin(raw_sin), .cos(raw_cos),
                                               .phase_valid, .phase(plain_phase), .disturbed(|signal_faults[1:0] || overspeed), .read(recorder_read),
@@ -144,20 +156,49 @@ module grating #(
     wire               counted;
     wire signed [16:0] count_step;
     wire        [15:0] counted_phase;
-    logic       [1:0]  index_later;                             // found, until the position of its count stands
+    logic       [2:0]  index_later;                             // found, until the position of its count stands
 
-    always_ff @(posedge clk) index_later <= rst ? '0 : {index_later[0], index_found};
+    always_ff @(posedge clk) index_later <= rst ? '0 : {index_later[1:0], index_found};
 
     count_phase u_counts (.clk, .rst, .tick(sample_tick), .count_step(quadrature_step), .align(align_written), .align_counts(align),
                           .valid(counted), .step(count_step), .phase(counted_phase));
     unwrap u_position (.clk, .rst, .valid(by_counts ? counted : stepped), .step(by_counts ? count_step : step),
-                       .phase(by_counts ? counted_phase : tracked_phase), .shift, .shift_periods, .done(position_valid), .position);
-    velocity_estimator u_velocity (.clk, .rst, .quantum, .tick, .position, .shift, .shift_periods, .velocity, .fine);
-    position_capture u_capture (.clk, .rst, .enabled(capture_sources), .index(by_counts ? index_later[1] : index_found), .tick, .software(capture_now || mark), .probe, .now,
+                       .phase(by_counts ? counted_phase : tracked_phase), .shift, .shift_periods, .done(placed), .position(place));
+    velocity_estimator u_velocity (.clk, .rst, .quantum, .tick, .position(place), .shift, .shift_periods, .velocity, .fine);
+
+    // compensate
+    wire               segment_in_force, segment_outside, segment_known;
+    logic              shifted;                                 // shift, as late as position
+    logic signed [31:0] shifted_periods;
+    wire signed [23:0] segment_error, segment_stored;
+
+    if (SEGMENTS != 0) begin : g_segments
+        localparam int INDEX = $clog2(SEGMENTS + 1);
+
+        segment_correction #(.INDEX(INDEX)) u_segments (.clk, .rst, .enable(segment_enable), .linear(segment_linear),
+            .origin_written(segment_origin_written), .origin(segment_origin), .segment_length, .segments(segments[INDEX-1:0]),
+            .write(segment_point_written), .point(segment_border[INDEX-1:0]), .value(segment_point), .look(segment_look),
+            .look_at(segment_look_at[INDEX-1:0]), .valid(placed), .position(place), .shift, .shift_periods, .done(position_valid),
+            .corrected(position), .moved, .moved_by, .in_force(segment_in_force), .outside(segment_outside), .error(segment_error),
+            .known(segment_known), .stored(segment_stored));
+        always_ff @(posedge clk) begin
+            shifted <= shift && !rst;
+            if (shift) shifted_periods <= shift_periods;
+        end
+    end else begin : g_no_segments
+        assign {position_valid, position} = {placed, place};
+        assign {moved, moved_by} = {shift, shift_periods, 16'd0};
+        assign {shifted, shifted_periods} = {shift, shift_periods};
+        assign {segment_in_force, segment_outside, segment_known, segment_error, segment_stored} = '0;
+    end
+
+    // capture, compare
+    position_capture u_capture (.clk, .rst, .enabled(capture_sources), .index(by_counts ? index_later[SEGMENTS == 0 ? 1 : 2] : index_found), .tick, .software(capture_now || mark), .probe, .now,
                                 .valid(position_valid), .position, .pop(capture_next), .clear(capture_clear), .present, .captured_sources,
                                 .captured_age, .captured_time, .captured_position, .free(capture_free), .overrun);
     position_compare u_compare (.clk, .rst, .start(compare_start), .step(compare_step), .count(compare_count), .pulse_length, .gap_length,
-                                .arm(compare_arm), .disarm(compare_disarm), .valid(position_valid), .position, .shift, .shift_periods,
+                                .arm(compare_arm), .disarm(compare_disarm), .valid(position_valid), .position, .shift(shifted),
+                                .shift_periods(shifted_periods),
                                 .armed, .pulse(compare_pulse), .late, .passed);
 
     // registers
@@ -182,12 +223,19 @@ module grating #(
         .capture_state_overrun(overrun), .captured_sources, .captured_age, .captured_time, .captured_position, .compare_start, .compare_step,
         .compare_count, .compare_pulse(pulse_length), .compare_gap(gap_length), .compare_state_armed(armed), .compare_state_late(late),
         .compare_passed(passed), .velocity_quantum(quantum), .velocity_fine(fine), .position_source_counts(counts_chosen),
-        .position_source_steps(by_steps), .position_source_sine(SINE != 0), .align, .align_written);
+        .position_source_steps(by_steps), .position_source_sine(SINE != 0), .align, .align_written,
+        .segment_use_enable(segment_enable), .segment_use_linear(segment_linear),
+        .segment_use_segments(segments), .segment_state_built(8'(SEGMENTS)), .segment_state_in_force(segment_in_force),
+        .segment_state_outside(segment_outside), .segment_state_known(segment_known), .segment_origin, .segment_origin_written, .segment_length,
+        .segment_point, .segment_point_border(segment_border), .segment_point_written, .segment_look_border(segment_look_at),
+        .segment_look_written(segment_look), .segment_stored, .segment_error);
 
     wire unused = &{1'b0, heading, illegal_seen, illegal_fault, revolution_fault, levels, adc_sin, adc_cos, spike_step, spike_hold,
                     amplitude_low, amplitude_high, disagreement_limit, rail, tolerance, jump, band, span, quiet, dead, offset_limit,
                     balance_limit, square_limit, clear_signal_faults, load_correction, sin_offset, cos_offset, gain, shear, harmonic_enable,
-                    harmonic_write, harmonic_at, harmonic_value, swap_harmonics, record, phases, every, recorder_read, step, tracked_phase};
+                    harmonic_write, harmonic_at, harmonic_value, swap_harmonics, record, phases, every, recorder_read, step, tracked_phase,
+                    index_later, segment_enable, segment_linear, segments, segment_origin, segment_origin_written, segment_length,
+                    segment_point, segment_border, segment_point_written, segment_look, segment_look_at};
 endmodule
 
 `default_nettype wire

@@ -12,6 +12,7 @@ module node #(
     parameter int W = 8,                        // bits of a sample
     parameter int DRIVES = 15,                  // what each axis can drive, see actuator
     parameter int FILTERS = 2,                  // of each servo, see biquad_cascade
+    parameter int SEGMENTS = 255,               // most segments of each scale's table, see grating
     parameter int SINE = 1,                     // of each grating: 0 for A/B/Z only, see grating
     parameter int LINKS = 0,                    // what else it speaks to, see links
     parameter int MEMORY_BYTES = 98304,         // of the soft core, program and data
@@ -112,7 +113,7 @@ module node #(
 
     // axes
     for (genvar n = 0; n < AXES; n++) begin : g_axis
-        axis #(.CLK_HZ(CLK_HZ), .W(W), .DRIVES(DRIVES), .FILTERS(FILTERS), .SINE(SINE)) u_axis (.clk, .rst, .tick, .tick_period, .sample_tick,
+        axis #(.CLK_HZ(CLK_HZ), .W(W), .DRIVES(DRIVES), .FILTERS(FILTERS), .SINE(SINE), .SEGMENTS(SEGMENTS)) u_axis (.clk, .rst, .tick, .tick_period, .sample_tick,
             .start((start_axes_written && start_axes[n]) || (mark && mark_axes[n])), .mark, .estop, .watchdog_expired, .cpu_stopped(trap || silent),
             .select(axis_select[n]), .write, .word, .wdata, .rdata(axis_rdata[32*n +: 32]),
             .grating_select(grating_select[n]), .grating_rdata(grating_rdata[32*n +: 32]),

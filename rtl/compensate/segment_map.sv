@@ -44,24 +44,24 @@ module segment_map #(
     logic [4:0]          term_q;
     logic signed [23:0]  even_q, odd_q;
     logic                asked;                     // the table works
-    logic [47:0]         from;                      // what it was asked for
     logic [W-1:0]        position_q;
     wire                 done, unused_outside;
-    wire signed [47:0]   answer;
+    wire signed [47:0]   unused_corrected;
+    wire signed [23:0]   error, unused_looked;
 
     wire                 on     = enable && swapped;
     wire                 asking = on && !asked;
     wire [47:0]          place  = {16'd0, angle} + (page ? SECOND : 48'd0);
-    wire [47:0]          error  = from - answer;
     wire [6:0]           number = closes ? 7'(SEGMENTS) : follows ? {1'b0, term_q, 1'b1} : {1'b0, term, 1'b0};
     wire                 puts   = closes || (follows ? number < 7'(SEGMENTS) : write && number < 7'(SEGMENTS));
     wire [INDEX-1:0]     point  = INDEX'(number) + (page ? '0 : INDEX'(POINTS));
     wire signed [23:0]   value  = closes ? even_q : follows ? odd_q : even;
-    wire                 unused = &{1'b0, unused_outside, error[47:24]};
+    wire                 unused = &{1'b0, unused_outside, unused_corrected, unused_looked};
 
     segment_table #(.INDEX(INDEX)) u_table
         (.clk, .rst(rst || swap || !on), .enable(1'b1), .linear(1'b1), .origin(48'sd0), .segment_length(LENGTH), .segments(INDEX'(2 * POINTS - 1)),
-         .write(puts), .point, .value, .valid(asking), .position(place), .done, .corrected(answer), .outside(unused_outside));
+         .write(puts), .point, .value, .look('0), .valid(asking), .position(place), .done, .corrected(unused_corrected),
+         .outside(unused_outside), .error, .looked(unused_looked));
 
     always_ff @(posedge clk) begin
         follows <= write;
@@ -72,9 +72,8 @@ module segment_map #(
             odd_q  <= odd;
         end
         asked <= (asked || asking) && !done;
-        if (asking) from <= place;
         refreshed <= done;
-        if (done) correction <= 32'($signed(error[23:0]));
+        if (done) correction <= 32'(error);
         if (swap) begin
             page    <= !page;
             swapped <= 1'b1;

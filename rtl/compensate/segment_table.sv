@@ -24,11 +24,14 @@ module segment_table #(
     input  wire                  write,             // strobe: value goes to point
     input  wire        [INDEX-1:0] point,           // border
     input  wire signed [23:0]    value,             // 2^-16 period: position there less the true one
+    input  wire [INDEX-1:0]      look,              // border whose point is to be read back
     input  wire                  valid,             // strobe
     input  wire signed [47:0]    position,          // 2^-16 period
     output logic                 done,              // strobe
     output logic signed [47:0]   corrected,         // 2^-16 period: position less its error
-    output logic                 outside            // level, with done: the position is beyond the table
+    output logic                 outside,           // level, with done: the position is beyond the table
+    output logic signed [23:0]   error,             // 2^-16 period, with done: position less corrected
+    output logic signed [23:0]   looked             // 2^-16 period: the point of look one clk before, while no position is under way
 );
     if (INDEX < 2 || INDEX > 12) begin : g_check INDEX_MUST_BE_FROM_2_TO_12 u_error (); end
 
@@ -37,7 +40,7 @@ module segment_table #(
     typedef enum logic [2:0] {IDLE, DIVIDE, FIRST, SECOND, RISE, LINE, FINISH} state_t;
 
     logic signed [23:0]    errors [0:(1<<INDEX)-1];
-    logic signed [23:0]    read, first;
+    logic signed [23:0]    first;
     state_t                state;
     logic [3:0]            count;
     logic signed [47:0]    here;                    // the position under way
@@ -46,21 +49,20 @@ module segment_table #(
     logic                  below, beyond;          // the first border, the longest table
     logic signed [40:0]    slice, line;             // 2^-32 period: rise of half a segment, a quarter …; error above first
 
-    wire signed [48:0]     distance = 49'(position) - 49'(origin);
     wire                   after    = beyond || index >= segments;
     wire                   away     = below || after;
     wire [INDEX-1:0]       border   = below ? '0 : after ? segments : index;
-    wire [INDEX-1:0]       read_at  = border + INDEX'(state != FIRST && !away);
+    wire [INDEX-1:0]       read_at  = state == IDLE ? look : border + INDEX'(state != FIRST && !away);
     wire [V-1:0]           dividend = state == LINE ? rest << 1 : rest;
     wire                   fits     = dividend >= part;
-    wire signed [24:0]     rise     = 25'(read) - 25'(first);
-    wire signed [24:0]     mean     = (25'(read) + 25'(first) + 25'sd1) >>> 1;
+    wire signed [24:0]     rise     = 25'(looked) - 25'(first);
+    wire signed [23:0]     mean     = 24'((25'(looked) + 25'(first) + 25'sd1) >>> 1);
     wire signed [41:0]     straight = 42'($signed({first, 16'd0})) + 42'(line) + 42'sd32768;
-    wire signed [47:0]     error    = linear ? 48'(straight >>> 16) : 48'(mean);
+    wire signed [23:0]     answer   = !enable ? '0 : linear ? 24'(straight >>> 16) : mean;
 
     always_ff @(posedge clk) begin
         if (write) errors[point] <= value;
-        read <= errors[read_at];
+        if (state != DIVIDE && state != LINE) looked <= errors[read_at];
     end
 
     always_ff @(posedge clk) begin
@@ -70,8 +72,8 @@ module segment_table #(
             IDLE:
                 if (valid) begin
                     here   <= position;
-                    below  <= distance < 0;
-                    rest   <= V'(distance[47:0]);
+                    below  <= position < origin;
+                    rest   <= V'(48'(position - origin));
                     part   <= V'(segment_length) << INDEX;
                     state  <= DIVIDE;
                 end
@@ -88,7 +90,7 @@ module segment_table #(
             end
             FIRST:  state <= SECOND;
             SECOND: begin
-                first <= read;
+                first <= looked;
                 state <= RISE;
             end
             RISE: begin
@@ -103,7 +105,8 @@ module segment_table #(
                 if (count == '1) state <= FINISH;
             end
             default: begin
-                corrected <= enable ? here - error : here;
+                corrected <= here - 48'(answer);
+                error     <= answer;
                 outside   <= away;
                 done      <= 1'b1;
                 state     <= IDLE;

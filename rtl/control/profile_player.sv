@@ -54,7 +54,7 @@ module profile_player #(
     input  wire                  hold_here,                     // strobe: target := position, queue emptied, standing
     input  wire signed [47:0]    position,                      // 2^-16 period, measured
     input  wire                  shift,                         // strobe: the origin moves
-    input  wire signed [31:0]    shift_periods,                 // period, added to target
+    input  wire signed [47:0]    shift_by,                      // 2^-16 period, added to target
     output logic signed [47:0]   target,                        // 2^-16 period, rounded down while moving
     output logic signed [31:0]   target_velocity,               // 2^-16 period/tick: the step just made; held inside 32 bits
     output logic signed [31:0]   target_acceleration,           // 2^-16 period/tick2: less the step before; held inside 32 bits
@@ -186,7 +186,7 @@ module profile_player #(
 
     // target: moved by a step or a shift, or set
     wire  signed [47:0] from = hold_here ? position : target;
-    wire  signed [47:0] by   = shift ? {shift_periods, 16'd0} : make && !hold_here ? acc[71:24] : '0;
+    wire  signed [47:0] by   = shift ? shift_by : make && !hold_here ? acc[71:24] : '0;
 
     wire                fits = stored[71:55] == {17{stored[71]}};
     wire  signed [31:0] held = fits ? stored[55:24] : {stored[71], {31{~stored[71]}}};
@@ -258,7 +258,7 @@ module profile_player #(
             assert (write_word != 3'd7);
             assert (!underrun || (queue_free == 5'(DEPTH) && braking));
             if (!$past(rst || hold_here || shift || make)) assert (target == $past(target));
-            if ($past(shift && !hold_here && !rst)) assert (target == $past(target) + {$past(shift_periods), 16'd0});
+            if ($past(shift && !hold_here && !rst)) assert (target == $past(target) + $past(shift_by));
             if ($past(hold_here && !shift && !rst)) assert (target == $past(position));
             if ($past(rst || hold_here)) assert (!moving && !armed && !ready && target_velocity == '0 && target_acceleration == '0 && line == '0);
             if ($past(moving) && !moving) assert (target_velocity == '0 && target_acceleration == '0);

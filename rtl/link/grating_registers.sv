@@ -91,7 +91,24 @@ module grating_registers #(
     output logic               position_source_steps,          // 1: the axis' own step and direction take the place of the pins a and b
     input  wire                position_source_sine,           // 1: sine and cosine were built, 0: the position is made of counts whatever `counts` says
     output logic signed [2:0]  align,                          // with counts: move position and phase by this, -2 to 2; the target does not follow [1/4 period]
-    output logic               align_written                   // strobe: align has just been written, its new value stands
+    output logic               align_written,                  // strobe: align has just been written, its new value stands
+    output logic               segment_use_enable,             // 1: positions are corrected
+    output logic               segment_use_linear,             // 0: a segment has the mean of its borders, 1: the straight line between them
+    output logic [7:0]         segment_use_segments,           // use of the segment table; position and target take its steps together: segments
+    input  wire  [7:0]         segment_state_built,            // most segments; 0: it was not built
+    input  wire                segment_state_in_force,         // positions are corrected
+    input  wire                segment_state_outside,          // the position is beyond the table, the error that of its border
+    input  wire                segment_state_known,            // segment_stored is the point that was asked for
+    output logic signed [47:0] segment_origin,                 // position of the first border; moves with the origin from when it is written [1/65536 period]
+    output logic               segment_origin_written,         // strobe: segment_origin has just been written, its new value stands
+    output logic [47:0]        segment_length,                 // length of a segment [1/65536 period]
+    output logic signed [23:0] segment_point,                  // position at a border less the true one; writing puts it there [1/65536 period]
+    output logic [7:0]         segment_point_border,           // position at a border less the true one; writing puts it there: border
+    output logic               segment_point_written,          // strobe: segment_point has just been written, its new value stands
+    output logic [7:0]         segment_look_border,            // border whose point is wanted back: border
+    output logic               segment_look_written,           // strobe: segment_look has just been written, its new value stands
+    input  wire  signed [23:0] segment_stored,                 // that point, once segment_state.known stands [1/65536 period]
+    input  wire  signed [23:0] segment_error                   // what is taken off the position now [1/65536 period]
 );
     logic        index_events_found_held;
     logic        index_events_revolution_wrong_held;
@@ -101,6 +118,8 @@ module grating_registers #(
     logic [31:0] compare_step_low;
     logic        compare_state_late_held;
     logic [7:0]  velocity_fine_high;
+    logic [31:0] segment_origin_low;
+    logic [31:0] segment_length_low;
 
     wire get = select && !write;
     wire put = select && write;
@@ -152,6 +171,9 @@ module grating_registers #(
             6'h29: rdata <= {{24{velocity_fine_high[7]}}, velocity_fine_high};
             6'h2A: rdata <= {29'd0, position_source_sine, position_source_steps, position_source_counts};
             6'h2B: rdata <= {{29{align[2]}}, align};
+            6'h2D: rdata <= {21'd0, segment_state_known, segment_state_outside, segment_state_in_force, segment_state_built};
+            6'h34: rdata <= {{8{segment_stored[23]}}, segment_stored};
+            6'h35: rdata <= {{8{segment_error[23]}}, segment_error};
             default: rdata <= '0;
         endcase
         if (get && word == 6'h1C) captured_position_high <= captured_position[47:32];
@@ -215,6 +237,19 @@ module grating_registers #(
         if (put && word == 6'h2A) position_source_steps <= wdata[1];
         align_written <= put && word == 6'h2B;
         if (put && word == 6'h2B) align <= wdata[2:0];
+        if (put && word == 6'h2C) segment_use_enable <= wdata[0];
+        if (put && word == 6'h2C) segment_use_linear <= wdata[1];
+        if (put && word == 6'h2C) segment_use_segments <= wdata[9:2];
+        segment_origin_written <= put && word == 6'h2F;
+        if (put && word == 6'h2E) segment_origin_low <= wdata;
+        if (put && word == 6'h2F) segment_origin <= {wdata[15:0], segment_origin_low};
+        if (put && word == 6'h30) segment_length_low <= wdata;
+        if (put && word == 6'h31) segment_length <= {wdata[15:0], segment_length_low};
+        segment_point_written <= put && word == 6'h32;
+        if (put && word == 6'h32) segment_point <= wdata[23:0];
+        if (put && word == 6'h32) segment_point_border <= wdata[31:24];
+        segment_look_written <= put && word == 6'h33;
+        if (put && word == 6'h33) segment_look_border <= wdata[7:0];
         if (rst) begin
             rdata <= '0;
             edge_filter_skip <= 16'h0000;
@@ -277,6 +312,19 @@ module grating_registers #(
             position_source_steps <= 1'b0;
             align_written <= 1'b0;
             align <= 3'h0;
+            segment_use_enable <= 1'b0;
+            segment_use_linear <= 1'b0;
+            segment_use_segments <= 8'h01;
+            segment_origin_written <= 1'b0;
+            segment_origin_low <= '0;
+            segment_origin <= 48'h000000000000;
+            segment_length_low <= '0;
+            segment_length <= 48'h000000000000;
+            segment_point_written <= 1'b0;
+            segment_point <= 24'h000000;
+            segment_point_border <= 8'h00;
+            segment_look_written <= 1'b0;
+            segment_look_border <= 8'h00;
         end
     end
 endmodule

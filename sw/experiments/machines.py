@@ -5,10 +5,10 @@ Each is powered up, with the parameters of its experiment in force; the names ar
 """
 from experiments import s0_fine, s2_stage, s3_zero, s4_job
 from experiments.s0_stage import ADDRESSES
-from twin import Twin
+from twin import WITH_SEGMENTS, Twin
 
 MACHINES = {
-    "s0": lambda seed, nodes=tuple(ADDRESSES.values()): Twin(nodes=nodes, seed=seed),
+    "s0": lambda seed, nodes=tuple(ADDRESSES.values()): Twin(nodes=nodes, seed=seed, node_parameters=WITH_SEGMENTS),
     "s0_fine": lambda seed: s0_fine.FineStage.power_up(seed).twin,
     "s2": lambda seed: s2_stage.Stage.power_up(seed).twin,
     "s3": lambda seed: s3_zero.Motor(seed).twin,

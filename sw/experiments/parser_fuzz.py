@@ -126,7 +126,7 @@ def parameters(data):
     axis = object.__new__(Axis)
     axis.period_nm = Fraction(800)
     with standard_input(data) as file:
-        texts = command_line.read_parameters(file)
+        texts, _ = command_line.read_parameters(file)
     for name, text in texts.items():
         axis.parameter_counts(name, text)
 

@@ -202,6 +202,7 @@ uint8_t axis_home(unsigned n)
     if (cause != LINE_CAUSE_OK) return cause;
 
     hand_over(n, false);
+    grating_write(n, GRATING_SEGMENT_USE, 0);               // homing looks for phases; the target takes the step with it
     cause = homing_begin(n);
     if (cause != LINE_CAUSE_OK) return cause;
     a->homed = false;
@@ -367,6 +368,12 @@ static uint8_t may_set(unsigned n, uint8_t id, int64_t value)
         if (value && parameters_get(n, LINE_PARAMETER_POSITION_SOURCE) == OWN_STEPS) return LINE_CAUSE_OUT_OF_RANGE;
         return on ? LINE_CAUSE_BUSY : LINE_CAUSE_OK;
     case LINE_PARAMETER_STEP_INVERT: return on ? LINE_CAUSE_BUSY : LINE_CAUSE_OK;
+    case LINE_PARAMETER_SEGMENTS:
+        return value && !FIELD_GET(grating_read(n, GRATING_SEGMENT_STATE), GRATING_SEGMENT_STATE_BUILT) ? LINE_CAUSE_NOT_BUILT : LINE_CAUSE_OK;
+    case LINE_PARAMETER_SEGMENT_COUNT:
+    case LINE_PARAMETER_SEGMENT_LENGTH:
+    case LINE_PARAMETER_SEGMENT_FIRST:
+        return parameters_get(n, LINE_PARAMETER_SEGMENTS) && value != parameters_get(n, id) ? LINE_CAUSE_SEGMENTS_IN_USE : LINE_CAUSE_OK;
     case LINE_PARAMETER_FINE_REACH:
         if (value && !(FIELD_GET(actuator_read(n, ACTUATOR_DRIVE), ACTUATOR_DRIVE_BUILT) & FINE_BUILT)) return LINE_CAUSE_NOT_BUILT;
         return value && parameters_get(n, LINE_PARAMETER_DRIVE) == CONVERTER ? LINE_CAUSE_OUT_OF_RANGE : LINE_CAUSE_OK;

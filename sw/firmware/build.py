@@ -28,7 +28,8 @@ IMAGES = sorted(path.stem.removeprefix("image_") for path in HERE.glob("image_*.
 AXES = {"station": 2}                                               # most that an image serves, where it is not the default
 SMALL, FAST = "-Os", "-O2"
 HOT = ("arithmetic.c",)                                 # the others wait more than they work
-NO_INLINING = ["-mllvm", "-inline-threshold=0"]         # for the parts of an image, with zig: smaller by a tenth
+SLIM = ("learner", "parameters")                        # and these, as the parts of an image, have time to spare
+SHORT = ["-mllvm", "-inline-threshold=0", "-mllvm", "-enable-machine-outliner=always"]      # of them with zig: what repeats stands once
 ZIG = ["-target", "riscv32-freestanding-none", "-mcpu=generic_rv32+m-a-f-d-c", "-mabi=ilp32", "-fno-sanitize=all",
        "-fno-stack-protector"]
 GNU = ["-march=rv32im", "-misa-spec=2.2", "-mabi=ilp32", "-nostdlib", "-nostartfiles",
@@ -101,7 +102,7 @@ def parts_of(name):
 def flags_of(path, parts):
     if path.name in HOT:
         return [FAST]
-    return [SMALL, *NO_INLINING] if path.stem in parts and not os.environ.get("CROSS") else [SMALL]
+    return [SMALL, *SHORT] if (path.stem in parts or path.stem in SLIM) and not os.environ.get("CROSS") else [SMALL]
 
 
 def fingerprint(sources, command, memory):

@@ -36,6 +36,7 @@ static struct homing {
     uint32_t mark_ms;
     int64_t mark;               // position then
     int64_t place;              // where the zero is to be
+    int32_t zero;               // what it was called, in periods
     int32_t phase;
 } homings[HARDWARE_AXES];
 
@@ -165,7 +166,8 @@ static void zero(unsigned n)
     }
     h->phase = (int32_t)(h->place - (int64_t)periods * 65536 - quarters * 16384);
     if (quarters) grating_write(n, GRATING_ALIGN, (uint32_t)-quarters);
-    axis_write(n, AXIS_SHIFT_ORIGIN, (uint32_t)((int32_t)parameters_get(n, LINE_PARAMETER_HOME_OFFSET) - periods));
+    h->zero = (int32_t)parameters_get(n, LINE_PARAMETER_HOME_OFFSET);
+    axis_write(n, AXIS_SHIFT_ORIGIN, (uint32_t)(h->zero - periods));
     if (quarters) motion_hold_here(n);
 }
 
@@ -273,4 +275,9 @@ uint8_t homing_poll(unsigned n, uint32_t state)
 int32_t homing_phase(unsigned n)
 {
     return homings[n].phase;
+}
+
+int32_t homing_zero(unsigned n)
+{
+    return homings[n].zero;
 }

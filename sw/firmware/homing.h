@@ -15,5 +15,6 @@ uint8_t homing_begin(unsigned n);
 uint8_t homing_poll(unsigned n, uint32_t state);
 
 int32_t homing_phase(unsigned n);       // [2^-16 period] place of the last zero above the phase zero that was chosen
+int32_t homing_zero(unsigned n);        // what the zero was called by the last homing, in periods
 
 #endif

@@ -3,7 +3,7 @@
 #ifndef MOIRE_LINE_PROTOCOL_H
 #define MOIRE_LINE_PROTOCOL_H
 
-#define PROTOCOL_CRC         0xF9A6A247u    // CRC-32 of line.toml
+#define PROTOCOL_CRC         0x700C8F8Au    // CRC-32 of line.toml
 #define LINE_VERSION         1u
 #define LINE_LONGEST_BODY    64u
 #define LINE_REQUEST_HEAD    2u    // sequence, operation
@@ -36,6 +36,8 @@ enum line_cause {
     LINE_CAUSE_NOT_BUILT = 23,    // this node was built without that
     LINE_CAUSE_TOO_LONG = 24,    // the motion would take days, or go too far for a change of target
     LINE_CAUSE_NO_STAIRS = 25,    // the stairs of this profile are not in order, or too many
+    LINE_CAUSE_NO_SEGMENTS = 26,    // no whole segment table is loaded
+    LINE_CAUSE_SEGMENTS_IN_USE = 27,    // the segment table is in use: switch it off first
     LINE_CAUSE_SENSOR_DEAD = 30,    // no good frame came from the angle sensor: check its power and its cable
     LINE_CAUSE_SENSOR_STUCK = 31,    // the angle sensor stands still: it sent one and the same angle while the table was turned
     LINE_CAUSE_STICTION = 32,    // the table did not follow its steps: it sticks, or the motor lost them
@@ -259,6 +261,8 @@ enum line_job_flag {    // bits
     X(23, "this node was built without that") \
     X(24, "the motion would take days, or go too far for a change of target") \
     X(25, "the stairs of this profile are not in order, or too many") \
+    X(26, "no whole segment table is loaded") \
+    X(27, "the segment table is in use") \
     X(30, "no good frame came from the angle sensor") \
     X(31, "the angle sensor stands still") \
     X(32, "the table did not follow its steps") \
@@ -351,6 +355,9 @@ enum line_operation {
     LINE_OPERATION_WRITE_REGISTER = 19,    // one word of the register map: only index, capture and compare of the grating blocks
     LINE_OPERATION_PREPARE = 20,    // plan to go to a position, and wait for start
     LINE_OPERATION_START = 21,    // begin the prepared motions of these axes (bit n: axis n), all in one tick; none if one of them has none
+    LINE_OPERATION_SEGMENTS = 22,    // the segment table: points loaded, the use in force (as the parameter segments), why not the one wanted
+    LINE_OPERATION_SET_SEGMENTS = 23,    // its points from this border on, in order: position there less the true one; border 0 begins a new table
+    LINE_OPERATION_GET_SEGMENTS = 24,    // its points from this border on
     LINE_OPERATION_POSITION = 30,    // where an axis is: the shortest answer that tells it
     LINE_OPERATION_FOLLOW = 34,    // from here to the next request each command to send is answered with the position at that moment
     LINE_OPERATION_SET_BAUD = 35,    // another baud rate, once this reply has been sent; 115200 again after a break, or 5 s without a request
@@ -511,6 +518,45 @@ enum line_operation {
 #define LINE_START_REQUEST_LENGTH 3u
 #define LINE_START_REQUEST_AXES 2u    // u8
 #define LINE_START_REPLY_LENGTH 3u
+#define LINE_SEGMENTS_REQUEST_LENGTH 3u
+#define LINE_SEGMENTS_REQUEST_AXIS 2u    // u8
+#define LINE_SEGMENTS_REPLY_LENGTH 7u
+#define LINE_SEGMENTS_REPLY_LOADED 3u    // u16
+#define LINE_SEGMENTS_REPLY_IN_FORCE 5u    // u8
+#define LINE_SEGMENTS_REPLY_REASON 6u    // u8
+#define LINE_SET_SEGMENTS_REQUEST_LENGTH 53u
+#define LINE_SET_SEGMENTS_REQUEST_AXIS 2u    // u8
+#define LINE_SET_SEGMENTS_REQUEST_BORDER 3u    // u8
+#define LINE_SET_SEGMENTS_REQUEST_POINTS 4u    // u8
+#define LINE_SET_SEGMENTS_REQUEST_POINT_0 5u    // i32
+#define LINE_SET_SEGMENTS_REQUEST_POINT_1 9u    // i32
+#define LINE_SET_SEGMENTS_REQUEST_POINT_2 13u    // i32
+#define LINE_SET_SEGMENTS_REQUEST_POINT_3 17u    // i32
+#define LINE_SET_SEGMENTS_REQUEST_POINT_4 21u    // i32
+#define LINE_SET_SEGMENTS_REQUEST_POINT_5 25u    // i32
+#define LINE_SET_SEGMENTS_REQUEST_POINT_6 29u    // i32
+#define LINE_SET_SEGMENTS_REQUEST_POINT_7 33u    // i32
+#define LINE_SET_SEGMENTS_REQUEST_POINT_8 37u    // i32
+#define LINE_SET_SEGMENTS_REQUEST_POINT_9 41u    // i32
+#define LINE_SET_SEGMENTS_REQUEST_POINT_10 45u    // i32
+#define LINE_SET_SEGMENTS_REQUEST_POINT_11 49u    // i32
+#define LINE_SET_SEGMENTS_REPLY_LENGTH 3u
+#define LINE_GET_SEGMENTS_REQUEST_LENGTH 4u
+#define LINE_GET_SEGMENTS_REQUEST_AXIS 2u    // u8
+#define LINE_GET_SEGMENTS_REQUEST_BORDER 3u    // u8
+#define LINE_GET_SEGMENTS_REPLY_LENGTH 51u
+#define LINE_GET_SEGMENTS_REPLY_POINT_0 3u    // i32
+#define LINE_GET_SEGMENTS_REPLY_POINT_1 7u    // i32
+#define LINE_GET_SEGMENTS_REPLY_POINT_2 11u    // i32
+#define LINE_GET_SEGMENTS_REPLY_POINT_3 15u    // i32
+#define LINE_GET_SEGMENTS_REPLY_POINT_4 19u    // i32
+#define LINE_GET_SEGMENTS_REPLY_POINT_5 23u    // i32
+#define LINE_GET_SEGMENTS_REPLY_POINT_6 27u    // i32
+#define LINE_GET_SEGMENTS_REPLY_POINT_7 31u    // i32
+#define LINE_GET_SEGMENTS_REPLY_POINT_8 35u    // i32
+#define LINE_GET_SEGMENTS_REPLY_POINT_9 39u    // i32
+#define LINE_GET_SEGMENTS_REPLY_POINT_10 43u    // i32
+#define LINE_GET_SEGMENTS_REPLY_POINT_11 47u    // i32
 #define LINE_POSITION_REQUEST_LENGTH 3u
 #define LINE_POSITION_REQUEST_AXIS 2u    // u8
 #define LINE_POSITION_REPLY_LENGTH 11u
@@ -668,6 +714,9 @@ enum line_operation {
     X(write_register, 19, 8, 3, 0) \
     X(prepare, 20, 11, 7, 1) \
     X(start, 21, 3, 3, 0) \
+    X(segments, 22, 3, 7, 1) \
+    X(set_segments, 23, 53, 3, 1) \
+    X(get_segments, 24, 4, 51, 1) \
     X(position, 30, 3, 11, 1) \
     X(follow, 34, 3, 11, 1) \
     X(set_baud, 35, 6, 3, 0) \
@@ -779,8 +828,12 @@ enum line_parameter {
     LINE_PARAMETER_STAIRS_RISE_3 = 84,    // [1/65536 period/s] stairs: height in section 3, the mirror of 5
     LINE_PARAMETER_STAIRS_BORDER_2 = 85,    // [1/65536] stairs: where section 2 begins, of the way from stairs_first to velocity
     LINE_PARAMETER_STAIRS_BORDER_3 = 86,    // [1/65536] stairs: where section 3 begins: 1/2 is 1:2:3, S4 prints 1/3
+    LINE_PARAMETER_SEGMENT_COUNT = 87,    // segment table: its segments
+    LINE_PARAMETER_SEGMENT_LENGTH = 88,    // [1/65536 period] segment table: length of a segment
+    LINE_PARAMETER_SEGMENT_FIRST = 89,    // [1/65536 period] segment table: first border, from the place that homing finds
+    LINE_PARAMETER_SEGMENTS = 90,    // segment table: 0 off, 1 a segment has the mean of its borders (S0), 2 straight lines; in force from homing on
 };
-#define LINE_PARAMETER_COUNT 86u
+#define LINE_PARAMETER_COUNT 90u
 
 // X(name, id, min, max, default): all int64_t, in counts of the wire
 #define LINE_PARAMETERS(X) \
@@ -869,7 +922,11 @@ enum line_parameter {
     X(stairs_rise_2, 83, 1LL, 65536000000LL, 1638400LL) \
     X(stairs_rise_3, 84, 1LL, 65536000000LL, 3276800LL) \
     X(stairs_border_2, 85, 0LL, 65536LL, 10923LL) \
-    X(stairs_border_3, 86, 0LL, 65536LL, 32768LL)
+    X(stairs_border_3, 86, 0LL, 65536LL, 32768LL) \
+    X(segment_count, 87, 1LL, 255LL, 120LL) \
+    X(segment_length, 88, 1LL, 70368744177664LL, 81920000LL) \
+    X(segment_first, 89, -70368744177664LL, 70368744177664LL, 0LL) \
+    X(segments, 90, 0LL, 2LL, 0LL)
 
 // parameters of which a node without sine and cosine takes only 0 and the default
 #define LINE_PARAMETERS_OF_SINE 25, 26, 27, 28, 29, 33, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48
@@ -921,6 +978,6 @@ enum line_setting {
     X(job_cut_limit, 19, 1LL, 1000000LL, 14400LL) \
     X(job_speed, 20, 1LL, 100LL, 100LL)
 
-#define LINE_VALUES_CRC 0xF2495B6Du     // of all of both: what a kept number means
+#define LINE_VALUES_CRC 0xE16D7519u     // of all of both: what a kept number means
 
 #endif

@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x18eb521cu            // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xc60e00c6u            // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define LINE_BASE 0x100u
@@ -966,6 +966,56 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define GRATING_ALIGN_MASK                             0x00000007u
 #define GRATING_ALIGN_SHIFT                            0
 #define GRATING_ALIGN_WIDTH                            3
+#define GRATING_SEGMENT_USE                            0x0b0u  // w: use of the segment table; position and target take its steps together
+#define GRATING_SEGMENT_USE_ENABLE_MASK                0x00000001u  // 1: positions are corrected
+#define GRATING_SEGMENT_USE_ENABLE_SHIFT               0
+#define GRATING_SEGMENT_USE_ENABLE_WIDTH               1
+#define GRATING_SEGMENT_USE_LINEAR_MASK                0x00000002u  // 0: a segment has the mean of its borders, 1: the straight line between them
+#define GRATING_SEGMENT_USE_LINEAR_SHIFT               1
+#define GRATING_SEGMENT_USE_LINEAR_WIDTH               1
+#define GRATING_SEGMENT_USE_SEGMENTS_MASK              0x000003fcu
+#define GRATING_SEGMENT_USE_SEGMENTS_SHIFT             2
+#define GRATING_SEGMENT_USE_SEGMENTS_WIDTH             8
+#define GRATING_SEGMENT_STATE                          0x0b4u  // r: what the segment table does
+#define GRATING_SEGMENT_STATE_BUILT_MASK               0x000000ffu  // most segments; 0: it was not built
+#define GRATING_SEGMENT_STATE_BUILT_SHIFT              0
+#define GRATING_SEGMENT_STATE_BUILT_WIDTH              8
+#define GRATING_SEGMENT_STATE_IN_FORCE_MASK            0x00000100u  // positions are corrected
+#define GRATING_SEGMENT_STATE_IN_FORCE_SHIFT           8
+#define GRATING_SEGMENT_STATE_IN_FORCE_WIDTH           1
+#define GRATING_SEGMENT_STATE_OUTSIDE_MASK             0x00000200u  // the position is beyond the table, the error that of its border
+#define GRATING_SEGMENT_STATE_OUTSIDE_SHIFT            9
+#define GRATING_SEGMENT_STATE_OUTSIDE_WIDTH            1
+#define GRATING_SEGMENT_STATE_KNOWN_MASK               0x00000400u  // segment_stored is the point that was asked for
+#define GRATING_SEGMENT_STATE_KNOWN_SHIFT              10
+#define GRATING_SEGMENT_STATE_KNOWN_WIDTH              1
+#define GRATING_SEGMENT_ORIGIN                         0x0b8u  // w: position of the first border; moves with the origin from when it is written [1/65536 period]
+#define GRATING_SEGMENT_ORIGIN_LOW                     0x0b8u
+#define GRATING_SEGMENT_ORIGIN_HIGH                    0x0bcu
+#define GRATING_SEGMENT_ORIGIN_WIDTH                   48
+#define GRATING_SEGMENT_LENGTH                         0x0c0u  // w: length of a segment [1/65536 period]
+#define GRATING_SEGMENT_LENGTH_LOW                     0x0c0u
+#define GRATING_SEGMENT_LENGTH_HIGH                    0x0c4u
+#define GRATING_SEGMENT_LENGTH_WIDTH                   48
+#define GRATING_SEGMENT_POINT                          0x0c8u  // w: position at a border less the true one; writing puts it there
+#define GRATING_SEGMENT_POINT_MASK                     0x00ffffffu
+#define GRATING_SEGMENT_POINT_SHIFT                    0
+#define GRATING_SEGMENT_POINT_WIDTH                    24
+#define GRATING_SEGMENT_POINT_BORDER_MASK              0xff000000u
+#define GRATING_SEGMENT_POINT_BORDER_SHIFT             24
+#define GRATING_SEGMENT_POINT_BORDER_WIDTH             8
+#define GRATING_SEGMENT_LOOK                           0x0ccu  // w: border whose point is wanted back: border
+#define GRATING_SEGMENT_LOOK_BORDER_MASK               0x000000ffu
+#define GRATING_SEGMENT_LOOK_BORDER_SHIFT              0
+#define GRATING_SEGMENT_LOOK_BORDER_WIDTH              8
+#define GRATING_SEGMENT_STORED                         0x0d0u  // r: that point, once segment_state.known stands [1/65536 period]
+#define GRATING_SEGMENT_STORED_MASK                    0x00ffffffu
+#define GRATING_SEGMENT_STORED_SHIFT                   0
+#define GRATING_SEGMENT_STORED_WIDTH                   24
+#define GRATING_SEGMENT_ERROR                          0x0d4u  // r: what is taken off the position now [1/65536 period]
+#define GRATING_SEGMENT_ERROR_MASK                     0x00ffffffu
+#define GRATING_SEGMENT_ERROR_SHIFT                    0
+#define GRATING_SEGMENT_ERROR_WIDTH                    24
 
 // actuator: what the command goes to, bridge, steps or converter, and the fine stage
 #define ACTUATOR_DRIVE                                 0x000u  // rw: the drive

@@ -9,7 +9,7 @@ namespace twin {
 constexpr int LEADING_ZEROS = 2;
 
 Interferometer::Interferometer(const StageParameters& parameters, uint64_t seed, uint64_t stream, double clk_hz)
-    : p(parameters), clk_hz_(clk_hz), random_(seed, stream), spikes_a_{RandomSource(seed, stream + 1), 0, 0},
+    : p(parameters), seed_(seed), stream_(stream), clk_hz_(clk_hz), random_(seed, stream), spikes_a_{RandomSource(seed, stream + 1), 0, 0},
       spikes_b_{RandomSource(seed, stream + 2), 0, 0} {
     configure();
     code_sin = code_cos = 1u << (int(p.signal_bits) - 1);
@@ -31,6 +31,7 @@ void Interferometer::configure() {
     first_bit_ = 32 - LEADING_ZEROS - int(p.signal_bits);
     draw(spikes_a_, 0);
     draw(spikes_b_, 0);
+    scale_error_.configure(p, seed_, stream_);
 }
 
 void Interferometer::draw(Spikes& spikes, uint64_t after) {
@@ -48,7 +49,7 @@ void Interferometer::analogue(double position, double& sine, double& cosine) con
         sine = cosine = 0;
         return;
     }
-    const double turns = (position - p.grating_offset) / p.grating_period, phase = 2 * M_PI * (turns - std::floor(turns));
+    const double turns = (position + scale_error_.at(position) - p.grating_offset) / p.grating_period, phase = 2 * M_PI * (turns - std::floor(turns));
     double s, c;
     sincos(phase, &s, &c);
     const std::complex<double> first(c, s);

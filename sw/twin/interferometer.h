@@ -2,7 +2,7 @@
 // Grating interferometer of one axis, from the place of the table to the pins of the node: sine and cosine through two
 // converters that sample together, and the comparators' quadrature levels with their spikes.
 //
-//   phase  = 2 pi (position - grating_offset) / period          sine = sin(phase)    cosine = cos(phase), with their errors:
+//   phase  = 2 pi (position + scale error - grating_offset) / period          sine = sin(phase)    cosine = cos(phase), with their errors:
 //            harmonics +-2 ... +-8 are added to exp(i phase) first, then gain, phase and offset bend it
 //   levels   A = cosine > 0, B = sine > 0: at a rising edge of A, B = 0 means forward (S0)
 //   frame    AD7356 class: sampled at the falling edge of cs_n, which also puts out the first leading zero; each falling edge of
@@ -12,6 +12,7 @@
 
 #include "parameters.h"
 #include "random_source.h"
+#include "scale_error.h"
 
 namespace twin {
 
@@ -52,6 +53,8 @@ private:
     static constexpr int HIGHEST = 8;
     double plus_[HIGHEST + 1] = {}, minus_[HIGHEST + 1] = {};  // harmonics
     int highest_ = 0;                                         // of them that is not zero
+    uint64_t seed_, stream_;
+    ScaleError scale_error_;
     double clk_hz_, sin_of_error_ = 0, cos_of_error_ = 1;
     int first_bit_ = 0;                                       // of the word, in the 32 bits that are shifted out
     RandomSource random_;

@@ -27,6 +27,8 @@ from .surroundings import pack as pack_surroundings
 CLK_HZ = 2_400_000
 START_S = 0.15                   # until the soft core of a node with one axis listens
 NODE = {"DRIVES": 1, "FILTERS": 0}     # what the stage of S0 needs of rtl/node.sv
+WITH_SEGMENTS = {**NODE, "SEGMENTS": 255}      # and with its segment table, which takes a fifteenth of the speed
+WITHOUT = {"SEGMENTS": 0}              # what no node has that does not ask for it
 BAUD = 115200
 BREAK_S = 0.003                  # the line low; nodes want 2 ms
 TURNAROUND_CELLS = 2             # the host hears a word half a cell before its end; the node's driver lets go half a cell after it
@@ -81,7 +83,7 @@ class LineState:
 
 
 def library(clk_hz, axes, node=None):
-    found = ctypes.CDLL(str(build.twin_library(clk_hz, axes, node)))
+    found = ctypes.CDLL(str(build.twin_library(clk_hz, axes, {**WITHOUT, **(node or {})})))
     declare(found, {**FUNCTIONS, **MACHINE_FUNCTIONS, **SURROUNDINGS_FUNCTIONS, **PEER_FUNCTIONS})
     return found
 
@@ -101,8 +103,9 @@ class Twin:
     """`nodes` are Nodes, or addresses of nodes with `axes` stages each. All nodes are of one build: one with fewer axes than
     another has unconnected ones behind them. `plant` overrides parameters of all machines, `plant_of` {axis: {…}} those of one;
     `firmware` is a list of words or None for the one in sw/firmware; `host_baud_error` 0.02 makes the host 2 % fast;
-    `node_parameters` {"W": 12} are parameters of rtl/node.sv, {"DRIVES": 15} builds all that an axis can drive. Nodes have all
-    links (LINKS = 63) if one of them has surroundings or peers; `peers` are two places of nodes, joined by a serial line."""
+    `node_parameters` {"W": 12} are parameters of rtl/node.sv, {"DRIVES": 15} builds all that an axis can drive, WITH_SEGMENTS
+    a segment table. Nodes have all links (LINKS = 63) if one of them has surroundings or peers; `peers` are two places of nodes, joined by
+    a serial line."""
 
     def __init__(self, nodes=(1, 2), seed=1, clk_hz=CLK_HZ, baud=BAUD, host_baud_error=0.0, axes=1, plant=None, plant_of=None,
                  firmware=None, node_parameters=NODE, peers=None, peer_baud=PEER_BAUD):

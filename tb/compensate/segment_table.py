@@ -17,17 +17,18 @@ def segment_table(position, errors, origin, length, linear, enable=1, index_bits
 
 
 class SegmentTable:
-    """done, corrected and outside are what stands after a clk. Settings and table stand still while a position is under way."""
+    """done, corrected, outside and error are what stands after a clk. Settings and table stand still while a position is under way."""
 
     LATENCY = 30
 
     def __init__(self):
-        self.left, self.done, self.corrected, self.outside = None, False, None, None
+        self.left, self.done, self.corrected, self.outside, self.error = None, False, None, None, None
 
     def clk(self, rst=0, valid=0, position=0, **settings):
         self.done = self.left == 1 and not rst
         if self.done:
             corrected, self.outside = segment_table(self.position, **settings)
+            self.error = self.position - corrected
             self.corrected = (corrected + 2**47) % 2**48 - 2**47
         if rst or self.done:
             self.left = None

@@ -8,7 +8,7 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from bench import run, start
 from segment_table import SegmentTable
 
-IDLE = dict(enable=1, linear=0, origin=0, segment_length=1, segments=1, write=0, point=0, value=0, valid=0, position=0)
+IDLE = dict(enable=1, linear=0, origin=0, segment_length=1, segments=1, write=0, point=0, value=0, look=0, valid=0, position=0)
 FAR = 1 << 47
 
 
@@ -45,7 +45,8 @@ class Table:
             await FallingEdge(dut.clk)
             assert int(dut.done.value) == model.done
             if model.done:
-                got, want = (dut.corrected.value.to_signed(), bool(dut.outside.value)), (model.corrected, model.outside)
+                got = dut.corrected.value.to_signed(), bool(dut.outside.value), dut.error.value.to_signed()
+                want = model.corrected, model.outside, model.error
                 assert got == want, f"{self.inputs} in {self.length} from {self.origin}: {got}, the model has {want}"
 
     async def at(self, position, linear=0, enable=1):
@@ -103,6 +104,19 @@ async def beyond_its_borders_the_error_is_that_of_the_border(dut):
 async def without_enable_the_position_passes(dut):
     table = await Table(dut).reset([7, 8, -9])
     assert (await table.at(1234, enable=0))[0] == 1234
+
+
+@cocotb.test()
+async def points_are_read_back_while_no_position_is_under_way(dut):
+    points = [random.randrange(-1 << 23, 1 << 23) for _ in range(256)]
+    table = await Table(dut).reset(points)
+    for n in (0, 255, *random.sample(range(256), 20)):
+        dut.look.value = n
+        await table.clk()
+        assert dut.looked.value.to_signed() == points[n]
+        await table.at(random.randrange(255_000), random.getrandbits(1))        # which reads other points
+        await table.clk(valid=0)
+        assert dut.looked.value.to_signed() == points[n]
 
 
 @cocotb.test()

@@ -92,12 +92,12 @@ class ProfilePlayer:
 
     def clk(self, rst=0, tick=0, push=None, start=0, brake=0, hold_here=0, position=0, shift=None, brake_rate=0, brake_jerk=0,
             slope=0, curve=0, percent=65536, pause=0, arm=0, start_at=0, now=0):
-        """push: (velocity, acceleration, jerk, ticks, last) or None. shift: periods or None."""
+        """push: (velocity, acceleration, jerk, ticks, last) or None. shift: 2^-16 period or None."""
         self.underrun = 0
         if rst or hold_here:
             self.exact = 0 if rst else position << 24
             if shift is not None and not rst:
-                self.exact = wrap(self.exact + (shift << 40), 72)
+                self.exact = wrap(self.exact + (shift << 24), 72)
             self.stand()
             self.empty()
             return self.pins()
@@ -107,7 +107,7 @@ class ProfilePlayer:
         room = len(self.queue) < self.depth and not self.braking and not self.writing
         reached = self.armed and wrap(now - start_at, 32) >= 0
         if self.shifted:
-            self.exact += shift << 40
+            self.exact += shift << 24
         if next(self.life):
             self.stand()
         else:

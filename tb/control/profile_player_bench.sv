@@ -29,7 +29,7 @@ module profile_player_bench (
     /* verilator lint_off PINCONNECTEMPTY */
     profile_player u_player (.clk, .rst, .brake_rate, .brake_jerk, .slope, .curve, .percent, .pause, .tick, .push, .segment_velocity, .segment_acceleration, .segment_jerk,
         .segment_ticks, .segment_last, .start, .arm(1'b0), .start_at(32'd0), .now(32'd0), .brake, .hold_here(1'b0), .position(48'd0),
-        .shift(1'b0), .shift_periods(32'd0), .target(), .target_velocity(), .target_acceleration(), .moving, .armed(), .queue_free, .underrun);
+        .shift(1'b0), .shift_by(48'd0), .target(), .target_velocity(), .target_acceleration(), .moving, .armed(), .queue_free, .underrun);
     /* verilator lint_on PINCONNECTEMPTY */
     assign prepared = u_player.job == u_player.WAIT;
 

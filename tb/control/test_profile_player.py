@@ -17,7 +17,7 @@ SETTINGS = "slope", "curve", "percent", "pause", "brake_rate", "brake_jerk"
 WORDS = "segment_velocity", "segment_acceleration", "segment_jerk", "segment_ticks", "segment_last"
 EVENTS = "rst", "tick", "start", "brake", "hold_here", "position", "arm", "start_at", "now"
 IDLE = dict.fromkeys(("tick", "push", "segment_velocity", "segment_acceleration", "segment_jerk", "segment_ticks", "segment_last",
-                      "start", "brake", "hold_here", "position", "shift", "shift_periods", "arm", "start_at", "now", *SETTINGS), 0)
+                      "start", "brake", "hold_here", "position", "shift", "shift_by", "arm", "start_at", "now", *SETTINGS), 0)
 
 
 class Player:
@@ -39,7 +39,7 @@ class Player:
         """One clk with these events (as ProfilePlayer.clk takes them); returns the pins after it."""
         dut, push, shift = self.dut, events.get("push"), events.get("shift")
         events = self.settings | events
-        pins = dict.fromkeys(EVENTS, 0) | events | dict(push=int(push is not None), shift=int(shift is not None), shift_periods=shift or 0)
+        pins = dict.fromkeys(EVENTS, 0) | events | dict(push=int(push is not None), shift=int(shift is not None), shift_by=shift or 0)
         for name, value in pins.items():
             if self.driven.get(name) != value:
                 getattr(dut, name).value = value
@@ -269,10 +269,10 @@ async def ends_of_the_range(dut):
         await player.play((sign * LSB, 0, 0, 1, 1))
         await player.finish()
         assert player.target == wrap(position + sign, 48)
-        for periods in (-1 << 31, (1 << 31) - 1):
+        for by in (-1 << 47, -1, (1 << 47) - 1):
             before = player.target
-            await player.clk(shift=periods)
-            assert player.target == wrap(before + (periods << 16), 48)
+            await player.clk(shift=by)
+            assert player.target == wrap(before + by, 48)
     for velocity, shown in ((-1 << 60, -1 << 31), (1 << 60, (1 << 31) - 1)):
         await player.play((velocity, 0, 0, 3, 1))
         await player.tick()
@@ -498,7 +498,7 @@ async def a_shift_loses_no_step_in_any_clk(dut):
         await player.play((PERIOD, 0, 0, 1, 1))
         await player.clk(tick=1)
         for n in range(9):
-            await player.clk(shift=-3 if n == wait else None)
+            await player.clk(shift=-3 * 65536 if n == wait else None)
         assert player.target == -2 * 65536 and not player.moving
 
 
@@ -599,7 +599,7 @@ async def any_events_match_the_model(dut):
                 events[name] = 1
         events["position"] = word(48)
         if chance(20):
-            events["shift"] = word(32)
+            events["shift"] = word(48)
         await player.clk(**events)
 
 

@@ -222,6 +222,7 @@ class Grating:
         self.points, self.written = {}, {}                              # table in force, table being written
         self.correction, self.loads = None, 0
         self.armed, self.captured, self.latch = False, None, 0
+        self.most_segments, self.segments, self.use, self.uses = 255, {}, None, []         # use: None, or the settings in force
 
     def index(self, position):
         if self.armed and self.word.get(DEFINES["GRATING_CAPTURE_SOURCES"], 0) & 1:
@@ -244,13 +245,30 @@ class Grating:
             return self.captured & 0xFFFFFFFF
         if offset == d["GRATING_CAPTURED_POSITION"] + 4:
             return self.latch
+        if offset == d["GRATING_SEGMENT_STATE"]:
+            return (self.most_segments | d["GRATING_SEGMENT_STATE_IN_FORCE_MASK"] * (self.use is not None) |
+                    d["GRATING_SEGMENT_STATE_KNOWN_MASK"])
+        if offset == d["GRATING_SEGMENT_STORED"]:
+            return self.segments.get(self.word[d["GRATING_SEGMENT_LOOK"]], 0) & 0xFFFFFFFF
         if offset == d["GRATING_POSITION_SOURCE"]:
             return self.word.get(offset, 0) | d["GRATING_POSITION_SOURCE_SINE_MASK"] * self.sine
         return self.word.get(offset, 0)
 
+    def wide(self, name, bits):
+        return signed(self.word[DEFINES[f"{name}_HIGH"]] << 32 & (1 << bits) - 1 | self.word[DEFINES[f"{name}_LOW"]], bits)
+
+    def use_segments(self, value):
+        self.use = dict(linear=bool(value & 2), segments=value >> 2, length=self.wide("GRATING_SEGMENT_LENGTH", 48),
+                        origin=self.wide("GRATING_SEGMENT_ORIGIN", 48)) if value & 1 else None
+        self.uses.append(self.use and self.use["linear"])
+
     def write(self, offset, value):
         d = DEFINES
         self.word[offset] = value
+        if offset == d["GRATING_SEGMENT_POINT"]:
+            self.segments[value >> 24] = signed(value & 0xFFFFFF, 24)
+        if offset == d["GRATING_SEGMENT_USE"]:
+            self.use_segments(value)
         if offset == d["GRATING_HARMONIC_POINT"]:
             self.written[value >> 18 & 255] = signed(value & 0x3FFFF, 18)
         if offset == d["GRATING_STROBES"]:

@@ -44,6 +44,7 @@ class FakeAxis:
         self.harmonics = {order: (0, 0) for order in range(1, 11)}
         self.waiting = dict(self.harmonics)
         self.signal = dict(faults=0, first=0)
+        self.points = []               # of the segment table
         self.speeds = []               # of moves, period/s
         self.full_speed_s = 0.0        # left of a motion that is paused
 
@@ -110,6 +111,8 @@ class FakeNode:
         self.scope, self.armed, self.samples = "empty", None, []       # samples: position, error, command, time
         self.executed = []             # names of the operations, without repetitions
         self.wrong_map = False
+        self.most_segments = 0         # of a table; 0: it was not built
+        self.spoils_points = False
 
     # the line
 
@@ -389,6 +392,27 @@ class FakeNode:
         return "ok", {f"{name}_{n}": padded[n][place] for n in range(5)
                       for place, name in enumerate(("position", "error", "command", "time"))}
 
+    def do_segments(self, axis):
+        use, whole = axis.parameters[90], len(axis.points) > axis.parameters[87]
+        reason = "ok" if not use else "no_segments" if not whole else "ok" if axis.homed else "not_homed"
+        if not self.most_segments:
+            return "not_built", {}
+        return "ok", dict(loaded=len(axis.points), in_force=use if reason == "ok" else 0, reason=CAUSE[reason])
+
+    def do_set_segments(self, axis, border, points, **values):
+        if not self.most_segments:
+            return "not_built", {}
+        if axis.parameters[90]:
+            return "segments_in_use", {}
+        if border not in (0, len(axis.points)) or points > 12 or border + points > self.most_segments + 1:
+            return "out_of_range", {}
+        axis.points = axis.points[:border] + list(values.values())[:points]
+        return "ok", {}
+
+    def do_get_segments(self, axis, border):
+        points = [point + self.spoils_points for point in axis.points[border:border + 12]]
+        return "ok", {f"point_{n}": point for n, point in enumerate(points + [0] * (12 - len(points)))}
+
     def do_write_register(self, _, address, value):
         if not 0xC00 <= address < 0xD00:
             return "no_such_register", {}
@@ -403,6 +427,8 @@ class FakeNode:
             return "ok", {"value": bool(self.captures) | (self.registers.get(address, 0) & 64)}
         if self.captures and 0xC68 <= address < 0xC78:
             return "ok", {"value": self.captures[0][address - 0xC68 >> 2]}
+        if address in (0xCB4, 0xCD4):                  # state and error of the segment table
+            return "ok", {"value": self.most_segments if address == 0xCB4 else 0xFFFFE000}
         if address & 0xFF == 0xA8 and 0xC00 <= address < 0x1400:       # position_source.sine
             return "ok", {"value": self.sine << 2}
         if 0x10 <= address < 0x18:                     # time stamp

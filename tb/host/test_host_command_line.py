@@ -362,7 +362,7 @@ def test_a_twin_that_is_not_there_is_exit_code_4(monkeypatch):
 
 def test_a_twin_that_does_not_build_is_exit_code_4(monkeypatch):
     class Broken:
-        BuildError, TwinTransport = RuntimeError, None
+        BuildError, TwinTransport, WITH_SEGMENTS = RuntimeError, None, {}
 
     def broken(_):
         raise RuntimeError("g++ is missing")

@@ -2,11 +2,12 @@
 """grating as a whole: the latency of its header, from the converter's pins on. What its blocks do is tested block by block; how they
 work together in motion, in tb/system."""
 import cocotb
+import pytest
 from cocotb.triggers import FallingEdge
 
 from bench import run, start
 
-LATENCY = 22                                            # clk from a converter word to its position
+LATENCY = 22                                            # clk from a converter word to its position; 1 more with a segment table
 SETTINGS = dict(deglitch=0, spike_step=0, spike_hold=0, amplitude_low=0, amplitude_high=65535, disagreement_limit=0)
 INPUTS = dict(tick=0, sample_tick=0, mark=0, now=0, select=0, write=0, word=0, wdata=0, shift=0, shift_periods=0, a=0, b=0, z=0, probe=0,
               adc_sin=1, adc_cos=1)
@@ -18,22 +19,23 @@ async def converted(dut):
     await FallingEdge(dut.clk)
     dut.sample_tick.value = 0
     for _ in range(100):
-        if int(dut.converted.value):
+        if int(dut.g_sine.converted.value):
             return
         await FallingEdge(dut.clk)
     raise AssertionError("no word came from the converter")
 
 
 @cocotb.test()
-async def latency_is_22_clk_from_a_converter_word_to_position(dut):
+async def latency_is_22_clk_from_a_converter_word_to_position_and_1_more_with_a_segment_table(dut):
+    latency = LATENCY + bool(int(dut.SEGMENTS.value))
     await start(dut, **SETTINGS, **INPUTS)
     await FallingEdge(dut.clk)
     for adc_cos, eighths in ((1, 1), (0, 3), (1, 1)):   # sin stands at its upper end
         dut.adc_cos.value = adc_cos
         await converted(dut)
-        for clk in range(1, LATENCY + 4):
+        for clk in range(1, latency + 4):
             await FallingEdge(dut.clk)
-            assert int(dut.position_valid.value) == (clk == LATENCY)
+            assert int(dut.position_valid.value) == (clk == latency)
         assert abs(dut.position.value.to_signed() - eighths * 8192) < 50        # the ends of 8 bits are 127 and -128
         assert int(dut.phase.value) == dut.position.value.to_unsigned() % 65536
 
@@ -50,5 +52,6 @@ async def reset_in_mid_flow_drops_the_word(dut):
     assert dut.position.value == 0
 
 
-def test_grating():
-    run("grating", __file__)
+@pytest.mark.parametrize("segments", [0, 255])
+def test_grating(segments):
+    run("grating", __file__, SEGMENTS=segments)

@@ -12,10 +12,14 @@ from moire.registers import FIELDS
 
 TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]                 # a leads b: up
 QUARTER = 1 << 14
-LATENCY = 5                                             # clk from the pins to position: filter 1, decoder 2, position 2
+LATENCY = 5                                             # clk from the pins to position: filter 1, decoder 2, position 2; table 1
 SETTINGS = dict(deglitch=0, spike_step=0, spike_hold=0, amplitude_low=0, amplitude_high=65535, disagreement_limit=0)
 INPUTS = dict(tick=0, sample_tick=0, mark=0, now=0, select=0, write=0, word=0, wdata=0, shift=0, shift_periods=0, a=0, b=0, z=0, probe=0,
               own_step=0, own_direction=0, adc_sin=1, adc_cos=1)
+
+
+def latency(dut):
+    return LATENCY + bool(int(dut.SEGMENTS.value))
 
 
 def register(name):
@@ -30,7 +34,7 @@ class Bench:
     @classmethod
     async def begin(cls, dut, place=0, mode=0, steps=0):
         bench = cls()
-        bench.dut, bench.place = dut, place
+        bench.dut, bench.place, bench.latency = dut, place, latency(dut)
         await start(dut, **SETTINGS, **{**INPUTS, **dict(zip("ab", TURN[place % 4]))})
         for _ in range(12):                             # filter and decoder only take their levels after reset
             await FallingEdge(dut.clk)
@@ -51,6 +55,21 @@ class Bench:
         await FallingEdge(self.dut.clk)
         self.dut.select.value = self.dut.write.value = 0
 
+    async def wide(self, name, value):
+        word = register(name)[0]
+        for more, half in enumerate((value & 0xFFFFFFFF, value >> 32 & 0xFFFFFFFF)):
+            self.dut.word.value, self.dut.wdata.value, self.dut.select.value, self.dut.write.value = word + more, half, 1, 1
+            await FallingEdge(self.dut.clk)
+        self.dut.select.value = self.dut.write.value = 0
+
+    async def rest(self):
+        """Until the segment table has answered for here, and its answer is in force."""
+        for _ in range(3):
+            await self.sample()
+            for _ in range(32):
+                await FallingEdge(self.dut.clk)
+        await self.sample()
+
     async def read(self, name, more=0):
         self.dut.word.value, self.dut.select.value = register(name)[0] + more, 1
         await FallingEdge(self.dut.clk)
@@ -61,7 +80,7 @@ class Bench:
         self.dut.sample_tick.value = 1
         await FallingEdge(self.dut.clk)
         self.dut.sample_tick.value = 0
-        for _ in range(LATENCY):
+        for _ in range(self.latency):
             await FallingEdge(self.dut.clk)
 
     def pins(self, z=0):
@@ -80,7 +99,7 @@ class Bench:
             for _ in range(clk):
                 await FallingEdge(self.dut.clk)
                 positions.append(self.position())
-        for _ in range(LATENCY):
+        for _ in range(self.latency):
             await FallingEdge(self.dut.clk)
             positions.append(self.position())
         return positions
@@ -106,7 +125,7 @@ async def position_is_exact_at_an_edge_every_clk(dut):
         place += step
         way.append(place * QUARTER)
     got = await bench.go(steps)
-    assert got[LATENCY - 1:LATENCY - 1 + len(way)] == way
+    assert got[bench.latency - 1:bench.latency - 1 + len(way)] == way
     assert bench.position() == place * QUARTER == bench.dut.quadrature_count.value.to_signed() * QUARTER
 
 
@@ -147,7 +166,7 @@ async def an_armed_index_is_captured_once(dut):
 @cocotb.test()
 async def align_moves_position_by_whole_counts_also_together_with_an_edge(dut):
     for counts in (-2, -1, 1, 2):
-        for wait in range(LATENCY + 2):                 # the strobe meets every clk of an edge's way, and none
+        for wait in range(latency(dut) + 2):                 # the strobe meets every clk of an edge's way, and none
             bench = await Bench.begin(dut)
             await bench.go([1] * 6)
             bench.place += 1
@@ -163,7 +182,7 @@ async def align_moves_position_by_whole_counts_also_together_with_an_edge(dut):
 @cocotb.test()
 async def shift_moves_the_origin_by_whole_periods_also_together_with_an_edge(dut):
     for periods in (-(1 << 31), -3, 1, (1 << 31) - 1):
-        for wait in range(LATENCY + 2):
+        for wait in range(latency(dut) + 2):
             bench = await Bench.begin(dut)
             bench.place += 1
             bench.pins()
@@ -208,6 +227,73 @@ async def reset_in_mid_flow_drops_the_edge(dut):
 
 
 @cocotb.test()
+async def with_a_segment_table_positions_captures_and_compare_points_are_on_the_corrected_scale(dut):
+    if not int(dut.SEGMENTS.value):
+        return
+    bench, errors = await Bench.begin(dut), [0, 900, -1500, 700]       # of three segments of 8 counts
+    for border, error in enumerate(errors):
+        await bench.write("segment_point", value=error & 0xFFFFFF, border=border)
+        await bench.write("segment_look", border=border)
+        await bench.go([])
+        assert await bench.read("segment_stored") == error & 0xFFFFFFFF
+    await bench.wide("segment_origin", 8 * QUARTER)
+    await bench.wide("segment_length", 8 * QUARTER)
+    await bench.go([1] * 12)
+    moved = []
+    await bench.write("segment_use", enable=1, linear=1, segments=3)
+    for _ in range(40):
+        if int(dut.moved.value):
+            moved.append(dut.moved_by.value.to_signed())
+        await FallingEdge(dut.clk)
+    assert moved == [-450] and bench.position() == 12 * QUARTER - 450
+    assert await bench.read("segment_state") == 0x5FF   # known, in force, 255
+    for step in (1, -1):                                # sign right in both directions
+        for _ in range(12 if step > 0 else 30):
+            await bench.go([step])
+            await bench.rest()
+            place = (bench.place - 8) / 8
+            left = max(0, min(2, int(place)))
+            error = errors[left] + (errors[left + 1] - errors[left]) * max(0, min(1, place - left))
+            assert abs(bench.position() - bench.place * QUARTER + error) <= 0.5
+            assert bool(await bench.read("segment_state") & 0x200) == (not 0 <= place < 3)
+    await bench.go([1] * (16 - bench.place))
+    await bench.rest()
+    await bench.write("capture_sources", value=4)
+    await bench.wide("compare_start", 16 * QUARTER - 900)
+    await bench.wide("compare_step", 4 * QUARTER)
+    await bench.write("compare_count", value=1)
+    for pulses, step in ((0, -1), (1, 1)):              # armed one count below, it fires where the corrected scale says so
+        await bench.go([step])
+        await bench.rest()
+        await bench.write("strobes", capture_now=1, compare_arm=1 - pulses)
+        await bench.sample()
+        assert await bench.read("compare_passed") == pulses
+    assert await bench.captured() == [15 * QUARTER - 788, 16 * QUARTER - 900]
+
+
+@cocotb.test()
+async def a_shift_moves_the_segment_table_with_the_scale(dut):
+    if not int(dut.SEGMENTS.value):
+        return
+    bench = await Bench.begin(dut)
+    for border, error in enumerate((0, 800)):
+        await bench.write("segment_point", value=error, border=border)
+    await bench.wide("segment_length", 40 * QUARTER)
+    await bench.write("segment_use", enable=1, linear=1, segments=1)
+    await bench.go([1] * 20)
+    await bench.rest()
+    assert bench.position() == 20 * QUARTER - 400
+    dut.shift.value, dut.shift_periods.value = 1, -7
+    await FallingEdge(dut.clk)
+    dut.shift.value = 0
+    await bench.go([])
+    assert bench.position() == -8 * QUARTER - 400
+    await bench.go([1] * 10)
+    await bench.rest()
+    assert bench.position() == 2 * QUARTER - 600
+
+
+@cocotb.test()
 async def the_register_tells_whether_sine_and_cosine_were_built(dut):
     bench = await Bench.begin(dut)
     assert await bench.read("position_source") >> 2 == int(dut.SINE.value)
@@ -246,6 +332,6 @@ async def without_sine_and_cosine_the_converter_rests_and_all_that_comes_of_it_i
         assert await bench.read(name) == 0, name
 
 
-@pytest.mark.parametrize("sine", [0, 1])
-def test_grating_counts(sine):
-    run("grating", __file__, SINE=sine)
+@pytest.mark.parametrize("sine, segments", [(0, 0), (0, 255), (1, 255)])
+def test_grating_counts(sine, segments):
+    run("grating", __file__, SINE=sine, SEGMENTS=segments)

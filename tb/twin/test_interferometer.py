@@ -23,6 +23,30 @@ def test_phase_is_right_to_a_picometre_over_the_whole_travel(base):
         assert math.hypot(sine, cosine) == pytest.approx(0.85)
 
 
+def reading(stage, place):
+    """What the scale shows at a place, as far from it as a period allows."""
+    sine, cosine = stage.analogue(place)
+    away = math.atan2(sine, cosine) / (2 * math.pi) * PERIOD - place
+    return away - PERIOD * round(away / PERIOD)
+
+
+def test_the_error_of_the_scale_is_as_stated():
+    linear = Stage(**IDEAL, scale_linear=2e-6)
+    cyclic = Stage(**IDEAL, scale_cyclic=150e-9, scale_pitch=8e-3)
+    for place in (0, -1e-3, 5e-3, 40e-3, 119e-3):
+        assert reading(linear, place) == pytest.approx(2e-6 * place, abs=1e-12)
+        assert reading(cyclic, place) == pytest.approx(150e-9 * math.sin(2 * math.pi * place / 8e-3), abs=1e-12)
+
+
+def test_the_random_walk_of_a_scale_is_that_of_its_seed_and_begins_at_zero():
+    first, again, other = (Stage(seed=seed, **IDEAL, scale_walk=5e-9) for seed in (1, 1, 2))
+    places = [n * 1e-3 for n in range(121)]
+    walk = numpy.array([reading(first, place) for place in places])
+    assert walk[0] == pytest.approx(0, abs=1e-12) and 3e-9 < numpy.std(numpy.diff(walk)) < 7e-9
+    assert walk.tolist() == [reading(again, place) for place in places] != [reading(other, place) for place in places]
+    assert reading(first, 20.5e-3) == pytest.approx((walk[20] + walk[21]) / 2, abs=1e-12)
+
+
 def test_the_phase_zero_lies_at_the_offset():
     stage = Stage(**IDEAL, grating_offset=0.3e-6)
     sine, cosine = stage.analogue(0.3e-6)

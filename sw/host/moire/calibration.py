@@ -14,13 +14,13 @@ signal / (signal + noise) (Wiener): what drowns in noise is left out rather than
 the order itself for the first three, which mounting makes; above, where a single order says little, from the power law
 c / k^p that makes the powers seen, noise included, most probable.
 """
-import csv
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from .columns import number, rows
 from .errors import BadFile, OutOfRange
 
 LARGEST_ERROR = 3600.0               # arc seconds; a ring that is farther off is not mounted, it has fallen down
@@ -98,36 +98,12 @@ class Harmonics:
         return "\n".join(lines)
 
 
-def number(text: str, what: str, where: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        raise BadFile(f"{where}: {what} is no number: {text.strip()!r}") from None
-    if not math.isfinite(value):
-        raise BadFile(f"{where}: {what} is {text.strip()}")
-    return value
-
-
-def rows(path: Path):
-    """(line, cells) of what is neither empty, nor a comment, nor the heading."""
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            lines = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise BadFile(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from error
-    found = [(line, cells) for line, cells in enumerate(lines, start=1)
-             if any(cell.strip() for cell in cells) and not cells[0].startswith("#")]
-    if found and found[0][1][0].strip()[:1].isalpha():
-        found.pop(0)
-    return found
-
-
 def read_readings(path) -> Readings:
     """A table `angle in degrees, error in arc seconds`, one reading a line, in the order of the motion; `#` begins a comment, a
     heading may stand above. An angle that falls back towards 0 begins the next revolution. What is wrong is told with its line."""
     path = Path(path)
     angles, errors, lines, turn = [], [], [], 0
-    for line, cells in rows(path):
+    for line, cells in rows(path)[1]:
         where = f"{path}, line {line}"
         if len(cells) != 2:
             raise BadFile(f"{where}: two columns are wanted, angle and error, not {len(cells)}")

@@ -73,6 +73,7 @@ CHOICES = {
     "step_output": ("step_and_direction", "quadrature", "pulses"),
     "step_invert": ("none", "step", "direction", "both"),
     "filters": ("none", "first", "second", "both"),
+    "segments": ("off", "rectangle", "linear"),
     "index_way": ("direct", "shorter", "up"),
     "peer_mode": ("off", "printed", "frames"),
     "peer_role": ("main", "sub"),
@@ -794,11 +795,14 @@ class Axis:
 
     def load_parameters(self, texts: dict) -> dict:
         """Some or all, as saved. Every one is checked before the first is written; the period goes first, since lengths hang on it."""
+        return {name: self.write_parameter(name, value) for name, value in self.check_parameters(texts).items()}
+
+    def check_parameters(self, texts: dict) -> dict:
+        """Counts of some or all, as saved, the period first; OutOfRange or UnknownName if they cannot be loaded."""
         period_nm = self.period_nm
         if "period" in texts:
             period_nm = Fraction(self.parameter_counts("period", texts["period"]), 1000)
-        counts = {name: self.parameter_counts(name, texts[name], period_nm) for name in sorted(texts, key=lambda name: name != "period")}
-        return {name: self.write_parameter(name, value) for name, value in counts.items()}
+        return {name: self.parameter_counts(name, texts[name], period_nm) for name in sorted(texts, key=lambda name: name != "period")}
 
     def set_tuning(self, tuning):
         """Gains and filters of moire.tune, written as they are; filters that it has none of are out of use."""

@@ -13,12 +13,24 @@ from fractions import Fraction
 from functools import cache, partial
 from pathlib import Path
 
-from . import command_index, command_job, command_keep, command_look, command_relay, command_replay, command_scope, command_twin, units
-from .client import CAPTURE_SOURCES, HOME_METHODS, Line, capture_source, register_fields
-from .errors import BadFile, LineError, MoireError, OutOfRange, PortError, UnitError
+from . import (
+    command_index,
+    command_job,
+    command_keep,
+    command_look,
+    command_relay,
+    command_replay,
+    command_scope,
+    command_segments,
+    command_twin,
+    units,
+)
+from .client import CAPTURE_SOURCES, HOME_METHODS, Line, capture_source, register_fields, whole
+from .errors import BadFile, LineError, MoireError, OutOfRange, PortError, Refused, UnitError
 from .line_tables import PARAMETERS
 from .protocol import ADDRESSES
 from .registers import FIELDS
+from .segments import Segments
 from .transport import BAUD, PARITIES, open_line
 
 EXAMPLES = """\
@@ -297,6 +309,8 @@ def make_parser() -> Parser:
     command_scope.add_to(group("scope", "record position, error and command of an axis: arm, read, show", commands, common,
                                "moire --port twin home -- scope arm --trigger motion -- move 100um -- scope read move.csv"),
                          command, checked, write_bytes)
+    command_segments.add_to(group("segments", "the segment table of an axis (S0): load, use, save, status", commands, common,
+                                  "moire --port twin home -- segments load scale.csv -- segments status"), command, write_bytes)
     command_index.add_to(partial(group, under=commands, common=common), command)
     command_job.add_to(partial(group, under=commands, common=common), command)
 
@@ -892,28 +906,48 @@ def do_params_set(session, command):
 
 
 def do_params_save(session, command):
-    saved = session.axis(command).save_parameters()
-    write_text(command.file, json.dumps({"parameters": saved}, indent=4) + "\n")
+    axis = session.axis(command)
+    saved, points = axis.save_parameters(), segment_points(axis)
+    write_text(command.file, json.dumps({"parameters": saved, **({"segment_points": points} if points else {})}, indent=4) + "\n")
     session.say(
-        {**place(command), "action": "save", "file": command.file, "count": len(saved)}, f"{len(saved)} parameters saved in {command.file}"
+        {**place(command), "action": "save", "file": command.file, "count": len(saved)},
+        f"{len(saved)} parameters{' and a segment table' if points else ''} saved in {command.file}",
     )
+
+
+def segment_points(axis) -> list:
+    """Those of its segment table; none where the node has no table."""
+    try:
+        return Segments(axis).read_points()
+    except Refused as refused:
+        if refused.cause != "not_built":
+            raise
+        return []
 
 
 def do_params_load(session, command):
-    texts = read_parameters(command.file)
-    loaded = session.axis(command).load_parameters(texts)
+    texts, points = read_parameters(command.file)
+    axis = session.axis(command)
+    if points:
+        axis.check_parameters(texts)
+        Segments(axis).write_points(points)
+    loaded = axis.load_parameters(texts)
     session.say(
         {**place(command), "action": "load", "file": command.file, "count": len(loaded)},
-        f"{len(loaded)} parameters loaded from {command.file}",
+        f"{len(loaded)} parameters{' and a segment table' if points else ''} loaded from {command.file}",
     )
 
 
-def read_parameters(file: str) -> dict:
+def read_parameters(file: str) -> tuple:
+    """The texts by name, and the points of the segment table in counts of the wire."""
     told = read_json(file)
     texts = told.get("parameters") if isinstance(told, dict) else None
     if not isinstance(texts, dict) or not all(isinstance(text, str) for text in texts.values()):
         raise BadFile(f'the file {file} holds no parameters: it must look like {{"parameters": {{"velocity": "5mm/s"}}}}')
-    return texts
+    points = told.get("segment_points", [])
+    if not isinstance(points, list) or not all(map(whole, points)):
+        raise BadFile(f"the segment_points in the file {file} are no list of whole numbers")
+    return texts, points
 
 
 def read_json(file: str):

@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0xF9A6A247
+PROTOCOL_CRC = 0x700C8F8A
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -55,6 +55,8 @@ CAUSES = {
     23: ("not_built", "this node was built without that"),
     24: ("too_long", "the motion would take days, or go too far for a change of target"),
     25: ("no_stairs", "the stairs of this profile are not in order, or too many"),
+    26: ("no_segments", "no whole segment table is loaded"),
+    27: ("segments_in_use", "the segment table is in use: switch it off first"),
     30: ("sensor_dead", "no good frame came from the angle sensor: check its power and its cable"),
     31: ("sensor_stuck", "the angle sensor stands still: it sent one and the same angle while the table was turned"),
     32: ("stiction", "the table did not follow its steps: it sticks, or the motor lost them"),
@@ -338,6 +340,20 @@ OPERATIONS = {operation.name: operation for operation in (
     Operation("start", 21, "begin the prepared motions of these axes (bit n: axis n), all in one tick; none if one of them has none",
               (("axes", "u8"),),
               ()),
+    Operation("segments", 22, "the segment table: points loaded, the use in force (as the parameter segments), why not the one wanted",
+              (("axis", "u8"),),
+              (("loaded", "u16"), ("in_force", "u8"), ("reason", "u8"),)),
+    Operation("set_segments", 23, "its points from this border on, in order: position there less the true one; border 0 begins a new table",
+              (("axis", "u8"), ("border", "u8"), ("points", "u8"), ("point_0", "i32"),
+               ("point_1", "i32"), ("point_2", "i32"), ("point_3", "i32"), ("point_4", "i32"),
+               ("point_5", "i32"), ("point_6", "i32"), ("point_7", "i32"), ("point_8", "i32"),
+               ("point_9", "i32"), ("point_10", "i32"), ("point_11", "i32"),),
+              ()),
+    Operation("get_segments", 24, "its points from this border on",
+              (("axis", "u8"), ("border", "u8"),),
+              (("point_0", "i32"), ("point_1", "i32"), ("point_2", "i32"), ("point_3", "i32"),
+               ("point_4", "i32"), ("point_5", "i32"), ("point_6", "i32"), ("point_7", "i32"),
+               ("point_8", "i32"), ("point_9", "i32"), ("point_10", "i32"), ("point_11", "i32"),)),
     Operation("position", 30, "where an axis is: the shortest answer that tells it",
               (("axis", "u8"),),
               (("position", "i64"),)),
@@ -679,6 +695,18 @@ PARAMETERS = {parameter.name: parameter for parameter in (
     Parameter("stairs_border_3", 86, "", Fraction(1, 65536),
               0, 65536, 32768,
               "stairs: where section 3 begins: 1/2 is 1:2:3, S4 prints 1/3"),
+    Parameter("segment_count", 87, "", Fraction(1, 1),
+              1, 255, 120,
+              "segment table: its segments"),
+    Parameter("segment_length", 88, "period", Fraction(1, 65536),
+              1, 70368744177664, 81920000,
+              "segment table: length of a segment"),
+    Parameter("segment_first", 89, "period", Fraction(1, 65536),
+              -70368744177664, 70368744177664, 0,
+              "segment table: first border, from the place that homing finds"),
+    Parameter("segments", 90, "", Fraction(1, 1),
+              0, 2, 0,
+              "segment table: 0 off, 1 a segment has the mean of its borders (S0), 2 straight lines; in force from homing on"),
 )}
 
 SETTINGS = {parameter.name: parameter for parameter in (

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0x18EB521C          # CRC-32 of tables/registers.rdl
+MAP_CRC = 0xC60E00C6          # CRC-32 of tables/registers.rdl
 BLOCKS = {"node": (0x000, 0x000), "line": (0x100, 0x000), "links": (0x200, 0x000), "axis": (0x400, 0x100), "grating": (0xC00, 0x100), "actuator": (0x1400, 0x100)}          # base, distance to the next one
 
 
@@ -527,6 +527,34 @@ FIELDS = (
           "1: sine and cosine were built, 0: the position is made of counts whatever `counts` says"),
     Field("grating", "align", "value", 0xAC, 0, 3, True, "rw", "period", Fraction(1, 4),
           "with counts: move position and phase by this, -2 to 2; the target does not follow"),
+    Field("grating", "segment_use", "enable", 0xB0, 0, 1, False, "w", "", Fraction(1),
+          "1: positions are corrected"),
+    Field("grating", "segment_use", "linear", 0xB0, 1, 1, False, "w", "", Fraction(1),
+          "0: a segment has the mean of its borders, 1: the straight line between them"),
+    Field("grating", "segment_use", "segments", 0xB0, 2, 8, False, "w", "", Fraction(1),
+          "use of the segment table; position and target take its steps together: segments"),
+    Field("grating", "segment_state", "built", 0xB4, 0, 8, False, "r", "", Fraction(1),
+          "most segments; 0: it was not built"),
+    Field("grating", "segment_state", "in_force", 0xB4, 8, 1, False, "r", "", Fraction(1),
+          "positions are corrected"),
+    Field("grating", "segment_state", "outside", 0xB4, 9, 1, False, "r", "", Fraction(1),
+          "the position is beyond the table, the error that of its border"),
+    Field("grating", "segment_state", "known", 0xB4, 10, 1, False, "r", "", Fraction(1),
+          "segment_stored is the point that was asked for"),
+    Field("grating", "segment_origin", "value", 0xB8, 0, 48, True, "w", "period", Fraction(1, 65536),
+          "position of the first border; moves with the origin from when it is written"),
+    Field("grating", "segment_length", "value", 0xC0, 0, 48, False, "w", "period", Fraction(1, 65536),
+          "length of a segment"),
+    Field("grating", "segment_point", "value", 0xC8, 0, 24, True, "w", "period", Fraction(1, 65536),
+          "position at a border less the true one; writing puts it there"),
+    Field("grating", "segment_point", "border", 0xC8, 24, 8, False, "w", "", Fraction(1),
+          "position at a border less the true one; writing puts it there: border"),
+    Field("grating", "segment_look", "border", 0xCC, 0, 8, False, "w", "", Fraction(1),
+          "border whose point is wanted back: border"),
+    Field("grating", "segment_stored", "value", 0xD0, 0, 24, True, "r", "period", Fraction(1, 65536),
+          "that point, once segment_state.known stands"),
+    Field("grating", "segment_error", "value", 0xD4, 0, 24, True, "r", "period", Fraction(1, 65536),
+          "what is taken off the position now"),
     Field("actuator", "drive", "kind", 0x00, 0, 2, False, "rw", "", Fraction(1),
           "0: bridge, 1: steps, 2: converter"),
     Field("actuator", "drive", "built", 0x00, 2, 4, False, "r", "", Fraction(1),

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""segments.c: a table is loaded in order and whole or not used, in force only at rest and with a zero, and it lies where the zero is."""
+import pytest
+
+from fake_machine import CAUSE, PARAMETER, PERIOD, Axis, Machine
+
+POINTS = [100 * n - 500 for n in range(30)]
+LENGTH, FIRST = 1000 * PERIOD, -2000 * PERIOD
+
+
+def table(machine, points=POINTS, **more):
+    for border in range(0, len(points), 12):
+        block = points[border:border + 12]
+        filled = {f"point_{n}": point for n, point in enumerate([*block, *[0] * 12][:12])}
+        machine.ask("set_segments", axis=0, border=border, points=len(block), **filled)
+    machine.set(segment_count=len(points) - 1, segment_length=LENGTH, segment_first=FIRST, **more)
+
+
+def look(machine):
+    told = machine.ask("segments", axis=0)
+    return told["loaded"], told["in_force"], CAUSE[told["reason"]]
+
+
+def refused(machine, name, value):
+    return machine.request("set_parameter", axis=0, parameter=PARAMETER[name]["id"], value=value)[0]
+
+
+def homed(**more):
+    machine = Machine(Axis(position=5 * PERIOD))
+    machine.set(home_method=37, **more)
+    machine.ask("enable", axis=0, on=1)
+    machine.ask("home", axis=0)
+    machine.run(300)
+    return machine
+
+
+def block(point=0, border=0, points=1):
+    return dict(axis=0, border=border, points=points, **{f"point_{n}": point for n in range(12)})
+
+
+def test_a_table_in_force_is_the_one_that_was_loaded_and_reads_back():
+    machine = homed()
+    table(machine)
+    assert look(machine) == (30, 0, "ok")
+    machine.set(segments=2)
+    machine.poll(4)
+    grating = machine.gratings[0]
+    assert look(machine) == (30, 2, "ok") and grating.use == dict(linear=True, segments=29, length=LENGTH, origin=FIRST)
+    assert [grating.segments[n] for n in range(30)] == POINTS
+    back = [machine.ask("get_segments", axis=0, border=border)[f"point_{n}"] for border in (0, 12, 24) for n in range(12)]
+    assert back[:30] == POINTS
+
+
+@pytest.mark.parametrize("offset", [-3, 0, 70])
+def test_the_table_counts_from_the_place_that_homing_finds_whatever_it_is_called(offset):
+    machine = homed(home_offset=offset)
+    table(machine, segments=1)
+    machine.set(home_offset=offset + 5)                 # counts from the next homing on
+    machine.poll(4)
+    assert machine.gratings[0].use["origin"] == FIRST + offset * PERIOD
+    machine.ask("home", axis=0)
+    assert machine.gratings[0].use is None
+    machine.run(300)
+    assert machine.gratings[0].use["origin"] == FIRST + (offset + 5) * PERIOD and look(machine) == (30, 1, "ok")
+
+
+def test_without_a_zero_it_is_not_in_force_and_says_so():
+    machine = Machine(Axis(position=0))
+    table(machine, segments=1)
+    machine.poll(4)
+    assert look(machine) == (30, 0, "not_homed") and machine.gratings[0].use is None
+
+
+def test_a_zero_that_is_lost_takes_it_out_of_force():
+    machine = homed()
+    table(machine, segments=1)
+    machine.poll(4)
+    machine.axes[0].causes = 1 << 4                     # encoder
+    machine.poll(4)
+    machine.axes[0].causes = 0
+    assert look(machine) == (30, 0, "not_homed") and machine.gratings[0].use is None
+
+
+def test_without_a_whole_table_it_is_not_in_force_and_says_so():
+    machine = homed()
+    table(machine, POINTS[:24])
+    machine.set(segment_count=24, segments=1)
+    machine.poll(4)
+    assert look(machine) == (24, 0, "no_segments")
+    machine.set(segments=0)
+    machine.set(segment_count=23)
+    machine.set(segments=1)
+    machine.poll(4)
+    assert look(machine) == (24, 1, "ok")
+
+
+def test_one_use_follows_on_another_with_none_between():
+    machine = homed()
+    table(machine, segments=1)
+    machine.poll(4)
+    machine.gratings[0].uses.clear()
+    machine.set(segments=2)
+    machine.poll(4)
+    assert machine.gratings[0].uses == [None, True] and look(machine) == (30, 2, "ok")
+    machine.set(segments=0)
+    machine.poll(4)
+    assert machine.gratings[0].use is None and look(machine) == (30, 0, "ok")
+
+
+def test_a_moving_axis_is_refused_a_change():
+    machine = homed()
+    table(machine)
+    machine.ask("move", axis=0, target=5000 * PERIOD)
+    machine.run(10)
+    assert refused(machine, "segments", 1) == "busy" and machine.gratings[0].use is None
+
+
+def test_a_table_in_use_is_not_changed():
+    machine = homed()
+    table(machine, segments=1)
+    machine.poll(4)
+    assert machine.request("set_segments", **block())[0] == "segments_in_use"
+    for name in ("segment_count", "segment_length", "segment_first"):
+        assert refused(machine, name, 1) == "segments_in_use"
+    assert look(machine) == (30, 1, "ok")
+
+
+def test_points_out_of_order_too_many_or_too_large_are_refused():
+    machine = homed()
+    assert machine.request("set_segments", **block(border=12))[0] == "out_of_range"
+    machine.ask("set_segments", **block(points=12))
+    for wrong in (block(border=11), block(border=13), block(border=12, points=13), block(border=12, point=1 << 23)):
+        assert machine.request("set_segments", **wrong)[0] == "out_of_range"
+    for border in range(12, 252, 12):
+        machine.ask("set_segments", **block(point=-(1 << 23) + 1, border=border, points=12))
+    assert machine.request("set_segments", **block(border=252, points=5))[0] == "out_of_range"
+    machine.ask("set_segments", **block(border=252, points=4))
+    assert look(machine)[0] == 256
+
+
+def test_a_node_without_a_table_says_so():
+    machine = homed()
+    machine.gratings[0].most_segments = 0
+    assert machine.request("set_segments", **block())[0] == "not_built"
+    assert refused(machine, "segments", 1) == "not_built" and refused(machine, "segments", 0) == "ok"
+
+
+def test_points_have_their_sign():
+    machine = homed()
+    table(machine, [-1, (1 << 23) - 1, -(1 << 23) + 1])
+    assert [machine.gratings[0].segments[n] for n in range(3)] == [-1, (1 << 23) - 1, -(1 << 23) + 1]

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""S0's segment table in the node: a scale that is long by 20 ppm, bends every 1.5 mm and wanders is measured against the true place at
+equal distances, the table is loaded, and what is left of the error is what theory says.
+
+Between borders h apart straight lines leave at most h^2 / 8 times the curvature of the error, and a step of the walk there; the
+rectangle leaves half of what the error changes from border to border besides.
+"""
+import math
+import random
+
+import pytest
+
+from moire.client import Line
+from moire.errors import Refused
+from moire.segments import Segments, SegmentTable
+from twin import START_S, WITH_SEGMENTS, Twin, TwinTransport
+
+CYCLIC, PITCH, WALK = 150e-9, 1.5e-3, 10e-9
+SCALE = dict(scale_linear=20e-6, scale_cyclic=CYCLIC, scale_pitch=PITCH, scale_walk=WALK)
+IDEAL = dict(signal_offset_sin=0, signal_offset_cos=0, signal_gain_cos=1, signal_phase_error=0)     # other tests have the learner
+SEGMENTS, LENGTH_NM = 10, 200_000
+NOISE_NM = 6                        # of a position that is read, and of the two borders beside it
+CURVED_NM = LENGTH_NM**2 / 8 * CYCLIC * 1e9 * (2 * math.pi / PITCH / 1e9) ** 2
+
+
+class Stage:
+    def __init__(self, twin):
+        self.machine, self.axis = twin.machine(), Line(TwinTransport(twin), random_source=random.Random(1)).axis(1)
+        self.axis.node.line.transport.wait(START_S)
+        self.segments = Segments(self.axis)
+        self.axis.enable()
+        self.axis.home()
+        self.zero_nm = 0.0
+        self.zero_nm = self.true_nm() - self.axis.status().position_nm
+
+    def true_nm(self):
+        return self.machine.state.position_m * 1e9 - self.zero_nm
+
+    def error_nm(self, target_nm=None):
+        """Position as told less the true one, at a target or here."""
+        if target_nm is not None:
+            self.axis.move(nm=target_nm)
+        told = [(self.axis.status().position_nm, self.true_nm()) for _ in range(4)]
+        return sum(position - true for position, true in told) / len(told)
+
+
+@pytest.fixture(scope="module")
+def stage():
+    with Twin(nodes=(1,), plant={**SCALE, **IDEAL}, node_parameters=WITH_SEGMENTS) as twin:
+        yield Stage(twin)
+
+
+@pytest.fixture(scope="module")
+def table(stage):
+    return SegmentTable(0, LENGTH_NM, tuple(stage.error_nm(n * LENGTH_NM) for n in range(SEGMENTS + 1)))
+
+
+def targets(way):
+    """Between the borders, in one direction."""
+    places = [(n + share) * LENGTH_NM for n in (0, 4, 9) for share in (0.25, 0.6)]
+    return places if way > 0 else places[::-1]
+
+
+def left_nm(stage, way):
+    stage.axis.move(nm=0 if way > 0 else SEGMENTS * LENGTH_NM)
+    return {target: stage.error_nm(target) for target in targets(way)}
+
+
+def test_the_scale_is_as_wrong_as_it_was_made(table):
+    assert max(map(abs, table.errors)) > 100 and abs(table.errors[0]) < NOISE_NM
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_straight_lines_leave_what_theory_says_in_both_directions(stage, table, way):
+    assert stage.segments.load(table, "linear").in_force == "linear"
+    for target, left in left_nm(stage, way).items():
+        assert abs(left) <= CURVED_NM + NOISE_NM, f"{left:.1f} nm at {target} nm"
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_the_rectangle_leaves_half_a_step_more_in_both_directions(stage, table, way):
+    assert stage.segments.load(table, "rectangle").in_force == "rectangle"
+    for target, left in left_nm(stage, way).items():
+        low = table.errors[int(target // LENGTH_NM)]
+        high = table.errors[int(target // LENGTH_NM) + 1]
+        share = target / LENGTH_NM % 1 - 0.5
+        assert abs(left - (high - low) * share) <= CURVED_NM + NOISE_NM, f"{left:.1f} nm at {target} nm"
+
+
+def test_coming_into_force_the_stage_stays_and_its_position_is_told_on_the_other_scale(stage, table):
+    stage.segments.load(table, "linear")
+    stage.segments.use("off")
+    error = stage.error_nm(3.5 * LENGTH_NM)
+    assert abs(error) > 30
+    for use, told in (("linear", 0), ("off", error), ("rectangle", 0), ("off", error)):
+        before = stage.true_nm()
+        stage.segments.use(use)
+        assert abs(stage.true_nm() - before) < NOISE_NM
+        assert abs(stage.error_nm() - told) < CURVED_NM + NOISE_NM + (use == "rectangle") * 5
+        status = stage.axis.status()
+        assert abs(status.target_nm - status.position_nm) < NOISE_NM and status.state == "holding"
+
+
+def test_a_homing_begins_without_the_table_and_finds_the_same_zero(stage, table):
+    stage.segments.load(table, "linear")
+    stage.error_nm(0.5 * LENGTH_NM)
+    stage.axis.home()
+    assert stage.segments.use("linear").in_force == "linear"
+    assert abs(stage.error_nm()) < NOISE_NM and abs(stage.error_nm(2.5 * LENGTH_NM)) < CURVED_NM + NOISE_NM
+
+
+def test_a_table_in_use_is_refused_a_change_and_a_moving_axis_too(stage, table):
+    stage.segments.load(table, "linear")
+    seconds = stage.axis.begin_move(mm=1.5)
+    assert seconds > 0.1
+    with pytest.raises(Refused, match="moving"):
+        stage.segments.use("off")
+    stage.axis.wait()
+    with pytest.raises(Refused, match="in use"):
+        stage.axis.write_parameter("segment_count", 3)
+    assert stage.segments.status().in_force == "linear"
