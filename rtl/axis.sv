@@ -12,7 +12,7 @@ module axis #(
     parameter int W = 8,                        // bits of a sample
     parameter int DRIVES = 15,                  // see actuator
     parameter int FILTERS = 2,                  // of the servo, see biquad_cascade
-    parameter int SEGMENTS = 255,               // most segments of the scale's table, see grating
+    parameter int SEGMENTS = 0,                 // most segments of the scale's table, see grating
     parameter int SINE = 1                      // see grating
 ) (
     input  wire                  clk,

@@ -9,7 +9,7 @@
 
 module grating #(
     parameter int W = 8,                        // bits of a sample
-    parameter int SEGMENTS = 255,               // most segments of its table; 0: there is none
+    parameter int SEGMENTS = 0,                 // most segments of its table; 0: there is none
     parameter int SINE = 1                      // 0: nothing of sine and cosine is built, the position is made of counts
 ) (
     input  wire                  clk,

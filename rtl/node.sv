@@ -12,7 +12,7 @@ module node #(
     parameter int W = 8,                        // bits of a sample
     parameter int DRIVES = 15,                  // what each axis can drive, see actuator
     parameter int FILTERS = 2,                  // of each servo, see biquad_cascade
-    parameter int SEGMENTS = 255,               // most segments of each scale's table, see grating
+    parameter int SEGMENTS = 0,                 // most segments of each scale's table, see grating
     parameter int SINE = 1,                     // of each grating: 0 for A/B/Z only, see grating
     parameter int LINKS = 0,                    // what else it speaks to, see links
     parameter int MEMORY_BYTES = 98304,         // of the soft core, program and data

@@ -51,7 +51,7 @@ module top (
         else         {rst, wait_q} <= {wait_q != '1, wait_q + 8'(wait_q != '1)};
     end
 
-    node #(.CLK_HZ(CLK_HZ), .FIRMWARE("build/firmware/firmware.hex")) u_node (
+    node #(.CLK_HZ(CLK_HZ), .SEGMENTS(255), .FIRMWARE("build/firmware/firmware.hex")) u_node (
         .clk, .rst, .address, .estop_open,
         .line_rx(usb_rx & rs485_rx), .line_tx(usb_tx), .line_driver_enable(rs485_driver_enable),
         .encoder_a, .encoder_b, .encoder_z, .probe, .adc_sin, .adc_cos, .adc_cs_n, .adc_sclk, .limit_low_open, .limit_high_open,

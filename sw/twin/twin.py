@@ -28,7 +28,6 @@ CLK_HZ = 2_400_000
 START_S = 0.15                   # until the soft core of a node with one axis listens
 NODE = {"DRIVES": 1, "FILTERS": 0}     # what the stage of S0 needs of rtl/node.sv
 WITH_SEGMENTS = {**NODE, "SEGMENTS": 255}      # and with its segment table, which takes a fifteenth of the speed
-WITHOUT = {"SEGMENTS": 0}              # what no node has that does not ask for it
 BAUD = 115200
 BREAK_S = 0.003                  # the line low; nodes want 2 ms
 TURNAROUND_CELLS = 2             # the host hears a word half a cell before its end; the node's driver lets go half a cell after it
@@ -83,7 +82,7 @@ class LineState:
 
 
 def library(clk_hz, axes, node=None):
-    found = ctypes.CDLL(str(build.twin_library(clk_hz, axes, {**WITHOUT, **(node or {})})))
+    found = ctypes.CDLL(str(build.twin_library(clk_hz, axes, node)))
     declare(found, {**FUNCTIONS, **MACHINE_FUNCTIONS, **SURROUNDINGS_FUNCTIONS, **PEER_FUNCTIONS})
     return found
 

@@ -144,7 +144,7 @@ async def strobes_last_one_clk(dut):
         assert (await bus.write(r.word, WORD ^ 1 << f.low))[r.port(f)] == 0
     for r in (r for r in bus.block.registers if r.on_write):
         out = await bus.write(r.word + r.wide, 5 << min(f.low for f in r.fields))
-        assert out[f"{r.name}_written"] == 1 and out[r.port(r.fields[0])] == 5 * bus.there[r.fields[0]]
+        assert out[f"{r.name}_written"] == 1 and out[r.port(r.fields[0])] == (5 << 32 * r.wide) * bus.there[r.fields[0]]
         assert (await bus.clk())[f"{r.name}_written"] == 0
     for r in (r for r in bus.block.registers if r.on_read):
         dut.select.value, dut.write.value, dut.word.value = 1, 0, r.word
