@@ -9,6 +9,7 @@ import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from runpy import run_path
 from typing import NamedTuple
 
 import serial
@@ -73,12 +74,14 @@ def build_firmware_fuzz(folder: Path, image, firmware=FIRMWARE) -> Path:
     if shutil.which("gcc") is None:
         raise NotMeasured("gcc is missing: fuzzing the firmware needs its sanitizers")
     traced = ["-Dmain=firmware_main", "-fsanitize-coverage=trace-pc"]
+    axes = run_path(str(FIRMWARE / "build.py"))["AXES"].get(image)
+    served = [f"-DHARDWARE_AXES={axes}u"] if axes else []
     sources = set(Path(firmware).glob("*.c")) - set(Path(firmware).glob("image_*.c")) | {Path(firmware) / f"image_{image}.c"}
     jobs = [(path, traced) for path in sorted(sources)] + [(ROOT / "sw" / "experiments" / "firmware_fuzz.c", [])]
     objects = []
     for path, more in jobs:
         objects.append(folder / f"{path.stem}.o")
-        run(["gcc", *SANITIZED, *more, f"-I{firmware}", "-c", path, "-o", objects[-1]])
+        run(["gcc", *SANITIZED, *served, *more, f"-I{firmware}", "-c", path, "-o", objects[-1]])
     run(["gcc", "-fsanitize=address,undefined", *objects, "-o", folder / "fuzz"])
     return folder / "fuzz"
 

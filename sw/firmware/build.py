@@ -28,7 +28,7 @@ IMAGES = sorted(path.stem.removeprefix("image_") for path in HERE.glob("image_*.
 AXES = {"station": 2}                                               # most that an image serves, where it is not the default
 SMALL, FAST = "-Os", "-O2"
 HOT = ("arithmetic.c",)                                 # the others wait more than they work
-SLIM = ("learner", "parameters")                        # and these, as the parts of an image, have time to spare
+SLIM = ("learner",)                                     # as the parts of an image it has time to spare
 SHORT = ["-mllvm", "-inline-threshold=0", "-mllvm", "-enable-machine-outliner=always"]      # of them with zig: what repeats stands once
 ZIG = ["-target", "riscv32-freestanding-none", "-mcpu=generic_rv32+m-a-f-d-c", "-mabi=ilp32", "-fno-sanitize=all",
        "-fno-stack-protector"]

@@ -23,7 +23,7 @@
 
 static struct table {
     uint16_t loaded;                            // points
-    uint8_t use;                                // what it was put in force as
+    uint8_t use;                                // what it was put in force as; OFF once it was taken out
 } tables[HARDWARE_AXES];
 
 static unsigned axes;
@@ -63,6 +63,7 @@ void segments_start(unsigned served_axes)
     turn = 0;
     for (unsigned n = 0; n < axes; n++) {
         tables[n].loaded = 0;
+        tables[n].use = OFF;
         grating_write(n, GRATING_SEGMENT_USE, 0);
     }
 }
@@ -71,12 +72,17 @@ void segments_start(unsigned served_axes)
 void segments_work(void)
 {
     turn = turn + 1 < axes ? turn + 1 : 0;
+    if (wanted(turn) == OFF && tables[turn].use == OFF) return;         // as a rule
     if (axis_ended(turn) == LINE_CAUSE_RUNNING) return;
     bool homed = axis_flags(turn) & LINE_FLAG_HOMED;
     uint8_t now = in_force(turn), use = homed ? wanted(turn) : OFF;
     if (now == use) return;
-    if (now != OFF) grating_write(turn, GRATING_SEGMENT_USE, 0);
-    else if (reason(turn) == LINE_CAUSE_BUSY) put_in_force(turn, use);
+    if (now != OFF) {
+        grating_write(turn, GRATING_SEGMENT_USE, 0);
+        tables[turn].use = OFF;
+    } else if (reason(turn) == LINE_CAUSE_BUSY) {
+        put_in_force(turn, use);
+    }
 }
 
 static uint8_t segments(unsigned n)

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+import experiments
 from fake_node import CAUSE, ESTOP, FakeLine, FakeNode
 from moire import command_line, tune
 from moire.command_twin import MACHINES
@@ -367,7 +368,9 @@ def test_a_twin_that_does_not_build_is_exit_code_4(monkeypatch):
     def broken(_):
         raise RuntimeError("g++ is missing")
     monkeypatch.setitem(sys.modules, "twin", Broken)
-    monkeypatch.setitem(sys.modules, "experiments.machines", SimpleNamespace(MACHINES={"s0": broken}))
+    machines = SimpleNamespace(MACHINES={"s0": broken})
+    monkeypatch.setitem(sys.modules, "experiments.machines", machines)
+    monkeypatch.setattr(experiments, "machines", machines, raising=False)       # there once it was imported
     err = io.StringIO()
     assert command_line.main(["--port", "twin", "status"], err=err) == 4
     assert err.getvalue() == "moire: the simulated machine cannot be built: g++ is missing\n"

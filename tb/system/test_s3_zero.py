@@ -61,6 +61,7 @@ def test_methods_1_and_2_take_the_first_mark_behind_the_switch(motor, method, st
 
 @pytest.mark.parametrize(("method", "edge"), [(17, LOW), (18, HIGH)])
 def test_methods_17_and_18_take_the_place_where_the_switch_opens(motor, method, edge):
+    motor.axis.set_parameter("home_creep", "1mm/s")
     place = home(motor, method, edge * 0.7e-6)
     late = motor.axis.get_parameter("home_creep").value * 1000 * 2 / 1000       # um in the two ms until the firmware looks
     assert abs(place - edge) <= 2 + late
