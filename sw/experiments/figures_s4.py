@@ -70,8 +70,10 @@ def s4_index_arcsec_max(count=JOBS):
     """The host tells the table's node its stations, as the main node does in a job."""
     build.twin_library(s4_job.CLK_HZ, 1, {**s4_job.NODE, "LINKS": SENSOR})
     with bar("tables") as progress, ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
-        worst = list(progress.track(pool.map(indexed, range(1, count + 1)), total=count))
-    console.print(f"largest error of each table: {', '.join(f'{error:.2f}' for error in worst)} arcsec")
+        worst = []
+        for error in progress.track(pool.map(indexed, range(1, count + 1)), total=count):
+            worst.append(error)
+            progress.console.print(f"table {len(worst)}: at most {error:.2f} arcsec at {STATIONS} stations")
     return max(worst)
 
 
