@@ -9,7 +9,6 @@ import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from runpy import run_path
 from typing import NamedTuple
 
 import serial
@@ -19,6 +18,7 @@ from experiments.figures_common import Figure, console
 from moire import cobs
 from moire.errors import MoireError
 from moire.protocol import parse_reply, request_body
+from twin.build import firmware_tools
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "sw" / "firmware"
@@ -74,14 +74,13 @@ def build_firmware_fuzz(folder: Path, image, firmware=FIRMWARE) -> Path:
     if shutil.which("gcc") is None:
         raise NotMeasured("gcc is missing: fuzzing the firmware needs its sanitizers")
     traced = ["-Dmain=firmware_main", "-fsanitize-coverage=trace-pc"]
-    axes = run_path(str(FIRMWARE / "build.py"))["AXES"].get(image)
-    served = [f"-DHARDWARE_AXES={axes}u"] if axes else []
-    sources = set(Path(firmware).glob("*.c")) - set(Path(firmware).glob("image_*.c")) | {Path(firmware) / f"image_{image}.c"}
-    jobs = [(path, traced) for path in sorted(sources)] + [(ROOT / "sw" / "experiments" / "firmware_fuzz.c", [])]
+    tools = firmware_tools()
+    sources = [path for path in tools.sources_of(image, Path(firmware)) if path.suffix == ".c"]
+    jobs = [(path, traced) for path in sources] + [(ROOT / "sw" / "experiments" / "firmware_fuzz.c", [])]
     objects = []
     for path, more in jobs:
         objects.append(folder / f"{path.stem}.o")
-        run(["gcc", *SANITIZED, *served, *more, f"-I{firmware}", "-c", path, "-o", objects[-1]])
+        run(["gcc", *SANITIZED, *tools.defines_of(image), *more, f"-I{firmware}", "-c", path, "-o", objects[-1]])
     run(["gcc", "-fsanitize=address,undefined", *objects, "-o", folder / "fuzz"])
     return folder / "fuzz"
 

@@ -6,7 +6,6 @@ with its firmware, in the twin, where a person at the host resets them; and some
 The soak of 10^6 faults of the axis is `make soak K=guard`.
 """
 import random
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -17,7 +16,6 @@ from twin import START_S, Axis, Node, Twin, TwinTransport, build
 
 ROOT = Path(__file__).resolve().parents[2]
 DRIVER = Path(__file__).with_name("guard_run.cpp")
-FIRMWARE = ROOT / "sw" / "firmware"
 FAULTS, NODE_FAULTS, CORE_FAULTS = 10**4, 300, 100     # in all; of them in the node; of them in its soft core
 SHARE = 400                                            # of the axis' faults in one run, with a seed of its own
 CLK_HZ = 1_500_000
@@ -130,12 +128,7 @@ def node_faults(count, seed, done):
 def spoilt_firmware(instruction):
     """The firmware's words, with an instruction in the way of the request to reset faults."""
     words = list(build.firmware())
-    sys.path.insert(0, str(FIRMWARE))
-    try:
-        from build import load_segments
-    finally:
-        sys.path.remove(str(FIRMWARE))
-    _, symbols = load_segments((ROOT / "build" / "firmware" / "firmware.elf").read_bytes())
+    _, symbols = build.firmware_tools().load_segments((ROOT / "build" / "firmware" / "firmware.elf").read_bytes())
     words[symbols["axis_reset_faults"] // 4] = instruction
     return words
 

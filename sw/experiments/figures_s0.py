@@ -11,7 +11,7 @@ from experiments.synthesis import synthesise
 from moire.errors import LineError
 from moire.line_tables import PARAMETERS
 from moire.protocol import TO_NODE, Exchange, State, frame, parse_reply, read_words, ready_byte, request_body, write_words
-from twin import START_S, FrameBench, build, cells_of, realtime_factor
+from twin import FrameBench, build, cells_of, realtime_factor
 from twin.twin import CLK_HZ
 
 SEED = 1
@@ -118,7 +118,6 @@ def s0_bus_wrong(frames=100_000):
     """Each frame damaged on its way to the node, and the node's reply damaged on its way to the host. Every hundredth frame
     goes undamaged and must be accepted, so that the count of zero means something."""
     source, bench = random.Random(SEED), FrameBench(ADDRESS)
-    bench.idle(round(START_S * CLK_HZ))                    # the soft core starts: so many clk, whatever their rate
     wrong = wrong_host = lost = good = 0
     last, bodies = None, requests(source)
     with bar("damaged frames") as progress:

@@ -406,6 +406,11 @@ uint8_t axis_ended(unsigned n)
     return axes[n].ended;
 }
 
+bool axis_homed(unsigned n)
+{
+    return axes[n].homed;
+}
+
 uint8_t axis_flags(unsigned n)
 {
     const struct axis *a = &axes[n];

@@ -27,5 +27,6 @@ uint8_t axis_set_parameter(unsigned n, uint8_t id, int64_t value);
 uint8_t axis_state(unsigned n);         // a line_state
 uint8_t axis_ended(unsigned n);         // a line_cause
 uint8_t axis_flags(unsigned n);         // line_flag bits
+bool axis_homed(unsigned n);
 
 #endif

@@ -28,8 +28,7 @@ IMAGES = sorted(path.stem.removeprefix("image_") for path in HERE.glob("image_*.
 AXES = {"station": 2}                                               # most that an image serves, where it is not the default
 SMALL, FAST = "-Os", "-O2"
 HOT = ("arithmetic.c",)                                 # the others wait more than they work
-SLIM = ("learner",)                                     # as the parts of an image it has time to spare
-SHORT = ["-mllvm", "-inline-threshold=0", "-mllvm", "-enable-machine-outliner=always"]      # of them with zig: what repeats stands once
+OUTLINE = ["-mllvm", "-enable-machine-outliner=always"] # of them with zig: instructions that repeat stand once
 ZIG = ["-target", "riscv32-freestanding-none", "-mcpu=generic_rv32+m-a-f-d-c", "-mabi=ilp32", "-fno-sanitize=all",
        "-fno-stack-protector"]
 GNU = ["-march=rv32im", "-misa-spec=2.2", "-mabi=ilp32", "-nostdlib", "-nostartfiles",
@@ -88,21 +87,20 @@ def image(segments, memory):
     return bytes(words), used
 
 
-def sources_of(name):
+def sources_of(name, folder=HERE):
     """All of the folder but the lists of the other images."""
-    others = {path for path in HERE.glob("image_*.c") if path.name != f"image_{name}.c"}
-    return sorted(set(HERE.glob("*.[chS]")) - others)
+    others = {path for path in folder.glob("image_*.c") if path.name != f"image_{name}.c"}
+    return sorted(set(folder.glob("*.[chS]")) - others)
 
 
-def parts_of(name):
-    """What the list of an image names."""
-    return set(re.findall(r'#include "(\w+)\.h"', (HERE / f"image_{name}.c").read_text()))
+def defines_of(name):
+    return [f"-DHARDWARE_AXES={AXES[name]}u"] if name in AXES else []
 
 
-def flags_of(path, parts):
+def flags_of(path):
     if path.name in HOT:
         return [FAST]
-    return [SMALL, *SHORT] if (path.stem in parts or path.stem in SLIM) and not os.environ.get("CROSS") else [SMALL]
+    return [SMALL] if os.environ.get("CROSS") else [SMALL, *OUTLINE]
 
 
 def fingerprint(sources, command, memory):
@@ -122,8 +120,7 @@ def run(command):
 
 def build(memory, out, force, name="axis"):
     command, libraries = compiler()
-    if name in AXES:
-        command += [f"-DHARDWARE_AXES={AXES[name]}u"]
+    command += defines_of(name)
     sources = [*sources_of(name), HERE / "link.ld", HERE / "build.py"]
     stem = "firmware" if name == "axis" else name
     elf, binary, text, note = (out / f"{stem}.{end}" for end in ("elf", "bin", "hex", "note"))
@@ -140,8 +137,7 @@ def build(memory, out, force, name="axis"):
     script.write_text(f"MEMORY_BYTES = {memory};\n" + (HERE / "link.ld").read_text())
     with tempfile.TemporaryDirectory(dir=out) as folder:
         objects = [Path(folder) / f"{path.name}.o" for path in inputs]
-        parts = parts_of(name)
-        compiled = [[*command, *FLAGS, *flags_of(path, parts), "-c", str(path), "-o", str(made)]
+        compiled = [[*command, *FLAGS, *flags_of(path), "-c", str(path), "-o", str(made)]
                     for path, made in zip(inputs, objects, strict=True)]
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             list(pool.map(run, compiled))

@@ -44,7 +44,7 @@ static uint8_t reason(unsigned n)
 {
     if (wanted(n) == in_force(n)) return LINE_CAUSE_OK;
     if (tables[n].loaded <= parameters_get(n, LINE_PARAMETER_SEGMENT_COUNT)) return LINE_CAUSE_NO_SEGMENTS;
-    return axis_flags(n) & LINE_FLAG_HOMED ? LINE_CAUSE_BUSY : LINE_CAUSE_NOT_HOMED;
+    return axis_homed(n) ? LINE_CAUSE_BUSY : LINE_CAUSE_NOT_HOMED;
 }
 
 static void put_in_force(unsigned n, uint8_t use)
@@ -74,8 +74,7 @@ void segments_work(void)
     turn = turn + 1 < axes ? turn + 1 : 0;
     if (wanted(turn) == OFF && tables[turn].use == OFF) return;         // as a rule
     if (axis_ended(turn) == LINE_CAUSE_RUNNING) return;
-    bool homed = axis_flags(turn) & LINE_FLAG_HOMED;
-    uint8_t now = in_force(turn), use = homed ? wanted(turn) : OFF;
+    uint8_t now = in_force(turn), use = axis_homed(turn) ? wanted(turn) : OFF;
     if (now == use) return;
     if (now != OFF) {
         grating_write(turn, GRATING_SEGMENT_USE, 0);

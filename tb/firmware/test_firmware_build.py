@@ -7,7 +7,8 @@ import sys
 
 import pytest
 
-from host_firmware import SOURCE, tools
+from host_firmware import SOURCE
+from twin.build import firmware_tools
 
 MEMORY = 98304
 
@@ -18,7 +19,7 @@ def build(out, *options, **environment):
 
 
 def functions(elf):
-    return set(tools().load_segments(elf.read_bytes())[1])
+    return set(firmware_tools().load_segments(elf.read_bytes())[1])
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """The links of nodes in the twin, pin by pin: the RTL between a program that hands its registers out and what stands around it."""
-import importlib.util
 import math
 import struct
 
@@ -9,7 +8,7 @@ import pytest
 from conftest import SOFTWARE
 from moire.client import Line
 from moire.registers import BY_NAME
-from twin import Axis, Node, Surroundings, Twin, TwinTransport
+from twin import Axis, Node, Surroundings, Twin, TwinTransport, build
 
 ARC_SECOND = math.pi / 180 / 3600
 CUT_S, WRITE_S = 0.3, 0.05       # the bridge is slow
@@ -21,9 +20,7 @@ EEPROM, KEYPAD, DISPLAY = 0x50, 0x34, 0x27
 @pytest.fixture(scope="module")
 def program(tmp_path_factory):
     """Words of links_bridge.c, made by the firmware's own tools."""
-    spec = importlib.util.spec_from_file_location("firmware_build", SOFTWARE / "firmware" / "build.py")
-    tools = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(tools)
+    tools = build.firmware_tools()
     folder, memory = tmp_path_factory.mktemp("program"), 4 * 4096
     command, libraries = tools.compiler()
     script, elf = folder / "link.ld", folder / "bridge.elf"

@@ -245,7 +245,6 @@ def test_a_firmware_file_is_read_with_its_addresses(tmp_path):
 
 def test_the_frame_bench_gives_the_answers_of_the_twin():
     bench = FrameBench(address=1)
-    bench.idle(120_000)                  # the firmware starts
     question = cells_of([ASK[1]])
     assert bench.exchange(question) == empty_reply(1)
     for cell in range(1, 10):

@@ -137,6 +137,11 @@ def text_of(table: SegmentTable) -> str:
     return "\n".join(["position / mm, error / nm", *lines, ""])
 
 
+def check_use(use: str):
+    if use not in USES:
+        raise OutOfRange(f"a segment table has no use '{use}': known are {', '.join(USES)}")
+
+
 class Segments:
     """The segment table of an Axis."""
 
@@ -152,8 +157,7 @@ class Segments:
     def use(self, use: str) -> SegmentStatus:
         """"off", "rectangle" or "linear", at once for an axis that rests; its position is then told on the other scale, and its target
         with it. What is not in force yet says why."""
-        if use not in USES:
-            raise OutOfRange(f"a segment table has no use '{use}': known are {', '.join(USES)}")
+        check_use(use)
         self.axis.set_parameter("segments", use)
         end = self.axis.transport.now() + PATIENCE_S
         while (status := self.status()).reason == "busy" and self.axis.transport.now() < end:
@@ -193,8 +197,7 @@ class Segments:
         self.check_points(points)
         geometry = {"segment_count": table.segments, "segment_length": table.length, "segment_first": table.first - self.zero()}
         counts = {name: axis.parameter_counts(name, value) for name, value in geometry.items()}
-        if use not in USES:
-            raise OutOfRange(f"a segment table has no use '{use}': known are {', '.join(USES)}")
+        check_use(use)
         self.write_points(points)
         for name, count in counts.items():
             axis.write_parameter(name, count)
