@@ -7,9 +7,16 @@ from experiments import s0_fine, s2_stage, s3_zero, s4_job
 from experiments.s0_stage import ADDRESSES
 from twin import WITH_SEGMENTS, Twin
 
+
+def fine_stage(seed):
+    stage = s0_fine.FineStage.power_up(seed)
+    stage.switch_fine_on("X")
+    return stage.twin
+
+
 MACHINES = {
     "s0": lambda seed, nodes=tuple(ADDRESSES.values()): Twin(nodes=nodes, seed=seed, node_parameters=WITH_SEGMENTS),
-    "s0_fine": lambda seed: s0_fine.FineStage.power_up(seed).twin,
+    "s0_fine": fine_stage,
     "s2": lambda seed: s2_stage.Stage.power_up(seed).twin,
     "s3": lambda seed: s3_zero.Motor(seed).twin,
     "s4": lambda seed: s4_job.IndexingMachine(seed).twin,

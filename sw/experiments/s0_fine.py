@@ -67,12 +67,15 @@ class FineStage(Stage):
         self.home(name)
         learned = self.learn_ellipse(name)
         self.home(name)
-        for parameter, value in FINE.items():
-            axis.set_parameter(parameter, value)
+        self.switch_fine_on(name)
         axis.move(0, progress=self.keep(name))
         self.sine_zero_nm[name] = self.zero_nm[name]
         self.zero_nm[name] += float(np.mean(self.watch(name, ZERO_S)["true_nm"]))
         return learned
+
+    def switch_fine_on(self, name):
+        for parameter, value in FINE.items():
+            self.axes[name].set_parameter(parameter, value)
 
     def machine(self, name):
         return self.twin.machine(list(self.axes).index(name))

@@ -14,7 +14,9 @@ def test_the_machines_that_are_told_are_those_that_are_made():
 
 
 @pytest.mark.parametrize(("machine", "entrance", "axes", "place", "way", "near_nm"), [
-    ("s2", "rfc2217", {1: 3}, ("--axis", "2"), "200um", 1000), ("s3", "tcp", {1: 1}, (), "100um", 1000),
+    ("s0_fine", "tcp", {1: 1}, (), "100um", 3),
+    ("s2", "rfc2217", {1: 3}, ("--axis", "2"), "200um", 1000),
+    ("s3", "tcp", {1: 1}, (), "100um", 1000),
     ("s4", "terminal", {1: 1, 2: 1}, ("--address", "2"), "200um", 1000)])
 def test_every_machine_is_found_and_moved_by_a_client(machine, entrance, axes, place, way, near_nm):
     with served("--machine", machine) as ports:
