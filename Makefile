@@ -50,13 +50,14 @@ prove: $(SETUP)   ## the properties in the modules that carry any; K=part of a p
 	$(call say,proofs)
 	@$(PYTHON) tools/prove.py $(if $K,-k '$K') -j $(JOBS)
 
-LATE := tables/commands.py tables/modules.py    # they read what the others make
+LATE       := tables/commands.py tables/modules.py    # they read what the others make
+GENERATORS := $(filter-out tables/made_files.py $(LATE),$(sort $(wildcard tables/*.py))) $(LATE)
 tables: $(SETUP)  ## write the made files again: registers, line, tables of numbers, the list of modules
-	@for table in $(filter-out $(LATE),$(sort $(wildcard tables/*.py))) $(LATE); do $(PYTHON) $$table || exit 1; done
+	@for table in $(GENERATORS); do $(PYTHON) $$table || exit 1; done
 
 fresh: $(SETUP)
 	$(call say,made files are fresh)
-	@stale=0; for table in $(sort $(wildcard tables/*.py)); do $(PYTHON) $$table --check || stale=1; done; exit $$stale
+	@stale=0; for table in $(GENERATORS); do $(PYTHON) $$table --check || stale=1; done; exit $$stale
 
 firmware: $(SETUP)   ## the soft core's program, build/firmware/firmware.hex
 	@$(PYTHON) sw/firmware/build.py --out build/firmware

@@ -1,16 +1,13 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Make rtl/interpolate/arctan_rom.sv: the arc tangent of one octant as 128 chords, in 1/32 LSB of a 16-bit phase.
-
-    python3 tables/arctan.py            write the file again
-    python3 tables/arctan.py --check    stop when the committed file is stale
-    python3 tables/arctan.py --bound    print how far arctan_table may be from the true phase, in LSB
 
 For a ratio r = (i + f / 2^FRACTION) / 2^INDEX from 0 to 1, phase = floor((base[i] + slope[i] * f / 2^FRACTION) / 2^GUARD).
 """
 import math
 import sys
 from pathlib import Path
+
+import made_files
 
 PHASE = 16                              # bits of a phase; 2^PHASE = one period
 INDEX = 7                               # bits of the ratio that choose the chord
@@ -70,17 +67,9 @@ endmodule
 """
 
 
-def main(arguments):
-    if arguments == ["--bound"]:
-        print(f"{BOUND:.4f}")
-    elif arguments == ["--check"]:
-        if not MADE.exists() or MADE.read_text() != text():
-            sys.exit(f"{MADE.relative_to(MADE.parents[2])} is stale: run python3 tables/arctan.py")
-    elif arguments:
-        sys.exit(__doc__)
-    else:
-        MADE.write_text(text())
+def main(arguments=None) -> int:
+    return made_files.main(__doc__, lambda: {MADE: text()}, arguments, lambda: f"{BOUND:.4f}")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    sys.exit(main())

@@ -1,10 +1,5 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Make rtl/interpolate/arctan_rotation_rom.sv: the angles by which arctan_pipelined and arctan_iterative turn, 2^-48 turn each.
-
-    python3 tables/arctan_rotation.py            write the file again
-    python3 tables/arctan_rotation.py --check    stop when the committed file is stale
-    python3 tables/arctan_rotation.py --bound    print for each width how far a phase may be from the true one, in LSB
 
 Of the two legs of a vector the longer is turned to become the amplitude, the shorter until it is gone. Digit i turns by
 atan(2^-i) up to i = TURNS. Then q = shorter / longer is below h = 2^-TURNS, the longer leg stays, and digit i means 2^-i of q:
@@ -14,6 +9,8 @@ import math
 import sys
 from fractions import Fraction
 from pathlib import Path
+
+import made_files
 
 PHASE = 16                              # bits of a phase; 2^PHASE = one turn
 UNIT = 48                               # the made angles are in 2^-UNIT turn
@@ -141,18 +138,14 @@ endmodule
 """
 
 
-def main(arguments):
-    if arguments == ["--check"]:
-        if not MADE.exists() or MADE.read_text() != text():
-            sys.exit(f"{MADE.relative_to(MADE.parents[2])} is stale: run python3 tables/arctan_rotation.py")
-    elif arguments == ["--bound"]:
-        for w in PIPELINED:
-            print(f"{w} bits: pipelined {quarter_bound(PIPELINED, w):.3f}, iterative {quarter_bound(ITERATIVE, w):.3f}")
-    elif arguments:
-        sys.exit(__doc__)
-    else:
-        MADE.write_text(text())
+def bounds():
+    return "\n".join(f"{w} bits: pipelined {quarter_bound(PIPELINED, w):.3f}, iterative {quarter_bound(ITERATIVE, w):.3f} LSB"
+                     for w in PIPELINED)
+
+
+def main(arguments=None) -> int:
+    return made_files.main(__doc__, lambda: {MADE: text()}, arguments, bounds)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    sys.exit(main())

@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Makes docs/commands, one page a command of `moire`, of the parser of the command line.
-
-python tables/commands.py            writes what is stale
-python tables/commands.py --check    writes nothing; exit code 1 when something is stale
-"""
+"""Makes docs/commands, one page a command of `moire`, of the parser of the command line."""
 import argparse
 import sys
 from pathlib import Path
+
+import made_files
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ROOT / "docs" / "commands"
@@ -75,26 +73,14 @@ def pages() -> dict:
     return {PAGES / "README.md": first_page(parser), **{PAGES / f"{name}.md": page(name, made) for name, made in below(parser).items()}}
 
 
-def main(words_given=None) -> int:
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--check", action="store_true", help="write nothing, exit with 1 when a page is stale")
-    check, stale, made = options.parse_args(words_given).check, 0, pages()
-    old = set(PAGES.glob("*.md")) - set(made)
-    for path, text in [*made.items(), *((path, None) for path in sorted(old))]:
-        if path.exists() and path.read_text(encoding="utf-8") == text:
-            continue
-        stale += 1
-        name = path.relative_to(ROOT)
-        if check:
-            print(f"{name} is stale: run python tables/commands.py", file=sys.stderr)
-        elif text is None:
-            path.unlink()
-            print(f"removed {name}")
-        else:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8", newline="\n")
-            print(f"made {name}")
-    return 1 if check and stale else 0
+def made() -> dict:
+    """{path: text}, None of a page whose command is gone."""
+    wanted = pages()
+    return wanted | dict.fromkeys(set(PAGES.glob("*.md")) - set(wanted))
+
+
+def main(arguments=None) -> int:
+    return made_files.main(__doc__, made, arguments)
 
 
 if __name__ == "__main__":

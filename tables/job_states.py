@@ -1,14 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The picture of the job's states in docs/job.md, made of the table of transitions in sw/firmware/job.c; and the rules it keeps.
-
-python tables/job_states.py            writes the picture when it is stale
-python tables/job_states.py --check    writes nothing; exit code 1 when it is stale
-"""
-import argparse
+"""The picture of the job's states in docs/job.md, made of the table of transitions in sw/firmware/job.c; and the rules it keeps."""
 import re
 import sys
 import tomllib
 from pathlib import Path
+
+import made_files
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "sw" / "firmware" / "job.c"
@@ -88,17 +85,7 @@ def made():
 
 
 def main(arguments=None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--check", action="store_true", help="write nothing, exit with 1 when the picture is stale")
-    only_check, text = parser.parse_args(arguments).check, made()
-    if PAGE.read_text(encoding="utf-8") == text:
-        return 0
-    if only_check:
-        print("docs/job.md is stale: run python tables/job_states.py", file=sys.stderr)
-        return 1
-    PAGE.write_text(text, encoding="utf-8", newline="\n")
-    print("made docs/job.md")
-    return 0
+    return made_files.main(__doc__, lambda: {PAGE: made()}, arguments)
 
 
 if __name__ == "__main__":

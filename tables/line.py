@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Makes of line.toml the firmware's header, the host's tables and the made parts of the protocol page.
-
-python tables/line.py            writes what is stale
-python tables/line.py --check    writes nothing; exit code 1 when something is stale
-"""
-import argparse
+"""Makes of line.toml the firmware's header, the host's tables and the made parts of the protocol page."""
 import re
 import sys
 import tomllib
 import zlib
 from fractions import Fraction
 from pathlib import Path
+
+import made_files
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "tables" / "line.toml"
@@ -326,27 +323,13 @@ def page(line: Line, text: str) -> str:
 
 # ------------------------------------------------------------------ command line
 
-def made_files(line: Line) -> dict:
+def made() -> dict:
+    line = Line(SOURCE.read_bytes())
     return {HEADER: header(line), HOST: host(line), PAGE: page(line, PAGE.read_text(encoding="utf-8"))}
 
 
 def main(arguments=None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--check", action="store_true", help="write nothing, exit with 1 when a made file is stale")
-    check = parser.parse_args(arguments).check
-    stale = 0
-    for path, text in made_files(Line(SOURCE.read_bytes())).items():
-        if path.exists() and path.read_text(encoding="utf-8") == text:
-            continue
-        stale += 1
-        name = path.relative_to(ROOT)
-        if check:
-            print(f"{name} is stale: run python tables/line.py", file=sys.stderr)
-        else:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8", newline="\n")
-            print(f"made {name}")
-    return 1 if check and stale else 0
+    return made_files.main(__doc__, made, arguments)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of modules in rtl/README.md, made of the modules' own headers; and the rules that every module keeps.
-
-python tables/modules.py [--check]        --check writes nothing and refuses a stale table
-"""
+"""The table of modules in rtl/README.md, made of the modules' own headers; and the rules that every module keeps."""
 import re
 import sys
 from pathlib import Path
+
+import made_files
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "rtl" / "README.md"
@@ -83,28 +82,23 @@ def row(path, wrong):
     return [room, f"[{path.stem}]({place})", *(facts.get(c, "") for c in COLUMNS[2:7]), link(model), link(test)]
 
 
-def main():
-    if sys.argv[1:] not in ([], ["--check"]):
-        sys.exit(__doc__.strip())
+def made() -> dict:
     wrong = []
     rows = [row(p, wrong) for p in sorted((ROOT / "rtl").rglob("*.sv"), key=lambda p: (p.parent != ROOT / "rtl", p))]
     if wrong:
-        sys.exit("\n".join(wrong))
+        raise ValueError("\n".join(wrong))
     cell = lambda text: text.replace("|", "\\|")
     table = ["| " + " | ".join(COLUMNS) + " |", "|" + " --- |" * len(COLUMNS)] + ["| " + " | ".join(map(cell, r)) + " |" for r in rows]
-    page = PAGE.read_text() if PAGE.exists() else f"{BEGIN}\n{END}\n"
-    before, begin, rest = page.partition(BEGIN)
-    old, end, after = rest.partition(END)
+    before, begin, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
+    _, end, after = rest.partition(END)
     if not begin or not end:
-        sys.exit(f"rtl/README.md must have the marks {BEGIN} and {END}, in this order")
-    new = f"{before}{BEGIN}\n" + "\n".join(table) + f"\n{END}{after}"
-    if new == page and PAGE.exists():
-        return
-    if sys.argv[1:]:
-        sys.exit("stale, run `make tables`: rtl/README.md")
-    PAGE.write_text(new)
-    print("made rtl/README.md")
+        raise ValueError(f"rtl/README.md must have the marks {BEGIN} and {END}, in this order")
+    return {PAGE: f"{before}{BEGIN}\n" + "\n".join(table) + f"\n{END}{after}"}
+
+
+def main(arguments=None) -> int:
+    return made_files.main(__doc__, made, arguments)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -1,9 +1,5 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Make rtl/control/profile_program.sv: what profile_player does between two ticks, one addition or subtraction a clk.
-
-    python3 tables/profile_program.py            write the file again
-    python3 tables/profile_program.py --check    stop when the committed file is stale
 
 A line is  TERMS [>> 1] [-> WORD] [; JOB [LABEL]]. TERMS are `acc`, the sum of the line before, and one place with + or -, or with
 `along` (+ if upward, else -) or `against` (the reverse). The sum goes to acc, halved with >> 1, and unhalved to a word. A condition
@@ -12,6 +8,8 @@ A line is  TERMS [>> 1] [-> WORD] [; JOB [LABEL]]. TERMS are `acc`, the sum of t
 import re
 import sys
 from pathlib import Path
+
+import made_files
 
 MADE = Path(__file__).resolve().parent.parent / "rtl" / "control" / "profile_program.sv"
 
@@ -224,15 +222,9 @@ endmodule
 """])
 
 
-def main(arguments):
-    if arguments == ["--check"]:
-        if not MADE.exists() or MADE.read_text() != text():
-            sys.exit(f"{MADE.relative_to(MADE.parents[2])} is stale: run python3 tables/profile_program.py")
-    elif arguments:
-        sys.exit(__doc__)
-    else:
-        MADE.write_text(text())
+def main(arguments=None) -> int:
+    return made_files.main(__doc__, lambda: {MADE: text()}, arguments)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    sys.exit(main())

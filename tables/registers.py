@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Everything that is made of tables/registers.rdl: the register blocks, the C header, the Python table and the page.
-
-python tables/registers.py [--check]        --check writes nothing and refuses stale files
-"""
+"""Everything that is made of tables/registers.rdl: the register blocks, the C header, the Python table and the page."""
 import sys
 import textwrap
 import zlib
@@ -12,6 +9,8 @@ from pathlib import Path
 
 from systemrdl import RDLCompileError, RDLCompiler
 from systemrdl.node import FieldNode, RegNode
+
+import made_files
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "tables" / "registers.rdl"
@@ -88,8 +87,9 @@ class Block:
         return sorted({f.needs for _, f in self.fields if f.needs})
 
 
-class Refused(Exception):
-    pass
+class Refused(ValueError):
+    def __init__(self, why):
+        super().__init__(f"tables/registers.rdl: {why}")
 
 
 def words(text):
@@ -529,25 +529,13 @@ def files():
     return made
 
 
-def main():
-    if sys.argv[1:] not in ([], ["--check"]):
-        sys.exit(__doc__.strip())
+def main(arguments=None) -> int:
     try:
-        made = files()
+        return made_files.main(__doc__, files, arguments)
     except RDLCompileError:                                 # the compiler has said where and why
-        sys.exit("tables/registers.rdl is not right: nothing was made")
-    except Refused as why:
-        sys.exit(f"tables/registers.rdl: {why}")
-    stale = [p for p, text in made.items() if not p.exists() or p.read_text() != text]
-    if sys.argv[1:]:
-        if stale:
-            sys.exit("stale, run `make tables`: " + ", ".join(str(p.relative_to(ROOT)) for p in stale))
-        return
-    for path in stale:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(made[path])
-        print("made", path.relative_to(ROOT))
+        print("tables/registers.rdl is not right: nothing was made", file=sys.stderr)
+        return 1
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -24,7 +24,6 @@ def test_the_made_pages_are_fresh_and_there_is_one_for_each_command():
 
 
 def test_a_stale_page_and_one_of_no_command_are_found_and_put_right(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(generator, "ROOT", tmp_path)
     monkeypatch.setattr(generator, "PAGES", tmp_path / "commands")
     assert generator.main([]) == 0 and generator.main(["--check"]) == 0
     (tmp_path / "commands" / "move.md").write_text("edited")

@@ -40,7 +40,6 @@ def test_a_stale_file_is_found_named_and_made_again(tmp_path, monkeypatch, capsy
         (tmp_path / name).write_text(text, encoding="utf-8")
         monkeypatch.setattr(generator, name, tmp_path / name)
     monkeypatch.setattr(generator, "HEADER", copy)
-    monkeypatch.setattr(generator, "ROOT", tmp_path)
     assert generator.main(["--check"]) == 1 and "line_protocol.h is stale" in capsys.readouterr().err
     assert generator.main([]) == 0 and "made" in capsys.readouterr().out
     assert generator.main(["--check"]) == 0
@@ -118,11 +117,14 @@ def test_a_compiler_reads_the_header_and_gets_the_same_numbers(tmp_path):
         (('[1,  "the node', '[2,  "the node'), "cause codes repeat"),
     ],
 )
-def test_a_wrong_table_is_refused_by_name(change, said):
+def test_a_wrong_table_is_refused_by_name_in_one_line(change, said, tmp_path, monkeypatch, capsys):
     text = SOURCE.read_text(encoding="utf-8")
     assert change[0] in text
-    with pytest.raises(ValueError, match=said):
-        generator.Line(text.replace(*change, 1).encode())
+    monkeypatch.setattr(generator, "SOURCE", tmp_path / "line.toml")
+    generator.SOURCE.write_text(text.replace(*change, 1), encoding="utf-8")
+    assert generator.main([]) == 1
+    told = capsys.readouterr()
+    assert said in told.err and told.err.count("\n") == 1 and not told.out
 
 
 def test_a_page_without_its_marks_is_refused():

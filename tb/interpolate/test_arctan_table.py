@@ -141,14 +141,10 @@ def test_the_committed_table_is_fresh():
 def test_a_changed_table_is_refused(tmp_path, monkeypatch):
     stale = tmp_path / "rtl" / "interpolate" / "arctan_rom.sv"
     monkeypatch.setattr(arctan, "MADE", stale)
-    with pytest.raises(SystemExit, match="stale"):
-        arctan.main(["--check"])
-    stale.parent.mkdir(parents=True)
-    arctan.main([])
-    arctan.main(["--check"])
+    assert arctan.main(["--check"]) == 1 and not stale.exists()
+    assert arctan.main([]) == arctan.main(["--check"]) == 0
     stale.write_text(stale.read_text().replace("19'd19,", "19'd20,"))
-    with pytest.raises(SystemExit, match="stale"):
-        arctan.main(["--check"])
+    assert arctan.main(["--check"]) == 1
 
 
 def test_the_module_has_the_widths_of_the_table():

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What every generator of this folder does with the files that it makes: write those that are stale, or only tell them."""
+import argparse
+import os
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def stale(made: dict) -> dict:
+    """{path: text} of files that do not hold their text; a text of None: the file should not be there."""
+    return {path: text for path, text in made.items() if (path.read_text(encoding="utf-8") if path.exists() else None) != text}
+
+
+def main(about: str, make, arguments=None, figures=None) -> int:
+    """Exit code of a generator: make() returns {path: text}, figures() what `--bound` prints. A ValueError says what is wrong with
+    the table, and nothing is written."""
+    parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
+    only = parser.add_mutually_exclusive_group()
+    only.add_argument("--check", action="store_true", help="write nothing, exit with 1 when a made file is stale")
+    if figures:
+        only.add_argument("--bound", action="store_true", help="print the bound of the error and write nothing")
+    wanted = parser.parse_args(arguments)
+    if figures and wanted.bound:
+        print(figures())
+        return 0
+    try:
+        found = stale(make())
+    except ValueError as why:
+        print(why, file=sys.stderr)
+        return 1
+    for path, text in found.items():
+        name = os.path.relpath(path, ROOT)
+        if wanted.check:
+            print(f"{name} is stale: run `make tables`", file=sys.stderr)
+        elif text is None:
+            path.unlink()
+            print(f"removed {name}")
+        else:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8", newline="\n")
+            print(f"made {name}")
+    return 1 if wanted.check and found else 0
