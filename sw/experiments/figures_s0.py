@@ -93,15 +93,15 @@ def damaged(cells, source):
 
 
 def heard(cells):
-    """Words that a UART makes of bit cells: a character begins with a low cell; without a stop bit it is dropped."""
+    """Words that a PC's port makes of bit cells: a character begins with a low cell; it counts without a stop bit too, a break does not."""
     words, place, idle = [], 0, True
     while place <= len(cells) - CELLS:
         if cells[place] or not idle:
             idle, place = bool(cells[place]), place + 1
             continue
-        idle = bool(cells[place + CELLS - 1])
-        if idle:
-            words.append(sum(bit << n for n, bit in enumerate(cells[place + 1:place + 10])))
+        idle, word = bool(cells[place + CELLS - 1]), sum(bit << n for n, bit in enumerate(cells[place + 1:place + 10]))
+        if idle or word:
+            words.append(word)
         place += CELLS
     return words
 

@@ -60,10 +60,8 @@ void HostUart::receive(bool level) {
         return;
     }
     if (bit_ == 10) {
-        if (level)
-            received.push_back(uint16_t(word_));
-        else
-            framing_errors++;
+        if (!level) framing_errors++;
+        if (level || word_) received.push_back(uint16_t(word_));
         receiving_ = false;
         return;
     }

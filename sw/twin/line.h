@@ -32,7 +32,7 @@ public:
     bool drives() const { return driving_; }
     bool level() const { return level_; }                     // of the driver
 
-    std::deque<uint16_t> received;                            // words with a stop bit
+    std::deque<uint16_t> received;                            // as a PC's port gives them: without a stop bit too, but no break
     uint32_t framing_errors = 0, start_glitches = 0;
     uint64_t first_cell = 0, last_cell = 0;                   // clk at which the last burst began and ended
 

@@ -194,7 +194,7 @@ class Twin:
         self.send_levels(levels, 1 / self.baud / fine)
 
     def receive_words(self, most=4096):
-        """Words that the host has received and not yet taken; those with a framing error are only counted."""
+        """Words that the host has received and not yet taken, as from a port of a PC: without a stop bit too, but no break."""
         out = numpy.empty(most, dtype=numpy.uint16)
         return out[:self.library.twin_receive_words(self.handle, out.ctypes.data, most)].tolist()
 

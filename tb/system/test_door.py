@@ -65,10 +65,11 @@ def test_a_client_at_another_rate_hears_nobody_and_spoils_nothing(ports):
     assert moire("--port", ports["tcp"], "status")[0]["command"] == "status"
 
 
-def test_two_nodes_with_one_address_are_told_apart_from_silence():
+@pytest.mark.parametrize("apart_s", [0.0053, 0.01, 0.0177])
+def test_two_nodes_with_one_address_are_told_apart_from_silence(apart_s):
     with TwinTransport(Twin(nodes=(1, 1))) as line:
         line.twin.power_cut(1)
-        line.wait(0.01)
+        line.wait(apart_s)
         line.twin.power_on(1)
         line.wait(START_S)
         with pytest.raises(LineGarbled, match="two nodes with the address 1"):
