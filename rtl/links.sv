@@ -172,15 +172,17 @@ module links #(
         end
 
         if (LINKS[4]) begin : g_display
-            wire        present, ready, busy, overrun;
+            localparam int   SCLK_HZ  = 1_000_000;                          // at most
+            localparam [7:0] HALF_CLK = 8'((CLK_HZ + 2 * SCLK_HZ - 1) / (2 * SCLK_HZ));
+            wire        present, ready, sent, overrun;
             wire [15:0] to_send;
 
             word_queue #(.W(16), .DEPTH(16)) u_words (.clk, .rst, .push(display_written), .in(display), .pop(ready), .present,
                 .out(to_send), .free(display_free), .overrun);
-            spi_word_sender #(.CLK_HZ(CLK_HZ)) u_sender (.clk, .rst, .valid(present), .ready, .word(to_send), .cs_n(display_cs_n),
-                .sclk(display_sclk), .sdi(display_data), .busy);
-            assign display_sending = display_written || !display_free[4] || busy;
-            wire unused = &{1'b0, overrun};
+            spi_word_sender u_sender (.clk, .rst, .half_clk(HALF_CLK), .valid(present), .ready, .word(to_send), .cs_n(display_cs_n),
+                .sclk(display_sclk), .sdi(display_data), .sent);
+            assign display_sending = display_written || !display_free[4] || !ready;
+            wire unused = &{1'b0, sent, overrun};
         end else begin : g_no_display
             assign {display_free, display_sending} = '0;
             assign {display_cs_n, display_sclk, display_data} = 3'b100;

@@ -12,8 +12,7 @@
 //          while cs_n is low; with its LDAC low the output changes at the rising edge of cs_n. sclk up to 50 MHz
 // model    tb/drive/spi_dac.py, equal in every bit of every cycle
 // proof    depth 40
-// proved   sclk is low while cs_n is high or changes; a frame has 16 rising edges of sclk; sdi stands from one clk before each
-//          of them to the falling edge
+// proved   a frame that begins while the drive is off is one of 0 V, and one begins for each change of enable
 `default_nettype none
 
 module spi_dac (
@@ -30,82 +29,41 @@ module spi_dac (
     output logic                 sdi,                       // pin
     output logic                 sent                       // strobe: the converter has taken a frame
 );
-    localparam [5:0] RAISE = 6'd33, LAST = 6'd35;           // halves of sclk in a frame: 0 set-up, 16 bits, 32 hold, 3 with cs_n high
-
-    logic               busy, due, enable_q;
-    logic        [5:0]  half;
-    logic        [7:0]  length, left;                       // clk of a half, less one; after this one
-    logic        [15:0] idle, shift;
+    logic               due, enable_q;
+    logic        [15:0] idle;
     logic signed [15:0] wanted;
 
     wire signed [16:0] trimmed = {wanted[15], wanted} + {trim[15], trim};
     wire signed [15:0] fitting = trimmed[16] == trimmed[15] ? trimmed[15:0] : {trimmed[16], {15{~trimmed[16]}}};
-    wire        [15:0] code    = {!fitting[15], fitting[14:0]};
-    wire        [7:0]  wanted_length = half_clk == 8'd0 ? 8'd0 : half_clk - 1'b1;
-    wire               starts  = !busy && (due || idle >= refresh);
-    wire        [5:0]  next    = half + 1'b1;
+    wire               ready;
+    wire               present = due || idle >= refresh;
+
+    spi_word_sender u_frames (.clk, .rst, .half_clk, .valid(present), .ready, .word({!fitting[15], fitting[14:0]}), .cs_n, .sclk, .sdi,
+        .sent);
 
     always_ff @(posedge clk) begin
-        sent     <= 1'b0;
         enable_q <= enable;
         if (valid) wanted <= command;
         if (!enable) wanted <= '0;
-        due <= (valid && enable) || enable != enable_q || (due && !starts);
-
-        left <= left - 1'b1;
-        if (starts) begin
-            busy   <= 1'b1;
-            half   <= '0;
-            length <= wanted_length;
-            left   <= wanted_length;
-            cs_n   <= 1'b0;
-            sdi    <= code[15];
-            shift  <= code << 1;
-        end else if (busy && left == 8'd0) begin
-            left <= length;
-            half <= next;
-            sclk <= next[0] && next < RAISE;
-            if (!next[0] && next < RAISE - 1'b1) {sdi, shift} <= {shift, 1'b0};
-            if (next == RAISE) begin
-                cs_n <= 1'b1;
-                sent <= 1'b1;
-            end
-            if (half == LAST) busy <= 1'b0;
-        end
-        idle <= busy ? '0 : idle + 1'b1;
+        due  <= (valid && enable) || enable != enable_q || (due && !ready);
+        idle <= ready ? idle + 1'b1 : '0;
         if (rst) begin
-            busy     <= 1'b0;
             due      <= 1'b1;
             enable_q <= 1'b0;
             wanted   <= '0;
             idle     <= '0;
-            cs_n     <= 1'b1;
-            sclk     <= 1'b0;
-            sdi      <= 1'b0;
-            sent     <= 1'b0;
         end
     end
 
 `ifdef FORMAL
-    logic       past = 1'b0;
-    logic [4:0] rises = '0;                                 // of sclk in this frame
+    logic past = 1'b0;
     always @(posedge clk) begin
-        past  <= 1'b1;
-        rises <= rst || cs_n ? '0 : rises + {4'd0, sclk && !$past(sclk)};
+        past <= 1'b1;
         if (!past) assume (rst);
         if (past) begin
-            assert (!(cs_n && sclk));
-            assert (!busy || half <= LAST);
-            assert (cs_n == (!busy || half >= RAISE));
-            assert (!sclk || (half[0] && half < RAISE));
-            if (!$past(rst)) begin
-                if (cs_n != $past(cs_n)) assert (!sclk && !$past(sclk));
-                if (sclk) assert (sdi == $past(sdi));
-                if (cs_n && !$past(cs_n)) assert (rises == 5'd16);
-                if (busy && !cs_n) assert (sclk == half[0]);
-                if (busy && !cs_n) assert (rises + {4'd0, sclk && !$past(sclk)} == (half[5:1] + {4'd0, half[0]}));
-            end
-            cover (sent && length == 8'd0);
+            assert (enable_q || wanted == '0);
+            if (!$past(rst) && enable_q != $past(enable_q)) assert (due);
+            cover (sent && !enable_q);
         end
     end
 `endif
