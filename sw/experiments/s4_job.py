@@ -77,7 +77,7 @@ CALM = Trouble()
 class Cut:
     station: int | None              # from 0 on; None is none
     wanted: float                    # arcsec, as the next two
-    angle: float                     # true, the farther one of begin and end
+    angle: float                     # true, the farther one of begin and end; at its begin if the table lost its power meanwhile
     error: float
     start_s: float
     whole: bool
@@ -160,6 +160,7 @@ class IndexingMachine:
         self.nodes = [self.line.node(address) for address in ADDRESSES]
         self.job, self.table = Job(self.nodes[MAIN]), Table(self.nodes[SUB])
         self.panel, self.mode, self.source, self.stations = self.twin.surroundings(MAIN), mode, random.Random(seed), []
+        self.table_dark_s = []
         self.twin.place(SUB, math.radians(self.source.uniform(0, ABOUT)))
         self.twin.run(START_S)
         for name, value in {"peer_mode": mode, "peer_role": "main", "job_cut_limit": "20s", "job_start_limit": "5s"}.items():
@@ -246,12 +247,16 @@ class IndexingMachine:
             angles = [math.degrees(angle) * 3600 % TURN for angle in (cut.angle_start_rad, cut.angle_end_rad) if angle is not None]
             station = min(range(len(self.stations)), key=lambda n: abs(apart(angles[0], self.stations[n])))
             wanted = self.stations[station]
+            if any(0 <= dark - cut.start_s <= CUT_S for dark in self.table_dark_s):     # what its springs hold back is let go
+                angles = angles[:1]
             angle = max(angles, key=lambda angle: abs(apart(angle, wanted)))
             error = apart(angle, wanted)
             found.append(Cut(station if abs(error) < NEAR else None, wanted, angle, error, cut.start_s, cut.whole))
         return found
 
     def power_cut(self, dark):
+        if SUB in dark:
+            self.table_dark_s.append(self.twin.time())
         for node in dark:
             self.twin.power_cut(node)
         self.twin.run(DARK_S)

@@ -21,23 +21,23 @@ uint32_t keep_build(void)
     return LINE_VALUES_CRC + axes;
 }
 
+// The settings last: by them a sub-node begins to listen to its main node, and then the axes must be as they were.
 bool keep_next(unsigned *at, struct keep_value *value)
 {
-    unsigned n = (*at)++, axis;
-    if (n < LINE_SETTING_COUNT) {
-        uint8_t id = (uint8_t)(n + 1u);
-        *value = (struct keep_value){settings_get(id), KEEP_NODE, id};
-        return value->value != settings_default(id);
+    unsigned n = (*at)++, axis = n / LINE_PARAMETER_COUNT;
+    if (axis < axes) {
+        uint8_t id = (uint8_t)(n % LINE_PARAMETER_COUNT + 1u);
+        *value = (struct keep_value){parameters_get(axis, id), axis, id};
+        return value->value != parameters_default(id);
     }
-    n -= LINE_SETTING_COUNT;
-    axis = n / LINE_PARAMETER_COUNT;
-    if (axis >= axes) {
+    n -= axes * LINE_PARAMETER_COUNT;
+    if (n >= LINE_SETTING_COUNT) {
         *value = (struct keep_value){.of = KEEP_END};
         return true;
     }
-    uint8_t id = (uint8_t)(n % LINE_PARAMETER_COUNT + 1u);
-    *value = (struct keep_value){parameters_get(axis, id), axis, id};
-    return value->value != parameters_default(id);
+    uint8_t id = (uint8_t)(n + 1u);
+    *value = (struct keep_value){settings_get(id), KEEP_NODE, id};
+    return value->value != settings_default(id);
 }
 
 bool keep_take(const struct keep_value *value)

@@ -64,6 +64,21 @@ def test_parameters_and_settings_are_in_force_after_a_power_cut_and_all_others_a
     assert station.kept() == {"writing": 0, "cause": "ok", "torn": 0, "generation": 1, "values": 6}
 
 
+def test_a_sub_node_listens_to_its_main_node_only_when_its_axis_is_as_it_was():
+    station, kept = powered(), {name: 4242 + n for n, name in enumerate(name for name in PARAMETER if name[:8] in ("filter_1", "filter_2"))}
+    station.set(**kept)
+    station.setting(peer_mode=2, peer_role=1)
+    station.keep()
+    station.power_cut()
+    seen = []
+    while not seen or station.kept()["writing"]:
+        station.run(0.5)
+        listens, taken = settings(station, "peer_mode")["peer_mode"] == 2, parameters(station, *kept) == kept
+        assert taken or not listens
+        seen.append((taken, listens))
+    assert seen[0] == (False, False) and seen[-1] == (True, True) and station.kept()["cause"] == "ok"
+
+
 def test_registers_follow_what_is_kept():
     station = powered()
     station.set(kp=12345)
