@@ -51,29 +51,30 @@ prove: $(SETUP)   ## the properties in the modules that carry any; K=part of a p
 	@$(PYTHON) tools/prove.py $(if $K,-k '$K') -j $(JOBS)
 
 LATE       := tables/commands.py tables/modules.py    # they read what the others make
-GENERATORS := $(filter-out tables/made_files.py $(LATE),$(sort $(wildcard tables/*.py))) $(LATE)
+GENERATORS := $(filter-out tables/__init__.py tables/made_files.py $(LATE),$(sort $(wildcard tables/*.py))) $(LATE)
+module      = $(subst /,.,$(basename $(1)))
 tables: $(SETUP)  ## write the made files again: registers, line, tables of numbers, the list of modules
-	@for table in $(GENERATORS); do $(PYTHON) $$table || exit 1; done
+	@for table in $(call module,$(GENERATORS)); do $(PYTHON) -m $$table || exit 1; done
 
 fresh: $(SETUP)
 	$(call say,made files are fresh)
-	@stale=0; for table in $(GENERATORS); do $(PYTHON) $$table --check || stale=1; done; exit $$stale
+	@stale=0; for table in $(call module,$(GENERATORS)); do $(PYTHON) -m $$table --check || stale=1; done; exit $$stale
 
 firmware: $(SETUP)   ## the soft core's program, build/firmware/firmware.hex
-	@$(PYTHON) sw/firmware/build.py --out build/firmware
+	@$(PYTHON) -m firmware.build --out build/firmware
 
 $(FIRMWARE): $(wildcard sw/firmware/*) | $(SETUP)
 	$(call say,firmware)
-	@$(PYTHON) sw/firmware/build.py --out build/firmware
+	@$(PYTHON) -m firmware.build --out build/firmware
 
 figure: $(SETUP) $(FIRMWARE)   ## NAME=x measures one figure afresh; the last line is `x VALUE UNIT`
-	@$(PYTHON) -m experiments.figure $(or $(NAME),$(error say which: make figure NAME=x))
+	@$(PYTHON) -m figures.figure $(or $(NAME),$(error say which: make figure NAME=x))
 
 figures: $(SETUP) $(FIRMWARE)  ## all figures, and their page
-	@$(PYTHON) -m experiments.figure --all
+	@$(PYTHON) -m figures.figure --all
 
 soak: $(SETUP) $(FIRMWARE)     ## the long campaigns, for a night: K=name of one
-	@$(PYTHON) -m experiments.soak $K
+	@$(PYTHON) -m figures.soak $K
 
 BOARDS := $(patsubst constraints/%/board.mk,%,$(wildcard constraints/*/board.mk))
 
@@ -88,7 +89,7 @@ clean:            ## remove what was built; the tools in build/venv stay (rm -rf
 	@find . -name __pycache__ -not -path './build/*' -prune -exec rm -rf {} +
 	@echo 'clean: build/venv stays; rm -rf build removes it too'
 
-$(SETUP): requirements.lock pyproject.toml tools/setup.sh
+$(SETUP): requirements.lock pyproject.toml sw/host/pyproject.toml tools/setup.sh
 	@tools/setup.sh
 
 .PHONY: help demo test check lint prove tables fresh firmware figure figures soak board clean

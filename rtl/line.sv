@@ -3,7 +3,7 @@
 //
 // latency  see the room link     rate  see there
 // source   S0: one master, many slaves on one pair of wires, the 9th bit marks command bytes
-// model    the models of its blocks; proved in motion by tb/link/test_line.py
+// model    the models of its blocks; proved in motion by tb/serial/test_line.py
 `default_nettype none
 
 module line #(

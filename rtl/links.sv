@@ -5,7 +5,7 @@
 // latency  see the rooms link and sense     rate  see there
 // source   S4: the main controller is a keyboard of the EDM machine, reads its lamps, has a panel and an EEPROM on I2C and a sub-controller
 //          at the peer port; the sub-controller reads a time-grating sensor. S0: numeric display
-// model    the models of its blocks; proved in motion by tb/link/test_links.py
+// model    the models of its blocks; proved in motion by tb/peripheral/test_links.py
 // built    LINKS chooses; a link that is absent has no logic but its settings, its pins are idle; with none there is not even a register
 `default_nettype none
 

@@ -7,7 +7,7 @@ import math
 import sys
 from pathlib import Path
 
-import made_files
+from tables import made_files
 
 PHASE = 16                              # bits of a phase; 2^PHASE = one period
 INDEX = 7                               # bits of the ratio that choose the chord

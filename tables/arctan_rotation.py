@@ -10,7 +10,7 @@ import sys
 from fractions import Fraction
 from pathlib import Path
 
-import made_files
+from tables import made_files
 
 PHASE = 16                              # bits of a phase; 2^PHASE = one turn
 UNIT = 48                               # the made angles are in 2^-UNIT turn

@@ -4,12 +4,10 @@ import argparse
 import sys
 from pathlib import Path
 
-import made_files
+from tables import made_files
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ROOT / "docs" / "commands"
-sys.path.insert(0, str(ROOT / "sw" / "host"))
-
 from moire.command_line import EXAMPLES, common_options, make_parser  # noqa: E402  (found through the line above)
 
 HEAD = ["<!-- SPDX-License-Identifier: Apache-2.0 -->", "<!-- Made by tables/commands.py of the parser in sw/host/moire: do not edit. -->"]

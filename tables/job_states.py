@@ -5,7 +5,7 @@ import sys
 import tomllib
 from pathlib import Path
 
-import made_files
+from tables import made_files
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "sw" / "firmware" / "job.c"

@@ -7,7 +7,7 @@ import zlib
 from fractions import Fraction
 from pathlib import Path
 
-import made_files
+from tables import made_files
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "tables" / "line.toml"

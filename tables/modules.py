@@ -4,7 +4,7 @@ import re
 import sys
 from pathlib import Path
 
-import made_files
+from tables import made_files
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "rtl" / "README.md"
@@ -44,7 +44,7 @@ def check_of(path):
     if not room.name:                                       # axis, node: block diagrams; whole-system tests are theirs
         return None, Path("tb/system")
     if name.endswith("_registers"):
-        return Path("tb/link/register_block.py"), Path("tb/link/test_registers.py")
+        return Path("tb/registers/register_block.py"), Path("tb/registers/test_registers.py")
     if name.endswith("_rom"):                               # a made table: its generator is the model
         user = name.removesuffix("_rom")
         return Path("tables") / f"{user}.py", next((p.relative_to(ROOT) for p in (ROOT / "tb" / room).glob(f"test_{user}*.py")), None)

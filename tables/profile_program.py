@@ -9,7 +9,7 @@ import re
 import sys
 from pathlib import Path
 
-import made_files
+from tables import made_files
 
 MADE = Path(__file__).resolve().parent.parent / "rtl" / "control" / "profile_program.sv"
 

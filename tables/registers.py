@@ -10,7 +10,7 @@ from pathlib import Path
 from systemrdl import RDLCompileError, RDLCompiler
 from systemrdl.node import FieldNode, RegNode
 
-import made_files
+from tables import made_files
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "tables" / "registers.rdl"
@@ -222,7 +222,7 @@ def verilog(block, constant):
     head = [f"// {name} -- the register block of {block.text}.", "//",
             "// latency  1 clk from select to rdata, and from a write to the new value        rate  one access per clk",
             "// source   tables/registers.rdl",
-            "// model    tb/link/register_block.py, equal in every bit of every cycle; test tb/link/test_registers.py",
+            "// model    tb/registers/register_block.py, equal in every bit of every cycle; test tb/registers/test_registers.py",
             f"// made     by tables/registers.py, never by hand{'; map_crc is the CRC-32 of the source' if block.name == 'node' else ''}"]
     fixed = [("input  wire ", "", "clk", ""),
              ("input  wire ", "", "rst", "every setting takes its first value, what was counted or held is cleared"),
@@ -502,7 +502,7 @@ def page(blocks, constant):
     for b in blocks:
         place = f"`0x{b.base:03X}`" + (f" + `0x{b.stride:03X}` · axis" if b.stride else "")
         title = b.text[0].upper() + b.text[1:]
-        out += [f"## {title}", "", f"From {place}; `rtl/link/{b.name}_registers.sv`.", "",
+        out += [f"## {title}", "", f"From {place}; `rtl/registers/{b.name}_registers.sv`.", "",
                 f"| {' | '.join(COLUMNS)} |", "|" + " --- |" * len(COLUMNS)]
         for r in b.registers:
             for i, f in enumerate(r.fields):
@@ -522,7 +522,7 @@ def page(blocks, constant):
 
 def files():
     constant, blocks = crc(), read()
-    made = {ROOT / "rtl" / "link" / f"{b.name}_registers.sv": verilog(b, constant) for b in blocks}
+    made = {ROOT / "rtl" / "registers" / f"{b.name}_registers.sv": verilog(b, constant) for b in blocks}
     made[ROOT / "sw" / "firmware" / "registers.h"] = header(blocks, constant)
     made[ROOT / "sw" / "host" / "moire" / "registers.py"] = python(blocks, constant)
     made[ROOT / "docs" / "registers.md"] = page(blocks, constant)

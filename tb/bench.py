@@ -8,7 +8,6 @@ import hashlib
 import os
 import random
 import re
-import sys
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -39,14 +38,6 @@ def source_of(top):
     found = list((ROOT / "rtl").rglob(f"{top}.sv"))
     assert len(found) == 1, f"there must be exactly one {top}.sv under rtl/, found {[str(p.relative_to(ROOT)) for p in found]}"
     return found[0]
-
-
-def model_path(*extra):
-    """Put every room of tb/ on sys.path, so that a model is imported by its name, then sw/, sw/host/ and tables/; the simulator
-    inherits the path. (Without sw/ on it the room tb/twin would stand before the package twin.)"""
-    rooms = [ROOT / "tb", *sorted(p for p in (ROOT / "tb").iterdir() if p.is_dir() and p.name[0] not in "._"), *extra]
-    sys.path[:0] = [folder for folder in map(str, reversed(rooms)) if folder not in sys.path]
-    sys.path += [folder for folder in (str(ROOT / f) for f in ("sw/host", "sw", "tables")) if folder not in sys.path]
 
 
 def seed():
@@ -89,12 +80,12 @@ def run(top, test, **parameters):
         fcntl.flock(lock, fcntl.LOCK_EX)
         runner.build(sources=[*sources, source], hdl_toplevel=top, parameters=values, always=True,
                      build_args=args, build_dir=build, timescale=("1ns", "1ps"), waves=waves)
-    model_path(here.parent)
+    module = ".".join(here.relative_to(ROOT).with_suffix("").parts)
     number = seed()
     print(f"{top} under {sim}, SEED={number}", flush=True)
     failed = f"{top} under {sim}: {{}}. Again: make test K={name.split('[')[0]} SIM={sim} SEED={number}"
     try:
-        count, wrong = get_results(runner.test(hdl_toplevel=top, test_module=here.stem, build_dir=build, test_dir=own, seed=number,
+        count, wrong = get_results(runner.test(hdl_toplevel=top, test_module=module, build_dir=build, test_dir=own, seed=number,
                                                waves=waves))
     except (SystemExit, RuntimeError):                    # the runner's words for a failed test and for no result at all
         count, wrong = None, None

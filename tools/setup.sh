@@ -12,7 +12,7 @@ LOG=$ROOT/build/setup.log
 say() { printf 'setup: %s\n' "$*"; }
 stop() { printf 'setup: %s\n' "$*" >&2; exit 1; }
 
-state() { { echo "$ROOT"; python3 -V; cat requirements.lock pyproject.toml; } 2>&1 | cksum; }
+state() { { echo "$ROOT"; python3 -V; cat requirements.lock pyproject.toml sw/host/pyproject.toml; } 2>&1 | cksum; }
 
 if [ -f "$STAMP" ] && [ "$(cat "$STAMP")" = "$(state)" ] && [ -x "$VENV/bin/python" ]; then
     touch "$STAMP"
@@ -85,7 +85,7 @@ last_word() { grep -E '^ERROR' "$LOG" | tail -n 1 | cut -c1-300 || true; }
 say "fetching $(grep -c == requirements.lock) pinned Python packages into build/venv: about 1.3 GB on the disk, some minutes the first time"
 pip install --no-deps -r requirements.lock \
     || stop "the Python packages could not be fetched: is there a way to a Python package index? pip's last word: $(last_word) (log: build/setup.log)"
-pip install --no-deps --no-build-isolation -e . \
+pip install --no-deps --no-build-isolation -e ./sw/host -e . \
     || stop "the project's own packages could not be installed; pip's last word: $(last_word) (log: build/setup.log)"
 pip check || stop "requirements.lock does not fit together: $(head -n 1 "$LOG")"
 state > "$STAMP"

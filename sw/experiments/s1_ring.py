@@ -14,7 +14,6 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from functools import cache
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import numpy as np
@@ -99,10 +98,8 @@ def as_in_the_paper(readings):
 @cache
 def harmonic_model():
     """tb/compensate/harmonic_map.py: integers, equal to the RTL in every bit."""
-    spec = spec_from_file_location("harmonic_map_model", ROOT / "tb" / "compensate" / "harmonic_map.py")
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    from tb.compensate import harmonic_map
+    return harmonic_map
 
 
 def set_of(found, counts_per_turn):

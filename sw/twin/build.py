@@ -4,7 +4,7 @@
 Everything lies under build/twin/<hash of all that goes in>, so nothing is built twice. The firmware is no part of it: it
 is written into the nodes' memory when a twin is made.
 
-    python sw/twin/build.py          builds both libraries and the firmware, says where they are
+    python -m twin.build          builds both libraries and the firmware, says where they are
 """
 import fcntl
 import hashlib
@@ -15,14 +15,12 @@ import sys
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
-from importlib.util import find_spec, module_from_spec, spec_from_file_location
+from importlib.util import find_spec
 from pathlib import Path
 
-if __package__:
-    from . import parameters
-else:
-    import parameters
+from firmware import build as firmware_build
+
+from . import parameters
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
@@ -142,15 +140,6 @@ def verilate(folder, verilator, source, prefix, values, *more):
         f"verilator of {source.stem}", environment={**os.environ, "VERILATOR_ROOT": str(verilator)})
 
 
-@cache
-def firmware_tools():
-    """sw/firmware/build.py as a module."""
-    found = spec_from_file_location("firmware_build", FIRMWARE / "build.py")
-    module = module_from_spec(found)
-    found.loader.exec_module(module)
-    return module
-
-
 def simulation(driver, source, firmware=None, **parameters):
     """The program made of a C++ driver and the Verilated module of a source file, which the driver includes as Vtop.h; with the
     firmware of an image when it is named, whose register accesses the driver serves."""
@@ -158,9 +147,9 @@ def simulation(driver, source, firmware=None, **parameters):
     support, files = runtime(tool, verilator), [driver, source, *sorted((ROOT / "rtl").rglob("*.sv"))]
     own, include = [], []
     if firmware:
-        sources = firmware_tools().sources_of(firmware)
+        sources = firmware_build.sources_of(firmware)
         own = [path for path in sources if path.suffix == ".c"]
-        files, include = [*files, *sources], [f"-I{FIRMWARE}", "-DMOIRE_REGISTER_ACCESS", *firmware_tools().defines_of(firmware)]
+        files, include = [*files, *sources], [f"-I{FIRMWARE}", "-DMOIRE_REGISTER_ACCESS", *firmware_build.defines_of(firmware)]
 
     def make(folder):
         verilate(folder, verilator, source, "Vtop", parameters)
@@ -227,13 +216,10 @@ def twin_library(clk_hz=2_400_000, axes=1, node=None):
 
 def firmware(image="axis"):
     """The words of an image of the firmware, built first when it is not fresh."""
-    script = FIRMWARE / "build.py"
-    if not script.exists():
-        raise BuildError("sw/firmware/build.py is missing: the twin has no firmware to run")
     BUILD.mkdir(parents=True, exist_ok=True)
     with open(BUILD / "firmware.lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        run([sys.executable, script, "--image", image, "--memory", MEMORY_BYTES], "the firmware's build")
+        run([sys.executable, "-m", "firmware.build", "--image", image, "--memory", MEMORY_BYTES], "the firmware's build")
         return words_of(ROOT / "build" / "firmware" / f"{'firmware' if image == 'axis' else image}.hex")
 
 

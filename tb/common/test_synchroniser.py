@@ -6,8 +6,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from synchroniser import Synchroniser
+from tb.bench import run, start
+from tb.common.synchroniser import Synchroniser
 
 
 def model_of(dut):

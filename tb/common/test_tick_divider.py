@@ -7,8 +7,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from tick_divider import TickDivider
+from tb.bench import run, start
+from tb.common.tick_divider import TickDivider
 
 
 async def clk(dut, period, restart=0, rst=0):

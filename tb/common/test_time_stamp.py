@@ -4,8 +4,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from time_stamp import time_stamp
+from tb.bench import run, start
+from tb.common.time_stamp import time_stamp
 
 
 @cocotb.test()

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rtl/compensate/segment_correction.sv does, in integers: clk(...) is one clk, the state is what stands after it."""
-from segment_table import segment_table
+from tb.compensate.segment_table import segment_table
 
 
 def wrap(value, bits=48):

@@ -8,8 +8,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import ROOT, run, start
-from harmonic_map import HarmonicMap, exact, round_of, term_of
+from tb.bench import ROOT, run, start
+from tb.compensate.harmonic_map import HarmonicMap, exact, round_of, term_of
 
 IDLE = dict(enable=0, radians_per_count=0, write=0, term=0, amplitude=0, phase=0, swap=0, angle=0, step=0, position=0)
 STROBES = "write", "swap", "step"

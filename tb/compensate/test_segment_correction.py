@@ -7,8 +7,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from segment_correction import SegmentCorrection, wrap
+from tb.bench import run, start
+from tb.compensate.segment_correction import SegmentCorrection, wrap
 
 IDLE = dict(enable=0, linear=0, origin_written=0, origin=0, segment_length=1, segments=1, write=0, point=0, value=0, look=0, look_at=0,
             valid=0, position=0, shift=0, shift_periods=0)

@@ -7,8 +7,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from segment_map import SegmentMap
+from tb.bench import run, start
+from tb.compensate.segment_map import SegmentMap
 
 IDLE = dict(enable=0, write=0, term=0, even=0, odd=0, swap=0, angle=0, position=0)
 STROBES = "write", "swap"

@@ -5,8 +5,8 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from segment_table import SegmentTable
+from tb.bench import run, start
+from tb.compensate.segment_table import SegmentTable
 
 IDLE = dict(enable=1, linear=0, origin=0, segment_length=1, segments=1, write=0, point=0, value=0, look=0, valid=0, position=0)
 FAR = 1 << 47

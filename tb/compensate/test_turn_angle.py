@@ -5,8 +5,8 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from turn_angle import TurnAngle
+from tb.bench import run, start
+from tb.compensate.turn_angle import TurnAngle
 
 IDLE = dict(counts_per_turn=0, angle_per_count=0, a=0, b=0, step=0, index=0)
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rtl/control/pid_servo.sv does, in integers: clk(...) is one clk and returns what is on the pins after it."""
-from biquad_cascade import STAGE, BiquadCascade
+from tb.control.biquad_cascade import STAGE, BiquadCascade
 
 TAKE, LOAD, PRODUCT = 8, 9, 25          # clk after tick: inputs taken, first term loaded; clk per term
 INTEGRATE = LOAD + PRODUCT              # the integral is new

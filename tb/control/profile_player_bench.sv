@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// profile_player_bench -- profile_player with its exact target in sight, and whether its next step is prepared: the top of sw/experiments/profile_run.cpp.
+// profile_player_bench -- profile_player with its exact target in sight, and whether its next step is prepared: the top of sw/figures/profile_run.cpp.
 `default_nettype none
 
 module profile_player_bench (

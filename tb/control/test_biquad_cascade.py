@@ -8,8 +8,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from biquad_cascade import HIGH, LOW, PAST, STAGE, BiquadCascade
+from tb.bench import run, start
+from tb.control.biquad_cascade import HIGH, LOW, PAST, STAGE, BiquadCascade
 
 ONE = 1 << 30
 IDLE = dict(in_use=0, coefficient_write=0, coefficient_address=0, coefficient=0, valid_in=0, track=0, x=0)

@@ -7,8 +7,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from pid_servo import PidServo
+from tb.bench import run, start
+from tb.control.pid_servo import PidServo
 
 INPUTS = ("closed_loop kp ki kd kv ka output_limit integral_limit dead_band target target_velocity target_acceleration moving "
           "position velocity open_command block_up block_down filters_in_use").split()

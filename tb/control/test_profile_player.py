@@ -7,8 +7,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from profile_player import FULL, ProfilePlayer, moved, wrap
+from tb.bench import run, start
+from tb.control.profile_player import FULL, ProfilePlayer, moved, wrap
 
 PERIOD = 1 << 40                        # of velocity, acceleration and jerk
 LSB = 1 << 24                           # of target, in the same unit

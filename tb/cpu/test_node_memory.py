@@ -11,8 +11,8 @@ import pytest
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import ROOT, run, source_of
-from node_memory import NodeMemory
+from tb.bench import ROOT, run, source_of
+from tb.cpu.node_memory import NodeMemory
 
 BYTES = 1024
 CONTENTS = [n * 0x9E3779B1 % (1 << 32) for n in range(BYTES // 4)]      # any words, all different

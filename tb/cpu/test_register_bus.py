@@ -7,8 +7,8 @@ import pytest
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge
 
-from bench import run
-from register_bus import RegisterBus
+from tb.bench import run
+from tb.cpu.register_bus import RegisterBus
 
 ALONE = {"node": 0x000, "line": 0x100, "links": 0x200}                                 # blocks of which there is one
 OF_AXES = {"axis": 0x400, "grating": 0xC00, "actuator": 0x1400}         # blocks that each axis has, where the first one lies

@@ -9,9 +9,9 @@ from pathlib import Path
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import ROOT, run, start
-from soft_core import results
-from twin.build import firmware_tools
+from firmware import build as firmware_build
+from tb.bench import ROOT, run, start
+from tb.cpu.soft_core import results
 
 BYTES = 2048
 BUILD = ROOT / "build" / "soft_core"
@@ -129,13 +129,12 @@ async def a_register_access_is_one_strobe(dut):
 
 def compiled():
     """The program as a file for $readmemh, the whole memory long; by the tools of the firmware's own build."""
-    firmware = firmware_tools()
-    here, command, libraries = Path(__file__).parent, *firmware.compiler()
+    here, command, libraries = Path(__file__).parent, *firmware_build.compiler()
     BUILD.mkdir(parents=True, exist_ok=True)
     elf, words = BUILD / "program.elf", BUILD / "program.hex"
-    subprocess.run([*command, *firmware.FLAGS, firmware.FAST, f"-DMEMORY_BYTES={BYTES}", f"-Wl,-T,{here / 'program.ld'}", "-o", str(elf),
+    subprocess.run([*command, *firmware_build.FLAGS, firmware_build.FAST, f"-DMEMORY_BYTES={BYTES}", f"-Wl,-T,{here / 'program.ld'}", "-o", str(elf),
                     str(here / "program.c"), *libraries], check=True, timeout=300)
-    content, _ = firmware.image(firmware.load_segments(elf.read_bytes())[0], BYTES)
+    content, _ = firmware_build.image(firmware_build.load_segments(elf.read_bytes())[0], BYTES)
     words.write_text("".join(f"{word:08x}\n" for (word,) in struct.iter_unpack("<I", content)))
     return words
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rtl/decode/encoder_counter.sv does: step(...) is one clk, and returns rdata after it."""
-from event_filter import EventFilter
-from index_latch import IndexLatch, Settings
-from quadrature_decoder import QuadratureDecoder
+from tb.decode.index_latch import IndexLatch, Settings
+from tb.decode.quadrature_decoder import QuadratureDecoder
+from tb.sense.event_filter import EventFilter
 
 ARM, FOUND, PROBED, ILLEGAL = 16, 32, 64, 128           # bits of word 1
 

@@ -2,9 +2,9 @@
 """What rtl/decode/incremental_encoder.sv does: its three blocks in a row, flags, and the time of the last edge."""
 from dataclasses import dataclass, field
 
-from event_filter import EventFilter
-from index_latch import IndexLatch, Settings
-from quadrature_decoder import QuadratureDecoder
+from tb.decode.index_latch import IndexLatch, Settings
+from tb.decode.quadrature_decoder import QuadratureDecoder
+from tb.sense.event_filter import EventFilter
 
 
 @dataclass(frozen=True)

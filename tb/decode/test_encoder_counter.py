@@ -6,8 +6,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge
 
-from bench import run, start
-from encoder_counter import ARM, FOUND, ILLEGAL, PROBED, EncoderCounter
+from tb.bench import run, start
+from tb.decode.encoder_counter import ARM, FOUND, ILLEGAL, PROBED, EncoderCounter
 
 TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]                 # a leads b: up
 UP, DOWN, EACH, CLEARS, PROBE, PROBE_LOW = (1 << n for n in range(10, 16))

@@ -6,9 +6,9 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from incremental_encoder import IncrementalEncoder, Setup
-from index_latch import Settings
+from tb.bench import run, start
+from tb.decode.incremental_encoder import IncrementalEncoder, Setup
+from tb.decode.index_latch import Settings
 
 TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]         # a leads b: up
 EACH = Settings(each=1)

@@ -9,8 +9,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, ReadOnly, RisingEdge
 
-from bench import run, start
-from index_latch import IndexLatch, Settings
+from tb.bench import run, start
+from tb.decode.index_latch import IndexLatch, Settings
 
 PORTS = ["active_low", "gate_mask", "gate", "take_up", "take_down", "each", "clears", "counts_per_revolution"]
 

@@ -7,8 +7,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, ReadOnly, RisingEdge
 
-from bench import run, start
-from quadrature_decoder import PULSES, X1, X2, X4, QuadratureDecoder
+from tb.bench import run, start
+from tb.decode.quadrature_decoder import PULSES, X1, X2, X4, QuadratureDecoder
 
 TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]        # a leads b: up
 

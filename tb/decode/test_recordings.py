@@ -14,8 +14,8 @@ import cocotb
 import pytest
 from cocotb.triggers import ClockCycles, FallingEdge
 
-import bench
-from quadrature_decoder import PULSES, X4
+from tb import bench
+from tb.decode.quadrature_decoder import PULSES, X4
 
 CAPTURES = bench.ROOT.parent / "shared" / "captures"
 RECORDINGS = [("hdns2000_fast", X4), ("hdns2000_left_right", X4), ("smoothieware_steps", PULSES)]

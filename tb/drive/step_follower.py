@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rtl/drive/step_follower.sv does, in integers: clk(…) is one clk and returns what stands after it."""
-from step_scaler import StepScaler
+from tb.drive.step_scaler import StepScaler
 
 
 def signed(value, bits):

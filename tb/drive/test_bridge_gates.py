@@ -5,8 +5,8 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from bridge_gates import BridgeGates
+from tb.bench import run, start
+from tb.drive.bridge_gates import BridgeGates
 
 IDLE = dict(dead_time=0, minimum_pulse=0, fast_decay=0, brake=0, bridge_a=0, bridge_b=0)
 PINS = ("gate_a_high", "gate_a_low", "gate_b_high", "gate_b_low")

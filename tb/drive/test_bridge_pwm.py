@@ -6,8 +6,8 @@ import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 from cocotb.utils import get_sim_time
 
-from bench import run, start
-from bridge_pwm import BridgePwm
+from tb.bench import run, start
+from tb.drive.bridge_pwm import BridgePwm
 
 FULL = 1 << 15
 CLK_PS = 10_000                         # as start() makes it

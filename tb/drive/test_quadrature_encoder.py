@@ -6,8 +6,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from quadrature_encoder import QuadratureEncoder, signed
+from tb.bench import run, start
+from tb.drive.quadrature_encoder import QuadratureEncoder, signed
 
 IDLE = dict(spacing=1, hysteresis=0, counts_per_turn=0, load=0, target=0, home=0, home_position=0)
 STROBES = "home", "load"

@@ -5,8 +5,8 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from spi_dac import SpiDac
+from tb.bench import run, start
+from tb.drive.spi_dac import SpiDac
 
 FULL = 1 << 15
 IDLE = dict(half_clk=1, refresh=65535, trim=0, enable=0, valid=0, command=0)

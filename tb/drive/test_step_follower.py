@@ -5,8 +5,8 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge, ReadOnly, Timer
 
-from bench import run, start
-from step_follower import StepFollower
+from tb.bench import run, start
+from tb.drive.step_follower import StepFollower
 
 IDLE = dict(ratio=0, shift=0, enable=0, rebase=0, tick=0, target=0, trim=0)
 ONE = 1 << 32                           # a step per period

@@ -10,8 +10,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import ROOT, run, start
-from step_generator import StepGenerator
+from tb.bench import ROOT, run, start
+from tb.drive.step_generator import StepGenerator
 
 PERIOD_W, TIME_W, AHEAD_W = 8, 5, 4
 ONE = 1 << 16

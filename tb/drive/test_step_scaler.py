@@ -5,8 +5,8 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from step_scaler import LATENCY, StepScaler
+from tb.bench import run, start
+from tb.drive.step_scaler import LATENCY, StepScaler
 
 IDLE = dict(ratio=0, valid=0, position=0)
 ONE = 1 << 32                           # a step per period

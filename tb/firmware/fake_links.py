@@ -6,8 +6,8 @@ A part has `built` (its bit of links.built), `read(offset)` (None: not its regis
 import math
 from collections import deque
 
-from fake_machine import CLK_HZ, DEFINES, PERIOD
-from station import Bus, Eeprom
+from tb.firmware.fake_machine import CLK_HZ, DEFINES, PERIOD
+from tb.firmware.station import Bus, Eeprom
 
 TURN_ARCSEC = 360 * 3600
 CLK_MS = CLK_HZ // 1000

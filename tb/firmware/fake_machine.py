@@ -9,7 +9,7 @@ import tomllib
 import zlib
 from collections import deque
 
-from host_firmware import READ, ROOT, SOURCE, WRITE, library
+from tb.firmware.host_firmware import READ, ROOT, SOURCE, WRITE, library
 
 DEFINES = {name: int(value.rstrip("u"), 0)
            for name, value in re.findall(r"^#define (\w+)\s+(0x[0-9a-fA-F]+u?|\d+u?)\b", (SOURCE / "registers.h").read_text(), re.M)}

@@ -9,7 +9,7 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-from twin.build import firmware_tools
+from firmware import build as firmware_build
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "sw" / "firmware"
@@ -59,8 +59,7 @@ WRITE = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32)
 @cache
 def library(image="axis"):
     """Compile if a source is newer; gcc or clang of the system, else zig."""
-    tools = firmware_tools()
-    sources = [*(path for path in tools.sources_of(image) if path.suffix != ".S"), BRIDGE]
+    sources = [*(path for path in firmware_build.sources_of(image) if path.suffix != ".S"), BRIDGE]
     result = ROOT / "build" / "firmware" / f"host_firmware_{image}.so"
     if not result.exists() or result.stat().st_mtime < max(path.stat().st_mtime for path in sources):
         command = next(([name] for name in ("cc", "gcc", "clang", "g++") if shutil.which(name)), [sys.executable, "-m", "ziglang", "cc"])
@@ -70,7 +69,7 @@ def library(image="axis"):
             subprocess.run([*command, "-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion", "-Werror",
                             "-fsanitize=undefined", "-fsanitize-undefined-trap-on-error",      # undefined behaviour ends the test
                             "-shared", "-fPIC", "-DMOIRE_REGISTER_ACCESS", f"-I{SOURCE}",
-                            *tools.defines_of(image),
+                            *firmware_build.defines_of(image),
                             *(str(path) for path in sources if path.suffix == ".c"), "-o", str(made)], check=True)
             os.replace(made, result)
     loaded = ctypes.CDLL(str(result))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The transport of the host package over fake_machine.Machine: host and firmware together, without hardware and without the twin."""
-from fake_machine import DEFINES
 from moire.transport import Transport
+from tb.firmware.fake_machine import DEFINES
 
 
 class MachineLine(Transport):

@@ -8,7 +8,7 @@ import random
 import zlib
 from collections import deque
 
-from fake_machine import CLK_HZ, DEFINES, TABLE, Axis, Machine
+from tb.firmware.fake_machine import CLK_HZ, DEFINES, TABLE, Axis, Machine
 
 BYTE_CLK, EDGE_CLK = CLK_HZ * 9 // 100_000, CLK_HZ // 100_000           # at 100 kHz
 STATE = {code: name for name, (code, _) in TABLE["job_state"].items()}

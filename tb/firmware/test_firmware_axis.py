@@ -4,9 +4,9 @@ import random
 
 import pytest
 
-from bench import seed
-from fake_machine import DEFINES, FAULT, PARAMETER, PERIOD, Axis, Machine
-from planner import distance, limits
+from tb.bench import seed
+from tb.firmware.fake_machine import DEFINES, FAULT, PARAMETER, PERIOD, Axis, Machine
+from tb.firmware.planner import distance, limits
 
 HOLD = DEFINES["AXIS_STROBES_HOLD_HERE_MASK"]
 BRAKE = DEFINES["AXIS_STROBES_BRAKE_MASK"]

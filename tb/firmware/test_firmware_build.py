@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from host_firmware import SOURCE
-from twin.build import firmware_tools
+from firmware import build as firmware_build
+from tb.firmware.host_firmware import SOURCE
 
 MEMORY = 98304
 
@@ -19,7 +19,7 @@ def build(out, *options, **environment):
 
 
 def functions(elf):
-    return set(firmware_tools().load_segments(elf.read_bytes())[1])
+    return set(firmware_build.load_segments(elf.read_bytes())[1])
 
 
 @pytest.fixture(scope="module")

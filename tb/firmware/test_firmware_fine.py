@@ -2,8 +2,8 @@
 """axis.c: the motor hands over to the fine stage and takes over again, on an axis that lives in fake_machine."""
 import pytest
 
-from fake_machine import DEFINES, FAULT, PARAMETER, PERIOD, Axis, Machine, signed
-from test_firmware_axis import CLOSED_LOOP, ENABLE, finish, homed
+from tb.firmware.fake_machine import DEFINES, FAULT, PARAMETER, PERIOD, Axis, Machine, signed
+from tb.firmware.test_firmware_axis import CLOSED_LOOP, ENABLE, finish, homed
 
 FINE = DEFINES["AXIS_CONTROL_FINE_MASK"]
 COMMAND = DEFINES["AXIS_COMMAND"]

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from fake_machine import CLK_HZ, DEFINES, PARAMETER, TABLE, Axis, Machine
+from tb.firmware.fake_machine import CLK_HZ, DEFINES, PARAMETER, TABLE, Axis, Machine
 
 BLOCK = DEFINES["GRATING_BASE"]
 REASON = {code: name for name, (code, _) in TABLE["learner_reason"].items()}

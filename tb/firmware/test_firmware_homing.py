@@ -4,8 +4,8 @@ import random
 
 import pytest
 
-from bench import seed
-from fake_machine import PARAMETER, PERIOD, Axis, Machine
+from tb.bench import seed
+from tb.firmware.fake_machine import PARAMETER, PERIOD, Axis, Machine
 
 QUARTER = PERIOD // 4
 COUNTS = 1                                                  # position_source

@@ -4,9 +4,9 @@ import random
 
 import pytest
 
-from bench import seed
-from fake_links import TURN_ARCSEC, Links, Sensor, Table
-from fake_machine import CAUSE, FAULT, TABLE, Axis, Machine
+from tb.bench import seed
+from tb.firmware.fake_links import TURN_ARCSEC, Links, Sensor, Table
+from tb.firmware.fake_machine import CAUSE, FAULT, TABLE, Axis, Machine
 
 PHASE = {code: name for name, (code, _) in TABLE["index_phase"].items()}
 SETTING = TABLE["setting"]

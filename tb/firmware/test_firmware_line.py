@@ -5,9 +5,9 @@ import zlib
 
 import pytest
 
-from bench import seed
-from fake_machine import CLK_HZ, DEFINES, PARAMETER, PERIOD, TABLE, Axis, Machine
-from host_firmware import ROOT
+from tb.bench import seed
+from tb.firmware.fake_machine import CLK_HZ, DEFINES, PARAMETER, PERIOD, TABLE, Axis, Machine
+from tb.firmware.host_firmware import ROOT
 
 COMMAND = DEFINES["LINE_RECEIVE_COMMAND_MASK"]
 GOOD = DEFINES["LINE_RECEIVE_GOOD_MASK"]

@@ -4,9 +4,9 @@ import random
 
 import pytest
 
-from bench import seed
-from fake_machine import DEFINES, PARAMETER, PERIOD, Axis, Machine
-from planner import limits, steps
+from tb.bench import seed
+from tb.firmware.fake_machine import DEFINES, PARAMETER, PERIOD, Axis, Machine
+from tb.firmware.planner import limits, steps
 
 TRAVEL = {"travel_low": -5000 * PERIOD, "travel_high": 20_000 * PERIOD, "home_method": 37, "position_source": 1}
 FINE = DEFINES["AXIS_CONTROL_FINE_MASK"]

@@ -6,9 +6,9 @@ import zlib
 
 import pytest
 
-from bench import seed
-from fake_links import I2c, Links, PeerPort, Sensor, Table
-from fake_machine import CAUSE, PARAMETER, TABLE, Axis, Machine
+from tb.bench import seed
+from tb.firmware.fake_links import I2c, Links, PeerPort, Sensor, Table
+from tb.firmware.fake_machine import CAUSE, PARAMETER, TABLE, Axis, Machine
 
 OPERATION = {name: operation["code"] for name, operation in TABLE["operation"].items()}
 PHASE = {code: name for name, (code, _) in TABLE["peer_phase"].items()}

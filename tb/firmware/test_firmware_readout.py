@@ -4,8 +4,8 @@ from fractions import Fraction
 
 import pytest
 
-from fake_links import Links, NumericDisplay
-from fake_machine import PARAMETER, PERIOD, TABLE, Axis, Machine
+from tb.firmware.fake_links import Links, NumericDisplay
+from tb.firmware.fake_machine import PARAMETER, PERIOD, TABLE, Axis, Machine
 
 SETTING = TABLE["setting"]
 

@@ -2,7 +2,7 @@
 """scope.c: what is kept before and after each trigger, at which distance, and the open loop that goes with it."""
 import pytest
 
-from fake_machine import CLK_HZ, DEFINES, FAULT, PERIOD, TABLE, Axis, Machine
+from tb.firmware.fake_machine import CLK_HZ, DEFINES, FAULT, PERIOD, TABLE, Axis, Machine
 
 TRIGGER = {name: code for name, (code, _) in TABLE["scope_trigger"].items()}
 SCOPE_STATE = {code: name for name, (code, _) in TABLE["scope_state"].items()}

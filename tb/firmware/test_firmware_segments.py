@@ -2,7 +2,7 @@
 """segments.c: a table is loaded in order and whole or not used, in force only at rest and with a zero, and it lies where the zero is."""
 import pytest
 
-from fake_machine import CAUSE, PARAMETER, PERIOD, Axis, Machine
+from tb.firmware.fake_machine import CAUSE, PARAMETER, PERIOD, Axis, Machine
 
 POINTS = [100 * n - 500 for n in range(30)]
 LENGTH, FIRST = 1000 * PERIOD, -2000 * PERIOD

@@ -2,7 +2,7 @@
 """settings.c and the images: what a node of one image answers, and what one of the other does not have."""
 import pytest
 
-from fake_machine import TABLE, Machine
+from tb.firmware.fake_machine import TABLE, Machine
 
 SETTING = TABLE["setting"]
 

@@ -4,8 +4,8 @@ import random
 
 import pytest
 
-from bench import seed
-from station import TURN, Station, SubNode, ms
+from tb.bench import seed
+from tb.firmware.station import TURN, Station, SubNode, ms
 
 STATIONS = 4
 ANGLES = [n * TURN // STATIONS for n in range(STATIONS)]

@@ -5,9 +5,9 @@ import zlib
 
 import pytest
 
-from bench import seed
-from fake_machine import PARAMETER, TABLE, Axis, Machine
-from station import SETTING, Station
+from tb.bench import seed
+from tb.firmware.fake_machine import PARAMETER, TABLE, Axis, Machine
+from tb.firmware.station import SETTING, Station
 
 COPIES = (8192, 12288)
 VALUE = 16                                                  # bytes

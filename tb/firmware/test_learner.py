@@ -7,10 +7,22 @@ import random
 import numpy as np
 import pytest
 
-import learner as model
-from bench import seed
-from experiments import figures_learner as signals
-from host_learner import LOADING, NOTHING, PHASES, PHASES_OF_BURST, SAMPLES, WORK, Ellipse, Learner, Machine, Values, library
+from figures import learner as signals
+from tb.bench import seed
+from tb.firmware import learner as model
+from tb.firmware.host_learner import (
+    LOADING,
+    NOTHING,
+    PHASES,
+    PHASES_OF_BURST,
+    SAMPLES,
+    WORK,
+    Ellipse,
+    Learner,
+    Machine,
+    Values,
+    library,
+)
 
 TOLD = {model.LEARNING: "learning", model.FROZEN: "frozen", model.STANDSTILL: "the scale stands still",
         model.PARTIAL_CIRCLE: "too little motion: no whole circles", model.AMPLITUDE: "amplitude outside its window",

@@ -5,9 +5,9 @@ import random
 
 import pytest
 
-from bench import seed
-from host_firmware import Plan, Segment, Stairs, library
-from planner import distance, gone, limits, peaks, shortest, steps
+from tb.bench import seed
+from tb.firmware.host_firmware import Plan, Segment, Stairs, library
+from tb.firmware.planner import distance, gone, limits, peaks, shortest, steps
 
 FOREVER, LONGEST = 1 << 40, 0x800000
 S0 = 6000, 125_000, 12_500_000                      # the stage of S0: period/s, /s2, /s3

@@ -4,8 +4,8 @@ import random
 
 import pytest
 
-from bench import seed
-from station import SETTING, TURN, Eeprom, Station, ms
+from tb.bench import seed
+from tb.firmware.station import SETTING, TURN, Eeprom, Station, ms
 
 EVENLY = [n * TURN // 36 for n in range(36)]
 

@@ -5,7 +5,8 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge, ReadOnly, RisingEdge
 
-from axis_guard import (
+from tb.bench import run, start
+from tb.guard.axis_guard import (
     CPU,
     DRIVE,
     ENCODER,
@@ -19,7 +20,6 @@ from axis_guard import (
     STEP_OVERRUN,
     AxisGuard,
 )
-from bench import run, start
 
 CAUSES = dict(limit_low=LIMIT_LOW, limit_high=LIMIT_HIGH, estop=ESTOP, encoder_fault=ENCODER, watchdog_expired=LINE_WATCHDOG,
               drive_fault=DRIVE, cpu_trap=CPU, profile_underrun=PROFILE_UNDERRUN,

@@ -6,8 +6,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge, Timer
 
-from bench import run, start
-from silence_watchdog import SilenceWatchdog
+from tb.bench import run, start
+from tb.guard.silence_watchdog import SilenceWatchdog
 
 CLK_NS = 10                             # as start() makes it
 

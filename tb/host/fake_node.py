@@ -2,14 +2,10 @@
 """A node in Python, written from docs/protocol.md and not from the host's code, and a line to it that can be spoilt."""
 import binascii
 import random
-import sys
 from functools import reduce
 from itertools import chain
 from math import inf
 from operator import and_
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "sw" / "host"))
 
 from moire.line_tables import CAUSES, OPERATIONS, PARAMETERS, PROTOCOL_CRC, SCOPE_STATES, STATES  # noqa: E402  (found through the line above)
 from moire.registers import MAP_CRC  # noqa: E402

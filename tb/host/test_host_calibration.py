@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from bench import seed
 from moire.calibration import Readings, fit, read_readings
 from moire.errors import BadFile, OutOfRange
+from tb.bench import seed
 
 TEN = np.arange(0, 361, 10.0)
 FINE = np.arange(0, 360, 0.05) + 0.013

@@ -6,8 +6,6 @@ from fractions import Fraction
 
 import pytest
 
-from bench import seed
-from fake_node import ESTOP, LIMIT_LOW, FakeLine, FakeNode
 from moire.client import CHOICES, Line
 from moire.errors import (
     LineError,
@@ -24,6 +22,8 @@ from moire.errors import (
 from moire.line_tables import CAUSES, PARAMETERS, PROTOCOL_CRC
 from moire.registers import FIELDS, MAP_CRC
 from moire.tune import Tuning
+from tb.bench import seed
+from tb.host.fake_node import ESTOP, LIMIT_LOW, FakeLine, FakeNode
 
 SEED = seed()
 

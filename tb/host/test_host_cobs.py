@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-import fake_node  # noqa: F401  (puts the package on the path)
 from moire import cobs
 from moire.protocol import FROM_NODE, TO_NODE, frame
 

@@ -8,11 +8,11 @@ from types import SimpleNamespace
 import pytest
 
 import experiments
-from fake_node import CAUSE, ESTOP, FakeLine, FakeNode
 from moire import command_line, tune
 from moire.command_twin import MACHINES
 from moire.errors import PortError
 from moire.line_tables import PARAMETERS
+from tb.host.fake_node import CAUSE, ESTOP, FakeLine, FakeNode
 
 
 class Call:

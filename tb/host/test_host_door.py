@@ -15,13 +15,13 @@ import pytest
 import serial
 import serial.rfc2217
 
-from fake_node import FakeLine, FakeNode
 from moire import cobs, command_line
 from moire.client import Line
 from moire.door import Door
 from moire.errors import LineGarbled, MoireError, NobodyAnswers, PortError
 from moire.protocol import request_body
 from moire.transport import CobsLine, SerialLine, open_line
+from tb.host.fake_node import FakeLine, FakeNode
 
 pytestmark = pytest.mark.filterwarnings("ignore:set(Daemon|Name).. is deprecated:DeprecationWarning")      # in pyserial
 SEED = int(os.environ.get("SEED") or 1)

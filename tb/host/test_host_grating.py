@@ -5,12 +5,12 @@ import json
 
 import pytest
 
-from fake_node import FakeLine, FakeNode
 from moire import command_line
 from moire.client import Line
 from moire.errors import MotionFailed, NotLearned, OutOfRange, Refused, UnknownName
 from moire.line_tables import PARAMETERS
-from test_host_command_line import Call, sentence
+from tb.host.fake_node import FakeLine, FakeNode
+from tb.host.test_host_command_line import Call, sentence
 
 VELOCITY = PARAMETERS["velocity"].id
 VALUES = dict(sin_offset=-300, cos_offset=12, gain=66000, shear=-5, cosine=list(range(10)), sine=[-n for n in range(10)])

@@ -7,10 +7,6 @@ from fractions import Fraction
 
 import pytest
 
-from fake_links import I2c, Links, PeerPort, Sensor
-from fake_links import Table as Worm
-from fake_machine import Axis, Machine
-from machine_line import MachineLine
 from moire import command_line
 from moire.client import Line
 from moire.errors import MotionFailed, OutOfRange, Refused, UnknownName
@@ -18,7 +14,11 @@ from moire.index import Table
 from moire.job import Job
 from moire.line_tables import SETTINGS
 from moire.settings import Settings
-from test_firmware_index import Station
+from tb.firmware.fake_links import I2c, Links, PeerPort, Sensor
+from tb.firmware.fake_links import Table as Worm
+from tb.firmware.fake_machine import Axis, Machine
+from tb.firmware.machine_line import MachineLine
+from tb.firmware.test_firmware_index import Station
 
 ADDRESS = 2
 

@@ -5,12 +5,12 @@ import json
 
 import pytest
 
-from machine_line import MachineLine
 from moire import command_line
 from moire.client import Line
 from moire.errors import BadFile, OutOfRange, Refused
 from moire.job import Job, equal_parts, read_stations
-from station import OPERATION, Station, SubNode
+from tb.firmware.machine_line import MachineLine
+from tb.firmware.station import OPERATION, Station, SubNode
 
 ADDRESS = 2
 

@@ -7,7 +7,7 @@ import pytest
 from moire.errors import MotionFailed, Refused
 from moire.keep import Kept
 from moire.line_tables import CAUSES
-from test_host_job import Workshop
+from tb.host.test_host_job import Workshop
 
 
 @pytest.fixture

@@ -4,12 +4,12 @@ import random
 
 import pytest
 
-from bench import seed
-from fake_node import FakeLine, FakeNode, spoil
 from moire.client import Line
 from moire.errors import LineError, LineGarbled, NobodyAnswers, OutOfRange
 from moire.line_tables import LONGEST_BODY, OPERATIONS
 from moire.protocol import Exchange, State, Timing, command_byte, frame, layout, parse_reply, request_body
+from tb.bench import seed
+from tb.host.fake_node import FakeLine, FakeNode, spoil
 
 SEED = seed()
 ENABLE = request_body("enable", 7, axis=0, on=1)

@@ -4,12 +4,12 @@ import json
 
 import pytest
 
-from fake_node import ESTOP, FakeLine, FakeNode
 from moire import recording
 from moire.client import Line
 from moire.errors import BadFile
 from moire.line_tables import PARAMETERS
-from test_host_command_line import Call, sentence
+from tb.host.fake_node import ESTOP, FakeLine, FakeNode
+from tb.host.test_host_command_line import Call, sentence
 
 
 def recorded(tmp_path, text="home -- move 1mm -- status", node=None):

@@ -8,18 +8,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import relay_set
-from bench import seed
-from flash import Flash
-from frame_check import FrameCheck
-from harmonic_map import exact, term_of
 from moire import command_relay
 from moire.calibration import fit, read_readings
 from moire.errors import BadFile, LineGarbled, NobodyAnswers, OutOfRange
 from moire.protocol import NINTH
 from moire.relay import COUNTS, FIRST, SECOND, Exchange, Relay, RelayRefused, Settings, identity_of, make_set, terms_of
 from moire.transport import Transport
-from relay_requests import RelayRequests
+from tb.bench import seed
+from tb.compensate.harmonic_map import exact, term_of
+from tb.relay import relay_set
+from tb.relay.flash import Flash
+from tb.relay.relay_requests import RelayRequests
+from tb.serial.frame_check import FrameCheck
 
 K = 4
 SOME = [(3.0, 1.0), (0.5, -2.0)]

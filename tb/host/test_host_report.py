@@ -10,7 +10,6 @@ import numpy
 import pytest
 from PIL import Image
 
-import fake_node  # noqa: F401  (puts the package on the path)
 from moire import report
 from moire.errors import BadFile, MoireError
 

@@ -5,7 +5,6 @@ import random
 
 import pytest
 
-import fake_node  # noqa: F401  (puts the package on the path)
 from moire import rfc2217
 
 SEED = int(os.environ.get("SEED") or 1)

@@ -5,11 +5,11 @@ import random
 
 import pytest
 
-from fake_node import FakeLine, FakeNode
 from moire.client import Line
 from moire.errors import OutOfRange, Refused
 from moire.scope import NoRecord, Scope, excite, lsb
-from test_host_command_line import Call, sentence
+from tb.host.fake_node import FakeLine, FakeNode
+from tb.host.test_host_command_line import Call, sentence
 
 PERIOD = 65536
 

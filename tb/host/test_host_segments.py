@@ -5,11 +5,11 @@ from fractions import Fraction
 
 import pytest
 
-from fake_node import FakeLine, FakeNode
 from moire.client import Line
 from moire.errors import BadFile, OutOfRange
 from moire.segments import NotInForce, Segments, SegmentTable, read_table, text_of
-from test_host_command_line import Call, sentence
+from tb.host.fake_node import FakeLine, FakeNode
+from tb.host.test_host_command_line import Call, sentence
 
 GOOD = ["0, 0", "1, 100", "2, -50", "3, 20"]
 

@@ -6,12 +6,12 @@ import os
 import pytest
 import serial
 
-from fake_node import FakeNode
 from moire import transport
 from moire.client import Line
 from moire.errors import PortError
 from moire.protocol import ODD_ADDRESSES
 from moire.transport import SerialLine
+from tb.host.fake_node import FakeNode
 
 
 class FakePort:

@@ -7,10 +7,9 @@ import numpy
 import pytest
 from PIL import Image
 
-import fake_node  # noqa: F401  (puts the package on the path)
-from biquad_cascade import BiquadCascade
 from moire import tune
-from pid_servo import PidServo
+from tb.control.biquad_cascade import BiquadCascade
+from tb.control.pid_servo import PidServo
 
 TICK = 1 / 4000
 

@@ -5,10 +5,9 @@ from fractions import Fraction
 
 import pytest
 
-import fake_node  # noqa: F401  (puts the package on the path)
-from bench import seed
 from moire import units
 from moire.errors import UnitError
+from tb.bench import seed
 
 SEED = seed()
 

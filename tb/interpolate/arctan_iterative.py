@@ -1,12 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rtl/interpolate/arctan_iterative.sv does, in integers: sample() is one sample, ArctanIterative.step() one clk."""
-import sys
 from functools import cache
-from pathlib import Path
 
-sys.path.append(str(Path(__file__).resolve().parents[2] / "tables"))
-
-import arctan_rotation  # noqa: E402  (found through the line above)
+from tables import arctan_rotation
 
 
 def latency(w):

@@ -1,13 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rtl/interpolate/arctan_pipelined.sv does, in integers: sample() is one sample, ArctanPipelined.step() one clk."""
-import sys
 from collections import deque
 from functools import cache
-from pathlib import Path
 
-sys.path.append(str(Path(__file__).resolve().parents[2] / "tables"))
-
-import arctan_rotation  # noqa: E402  (found through the line above)
+from tables import arctan_rotation
 
 
 def latency(w, steps=1):

@@ -1,11 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rtl/interpolate/arctan_table.sv does, in integers: phase_of() is one sample, ArctanTable.step() one clk."""
-import sys
-from pathlib import Path
 
-sys.path.append(str(Path(__file__).resolve().parents[2] / "tables"))
 
-import arctan  # noqa: E402  (found through the line above)
+from tables import arctan
 
 LATENCY = 23
 

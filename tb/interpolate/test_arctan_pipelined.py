@@ -12,9 +12,9 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge
 
-from arctan_pipelined import ArctanPipelined, arctan_rotation, latency, sample
-from bench import run, source_of, start
-from phase_judge import close_calls, error, localparam, pairs_of_8_bits
+from tb.bench import run, source_of, start
+from tb.interpolate.arctan_pipelined import ArctanPipelined, arctan_rotation, latency, sample
+from tb.interpolate.phase_judge import close_calls, error, localparam, pairs_of_8_bits
 
 IDLE = dict(valid=0, sin=0, cos=0)
 PLAN = arctan_rotation.PIPELINED

@@ -15,8 +15,8 @@ import cocotb
 import pytest
 from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge
 
-from arctan_table import LATENCY, ArctanTable, arctan, phase_of
-from bench import run, start
+from tb.bench import run, start
+from tb.interpolate.arctan_table import LATENCY, ArctanTable, arctan, phase_of
 
 IDLE = dict(valid=0, sin=0, cos=0)
 
@@ -135,7 +135,7 @@ def test_any_wider_pair_is_within_the_bound():
 
 
 def test_the_committed_table_is_fresh():
-    subprocess.run([sys.executable, arctan.__file__, "--check"], check=True)
+    subprocess.run([sys.executable, "-m", "tables.arctan", "--check"], check=True)
 
 
 def test_a_changed_table_is_refused(tmp_path, monkeypatch):

@@ -5,8 +5,8 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from fringe_tracker import QUARTER, FringeTracker
+from tb.bench import run, start
+from tb.interpolate.fringe_tracker import QUARTER, FringeTracker
 
 IDLE = dict(valid=0, phase=0)
 

@@ -5,7 +5,7 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge
 
-from bench import run, start
+from tb.bench import run, start
 
 LATENCY = 22                                            # clk from a converter word to its position; 1 more with a segment table
 SETTINGS = dict(deglitch=0, spike_step=0, spike_hold=0, amplitude_low=0, amplitude_high=65535, disagreement_limit=0)

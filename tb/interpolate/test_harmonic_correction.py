@@ -6,8 +6,8 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge
 
-from bench import run, start
-from harmonic_correction import LATENCY, POINTS, HarmonicCorrection, corrected
+from tb.bench import run, start
+from tb.interpolate.harmonic_correction import LATENCY, POINTS, HarmonicCorrection, corrected
 
 IDLE = dict(valid=0, phase=0, enable=1, write=0, point=0, value=0, swap=0)
 

@@ -6,8 +6,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge
 
-from bench import run, start
-from learner_recorder import LearnerRecorder
+from tb.bench import run, start
+from tb.interpolate.learner_recorder import LearnerRecorder
 
 IDLE = dict(start=0, phases=0, every=1, sampled=0, sin=0, cos=0, phase_valid=0, phase=0, disturbed=0, read=0)
 

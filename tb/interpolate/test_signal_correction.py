@@ -8,8 +8,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge
 
-from bench import run, start
-from signal_correction import LATENCY, Settings, SignalCorrection, corrected
+from tb.bench import run, start
+from tb.interpolate.signal_correction import LATENCY, Settings, SignalCorrection, corrected
 
 IDLE = dict(valid=0, sin=0, cos=0, load=0, sin_offset=0, cos_offset=0, gain=0, shear=0)
 

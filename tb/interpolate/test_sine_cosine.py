@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from cocotb.triggers import ClockCycles, FallingEdge
 
-from arctan_pipelined import arctan_rotation, sample
-from bench import run, seed, start
-from fringe_tracker import FringeTracker
-from unwrap import Unwrap
+from tb.bench import run, seed, start
+from tb.interpolate.arctan_pipelined import arctan_rotation, sample
+from tb.interpolate.fringe_tracker import FringeTracker
+from tb.position.unwrap import Unwrap
 
 PERIOD_NM = 800
 LATENCY = 22                                            # clk from a converter word to its position
@@ -283,5 +283,5 @@ def test_the_read_out_is_the_floor_of_the_place(subdivision):
 
 @pytest.mark.parametrize("w", [8, 12])
 def test_sine_cosine(w, monkeypatch):
-    monkeypatch.setattr("bench.source_of", lambda top: Path(__file__).with_name(f"{top}.sv"))    # a bench top is no part of rtl/
+    monkeypatch.setattr("tb.bench.source_of", lambda top: Path(__file__).with_name(f"{top}.sv"))    # a bench top is no part of rtl/
     run("interpolator_bench", __file__, W=w)

@@ -5,8 +5,8 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from coarse_check import CoarseCheck
+from tb.bench import run, start
+from tb.position.coarse_check import CoarseCheck
 
 IDLE = dict(limit=0, valid=0, position=0, count=0, shift=0, shift_periods=0)
 LIMIT = 32768                                           # as in tables/line.toml: as far from the quarter period between two counts

@@ -5,8 +5,8 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge
 
-from bench import run, start
-from count_phase import CountPhase
+from tb.bench import run, start
+from tb.position.count_phase import CountPhase
 
 IDLE = dict(tick=0, count_step=0, align=0, align_counts=0)
 

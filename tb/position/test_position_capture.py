@@ -6,8 +6,16 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from position_capture import INDEX, NEVER, SOFTWARE, TICK, PositionCapture, falling, rising
+from tb.bench import run, start
+from tb.position.position_capture import (
+    INDEX,
+    NEVER,
+    SOFTWARE,
+    TICK,
+    PositionCapture,
+    falling,
+    rising,
+)
 
 INPUTS = dict(enabled=0, index=0, tick=0, software=0, probe=0, now=0, valid=0, position=0, pop=0, clear=0)
 

@@ -5,8 +5,8 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from position_compare import PositionCompare, wrapped
+from tb.bench import run, start
+from tb.position.position_compare import PositionCompare, wrapped
 
 INPUTS = dict(start=0, step=0, count=0, pulse_length=1, gap_length=1, arm=0, disarm=0, valid=0, position=0, shift=0, shift_periods=0)
 PERIOD = 1 << 16

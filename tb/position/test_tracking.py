@@ -7,10 +7,10 @@ from pathlib import Path
 import cocotb
 from cocotb.triggers import FallingEdge
 
-from bench import run, start
-from coarse_check import CoarseCheck
-from fringe_tracker import FringeTracker
-from unwrap import Unwrap
+from tb.bench import run, start
+from tb.interpolate.fringe_tracker import FringeTracker
+from tb.position.coarse_check import CoarseCheck
+from tb.position.unwrap import Unwrap
 
 PERIOD, QUARTER = 1 << 16, 1 << 14
 LIMIT = PERIOD // 2                                     # the quarter period between two counts, and as much for comparators and lag
@@ -161,5 +161,5 @@ async def a_count_that_stands_or_loses_is_told_when_it_is_half_a_period_off(dut)
 
 
 def test_tracking(monkeypatch):
-    monkeypatch.setattr("bench.source_of", lambda top: Path(__file__).with_name(f"{top}.sv"))    # a bench top is no part of rtl/
+    monkeypatch.setattr("tb.bench.source_of", lambda top: Path(__file__).with_name(f"{top}.sv"))    # a bench top is no part of rtl/
     run("tracking_bench", __file__)

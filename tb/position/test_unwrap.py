@@ -5,8 +5,8 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from unwrap import Unwrap
+from tb.bench import run, start
+from tb.position.unwrap import Unwrap
 
 IDLE = dict(valid=0, step=0, phase=0, shift=0, shift_periods=0)
 

@@ -7,8 +7,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from velocity_estimator import VelocityEstimator
+from tb.bench import run, start
+from tb.position.velocity_estimator import VelocityEstimator
 
 X4 = 1 << 14                                            # quantum of a plain scale
 IDLE = dict(quantum=X4, tick=0, position=0, shift=0, shift_periods=0)

@@ -5,8 +5,8 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from zero_crossing import ZeroCrossing
+from tb.bench import run, start
+from tb.position.zero_crossing import ZeroCrossing
 
 IDLE = dict(valid=0, position=0, shift=0)
 

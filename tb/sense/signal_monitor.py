@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from circle_monitor import CircleMonitor
-from leg_monitor import LegMonitor
-from vector_length import vector_length
+from tb.sense.circle_monitor import CircleMonitor
+from tb.sense.leg_monitor import LegMonitor
+from tb.sense.vector_length import vector_length
 
 NEVER = 65535
 FAULTS = ("too_low", "too_high", "at_rail", "off_circle", "jump", "frozen", "silent", "opposed", "level_stuck", "leg_missing",

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rtl/sense/status_inputs.sv does, in integers: step(...) is one clk and returns the pins after it, lists of level, rose, fell."""
-from synchroniser import Synchroniser
+from tb.common.synchroniser import Synchroniser
 
 SETTLE = 4                                  # clk after reset in which the level follows
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from circle_monitor import NEVER, CircleMonitor
+from tb.bench import run, start
+from tb.sense.circle_monitor import NEVER, CircleMonitor
 
 LATENCY = 5
 LIMITS = ("tolerance", "offset_limit", "balance_limit", "square_limit")
@@ -134,7 +134,7 @@ async def any_walk_matches_the_model(dut):
 
 def test_the_circle_between_its_directions_is_expected_within_5_percent():
     """The header's claim: 5 % offsets, 6 % gain, 4 degrees, the harmonics of the test signal."""
-    from vector_length import vector_length
+    from tb.sense.vector_length import vector_length
     source = np.random.default_rng(1)
     lanes, steps, worst = 300, 400, 0.0
     monitor = CircleMonitor(lanes)

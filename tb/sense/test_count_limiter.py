@@ -6,8 +6,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from count_limiter import CountLimiter
+from tb.bench import run, start
+from tb.sense.count_limiter import CountLimiter
 
 
 async def begin(dut):

@@ -6,8 +6,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from deglitcher import Deglitcher
+from tb.bench import run, start
+from tb.sense.deglitcher import Deglitcher
 
 
 async def begin(dut, level=0, stable=0):

@@ -6,8 +6,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from dual_adc_reader import DualAdcReader
+from tb.bench import run, start
+from tb.sense.dual_adc_reader import DualAdcReader
 
 
 class Converter:

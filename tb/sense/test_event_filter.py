@@ -6,9 +6,9 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from deglitcher import Deglitcher
-from event_filter import EventFilter
+from tb.bench import run, start
+from tb.sense.deglitcher import Deglitcher
+from tb.sense.event_filter import EventFilter
 
 
 class Bench:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from leg_monitor import NEVER, LegMonitor
+from tb.bench import run, start
+from tb.sense.leg_monitor import NEVER, LegMonitor
 
 OFF = {"rail": NEVER, "band": 0, "span": NEVER, "quiet": 0, "dead": NEVER}
 OUTPUTS = ("at_rail", "frozen", "silent", "opposed", "level_stuck", "leg_missing")

@@ -1,21 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""printed_bench: both of its paths, sample by sample, against their models in a row; what the comparison of figures_printed.py rests on."""
+"""printed_bench: both of its paths, sample by sample, against their models in a row; what the comparison of sw/figures/printed.py rests on."""
 import math
 import random
 
 import cocotb
 from cocotb.triggers import FallingEdge
 
-import arctan_table
-import harmonic_correction
-import signal_correction
-from arctan_pipelined import sample
-from bench import run, start
-from count_limiter import CountLimiter
-from fringe_tracker import FringeTracker
-from spike_limiter import SpikeLimiter
-from turning_point_offset import TurningPointOffset
-from unwrap import Unwrap
+from tb.bench import run, start
+from tb.interpolate import arctan_table, harmonic_correction, signal_correction
+from tb.interpolate.arctan_pipelined import sample
+from tb.interpolate.fringe_tracker import FringeTracker
+from tb.position.unwrap import Unwrap
+from tb.sense.count_limiter import CountLimiter
+from tb.sense.spike_limiter import SpikeLimiter
+from tb.sense.turning_point_offset import TurningPointOffset
 
 APART, LARGEST_MOVE, SUBDIVISION = 30, 40, 160          # clk from sample to sample; counts; counts of a period
 IDLE = dict(valid=0, sin=0, cos=0, largest_move=LARGEST_MOVE, limit_counts=1, load=0, sin_offset=0, cos_offset=0, gain=0, shear=0,

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from signal_monitor import FAULTS, Settings, SignalMonitor
+from tb.bench import run, start
+from tb.sense.signal_monitor import FAULTS, Settings, SignalMonitor
 
 CLKS = dict(enumerate([10, 10, 2, 14, 5, 2, 2, 2, 2, 2, 14, 14, 14]))      # from valid to each fault
 LATEST = max(CLKS.values())
@@ -261,9 +261,9 @@ async def any_signal_in_any_settings_matches_the_model_in_every_clk(dut):
 
 
 def test_the_campaigns_tracker_is_that_of_the_house():
-    from coarse_check import CoarseCheck
-    from experiments.figures_faults import LOST, Tracker
-    from fringe_tracker import FringeTracker
+    from figures.faults import LOST, Tracker
+    from tb.interpolate.fringe_tracker import FringeTracker
+    from tb.position.coarse_check import CoarseCheck
     source = np.random.default_rng(1)
     lanes = 20
     many, position = Tracker(lanes), [0] * lanes

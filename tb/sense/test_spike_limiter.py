@@ -6,8 +6,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from spike_limiter import SpikeLimiter
+from tb.bench import run, start
+from tb.sense.spike_limiter import SpikeLimiter
 
 
 async def begin(dut):

@@ -6,8 +6,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge
 
-import bench
-from status_inputs import StatusInputs
+from tb import bench
+from tb.sense.status_inputs import StatusInputs
 
 CLK_HZ = 8000
 MS = CLK_HZ // 1000

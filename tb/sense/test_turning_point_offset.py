@@ -7,8 +7,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from turning_point_offset import TurningPointOffset
+from tb.bench import run, start
+from tb.sense.turning_point_offset import TurningPointOffset
 
 
 class Remover:

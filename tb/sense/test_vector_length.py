@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from vector_length import vector_length
+from tb.bench import run, start
+from tb.sense.vector_length import vector_length
 
 LATENCY = 8
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bench import ROOT
+from tb.bench import ROOT
 
 BOARDS = sorted(path.parent for path in (ROOT / "constraints").glob("*/board.mk"))
 

@@ -4,12 +4,12 @@ import random
 
 import pytest
 
-from bench import seed
 from experiments.s2_stage import SCALES
 from experiments.s4_job import CLK_HZ, NODE
 from moire.client import Line
 from moire.errors import LineError
 from moire.protocol import mark_words
+from tb.bench import seed
 from twin import START_S, Node, Twin, TwinTransport
 from twin.twin import ALL_LINKS
 

@@ -7,8 +7,8 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge
 
-from bench import run, seed, start
 from moire.registers import FIELDS
+from tb.bench import run, seed, start
 
 TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]                 # a leads b: up
 QUARTER = 1 << 14

@@ -4,10 +4,10 @@ import random
 
 import pytest
 
-from bench import seed
 from moire.client import Line
 from moire.errors import NobodyAnswers
 from moire.protocol import FROM_NODE, command_byte, parse_reply, read_words
+from tb.bench import seed
 from twin import START_S, Twin, TwinTransport
 
 BAUD = 300_000                     # an eighth of the clk of the twin, the highest that it can do

@@ -3,11 +3,11 @@
 import math
 import random
 
-from bench import seed
 from moire.client import Line
 from moire.index import TURN, Table
 from moire.job import Job
 from moire.settings import Settings
+from tb.bench import seed
 from twin import Twin, TwinTransport, build
 from twin.surroundings import Surroundings
 from twin.twin import Axis, Node

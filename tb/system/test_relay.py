@@ -6,11 +6,11 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from bench import run, start
-from flash import Flash
-from harmonic_map import exact, term_of
 from moire.relay import BEGIN_SET, CLEAR, FLASH, PIECE, SET, STATUS, Exchange, Status, identity_of
-from relay_set import image
+from tb.bench import run, start
+from tb.compensate.harmonic_map import exact, term_of
+from tb.relay.flash import Flash
+from tb.relay.relay_set import image
 
 K, FIRST, SECOND, BIT = 2, 4096, 8192, 8
 COUNTS = 4000

@@ -2,10 +2,20 @@
 """relay with a table of segments instead of harmonics, pins to pins: it corrects by it in both directions, and takes no other set."""
 import cocotb
 
-from bench import run
 from moire.relay import identity_of
-from relay_set import image
-from test_relay import BIT, CORRECTING, COUNTS, FIRST, KNOWN, LOADED, REFUSED, SECOND, Relay
+from tb.bench import run
+from tb.relay.relay_set import image
+from tb.system.test_relay import (
+    BIT,
+    CORRECTING,
+    COUNTS,
+    FIRST,
+    KNOWN,
+    LOADED,
+    REFUSED,
+    SECOND,
+    Relay,
+)
 
 SEGMENTS = 5
 POINTS = 0.0, 3.5, -2.0, 6.25, 1.0                  # counts at the borders

@@ -6,7 +6,7 @@ import random
 import numpy as np
 import pytest
 
-from experiments import figures_learner
+from figures import learner as figures_learner
 from moire.client import CORRECTION, Line
 from twin import START_S, Twin, TwinTransport, parameters
 

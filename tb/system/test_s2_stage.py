@@ -4,8 +4,8 @@ import os
 
 import pytest
 
-from experiments import figures_s2s3
 from experiments.s2_stage import SCALES, WORD, Stage
+from figures import s2s3 as figures_s2s3
 
 SEED = int(os.environ.get("SEED") or 1)
 NEAR = 4                                                        # counts within which a move settles

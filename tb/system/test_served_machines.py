@@ -4,7 +4,7 @@ import pytest
 
 from experiments.machines import MACHINES
 from moire import command_twin
-from test_door import moire, served
+from tb.system.test_door import moire, served
 
 pytestmark = pytest.mark.filterwarnings("ignore:set(Daemon|Name).. is deprecated:DeprecationWarning")      # in pyserial
 

@@ -5,13 +5,13 @@ import random
 
 import pytest
 
-from bench import seed
 from moire.client import Line
 from moire.index import TURN, Table
 from moire.job import Job
 from moire.line_tables import CAUSES, FAULTS
 from moire.settings import Settings
-from test_firmware_peer import OPERATION, bodies, frame, index_to, look
+from tb.bench import seed
+from tb.firmware.test_firmware_peer import OPERATION, bodies, frame, index_to, look
 from twin import Surroundings, Twin, TwinTransport, build
 from twin.twin import Axis, Node
 

@@ -9,7 +9,7 @@ import subprocess
 import numpy
 import pytest
 
-from ps2_lines import Host, Keyboard
+from tb.peripheral.ps2_lines import Host, Keyboard
 from twin import Surroundings, SurroundingsBench
 
 CLK_HZ = 400_000
@@ -99,7 +99,7 @@ def test_nothing_is_lost_when_the_pc_holds_the_keyboard():
     assert state.computer_unanswered == 0 and bench.state.keyboard_lights == 2
 
 
-# each against the other side as tb/link has it
+# each against the other side as tb/peripheral has it
 
 def pulls(bench, party, side):
     """A clk with the party at one of the ports."""

@@ -5,7 +5,7 @@ import math
 import numpy
 import pytest
 
-from experiments import figures_learner
+from figures import learner as figures_learner
 from twin.stage import Stage
 
 PERIOD = 0.8e-6

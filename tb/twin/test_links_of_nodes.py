@@ -2,13 +2,14 @@
 """The links of nodes in the twin, pin by pin: the RTL between a program that hands its registers out and what stands around it."""
 import math
 import struct
+from pathlib import Path
 
 import pytest
 
-from conftest import SOFTWARE
+from firmware import build as firmware_build
 from moire.client import Line
 from moire.registers import BY_NAME
-from twin import Axis, Node, Surroundings, Twin, TwinTransport, build
+from twin import Axis, Node, Surroundings, Twin, TwinTransport
 
 ARC_SECOND = math.pi / 180 / 3600
 CUT_S, WRITE_S = 0.3, 0.05       # the bridge is slow
@@ -19,16 +20,15 @@ EEPROM, KEYPAD, DISPLAY = 0x50, 0x34, 0x27
 
 @pytest.fixture(scope="module")
 def program(tmp_path_factory):
-    """Words of links_bridge.c, made by the firmware's own tools."""
-    tools = build.firmware_tools()
+    """Words of links_bridge.c, made by the firmware's own firmware_build."""
     folder, memory = tmp_path_factory.mktemp("program"), 4 * 4096
-    command, libraries = tools.compiler()
+    command, libraries = firmware_build.compiler()
     script, elf = folder / "link.ld", folder / "bridge.elf"
-    script.write_text(f"MEMORY_BYTES = {memory};\n" + (SOFTWARE / "firmware" / "link.ld").read_text())
-    sources = [SOFTWARE.parent / "tb" / "twin" / "links_bridge.c", SOFTWARE / "firmware" / "start.S"]
-    tools.run([*command, *tools.FLAGS, tools.SMALL, f"-I{SOFTWARE / 'firmware'}", *map(str, sources), "-Wl,--gc-sections",
+    script.write_text(f"MEMORY_BYTES = {memory};\n" + (firmware_build.HERE / "link.ld").read_text())
+    sources = [Path(__file__).with_name("links_bridge.c"), firmware_build.HERE / "start.S"]
+    firmware_build.run([*command, *firmware_build.FLAGS, firmware_build.SMALL, f"-I{firmware_build.HERE}", *map(str, sources), "-Wl,--gc-sections",
                f"-Wl,-T,{script}", "-o", str(elf), *libraries])
-    content, used = tools.image(tools.load_segments(elf.read_bytes())[0], memory)
+    content, used = firmware_build.image(firmware_build.load_segments(elf.read_bytes())[0], memory)
     return [word for (word,) in struct.iter_unpack("<I", content[:(used + 3) // 4 * 4])]
 
 

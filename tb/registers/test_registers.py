@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every register of every made block: access, first value, neighbours, words of 64 bits, strobes, counters, sticky bits; and
+what the other made files say about the same map."""
+import random
+import re
+import zlib
+
+import cocotb
+import pytest
+from cocotb.triggers import FallingEdge, RisingEdge
+
+from moire import registers as host
+from tables import registers as tables
+from tb.bench import ROOT, run, start
+from tb.registers.register_block import WORD, RegisterBlock
+
+
+class Bus:
+    """One clk at a time, the model beside the block in every one of them."""
+
+    def __init__(self, dut):
+        self.dut = dut
+        self.block = next(b for b in tables.read() if f"{b.name}_registers" == dut._name)
+        without = [parameter for parameter in self.block.parameters if not int(getattr(dut, parameter).value)]
+        self.model = RegisterBlock(self.block, tables.crc(), without)
+        self.there = {f: f.needs not in without for _, f in self.block.fields}
+        self.inputs = {r.port(f): 0 for r, f in self.block.fields if f.kind in ("input", "counter", "sticky")}
+        self.width = {r.port(f): f.width if f.kind == "input" else 1 for r, f in self.block.fields}
+
+    async def begin(self):
+        await start(self.dut, select=0, write=0, word=0, wdata=0, **self.inputs)
+        return self
+
+    def of(self, *kinds):
+        return [(r, f) for r, f in self.block.fields if f.kind in kinds and self.there[f]]
+
+    async def clk(self, select=0, write=0, word=0, wdata=0, rst=0, **inputs):
+        """Inputs named here stand for this clk only."""
+        now = self.inputs | inputs
+        for name, level in [*now.items(), ("select", select), ("write", write), ("word", word), ("wdata", wdata), ("rst", rst)]:
+            port = getattr(self.dut, name)
+            if int(port.value) != level:
+                port.value = level
+        await RisingEdge(self.dut.clk)
+        await FallingEdge(self.dut.clk)
+        want = self.model.step(select, write, word, wdata, now, rst)
+        got = {name: int(getattr(self.dut, name).value) for name in want}
+        wrong = [f"{n} is {got[n]:#x}, the model has {want[n]:#x}" for n in want if got[n] != want[n]]
+        assert not wrong, f"word {word:#x} {'write' if write else 'read' if select else 'idle'}: {'; '.join(wrong)}"
+        return got
+
+    async def read(self, word, **inputs):
+        return (await self.clk(1, 0, word, **inputs))["rdata"]
+
+    async def write(self, word, wdata, **inputs):
+        return await self.clk(1, 1, word, wdata, **inputs)
+
+    def noise(self):
+        return {name: random.getrandbits(self.width[name]) for name in self.inputs}
+
+
+@cocotb.test()
+async def latency_is_1(dut):
+    """clk() looks at the outputs right after the edge that took the access."""
+    bus = await Bus(dut).begin()
+    r, f = next((r, f) for r, f in bus.of("setting") if not r.wide and "r" in f.access)
+    assert (await bus.write(r.word, 1 << f.low))[r.port(f)] == 1
+    assert await bus.read(r.word) >> f.low & 1 == 1
+    assert (await bus.clk())["rdata"] == 0
+
+
+@cocotb.test()
+async def reset_gives_the_first_values(dut):
+    bus = await Bus(dut).begin()
+    for _ in range(2):
+        for r in bus.block.registers:
+            first = sum(f.reset << f.low for f in r.fields if f.kind == "setting" and "r" in f.access and bus.there[f])
+            if all(f.kind == "setting" for f in r.fields):
+                assert await bus.read(r.word) == first & WORD
+                assert not r.wide or await bus.read(r.word + 1) == first >> 32
+        for word in range(64):
+            await bus.write(word, random.getrandbits(32))
+        await bus.clk(1, 1, 0, WORD, rst=1)
+
+
+@cocotb.test()
+async def every_bit_of_every_register_is_its_own(dut):
+    bus = await Bus(dut).begin()
+    for r in bus.block.registers:
+        for word in range(r.word, r.word + 1 + r.wide):
+            for data in [0, WORD, 0x5555_5555, 0xAAAA_AAAA, *(1 << n for n in range(32))]:
+                await bus.write(word, data)
+                await bus.read(word)
+
+
+@cocotb.test()
+async def every_input_reads_back_at_both_ends_of_its_range(dut):
+    bus = await Bus(dut).begin()
+    for r, f in bus.of("input"):
+        port = r.port(f)
+        for value in (1, (1 << f.width) - 1, 1 << f.width - 1, (1 << f.width - 1) - 1):
+            bus.inputs[port] = value
+            low, high = await bus.read(r.word), (await bus.read(r.word + 1) if r.wide else 0)
+            whole = (high << 32 | low) >> f.low
+            assert whole & (1 << f.width) - 1 == value
+            if f.signed and len(r.fields) == 1 and value >> f.width - 1:
+                assert whole == (1 << (64 if r.wide else 32)) - (1 << f.width) + value
+        bus.inputs[port] = 0
+
+
+@cocotb.test()
+async def a_word_without_a_register_reads_zero(dut):
+    bus = await Bus(dut).begin()
+    bus.inputs = {name: (1 << bus.width[name]) - 1 for name in bus.inputs if name not in [r.port(f) for r, f in bus.of("counter")]} | \
+                 {r.port(f): 0 for r, f in bus.of("counter")}
+    known = {word for r in bus.block.registers for word in range(r.word, r.word + 1 + r.wide) if any("r" in f.access for f in r.fields)}
+    for word in sorted(set(range(64)) - known):
+        await bus.write(word, WORD)
+        assert await bus.read(word) == 0
+
+
+@cocotb.test()
+async def a_wide_value_is_read_and_written_whole(dut):
+    bus = await Bus(dut).begin()
+    for r in (r for r in bus.block.registers if r.wide):
+        f = r.fields[0]
+        ones, port = (1 << f.width) - 1, r.port(f)
+        if f.kind == "input":
+            bus.inputs[port] = 0xFFFF_FFFF
+            assert await bus.read(r.word) == WORD
+            bus.inputs[port] = 0x1_0000_0000                       # the carry comes between the two reads
+            assert await bus.read(r.word + 1) == 0
+        else:
+            assert (await bus.write(r.word, 0x89AB_CDEF))[port] == f.reset & ones
+            assert (await bus.write(r.word + 1, 0x0123_4567))[port] == 0x0123_4567_89AB_CDEF & ones
+
+
+@cocotb.test()
+async def strobes_last_one_clk(dut):
+    bus = await Bus(dut).begin()
+    for r, f in bus.of("pulse"):
+        assert (await bus.write(r.word, 1 << f.low))[r.port(f)] == 1
+        assert (await bus.clk())[r.port(f)] == 0
+        assert (await bus.write(r.word, WORD ^ 1 << f.low))[r.port(f)] == 0
+    for r in (r for r in bus.block.registers if r.on_write):
+        out = await bus.write(r.word + r.wide, 5 << min(f.low for f in r.fields))
+        assert out[f"{r.name}_written"] == 1 and out[r.port(r.fields[0])] == (5 << 32 * r.wide) * bus.there[r.fields[0]]
+        assert (await bus.clk())[f"{r.name}_written"] == 0
+    for r in (r for r in bus.block.registers if r.on_read):
+        dut.select.value, dut.write.value, dut.word.value = 1, 0, r.word
+        await cocotb.triggers.Timer(1, "ns")
+        assert getattr(dut, f"{r.name}_read").value == 1, "the strobe goes with the read, not after it"
+        await bus.clk()
+
+
+@cocotb.test()
+async def counters_count_clear_and_stop_at_the_end(dut):
+    bus = await Bus(dut).begin()
+    for r, f in bus.of("counter"):
+        port = r.port(f)
+        for _ in range(3):
+            await bus.clk(**{port: 1})
+        assert await bus.read(r.word) == 3 << f.low
+        await bus.write(r.word, WORD, **{port: 1})
+        assert await bus.read(r.word) == 1 << f.low, "an event in the clk of the write is counted"
+        getattr(dut, f"{port}_count").value = bus.model.value[port] = (1 << f.width) - 2
+        await FallingEdge(dut.clk)
+        for _ in range(3):
+            await bus.clk(**{port: 1})
+        assert await bus.read(r.word) == (1 << f.width) - 1 << f.low
+        await bus.write(r.word, 0)
+        assert await bus.read(r.word) == 0
+
+
+@cocotb.test()
+async def a_sticky_bit_stands_until_one_is_written_to_it(dut):
+    bus = await Bus(dut).begin()
+    for r, f in bus.of("sticky"):
+        port = r.port(f)
+        await bus.clk(**{port: 1})
+        await bus.write(r.word, WORD ^ 1 << f.low)
+        assert await bus.read(r.word) == 1 << f.low
+        await bus.write(r.word, 1 << f.low, **{port: 1})
+        assert await bus.read(r.word) == 1 << f.low, "an event in the clk of the write is held"
+        await bus.write(r.word, 1 << f.low)
+        assert await bus.read(r.word) == 0
+
+
+@cocotb.test()
+async def any_access_matches_the_model(dut):
+    bus = await Bus(dut).begin()
+    used = [word for r in bus.block.registers for word in range(r.word, r.word + 1 + r.wide)]
+    for n in range(1500):
+        word = random.choice(used) if random.random() < 0.9 else random.randrange(64)
+        await bus.clk(random.random() < 0.8, random.getrandbits(1), word, random.getrandbits(32), random.random() < 0.005,
+                      **(bus.noise() if n % 3 == 0 else {}))
+
+
+@cocotb.test()
+async def a_setting_whose_need_was_not_built_reads_zero_whatever_is_written(dut):
+    bus = await Bus(dut).begin()
+    for r, f in ((r, f) for r, f in bus.block.fields if not bus.there[f]):
+        got = await bus.write(r.word, WORD)
+        assert got[r.port(f)] == 0 and await bus.read(r.word) >> f.low & (1 << f.width) - 1 == 0
+
+
+@pytest.mark.parametrize("block", ["node", "line", "links", "axis", "grating", "actuator"])
+def test_registers(block):
+    run(f"{block}_registers", __file__)
+
+
+@pytest.mark.parametrize("block", ["axis", "grating"])
+def test_registers_without_sine(block):
+    run(f"{block}_registers", __file__, SINE=0)
+
+
+def test_all_made_files_carry_the_crc_of_the_source():
+    source = (ROOT / "tables" / "registers.rdl").read_bytes().replace(b"\r\n", b"\n")
+    made = {"rtl/registers/node_registers.sv": r"6'h00: rdata <= 32'h(\w{8});", "sw/firmware/registers.h": r"MAP_CRC 0x(\w{8})u",
+            "sw/host/moire/registers.py": r"MAP_CRC = 0x(\w{8})", "docs/registers.md": r"CRC-32 `0x(\w{8})`"}
+    for name, place in made.items():
+        assert re.search(place, (ROOT / name).read_text(), re.IGNORECASE).group(1).upper() == f"{zlib.crc32(source):08X}", name
+
+
+@pytest.mark.parametrize("axes", [1, 2, 4, 8])
+def test_host_and_firmware_find_every_register_at_every_axis_count(axes):
+    header = dict(re.findall(r"#define (\w+) +(0x[0-9a-fA-F]+)u", (ROOT / "sw" / "firmware" / "registers.h").read_text()))
+    taken = {}
+    for block in tables.read(axes):
+        assert block.count == (axes if block.name in ("axis", "grating", "actuator") else 1)
+        for n in range(block.count):
+            for r in block.registers:
+                address = block.base + n * block.stride + r.offset
+                base, stride, offset = (int(header.get(f"{block.name}_{x}".upper(), "0"), 16) for x in ("BASE", "STRIDE", r.name))
+                assert base + n * stride + offset == address
+                for f in r.fields:
+                    entry = host.BY_NAME[block.name, r.name, f.name]
+                    assert (entry.address(n), entry.low, entry.width, entry.signed) == (address, f.low, f.width, f.signed)
+                for word in range(address, address + (8 if r.wide else 4), 4):
+                    assert taken.setdefault(word, (block.name, n, r.name)) == (block.name, n, r.name) and word < 1 << 16
+
+
+def test_host_reads_a_field_out_of_a_word():
+    cos = host.BY_NAME["axis", "sample", "cos"]
+    assert cos.value(0xFFFE_1234) == -2 and cos.value(0x7FFF_0000) == 32767
+    velocity = host.BY_NAME["axis", "segment_velocity", "value"]
+    assert velocity.value((1 << 64) - 3) == -3 and velocity.lsb == 2**-40

@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: Apache-2.0
+"""relay_requests: each request by hand, the same one again, what is broken or comes too early, and any strobes against the model."""
+import random
+
+import cocotb
+from cocotb.triggers import FallingEdge, RisingEdge
+
+from tb.bench import run, start
+from tb.relay.relay_requests import BEGIN_SET, CLEAR, FLASH, SET, RelayRequests
+from tb.serial.frame_check import FrameCheck, frame
+
+STATUS = 0
+INPUTS = "valid", "data", "command", "good", "events", "levels", "source", "orders", "identity", "position", "correction", "pass_ready", \
+    "pass_done", "pass_data", "answer_ready"
+IDLE = dict.fromkeys(INPUTS, 0)
+
+
+class Requests:
+    """The design with the model beside it in every clk, frames before it, a chip and a slow line behind it."""
+
+    def __init__(self, dut):
+        self.dut, self.model, self.last = dut, RelayRequests(), {}
+        self.said, self.set, self.chip, self.answers, self.waits = bytearray(), [], bytearray(), 3, None
+
+    async def reset(self):
+        await start(self.dut, **IDLE)
+        await FallingEdge(self.dut.clk)
+        await self.clk(rst=1)
+        return self
+
+    async def clk(self, **inputs):
+        dut, model = self.dut, self.model
+        values = {**IDLE, "rst": 0, "answer_ready": int(random.randrange(self.answers) == 0), **inputs}
+        if "pass_ready" not in inputs:
+            values["pass_ready"] = int(model.pass_select and self.waits is None)
+        if self.waits == 0:
+            values.update(pass_done=1, pass_data=self.chip[-1] ^ 0xFF)
+        self.waits = self.waits - 1 if self.waits else None
+        for name, level in values.items():
+            if self.last.get(name) != level:
+                getattr(dut, name).value = level
+        self.last = values
+        if model.answer_valid and values["answer_ready"]:
+            self.said.append(int(dut.answer.value))
+        model.clk(**values)
+        await RisingEdge(dut.clk)
+        await FallingEdge(dut.clk)
+        for name in ("flags", "set_start", "set_valid", "pass_select", "pass_valid", "answer_valid"):
+            got, want = int(getattr(dut, name).value), int(getattr(model, name))
+            assert got == want, f"{values}: {name} is {got}, the model has {want} in {model.state}"
+        if model.answer_valid:
+            assert int(dut.answer.value) == model.answer
+        if model.set_start:
+            self.set.append("start")
+        if model.set_valid or model.pass_valid:
+            assert int(dut.set_data.value) == model.set_data
+            (self.set if model.set_valid else self.chip).append(model.set_data)
+        if model.pass_valid:
+            self.waits = 2
+
+    async def hear(self, words, gaps=0, **levels):
+        check = FrameCheck()
+        for word in words:
+            passed, data, command, good, *_ = check.step(1, *word, 0)
+            await self.clk(valid=passed, data=data, command=command, good=good, **levels)
+            for _ in range(gaps):
+                await self.clk(data=random.getrandbits(8), **levels)
+
+    async def ask(self, *body, **levels):
+        """The body of the answer; None if there is none."""
+        self.said = bytearray()
+        await self.hear(frame(0x21, body), **levels)
+        for _ in range(4):
+            await self.clk(**levels)
+        clks = 0
+        while self.model.state != "listen":
+            await self.clk(**levels)
+            clks += 1
+            assert clks < 4000
+        if not self.said:
+            return None
+        words = frame(0x61, self.said[2:-4])
+        assert [byte for byte, _ in words] == list(self.said)
+        return bytes(self.said[2:-4])
+
+
+@cocotb.test()
+async def status_by_hand(dut):
+    host = await Requests(dut).reset()
+    await host.clk(events=0x05)
+    told = await host.ask(9, STATUS, levels=0x0B, source=2, orders=32, identity=0x11223344, position=0x55667788, correction=-2 & 0xFFFFFFFF)
+    assert told == bytes([9, 0, 5, 0x0B, 130, 0x44, 0x33, 0x22, 0x11, 0x88, 0x77, 0x66, 0x55, 0xFE, 0xFF, 0xFF, 0xFF])
+
+
+@cocotb.test()
+async def the_answer_comes_as_soon_as_the_header_says(dut):
+    host = await Requests(dut).reset()
+    for length in (2, 3, 10):
+        await host.hear(frame(0x21, [length, STATUS, *[0] * (length - 2)]), answer_ready=0)
+        clks = 0
+        while not dut.answer_valid.value:
+            await host.clk(answer_ready=0)
+            clks += 1
+        assert clks == 2 * length + 1
+        while host.model.state != "listen":
+            await host.clk()
+
+
+@cocotb.test()
+async def flags_fall_that_are_named_and_no_others(dut):
+    host = await Requests(dut).reset()
+    await host.clk(events=0xFF)
+    assert (await host.ask(1, CLEAR, 0x0F))[2] == 0xF0
+    assert (await host.ask(2, CLEAR, 0xC0, events=0x40))[2] == 0x70
+    assert (await host.ask(3, CLEAR))[2] == 0x70
+
+
+@cocotb.test()
+async def a_set_passes_byte_by_byte(dut):
+    host = await Requests(dut).reset()
+    assert (await host.ask(1, BEGIN_SET, 10, 20, 30))[:2] == bytes([1, BEGIN_SET])
+    assert await host.ask(2, SET, 40) and host.set == ["start", 10, 20, 30, 40]
+
+
+@cocotb.test()
+async def a_repeated_request_is_answered_and_not_acted_on(dut):
+    host = await Requests(dut).reset()
+    for _ in range(3):
+        assert (await host.ask(0, BEGIN_SET, 1, 2))[:2] == bytes([0, BEGIN_SET])
+    for _ in range(3):
+        assert (await host.ask(1, SET, 3))[:2] == bytes([1, SET])
+    assert host.set == ["start", 1, 2, 3]
+    await host.clk(events=0x03)
+    assert (await host.ask(2, CLEAR, 0x01))[2] == 0x02
+    await host.clk(events=0x01)
+    assert (await host.ask(2, CLEAR, 0x01))[2] == 0x03
+    assert (await host.ask(3, CLEAR, 0x01))[2] == 0x02
+
+
+@cocotb.test()
+async def the_first_request_after_reset_repeats_nothing(dut):
+    for _ in range(2):
+        host = await Requests(dut).reset()
+        assert await host.ask(7, BEGIN_SET, 5) and host.set == ["start", 5]
+
+
+@cocotb.test()
+async def flash_bytes_go_out_and_back_and_wait_until_the_chip_is_free(dut):
+    host = await Requests(dut).reset()
+    assert await host.ask(5, FLASH, 0x9F, 0, 1) == bytes([5, FLASH, 0x60, 0xFF, 0xFE])
+    assert bytes(host.chip) == bytes([0x9F, 0, 1])
+    await host.hear(frame(0x21, [6, FLASH, 3]))
+    for _ in range(50):
+        await host.clk(pass_ready=0)
+    assert len(host.chip) == 3 and host.model.pass_select
+    while host.model.state != "listen":
+        await host.clk()
+    assert host.chip[3:] == b"\x03"
+    longest = bytes(range(62))
+    assert await host.ask(8, FLASH, *longest) == bytes([8, FLASH]) + bytes(byte ^ 0xFF for byte in longest)
+
+
+@cocotb.test()
+async def neither_unknown_kinds_nor_empty_requests_have_an_answer(dut):
+    host = await Requests(dut).reset()
+    for body in ([1, 5], [2, 255, 1, 2], [3]):
+        assert await host.ask(*body) is None
+    assert await host.ask(4, STATUS) and not host.set and not host.chip
+
+
+@cocotb.test()
+async def a_frame_that_begins_before_the_answer_is_out_is_dropped_whole(dut):
+    host = await Requests(dut).reset()
+    for early in range(1, 9):
+        await host.hear(frame(0x21, [early, STATUS]))
+        words = frame(0x21, [100 + early, BEGIN_SET, 1])
+        await host.hear(words[:early])
+        while host.model.state != "listen":
+            await host.clk(answer_ready=1)
+        check = FrameCheck()
+        passed = [check.step(1, *word, 0) for word in words]
+        for _, data, command, good, *_ in passed[early:]:
+            await host.clk(valid=1, data=data, command=command, good=good)
+        for _ in range(20):
+            await host.clk()
+    assert not host.set and await host.ask(50, STATUS)
+
+
+@cocotb.test()
+async def a_broken_frame_moves_nothing(dut):
+    host = await Requests(dut).reset()
+    whole = frame(0x21, [1, BEGIN_SET, 1, 2])
+    for n in range(1, len(whole)):
+        broken = list(whole)
+        broken[n] = broken[n][0] ^ 1 << random.randrange(8), 0
+        await host.hear(broken)
+        for _ in range(20):
+            await host.clk()
+    assert not host.set and not host.said
+
+
+@cocotb.test()
+async def reset_in_mid_flow(dut):
+    host = await Requests(dut).reset()
+    for wait in range(0, 60, 3):
+        await host.clk(events=1)
+        await host.hear(frame(0x21, [1, random.choice((STATUS, BEGIN_SET, FLASH)), 2, 3]))
+        for _ in range(wait):
+            await host.clk()
+        host.waits = None
+        await host.clk(rst=1)
+        assert host.model.flags == 0 and not dut.answer_valid.value
+        assert (await host.ask(1, STATUS))[2] == 0
+
+
+@cocotb.test()
+async def any_strobes_match_the_model(dut):
+    host = await Requests(dut).reset()
+    for _ in range(120):
+        host.answers = random.choice((1, 2, 9))
+        body = [random.randrange(4), random.choice((0, 1, 2, 3, 4, 9)), *random.randbytes(random.randrange(12))]
+        levels = dict(events=random.choice((0, 0, random.getrandbits(8))), levels=random.getrandbits(8), source=random.randrange(3),
+                      orders=random.getrandbits(6), identity=random.getrandbits(32), position=random.getrandbits(32),
+                      correction=random.getrandbits(32))
+        words = frame(random.choice((0x21, 0x21, 0x11)), body)
+        await host.hear(words[:random.choice((len(words), len(words), random.randrange(1, len(words))))], random.randrange(2), **levels)
+        for _ in range(random.choice((0, 5, 400))):
+            await host.clk(**levels)
+
+
+def test_relay_requests():
+    run("relay_requests", __file__)

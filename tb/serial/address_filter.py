@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What rtl/serial/address_filter.sv does, in integers: step(…) is one clk and returns (valid, data, command) after it."""
+
+
+class AddressFilter:
+    def __init__(self):
+        self.open = 0
+
+    def step(self, address, valid, data, ninth, rst=0):
+        if rst:
+            self.open = 0
+            return 0, data, ninth
+        own = data in (0x10 | address, 0x20 | address, 0x20)
+        passed = int(bool(valid and (own if ninth else self.open)))
+        if valid and ninth:
+            self.open = int(own)
+        return passed, data, ninth
