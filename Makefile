@@ -63,7 +63,7 @@ fresh: $(SETUP)
 firmware: $(SETUP)   ## the soft core's program, build/firmware/firmware.hex
 	@$(PYTHON) -m firmware.build --out build/firmware
 
-$(FIRMWARE): $(wildcard sw/firmware/*) | $(SETUP)
+$(FIRMWARE): $(shell find sw/firmware -type f) | $(SETUP)
 	$(call say,firmware)
 	@$(PYTHON) -m firmware.build --out build/firmware
 

@@ -43,22 +43,22 @@ module actuator #(
     output logic                 step_overrun   // level: more steps are owed than may be
 );
     if (DRIVES < 1 || DRIVES > 15)    begin : g_check_drives DRIVES_MUST_BE_FROM_1_TO_15 u_error (); end
-    if (DRIVES[3] && !DRIVES[2])      begin : g_check_fine FINE_STAGE_NEEDS_THE_CONVERTER u_error (); end
+    if (DRIVES[3] && !DRIVES[2])      begin : g_check_fine FINE_STAGE_NEEDS_THE_DAC u_error (); end
 
     // settings from the registers
     wire        [1:0]  kind, mode;
     wire        [15:0] pwm_period, refresh;
-    wire        [13:0] high_clk, low_clk, setup_clk, hold_clk;
+    wire        [13:0] high_cycles, low_cycles, setup_cycles, hold_cycles;
     wire               step_low, direction_low, fine_kp_written;
     wire        [3:0]  trim_shift;
     wire signed [47:0] step_ratio;
     wire signed [31:0] steps;
-    wire        [7:0]  half_clk;
-    wire signed [15:0] converter_trim, fine_command;
+    wire        [7:0]  half_period;
+    wire signed [15:0] dac_trim, fine_command;
     wire        [23:0] fine_kp, fine_ki;
     wire        [14:0] fine_limit;
 
-    wire by_bridge = kind == 2'd0, by_steps = kind == 2'd1, by_converter = kind == 2'd2;
+    wire by_bridge = kind == 2'd0, by_steps = kind == 2'd1, by_dac = kind == 2'd2;
 
     // bridge
     if (DRIVES[0]) begin : g_bridge
@@ -69,16 +69,16 @@ module actuator #(
 
     // steps
     if (DRIVES[1]) begin : g_steps
-        wire               go, anew;
-        wire signed [47:0] place;
+        wire               go, restart;
+        wire signed [47:0] step_target;
         assign upward = direction ^ direction_low;
         wire               blocked = target_velocity < 0 ? block_down : target_velocity > 0 && block_up;
 
         step_follower u_follower (.clk, .rst, .ratio(step_ratio), .shift(trim_shift), .enable(enable && by_steps), .rebase, .tick, .target,
-                                  .trim(command), .go, .anew, .place);
-        step_generator #(.PERIOD_W(18)) u_steps (.clk, .rst, .period(tick_period[17:0]), .high_clk, .low_clk, .setup_clk, .hold_clk, .mode,
-                                                 .step_low, .direction_low, .enable(enable && by_steps && !blocked), .load(anew), .tick(go),
-                                                 .target(place), .step, .direction, .steps, .overrun(step_overrun));
+                                  .trim(command), .go, .restart, .position(step_target));
+        step_generator #(.PERIOD_W(18)) u_steps (.clk, .rst, .period(tick_period[17:0]), .high_cycles, .low_cycles, .setup_cycles, .hold_cycles, .mode,
+                                                 .step_low, .direction_low, .enable(enable && by_steps && !blocked), .load(restart), .tick(go),
+                                                 .target(step_target), .step, .direction, .steps, .overrun(step_overrun));
     end else begin : g_no_steps
         assign {step, direction, upward, step_overrun, steps} = '0;
     end
@@ -109,26 +109,26 @@ module actuator #(
     end
 
     // converter: of the main command, or of the fine stage
-    if (DRIVES[2]) begin : g_converter
+    if (DRIVES[2]) begin : g_dac
         wire sent;
 
-        spi_dac u_converter (.clk, .rst, .half_clk, .refresh, .trim(converter_trim), .enable, .valid(by_converter ? valid : fine_valid),
-                             .command(by_converter ? command : fine_command), .cs_n(dac_cs_n), .sclk(dac_sclk), .sdi(dac_sdi), .sent);
-        wire unused_converter = &{1'b0, sent};
-    end else begin : g_no_converter
+        spi_dac u_dac (.clk, .rst, .half_period, .refresh, .trim(dac_trim), .enable, .valid(by_dac ? valid : fine_valid),
+                             .command(by_dac ? command : fine_command), .cs_n(dac_cs_n), .sclk(dac_sclk), .sdi(dac_sdi), .sent);
+        wire unused_dac = &{1'b0, sent};
+    end else begin : g_no_dac
         assign {dac_cs_n, dac_sclk, dac_sdi} = 3'b100;
     end
 
     // registers
     actuator_registers u_registers (.clk, .rst, .select, .write, .word, .wdata, .rdata, .drive_kind(kind), .drive_built(4'(DRIVES)), .pwm_period,
-        .step_pulse_high(high_clk), .step_pulse_low(low_clk), .step_direction_setup(setup_clk), .step_direction_hold(hold_clk),
+        .step_pulse_high(high_cycles), .step_pulse_low(low_cycles), .step_direction_setup(setup_cycles), .step_direction_hold(hold_cycles),
         .step_output_mode(mode), .step_output_step_low(step_low), .step_output_direction_low(direction_low), .step_output_trim(trim_shift),
-        .step_ratio, .steps, .converter_half_clk(half_clk), .converter_refresh(refresh), .converter_trim, .fine_kp, .fine_kp_written, .fine_ki,
+        .step_ratio, .steps, .dac_half_period(half_period), .dac_refresh(refresh), .dac_trim, .fine_kp, .fine_kp_written, .fine_ki,
         .fine_limit, .fine_command);
 
-    wire unused = &{1'b0, tick_period, valid, high_clk, low_clk, setup_clk, hold_clk, mode, step_low, direction_low, trim_shift, step_ratio,
-                    half_clk, refresh, converter_trim, fine_kp, fine_kp_written, fine_ki, fine_limit, pwm_period, block_up, block_down, rebase,
-                    fine, moving, position, target, target_velocity, tick, by_bridge, by_steps, by_converter, fine_valid, fine_command};
+    wire unused = &{1'b0, tick_period, valid, high_cycles, low_cycles, setup_cycles, hold_cycles, mode, step_low, direction_low, trim_shift, step_ratio,
+                    half_period, refresh, dac_trim, fine_kp, fine_kp_written, fine_ki, fine_limit, pwm_period, block_up, block_down, rebase,
+                    fine, moving, position, target, target_velocity, tick, by_bridge, by_steps, by_dac, fine_valid, fine_command};
 endmodule
 
 `default_nettype wire

@@ -21,7 +21,7 @@ module axis #(
     input  wire        [23:0]    tick_period,   // clk
     input  wire                  sample_tick,   // strobe: start a conversion
     input  wire                  start,         // strobe: play the queued segments, with other axes
-    input  wire                  mark,          // strobe: a moment of all nodes of the line, captured
+    input  wire                  sync,          // strobe: a moment of all nodes of the line, captured
     input  wire                  estop,         // level: 1 pressed
     input  wire                  watchdog_expired, // level: the line is silent
     input  wire                  cpu_stopped,   // level: the soft core has stopped or hangs
@@ -30,8 +30,8 @@ module axis #(
     input  wire        [5:0]     word,          // 32-bit word of the block
     input  wire        [31:0]    wdata,
     output logic       [31:0]    rdata,
-    input  wire                  grating_select, // register bus, its grating
-    output logic       [31:0]    grating_rdata,
+    input  wire                  feedback_select, // register bus, its grating
+    output logic       [31:0]    feedback_rdata,
     input  wire                  actuator_select, // register bus, its actuator
     output logic       [31:0]    actuator_rdata,
     input  wire        [31:0]    now,           // clk
@@ -60,17 +60,17 @@ module axis #(
 
     // settings and strobes from the registers
     wire               control_enable, control_closed_loop, control_homing, control_fine;
-    wire               strobes_reset_faults, strobes_hold_here, strobes_start, strobes_brake, strobes_arm;
-    wire        [31:0] following_limit, segment_jerk, brake_rate, brake_jerk, override_slope, override_curve, start_at;
-    wire        [16:0] override_percent;
-    wire               override_pause, kp_written, kd_written, kv_written, ka_written, filter_coefficient_written;
+    wire               strobes_reset_faults, strobes_set_target_to_position, strobes_start, strobes_controlled_stop, strobes_arm;
+    wire        [31:0] following_limit, segment_jerk, stop_deceleration, stop_jerk, feed_override_slope, feed_override_curve, start_at;
+    wire        [16:0] feed_override_fraction;
+    wire               feed_override_pause, kp_written, kd_written, kv_written, ka_written, filter_coefficient_written;
     wire        [3:0]  filters_in_use;
     wire        [4:0]  filters_address;
     wire signed [31:0] filter_coefficient;
     wire signed [31:0] shift_origin;
     wire               shift_origin_written, segment_ticks_written, segment_last;
     wire        [15:0] deglitch, amplitude_low, amplitude_high, dead_band;
-    wire        [7:0]  spike_step, spike_hold;
+    wire        [7:0]  outlier_step, outlier_hold;
     wire        [19:0] disagreement_limit;
     wire        [4:0]  encoder_fault_mask;
     wire        [23:0] kp, ki, kd, kv, ka, segment_ticks;
@@ -84,8 +84,8 @@ module axis #(
 
     synchroniser #(.W(8)) u_pins (.clk, .rst, .d({probe, drive_fault_n, limit_high_open, limit_low_open, encoder_z, encoder_b, encoder_a}),
                                   .q({pin_probe, pin_fault_n, pin_high, pin_low, pin_z, pin_b, pin_a}));
-    deglitcher u_low (.clk, .rst, .stable(16'(LIMIT_CLK)), .level(pin_low), .filtered(limit_low), .rejected(low_rejected));
-    deglitcher u_high (.clk, .rst, .stable(16'(LIMIT_CLK)), .level(pin_high), .filtered(limit_high), .rejected(high_rejected));
+    deglitcher u_low (.clk, .rst, .stable_cycles(16'(LIMIT_CLK)), .level(pin_low), .filtered(limit_low), .rejected(low_rejected));
+    deglitcher u_high (.clk, .rst, .stable_cycles(16'(LIMIT_CLK)), .level(pin_high), .filtered(limit_high), .rejected(high_rejected));
 
     // measuring path
     wire signed [W-1:0] sin, cos;
@@ -99,9 +99,9 @@ module axis #(
     wire signed [47:0]  moved_by;
     wire                upward;
 
-    grating #(.W(W), .SINE(SINE), .SEGMENTS(SEGMENTS)) u_grating (.clk, .rst, .tick, .sample_tick, .mark, .now, .own_step(step), .own_direction(upward), .select(grating_select), .write,
-        .word, .wdata, .rdata(grating_rdata),
-        .deglitch, .spike_step, .spike_hold, .amplitude_low, .amplitude_high, .disagreement_limit, .shift(shift_origin_written),
+    feedback_channel #(.W(W), .SINE(SINE), .SEGMENTS(SEGMENTS)) u_feedback (.clk, .rst, .tick, .sample_tick, .sync, .now, .own_step(step), .own_direction(upward), .select(feedback_select), .write,
+        .word, .wdata, .rdata(feedback_rdata),
+        .deglitch, .outlier_step, .outlier_hold, .amplitude_low, .amplitude_high, .disagreement_limit, .shift(shift_origin_written),
         .shift_periods(shift_origin), .a(pin_a), .b(pin_b), .z(pin_z), .probe(pin_probe), .adc_sin, .adc_cos, .adc_cs_n, .adc_sclk,
         .compare_pulse, .sin, .cos, .sample_rejected, .edge_rejected, .phase, .amplitude, .quadrature_count, .events(encoder_events),
         .signal_fault, .position_valid, .position, .moved, .moved_by, .velocity);
@@ -114,10 +114,10 @@ module axis #(
     wire        [4:0]  queue_free;
     wire signed [15:0] servo_command;
 
-    profile_player u_profile (.clk, .rst, .brake_rate, .brake_jerk, .slope(override_slope), .curve(override_curve), .percent(override_percent),
-                              .pause(override_pause), .tick, .push(segment_ticks_written), .segment_velocity, .segment_acceleration,
+    profile_player u_profile (.clk, .rst, .stop_deceleration, .stop_jerk, .slope(feed_override_slope), .curve(feed_override_curve), .feed_fraction(feed_override_fraction),
+                              .pause(feed_override_pause), .tick, .push(segment_ticks_written), .segment_velocity, .segment_acceleration,
                               .segment_jerk, .segment_ticks, .segment_last, .start(strobes_start || start), .arm(strobes_arm), .start_at, .now,
-                              .brake(strobes_brake), .hold_here(strobes_hold_here), .position, .shift(moved),
+                              .controlled_stop(strobes_controlled_stop), .set_target_to_position(strobes_set_target_to_position), .position, .shift(moved),
                               .shift_by(moved_by), .target, .target_velocity, .target_acceleration, .moving, .armed, .queue_free,
                               .underrun);
     pid_servo #(.BIQUADS(FILTERS)) u_servo (.clk, .rst, .closed_loop(control_closed_loop), .kp, .ki, .kd, .kv, .ka, .output_limit, .integral_limit,
@@ -132,7 +132,7 @@ module axis #(
     wire        [9:0]  faults, causes_now, first_fault;
     wire signed [47:0] fault_position;
 
-    axis_guard u_guard (.clk, .rst, .enable_request(control_enable), .closed_loop(control_closed_loop || control_fine), .homing(control_homing),
+    drive_interlock u_interlock (.clk, .rst, .enable_request(control_enable), .closed_loop(control_closed_loop || control_fine), .homing(control_homing),
                         .reset_faults(strobes_reset_faults), .limit_low, .limit_high, .estop, .drive_fault(!pin_fault_n),
                         .encoder_fault(signal_fault || |(encoder_events & encoder_fault_mask)), .following_limit, .error, .error_valid(commanded),
                         .watchdog_expired, .cpu_trap(cpu_stopped), .profile_underrun(underrun), .step_overrun, .position, .valid_in(commanded),
@@ -141,22 +141,22 @@ module axis #(
 
     // drive
     actuator #(.DRIVES(DRIVES)) u_actuator (.clk, .rst, .tick, .tick_period, .select(actuator_select), .write, .word, .wdata,
-        .rdata(actuator_rdata), .enable(drive_enable), .fine(control_fine), .rebase(strobes_hold_here || moved), .block_up,
+        .rdata(actuator_rdata), .enable(drive_enable), .fine(control_fine), .rebase(strobes_set_target_to_position || moved), .block_up,
         .block_down, .valid(passed), .command, .target, .target_velocity, .moving, .position, .bridge_a, .bridge_b, .step, .direction, .upward,
         .dac_cs_n, .dac_sclk, .dac_sdi, .fine_saturated, .step_overrun);
 
     // registers
     axis_registers #(.SINE(SINE)) u_registers (.clk, .rst, .select, .write, .word, .wdata, .rdata,
         .control_enable, .control_closed_loop, .control_homing, .control_fine,
-        .strobes_reset_faults, .strobes_hold_here, .strobes_start, .strobes_brake, .strobes_arm,
+        .strobes_reset_faults, .strobes_set_target_to_position, .strobes_start, .strobes_controlled_stop, .strobes_arm,
         .state_enabled(drive_enable), .state_limit_low(limit_low), .state_limit_high(limit_high), .state_estop(estop),
         .state_drive_fault(!pin_fault_n), .state_moving(moving), .state_saturated(saturated), .state_queue_free(queue_free), .state_armed(armed),
         .state_fine_saturated(fine_saturated),
         .faults_limit_low(faults[0]), .faults_limit_high(faults[1]), .faults_estop(faults[2]), .faults_following_error(faults[3]),
-        .faults_encoder(faults[4]), .faults_line_watchdog(faults[5]), .faults_drive(faults[6]), .faults_cpu(faults[7]),
+        .faults_encoder(faults[4]), .faults_bus_watchdog(faults[5]), .faults_drive(faults[6]), .faults_cpu(faults[7]),
         .faults_profile_underrun(faults[8]), .faults_step_overrun(faults[9]), .causes_now, .first_fault, .fault_position, .following_limit,
         .position, .target, .velocity, .shift_origin, .shift_origin_written, .zero_crossing_up(zero_up), .zero_crossing_down(zero_down),
-        .sensing_deglitch(deglitch), .sensing_spike_step(spike_step), .sensing_spike_hold(spike_hold),
+        .sensing_deglitch(deglitch), .sensing_outlier_step(outlier_step), .sensing_outlier_hold(outlier_hold),
         .amplitude_window_low(amplitude_low), .amplitude_window_high(amplitude_high), .disagreement_limit,
         .sample_sin(16'(sin)), .sample_cos(16'(cos)), .phase_phase(phase), .phase_amplitude(amplitude), .quadrature_count,
         .encoder_events_illegal_edge(encoder_events[0]), .encoder_events_overspeed(encoder_events[1]),
@@ -166,7 +166,7 @@ module axis #(
         .following_error(error), .command, .open_command, .filters_in_use, .filters_address, .filter_coefficient,
         .filter_coefficient_written,
         .segment_velocity, .segment_acceleration, .segment_jerk, .segment_ticks, .segment_ticks_written, .segment_ticks_last(segment_last),
-        .brake_rate, .brake_jerk, .override_percent, .override_pause, .override_slope, .override_curve, .start_at);
+        .stop_deceleration, .stop_jerk, .feed_override_fraction, .feed_override_pause, .feed_override_slope, .feed_override_curve, .start_at);
 
     wire unused = &{1'b0, low_rejected, high_rejected};
 endmodule

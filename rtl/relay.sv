@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // relay -- a box between a read head and its controller: A/B/Z in, corrected A/B/Z out, as if it were the encoder.
 //
-// latency  edge in to edge out 10 clk with the filter in bypass, `filter_needed` - 1 clk more with it; the same whatever K is
-// rate     one edge per clk; 1 / spacing if that is longer
+// latency  edge in to edge out 10 clk with the filter in bypass, `filter_required` - 1 clk more with it; the same whatever K is
+// rate     one edge per clk; 1 / minimum_edge_separation if that is longer
 // start    the pins follow until the first edge; uncorrected until a set is in force and the index has come: see `correcting`
 // flags    0 illegal edge, 1 counts between two indexes wrong, 2 index missing, 3 glitch rejected, 4 output more than 4 counts
 //          behind, 5 a set of the host was refused             levels  0 index was seen, 1 a set is in force, 2 correcting, 3 reading flash
@@ -28,9 +28,9 @@ module relay #(
     output logic                 relay_z,
     output logic                 correcting,        // pin: what goes out is corrected
     output logic                 fault,             // pin: a flag stands
-    input  wire                  uart_rx,           // pins to the host
-    output logic                 uart_tx,
-    output logic                 uart_driver_enable,
+    input  wire                  rs485_rx,           // pins to the host
+    output logic                 rs485_tx,
+    output logic                 rs485_driver_enable,
     output logic                 flash_chip_n,      // pins to the flash
     output logic                 flash_sclk,
     output logic                 flash_sdo,
@@ -54,26 +54,26 @@ module relay #(
     wire signed [31:0]   amplitude;
     wire        [31:0]   phase, identity, counts_per_turn, radians_per_count;
     wire        [47:0]   angle_per_count;
-    wire        [15:0]   spacing, hysteresis;
-    wire        [7:0]    filter_needed, flags;
+    wire        [15:0]   minimum_edge_separation, hysteresis;
+    wire        [7:0]    filter_required, flags;
     wire        [1:0]    index_gate_mask, index_gate, source;
     wire                 stored_start, stored_valid, sent_start, sent_valid, pass_select, pass_ready, pass_valid, pass_done, reading;
     wire        [7:0]    stored, sent;
-    wire                 unused_heading, unused_time, unused_armed, unused_seen, unused_illegal_fault, unused_revolution_fault;
+    wire                 unused_direction, unused_time, unused_armed, unused_seen, unused_illegal_fault, unused_revolution_fault;
     wire signed [W-1:0]  unused_count, unused_index_count;
-    wire                 unused = &{1'b0, unused_heading, unused_time, unused_armed, unused_seen, unused_illegal_fault, unused_revolution_fault,
+    wire                 unused = &{1'b0, unused_direction, unused_time, unused_armed, unused_seen, unused_illegal_fault, unused_revolution_fault,
                                     unused_count, unused_index_count, filtered[2], refreshed, relayed};
 
     assign fault      = |flags;
     assign correcting = known && loaded;
 
-    synchroniser #(.W(5), .RESET(2)) u_pins (.clk, .rst, .d({encoder_a, encoder_b, encoder_z, uart_rx, flash_sdi}), .q({a, b, z, rx, sdi}));
+    synchroniser #(.W(5), .RESET(2)) u_pins (.clk, .rst, .d({encoder_a, encoder_b, encoder_z, rs485_rx, flash_sdi}), .q({a, b, z, rx, sdi}));
 
-    incremental_encoder #(.W(W), .TIME_W(1), .FILTER_W(8), .SPARE_W(1), .SKIP_W(1)) u_encoder
-        (.clk, .rst, .filter_skip(1'b0), .filter_needed, .filter_spare(1'b0), .mode(2'd0), .index_low, .index_gate_mask, .index_gate,
+    incremental_encoder #(.W(W), .TIME_W(1), .FILTER_W(8), .TOLERATED_W(1), .SKIP_W(1)) u_encoder
+        (.clk, .rst, .filter_skip(1'b0), .filter_required, .filter_tolerated(1'b0), .mode(2'd0), .index_low, .index_gate_mask, .index_gate,
          .index_up(1'b1), .index_down(1'b1), .index_each(1'b1), .index_clears(1'b0), .counts_per_revolution(counts_per_turn),
          .illegal_enable(1'b0), .arm_index(1'b0), .clear_flags(1'b0), .now(1'b0), .a, .b, .z, .count(unused_count), .step,
-         .heading(unused_heading), .edge_time(unused_time), .index_found, .index_armed(unused_armed), .index_count(unused_index_count),
+         .direction(unused_direction), .edge_time(unused_time), .index_found, .index_armed(unused_armed), .index_count(unused_index_count),
          .filtered, .rejected, .illegal, .illegal_seen(unused_seen), .illegal_fault(unused_illegal_fault), .revolution_wrong,
          .revolution_fault(unused_revolution_fault));
     synchroniser #(.W(2)) u_before (.clk, .rst, .d(filtered[1:0]), .q({b_before, a_before}));     // as old as step at least
@@ -91,7 +91,7 @@ module relay #(
              .corrected, .refreshed);
     end
     quadrature_encoder #(.W(W)) u_output
-        (.clk, .rst, .spacing, .hysteresis, .counts_per_turn, .load(!moved), .target(corrected), .home(referenced), .home_position(position),
+        (.clk, .rst, .minimum_edge_separation, .hysteresis, .counts_per_turn, .load(!moved), .target(corrected), .home(referenced), .home_position(position),
          .a(relay_a), .b(relay_b), .z(relay_z), .position(relayed), .behind);
 
     relay_store #(.LENGTH(LENGTH), .FIRST(FIRST), .SECOND(SECOND)) u_store
@@ -100,9 +100,9 @@ module relay #(
     relay_set #(.K(TERMS), .SEGMENTS(SEGMENTS)) u_set
         (.clk, .rst, .start(reading ? stored_start : sent_start), .valid(reading ? stored_valid : sent_valid), .data(reading ? stored : sent),
          .write, .term, .amplitude, .phase, .swap, .good(set_good), .bad(set_bad), .loaded, .identity, .counts_per_turn, .angle_per_count,
-         .spacing, .radians_per_count, .hysteresis, .filter_needed, .index_low, .index_gate_mask, .index_gate);
+         .minimum_edge_separation, .radians_per_count, .hysteresis, .filter_required, .index_low, .index_gate_mask, .index_gate);
     relay_bridge u_bridge
-        (.clk, .rst, .bit_time(20'(BIT_TIME)), .rx, .tx(uart_tx), .driver_enable(uart_driver_enable),
+        (.clk, .rst, .bit_time(20'(BIT_TIME)), .rx, .tx(rs485_tx), .driver_enable(rs485_driver_enable),
          .events({2'd0, set_bad && !reading, behind, |rejected, missing, revolution_wrong, illegal}), .levels({4'd0, reading, correcting, loaded, known}),
          .source, .orders(SEGMENTS == 0 ? 6'(K) : 6'd0), .identity, .position, .correction, .flags, .set_start(sent_start), .set_valid(sent_valid), .set_data(sent), .pass_select,
          .pass_ready, .pass_valid, .pass_done, .pass_data(stored));

@@ -4,11 +4,11 @@ import argparse
 import sys
 from pathlib import Path
 
+from moire.cli.command_line import EXAMPLES, common_options, make_parser
 from tables import made_files
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ROOT / "docs" / "commands"
-from moire.command_line import EXAMPLES, common_options, make_parser  # noqa: E402  (found through the line above)
 
 HEAD = ["<!-- SPDX-License-Identifier: Apache-2.0 -->", "<!-- Made by tables/commands.py of the parser in sw/host/moire: do not edit. -->"]
 COMMON = {option for action in common_options()._actions for option in action.option_strings}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The picture of the job's states in docs/job.md, made of the table of transitions in sw/firmware/job.c; and the rules it keeps."""
+"""The picture of the job's states in docs/job.md, made of the table of transitions in sw/firmware/station/job/job.c; and the rules it keeps."""
 import re
 import sys
 import tomllib
@@ -8,8 +8,8 @@ from pathlib import Path
 from tables import made_files
 
 ROOT = Path(__file__).resolve().parent.parent
-SOURCE = ROOT / "sw" / "firmware" / "job.c"
-LINE = ROOT / "tables" / "line.toml"
+SOURCE = ROOT / "sw" / "firmware" / "station" / "job" / "job.c"
+LINE = ROOT / "tables" / "bus.toml"
 PAGE = ROOT / "docs" / "job.md"
 BEGIN, END = "<!-- made by tables/job_states.py -->", "<!-- end of job_states -->"
 UNDER_WAY = "UNDER_WAY"                     # in the table: from any state in which a job is under way
@@ -33,10 +33,10 @@ def transitions(text):
 
 
 def check(rows, states):
-    """Every state is in line.toml, can be reached and left; what waits for a person goes on by a person only."""
+    """Every state is in bus.toml, can be reached and left; what waits for a person goes on by a person only."""
     used = {row[0] for row in rows if row[0] != UNDER_WAY} | {row[2] for row in rows}
     if used != states:
-        raise ValueError(f"job.c and the job_state of line.toml differ: {', '.join(sorted(used ^ states))}")
+        raise ValueError(f"job.c and the job_state of bus.toml differ: {', '.join(sorted(used ^ states))}")
     reached = {FIRST}
     while more := {to for start, _, to in rows if start in reached | {UNDER_WAY}} - reached:
         reached |= more

@@ -14,7 +14,7 @@ from tables import made_files
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "tables" / "registers.rdl"
-BUS_BASE = 0x8000_0000                  # where the soft core sees the map
+REGISTER_BUS_BASE = 0x8000_0000                  # where the soft core sees the map
 SLOT = 0x100                            # bytes a block may fill: a word index inside it has 6 bits
 MADE = "made by tables/registers.py from tables/registers.rdl; change those"
 
@@ -327,7 +327,7 @@ C_BEGIN = """\
 // SPDX-License-Identifier: Apache-2.0
 // The register map as the firmware sees it; {made}.
 //
-// NODE_x, LINE_x, AXIS_x are byte offsets inside a block. Fields: FIELD_GET(word, AXIS_STATE_QUEUE_FREE),
+// NODE_x, BUS_x, AXIS_x are byte offsets inside a block. Fields: FIELD_GET(word, AXIS_STATE_QUEUE_FREE),
 // FIELD_GET_SIGNED, FIELD_PUT(AXIS_CONTROL_ENABLE, 1). A value alone in its register has the register's name.
 #ifndef MOIRE_REGISTERS_H
 #define MOIRE_REGISTERS_H
@@ -368,7 +368,7 @@ def header(blocks, constant):
         places.append(f"#define {b.name.upper()}_BASE {b.base:#05x}u")
         if b.stride:
             places.append(f"#define {b.name.upper()}_STRIDE {b.stride:#05x}u")
-    out = [C_BEGIN.format(made=MADE, base=BUS_BASE, constant=constant, places="\n".join(places))]
+    out = [C_BEGIN.format(made=MADE, base=REGISTER_BUS_BASE, constant=constant, places="\n".join(places))]
     for b in blocks:
         up, argument = b.name.upper(), "unsigned axis, " if b.stride else ""
         place = f"{up}_BASE + axis * {up}_STRIDE" if b.stride else f"{up}_BASE"
@@ -498,7 +498,7 @@ COLUMNS = ["offset", "register", "bits", "field", "access", "first value", "unit
 
 
 def page(blocks, constant):
-    out = [PAGE_BEGIN.format(made=MADE, constant=constant, base=BUS_BASE)]
+    out = [PAGE_BEGIN.format(made=MADE, constant=constant, base=REGISTER_BUS_BASE)]
     for b in blocks:
         place = f"`0x{b.base:03X}`" + (f" + `0x{b.stride:03X}` · axis" if b.stride else "")
         title = b.text[0].upper() + b.text[1:]
@@ -523,8 +523,8 @@ def page(blocks, constant):
 def files():
     constant, blocks = crc(), read()
     made = {ROOT / "rtl" / "registers" / f"{b.name}_registers.sv": verilog(b, constant) for b in blocks}
-    made[ROOT / "sw" / "firmware" / "registers.h"] = header(blocks, constant)
-    made[ROOT / "sw" / "host" / "moire" / "registers.py"] = python(blocks, constant)
+    made[ROOT / "sw" / "firmware" / "made" / "registers.h"] = header(blocks, constant)
+    made[ROOT / "sw" / "host" / "moire" / "made" / "registers.py"] = python(blocks, constant)
     made[ROOT / "docs" / "registers.md"] = page(blocks, constant)
     return made
 

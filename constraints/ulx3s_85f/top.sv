@@ -53,11 +53,11 @@ module top (
 
     node #(.CLK_HZ(CLK_HZ), .SEGMENTS(255), .FIRMWARE("build/firmware/firmware.hex")) u_node (
         .clk, .rst, .address, .estop_open,
-        .line_rx(usb_rx & rs485_rx), .line_tx(usb_tx), .line_driver_enable(rs485_driver_enable),
+        .rs485_rx(usb_rx & rs485_rx), .rs485_tx(usb_tx), .rs485_driver_enable(rs485_driver_enable),
         .encoder_a, .encoder_b, .encoder_z, .probe, .adc_sin, .adc_cos, .adc_cs_n, .adc_sclk, .limit_low_open, .limit_high_open,
         .drive_fault_n, .drive_enable, .bridge_a, .bridge_b, .step, .direction, .dac_cs_n, .dac_sclk, .dac_sdi, .compare_pulse,
-        .i2c_scl(1'b1), .i2c_sda(1'b1), .keyboard_clock(1'b1), .keyboard_data(1'b1), .machine_clock(1'b1), .machine_data(1'b1),
-        .peer_rx(1'b1), .sensor_rx(1'b1), .machine_status(2'b00));
+        .i2c_scl(1'b1), .i2c_sda(1'b1), .keyboard_clock(1'b1), .keyboard_data(1'b1), .edm_clock(1'b1), .edm_data(1'b1),
+        .peer_rx(1'b1), .sensor_rx(1'b1), .edm_status(2'b00));
 
     assign rs485_tx = usb_tx;
     assign led      = {locked && !rst, rs485_driver_enable, estop_open, limit_high_open, limit_low_open, !drive_fault_n, step, drive_enable};

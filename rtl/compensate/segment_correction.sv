@@ -9,8 +9,8 @@
 // scale    origin moves with the position at each shift: the table stays where it lies on the scale
 // moved    what is no motion: a shift, and the step when the correction comes into force or is given up. A target that takes moved_by
 //          with it is as far from the position as before
-// reading  stored is the point of look_at when known stands: as soon as the table is free, also while it is in use
-// source   S0: table of equal segments; the rest keeps the error of its place for the time that it takes to look the next one up
+// reading  stored is the point of read_point when known stands: as soon as the table is free, also while it is in use
+// source   S0: table of equal segments; the rest keeps the error of its place for the time that it takes to read the next one up
 // model    tb/compensate/segment_correction.py, equal in every bit of every cycle
 // proved   between two positions corrected moves by moved_by only, and it is never farther from position than error: out of force it is
 //          the position
@@ -31,8 +31,8 @@ module segment_correction #(
     input  wire                    write,               // strobe: value goes to point
     input  wire        [INDEX-1:0] point,               // border
     input  wire signed [23:0]      value,               // 2^-16 period: position there less the true one
-    input  wire                    look,                // strobe: read the point of look_at back
-    input  wire        [INDEX-1:0] look_at,
+    input  wire                    read,                // strobe: read the point of read_point back
+    input  wire        [INDEX-1:0] read_point,
     input  wire                    valid,               // strobe: position is new
     input  wire signed [47:0]      position,            // Q32.16 periods
     input  wire                    shift,               // strobe: position grows by shift_periods in the next clk
@@ -52,7 +52,7 @@ module segment_correction #(
     logic               off;                            // enable was 0: what the table was asked is forgotten
     logic               looking;
     wire                told, beyond;
-    wire signed [23:0]  answer, looked;
+    wire signed [23:0]  answer, read_value;
     wire signed [47:0]  unused_corrected;
 
     wire                asking = enable && !asked && !looking && (valid || !in_force);
@@ -63,8 +63,8 @@ module segment_correction #(
     wire                unused = &{1'b0, unused_corrected};
 
     segment_table #(.INDEX(INDEX)) u_table (.clk, .rst(rst || !enable), .enable(1'b1), .linear, .origin(first), .segment_length, .segments,
-        .write, .point, .value, .look(look_at), .valid(asking), .position, .done(told), .corrected(unused_corrected), .outside(beyond),
-        .error(answer), .looked);
+        .write, .point, .value, .read_point(read_point), .valid(asking), .position, .done(told), .corrected(unused_corrected), .outside(beyond),
+        .error(answer), .read_value);
 
     always_ff @(posedge clk) begin
         if (origin_written) first <= origin;
@@ -82,9 +82,9 @@ module segment_correction #(
         done     <= valid;
         if (valid || moved) corrected <= position - 48'(fresh);
 
-        looking <= look || (looking && asked);
-        known   <= !look && (known || (looking && !asked));
-        if (looking && !asked) stored <= looked;
+        looking <= read || (looking && asked);
+        known   <= !read && (known || (looking && !asked));
+        if (looking && !asked) stored <= read_value;
         if (rst || !enable) begin
             answered <= 1'b0;
             in_force <= 1'b0;

@@ -47,7 +47,7 @@ module segment_map #(
     logic [W-1:0]        position_q;
     wire                 done, unused_outside;
     wire signed [47:0]   unused_corrected;
-    wire signed [23:0]   error, unused_looked;
+    wire signed [23:0]   error, unused_read_value;
 
     wire                 on     = enable && swapped;
     wire                 asking = on && !asked;
@@ -56,12 +56,12 @@ module segment_map #(
     wire                 puts   = closes || (follows ? number < 7'(SEGMENTS) : write && number < 7'(SEGMENTS));
     wire [INDEX-1:0]     point  = INDEX'(number) + (page ? '0 : INDEX'(POINTS));
     wire signed [23:0]   value  = closes ? even_q : follows ? odd_q : even;
-    wire                 unused = &{1'b0, unused_outside, unused_corrected, unused_looked};
+    wire                 unused = &{1'b0, unused_outside, unused_corrected, unused_read_value};
 
     segment_table #(.INDEX(INDEX)) u_table
         (.clk, .rst(rst || swap || !on), .enable(1'b1), .linear(1'b1), .origin(48'sd0), .segment_length(LENGTH), .segments(INDEX'(2 * POINTS - 1)),
-         .write(puts), .point, .value, .look('0), .valid(asking), .position(place), .done, .corrected(unused_corrected),
-         .outside(unused_outside), .error, .looked(unused_looked));
+         .write(puts), .point, .value, .read_point('0), .valid(asking), .position(place), .done, .corrected(unused_corrected),
+         .outside(unused_outside), .error, .read_value(unused_read_value));
 
     always_ff @(posedge clk) begin
         follows <= write;

@@ -24,14 +24,14 @@ module segment_table #(
     input  wire                  write,             // strobe: value goes to point
     input  wire        [INDEX-1:0] point,           // border
     input  wire signed [23:0]    value,             // 2^-16 period: position there less the true one
-    input  wire [INDEX-1:0]      look,              // border whose point is to be read back
+    input  wire [INDEX-1:0]      read_point,              // border whose point is to be read back
     input  wire                  valid,             // strobe
     input  wire signed [47:0]    position,          // 2^-16 period
     output logic                 done,              // strobe
     output logic signed [47:0]   corrected,         // 2^-16 period: position less its error
     output logic                 outside,           // level, with done: the position is beyond the table
     output logic signed [23:0]   error,             // 2^-16 period, with done: position less corrected
-    output logic signed [23:0]   looked             // 2^-16 period: the point of look one clk before, while no position is under way
+    output logic signed [23:0]   read_value             // 2^-16 period: the point of read_point one clk before, while no position is under way
 );
     if (INDEX < 2 || INDEX > 12) begin : g_check INDEX_MUST_BE_FROM_2_TO_12 u_error (); end
 
@@ -52,17 +52,17 @@ module segment_table #(
     wire                   after    = beyond || index >= segments;
     wire                   away     = below || after;
     wire [INDEX-1:0]       border   = below ? '0 : after ? segments : index;
-    wire [INDEX-1:0]       read_at  = state == IDLE ? look : border + INDEX'(state != FIRST && !away);
+    wire [INDEX-1:0]       read_at  = state == IDLE ? read_point : border + INDEX'(state != FIRST && !away);
     wire [V-1:0]           dividend = state == LINE ? rest << 1 : rest;
     wire                   fits     = dividend >= part;
-    wire signed [24:0]     rise     = 25'(looked) - 25'(first);
-    wire signed [23:0]     mean     = 24'((25'(looked) + 25'(first) + 25'sd1) >>> 1);
+    wire signed [24:0]     rise     = 25'(read_value) - 25'(first);
+    wire signed [23:0]     mean     = 24'((25'(read_value) + 25'(first) + 25'sd1) >>> 1);
     wire signed [41:0]     straight = 42'($signed({first, 16'd0})) + 42'(line) + 42'sd32768;
     wire signed [23:0]     answer   = !enable ? '0 : linear ? 24'(straight >>> 16) : mean;
 
     always_ff @(posedge clk) begin
         if (write) errors[point] <= value;
-        if (state != DIVIDE && state != LINE) looked <= errors[read_at];
+        if (state != DIVIDE && state != LINE) read_value <= errors[read_at];
     end
 
     always_ff @(posedge clk) begin
@@ -90,7 +90,7 @@ module segment_table #(
             end
             FIRST:  state <= SECOND;
             SECOND: begin
-                first <= looked;
+                first <= read_value;
                 state <= RISE;
             end
             RISE: begin

@@ -12,17 +12,17 @@
 //          rate from 0 to 100 % |velocity|, |acceleration| and |jerk| stay below those of the segments times rate,
 //          rate^2, rate^2; at 100 % each step is the mean of two of the profile. The lengths are those of the profile.
 //          Where the velocity itself steps between two segments, one step below 100 % may exceed it by half of that
-// rate's   way to `percent`: it changes by `slope` a tick at most, its change by `curve`, and it ends at the setting exactly,
+// rate's   way to `feed_fraction`: it changes by `slope` a tick at most, its change by `curve`, and it ends at the setting exactly,
 //          whatever the setting did on the way; a profile begins at the setting
-// brake    from the step and the acceleration made last: the acceleration changes by brake_jerk a tick at most, a part of
-//          brake_jerk in the first and the last, is brought below brake_rate, and both end at zero
+// brake    from the step and the acceleration made last: the acceleration changes by stop_jerk a tick at most, a part of
+//          stop_jerk in the first and the last, is brought below stop_deceleration, and both end at zero
 // law      of both ways to zero: the slope is a whole number of paces; area is what it still adds while it falls to zero
 //          from here. It grows while what is left is enough for the larger area, falls when that is less than the area,
 //          else it stays. Less than a pace is left in the end, and is the last step
 // source   forward differences of a cubic; Schoenberg, Quart. Appl. Math. 4 (1946) 45; time-optimal control of two
 //          integrators, made discrete so that it ends at zero without chatter
-// built    one adder of 72 bits and 16 words of memory, moved by profile_program (tables/profile_program.py)
-// proved   target moves by a step, shift or hold_here only, by the whole of it; what stops moving has no velocity nor
+// built    one adder of 72 bits and 16 words of memory, moved by profile_microcode (tables/profile_microcode.py)
+// proved   target moves by a step, shift or set_target_to_position only, by the whole of it; what stops moving has no velocity nor
 //          acceleration; queue_free is never above DEPTH; brake and underrun leave the queue empty
 // proof    depth 8, DEPTH = 2
 // model    tb/control/profile_player.py, equal in every bit of every cycle
@@ -33,11 +33,11 @@ module profile_player #(
 ) (
     input  wire                  clk,
     input  wire                  rst,                           // target becomes zero, the queue empty
-    input  wire        [31:0]    brake_rate,                    // 2^-32 period/tick2; 0: velocity is zero after one step
-    input  wire        [31:0]    brake_jerk,                    // 2^-40 period/tick3; 0, or more than brake_rate: not limited
+    input  wire        [31:0]    stop_deceleration,                    // 2^-32 period/tick2; 0: velocity is zero after one step
+    input  wire        [31:0]    stop_jerk,                    // 2^-40 period/tick3; 0, or more than stop_deceleration: not limited
     input  wire        [31:0]    slope,                         // of the rate, 2^-32 per tick; 0: no limit
     input  wire        [31:0]    curve,                         // of the rate, 2^-32 per tick2; 0: no limit but slope
-    input  wire        [16:0]    percent,                       // rate wanted, 2^-16: 65536 is 100 %, more is taken for it
+    input  wire        [16:0]    feed_fraction,                       // rate wanted, 2^-16: 65536 is 100 %, more is taken for it
     input  wire                  pause,                         // the rate wanted is 0
     input  wire                  tick,                          // strobe: servo tick
     input  wire                  push,                          // strobe: queue the segment; lost when full or braking
@@ -47,11 +47,11 @@ module profile_player #(
     input  wire        [23:0]    segment_ticks,                 // duration; 0: the segment is skipped
     input  wire                  segment_last,                  // the profile ends with this segment
     input  wire                  start,                         // strobe: play the queue; ignored while moving or when it is empty
-    input  wire                  arm,                           // strobe: start when `now` reaches start_at; a brake or hold_here disarms
+    input  wire                  arm,                           // strobe: start when `now` reaches start_at; a brake or set_target_to_position disarms
     input  wire        [31:0]    start_at,                      // clk
     input  wire        [31:0]    now,                           // clk, wraps
-    input  wire                  brake,                         // strobe: controlled stop, queue emptied
-    input  wire                  hold_here,                     // strobe: target := position, queue emptied, standing
+    input  wire                  controlled_stop,                         // strobe: controlled stop, queue emptied
+    input  wire                  set_target_to_position,                     // strobe: target := position, queue emptied, standing
     input  wire signed [47:0]    position,                      // 2^-16 period, measured
     input  wire                  shift,                         // strobe: the origin moves
     input  wire signed [47:0]    shift_by,                      // 2^-16 period, added to target
@@ -67,7 +67,7 @@ module profile_player #(
 
     localparam int A = $clog2(DEPTH);
 
-    // as in tables/profile_program.py
+    // as in tables/profile_microcode.py
     localparam [4:0] GOTO = 5'd1, NEGATIVE = 5'd2, POSITIVE = 5'd3, QUOTIENT = 5'd4, LOOP = 5'd5, MULTIPLY = 5'd6, FACTOR = 5'd7,
                      COUNT_31 = 5'd8, WORD = 5'd9, POP = 5'd10, LAST = 5'd11, STARVED = 5'd12, READY = 5'd13, CROSS = 5'd14,
                      CROSSED = 5'd15, FIRST = 5'd16, LATER = 5'd17, STOPPING = 5'd18, WIDE = 5'd19, ARRIVED = 5'd20,
@@ -90,13 +90,13 @@ module profile_player #(
 
     wire         full    = queue_free == 5'd0;
     wire         empty   = queue_free == 5'(DEPTH);
-    wire         clear   = hold_here || rst;
+    wire         clear   = set_target_to_position || rst;
     wire         ticked  = job == WAIT && tick && moving;
     wire         make    = job == MAKE && !shift;
-    wire         pop     = job == POP && !empty && !brake;      // a brake may have emptied it on the way
+    wire         pop     = job == POP && !empty && !controlled_stop;      // a brake may have emptied it on the way
     wire         starve  = job == STARVED && !braking && empty;
     wire         reached = armed && $signed(now - start_at) >= 0;
-    wire         begins  = (start || reached) && !empty && !moving && !brake;
+    wire         begins  = (start || reached) && !empty && !moving && !controlled_stop;
 
     always_comb begin
         case (job)
@@ -123,7 +123,7 @@ module profile_player #(
     wire         stay = (job == WAIT && !ticked) || (job == MAKE && shift);
     wire  [6:0]  next = clear ? 7'd0 : stay ? line : jump ? target_line : line + 7'd1;
 
-    profile_program u_program (.clk, .next, .code({target_line, job, halved, with_acc, sign, place, word}));
+    profile_microcode u_microcode (.clk, .next, .code({target_line, job, halved, with_acc, sign, place, word}));
 
     // the queue: seven words a segment, written and read one a clk
     logic [32:0]  queue [0:DEPTH*8-1];
@@ -164,12 +164,12 @@ module profile_player #(
     wire         [3:0]  write_to  = word[4] ? {1'b0, !stopping, word[1:0]} : word[3:0];
     wire         [71:0] stored    = memory[read_from];
     wire                queue_high = !from_memory && place[2:0] == QUEUE_HIGH;
-    wire         [32:0] setting   = pause ? 33'd0 : percent[16] ? 33'h1_0000_0000 : {1'b0, percent[15:0], 16'd0};
+    wire         [32:0] setting   = pause ? 33'd0 : feed_fraction[16] ? 33'h1_0000_0000 : {1'b0, feed_fraction[15:0], 16'd0};
 
     always_comb begin
         case (place[2:0])
-            LIMIT:     outside = stopping ? {brake_rate, 8'd0} : {8'd0, slope};
-            CURVE:     outside = {8'd0, stopping ? brake_jerk : curve};
+            LIMIT:     outside = stopping ? {stop_deceleration, 8'd0} : {8'd0, slope};
+            CURVE:     outside = {8'd0, stopping ? stop_jerk : curve};
             SETTING:   outside = {7'd0, setting};
             FULL:      outside = 40'h1_0000_0000;
             HALF:      outside = {16'd0, final_step, 23'd0};
@@ -185,8 +185,8 @@ module profile_player #(
     wire         [71:0] sum   = (with_acc ? acc : '0) + (term ^ {72{minus}}) + 72'(minus);
 
     // target: moved by a step or a shift, or set
-    wire  signed [47:0] from = hold_here ? position : target;
-    wire  signed [47:0] by   = shift ? shift_by : make && !hold_here ? acc[71:24] : '0;
+    wire  signed [47:0] from = set_target_to_position ? position : target;
+    wire  signed [47:0] by   = shift ? shift_by : make && !set_target_to_position ? acc[71:24] : '0;
 
     wire                fits = stored[71:55] == {17{stored[71]}};
     wire  signed [31:0] held = fits ? stored[55:24] : {stored[71], {31{~stored[71]}}};
@@ -227,19 +227,19 @@ module profile_player #(
         underrun <= starve;
         if (arm || reached) armed <= arm;
         if (begins) moving <= 1'b1;
-        if ((brake && moving) || starve) braking <= 1'b1;
+        if ((controlled_stop && moving) || starve) braking <= 1'b1;
         if (make) target_velocity <= final_step ? '0 : held;
         if (make && final_step) target_acceleration <= '0;
         else if (job == DISPATCH) target_acceleration <= held;
 
-        if (brake || starve || clear) begin
+        if (controlled_stop || starve || clear) begin
             queue_free <= 5'(DEPTH);
             write_at   <= read_at;
             write_word <= '0;
         end
         if (clear || (make && final_step)) {moving, braking, ready, last, final_step, arrived} <= '0;
         if (clear || (make && final_step)) {first, count} <= 6'b1_00000;
-        if (brake || clear) armed <= 1'b0;
+        if (controlled_stop || clear) armed <= 1'b0;
         if (clear) begin
             underrun            <= 1'b0;
             target_velocity     <= '0;
@@ -257,12 +257,12 @@ module profile_player #(
             assert (queue_free <= 5'(DEPTH));
             assert (write_word != 3'd7);
             assert (!underrun || (queue_free == 5'(DEPTH) && braking));
-            if (!$past(rst || hold_here || shift || make)) assert (target == $past(target));
-            if ($past(shift && !hold_here && !rst)) assert (target == $past(target) + $past(shift_by));
-            if ($past(hold_here && !shift && !rst)) assert (target == $past(position));
-            if ($past(rst || hold_here)) assert (!moving && !armed && !ready && target_velocity == '0 && target_acceleration == '0 && line == '0);
+            if (!$past(rst || set_target_to_position || shift || make)) assert (target == $past(target));
+            if ($past(shift && !set_target_to_position && !rst)) assert (target == $past(target) + $past(shift_by));
+            if ($past(set_target_to_position && !shift && !rst)) assert (target == $past(position));
+            if ($past(rst || set_target_to_position)) assert (!moving && !armed && !ready && target_velocity == '0 && target_acceleration == '0 && line == '0);
             if ($past(moving) && !moving) assert (target_velocity == '0 && target_acceleration == '0);
-            if ($past(brake) && !$past(rst)) assert (queue_free == 5'(DEPTH) && !armed);
+            if ($past(controlled_stop) && !$past(rst)) assert (queue_free == 5'(DEPTH) && !armed);
         end
         cover (past && !rst && moving && armed && queue_free != 5'(DEPTH));
         cover (past && !rst && braking && !ready);

@@ -14,50 +14,50 @@ module register_bus #(
     input  wire                  select,        // strobe: an access
     input  wire        [15:0]    address,       // byte address inside the register map
     input  wire        [31:0]    node_rdata,    // answer of each block, the clk after its select
-    input  wire        [31:0]    line_rdata,
-    input  wire        [31:0]    links_rdata,
+    input  wire        [31:0]    bus_rdata,
+    input  wire        [31:0]    peripherals_rdata,
     input  wire        [32*AXES-1:0] axis_rdata, // axis n in bits 32 n + 31 .. 32 n
-    input  wire        [32*AXES-1:0] grating_rdata,
+    input  wire        [32*AXES-1:0] feedback_rdata,
     input  wire        [32*AXES-1:0] actuator_rdata,
     output logic                 node_select,   // strobe: the access is for this block
-    output logic                 line_select,
-    output logic                 links_select,
+    output logic                 bus_select,
+    output logic                 peripherals_select,
     output logic       [AXES-1:0] axis_select,
-    output logic       [AXES-1:0] grating_select,
+    output logic       [AXES-1:0] feedback_select,
     output logic       [AXES-1:0] actuator_select,
     output logic       [31:0]    rdata          // answer of the block selected last; 0 where there is none
 );
     if (AXES < 1 || AXES > 8) begin : g_check AXES_MUST_BE_FROM_1_TO_8 u_error (); end
 
-    logic            node_q, line_q, links_q;
-    logic [AXES-1:0] axis_q, grating_q, actuator_q;
+    logic            node_q, bus_q, peripherals_q;
+    logic [AXES-1:0] axis_q, feedback_q, actuator_q;
 
     wire [7:0] block = address[15:8];
 
     always_comb begin
         node_select = select && block == 8'd0;
-        line_select = select && block == 8'd1;
-        links_select = select && block == 8'd2;
+        bus_select = select && block == 8'd1;
+        peripherals_select = select && block == 8'd2;
         for (int n = 0; n < AXES; n++) begin
             axis_select[n]    = select && block == 8'(4 + n);
-            grating_select[n] = select && block == 8'(12 + n);
+            feedback_select[n] = select && block == 8'(12 + n);
             actuator_select[n] = select && block == 8'(20 + n);
         end
     end
 
     always_comb begin
-        rdata = ({32{node_q}} & node_rdata) | ({32{line_q}} & line_rdata) | ({32{links_q}} & links_rdata);
+        rdata = ({32{node_q}} & node_rdata) | ({32{bus_q}} & bus_rdata) | ({32{peripherals_q}} & peripherals_rdata);
         for (int n = 0; n < AXES; n++)
-            rdata = rdata | ({32{axis_q[n]}} & axis_rdata[32*n +: 32]) | ({32{grating_q[n]}} & grating_rdata[32*n +: 32])
+            rdata = rdata | ({32{axis_q[n]}} & axis_rdata[32*n +: 32]) | ({32{feedback_q[n]}} & feedback_rdata[32*n +: 32])
                           | ({32{actuator_q[n]}} & actuator_rdata[32*n +: 32]);
     end
 
     always_ff @(posedge clk) begin
         node_q    <= node_select;
-        line_q    <= line_select;
-        links_q   <= links_select;
+        bus_q    <= bus_select;
+        peripherals_q   <= peripherals_select;
         axis_q    <= axis_select;
-        grating_q <= grating_select;
+        feedback_q <= feedback_select;
         actuator_q <= actuator_select;
     end
 

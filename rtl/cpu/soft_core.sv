@@ -4,7 +4,7 @@
 // latency  memory answers without a wait, registers with one of 1 clk
 // rate     an operation takes 3 clk, a memory access 5, a register access or a product 6, a quotient 40
 // source   PicoRV32, from the package pythondata_cpu_picorv32; its look-ahead address reaches the memory one clk early
-// model    tb/cpu/soft_core.py, the results of the program tb/cpu/program.c
+// model    tb/cpu/soft_core.py, the results of the program tb/cpu/core_test.c
 //
 // map      0000_0000 memory (start address 0, stack from its end), 8000_0000 registers (64 KiB, whole words only).
 //          Anything else, a misaligned access and an illegal instruction stop the core: trap stands until rst.

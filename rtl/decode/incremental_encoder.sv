@@ -7,22 +7,22 @@
 // source   the features of HostMot2's encoder counter, with N-of-M, more modes, direction and revolution checks added
 // model    tb/decode/incremental_encoder.py, equal in every bit of every cycle
 // proved   a fault only by an event after it was enabled; edge_time changes with a step of count and at no other time
-// proof    W = 4, TIME_W = 4, FILTER_W = 2, SPARE_W = 1, SKIP_W = 1
+// proof    W = 4, TIME_W = 4, FILTER_W = 2, TOLERATED_W = 1, SKIP_W = 1
 `default_nettype none
 
 module incremental_encoder #(
     parameter int W        = 32,            // bits of count
     parameter int TIME_W   = 32,            // bits of the time stamp
-    parameter int FILTER_W = 8,             // bits of filter_needed
-    parameter int SPARE_W  = 4,             // bits of filter_spare
+    parameter int FILTER_W = 8,             // bits of filter_required
+    parameter int TOLERATED_W  = 4,             // bits of filter_tolerated
     parameter int SKIP_W   = 16,            // bits of filter_skip
     parameter int CHECK    = 1              // 0: without the check of counts_per_revolution
 ) (
     input  wire                  clk,
     input  wire                  rst,
     input  wire [SKIP_W-1:0]     filter_skip, // event_filter: clk left out between two samples
-    input  wire [FILTER_W-1:0]   filter_needed, // event_filter: N; 0 and 1 pass every sample
-    input  wire [SPARE_W-1:0]    filter_spare, // event_filter: M - N
+    input  wire [FILTER_W-1:0]   filter_required, // event_filter: N; 0 and 1 pass every sample
+    input  wire [TOLERATED_W-1:0]    filter_tolerated, // event_filter: M - N
     input  wire [1:0]            mode,      // quadrature_decoder: x4, x2, x1, pulses and direction
     input  wire                  index_low, // index_latch: active_low
     input  wire [1:0]            index_gate_mask,
@@ -41,7 +41,7 @@ module incremental_encoder #(
     input  wire                  z,
     output logic signed [W-1:0]  count,
     output logic signed [1:0]    step,
-    output logic                 heading,   // as in quadrature_decoder
+    output logic                 direction,   // as in quadrature_decoder
     output logic [TIME_W-1:0]    edge_time, // now in the clk before count took its last step, both change at once; nothing before the first step
     output logic                 index_found, // strobe
     output logic                 index_armed,
@@ -54,16 +54,16 @@ module incremental_encoder #(
     output logic                 revolution_wrong, // strobe
     output logic                 revolution_fault // flag: a wrong revolution since clear_flags
 );
-    wire a_later, b_later, settled, stepping, clear;
+    wire a_later, b_later, ready, stepping, clear;
 
-    event_filter #(.LEVELS(3), .W(FILTER_W), .SPARE_W(SPARE_W), .SKIP_W(SKIP_W)) u_filter
-        (.clk, .rst, .skip(filter_skip), .needed(filter_needed), .spare(filter_spare), .level({z, b, a}),
+    event_filter #(.LEVELS(3), .W(FILTER_W), .TOLERATED_W(TOLERATED_W), .SKIP_W(SKIP_W)) u_filter
+        (.clk, .rst, .skip(filter_skip), .required(filter_required), .tolerated(filter_tolerated), .level({z, b, a}),
          .filtered, .rejected);
     quadrature_decoder #(.W(W)) u_decoder
-        (.clk, .rst, .mode, .clear, .a(a_later), .b(b_later), .settled, .stepping, .count, .step, .heading, .illegal);
+        (.clk, .rst, .mode, .clear, .a(a_later), .b(b_later), .ready, .stepping, .count, .step, .direction, .illegal);
     index_latch #(.W(W), .CHECK(CHECK)) u_index
         (.clk, .rst, .active_low(index_low), .gate_mask(index_gate_mask), .gate(index_gate), .take_up(index_up), .take_down(index_down),
-         .each(index_each), .clears(index_clears), .counts_per_revolution, .arm(arm_index), .probe(1'b0), .settled, .heading, .stepping,
+         .each(index_each), .clears(index_clears), .counts_per_revolution, .arm(arm_index), .probe(1'b0), .ready, .direction, .stepping,
          .count, .a(filtered[0]), .b(filtered[1]), .z(filtered[2]), .a_later, .b_later, .clear, .armed(index_armed), .found(index_found),
          .index_count, .revolution_wrong);
 
@@ -91,7 +91,7 @@ module incremental_encoder #(
             assert (!illegal_fault || illegal_seen);
         end
         if (past && !$past(rst)) begin
-            if (settled && $past(settled) && edge_time != $past(edge_time)) assert (step != 0 && edge_time == $past(now));
+            if (ready && $past(ready) && edge_time != $past(edge_time)) assert (step != 0 && edge_time == $past(now));
             if (step != 0) assert (edge_time == $past(now));
             if ($past(illegal)) assert (illegal_seen);
             cover (index_found && step == -1);

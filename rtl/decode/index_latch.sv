@@ -31,8 +31,8 @@ module index_latch #(
     input  wire        [W-1:0]   counts_per_revolution, // in counts of the decoder's mode; 0, or each = 0: not checked
     input  wire                  arm,       // strobe: take the next index
     input  wire                  probe,     // strobe: latch the count
-    input  wire                  settled,   // from the decoder behind a_later, b_later, as are heading, stepping, count
-    input  wire                  heading,
+    input  wire                  ready,   // from the decoder behind a_later, b_later, as are direction, stepping, count
+    input  wire                  direction,
     input  wire                  stepping,
     input  wire signed [W-1:0]   count,
     input  wire                  a,         // levels, synchronous to clk and already filtered
@@ -53,10 +53,10 @@ module index_latch #(
 
     wire at_index   = (z ^ active_low) && ((gate ^ {b, a}) & gate_mask) == 0;
     wire at_index_q = (z_later ^ active_low) && ((gate ^ {b_later, a_later}) & gate_mask) == 0;    // settings of now: they make no edge
-    wire entering   = settled && at_index && !at_index_q && !used;
-    wire met        = heading ? from_below : from_above;
+    wire entering   = ready && at_index && !at_index_q && !used;
+    wire met        = direction ? from_below : from_above;
     wire take       = met && wanted;
-    wire stepped    = settled && stepping;
+    wire stepped    = ready && stepping;
 
     assign clear = take && clears;
 
@@ -71,7 +71,7 @@ module index_latch #(
         armed      <= arm || (armed && !take);
         found      <= take;
         // less the reverse of the step: an adder of its own costs nothing here, that of the decoder shared costs W cells
-        if (take || probe) index_count <= count - {{W-1{stepped && heading}}, stepped};
+        if (take || probe) index_count <= count - {{W-1{stepped && direction}}, stepped};
         if (rst) begin
             from_below  <= 1'b0;
             from_above  <= 1'b0;
@@ -121,13 +121,13 @@ module index_latch #(
             assert (!clear || (take && clears));
             if (take) begin
                 assert ({a_later, b_later, z_later} != {$past(a_later), $past(b_later), $past(z_later)});
-                assert ((z_later ^ $past(active_low)) && $past(settled) && $past(free));
-                assert ($past(each || armed) && (heading ? $past(take_up) : $past(take_down)));
+                assert ((z_later ^ $past(active_low)) && $past(ready) && $past(free));
+                assert ($past(each || armed) && (direction ? $past(take_up) : $past(take_down)));
             end
         end
         if (past && !$past(rst)) begin
             assert (found == $past(take));
-            if (found || $past(probe)) assert (index_count == W'($past(count) + ($past(stepped) ? $past(heading) ? 1 : -1 : 0)));
+            if (found || $past(probe)) assert (index_count == W'($past(count) + ($past(stepped) ? $past(direction) ? 1 : -1 : 0)));
             else assert (index_count == $past(index_count));
             assert (!armed || !found || $past(arm));
             cover (found && gate_mask == 3 && !each);

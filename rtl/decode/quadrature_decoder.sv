@@ -21,11 +21,11 @@ module quadrature_decoder #(
     input  wire                  clear,     // strobe: count becomes zero at the end of this clk, an edge in this clk included
     input  wire                  a,         // level, synchronous to clk and already filtered
     input  wire                  b,         // level; a leading b counts up
-    output logic                 settled,   // level: edges count from here on
-    output logic                 stepping,  // count takes a step at the end of this clk, if settled
+    output logic                 ready,   // level: edges count from here on
+    output logic                 stepping,  // count takes a step at the end of this clk, if ready
     output logic signed [W-1:0]  count,     // 1/4, 1/2 or 1 period by mode, or pulses; wraps
     output logic signed [1:0]    step,      // what count moved by in this clk, but for clear: -1, 0, +1
-    output logic                 heading,   // direction of the last edge, that of this clk included, counted or not; 1 before the first. Mode 3: b is 0
+    output logic                 direction,   // direction of the last edge, that of this clk included, counted or not; 1 before the first. Mode 3: b is 0
     output logic                 illegal    // strobe: a and b changed at once (mode 3: b as a rose); not counted, count is wrong from here on
 );
     if (W < 2)      begin : g_check_w W_MUST_BE_AT_LEAST_2 u_error (); end
@@ -52,22 +52,22 @@ module quadrature_decoder #(
     wire down = stepping & ~up;
 
     assign stepping = edge_b ? ~edge_a & mode == X4 : edge_a & of_a;
-    assign heading  = mode == PULSES || (edge_a ^ edge_b) ? up : upward;
+    assign direction  = mode == PULSES || (edge_a ^ edge_b) ? up : upward;
 
     always_ff @(posedge clk) begin
         a_q     <= a;
         b_q     <= b;
-        upward  <= heading || !settled;
-        illegal <= settled & edge_a & edge_b & (mode != PULSES || a);
+        upward  <= direction || !ready;
+        illegal <= ready & edge_a & edge_b & (mode != PULSES || a);
         step    <= {down, stepping};
         count   <= count + {{W-1{down}}, stepping};
-        if (clear || !settled) count <= '0;
-        if (!settled) step <= '0;
-        settled <= settle == '0 || settle == S'(1);
-        if (!settled) settle <= settle - 1'b1;
+        if (clear || !ready) count <= '0;
+        if (!ready) step <= '0;
+        ready <= settle == '0 || settle == S'(1);
+        if (!ready) settle <= settle - 1'b1;
         if (rst) begin
             settle  <= S'(SETTLE);
-            settled <= 1'b0;
+            ready <= 1'b0;
             count   <= '0;
             step    <= '0;
             upward  <= 1'b1;
@@ -96,13 +96,13 @@ module quadrature_decoder #(
     always @(posedge clk) begin
         past   <= 1'b1;
         mode_q <= mode;
-        way    <= rst || !settled ? {{W{1'b0}}, place} : way_now;
-        if (rst || !settled)                                 zero <= borders(mode, {{W{1'b0}}, place});
+        way    <= rst || !ready ? {{W{1'b0}}, place} : way_now;
+        if (rst || !ready)                                 zero <= borders(mode, {{W{1'b0}}, place});
         else if (clear || turned == 2 || mode != mode_q) zero <= borders(mode, way_now) - count_now;
         if (!past) assume (rst);
         if (past) begin
-            assert (settled == (settle == '0));
-            assert (settled || count == 0);
+            assert (ready == (settle == '0));
+            assert (ready || count == 0);
             assert (place_q == way[1:0]);
             if (mode_q != PULSES) assert (count == borders(mode_q, way) - zero);
         end
@@ -110,7 +110,7 @@ module quadrature_decoder #(
             assert (step != -2);
             assert (count == ($past(clear) ? W'(0) : W'($past(count) + {{W-2{step[1]}}, step})));
             assert (!(illegal && step != 0));
-            if (step != 0) assert ($past(settled) && ($past(a ^ a_q) ^ $past(b ^ b_q)));
+            if (step != 0) assert ($past(ready) && ($past(a ^ a_q) ^ $past(b ^ b_q)));
             if (step != 0 && mode_q != PULSES) assert ($past(place) == 2'($past(place_q) + step));
             if (step != 0 && mode_q == PULSES) assert ($past(a && !a_q) && step[1] == $past(b));
             if (step != 0) assert (upward == (step == 1));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // quadrature_encoder -- turn a target position into the A/B/Z of an incremental encoder, one edge at a time.
 //
-// latency  2 clk from target to the edge, if `spacing` allows it
-// rate     one edge per `spacing` clk; a target further off is made up at that rate, the way back too
+// latency  2 clk from target to the edge, if `minimum_edge_separation` allows it
+// rate     one edge per `minimum_edge_separation` clk; a target further off is made up at that rate, the way back too
 // rounding a settled position is target rounded to the nearest count, a half goes up. Around it `hysteresis` widens the band
 //          in which nothing moves to 1/2 + hysteresis each way: a target that trembles by less than twice that makes no edge
 //          but the first one
@@ -10,19 +10,19 @@
 //          together with the edge. home waits for a clk without an edge
 // source   S1: A/B/Z sent on as if the relay were the encoder
 // model    tb/drive/quadrature_encoder.py, equal in every bit of every cycle
-// proved   a and b never change both in one clk, no edge sooner than `spacing` after the one before, pins and position agree
-//          for ever, a target that moves no faster than the spacing is followed within 1/2 + hysteresis + 1 count
-// proof    W = 6, F = 2, SPACING_W = 3
+// proved   a and b never change both in one clk, no edge sooner than `minimum_edge_separation` after the one before, pins and position agree
+//          for ever, a target that moves no faster than the minimum_edge_separation is followed within 1/2 + hysteresis + 1 count
+// proof    W = 6, F = 2, SEPARATION_W = 3
 `default_nettype none
 
 module quadrature_encoder #(
     parameter int W         = 32,                   // bits of position
     parameter int F         = 16,                   // fraction bits of target
-    parameter int SPACING_W = 16                    // bits of spacing
+    parameter int SEPARATION_W = 16                    // bits of minimum_edge_separation
 ) (
     input  wire                  clk,
     input  wire                  rst,
-    input  wire [SPACING_W-1:0]  spacing,           // clk between two edges at least; 0 is taken as 1
+    input  wire [SEPARATION_W-1:0]  minimum_edge_separation,           // clk between two edges at least; 0 is taken as 1
     input  wire        [F-1:0]   hysteresis,        // 2^-F count
     input  wire        [W-1:0]   counts_per_turn,   // 0: z stays low
     input  wire                  load,              // level: position is home_position without edges: only while nobody looks
@@ -45,7 +45,7 @@ module quadrature_encoder #(
     logic                 aimed;                    // they stand
     logic [W-1:2]         ahead_q, back_q;          // of the clk before, for behind
     logic                 aimed_q;
-    logic [SPACING_W-1:0] left;                     // clk until an edge is allowed
+    logic [SEPARATION_W-1:0] left;                     // clk until an edge is allowed
     logic [W-1:0]         place;                    // count from the index up
     logic [W-1:0]         highest;                  // that place takes
     logic                 placed, waiting;          // place is known; home has not been taken yet
@@ -75,7 +75,7 @@ module quadrature_encoder #(
         back_q     <= back[W-1:2];
         behind     <= aimed_q && ((!ahead_q[W-1] && |ahead_q[W-2:2]) || (back_q[W-1] && !(&back_q[W-2:2])));
 
-        if (up || down)       left <= spacing == '0 ? '0 : spacing - 1'b1;
+        if (up || down)       left <= minimum_edge_separation == '0 ? '0 : minimum_edge_separation - 1'b1;
         else if (left != '0)  left <= left - 1'b1;
 
         if (load)      position <= home_position;
@@ -104,7 +104,7 @@ module quadrature_encoder #(
 `ifdef FORMAL
     logic                 past = 1'b0;
     logic                 loaded;                   // position was loaded, and nobody has looked since
-    logic [SPACING_W-1:0] stood;                    // clk since the last edge
+    logic [SEPARATION_W-1:0] stood;                    // clk since the last edge
     always @(posedge clk) begin
         past   <= 1'b1;
         loaded <= rst || load;
@@ -123,13 +123,13 @@ module quadrature_encoder #(
         end
     end
 
-    // one spacing for ever: no edge comes too soon
-    logic [SPACING_W-1:0] agreed;
+    // one minimum_edge_separation for ever: no edge comes too soon
+    logic [SEPARATION_W-1:0] agreed;
     logic                 steady;
-    wire  [SPACING_W-1:0] least = agreed == '0 ? '0 : agreed - 1'b1;
+    wire  [SEPARATION_W-1:0] least = agreed == '0 ? '0 : agreed - 1'b1;
     always @(posedge clk) begin
-        steady <= rst ? 1'b1 : steady && spacing == agreed;
-        if (rst) agreed <= spacing;
+        steady <= rst ? 1'b1 : steady && minimum_edge_separation == agreed;
+        if (rst) agreed <= minimum_edge_separation;
         if (past && steady) begin
             assert (left <= least);
             assert (stood == '1 || {1'b0, left} + {1'b0, stood} >= {1'b0, least});
@@ -137,9 +137,9 @@ module quadrature_encoder #(
         end
     end
 
-    // a target that takes one count at a time and no sooner than the spacing is never lost
+    // a target that takes one count at a time and no sooner than the minimum_edge_separation is never lost
     logic           calm;                           // it has done so since the start, hysteresis at rest
-    logic [SPACING_W:0] quiet;                      // clk since it moved
+    logic [SEPARATION_W:0] quiet;                      // clk since it moved
     logic [F-1:0]   hysteresis_q;
     logic [W+F-1:0] target_q;
     wire  signed [W+F-1:0] moved = target - target_q;
@@ -153,7 +153,7 @@ module quadrature_encoder #(
         hysteresis_q <= hysteresis;
         quiet        <= rst || load || still ? (rst || load ? '1 : quiet + !(&quiet)) : '0;
         calm         <= rst ? 1'b0 : load ? target == {home_position, {F{1'b0}}} && steady
-                      : calm && steady && spacing == agreed && hysteresis == hysteresis_q && (still || slow);
+                      : calm && steady && minimum_edge_separation == agreed && hysteresis == hysteresis_q && (still || slow);
         if (past && calm) begin
             assert (loaded || aimed);
             if (!loaded) begin

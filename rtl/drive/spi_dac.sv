@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // spi_dac -- commands to a 16-bit bipolar converter on three wires, and 0 V to it while the drive is off.
 //
-// latency  33 * half_clk + 2 clk from valid, while no frame is being sent, to the rising edge of cs_n, at which the converter
-//          takes the command; a frame that is being sent is ended first, 36 * half_clk clk at most
-// rate     a frame per 36 * half_clk + 1 clk; of commands that come faster the last one is sent
+// latency  33 * half_period + 2 clk from valid, while no frame is being sent, to the rising edge of cs_n, at which the converter
+//          takes the command; a frame that is being sent is ended first, 36 * half_period clk at most
+// rate     a frame per 36 * half_period + 1 clk; of commands that come faster the last one is sent
 // refresh  after `refresh` clk without a frame the same code is sent again: a disturbed converter does not stay wrong
 // off      when enable falls 0 V is sent at once, and at each refresh. A command that comes while it is low is forgotten: when
 //          it rises 0 V stands until the next command
@@ -18,7 +18,7 @@
 module spi_dac (
     input  wire                  clk,
     input  wire                  rst,
-    input  wire        [7:0]     half_clk,                  // clk that sclk is high, and low; 0 counts as 1; taken with a frame
+    input  wire        [7:0]     half_period,                  // clk that sclk is high, and low; 0 counts as 1; taken with a frame
     input  wire        [15:0]    refresh,                   // clk
     input  wire signed [15:0]    trim,                      // full scale 2^15: code at which the output is 0 V, less 32768
     input  wire                  enable,                    // level: 0: 0 V
@@ -38,7 +38,7 @@ module spi_dac (
     wire               ready;
     wire               present = due || idle >= refresh;
 
-    spi_word_sender u_frames (.clk, .rst, .half_clk, .valid(present), .ready, .word({!fitting[15], fitting[14:0]}), .cs_n, .sclk, .sdi,
+    spi_word_sender u_frames (.clk, .rst, .half_period, .valid(present), .ready, .word({!fitting[15], fitting[14:0]}), .cs_n, .sclk, .sdi,
         .sent);
 
     always_ff @(posedge clk) begin

@@ -29,15 +29,15 @@ module step_generator #(
     input  wire                       clk,
     input  wire                       rst,          // the pins low at once
     input  wire        [PERIOD_W-1:0] period,       // clk from tick to tick; taken while not following; 0: not following
-    input  wire        [TIME_W-1:0]   high_clk,     // least length of a pulse; 0 counts as 1, here and below
-    input  wire        [TIME_W-1:0]   low_clk,      // least length of a gap
-    input  wire        [TIME_W-1:0]   setup_clk,    // least time from a change of direction to an active edge, at least 2
-    input  wire        [TIME_W-1:0]   hold_clk,     // least time from a trailing edge to a change of direction
+    input  wire        [TIME_W-1:0]   high_cycles,     // least length of a pulse; 0 counts as 1, here and below
+    input  wire        [TIME_W-1:0]   low_cycles,      // least length of a gap
+    input  wire        [TIME_W-1:0]   setup_cycles,    // least time from a change of direction to an active edge, at least 2
+    input  wire        [TIME_W-1:0]   hold_cycles,     // least time from a trailing edge to a change of direction
     input  wire        [1:0]          mode,         // 0 step and direction; 1 quadrature; 2, 3 pulses; taken at rest while enable is low
     input  wire                       step_low,     // step is active low; taken like mode
     input  wire                       direction_low, // direction is low going up (pulses: active low); taken like mode
     input  wire                       enable,       // 1: follow target
-    input  wire                       load,         // strobe: begin the line anew at the floor of target
+    input  wire                       load,         // strobe: begin the line restart at the floor of target
     input  wire                       tick,         // strobe: draw a line to target
     input  wire signed [47:0]         target,       // Q32.16 steps, wraps
     output logic                      step,         // pin
@@ -68,7 +68,7 @@ module step_generator #(
     logic        [1:0]      quarter, wire_mode;     // quarter: of the period of a and b
     logic                   wire_step_low, wire_direction_low, rewired;     // rewired: the pins take mode and polarity in this clk
 
-    wire anew  = load || !enable || line_clk == '0;
+    wire restart  = load || !enable || line_clk == '0;
     wire ended = &spent[P-1:1];
     wire start = (tick || waiting) && ended;
     wire steep = slope[47:P+16] != {(32-P){slope[47]}};
@@ -78,7 +78,7 @@ module step_generator #(
     wire signed [W-1:0] moved = ahead[W+15:16] + (whole ^ {W{back}}) + W'(back);
     wire signed [W-1:0] now   = acted ? moved : ahead[W+15:16];
 
-    wire follows = !anew && !overrun && !acted && !rewired;
+    wire follows = !restart && !overrun && !acted && !rewired;
     wire stood   = &stand[TIME_W-1:1];
     wire settled = &settle[TIME_W-1:1];
     wire due     = upward != ahead[W+15];
@@ -104,7 +104,7 @@ module step_generator #(
         acted   <= rise || turns;
         strays  <= !acted && moved[W-1] == upward;
         if (steep || ahead[W+15] != ahead[W+14]) overrun <= 1'b1;
-        if (anew) begin
+        if (restart) begin
             line_clk <= period;
             spent    <= '1;
             slope    <= '0;
@@ -116,8 +116,8 @@ module step_generator #(
             overrun  <= 1'b0;
         end
 
-        if (times || !stood) stand <= times ? ~(rise ? high_clk : low_clk) : stand + {TIME_W{times}} + 1'b1;
-        if (steadies || !settled) settle <= steadies ? ~(fall ? hold_clk : setup_clk) : settle + {TIME_W{steadies}} + 1'b1;
+        if (times || !stood) stand <= times ? ~(rise ? high_cycles : low_cycles) : stand + {TIME_W{times}} + 1'b1;
+        if (steadies || !settled) settle <= steadies ? ~(fall ? hold_cycles : setup_cycles) : settle + {TIME_W{steadies}} + 1'b1;
         pulse   <= pulse_next;
         upward  <= upward_next;
         turning <= turns || rewired || (turning && !rise);
@@ -155,10 +155,10 @@ module step_generator #(
         since     <= steadies ? 1 : later(since);
         gap_ago   <= fall ? 1 : later(gap_ago);
         turn_ago  <= turns || rewired ? 1 : later(turn_ago);
-        if (times)    asked    <= rise ? high_clk : low_clk;
-        if (steadies) settling <= fall ? hold_clk : setup_clk;
-        if (fall) held <= hold_clk;
-        if (turns || rewired) set_up <= setup_clk;
+        if (times)    asked    <= rise ? high_cycles : low_cycles;
+        if (steadies) settling <= fall ? hold_cycles : setup_cycles;
+        if (fall) held <= hold_cycles;
+        if (turns || rewired) set_up <= setup_cycles;
         if (rst || !past) begin
             {stood_for, since, gap_ago, turn_ago} <= {4{1'b1, {T{1'b0}}}};
             {asked, settling, held, set_up} <= '0;

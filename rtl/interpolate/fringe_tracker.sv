@@ -11,7 +11,7 @@
 // model    tb/interpolate/fringe_tracker.py, equal in every bit of every cycle
 // proof    depth 6
 // proved   modulo a period the step is the phase less the phase before; without overspeed it is less than a quarter period
-//          from the one foreseen; at any constant speed below a quarter period a sample, one bad sample in four moves nothing
+//          from the one predicted_step; at any constant speed below a quarter period a sample, one bad sample in four moves nothing
 `default_nettype none
 
 module fringe_tracker (
@@ -26,15 +26,15 @@ module fringe_tracker (
 );
     localparam signed [15:0] QUARTER = 16'sd16384;
 
-    logic               started, strayed;   // strayed: the last phase was an overspeed
-    logic        [15:0] last, aim;          // aim: the phase that is foreseen
+    logic               started, outlier;   // outlier: the last phase was an overspeed
+    logic        [15:0] last, predicted_phase;          // predicted_phase: the phase that is predicted_step
     logic signed [16:0] speed;              // step per sample, of the samples that did not stray
-    logic signed [17:0] foreseen;           // step: speed, or what leads back to the line after a stray one
+    logic signed [17:0] predicted_step;           // step: speed, or what leads back to the line after a stray one
 
-    wire signed [15:0] deviation = $signed(phase - aim);
-    wire signed [18:0] wanted    = 19'(foreseen) + 19'(deviation);
+    wire signed [15:0] deviation = $signed(phase - predicted_phase);
+    wire signed [18:0] measured_step    = 19'(predicted_step) + 19'(deviation);
     wire               near      = deviation > -QUARTER && deviation < QUARTER;
-    wire               fits      = wanted[18:16] == {3{wanted[16]}};
+    wire               fits      = measured_step[18:16] == {3{measured_step[16]}};
     wire signed [15:0] nearest   = $signed(phase - last);
 
     assign phase_out = last;
@@ -44,34 +44,34 @@ module fringe_tracker (
         overspeed <= 1'b0;
         if (valid) begin
             started <= 1'b1;
-            strayed <= 1'b0;
+            outlier <= 1'b0;
             last    <= phase;
-            aim     <= phase;
+            predicted_phase     <= phase;
             if (!started) step <= '0;
             else if (fits && near) begin
-                step <= wanted[16:0];
-                if (!strayed) speed <= wanted[16:0];
-                foreseen <= strayed ? 18'(speed) : 18'(wanted);
-                aim      <= strayed ? phase + speed[15:0] : {phase[14:0], 1'b0} - last;
+                step <= measured_step[16:0];
+                if (!outlier) speed <= measured_step[16:0];
+                predicted_step <= outlier ? 18'(speed) : 18'(measured_step);
+                predicted_phase      <= outlier ? phase + speed[15:0] : {phase[14:0], 1'b0} - last;
             end else begin
                 overspeed <= 1'b1;
-                if (fits && !strayed) begin
-                    step     <= wanted[16:0];
-                    strayed  <= 1'b1;
-                    foreseen <= 18'(speed) - 18'(deviation);
-                    aim      <= aim + speed[15:0];
+                if (fits && !outlier) begin
+                    step     <= measured_step[16:0];
+                    outlier  <= 1'b1;
+                    predicted_step <= 18'(speed) - 18'(deviation);
+                    predicted_phase      <= predicted_phase + speed[15:0];
                 end else begin
                     step     <= 17'(nearest);
                     speed    <= '0;
-                    foreseen <= '0;
+                    predicted_step <= '0;
                 end
             end
         end
         if (rst) begin
             started   <= 1'b0;
-            strayed   <= 1'b0;
+            outlier   <= 1'b0;
             speed     <= '0;
-            foreseen  <= '0;
+            predicted_step  <= '0;
             step      <= '0;
             done      <= 1'b0;
             overspeed <= 1'b0;
@@ -83,40 +83,40 @@ module fringe_tracker (
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
-        if (past && started) assert (aim == 16'(last + foreseen[15:0]));
-        if (past && !started) assert (foreseen == 0);
+        if (past && started) assert (predicted_phase == 16'(last + predicted_step[15:0]));
+        if (past && !started) assert (predicted_step == 0);
         if (past && !$past(rst)) begin
             assert (done == $past(valid));
             if (done) assert (last == $past(phase));
             if (done && $past(started)) assert (step[15:0] == last - $past(last));
             if (done && $past(started) && !overspeed) begin
-                assert (19'(step) - 19'($past(foreseen)) < 19'(QUARTER));
-                assert (19'($past(foreseen)) - 19'(step) < 19'(QUARTER));
+                assert (19'(step) - 19'($past(predicted_step)) < 19'(QUARTER));
+                assert (19'($past(predicted_step)) - 19'(step) < 19'(QUARTER));
             end
             if (overspeed) assert (done);
-            cover (overspeed && !strayed);
-            cover (done && $past(strayed) && !overspeed);
+            cover (overspeed && !outlier);
+            cover (done && $past(outlier) && !overspeed);
         end
     end
 
-    // a scale that moves by `pace` a sample, seen with now and then a bad sample: three good ones at least in between
-    (* anyconst *) logic signed [16:0] pace;
+    // a scale that moves by `increment` a sample, seen with now and then a bad sample: three good ones at least in between
+    (* anyconst *) logic signed [16:0] increment;
     (* anyconst *) logic               lawful;     // 0: any phase may come
     (* anyseq *)   logic               bad;
     logic signed [23:0] scale, seen;        // where the scale will be at the next sample; the sum of the steps
     logic        [1:0]  good, settled;      // samples since the last bad one, up to 3; since reset, up to 2: phase and speed are known
     wire  signed [23:0] sum  = done ? seen + 24'(step) : seen;
-    wire  signed [23:0] away = sum - (scale - 24'(pace));
-    wire  signed [23:0] drag = 24'(speed) - 24'(pace);      // what a bad sample that did not stray left in the speed
+    wire  signed [23:0] away = sum - (scale - 24'(increment));
+    wire  signed [23:0] drag = 24'(speed) - 24'(increment);      // what a bad sample that did not stray left in the speed
     always @(posedge clk) begin
         if (lawful) begin
-            assume (pace > -17'sd16384 && pace < 17'sd16384);
+            assume (increment > -17'sd16384 && increment < 17'sd16384);
             if (bad) assume (good == 3 && settled == 2);
             if (valid && !bad) assume (phase == scale[15:0]);
         end
         if (done) seen <= sum;
         if (valid) begin
-            scale   <= scale + 24'(pace);
+            scale   <= scale + 24'(increment);
             good    <= bad ? 2'd0 : good == 3 ? 2'd3 : good + 1'b1;
             settled <= settled == 2 ? 2'd2 : settled + 1'b1;
         end
@@ -131,18 +131,18 @@ module fringe_tracker (
             assert (started == (settled != 0) && settled <= 2);
             if (started) assert (sum[15:0] == last);
             else assert (sum == 0 && scale == 0);
-            if (settled < 2) assert (!strayed && speed == 0 && foreseen == 0 && good == 3);
+            if (settled < 2) assert (!outlier && speed == 0 && predicted_step == 0 && good == 3);
             else case (good)
-                0: if (strayed) assert (speed == pace && 24'(foreseen) == 24'(pace) - away && away >= -32768 && away < 32768);
-                   else assert (drag == away && foreseen == 18'(speed) && away > -16384 && away < 16384);
-                1: if (strayed) assert (24'(foreseen) == 24'(pace) + drag + drag + drag && drag > -16384 && drag < 16384
+                0: if (outlier) assert (speed == increment && 24'(predicted_step) == 24'(increment) - away && away >= -32768 && away < 32768);
+                   else assert (drag == away && predicted_step == 18'(speed) && away > -16384 && away < 16384);
+                1: if (outlier) assert (24'(predicted_step) == 24'(increment) + drag + drag + drag && drag > -16384 && drag < 16384
                                         && (drag >= 8192 || drag <= -8192));
-                   else assert (foreseen == 18'(speed) && drag > -8192 && drag < 8192);
-                2: assert (!strayed && foreseen == 18'(speed) && (speed == pace || speed == 0));
-                default: assert (!strayed && foreseen == 18'(speed) && speed == pace);
+                   else assert (predicted_step == 18'(speed) && drag > -8192 && drag < 8192);
+                2: assert (!outlier && predicted_step == 18'(speed) && (speed == increment || speed == 0));
+                default: assert (!outlier && predicted_step == 18'(speed) && speed == increment);
             endcase
         end
-        cover (past && lawful && good == 0 && strayed && pace == 17'sd1000);
+        cover (past && lawful && good == 0 && outlier && increment == 17'sd1000);
     end
 `endif
 endmodule

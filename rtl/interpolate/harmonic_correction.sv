@@ -4,7 +4,7 @@
 // latency  4 clk from valid to done        rate  one phase per clk; one table entry per clk
 // table    Two of them. One is in force, the other is written; swap exchanges them between two phases, so that no phase
 //          ever meets a table half written. Until the first swap nothing is corrected.
-// source   Fourier series of the sub-division error, orders up to 9 (sw/firmware/learner.c); the chord of a sine of order 9
+// source   Fourier series of the sub-division error, orders up to 9 (sw/firmware/calibration/calibration.c); the chord of a sine of order 9
 //          leaves 0.6 % of it, of order 2 0.03 %
 // model    tb/interpolate/harmonic_correction.py, equal in every bit of every cycle
 `default_nettype none

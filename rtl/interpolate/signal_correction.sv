@@ -2,8 +2,8 @@
 // signal_correction -- take offset, gain and phase error off a sine and a cosine sample: an ellipse becomes a circle.
 //
 // latency  3 clk from valid to done        rate  one sample per clk
-// source   Heydemann, Appl. Opt. 20 (1981) 3382: cos' = cos - cos_offset, sin' = gain (sin - sin_offset) + shear cos'. Both
-//          come out at half the size, so that a corrected leg may be larger than full scale; what is still too large is held
+// source   Heydemann, Appl. Opt. 20 (1981) 3382: cos' = cos - cos_offset, sin' = gain (sin - sin_offset) + quadrature_error cos'. Both
+//          come out at half the size, so that a corrected channel may be larger than full scale; what is still too large is held
 // model    tb/interpolate/signal_correction.py, equal in every bit of every cycle
 `default_nettype none
 
@@ -16,7 +16,7 @@ module signal_correction #(
     input  wire signed [15:0]    sin_offset, // full scale = 2^15
     input  wire signed [15:0]    cos_offset, // full scale = 2^15
     input  wire        [16:0]    gain,      // 1.0 = 2^16
-    input  wire signed [16:0]    shear,     // 1.0 = 2^16
+    input  wire signed [16:0]    quadrature_error,     // 1.0 = 2^16
     input  wire                  valid,     // strobe: sin and cos are a new sample
     input  wire signed [W-1:0]   sin,       // full scale = 2^(W-1)
     input  wire signed [W-1:0]   cos,
@@ -29,7 +29,7 @@ module signal_correction #(
     logic               centred, multiplied;            // strobes
     logic signed [15:0] sin_centre, cos_centre;
     logic signed [17:0] sin_factor, cos_factor;
-    logic signed [16:0] sin_leg, cos_leg, cos_kept;     // full scale of sin = 2^15
+    logic signed [16:0] sin_channel, cos_channel, cos_kept;     // full scale of sin = 2^15
     logic signed [34:0] sin_part, cos_part;
 
     wire signed [15:0] sin_wide = 16'(sin) <<< (16 - W);
@@ -45,13 +45,13 @@ module signal_correction #(
         multiplied <= centred;
         done       <= multiplied;
         if (valid) begin
-            sin_leg <= 17'(sin_wide) - 17'(sin_zero);
-            cos_leg <= 17'(cos_wide) - 17'(cos_zero);
+            sin_channel <= 17'(sin_wide) - 17'(sin_zero);
+            cos_channel <= 17'(cos_wide) - 17'(cos_zero);
         end
         if (centred) begin
-            sin_part <= sin_leg * sin_factor;
-            cos_part <= cos_leg * cos_factor;
-            cos_kept <= cos_leg;
+            sin_part <= sin_channel * sin_factor;
+            cos_part <= cos_channel * cos_factor;
+            cos_kept <= cos_channel;
         end
         if (multiplied) begin
             sin_out <= sin_half[18:15] == {4{sin_half[18]}} ? sin_half[15:0] : {sin_half[18], {15{!sin_half[18]}}};
@@ -61,7 +61,7 @@ module signal_correction #(
             sin_centre <= sin_offset;
             cos_centre <= cos_offset;
             sin_factor <= $signed({1'b0, gain});
-            cos_factor <= 18'(shear);
+            cos_factor <= 18'(quadrature_error);
         end
         if (rst) begin
             centred    <= 1'b0;

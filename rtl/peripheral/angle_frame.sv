@@ -16,7 +16,7 @@ module angle_frame #(
     input  wire          rst,
     input  wire  [23:0]  gap,                   // clk, longest pause between the ends of two bytes of a frame
     input  wire  [31:0]  stale_after,           // clk without a good frame; 0: never stale
-    input  wire          byte_valid,            // strobe, of character_receiver with NINTH = 0
+    input  wire          byte_valid,            // strobe, of uart_rx with NINTH = 0
     input  wire  [7:0]   byte_data,
     input  wire          framing_error,         // strobe
     input  wire          clear,                 // strobe: counts to 0

@@ -34,7 +34,7 @@ module ps2_inject_queue #(
     wire         popped  = pop && present;
     wire [C-1:0] stored  = C'(DEPTH) - free;
 
-    word_queue #(.W(9), .DEPTH(DEPTH)) u_codes (.clk, .rst, .push, .in({in_last, in}), .pop, .present, .out({last, out}), .free, .overrun);
+    sync_fifo #(.W(9), .DEPTH(DEPTH)) u_codes (.clk, .rst, .push, .in({in_last, in}), .pop, .present, .out({last, out}), .free, .overrun);
 
     assign valid = present && !discard;
 
@@ -56,7 +56,7 @@ module ps2_inject_queue #(
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
-        assume (stored <= C'(DEPTH) && (!present || stored != '0));         // as word_queue is proved to do
+        assume (stored <= C'(DEPTH) && (!present || stored != '0));         // as sync_fifo is proved to do
         assume (!ready || (valid && injecting));                            // as ps2_arbiter does
         if (past && $past(!rst && injecting && !(ready && last))) assume (injecting || rst);
         if (past && !$past(injecting) && injecting) assume ($past(valid));

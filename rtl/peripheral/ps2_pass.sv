@@ -49,7 +49,7 @@ module ps2_pass #(
 
     for (genvar n = 0; n < 4; n++) begin : g_line
         deglitcher #(.W(8)) u_deglitcher (
-            .clk, .rst, .stable(8'(FILTER)), .level(level[n]), .filtered(line[n]), .rejected(rejected[n]));
+            .clk, .rst, .stable_cycles(8'(FILTER)), .level(level[n]), .filtered(line[n]), .rejected(rejected[n]));
     end
 
     ps2_host #(.CLK_HZ(CLK_HZ)) u_host (

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // spi_word_sender -- words of 16 bits to a device that takes them at the rising edge of its chip select: a converter, a display driver.
 //
-// latency  33 * half_clk + 1 clk from valid and ready to the rising edge of cs_n; cs_n falls 1 clk after them
-// rate     a word per 36 * half_clk + 1 clk; 3 half_clk of it cs_n is high
+// latency  33 * half_period + 1 clk from valid and ready to the rising edge of cs_n; cs_n falls 1 clk after them
+// rate     a word per 36 * half_period + 1 clk; 3 half_period of it cs_n is high
 // source   AD5542A, Analog Devices, and MAX7219, Maxim: most significant bit first, taken at rising edges of sclk while cs_n is low, the
 //          word at that of cs_n; sclk up to 50 and 10 MHz, cs_n high for 50 ns
 // model    tb/peripheral/spi_word_sender.py, equal in every bit of every cycle
@@ -14,7 +14,7 @@
 module spi_word_sender (
     input  wire                  clk,
     input  wire                  rst,           // drops the word in flight
-    input  wire        [7:0]     half_clk,      // clk that sclk is high, and low; 0 counts as 1; taken with a word
+    input  wire        [7:0]     half_period,      // clk that sclk is high, and low; 0 counts as 1; taken with a word
     input  wire                  valid,         // level: a word stands
     output logic                 ready,         // with valid: taken in this clk
     input  wire        [15:0]    word,
@@ -29,7 +29,7 @@ module spi_word_sender (
     logic [7:0]  length, left;                              // clk of a half, less one; after this one
     logic [15:0] shifted;                                   // the bit on the wire highest
 
-    wire [7:0] wanted_length = half_clk == 8'd0 ? 8'd0 : half_clk - 1'b1;
+    wire [7:0] wanted_length = half_period == 8'd0 ? 8'd0 : half_period - 1'b1;
     wire [5:0] next          = half + 1'b1;
 
     assign sdi = shifted[15];

@@ -67,7 +67,7 @@ module velocity_estimator #(
     // the last step, the one that the next way is measured from, and the times
     logic                 anchored;             // there was a step since reset or since the scale last stood
     logic                 fresh;                // the last step has not been looked at
-    logic signed [P-1:0]  step_place, run_place, base_place;
+    logic signed [P-1:0]  step_position, run_position, base_position;
     logic        [N-1:0]  step_time, run_time, base_time;
     logic  [TIME_W-1:0]   quiet, since_tick, period;    // clk since the last step, since the last tick; length of a tick
 
@@ -122,7 +122,7 @@ module velocity_estimator #(
         since_tick <= ticked[0] ? '0 : since_tick == '1 ? since_tick : since_tick + 1'b1;
         if (ticked[0]) begin
             period     <= since_tick == '1 ? since_tick : since_tick + 1'b1;
-            base_place <= run_place;
+            base_position <= run_position;
             base_time  <= run_time;
         end
 
@@ -131,10 +131,10 @@ module velocity_estimator #(
                 state    <= LOAD;
                 bounding <= !fresh;
                 fresh    <= 1'b0;
-                run_way  <= fresh ? step_place - base_place : bound;
+                run_way  <= fresh ? step_position - base_position : bound;
                 divisor  <= {fresh ? step_time - base_time : {2'b0, quiet}, 1'b0};
                 if (fresh) begin
-                    run_place <= step_place;
+                    run_position <= step_position;
                     run_time  <= step_time;
                 end
             end
@@ -161,16 +161,16 @@ module velocity_estimator #(
         endcase
 
         if (stepped) begin
-            step_place <= place;
+            step_position <= place;
             step_time  <= now;
             fresh      <= 1'b1;
             anchored   <= 1'b1;
             if (!anchored || quiet == '1) begin // the first since the scale stood: from here on
                 state      <= CHOOSE;
                 fresh      <= 1'b0;
-                run_place  <= place;
+                run_position  <= place;
                 run_time   <= now;
-                base_place <= place;
+                base_position <= place;
                 base_time  <= now;
                 speed      <= '0;
             end

@@ -28,9 +28,9 @@ module actuator_registers (
     output logic [3:0]         step_output_trim,           // the command moves the target by command * 2^trim LSB of position
     output logic signed [47:0] step_ratio,                 // steps in one period; the sign turns the direction [2^-32 step/period]
     input  wire  signed [31:0] steps,                      // steps on the wire since reset [step]
-    output logic [7:0]         converter_half_clk,         // half a period of its clock; 0 counts as 1 [clk]
-    output logic [15:0]        converter_refresh,          // after so long without one the last is sent again [clk]
-    output logic signed [15:0] converter_trim,             // added to each word
+    output logic [7:0]         dac_half_period,            // half a period of its clock; 0 counts as 1 [clk]
+    output logic [15:0]        dac_refresh,                // after so long without one the last is sent again [clk]
+    output logic signed [15:0] dac_trim,                   // added to each word
     output logic [23:0]        fine_kp,                    // proportional gain of the fine stage [1/65536 command/(period/65536)]
     output logic               fine_kp_written,            // strobe: fine_kp has just been written, its new value stands
     output logic [23:0]        fine_ki,                    // its integral gain, each tick [1/16777216 command/(period/65536)]
@@ -53,8 +53,8 @@ module actuator_registers (
             6'h06: rdata <= step_ratio[31:0];
             6'h07: rdata <= {{16{step_ratio[47]}}, step_ratio[47:32]};
             6'h08: rdata <= steps;
-            6'h09: rdata <= {8'd0, converter_refresh, converter_half_clk};
-            6'h0A: rdata <= {{16{converter_trim[15]}}, converter_trim};
+            6'h09: rdata <= {8'd0, dac_refresh, dac_half_period};
+            6'h0A: rdata <= {{16{dac_trim[15]}}, dac_trim};
             6'h0C: rdata <= {8'd0, fine_kp};
             6'h0D: rdata <= {8'd0, fine_ki};
             6'h0E: rdata <= {17'd0, fine_limit};
@@ -74,9 +74,9 @@ module actuator_registers (
         if (put && word == 6'h04) step_output_trim <= wdata[7:4];
         if (put && word == 6'h06) step_ratio_low <= wdata;
         if (put && word == 6'h07) step_ratio <= {wdata[15:0], step_ratio_low};
-        if (put && word == 6'h09) converter_half_clk <= wdata[7:0];
-        if (put && word == 6'h09) converter_refresh <= wdata[23:8];
-        if (put && word == 6'h0A) converter_trim <= wdata[15:0];
+        if (put && word == 6'h09) dac_half_period <= wdata[7:0];
+        if (put && word == 6'h09) dac_refresh <= wdata[23:8];
+        if (put && word == 6'h0A) dac_trim <= wdata[15:0];
         fine_kp_written <= put && word == 6'h0C;
         if (put && word == 6'h0C) fine_kp <= wdata[23:0];
         if (put && word == 6'h0D) fine_ki <= wdata[23:0];
@@ -95,9 +95,9 @@ module actuator_registers (
             step_output_trim <= 4'h0;
             step_ratio_low <= '0;
             step_ratio <= 48'h000000000000;
-            converter_half_clk <= 8'h01;
-            converter_refresh <= 16'hFFFF;
-            converter_trim <= 16'h0000;
+            dac_half_period <= 8'h01;
+            dac_refresh <= 16'hFFFF;
+            dac_trim <= 16'h0000;
             fine_kp_written <= 1'b0;
             fine_kp <= 24'h000000;
             fine_ki <= 24'h000000;

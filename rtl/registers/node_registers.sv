@@ -22,7 +22,7 @@ module node_registers (
     input  wire  [63:0] time_stamp,          // clk since reset, wraps; the time stamp of everything [clk]
     output logic [23:0] tick_period,         // servo tick of all axes [clk]
     output logic [15:0] sample_period,       // sample rate of all converters [clk]
-    output logic        alive_beat,          // strobe: sign of life of the firmware; while a drive is on it is wanted within 1 200 000 clk and 20 ms: beat
+    output logic        heartbeat_kick,      // strobe: sign of life of the firmware; while a drive is on it is wanted within 1 200 000 clk and 20 ms: kick
     output logic [7:0]  start_axes,          // bit n: axis n
     output logic        start_axes_written   // strobe: start_axes has just been written, its new value stands
 );
@@ -35,7 +35,7 @@ module node_registers (
     always_ff @(posedge clk) begin
         rdata <= '0;
         if (get) case (word)
-            6'h00: rdata <= 32'hC60E00C6;
+            6'h00: rdata <= 32'hB6BA37BE;
             6'h01: rdata <= clk_hz;
             6'h02: rdata <= {16'd0, build_memory, build_address, build_axes};
             6'h04: rdata <= time_stamp[31:0];
@@ -48,7 +48,7 @@ module node_registers (
 
         if (put && word == 6'h06) tick_period <= wdata[23:0];
         if (put && word == 6'h07) sample_period <= wdata[15:0];
-        alive_beat <= put && word == 6'h08 && wdata[0];
+        heartbeat_kick <= put && word == 6'h08 && wdata[0];
         start_axes_written <= put && word == 6'h09;
         if (put && word == 6'h09) start_axes <= wdata[7:0];
         if (rst) begin
@@ -56,7 +56,7 @@ module node_registers (
             time_stamp_high <= '0;
             tick_period <= 24'h000000;
             sample_period <= 16'h0000;
-            alive_beat <= 1'b0;
+            heartbeat_kick <= 1'b0;
             start_axes_written <= 1'b0;
             start_axes <= 8'h00;
         end

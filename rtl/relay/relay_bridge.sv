@@ -35,21 +35,21 @@ module relay_bridge #(
 );
     wire         received, ninth, framing_error, own, own_command, passed, command, good, answer_valid, answer_ready;
     wire  [7:0]  character, own_data, data, answer;
-    wire         unused_glitch, unused_receiving, unused_good, unused_bad, unused_mark, unused_sending;
-    wire         unused = &{1'b0, unused_glitch, unused_receiving, unused_good, unused_bad, unused_mark, unused_sending};
+    wire         unused_glitch, unused_receiving, unused_good, unused_bad, unused_sync, unused_sending;
+    wire         unused = &{1'b0, unused_glitch, unused_receiving, unused_good, unused_bad, unused_sync, unused_sending};
 
-    character_receiver u_receiver
+    uart_rx u_receiver
         (.clk, .rst, .bit_time, .rx, .valid(received), .data(character), .ninth, .framing_error, .start_glitch(unused_glitch),
          .busy(unused_receiving));
     address_filter u_filter
         (.clk, .rst, .address(4'd1), .valid_in(received), .data_in(character), .ninth, .valid(own), .data(own_data), .command(own_command));
     frame_check #(.LONGEST(LONGEST)) u_check
         (.clk, .rst, .valid_in(own), .data_in(own_data), .command_in(own_command), .framing_error, .valid(passed), .data, .command, .good,
-         .frame_good(unused_good), .frame_bad(unused_bad), .mark(unused_mark));
+         .frame_good(unused_good), .frame_bad(unused_bad), .sync(unused_sync));
     relay_requests #(.LONGEST(LONGEST)) u_requests
         (.clk, .rst, .valid(passed), .data, .command, .good, .events, .levels, .source, .orders, .identity, .position, .correction, .flags, .set_start,
          .set_valid, .set_data, .pass_select, .pass_ready, .pass_valid, .pass_done, .pass_data, .answer_valid, .answer_ready, .answer);
-    character_transmitter u_transmitter
+    uart_tx u_transmitter
         (.clk, .rst, .bit_time, .valid(answer_valid), .ready(answer_ready), .data(answer), .ninth(1'b0), .tx, .driver_enable,
          .busy(unused_sending));
 endmodule

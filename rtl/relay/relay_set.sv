@@ -3,7 +3,7 @@
 //
 // latency  2 clk from the last byte to good or bad, swap and settings          rate  one byte per clk
 // set      32-bit words, low byte first: marker 4D4F49 and K in its low byte; counts_per_turn; angle_per_count, low word; its
-//          high half and spacing above; radians_per_count; hysteresis, filter_needed from bit 16, {index_low, gate_mask, gate}
+//          high half and minimum_edge_separation above; radians_per_count; hysteresis, filter_required from bit 16, {index_low, gate_mask, gate}
 //          from bit 24; amplitude and phase of each order from 1 up; CRC-32 of all before
 // segments with SEGMENTS the map is a table: the low byte of the marker is 128 + SEGMENTS, and K = (SEGMENTS + 1) / 2 terms hold two
 //          of its points each
@@ -35,10 +35,10 @@ module relay_set #(
     output logic       [31:0]    identity,          // CRC-32 of the set in force
     output logic       [31:0]    counts_per_turn,
     output logic       [47:0]    angle_per_count,   // 2^-48 turn
-    output logic       [15:0]    spacing,           // clk
+    output logic       [15:0]    minimum_edge_separation,           // clk
     output logic       [31:0]    radians_per_count, // 2^-40
     output logic       [15:0]    hysteresis,        // 2^-16 count
-    output logic       [7:0]     filter_needed,     // samples
+    output logic       [7:0]     filter_required,     // samples
     output logic                 index_low,         // the index is 0
     output logic       [1:0]     index_gate_mask,
     output logic       [1:0]     index_gate
@@ -73,7 +73,7 @@ module relay_set #(
 
     crc32_stream u_crc (.clk, .rst, .start, .valid(take && !start), .data, .crc);
 
-    assign {index_low, index_gate_mask, index_gate, filter_needed, hysteresis, radians_per_count, spacing, angle_per_count, counts_per_turn}
+    assign {index_low, index_gate_mask, index_gate, filter_required, hysteresis, radians_per_count, minimum_edge_separation, angle_per_count, counts_per_turn}
         = settings[156:0];
 
     wire unused = &{1'b0, settings[159:157]};

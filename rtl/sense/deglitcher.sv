@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // deglitcher -- let a level change only after it has stood still for a set time, and report what came back too soon.
 //
-// latency  `stable` clk from level to filtered, 1 clk for stable = 0; 1 clk while it settles after reset
-// rate     pulses of `stable` clk and longer pass, shorter ones never do
+// latency  `stable_cycles` clk from level to filtered, 1 clk for stable_cycles = 0; 1 clk while it settles after reset
+// rate     pulses of `stable_cycles` clk and longer pass, shorter ones never do
 // source   S0: a monostable longer than a noise spike and shorter than a data pulse; S2: N equal samples in a row
 // model    tb/sense/deglitcher.py, equal in every bit of every cycle
-// proved   a change passes only after `stable` equal clk, at once then, and never sooner after the change before it
+// proved   a change passes only after `stable_cycles` equal clk, at once then, and never sooner after the change before it
 `default_nettype none
 
 module deglitcher #(
-    parameter int W      = 16,              // bits of stable
+    parameter int W      = 16,              // bits of stable_cycles
     parameter int SETTLE = 4                // clk after reset in which filtered follows level: synchronisers fill meanwhile
 ) (
     input  wire          clk,
     input  wire          rst,               // filtered follows level, nothing is reported
-    input  wire  [W-1:0] stable,            // clk in a row that level must differ; 0 is taken as 1; new values act at once
+    input  wire  [W-1:0] stable_cycles,            // clk in a row that level must differ; 0 is taken as 1; new values act at once
     input  wire          level,             // synchronous to clk
     output logic         filtered,          // level without its short pulses
     output logic         rejected           // strobe: level changed and came back before its time
@@ -25,10 +25,10 @@ module deglitcher #(
     localparam int S = $clog2(SETTLE + 1);
 
     logic [S-1:0] settle;                   // clk left of settling
-    logic [W-1:0] age;                      // clk in a row that level has differed; below stable, so it cannot overflow
+    logic [W-1:0] age;                      // clk in a row that level has differed; below stable_cycles, so it cannot overflow
 
     wire differs = level ^ filtered;
-    wire ripe    = {1'b0, age} + 1'b1 >= {1'b0, stable};
+    wire ripe    = {1'b0, age} + 1'b1 >= {1'b0, stable_cycles};
 
     always_ff @(posedge clk) begin
         rejected <= 1'b0;
@@ -71,13 +71,13 @@ module deglitcher #(
         if (past && !$past(rst) && $past(settle) == 0) begin
             if (filtered != $past(filtered)) begin
                 assert (filtered == level_q);
-                assert (same >= {1'b0, $past(stable)});
-                assert ({1'b0, $past(stood)} + 1 >= {2'b0, $past(stable)});
+                assert (same >= {1'b0, $past(stable_cycles)});
+                assert ({1'b0, $past(stood)} + 1 >= {2'b0, $past(stable_cycles)});
                 assert (!rejected);
-                cover ($past(stable) == 5);
+                cover ($past(stable_cycles) == 5);
             end
-            if (filtered != level_q) assert (age != 0 && age < $past(stable));
-            cover (rejected && $past(stable) == 5 && $past(age) == 4);
+            if (filtered != level_q) assert (age != 0 && age < $past(stable_cycles));
+            cover (rejected && $past(stable_cycles) == 5 && $past(age) == 4);
         end
     end
 `endif

@@ -20,7 +20,7 @@ module vector_length #(
     output logic       [15:0]  length,      // in units of sin
     output logic       [1:0]   axis,        // nearest axis: 0 +cos, 1 +sin, 2 -cos, 3 -sin; on a diagonal the one of cos
     output logic       [1:0]   quadrant,    // 0: sin, cos >= 0, then counted in the same sense as axis
-    output logic       [2:0]   tilt         // smaller over larger leg in quarters, rounded: 0 on an axis, 4 on a diagonal
+    output logic       [2:0]   tilt         // smaller over larger channel in quarters, rounded: 0 on an axis, 4 on a diagonal
 );
     if (W < 8 || W > 16) begin : g_check W_MUST_BE_FROM_8_TO_16 u_error (); end
 
@@ -28,7 +28,7 @@ module vector_length #(
     localparam int N = W + 1 + F;           // bits of x and y, which stay between -2^W and 2^W
 
     logic [W-1:0]        sin_size, cos_size, major, minor;
-    logic                sin_low, cos_low;  // the legs have a minus sign
+    logic                sin_low, cos_low;  // the channels have a minus sign
     logic signed [N-1:0] x [1:4];           // after rotation k
     logic signed [N-1:0] y [1:4];
     logic signed [N-1:0] scaled;            // x without the gain of the rotations

@@ -26,7 +26,7 @@ module frame_check #(
     output logic                 good,          // with valid: length and CRC-32 of the frame that ends here are right
     output logic                 frame_good,    // strobe: the same
     output logic                 frame_bad,     // strobe: wrong length, wrong CRC-32, or interrupted
-    output logic                 mark           // strobe: a good one that is for all nodes
+    output logic                 sync           // strobe: a good one that is for all nodes
 );
     if (LONGEST < 1 || LONGEST > 124) begin : g_check LONGEST_MUST_BE_FROM_1_TO_124 u_error (); end
 
@@ -50,7 +50,7 @@ module frame_check #(
 
     assign good       = ended && crc == WHOLE;
     assign frame_good = good;
-    assign mark       = good && to_all;
+    assign sync       = good && to_all;
     assign frame_bad  = broken || (ended && !good);
 
     always_ff @(posedge clk) begin
@@ -102,7 +102,7 @@ module frame_check #(
             assert (!(frame_good && frame_bad));
             if (good) assert (valid && !command && taken == length + 8'd5);
             if (frame_good) assert ($past(running) && !running);
-            if (mark) assert (frame_good && to_all);
+            if (sync) assert (frame_good && to_all);
             if (frame_bad) assert ($past(running));
             if ($past(running) && !running) assert (frame_good || frame_bad);
             cover (frame_good);

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The machines of the experiments for any client: `moire twin --machine s2`, `moire --port twin:s2`.
 
-Each is powered up, with the parameters of its experiment in force; the names are those of moire.command_twin.
+Each is powered up, with the parameters of its experiment in force; the names are those of moire.cli.twin.
 """
 from experiments import s0_fine, s2_stage, s3_zero, s4_job
 from experiments.s0_stage import ADDRESSES
-from twin import WITH_SEGMENTS, Twin
+from moire.errors import TwinNotBuilt
+from twin import WITH_SEGMENTS, BuildError, Twin, TwinTransport
 
 
 def fine_stage(seed):
@@ -21,3 +22,11 @@ MACHINES = {
     "s3": lambda seed: s3_zero.Motor(seed).twin,
     "s4": lambda seed: s4_job.IndexingMachine(seed).twin,
 }
+
+
+def open_port(machine: str, seed: int, **settings) -> TwinTransport:
+    """The port `twin:MACHINE` of the host package (entry point of the group moire.ports); TwinNotBuilt where it cannot be built."""
+    try:
+        return TwinTransport(MACHINES[machine](seed, **settings))
+    except (BuildError, OSError) as error:
+        raise TwinNotBuilt(f"the simulated machine cannot be built: {str(error).strip().splitlines()[-1]}") from None

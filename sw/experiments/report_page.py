@@ -4,7 +4,7 @@ import base64
 import html
 from pathlib import Path
 
-from moire import report
+from moire.analysis import report
 
 ROOT = Path(__file__).resolve().parents[2]
 

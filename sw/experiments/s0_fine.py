@@ -20,18 +20,18 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from experiments.s0_stage import ADDRESSES, LOOK_S, ROOT, Stage, random_moves, table
-from moire import report
-from moire.client import Line
+from experiments.s0_stage import ADDRESSES, POLL_S, ROOT, Stage, random_moves, table
+from moire.analysis import report
+from moire.bus.client import Bus
 from moire.errors import MoireError
 from twin import START_S, BuildError, Twin, TwinTransport
 
-AIM_NM = 10.0                        # of the paper
+REQUIRED_NM = 10.0                        # of the paper
 NODE = {"DRIVES": 0b1101, "FILTERS": 0}          # bridge, converter and fine stage
 FINE = {"fine_ki": 20000 / 2**24,    # 9 Hz: with twice as much the flexure's mode of 500 Hz, 25 times its own, would ring
         "fine_reach": "100nm", "settle_window": "3nm"}
-WAYS = ("0.7mm", "0.3mm")            # to and fro, while the ellipse is learned
-MOST_WAYS = 30
+STROKES = ("0.7mm", "0.3mm")            # to and fro, while the ellipse is learned
+MOST_STROKES = 30
 ZERO_S = 0.2                         # over which the place of the zero is averaged
 HOLD_S = 1.0                         # over which the jitter is
 TRACE_HZ = 10_000
@@ -47,28 +47,28 @@ class FineStage(Stage):
     @classmethod
     def power_up(cls, seed=1, names=("X",), **plant):
         twin = Twin(seed=seed, nodes=tuple(ADDRESSES[name] for name in names), plant={"piezo_fitted": 1, **plant}, node_parameters=NODE)
-        line = Line(TwinTransport(twin), random_source=random.Random(seed), poll_s=LOOK_S)
-        line.transport.wait(START_S)
-        return cls(twin, line, {name: line.axis(ADDRESSES[name]) for name in names})
+        bus = Bus(TwinTransport(twin), random_source=random.Random(seed), poll_s=POLL_S)
+        bus.transport.wait(START_S)
+        return cls(twin, bus, {name: bus.axis(ADDRESSES[name]) for name in names})
 
-    def learn_ellipse(self, name):
+    def calibrate_ellipse(self, name):
         """To and fro until an ellipse is accepted, which then stays in force; returns what the learner says."""
         axis = self.axes[name]
-        axis.learner("learn")
-        for way in range(MOST_WAYS):
-            axis.move(WAYS[way % len(WAYS)], progress=self.keep(name))
-            if axis.learner().accepted:
+        axis.calibration("calibrate")
+        for way in range(MOST_STROKES):
+            axis.move(STROKES[way % len(STROKES)], progress=self.record_while_moving(name))
+            if axis.calibration().accepted:
                 break
-        return axis.learner("freeze")
+        return axis.calibration("freeze")
 
     def prepare(self, name):
         """Home, learn, home again, fine stage on; then the zero is where the axis stands."""
         axis = self.axes[name]
         self.home(name)
-        learned = self.learn_ellipse(name)
+        learned = self.calibrate_ellipse(name)
         self.home(name)
         self.switch_fine_on(name)
-        axis.move(0, progress=self.keep(name))
+        axis.move(0, progress=self.record_while_moving(name))
         self.sine_zero_nm[name] = self.zero_nm[name]
         self.zero_nm[name] += float(np.mean(self.watch(name, ZERO_S)["true_nm"]))
         return learned
@@ -83,7 +83,7 @@ class FineStage(Stage):
     def watch(self, name, seconds):
         """Let time pass; what the machine truly did, true_nm from the zero."""
         self.machine(name).trace(TRACE_HZ)
-        self.let_pass(seconds)
+        self.dwell(seconds)
         return self.traced(name)
 
     def traced(self, name):
@@ -138,15 +138,15 @@ def run(seed=1, count=24, folder=FOLDER, console=None):
     picture = hand_over_picture(stage, "X", moves[-1].target_nm + 2e5)
     errors = report.Errors.of(moves)
     result = report.Result(
-        title="S0: coarse and fine together", seed=seed, moves=moves, paper_error_nm=AIM_NM,
+        title="S0: coarse and fine together", seed=seed, moves=moves, paper_error_nm=REQUIRED_NM,
         drawn={"hand_over": ("The end of a move: the motor hands over to the piezo", picture)},
         summary="The X axis, simulated from the very RTL and firmware that go into the FPGA, closed around a model of the stage with a "
                 "piezo on its table: hysteresis, creep, a mode at 500 Hz. The true position is the model's; no controller sees it.",
-        compared=[report.Compared("positioning error, motor and piezo", "aim 10 nm", f"{errors.largest:.1f} nm", errors.largest <= AIM_NM),
+        compared=[report.Compared("positioning error, motor and piezo", "aim 10 nm", f"{errors.largest:.1f} nm", errors.largest <= REQUIRED_NM),
                   report.Compared("error, rms", "not given", f"{errors.rms:.2f} nm"),
                   report.Compared("standstill jitter over 1 s", "not given", f"{jitter:.2f} nm rms")],
         facts={"zero beside a zero of the sine": f"{stage.zero_nm['X'] - stage.sine_zero_nm['X']:+.1f} nm",
-               "simulated time": f"{stage.line.transport.now():.2f} s", "wall time": f"{time.perf_counter() - began:.1f} s",
+               "simulated time": f"{stage.bus.transport.now():.2f} s", "wall time": f"{time.perf_counter() - began:.1f} s",
                "again": f"build/venv/bin/python -m experiments.s0_fine --seed {seed} --moves {count}"})
     path = report.write(result, folder)
     stage.axes["X"].disable()

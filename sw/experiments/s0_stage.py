@@ -17,15 +17,15 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from moire import report
-from moire.client import Line
+from moire.analysis import report
+from moire.bus.client import Bus
 from moire.errors import MoireError
 from twin import START_S, BuildError, Twin, TwinTransport
 
 ROOT = Path(__file__).resolve().parents[2]
 ADDRESSES = {"X": 1, "Y": 2}         # on the line; the order is that of the axes in the twin
 PERIOD_NM = 800.0
-LOOK_S = 0.005                       # between two looks at a motion
+POLL_S = 0.005                       # between two looks at a motion
 MOVES = 24
 
 
@@ -34,27 +34,27 @@ class Stage:
     """The simulated machine and the host that talks to it. `zero_nm` is the true place of each axis' zero."""
 
     twin: object
-    line: Line
+    bus: Bus
     axes: dict
     zero_nm: dict = field(default_factory=dict)
 
     @classmethod
     def power_up(cls, seed=1, **plant):
         twin = Twin(seed=seed, nodes=tuple(ADDRESSES.values()), plant=plant)
-        line = Line(TwinTransport(twin), random_source=random.Random(seed), poll_s=LOOK_S)
-        line.transport.wait(START_S)
-        return cls(twin, line, {})
+        bus = Bus(TwinTransport(twin), random_source=random.Random(seed), poll_s=POLL_S)
+        bus.transport.wait(START_S)
+        return cls(twin, bus, {})
 
     def find(self):
         """Both nodes, checked against the tables that this host was made with."""
-        found = [identity.address for identity in self.line.find()]
+        found = [identity.address for identity in self.bus.find()]
         missing = [name for name, address in ADDRESSES.items() if address not in found]
         if missing:
             raise MoireError(f"no node answers for {' and '.join(missing)}; found addresses {found or 'none'}")
-        self.axes = {name: self.line.axis(address) for name, address in ADDRESSES.items()}
+        self.axes = {name: self.bus.axis(address) for name, address in ADDRESSES.items()}
         return [axis.node.identity for axis in self.axes.values()]
 
-    def keep(self, name, progress=None):
+    def record_while_moving(self, name, progress=None):
         """A progress callback that also talks to the other axes, so that no drive hears silence."""
         def look(status):
             told = {other: status if other == name else axis.status() for other, axis in self.axes.items()}
@@ -62,18 +62,18 @@ class Stage:
                 progress(told)
         return look
 
-    def let_pass(self, seconds):
+    def dwell(self, seconds):
         """Let time pass, talking to all axes often enough for their watchdogs."""
-        end = self.line.transport.now() + seconds
-        while self.line.transport.now() < end:
+        end = self.bus.transport.now() + seconds
+        while self.bus.transport.now() < end:
             for axis in self.axes.values():
                 axis.status()
-            self.line.transport.wait(max(0.0, min(0.05, end - self.line.transport.now())))
+            self.bus.transport.wait(max(0.0, min(0.05, end - self.bus.transport.now())))
 
     def home(self, name, progress=None):
         axis = self.axes[name]
         axis.enable()
-        status = axis.home(progress=self.keep(name, progress))
+        status = axis.home(progress=self.record_while_moving(name, progress))
         self.zero_nm[name] = round((self.true_nm(name, from_zero=False) - status.position_nm) / PERIOD_NM) * PERIOD_NM
         return status
 
@@ -83,9 +83,9 @@ class Stage:
 
     def move(self, name, target_nm, progress=None):
         """Go there, wait until the node says that it arrived, and judge it by the true position."""
-        began = self.line.transport.now()
-        status = self.axes[name].move(target_nm, progress=self.keep(name, progress))
-        took = self.line.transport.now() - began
+        began = self.bus.transport.now()
+        status = self.axes[name].move(target_nm, progress=self.record_while_moving(name, progress))
+        took = self.bus.transport.now() - began
         true = self.true_nm(name)
         return report.Move(name, target_nm, status.position_nm, true, true - target_nm, took)
 
@@ -122,7 +122,7 @@ class Recorder:
         self.samples = {name: [] for name in stage.axes}              # (sin, cos)
 
     def look(self, told):
-        now = self.stage.line.transport.now()
+        now = self.stage.bus.transport.now()
         for name, status in told.items():
             self.seen[name].append((now, status.target_nm, status.position_nm))
             if status.in_motion:
@@ -166,7 +166,7 @@ def run(seed=1, count=MOVES, folder=ROOT / "build" / "report", console=None):
     margins = ", ".join(f"{name} {axis.encoder().home_margin:.2f}" for name, axis in stage.axes.items())
     for axis in stage.axes.values():
         axis.disable()
-    simulated, wall = stage.line.transport.now(), time.perf_counter() - began
+    simulated, wall = stage.bus.transport.now(), time.perf_counter() - began
     console.print(table(moves))
     errors = report.Errors.of(moves)
     result = report.Result(
@@ -183,7 +183,7 @@ def run(seed=1, count=MOVES, folder=ROOT / "build" / "report", console=None):
         ],
         facts={"simulated time": f"{simulated:.2f} s", "wall time": f"{wall:.1f} s",
                "margin of the phase zero at homing (1: sure, 0: ambiguous)": margins,
-               "line": f"{stage.line.statistics.exchanges} exchanges, {stage.line.statistics.repeats} repeated",
+               "line": f"{stage.bus.statistics.exchanges} exchanges, {stage.bus.statistics.repeats} repeated",
                "again": f"build/venv/bin/python -m experiments.s0_stage --seed {seed} --moves {count}"})
     path = report.write(result, folder)
     console.print(f"largest error {errors.largest:.1f} nm, rms {errors.rms:.1f} nm (paper: below 800 nm); "

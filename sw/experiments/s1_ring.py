@@ -20,14 +20,14 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from moire import report
-from moire.calibration import Readings, fit, read_readings
+from moire.analysis import report
+from moire.analysis.harmonic_fit import Readings, fit, read_readings
+from moire.bus.transport import BITS, Transport
+from moire.cli.relay import Relay, Settings, make_set, terms_of
 from moire.errors import BadFile, MoireError
-from moire.relay import Relay, Settings, make_set, terms_of
-from moire.transport import BITS, Transport
 from twin import BuildError
 from twin.build import simulation
-from twin.ring import ARC_SECOND, RotaryRing
+from twin.machines.ring import ARC_SECOND, RotaryRing
 
 ROOT = Path(__file__).resolve().parents[2]
 DRIVER, RELAY = Path(__file__).with_name("relay_run.cpp"), ROOT / "rtl" / "relay.sv"
@@ -132,7 +132,7 @@ class VerilatedRelay(Transport):
     """The RTL of the relay with a ring before it, a counter behind it and its UART as the line; time passes only by what is sent."""
 
     character_s = BITS * 16 / CLK_HZ
-    time_stands = True
+    time_is_stopped = True
 
     def __init__(self, counts_per_turn: int, place: int):
         program = simulation(DRIVER, RELAY, K=ORDERS, BAUD=BAUD)
@@ -194,7 +194,7 @@ def left_by_relay(ring, found, angles, start_s=0.0):
 # ------------------------------------------------------------------ the experiment
 
 @dataclass(frozen=True)
-class Way:
+class Method:
     name: str
     found: object
     left: np.ndarray                 # arcsec, at the angles of the second pass
@@ -277,7 +277,7 @@ def run(seed=1, places=180, folder=ROOT / "build" / "report", console=None):
     for name, found in ((f"the paper's way, {PAPER_ORDERS} orders", as_in_the_paper(readings)), (f"ours, {ORDERS} orders", ours(readings))):
         with console.status(f"{name}: through the Verilated relay"):
             left, status = left_by_relay(ring, found, angles, start)
-        ways.append(Way(name, found, left))
+        ways.append(Method(name, found, left))
     made = Table("", "largest error / arcsec", title=f"second pass, {places} angles between those of the readings")
     made.columns[1].justify = "right"
     for name, value in (("before", np.abs(before).max()), *((way.name, way.peak) for way in ways), ("the paper", PAPER_AFTER)):

@@ -20,15 +20,15 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments.report_page import ROOT, page, picture
-from moire import report
-from moire.client import Line
+from moire.analysis import report
+from moire.bus.client import Bus
 from moire.errors import MoireError
 from twin import START_S, BuildError, Twin, TwinTransport
-from twin.twin import Axis, Node
+from twin.nodes.twin import Axis, Node
 
 CLK_HZ = 3_000_000
 NODE = {"DRIVES": 2, "FILTERS": 0, "SINE": 0}
-LOOK_S = 0.02
+POLL_S = 0.02
 SLOW_MM_S = 0.5                      # the paper's top speed, 30 mm/min
 WORD = 1 << 16                       # counts of the paper's counter
 PAPER_SHARE = 1e-4                   # against a digital read-out
@@ -59,7 +59,7 @@ class Scale:
     def machine(self):
         count = float(self.count_um) * 1e-6
         return Axis("stepper_stage", {
-            "scale_count": count, "scale_index_place": count / 2, "scale_index_width": count, "scale_index_scatter": count / 25,
+            "scale_count": count, "scale_index_position": count / 2, "scale_index_width": count, "scale_index_scatter": count / 25,
             "stepper_microsteps": round(Fraction(5000, 200) / self.step_um), "switch_high": self.travel_mm * 1e-3 + 2e-3,
             "travel_high_stop": self.travel_mm * 1e-3 + 3e-3})
 
@@ -72,7 +72,7 @@ class Scale:
             "integral_limit": 0.99, "output_limit": 0.99, "dead_band": f"{float(3 * self.count_um)}um",
             "settle_window": f"{float(4 * self.count_um)}um", "settle_time": "20ms", "following_limit": "1mm",
             "travel_low": f"{float(-edge)}mm", "travel_high": f"{float(edge)}mm", "acceleration": "1m/s2", "jerk": "50m/s3",
-            "velocity": f"{self.top_mm_s}mm/s", "home_method": 1, "home_velocity": "20mm/s", "home_creep": "5mm/s",
+            "velocity": f"{self.top_mm_s}mm/s", "home_method": 1, "homing_search_speed": "20mm/s", "homing_latch_speed": "5mm/s",
             "home_distance": "4mm"}
 
 
@@ -102,16 +102,16 @@ class Stage:
     """The simulated machine, its node, and the host that talks to it."""
 
     twin: object
-    line: Line
+    bus: Bus
     axes: dict
     seen: dict = field(default_factory=lambda: {name: [] for name in SCALES})       # (time, counts)
 
     @classmethod
     def power_up(cls, seed=1):
         twin = Twin([Node(1, [scale.machine() for scale in SCALES.values()])], seed=seed, clk_hz=CLK_HZ, node_parameters=NODE)
-        line = Line(TwinTransport(twin), random_source=random.Random(seed), poll_s=LOOK_S)
-        line.transport.wait(START_S)
-        stage = cls(twin, line, {name: line.axis(1, number) for number, name in enumerate(SCALES)})
+        bus = Bus(TwinTransport(twin), random_source=random.Random(seed), poll_s=POLL_S)
+        bus.transport.wait(START_S)
+        stage = cls(twin, bus, {name: bus.axis(1, number) for number, name in enumerate(SCALES)})
         for name, scale in SCALES.items():
             for parameter, value in scale.settings().items():
                 stage.axes[name].set_parameter(parameter, value)
@@ -127,10 +127,10 @@ class Stage:
             begin(name, self.axes[name])
         waiting, ended = set(names), {}
         while waiting:
-            self.line.transport.wait(LOOK_S)
+            self.bus.transport.wait(POLL_S)
             for name in sorted(waiting):
                 status = self.axes[name].status()
-                self.seen[name].append((self.line.transport.now(), status.counts))
+                self.seen[name].append((self.bus.transport.now(), status.counts))
                 if status.ended != "running":
                     waiting.discard(name)
         for name in names:
@@ -253,7 +253,7 @@ def run(seed=1, path=ROOT / "build" / "report" / "s2.html", console=None):
                 "16-bit counter above and below the origin: the paper's counter reads the same at both, and its direction bit only tells "
                 "the way of the last pulse. The node's position has 48 bits and a sign.",
                 [report.table(("", "paper", "here", ""), compared), pictures(stage), report.table(HEAD, rows(made), text_columns=2)],
-                {"simulated time": f"{stage.line.transport.now():.1f} s",
+                {"simulated time": f"{stage.bus.transport.now():.1f} s",
                  "again": f"build/venv/bin/python -m experiments.s2_stage --seed {seed}"})
     console.print(f"{wrong} of {pulses} pulses counted wrongly; table and node differ by {widest:.2f} counts at most")
     console.print(f"report with pictures: {path}", soft_wrap=True)

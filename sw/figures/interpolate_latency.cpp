@@ -3,13 +3,13 @@
 // standing in the converter's register to its position. Both data lines stand at 1: sin and cos are at their upper end, 45 degrees.
 #include <cstdint>
 #include <cstdio>
-#include "Vgrating.h"
-#include "Vgrating___024root.h"
+#include "Vfeedback_channel.h"
+#include "Vfeedback_channel___024root.h"
 
 int main() {
     constexpr int LONGEST = 1000;                             // clk
     constexpr uint64_t EIGHTH = 8192;                         // 2^-16 period
-    Vgrating grating;
+    Vfeedback_channel grating;
     int clk = 0;
     const auto step = [&] {
         grating.clk = 0;
@@ -26,7 +26,7 @@ int main() {
     grating.sample_tick = 1;
     step();
     grating.sample_tick = 0;
-    while (!grating.rootp->grating__DOT__converted && clk < LONGEST) step();
+    while (!grating.rootp->feedback_channel__DOT__converted && clk < LONGEST) step();
     const int word = clk;
     while (!grating.position_valid && clk < LONGEST) step();
     if (clk == LONGEST || grating.position != EIGHTH) {

@@ -39,14 +39,14 @@ def writing_ms(station):
 
 def torn(cuts=CUTS, seed=1):
     """Power cuts of so many after which program, journal or values were neither those of before nor the new ones, whole."""
-    from tb.firmware.fake_machine import PARAMETER
-    from tb.firmware.station import TURN, Station
+    from twin.compiled.node import PARAMETER
+    from twin.compiled.station import TURN, Station
 
     def values():
         return [station.ask("get_parameter", axis=0, parameter=number)["value"] for number in kept_numbers]
 
     def state():
-        return station.program(), station.ask("job_program")["journal"], values()
+        return station.program(), station.ask("job_stations")["journal"], values()
 
     kept_numbers = [PARAMETER[f"filter_{n}_{name}"]["id"] for n in (1, 2) for name in ("b0", "b1", "b2", "a1", "a2")]
     source, station = random.Random(seed), Station(seed=seed)
@@ -66,7 +66,7 @@ def torn(cuts=CUTS, seed=1):
                 for number in source.sample(kept_numbers, source.randrange(1, len(kept_numbers))):
                     station.ask("set_parameter", axis=0, parameter=number, value=source.randrange(2**30))
                 new_kept = values()
-                station.ask("keep", action=0)
+                station.ask("save_settings", action=0)
                 span = duration(len(kept_numbers) * VALUE_STATIONS)
             else:
                 new_program = sorted(source.sample(range(TURN), source.randrange(1, 361)))

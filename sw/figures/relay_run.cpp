@@ -120,15 +120,15 @@ struct Relay {
     std::vector<unsigned> exchange(const std::vector<unsigned> &words) { // 9-bit words; those of the answer
         std::vector<unsigned> answer;
         for (unsigned sent : words)
-            for (int bit = 0; bit < 11; bit++) pins.uart_rx = bit == 0 ? 0 : bit < 10 ? sent >> (bit - 1) & 1 : 1, wait(BIT);
-        for (int silent = 0; silent < 1000 && !pins.uart_driver_enable; silent++) clk();
-        while (pins.uart_driver_enable) {
-            if (pins.uart_tx) { clk(); continue; }
+            for (int bit = 0; bit < 11; bit++) pins.rs485_rx = bit == 0 ? 0 : bit < 10 ? sent >> (bit - 1) & 1 : 1, wait(BIT);
+        for (int silent = 0; silent < 1000 && !pins.rs485_driver_enable; silent++) clk();
+        while (pins.rs485_driver_enable) {
+            if (pins.rs485_tx) { clk(); continue; }
             unsigned heard = 0;
             wait(BIT / 2);
             for (int bit = 0; bit < 10; bit++) {
                 wait(BIT);
-                if (bit < 9) heard |= unsigned(pins.uart_tx) << bit;
+                if (bit < 9) heard |= unsigned(pins.rs485_tx) << bit;
             }
             answer.push_back(heard);
         }
@@ -152,7 +152,7 @@ struct Relay {
     }
     unsigned flags() { return ask(0)[0]; }
     Relay(int64_t counts, int64_t place) : counts(counts), place(place), counted(place) {
-        pins.uart_rx = pins.flash_sdi = 1, pins.rst = 1, show(), wait(4), pins.rst = 0;
+        pins.rs485_rx = pins.flash_sdi = 1, pins.rst = 1, show(), wait(4), pins.rst = 0;
         wait(2 * (2048 + 65 * (4 * (7 + 2 * K) + 5)) + 1000);            // both copies of an empty flash
         watch = true;
     }

@@ -8,11 +8,21 @@ import numpy as np
 from experiments import s0_stage
 from figures.common import Figure, bar, console
 from figures.synthesis import synthesise
-from moire.errors import LineError
-from moire.line_tables import PARAMETERS
-from moire.protocol import TO_NODE, Exchange, State, frame, parse_reply, read_words, ready_byte, request_body, write_words
+from moire.bus.protocol import (
+    TO_NODE,
+    Exchange,
+    State,
+    frame,
+    parse_reply,
+    read_words,
+    ready_byte,
+    request_body,
+    write_words,
+)
+from moire.errors import BusError
+from moire.made.bus_tables import PARAMETERS
 from twin import FrameBench, build, cells_of, realtime_factor
-from twin.twin import CLK_HZ
+from twin.nodes.twin import CLK_HZ
 
 SEED = 1
 SETTLE_TIME = PARAMETERS["settle_time"].id
@@ -62,7 +72,7 @@ def s0_home_spread_nm():
         task = progress.add_task("", total=20)
         for _ in range(20):
             stage.home("X")
-            stage.let_pass(0.05)
+            stage.dwell(0.05)
             readings.append([apart_nm(stage) for _ in range(READINGS)])
             progress.advance(task)
             stage.move("X", source.uniform(-0.5e6, 1.5e6))
@@ -151,7 +161,7 @@ def s0_bus_wrong(frames=100_000):
     console.print(f"{frames} damaged requests: {wrong} accepted by the node; their replies damaged: {wrong_host} accepted by the host; "
                   f"{good} of {frames // 100} undamaged requests between them accepted; answers missing afterwards: {lost}")
     if good != frames // 100 or lost:
-        raise LineError(ADDRESS, f"the node missed {frames // 100 - good} undamaged frames and {lost} answers")
+        raise BusError(ADDRESS, f"the node missed {frames // 100 - good} undamaged frames and {lost} answers")
     return wrong + wrong_host
 
 

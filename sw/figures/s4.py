@@ -10,14 +10,14 @@ from multiprocessing import get_context
 
 from experiments import s4_job
 from figures.common import Figure, bar, console
-from moire.client import Line
-from moire.index import Table
+from moire.bus.client import Bus
+from moire.bus.indexing_table import IndexingTable
 from twin import START_S, Axis, Node, Twin, TwinTransport, build
 
 PROCESSES = 2
 JOBS = 20
 STATIONS = 36
-SENSOR = 8                                          # of LINKS: the angle sensor only
+SENSOR = 8                                          # of PERIPHERALS: the angle sensor only
 TROUBLED_STATIONS, TROUBLED_PART = 8, 0.06          # of a turn
 TROUBLED_STATION_S = 3                              # of one, about; the power goes within the job
 
@@ -26,14 +26,14 @@ def indexed(seed):                      # in a process of its own, as the jobs: 
     """arcsec: the largest true error of a table that goes to the stations of a job, from its rest until a cut would have ended."""
     source = random.Random(seed)
     with Twin([Node(1, [Axis("worm_table", s4_job.random_worm(source))])], seed=seed, clk_hz=s4_job.CLK_HZ,
-              firmware=build.firmware("station"), node_parameters={**s4_job.NODE, "LINKS": SENSOR}) as twin:
-        node = Line(TwinTransport(twin), random_source=random.Random(seed), poll_s=s4_job.LOOK_S).node(1)
-        twin.place(0, math.radians(source.uniform(0, s4_job.ABOUT)))
+              firmware=build.firmware("station"), node_parameters={**s4_job.NODE, "PERIPHERALS": SENSOR}) as twin:
+        node = Bus(TwinTransport(twin), random_source=random.Random(seed), poll_s=s4_job.POLL_S).node(1)
+        twin.set_position(0, math.radians(source.uniform(0, s4_job.ABOUT)))
         twin.run(START_S)
         s4_job.set_up_table(node)
         errors = []
         for station in s4_job.random_stations(STATIONS, source):
-            Table(node).index(station)
+            IndexingTable(node).turn(station)
             for _ in range(2):
                 errors.append(s4_job.apart(math.degrees(twin.truth(0).position_rad) * 3600, station))
                 twin.run(s4_job.CUT_S)
@@ -68,7 +68,7 @@ def jobs(job, count):
 
 def s4_index_arcsec_max(count=JOBS):
     """The host tells the table's node its stations, as the main node does in a job."""
-    build.twin_library(s4_job.CLK_HZ, 1, {**s4_job.NODE, "LINKS": SENSOR})
+    build.twin_library(s4_job.CLK_HZ, 1, {**s4_job.NODE, "PERIPHERALS": SENSOR})
     with bar("tables") as progress, ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
         worst = []
         for error in progress.track(pool.map(indexed, range(1, count + 1)), total=count):

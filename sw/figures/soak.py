@@ -6,21 +6,12 @@
 import argparse
 import sys
 import time
-from importlib import import_module
-from pathlib import Path
 
-from figures.common import console
-
-
-def campaigns():
-    found = {}
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        found |= getattr(import_module(f"figures.{path.stem}"), "SOAK", {})
-    return found
+from figures.common import collected, console
 
 
 def main(arguments=None):
-    known = campaigns()
+    known = collected("SOAK")
     parser = argparse.ArgumentParser(prog="python -m figures.soak", description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"which; all without one: {', '.join(known)}")
     options = parser.parse_args(arguments)

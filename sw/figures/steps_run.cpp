@@ -36,17 +36,17 @@ struct Driver {                          // what a stepper driver sees on its tw
         now++, edge = false;
         if (direction != up) {
             if (pulse || step) violations++;                                    // in a pulse
-            violations += now - fell < std::max<int64_t>(asked.hold_clk, 1);
+            violations += now - fell < std::max<int64_t>(asked.hold_cycles, 1);
             up = direction, turned = now, turns++;
         }
         if (step == pulse) return;
         pulse = step, edge = step;
         if (step) {
-            violations += now - fell < std::max<int64_t>(asked.low_clk, 1);
-            violations += now - turned < std::max<int64_t>(asked.setup_clk, 1);
+            violations += now - fell < std::max<int64_t>(asked.low_cycles, 1);
+            violations += now - turned < std::max<int64_t>(asked.setup_cycles, 1);
             rose = now, count += up ? 1 : -1;
         } else {
-            violations += now - rose < std::max<int64_t>(asked.high_clk, 1);
+            violations += now - rose < std::max<int64_t>(asked.high_cycles, 1);
             fell = now;
         }
     }
@@ -70,8 +70,8 @@ struct Bench {
     void settings(Random &random, unsigned longest, unsigned period) {
         pins->enable = 0;
         for (int n = 0; n < 600; n++) clk();                                    // comes to rest
-        pins->high_clk = random.below(longest + 1), pins->low_clk = random.below(longest + 1);
-        pins->setup_clk = random.below(longest + 1), pins->hold_clk = random.below(longest + 1);
+        pins->high_cycles = random.below(longest + 1), pins->low_cycles = random.below(longest + 1);
+        pins->setup_cycles = random.below(longest + 1), pins->hold_cycles = random.below(longest + 1);
         pins->period = period, pins->step_low = random.below(2), pins->direction_low = random.below(2);
         for (int n = 0; n < 600; n++) {
             pins->clk = 1, pins->eval();
@@ -98,7 +98,7 @@ int reversals(uint64_t wanted, uint64_t seed) {
         const unsigned period = 60 + random.below(300), longest = random.one_in(2) ? 6 : 40;
         bench.target(place);
         bench.settings(random, longest, period);
-        const int64_t per_step = std::max<int64_t>(pins.high_clk, 1) + std::max<int64_t>(pins.low_clk, 1);
+        const int64_t per_step = std::max<int64_t>(pins.high_cycles, 1) + std::max<int64_t>(pins.low_cycles, 1);
         const int64_t fastest = std::min<int64_t>(ONE * period / per_step, 200 * ONE);  // of a line
         pins.enable = 1;
         const int64_t origin = whole(place) - int32_t(pins.steps);

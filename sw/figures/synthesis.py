@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Synthesis, place and route of a module for the Lattice ECP5 or iCE40: how fast and how large it becomes on this day's sources.
 
-python -m experiments.synthesis TOP [NAME=VALUE …] [--seed N] [--ice40]        e.g. node AXES=2
+python -m figures.synthesis TOP [NAME=VALUE …] [--seed N] [--ice40]        e.g. node AXES=2
 """
 import argparse
 import json

@@ -22,9 +22,10 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 OUT = HERE.parents[1] / "build" / "firmware"
+LINK = HERE / "core" / "link.ld"
 FLAGS = ["-std=c11", "-g", "-Wall", "-Wextra", "-Werror", "-ffreestanding", "-ffunction-sections",
          "-fdata-sections", "-fomit-frame-pointer", "-static", "-Wframe-larger-than=1536"]    # the stack has 4096
-IMAGES = sorted(path.stem.removeprefix("image_") for path in HERE.glob("image_*.c"))
+IMAGES = sorted(path.stem.removeprefix("image_") for path in (HERE / "images").glob("image_*.c"))
 AXES = {"station": 2}                                               # most that an image serves, where it is not the default
 SMALL, FAST = "-Os", "-O2"
 HOT = ("arithmetic.c",)                                 # the others wait more than they work
@@ -89,8 +90,8 @@ def image(segments, memory):
 
 def sources_of(name, folder=HERE):
     """All of the folder but the lists of the other images."""
-    others = {path for path in folder.glob("image_*.c") if path.name != f"image_{name}.c"}
-    return sorted(set(folder.glob("*.[chS]")) - others)
+    others = {path for path in (folder / "images").glob("image_*.c") if path.name != f"image_{name}.c"}
+    return sorted(set(folder.rglob("*.[chS]")) - others)
 
 
 def defines_of(name):
@@ -106,7 +107,7 @@ def flags_of(path):
 def fingerprint(sources, command, memory):
     state = hashlib.sha256(repr((command, memory)).encode())
     for source in sources:
-        state.update(source.name.encode() + source.read_bytes())
+        state.update(source.relative_to(HERE).as_posix().encode() + source.read_bytes())
     return state.hexdigest()
 
 
@@ -121,7 +122,7 @@ def run(command):
 def build(memory, out, force, name="axis"):
     command, libraries = compiler()
     command += defines_of(name)
-    sources = [*sources_of(name), HERE / "link.ld", HERE / "build.py"]
+    sources = [*sources_of(name), LINK, HERE / "build.py"]
     stem = "firmware" if name == "axis" else name
     elf, binary, text, note = (out / f"{stem}.{end}" for end in ("elf", "bin", "hex", "note"))
     mark = fingerprint(sources, command, memory)
@@ -134,10 +135,10 @@ def build(memory, out, force, name="axis"):
 
     inputs = [path for path in sources if path.suffix in (".c", ".S")]
     script = out / f"{stem}.ld"                                 # zig's linker takes no --defsym
-    script.write_text(f"MEMORY_BYTES = {memory};\n" + (HERE / "link.ld").read_text())
+    script.write_text(f"MEMORY_BYTES = {memory};\n" + (LINK).read_text())
     with tempfile.TemporaryDirectory(dir=out) as folder:
         objects = [Path(folder) / f"{path.name}.o" for path in inputs]
-        compiled = [[*command, *FLAGS, *flags_of(path), "-c", str(path), "-o", str(made)]
+        compiled = [[*command, *FLAGS, *flags_of(path), f"-I{HERE}", "-c", str(path), "-o", str(made)]
                     for path, made in zip(inputs, objects, strict=True)]
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             list(pool.map(run, compiled))

@@ -13,8 +13,8 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "hardware.h"
-#include "line_protocol.h"
+#include "core/hardware.h"
+#include "made/bus_protocol.h"
 
 #define EDGES 65536u
 #define LONGEST 512u
@@ -82,10 +82,10 @@ uint32_t register_read(uint32_t offset)
     case NODE_CLK_HZ: return CLK;
     case NODE_BUILD: return AXES | 1u << 4 | 64u << 8;
     case NODE_TIME_STAMP_LOW: return clk += 10;
-    case LINE_BASE + LINE_RECEIVE: return take(&line_words, LINE_RECEIVE_PRESENT_MASK);
-    case LINE_BASE + LINE_CRC: return 0;                        // of anything: so every CRC-32 of zeros is right
-    case LINKS_BASE + LINKS_BUILT: return ~0u;
-    case LINKS_BASE + LINKS_PEER_RECEIVE: return take(&peer_bytes, LINKS_PEER_RECEIVE_PRESENT_MASK);
+    case BUS_BASE + BUS_RECEIVE: return take(&line_words, BUS_RECEIVE_PRESENT_MASK);
+    case BUS_BASE + BUS_CRC: return 0;                        // of anything: so every CRC-32 of zeros is right
+    case PERIPHERALS_BASE + PERIPHERALS_BUILT: return ~0u;
+    case PERIPHERALS_BASE + PERIPHERALS_PEER_RECEIVE: return take(&peer_bytes, PERIPHERALS_PEER_RECEIVE_PRESENT_MASK);
     default: return held;
     }
 }
@@ -102,11 +102,11 @@ static void receive(unsigned word)
 
 static void receive_frame(const uint8_t *body, unsigned length)
 {
-    receive(0x21u | LINE_RECEIVE_COMMAND_MASK);
+    receive(0x21u | BUS_RECEIVE_COMMAND_MASK);
     receive(length);
     for (unsigned n = 0; n < length; n++) receive(body[n]);
-    for (unsigned n = 0; n < 4; n++) receive(rand() % 256 | (n == 3 && length <= LINE_LONGEST_BODY ? LINE_RECEIVE_GOOD_MASK : 0));
-    receive(0x11u | LINE_RECEIVE_COMMAND_MASK);
+    for (unsigned n = 0; n < 4; n++) receive(rand() % 256 | (n == 3 && length <= BUS_LONGEST_BODY ? BUS_RECEIVE_GOOD_MASK : 0));
+    receive(0x11u | BUS_RECEIVE_COMMAND_MASK);
 }
 
 // ------------------------------------------------------------------ an input, played
@@ -133,7 +133,7 @@ static void play(const struct input *input)
             break;
         }
         case FRAME: {
-            unsigned length = NEXT % (2u * LINE_LONGEST_BODY);    // the hardware marks none that is too long as good
+            unsigned length = NEXT % (2u * BUS_LONGEST_BODY);    // the hardware marks none that is too long as good
             if (length > input->length - at) length = input->length - at;
             receive_frame(&input->bytes[at], length);
             at += length;
@@ -184,7 +184,7 @@ static uint32_t draw(uint32_t below)
 }
 
 #define OPERATION(name, code, request, ...) {code, request},
-static const uint8_t operations[][2] = {LINE_OPERATIONS(OPERATION)};
+static const uint8_t operations[][2] = {BUS_OPERATIONS(OPERATION)};
 
 static void insert(struct input *input, const uint8_t *bytes, unsigned length)
 {
@@ -207,14 +207,14 @@ static unsigned request(uint8_t *body)                          // of the right 
 
 static void insert_request(struct input *input)
 {
-    uint8_t bytes[2 + LINE_LONGEST_BODY] = {FRAME};
+    uint8_t bytes[2 + BUS_LONGEST_BODY] = {FRAME};
     bytes[1] = (uint8_t)request(&bytes[2]);
     insert(input, bytes, 2u + bytes[1]);
 }
 
 static void insert_peer_frame(struct input *input)              // COBS of a request and its CRC-32, zeros around it
 {
-    uint8_t bytes[4 + LINE_LONGEST_BODY + 5] = {PEER}, content[LINE_LONGEST_BODY + 4] = {0};
+    uint8_t bytes[4 + BUS_LONGEST_BODY + 5] = {PEER}, content[BUS_LONGEST_BODY + 4] = {0};
     unsigned length = request(content) + 4u, code = 3;
     for (unsigned n = 0; n < length; n++) {
         bytes[4 + n] = content[n];

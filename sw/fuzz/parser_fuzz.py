@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Coverage-guided fuzzing of all that the host package reads: bytes of the line and of clients, files, words on the command line.
 
-    python -m experiments.parser_fuzz SECONDS [SEED]
+    python -m fuzz.parser_fuzz SECONDS [SEED]
 
 Whatever a parser is given it answers, or refuses by a MoireError; any other exception, and anything that takes long, is a crash. An input
 that reaches a pair of lines that was not reached before joins the corpus that the next inputs are made of.
@@ -16,11 +16,14 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 
-from moire import calibration, cobs, command_line, protocol, recording, relay, rfc2217, units
-from moire.client import Axis
+from moire import units
+from moire.analysis import harmonic_fit as calibration
+from moire.bus import cobs, protocol, recording, rfc2217
+from moire.bus.client import Axis
+from moire.bus.transport import Transport
+from moire.cli import command_line, relay
 from moire.errors import MoireError
-from moire.line_tables import OPERATIONS, PARAMETERS
-from moire.transport import Transport
+from moire.made.bus_tables import OPERATIONS, PARAMETERS
 
 PACKAGE = str(Path(protocol.__file__).parent)
 LONGEST = 600
@@ -72,7 +75,7 @@ def relay_exchange(data):
 
 
 class Silent(Transport):
-    time_stands = True
+    time_is_stopped = True
 
     def send(self, words):
         assert all(0 <= word < 512 for word in words)
@@ -148,7 +151,7 @@ def good_reply():
     return bytes(byte for word in words for byte in (word, 0))
 
 
-HEAD = '{"record": "moire line", "version": 1, "protocol_crc": %d}\n' % recording.PROTOCOL_CRC
+HEAD = '{"record": "moire bus", "version": 1, "protocol_crc": %d}\n' % recording.PROTOCOL_CRC
 SEEDS = {
     packets: [cobs.packet(0x51, bytes([7, 2, 3])), cobs.packet(0x21, protocol.request_body("identify", 1))],
     telnet: [bytes([255, 253, 44, 255, 250, 44, 3, 4, 255, 240, 33]), bytes([255, 250, 44, 1, 0, 0, 37, 128, 255, 240, 255, 255])],

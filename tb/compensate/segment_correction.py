@@ -13,7 +13,7 @@ class SegmentCorrection:
     def __init__(self, index=8):
         self.index, self.round = index, index + 22              # clk of the table
         self.points = [0] * (1 << index)
-        self.moved_by = self.stored = self.looked = 0
+        self.moved_by = self.stored = self.read_value = 0
         self.off = True
         self.reset()
 
@@ -27,8 +27,8 @@ class SegmentCorrection:
         self.told = self.answered = self.in_force = self.outside = False
         self.error = 0
 
-    def clk(self, rst=0, enable=0, linear=0, origin_written=0, origin=0, segment_length=1, segments=1, write=0, point=0, value=0, look=0,
-            look_at=0, valid=0, position=0, shift=0, shift_periods=0):
+    def clk(self, rst=0, enable=0, linear=0, origin_written=0, origin=0, segment_length=1, segments=1, write=0, point=0, value=0, read=0,
+            read_point=0, valid=0, position=0, shift=0, shift_periods=0):
         fresh = self.answer if enable and valid and self.answered else self.error
         begins, ends = bool(enable and self.told and not self.in_force), bool(not enable and self.in_force)
         asking = bool(enable and not self.asked and not self.looking and (valid or not self.in_force))
@@ -41,10 +41,10 @@ class SegmentCorrection:
 
         free = self.looking and not self.asked
         if free:
-            self.stored = self.looked
-        self.known = not look and (self.known or free)
-        self.looking = bool(look or (self.looking and self.asked))
-        self.looked = self.points[look_at]
+            self.stored = self.read_value
+        self.known = not read and (self.known or free)
+        self.looking = bool(read or (self.looking and self.asked))
+        self.read_value = self.points[read_point]
 
         if self.told:
             self.outside = self.beyond

@@ -10,9 +10,9 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import run, start
 from tb.compensate.segment_correction import SegmentCorrection, wrap
 
-IDLE = dict(enable=0, linear=0, origin_written=0, origin=0, segment_length=1, segments=1, write=0, point=0, value=0, look=0, look_at=0,
+IDLE = dict(enable=0, linear=0, origin_written=0, origin=0, segment_length=1, segments=1, write=0, point=0, value=0, read=0, read_point=0,
             valid=0, position=0, shift=0, shift_periods=0)
-STROBES = "origin_written", "write", "look", "valid", "shift"
+STROBES = "origin_written", "write", "read", "valid", "shift"
 SIGNED = "corrected", "moved_by", "error"
 FLAGS = "done", "moved", "in_force", "outside", "known"
 
@@ -185,7 +185,7 @@ async def points_are_read_back_at_work_too(dut):
     for enable in (0, 1, 0, 1):
         for n in random.sample(range(len(points)), 4):
             await scale.clk(random.randrange(1, 40), valid=1, position=random.randrange(1 << 18), enable=enable)
-            await scale.clk(look=1, look_at=n)
+            await scale.clk(read=1, read_point=n)
             await scale.clk()
             for _ in range(scale.model.round + 3):
                 await scale.clk(valid=1, enable=int(enable and random.randrange(20) > 0))
@@ -223,7 +223,7 @@ async def any_motion_and_any_table_match_the_model(dut):
             if chance > 0.97:
                 scale.inputs.update(shift=1, shift_periods=random.randrange(-1 << 31, 1 << 31))
             if 0.9 < chance < 0.92:
-                scale.inputs.update(look=1, look_at=random.randrange(most + 1))
+                scale.inputs.update(read=1, read_point=random.randrange(most + 1))
             await scale.clk(enable=int(random.random() > 0.01), linear=linear)
 
 

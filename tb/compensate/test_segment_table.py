@@ -8,7 +8,7 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import run, start
 from tb.compensate.segment_table import SegmentTable
 
-IDLE = dict(enable=1, linear=0, origin=0, segment_length=1, segments=1, write=0, point=0, value=0, look=0, valid=0, position=0)
+IDLE = dict(enable=1, linear=0, origin=0, segment_length=1, segments=1, write=0, point=0, value=0, read_point=0, valid=0, position=0)
 FAR = 1 << 47
 
 
@@ -111,12 +111,12 @@ async def points_are_read_back_while_no_position_is_under_way(dut):
     points = [random.randrange(-1 << 23, 1 << 23) for _ in range(256)]
     table = await Table(dut).reset(points)
     for n in (0, 255, *random.sample(range(256), 20)):
-        dut.look.value = n
+        dut.read_point.value = n
         await table.clk()
-        assert dut.looked.value.to_signed() == points[n]
+        assert dut.read_value.value.to_signed() == points[n]
         await table.at(random.randrange(255_000), random.getrandbits(1))        # which reads other points
         await table.clk(valid=0)
-        assert dut.looked.value.to_signed() == points[n]
+        assert dut.read_value.value.to_signed() == points[n]
 
 
 @cocotb.test()

@@ -84,25 +84,25 @@ class ProfilePlayer:
         self.velocity = self.acceleration = self.jerk = self.left = self.last = self.fraction = self.offset = 0
         self.step = self.change = self.ready = self.final = self.arrived = self.rate = 0
         self.moving = self.braking = self.target_velocity = self.target_acceleration = 0
-        self.ramp, self.brake = Way(), None
+        self.ramp, self.controlled_stop = Way(), None
 
     def pins(self):
         return (wrap(self.exact >> 24, 48), self.target_velocity, self.target_acceleration, self.moving, self.armed,
                 self.depth - len(self.queue), self.underrun)
 
-    def clk(self, rst=0, tick=0, push=None, start=0, brake=0, hold_here=0, position=0, shift=None, brake_rate=0, brake_jerk=0,
-            slope=0, curve=0, percent=65536, pause=0, arm=0, start_at=0, now=0):
+    def clk(self, rst=0, tick=0, push=None, start=0, controlled_stop=0, set_target_to_position=0, position=0, shift=None, stop_deceleration=0, stop_jerk=0,
+            slope=0, curve=0, feed_fraction=65536, pause=0, arm=0, start_at=0, now=0):
         """push: (velocity, acceleration, jerk, ticks, last) or None. shift: 2^-16 period or None."""
         self.underrun = 0
-        if rst or hold_here:
+        if rst or set_target_to_position:
             self.exact = 0 if rst else position << 24
             if shift is not None and not rst:
                 self.exact = wrap(self.exact + (shift << 24), 72)
             self.stand()
             self.empty()
             return self.pins()
-        self.tick, self.shifted, self.brake_now, self.brake_rate, self.brake_jerk = tick, shift is not None, brake, brake_rate, brake_jerk
-        self.slope, self.curve, self.setting = slope, curve, 0 if pause else min(percent, 65536) << 16
+        self.tick, self.shifted, self.brake_now, self.stop_deceleration, self.stop_jerk = tick, shift is not None, controlled_stop, stop_deceleration, stop_jerk
+        self.slope, self.curve, self.setting = slope, curve, 0 if pause else min(feed_fraction, 65536) << 16
         moving, waiting = self.moving, bool(self.queue)
         room = len(self.queue) < self.depth and not self.braking and not self.writing
         reached = self.armed and wrap(now - start_at, 32) >= 0
@@ -111,15 +111,15 @@ class ProfilePlayer:
         if next(self.life):
             self.stand()
         else:
-            self.braking |= int(bool(brake and moving) or self.underrun)
-        if (start or reached) and waiting and not moving and not brake:
+            self.braking |= int(bool(controlled_stop and moving) or self.underrun)
+        if (start or reached) and waiting and not moving and not controlled_stop:
             self.moving = 1
-        self.armed = int((arm or (self.armed and not reached)) and not brake)
+        self.armed = int((arm or (self.armed and not reached)) and not controlled_stop)
         self.writing = max(0, self.writing - 1)
         if push and room:
             self.queue.append(push)
             self.writing = 6
-        if brake or self.underrun:
+        if controlled_stop or self.underrun:
             self.queue.clear()
             self.writing = 0
         self.exact = wrap(self.exact, 72)
@@ -230,10 +230,10 @@ class ProfilePlayer:
 
     def stop(self):
         """Prepare the next step of a brake."""
-        limit, first, abrupt = self.brake_rate << 8, self.brake is None, False
+        limit, first, abrupt = self.stop_deceleration << 8, self.brake is None, False
         yield
         if first:
-            self.brake = Way()
+            self.controlled_stop = Way()
             yield
             abrupt = limit == 0
             if not abrupt:
@@ -257,9 +257,9 @@ class ProfilePlayer:
         yield
 
     def begin_to_brake(self, limit):
-        """A slope of as many whole paces as the acceleration is high: (too fast to brake, "stay" if it must not grow at this step)."""
+        """A slope of as many whole paces as the acceleration is high: (too fast to stop, "stay" if it must not grow at this step)."""
         brake = self.brake
-        yield from clks(1 + brake.choose(limit, self.brake_jerk) + 1 + 3 + 31)
+        yield from clks(1 + brake.choose(limit, self.stop_jerk) + 1 + 3 + 31)
         brake.upward = int(self.change > 0)
         quotient, rest = divmod(abs(self.change), brake.pace)
         quotient = min(quotient, (1 << 32) - 1)

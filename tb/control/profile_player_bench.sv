@@ -5,11 +5,11 @@
 module profile_player_bench (
     input  wire               clk,
     input  wire               rst,
-    input  wire        [31:0] brake_rate,
-    input  wire        [31:0] brake_jerk,
+    input  wire        [31:0] stop_deceleration,
+    input  wire        [31:0] stop_jerk,
     input  wire        [31:0] slope,
     input  wire        [31:0] curve,
-    input  wire        [16:0] percent,
+    input  wire        [16:0] feed_fraction,
     input  wire               pause,
     input  wire               tick,
     input  wire               push,
@@ -19,7 +19,7 @@ module profile_player_bench (
     input  wire        [23:0] segment_ticks,
     input  wire               segment_last,
     input  wire               start,
-    input  wire               brake,
+    input  wire               controlled_stop,
     output logic       [71:0] exact,                            // 2^-40 period; while prepared
     output logic              moving,
     output logic       [4:0]  queue_free,
@@ -27,8 +27,8 @@ module profile_player_bench (
     output logic              prepared                          // level: a tick is taken
 );
     /* verilator lint_off PINCONNECTEMPTY */
-    profile_player u_player (.clk, .rst, .brake_rate, .brake_jerk, .slope, .curve, .percent, .pause, .tick, .push, .segment_velocity, .segment_acceleration, .segment_jerk,
-        .segment_ticks, .segment_last, .start, .arm(1'b0), .start_at(32'd0), .now(32'd0), .brake, .hold_here(1'b0), .position(48'd0),
+    profile_player u_player (.clk, .rst, .stop_deceleration, .stop_jerk, .slope, .curve, .feed_fraction, .pause, .tick, .push, .segment_velocity, .segment_acceleration, .segment_jerk,
+        .segment_ticks, .segment_last, .start, .arm(1'b0), .start_at(32'd0), .now(32'd0), .controlled_stop, .set_target_to_position(1'b0), .position(48'd0),
         .shift(1'b0), .shift_by(48'd0), .target(), .target_velocity(), .target_acceleration(), .moving, .armed(), .queue_free, .underrun);
     /* verilator lint_on PINCONNECTEMPTY */
     assign prepared = u_player.job == u_player.WAIT;

@@ -13,11 +13,11 @@ from tb.control.profile_player import FULL, ProfilePlayer, moved, wrap
 PERIOD = 1 << 40                        # of velocity, acceleration and jerk
 LSB = 1 << 24                           # of target, in the same unit
 GAP, BRAKE_GAP, PUSH_GAP = 160, 350, 7                # clk from tick to tick that the header asks for
-SETTINGS = "slope", "curve", "percent", "pause", "brake_rate", "brake_jerk"
+SETTINGS = "slope", "curve", "feed_fraction", "pause", "stop_deceleration", "stop_jerk"
 WORDS = "segment_velocity", "segment_acceleration", "segment_jerk", "segment_ticks", "segment_last"
-EVENTS = "rst", "tick", "start", "brake", "hold_here", "position", "arm", "start_at", "now"
+EVENTS = "rst", "tick", "start", "controlled_stop", "set_target_to_position", "position", "arm", "start_at", "now"
 IDLE = dict.fromkeys(("tick", "push", "segment_velocity", "segment_acceleration", "segment_jerk", "segment_ticks", "segment_last",
-                      "start", "brake", "hold_here", "position", "shift", "shift_by", "arm", "start_at", "now", *SETTINGS), 0)
+                      "start", "controlled_stop", "set_target_to_position", "position", "shift", "shift_by", "arm", "start_at", "now", *SETTINGS), 0)
 
 
 class Player:
@@ -25,7 +25,7 @@ class Player:
 
     def __init__(self, dut):
         self.dut, self.model, self.clk_count = dut, ProfilePlayer(int(dut.DEPTH.value)), 0
-        self.settings = dict(slope=0, curve=0, percent=65536, pause=0, brake_rate=0, brake_jerk=0)
+        self.settings = dict(slope=0, curve=0, feed_fraction=65536, pause=0, stop_deceleration=0, stop_jerk=0)
         self.driven = {}
         self.stands = -1                                # clk that the words of a segment must still stand
 
@@ -135,15 +135,15 @@ async def latency_is_2(dut):
 
 @cocotb.test()
 async def ticks_may_follow_each_other_in_160_clk(dut):
-    """And in 350 from the first of a brake: with less the step would not be ready, and the tick be lost."""
+    """And in 350 from the first of a controlled_stop: with less the step would not be ready, and the tick be lost."""
     player = await Player(dut).reset()
-    player.settings |= dict(percent=65535, brake_rate=1 << 20, brake_jerk=1 << 25)
+    player.settings |= dict(feed_fraction=65535, stop_deceleration=1 << 20, stop_jerk=1 << 25)
     await player.play((PERIOD, 0, 0, 9, 0), (PERIOD, 0, 0, 100, 1))
     for _ in range(30):
         before = player.target
         await player.tick(GAP)
         assert player.target != before
-    await player.clk(brake=1)
+    await player.clk(controlled_stop=1)
     for n in range(20):
         before = player.target
         await player.tick(BRAKE_GAP if n < 2 else GAP)
@@ -172,10 +172,10 @@ async def slower_it_takes_the_same_way_and_lands_on_the_same_bit(dut):
     jerk = (1 << 30) + 12345
     segments = ((0, 0, jerk, 5, 0), (10 * jerk, 5 * jerk, -jerk, 5, 0), (25 * jerk, 0, 0, 3, 1))
     exact = positions(*segments)
-    for percent in (21845, 65535, 8192):
-        rate = percent << 16
-        await player.clk(hold_here=1, position=0)
-        player.settings["percent"] = percent
+    for feed_fraction in (21845, 65535, 8192):
+        rate = feed_fraction << 16
+        await player.clk(set_target_to_position=1, position=0)
+        player.settings["feed_fraction"] = feed_fraction
         await player.play(*segments)
         targets, time = await player.finish(), 0
         for n, target in enumerate(targets):
@@ -198,10 +198,10 @@ async def slower_every_step_keeps_the_limits_of_the_profile(dut):
     for _ in range(3):
         limits.append(max(map(abs, steps)))
         steps = [b - a for a, b in zip(steps, steps[1:])]
-    for percent in (65536, 32768 + 123, 65536 // 3):
-        rate = percent << 16
-        player.settings["percent"] = percent
-        await player.clk(hold_here=1, position=0)
+    for feed_fraction in (65536, 32768 + 123, 65536 // 3):
+        rate = feed_fraction << 16
+        player.settings["feed_fraction"] = feed_fraction
+        await player.clk(set_target_to_position=1, position=0)
         await player.play(*segments)
         seen = [0, 0, 0]
         while player.moving:
@@ -252,18 +252,18 @@ async def the_fraction_goes_on_from_segment_to_segment_and_ends_at_the_nearest_l
 @cocotb.test()
 async def ends_of_the_range(dut):
     player = await Player(dut).reset()
-    for percent in (65536, 65535, 1, 131071):
-        player.settings["percent"] = percent
+    for feed_fraction in (65536, 65535, 1, 131071):
+        player.settings["feed_fraction"] = feed_fraction
         for v in (-1 << 63, (1 << 63) - 1):
             for a in (-1 << 63, (1 << 63) - 1):
                 for j in (-1 << 31, (1 << 31) - 1):
                     await player.play((v, a, j, 3, 1))
                     await player.tick()
                     await player.tick()
-                    await player.clk(hold_here=1)
-    player.settings["percent"] = 65536
+                    await player.clk(set_target_to_position=1)
+    player.settings["feed_fraction"] = 65536
     for position in (-1 << 47, (1 << 47) - 1):
-        await player.clk(hold_here=1, position=position)
+        await player.clk(set_target_to_position=1, position=position)
         assert player.target == position
         sign = -1 if position < 0 else 1
         await player.play((sign * LSB, 0, 0, 1, 1))
@@ -329,7 +329,7 @@ async def an_armed_player_starts_when_its_time_has_come(dut):
         assert time == start_at or (start_at == 2 and waited == 1)
         assert not player.armed
         await player.finish()
-    for event in ("brake", "hold_here"):
+    for event in ("controlled_stop", "set_target_to_position"):
         await player.clk(arm=1, start_at=1000)
         await player.clk(**{event: 1}, start_at=1000)
         assert not player.armed
@@ -352,7 +352,7 @@ async def segments_of_0_ticks_are_skipped(dut):
 @cocotb.test()
 async def an_underrun_strobes_once_and_brakes(dut):
     player = await Player(dut).reset()
-    player.settings |= dict(brake_rate=1 << 30, brake_jerk=0)      # a quarter period/tick2, at once
+    player.settings |= dict(stop_deceleration=1 << 30, stop_jerk=0)      # a quarter period/tick2, at once
     await player.play((PERIOD, 0, 0, 4, 0))
     strobes, targets = 0, []
     while player.moving:
@@ -375,15 +375,15 @@ async def a_segment_that_comes_before_its_time_is_no_underrun(dut):
     assert player.target == 3 * 65536
 
 
-async def stop_from(player, velocity, acceleration, rate, jerk, percent=65536):
+async def stop_from(player, velocity, acceleration, rate, jerk, feed_fraction=65536):
     """The steps of a brake from about there, and the limits it had to keep."""
-    player.settings |= dict(brake_rate=rate, brake_jerk=jerk, percent=percent)
-    await player.clk(hold_here=1, position=0)
+    player.settings |= dict(stop_deceleration=rate, stop_jerk=jerk, feed_fraction=feed_fraction)
+    await player.clk(set_target_to_position=1, position=0)
     await player.play((velocity - 3 * acceleration, acceleration, 0, 100, 0), (PERIOD, 0, 0, 1, 1))
     for _ in range(3):
         await player.tick()
     steps = []
-    await player.clk(brake=1)
+    await player.clk(controlled_stop=1)
     assert player.free == int(player.dut.DEPTH.value) and player.moving
     await player.push((PERIOD, 0, 0, 1, 1))
     await player.clk(start=1)
@@ -451,14 +451,14 @@ async def brake_at_rate_0_stops_in_one_step(dut):
 @cocotb.test()
 async def brake_while_paused_ends_the_profile(dut):
     player = await Player(dut).reset()
-    player.settings |= dict(brake_rate=1 << 30, brake_jerk=1 << 30)
+    player.settings |= dict(stop_deceleration=1 << 30, stop_jerk=1 << 30)
     await player.play((PERIOD, 0, 0, 100, 1))
     await player.tick()
     player.settings["pause"] = 1
     for _ in range(3):
         await player.tick()
     stands = player.target
-    await player.clk(brake=1)
+    await player.clk(controlled_stop=1)
     await player.finish(most=6)
     assert abs(player.target - stands) <= 1
 
@@ -467,26 +467,26 @@ async def brake_while_paused_ends_the_profile(dut):
 async def brake_at_rest_only_empties_the_queue(dut):
     player = await Player(dut).reset()
     await player.push((PERIOD, 0, 0, 1, 1))
-    await player.clk(brake=1)
+    await player.clk(controlled_stop=1)
     assert player.free == int(dut.DEPTH.value) and not player.moving
     await player.play((PERIOD, 0, 0, 2, 1))
     assert len(await player.finish()) == 2
 
 
 @cocotb.test()
-async def hold_here_stands_at_the_position_with_an_empty_queue(dut):
+async def set_target_to_position_stands_at_the_position_with_an_empty_queue(dut):
     player = await Player(dut).reset()
     for wait in (*range(8), 30, 60, 90):                # in every phase of a tick
         for segment in ((PERIOD + 5, 0, 0, 5, 0), (PERIOD, 0, 0, 1, 1)):
             await player.push(segment)
-        await player.clk(start=1, percent=21845)
+        await player.clk(start=1, feed_fraction=21845)
         if wait < 8:                                    # and in the clk that makes a step
             for n in range(GAP):
-                await player.clk(tick=int(n == 0), percent=21845)
-        await player.clk(tick=1, percent=21845)
+                await player.clk(tick=int(n == 0), feed_fraction=21845)
+        await player.clk(tick=1, feed_fraction=21845)
         for _ in range(wait):
-            await player.clk(percent=21845)
-        await player.clk(hold_here=1, position=-777)
+            await player.clk(feed_fraction=21845)
+        await player.clk(set_target_to_position=1, position=-777)
         assert (player.target, player.velocity, player.moving, player.free) == (-777, 0, 0, int(dut.DEPTH.value))
 
 
@@ -494,7 +494,7 @@ async def hold_here_stands_at_the_position_with_an_empty_queue(dut):
 async def a_shift_loses_no_step_in_any_clk(dut):
     player = await Player(dut).reset()
     for wait in range(7):
-        await player.clk(hold_here=1, position=0)
+        await player.clk(set_target_to_position=1, position=0)
         await player.play((PERIOD, 0, 0, 1, 1))
         await player.clk(tick=1)
         for n in range(9):
@@ -508,9 +508,9 @@ async def reset_in_mid_flow(dut):
     for wait in (*range(5), 40, 75):
         await player.play((PERIOD, 0, 0, 5, 0), (PERIOD, 0, 0, 5, 1))
         await player.tick()
-        await player.clk(tick=1, percent=32768)
+        await player.clk(tick=1, feed_fraction=32768)
         for _ in range(wait):
-            await player.clk(percent=32768)
+            await player.clk(feed_fraction=32768)
         await player.clk(rst=1)
         assert (player.target, player.moving, player.free) == (0, 0, int(dut.DEPTH.value))
 
@@ -532,7 +532,7 @@ async def the_rate_goes_to_its_setting_by_hand(dut):
     player = await Player(dut).reset()
     await player.play(ENDLESS)
     await rates(player, 3)
-    player.settings |= dict(slope=1 << 29, curve=1 << 28, percent=0)
+    player.settings |= dict(slope=1 << 29, curve=1 << 28, feed_fraction=0)
     assert [rate * 16 >> 30 for rate in await rates(player, 12)] == [16, 15, 13, 11, 9, 7, 5, 3, 1, 0, 0, 0]
 
 
@@ -544,10 +544,10 @@ async def every_way_of_the_rate_keeps_slope_and_curve_and_ends_at_the_setting(du
     slope, curve = 1 << 29, 1 << 27
     player.settings |= dict(slope=slope, curve=curve)
     for _ in range(25):                                 # settings that change on the way make no jump
-        player.settings |= dict(percent=random.choice((0, 1, 65535, 131071, random.randrange(65536))), pause=int(random.randrange(4) == 0))
+        player.settings |= dict(feed_fraction=random.choice((0, 1, 65535, 131071, random.randrange(65536))), pause=int(random.randrange(4) == 0))
         seen += await rates(player, random.choice((1, 2, 5, 30)))
     seen += await rates(player, 40)
-    setting = 0 if player.settings["pause"] else min(player.settings["percent"], 65536) << 14
+    setting = 0 if player.settings["pause"] else min(player.settings["feed_fraction"], 65536) << 14
     assert seen[-1] == setting
     paces = [b - a for a, b in zip(seen, seen[1:])]
     assert max(map(abs, paces)) <= slope + 4 >> 2 and all(abs(b - a) <= (curve >> 2) + 2 for a, b in zip(paces, paces[1:]))
@@ -566,7 +566,7 @@ async def a_setting_that_changes_in_any_clk_makes_no_jump(dut):
         for n in range(GAP):
             dut.tick.value = int(n == 0)
             if n == moment:
-                dut.percent.value = random.randrange(65537)
+                dut.feed_fraction.value = random.randrange(65537)
             await RisingEdge(dut.clk)
             await FallingEdge(dut.clk)
         seen.append(dut.target_velocity.value.to_signed())
@@ -589,12 +589,12 @@ async def any_events_match_the_model(dut):
         if wait <= 0 and chance(3):
             if wait < -BRAKE_GAP or chance(3):          # the settings stand until the step is prepared
                 wait = BRAKE_GAP
-                player.settings |= dict(brake_rate=setting(32), brake_jerk=setting(32), slope=setting(32), curve=setting(32),
-                                        percent=random.choice((65536, 65536, 0, setting(17))), pause=int(chance(6)))
+                player.settings |= dict(stop_deceleration=setting(32), stop_jerk=setting(32), slope=setting(32), curve=setting(32),
+                                        feed_fraction=random.choice((65536, 65536, 0, setting(17))), pause=int(chance(6)))
             events["tick"], wait = 1, random.choice((GAP, GAP, BRAKE_GAP)) if chance(4) else BRAKE_GAP
         if chance(30) and player.stands <= 0:           # the words of the last one are written
             events["push"] = (word(64), word(64), word(32), random.choice((0, 1, 1, 2, 3, 5)), int(chance(4)))
-        for name, one_in in (("start", 60), ("arm", 300), ("brake", 1500), ("hold_here", 2500), ("rst", 5000)):
+        for name, one_in in (("start", 60), ("arm", 300), ("controlled_stop", 1500), ("set_target_to_position", 2500), ("rst", 5000)):
             if chance(one_in):
                 events[name] = 1
         events["position"] = word(48)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What tb/cpu/program.c must find: the results of rv32im for two operands, in the order in which the program writes them."""
+"""What tb/cpu/core_test.c must find: the results of rv32im for two operands, in the order in which the program writes them."""
 MASK = (1 << 32) - 1
 
 

@@ -10,8 +10,8 @@ from cocotb.triggers import FallingEdge
 from tb.bench import run
 from tb.cpu.register_bus import RegisterBus
 
-ALONE = {"node": 0x000, "line": 0x100, "links": 0x200}                                 # blocks of which there is one
-OF_AXES = {"axis": 0x400, "grating": 0xC00, "actuator": 0x1400}         # blocks that each axis has, where the first one lies
+ALONE = {"node": 0x000, "bus": 0x100, "peripherals": 0x200}                                 # blocks of which there is one
+OF_AXES = {"axis": 0x400, "feedback": 0xC00, "actuator": 0x1400}         # blocks that each axis has, where the first one lies
 
 
 async def access(dut, model, select, address):

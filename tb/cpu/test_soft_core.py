@@ -133,7 +133,7 @@ def compiled():
     BUILD.mkdir(parents=True, exist_ok=True)
     elf, words = BUILD / "program.elf", BUILD / "program.hex"
     subprocess.run([*command, *firmware_build.FLAGS, firmware_build.FAST, f"-DMEMORY_BYTES={BYTES}", f"-Wl,-T,{here / 'program.ld'}", "-o", str(elf),
-                    str(here / "program.c"), *libraries], check=True, timeout=300)
+                    str(here / "core_test.c"), *libraries], check=True, timeout=300)
     content, _ = firmware_build.image(firmware_build.load_segments(elf.read_bytes())[0], BYTES)
     words.write_text("".join(f"{word:08x}\n" for (word,) in struct.iter_unpack("<I", content)))
     return words

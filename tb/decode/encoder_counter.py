@@ -8,8 +8,8 @@ ARM, FOUND, PROBED, ILLEGAL = 16, 32, 64, 128           # bits of word 1
 
 
 class EncoderCounter:
-    def __init__(self, filter_w=4, spare_w=0, skip_w=0):
-        self.there = (1 << filter_w) - 1 | 0xFFF0 | ((1 << spare_w) - 1) << 16 | ((1 << skip_w) - 1) << 20
+    def __init__(self, filter_w=4, tolerated_w=0, skip_w=0):
+        self.there = (1 << filter_w) - 1 | 0xFFF0 | ((1 << tolerated_w) - 1) << 16 | ((1 << skip_w) - 1) << 20
         self.filter, self.decoder, self.index = EventFilter(3, settle=3), QuadratureDecoder(16, settle=7), IndexLatch(16, 0)
         self.clean, self.edge_time, self.probe = [0, 0, 0], None, (0, 0)
         self.reset()
@@ -35,14 +35,14 @@ class EncoderCounter:
         index = Settings(active_low=self.bit(6), gate_mask=3 * self.bit(7), gate=self.bit(8, 2), take_up=self.bit(10),
                          take_down=self.bit(11), each=self.bit(12), clears=self.bit(13))
         mode, later, decoder = self.bit(4, 2), self.index.later, self.decoder
-        heading, moves, _ = decoder.look(later[0], later[1], mode)
-        clear = self.index.clear(index, heading)
+        direction, moves, _ = decoder.look(later[0], later[1], mode)
+        clear = self.index.clear(index, direction)
         if moves:
             self.edge_time = now
-        settled, count = decoder.settled, decoder.count
+        ready, count = decoder.ready, decoder.count
         self.seen = self.seen & ~told | self.found * FOUND | self.probing * PROBED | self.illegal * ILLEGAL
         _, _, self.illegal = decoder.step(later[0], later[1], mode, clear, rst)
-        _, self.found, _, _ = self.index.step(index, self.clean, settled, heading, moves if settled else 0, count, int(bool(told & ARM)),
+        _, self.found, _, _ = self.index.step(index, self.clean, ready, direction, moves if ready else 0, count, int(bool(told & ARM)),
                                               rst, self.probing)
         self.clean, _ = self.filter.step(self.bit(20, 12), self.bit(0, 4), self.bit(16, 4), [a, b, z], rst)
         self.probing = int(self.bit(14) and self.probe[0] != self.probe[1] and self.probe[0] != self.bit(15))

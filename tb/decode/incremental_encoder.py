@@ -10,8 +10,8 @@ from tb.sense.event_filter import EventFilter
 @dataclass(frozen=True)
 class Setup:
     skip: int = 0
-    needed: int = 0
-    spare: int = 0
+    required: int = 0
+    tolerated: int = 0
     mode: int = 0
     illegal_enable: int = 0
     index: Settings = field(default_factory=Settings)
@@ -26,19 +26,19 @@ class IncrementalEncoder:
     def step(self, setup, a, b, z, now, arm=0, clear_flags=0, rst=0):
         """One clk; the pins after it by name. edge_time is None while it means nothing."""
         later, decoder = self.index.later, self.decoder
-        heading, moves, _ = decoder.look(later[0], later[1], setup.mode)
-        clear = self.index.clear(setup.index, heading)
+        direction, moves, _ = decoder.look(later[0], later[1], setup.mode)
+        clear = self.index.clear(setup.index, direction)
         if moves:
             self.edge_time = now
-        settled = decoder.settled
+        ready = decoder.ready
         self.seen = int(self.illegal or (self.seen and not clear_flags))
         self.fault = int(setup.illegal_enable and (self.illegal or (self.fault and not clear_flags)))
         self.revolution = int(self.wrong or (self.revolution and not clear_flags))
         count_before = decoder.count
         count, step, self.illegal = decoder.step(later[0], later[1], setup.mode, clear, rst)
-        armed, found, index_count, self.wrong = self.index.step(setup.index, self.clean, settled, heading, moves if settled else 0,
+        armed, found, index_count, self.wrong = self.index.step(setup.index, self.clean, ready, direction, moves if ready else 0,
                                                                 count_before, arm, rst)
-        self.clean, rejected = self.filter.step(setup.skip, setup.needed, setup.spare, [a, b, z], rst)
+        self.clean, rejected = self.filter.step(setup.skip, setup.required, setup.tolerated, [a, b, z], rst)
         if rst:
             self.seen = self.fault = self.revolution = 0
         return {"count": count, "step": step, "edge_time": self.edge_time, "index_found": found, "index_armed": armed,

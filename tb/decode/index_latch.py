@@ -35,17 +35,17 @@ class IndexLatch:
     def wrap(self, value):
         return (value + (1 << self.w - 1)) % (1 << self.w) - (1 << self.w - 1)
 
-    def met(self, heading):
-        return self.up if heading else self.down
+    def met(self, direction):
+        return self.up if direction else self.down
 
-    def clear(self, settings, heading):
-        return int(self.met(heading) and self.wanted and settings.clears)
+    def clear(self, settings, direction):
+        return int(self.met(direction) and self.wanted and settings.clears)
 
-    def step(self, settings, levels, settled, heading, stepped, count, arm=0, rst=0, probe=0):
+    def step(self, settings, levels, ready, direction, stepped, count, arm=0, rst=0, probe=0):
         """levels (a, b, z); stepped is -1, 0, +1 of the decoder in this clk. Returns (armed, found, index_count, revolution_wrong)."""
-        met = self.met(heading)
+        met = self.met(direction)
         take = int(met and self.wanted)
-        entering = settled and settings.holds(*levels) and not settings.holds(*self.later) and not self.used
+        entering = ready and settings.holds(*levels) and not settings.holds(*self.later) and not self.used
         on = settings.each and settings.counts_per_revolution
         per = settings.counts_per_revolution
         self.wrong = int(bool(self.check and self.judge_turn and (self.turn % (1 << self.w)) not in (0, per, -per % (1 << self.w))))

@@ -11,11 +11,11 @@ class QuadratureDecoder:
         self.w, self.settling, self.settle, self.a, self.b, self.count, self.upward = w, settle, 0, 0, 0, 0, 1
 
     @property
-    def settled(self):
+    def ready(self):
         return int(self.settle == 0)
 
     def look(self, a, b, mode=X4):
-        """(heading, what count would move by, illegal) with these levels in this clk, settled or not."""
+        """(direction, what count would move by, illegal) with these levels in this clk, ready or not."""
         if mode == PULSES:
             rise, change = a and not self.a, b != self.b
             return 1 - b, 0 if change or not rise else 1 - 2 * b, int(rise and change)
@@ -27,10 +27,10 @@ class QuadratureDecoder:
         return self.upward, 0, int(moved == 2)
 
     def step(self, a, b, mode=X4, clear=0, rst=0):
-        heading, step, illegal = self.look(a, b, mode)
+        direction, step, illegal = self.look(a, b, mode)
         if rst or self.settle:
-            heading, step, illegal = 1, 0, 0
-        self.a, self.b, self.upward = a, b, heading
+            direction, step, illegal = 1, 0, 0
+        self.a, self.b, self.upward = a, b, direction
         self.settle = self.settling if rst else max(self.settle - 1, 0)
         total = 0 if rst or clear else self.count + step
         self.count = (total + (1 << self.w - 1)) % (1 << self.w) - (1 << self.w - 1)

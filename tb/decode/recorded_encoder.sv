@@ -18,14 +18,14 @@ module recorded_encoder #(
 );
     for (genvar i = 0; i < PAIRS; i++) begin : g_pair
         wire a_filtered, b_filtered, a_rejected, b_rejected, skipped;
-        wire settled, stepping, heading;
+        wire ready, stepping, direction;
         wire signed [1:0] step;
 
         deglitcher u_deglitcher_a (.clk, .rst, .stable, .level(a[i]), .filtered(a_filtered), .rejected(a_rejected));
         deglitcher u_deglitcher_b (.clk, .rst, .stable, .level(b[i]), .filtered(b_filtered), .rejected(b_rejected));
-        quadrature_decoder u_decoder (.clk, .rst, .mode, .clear(1'b0), .a(a_filtered), .b(b_filtered), .settled, .stepping,
-                                      .count(counts[32*i +: 32]), .step, .heading, .illegal(skipped));
-        wire unused = &{1'b0, settled, stepping, heading};
+        quadrature_decoder u_decoder (.clk, .rst, .mode, .clear(1'b0), .a(a_filtered), .b(b_filtered), .ready, .stepping,
+                                      .count(counts[32*i +: 32]), .step, .direction, .illegal(skipped));
+        wire unused = &{1'b0, ready, stepping, direction};
 
         always_ff @(posedge clk) begin
             edges[32*i +: 32]      <= edges[32*i +: 32] + 32'(step != 0);

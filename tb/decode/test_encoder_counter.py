@@ -20,7 +20,7 @@ class Bench:
     async def begin(cls, dut, settings=0):
         bench = cls()
         bench.dut, bench.now, bench.z, bench.probe, bench.place = dut, 0, 0, 0, 0
-        bench.model = EncoderCounter(*(int(getattr(dut, name).value) for name in ("FILTER_W", "SPARE_W", "SKIP_W")))
+        bench.model = EncoderCounter(*(int(getattr(dut, name).value) for name in ("FILTER_W", "TOLERATED_W", "SKIP_W")))
         await start(dut, select=0, write=0, word=0, wdata=0, now=0, a=0, b=0, z=0, probe=0)
         await FallingEdge(dut.clk)
         for _ in range(3):
@@ -95,10 +95,10 @@ async def rdata_is_0_when_nothing_is_read_and_word_3_does_not_exist(dut):
 @cocotb.test()
 async def settings_that_are_left_out_read_0(dut):
     bench = await Bench.begin(dut)
-    filter_w, spare_w, skip_w = (int(getattr(dut, name).value) for name in ("FILTER_W", "SPARE_W", "SKIP_W"))
+    filter_w, tolerated_w, skip_w = (int(getattr(dut, name).value) for name in ("FILTER_W", "TOLERATED_W", "SKIP_W"))
     for value in (0xFFFFFFFF, 0, 0xA5A5A5A5):
         await bench.write(2, value)
-        there = value & 0xFFF0 | value & 2**filter_w - 1 | value & (2**spare_w - 1) << 16 | value & (2**skip_w - 1) << 20
+        there = value & 0xFFF0 | value & 2**filter_w - 1 | value & (2**tolerated_w - 1) << 16 | value & (2**skip_w - 1) << 20
         assert await bench.read(2) == there
 
 
@@ -194,15 +194,15 @@ async def a_flag_that_comes_again_in_the_clk_in_which_it_is_forgotten_stays(dut)
 
 @cocotb.test()
 async def pulses_shorter_than_the_filter_never_count(dut):
-    needed = (1 << int(dut.FILTER_W.value)) - 1
-    bench = await Bench.begin(dut, needed)
-    await bench.go(range(1, 3), clk=needed + 4)
+    required = (1 << int(dut.FILTER_W.value)) - 1
+    bench = await Bench.begin(dut, required)
+    await bench.go(range(1, 3), clk=required + 4)
     for _ in range(5):
-        await bench.wait(needed - 1, levels=(0, 1))
-        await bench.wait(needed + 2)
+        await bench.wait(required - 1, levels=(0, 1))
+        await bench.wait(required + 2)
     assert await bench.count() == 2
     bench.place = 3
-    assert [await bench.count() for _ in range(needed + 3)].index(3) == max(needed, 1) + 2
+    assert [await bench.count() for _ in range(required + 3)].index(3) == max(required, 1) + 2
 
 
 @cocotb.test()
@@ -232,6 +232,6 @@ async def any_pins_and_accesses_match_the_model_in_every_clk(dut):
             await bench.clk(rst=int(random.random() < 0.002), **told)
 
 
-@pytest.mark.parametrize("filter_w, spare_w, skip_w", [(4, 0, 0), (1, 0, 0), (3, 2, 4)])
-def test_encoder_counter(filter_w, spare_w, skip_w):
-    run("encoder_counter", __file__, FILTER_W=filter_w, SPARE_W=spare_w, SKIP_W=skip_w)
+@pytest.mark.parametrize("filter_w, tolerated_w, skip_w", [(4, 0, 0), (1, 0, 0), (3, 2, 4)])
+def test_encoder_counter(filter_w, tolerated_w, skip_w):
+    run("encoder_counter", __file__, FILTER_W=filter_w, TOLERATED_W=tolerated_w, SKIP_W=skip_w)

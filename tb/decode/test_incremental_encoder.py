@@ -19,7 +19,7 @@ class Bench:
     """Design and model side by side. An encoder with its index where `at_index(place)` holds is moved over them."""
 
     @classmethod
-    async def begin(cls, dut, setup=None, levels=(0, 0, 0), settled=True):
+    async def begin(cls, dut, setup=None, levels=(0, 0, 0), ready=True):
         bench = cls()
         bench.dut, bench.setup, bench.now, bench.place = dut, setup or Setup(), 0, 0
         bench.model = IncrementalEncoder(int(dut.W.value), int(dut.CHECK.value))
@@ -27,13 +27,13 @@ class Bench:
         await start(dut, a=levels[0], b=levels[1], z=levels[2], now=0)
         bench.model.step(bench.setup, *levels, 0, rst=1)
         bench.model.step(bench.setup, *levels, 0, rst=1)
-        if settled:
+        if ready:
             await bench.play([levels] * 12)
         return bench
 
     def put(self, levels, rst=0, arm=0, clear_flags=0):
         dut, setup, index = self.dut, self.setup, self.setup.index
-        values = {"filter_skip": setup.skip, "filter_needed": setup.needed, "filter_spare": setup.spare, "mode": setup.mode,
+        values = {"filter_skip": setup.skip, "filter_required": setup.required, "filter_tolerated": setup.tolerated, "mode": setup.mode,
                   "index_low": index.active_low, "index_gate_mask": index.gate_mask, "index_gate": index.gate, "index_up": index.take_up,
                   "index_down": index.take_down, "index_each": index.each, "index_clears": index.clears,
                   "counts_per_revolution": index.counts_per_revolution, "illegal_enable": setup.illegal_enable, "arm_index": arm,
@@ -83,15 +83,15 @@ def there_and_back(*turns):
 
 @cocotb.test()
 async def latency_is_needed_samples_and_2_clk(dut):
-    for needed in (0, 1, 3):
-        bench = await Bench.begin(dut, Setup(needed=needed))
+    for required in (0, 1, 3):
+        bench = await Bench.begin(dut, Setup(required=required))
         out = await bench.play([(1, 0, 0)] * 12)
-        assert [row["count"] for row in out].index(1) + 1 == max(needed, 1) + 2
+        assert [row["count"] for row in out].index(1) + 1 == max(required, 1) + 2
 
 
 @cocotb.test()
 async def index_and_count_arrive_together(dut):
-    bench = await Bench.begin(dut, Setup(needed=3, index=EACH))
+    bench = await Bench.begin(dut, Setup(required=3, index=EACH))
     out = await bench.play([(1, 0, 1)] * 12)
     assert [row["index_found"] for row in out].index(1) + 1 == 3 + 2
     assert [row["count"] for row in out].index(1) + 1 == 3 + 2 and found(out) == [1]
@@ -175,7 +175,7 @@ async def arming_inside_an_index_waits_for_the_next(dut):
 
 @cocotb.test()
 async def an_index_that_stands_at_power_up_and_new_settings_make_no_event(dut):
-    bench = await Bench.begin(dut, Setup(index=CLEARS), levels=(1, 0, 1), settled=False)
+    bench = await Bench.begin(dut, Setup(index=CLEARS), levels=(1, 0, 1), ready=False)
     assert found(await bench.play([(1, 0, 1)] * 30)) == []
     for index in (EACH.but(active_low=1), EACH, EACH.but(gate_mask=3, gate=3), EACH.but(gate_mask=3, gate=1), EACH):
         bench.setup = Setup(index=index)
@@ -269,8 +269,8 @@ async def any_pins_settings_and_strobes_match_the_model(dut):
     for _ in range(60):
         index = Settings(bits(1), bits(2) & bits(2), bits(2), bits(1) | bits(1), bits(1) | bits(1), bits(1), bits(1),
                          random.choice([0, 5, 8, 12]) % top)
-        skip, needed, spare = random.choice([0, 0, 1, 3]), random.choice([0, 1, 1, 2, 3]), random.choice([0, 0, 1, 2])
-        bench.setup = Setup(skip, needed, spare, bits(2), bits(1), index)
+        skip, required, tolerated = random.choice([0, 0, 1, 3]), random.choice([0, 1, 1, 2, 3]), random.choice([0, 0, 1, 2])
+        bench.setup = Setup(skip, required, tolerated, bits(2), bits(1), index)
         if random.random() < 0.3:
             rows = [(bits(1), bits(1), bits(1)) for _ in range(60)]
         else:

@@ -16,7 +16,7 @@ PORTS = ["active_low", "gate_mask", "gate", "take_up", "take_down", "each", "cle
 
 
 async def begin(dut, levels=(0, 0, 0)):
-    idle = dict.fromkeys([*PORTS, "arm", "probe", "settled", "heading", "stepping", "count"], 0)
+    idle = dict.fromkeys([*PORTS, "arm", "probe", "ready", "direction", "stepping", "count"], 0)
     await start(dut, a=levels[0], b=levels[1], z=levels[2], **idle)
     model = IndexLatch(int(dut.W.value), int(dut.CHECK.value))
     for _ in range(2):
@@ -24,18 +24,18 @@ async def begin(dut, levels=(0, 0, 0)):
     return model
 
 
-async def clk(dut, model, settings, levels, heading=1, stepped=0, count=0, settled=1, arm=0, rst=0, probe=0):
+async def clk(dut, model, settings, levels, direction=1, stepped=0, count=0, ready=1, arm=0, rst=0, probe=0):
     """One clk of both; returns (clear in this clk, armed, found, index_count, revolution_wrong after it)."""
     for name in PORTS:
         getattr(dut, name).value = getattr(settings, name)
     dut.a.value, dut.b.value, dut.z.value = levels
-    dut.heading.value, dut.stepping.value, dut.count.value = heading, abs(stepped), count
-    dut.settled.value, dut.arm.value, dut.probe.value, dut.rst.value = settled, arm, probe, rst
+    dut.direction.value, dut.stepping.value, dut.count.value = direction, abs(stepped), count
+    dut.ready.value, dut.arm.value, dut.probe.value, dut.rst.value = ready, arm, probe, rst
     await ReadOnly()
-    clear, wanted = int(dut.clear.value), model.clear(settings, heading)
+    clear, wanted = int(dut.clear.value), model.clear(settings, direction)
     await RisingEdge(dut.clk)
     await FallingEdge(dut.clk)
-    want = wanted, *model.step(settings, levels, settled, heading, stepped, count, arm, rst, probe)
+    want = wanted, *model.step(settings, levels, ready, direction, stepped, count, arm, rst, probe)
     got = (clear, int(dut.armed.value), int(dut.found.value), dut.index_count.value.to_signed(), int(dut.revolution_wrong.value))
     assert got == want, f"{settings}: (clear, armed, found, index_count, revolution_wrong) is {got}, the model has {want}"
     assert (int(dut.a_later.value), int(dut.b_later.value)) == levels[:2]
@@ -92,7 +92,7 @@ async def reset_in_the_middle_of_an_index_forgets_it(dut):
 async def a_probe_latches_the_count_with_the_step_of_its_clk_and_is_no_index(dut):
     model = await begin(dut)
     for stepped, want in ((0, 5), (1, 6), (-1, 4)):
-        row = await clk(dut, model, Settings(clears=1), (0, 0, 0), heading=int(stepped >= 0), stepped=stepped, count=5, probe=1)
+        row = await clk(dut, model, Settings(clears=1), (0, 0, 0), direction=int(stepped >= 0), stepped=stepped, count=5, probe=1)
         assert row[:4] == (0, 0, 0, want)
         assert (await clk(dut, model, Settings(), (0, 0, 0), count=3))[3] == want
 

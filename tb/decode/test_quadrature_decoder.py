@@ -13,13 +13,13 @@ from tb.decode.quadrature_decoder import PULSES, X1, X2, X4, QuadratureDecoder
 TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]        # a leads b: up
 
 
-async def begin(dut, a=0, b=0, mode=X4, settled=True):
+async def begin(dut, a=0, b=0, mode=X4, ready=True):
     """Reset with the pins at these levels; the model has seen the same clk."""
     await start(dut, a=a, b=b, mode=mode, clear=0)
     model = QuadratureDecoder(int(dut.W.value), int(dut.SETTLE.value))
     model.mode = mode
     model.step(a, b, mode, 0, 1)
-    if settled:
+    if ready:
         await drive(dut, model, [(a, b)] * int(dut.SETTLE.value))
     return model
 
@@ -31,8 +31,8 @@ async def drive(dut, model, levels, rst=0, clear=0):
     for clk, (a, b) in enumerate(levels):
         dut.a.value, dut.b.value = a, b
         await ReadOnly()
-        heading, moves, _ = model.look(a, b, model.mode)
-        assert (int(dut.heading.value), int(dut.stepping.value), int(dut.settled.value)) == (heading, abs(moves), model.settled)
+        direction, moves, _ = model.look(a, b, model.mode)
+        assert (int(dut.direction.value), int(dut.stepping.value), int(dut.ready.value)) == (direction, abs(moves), model.ready)
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
         want = model.step(a, b, model.mode, clear, rst)
@@ -143,13 +143,13 @@ async def a_change_of_mode_makes_no_count(dut):
 @cocotb.test()
 async def power_up_at_any_levels_makes_no_count(dut):
     for a, b in TURN:
-        model = await begin(dut, a, b, settled=False)
+        model = await begin(dut, a, b, ready=False)
         assert await drive(dut, model, [(a, b)] * 20) == [(0, 0, 0)] * 20
 
 
 @cocotb.test()
 async def levels_that_arrive_late_after_reset_make_no_count(dut):
-    model = await begin(dut, 0, 0, settled=False)
+    model = await begin(dut, 0, 0, ready=False)
     late = int(dut.SETTLE.value) - 1                    # what is in front fills meanwhile
     assert await drive(dut, model, [(0, 0)] * late + [(1, 1)] * 9) == [(0, 0, 0)] * (late + 9)
     assert (await drive(dut, model, [(0, 1)]))[-1] == (1, 1, 0)

@@ -22,7 +22,7 @@ class QuadratureEncoder:
         b = self.position >> 1 & 1
         return b ^ self.position & 1, b, int(self.place == 0 and self.turn != 0)
 
-    def clk(self, rst=0, spacing=0, hysteresis=0, counts_per_turn=0, load=0, target=0, home=0, home_position=0):
+    def clk(self, rst=0, minimum_edge_separation=0, hysteresis=0, counts_per_turn=0, load=0, target=0, home=0, home_position=0):
         self.turn = counts_per_turn
         if rst:
             self.__init__(self.w, self.f)
@@ -49,6 +49,6 @@ class QuadratureEncoder:
         self.highest = (counts_per_turn - 1) % whole
         if home:
             self.waiting = home_position
-        self.left = max(0, spacing - 1) if up or down else max(0, self.left - 1)
+        self.left = max(0, minimum_edge_separation - 1) if up or down else max(0, self.left - 1)
         self.position = home_position if load else (self.position + up - down) % whole
         self.aim = None if load else (target, (1 << self.f - 1) + hysteresis)

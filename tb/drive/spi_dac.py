@@ -16,13 +16,13 @@ class SpiDac:
         self.due, self.enable, self.wanted, self.idle = 1, 0, 0, 0
         return self.frames.pins()[1:]
 
-    def clk(self, rst=0, half_clk=0, refresh=0, trim=0, enable=0, valid=0, command=0):
+    def clk(self, rst=0, half_period=0, refresh=0, trim=0, enable=0, valid=0, command=0):
         """cs_n, sclk, sdi, sent."""
         if rst:
             return self.reset()
         free = self.ready
         present = self.due or self.idle >= refresh
-        self.ready, *pins = self.frames.step(present, code_of(self.wanted, trim), half_clk)
+        self.ready, *pins = self.frames.step(present, code_of(self.wanted, trim), half_period)
         self.idle = self.idle + 1 & 0xFFFF if free else 0
         self.due = int(bool(self.due and not free or valid and enable or enable != self.enable))
         self.wanted = 0 if not enable else command if valid else self.wanted

@@ -12,11 +12,11 @@ class StepFollower:
         self.scaler, self.wait, self.rebased, self.pending, self.done = StepScaler(), 0, 1, 1, 0
 
     def clk(self, rst=0, ratio=0, shift=0, enable=0, rebase=0, tick=0, target=0, trim=0):
-        """go, anew and place as they stand after the clk, with the levels of enable and rebase of this clk."""
+        """go, restart and position as they stand after the clk, with the levels of enable and rebase of this clk."""
         take = self.wait == 1
         moved = int(rebase or not enable)
-        wanted = signed(target + (trim << shift), 48)
-        done, place = self.scaler.clk(rst=rst, ratio=ratio, valid=take, position=wanted)
+        required = signed(target + (trim << shift), 48)
+        done, position = self.scaler.clk(rst=rst, ratio=ratio, valid=take, position=required)
         if rst:
             self.wait, self.rebased, self.pending = 0, 1, 1
         else:
@@ -25,4 +25,4 @@ class StepFollower:
             self.wait = 8 if tick else max(self.wait - 1, 0)
         self.done = done
         fresh = self.pending or self.rebased or moved
-        return dict(go=int(done and not fresh), anew=int(done and bool(fresh)), place=place)
+        return dict(go=int(done and not fresh), restart=int(done and bool(fresh)), position=position)

@@ -20,10 +20,10 @@ class StepGenerator:
         self.quarter = self.steps = 0
         self.wiring = (0, 0, 0)                                 # mode, step_low, direction_low as they are in force
         self.pins = (0, 0)
-        self.anew(target)
+        self.restart(target)
         return self.shown()
 
-    def anew(self, target):
+    def restart(self, target):
         self.line_end = target >> 16 << 16
         self.left = 0                                           # clk left of the line, beside the last
         self.slope = self.ahead = 0
@@ -44,7 +44,7 @@ class StepGenerator:
             pins = self.pulse and self.upward, self.pulse and not self.upward
         return int(pins[0]) ^ step_low, int(pins[1]) ^ direction_low
 
-    def clk(self, rst=0, period=0, high_clk=0, low_clk=0, setup_clk=0, hold_clk=0, mode=0, step_low=0, direction_low=0, enable=0, load=0,
+    def clk(self, rst=0, period=0, high_cycles=0, low_cycles=0, setup_cycles=0, hold_cycles=0, mode=0, step_low=0, direction_low=0, enable=0, load=0,
             tick=0, target=0):
         if rst:
             return self.reset(target)
@@ -75,12 +75,12 @@ class StepGenerator:
             self.left, self.waiting = self.left - 1, bool(tick or self.waiting)
         upward = self.upward
         if not follows_target:
-            self.anew(target)
+            self.restart(target)
             self.line_clk = period
 
         # the wire
-        self.stand = (high_clk if rise else low_clk) - 1 if rise or fall or self.rewired else self.stand - 1
-        self.settle = (hold_clk if fall else setup_clk) - 1 if fall or turns or self.rewired else self.settle - 1
+        self.stand = (high_cycles if rise else low_cycles) - 1 if rise or fall or self.rewired else self.stand - 1
+        self.settle = (hold_cycles if fall else setup_cycles) - 1 if fall or turns or self.rewired else self.settle - 1
         self.steps += (1 if upward else -1) * rise
         self.quarter += (1 if upward else -1) * rise
         self.pulse = rise or (self.pulse and not fall)

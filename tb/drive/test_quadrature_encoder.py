@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""quadrature_encoder: edges by hand, latency, spacing, hysteresis, index, both ends of the range, and any target against the model."""
+"""quadrature_encoder: edges by hand, latency, minimum_edge_separation, hysteresis, index, both ends of the range, and any target against the model."""
 import random
 
 import cocotb
@@ -9,7 +9,7 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import run, start
 from tb.drive.quadrature_encoder import QuadratureEncoder, signed
 
-IDLE = dict(spacing=1, hysteresis=0, counts_per_turn=0, load=0, target=0, home=0, home_position=0)
+IDLE = dict(minimum_edge_separation=1, hysteresis=0, counts_per_turn=0, load=0, target=0, home=0, home_position=0)
 STROBES = "home", "load"
 
 
@@ -88,19 +88,19 @@ async def a_half_goes_up(dut):
 @cocotb.test()
 async def edges_keep_their_spacing_while_a_jump_is_made_up_and_none_is_lost(dut):
     encoder = await Encoder(dut).reset()
-    for spacing in (0, 1, 2, 5, 17):
-        await encoder.at(0, spacing=spacing)
-        await encoder.clk(40 * max(1, spacing))
+    for minimum_edge_separation in (0, 1, 2, 5, 17):
+        await encoder.at(0, minimum_edge_separation=minimum_edge_separation)
+        await encoder.clk(40 * max(1, minimum_edge_separation))
         for jump in (12, -11, 0):
             await encoder.at(jump)
             times, before = [], encoder.position
-            for n in range(26 * max(1, spacing)):
+            for n in range(26 * max(1, minimum_edge_separation)):
                 was = encoder.position
                 await encoder.clk()
                 if encoder.position != was:
                     times.append(n)
             assert encoder.position == jump and len(times) == abs(jump - before)
-            assert all(later - earlier == max(1, spacing) for earlier, later in zip(times, times[1:]))
+            assert all(later - earlier == max(1, minimum_edge_separation) for earlier, later in zip(times, times[1:]))
 
 
 @cocotb.test()
@@ -181,7 +181,7 @@ async def it_follows_across_the_wrap_of_position(dut):
 
 @cocotb.test()
 async def behind_means_more_than_4_counts_2_clk_before(dut):
-    encoder = await Encoder(dut).reset(spacing=3)
+    encoder = await Encoder(dut).reset(minimum_edge_separation=3)
     for goal in (9, -8):
         await encoder.at(goal)
         far, late = [], []
@@ -195,7 +195,7 @@ async def behind_means_more_than_4_counts_2_clk_before(dut):
 
 @cocotb.test()
 async def reset_in_mid_flow(dut):
-    encoder = await Encoder(dut).reset(spacing=3, counts_per_turn=7)
+    encoder = await Encoder(dut).reset(minimum_edge_separation=3, counts_per_turn=7)
     await encoder.at(50, home=1, home_position=2)
     for wait in range(1, 8):
         await encoder.clk(wait)
@@ -215,7 +215,7 @@ async def any_target_matches_the_model(dut):
         elif kind == 100:
             target = random.getrandbits(width)
         elif kind == 101:
-            inputs["spacing"] = random.choice((0, 1, 1, 2, 3, 9))
+            inputs["minimum_edge_separation"] = random.choice((0, 1, 1, 2, 3, 9))
         elif kind == 102:
             inputs["hysteresis"] = random.getrandbits(encoder.f)
         elif kind == 103:

@@ -9,7 +9,7 @@ from tb.bench import run, start
 from tb.drive.spi_dac import SpiDac
 
 FULL = 1 << 15
-IDLE = dict(half_clk=1, refresh=65535, trim=0, enable=0, valid=0, command=0)
+IDLE = dict(half_period=1, refresh=65535, trim=0, enable=0, valid=0, command=0)
 
 
 class Converter:
@@ -63,7 +63,7 @@ class Dac:
     async def give(self, command, **inputs):
         """Give a command, and return the code that the converter has then."""
         await self.clk(valid=1, command=command, **inputs)
-        await self.run(80 * max(1, self.inputs["half_clk"]))
+        await self.run(80 * max(1, self.inputs["half_period"]))
         return self.converter.codes[-1]
 
 
@@ -87,13 +87,13 @@ async def trim_is_added_and_held_inside_16_bits(dut):
 @cocotb.test()
 async def latency_is_33_halves_and_2(dut):
     dac = await Dac(dut).reset(enable=1)
-    for half_clk in (1, 2, 7):
-        await dac.run(600, half_clk=half_clk)
+    for half_period in (1, 2, 7):
+        await dac.run(600, half_period=half_period)
         pins, latency = await dac.clk(valid=1, command=-3), 1
         while not pins[3]:
             pins = await dac.clk()
             latency += 1
-        assert latency == 33 * half_clk + 2 and dac.converter.codes[-1] == 32765
+        assert latency == 33 * half_period + 2 and dac.converter.codes[-1] == 32765
 
 
 @cocotb.test()
@@ -140,15 +140,15 @@ async def the_same_code_is_sent_again_after_refresh(dut):
 
 
 @cocotb.test()
-async def both_ends_of_half_clk(dut):
+async def both_ends_of_half_period(dut):
     dac = await Dac(dut).reset(enable=1)
     await dac.run(100)
-    for half_clk, length in ((0, 1), (1, 1), (255, 255)):
-        dac.inputs["half_clk"] = half_clk
+    for half_period, length in ((0, 1), (1, 1), (255, 255)):
+        dac.inputs["half_period"] = half_period
         await dac.clk(valid=1, command=-FULL)
         pins, high = await dac.clk(), 0
         while not pins[3]:
-            pins = await dac.clk(half_clk=3)            # taken with the frame
+            pins = await dac.clk(half_period=3)            # taken with the frame
             high += pins[1]
         assert high == 16 * length and dac.converter.codes[-1] == 0
         await dac.run(4 * 255)
@@ -156,7 +156,7 @@ async def both_ends_of_half_clk(dut):
 
 @cocotb.test()
 async def reset_in_mid_flow(dut):
-    dac = await Dac(dut).reset(enable=1, half_clk=2)
+    dac = await Dac(dut).reset(enable=1, half_period=2)
     for wait in (0, 1, 2, 3, 33, 66, 67, 68, 72):
         await dac.clk(valid=1, command=999)
         await dac.run(wait)
@@ -174,7 +174,7 @@ async def any_commands_match_the_model(dut):
         if random.randrange(40) == 0:
             inputs.update(valid=1, command=random.choice((0, -FULL, FULL - 1, random.randrange(-FULL, FULL))))
         if random.randrange(200) == 0:
-            inputs.update(half_clk=random.choice((0, 1, 2, 3)), refresh=random.choice((0, 1, 50, 500)), trim=random.randrange(-FULL, FULL))
+            inputs.update(half_period=random.choice((0, 1, 2, 3)), refresh=random.choice((0, 1, 50, 500)), trim=random.randrange(-FULL, FULL))
         if random.randrange(150) == 0:
             inputs["enable"] = int(random.randrange(4) > 0)
         await dac.clk(**inputs)

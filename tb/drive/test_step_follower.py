@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""step_follower: places by hand, when it begins anew, reset in mid-flow, and random inputs against the model in every clk."""
+"""step_follower: places by hand, when it begins restart, reset in mid-flow, and random inputs against the model in every clk."""
 import random
 
 import cocotb
@@ -33,7 +33,7 @@ class Follower:
         await FallingEdge(self.dut.clk)
         await ReadOnly()
         want = self.model.clk(rst, **self.inputs)
-        got = dict(go=int(self.dut.go.value), anew=int(self.dut.anew.value), place=self.dut.place.value.to_signed())
+        got = dict(go=int(self.dut.go.value), restart=int(self.dut.restart.value), position=self.dut.position.value.to_signed())
         assert got == want, f"{self.inputs}: {got}, the model has {want}"
         self.inputs.update(tick=0, rebase=0)
         await Timer(1, "step")
@@ -44,15 +44,15 @@ class Follower:
         for clk in range(1, 100):
             now = inputs if clk - 1 == at_clk else {}
             got = await self.clk(tick=clk == 1, **now)
-            if got["go"] or got["anew"]:
-                return ("go" if got["go"] else "anew"), got["place"], clk
+            if got["go"] or got["restart"]:
+                return ("go" if got["go"] else "restart"), got["position"], clk
         return None
 
 
 @cocotb.test()
 async def latency_is_57_and_the_place_is_target_and_trim_in_steps(dut):
     follower = await Follower(dut).reset(enable=1, ratio=5 * ONE // 2, target=3 << 16)
-    assert await follower.tick() == ("anew", 15 << 15, LATENCY)
+    assert await follower.tick() == ("restart", 15 << 15, LATENCY)
     assert await follower.tick() == ("go", 15 << 15, LATENCY)
     follower.inputs.update(target=-7, ratio=-ONE)
     assert await follower.tick() == ("go", 7, LATENCY)
@@ -77,9 +77,9 @@ async def it_begins_anew_after_a_rebase_whenever_it_comes(dut):
         if at is None:
             await follower.clk(rebase=1)
         else:
-            assert (await follower.tick(at, rebase=1))[0] == "anew"
-        if at is None or at >= 8:                           # the place was taken before: the next one begins anew again
-            assert (await follower.tick())[0] == "anew"
+            assert (await follower.tick(at, rebase=1))[0] == "restart"
+        if at is None or at >= 8:                           # the position was taken before: the next one begins restart again
+            assert (await follower.tick())[0] == "restart"
         assert (await follower.tick())[0] == "go"
 
 
@@ -88,9 +88,9 @@ async def nothing_goes_with_the_drive_off_and_it_begins_anew_with_it_on(dut):
     follower = await Follower(dut).reset(enable=1, ratio=ONE)
     await follower.tick()
     follower.inputs.update(enable=0, target=9 << 16)
-    assert [(await follower.tick())[0] for _ in range(3)] == ["anew"] * 3
+    assert [(await follower.tick())[0] for _ in range(3)] == ["restart"] * 3
     follower.inputs.update(enable=1)
-    assert [(await follower.tick())[0] for _ in range(2)] == ["anew", "go"]
+    assert [(await follower.tick())[0] for _ in range(2)] == ["restart", "go"]
 
 
 @cocotb.test()
@@ -103,8 +103,8 @@ async def a_reset_in_mid_flow_forgets_the_place(dut):
     await follower.clk(1)
     for _ in range(80):
         got = await follower.clk()
-        assert not got["go"] and not got["anew"]
-    assert (await follower.tick())[0] == "anew"
+        assert not got["go"] and not got["restart"]
+    assert (await follower.tick())[0] == "restart"
 
 
 @cocotb.test()

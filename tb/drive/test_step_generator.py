@@ -15,7 +15,7 @@ from tb.drive.step_generator import StepGenerator
 
 PERIOD_W, TIME_W, AHEAD_W = 8, 5, 4
 ONE = 1 << 16
-IDLE = dict(period=20, high_clk=1, low_clk=1, setup_clk=2, hold_clk=1, mode=0, step_low=0, direction_low=0, enable=0, load=0, tick=0,
+IDLE = dict(period=20, high_cycles=1, low_cycles=1, setup_cycles=2, hold_cycles=1, mode=0, step_low=0, direction_low=0, enable=0, load=0, tick=0,
             target=0)
 WAVEFORM = ROOT / "build" / "step_generator.csv"
 RECORDING = ROOT.parent / "shared" / "captures" / "smoothieware_steps.csv"
@@ -116,7 +116,7 @@ async def the_wire_is_at_the_floor_of_the_line_after_every_line(dut):
 
 @cocotb.test()
 async def a_step_each_2_clk_at_most_and_the_rest_is_made_up(dut):
-    generator = await Generator(dut).reset(target=0, period=100, setup_clk=0, hold_clk=0)
+    generator = await Generator(dut).reset(target=0, period=100, setup_cycles=0, hold_cycles=0)
     await generator.line(49)
     pins = await generator.line(99)
     steps = rises([step for step, _ in pins], before=pins[0][0])
@@ -128,7 +128,7 @@ async def a_step_each_2_clk_at_most_and_the_rest_is_made_up(dut):
 @cocotb.test()
 async def timings_are_kept_at_both_ends(dut):
     for high, low, setup, hold in ((0, 0, 0, 0), (1, 1, 1, 1), (31, 1, 1, 1), (1, 31, 1, 1), (1, 1, 31, 1), (1, 1, 1, 31), (3, 4, 9, 7)):
-        generator = await Generator(dut).reset(target=0, period=120, high_clk=high, low_clk=low, setup_clk=setup, hold_clk=hold)
+        generator = await Generator(dut).reset(target=0, period=120, high_cycles=high, low_cycles=low, setup_cycles=setup, hold_cycles=hold)
         for target in (3, 1, 4, 4, 0, 0):
             await generator.line(target)
         assert (await generator.wait(300))[2:] == (0, 0)
@@ -154,7 +154,7 @@ async def timings_are_kept_at_both_ends(dut):
 
 @cocotb.test()
 async def quadrature_has_an_edge_a_step_and_a_leads_going_up(dut):
-    generator = await Generator(dut).reset(target=0, mode=1, high_clk=2, low_clk=2, period=40)
+    generator = await Generator(dut).reset(target=0, mode=1, high_cycles=2, low_cycles=2, period=40)
     gray = [(0, 0), (1, 0), (1, 1), (0, 1)]
     for target in (9, 4, -7, -7):
         await generator.line(target, 80)
@@ -191,7 +191,7 @@ async def polarity_turns_the_pins_over(dut):
 
 @cocotb.test()
 async def off_finishes_the_pulse_and_on_again_does_not_jump(dut):
-    generator = await Generator(dut).reset(target=0, period=40, high_clk=6)
+    generator = await Generator(dut).reset(target=0, period=40, high_cycles=6)
     await generator.line(4)
     while not generator.seen[-1][0]:
         await generator.clk()
@@ -234,7 +234,7 @@ async def overrun_when_target_runs_away_and_only_load_or_off_ends_it(dut):
         got = await generator.line(jump)
         assert (await generator.clk())[3] and len({step for step, _ in got[4:]}) == 1
         assert not (await generator.clk(load=1))[3]
-    generator = await Generator(dut).reset(target=0, period=200, high_clk=30)   # 2^(PERIOD_W + AHEAD_W - 2) / 200 = 5.1 steps
+    generator = await Generator(dut).reset(target=0, period=200, high_cycles=30)   # 2^(PERIOD_W + AHEAD_W - 2) / 200 = 5.1 steps
     await generator.line(4)
     assert not (await generator.wait(200))[3]
     await generator.line(40)
@@ -262,7 +262,7 @@ async def a_period_of_0_stands(dut):
 
 @cocotb.test()
 async def reset_in_mid_flow(dut):
-    generator = await Generator(dut).reset(target=0, period=20, high_clk=3)
+    generator = await Generator(dut).reset(target=0, period=20, high_cycles=3)
     for wait in range(20):
         await generator.line(generator.model.line_end // ONE + 4, 3 + wait)
         assert await generator.clk(rst=1) == (0, 0, 0, 0)
@@ -282,7 +282,7 @@ async def any_lines_match_the_model(dut):
                 speed = random.randrange(-2**47, 2**47)
             target = (target + speed + 2**47) % 2**48 - 2**47
             inputs.update(tick=1, target=target)
-        for name in ("high_clk", "low_clk", "setup_clk", "hold_clk"):
+        for name in ("high_cycles", "low_cycles", "setup_cycles", "hold_cycles"):
             if random.randrange(300) == 0:
                 inputs[name] = random.choice((0, 1, 2, 31, random.randrange(8)))
         if random.randrange(100) == 0:
@@ -299,7 +299,7 @@ async def any_lines_match_the_model(dut):
 @cocotb.test()
 async def writes_a_waveform_of_23_steps_up_and_9_down(dut):
     """sigrok judges it below."""
-    generator = await Generator(dut).reset(target=0, period=50, high_clk=2, low_clk=3, setup_clk=4, hold_clk=3)
+    generator = await Generator(dut).reset(target=0, period=50, high_cycles=2, low_cycles=3, setup_cycles=4, hold_cycles=3)
     for target in (8, 16, 23, 23, 20, 14, 14):
         await generator.line(target)
     WAVEFORM.write_text("".join(f"{step},{direction}\n" for step, direction in generator.seen))
@@ -320,7 +320,7 @@ def recorded():
 async def follows_a_recorded_machine_there_and_back(dut):
     places = recorded()
     assert places[0] == places[-1] == 0 and max(places) == RECORDED
-    generator = await Generator(dut).reset(target=0, high_clk=2, low_clk=2, setup_clk=2, hold_clk=2)
+    generator = await Generator(dut).reset(target=0, high_cycles=2, low_cycles=2, setup_cycles=2, hold_cycles=2)
     for before, place in zip(places, places[1:]):
         await generator.line(place)
         assert min(before, place) - 1 <= generator.model.steps <= max(before, place)

@@ -5,9 +5,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from figures.common import Figure
+from figures.common import Figure, collected
 from figures.comparison import BAR, OURS, Comparison, Peer, bars, comparisons, page, scale
-from figures.figure import all_figures
 
 SMALL = Figure(lambda: 2.0, "nm", "an <error>", "< 3", lambda v: v < 3, 1)
 
@@ -61,7 +60,7 @@ def test_the_page_has_every_figure_and_pictures_where_there_are_peers():
 
 
 def test_every_comparison_belongs_to_a_figure():
-    known, figures = comparisons(), all_figures()
+    known, figures = comparisons(), collected("FIGURES")
     assert set(known) <= set(figures)
     for name, comparison in known.items():
         assert all(0 < len(peer.source) <= 60 and len(peer.name) <= 36 for peer in comparison.peers), f"{name}: too long for a bar"

@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from figures.door import FIRMWARE, fuzz_firmware, images
+from figures.gateway import FIRMWARE, fuzz_firmware, images
 from fuzz import parser_fuzz
 from moire.errors import BadFile
 

@@ -5,22 +5,22 @@ import random
 import pytest
 
 from tb.bench import seed
-from tb.firmware.fake_machine import DEFINES, FAULT, PARAMETER, PERIOD, Axis, Machine
-from tb.firmware.planner import distance, limits
+from tb.firmware.plan_model import distance, limits
+from twin.compiled.node import DEFINES, FAULT, PARAMETER, PERIOD, Axis, FakeNode
 
-HOLD = DEFINES["AXIS_STROBES_HOLD_HERE_MASK"]
-BRAKE = DEFINES["AXIS_STROBES_BRAKE_MASK"]
+SET_TARGET = DEFINES["AXIS_STROBES_SET_TARGET_TO_POSITION_MASK"]
+CONTROLLED_STOP = DEFINES["AXIS_STROBES_CONTROLLED_STOP_MASK"]
 RESET = DEFINES["AXIS_STROBES_RESET_FAULTS_MASK"]
 ENABLE = DEFINES["AXIS_CONTROL_ENABLE_MASK"]
 CLOSED_LOOP = DEFINES["AXIS_CONTROL_CLOSED_LOOP_MASK"]
 HOMING = DEFINES["AXIS_CONTROL_HOMING_MASK"]
 STEPS_OF_HOMING = [3, 40, 68, 72, 76, 80, 120, 170, 190, 205]     # ms: approach, catch, creep, depart, settle, zero
 DISTANCE = 100 * PERIOD                                     # from switch to zero
-SHORT = {"travel_low": -50 * PERIOD, "travel_high": 2000 * PERIOD, "home_distance": DISTANCE, "home_velocity": 2000}
+SHORT = {"travel_low": -50 * PERIOD, "travel_high": 2000 * PERIOD, "home_distance": DISTANCE, "homing_search_speed": 2000}
 
 
 def enabled(*axes, **parameters):
-    machine = Machine(*axes)
+    machine = FakeNode(*axes)
     machine.set(**{**SHORT, **parameters})
     machine.ask("enable", axis=0, on=1)
     return machine
@@ -42,19 +42,19 @@ def finish(machine, ms=20_000):
 # enable
 
 def test_the_drive_is_off_at_start():
-    machine = Machine()
+    machine = FakeNode()
     machine.run(10)
     status = machine.status()
-    assert (status["state"], status["ended"], status["flags"]) == ("off", "never", set())
+    assert (status["state"], status["ended"], status["flags"]) == ("off", "no_motion_yet", set())
     assert machine.axes[0].control == 0
 
 
 def test_enable_holds_here_before_the_loop_is_closed():
     axis = Axis(position=12345)
-    machine = Machine(axis)
+    machine = FakeNode(axis)
     axis.player.target, axis.strobes = 0, []
     machine.ask("enable", axis=0, on=1)
-    assert axis.strobes == [(HOLD, 0)] and axis.control == ENABLE | CLOSED_LOOP and axis.target == 12345
+    assert axis.strobes == [(SET_TARGET, 0)] and axis.control == ENABLE | CLOSED_LOOP and axis.target == 12345
     status = machine.status()
     assert status["state"] == "holding" and status["flags"] == {"enabled", "settled"}
 
@@ -81,12 +81,12 @@ def test_enable_off_is_always_allowed_and_ends_a_motion():
 
 
 def test_enable_takes_only_0_and_1():
-    assert Machine().request("enable", axis=0, on=2)[0] == "out_of_range"
+    assert FakeNode().request("enable", axis=0, on=2)[0] == "out_of_range"
 
 
 @pytest.mark.parametrize("fault", ["estop", "drive"])
 def test_enable_is_refused_while_a_fault_is_latched(fault):
-    machine = Machine()
+    machine = FakeNode()
     machine.axes[0].causes = FAULT[fault]
     machine.run(2)
     assert machine.request("enable", axis=0, on=1)[0] == "faulted" and machine.axes[0].control == 0
@@ -95,7 +95,7 @@ def test_enable_is_refused_while_a_fault_is_latched(fault):
 
 def test_enable_is_refused_if_the_guard_does_not_agree():
     """Causes that latch only when the drive is asked for."""
-    machine = Machine()
+    machine = FakeNode()
     machine.axes[0].causes = FAULT["encoder"]
     assert machine.request("enable", axis=0, on=1)[0] == "faulted"
     assert machine.status()["state"] == "faulted" and machine.axes[0].control == 0
@@ -131,7 +131,7 @@ def test_each_limit_of_the_motion_counts_from_when_it_is_set():
         ticks = machine.ask("move", axis=0, target=100 * PERIOD * (n % 2))["duration_ticks"]
         assert finish(machine) == "ok" and ticks > last
         last = ticks
-    assert machine.axes[0].word[DEFINES["AXIS_BRAKE_RATE"]] == limits(700, 20_000, 1_000_000)[1] >> 8
+    assert machine.axes[0].word[DEFINES["AXIS_STOP_DECELERATION"]] == limits(700, 20_000, 1_000_000)[1] >> 8
 
 
 def test_a_move_to_where_the_axis_is_ends_after_the_settling_time():
@@ -152,7 +152,7 @@ def test_any_sequence_of_moves_lands_exactly():
 
 def test_motions_are_refused_in_the_documented_order():
     axis = Axis(position=50 * PERIOD, low=0)
-    machine = Machine(axis)
+    machine = FakeNode(axis)
     machine.set(**SHORT)
 
     def move(target=0):
@@ -188,12 +188,12 @@ def test_parameters_are_refused_while_the_axis_moves():
 # prepared motions, override
 
 def begun(machine):
-    """The axes that the node was told to start together."""
+    """The axes that the node was reported to start together."""
     return machine.word.pop(DEFINES["NODE_START_AXES"], 0)
 
 
 def two_homed():
-    machine = Machine(Axis(position=50 * PERIOD, low=0), Axis(position=60 * PERIOD, low=0))
+    machine = FakeNode(Axis(position=50 * PERIOD, low=0), Axis(position=60 * PERIOD, low=0))
     for n in (0, 1):
         machine.set(n, **SHORT)
         machine.ask("enable", axis=n, on=1)
@@ -228,26 +228,26 @@ def test_none_begins_if_one_of_them_is_not_prepared():
     assert begun(machine) == 2 and machine.request("start", axes=2)[0] == "not_prepared"
 
 
-def mark(machine):
+def sync(machine):
     """As the hardware does it: counts, and plays the queued segments of the axes that wait."""
-    line = DEFINES["LINE_BASE"]
-    machine.word[line + DEFINES["LINE_MARKS"]] = machine.word.get(line + DEFINES["LINE_MARKS"], 0) + 1
+    line = DEFINES["BUS_BASE"]
+    machine.word[line + DEFINES["BUS_SYNCS"]] = machine.word.get(line + DEFINES["BUS_SYNCS"], 0) + 1
     for n, axis in enumerate(machine.axes):
-        axis.player.moving |= bool(machine.word[line + DEFINES["LINE_MARK_AXES"]] >> n & 1 and axis.player.queue)
-    return machine.hear([0x20 | DEFINES["LINE_RECEIVE_COMMAND_MASK"], 1, 7, 0, 0, 0, DEFINES["LINE_RECEIVE_GOOD_MASK"]])
+        axis.player.moving |= bool(machine.word[line + DEFINES["BUS_SYNC_AXES"]] >> n & 1 and axis.player.queue)
+    return machine.hear([0x20 | DEFINES["BUS_RECEIVE_COMMAND_MASK"], 1, 7, 0, 0, 0, DEFINES["BUS_RECEIVE_GOOD_MASK"]])
 
 
 def test_a_mark_starts_the_axes_that_wait_for_it_and_no_other_and_is_not_answered():
     machine = two_homed()
     for n in (0, 1):
         machine.ask("prepare", axis=n, target=100 * PERIOD)
-    machine.ask("start_at_mark", axes=2)
+    machine.ask("start_at_sync", axes=2)
     machine.run(20)
     assert [machine.status(n)["state"] for n in (0, 1)] == ["prepared", "prepared"]
-    assert mark(machine) == b""
+    assert sync(machine) == b""
     assert [machine.status(n)["state"] for n in (0, 1)] == ["prepared", "moving"]
     assert machine.run(20_000, until=lambda: machine.status(1)["ended"] == "ok") and machine.status(1)["target"] == 100 * PERIOD
-    mark(machine)
+    sync(machine)
     machine.run(20)
     assert machine.status(0)["state"] == "prepared"
 
@@ -255,10 +255,10 @@ def test_a_mark_starts_the_axes_that_wait_for_it_and_no_other_and_is_not_answere
 def test_what_waits_for_a_mark_can_be_taken_back_and_what_is_not_prepared_cannot_wait():
     machine = two_homed()
     machine.ask("prepare", axis=0, target=100 * PERIOD)
-    assert machine.request("start_at_mark", axes=3)[0] == "not_prepared" and machine.request("start_at_mark", axes=4)[0] == "out_of_range"
-    machine.ask("start_at_mark", axes=1)
-    machine.ask("start_at_mark", axes=0)
-    mark(machine)
+    assert machine.request("start_at_sync", axes=3)[0] == "not_prepared" and machine.request("start_at_sync", axes=4)[0] == "out_of_range"
+    machine.ask("start_at_sync", axes=1)
+    machine.ask("start_at_sync", axes=0)
+    sync(machine)
     machine.run(20)
     assert machine.status()["state"] == "prepared"
 
@@ -274,7 +274,7 @@ def test_a_prepared_motion_that_is_given_up_is_not_begun_later(end):
     else:
         machine.axes[0].causes = FAULT["estop"]
         machine.run(1)
-    assert machine.axes[0].strobes[-1][0] == HOLD
+    assert machine.axes[0].strobes[-1][0] == SET_TARGET
     assert machine.request("start", axes=1)[0] == "not_prepared" and begun(machine) == 0
     assert machine.status()["ended"] == ("ended_by_fault" if end == "estop" else "stopped")
 
@@ -283,9 +283,9 @@ def test_the_override_changes_in_motion_and_nothing_else_does():
     machine = homed()
     machine.ask("move", axis=0, target=500 * PERIOD)
     for share in (65536, 32768, 1, 0):
-        machine.ask("set_parameter", axis=0, parameter=PARAMETER["override"]["id"], value=share)
-        assert machine.axes[0].read(DEFINES["AXIS_OVERRIDE"]) == share
-    assert machine.request("set_parameter", axis=0, parameter=PARAMETER["override"]["id"], value=65537)[0] == "out_of_range"
+        machine.ask("set_parameter", axis=0, parameter=PARAMETER["feed_override"]["id"], value=share)
+        assert machine.axes[0].read(DEFINES["AXIS_FEED_OVERRIDE"]) == share
+    assert machine.request("set_parameter", axis=0, parameter=PARAMETER["feed_override"]["id"], value=65537)[0] == "out_of_range"
     assert machine.request("set_parameter", axis=0, parameter=PARAMETER["velocity"]["id"], value=100)[0] == "busy"
 
 
@@ -299,7 +299,7 @@ def test_what_the_drive_is_changes_only_with_the_drive_off(name, value):
 
 
 def test_a_drive_that_was_not_built_is_refused():
-    machine = Machine()
+    machine = FakeNode()
     machine.actuators[0][DEFINES["ACTUATOR_DRIVE"]] = 0b0001 << DEFINES["ACTUATOR_DRIVE_BUILT_SHIFT"]
     for name, value in (("drive", 1), ("drive", 2), ("fine_reach", 65536)):
         assert machine.request("set_parameter", axis=0, parameter=PARAMETER[name]["id"], value=value)[0] == "not_built"
@@ -311,7 +311,7 @@ SINE = [parameter for parameter in PARAMETER.values() if "needs" in parameter]
 
 def test_without_sine_and_cosine_a_parameter_that_needs_them_takes_what_asks_for_nothing():
     wanted = {p["id"]: next(value for value in (p["min"] + 1, p["min"] + 2) if value != p["default"]) if p["max"] > 1 else 1 for p in SINE}
-    machine = Machine(sine=False)
+    machine = FakeNode(sine=False)
     for parameter in SINE:
         asked = {"axis": 0, "parameter": parameter["id"]}
         for value in (0, parameter["default"]):
@@ -320,36 +320,36 @@ def test_without_sine_and_cosine_a_parameter_that_needs_them_takes_what_asks_for
         assert machine.request("set_parameter", **asked, value=wanted[parameter["id"]])[0] == "not_built"
         assert machine.request("set_parameter", **asked, value=parameter["max"] + 1)[0] == "out_of_range"
         assert machine.ask("get_parameter", **asked)["value"] == parameter["default"]
-    machine = Machine()
+    machine = FakeNode()
     for number, value in wanted.items():
         machine.ask("set_parameter", axis=0, parameter=number, value=value)
 
 
 def test_without_sine_and_cosine_the_position_is_made_of_counts_from_power_up_on():
-    machine, source = Machine(sine=False), {"axis": 0, "parameter": PARAMETER["position_source"]["id"]}
-    chosen = DEFINES["GRATING_POSITION_SOURCE_COUNTS_MASK"]
+    machine, source = FakeNode(sine=False), {"axis": 0, "parameter": PARAMETER["position_source"]["id"]}
+    chosen = DEFINES["FEEDBACK_POSITION_SOURCE_COUNTS_MASK"]
     assert machine.ask("get_parameter", **source)["value"] == 1
-    assert machine.gratings[0].word[DEFINES["GRATING_POSITION_SOURCE"]] & chosen
+    assert machine.feedback_channels[0].word[DEFINES["FEEDBACK_POSITION_SOURCE"]] & chosen
     assert machine.request("set_parameter", **source, value=0)[0] == "not_built"
     machine.ask("set_parameter", **source, value=2)
     machine.ask("set_parameter", **source, value=1)
-    assert Machine().ask("get_parameter", **source)["value"] == 0
+    assert FakeNode().ask("get_parameter", **source)["value"] == 0
 
 
 def test_without_sine_and_cosine_their_operations_are_not_built_and_the_others_work():
-    operations = (("signal", {}), ("learner", {"action": 0}), ("get_correction", {}), ("get_harmonic", {"order": 1}),
+    operations = (("signal", {}), ("calibration", {"action": 0}), ("get_correction", {}), ("get_harmonic", {"order": 1}),
                   ("set_harmonic", {"order": 1, "cosine": 0, "sine": 0}),
-                  ("set_correction", {"sin_offset": 0, "cos_offset": 0, "gain": 65536, "shear": 0, "apply": 1}))
-    machine = Machine()
+                  ("set_correction", {"sin_offset": 0, "cos_offset": 0, "gain": 65536, "quadrature_error": 0, "apply": 1}))
+    machine = FakeNode()
     for operation, fields in operations:
         machine.ask(operation, axis=0, **fields)
-    machine = Machine(sine=False)
+    machine = FakeNode(sine=False)
     for operation, fields in operations:
         assert machine.request(operation, axis=0, **fields)[0] == "not_built"
     machine.ask("encoder", axis=0)
     machine.ask("arm_scope", axis=0, trigger=0, before=0, every=1, level=0, amplitude=0)
     machine.run(50)
-    assert not machine.gratings[0].records
+    assert not machine.feedback_channels[0].records
 
 
 def test_a_move_of_days_is_refused():
@@ -391,7 +391,7 @@ def test_stop_brakes_and_keeps_the_drive_on():
     before = machine.axes[0].position
     machine.axes[0].strobes = []
     machine.ask("stop", axis=0)
-    assert [strobes for strobes, _ in machine.axes[0].strobes] == [BRAKE] and machine.status()["state"] == "stopping"
+    assert [strobes for strobes, _ in machine.axes[0].strobes] == [CONTROLLED_STOP] and machine.status()["state"] == "stopping"
     machine.ask("stop", axis=0)                             # once more changes nothing
     assert len(machine.axes[0].strobes) == 1
     assert machine.request("move", axis=0, target=0)[0] == "busy"
@@ -437,7 +437,7 @@ def test_a_fault_ends_the_motion_and_is_named(fault):
     assert machine.request("move", axis=0, target=0)[0] == "faulted"
 
     if fault in ("estop", "drive", "cpu"):
-        assert machine.request("reset_faults", axis=0)[0] == "fault_stands"
+        assert machine.request("reset_faults", axis=0)[0] == "fault_persists"
     axis.causes = 0
     machine.ask("reset_faults", axis=0)
     assert machine.status()["state"] == "off" and machine.status()["faults"] == 0
@@ -471,7 +471,7 @@ def test_reset_without_a_fault_does_not_switch_the_drive_off():
 
 
 def test_reset_forgets_the_encoder_events():
-    machine = Machine()
+    machine = FakeNode()
     machine.axes[0].word[DEFINES["AXIS_ENCODER_EVENTS"]] = 0b10101
     assert machine.status()["encoder_events"] == 0b10101
     machine.ask("reset_faults", axis=0)
@@ -504,7 +504,7 @@ def test_running_into_a_switch_is_a_fault_and_there_is_a_way_off_it():
 
 
 def test_faults_of_one_axis_leave_the_other_alone():
-    machine = Machine(Axis(), Axis())
+    machine = FakeNode(Axis(), Axis())
     for axis in (0, 1):
         machine.ask("enable", axis=axis, on=1)
     machine.axes[1].causes = FAULT["encoder"]
@@ -534,7 +534,7 @@ def test_home_puts_the_zero_at_a_phase_zero_a_distance_from_the_edge(offset):
 
 def test_home_stops_creeping_when_the_switch_opens():
     machine = homed()
-    assert [strobes for strobes, _ in machine.axes[0].strobes].count(BRAKE) == 1
+    assert [strobes for strobes, _ in machine.axes[0].strobes].count(CONTROLLED_STOP) == 1
 
 
 def test_the_target_follows_an_axis_that_slides_into_its_switch():
@@ -553,7 +553,7 @@ def test_the_target_follows_an_axis_that_slides_into_its_switch():
 
 def test_the_longest_search_stays_inside_the_numbers():
     axis = Axis()
-    machine = enabled(axis, travel_low=-2**47, travel_high=2**47 - 1, home_velocity=1_000_000)
+    machine = enabled(axis, travel_low=-2**47, travel_high=2**47 - 1, homing_search_speed=1_000_000)
     machine.ask("home", axis=0)
     while not axis.pushed[-1][4]:
         axis.player.queue.clear()                           # as if they had been played

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from firmware import build as firmware_build
-from tb.firmware.host_firmware import SOURCE
+from twin.compiled.firmware import SOURCE
 
 MEMORY = 98304
 
@@ -65,5 +65,5 @@ def test_each_image_is_made_beside_the_others(made, tmp_path):
     run = build(tmp_path, "--image", "station")
     assert run.returncode == 0 and run.stdout.startswith("station: "), run.stderr
     station, axis = functions(tmp_path / "station.elf"), functions(made[0] / "firmware.elf")
-    assert "settings_operation" in station and not {"correction_work", "learner_work"} & station
-    assert "settings_operation" not in axis and {"correction_work", "learner_work"} <= axis
+    assert "settings_operation" in station and not {"calibration_axes_work", "calibration_work"} & station
+    assert "settings_operation" not in axis and {"calibration_axes_work", "calibration_work"} <= axis

@@ -2,8 +2,8 @@
 """axis.c: the motor hands over to the fine stage and takes over again, on an axis that lives in fake_machine."""
 import pytest
 
-from tb.firmware.fake_machine import DEFINES, FAULT, PARAMETER, PERIOD, Axis, Machine, signed
 from tb.firmware.test_firmware_axis import CLOSED_LOOP, ENABLE, finish, homed
+from twin.compiled.node import DEFINES, FAULT, PARAMETER, PERIOD, Axis, FakeNode, signed
 
 FINE = DEFINES["AXIS_CONTROL_FINE_MASK"]
 COMMAND = DEFINES["AXIS_COMMAND"]
@@ -149,7 +149,7 @@ def test_off_and_fault_end_it():
 
 
 def test_no_fine_stage_behind_a_converter_that_drives():
-    machine = Machine(Coarse())
+    machine = FakeNode(Coarse())
     for name, value, cause in (("fine_reach", REACH, "ok"), ("drive", 2, "out_of_range"), ("fine_reach", 0, "ok"), ("drive", 2, "ok"),
                                ("fine_reach", REACH, "out_of_range")):
         assert machine.request("set_parameter", axis=0, parameter=PARAMETER[name]["id"], value=value)[0] == cause, (name, value)

@@ -5,17 +5,17 @@ import random
 import pytest
 
 from tb.bench import seed
-from tb.firmware.fake_machine import PARAMETER, PERIOD, Axis, Machine
+from twin.compiled.node import PARAMETER, PERIOD, Axis, FakeNode
 
 QUARTER = PERIOD // 4
 COUNTS = 1                                                  # position_source
-TRAVEL = {"travel_low": -500 * PERIOD, "travel_high": 500 * PERIOD, "home_distance": 300 * PERIOD, "home_velocity": 2000,
+TRAVEL = {"travel_low": -500 * PERIOD, "travel_high": 500 * PERIOD, "home_distance": 300 * PERIOD, "homing_search_speed": 2000,
           "following_limit": 2**31 - 1}
 
 
 def home(axis, method, source=COUNTS, **parameters):
     """How it ended, and the machine."""
-    machine = Machine(axis)
+    machine = FakeNode(axis)
     machine.set(**{**TRAVEL, "home_method": method, "position_source": source, **parameters})
     machine.ask("enable", axis=0, on=1)
     machine.ask("home", axis=0)
@@ -115,7 +115,7 @@ def test_methods_35_and_37_take_the_place_where_the_axis_stands(method):
 
 @pytest.mark.parametrize("method", [0, 3, 16, 19, 32, 36])
 def test_a_method_that_does_not_exist_is_refused(method):
-    machine = Machine()
+    machine = FakeNode()
     known = PARAMETER["home_method"]
     assert machine.request("set_parameter", axis=0, parameter=known["id"], value=method)[0] == "out_of_range"
     assert machine.ask("get_parameter", axis=0, parameter=known["id"])["value"] == known["default"]

@@ -5,8 +5,8 @@ import random
 import pytest
 
 from tb.bench import seed
-from tb.firmware.fake_machine import DEFINES, PARAMETER, PERIOD, Axis, Machine
-from tb.firmware.planner import limits, steps
+from tb.firmware.plan_model import limits, steps
+from twin.compiled.node import DEFINES, PARAMETER, PERIOD, Axis, FakeNode
 
 TRAVEL = {"travel_low": -5000 * PERIOD, "travel_high": 20_000 * PERIOD, "home_method": 37, "position_source": 1}
 FINE = DEFINES["AXIS_CONTROL_FINE_MASK"]
@@ -15,7 +15,7 @@ ENABLE = DEFINES["AXIS_CONTROL_ENABLE_MASK"]
 
 
 def homed(axes=1, **parameters):
-    machine = Machine(*(Axis() for _ in range(axes)))
+    machine = FakeNode(*(Axis() for _ in range(axes)))
     for n in range(axes):
         machine.set(axis=n, **{**TRAVEL, **parameters})
         machine.ask("enable", axis=n, on=1)
@@ -90,8 +90,8 @@ def test_a_change_of_the_override_adds_no_more_than_a_quarter_of_acceleration_an
     machine.ask("move", axis=0, target=3000 * PERIOD)
     machine.set(override=32768)
     word = machine.axes[0].word
-    assert word[DEFINES["AXIS_OVERRIDE"]] == 32768
-    slope, curve = word[DEFINES["AXIS_OVERRIDE_SLOPE"]] / 2**32 * 4000, word[DEFINES["AXIS_OVERRIDE_CURVE"]] / 2**32 * 4000**2
+    assert word[DEFINES["AXIS_FEED_OVERRIDE"]] == 32768
+    slope, curve = word[DEFINES["AXIS_FEED_OVERRIDE_SLOPE"]] / 2**32 * 4000, word[DEFINES["AXIS_FEED_OVERRIDE_CURVE"]] / 2**32 * 4000**2
     velocity, acceleration = (PARAMETER[name]["default"] for name in ("velocity", "acceleration"))
     of_acceleration, of_jerk = velocity * slope / acceleration, (3 * acceleration * slope + velocity * curve) / jerk
     assert max(of_acceleration, of_jerk) <= 0.25 and (of_acceleration > 0.2499 or of_jerk > 0.2499)
@@ -115,16 +115,16 @@ def test_a_trapezoid_is_at_full_acceleration_within_three_ticks_and_brakes_witho
     slopes = [b - a for a, b in zip(every, every[1:])]
     assert max(map(abs, slopes)) <= acceleration and max(every) <= velocity and slopes[4] > 0.99 * acceleration
     assert ticks <= (700 << 40) / velocity + velocity / acceleration + 4 + 1e-3 * len(every)
-    assert axis.word[DEFINES["AXIS_BRAKE_JERK"]] == 0
+    assert axis.word[DEFINES["AXIS_STOP_JERK"]] == 0
     machine.set(profile=0)
-    assert axis.word[DEFINES["AXIS_BRAKE_JERK"]] == limits(1, 1, PARAMETER["jerk"]["default"])[2]
+    assert axis.word[DEFINES["AXIS_STOP_JERK"]] == limits(1, 1, PARAMETER["jerk"]["default"])[2]
 
 
 @pytest.mark.parametrize("border_3, sections", [(32768, (400, 1200)), (21846, (400, 800))])
 def test_stairs_climb_as_in_s4_and_come_down_the_mirror(border_3, sections):
     """f0 = 50, top 2450, rises of 50, 100, 200 period/s every 20 ms; sections 2 and 3 begin at 1/6 and 1/2, or 1/3, of the climb."""
     rates = {"first": 50, "rise_1": 50, "rise_2": 100, "rise_3": 200}
-    machine = homed(profile=2, velocity=2450, stairs_border_3=border_3, **{f"stairs_{name}": rate * 65536 for name, rate in rates.items()})
+    machine = homed(profile=2, velocity=2450, stepped_border_3=border_3, **{f"stepped_{name}": rate * 65536 for name, rate in rates.items()})
     axis = machine.axes[0]
     axis.pushed = []
     machine.ask("move", axis=0, target=3000 * PERIOD)
@@ -163,10 +163,10 @@ def test_a_short_way_on_stairs_and_a_low_velocity_keep_their_speed():
         assert max(every) - min(every) <= 1 and max(every) <= min(12.5, velocity) * 2**40 / 4000
 
 
-@pytest.mark.parametrize("wrong", [{"stairs_border_2": 40_000}, {"stairs_rise_1": 1, "stairs_rise_2": 1, "stairs_rise_3": 1}])
+@pytest.mark.parametrize("wrong", [{"stepped_border_2": 40_000}, {"stepped_rise_1": 1, "stepped_rise_2": 1, "stepped_rise_3": 1}])
 def test_stairs_that_cannot_be_climbed_are_refused_with_their_cause(wrong):
     machine = homed(profile=2, velocity=2450, **wrong)
-    assert machine.request("move", axis=0, target=15_000 * PERIOD)[0] == "no_stairs"
+    assert machine.request("move", axis=0, target=15_000 * PERIOD)[0] == "stepped_profile_invalid"
     machine.set(profile=0)
     machine.ask("move", axis=0, target=15_000 * PERIOD)
     assert finish(machine) == "ok"

@@ -7,39 +7,39 @@ import zlib
 import pytest
 
 from tb.bench import seed
-from tb.firmware.fake_links import I2c, Links, PeerPort, Sensor, Table
-from tb.firmware.fake_machine import CAUSE, PARAMETER, TABLE, Axis, Machine
+from twin.compiled.node import CAUSE, PARAMETER, TABLE, Axis, FakeNode
+from twin.compiled.peripherals import FakePeripherals, I2c, PeerPort, Sensor, Table
 
 OPERATION = {name: operation["code"] for name, operation in TABLE["operation"].items()}
 PHASE = {code: name for name, (code, _) in TABLE["peer_phase"].items()}
 SETTING = TABLE["setting"]
-PRINTED, FRAMES = 1, 2
+LEGACY, FRAMES = 1, 2
 READY = 1                            # a store_state
 MAIN, SUB = 0, 1
 ORDER, DONE = b"\xFF\xFF\xAA", b"\xFF\xFF\x55"
 ARCSEC = 100
-AXIS = {"position_source": 2, "velocity": 30000, "acceleration": 500000, "jerk": 50000000, "home_creep": 300, "following_limit": 2**31 - 1}
+AXIS = {"position_source": 2, "velocity": 30000, "acceleration": 500000, "jerk": 50000000, "homing_latch_speed": 300, "following_limit": 2**31 - 1}
 
 
-class Node(Machine):
+class Node(FakeNode):
     """The firmware has one set of variables: so this is one of the two, the test speaks for the other."""
 
     def __init__(self, mode, role):
         self.random = random.Random(seed())
         self.table = Table(self.random)
         self.sensor, self.port, self.i2c = Sensor(self.random, self.table), PeerPort(), I2c()
-        self.told = {"peer_mode": mode, "peer_role": role}
-        super().__init__(Axis(), image="station", links=Links(self.sensor, self.port, self.i2c))
+        self.reported = {"peer_mode": mode, "peer_role": role}
+        super().__init__(Axis(), image="station", peripherals=FakePeripherals(self.sensor, self.port, self.i2c))
         self.begin()
 
     def begin(self):
         assert self.run(5000, until=lambda: self.firmware.store_state() == READY)
         self.set(**AXIS)
-        self.tell(**self.told)
+        self.tell(**self.reported)
         self.run(50)
 
     def power_cut(self):
-        """Of the node just now; it has power again at once, and is told its values."""
+        """Of the node just now; it has power again at once, and is reported its values."""
         self.i2c.power_cut(self.random)
         self.port.received.clear()
         self.port.sent.clear()
@@ -64,7 +64,7 @@ class Node(Machine):
         return bytes(self.other.received)
 
     def order(self, station=0, arcsec=0):
-        return CAUSE[self.firmware.peer_index(station, ctypes.c_uint32(round(arcsec * ARCSEC)))]
+        return CAUSE[self.firmware.peer_turn_to(station, ctypes.c_uint32(round(arcsec * ARCSEC)))]
 
 
 def stations(node, *arcsec):
@@ -98,25 +98,25 @@ def bodies(data):
     return found
 
 
-def index_to(sequence, arcsec):
-    return bytes([sequence, OPERATION["index_to"]]) + round(arcsec * ARCSEC).to_bytes(4, "little")
+def turn_to(sequence, arcsec):
+    return bytes([sequence, OPERATION["turn_to"]]) + round(arcsec * ARCSEC).to_bytes(4, "little")
 
 
 def look(sequence):
-    return bytes([sequence, OPERATION["index_state"]])
+    return bytes([sequence, OPERATION["turn_state"]])
 
 
 # ------------------------------------------------------------------ the sub-node, printed
 
 def test_the_order_as_printed_indexes_to_the_next_station_and_is_answered_as_printed():
-    node = Node(PRINTED, SUB)
+    node = Node(LEGACY, SUB)
     stations(node, 600, 900, 1500)
     for place in (600, 900, 1500):
         node.say(ORDER)
-        assert node.heard(200) == b"" and node.peer()["phase"] == "indexing"
+        assert node.heard(200) == b"" and node.peer()["phase"] == "turning"
         node.port.other = PeerPort()
         assert node.run(60_000, until=lambda: node.port.other.received and not node.port.sent)
-        assert bytes(node.port.other.received) == DONE and node.peer()["phase"] == "indexed"
+        assert bytes(node.port.other.received) == DONE and node.peer()["phase"] == "turned"
         assert abs(node.table.angle - place) <= 2
     node.say(ORDER)
     assert node.heard(3000) == b""
@@ -126,7 +126,7 @@ def test_the_order_as_printed_indexes_to_the_next_station_and_is_answered_as_pri
 @pytest.mark.parametrize("before", [b"", b"\xFF", b"\xFF\xFF\xFF", b"\xFF\xAA", b"\xFF\xFF\x55", b"\xFF\xFF\x00\xFF", b"\xAA\xAA",
                                     bytes(range(256))])
 def test_an_order_is_found_after_any_garbage(before):
-    node = Node(PRINTED, SUB)
+    node = Node(LEGACY, SUB)
     stations(node, 600)
     for byte in before:
         node.say([byte])
@@ -134,11 +134,11 @@ def test_an_order_is_found_after_any_garbage(before):
     assert node.peer()["phase"] == "idle"
     node.say(ORDER)
     node.run(20)
-    assert node.peer()["phase"] == "indexing" and node.peer()["garbage"] == len(before) and node.peer()["heard"] == 1
+    assert node.peer()["phase"] == "turning" and node.peer()["garbage"] == len(before) and node.peer()["heard"] == 1
 
 
 def test_a_node_that_hears_nothing_but_garbage_for_long_still_hears_an_order():
-    node, source = Node(PRINTED, SUB), random.Random(seed())
+    node, source = Node(LEGACY, SUB), random.Random(seed())
     stations(node, 600)
     sent = 0
     for _ in range(500):
@@ -149,31 +149,31 @@ def test_a_node_that_hears_nothing_but_garbage_for_long_still_hears_an_order():
     assert node.peer()["phase"] == "idle" and node.peer()["garbage"] == sent + 500
     node.say(ORDER)
     node.run(20)
-    assert node.peer()["phase"] == "indexing"
+    assert node.peer()["phase"] == "turning"
 
 
 def test_an_index_that_fails_is_not_answered_and_the_next_order_goes_there_again():
-    node = Node(PRINTED, SUB)
+    node = Node(LEGACY, SUB)
     stations(node, 3600, 7200)
     node.say(ORDER)
     node.run(500)
     node.sensor.dead = True
-    assert node.heard(2000) == b"" and node.peer()["ended"] == "sensor_dead" and node.peer()["phase"] == "failed"
+    assert node.heard(2000) == b"" and node.peer()["ended"] == "sensor_timed_out" and node.peer()["phase"] == "failed"
     node.sensor.dead = False
     node.run(50)
     node.say(ORDER)
-    assert node.run(60_000, until=lambda: node.peer()["phase"] == "indexed") and abs(node.table.angle - 3600) <= 2
+    assert node.run(60_000, until=lambda: node.peer()["phase"] == "turned") and abs(node.table.angle - 3600) <= 2
 
 
 def test_a_second_order_while_it_indexes_is_nothing():
-    node = Node(PRINTED, SUB)
+    node = Node(LEGACY, SUB)
     stations(node, 600, 1200)
     node.say(ORDER)
     node.run(100)
     node.say(ORDER)
-    assert node.run(60_000, until=lambda: node.peer()["phase"] == "indexed")
+    assert node.run(60_000, until=lambda: node.peer()["phase"] == "turned")
     node.run(500)
-    assert abs(node.table.angle - 600) <= 2 and node.peer()["phase"] == "indexed"
+    assert abs(node.table.angle - 600) <= 2 and node.peer()["phase"] == "turned"
 
 
 def indexed(node, place):
@@ -185,7 +185,7 @@ def indexed(node, place):
 
 
 def test_the_next_station_can_be_told_and_is_that_of_before_after_a_power_cut():
-    node = Node(PRINTED, SUB)
+    node = Node(LEGACY, SUB)
     stations(node, 600, 900, 1500)
     assert node.request("peer_next", station=3)[0] == "no_station"
     node.ask("peer_next", station=2)
@@ -198,7 +198,7 @@ def test_the_next_station_can_be_told_and_is_that_of_before_after_a_power_cut():
 
 def test_a_sub_node_goes_on_with_its_list_after_a_power_cut_at_any_moment():
     """What was answered is not gone to again; what was not is, or was counted and the answer lost: never is one left out unseen."""
-    node, places = Node(PRINTED, SUB), [300 + 90 * n for n in range(12)]
+    node, places = Node(LEGACY, SUB), [300 + 90 * n for n in range(12)]
     stations(node, *places)
     done = 0
     while done < len(places):
@@ -213,29 +213,29 @@ def test_a_sub_node_goes_on_with_its_list_after_a_power_cut_at_any_moment():
 
 
 def test_an_order_that_comes_while_the_eeprom_is_read_is_done_when_the_list_is_there():
-    node = Node(PRINTED, SUB)
+    node = Node(LEGACY, SUB)
     stations(node, 300)
     node.i2c.power_cut(node.random)
     node.firmware.firmware_start()
     node.say(ORDER)
-    node.tell(**node.told)
+    node.tell(**node.reported)
     node.set(**AXIS)
     assert node.peer()["stations"] == 0 and node.peer()["heard"] == 0
-    assert node.run(60_000, until=lambda: node.peer()["phase"] == "indexed") and abs(node.table.angle - 300) <= 2
+    assert node.run(60_000, until=lambda: node.peer()["phase"] == "turned") and abs(node.table.angle - 300) <= 2
 
 
 def test_done_is_said_only_when_the_count_is_in_the_journal():
-    node = Node(PRINTED, SUB)
+    node = Node(LEGACY, SUB)
     stations(node, 300)
     node.say(ORDER)
     node.run(50)
     node.i2c.bus.devices.clear()
-    assert node.heard(20_000) == b"" and (node.peer()["phase"], node.peer()["ended"]) == ("failed", "store_missing")
+    assert node.heard(20_000) == b"" and (node.peer()["phase"], node.peer()["ended"]) == ("failed", "eeprom_missing")
     assert abs(node.table.angle - 300) <= 2
 
 
 def test_a_new_list_begins_with_its_first_station():
-    node = Node(PRINTED, SUB)
+    node = Node(LEGACY, SUB)
     stations(node, 300, 600)
     indexed(node, 300)
     assert node.peer()["next"] == 1
@@ -244,7 +244,7 @@ def test_a_new_list_begins_with_its_first_station():
 
 
 def test_the_list_does_not_change_while_the_table_turns():
-    node = Node(PRINTED, SUB)
+    node = Node(LEGACY, SUB)
     stations(node, 600, 1200)
     node.say(ORDER)
     node.run(100)
@@ -252,41 +252,41 @@ def test_the_list_does_not_change_while_the_table_turns():
 
 
 def test_only_a_sub_node_has_a_next_station():
-    node = Node(PRINTED, MAIN)
+    node = Node(LEGACY, MAIN)
     stations(node, 600, 1200)
-    assert node.request("peer_next", station=1)[0] == "peer_off" and node.ask("job_program")["journal"] == 0
+    assert node.request("peer_next", station=1)[0] == "peer_off" and node.ask("job_stations")["journal"] == 0
 
 
 # ------------------------------------------------------------------ the main node, printed
 
 def test_the_main_node_orders_as_printed_and_waits_for_the_answer():
-    node = Node(PRINTED, MAIN)
+    node = Node(LEGACY, MAIN)
     assert node.order(3) == "ok" and node.heard() == ORDER
-    assert node.peer()["phase"] == "indexing" and node.order(4) == "busy"
+    assert node.peer()["phase"] == "turning" and node.order(4) == "busy"
     node.say(b"\xFF\x55\xFF\xFF\xFF\x55")
     node.run(5)
-    assert node.peer()["phase"] == "indexed" and node.peer()["station"] == 3
-    assert PHASE[node.firmware.peer_state()] == "indexed" and CAUSE[node.firmware.peer_cause()] == "ok"
+    assert node.peer()["phase"] == "turned" and node.peer()["station"] == 3
+    assert PHASE[node.firmware.peer_state()] == "turned" and CAUSE[node.firmware.peer_cause()] == "ok"
 
 
 def test_an_answer_that_never_comes_is_told_by_time_and_one_that_nobody_waits_for_is_nothing():
-    node = Node(PRINTED, MAIN)
+    node = Node(LEGACY, MAIN)
     node.say(DONE)
     node.run(5)
     assert node.peer()["phase"] == "idle"
-    node.tell(peer_patience=500)
+    node.tell(peer_timeout=500)
     node.order()
     node.run(490)
-    assert node.peer()["phase"] == "indexing"
+    assert node.peer()["phase"] == "turning"
     node.run(20)
-    assert (node.peer()["phase"], node.peer()["ended"]) == ("silent", "look_at_sub_node")
+    assert (node.peer()["phase"], node.peer()["ended"]) == ("silent", "check_sub_node")
     node.say(DONE)
     node.run(5)
     assert node.peer()["phase"] == "silent"
 
 
 def test_a_stopped_order_is_over_for_the_main_node():
-    node = Node(PRINTED, MAIN)
+    node = Node(LEGACY, MAIN)
     node.order()
     node.firmware.peer_stop()
     assert (node.peer()["phase"], node.peer()["ended"]) == ("failed", "stopped")
@@ -296,36 +296,36 @@ def test_a_stopped_order_is_over_for_the_main_node():
 
 def test_a_frame_is_done_and_answered_with_the_body_of_the_line():
     node = Node(FRAMES, SUB)
-    node.say(frame(index_to(7, 600)))
-    assert bodies(node.heard()) == [bytes([7, OPERATION["index_to"], 0])]
+    node.say(frame(turn_to(7, 600)))
+    assert bodies(node.heard()) == [bytes([7, OPERATION["turn_to"], 0])]
     node.say(frame(look(8)))
     reply = bodies(node.heard())[0]
-    assert reply[:3] == bytes([8, OPERATION["index_state"], 0]) and int.from_bytes(reply[7:11], "little") == 60_000
-    assert node.run(60_000, until=lambda: node.ask("index_state")["phase"] == 0) and abs(node.table.angle - 600) <= 2
+    assert reply[:3] == bytes([8, OPERATION["turn_state"], 0]) and int.from_bytes(reply[7:11], "little") == 60_000
+    assert node.run(60_000, until=lambda: node.ask("turn_state")["phase"] == 0) and abs(node.table.angle - 600) <= 2
 
 
 def test_a_request_that_comes_again_is_answered_again_and_not_acted_on_again():
     node = Node(FRAMES, SUB)
-    node.say(frame(index_to(1, 600)))
+    node.say(frame(turn_to(1, 600)))
     first = bodies(node.heard())
-    node.run(30_000, until=lambda: node.ask("index_state")["phase"] == 0)
+    node.run(30_000, until=lambda: node.ask("turn_state")["phase"] == 0)
     node.say(frame(bytes([2, OPERATION["stop"], 0])))
     node.heard()
-    node.say(frame(index_to(1, 300)))
-    node.run(30_000, until=lambda: node.ask("index_state")["phase"] == 0)
+    node.say(frame(turn_to(1, 300)))
+    node.run(30_000, until=lambda: node.ask("turn_state")["phase"] == 0)
     pushed = len(node.axes[0].pushed)
-    node.say(frame(index_to(1, 300)))
+    node.say(frame(turn_to(1, 300)))
     assert bodies(node.heard(200)) == first and len(node.axes[0].pushed) == pushed
     assert node.peer()["repeated"] == 1
-    node.say(frame(index_to(2, 600)))
+    node.say(frame(turn_to(2, 600)))
     node.heard(500)
     assert len(node.axes[0].pushed) > pushed                    # another one is
 
 
 def test_what_is_refused_is_answered_with_its_cause():
     node = Node(FRAMES, SUB)
-    for sequence, (body, cause) in enumerate([(b"\xC8", "unknown_operation"), (bytes([OPERATION["index_to"]]), "wrong_length"),
-                                              (index_to(0, 1296000)[1:], "out_of_range")]):
+    for sequence, (body, cause) in enumerate([(b"\xC8", "unknown_operation"), (bytes([OPERATION["turn_to"]]), "wrong_length"),
+                                              (turn_to(0, 1296000)[1:], "out_of_range")]):
         node.say(frame(bytes([sequence]) + body))
         assert [CAUSE[reply[2]] for reply in bodies(node.heard())] == [cause]
 
@@ -346,8 +346,8 @@ def test_damaged_frames_are_counted_and_not_answered_and_the_next_one_is():
             whole = bytearray(source.randbytes(source.randrange(64)))
         before = node.peer()["heard"]
         node.say(whole + b"\0")
-        told = node.heard(8)
-        assert bodies(told) == [] and told == b"" or kind == 2 and node.peer()["heard"] == before + 1     # a zero between frames is none
+        reported = node.heard(8)
+        assert bodies(reported) == [] and reported == b"" or kind == 2 and node.peer()["heard"] == before + 1     # a zero between frames is none
     node.say(frame(good))
     assert len(bodies(node.heard())) == 1 and node.peer()["garbage"] > 150
 
@@ -367,7 +367,7 @@ class Answering:
     """The sub-node: answers what the main node asks, if `hears` says so."""
 
     def __init__(self, node):
-        self.node, self.asked, self.phase, self.ended, self.target, self.cause = node, [], 0, "never", 0, "ok"
+        self.node, self.asked, self.phase, self.ended, self.target, self.cause = node, [], 0, "no_motion_yet", 0, "ok"
         self.answers, self.last = True, None
         node.port.other = self.port = PeerPort()
 
@@ -383,7 +383,7 @@ class Answering:
 
     def reply(self, body):
         cause = "ok"
-        if body[1] == OPERATION["index_to"] and body != self.last:
+        if body[1] == OPERATION["turn_to"] and body != self.last:
             cause = self.cause
             if cause == "ok":
                 self.phase, self.ended, self.target = 1, "running", int.from_bytes(body[2:6], "little")
@@ -391,7 +391,7 @@ class Answering:
             self.phase, self.ended = 0, "stopped"
         code = next(number for number, name in CAUSE.items() if name == cause)
         fields = b""
-        if body[1] == OPERATION["index_state"]:
+        if body[1] == OPERATION["turn_state"]:
             ended = next(number for number, name in CAUSE.items() if name == self.ended)
             fields = bytes([self.phase, ended, 0, 0]) + self.target.to_bytes(4, "little") + bytes(8)
         if body[1] == OPERATION["status"]:
@@ -417,18 +417,18 @@ def test_the_main_node_looks_orders_and_watches_until_the_table_has_indexed():
     sub = Answering(node)
     assert node.order(5, 600) == "ok"
     sub.run(500)
-    assert sub.operations()[:3] == ["index_state", "set_parameter", "index_to"] and set(sub.operations()[3:]) == {"index_state"}
+    assert sub.operations()[:3] == ["turn_state", "set_parameter", "turn_to"] and set(sub.operations()[3:]) == {"turn_state"}
     assert len({body[0] for body in sub.asked}) == len(sub.asked) and 5 <= len(sub.asked) <= 14
-    assert sub.target == 60_000 and node.peer()["phase"] == "indexing"
+    assert sub.target == 60_000 and node.peer()["phase"] == "turning"
     sub.phase, sub.ended = 0, "ok"
     sub.run(100)
-    assert (node.peer()["phase"], node.peer()["ended"], node.peer()["station"]) == ("indexed", "ok", 5)
+    assert (node.peer()["phase"], node.peer()["ended"], node.peer()["station"]) == ("turned", "ok", 5)
     count = len(sub.asked)
     sub.run(500)
     assert len(sub.asked) == count                              # then it is quiet
 
 
-@pytest.mark.parametrize("ended", ["sensor_dead", "stiction", "ended_by_fault"])
+@pytest.mark.parametrize("ended", ["sensor_timed_out", "stiction", "ended_by_fault"])
 def test_the_cause_of_the_sub_node_is_that_of_the_main_node(ended):
     node = Node(FRAMES, MAIN)
     sub = Answering(node)
@@ -446,8 +446,8 @@ def test_the_speed_goes_before_each_order():
     node.tell(job_speed=25)
     node.order(0, 600)
     sub.run(200)
-    told = next(body for body in sub.asked if body[1] == OPERATION["set_parameter"])
-    assert told[2:4] == bytes([0, PARAMETER["override"]["id"]]) and int.from_bytes(told[4:], "little") == 65536 // 4
+    reported = next(body for body in sub.asked if body[1] == OPERATION["set_parameter"])
+    assert reported[2:4] == bytes([0, PARAMETER["feed_override"]["id"]]) and int.from_bytes(reported[4:], "little") == 65536 // 4
 
 
 def test_an_order_that_is_refused_has_failed():
@@ -468,7 +468,7 @@ def test_a_silent_sub_node_is_told_after_two_seconds_of_asking(after):
     sub.run(after)
     sub.answers = False
     sub.run(1900)
-    assert node.peer()["phase"] == "indexing"
+    assert node.peer()["phase"] == "turning"
     sub.run(250)
     assert (node.peer()["phase"], node.peer()["ended"]) == ("silent", "peer_silent")
     assert len({body[0] for body in sub.asked[-20:]}) == 1      # the same request each time
@@ -479,7 +479,7 @@ def test_a_sub_node_that_lost_its_power_is_told():
     sub = Answering(node)
     node.order(0, 600)
     sub.run(200)
-    sub.phase, sub.ended, sub.target = 0, "never", 0
+    sub.phase, sub.ended, sub.target = 0, "no_motion_yet", 0
     sub.run(200)
     assert (node.peer()["phase"], node.peer()["ended"]) == ("failed", "peer_restarted")
 
@@ -490,8 +490,8 @@ def test_a_sub_node_that_still_turns_is_stopped_first():
     sub.phase, sub.ended, sub.target = 3, "running", 5
     node.order(0, 600)
     sub.run(500)
-    assert sub.operations()[:5] == ["index_state", "stop", "index_state", "set_parameter", "index_to"]
-    assert node.peer()["phase"] == "indexing"
+    assert sub.operations()[:5] == ["turn_state", "stop", "turn_state", "set_parameter", "turn_to"]
+    assert node.peer()["phase"] == "turning"
 
 
 def test_a_sub_node_that_never_comes_to_rest_is_busy():
@@ -527,8 +527,8 @@ def test_a_noisy_line_costs_repetitions_and_nothing_else():
         before, place = sub.target, (100 + station) * ARCSEC
         assert sub.run(3000, until=lambda before=before: sub.target != before) and sub.target == place
         sub.phase, sub.ended = 0, "ok"
-        assert sub.run(3000, until=lambda: node.peer()["phase"] == "indexed")
-    assert node.peer()["garbage"] > 0 and len(set(sub.asked)) < len(sub.asked) and 10 <= sub.operations().count("index_to") < 30
+        assert sub.run(3000, until=lambda: node.peer()["phase"] == "turned")
+    assert node.peer()["garbage"] > 0 and len(set(sub.asked)) < len(sub.asked) and 10 <= sub.operations().count("turn_to") < 30
 
 
 # ------------------------------------------------------------------ not in use
@@ -540,11 +540,11 @@ def test_a_node_whose_peer_port_is_not_in_use_orders_nothing_and_obeys_nothing()
     stations(node, 600)
     node.say(ORDER + frame(look(1)))
     assert node.heard() == b"" and node.peer()["phase"] == "idle"
-    node = Node(PRINTED, SUB)
+    node = Node(LEGACY, SUB)
     assert node.order() == "peer_off"
 
 
 def test_a_node_without_a_peer_port_says_so():
     node = Node(FRAMES, MAIN)
-    node.links.parts = [node.sensor]
+    node.peripherals.parts = [node.sensor]
     assert node.order() == "not_built"

@@ -4,16 +4,16 @@ from fractions import Fraction
 
 import pytest
 
-from tb.firmware.fake_links import Links, NumericDisplay
-from tb.firmware.fake_machine import PARAMETER, PERIOD, TABLE, Axis, Machine
+from twin.compiled.node import PARAMETER, PERIOD, TABLE, Axis, FakeNode
+from twin.compiled.peripherals import FakePeripherals, NumericDisplay
 
 SETTING = TABLE["setting"]
 
 
-class Station(Machine):
+class Station(FakeNode):
     def __init__(self, position=0):
         self.display = NumericDisplay()
-        super().__init__(Axis(position), image="station", links=Links(self.display))
+        super().__init__(Axis(position), image="station", peripherals=FakePeripherals(self.display))
 
     def shown(self, decimals):
         self.ask("set_setting", setting=SETTING["readout_decimals"]["id"], value=decimals)

@@ -2,7 +2,7 @@
 """scope.c: what is kept before and after each trigger, at which distance, and the open loop that goes with it."""
 import pytest
 
-from tb.firmware.fake_machine import CLK_HZ, DEFINES, FAULT, PERIOD, TABLE, Axis, Machine
+from twin.compiled.node import CLK_HZ, DEFINES, FAULT, PERIOD, TABLE, Axis, FakeNode
 
 TRIGGER = {name: code for name, (code, _) in TABLE["scope_trigger"].items()}
 SCOPE_STATE = {code: name for name, (code, _) in TABLE["scope_state"].items()}
@@ -20,18 +20,18 @@ def state(machine):
 
 
 def samples(machine):
-    told, out = machine.ask("scope"), []
-    assert SCOPE_STATE[told["state"]] == "full"
-    while len(out) < told["count"]:
+    reported, out = machine.ask("scope"), []
+    assert SCOPE_STATE[reported["state"]] == "full"
+    while len(out) < reported["count"]:
         fields = machine.ask("read_scope", first=len(out))
         out += [{name: fields[f"{name}_{n}"] for name in ("position", "error", "command", "time")} for n in range(5)]
-    assert all(set(sample.values()) == {0} for sample in out[told["count"]:])
-    return out[:told["count"]], told["before"]
+    assert all(set(sample.values()) == {0} for sample in out[reported["count"]:])
+    return out[:reported["count"]], reported["before"]
 
 
 @pytest.fixture
 def machine():
-    made = Machine(Axis(), Axis(), address=1)
+    made = FakeNode(Axis(), Axis(), address=1)
     for axis in (0, 1):
         made.set(axis, home_method=37, settle_time=1)
         made.ask("enable", axis=axis, on=1)
@@ -78,8 +78,8 @@ def test_a_motion_triggers_and_what_went_before_is_kept(machine, before):
     rest = machine.axes[0].position & 0xFFFFFFFF
     machine.ask("move", axis=0, target=200 * PERIOD)
     machine.run(SAMPLES + 5)
-    taken, told = samples(machine)
-    assert len(taken) == SAMPLES and told == before
+    taken, reported = samples(machine)
+    assert len(taken) == SAMPLES and reported == before
     assert all(sample["position"] & 0xFFFFFFFF == rest for sample in taken[:before])
     if before < SAMPLES - 10:
         assert taken[before + 8]["position"] & 0xFFFFFFFF != rest
@@ -186,9 +186,9 @@ def test_stop_disable_and_fault_end_the_open_loop_and_the_record(machine, way):
     else:
         machine.axes[0].causes = FAULT["estop"]
     machine.run(5)
-    told = machine.status()
-    assert told["state"] == {"stop": "holding", "disable": "off", "fault": "faulted"}[way]
-    assert told["ended"] == ("ended_by_fault" if way == "fault" else "stopped")
+    reported = machine.status()
+    assert reported["state"] == {"stop": "holding", "disable": "off", "fault": "faulted"}[way]
+    assert reported["ended"] == ("ended_by_fault" if way == "fault" else "stopped")
     before = machine.axes[0].word[DEFINES["AXIS_OPEN_COMMAND"]]
     machine.run(50)
     assert machine.axes[0].word[DEFINES["AXIS_OPEN_COMMAND"]] == before and 20 < len(samples(machine)[0]) < 40

@@ -2,7 +2,7 @@
 """segments.c: a table is loaded in order and whole or not used, in force only at rest and with a zero, and it lies where the zero is."""
 import pytest
 
-from tb.firmware.fake_machine import CAUSE, PARAMETER, PERIOD, Axis, Machine
+from twin.compiled.node import CAUSE, PARAMETER, PERIOD, Axis, FakeNode
 
 POINTS = [100 * n - 500 for n in range(30)]
 LENGTH, FIRST = 1000 * PERIOD, -2000 * PERIOD
@@ -17,8 +17,8 @@ def table(machine, points=POINTS, **more):
 
 
 def look(machine):
-    told = machine.ask("segments", axis=0)
-    return told["loaded"], told["in_force"], CAUSE[told["reason"]]
+    reported = machine.ask("segments", axis=0)
+    return reported["loaded"], reported["in_force"], CAUSE[reported["reason"]]
 
 
 def refused(machine, name, value):
@@ -26,7 +26,7 @@ def refused(machine, name, value):
 
 
 def homed(**more):
-    machine = Machine(Axis(position=5 * PERIOD))
+    machine = FakeNode(Axis(position=5 * PERIOD))
     machine.set(home_method=37, **more)
     machine.ask("enable", axis=0, on=1)
     machine.ask("home", axis=0)
@@ -44,7 +44,7 @@ def test_a_table_in_force_is_the_one_that_was_loaded_and_reads_back():
     assert look(machine) == (30, 0, "ok")
     machine.set(segments=2)
     machine.poll(4)
-    grating = machine.gratings[0]
+    grating = machine.feedback_channels[0]
     assert look(machine) == (30, 2, "ok") and grating.use == dict(linear=True, segments=29, length=LENGTH, origin=FIRST)
     assert [grating.segments[n] for n in range(30)] == POINTS
     back = [machine.ask("get_segments", axis=0, border=border)[f"point_{n}"] for border in (0, 12, 24) for n in range(12)]
@@ -57,18 +57,18 @@ def test_the_table_counts_from_the_place_that_homing_finds_whatever_it_is_called
     table(machine, segments=1)
     machine.set(home_offset=offset + 5)                 # counts from the next homing on
     machine.poll(4)
-    assert machine.gratings[0].use["origin"] == FIRST + offset * PERIOD
+    assert machine.feedback_channels[0].use["origin"] == FIRST + offset * PERIOD
     machine.ask("home", axis=0)
-    assert machine.gratings[0].use is None
+    assert machine.feedback_channels[0].use is None
     machine.run(300)
-    assert machine.gratings[0].use["origin"] == FIRST + (offset + 5) * PERIOD and look(machine) == (30, 1, "ok")
+    assert machine.feedback_channels[0].use["origin"] == FIRST + (offset + 5) * PERIOD and look(machine) == (30, 1, "ok")
 
 
 def test_without_a_zero_it_is_not_in_force_and_says_so():
-    machine = Machine(Axis(position=0))
+    machine = FakeNode(Axis(position=0))
     table(machine, segments=1)
     machine.poll(4)
-    assert look(machine) == (30, 0, "not_homed") and machine.gratings[0].use is None
+    assert look(machine) == (30, 0, "not_homed") and machine.feedback_channels[0].use is None
 
 
 def test_a_zero_that_is_lost_takes_it_out_of_force():
@@ -78,7 +78,7 @@ def test_a_zero_that_is_lost_takes_it_out_of_force():
     machine.axes[0].causes = 1 << 4                     # encoder
     machine.poll(4)
     machine.axes[0].causes = 0
-    assert look(machine) == (30, 0, "not_homed") and machine.gratings[0].use is None
+    assert look(machine) == (30, 0, "not_homed") and machine.feedback_channels[0].use is None
 
 
 def test_without_a_whole_table_it_is_not_in_force_and_says_so():
@@ -98,13 +98,13 @@ def test_one_use_follows_on_another_with_none_between():
     machine = homed()
     table(machine, segments=1)
     machine.poll(4)
-    machine.gratings[0].uses.clear()
+    machine.feedback_channels[0].uses.clear()
     machine.set(segments=2)
     machine.poll(4)
-    assert machine.gratings[0].uses == [None, True] and look(machine) == (30, 2, "ok")
+    assert machine.feedback_channels[0].uses == [None, True] and look(machine) == (30, 2, "ok")
     machine.set(segments=0)
     machine.poll(4)
-    assert machine.gratings[0].use is None and look(machine) == (30, 0, "ok")
+    assert machine.feedback_channels[0].use is None and look(machine) == (30, 0, "ok")
 
 
 def test_a_moving_axis_is_refused_a_change():
@@ -112,7 +112,7 @@ def test_a_moving_axis_is_refused_a_change():
     table(machine)
     machine.ask("move", axis=0, target=5000 * PERIOD)
     machine.run(10)
-    assert refused(machine, "segments", 1) == "busy" and machine.gratings[0].use is None
+    assert refused(machine, "segments", 1) == "busy" and machine.feedback_channels[0].use is None
 
 
 def test_a_table_in_use_is_not_changed():
@@ -140,7 +140,7 @@ def test_points_out_of_order_too_many_or_too_large_are_refused():
 
 def test_a_node_without_a_table_says_so():
     machine = homed()
-    machine.gratings[0].most_segments = 0
+    machine.feedback_channels[0].most_segments = 0
     assert machine.request("set_segments", **block())[0] == "not_built"
     assert refused(machine, "segments", 1) == "not_built" and refused(machine, "segments", 0) == "ok"
 
@@ -148,4 +148,4 @@ def test_a_node_without_a_table_says_so():
 def test_points_have_their_sign():
     machine = homed()
     table(machine, [-1, (1 << 23) - 1, -(1 << 23) + 1])
-    assert [machine.gratings[0].segments[n] for n in range(3)] == [-1, (1 << 23) - 1, -(1 << 23) + 1]
+    assert [machine.feedback_channels[0].segments[n] for n in range(3)] == [-1, (1 << 23) - 1, -(1 << 23) + 1]

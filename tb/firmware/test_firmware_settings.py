@@ -2,14 +2,14 @@
 """settings.c and the images: what a node of one image answers, and what one of the other does not have."""
 import pytest
 
-from tb.firmware.fake_machine import TABLE, Machine
+from twin.compiled.node import TABLE, FakeNode
 
 SETTING = TABLE["setting"]
 
 
 @pytest.fixture
 def station():
-    return Machine(image="station")
+    return FakeNode(image="station")
 
 
 def test_each_setting_begins_at_its_default_and_takes_both_ends_of_its_range(station):
@@ -34,15 +34,15 @@ def test_a_setting_that_does_not_exist_is_refused(station, number):
 
 
 def test_an_operation_that_an_image_lacks_is_not_built(station):
-    assert station.request("learner", axis=0, action=0)[0] == "not_built"
+    assert station.request("calibration", axis=0, action=0)[0] == "not_built"
     assert station.request("get_correction", axis=0)[0] == "not_built"
-    assert Machine().request("get_setting", setting=1)[0] == "not_built"
-    assert Machine().request("index_to", angle=0)[0] == "not_built"
+    assert FakeNode().request("get_setting", setting=1)[0] == "not_built"
+    assert FakeNode().request("turn_to", angle=0)[0] == "not_built"
 
 
 def test_an_axis_that_does_not_exist_is_told_by_both_images(station):
-    assert station.request("learner", axis=1, action=0)[0] == "no_such_axis"
-    assert Machine().request("learner", axis=1, action=0)[0] == "no_such_axis"
+    assert station.request("calibration", axis=1, action=0)[0] == "no_such_axis"
+    assert FakeNode().request("calibration", axis=1, action=0)[0] == "no_such_axis"
 
 
 def test_axes_move_in_a_station_as_elsewhere(station):

@@ -5,7 +5,7 @@ import random
 import pytest
 
 from tb.bench import seed
-from tb.firmware.station import TURN, Station, SubNode, ms
+from twin.compiled.station import TURN, Station, SubNode, ms
 
 STATIONS = 4
 ANGLES = [n * TURN // STATIONS for n in range(STATIONS)]
@@ -16,7 +16,7 @@ def node(frames=True, angles=ANGLES, panel=False, **options):
     """A main node with a sub-node and a program."""
     station = Station(absent=() if panel else ("keypad", "display"), **options)
     station.sub_node = SubNode(frames=frames)
-    station.setting(peer_mode=FRAMES if frames else PRINTED, job_start_limit=2, job_cut_limit=5, peer_patience=3000)
+    station.setting(peer_mode=FRAMES if frames else PRINTED, job_start_limit=2, job_cut_limit=5, peer_timeout=3000)
     station.ready()
     assert station.load(angles) == "ok"
     station.run(2500 if panel else 0)                       # it is found
@@ -61,14 +61,14 @@ def test_the_table_turns_only_while_the_machine_rests():
 
 def test_every_cut_is_in_the_journal_before_the_keys_are_sent():
     station = node()
-    start(station, "indexing")
+    start(station, "turning")
     for n in range(STATIONS):
         station.until("cutting")
         record = station.eeprom.memory[4096:4096 + 64 * 64]
         newest = max((record[at:at + 12] for at in range(0, len(record), 64) if record[at:at + 4] != b"\xff" * 4),
                      key=lambda line: int.from_bytes(line[:4], "little"))
         assert (newest[8], newest[10]) == (n, 3)            # station, cut begun
-        station.until("ended", "leaving", "indexing", "finishing")
+        station.until("ended", "leaving", "turning", "finishing")
 
 
 # a person
@@ -78,7 +78,7 @@ def test_pause_stands_before_the_next_cut_and_resume_goes_on():
     start(station, "cutting")
     assert station.do("pause") == "ok" and "pausing" in station.job()["flags"]
     job = station.until("paused")
-    assert job["cause"] == "paused_by_person" and job["station"] == 1 and cuts(station) == 1 and job["answers"] == {"resume", "stop"}
+    assert job["cause"] == "paused_by_operator" and job["station"] == 1 and cuts(station) == 1 and job["answers"] == {"resume", "stop"}
     station.run(3000)
     assert cuts(station) == 1
     assert station.do("resume") == "ok"
@@ -88,7 +88,7 @@ def test_pause_stands_before_the_next_cut_and_resume_goes_on():
 
 def test_pause_while_the_table_turns_stands_before_the_cut():
     station = node()
-    start(station, "indexing")
+    start(station, "turning")
     station.do("pause")
     assert station.until("paused")["station"] == 0 and cuts(station) == 0
     station.do("resume")
@@ -96,10 +96,10 @@ def test_pause_while_the_table_turns_stands_before_the_cut():
     assert cuts(station) == STATIONS
 
 
-@pytest.mark.parametrize("at", ["indexing", "cutting", "paused"])
+@pytest.mark.parametrize("at", ["turning", "cutting", "paused"])
 def test_stop_ends_the_job_wherever_it_is(at):
     station = node()
-    start(station, "indexing")
+    start(station, "turning")
     if at == "paused":
         station.do("pause")
     station.until(at)
@@ -130,12 +130,12 @@ def test_a_program_is_not_changed_while_a_job_is_under_way():
     assert station.load([5]) == "ok"
 
 
-def test_the_keys_wait_while_a_person_types():
+def test_the_keys_pending_while_a_person_types():
     station = node()
     station.edm.types_until = station.clk + ms(25_000)
     start(station, "cutting")
     station.run(15_000)
-    assert cuts(station) == 0 and "keys_wait" in station.job()["flags"] and station.edm.heard == b""
+    assert cuts(station) == 0 and "keys_pending" in station.job()["flags"] and station.edm.heard == b""
     station.until("finished")
     assert cuts(station) == STATIONS and station.edm.heard == station.edm.START * STATIONS
 
@@ -170,7 +170,7 @@ def test_a_cut_that_does_not_end_is_asked_about_and_may_be_followed():
     station.edm.endless = True
     job = start(station, "unsure")
     assert job["cause"] == "cut_not_ended" and job["answers"] == {"resume", "next", "stop"}
-    assert station.do("again") == "machine_busy"            # it would cut twice
+    assert station.do("again") == "edm_busy"            # it would cut twice
     assert station.do("resume") == "ok"
     station.until("following")
     station.edm.endless = False
@@ -196,9 +196,9 @@ def test_an_alarm_in_the_cut_is_asked_about_with_its_words():
     assert station.run(2000, until=lambda: station.edm.inputs & 1)
     station.edm.alarm()
     job = station.until("unsure")
-    assert job["cause"] == "machine_alarm" and {"alarm"} <= job["flags"] and job["answers"] == {"next", "stop"}
+    assert job["cause"] == "edm_alarm" and {"alarm"} <= job["flags"] and job["answers"] == {"next", "stop"}
     assert station.shown()[1:3] == ["the machine reports", "an alarm"]
-    assert station.do("again") == "machine_alarm"
+    assert station.do("again") == "edm_alarm"
     station.edm.alarm(False)
     assert station.do("again") == "ok"
     station.until("finished")
@@ -212,15 +212,15 @@ def test_an_alarm_that_comes_a_little_after_the_end_of_the_cut_counts():
     assert station.run(2000, until=lambda: not station.edm.inputs & 1)
     station.run(100)
     station.edm.alarm()
-    assert station.until("unsure")["cause"] == "machine_alarm"
+    assert station.until("unsure")["cause"] == "edm_alarm"
 
 
 def test_an_alarm_before_the_cut_pauses():
     station = node()
-    start(station, "indexing")
+    start(station, "turning")
     station.edm.alarm()
     job = station.until("paused")
-    assert job["cause"] == "machine_alarm" and station.do("resume") == "machine_alarm" and station.edm.heard == b""
+    assert job["cause"] == "edm_alarm" and station.do("resume") == "edm_alarm" and station.edm.heard == b""
     station.edm.alarm(False)
     station.do("resume")
     station.until("finished")
@@ -238,7 +238,7 @@ def test_keys_that_the_machine_does_not_take_are_taken_back_and_never_come_late(
     station = node()
     station.edm.takes_nothing = True
     job = start(station, "unsure")
-    assert job["cause"] == "keys_not_taken" and "keys_wait" not in job["flags"] and job["answers"] == {"again", "next", "stop"}
+    assert job["cause"] == "keys_not_taken" and "keys_pending" not in job["flags"] and job["answers"] == {"again", "next", "stop"}
     station.edm.takes_nothing = False
     station.run(5000)
     assert cuts(station) == 0 and station.edm.heard == b""
@@ -253,7 +253,7 @@ def test_a_machine_that_takes_half_the_keys_is_named_and_gets_the_others_once():
     assert station.run(5000, until=lambda: station.edm.injecting)
     station.edm.next_key = station.clk + ms(30_000)
     job = station.until("unsure")
-    assert job["cause"] == "keys_not_taken" and station.do("again") == "machine_busy" and "keys_wait" in job["flags"]
+    assert job["cause"] == "keys_not_taken" and station.do("again") == "edm_busy" and "keys_pending" in job["flags"]
     assert station.run(30_000, until=lambda: station.edm.inputs & 1)
     assert station.do("resume") == "ok"
     station.until("finished")
@@ -275,9 +275,9 @@ def test_stop_takes_back_the_keys_that_wait():
 def test_a_machine_that_cuts_or_alarms_is_not_started():
     station = node()
     station.edm.set(1)
-    assert station.do("start") == "machine_busy"
+    assert station.do("start") == "edm_busy"
     station.edm.set(2)
-    assert station.do("start") == "machine_alarm"
+    assert station.do("start") == "edm_alarm"
 
 
 @pytest.mark.parametrize("missing", [2, 32])
@@ -287,7 +287,7 @@ def test_a_node_without_keyboard_or_status_inputs_does_no_job(missing):
 
 # the sub-node
 
-@pytest.mark.parametrize("cause", ["sensor_dead", "not_converged", "sensor_disagrees", "stiction"])
+@pytest.mark.parametrize("cause", ["sensor_timed_out", "not_converged", "sensor_disagrees", "stiction"])
 def test_what_the_sub_node_failed_of_is_told_and_resume_tries_again(cause):
     station = node()
     station.sub_node.fault = cause
@@ -303,7 +303,7 @@ def test_what_the_sub_node_failed_of_is_told_and_resume_tries_again(cause):
                                               ("step_overrun", ["more steps were owed", "than may be"])])
 def test_a_fault_of_the_sub_node_is_said_in_words_and_reset_by_resume_when_its_cause_is_gone(fault, words):
     station = node(panel=True)
-    start(station, "indexing")
+    start(station, "turning")
     station.run(50)
     station.sub_node.latch(fault, "cpu")
     station.sub_node.cause_stands = True
@@ -315,7 +315,7 @@ def test_a_fault_of_the_sub_node_is_said_in_words_and_reset_by_resume_when_its_c
     assert station.sub_node.resets == 0                     # never by itself
     station.press("RESUME")
     job = station.until("paused")
-    assert job["cause"] == "fault_stands" and job["table_faults"] == {fault} and station.sub_node.resets == 1
+    assert job["cause"] == "fault_persists" and job["table_faults"] == {fault} and station.sub_node.resets == 1
     station.sub_node.cause_stands = False
     station.press("RESUME")
     station.until("finished")
@@ -342,7 +342,7 @@ def test_a_fault_that_comes_between_two_tries_is_told_before_it_is_reset():
     start(station, "paused")
     station.sub_node.latch("drive")
     station.do("resume")
-    station.until("indexing")
+    station.until("turning")
     assert station.until("paused")["cause"] == "faulted" and station.sub_node.resets == 0
 
 
@@ -359,7 +359,7 @@ def test_a_sub_node_that_is_silent_is_named():
 def test_a_sub_node_starts_no_job_of_its_own():
     station = node()
     station.setting(peer_role=1)
-    assert station.do("start") == "peer_off" and station.ask("job_program")["journal"] == 0
+    assert station.do("start") == "peer_off" and station.ask("job_stations")["journal"] == 0
 
 
 def test_a_peer_port_that_is_not_in_use_is_named():
@@ -370,9 +370,9 @@ def test_a_peer_port_that_is_not_in_use_is_named():
 
 def test_a_sub_node_that_counts_is_never_sent_on_when_its_place_is_not_known():
     station = node(frames=False)
-    station.sub_node.fault = "never"
-    assert start(station, "paused")["cause"] == "look_at_sub_node"
-    assert station.job()["answers"] == {"stop"} and station.do("resume") == "table_unknown" and station.sub_node.requests == 1
+    station.sub_node.fault = "no_motion_yet"
+    assert start(station, "paused")["cause"] == "check_sub_node"
+    assert station.job()["answers"] == {"stop"} and station.do("resume") == "table_position_unknown" and station.sub_node.requests == 1
     station.do("stop")
     station.until("idle")
 
@@ -423,7 +423,7 @@ def test_a_cut_that_ended_without_power_is_cut_again_only_if_a_person_says_so(an
 def test_a_job_whose_power_went_between_the_cuts_waits_for_resume_and_misses_none():
     station = node()
     start(station, "cutting")
-    station.until("indexing")
+    station.until("turning")
     station.power_cut()
     job = station.ready()
     assert (job["state"], job["cause"], job["station"]) == ("paused", "power_lost", 1) and job["answers"] == {"resume", "stop"}
@@ -469,17 +469,17 @@ def test_a_job_of_another_program_is_not_resumed():
     station.eeprom.memory[90] ^= 1
     station.power_cut()
     job = station.ready()
-    assert job["state"] == "idle" and station.program() == [1, 2] and "copy_torn" in job["flags"]
+    assert job["state"] == "idle" and station.program() == [1, 2] and "copy_damaged" in job["flags"]
 
 
 # the EEPROM in the job
 
 def test_no_cut_begins_that_is_not_in_the_journal():
     station = node()
-    start(station, "indexing")
+    start(station, "turning")
     station.bus.devices.pop(0x50)
     job = station.until("paused")
-    assert job["cause"] == "store_missing" and station.edm.heard == b"" and station.do("resume") == "store_missing"
+    assert job["cause"] == "eeprom_missing" and station.edm.heard == b"" and station.do("resume") == "eeprom_missing"
     station.bus.devices[0x50] = station.eeprom
     station.run(4000)
     assert station.do("resume") == "ok"
@@ -490,12 +490,12 @@ def test_no_cut_begins_that_is_not_in_the_journal():
 def test_another_eeprom_in_the_middle_of_a_job_is_refused():
     other = node(angles=[1, 2]).eeprom
     station = node()
-    start(station, "indexing")
+    start(station, "turning")
     mine = station.bus.devices.pop(0x50)
     station.until("paused")
     station.bus.devices[0x50] = other
     station.run(4000)
-    assert station.do("resume") == "program_changed" and station.job()["answers"] == {"stop"} and cuts(station) == 0
+    assert station.do("resume") == "job_changed" and station.job()["answers"] == {"stop"} and cuts(station) == 0
     station.bus.devices.pop(0x50)
     station.power_cut()
     station.bus.devices[0x50] = mine
@@ -509,7 +509,7 @@ def test_a_cut_whose_end_cannot_be_noted_is_asked_about():
     start(station, "cutting")
     station.bus.devices.pop(0x50)
     job = station.until("unsure")
-    assert job["cause"] == "store_missing"
+    assert job["cause"] == "eeprom_missing"
     station.bus.devices[0x50] = station.eeprom
     station.run(4000)
     assert station.do("next") == "ok"

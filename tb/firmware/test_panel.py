@@ -2,7 +2,7 @@
 """panel.c with keypad.c and display.c: programs entered by key, everything said in words, and parts that are missing."""
 import pytest
 
-from tb.firmware.station import KEYS, SETTING, TABLE, TURN, Station
+from twin.compiled.station import KEYS, SETTING, TABLE, TURN, Station
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ import random
 import pytest
 
 from tb.bench import seed
-from tb.firmware.host_firmware import Plan, Segment, Stairs, library
-from tb.firmware.planner import distance, gone, limits, peaks, shortest, steps
+from tb.firmware.plan_model import distance, gone, limits, peaks, shortest, steps
+from twin.compiled.firmware import Plan, Segment, SteppedProfile, library
 
 FOREVER, LONGEST = 1 << 40, 0x800000
 S0 = 6000, 125_000, 12_500_000                      # the stage of S0: period/s, /s2, /s3
@@ -232,7 +232,7 @@ def test_a_retarget_to_the_same_place_ends_at_the_same_time():
 
 def test_an_override_adds_a_quarter_of_acceleration_and_jerk_at_most():
     made, slope, curve = library().planner_limits(*S0), ctypes.c_uint32(), ctypes.c_uint32()
-    library().planner_override(ctypes.byref(made), ctypes.byref(slope), ctypes.byref(curve))
+    library().planner_feed_override(ctypes.byref(made), ctypes.byref(slope), ctypes.byref(curve))
     slope, curve = slope.value / 2**32, curve.value / 2**32
     assert made.velocity * slope <= made.acceleration / 4 and 3 * made.acceleration * slope + made.velocity * curve <= made.jerk / 4
     assert slope > 0.999 * min(made.acceleration / made.velocity / 4, made.jerk / made.acceleration / 24)
@@ -267,13 +267,13 @@ def test_impossible_limits_are_refused_with_their_cause():
 def test_stairs_climb_by_sections_and_come_down_the_mirror(as_printed):
     """S4: f0 = 50 Hz, steps of 50, 100, 200 Hz every 20 ms, to 2450 Hz; a period is a pulse."""
     hertz = 2**40 // 4000
-    stairs = Stairs(first=50 * hertz, top=2450 * hertz, ticks=80)
+    stairs = SteppedProfile(first=50 * hertz, top=2450 * hertz, ticks=80)
     stairs.rise[:] = 50 * hertz, 100 * hertz, 200 * hertz
-    library().planner_borders(ctypes.byref(stairs), 65536 // 6 + 1, 65536 // 3 + 1 if as_printed else 65536 // 2)
+    library().planner_stepped_borders(ctypes.byref(stairs), 65536 // 6 + 1, 65536 // 3 + 1 if as_printed else 65536 // 2)
     assert [round(border / hertz) for border in stairs.border] == [450, 850 if as_printed else 1250]
     for pulses in (1, 7, 100, 5000, -20000):
         plan = Plan()
-        assert library().planner_climb(ctypes.byref(plan), ctypes.byref(stairs), pulses << 16)
+        assert library().planner_stepped_move(ctypes.byref(plan), ctypes.byref(stairs), pulses << 16)
         ticks, pieces = plan.ticks, taken(plan, FOREVER, LONGEST)
         assert distance(pieces) == pulses << 40 and sum(piece[3] for piece in pieces) == ticks
         assert all(piece[1:3] == (0, 0) for piece in pieces)
@@ -288,4 +288,4 @@ def test_stairs_climb_by_sections_and_come_down_the_mirror(as_printed):
     assert fall[:len(climb)] == climb and len(fall) <= len(climb) + 1    # the top may be two pieces, one unit apart
     assert all(piece[3] == stairs.ticks for piece in pieces[:top] + pieces[-len(climb):])
     stairs.border[1] = stairs.border[0] - 1
-    assert not library().planner_climb(ctypes.byref(plan), ctypes.byref(stairs), 1 << 16) and plan.cause == 5
+    assert not library().planner_stepped_move(ctypes.byref(plan), ctypes.byref(stairs), 1 << 16) and plan.cause == 5

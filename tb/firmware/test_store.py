@@ -5,7 +5,7 @@ import random
 import pytest
 
 from tb.bench import seed
-from tb.firmware.station import SETTING, TURN, Eeprom, Station, ms
+from twin.compiled.station import SETTING, TURN, Eeprom, Station, ms
 
 EVENLY = [n * TURN // 36 for n in range(36)]
 
@@ -21,7 +21,7 @@ def test_a_program_is_read_back_as_written_and_after_a_power_cut():
     assert station.load(EVENLY) == "ok" and station.program() == EVENLY
     station.power_cut()
     station.ready()
-    assert station.program() == EVENLY and station.ask("job_program")["generation"] == 1
+    assert station.program() == EVENLY and station.ask("job_stations")["generation"] == 1
 
 
 def test_each_new_program_goes_over_the_older_copy():
@@ -64,11 +64,11 @@ def test_an_angle_that_cannot_be_is_named_and_not_taken(angles, cause):
 def test_what_is_no_whole_program_is_refused():
     station = powered()
     assert station.request("job_save")[0] == "no_stations"
-    assert station.request("job_add", station=0, angle=0)[0] == "program_incomplete"
+    assert station.request("job_add", station=0, angle=0)[0] == "job_incomplete"
     station.ask("job_begin")
     assert station.request("job_save")[0] == "no_stations"
-    assert station.request("job_add", station=1, angle=0)[0] == "program_incomplete"
-    assert station.ask("job_program")["stations"] == 0
+    assert station.request("job_add", station=1, angle=0)[0] == "job_incomplete"
+    assert station.ask("job_stations")["stations"] == 0
     assert station.request("job_angle", station=0)[0] == "out_of_range"
 
 
@@ -81,10 +81,10 @@ def test_settings_are_kept_with_the_program():
     assert [station.ask("get_setting", setting=SETTING[name])["value"] for name in ("job_cut_limit", "peer_mode")] == [77, 2]
 
 
-def test_a_blank_eeprom_has_no_program():
+def test_a_blank_eeprom_has_no_job():
     station = powered()
-    assert station.ask("job_program") == {"writing": 0, "ended": 43, "generation": 0, "stations": 0, "journal": 0}
-    assert station.do("start") == "no_program"
+    assert station.ask("job_stations") == {"writing": 0, "ended": 43, "generation": 0, "stations": 0, "journal": 0}
+    assert station.do("start") == "no_job"
 
 
 @pytest.mark.parametrize("copies", [1, 2])
@@ -96,20 +96,20 @@ def test_a_damaged_copy_is_told_and_the_other_one_is_in_force(copies):
         station.eeprom.memory[at] ^= 4
     station.power_cut()
     job = station.ready()
-    assert "copy_torn" in job["flags"]
+    assert "copy_damaged" in job["flags"]
     if copies == 1:
         assert station.program() == [1, 2, 3]
-        assert station.load([7]) == "ok" and "copy_torn" not in station.job()["flags"]
+        assert station.load([7]) == "ok" and "copy_damaged" not in station.job()["flags"]
     else:
-        assert station.program() == [] and station.do("start") == "program_torn"
+        assert station.program() == [] and station.do("start") == "job_damaged"
 
 
 def test_a_missing_eeprom_is_named_and_found_when_it_comes():
     station = Station(absent=["eeprom"])
     station.run(2000)
     job = station.job()
-    assert (job["state"], job["cause"]) == ("loading", "store_missing") and "store" not in job["flags"]
-    assert station.do("start") == "store_missing" and station.request("job_begin")[0] == "store_missing"
+    assert (job["state"], job["cause"]) == ("loading", "eeprom_missing") and "store" not in job["flags"]
+    assert station.do("start") == "eeprom_missing" and station.request("job_begin")[0] == "eeprom_missing"
     station.bus.devices[0x50] = station.eeprom
     station.ready()
     assert station.load(EVENLY) == "ok"
@@ -119,7 +119,7 @@ def test_a_stuck_bus_is_named_and_forgotten_when_it_is_free():
     station = Station()
     station.bus.stuck = True
     station.run(2000)
-    assert station.job()["cause"] == "store_missing"
+    assert station.job()["cause"] == "eeprom_missing"
     station.bus.stuck = False
     station.ready()
 
@@ -127,7 +127,7 @@ def test_a_stuck_bus_is_named_and_forgotten_when_it_is_free():
 def test_a_node_without_the_link_says_so():
     station = Station(built=0)
     station.run(500)
-    assert station.job()["cause"] == "store_missing"
+    assert station.job()["cause"] == "eeprom_missing"
 
 
 def test_a_worn_page_of_the_program_is_named_and_the_old_program_stays():
@@ -135,13 +135,13 @@ def test_a_worn_page_of_the_program_is_named_and_the_old_program_stays():
     station.load([1, 2, 3])
     station.eeprom.worn[2048 + 90] = 0xA5
     station.eeprom.worn[90] = 0xA5
-    assert station.load(EVENLY) == "store_failed" and station.program() == [1, 2, 3]
+    assert station.load(EVENLY) == "eeprom_failed" and station.program() == [1, 2, 3]
 
 
 def test_a_write_that_the_device_never_ends_is_named():
     station = powered()
     station.eeprom.WRITE = ms(10_000)
-    assert station.load(EVENLY) == "store_missing"
+    assert station.load(EVENLY) == "eeprom_missing"
 
 
 def test_a_program_cut_off_at_any_moment_is_the_old_one_or_the_new_one_whole():
@@ -175,20 +175,20 @@ def test_writes_are_spread_over_the_pages_of_the_journal():
     station.load([1])
     station.eeprom.stopped = lambda now: noticed(station.eeprom, now)
     for _ in range(130):
-        assert station.firmware.store_note(0, 1) == 0
+        assert station.firmware.journal_write(0, 1) == 0
         station.saved()
     assert len(pages) == 130 and set(pages) == set(range(64, 128)) and max(map(pages.count, pages)) == 3
     station.power_cut()
     station.ready()
-    assert station.ask("job_program")["journal"] == 130
+    assert station.ask("job_stations")["journal"] == 130
 
 
 def test_a_worn_page_of_the_journal_is_passed_over():
     station = powered()
     station.load([1])
     station.eeprom.worn[4096 + 64 * 1 + 3] = 0x5A          # where the first line goes
-    assert station.firmware.store_note(0, 1) == 0 and station.saved() == "ok"
-    assert station.ask("job_program")["journal"] == 2
+    assert station.firmware.journal_write(0, 1) == 0 and station.saved() == "ok"
+    assert station.ask("job_stations")["journal"] == 2
 
 
 def test_lines_behind_worn_pages_that_stay_blank_are_found():
@@ -197,10 +197,10 @@ def test_lines_behind_worn_pages_that_stay_blank_are_found():
     for page in (1, 2):                                    # as many as a line passes over
         station.eeprom.worn.update({4096 + 64 * page + n: 0xFF for n in range(64)})
     for line in (3, 4):
-        assert station.firmware.store_note(0, 1) == 0 and station.saved() == "ok"
+        assert station.firmware.journal_write(0, 1) == 0 and station.saved() == "ok"
         station.power_cut()
         station.ready()
-        assert station.ask("job_program")["journal"] == line
+        assert station.ask("job_stations")["journal"] == line
 
 
 def test_a_journal_that_was_hardly_written_is_not_read_to_its_end():
@@ -208,7 +208,7 @@ def test_a_journal_that_was_hardly_written_is_not_read_to_its_end():
     for lines in (1, 20):                                  # 6: the job was stopped
         station.load([1])
         for _ in range(lines):
-            assert station.firmware.store_note(0, 6) == 0 and station.saved() == "ok"
+            assert station.firmware.journal_write(0, 6) == 0 and station.saved() == "ok"
         station.power_cut()
         begun = station.clk
         station.ready()

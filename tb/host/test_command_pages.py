@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from moire import command_line
+from moire.cli import command_line
 from tables import commands as generator
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -16,7 +16,7 @@ def test_the_made_pages_are_fresh_and_there_is_one_for_each_command():
     assert generator.main(["--check"]) == 0
     names = set(generator.below(command_line.make_parser()))
     assert {path.stem for path in generator.PAGES.glob("*.md")} == names | {"README"}
-    assert names >= {"find", "status", "home", "move", "watch", "scope", "tune", "calibrate", "params", "fault", "reset", "selftest"}
+    assert names >= {"find", "status", "home", "move", "watch", "scope", "tune", "commission", "params", "fault", "reset", "selftest"}
 
 
 def test_a_stale_page_and_one_of_no_command_are_found_and_put_right(tmp_path, monkeypatch, capsys):

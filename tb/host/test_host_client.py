@@ -6,12 +6,13 @@ from fractions import Fraction
 
 import pytest
 
-from moire.client import CHOICES, Line
+from moire.analysis.tune import Tuning
+from moire.bus.client import CHOICES, Bus
 from moire.errors import (
-    LineError,
-    LineGarbled,
+    BusError,
+    BusGarbled,
     MotionFailed,
-    NobodyAnswers,
+    NoAnswer,
     OutOfRange,
     PortError,
     Refused,
@@ -19,18 +20,17 @@ from moire.errors import (
     UnknownName,
     WrongBuild,
 )
-from moire.line_tables import CAUSES, PARAMETERS, PROTOCOL_CRC
-from moire.registers import FIELDS, MAP_CRC
-from moire.tune import Tuning
+from moire.made.bus_tables import CAUSES, PARAMETERS, PROTOCOL_CRC
+from moire.made.registers import FIELDS, MAP_CRC
 from tb.bench import seed
-from tb.host.fake_node import ESTOP, LIMIT_LOW, FakeLine, FakeNode
+from tb.fakes.fake_node import ESTOP, LIMIT_LOW, FakeBus, FakeNode
 
 SEED = seed()
 
 
 def stage(**node):
-    fake = FakeLine(FakeNode(**node))
-    return fake, fake.nodes[0], Line(fake).axis(fake.nodes[0].address)
+    fake = FakeBus(FakeNode(**node))
+    return fake, fake.nodes[0], Bus(fake).axis(fake.nodes[0].address)
 
 
 def homed_stage():
@@ -43,37 +43,37 @@ def homed_stage():
 # ------------------------------------------------------------------ who is there
 
 def test_find_tells_every_node_of_any_build():
-    fake = FakeLine(FakeNode(3, axes=2), FakeNode(15, map_crc=5))
-    found = Line(fake).find()
+    fake = FakeBus(FakeNode(3, axes=2), FakeNode(15, map_crc=5))
+    found = Bus(fake).find()
     assert [(node.address, node.axes, node.matches) for node in found] == [(3, 2, True), (15, 1, False)]
-    assert Line(fake).find([1, 2]) == []
+    assert Bus(fake).find([1, 2]) == []
     assert fake.now() < 10
 
 
 def test_nobody_is_a_clear_exception():
-    with pytest.raises(NobodyAnswers, match="nobody answers at address 4, asked 5 times: check power"):
-        Line(FakeLine(FakeNode(1))).axis(4)
+    with pytest.raises(NoAnswer, match="nobody answers at address 4, asked 5 times: check power"):
+        Bus(FakeBus(FakeNode(1))).axis(4)
 
 
 @pytest.mark.parametrize("crc, value, words", [("map_crc", MAP_CRC, "register map"), ("protocol_crc", PROTOCOL_CRC, "protocol table")])
 def test_a_node_of_another_build_is_refused_with_both_numbers(crc, value, words):
     with pytest.raises(WrongBuild, match=f"{words}.*CRC-32 0000BEEF in the node, {value:08X} in this host") as caught:
-        Line(FakeLine(FakeNode(**{crc: 0xBEEF}))).axis()
+        Bus(FakeBus(FakeNode(**{crc: 0xBEEF}))).axis()
     assert (caught.value.node, caught.value.host) == (0xBEEF, value)
 
 
 def test_an_axis_that_is_not_there_is_refused():
     with pytest.raises(Refused, match="node 1 has no axis 1: it has only axis 0"):
-        Line(FakeLine(FakeNode())).axis(1, 1)
+        Bus(FakeBus(FakeNode())).axis(1, 1)
     with pytest.raises(Refused, match="axes 0 to 1"):
-        Line(FakeLine(FakeNode(axes=2))).axis(1, 2)
+        Bus(FakeBus(FakeNode(axes=2))).axis(1, 2)
 
 
 def test_a_garbled_line_is_told_from_a_silent_one():
-    fake = FakeLine(FakeNode())
+    fake = FakeBus(FakeNode())
     fake.from_node = lambda word: [word ^ 4]
-    with pytest.raises(LineGarbled, match="garbled, tried 5 times: 65 came instead of 61"):
-        Line(fake).axis()
+    with pytest.raises(BusGarbled, match="garbled, tried 5 times: 65 came instead of 61"):
+        Bus(fake).axis()
 
 
 # ------------------------------------------------------------------ real units
@@ -100,9 +100,9 @@ def test_status_is_in_real_units():
 
 
 def test_the_period_is_read_from_the_node():
-    fake = FakeLine(FakeNode())
+    fake = FakeBus(FakeNode())
     fake.nodes[0].axes[0].parameters[1] = 4_000_000
-    axis = Line(fake).axis()
+    axis = Bus(fake).axis()
     assert axis.period_nm == 4000 and axis.to_nm(65536) == 4000 and axis.to_counts(-6000) == -98304
 
 
@@ -129,8 +129,8 @@ def test_registers_are_read_by_name_and_wide_ones_low_word_first():
     assert axis.node.read_named("axis.control") == {"enable": 1, "closed_loop": 0, "homing": 1, "fine": 0}
     with pytest.raises(UnknownName, match="there is no register 'axis.speed': known are node.map_crc"):
         axis.node.read_named("axis.speed")
-    with pytest.raises(OutOfRange, match="line.transmit can only be written"):
-        axis.node.read_named("line.transmit")
+    with pytest.raises(OutOfRange, match="bus.transmit can only be written"):
+        axis.node.read_named("bus.transmit")
 
 
 # ------------------------------------------------------------------ motion
@@ -183,10 +183,10 @@ def test_every_cause_of_the_table_becomes_a_refusal_with_its_words():
 
 
 def test_hardware_and_firmware_that_do_not_fit_are_refused_in_words():
-    fake = FakeLine(FakeNode())
+    fake = FakeBus(FakeNode())
     fake.nodes[0].wrong_map = True
     with pytest.raises(Refused, match="register maps differ"):
-        Line(fake).axis()
+        Bus(fake).axis()
 
 
 def test_a_fault_is_told_in_words_until_it_is_reset():
@@ -262,7 +262,7 @@ def test_ctrl_c_in_the_middle_of_an_exchange_stops_the_axis_too():
         with pytest.raises(KeyboardInterrupt):
             axis.move(mm=10)
         assert node.axes[0].kind is None, place
-        assert axis.move(mm=1).position_nm == 1_000_000            # and the line is in order again
+        assert axis.move(mm=1).position_nm == 1_000_000            # and the bus is in order again
 
 
 def test_an_axis_that_cannot_be_told_to_stop_is_said():
@@ -272,7 +272,7 @@ def test_an_axis_that_cannot_be_told_to_stop_is_said():
         fake.to_node = lambda word: []
         raise KeyboardInterrupt
 
-    with pytest.raises(LineError, match="axis 0 of node 1 could not be told to stop, its watchdog has to: nobody answers"):
+    with pytest.raises(BusError, match="axis 0 of node 1 could not be told to stop, its watchdog has to: nobody answers"):
         axis.move(mm=10, progress=cut_and_interrupt)
 
 
@@ -281,7 +281,7 @@ def test_waiting_talks_often_enough_for_the_watchdog():
     times = []
     node.do_status = lambda inside, told=node.do_status: times.append(fake.now()) or told(inside)
     began = fake.now()
-    axis.let_pass(1.0)
+    axis.dwell(1.0)
     assert 1.0 <= fake.now() - began < 1.2
     assert max(b - a for a, b in zip(times, times[1:])) < 0.1
 
@@ -290,8 +290,8 @@ def test_waiting_talks_often_enough_for_the_watchdog():
 
 def two_axes():
     """A node with both axes homed."""
-    fake = FakeLine(FakeNode(axes=2))
-    node = Line(fake).node(1)
+    fake = FakeBus(FakeNode(axes=2))
+    node = Bus(fake).node(1)
     for number in (0, 1):
         node.axis(number).enable()
         node.axis(number).home()
@@ -310,71 +310,71 @@ def test_prepared_axes_begin_together_and_end_one_after_the_other():
 
 
 def two_nodes():
-    fake = FakeLine(FakeNode(1), FakeNode(2, axes=2))
-    line = Line(fake)
-    for axis in (line.axis(1), line.axis(2), line.axis(2, 1)):
+    fake = FakeBus(FakeNode(1), FakeNode(2, axes=2))
+    bus = Bus(fake)
+    for axis in (bus.axis(1), bus.axis(2), bus.axis(2, 1)):
         axis.enable()
         axis.home()
-    return fake, line
+    return fake, bus
 
 
 def test_axes_of_two_nodes_begin_at_one_mark():
-    fake, line = two_nodes()
-    chosen = [line.axis(1), line.axis(2, 1)]
+    fake, bus = two_nodes()
+    chosen = [bus.axis(1), bus.axis(2, 1)]
     for axis in chosen:
         axis.prepare(mm=1)
     seen = []
-    ended = line.start(*chosen, progress=lambda status: seen.append([axis.kind for node in fake.nodes for axis in node.axes]))
+    ended = bus.start(*chosen, progress=lambda status: seen.append([axis.kind for node in fake.nodes for axis in node.axes]))
     assert seen[0][0] == seen[0][2] == "moving" != seen[0][1] and [round(status.position_nm) for status in ended] == [1_000_000] * 2
-    assert [node.counters["marks"] for node in fake.nodes] == [1, 1]
+    assert [node.counters["syncs"] for node in fake.nodes] == [1, 1]
 
 
 def test_none_of_two_nodes_starts_if_one_was_not_prepared():
-    fake, line = two_nodes()
-    line.axis(1).prepare(mm=1)
+    fake, bus = two_nodes()
+    bus.axis(1).prepare(mm=1)
     with pytest.raises(Refused, match="the axis has no motion prepared"):
-        line.start(line.axis(1), line.axis(2))
-    line.mark()
+        bus.start(bus.axis(1), bus.axis(2))
+    bus.sync()
     assert fake.nodes[0].axes[0].kind == "prepared"
 
 
 def test_a_node_that_does_not_hear_the_mark_is_named_and_the_others_are_stopped():
-    fake, line = two_nodes()
-    for axis in (line.axis(1), line.axis(2)):
+    fake, bus = two_nodes()
+    for axis in (bus.axis(1), bus.axis(2)):
         axis.prepare(mm=1)
     deaf, hears = fake.nodes[1], fake.nodes[1].hear
     deaf.hear = lambda word: [] if deaf.marked and word == 0x120 else hears(word)
-    with pytest.raises(LineError, match="the node did not hear the mark"):
-        line.start(line.axis(1), line.axis(2))
+    with pytest.raises(BusError, match="the node did not hear the mark"):
+        bus.start(bus.axis(1), bus.axis(2))
     fake.wait(1)
-    assert line.axis(1).status().ended == "stopped" and not deaf.marked
+    assert bus.axis(1).status().ended == "stopped" and not deaf.marked
 
 
 def test_another_baud_rate_is_that_of_all_nodes_or_of_none():
-    fake, line = two_nodes()
-    line.set_baud(1_000_000, [1, 2])
-    assert line.baud_changed and fake.character_s == pytest.approx(11e-6)
-    line.first_baud()
-    assert not line.baud_changed and fake.character_s == pytest.approx(11 / 115_200)
+    fake, bus = two_nodes()
+    bus.set_baud(1_000_000, [1, 2])
+    assert bus.baud_changed and fake.character_s == pytest.approx(11e-6)
+    bus.first_baud()
+    assert not bus.baud_changed and fake.character_s == pytest.approx(11 / 115_200)
     with pytest.raises(Refused, match="set_baud"):
-        line.set_baud(5_000_000, [1, 2])
-    with pytest.raises(NobodyAnswers):
-        line.set_baud(1_000_000, [1, 3])
+        bus.set_baud(5_000_000, [1, 2])
+    with pytest.raises(NoAnswer):
+        bus.set_baud(1_000_000, [1, 3])
     assert fake.character_s == pytest.approx(11 / 115_200)
 
 
 @pytest.mark.parametrize("rate", [115_200, 1_000_000, 9_600])
 def test_nodes_at_any_usual_baud_rate_are_found_and_the_line_stays_there(rate):
-    fake, line = two_nodes()
+    fake, bus = two_nodes()
     for node in fake.nodes:
         node.baud = rate
-    found, baud = line.find_baud()
+    found, baud = bus.find_baud()
     assert [identity.address for identity in found] == [1, 2] and baud == rate
-    assert line.axis(2).status().state == "holding"
+    assert bus.axis(2).status().state == "holding"
 
 
 def test_a_rate_that_the_port_cannot_do_is_passed_over_and_a_port_that_is_gone_is_not():
-    fake, line = two_nodes()
+    fake, bus = two_nodes()
     fake.nodes[0].baud, able, set_baud = 9_600, {115_200, 9_600}, fake.set_baud
 
     def choosy(baud):
@@ -382,34 +382,34 @@ def test_a_rate_that_the_port_cannot_do_is_passed_over_and_a_port_that_is_gone_i
             raise PortError("the port COM7 failed")
         set_baud(baud)
     fake.nodes[1].baud, fake.set_baud = 9_600, choosy
-    assert line.find_baud()[1] == 9_600
+    assert bus.find_baud()[1] == 9_600
     able.clear()
     with pytest.raises(PortError, match="COM7"):
-        line.find_baud()
+        bus.find_baud()
 
 
 def test_nobody_at_any_rate_leaves_the_first_one_and_what_was_garbled_is_said():
-    fake, line = two_nodes()
-    assert line.find_baud([5], rates=(9_600,)) == ([], 115_200) and fake.baud == 115_200
+    fake, bus = two_nodes()
+    assert bus.find_baud([5], rates=(9_600,)) == ([], 115_200) and fake.baud == 115_200
     fake.from_node = lambda word: [word ^ 1]
-    with pytest.raises(LineGarbled):
-        line.find_baud(rates=(9_600,))
+    with pytest.raises(BusGarbled):
+        bus.find_baud(rates=(9_600,))
 
 
 def test_find_tells_two_nodes_with_one_address_that_identify_themselves_alike():
-    fake = FakeLine(FakeNode(), FakeNode())
+    fake = FakeBus(FakeNode(), FakeNode())
     fake.wired_and = True
-    assert [identity.address for identity in Line(fake).find()] == [1]       # to the very clk the same: nothing could tell
+    assert [identity.address for identity in Bus(fake).find()] == [1]       # to the very clk the same: nothing could tell
     fake.nodes[1].powered_up = 0.3
-    with pytest.raises(LineGarbled, match="two nodes with the address 1"):
-        Line(fake).find()
+    with pytest.raises(BusGarbled, match="two nodes with the address 1"):
+        Bus(fake).find()
 
 
 def test_what_needs_the_own_line_is_refused_through_a_door():
-    fake, line = two_nodes()
+    fake, bus = two_nodes()
     fake.handshake = False
-    for action in (line.mark, lambda: line.set_baud(9600, [1]), line.find_baud, lambda: line.start(line.axis(1))):
-        with pytest.raises(LineError, match="the nodes' own line"):
+    for action in (bus.sync, lambda: bus.set_baud(9600, [1]), bus.find_baud, lambda: bus.start(bus.axis(1))):
+        with pytest.raises(BusError, match="the nodes' own line"):
             action()
 
 
@@ -466,7 +466,7 @@ def test_pause_stands_and_resume_goes_on_at_the_override_before():
 def test_resume_of_what_another_program_paused_is_full_speed():
     fake, _, axis = homed_stage()
     axis.pause()
-    assert Line(fake).axis(1).resume() == 1
+    assert Bus(fake).axis(1).resume() == 1
 
 
 @pytest.mark.parametrize("share", ["120%", "-1%", 1.5, "fast", "50 mm"])
@@ -501,7 +501,7 @@ def test_the_drive_is_told_in_words():
     _, node, axis = homed_stage()
     node.registers.update({0x1400: 1 | 0b1111 << 2, 0x1420: -7 & 0xFFFFFFFF, 0x143C: -16384 & 0xFFFF})
     drive = axis.drive()
-    assert (drive.kind, drive.built, drive.steps, drive.fine_command) == ("steps", ("bridge", "steps", "converter", "fine"), -7, -0.5)
+    assert (drive.kind, drive.built, drive.steps, drive.fine_command) == ("steps", ("bridge", "steps", "dac", "fine"), -7, -0.5)
     assert drive.override == 1
 
 
@@ -517,7 +517,7 @@ def test_a_parameter_that_is_a_choice_takes_and_tells_its_words():
             assert axis.get_parameter(name).written() == word
         with pytest.raises(OutOfRange, match=f"{name} is no 'sideways': allowed are {words[0]}, "):
             axis.set_parameter(name, "sideways")
-    assert axis.set_parameter("override", "25%").value == Fraction(1, 4)
+    assert axis.set_parameter("feed_override", "25%").value == Fraction(1, 4)
 
 
 def test_a_tuning_is_written_gain_by_gain_and_filter_by_filter():

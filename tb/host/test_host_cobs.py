@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from moire import cobs
-from moire.protocol import FROM_NODE, TO_NODE, frame
+from moire.bus import cobs
+from moire.bus.protocol import FROM_NODE, TO_NODE, frame
 
 SEED = int(os.environ.get("SEED") or 1)
 BODY = b"\x07\x03\x00\x01"

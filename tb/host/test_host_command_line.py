@@ -3,28 +3,29 @@
 import io
 import json
 import sys
-from types import SimpleNamespace
 
 import pytest
 
-import experiments
-from moire import command_line, tune
-from moire.command_twin import MACHINES
+from experiments import machines
+from moire.analysis import tune
+from moire.cli import command_line
+from moire.cli.twin import MACHINES
 from moire.errors import PortError
-from moire.line_tables import PARAMETERS
-from tb.host.fake_node import CAUSE, ESTOP, FakeLine, FakeNode
+from moire.made.bus_tables import PARAMETERS
+from tb.fakes.fake_node import CAUSE, ESTOP, FakeBus, FakeNode
+from twin import BuildError
 
 
 class Call:
-    """One call of `moire` against a fake line."""
+    """One call of `moire` against a fake bus."""
 
-    def __init__(self, text, *nodes, line=None):
-        self.line = line or FakeLine(*(nodes or [FakeNode()]))
+    def __init__(self, text, *nodes, bus=None):
+        self.bus = bus or FakeBus(*(nodes or [FakeNode()]))
         self.options, out, err = None, io.StringIO(), io.StringIO()
 
         def open_transport(options):
             self.options = options
-            return self.line
+            return self.bus
         arguments = text.split() if isinstance(text, str) else text
         self.code = command_line.main(arguments, open_transport, out, err)
         self.out, self.err = out.getvalue(), err.getvalue()
@@ -48,7 +49,7 @@ def test_home_move_status_in_one_call_and_the_drive_is_off_at_its_end():
     assert call.code == 0 and call.err == ""
     assert "at 1.000000 mm, error 0.0 nm" in call.out
     assert "holding position, zero known\n  position  0.800000 mm   160000 counts" in call.out
-    assert not node.axes[0].enabled and node.axes[0].faults == 0 and call.line.closed
+    assert not node.axes[0].enabled and node.axes[0].faults == 0 and call.bus.closed
 
 
 def test_a_drive_that_was_on_before_is_left_to_its_owner():
@@ -91,7 +92,7 @@ def test_find_tries_the_usual_baud_rates_and_says_which_it_is():
 
 def test_enable_wait_stop_reset_encoder_counters():
     call = Call("enable -- wait 0.5s -- stop -- disable -- reset -- encoder -- counters")
-    assert call.code == 0 and call.line.clock > 0.5
+    assert call.code == 0 and call.bus.clock > 0.5
     assert "drive on" in call.out and "no fault is latched" in call.out
     assert "margin 50 %" in call.out and "frames_good" in call.out and "no_answer" in call.out
 
@@ -109,7 +110,7 @@ def test_a_node_without_sine_and_cosine_says_so():
 def test_registers_by_address_and_by_name():
     node = FakeNode()
     node.registers = {0x110: 258, 0x400: 5}
-    call = Call("register 0x110 272 line.frames_good axis.control", node)
+    call = Call("register 0x110 272 bus.frames_good axis.control", node)
     assert call.code == 0
     assert "0x110 = 0x00000102 258\n272 = 0x00000102 258\nline.frames_good: value = 258\naxis.control: enable = 1" in call.out
     assert "axis.position" in Call("register").out
@@ -334,15 +335,15 @@ def test_a_motion_that_ends_badly_is_exit_code_1():
 def test_silence_and_noise_are_exit_code_3():
     assert "nobody answers at address 5, asked 5 times" in sentence(Call("status --address 5"), 3)
     assert "nobody answers at the addresses 3, 4" in sentence(Call("find 3 4"), 3)
-    line = FakeLine(FakeNode())
-    line.from_node = lambda word: [word ^ 1]
-    assert "garbled" in sentence(Call("status", line=line), 3)
+    bus = FakeBus(FakeNode())
+    bus.from_node = lambda word: [word ^ 1]
+    assert "garbled" in sentence(Call("status", bus=bus), 3)
 
 
 def test_two_nodes_with_one_address_are_exit_code_3():
-    line = FakeLine(FakeNode(), FakeNode())
-    line.wired_and, line.nodes[1].powered_up = True, 0.3
-    assert "two nodes with the address 1" in sentence(Call("find", line=line), 3)
+    bus = FakeBus(FakeNode(), FakeNode())
+    bus.wired_and, bus.nodes[1].powered_up = True, 0.3
+    assert "two nodes with the address 1" in sentence(Call("find", bus=bus), 3)
 
 
 def test_ports_are_exit_code_4(monkeypatch):
@@ -354,23 +355,18 @@ def test_ports_are_exit_code_4(monkeypatch):
     assert command_line.main(["status"], err=err) == 4 and err.getvalue() == "moire: there is no port /dev/no_such_port\n"
 
 
-def test_a_twin_that_is_not_there_is_exit_code_4(monkeypatch):
-    monkeypatch.setitem(sys.modules, "twin", None)
+def test_without_a_checkout_the_port_twin_says_what_to_do(monkeypatch):
+    monkeypatch.setattr("moire.cli.twin.entry_points", lambda **_: ())
     err = io.StringIO()
     assert command_line.main(["--port", "twin", "status"], err=err) == 4
-    assert err.getvalue().startswith("moire: the simulated machine is not here: use the checkout of Moire")
+    assert err.getvalue() == ("moire: the simulated machine needs a checkout of Moire: run `make demo` there and use its "
+                              "build/venv/bin/moire\n")
 
 
 def test_a_twin_that_does_not_build_is_exit_code_4(monkeypatch):
-    class Broken:
-        BuildError, TwinTransport, WITH_SEGMENTS = RuntimeError, None, {}
-
     def broken(_):
-        raise RuntimeError("g++ is missing")
-    monkeypatch.setitem(sys.modules, "twin", Broken)
-    machines = SimpleNamespace(MACHINES={"s0": broken})
-    monkeypatch.setitem(sys.modules, "experiments.machines", machines)
-    monkeypatch.setattr(experiments, "machines", machines, raising=False)       # there once it was imported
+        raise BuildError("g++ is missing")
+    monkeypatch.setitem(machines.MACHINES, "s0", broken)
     err = io.StringIO()
     assert command_line.main(["--port", "twin", "status"], err=err) == 4
     assert err.getvalue() == "moire: the simulated machine cannot be built: g++ is missing\n"
@@ -390,26 +386,26 @@ def test_another_build_is_exit_code_5():
 
 def test_ctrl_c_stops_the_axis_and_is_exit_code_130():
     node = FakeNode()
-    line = FakeLine(node)
+    bus = FakeBus(node)
 
     def interrupt():
         raise KeyboardInterrupt
-    line.at.append((0.5, interrupt))
-    call = Call("home", line=line)
+    bus.at.append((0.5, interrupt))
+    call = Call("home", bus=bus)
     assert "interrupted; what moved was stopped under control" in sentence(call, 130)
     assert node.axes[0].ended == "stopped"
-    assert "stop" in node.executed and node.axes[0].kind is None and not node.axes[0].enabled and line.closed
+    assert "stop" in node.executed and node.axes[0].kind is None and not node.axes[0].enabled and bus.closed
 
 
 def test_ctrl_c_in_another_command_stops_what_moves_too():
     node = FakeNode()
     node.axes[0].homed = True
-    line = FakeLine(node)
+    bus = FakeBus(node)
 
     def interrupt():
         raise KeyboardInterrupt
-    line.at.append((0.5, interrupt))
-    assert Call("move 100mm --no-wait -- watch --json", line=line).told[-1]["exit_code"] == 130
+    bus.at.append((0.5, interrupt))
+    assert Call("move 100mm --no-wait -- watch --json", bus=bus).told[-1]["exit_code"] == 130
     assert node.executed[-1] == "enable" and "stop" in node.executed and node.axes[0].ended == "stopped"
     assert node.axes[0].target != 100_000_000 * 65536 // 800
 
@@ -514,11 +510,11 @@ def test_a_waiting_shell_talks_on_a_line_whose_time_runs(monkeypatch):
             yield "quit\n"
     import threading
     node = FakeNode()
-    line = FakeLine(node)
-    line.time_stands = False
+    bus = FakeBus(node)
+    bus.time_is_stopped = False
     monkeypatch.setattr(sys, "stdin", Keyboard())
-    monkeypatch.setattr(command_line, "KEEP_COMPANY_S", 0.01)
-    assert Call("shell", line=line).code == 0 and node.executed.count("status") >= 2
+    monkeypatch.setattr(command_line, "KEEP_ALIVE_S", 0.01)
+    assert Call("shell", bus=bus).code == 0 and node.executed.count("status") >= 2
 
 
 def test_a_port_that_does_not_open_ends_the_shell_at_once(monkeypatch):

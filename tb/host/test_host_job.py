@@ -5,12 +5,12 @@ import json
 
 import pytest
 
-from moire import command_line
-from moire.client import Line
+from moire.bus.client import Bus
+from moire.cli import command_line
+from moire.cli.job import Job, equal_parts, read_stations
 from moire.errors import BadFile, OutOfRange, Refused
-from moire.job import Job, equal_parts, read_stations
-from tb.firmware.machine_line import MachineLine
-from tb.firmware.station import OPERATION, Station, SubNode
+from tb.fakes.firmware_bus import FakeNodeBus
+from twin.compiled.station import OPERATION, Station, SubNode
 
 ADDRESS = 2
 
@@ -20,12 +20,12 @@ class Workshop:
         self.station = Station(**{"absent": ("keypad", "display"), **options})
         self.station.sub_node = SubNode()
         self.station.setting(peer_mode=2)
-        self.job = Job(Line(MachineLine(self.station)).node(ADDRESS))
+        self.job = Job(Bus(FakeNodeBus(self.station)).node(ADDRESS))
 
     def call(self, text):
         """Exit code, what was told, what was complained."""
         out, err = io.StringIO(), io.StringIO()
-        code = command_line.main(["--address", str(ADDRESS), *text.split()], lambda options: MachineLine(self.station), out, err)
+        code = command_line.main(["--address", str(ADDRESS), *text.split()], lambda options: FakeNodeBus(self.station), out, err)
         return code, out.getvalue(), err.getvalue()
 
 
@@ -37,7 +37,7 @@ def test_a_program_is_loaded_read_and_cut():
     states = []
     state = workshop.job.wait(progress=lambda state: states.append(state.state))
     assert state.state == "finished" and state.words == "all cut, station 3 of 3" and len(workshop.station.edm.cuts) == 3
-    assert {"indexing", "cutting"} <= set(states) and workshop.station.sub_node.angles == [0, 540_000, 720_000]
+    assert {"turning", "cutting"} <= set(states) and workshop.station.sub_node.angles == [0, 540_000, 720_000]
 
 
 def test_a_turn_is_divided_to_the_nearest_count():

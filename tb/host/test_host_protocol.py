@@ -4,12 +4,21 @@ import random
 
 import pytest
 
-from moire.client import Line
-from moire.errors import LineError, LineGarbled, NobodyAnswers, OutOfRange
-from moire.line_tables import LONGEST_BODY, OPERATIONS
-from moire.protocol import Exchange, State, Timing, command_byte, frame, layout, parse_reply, request_body
+from moire.bus.client import Bus
+from moire.bus.protocol import (
+    Exchange,
+    State,
+    Timing,
+    command_byte,
+    frame,
+    layout,
+    parse_reply,
+    request_body,
+)
+from moire.errors import BusError, BusGarbled, NoAnswer, OutOfRange
+from moire.made.bus_tables import LONGEST_BODY, OPERATIONS
 from tb.bench import seed
-from tb.host.fake_node import FakeLine, FakeNode, spoil
+from tb.fakes.fake_node import FakeBus, FakeNode, spoil
 
 SEED = seed()
 ENABLE = request_body("enable", 7, axis=0, on=1)
@@ -84,7 +93,7 @@ def test_silence_is_nobody_answers_after_all_tries():
         exchange.words_to_send()
         exchange.silence()
     assert exchange.attempts == 3 and exchange.events == ["no answer"] * 3
-    with pytest.raises(NobodyAnswers, match="nobody answers at address 9, asked 3 times") as caught:
+    with pytest.raises(NoAnswer, match="nobody answers at address 9, asked 3 times") as caught:
         exchange.result()
     assert caught.value.address == 9
 
@@ -103,7 +112,7 @@ def test_each_garbled_answer_is_named(words, reason):
     exchange = Exchange(1, ENABLE, tries=1)
     exchange.feed(words)
     assert exchange.state == State.FAILED
-    with pytest.raises(LineGarbled, match=reason):
+    with pytest.raises(BusGarbled, match=reason):
         exchange.result()
 
 
@@ -111,7 +120,7 @@ def test_an_answer_that_breaks_off_is_garbled_and_not_nobody():
     exchange = Exchange(1, ENABLE, tries=1)
     exchange.feed([0x61, 0x51, 3, 7])
     exchange.silence()
-    with pytest.raises(LineGarbled, match="broke off"):
+    with pytest.raises(BusGarbled, match="broke off"):
         exchange.result()
 
 
@@ -125,7 +134,7 @@ def test_an_old_reply_repeats_the_same_words_at_once():
     exchange.feed([0x61])
     assert exchange.words_to_send() == first
     exchange.feed(reply_words(sequence=7, operation=2, cause=3))         # right number, another operation: old too
-    with pytest.raises(LineGarbled, match="never received the request whole"):
+    with pytest.raises(BusGarbled, match="never received the request whole"):
         exchange.result()
 
 
@@ -145,7 +154,7 @@ def test_a_line_that_never_falls_silent_is_given_up():
     for _ in range(3 * Exchange.LONGEST_NOISE):
         exchange.words_to_send()
         exchange.feed([0xAA])
-    with pytest.raises(LineGarbled):
+    with pytest.raises(BusGarbled):
         exchange.result()
 
 
@@ -164,15 +173,15 @@ def test_a_lost_word_at_any_place_is_repeated_and_acted_on_once():
     for to_node in (True, False):
         for place in range(60):
             node = FakeNode()
-            fake, seen = FakeLine(node), []
+            fake, seen = FakeBus(node), []
 
             def lose(word, place=place, seen=seen):
                 seen.append(word)
                 return [] if len(seen) == place + 1 else [word]
             setattr(fake, "to_node" if to_node else "from_node", lose)
-            line = Line(fake, random_source=random.Random(1))
-            line.request(1, "enable", axis=0, on=1)
-            line.request(1, "set_parameter", axis=0, parameter=15, value=4)
+            bus = Bus(fake, random_source=random.Random(1))
+            bus.request(1, "enable", axis=0, on=1)
+            bus.request(1, "set_parameter", axis=0, parameter=15, value=4)
             assert node.executed == ["enable", "set_parameter"], place
             assert node.axes[0].writes == ["kp"]
             if place >= len(seen):
@@ -182,13 +191,13 @@ def test_a_lost_word_at_any_place_is_repeated_and_acted_on_once():
 
 def test_a_repeated_request_is_counted_by_node_and_host():
     node = FakeNode()
-    fake = FakeLine(node)
+    fake = FakeBus(node)
     dropped = iter([True])
     fake.from_node = lambda word: [] if word == 0x51 and next(dropped, False) else [word]
-    line = Line(fake)
-    line.request(1, "enable", axis=0, on=1)
+    bus = Bus(fake)
+    bus.request(1, "enable", axis=0, on=1)
     assert node.counters["repeated"] == 1 and node.executed == ["enable"]
-    assert line.statistics.repeats == 1 and line.statistics.garbled == 1
+    assert bus.statistics.repeats == 1 and bus.statistics.garbled == 1
 
 
 def test_any_noise_ends_in_the_right_reply_or_in_a_line_error():
@@ -197,38 +206,38 @@ def test_any_noise_ends_in_the_right_reply_or_in_a_line_error():
     done = failed = 0
     for _ in range(150):
         node = FakeNode()
-        fake = FakeLine(node)
+        fake = FakeBus(node)
         share = source.choice([0.001, 0.01, 0.05, 0.3])
         fake.to_node, fake.from_node = spoil(source, share), spoil(source, share)
-        line = Line(fake, random_source=source)
+        bus = Bus(fake, random_source=source)
         for _ in range(8):
             value = source.randrange(0, 16777216)
             before = len(node.axes[0].writes)
             try:
-                line.request(1, "set_parameter", axis=0, parameter=15, value=value)
+                bus.request(1, "set_parameter", axis=0, parameter=15, value=value)
                 assert node.axes[0].parameters[15] == value and len(node.axes[0].writes) == before + 1
                 done += 1
-            except LineError:
+            except BusError:
                 assert len(node.axes[0].writes) <= before + 1
                 failed += 1
         # when the noise is over the line works again
         fake.to_node = fake.from_node = lambda word: [word]
-        assert line.request(1, "get_parameter", axis=0, parameter=15)["value"] == node.axes[0].parameters[15]
+        assert bus.request(1, "get_parameter", axis=0, parameter=15)["value"] == node.axes[0].parameters[15]
     assert done > 300 and failed > 50
 
 
 def test_sequence_numbers_begin_at_random_and_wrap():
     node = FakeNode()
-    line = Line(FakeLine(node), random_source=random.Random(SEED))
+    bus = Bus(FakeBus(node), random_source=random.Random(SEED))
     numbers = []
     for _ in range(300):
-        line.request(1, "enable", axis=0, on=0)
+        bus.request(1, "enable", axis=0, on=0)
         numbers.append(node.last[0])
     assert all((b - a) % 256 == 1 for a, b in zip(numbers, numbers[1:])) and 0 in numbers
     assert node.counters["repeated"] == 0
     firsts = set()
     for number in range(20):
-        other = Line(FakeLine(node), random_source=random.Random(number))
+        other = Bus(FakeBus(node), random_source=random.Random(number))
         other.request(1, "enable", axis=0, on=0)
         firsts.add(node.last[0])
     assert len(firsts) > 10
@@ -236,14 +245,14 @@ def test_sequence_numbers_begin_at_random_and_wrap():
 
 def test_a_new_host_with_the_number_of_the_last_one_still_gets_fresh_answers():
     node = FakeNode()
-    fake = FakeLine(node)
+    fake = FakeBus(node)
 
     class Always5(random.Random):
         def randrange(self, *_):
             return 5
 
-    axis = Line(fake, random_source=Always5()).axis()
+    axis = Bus(fake, random_source=Always5()).axis()
     before = axis.status().position_nm
     node.axes[0].position += 65536
-    axis = Line(fake, random_source=Always5()).axis()        # identify is the repetition, and its answer is the same anyway
+    axis = Bus(fake, random_source=Always5()).axis()        # identify is the repetition, and its answer is the same anyway
     assert axis.status().position_nm == pytest.approx(before + 800)

@@ -4,11 +4,11 @@ import json
 
 import pytest
 
-from moire import recording
-from moire.client import Line
+from moire.bus import recording
+from moire.bus.client import Bus
 from moire.errors import BadFile
-from moire.line_tables import PARAMETERS
-from tb.host.fake_node import ESTOP, FakeLine, FakeNode
+from moire.made.bus_tables import PARAMETERS
+from tb.fakes.fake_node import ESTOP, FakeBus, FakeNode
 from tb.host.test_host_command_line import Call, sentence
 
 
@@ -51,17 +51,17 @@ def test_a_record_is_told_in_words_without_a_port(tmp_path):
 
 
 def test_what_went_wrong_on_the_line_is_in_the_record(tmp_path):
-    line = FakeLine(FakeNode())
+    bus = FakeBus(FakeNode())
     broken = [True]
-    line.from_node = lambda word: [word ^ broken.pop()] if broken else [word]
+    bus.from_node = lambda word: [word ^ broken.pop()] if broken else [word]
     with open(tmp_path / "bad.jsonl", "w") as file:
-        Line(recording.Recorder(line, file)).identify(1)
+        Bus(recording.Recorder(bus, file)).identify(1)
     rows = recording.listing(recording.read((tmp_path / "bad.jsonl").read_text()))
     assert [row.strip() for row in rows if "no right" in row] == ["no right reply: 60"]
 
 
 def test_a_recorder_hides_nothing_of_its_transport():
-    class Deep(FakeLine):
+    class Deep(FakeBus):
         handshake, character_s = False, 0.125
 
         def reaches(self, address):
@@ -72,11 +72,11 @@ def test_a_recorder_hides_nothing_of_its_transport():
 
         def send_break(self):
             self.broken = True
-    line = recording.Recorder(Deep(), open("/dev/null", "w"))
-    assert (line.handshake, line.time_stands, line.character_s, line.reaches(3), line.reaches(4)) == (False, True, 0.125, True, False)
-    line.set_baud(4)
-    line.send_break()
-    assert line.character_s == 0.25 and line.transport.broken
+    bus = recording.Recorder(Deep(), open("/dev/null", "w"))
+    assert (bus.handshake, bus.time_is_stopped, bus.character_s, bus.reaches(3), bus.reaches(4)) == (False, True, 0.125, True, False)
+    bus.set_baud(4)
+    bus.send_break()
+    assert bus.character_s == 0.25 and bus.transport.broken
 
 
 def test_a_change_of_the_baud_rate_and_the_break_after_it_are_recorded_and_replayed(tmp_path):
@@ -97,17 +97,17 @@ def test_a_record_that_broke_off_at_another_baud_rate_leaves_the_nodes_at_the_fi
     file.write_text("\n".join(rows[:-2]))                # without the break and what follows it
     assert recording.last_baud(recording.read(file.read_text())) == 1_000_000
     call = Call(f"replay {file}")
-    assert call.code == 0 and call.line.nodes[0].baud == call.line.baud == 115200
+    assert call.code == 0 and call.bus.nodes[0].baud == call.bus.baud == 115200
 
 
 def test_a_record_with_another_baud_rate_is_not_replayed_through_a_door(tmp_path):
-    line = FakeLine(FakeNode())
-    line.handshake = False
-    assert "the nodes' own line" in sentence(Call(f"replay {recorded(tmp_path, 'baud 9600 1')}", line=line), 3)
+    bus = FakeBus(FakeNode())
+    bus.handshake = False
+    assert "the nodes' own line" in sentence(Call(f"replay {recorded(tmp_path, 'baud 9600 1')}", bus=bus), 3)
 
 
 @pytest.mark.parametrize("text", [
-    "", "{}", "no json", '{"record": "moire line", "version": 2, "protocol_crc": 0}',
+    "", "{}", "no json", '{"record": "moire bus", "version": 2, "protocol_crc": 0}',
     json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + '\n{"at": 1}',
     json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + '\n{"at": 1, "send": [512]}',
     json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + '\n{"at": 1, "receive": [1], "wanted": 1}',
@@ -116,7 +116,7 @@ def test_a_record_with_another_baud_rate_is_not_replayed_through_a_door(tmp_path
 ])
 def test_a_file_that_is_no_record_is_refused(tmp_path, text):
     (tmp_path / "no.jsonl").write_text(text)
-    assert "is no record of a line: make one with" in sentence(Call(f"replay {tmp_path / 'no.jsonl'}"), 2)
+    assert "is no record of a bus: make one with" in sentence(Call(f"replay {tmp_path / 'no.jsonl'}"), 2)
 
 
 def test_a_record_of_another_protocol_is_refused():
@@ -126,7 +126,7 @@ def test_a_record_of_another_protocol_is_refused():
 
 def test_a_record_that_cannot_be_written_is_one_sentence(tmp_path):
     call = Call(f"--record {tmp_path}/no/such.jsonl status")
-    assert "such.jsonl cannot be written" in sentence(call, 2) and call.line.closed
+    assert "such.jsonl cannot be written" in sentence(call, 2) and call.bus.closed
 
 
 # ------------------------------------------------------------------ look
@@ -211,11 +211,11 @@ def test_selftest_finds_and_names_what_is_wrong(spoil, name, said):
 
 
 def test_selftest_counts_what_is_wrong_on_the_line():
-    line, count = FakeLine(FakeNode()), [0]
+    bus, count = FakeBus(FakeNode()), [0]
 
     def every_hundredth(word):
         count[0] += 1
         return [word ^ 1] if count[0] % 100 == 0 and count[0] > 300 else [word]
-    line.to_node = every_hundredth
-    call = Call("selftest", line=line)
+    bus.to_node = every_hundredth
+    call = Call("selftest", bus=bus)
     assert "FAILED   line" in call.out and "frames_bad" in call.out and "repeats" in call.out

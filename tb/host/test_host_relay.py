@@ -8,12 +8,23 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from moire import command_relay
-from moire.calibration import fit, read_readings
-from moire.errors import BadFile, LineGarbled, NobodyAnswers, OutOfRange
-from moire.protocol import NINTH
-from moire.relay import COUNTS, FIRST, SECOND, Exchange, Relay, RelayRefused, Settings, identity_of, make_set, terms_of
-from moire.transport import Transport
+from moire.analysis.harmonic_fit import fit, read_readings
+from moire.bus.protocol import NINTH
+from moire.bus.transport import Transport
+from moire.cli import relay as command_relay
+from moire.cli.relay import (
+    COUNTS,
+    FIRST,
+    SECOND,
+    Exchange,
+    Relay,
+    RelayRefused,
+    Settings,
+    identity_of,
+    make_set,
+    terms_of,
+)
+from moire.errors import BadFile, BusGarbled, NoAnswer, OutOfRange
 from tb.bench import seed
 from tb.compensate.harmonic_map import exact, term_of
 from tb.relay import relay_set
@@ -24,7 +35,7 @@ from tb.serial.frame_check import FrameCheck
 K = 4
 SOME = [(3.0, 1.0), (0.5, -2.0)]
 LIMITS = [(dict(counts_per_turn=1608), "counts per turn"), (dict(counts_per_turn=2**25 + 1), "counts per turn"),
-          (dict(spacing=65536), "spacing"), (dict(hysteresis=1.0), "hysteresis"), (dict(filter_samples=256), "filter"),
+          (dict(minimum_edge_separation=65536), "minimum_edge_separation"), (dict(hysteresis=1.0), "hysteresis"), (dict(filter_samples=256), "filter"),
           (dict(index_gate_mask=4), "mask"), (dict(index_gate=-1), "gate")]
 
 
@@ -106,7 +117,7 @@ def noise(source, share):
 
 
 def test_a_set_is_that_of_the_model_of_the_hardware():
-    settings = Settings(40_000, spacing=7, hysteresis=0.125, filter_samples=3, index_low=True, index_gate_mask=2, index_gate=1)
+    settings = Settings(40_000, minimum_edge_separation=7, hysteresis=0.125, filter_samples=3, index_low=True, index_gate_mask=2, index_gate=1)
     words = [term_of(*term) for term in SOME] + [(0, 0)] * (K - len(SOME))
     assert make_set(SOME, settings, K) == relay_set.image(words, 40_000, 7, 0x2000, 3, 1, 2, 1)
 
@@ -201,7 +212,7 @@ def test_a_noisy_line_leads_to_the_same_set_or_to_an_error():
             relay.write(a_set())
             relay.save(a_set())
             done += 1
-        except (LineGarbled, NobodyAnswers):
+        except (BusGarbled, NoAnswer):
             continue
         assert transport.set.identity == identity_of(a_set()) and transport.chip.memory[FIRST:FIRST + len(a_set())] == a_set()
     assert done > 5
@@ -222,9 +233,9 @@ def test_a_repeated_request_is_not_acted_on_again():
 
 
 def test_nobody_answers_and_noise_are_told_apart():
-    with pytest.raises(NobodyAnswers):
+    with pytest.raises(NoAnswer):
         Relay(FakeRelay(spoil=lambda words: []))
-    with pytest.raises(LineGarbled, match="wrong CRC-32"):
+    with pytest.raises(BusGarbled, match="wrong CRC-32"):
         Relay(FakeRelay(spoil=lambda words: words if words[0] & NINTH else [*words[:5], words[5] ^ 1, *words[6:]]))
     with pytest.raises(OutOfRange, match="2 to 64 bytes"):
         Exchange(bytes(65))

@@ -10,7 +10,7 @@ import numpy
 import pytest
 from PIL import Image
 
-from moire import report
+from moire.analysis import report
 from moire.errors import BadFile, MoireError
 
 MOVES = [

@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from moire import rfc2217
+from moire.bus import rfc2217
 
 SEED = int(os.environ.get("SEED") or 1)
 IAC, SB, SE, COM_PORT = 0xFF, 0xFA, 0xF0, 44

@@ -5,17 +5,17 @@ import random
 
 import pytest
 
-from moire.client import Line
+from moire.bus.client import Bus
+from moire.cli.scope import NoRecord, Scope, excite, lsb
 from moire.errors import OutOfRange, Refused
-from moire.scope import NoRecord, Scope, excite, lsb
-from tb.host.fake_node import FakeLine, FakeNode
+from tb.fakes.fake_node import FakeBus, FakeNode
 from tb.host.test_host_command_line import Call, sentence
 
 PERIOD = 65536
 
 
 def axis_of(node):
-    return Line(FakeLine(node)).axis()
+    return Bus(FakeBus(node)).axis()
 
 
 def low(position):

@@ -5,10 +5,10 @@ from fractions import Fraction
 
 import pytest
 
-from moire.client import Line
+from moire.bus.client import Bus
+from moire.cli.segments import NotInForce, Segments, SegmentTable, read_table, text_of
 from moire.errors import BadFile, OutOfRange
-from moire.segments import NotInForce, Segments, SegmentTable, read_table, text_of
-from tb.host.fake_node import FakeLine, FakeNode
+from tb.fakes.fake_node import FakeBus, FakeNode
 from tb.host.test_host_command_line import Call, sentence
 
 GOOD = ["0, 0", "1, 100", "2, -50", "3, 20"]
@@ -22,7 +22,7 @@ def node_with_table():
 
 
 def axis_of(node):
-    return Line(FakeLine(node)).axis()
+    return Bus(FakeBus(node)).axis()
 
 
 @pytest.fixture

@@ -6,19 +6,19 @@ import os
 import pytest
 import serial
 
-from moire import transport
-from moire.client import Line
+from moire.bus import transport
+from moire.bus.client import Bus
+from moire.bus.protocol import ODD_ADDRESSES
+from moire.bus.transport import SerialBus
 from moire.errors import PortError
-from moire.protocol import ODD_ADDRESSES
-from moire.transport import SerialLine
-from tb.host.fake_node import FakeNode
+from tb.fakes.fake_node import FakeNode
 
 
 class FakePort:
     """Stands for serial.Serial: turns bytes and parity into words for a node, as the wire would."""
 
     def __init__(self, name="fake", mark=True, node=None, **settings):
-        self.settings, self.node, self.mark = settings, node or FakeNode(), mark
+        self.settings, self.node, self.sync = settings, node or FakeNode(), mark
         self.held, self.timeout, self.words, self.answers, self.is_open = "N", 0, [], bytearray(), True
 
     @property
@@ -27,7 +27,7 @@ class FakePort:
 
     @parity.setter
     def parity(self, value):
-        if value in "MS" and not self.mark:
+        if value in "MS" and not self.sync:
             raise ValueError(f"Invalid parity: {value!r}")
         self.held = value
 
@@ -65,13 +65,13 @@ def serial_line(parity="auto", **port):
     def open_port(name, **settings):
         made.append(FakePort(name, **port, **settings))
         return made[0]
-    return SerialLine("COM7", 1_000_000, parity, open_port), made[0]
+    return SerialBus("COM7", 1_000_000, parity, open_port), made[0]
 
 
 @pytest.mark.parametrize("mark, parity", [(True, "auto"), (True, "odd"), (False, "auto"), (False, "odd"), (True, "mark")])
 def test_an_exchange_has_the_ninth_bit_on_command_bytes_only(mark, parity):
     line, port = serial_line(parity, mark=mark, node=FakeNode(address=7))
-    assert Line(line).axis(address=7).status().state == "off"
+    assert Bus(line).axis(address=7).status().state == "off"
     assert [word for word in port.words if word >> 8] == [0x127, 0x117] * 3
     assert port.node.counters["frames_bad"] == 0 and port.node.counters["frames_good"] == 3
     assert port.settings["baudrate"] == 1_000_000 and port.settings["stopbits"] == 1
@@ -98,7 +98,7 @@ def test_mark_reaches_all_addresses_and_odd_parity_eight():
 
 def test_find_asks_only_whom_odd_parity_reaches():
     line, port = serial_line(mark=False, node=FakeNode(address=11))
-    client = Line(line)
+    client = Bus(line)
     client.FIND_ANSWER_S = 0.001
     assert [node.address for node in client.find()] == [11]
     assert {word & 15 for word in port.words if word >> 8} == set(ODD_ADDRESSES)
@@ -140,13 +140,13 @@ def test_a_port_that_does_not_open_says_why_in_one_sentence(error, sentence):
     def open_port(*_, **__):
         raise error
     with pytest.raises(PortError) as caught:
-        SerialLine("COM7", 1_000_000, open_port=open_port)
+        SerialBus("COM7", 1_000_000, open_port=open_port)
     assert str(caught.value).startswith(sentence) and "\n" not in str(caught.value)
 
 
 def test_a_missing_device_is_said_by_the_real_library_too():
     with pytest.raises(PortError, match="there is no port /dev/no_such_port"):
-        SerialLine("/dev/no_such_port")
+        SerialBus("/dev/no_such_port")
 
 
 def test_a_port_that_vanishes_is_a_port_error():
@@ -167,7 +167,7 @@ def test_a_port_that_drops_the_parity_bit_is_refused_and_not_trusted(parity, sai
     # what a pseudo terminal does
     near, far = os.openpty()
     with pytest.raises(PortError, match=said):
-        SerialLine(os.ttyname(far), parity=parity)
+        SerialBus(os.ttyname(far), parity=parity)
     os.close(near)
     os.close(far)
 
@@ -177,7 +177,7 @@ def test_a_port_in_use_is_said_by_the_real_library_too():
     near, far = os.openpty()
     with serial.Serial(os.ttyname(far), exclusive=True):
         with pytest.raises(PortError, match="is in use by another program"):
-            SerialLine(os.ttyname(far))
+            SerialBus(os.ttyname(far))
     os.close(near)
     os.close(far)
 

@@ -7,7 +7,7 @@ import numpy
 import pytest
 from PIL import Image
 
-from moire import tune
+from moire.analysis import tune
 from tb.control.biquad_cascade import BiquadCascade
 from tb.control.pid_servo import PidServo
 

@@ -11,27 +11,27 @@ def wrapped(phase):
 
 class FringeTracker:
     def __init__(self):
-        self.last, self.speed, self.foreseen, self.strayed, self.moved = None, 0, 0, False, 0
+        self.last, self.speed, self.predicted_step, self.outlier, self.moved = None, 0, 0, False, 0
 
     def follow(self, phase):
         """One phase; returns step, overspeed."""
         if self.last is None:
             self.last = phase
             return 0, 0
-        deviation = wrapped(phase - self.last - self.foreseen)
-        step, nearest = self.foreseen + deviation, wrapped(phase - self.last)
+        deviation = wrapped(phase - self.last - self.predicted_step)
+        step, nearest = self.predicted_step + deviation, wrapped(phase - self.last)
         fits, near = -PERIOD <= step < PERIOD, abs(deviation) < QUARTER
         self.last = phase
         if fits and near:
-            if not self.strayed:
+            if not self.outlier:
                 self.speed = step
-            self.foreseen, self.strayed = self.speed, False
+            self.predicted_step, self.outlier = self.speed, False
             return step, 0
-        if fits and not self.strayed:
-            self.foreseen, self.strayed = self.speed - deviation, True
+        if fits and not self.outlier:
+            self.predicted_step, self.outlier = self.speed - deviation, True
             return step, 1
-        self.foreseen = self.speed = 0
-        self.strayed = False
+        self.predicted_step = self.speed = 0
+        self.outlier = False
         return nearest, 1
 
     def step(self, valid, phase):

@@ -9,17 +9,17 @@ class Settings(NamedTuple):
     sin_offset: int = 0         # full scale 2^15
     cos_offset: int = 0
     gain: int = 1 << 16         # 1.0 = 2^16
-    shear: int = 0
+    quadrature_error: int = 0
 
 
-def held(leg):
-    return max(-32768, min(32767, leg))
+def held(channel):
+    return max(-32768, min(32767, channel))
 
 
 def corrected(sin, cos, settings, w=8):
     """(sin_out, cos_out) of a sample of w bits."""
-    sin_leg, cos_leg = (sin << 16 - w) - settings.sin_offset, (cos << 16 - w) - settings.cos_offset
-    return held(sin_leg * settings.gain + cos_leg * settings.shear + 65536 >> 17), held(cos_leg + 1 >> 1)
+    sin_channel, cos_channel = (sin << 16 - w) - settings.sin_offset, (cos << 16 - w) - settings.cos_offset
+    return held(sin_channel * settings.gain + cos_channel * settings.quadrature_error + 65536 >> 17), held(cos_channel + 1 >> 1)
 
 
 class SignalCorrection:

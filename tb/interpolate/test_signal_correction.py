@@ -11,7 +11,7 @@ from cocotb.triggers import FallingEdge
 from tb.bench import run, start
 from tb.interpolate.signal_correction import LATENCY, Settings, SignalCorrection, corrected
 
-IDLE = dict(valid=0, sin=0, cos=0, load=0, sin_offset=0, cos_offset=0, gain=0, shear=0)
+IDLE = dict(valid=0, sin=0, cos=0, load=0, sin_offset=0, cos_offset=0, gain=0, quadrature_error=0)
 
 
 async def begin(dut):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From converter words to position: the chain of grating.sv, nothing learned yet, driven with what a grating gives.
+"""From converter words to position: the chain of feedback_channel.sv, nothing learned yet, driven with what a grating gives.
 
 Every disturbance has a bound on the position error from theory, and every motion is held against it: the RTL on short
 motions, the models on long ones. One period is 0.8 um, as in S0.
@@ -20,7 +20,7 @@ from tb.position.unwrap import Unwrap
 PERIOD_NM = 800
 LATENCY = 22                                            # clk from a converter word to its position
 ARCTAN = arctan_rotation.quarter_bound(arctan_rotation.PIPELINED, 16)       # LSB of phase; a corrected leg is half of 16 bits large
-SETTINGS = dict(spike_step=0, spike_hold=0, load=0, sin_offset=0, cos_offset=0, gain=1 << 16, shear=0, enable=0, write=0, point=0, value=0,
+SETTINGS = dict(outlier_step=0, outlier_hold=0, load=0, sin_offset=0, cos_offset=0, gain=1 << 16, quadrature_error=0, enable=0, write=0, point=0, value=0,
                 swap=0, shift=0, shift_periods=0)
 AMPLITUDE = 0.84                                       # of full scale: room for what is added
 CLEAN = dict(offset=0.0, gain=0.0, phase=0.0, noise=0.0)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rtl/peripheral/ps2_inject_queue.sv does: outputs(injecting) are those in a clk, step(…) is the clk."""
-from tb.serial.word_queue import WordQueue
+from tb.serial.sync_fifo import SyncFifo
 
 
 class Ps2InjectQueue:
     def __init__(self, depth=32):
-        self.depth, self.queue, self.doomed = depth, WordQueue(depth), 0
+        self.depth, self.queue, self.doomed = depth, SyncFifo(depth), 0
 
     def discards(self, injecting):
         return self.doomed > 0 and not injecting

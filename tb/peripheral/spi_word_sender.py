@@ -8,7 +8,7 @@ class SpiWordSender:
     def __init__(self):
         self.word, self.age = 0, None       # age: clk since the word was taken, None: ready
 
-    def step(self, valid, word, half_clk, rst=0):
+    def step(self, valid, word, half_period, rst=0):
         if rst:
             self.__init__()
         elif self.age is not None:
@@ -16,7 +16,7 @@ class SpiWordSender:
             if self.age == HALVES * self.length:
                 self.age = None
         elif valid:
-            self.word, self.length, self.age = word, max(half_clk, 1), 0
+            self.word, self.length, self.age = word, max(half_period, 1), 0
         return self.pins()
 
     def pins(self):

@@ -13,20 +13,20 @@ class Wires:
     """The design and its model; and what a display driver on the wires takes."""
 
     def __init__(self, dut):
-        self.dut, self.model, self.half_clk = dut, SpiWordSender(), 1
+        self.dut, self.model, self.half_period = dut, SpiWordSender(), 1
         self.bits, self.taken, self.last, self.now = [], [], (1, 0), 0
         self.fell = self.rose = self.risen = None           # clk of the last edges of cs_n, of sclk's last rise
 
     async def begin(self):
-        await bench.start(self.dut, half_clk=1, valid=0, word=0)
+        await bench.start(self.dut, half_period=1, valid=0, word=0)
         await self.clk(rst=1)
         return self
 
     async def clk(self, word=None, rst=0):
         d = self.dut
-        d.half_clk.value, d.valid.value, d.word.value, d.rst.value = self.half_clk, word is not None, word or 0, rst
+        d.half_period.value, d.valid.value, d.word.value, d.rst.value = self.half_period, word is not None, word or 0, rst
         await FallingEdge(d.clk)
-        want = self.model.step(word is not None, word or 0, self.half_clk, rst)
+        want = self.model.step(word is not None, word or 0, self.half_period, rst)
         got = tuple(int(p.value) for p in (d.ready, d.cs_n, d.sclk, d.sdi, d.sent))
         assert got == want, f"{got} where the model has {want}"
         self.watch(*got[1:])
@@ -61,10 +61,10 @@ async def one_word_by_hand(dut):
 @cocotb.test()
 async def cs_n_rises_33_half_periods_after_it_fell_and_the_next_word_36_and_a_clk(dut):
     wires = await Wires(dut).begin()
-    for half_clk in (0, 1, 2, 3, 255):
-        wires.half_clk, half = half_clk, max(half_clk, 1)
+    for half_period in (0, 1, 2, 3, 255):
+        wires.half_period, half = half_period, max(half_period, 1)
         await wires.clk(0xFFFF)
-        wires.half_clk = 7                                                 # taken with a word
+        wires.half_period = 7                                                 # taken with a word
         fell = wires.fell
         assert fell == wires.now
         while not (await wires.clk(0x8001))[0]:
@@ -81,7 +81,7 @@ async def any_words_at_any_pauses_arrive_in_order(dut):
     wires = await Wires(dut).begin()
     words = [0, 0xFFFF, *(random.getrandbits(16) for _ in range(30))]
     for word in words:
-        wires.half_clk = random.randrange(4)
+        wires.half_period = random.randrange(4)
         await wires.send(word)
         for _ in range(random.choice([0, 0, 1, 50])):
             await wires.clk()

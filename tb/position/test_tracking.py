@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fringe_tracker, unwrap and coarse_check in a row: full resolution without lag up to a quarter period a sample, and whatever makes
+"""fringe_tracker, unwrap and count_phase_check in a row: full resolution without lag up to a quarter period a sample, and whatever makes
 the position wrong is told within two samples, or the position is right again."""
 import random
 from pathlib import Path
@@ -9,7 +9,7 @@ from cocotb.triggers import FallingEdge
 
 from tb.bench import run, start
 from tb.interpolate.fringe_tracker import FringeTracker
-from tb.position.coarse_check import CoarseCheck
+from tb.position.count_phase_check import CountPhaseCheck
 from tb.position.unwrap import Unwrap
 
 PERIOD, QUARTER = 1 << 16, 1 << 14
@@ -29,7 +29,7 @@ class Scale:
         dut.rst.value, dut.valid.value, dut.limit.value = 1, 0, LIMIT
         await FallingEdge(dut.clk)
         dut.rst.value = 0
-        self.tracker, self.unwrap, self.coarse = FringeTracker(), Unwrap(), CoarseCheck()
+        self.tracker, self.unwrap, self.coarse = FringeTracker(), Unwrap(), CountPhaseCheck()
 
     async def sample(self, place, phase=None, count=None):
         dut = self.dut

@@ -20,7 +20,7 @@ module tracking_bench (
 
     fringe_tracker u_tracker (.clk, .rst, .valid, .phase, .done(stepped), .step, .phase_out(tracked_phase), .overspeed);
     unwrap u_position (.clk, .rst, .valid(stepped), .step, .phase(tracked_phase), .shift(1'b0), .shift_periods(32'sd0), .done, .position);
-    coarse_check u_coarse (.clk, .rst, .limit, .valid(done), .position, .count, .shift(1'b0), .shift_periods(32'sd0), .disagreement);
+    count_phase_check u_count_phase_check (.clk, .rst, .limit, .valid(done), .position, .count, .shift(1'b0), .shift_periods(32'sd0), .disagreement);
 endmodule
 
 `default_nettype wire

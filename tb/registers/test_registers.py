@@ -9,7 +9,7 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from moire import registers as host
+from moire.made import registers as host
 from tables import registers as tables
 from tb.bench import ROOT, run, start
 from tb.registers.register_block import WORD, RegisterBlock
@@ -204,20 +204,20 @@ async def a_setting_whose_need_was_not_built_reads_zero_whatever_is_written(dut)
         assert got[r.port(f)] == 0 and await bus.read(r.word) >> f.low & (1 << f.width) - 1 == 0
 
 
-@pytest.mark.parametrize("block", ["node", "line", "links", "axis", "grating", "actuator"])
+@pytest.mark.parametrize("block", ["node", "bus", "peripherals", "axis", "feedback", "actuator"])
 def test_registers(block):
     run(f"{block}_registers", __file__)
 
 
-@pytest.mark.parametrize("block", ["axis", "grating"])
+@pytest.mark.parametrize("block", ["axis", "feedback"])
 def test_registers_without_sine(block):
     run(f"{block}_registers", __file__, SINE=0)
 
 
 def test_all_made_files_carry_the_crc_of_the_source():
     source = (ROOT / "tables" / "registers.rdl").read_bytes().replace(b"\r\n", b"\n")
-    made = {"rtl/registers/node_registers.sv": r"6'h00: rdata <= 32'h(\w{8});", "sw/firmware/registers.h": r"MAP_CRC 0x(\w{8})u",
-            "sw/host/moire/registers.py": r"MAP_CRC = 0x(\w{8})", "docs/registers.md": r"CRC-32 `0x(\w{8})`"}
+    made = {"rtl/registers/node_registers.sv": r"6'h00: rdata <= 32'h(\w{8});", "sw/firmware/made/registers.h": r"MAP_CRC 0x(\w{8})u",
+            "sw/host/moire/made/registers.py": r"MAP_CRC = 0x(\w{8})", "docs/registers.md": r"CRC-32 `0x(\w{8})`"}
     for name, place in made.items():
         assert re.search(place, (ROOT / name).read_text(), re.IGNORECASE).group(1).upper() == f"{zlib.crc32(source):08X}", name
 
@@ -227,7 +227,7 @@ def test_host_and_firmware_find_every_register_at_every_axis_count(axes):
     header = dict(re.findall(r"#define (\w+) +(0x[0-9a-fA-F]+)u", (ROOT / "sw" / "firmware" / "registers.h").read_text()))
     taken = {}
     for block in tables.read(axes):
-        assert block.count == (axes if block.name in ("axis", "grating", "actuator") else 1)
+        assert block.count == (axes if block.name in ("axis", "feedback", "actuator") else 1)
         for n in range(block.count):
             for r in block.registers:
                 address = block.base + n * block.stride + r.offset

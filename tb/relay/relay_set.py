@@ -12,13 +12,13 @@ def marker(k, segments=0):
     return 0x4D4F4900 + (128 + segments if segments else k)
 
 
-def image(terms, counts_per_turn, spacing=1, hysteresis=0x4000, filter_needed=0, index_low=0, gate_mask=0, gate=0,
+def image(terms, counts_per_turn, minimum_edge_separation=1, hysteresis=0x4000, filter_required=0, index_low=0, gate_mask=0, gate=0,
           segments=0):
     """Bytes of a set; terms are the words (amplitude, phase) of each order from 1 up, or two points each."""
     angle = round(2**48 / counts_per_turn) if counts_per_turn else 0
     radians = round(2 * math.pi * 2**40 / counts_per_turn) % 2**32 if counts_per_turn else 0
-    words = [marker(len(terms), segments), counts_per_turn, angle % 2**32, angle >> 32 | spacing << 16, radians,
-             hysteresis | filter_needed << 16 | (index_low << 4 | gate_mask << 2 | gate) << 24]
+    words = [marker(len(terms), segments), counts_per_turn, angle % 2**32, angle >> 32 | minimum_edge_separation << 16, radians,
+             hysteresis | filter_required << 16 | (index_low << 4 | gate_mask << 2 | gate) << 24]
     for amplitude, phase in terms:
         words += [amplitude % 2**32, phase % 2**32]
     body = b"".join(word.to_bytes(4, "little") for word in words)

@@ -10,7 +10,7 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import run, start
 from tb.relay.relay_set import RelaySet, image
 
-SETTINGS = "counts_per_turn", "angle_per_count", "spacing", "radians_per_count", "hysteresis", "filter_needed", "index_gate", \
+SETTINGS = "counts_per_turn", "angle_per_count", "minimum_edge_separation", "radians_per_count", "hysteresis", "filter_required", "index_gate", \
     "index_gate_mask", "index_low"
 WIDTHS = 32, 48, 16, 32, 16, 8, 2, 2, 1
 
@@ -74,11 +74,11 @@ def any_terms(row):
 async def by_hand(dut):
     row = await Bytes(dut).reset()
     terms = any_terms(row)
-    whole = image(terms, 1 << 15, spacing=3, hysteresis=0x1234, filter_needed=4, index_low=1, gate_mask=3, gate=2, segments=row.segments)
+    whole = image(terms, 1 << 15, minimum_edge_separation=3, hysteresis=0x1234, filter_required=4, index_low=1, gate_mask=3, gate=2, segments=row.segments)
     assert await row.send(whole) == 1
     assert row.written == [(n, a, p) for n, (a, p) in enumerate(terms)]
-    assert int(dut.counts_per_turn.value) == 32768 and int(dut.angle_per_count.value) == 1 << 33 and int(dut.spacing.value) == 3
-    assert int(dut.hysteresis.value) == 0x1234 and int(dut.filter_needed.value) == 4 and int(dut.radians_per_count.value) == 210828714
+    assert int(dut.counts_per_turn.value) == 32768 and int(dut.angle_per_count.value) == 1 << 33 and int(dut.minimum_edge_separation.value) == 3
+    assert int(dut.hysteresis.value) == 0x1234 and int(dut.filter_required.value) == 4 and int(dut.radians_per_count.value) == 210828714
     assert (int(dut.index_low.value), int(dut.index_gate_mask.value), int(dut.index_gate.value)) == (1, 3, 2)
 
 

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/deglitcher.sv does: step(stable, level, rst) is one clk, and returns what is on the pins after it."""
+"""What rtl/sense/deglitcher.sv does: step(stable_cycles, level, rst) is one clk, and returns what is on the pins after it."""
 
 
 class Deglitcher:
     def __init__(self, settle=4):
         self.settling, self.settle, self.filtered, self.age = settle, settle, 0, 0
 
-    def step(self, stable, level, rst=0):
+    def step(self, stable_cycles, level, rst=0):
         rejected = 0
         if rst:
             self.settle, self.age, self.filtered = self.settling, 0, level
@@ -17,6 +17,6 @@ class Deglitcher:
             rejected, self.age = int(self.age > 0), 0
         else:
             self.age += 1
-            if self.age >= stable:
+            if self.age >= stable_cycles:
                 self.filtered, self.age = level, 0
         return self.filtered, rejected

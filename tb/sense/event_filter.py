@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/event_filter.sv does: step(skip, needed, spare, levels, rst) is one clk, and returns the pins after it."""
+"""What rtl/sense/event_filter.sv does: step(skip, required, tolerated, levels, rst) is one clk, and returns the pins after it."""
 
 
 class Level:
@@ -11,14 +11,14 @@ class Level:
     def forget(self):
         self.seen = self.against = 0
 
-    def sample(self, last, spare, level):
+    def sample(self, last, tolerated, level):
         if level != self.filtered:
             if self.seen & last == last:
                 self.filtered = level
                 self.forget()
             else:
                 self.seen += 1
-        elif self.against & spare == spare:
+        elif self.against & tolerated == tolerated:
             died = self.seen > 0
             self.forget()
             return int(died)
@@ -32,7 +32,7 @@ class EventFilter:
         self.levels, self.settling, self.settle, self.left = [Level() for _ in range(levels)], settle, 0, 0
         self.last = 0
 
-    def step(self, skip, needed, spare, levels, rst=0):
+    def step(self, skip, required, tolerated, levels, rst=0):
         """levels as a list, the lowest bit first; returns the lists filtered, rejected."""
         rejected = [0] * len(self.levels)
         if rst or self.settle:
@@ -40,8 +40,8 @@ class EventFilter:
                 own.filtered = level
                 own.forget()
         elif self.left == 0:
-            rejected = [own.sample(self.last, spare, level) for own, level in zip(self.levels, levels)]
-        self.last = max(needed, 1) - 1
+            rejected = [own.sample(self.last, tolerated, level) for own, level in zip(self.levels, levels)]
+        self.last = max(required, 1) - 1
         self.left = 0 if rst else skip if self.left == 0 else self.left - 1
         self.settle = self.settling if rst else max(self.settle - 1, 0)
         return [own.filtered for own in self.levels], rejected

@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tb.sense.circle_monitor import CircleMonitor
-from tb.sense.leg_monitor import LegMonitor
+from tb.sense.channel_monitor import ChannelMonitor
+from tb.sense.lissajous_monitor import LissajousMonitor
 from tb.sense.vector_length import vector_length
 
 NEVER = 65535
-FAULTS = ("too_low", "too_high", "at_rail", "off_circle", "jump", "frozen", "silent", "opposed", "level_stuck", "leg_missing",
-          "offset_drift", "unbalanced", "not_square", "phase_jump", "lost_count")
+FAULTS = ("too_low", "too_high", "clipped", "off_circle", "jump", "channel_stuck", "no_noise", "comparator_mismatch", "comparator_stuck", "channel_missing",
+          "offset_drift", "unbalanced", "not_in_quadrature", "phase_jump", "lost_count")
 COUNTS = 16         # samples for which a bad one counts
 
 
@@ -19,23 +19,23 @@ class Settings:
     """As after reset of the settings: nothing is judged."""
     low: int = 0
     high: int = NEVER
-    rail: int = NEVER
+    clip_level: int = NEVER
     tolerance: int = NEVER
     jump: int = NEVER
     band: int = 0
     span: int = NEVER
-    quiet: int = 0
-    dead: int = NEVER
+    no_noise_samples: int = 0
+    sign_threshold: int = NEVER
     offset_limit: int = NEVER
     balance_limit: int = NEVER
-    square_limit: int = NEVER
+    quadrature_limit: int = NEVER
 
     @classmethod
-    def advised(cls, amplitude, width=8, quiet=0):
+    def advised(cls, amplitude, width=8, no_noise_samples=0):
         """The settings that docs/signal_faults.md advises for a signal of this amplitude with at most 0.5 LSB rms of noise."""
         part = lambda percent: round(amplitude * percent / 100)
-        return cls(low=part(70), high=part(130), rail=2 ** (width - 1) - 2, tolerance=part(9), jump=part(13), band=3, span=part(80),
-                   quiet=quiet, dead=part(20), offset_limit=part(12), balance_limit=part(16), square_limit=part(16))
+        return cls(low=part(70), high=part(130), clip_level=2 ** (width - 1) - 2, tolerance=part(9), jump=part(13), band=3, span=part(80),
+                   no_noise_samples=no_noise_samples, sign_threshold=part(20), offset_limit=part(12), balance_limit=part(16), quadrature_limit=part(16))
 
 
 class Twice:
@@ -52,10 +52,10 @@ class Twice:
 
 class SignalMonitor:
     def __init__(self, lanes=1):
-        self.cos, self.sin, self.circle = LegMonitor(lanes), LegMonitor(lanes), CircleMonitor(lanes)
-        self.twice = {name: Twice(lanes) for name in ("too_low", "too_high", "at_rail", "off_circle", "opposed")}
+        self.cos, self.sin, self.circle = ChannelMonitor(lanes), ChannelMonitor(lanes), LissajousMonitor(lanes)
+        self.twice = {name: Twice(lanes) for name in ("too_low", "too_high", "clipped", "off_circle", "comparator_mismatch")}
         self.last_sin, self.last_cos, self.step = (np.zeros(lanes, np.int64) for _ in range(3))
-        self.seen, self.amplitude, self.learnt = 0, np.zeros(lanes, np.int64), np.zeros(lanes, bool)
+        self.seen, self.amplitude, self.ready = 0, np.zeros(lanes, np.int64), np.zeros(lanes, bool)
 
     def sample(self, sin, cos, a, b, settings):
         """The faults 0 … 12 of this sample as bits; sin, cos, a, b: integer arrays, one element a lane."""
@@ -64,17 +64,17 @@ class SignalMonitor:
         jumped = (self.seen >= 2) & (s.jump != NEVER) & (way > 2 * self.step + s.jump)
         self.last_sin, self.last_cos, self.step, self.seen = sin, cos, way, self.seen + 1
 
-        legs = zip(self.cos.sample(cos, sin, a, b, s.rail, s.band, s.span, s.quiet, s.dead),
-                   self.sin.sample(sin, cos, b, a, s.rail, s.band, s.span, s.quiet, s.dead))
-        at_rail, frozen, silent, opposed, level_stuck, leg_missing = (x | y for x, y in legs)
+        channels = zip(self.cos.sample(cos, sin, a, b, s.clip_level, s.band, s.span, s.no_noise_samples, s.sign_threshold),
+                   self.sin.sample(sin, cos, b, a, s.clip_level, s.band, s.span, s.no_noise_samples, s.sign_threshold))
+        clipped, channel_stuck, no_noise, comparator_mismatch, comparator_stuck, channel_missing = (x | y for x, y in channels)
 
         self.amplitude, axis, quadrant, tilt = vector_length(sin, cos)
-        self.learnt, off_circle, drift, unbalanced, skewed = self.circle.sample(
-            self.amplitude, axis, quadrant, tilt, s.tolerance, s.offset_limit, s.balance_limit, s.square_limit)
+        self.ready, off_circle, drift, unbalanced, skewed = self.circle.sample(
+            self.amplitude, axis, quadrant, tilt, s.tolerance, s.offset_limit, s.balance_limit, s.quadrature_limit)
 
         twice = {name: self.twice[name].sample(bad) for name, bad in [
             ("too_low", self.amplitude < s.low), ("too_high", (s.high != NEVER) & (self.amplitude > s.high)),
-            ("at_rail", at_rail), ("off_circle", off_circle), ("opposed", opposed)]}
-        flags = dict(twice, jump=jumped, frozen=frozen, silent=silent, level_stuck=level_stuck, leg_missing=leg_missing,
-                     offset_drift=drift, unbalanced=unbalanced, not_square=skewed)
+            ("clipped", clipped), ("off_circle", off_circle), ("comparator_mismatch", comparator_mismatch)]}
+        flags = dict(twice, jump=jumped, channel_stuck=channel_stuck, no_noise=no_noise, comparator_stuck=comparator_stuck, channel_missing=channel_missing,
+                     offset_drift=drift, unbalanced=unbalanced, not_in_quadrature=skewed)
         return sum(np.asarray(flags[name], np.int64) << n for n, name in enumerate(FAULTS) if name in flags)

@@ -10,23 +10,23 @@ from tb.bench import run, start
 from tb.sense.deglitcher import Deglitcher
 
 
-async def begin(dut, level=0, stable=0):
+async def begin(dut, level=0, stable_cycles=0):
     """Reset with the pins at these levels; the model has seen the same clk."""
-    await start(dut, level=level, stable=stable)
+    await start(dut, level=level, stable_cycles=stable_cycles)
     model = Deglitcher(int(dut.SETTLE.value))
-    model.step(stable, level, 1)
+    model.step(stable_cycles, level, 1)
     return model
 
 
-async def drive(dut, model, stable, levels, rst=0):
+async def drive(dut, model, stable_cycles, levels, rst=0):
     """Put each level on the pin for one clk and hold the model beside the design; return (filtered, rejected) of each clk."""
-    dut.stable.value, dut.rst.value, out = stable, rst, []
+    dut.stable_cycles.value, dut.rst.value, out = stable_cycles, rst, []
     for clk, level in enumerate(levels):
         dut.level.value = level
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
-        got, want = (int(dut.filtered.value), int(dut.rejected.value)), model.step(stable, level, rst)
-        assert got == want, f"clk {clk}, stable {stable}: (filtered, rejected) is {got}, the model has {want}"
+        got, want = (int(dut.filtered.value), int(dut.rejected.value)), model.step(stable_cycles, level, rst)
+        assert got == want, f"clk {clk}, stable_cycles {stable_cycles}: (filtered, rejected) is {got}, the model has {want}"
         out.append(got)
     dut.rst.value = 0
     return out
@@ -36,10 +36,10 @@ async def drive(dut, model, stable, levels, rst=0):
 async def latency_is_stable(dut):
     model = await begin(dut)
     await drive(dut, model, 1, [0] * 10)
-    for stable in (0, 1, 2, 3, 7):
+    for stable_cycles in (0, 1, 2, 3, 7):
         for level in (1, 0):
-            out = await drive(dut, model, stable, [level] * (stable + 2))
-            assert [filtered for filtered, _ in out].index(level) + 1 == max(1, stable)
+            out = await drive(dut, model, stable_cycles, [level] * (stable_cycles + 2))
+            assert [filtered for filtered, _ in out].index(level) + 1 == max(1, stable_cycles)
             assert not any(rejected for _, rejected in out)
 
 
@@ -64,13 +64,13 @@ async def a_train_of_short_pulses_never_passes(dut):
 @cocotb.test()
 async def a_level_that_stands_from_power_up_makes_no_edge(dut):
     for level in (1, 0):
-        model = await begin(dut, level=level, stable=15)
+        model = await begin(dut, level=level, stable_cycles=15)
         assert await drive(dut, model, 15, [level] * 40) == [(level, 0)] * 40
 
 
 @cocotb.test()
 async def synchronisers_that_fill_after_reset_make_no_edge_later(dut):
-    model = await begin(dut, level=0, stable=15)
+    model = await begin(dut, level=0, stable_cycles=15)
     filling = int(dut.SETTLE.value) - 1
     out = await drive(dut, model, 15, [0] * filling + [1] * 40)
     assert out == [(0, 0)] * filling + [(1, 0)] * 40
@@ -108,11 +108,11 @@ async def reset_in_the_middle_of_a_pulse_forgets_it(dut):
 async def any_levels_match_the_model(dut):
     model = await begin(dut)
     for _ in range(300):
-        stable, pulse = random.choice([0, 1, 2, 3, 5, 8, 15]), random.choice([2, 4, 16])
+        stable_cycles, pulse = random.choice([0, 1, 2, 3, 5, 8, 15]), random.choice([2, 4, 16])
         levels = [bit for _ in range(40 // pulse) for bit in [random.getrandbits(1)] * random.randint(1, pulse)]
-        await drive(dut, model, stable, levels)
+        await drive(dut, model, stable_cycles, levels)
         if random.random() < 0.05:
-            await drive(dut, model, stable, levels[:2], rst=1)
+            await drive(dut, model, stable_cycles, levels[:2], rst=1)
 
 
 @pytest.mark.parametrize("w, settle", [(16, 4), (4, 1)])

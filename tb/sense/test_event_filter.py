@@ -15,13 +15,13 @@ class Bench:
     """Design and model side by side; play() gives the same levels to every line and returns (filtered, rejected) of line 0."""
 
     @classmethod
-    async def begin(cls, dut, level=0, skip=0, needed=0, spare=0, settled=True):
+    async def begin(cls, dut, level=0, skip=0, required=0, tolerated=0, settled=True):
         bench = cls()
         bench.dut, bench.lines = dut, int(dut.LEVELS.value)
         bench.model = EventFilter(bench.lines, int(dut.SETTLE.value))
-        bench.settings = skip, needed, spare
-        await start(dut, level=bench.word([level] * bench.lines), skip=skip, needed=needed, spare=spare)
-        bench.model.step(skip, needed, spare, [level] * bench.lines, 1)
+        bench.settings = skip, required, tolerated
+        await start(dut, level=bench.word([level] * bench.lines), skip=skip, required=required, tolerated=tolerated)
+        bench.model.step(skip, required, tolerated, [level] * bench.lines, 1)
         if settled:
             await bench.play([level] * int(dut.SETTLE.value))
         return bench
@@ -30,14 +30,14 @@ class Bench:
     def word(levels):
         return sum(level << n for n, level in enumerate(levels))
 
-    async def set(self, skip=0, needed=0, spare=0):
+    async def set(self, skip=0, required=0, tolerated=0):
         """New settings, and the clk that they take, in which the levels stand still."""
-        self.settings = skip, needed, spare
+        self.settings = skip, required, tolerated
         await self.rows([[own.filtered for own in self.model.levels]])
 
     async def rows(self, rows, rst=0):
         dut, out = self.dut, []
-        dut.skip.value, dut.needed.value, dut.spare.value = self.settings
+        dut.skip.value, dut.required.value, dut.tolerated.value = self.settings
         dut.rst.value = rst
         for clk, levels in enumerate(rows):
             dut.level.value = self.word(levels)
@@ -45,7 +45,7 @@ class Bench:
             await FallingEdge(dut.clk)
             filtered, rejected = self.model.step(*self.settings, levels, rst)
             got, want = (int(dut.filtered.value), int(dut.rejected.value)), (self.word(filtered), self.word(rejected))
-            assert got == want, f"clk {clk}, (skip, needed, spare) {self.settings}: (filtered, rejected) is {got}, the model has {want}"
+            assert got == want, f"clk {clk}, (skip, required, tolerated) {self.settings}: (filtered, rejected) is {got}, the model has {want}"
             out.append((filtered[0], rejected[0]))
         dut.rst.value = 0
         return out
@@ -57,23 +57,23 @@ class Bench:
 @cocotb.test()
 async def latency_of_a_clean_edge_is_needed_samples(dut):
     bench = await Bench.begin(dut)
-    for needed in (0, 1, 2, 3, 7):
-        for spare in (0, 1, 3):
+    for required in (0, 1, 2, 3, 7):
+        for tolerated in (0, 1, 3):
             for level in (1, 0):
-                await bench.set(0, needed, spare)
-                out = await bench.play([level] * (needed + 2))
-                assert [filtered for filtered, _ in out].index(level) + 1 == max(1, needed)
+                await bench.set(0, required, tolerated)
+                out = await bench.play([level] * (required + 2))
+                assert [filtered for filtered, _ in out].index(level) + 1 == max(1, required)
 
 
 @cocotb.test()
 async def with_spare_0_and_skip_0_it_is_the_deglitcher(dut):
-    for needed in (0, 1, 2, 5, 8):
-        bench, other = await Bench.begin(dut, needed=needed), Deglitcher(int(dut.SETTLE.value))
-        other.step(needed, 0, 1)
+    for required in (0, 1, 2, 5, 8):
+        bench, other = await Bench.begin(dut, required=required), Deglitcher(int(dut.SETTLE.value))
+        other.step(required, 0, 1)
         for _ in range(int(dut.SETTLE.value)):
-            other.step(needed, 0)
+            other.step(required, 0)
         levels = [bit for _ in range(60) for bit in [random.getrandbits(1)] * random.randint(1, 9)]
-        assert await bench.play(levels) == [other.step(needed, level) for level in levels]
+        assert await bench.play(levels) == [other.step(required, level) for level in levels]
 
 
 @cocotb.test()
@@ -97,12 +97,12 @@ async def three_of_four_passes_and_two_of_four_is_rejected_and_reported_once(dut
 async def a_pulse_of_too_few_samples_never_passes_at_any_setting(dut):
     bench = await Bench.begin(dut)
     for skip in (0, 1, 2):
-        for needed in (2, 3, 6):
-            for spare in (0, 1, 2):
-                await bench.set(skip, needed, spare)
+        for required in (2, 3, 6):
+            for tolerated in (0, 1, 2):
+                await bench.set(skip, required, tolerated)
                 await bench.play([0] * 30)
-                width = (needed - 1) * (skip + 1)
-                quiet = (spare + 2) * (skip + 1)
+                width = (required - 1) * (skip + 1)
+                quiet = (tolerated + 2) * (skip + 1)
                 out = await bench.play(([1] * width + [0] * quiet) * 4)
                 assert not any(filtered for filtered, _ in out)
                 assert sum(rejected for _, rejected in out) == 4
@@ -112,7 +112,7 @@ async def a_pulse_of_too_few_samples_never_passes_at_any_setting(dut):
 async def a_pulse_of_needed_sample_periods_passes_wherever_it_begins(dut):
     for skip in (1, 2, 3):
         for phase in range(skip + 1):
-            bench = await Bench.begin(dut, skip=skip, needed=4)
+            bench = await Bench.begin(dut, skip=skip, required=4)
             await bench.play([0] * (7 + phase))
             out = await bench.play([1] * (4 * (skip + 1)) + [0] * 3)
             assert any(filtered for filtered, _ in out)

@@ -51,7 +51,7 @@ class Watch:
                                               f"{names(self.now)}, first {names(self.first)}"
 
     async def sample(self, cos, sin, a=None, b=None, gap=0):
-        cos, sin = (round(min(self.full - 1, max(-self.full, leg))) for leg in (cos, sin))
+        cos, sin = (round(min(self.full - 1, max(-self.full, channel))) for channel in (cos, sin))
         await self.clk((sin, cos, int(cos > 0) if a is None else a, int(sin > 0) if b is None else b))
         for _ in range(gap):
             await self.clk()
@@ -77,21 +77,21 @@ def advised(dut, **more):
     return Settings(**asdict(Settings.advised(0.78 * 2 ** (width - 1), width)) | more)
 
 
-async def learnt(dut, **more):
+async def ready(dut, **more):
     """A monitor that has seen a good signal, and its amplitude."""
     watch = await begin(dut, advised(dut, **more))
     size = 0.78 * watch.full
     await watch.turn(size, 2.25, steps=24)
     await watch.turn(size, -0.25, begin=0.25)
     await watch.rest()
-    assert int(dut.learnt.value) and not watch.seen
+    assert int(dut.ready.value) and not watch.seen
     return watch, size
 
 
 @cocotb.test()
 async def latency_is_2_5_10_and_14(dut):
-    for name, lag in [("at_rail", 2), ("jump", 5), ("too_high", 10), ("off_circle", 14)]:
-        watch = await begin(dut, Settings(rail=110, jump=10, high=120, tolerance=20))
+    for name, lag in [("clipped", 2), ("jump", 5), ("too_high", 10), ("off_circle", 14)]:
+        watch = await begin(dut, Settings(clip_level=110, jump=10, high=120, tolerance=20))
         await watch.turn(90, 2.25, steps=80)
         await watch.rest()
         assert not watch.seen
@@ -124,7 +124,7 @@ async def with_everything_switched_off_nothing_alarms(dut):
 
 @cocotb.test()
 async def a_good_signal_without_noise_raises_nothing_moving_or_at_rest(dut):
-    watch, size = await learnt(dut)
+    watch, size = await ready(dut)
     for steps in (200, 60, 13, 7, 5, 4.1):
         await watch.turn(size, 2.0, steps=steps)
     for place in (0, 3, 10):
@@ -137,7 +137,7 @@ async def a_good_signal_without_noise_raises_nothing_moving_or_at_rest(dut):
 
 @cocotb.test()
 async def a_single_spike_is_only_a_jump(dut):
-    watch, size = await learnt(dut)
+    watch, size = await ready(dut)
     for n in range(60):
         await watch.sample(size if n != 30 else 0, 0)
     await watch.rest()
@@ -148,40 +148,40 @@ async def a_single_spike_is_only_a_jump(dut):
 async def each_fault_of_a_moving_signal_has_its_name(dut):
     for name, distort in [
             ("too_low", lambda cos, sin: (0.65 * cos, 0.65 * sin)), ("too_high", lambda cos, sin: (1.35 * cos, 0.9 * sin)),
-            ("at_rail", lambda cos, sin: (1.5 * cos, sin)), ("off_circle", lambda cos, sin: (cos, 0.75 * sin)),
-            ("frozen", lambda cos, sin: (cos, 5)), ("offset_drift", lambda cos, sin: (cos, sin + 0.117 * 2 ** (int(dut.W.value) - 1))),
-            ("unbalanced", lambda cos, sin: (1.1 * cos, 0.9 * sin)), ("not_square", lambda cos, sin: (cos, sin + 0.2 * cos))]:
-        watch, size = await learnt(dut)
+            ("clipped", lambda cos, sin: (1.5 * cos, sin)), ("off_circle", lambda cos, sin: (cos, 0.75 * sin)),
+            ("channel_stuck", lambda cos, sin: (cos, 5)), ("offset_drift", lambda cos, sin: (cos, sin + 0.117 * 2 ** (int(dut.W.value) - 1))),
+            ("unbalanced", lambda cos, sin: (1.1 * cos, 0.9 * sin)), ("not_in_quadrature", lambda cos, sin: (cos, sin + 0.2 * cos))]:
+        watch, size = await ready(dut)
         await watch.turn(size, 4.0, distort=distort)
         await watch.rest()
         assert name in names(watch.seen), f"{name} is not among {names(watch.seen)}"
 
 
 @cocotb.test()
-async def each_fault_of_a_comparator_or_leg_has_its_name(dut):
-    for name, a in [("opposed", lambda n: n // 30 % 2), ("level_stuck", lambda n: 1)]:
-        watch, size = await learnt(dut)
+async def each_fault_of_a_comparator_or_channel_has_its_name(dut):
+    for name, a in [("comparator_mismatch", lambda n: n // 30 % 2), ("comparator_stuck", lambda n: 1)]:
+        watch, size = await ready(dut)
         for n in range(120):
             angle = 2 * np.pi * n / 60
             await watch.sample(size * np.cos(angle), size * np.sin(angle), a=a(n))
         await watch.rest()
         assert name in names(watch.seen)
-    watch, size = await learnt(dut)
+    watch, size = await ready(dut)
     for n in range(180):
         angle = 2 * np.pi * (n + 0.5) / 60
         await watch.sample(size, 0, a=int(np.cos(angle) > 0), b=int(np.sin(angle) > 0))
     await watch.rest()
-    assert "leg_missing" in names(watch.seen)
-    watch, size = await learnt(dut, quiet=50)
+    assert "channel_missing" in names(watch.seen)
+    watch, size = await ready(dut, no_noise_samples=50)
     for _ in range(52):
         await watch.sample(size, 0)
-    assert names(watch.seen) == ["silent"]
+    assert names(watch.seen) == ["no_noise"]
 
 
 @cocotb.test()
-async def a_leg_that_opens_at_rest_is_found_at_the_second_sample(dut):
+async def a_channel_that_opens_at_rest_is_found_at_the_second_sample(dut):
     for place in (0.08, 0.1, 0.2, 0.4):                 # fringe; the sine goes to zero
-        watch, size = await learnt(dut)
+        watch, size = await ready(dut)
         await watch.turn(size, place, steps=400)
         angle = 2 * np.pi * place
         for _ in range(50):
@@ -194,10 +194,10 @@ async def a_leg_that_opens_at_rest_is_found_at_the_second_sample(dut):
 
 
 @cocotb.test()
-async def a_signal_lost_in_both_legs_is_told_at_the_second_sample_moving_or_at_rest(dut):
+async def a_signal_lost_in_both_channels_is_told_at_the_second_sample_moving_or_at_rest(dut):
     for steps in (4.1, 60, None):                       # samples a fringe; None: at rest
         for place in (0.125, 0.77):
-            watch, size = await learnt(dut)
+            watch, size = await ready(dut)
             await watch.turn(size, place, steps=200)
             for n in range(20):
                 angle = 2 * np.pi * (place + (n / steps if steps else 0))
@@ -212,14 +212,14 @@ async def a_signal_lost_in_both_legs_is_told_at_the_second_sample_moving_or_at_r
 
 
 @cocotb.test()
-async def the_first_fault_stands_until_it_is_cleared(dut):
-    watch = await begin(dut, Settings(rail=10, high=10))
+async def the_first_fault_persists_until_it_is_cleared(dut):
+    watch = await begin(dut, Settings(clip_level=10, high=10))
     for _ in range(3):
         await watch.sample(0, 50)
     await watch.rest()
-    assert names(int(dut.first.value)) == ["at_rail"] and names(int(dut.faults.value)) == ["too_high", "at_rail"]
+    assert names(int(dut.first.value)) == ["clipped"] and names(int(dut.faults.value)) == ["too_high", "clipped"]
     await watch.clk(clear=1)
-    assert names(int(dut.first.value)) == ["too_high", "at_rail"]
+    assert names(int(dut.first.value)) == ["too_high", "clipped"]
     for _ in range(17):
         await watch.sample(0, 5)
     await watch.rest()
@@ -230,11 +230,11 @@ async def the_first_fault_stands_until_it_is_cleared(dut):
 
 @cocotb.test()
 async def reset_in_mid_flow_drops_faults_and_samples(dut):
-    watch = await begin(dut, Settings(rail=10, high=10))
+    watch = await begin(dut, Settings(clip_level=10, high=10))
     for _ in range(12):
         await watch.sample(0, 50)
     assert int(dut.faults.value)
-    watch = await begin(dut, Settings(rail=10, high=10))
+    watch = await begin(dut, Settings(clip_level=10, high=10))
     await watch.rest(20)
     assert not watch.seen
 
@@ -244,17 +244,17 @@ async def any_signal_in_any_settings_matches_the_model_in_every_clk(dut):
     for _ in range(8):
         top = (1 << int(dut.W.value) - 1) - 1
         level = lambda top=top: random.choice([0, top // 10, top // 4, top, 65535])
-        settings = random.choice([advised(dut, quiet=random.choice([0, 3])), Settings(level(), level(), level(), level(), level(),
+        settings = random.choice([advised(dut, no_noise_samples=random.choice([0, 3])), Settings(level(), level(), level(), level(), level(),
                                   random.choice([0, 3, 255]), level(), random.choice([0, 5]), level(), level(), level(), level())])
-        watch, angle, speed, leg = await begin(dut, settings), 0.0, 0.05, 0.0
+        watch, angle, speed, channel = await begin(dut, settings), 0.0, 0.05, 0.0
         for n in range(160):
             if n % 40 == 0:
                 speed, shrink = random.choice([0, 0.02, 0.3, 1.5, -0.8]), random.choice([1, 1, 0.3, 1.4])
-                leg = random.choice([1, 1, 1, 0, -1])
+                channel = random.choice([1, 1, 1, 0, -1])
             angle += speed
             size = 0.8 * top * shrink + random.gauss(0, 0.5)
             upset = {"a": random.getrandbits(1)} if random.random() < 0.05 else {}
-            await watch.sample(size * np.cos(angle), leg * size * np.sin(angle), **upset)
+            await watch.sample(size * np.cos(angle), channel * size * np.sin(angle), **upset)
             for _ in range(random.choice([0, 0, 0, 1, 5])):
                 await watch.clk(phase_jump=int(random.random() < 0.02), lost_count=int(random.random() < 0.02),
                                 clear=int(random.random() < 0.05))
@@ -263,11 +263,11 @@ async def any_signal_in_any_settings_matches_the_model_in_every_clk(dut):
 def test_the_campaigns_tracker_is_that_of_the_house():
     from figures.faults import LOST, Tracker
     from tb.interpolate.fringe_tracker import FringeTracker
-    from tb.position.coarse_check import CoarseCheck
+    from tb.position.count_phase_check import CountPhaseCheck
     source = np.random.default_rng(1)
     lanes = 20
     many, position = Tracker(lanes), [0] * lanes
-    each, checks = [FringeTracker() for _ in range(lanes)], [CoarseCheck() for _ in range(lanes)]
+    each, checks = [FringeTracker() for _ in range(lanes)], [CountPhaseCheck() for _ in range(lanes)]
     phase, count = np.zeros(lanes, np.int64), np.zeros(lanes, np.int64)
     speed = source.integers(-16000, 16000, lanes)
     for _ in range(300):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/serial/frame_check.sv does: step(…) is one clk and returns (valid, data, command, good, frame_good, frame_bad, mark)
+"""What rtl/serial/frame_check.sv does: step(…) is one clk and returns (valid, data, command, good, frame_good, frame_bad, sync)
 after it.
 
 It keeps the bytes of the frame and asks zlib at its end."""
@@ -20,7 +20,7 @@ class FrameCheck:
         if rst:
             self.bytes = None
             return 0, data, command, 0, 0, 0, 0
-        good = bad = passed = mark = 0
+        good = bad = passed = sync = 0
         if self.bytes is not None and framing_error:
             self.bytes, bad = None, 1
         if valid and command:
@@ -33,6 +33,6 @@ class FrameCheck:
                 self.bytes, bad = None, 1
             elif len(self.bytes) == length + 6:
                 good = int(zlib.crc32(self.bytes[:-4]) == int.from_bytes(self.bytes[-4:], "little"))
-                mark = int(good and not self.bytes[0] & 15)
+                sync = int(good and not self.bytes[0] & 15)
                 self.bytes, bad = None, 1 - good
-        return passed, data, command, good, good, int(bad), mark
+        return passed, data, command, good, good, int(bad), sync

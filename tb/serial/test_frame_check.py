@@ -30,10 +30,10 @@ class Line:
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
         self.clks += 1
-        got = tuple(int(x.value) for x in (dut.valid, dut.data, dut.command, dut.good, dut.frame_good, dut.frame_bad, dut.mark))
+        got = tuple(int(x.value) for x in (dut.valid, dut.data, dut.command, dut.good, dut.frame_good, dut.frame_bad, dut.sync))
         want = self.model.step(*inputs)
         assert got[0] == want[0] and got[3:] == want[3:] and (not got[0] or got == want), \
-            f"clk {self.clks}: (valid, data, command, good, frame_good, frame_bad, mark) is {got}, the model has {want}"
+            f"clk {self.clks}: (valid, data, command, good, frame_good, frame_bad, sync) is {got}, the model has {want}"
         return got
 
     async def hear(self, words):

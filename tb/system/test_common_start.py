@@ -6,12 +6,12 @@ import pytest
 
 from experiments.s2_stage import SCALES
 from experiments.s4_job import CLK_HZ, NODE
-from moire.client import Line
-from moire.errors import LineError
-from moire.protocol import mark_words
+from moire.bus.client import Bus
+from moire.bus.protocol import sync_words
+from moire.errors import BusError
 from tb.bench import seed
 from twin import START_S, Node, Twin, TwinTransport
-from twin.twin import ALL_LINKS
+from twin.nodes.twin import ALL_PERIPHERALS
 
 ADDRESSES = (1, 2)
 SCALE = SCALES["Z"]
@@ -26,14 +26,14 @@ MOVED_M = 1e-9
 def axes():
     """Of two nodes that stand at zero; the second lost its power for a moment, so its ticks come at other moments."""
     with Twin([Node(address, [SCALE.machine()]) for address in ADDRESSES], clk_hz=CLK_HZ, seed=seed() % 1000,
-              node_parameters={"LINKS": ALL_LINKS, **NODE}) as twin:
-        line = Line(TwinTransport(twin), random_source=random.Random(seed()))
+              node_parameters={"PERIPHERALS": ALL_PERIPHERALS, **NODE}) as twin:
+        bus = Bus(TwinTransport(twin), random_source=random.Random(seed()))
         twin.run(START_S)
         twin.power_cut(1)
         twin.run(random.Random(seed()).uniform(0.0101, 0.0102))
         twin.power_on(1)
         twin.run(START_S)
-        made = [line.axis(address) for address in ADDRESSES]
+        made = [bus.axis(address) for address in ADDRESSES]
         for axis in made:
             for name, value in SETTINGS.items():
                 axis.set_parameter(name, value)
@@ -68,12 +68,12 @@ def began(twin):
 
 
 def test_two_tables_on_two_nodes_begin_to_move_within_a_microsecond(prepared):
-    line, twin = prepared[0].node.line, prepared[0].transport.twin
-    ticks = [line.node(address).read_named("node.time_stamp")["value"] for address in ADDRESSES]
+    bus, twin = prepared[0].node.bus, prepared[0].transport.twin
+    ticks = [bus.node(address).read_named("node.time_stamp")["value"] for address in ADDRESSES]
     assert ticks[0] - ticks[1] > START_S * CLK_HZ                    # the nodes have not begun together
     for axis in prepared:
-        line.request(axis.node.address, "start_at_mark", axes=1)
-    line.transport.send(mark_words(1))
+        bus.request(axis.node.address, "start_at_sync", axes=1)
+    bus.transport.send(sync_words(1))
     moved, stepped = began(twin)
     assert abs(stepped[1] - stepped[0]) <= 1e-6 and abs(moved[1] - moved[0]) <= 1e-6
     reached = [axis.wait() for axis in prepared]
@@ -81,30 +81,30 @@ def test_two_tables_on_two_nodes_begin_to_move_within_a_microsecond(prepared):
 
 
 def test_a_node_that_missed_the_mark_is_reported_and_does_not_move(prepared):
-    line, twin = prepared[0].node.line, prepared[0].transport.twin
+    bus, twin = prepared[0].node.bus, prepared[0].transport.twin
     steps = [twin.truth(n).steps for n in range(2)]
 
     class Deaf:
         """The second node's cable is off while a mark is sent."""
 
         def __getattr__(self, name):
-            return getattr(twin_line, name)
+            return getattr(twin_bus, name)
 
         def send(self, words):
-            if words[0] == mark_words(1)[0]:
+            if words[0] == sync_words(1)[0]:
                 with twin.fault("line_cut", 1, True):
-                    twin_line.send(words)
+                    twin_bus.send(words)
             else:
-                twin_line.send(words)
+                twin_bus.send(words)
 
-    twin_line, line.transport = line.transport, Deaf()
-    with pytest.raises(LineError, match="the node did not hear the mark at which its motion should begin") as caught:
-        line.start(*prepared)
-    line.transport = twin_line
+    twin_bus, bus.transport = bus.transport, Deaf()
+    with pytest.raises(BusError, match="the node did not hear the mark at which its motion should begin") as caught:
+        bus.start(*prepared)
+    bus.transport = twin_bus
     assert caught.value.address == 2
     assert twin.truth(1).steps == steps[1] and twin.truth(0).steps != steps[0]      # the first had begun, and was stopped
     heard, missed = (axis.status() for axis in prepared)
     assert heard.ended == "stopped" and not heard.in_motion and missed.state != "prepared"
-    line.mark()
+    bus.sync()
     twin.run(0.02)
     assert twin.truth(1).steps == steps[1]                           # a later mark does not begin it

@@ -6,7 +6,17 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from moire.relay import BEGIN_SET, CLEAR, FLASH, PIECE, SET, STATUS, Exchange, Status, identity_of
+from moire.cli.relay import (
+    BEGIN_SET,
+    CLEAR,
+    FLASH,
+    PIECE,
+    SET,
+    STATUS,
+    Exchange,
+    Status,
+    identity_of,
+)
 from tb.bench import run, start
 from tb.compensate.harmonic_map import exact, term_of
 from tb.relay.flash import Flash
@@ -14,7 +24,7 @@ from tb.relay.relay_set import image
 
 K, FIRST, SECOND, BIT = 2, 4096, 8192, 8
 COUNTS = 4000
-IDLE = dict(encoder_a=0, encoder_b=0, encoder_z=0, uart_rx=1, flash_sdi=1)
+IDLE = dict(encoder_a=0, encoder_b=0, encoder_z=0, rs485_rx=1, flash_sdi=1)
 KNOWN, LOADED, CORRECTING, READING = 1, 2, 4, 8
 ILLEGAL, WRONG_TURN, MISSING, REJECTED, BEHIND, REFUSED = 1, 2, 4, 8, 16, 32
 
@@ -91,26 +101,26 @@ class Relay:
     async def tell(self, words):
         for word in words:
             for level in (0, *(word >> n & 1 for n in range(9)), 1):
-                self.dut.uart_rx.value = level
+                self.dut.rs485_rx.value = level
                 await self.clk(BIT)
 
     async def listen(self, patience=6000):
         """The words that the relay sends until it lets go of the line."""
         words, waited = [], 0
-        while not int(self.dut.uart_driver_enable.value):
+        while not int(self.dut.rs485_driver_enable.value):
             await self.clk()
             waited += 1
             if waited > patience:
                 return words
-        while int(self.dut.uart_driver_enable.value):
-            if int(self.dut.uart_tx.value):
+        while int(self.dut.rs485_driver_enable.value):
+            if int(self.dut.rs485_tx.value):
                 await self.clk()
                 continue
             await self.clk(BIT // 2)
             bits = []
             for _ in range(10):
                 await self.clk(BIT)
-                bits.append(int(self.dut.uart_tx.value))
+                bits.append(int(self.dut.rs485_tx.value))
             words.append(sum(bit << n for n, bit in enumerate(bits[:9])))
             assert bits[9] == 1
         return words
@@ -211,7 +221,7 @@ async def a_missing_index_and_illegal_edges_are_flagged_until_they_are_cleared(d
 async def a_glitch_is_rejected_and_flagged(dut):
     relay = await Relay(dut).power_up(place=-4)
     await relay.booted()
-    await relay.give(image(some_terms(0.001), COUNTS, filter_needed=4))
+    await relay.give(image(some_terms(0.001), COUNTS, filter_required=4))
     await relay.go(20, clk_each=8)
     dut.encoder_a.value = 1 - int(dut.encoder_a.value)
     await relay.clk(2)

@@ -6,9 +6,10 @@ import random
 import numpy as np
 import pytest
 
-from figures import learner as figures_learner
-from moire.client import CORRECTION, Line
-from twin import START_S, Twin, TwinTransport, parameters
+from figures import calibration as figures_calibration
+from moire.bus.client import CORRECTION, Bus
+from twin import START_S, Twin, TwinTransport
+from twin.parameters import tables as parameters
 
 PLACES = 16                          # of a period
 LOOKS = 8                            # at each: the noise of one is 0.7 nm
@@ -17,15 +18,15 @@ LOADING_S = 0.6                      # until the node has computed the table and
 
 @pytest.fixture(scope="module")
 def machine_and_axis():
-    with Twin(nodes=(1,), plant=figures_learner.HARMONICS_OF_TWIN) as twin:
-        line = Line(TwinTransport(twin), random_source=random.Random(1))
-        line.transport.wait(START_S)
-        yield twin.machine(), line.axis(1)
+    with Twin(nodes=(1,), plant=figures_calibration.HARMONICS_OF_TWIN) as twin:
+        bus = Bus(TwinTransport(twin), random_source=random.Random(1))
+        bus.transport.wait(START_S)
+        yield twin.machine(), bus.axis(1)
 
 
 @pytest.fixture(scope="module")
 def learned():
-    machine, *_ = figures_learner.learn(1, 0, 0, curve=figures_learner.curve_of_twin(), amplitude=parameters.values()["signal_amplitude"])
+    machine, *_ = figures_calibration.learn(1, 0, 0, curve=figures_calibration.curve_of_twin(), amplitude=parameters.values()["signal_amplitude"])
     assert machine.learner.settled
     return {**machine.values, "cosine": list(machine.values["cosine"]), "sine": list(machine.values["sine"])}
 
@@ -34,11 +35,11 @@ def left_nm(machine, axis, correction):
     """Largest difference of the node's position from the true one over a period with this correction, the mean taken off. The table
     stands at each place."""
     axis.set_correction(correction)
-    axis.node.line.transport.wait(LOADING_S)
+    axis.node.bus.transport.wait(LOADING_S)
     away = []
     for n in range(PLACES):
-        machine.place(n * 0.8e-6 / PLACES)
-        axis.node.line.transport.wait(0.001)
+        machine.set_position(n * 0.8e-6 / PLACES)
+        axis.node.bus.transport.wait(0.001)
         away.append(np.mean([axis.status().position_nm - machine.state.position_nm for _ in range(LOOKS)]))
     return np.abs(np.array(away) - np.mean(away)).max()
 

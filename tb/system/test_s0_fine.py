@@ -44,13 +44,13 @@ def test_moves_end_within_5_nm(stage):
     for target_nm in (1e5 + 100, 1e5 - 7000, 3e5 + 333, 2.5e5):
         move = stage.move(X, target_nm)
         assert abs(move.error_nm) <= BOUND_NM, move
-        stage.let_pass(0.15)
+        stage.dwell(0.15)
         assert stage.axes[X].status().drive_command == 0, "the motor rests"
         assert converter(stage) != ZERO_VOLT, "and the piezo holds"
 
 
 def test_it_stands_within_a_nanometre(stage):
-    stage.let_pass(0.2)
+    stage.dwell(0.2)
     true = stage.watch(X, 0.5)["true_nm"]
     assert true.std() <= 1 and abs(true.mean() - 1e5) <= BOUND_NM
 
@@ -72,21 +72,21 @@ def test_a_table_that_is_pushed_is_kept_by_the_piezo(stage):
     before = stage.machine(X).state.piezo_m
     for newton in np.linspace(0, NEWTON, 20):
         stage.machine(X).push(newton)
-        stage.let_pass(0.02)
+        stage.dwell(0.02)
     try:
         true = stage.watch(X, 0.3)["true_nm"]
         assert abs(true[-1000:].mean() - 1e5) <= BOUND_NM
         assert abs(stage.machine(X).state.piezo_m - before) > 100e-9
     finally:
         stage.machine(X).push(0)
-        stage.let_pass(0.2)
+        stage.dwell(0.2)
 
 
 def drift(stage, first_nm, last_nm):
     """The scale creeps along its machine, 10 nm at a time."""
     for place in np.arange(first_nm, last_nm, 10.0 if last_nm > first_nm else -10.0):
         stage.machine(X).set(grating_offset=place * 1e-9)
-        stage.let_pass(0.01)
+        stage.dwell(0.01)
     stage.machine(X).set(grating_offset=last_nm * 1e-9)
 
 
@@ -96,7 +96,7 @@ def test_beyond_its_range_the_motor_takes_over_and_hands_back(stage):
     stage.machine(X).trace(10_000)
     try:
         drift(stage, 0, DRIFT_NM)
-        stage.let_pass(0.4)
+        stage.dwell(0.4)
         trace = stage.traced(X)
         command = np.abs(trace["dac_code"] - ZERO_VOLT)
         spent = int(np.flatnonzero(command == limit)[0])
@@ -107,11 +107,11 @@ def test_beyond_its_range_the_motor_takes_over_and_hands_back(stage):
     finally:
         axis.write_parameter("fine_limit", 30000)
         drift(stage, DRIFT_NM, 0)
-        stage.let_pass(0.3)
+        stage.dwell(0.3)
 
 
 def test_homing_with_the_fine_stage_on_finds_the_same_zero(stage):
-    stage.axes[X].home(progress=stage.keep(X))
+    stage.axes[X].home(progress=stage.record_while_moving(X))
     assert abs(stage.move(X, 0).error_nm) <= BOUND_NM
 
 
@@ -119,7 +119,7 @@ def test_drive_off_in_a_fine_hold_puts_the_piezo_to_the_middle(stage):
     axis = stage.axes[X]
     assert converter(stage) != ZERO_VOLT
     axis.disable()
-    stage.let_pass(0.01)
+    stage.dwell(0.01)
     assert converter(stage) == ZERO_VOLT and not stage.machine(X).state.enabled
     axis.enable()
     assert converter(stage) == ZERO_VOLT, "nothing of the last hold comes back"
@@ -128,11 +128,11 @@ def test_drive_off_in_a_fine_hold_puts_the_piezo_to_the_middle(stage):
 def test_a_fault_in_a_fine_hold_puts_the_piezo_to_the_middle(stage):
     axis = stage.axes[X]
     with stage.twin.fault("estop"):
-        stage.let_pass(0.01)
+        stage.dwell(0.01)
         status = axis.status()
         assert status.state == "faulted" and status.faults == ("estop",)
         assert converter(stage) == ZERO_VOLT and not stage.machine(X).state.enabled
-    stage.let_pass(0.01)
+    stage.dwell(0.01)
     axis.reset()
     axis.enable()
     assert abs(stage.move(X, 1.2e5).error_nm) <= BOUND_NM

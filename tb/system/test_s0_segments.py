@@ -10,9 +10,9 @@ import random
 
 import pytest
 
-from moire.client import Line
+from moire.bus.client import Bus
+from moire.cli.segments import Segments, SegmentTable
 from moire.errors import Refused
-from moire.segments import Segments, SegmentTable
 from twin import START_S, WITH_SEGMENTS, Twin, TwinTransport
 
 CYCLIC, PITCH, WALK = 150e-9, 1.5e-3, 10e-9
@@ -25,8 +25,8 @@ CURVED_NM = LENGTH_NM**2 / 8 * CYCLIC * 1e9 * (2 * math.pi / PITCH / 1e9) ** 2
 
 class Stage:
     def __init__(self, twin):
-        self.machine, self.axis = twin.machine(), Line(TwinTransport(twin), random_source=random.Random(1)).axis(1)
-        self.axis.node.line.transport.wait(START_S)
+        self.machine, self.axis = twin.machine(), Bus(TwinTransport(twin), random_source=random.Random(1)).axis(1)
+        self.axis.node.bus.transport.wait(START_S)
         self.segments = Segments(self.axis)
         self.axis.enable()
         self.axis.home()

@@ -6,9 +6,9 @@ import random
 import pytest
 
 from experiments.s0_stage import ADDRESSES, PERIOD_NM, Stage
-from moire import client
-from moire.errors import LineGarbled, MotionFailed, NobodyAnswers, Refused, WrongBuild
-from moire.protocol import request_body
+from moire.bus import client
+from moire.bus.protocol import request_body
+from moire.errors import BusGarbled, MotionFailed, NoAnswer, Refused, WrongBuild
 
 SEED = int(os.environ.get("SEED") or 1)
 AXIS = {name: number for number, name in enumerate(ADDRESSES)}
@@ -38,7 +38,7 @@ def stage(homed):
 
 def rest(stage, name):
     """True position, told position and target: what a refused command must not change. Looks long enough to see a motion begin."""
-    stage.let_pass(0.05)
+    stage.dwell(0.05)
     status = stage.axes[name].status()
     return stage.true_nm(name), status.target_nm
 
@@ -87,14 +87,14 @@ def test_five_moves_reach_their_targets(stage):
 
 def test_targets_that_change_in_flight_leave_the_queue_filled(stage):
     """The soft core goes on feeding while it plans: the profile never runs out, and the axis ends at the last target."""
-    axis, transport = stage.axes["X"], stage.line.transport
+    axis, transport = stage.axes["X"], stage.bus.transport
     targets, longest = (3e6, 3.000_01e6, 1e6, 2.5e6, -0.02e6), 0.0
     for target_nm in targets:
         began = transport.now()
         axis.request("move", target=axis.to_counts(target_nm))
         longest = max(longest, transport.now() - began)
-        stage.let_pass(0.02)
-    axis.wait(stage.keep("X"))
+        stage.dwell(0.02)
+    axis.wait(stage.record_while_moving("X"))
     status = axis.status()
     assert not status.faults and abs(status.target_nm - targets[-1]) < 1 and abs(stage.true_nm("X") - targets[-1]) <= BOUND_NM
     print(f"answered within {longest * axis.node.identity.clk_hz / 1e3:.0f} 000 clk")
@@ -111,12 +111,12 @@ def test_homing_again_finds_the_same_zero(stage):
 def test_stop_in_mid_move_keeps_the_axis_under_control(stage):
     axis = stage.axes["X"]
     axis.request("move", target=axis.to_counts(1.5e6))
-    stage.let_pass(0.15)
+    stage.dwell(0.15)
     before = axis.status()
     assert before.velocity_mm_s > 1
     axis.stop()
     with pytest.raises(MotionFailed) as caught:
-        axis.wait(stage.keep("X"))
+        axis.wait(stage.record_while_moving("X"))
     assert caught.value.cause == "stopped"
     status = axis.status()
     assert status.enabled and status.state == "holding" and not status.faults
@@ -139,12 +139,12 @@ def sub_division_errors(stage, name, count=12, looks=8):
 def test_the_learner_takes_the_ellipse_off_in_motion(stage):
     axis = stage.axes["Y"]
     before = sub_division_errors(stage, "Y")
-    axis.learner("learn")
+    axis.calibration("calibrate")
     for n in range(30):
         stage.move("Y", 0.3e6 if n % 2 else 0.7e6)
-        if axis.learner("look").accepted:
+        if axis.calibration("read").accepted:
             break
-    learner = axis.learner("freeze")
+    learner = axis.calibration("freeze")
     assert learner.accepted == 1 and learner.refused == 0, learner
     after = sub_division_errors(stage, "Y")
     spread = [max(errors) - min(errors) for errors in (before, after)]
@@ -170,7 +170,7 @@ def fault_during_move(stage, name, provoke, distance_nm=0.5e6):
     axis = stage.axes[name]
     here = axis.status().position_nm
     axis.request("move", target=axis.to_counts(here + distance_nm))
-    stage.let_pass(0.06)
+    stage.dwell(0.06)
     provoke()
     return axis
 
@@ -182,9 +182,9 @@ def assert_stopped_by(stage, name, cause):
     assert not status.enabled and status.state == "faulted" and cause in status.first_fault, status
     refused("faulted", axis.move, 0)
     refused("faulted", axis.enable)
-    stage.let_pass(0.1)
+    stage.dwell(0.1)
     place = stage.true_nm(name)
-    stage.let_pass(0.1)
+    stage.dwell(0.1)
     assert abs(stage.true_nm(name) - place) < 100, "the axis stands"
     return status
 
@@ -209,7 +209,7 @@ def test_limit_switch_stops_the_drive_and_lets_the_axis_leave(stage):
     axis.enable()
     place = stage.true_nm("X")
     axis.request("move", target=axis.to_counts(-1.29e6))          # further in: the guard lets no command pass
-    stage.let_pass(0.3)
+    stage.dwell(0.3)
     assert place - 100 < stage.true_nm("X") < place + 5000
     axis.disable()
     axis.reset()
@@ -224,9 +224,9 @@ def test_emergency_stop_takes_the_drive_at_once_and_holds_until_reset(stage):
     stage.twin.run(1e-5)
     assert not stage.twin.truth(AXIS["X"]).enabled, "off within 10 us, whatever the soft core does"
     assert_stopped_by(stage, "X", "estop")
-    assert "emergency stop" in refused("fault_stands", axis.reset)
+    assert "emergency stop" in refused("fault_persists", axis.reset)
     stage.twin.clear("estop", AXIS["X"])
-    stage.let_pass(0.01)
+    stage.dwell(0.01)
     refused("faulted", axis.enable)
     axis.reset()
     axis.enable()
@@ -238,11 +238,11 @@ def test_cut_cable_stops_both_drives(stage):
     fault_during_move(stage, "X", lambda: stage.twin.inject("line_cut", "host"), distance_nm=1.5e6)
     stage.twin.run(0.6)
     assert not any(stage.twin.truth(AXIS[name]).enabled for name in AXIS)
-    with pytest.raises(NobodyAnswers):
+    with pytest.raises(NoAnswer):
         stage.axes["X"].status()
     stage.twin.clear("line_cut", "host")
     for name, axis in stage.axes.items():
-        assert_stopped_by(stage, name, "line_watchdog")
+        assert_stopped_by(stage, name, "bus_watchdog")
         assert_position_survived(stage, name)
         axis.reset()
         axis.enable()
@@ -250,10 +250,10 @@ def test_cut_cable_stops_both_drives(stage):
 
 def test_encoder_cut_is_a_fault_and_takes_the_zero_away(stage):
     axis = fault_during_move(stage, "Y", lambda: stage.twin.inject("encoder_cut", AXIS["Y"]))
-    stage.let_pass(0.01)
+    stage.dwell(0.01)
     assert_stopped_by(stage, "Y", "encoder")
     stage.twin.clear("encoder_cut", AXIS["Y"])
-    stage.let_pass(0.02)
+    stage.dwell(0.02)
     axis.reset()
     axis.enable()
     refused("not_homed", axis.move, 0)
@@ -263,7 +263,7 @@ def test_encoder_cut_is_a_fault_and_takes_the_zero_away(stage):
 
 def test_jammed_motor_is_a_following_error(stage):
     axis = fault_during_move(stage, "X", lambda: stage.twin.inject("motor_jam", AXIS["X"]))
-    stage.let_pass(0.3)
+    stage.dwell(0.3)
     assert_stopped_by(stage, "X", "following_error")
     stage.twin.clear("motor_jam", AXIS["X"])
     axis.reset()
@@ -273,11 +273,11 @@ def test_jammed_motor_is_a_following_error(stage):
 
 def test_drive_fault_pin_takes_the_drive(stage):
     axis = fault_during_move(stage, "X", lambda: stage.twin.inject("drive_fault", AXIS["X"]), distance_nm=-0.2e6)
-    stage.let_pass(0.01)
+    stage.dwell(0.01)
     assert_stopped_by(stage, "X", "drive")
-    refused("fault_stands", axis.reset)
+    refused("fault_persists", axis.reset)
     stage.twin.clear("drive_fault", AXIS["X"])
-    stage.let_pass(0.01)
+    stage.dwell(0.01)
     axis.reset()
 
 
@@ -289,7 +289,7 @@ def test_nonsense_on_the_line_moves_nothing_and_the_next_command_works(stage):
     bad = axis.node.counters()
     for seed in range(3):
         stage.twin.send_nonsense(400, seed=SEED + seed)
-        stage.let_pass(0.02)
+        stage.dwell(0.02)
         assert stage.axes["X"].status().state == "holding"
     after = rest(stage, "X")
     assert after[1] == before[1] and abs(after[0] - before[0]) < BOUND_NM
@@ -304,7 +304,7 @@ def send_frame(stage, address, body, crc_flip=0, length=None):
     command = 0x20 | address
     payload = bytes([len(body) if length is None else length]) + body
     crc = (zlib.crc32(bytes([command]) + payload) ^ crc_flip).to_bytes(4, "little")
-    transport = stage.line.transport
+    transport = stage.bus.transport
     transport.send([0x100 | command])
     ready = transport.receive(1, 0.005)
     transport.send(list(payload + crc))
@@ -330,7 +330,7 @@ def test_a_frame_under_another_nodes_address_is_not_obeyed(stage):
     crc = zlib.crc32(bytes([0x20 | ADDRESSES["X"]]) + payload).to_bytes(4, "little")
     before = rest(stage, "Y")
     bad = stage.axes["Y"].node.counters()["frames_bad"]
-    transport = stage.line.transport
+    transport = stage.bus.transport
     transport.send([0x120 | ADDRESSES["Y"]])
     transport.receive(1, 0.005)
     transport.send(list(payload + crc))
@@ -346,7 +346,7 @@ def test_a_repeated_request_is_answered_again_and_not_acted_on_again(stage):
     body = request_body("set_parameter", 99, axis=0, parameter=client.PARAMETERS["settle_time"].id, value=21)
     for _ in range(3):
         ready, _ = send_frame(stage, ADDRESSES["X"], body)
-        transport = stage.line.transport
+        transport = stage.bus.transport
         transport.send([0x110 | ADDRESSES["X"]])
         assert transport.receive(9, 0.01)[2:5] == [99, body[1], 0]
     assert axis.node.counters()["repeated"] == counted + 2
@@ -360,7 +360,7 @@ def test_unknown_command_and_wrong_length_are_refused_in_words(stage, monkeypatc
     bodies = {bytes([41, 200]): "does not know this command", bytes([42, 5, 0, 1]): "wrong length", bytes([43]): "wrong length"}
     for body, words in bodies.items():
         send_frame(stage, ADDRESSES["X"], body)
-        transport = stage.line.transport
+        transport = stage.bus.transport
         transport.send([0x110 | ADDRESSES["X"]])
         reply = transport.receive(9, 0.01)
         assert reply[0] == 0x50 | ADDRESSES["X"] and reply[2] == body[0]
@@ -370,8 +370,8 @@ def test_unknown_command_and_wrong_length_are_refused_in_words(stage, monkeypatc
 
 
 def test_address_of_nobody_is_said(stage):
-    with pytest.raises(NobodyAnswers, match="nobody answers at address 7"):
-        stage.line.node(7)
+    with pytest.raises(NoAnswer, match="nobody answers at address 7"):
+        stage.bus.node(7)
 
 
 def test_target_outside_the_travel_is_refused_with_the_travel(stage):
@@ -401,28 +401,28 @@ def test_commands_for_another_axis_and_in_mid_move_are_refused(stage):
     refused("busy", axis.request, "move", target=0)
     refused("busy", axis.request, "home")
     refused("busy", axis.request, "set_parameter", parameter=client.PARAMETERS["kp"].id, value=1)
-    axis.wait(stage.keep("X"))
+    axis.wait(stage.record_while_moving("X"))
     assert abs(stage.true_nm("X") - here - 0.3e6) <= 2 * BOUND_NM
 
 
 def test_a_node_of_another_build_is_refused(stage, monkeypatch):
     monkeypatch.setattr(client, "MAP_CRC", client.MAP_CRC ^ 1)
     with pytest.raises(WrongBuild, match="register map"):
-        client.Line(stage.line.transport, random_source=random.Random(SEED)).node(ADDRESSES["X"])
+        client.Bus(stage.bus.transport, random_source=random.Random(SEED)).node(ADDRESSES["X"])
 
 
 def test_a_line_with_much_noise_still_brings_every_command_through_or_says_so(stage):
     """Spikes on the line: replies are repeated, nothing wrong is obeyed; what does not come through is an exception."""
     axis = stage.axes["X"]
     target = axis.status().target_nm
-    stage.twin.line_spikes(200)
+    stage.twin.bus_spikes(200)
     answered = 0
     for _ in range(15):
         try:
             assert axis.status().target_nm == target
             answered += 1
-        except (LineGarbled, NobodyAnswers):
+        except (BusGarbled, NoAnswer):
             pass
-    stage.twin.line_spikes(0)
-    stage.let_pass(0.02)
+    stage.twin.bus_spikes(0)
+    stage.dwell(0.02)
     assert answered >= 12

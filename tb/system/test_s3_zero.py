@@ -41,7 +41,7 @@ def test_searches_from_both_sides_of_the_mark_and_from_on_it_find_the_same_count
     assert {search.zero_counts for search in made} == {0}
     assert {search.start_um > 0 for search in made} == {True, False}
     assert {len(search.ways.split(", ")) for search in made} >= {2, 4}      # met at once, and only on the other side
-    assert all(abs(search.rest_um) < 2 for search in made)
+    assert all(abs(search.remaining_um) < 2 for search in made)
 
 
 @pytest.mark.parametrize("start_m", [-0.8e-3, 0.8e-3])
@@ -61,9 +61,9 @@ def test_methods_1_and_2_take_the_first_mark_behind_the_switch(motor, method, st
 
 @pytest.mark.parametrize(("method", "edge"), [(17, LOW), (18, HIGH)])
 def test_methods_17_and_18_take_the_place_where_the_switch_opens(motor, method, edge):
-    motor.axis.set_parameter("home_creep", "1mm/s")
+    motor.axis.set_parameter("homing_latch_speed", "1mm/s")
     place = home(motor, method, edge * 0.7e-6)
-    late = motor.axis.get_parameter("home_creep").value * 1000 * 2 / 1000       # um in the two ms until the firmware looks
+    late = motor.axis.get_parameter("homing_latch_speed").value * 1000 * 2 / 1000       # um in the two ms until the firmware looks
     assert abs(place - edge) <= 2 + late
 
 
@@ -76,16 +76,16 @@ def test_methods_35_and_37_call_this_place_zero(motor, method):
 
 
 def test_a_search_without_a_mark_in_reach_ends_with_its_cause_and_the_axis_under_control():
-    motor = s3_zero.Motor(SEED, scale_index_place=5e-3)
+    motor = s3_zero.Motor(SEED, scale_index_position=5e-3)
     motor.axis.enable()
     with pytest.raises(MotionFailed) as caught:
         motor.axis.home()
     assert caught.value.cause == "no_index"
     status = motor.axis.status()
     assert status.state == "holding" and status.enabled and not status.homed and not status.faults
-    before = motor.place_um
-    motor.axis.let_pass(0.1)
-    assert abs(motor.place_um - before) < 2                     # it stands
+    before = motor.position_um
+    motor.axis.dwell(0.1)
+    assert abs(motor.position_um - before) < 2                     # it stands
 
 
 def test_a_mark_that_is_stuck_is_no_zero(motor):

@@ -7,7 +7,7 @@ import random
 import pytest
 
 from experiments.s4_job import MAIN, SUB, TOLERANCE, Cut, IndexingMachine, Outcome, Trouble, apart, random_stations, random_worm
-from moire.job import JobState
+from moire.cli.job import JobState
 
 SEED = int(os.environ.get("SEED") or 1)
 NEAR_BY = 0.004                      # of a turn: stations 0.7 degree apart
@@ -51,7 +51,7 @@ def outcome_of(*cuts, stations=(0.0, 3600.0), state="finished"):
     (outcome_of((0, 0.1, True), (1, 0.1, True), (None, 900.0, True)), [], [], 1),
 ])
 def test_a_job_is_whole_when_each_station_was_cut_once(outcome, uncut, twice, strays):
-    assert (outcome.uncut, outcome.twice, len(outcome.strays)) == (uncut, twice, strays)
+    assert (outcome.uncut, outcome.twice, len(outcome.outside_tolerance)) == (uncut, twice, strays)
     assert outcome.whole == (not uncut and not twice and not strays)
 
 

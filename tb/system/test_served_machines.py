@@ -3,8 +3,8 @@
 import pytest
 
 from experiments.machines import MACHINES
-from moire import command_twin
-from tb.system.test_door import moire, served
+from moire.cli import twin as command_twin
+from tb.system.test_gateway import moire, served
 
 pytestmark = pytest.mark.filterwarnings("ignore:set(Daemon|Name).. is deprecated:DeprecationWarning")      # in pyserial
 

@@ -5,37 +5,37 @@ import random
 
 import pytest
 
-from moire.client import Line
-from moire.index import TURN, Table
-from moire.job import Job
-from moire.line_tables import CAUSES, FAULTS
-from moire.settings import Settings
+from moire.bus.client import Bus
+from moire.bus.indexing_table import TURN, IndexingTable
+from moire.bus.settings import Settings
+from moire.cli.job import Job
+from moire.made.bus_tables import CAUSES, FAULTS
 from tb.bench import seed
-from tb.firmware.test_firmware_peer import OPERATION, bodies, frame, index_to, look
-from twin import Surroundings, Twin, TwinTransport, build
-from twin.twin import Axis, Node
+from tb.firmware.test_firmware_peer import OPERATION, bodies, frame, look, turn_to
+from twin import Devices, Twin, TwinTransport, build
+from twin.nodes.twin import Axis, Node
 
 SUB, MAIN = 0, 1                 # places
 ESTOP = next(bit for bit, (name, _) in FAULTS.items() if name == "estop")
 NODE = {"DRIVES": 2, "FILTERS": 0, "SINE": 0}
 AXIS = {"period": "1um", "drive": "steps", "position_source": "own_steps", "steps_per_period": 4, "counts_per_period": 4,
         "disagreement_limit": 0, "encoder_fault_mask": 0, "deglitch": 0, "kp": 0, "ki": 0, "kd": 0, "kv": 0, "ka": 0,
-        "following_limit": "10mm", "velocity": "20mm/s", "acceleration": "100mm/s2", "jerk": "1000mm/s3", "home_creep": "0.2mm/s",
+        "following_limit": "10mm", "velocity": "20mm/s", "acceleration": "100mm/s2", "jerk": "1000mm/s3", "homing_latch_speed": "0.2mm/s",
         "settle_window": "1um", "settle_time": "5ms", "watchdog_time": "60s"}
-QUICK = {"index_allowance": "40arcsec", "index_take_up": "40arcsec", "index_share": "0.7", "index_settle": "50ms"}
+QUICK = {"turn_allowance": "40arcsec", "turn_take_up": "40arcsec", "turn_share": "0.7", "turn_settle": "50ms"}
 
 
 class Station:
     def __init__(self):
         table = Axis("worm_table", {"sensor_dropped": 0.005, "sensor_corrupt": 0.005})
-        self.twin = Twin([Node(1, [table], Surroundings(eeprom=True)), Node(2, [])], seed=seed() % 1000, node_parameters=NODE,
+        self.twin = Twin([Node(1, [table], Devices(eeprom=True)), Node(2, [])], seed=seed() % 1000, node_parameters=NODE,
                          firmware=build.firmware("station"), peers=(SUB, MAIN), peer_baud=115200)
-        line = Line(TwinTransport(self.twin), random_source=random.Random(seed()), poll_s=0.1)
-        line.transport.wait(0.1)
-        node, axis = line.node(1), line.axis(1)
+        bus = Bus(TwinTransport(self.twin), random_source=random.Random(seed()), poll_s=0.1)
+        bus.transport.wait(0.1)
+        node, axis = bus.node(1), bus.axis(1)
         for name, value in AXIS.items():
             axis.set_parameter(name, value)
-        self.settings, self.table, self.job = Settings(node), Table(node), Job(node)
+        self.settings, self.table, self.job = Settings(node), IndexingTable(node), Job(node)
         self.settings.load(QUICK)
         self.to_sub, self.from_sub = self.twin.peer_lines[MAIN, SUB], self.twin.peer_lines[SUB, MAIN]
 
@@ -63,7 +63,7 @@ def station():
 
 def test_a_target_below_is_reached_from_below_within_two_arcsec_of_the_truth(station):
     target = station.beside(-100)
-    state = station.table.index(target)
+    state = station.table.turn(target)
     assert abs(state.left) <= 0.5 and abs(station.error(target)) <= 2
     told = station.twin.truth(SUB)
     assert told.lost_steps == 0 and told.step_timing_errors == 0
@@ -74,8 +74,8 @@ def test_a_frame_from_the_peer_turns_the_table_amid_garbage(station):
     station.settings.set("peer_mode", "frames")
     target = station.beside(200)
     station.to_sub.garbage(20)
-    assert any(station.ask(index_to(7, target)) == [bytes([7, OPERATION["index_to"], 0])] for _ in range(10))
-    assert any(reply[:3] == bytes([8 + n, OPERATION["index_state"], 0]) for n in range(10) for reply in station.ask(look(8 + n)))
+    assert any(station.ask(turn_to(7, target)) == [bytes([7, OPERATION["turn_to"], 0])] for _ in range(10))
+    assert any(reply[:3] == bytes([8 + n, OPERATION["turn_state"], 0]) for n in range(10) for reply in station.ask(look(8 + n)))
     station.to_sub.garbage(0)
     assert station.table.wait().ended == "ok" and abs(station.error(target)) <= 2
     assert station.table.peer().garbage > 0
@@ -91,14 +91,14 @@ def test_an_emergency_stop_is_told_to_the_peer_and_reset_by_it_when_it_is_over(s
         return causes[reply[2]], reply[3:]
 
     with station.twin.fault("estop", SUB):
-        station.ask(index_to(30, station.beside(100)))
-        assert ask(31, "index_to", b"\0" * 4)[0] == "faulted"
+        station.ask(turn_to(30, station.beside(100)))
+        assert ask(31, "turn_to", b"\0" * 4)[0] == "faulted"
         cause, fields = ask(32, "status")
         assert cause == "ok" and int.from_bytes(fields[6:8], "little") == 1 << ESTOP
-        assert ask(33, "reset_faults")[0] == "fault_stands"
+        assert ask(33, "reset_faults")[0] == "fault_persists"
     assert ask(34, "reset_faults")[0] == "ok"
     target = station.beside(100)
-    assert station.ask(index_to(35, target)) == [bytes([35, OPERATION["index_to"], 0])]
+    assert station.ask(turn_to(35, target)) == [bytes([35, OPERATION["turn_to"], 0])]
     assert station.table.wait().ended == "ok" and abs(station.error(target)) <= 2
 
 
@@ -110,6 +110,6 @@ def test_the_bytes_as_printed_turn_the_table_to_its_next_station(station):
     station.from_sub.take_heard()
     station.to_sub.put(b"\xFF\xFF\xAA")
     station.twin.run(0.1)
-    assert station.table.peer().phase == "indexing" and station.table.wait().ended == "ok"
+    assert station.table.peer().phase == "turning" and station.table.wait().ended == "ok"
     station.twin.run(0.01)
     assert bytes(station.from_sub.take_heard()) == b"\xFF\xFF\x55" and abs(station.error(target)) <= 2

@@ -5,8 +5,8 @@ import math
 import numpy
 import pytest
 
-from figures import learner as figures_learner
-from twin.stage import Stage
+from figures import calibration as figures_calibration
+from twin.machines.stage import Stage
 
 PERIOD = 0.8e-6
 IDEAL = dict(signal_offset_sin=0, signal_offset_cos=0, signal_gain_cos=1, signal_phase_error=0, signal_noise=0, comparator_spike_rate=0)
@@ -77,8 +77,8 @@ def test_a_harmonic_of_the_vector_is_that_one_and_no_other(harmonic):
 
 
 def test_harmonics_come_before_gain_phase_and_offset_as_the_figures_take_them():
-    cos, sin = figures_learner.curve_of_twin()(2 * numpy.pi * numpy.arange(64) / 64)
-    assert numpy.abs(vector(Stage(**figures_learner.HARMONICS_OF_TWIN)) - (cos + 1j * sin)).max() < 1e-9
+    cos, sin = figures_calibration.curve_of_twin()(2 * numpy.pi * numpy.arange(64) / 64)
+    assert numpy.abs(vector(Stage(**figures_calibration.HARMONICS_OF_TWIN)) - (cos + 1j * sin)).max() < 1e-9
 
 
 def test_codes_by_hand():

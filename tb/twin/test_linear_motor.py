@@ -5,7 +5,8 @@ import math
 import numpy
 import pytest
 
-from twin import Machine, parameters
+from twin import Machine
+from twin.parameters import tables as parameters
 
 FREE = dict(guide_coulomb=1e-9, guide_static=1e-9, guide_viscous=0, guide_presliding_damping=0)
 AMPERE = 0.3 * 10 / 32768        # a count of the converter
@@ -60,7 +61,7 @@ def test_it_accelerates_as_force_over_mass():
 
 def test_it_swings_on_flexure_and_cable_without_losing_energy():
     machine = motor(**FREE, clk_hz=100_000)
-    machine.place(1e-3)
+    machine.set_position(1e-3)
     machine.trace(10_000)
     machine.run(6.0)
     trace = machine.take_trace()
@@ -86,7 +87,7 @@ def test_it_rests_anywhere_within_a_millimetre_and_stays_there():
 
 def test_friction_holds_it_below_break_away():
     machine = motor(flexure_stiffness=0, cable_stiffness=0)
-    machine.place(0.0)
+    machine.set_position(0.0)
     for share, slides in ((0.6, False), (1.2, True)):
         for n in range(1, 51):
             machine.dac(32768 + round(share * 1.1 / 12 / AMPERE * n / 50))
@@ -98,7 +99,7 @@ def test_the_mark_is_a_count_wide_and_scatters_as_stated():
     machine = motor(**{**FREE, "guide_viscous": 300.0}, flexure_stiffness=0, cable_stiffness=0, clk_hz=1_000_000)
     lows, highs = [], []
     for sign in (1, -1) * 4:
-        machine.place(-sign * 5e-6)
+        machine.set_position(-sign * 5e-6)
         machine.dac(32768 + sign * round(300 * 1e-3 / 12 / AMPERE))        # 1 mm/s
         machine.trace(100_000)
         machine.run(0.015)
@@ -113,7 +114,7 @@ def test_the_mark_is_a_count_wide_and_scatters_as_stated():
 
 def test_the_scale_counts_every_micrometre_both_ways():
     machine = motor(**{**FREE, "guide_viscous": 30.0}, flexure_stiffness=0, cable_stiffness=0)
-    machine.place(0.5e-6)
+    machine.set_position(0.5e-6)
     start, total = machine.state.scale_counts, 0
     for sign in (1, -1):
         machine.dac(32768 + sign * round(30 * 50e-3 / 12 / AMPERE))        # 50 mm/s
@@ -123,7 +124,7 @@ def test_the_scale_counts_every_micrometre_both_ways():
         assert abs(steps).max() == 1
         total += steps.sum()
     assert abs(total - (machine.state.scale_counts - start)) <= 2          # an edge may lie between two watches
-    machine.place(-3e-3)
+    machine.set_position(-3e-3)
     machine.run(1e-4)
     assert machine.state.scale_counts in (-3001, -3000)
 
@@ -136,7 +137,7 @@ def test_stops_and_switches():
         assert abs(machine.state.position_m - end) < 0.5e-3 and abs(machine.state.position_m) > 8e-3
         assert (machine.state.limit_low, machine.state.limit_high) == (end < 0, end > 0)
     machine.dac(32768)
-    machine.place(0.0)
+    machine.set_position(0.0)
     machine.run(1e-3)
     assert not machine.state.limit_low and not machine.state.limit_high
     assert machine.level("sensor_rx") and not machine.level("drive_fault")     # no sensor: its line idles

@@ -8,11 +8,11 @@ import subprocess
 import numpy
 import pytest
 
-from twin import Surroundings, SurroundingsBench
+from twin import Devices, DevicesBench
 
 CLK_HZ, BUS_HZ = 2_000_000, 100_000
 EEPROM, KEYPAD, DISPLAY = 0x50, 0x34, 0x27
-PANEL = Surroundings(eeprom=True, keypad=True, display=True)
+PANEL = Devices(eeprom=True, keypad=True, display=True)
 
 
 class Master:
@@ -84,7 +84,7 @@ class Master:
 
 @pytest.fixture
 def panel():
-    return SurroundingsBench(PANEL, clk_hz=CLK_HZ)
+    return DevicesBench(PANEL, clk_hz=CLK_HZ)
 
 
 @pytest.fixture
@@ -396,7 +396,7 @@ def test_devices_that_are_absent_or_dead_do_not_answer(panel, master):
         with panel.fault(fault):
             assert not master.send(address)
         assert master.send(address)
-    other = SurroundingsBench(Surroundings(keypad=True))
+    other = DevicesBench(Devices(keypad=True))
     assert not Master(other).send(EEPROM) and Master(other).send(KEYPAD)
     other.clear("eeprom_dead")                                 # what is not there does not come back
     assert not Master(other).send(EEPROM)
@@ -414,7 +414,7 @@ def test_a_shorted_line_is_low(panel):
 def test_what_does_not_exist_is_refused(panel):
     for call, error in ((lambda: panel.press(34), IndexError), (lambda: panel.write_eeprom(16383, [1, 2]), IndexError),
                         (lambda: panel.inject("fire"), KeyError), (lambda: panel.set(weight=1), KeyError),
-                        (lambda: SurroundingsBench(Surroundings(parameters={"weight": 1})), KeyError)):
+                        (lambda: DevicesBench(Devices(parameters={"weight": 1})), KeyError)):
         with pytest.raises(error):
             call()
 

@@ -5,7 +5,7 @@ import math
 import numpy
 import pytest
 
-from twin.stage import Stage
+from twin.machines.stage import Stage
 
 DAMPED = dict(piezo_mode_damping=0.7)
 STILL = dict(piezo_creep=0, **DAMPED)

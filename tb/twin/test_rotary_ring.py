@@ -4,7 +4,7 @@ import numpy
 import pytest
 
 from twin import RotaryRing
-from twin.ring import ARC_SECOND
+from twin.machines.ring import ARC_SECOND
 
 TURN = 2 * numpy.pi
 ANGLES = numpy.arange(36_000) / 36_000 * TURN

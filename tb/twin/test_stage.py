@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from twin import parameters
-from twin.stage import Stage
+from twin.machines.stage import Stage
+from twin.parameters import tables as parameters
 
 SMOOTH = dict(motor_coulomb=1e-9, motor_static=1e-9, motor_viscous=0, motor_presliding_damping=0, table_coulomb=1e-9, table_static=1e-9,
               table_viscous=0, table_presliding_damping=0)

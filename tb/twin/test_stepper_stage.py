@@ -15,7 +15,7 @@ FREE = dict(motor_coulomb=1e-9, motor_static=1e-9, motor_viscous=0, motor_presli
 def stepper(clk_hz=1_000_000, place=20e-3, **values):
     machine = Machine("stepper_stage", clk_hz=clk_hz, **values)
     machine.pins(drive_enable=1)
-    machine.place(place)
+    machine.set_position(place)
     machine.run(0.01)
     return machine
 

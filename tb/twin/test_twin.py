@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The twin as an instrument: its line, its faults, its clock, and that the same seed gives the same run."""
+"""The twin as an instrument: its bus, its faults, its clock, and that the same seed gives the same run."""
 import zlib
 
 import numpy
@@ -31,8 +31,8 @@ def ask(twin, address=1, **damage):
 
 def test_both_nodes_answer_and_nobody_collides(twin):
     assert ask(twin, 1) == empty_reply(1) and ask(twin, 2) == empty_reply(2)
-    assert twin.line().collisions == 0 and twin.line().framing_errors == 0
-    assert twin.line_stays_idle(0.01)
+    assert twin.bus().collisions == 0 and twin.bus().framing_errors == 0
+    assert twin.bus_stays_idle(0.01)
 
 
 def test_the_transport_returns_as_soon_as_the_words_are_there(twin):
@@ -41,7 +41,7 @@ def test_the_transport_returns_as_soon_as_the_words_are_there(twin):
     before = transport.now()
     assert transport.receive(9, 1.0) == empty_reply(1)
     assert transport.now() - before > 9 * transport.character_s
-    assert transport.now() - twin.line().last_driven_s < transport.character_s        # not long after the last word
+    assert transport.now() - twin.bus().last_driven_s < transport.character_s        # not long after the last word
     before = transport.now()
     assert transport.receive(1, 0.003) == []
     assert transport.now() - before == pytest.approx(0.003)
@@ -52,7 +52,7 @@ def test_the_transport_returns_as_soon_as_the_words_are_there(twin):
 def test_words_wait_until_they_are_taken(twin):
     twin.send_words([ASK[1]])
     twin.run(0.005)
-    assert twin.line().words_waiting == 9
+    assert twin.bus().words_waiting == 9
     assert twin.receive_words(4) + twin.receive_words() == empty_reply(1)
 
 
@@ -74,9 +74,9 @@ def test_a_flipped_bit_of_the_reply_reaches_the_host_as_such(twin):
     expected = empty_reply(1)
     expected[4] ^= 1 << 6
     assert ask(twin) == expected
-    before = twin.line().framing_errors
+    before = twin.bus().framing_errors
     twin.flip_reply_cells([10])                                # the first stop bit: a PC's port gives the word all the same
-    assert ask(twin) == empty_reply(1) and twin.line().framing_errors == before + 1
+    assert ask(twin) == empty_reply(1) and twin.bus().framing_errors == before + 1
     assert ask(twin) == empty_reply(1)
 
 
@@ -96,7 +96,7 @@ def test_nodes_of_one_address_collide():
     with Twin(seed=1, nodes=(1, 1)) as twin:
         twin.run(START_S)
         ask(twin)
-        assert twin.line().collisions > 0
+        assert twin.bus().collisions > 0
 
 
 def test_levels_and_words_are_the_same_on_the_line(twin):
@@ -109,11 +109,11 @@ def test_levels_and_words_are_the_same_on_the_line(twin):
 def test_after_nonsense_and_spikes_the_nodes_answer_again(twin):
     twin.send_nonsense(300, seed=3)
     twin.run(0.02)
-    twin.line_spikes(5000)
-    edges = twin.line().edges
+    twin.bus_spikes(5000)
+    edges = twin.bus().edges
     twin.run(0.02)
-    assert 100 < twin.line().edges - edges < 320               # 100 spikes of two edges, and answers to chance commands
-    twin.line_spikes(0)
+    assert 100 < twin.bus().edges - edges < 320               # 100 spikes of two edges, and answers to chance commands
+    twin.bus_spikes(0)
     twin.run(0.01)
     twin.receive_words()
     assert ask(twin, 1) == empty_reply(1) and ask(twin, 2) == empty_reply(2)
@@ -125,7 +125,7 @@ def record(seed, **arguments):
         twin.run(START_S)
         twin.push(0, 30.0)
         words = ask(twin)
-        return words, twin.take_trace(0)["position_m"].tolist(), [twin.truth(n) for n in (0, 1)], twin.line().edges
+        return words, twin.take_trace(0)["position_m"].tolist(), [twin.truth(n) for n in (0, 1)], twin.bus().edges
 
 
 def test_the_same_seed_gives_the_same_run():
@@ -155,9 +155,9 @@ def test_a_trace_holds_what_was_true(twin):
 
 
 def test_each_fault_is_seen_by_the_node(twin):
-    from moire.client import Line
+    from moire.bus.client import Bus
 
-    axis = Line(TwinTransport(twin)).axis(1)
+    axis = Bus(TwinTransport(twin)).axis(1)
     assert not axis.status().faults and not axis.status().encoder_events
     for fault in ("estop", "limit_low", "limit_high"):
         with twin.fault(fault):
@@ -179,15 +179,15 @@ def test_parameters_are_set_and_read_by_name(twin):
 
 
 def test_a_node_drives_any_machine():
-    from moire.client import Line
+    from moire.bus.client import Bus
 
     with Twin([Node(1, [Axis("linear_motor", {"travel_start_lowest": 0.5e-3})]), Node(2, [Axis("stepper_stage")])], seed=1) as twin:
         twin.run(START_S)
         assert 0.5e-3 <= twin.truth(0).position_m <= 1e-3 and 5e-3 <= twin.truth(1).position_m <= 20e-3
-        line = Line(TwinTransport(twin))
-        motor, stepper = line.axis(1), line.axis(2)
+        bus = Bus(TwinTransport(twin))
+        motor, stepper = bus.axis(1), bus.axis(2)
         for place, low, high in ((-7.5e-3, True, False), (0.0, False, False), (7.5e-3, False, True)):
-            twin.place(0, place)
+            twin.set_position(0, place)
             twin.run(0.001)
             status = motor.status()
             assert (status.limit_low, status.limit_high) == (low, high)

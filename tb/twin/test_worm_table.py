@@ -149,7 +149,7 @@ def test_faults_of_the_sensor():
     machine.run(0.02)
     with machine.fault("sensor_stuck"):
         machine.run(0.02)
-        machine.place(machine.state.position_rad + 0.1)
+        machine.set_position(machine.state.position_rad + 0.1)
         stuck, _ = readings(machine, 0.05)
     assert len({angle for _, _, angle in stuck}) == 1
     machine.run(0.02)

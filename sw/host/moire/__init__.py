@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Host package of Moire: talks to motion controllers on a multi-drop line."""
-from .client import Axis, Line, Node, Status
-from .errors import MoireError
-from .transport import SerialLine, Transport
+from moire.bus.client import Axis, Bus, Node, Status
+from moire.bus.transport import SerialBus, Transport
 
-__all__ = ["Axis", "Line", "MoireError", "Node", "SerialLine", "Status", "Transport"]
+from .errors import MoireError
+
+__all__ = ["Axis", "Bus", "MoireError", "Node", "SerialBus", "Status", "Transport"]

@@ -45,7 +45,7 @@ class TwinNotBuilt(PortError):
     """The simulated machine cannot be loaded."""
 
 
-class LineError(MoireError):
+class BusError(MoireError):
     """The exchange did not succeed, however often it was repeated."""
 
     exit_code = 3
@@ -55,14 +55,14 @@ class LineError(MoireError):
         self.address = address
 
 
-class NobodyAnswers(LineError):
+class NoAnswer(BusError):
     """Not one word came back."""
 
     def __init__(self, address: int, tries: int = 1):
         super().__init__(address, f"nobody answers at address {address}, asked {times(tries)}: check power, wiring, baud rate and address")
 
 
-class LineGarbled(LineError):
+class BusGarbled(BusError):
     """Words came back, but no right reply."""
 
     def __init__(self, address: int, reason: str, tries: int = 1):
@@ -83,7 +83,7 @@ class WrongBuild(MoireError):
 
 
 class Refused(MoireError):
-    """The node said no. `cause` is the name of the code in line.toml."""
+    """The node said no. `cause` is the name of the code in bus.toml."""
 
     def __init__(self, cause: str, code: int, sentence: str):
         super().__init__(sentence)
@@ -98,8 +98,8 @@ class MotionFailed(MoireError):
         self.cause, self.code = cause, code
 
 
-class NotLearned(MoireError):
-    """The correction was not learned in time. `cause` is the name of the reason in line.toml."""
+class NotCalibrated(MoireError):
+    """The correction was not learned in time. `cause` is the name of the reason in bus.toml."""
 
     def __init__(self, cause: str, sentence: str):
         super().__init__(sentence)

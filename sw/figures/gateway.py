@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figures of the front gateway: how fast a stock client reads through it, and that nothing fed to a parser brings one down."""
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import NamedTuple
+
+import serial
+
+from figures.common import Figure, console
+from firmware import build as firmware_build
+from fuzz import parser_fuzz
+from moire.bus import cobs
+from moire.bus.protocol import parse_reply, request_body
+from moire.errors import MoireError
+
+ROOT = Path(__file__).resolve().parents[2]
+FIRMWARE = ROOT / "sw" / "firmware"
+READ_S = 10
+START_S = 3                  # the firmware starts, and loads its tables
+FUZZ_S = 600
+SANITIZED = ["-std=gnu11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined", "-fno-sanitize-recover=all",
+             "-DMOIRE_REGISTER_ACCESS"]
+
+
+class NotMeasured(MoireError):
+    """What the figure needs is not here."""
+
+
+# ------------------------------------------------------------------ reads
+
+def rfc2217_reads_per_s(seconds=READ_S):
+    """Positions of a node of the twin, read one after the other by pyserial alone over RFC 2217 in 8N1."""
+    command = [sys.executable, "-m", "moire.cli.command_line", "twin", "--nodes", "1", "--rfc2217", "0", "--tcp", "0", "--json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as twin:
+        told = twin.stdout.readline()
+        if not told.startswith('{"command": "twin"'):
+            raise NotMeasured(f"the twin is not served: {told.strip()}")
+        try:
+            with serial.serial_for_url(json.loads(told)["rfc2217"], timeout=1) as port:
+                read_positions(port, START_S)
+                return read_positions(port, seconds)
+        finally:
+            twin.terminate()
+
+
+def read_positions(port, seconds):
+    count, reader, began = 0, cobs.PacketReader(), time.perf_counter()
+    while time.perf_counter() - began < seconds:
+        port.write(cobs.packet(0x21, request_body("position", count, axis=0)))
+        contents = []
+        while not contents:
+            byte = port.read(1)
+            if not byte:
+                raise NotMeasured("a read got no answer")
+            contents = reader.feed(byte + port.read(port.in_waiting))
+        reply = parse_reply(cobs.body_of(contents[0]) or b"")
+        if reply is None or (reply.sequence, reply.cause) != (count % 256, 0):
+            raise NotMeasured("a read got a wrong answer")
+        count += 1
+    return count / (time.perf_counter() - began)
+
+
+# ------------------------------------------------------------------ fuzzing
+
+def build_firmware_fuzz(folder: Path, image, firmware=FIRMWARE) -> Path:
+    """An image of the firmware of this folder and its fuzzer as a program of this computer, by gcc with its sanitizers."""
+    if shutil.which("gcc") is None:
+        raise NotMeasured("gcc is missing: fuzzing the firmware needs its sanitizers")
+    traced = ["-Dmain=firmware_main", "-fsanitize-coverage=trace-pc"]
+    tools = firmware_build
+    sources = [path for path in tools.sources_of(image, Path(firmware)) if path.suffix == ".c"]
+    jobs = [(path, traced) for path in sources] + [(ROOT / "sw" / "fuzz" / "firmware_fuzz.c", [])]
+    objects = []
+    for path, more in jobs:
+        objects.append(folder / f"{path.stem}.o")
+        run(["gcc", *SANITIZED, *tools.defines_of(image), *more, f"-I{firmware}", "-c", path, "-o", objects[-1]])
+    run(["gcc", "-fsanitize=address,undefined", *objects, "-o", folder / "fuzz"])
+    return folder / "fuzz"
+
+
+def run(command):
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise NotMeasured(f"the fuzzer does not build: {(done.stderr.splitlines() or ['no word'])[0]}")
+
+
+def images(firmware=FIRMWARE):
+    return sorted(path.stem.removeprefix("image_") for path in (Path(firmware) / "images").glob("image_*.c"))
+
+
+class Outcome(NamedTuple):
+    image: str
+    runs: int
+    edges: int
+    kept: int
+    said: str | None                     # by a sanitizer, or about an input that took too long
+
+
+def fuzz_firmware(seconds, image, seed=1, firmware=FIRMWARE) -> Outcome:
+    with tempfile.TemporaryDirectory() as folder:
+        program = build_firmware_fuzz(Path(folder), image, firmware)
+        done = subprocess.run([program, str(seconds), str(seed)], capture_output=True, text=True, check=False,
+                              env={**os.environ, "ASAN_OPTIONS": "detect_leaks=0:abort_on_error=1", "UBSAN_OPTIONS": "abort_on_error=1"})
+    if done.returncode:
+        return Outcome(image, 0, 0, 0, done.stderr)
+    return Outcome(image, *map(int, done.stdout.split()), None)
+
+
+def host_parser_crashes(seconds=FUZZ_S, seed=1):
+    """Both at once, each on a processor of its own."""
+    with ThreadPoolExecutor(1) as beside:
+        names = images()
+        firmware = beside.submit(lambda: [fuzz_firmware(seconds / len(names), image, seed) for image in names])
+        targets = parser_fuzz.fuzz(seconds, seed)
+        outcomes = firmware.result()
+    crashes = 0
+    for outcome in outcomes:
+        console.print(f"firmware, image {outcome.image}: {outcome.runs} scripts, {outcome.edges} edges, {outcome.kept} kept")
+        if outcome.said is not None:
+            crashes += 1
+            console.print(outcome.said, markup=False)
+    for target in targets:
+        console.print(f"{target.parse.__name__}: {target.runs} inputs, {len(target.seen)} pairs of lines, {len(target.corpus)} kept")
+        for where, data in target.crashes.items():
+            crashes += 1
+            console.print(f"{where}: {data!r}", markup=False)
+    return crashes
+
+
+FIGURES = {
+    "rfc2217_reads_per_s": Figure(rfc2217_reads_per_s, "1/s", "position reads from the twin by stock pyserial over RFC 2217, in 8N1",
+                                  ">= 100", lambda value: value >= 100, 0),
+    "host_parser_crashes": Figure(host_parser_crashes, "crashes", "coverage-guided fuzzing of host and firmware parsers under sanitizers, "
+                                  f"{FUZZ_S // 60} minutes", "0", lambda value: value == 0, 0),
+}
+SOAK = {"parsers": lambda: (crashes := host_parser_crashes(24 * 3600), crashes == 0)}

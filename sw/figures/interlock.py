@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figure of the guard: does any fault, at whatever clk it comes, leave the drive on, or tell the wrong story afterwards.
+
+Most faults are injected into the Verilated axis, whose registers are driven over its bus (interlock_run.cpp); some into the whole node
+with its firmware, in the twin, where a person at the host resets them; and some stop the soft core itself.
+The soak of 10^6 faults of the axis is `make soak K=guard`.
+"""
+import random
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from figures.common import Figure, bar, console
+from firmware import build as firmware_build
+from moire import Bus
+from moire.errors import BusError, Refused
+from twin import START_S, Axis, Node, Twin, TwinTransport, build
+
+ROOT = Path(__file__).resolve().parents[2]
+DRIVER = Path(__file__).with_name("interlock_run.cpp")
+FAULTS, NODE_FAULTS, CORE_FAULTS = 10**4, 300, 100     # in all; of them in the node; of them in its soft core
+SHARE = 400                                            # of the axis' faults in one run, with a seed of its own
+CLK_HZ = 1_500_000
+TICK_S = 1 / 4000
+WATCHDOG_S = 0.04
+ANSWER_S = 0.01                                        # that the longest answer takes on the line, after its request
+CORE_SILENCE_S = 0.02 + 1_200_000 / CLK_HZ             # the node's watchdog of its soft core
+ROUND_S = 0.005                                        # a request on the line, and the round of the firmware that finds it
+FORGIVEN_NM = {"encoder_cut": 400}                     # between the position told last and that of the fault: a cut signal has any phase
+HELD_NM = 100                                          # while the axis holds and its scale is sound
+CAUSES = {"estop": "estop", "limit_low": "limit_low", "limit_high": "limit_high", "drive_fault": "drive", "encoder_cut": "encoder",
+          "line": "bus_watchdog"}                     # what is injected: what must be told
+STANDS = ("estop", "drive_fault", "encoder_cut")       # no reset while it does; after one a pressed switch only blocks the way into it
+INSTRUCTIONS = {"hang": 0x0000006F, "trap": 0x00000000}     # jump to itself; none at all
+
+
+# ------------------------------------------------------------------ the axis
+
+def axis_faults(count, done=lambda n: None):
+    """{name: number} over so many faults of the axis: faults, failures, and how many of each cause."""
+    program, totals = build.simulation(DRIVER, ROOT / "rtl" / "axis.sv", CLK_HZ=4_000_000), {}
+
+    def share(seed):
+        wanted = min(SHARE, count - seed * SHARE)
+        words = build.run([program, wanted, seed + 1], "interlock_run").split()
+        done(wanted)
+        return zip(words[1::2], map(int, words[::2]))
+
+    with ThreadPoolExecutor(2) as pool:
+        for told in pool.map(share, range(-(-count // SHARE))):
+            for name, value in told:
+                totals[name] = totals.get(name, 0) + value
+    return totals
+
+
+# ------------------------------------------------------------------ the node
+
+def powered_up(source, firmware=None):
+    """A twin of one node and its axis with the drive on."""
+    twin = Twin([Node(1, [Axis("stage")])], seed=source.randrange(1 << 31), clk_hz=CLK_HZ, node_parameters={"FILTERS": 0},
+                firmware=firmware)
+    twin.run(START_S)
+    axis = Bus(TwinTransport(twin)).axis(1)
+    axis.enable()
+    return twin, axis
+
+
+def refused(request, cause):
+    try:
+        request()
+    except Refused as error:
+        return error.cause == cause
+    return False
+
+
+def node_fault(twin, axis, fault, source):
+    """What was wrong with one fault, None if nothing was: the drive off in time, cause, position, and that only a person brings it back."""
+    told = CAUSES[fault]
+    axis.dwell(0.002 + source.random() * 0.005)
+    before = axis.status()
+    if not before.enabled or before.faults:
+        return f"not on before: {before.fault_words}"
+    if fault == "line":
+        twin.run(WATCHDOG_S - ANSWER_S)                # the last good frame ended before its answer
+        if not twin.truth().enabled:
+            return "off too soon"
+        twin.run(ANSWER_S)
+    else:
+        twin.run(source.random() * TICK_S)
+        twin.inject(fault)
+    twin.run(TICK_S)
+    if twin.truth().enabled:
+        return "drive not off within a tick"
+    status = axis.status()
+    if status.first_fault != (told,):
+        return f"told as {status.first_fault}"
+    if (off_nm := abs(axis.encoder().fault_position_nm - before.position_nm)) > FORGIVEN_NM.get(fault, HELD_NM):
+        return f"latched position {off_nm:.0f} nm off"
+    if not refused(axis.enable, "faulted"):
+        return "enabled with a fault latched"
+    if fault in STANDS and not refused(axis.reset, "fault_persists"):
+        return "reset while the cause stands"
+    if fault != "line":
+        twin.clear(fault)
+    twin.run(0.005)
+    if not axis.status().faults or twin.truth().enabled:
+        return "the cause went, and the fault with it"
+    axis.reset()
+    if axis.status().faults or twin.truth().enabled:
+        return "not reset, or on by itself"
+    axis.enable()
+    return None
+
+
+def node_faults(count, seed, done):
+    """Sentences about faults of the node that went wrong."""
+    source, wrong = random.Random(seed), []
+    twin, axis = powered_up(source)
+    axis.set_parameter("watchdog_time", WATCHDOG_S)
+    for n in range(count):
+        fault = list(CAUSES)[n % len(CAUSES)]
+        if sentence := node_fault(twin, axis, fault, source):
+            wrong.append(f"{fault} at {twin.time():.3f} s: {sentence}")
+            twin, axis = powered_up(source)
+            axis.set_parameter("watchdog_time", WATCHDOG_S)
+        done(1)
+    return wrong
+
+
+def spoilt_firmware(instruction):
+    """The firmware's words, with an instruction in the way of the request to reset faults."""
+    words = list(build.firmware())
+    _, symbols = firmware_build.load_segments((ROOT / "build" / "firmware" / "firmware.elf").read_bytes())
+    words[symbols["axis_reset_faults"] // 4] = instruction
+    return words
+
+
+def core_fault(twin, axis, kind):
+    """What was wrong with a soft core that stops, None if nothing was."""
+    axis.set_parameter("watchdog_time", f"{2 * CORE_SILENCE_S:.1f}s")     # that of the line is not to be the first
+    begun = twin.time()
+    if answers(axis, "reset_faults"):
+        return "the soft core still answers"
+    if kind == "hang":
+        twin.run(begun + CORE_SILENCE_S - ROUND_S - twin.time())
+        if not twin.truth().enabled:
+            return "off too soon"
+        twin.run(2 * ROUND_S)
+    twin.run(TICK_S)
+    if twin.truth().enabled:
+        return "drive not off in time"
+    if answers(axis, "enable", on=1):
+        return "the soft core still answers"
+    twin.run(0.01)
+    return "on again" if twin.truth().enabled else None
+
+
+def answers(axis, operation, **fields):
+    try:
+        axis.node.bus.exchange(1, operation, tries=1, answer_s=ROUND_S, axis=0, **fields)
+    except BusError:
+        return False
+    return True
+
+
+def core_faults(count, seed, done):
+    source, wrong = random.Random(seed), []
+    images = {kind: spoilt_firmware(instruction) for kind, instruction in INSTRUCTIONS.items()}
+    for n in range(count):
+        kind = list(INSTRUCTIONS)[n % len(INSTRUCTIONS)]
+        twin, axis = powered_up(source, images[kind])
+        twin.run(source.random() * 0.02)
+        if sentence := core_fault(twin, axis, kind):
+            wrong.append(f"{kind}: {sentence}")
+        twin.close()
+        done(1)
+    return wrong
+
+
+def guard_failures():
+    with bar(f"{FAULTS} faults") as progress:
+        task = progress.add_task("", total=FAULTS)
+
+        def done(n):
+            progress.advance(task, n)
+
+        wrong = node_faults(NODE_FAULTS - CORE_FAULTS, 1, done) + core_faults(CORE_FAULTS, 2, done)
+        totals = axis_faults(FAULTS - NODE_FAULTS, done)
+    console.print("axis: " + ", ".join(f"{value} {name}" for name, value in totals.items()))
+    console.print(f"node: {NODE_FAULTS - CORE_FAULTS} faults, {CORE_FAULTS} of its soft core, {len(wrong)} failures")
+    for sentence in wrong:
+        console.print(f"  {sentence}")
+    return float(totals["failures"] + len(wrong))
+
+
+def soak():
+    totals = axis_faults(10**6)
+    return totals, totals["failures"] == 0
+
+
+FIGURES = {
+    "guard_failures": Figure(guard_failures, "faults", "of 10^4 faults at random clk: drive not off within a tick, wrong first cause or "
+                             "position, or gone without a person", "0", lambda value: value == 0, 0),
+}
+
+SOAK = {"guard": soak}

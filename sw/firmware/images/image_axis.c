@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+// image_axis -- the axes of a measuring machine: their sines and cosines are corrected.
+#include "calibration/calibration_axes.h"
+#include "core/image.h"
+#include "bus/scope.h"
+#include "calibration/segments.h"
+
+const struct image_part image_parts[] = {
+    {calibration_axes_start, calibration_axes_work, calibration_axes_operation},
+    {segments_start, segments_work, segments_operation},
+    {scope_start, scope_work, scope_operation},
+};
+const unsigned image_part_count = sizeof image_parts / sizeof *image_parts;

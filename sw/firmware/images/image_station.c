@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// image_station -- a station of an indexing machine (S4), main node and sub-node alike.
+#include "core/hardware.h"
+#include "station/i2c.h"
+#include "core/image.h"
+#include "station/table/turn.h"
+#include "station/job/job.h"
+#include "station/storage/nonvolatile.h"
+#include "made/bus_protocol.h"
+#include "station/job/edm.h"
+#include "station/panel/panel.h"
+#include "station/table/peer.h"
+#include "station/panel/readout.h"
+#include "bus/scope.h"
+#include "station/table/sensor.h"
+#include "station/settings.h"
+#include "station/storage/store.h"
+
+_Static_assert(BUS_SETTING_COUNT + HARDWARE_AXES * BUS_PARAMETER_COUNT <= VALUE_STORE_MAX, "the EEPROM keeps all values");
+
+const struct image_part image_parts[] = {
+    {settings_start, 0, settings_operation},
+    {sensor_start, sensor_work, sensor_operation},
+    {turn_start, turn_work, turn_operation},
+    {peer_start, peer_work, peer_operation},
+    {i2c_start, i2c_work, 0},
+    {nonvolatile_start, 0, nonvolatile_operation},
+    {store_start, store_work, 0},
+    {edm_start, edm_work, 0},
+    {job_start, job_work, job_operation},
+    {panel_start, panel_work, 0},
+    {readout_start, readout_work, 0},
+    {scope_start, scope_work, scope_operation},
+};
+const unsigned image_part_count = sizeof image_parts / sizeof *image_parts;

@@ -1,0 +1,983 @@
+// SPDX-License-Identifier: Apache-2.0
+// Made by tables/bus.py from tables/bus.toml: do not edit.
+#ifndef MOIRE_BUS_PROTOCOL_H
+#define MOIRE_BUS_PROTOCOL_H
+
+#define PROTOCOL_CRC         0x51AFEE9Du    // CRC-32 of bus.toml
+#define BUS_VERSION         1u
+#define BUS_LONGEST_BODY    64u
+#define BUS_REQUEST_HEAD    2u    // sequence, operation
+#define BUS_REPLY_HEAD      3u    // sequence, operation, cause
+
+enum bus_cause {
+    BUS_CAUSE_OK = 0,    // done
+    BUS_CAUSE_UNKNOWN_OPERATION = 1,    // the node does not know this command
+    BUS_CAUSE_WRONG_LENGTH = 2,    // the command has the wrong length
+    BUS_CAUSE_NO_SUCH_AXIS = 3,    // the node has no axis of this number
+    BUS_CAUSE_UNKNOWN_PARAMETER = 4,    // the node has no parameter of this number
+    BUS_CAUSE_OUT_OF_RANGE = 5,    // the value is outside what this parameter allows
+    BUS_CAUSE_OUT_OF_TRAVEL = 6,    // the target is outside the travel
+    BUS_CAUSE_NOT_HOMED = 7,    // the axis has no zero yet: home it first
+    BUS_CAUSE_NOT_ENABLED = 8,    // the drive is off: enable it first
+    BUS_CAUSE_FAULTED = 9,    // a fault is latched: remove its cause and reset it first
+    BUS_CAUSE_FAULT_PERSISTS = 10,    // the cause of the fault still stands
+    BUS_CAUSE_BUSY = 11,    // the axis is moving: stop it or wait
+    BUS_CAUSE_WRONG_MAP = 12,    // firmware and hardware were not made for each other (register maps differ)
+    BUS_CAUSE_NO_SUCH_REGISTER = 13,    // the node has no register at this address
+    BUS_CAUSE_STOPPED = 14,    // stopped by the host
+    BUS_CAUSE_NO_SWITCH = 15,    // no limit switch was found within the travel
+    BUS_CAUSE_SWITCH_STUCK = 16,    // the limit switch did not open within the home distance
+    BUS_CAUSE_NOT_SETTLED = 17,    // the target was not reached within the settling time
+    BUS_CAUSE_ENDED_BY_FAULT = 18,    // a fault ended the motion
+    BUS_CAUSE_RUNNING = 19,    // the motion is under way
+    BUS_CAUSE_NO_MOTION_YET = 20,    // no motion was asked for yet
+    BUS_CAUSE_NO_INDEX = 21,    // no index was found within the home distance
+    BUS_CAUSE_NOT_PREPARED = 22,    // the axis has no motion prepared
+    BUS_CAUSE_NOT_BUILT = 23,    // this node was built without that
+    BUS_CAUSE_TOO_LONG = 24,    // the motion would take days, or go too far for a change of target
+    BUS_CAUSE_STEPPED_PROFILE_INVALID = 25,    // the stairs of this profile are not in order, or too many
+    BUS_CAUSE_NO_SEGMENTS = 26,    // no whole segment table is loaded
+    BUS_CAUSE_SEGMENTS_IN_USE = 27,    // the segment table is in use: switch it off first
+    BUS_CAUSE_SENSOR_TIMED_OUT = 30,    // no good frame came from the angle sensor: check its power and its cable
+    BUS_CAUSE_SENSOR_STUCK = 31,    // the angle sensor stands still: it sent one and the same angle while the table was turned
+    BUS_CAUSE_STICTION = 32,    // the table did not follow its steps: it sticks, or the motor lost them
+    BUS_CAUSE_WRONG_SIGN = 33,    // the table turned against its steps: turn the sign of steps_per_period
+    BUS_CAUSE_NOT_CONVERGED = 34,    // the tolerance was not reached within the allowed tries
+    BUS_CAUSE_SENSOR_DISAGREES = 35,    // angle sensor and steps disagree: they tell different ways of the table
+    BUS_CAUSE_PEER_SILENT = 36,    // the other node does not answer: check the cable between the two and its peer_mode
+    BUS_CAUSE_NO_STATION = 37,    // the other node has no such station: write the program to both
+    BUS_CAUSE_PEER_OFF = 38,    // the peer port is not in use: see the settings peer_mode and peer_role
+    BUS_CAUSE_PEER_RESTARTED = 39,    // the other node lost its power while it indexed
+    BUS_CAUSE_EEPROM_MISSING = 40,    // the EEPROM does not answer
+    BUS_CAUSE_EEPROM_FAILED = 41,    // the EEPROM does not keep what is written
+    BUS_CAUSE_EEPROM_BUSY = 42,    // the EEPROM is being read or written
+    BUS_CAUSE_NO_JOB = 43,    // no program of stations is stored
+    BUS_CAUSE_JOB_DAMAGED = 44,    // the stored program is damaged
+    BUS_CAUSE_JOB_INCOMPLETE = 45,    // give all stations of a program in order
+    BUS_CAUSE_NO_STATIONS = 46,    // a program needs at least one station
+    BUS_CAUSE_TOO_MANY_STATIONS = 47,    // the EEPROM is full: it holds 360 stations
+    BUS_CAUSE_ANGLE_OUT_OF_TURN = 48,    // angles must be below 360 degrees
+    BUS_CAUSE_ANGLES_NOT_ASCENDING = 49,    // each angle must be larger than the last
+    BUS_CAUSE_JOB_ACTIVE = 50,    // a job is under way: stop it first
+    BUS_CAUSE_NOT_NOW = 51,    // the job does not wait for that now
+    BUS_CAUSE_EDM_BUSY = 52,    // the machine cuts, or its keys still wait
+    BUS_CAUSE_EDM_ALARM = 53,    // the machine reports an alarm
+    BUS_CAUSE_KEYS_NOT_TAKEN = 54,    // the machine does not take our keys
+    BUS_CAUSE_CUT_NOT_STARTED = 55,    // the cut did not start in time
+    BUS_CAUSE_CUT_NOT_ENDED = 56,    // the cut did not end in time
+    BUS_CAUSE_POWER_LOST = 57,    // the power was lost during the job
+    BUS_CAUSE_PAUSED_BY_OPERATOR = 58,    // paused by a person
+    BUS_CAUSE_KEY_WITHOUT_FUNCTION = 59,    // this key has no function
+    BUS_CAUSE_TABLE_POSITION_UNKNOWN = 60,    // nobody knows where the table stands
+    BUS_CAUSE_JOB_CHANGED = 61,    // this is not the program of the job
+    BUS_CAUSE_CHECK_SUB_NODE = 66,    // look at the sub-node: it did not say that it has indexed; its faults are told and reset there
+    BUS_CAUSE_NOTHING_SAVED = 67,    // no values are kept: the defaults are in force
+    BUS_CAUSE_SAVED_DAMAGED = 68,    // the kept values are damaged: the defaults are in force
+    BUS_CAUSE_SAVED_OTHER_BUILD = 69,    // the kept values are of another build: the defaults are in force
+    BUS_CAUSE_SAVED_REFUSED = 70,    // not all kept values are allowed: the others are in force
+    BUS_CAUSE_SAVED_NOT_READ = 71,    // the kept values were not taken: the EEPROM did not answer at power-up, the defaults are in force
+};
+
+enum bus_fault {    // bits
+    BUS_FAULT_LIMIT_LOW = 1 << 0,    // limit switch at the low end
+    BUS_FAULT_LIMIT_HIGH = 1 << 1,    // limit switch at the high end
+    BUS_FAULT_ESTOP = 1 << 2,    // emergency stop
+    BUS_FAULT_FOLLOWING_ERROR = 1 << 3,    // following error too large
+    BUS_FAULT_ENCODER = 1 << 4,    // encoder fault
+    BUS_FAULT_BUS_WATCHDOG = 1 << 5,    // the line fell silent
+    BUS_FAULT_DRIVE = 1 << 6,    // the drive reports a fault
+    BUS_FAULT_CPU = 1 << 7,    // the soft core stopped or hangs
+    BUS_FAULT_PROFILE_UNDERRUN = 1 << 8,    // the profile ran out of segments
+    BUS_FAULT_STEP_OVERRUN = 1 << 9,    // more steps were owed than may be: too fast for the step timing, or blocked
+};
+
+enum bus_encoder_event {    // bits
+    BUS_ENCODER_EVENT_ILLEGAL_EDGE = 1 << 0,    // both quadrature levels changed at once
+    BUS_ENCODER_EVENT_OVERSPEED = 1 << 1,    // the phase jumped: too fast, or the signal is broken
+    BUS_ENCODER_EVENT_AMPLITUDE_LOW = 1 << 2,    // signal too small
+    BUS_ENCODER_EVENT_AMPLITUDE_HIGH = 1 << 3,    // signal too large
+    BUS_ENCODER_EVENT_DISAGREEMENT = 1 << 4,    // interpolated position and quadrature count differ
+};
+
+enum bus_state {
+    BUS_STATE_OFF = 0,    // drive off
+    BUS_STATE_HOLDING = 1,    // holding position
+    BUS_STATE_HOMING = 2,    // homing
+    BUS_STATE_MOVING = 3,    // moving
+    BUS_STATE_SETTLING = 4,    // settling
+    BUS_STATE_STOPPING = 5,    // stopping
+    BUS_STATE_FAULTED = 6,    // faulted
+    BUS_STATE_PREPARED = 7,    // waiting for the common start
+    BUS_STATE_EXCITED = 8,    // driven in open loop for a record
+};
+
+enum bus_flag {    // bits
+    BUS_FLAG_ENABLED = 1 << 0,    // drive on
+    BUS_FLAG_HOMED = 1 << 1,    // zero known
+    BUS_FLAG_LIMIT_LOW = 1 << 2,    // switch at the low end pressed
+    BUS_FLAG_LIMIT_HIGH = 1 << 3,    // switch at the high end pressed
+    BUS_FLAG_ESTOP = 1 << 4,    // emergency stop pressed
+    BUS_FLAG_SETTLED = 1 << 5,    // inside the settling window
+    BUS_FLAG_SATURATED = 1 << 6,    // command at its limit
+};
+
+enum bus_calibration_reason {
+    BUS_CALIBRATION_REASON_CALIBRATING = 0,    // learning
+    BUS_CALIBRATION_REASON_FROZEN = 1,    // frozen
+    BUS_CALIBRATION_REASON_STANDSTILL = 2,    // the scale stands still
+    BUS_CALIBRATION_REASON_PARTIAL_CIRCLE = 3,    // too little motion: no whole circles
+    BUS_CALIBRATION_REASON_AMPLITUDE = 4,    // amplitude outside its window
+    BUS_CALIBRATION_REASON_DISTORTED = 5,    // offset, gain or phase farther off than can be corrected
+    BUS_CALIBRATION_REASON_TOO_FAST = 6,    // fewer than eight samples a period
+    BUS_CALIBRATION_REASON_UNSTEADY = 7,    // the speed changes too much
+    BUS_CALIBRATION_REASON_ONE_SPEED = 8,    // all at one speed: a vibration locked to the fringe would not show
+    BUS_CALIBRATION_REASON_VIBRATION = 9,    // vibration locked to the fringe: the bursts disagree
+};
+
+enum bus_signal_fault {    // bits
+    BUS_SIGNAL_FAULT_TOO_LOW = 1 << 0,    // signal too small
+    BUS_SIGNAL_FAULT_TOO_HIGH = 1 << 1,    // signal too large
+    BUS_SIGNAL_FAULT_CLIPPED = 1 << 2,    // the converter is at its end
+    BUS_SIGNAL_FAULT_OFF_CIRCLE = 1 << 3,    // sine and cosine left their circle
+    BUS_SIGNAL_FAULT_JUMP = 1 << 4,    // a sudden step that no motion makes
+    BUS_SIGNAL_FAULT_CHANNEL_STUCK = 1 << 5,    // a leg stands while the other one moves
+    BUS_SIGNAL_FAULT_NO_NOISE = 1 << 6,    // the same code for too long: the noise of a living converter is missing
+    BUS_SIGNAL_FAULT_COMPARATOR_MISMATCH = 1 << 7,    // comparators and samples have opposite signs
+    BUS_SIGNAL_FAULT_COMPARATOR_STUCK = 1 << 8,    // a leg changes sign, its comparator never does
+    BUS_SIGNAL_FAULT_CHANNEL_MISSING = 1 << 9,    // the comparators change, a leg never changes sign
+    BUS_SIGNAL_FAULT_OFFSET_DRIFT = 1 << 10,    // offset too large
+    BUS_SIGNAL_FAULT_UNBALANCED = 1 << 11,    // amplitudes of sine and cosine too different
+    BUS_SIGNAL_FAULT_NOT_IN_QUADRATURE = 1 << 12,    // sine and cosine not at right angles
+    BUS_SIGNAL_FAULT_PHASE_JUMP = 1 << 13,    // the phase jumped
+    BUS_SIGNAL_FAULT_LOST_COUNT = 1 << 14,    // interpolated position and quadrature count differ
+};
+
+enum bus_calibration_action {
+    BUS_CALIBRATION_ACTION_READ = 0,    // only look
+    BUS_CALIBRATION_ACTION_CALIBRATE = 1,    // learn from here on
+    BUS_CALIBRATION_ACTION_FREEZE = 2,    // learn no more; what was learned stays in force
+    BUS_CALIBRATION_ACTION_CLEAR = 3,    // correct nothing, begin afresh
+};
+
+enum bus_scope_trigger {
+    BUS_SCOPE_TRIGGER_NOW = 0,    // at once
+    BUS_SCOPE_TRIGGER_MOTION = 1,    // the axis moves or homes
+    BUS_SCOPE_TRIGGER_SETTLING = 2,    // a motion has been played
+    BUS_SCOPE_TRIGGER_ERROR = 3,    // the error reaches the level
+    BUS_SCOPE_TRIGGER_FAULT = 4,    // a fault latches
+};
+
+enum bus_scope_state {
+    BUS_SCOPE_STATE_EMPTY = 0,    // nothing was recorded
+    BUS_SCOPE_STATE_WAITING = 1,    // waiting for the trigger
+    BUS_SCOPE_STATE_RECORDING = 2,    // recording
+    BUS_SCOPE_STATE_FULL = 3,    // complete
+};
+
+enum bus_turn_phase {
+    BUS_TURN_PHASE_IDLE = 0,    // at rest
+    BUS_TURN_PHASE_READING = 1,    // waiting for the table to settle, and reading its angle
+    BUS_TURN_PHASE_GOING_BELOW = 2,    // going down, below the target
+    BUS_TURN_PHASE_COMING_UP = 3,    // coming up on the long way
+    BUS_TURN_PHASE_CLOSING_IN = 4,    // closing in on the target
+};
+
+enum bus_peer_phase {
+    BUS_PEER_PHASE_IDLE = 0,    // nothing was asked for
+    BUS_PEER_PHASE_TURNING = 1,    // the sub-node indexes
+    BUS_PEER_PHASE_TURNED = 2,    // the sub-node has indexed
+    BUS_PEER_PHASE_FAILED = 3,    // the sub-node failed
+    BUS_PEER_PHASE_SILENT = 4,    // the sub-node does not answer
+};
+
+enum bus_job_state {
+    BUS_JOB_STATE_LOADING = 0,    // loading
+    BUS_JOB_STATE_IDLE = 1,    // ready
+    BUS_JOB_STATE_FINISHED = 2,    // all cut
+    BUS_JOB_STATE_STARTING = 3,    // starts
+    BUS_JOB_STATE_TURNING = 4,    // table turns
+    BUS_JOB_STATE_ARRIVED = 5,    // at station
+    BUS_JOB_STATE_BEGINNING = 6,    // begins cut
+    BUS_JOB_STATE_CUTTING = 7,    // cutting
+    BUS_JOB_STATE_FOLLOWING = 8,    // cutting
+    BUS_JOB_STATE_ENDED = 9,    // cut done
+    BUS_JOB_STATE_LEAVING = 10,    // leaves
+    BUS_JOB_STATE_FINISHING = 11,    // finishing
+    BUS_JOB_STATE_PAUSED = 12,    // paused
+    BUS_JOB_STATE_UNSURE = 13,    // is it cut?
+    BUS_JOB_STATE_STOPPING = 14,    // stopping
+};
+
+enum bus_job_action {
+    BUS_JOB_ACTION_START = 0,    // cut all stations from the first one on
+    BUS_JOB_ACTION_PAUSE = 1,    // stand before the next cut or the next station
+    BUS_JOB_ACTION_RESUME = 2,    // go on; if it is unsure whether a station was cut, wait for the end of the cut under way
+    BUS_JOB_ACTION_STOP = 3,    // end the job; a cut under way is left to the machine
+    BUS_JOB_ACTION_AGAIN = 4,    // cut the station again
+    BUS_JOB_ACTION_NEXT = 5,    // the station is cut: go to the next one
+};
+
+enum bus_save_action {
+    BUS_SAVE_ACTION_SAVE = 0,    // keep what differs from the defaults, for the next power-up
+    BUS_SAVE_ACTION_CLEAR = 1,    // begin with the defaults at the next power-up
+};
+
+enum bus_job_flag {    // bits
+    BUS_JOB_FLAG_EEPROM = 1 << 0,    // the EEPROM answers
+    BUS_JOB_FLAG_KEYPAD = 1 << 1,    // the key-pad answers
+    BUS_JOB_FLAG_DISPLAY = 1 << 2,    // the character display answers
+    BUS_JOB_FLAG_CUTTING = 1 << 3,    // the machine cuts
+    BUS_JOB_FLAG_ALARM = 1 << 4,    // the machine reports an alarm
+    BUS_JOB_FLAG_KEYS_PENDING = 1 << 5,    // keys for the machine wait: a person types, or it does not take them
+    BUS_JOB_FLAG_PAUSING = 1 << 6,    // a pause comes next
+    BUS_JOB_FLAG_COPY_DAMAGED = 1 << 7,    // one copy of the program is damaged, the other one is in force
+};
+
+// X(code, words), up to a colon
+#define BUS_CAUSE_WORDS(X) \
+    X(0, "done") \
+    X(1, "the node does not know this command") \
+    X(2, "the command has the wrong length") \
+    X(3, "the node has no axis of this number") \
+    X(4, "the node has no parameter of this number") \
+    X(5, "the value is outside what this parameter allows") \
+    X(6, "the target is outside the travel") \
+    X(7, "the axis has no zero yet") \
+    X(8, "the drive is off") \
+    X(9, "a fault is latched") \
+    X(10, "the cause of the fault still stands") \
+    X(11, "the axis is moving") \
+    X(12, "firmware and hardware were not made for each other (register maps differ)") \
+    X(13, "the node has no register at this address") \
+    X(14, "stopped by the host") \
+    X(15, "no limit switch was found within the travel") \
+    X(16, "the limit switch did not open within the home distance") \
+    X(17, "the target was not reached within the settling time") \
+    X(18, "a fault ended the motion") \
+    X(19, "the motion is under way") \
+    X(20, "no motion was asked for yet") \
+    X(21, "no index was found within the home distance") \
+    X(22, "the axis has no motion prepared") \
+    X(23, "this node was built without that") \
+    X(24, "the motion would take days, or go too far for a change of target") \
+    X(25, "the stairs of this profile are not in order, or too many") \
+    X(26, "no whole segment table is loaded") \
+    X(27, "the segment table is in use") \
+    X(30, "no good frame came from the angle sensor") \
+    X(31, "the angle sensor stands still") \
+    X(32, "the table did not follow its steps") \
+    X(33, "the table turned against its steps") \
+    X(34, "the tolerance was not reached within the allowed tries") \
+    X(35, "angle sensor and steps disagree") \
+    X(36, "the other node does not answer") \
+    X(37, "the other node has no such station") \
+    X(38, "the peer port is not in use") \
+    X(39, "the other node lost its power while it indexed") \
+    X(40, "the EEPROM does not answer") \
+    X(41, "the EEPROM does not keep what is written") \
+    X(42, "the EEPROM is being read or written") \
+    X(43, "no program of stations is stored") \
+    X(44, "the stored program is damaged") \
+    X(45, "give all stations of a program in order") \
+    X(46, "a program needs at least one station") \
+    X(47, "the EEPROM is full") \
+    X(48, "angles must be below 360 degrees") \
+    X(49, "each angle must be larger than the last") \
+    X(50, "a job is under way") \
+    X(51, "the job does not wait for that now") \
+    X(52, "the machine cuts, or its keys still wait") \
+    X(53, "the machine reports an alarm") \
+    X(54, "the machine does not take our keys") \
+    X(55, "the cut did not start in time") \
+    X(56, "the cut did not end in time") \
+    X(57, "the power was lost during the job") \
+    X(58, "paused by a person") \
+    X(59, "this key has no function") \
+    X(60, "nobody knows where the table stands") \
+    X(61, "this is not the program of the job") \
+    X(66, "look at the sub-node") \
+    X(67, "no values are kept") \
+    X(68, "the kept values are damaged") \
+    X(69, "the kept values are of another build") \
+    X(70, "not all kept values are allowed") \
+    X(71, "the kept values were not taken")
+
+// X(code, words), up to a colon
+#define BUS_FAULT_WORDS(X) \
+    X(0, "limit switch at the low end") \
+    X(1, "limit switch at the high end") \
+    X(2, "emergency stop") \
+    X(3, "following error too large") \
+    X(4, "encoder fault") \
+    X(5, "the line fell silent") \
+    X(6, "the drive reports a fault") \
+    X(7, "the soft core stopped or hangs") \
+    X(8, "the profile ran out of segments") \
+    X(9, "more steps were owed than may be")
+
+// X(code, words), up to a colon
+#define BUS_JOB_STATE_WORDS(X) \
+    X(0, "loading") \
+    X(1, "ready") \
+    X(2, "all cut") \
+    X(3, "starts") \
+    X(4, "table turns") \
+    X(5, "at station") \
+    X(6, "begins cut") \
+    X(7, "cutting") \
+    X(8, "cutting") \
+    X(9, "cut done") \
+    X(10, "leaves") \
+    X(11, "finishing") \
+    X(12, "paused") \
+    X(13, "is it cut?") \
+    X(14, "stopping")
+
+enum bus_operation {
+    BUS_OPERATION_IDENTIFY = 1,    // who is there, and what was it built from
+    BUS_OPERATION_STATUS = 2,    // state, position and faults of an axis; ended is the cause of the last motion
+    BUS_OPERATION_ENABLE = 3,    // drive on (1) or off (0)
+    BUS_OPERATION_HOME = 4,    // find the zero by the method of the parameter home_method
+    BUS_OPERATION_MOVE = 5,    // go to a position; also while the axis moves to another (duration_ticks is 0 then): it goes on from where it is
+    BUS_OPERATION_STOP = 6,    // controlled stop; the drive stays on
+    BUS_OPERATION_RESET_FAULTS = 7,    // clear latched faults whose cause is gone; the drive stays off
+    BUS_OPERATION_GET_PARAMETER = 8,    // read a parameter
+    BUS_OPERATION_SET_PARAMETER = 9,    // write a parameter; not while the axis moves
+    BUS_OPERATION_COUNTERS = 10,    // what happened on the line
+    BUS_OPERATION_ENCODER = 11,    // the sensor as it is now, and where the last homing met its phase zero
+    BUS_OPERATION_READ_REGISTER = 12,    // one word of the register map, by byte address
+    BUS_OPERATION_CALIBRATION = 13,    // correction of the sine and cosine: what its learner does, or what it shall do; scatter is in 2^-20 period
+    BUS_OPERATION_GET_CORRECTION = 14,    // offsets in 2^-15 of full scale, factors in 2^-16: sin' = gain (sin - offset) + quadrature_error (cos - offset)
+    BUS_OPERATION_GET_HARMONIC = 15,    // phase error of order k, 1 to 10, in 2^-24 period: cosine cos k phase + sine sin k phase is subtracted
+    BUS_OPERATION_SET_CORRECTION = 16,    // as got; with apply 1 it comes into force with all harmonics set since the last time, with 0 it waits
+    BUS_OPERATION_SET_HARMONIC = 17,    // as got; waits for set_correction, and is 0 unless set
+    BUS_OPERATION_SIGNAL = 18,    // what is wrong with the sine and cosine now, and what came first since reset_faults (bits of signal_fault)
+    BUS_OPERATION_WRITE_REGISTER = 19,    // one word of the register map: only index, capture and compare of the grating blocks
+    BUS_OPERATION_PREPARE = 20,    // plan to go to a position, and wait for start
+    BUS_OPERATION_START = 21,    // begin the prepared motions of these axes (bit n: axis n), all in one tick; none if one of them has none
+    BUS_OPERATION_SEGMENTS = 22,    // the segment table: points loaded, the use in force (as the parameter segments), why not the one wanted
+    BUS_OPERATION_SET_SEGMENTS = 23,    // its points from this border on, in order: position there less the true one; border 0 begins a new table
+    BUS_OPERATION_GET_SEGMENTS = 24,    // its points from this border on
+    BUS_OPERATION_POSITION = 30,    // where an axis is: the shortest answer that tells it
+    BUS_OPERATION_FOLLOW = 34,    // from here to the next request each command to send is answered with the position at that moment
+    BUS_OPERATION_SET_BAUD = 35,    // another baud rate, once this reply has been sent; 115200 again after a break, or 5 s without a request
+    BUS_OPERATION_START_AT_SYNC = 36,    // as start, but at the next mark, which all nodes of the line hear at once; 0 takes it back
+    BUS_OPERATION_ARM_SCOPE = 31,    // record every so many ticks, from before a trigger on; an amplitude drives in open loop, to level at most
+    BUS_OPERATION_SCOPE = 32,    // how far the record is; count is 0 until it is complete
+    BUS_OPERATION_READ_SCOPE = 33,    // five samples from this one on, 0 behind the end; time from sample to sample in 64 clk, position: low word
+    BUS_OPERATION_GET_SETTING = 40,    // read a setting of a station
+    BUS_OPERATION_SET_SETTING = 41,    // write a setting of a station
+    BUS_OPERATION_TURN_TO = 42,    // turn the table of axis 0 to an absolute angle, 0.01 arcsec; refused while an axis moves
+    BUS_OPERATION_TURN_STATE = 43,    // what the table does, how its last index ended, the angle of its last reading; all in 0.01 arcsec
+    BUS_OPERATION_SENSOR = 44,    // the last good frame of the angle sensor in 0.01 arcsec, its age in clk, and frames since power-up
+    BUS_OPERATION_PEER = 45,    // what the peer port does: the last index asked for, the stations of a sub-node that counts them, what was heard
+    BUS_OPERATION_PEER_NEXT = 47,    // the station of its program to which the next order goes in mode printed; kept in the EEPROM
+    BUS_OPERATION_JOB = 48,    // what the job does, at which station (from 0 on), why it waits, for which answers: bits of job_action
+    BUS_OPERATION_JOB_DO = 49,    // start, pause, resume or stop the job, or answer its question
+    BUS_OPERATION_JOB_STATIONS = 50,    // the stored program; writing 1 while it is written or read, then how that ended, or why there is none
+    BUS_OPERATION_JOB_ANGLE = 51,    // angle of a station of the stored program, in 0.01 arcsec
+    BUS_OPERATION_JOB_BEGIN = 52,    // begin a new program; it comes into force when it is saved, and not while a job is under way
+    BUS_OPERATION_JOB_ADD = 53,    // give the new program a station; in their order, from 0 on, with ascending angles
+    BUS_OPERATION_JOB_SAVE = 54,    // write the new program and the settings into the EEPROM; job_stations tells when and how that ended
+    BUS_OPERATION_SAVE_SETTINGS = 58,    // keep parameters and settings in the EEPROM, or forget them; kept tells when and how that ended
+    BUS_OPERATION_SAVED_SETTINGS = 59,    // what is kept, or why not; writing 1 while the EEPROM is written or read; torn 1: one copy was damaged
+};
+
+// Lengths of whole bodies and offsets of their fields, in bytes, little endian.
+#define BUS_IDENTIFY_REQUEST_LENGTH 2u
+#define BUS_IDENTIFY_REPLY_LENGTH 27u
+#define BUS_IDENTIFY_REPLY_MAP_CRC 3u    // u32
+#define BUS_IDENTIFY_REPLY_PROTOCOL_CRC 7u    // u32
+#define BUS_IDENTIFY_REPLY_VERSION 11u    // u16
+#define BUS_IDENTIFY_REPLY_ADDRESS 13u    // u8
+#define BUS_IDENTIFY_REPLY_AXES 14u    // u8
+#define BUS_IDENTIFY_REPLY_CLK_HZ 15u    // u32
+#define BUS_IDENTIFY_REPLY_TICK_HZ 19u    // u32
+#define BUS_IDENTIFY_REPLY_SAMPLE_HZ 23u    // u32
+#define BUS_STATUS_REQUEST_LENGTH 3u
+#define BUS_STATUS_REQUEST_AXIS 2u    // u8
+#define BUS_STATUS_REPLY_LENGTH 41u
+#define BUS_STATUS_REPLY_STATE 3u    // u8
+#define BUS_STATUS_REPLY_ENDED 4u    // u8
+#define BUS_STATUS_REPLY_FLAGS 5u    // u8
+#define BUS_STATUS_REPLY_ENCODER_EVENTS 6u    // u8
+#define BUS_STATUS_REPLY_FAULTS 7u    // u16
+#define BUS_STATUS_REPLY_FIRST_FAULT 9u    // u16
+#define BUS_STATUS_REPLY_POSITION 11u    // i64
+#define BUS_STATUS_REPLY_TARGET 19u    // i64
+#define BUS_STATUS_REPLY_VELOCITY 27u    // i32
+#define BUS_STATUS_REPLY_COMMAND 31u    // i16
+#define BUS_STATUS_REPLY_COUNTS 33u    // i64
+#define BUS_ENABLE_REQUEST_LENGTH 4u
+#define BUS_ENABLE_REQUEST_AXIS 2u    // u8
+#define BUS_ENABLE_REQUEST_ON 3u    // u8
+#define BUS_ENABLE_REPLY_LENGTH 3u
+#define BUS_HOME_REQUEST_LENGTH 3u
+#define BUS_HOME_REQUEST_AXIS 2u    // u8
+#define BUS_HOME_REPLY_LENGTH 3u
+#define BUS_MOVE_REQUEST_LENGTH 11u
+#define BUS_MOVE_REQUEST_AXIS 2u    // u8
+#define BUS_MOVE_REQUEST_TARGET 3u    // i64
+#define BUS_MOVE_REPLY_LENGTH 7u
+#define BUS_MOVE_REPLY_DURATION_TICKS 3u    // u32
+#define BUS_STOP_REQUEST_LENGTH 3u
+#define BUS_STOP_REQUEST_AXIS 2u    // u8
+#define BUS_STOP_REPLY_LENGTH 3u
+#define BUS_RESET_FAULTS_REQUEST_LENGTH 3u
+#define BUS_RESET_FAULTS_REQUEST_AXIS 2u    // u8
+#define BUS_RESET_FAULTS_REPLY_LENGTH 3u
+#define BUS_GET_PARAMETER_REQUEST_LENGTH 4u
+#define BUS_GET_PARAMETER_REQUEST_AXIS 2u    // u8
+#define BUS_GET_PARAMETER_REQUEST_PARAMETER 3u    // u8
+#define BUS_GET_PARAMETER_REPLY_LENGTH 11u
+#define BUS_GET_PARAMETER_REPLY_VALUE 3u    // i64
+#define BUS_SET_PARAMETER_REQUEST_LENGTH 12u
+#define BUS_SET_PARAMETER_REQUEST_AXIS 2u    // u8
+#define BUS_SET_PARAMETER_REQUEST_PARAMETER 3u    // u8
+#define BUS_SET_PARAMETER_REQUEST_VALUE 4u    // i64
+#define BUS_SET_PARAMETER_REPLY_LENGTH 3u
+#define BUS_COUNTERS_REQUEST_LENGTH 2u
+#define BUS_COUNTERS_REPLY_LENGTH 43u
+#define BUS_COUNTERS_REPLY_FRAMES_GOOD 3u    // u32
+#define BUS_COUNTERS_REPLY_FRAMES_BAD 7u    // u32
+#define BUS_COUNTERS_REPLY_FRAMING_ERRORS 11u    // u32
+#define BUS_COUNTERS_REPLY_START_GLITCHES 15u    // u32
+#define BUS_COUNTERS_REPLY_OVERRUNS 19u    // u32
+#define BUS_COUNTERS_REPLY_REPEATED 23u    // u32
+#define BUS_COUNTERS_REPLY_REFUSED 27u    // u32
+#define BUS_COUNTERS_REPLY_BREAKS 31u    // u32
+#define BUS_COUNTERS_REPLY_TRANSMIT_TIMEOUTS 35u    // u32
+#define BUS_COUNTERS_REPLY_SYNCS 39u    // u32
+#define BUS_ENCODER_REQUEST_LENGTH 3u
+#define BUS_ENCODER_REQUEST_AXIS 2u    // u8
+#define BUS_ENCODER_REPLY_LENGTH 35u
+#define BUS_ENCODER_REPLY_SIN 3u    // i16
+#define BUS_ENCODER_REPLY_COS 5u    // i16
+#define BUS_ENCODER_REPLY_PHASE 7u    // u16
+#define BUS_ENCODER_REPLY_AMPLITUDE 9u    // u16
+#define BUS_ENCODER_REPLY_QUADRATURE_COUNT 11u    // i32
+#define BUS_ENCODER_REPLY_REJECTED_PULSES 15u    // u32
+#define BUS_ENCODER_REPLY_REJECTED_SAMPLES 19u    // u32
+#define BUS_ENCODER_REPLY_HOME_PHASE 23u    // i32
+#define BUS_ENCODER_REPLY_FAULT_POSITION 27u    // i64
+#define BUS_READ_REGISTER_REQUEST_LENGTH 4u
+#define BUS_READ_REGISTER_REQUEST_ADDRESS 2u    // u16
+#define BUS_READ_REGISTER_REPLY_LENGTH 7u
+#define BUS_READ_REGISTER_REPLY_VALUE 3u    // u32
+#define BUS_CALIBRATION_REQUEST_LENGTH 4u
+#define BUS_CALIBRATION_REQUEST_AXIS 2u    // u8
+#define BUS_CALIBRATION_REQUEST_ACTION 3u    // u8
+#define BUS_CALIBRATION_REPLY_LENGTH 18u
+#define BUS_CALIBRATION_REPLY_REASON 3u    // u8
+#define BUS_CALIBRATION_REPLY_CONVERGED 4u    // u8
+#define BUS_CALIBRATION_REPLY_FROZEN 5u    // u8
+#define BUS_CALIBRATION_REPLY_ACCEPTED 6u    // u32
+#define BUS_CALIBRATION_REPLY_REFUSED 10u    // u32
+#define BUS_CALIBRATION_REPLY_SCATTER 14u    // u32
+#define BUS_GET_CORRECTION_REQUEST_LENGTH 3u
+#define BUS_GET_CORRECTION_REQUEST_AXIS 2u    // u8
+#define BUS_GET_CORRECTION_REPLY_LENGTH 15u
+#define BUS_GET_CORRECTION_REPLY_SIN_OFFSET 3u    // i16
+#define BUS_GET_CORRECTION_REPLY_COS_OFFSET 5u    // i16
+#define BUS_GET_CORRECTION_REPLY_GAIN 7u    // i32
+#define BUS_GET_CORRECTION_REPLY_QUADRATURE_ERROR 11u    // i32
+#define BUS_GET_HARMONIC_REQUEST_LENGTH 4u
+#define BUS_GET_HARMONIC_REQUEST_AXIS 2u    // u8
+#define BUS_GET_HARMONIC_REQUEST_ORDER 3u    // u8
+#define BUS_GET_HARMONIC_REPLY_LENGTH 11u
+#define BUS_GET_HARMONIC_REPLY_COSINE 3u    // i32
+#define BUS_GET_HARMONIC_REPLY_SINE 7u    // i32
+#define BUS_SET_CORRECTION_REQUEST_LENGTH 16u
+#define BUS_SET_CORRECTION_REQUEST_AXIS 2u    // u8
+#define BUS_SET_CORRECTION_REQUEST_SIN_OFFSET 3u    // i16
+#define BUS_SET_CORRECTION_REQUEST_COS_OFFSET 5u    // i16
+#define BUS_SET_CORRECTION_REQUEST_GAIN 7u    // i32
+#define BUS_SET_CORRECTION_REQUEST_QUADRATURE_ERROR 11u    // i32
+#define BUS_SET_CORRECTION_REQUEST_APPLY 15u    // u8
+#define BUS_SET_CORRECTION_REPLY_LENGTH 3u
+#define BUS_SET_HARMONIC_REQUEST_LENGTH 12u
+#define BUS_SET_HARMONIC_REQUEST_AXIS 2u    // u8
+#define BUS_SET_HARMONIC_REQUEST_ORDER 3u    // u8
+#define BUS_SET_HARMONIC_REQUEST_COSINE 4u    // i32
+#define BUS_SET_HARMONIC_REQUEST_SINE 8u    // i32
+#define BUS_SET_HARMONIC_REPLY_LENGTH 3u
+#define BUS_SIGNAL_REQUEST_LENGTH 3u
+#define BUS_SIGNAL_REQUEST_AXIS 2u    // u8
+#define BUS_SIGNAL_REPLY_LENGTH 7u
+#define BUS_SIGNAL_REPLY_FAULTS 3u    // u16
+#define BUS_SIGNAL_REPLY_FIRST 5u    // u16
+#define BUS_WRITE_REGISTER_REQUEST_LENGTH 8u
+#define BUS_WRITE_REGISTER_REQUEST_ADDRESS 2u    // u16
+#define BUS_WRITE_REGISTER_REQUEST_VALUE 4u    // u32
+#define BUS_WRITE_REGISTER_REPLY_LENGTH 3u
+#define BUS_PREPARE_REQUEST_LENGTH 11u
+#define BUS_PREPARE_REQUEST_AXIS 2u    // u8
+#define BUS_PREPARE_REQUEST_TARGET 3u    // i64
+#define BUS_PREPARE_REPLY_LENGTH 7u
+#define BUS_PREPARE_REPLY_DURATION_TICKS 3u    // u32
+#define BUS_START_REQUEST_LENGTH 3u
+#define BUS_START_REQUEST_AXES 2u    // u8
+#define BUS_START_REPLY_LENGTH 3u
+#define BUS_SEGMENTS_REQUEST_LENGTH 3u
+#define BUS_SEGMENTS_REQUEST_AXIS 2u    // u8
+#define BUS_SEGMENTS_REPLY_LENGTH 7u
+#define BUS_SEGMENTS_REPLY_LOADED 3u    // u16
+#define BUS_SEGMENTS_REPLY_IN_FORCE 5u    // u8
+#define BUS_SEGMENTS_REPLY_REASON 6u    // u8
+#define BUS_SET_SEGMENTS_REQUEST_LENGTH 53u
+#define BUS_SET_SEGMENTS_REQUEST_AXIS 2u    // u8
+#define BUS_SET_SEGMENTS_REQUEST_BORDER 3u    // u8
+#define BUS_SET_SEGMENTS_REQUEST_POINTS 4u    // u8
+#define BUS_SET_SEGMENTS_REQUEST_POINT_0 5u    // i32
+#define BUS_SET_SEGMENTS_REQUEST_POINT_1 9u    // i32
+#define BUS_SET_SEGMENTS_REQUEST_POINT_2 13u    // i32
+#define BUS_SET_SEGMENTS_REQUEST_POINT_3 17u    // i32
+#define BUS_SET_SEGMENTS_REQUEST_POINT_4 21u    // i32
+#define BUS_SET_SEGMENTS_REQUEST_POINT_5 25u    // i32
+#define BUS_SET_SEGMENTS_REQUEST_POINT_6 29u    // i32
+#define BUS_SET_SEGMENTS_REQUEST_POINT_7 33u    // i32
+#define BUS_SET_SEGMENTS_REQUEST_POINT_8 37u    // i32
+#define BUS_SET_SEGMENTS_REQUEST_POINT_9 41u    // i32
+#define BUS_SET_SEGMENTS_REQUEST_POINT_10 45u    // i32
+#define BUS_SET_SEGMENTS_REQUEST_POINT_11 49u    // i32
+#define BUS_SET_SEGMENTS_REPLY_LENGTH 3u
+#define BUS_GET_SEGMENTS_REQUEST_LENGTH 4u
+#define BUS_GET_SEGMENTS_REQUEST_AXIS 2u    // u8
+#define BUS_GET_SEGMENTS_REQUEST_BORDER 3u    // u8
+#define BUS_GET_SEGMENTS_REPLY_LENGTH 51u
+#define BUS_GET_SEGMENTS_REPLY_POINT_0 3u    // i32
+#define BUS_GET_SEGMENTS_REPLY_POINT_1 7u    // i32
+#define BUS_GET_SEGMENTS_REPLY_POINT_2 11u    // i32
+#define BUS_GET_SEGMENTS_REPLY_POINT_3 15u    // i32
+#define BUS_GET_SEGMENTS_REPLY_POINT_4 19u    // i32
+#define BUS_GET_SEGMENTS_REPLY_POINT_5 23u    // i32
+#define BUS_GET_SEGMENTS_REPLY_POINT_6 27u    // i32
+#define BUS_GET_SEGMENTS_REPLY_POINT_7 31u    // i32
+#define BUS_GET_SEGMENTS_REPLY_POINT_8 35u    // i32
+#define BUS_GET_SEGMENTS_REPLY_POINT_9 39u    // i32
+#define BUS_GET_SEGMENTS_REPLY_POINT_10 43u    // i32
+#define BUS_GET_SEGMENTS_REPLY_POINT_11 47u    // i32
+#define BUS_POSITION_REQUEST_LENGTH 3u
+#define BUS_POSITION_REQUEST_AXIS 2u    // u8
+#define BUS_POSITION_REPLY_LENGTH 11u
+#define BUS_POSITION_REPLY_POSITION 3u    // i64
+#define BUS_FOLLOW_REQUEST_LENGTH 3u
+#define BUS_FOLLOW_REQUEST_AXIS 2u    // u8
+#define BUS_FOLLOW_REPLY_LENGTH 11u
+#define BUS_FOLLOW_REPLY_POSITION 3u    // i64
+#define BUS_SET_BAUD_REQUEST_LENGTH 6u
+#define BUS_SET_BAUD_REQUEST_BAUD 2u    // u32
+#define BUS_SET_BAUD_REPLY_LENGTH 3u
+#define BUS_START_AT_SYNC_REQUEST_LENGTH 3u
+#define BUS_START_AT_SYNC_REQUEST_AXES 2u    // u8
+#define BUS_START_AT_SYNC_REPLY_LENGTH 3u
+#define BUS_ARM_SCOPE_REQUEST_LENGTH 13u
+#define BUS_ARM_SCOPE_REQUEST_AXIS 2u    // u8
+#define BUS_ARM_SCOPE_REQUEST_TRIGGER 3u    // u8
+#define BUS_ARM_SCOPE_REQUEST_BEFORE 4u    // u8
+#define BUS_ARM_SCOPE_REQUEST_EVERY 5u    // u16
+#define BUS_ARM_SCOPE_REQUEST_LEVEL 7u    // u32
+#define BUS_ARM_SCOPE_REQUEST_AMPLITUDE 11u    // i16
+#define BUS_ARM_SCOPE_REPLY_LENGTH 3u
+#define BUS_SCOPE_REQUEST_LENGTH 2u
+#define BUS_SCOPE_REPLY_LENGTH 6u
+#define BUS_SCOPE_REPLY_STATE 3u    // u8
+#define BUS_SCOPE_REPLY_COUNT 4u    // u8
+#define BUS_SCOPE_REPLY_BEFORE 5u    // u8
+#define BUS_READ_SCOPE_REQUEST_LENGTH 3u
+#define BUS_READ_SCOPE_REQUEST_FIRST 2u    // u8
+#define BUS_READ_SCOPE_REPLY_LENGTH 63u
+#define BUS_READ_SCOPE_REPLY_POSITION_0 3u    // i32
+#define BUS_READ_SCOPE_REPLY_ERROR_0 7u    // i32
+#define BUS_READ_SCOPE_REPLY_COMMAND_0 11u    // i16
+#define BUS_READ_SCOPE_REPLY_TIME_0 13u    // u16
+#define BUS_READ_SCOPE_REPLY_POSITION_1 15u    // i32
+#define BUS_READ_SCOPE_REPLY_ERROR_1 19u    // i32
+#define BUS_READ_SCOPE_REPLY_COMMAND_1 23u    // i16
+#define BUS_READ_SCOPE_REPLY_TIME_1 25u    // u16
+#define BUS_READ_SCOPE_REPLY_POSITION_2 27u    // i32
+#define BUS_READ_SCOPE_REPLY_ERROR_2 31u    // i32
+#define BUS_READ_SCOPE_REPLY_COMMAND_2 35u    // i16
+#define BUS_READ_SCOPE_REPLY_TIME_2 37u    // u16
+#define BUS_READ_SCOPE_REPLY_POSITION_3 39u    // i32
+#define BUS_READ_SCOPE_REPLY_ERROR_3 43u    // i32
+#define BUS_READ_SCOPE_REPLY_COMMAND_3 47u    // i16
+#define BUS_READ_SCOPE_REPLY_TIME_3 49u    // u16
+#define BUS_READ_SCOPE_REPLY_POSITION_4 51u    // i32
+#define BUS_READ_SCOPE_REPLY_ERROR_4 55u    // i32
+#define BUS_READ_SCOPE_REPLY_COMMAND_4 59u    // i16
+#define BUS_READ_SCOPE_REPLY_TIME_4 61u    // u16
+#define BUS_GET_SETTING_REQUEST_LENGTH 3u
+#define BUS_GET_SETTING_REQUEST_SETTING 2u    // u8
+#define BUS_GET_SETTING_REPLY_LENGTH 11u
+#define BUS_GET_SETTING_REPLY_VALUE 3u    // i64
+#define BUS_SET_SETTING_REQUEST_LENGTH 11u
+#define BUS_SET_SETTING_REQUEST_SETTING 2u    // u8
+#define BUS_SET_SETTING_REQUEST_VALUE 3u    // i64
+#define BUS_SET_SETTING_REPLY_LENGTH 3u
+#define BUS_TURN_TO_REQUEST_LENGTH 6u
+#define BUS_TURN_TO_REQUEST_ANGLE 2u    // u32
+#define BUS_TURN_TO_REPLY_LENGTH 3u
+#define BUS_TURN_STATE_REQUEST_LENGTH 2u
+#define BUS_TURN_STATE_REPLY_LENGTH 19u
+#define BUS_TURN_STATE_REPLY_PHASE 3u    // u8
+#define BUS_TURN_STATE_REPLY_ENDED 4u    // u8
+#define BUS_TURN_STATE_REPLY_TRIES 5u    // u8
+#define BUS_TURN_STATE_REPLY_OVERSHOOTS 6u    // u8
+#define BUS_TURN_STATE_REPLY_TARGET 7u    // u32
+#define BUS_TURN_STATE_REPLY_READING 11u    // u32
+#define BUS_TURN_STATE_REPLY_LEFT 15u    // i32
+#define BUS_SENSOR_REQUEST_LENGTH 2u
+#define BUS_SENSOR_REPLY_LENGTH 28u
+#define BUS_SENSOR_REPLY_ANGLE 3u    // u32
+#define BUS_SENSOR_REPLY_AGE 7u    // u32
+#define BUS_SENSOR_REPLY_TIMED_OUT 11u    // u8
+#define BUS_SENSOR_REPLY_FRAMES 12u    // u32
+#define BUS_SENSOR_REPLY_WRONG_CRC 16u    // u32
+#define BUS_SENSOR_REPLY_BROKEN 20u    // u32
+#define BUS_SENSOR_REPLY_MISSED 24u    // u32
+#define BUS_PEER_REQUEST_LENGTH 2u
+#define BUS_PEER_REPLY_LENGTH 23u
+#define BUS_PEER_REPLY_PHASE 3u    // u8
+#define BUS_PEER_REPLY_ENDED 4u    // u8
+#define BUS_PEER_REPLY_STATION 5u    // u16
+#define BUS_PEER_REPLY_STATIONS 7u    // u16
+#define BUS_PEER_REPLY_NEXT 9u    // u16
+#define BUS_PEER_REPLY_HEARD 11u    // u32
+#define BUS_PEER_REPLY_GARBAGE 15u    // u32
+#define BUS_PEER_REPLY_REPEATED 19u    // u32
+#define BUS_PEER_NEXT_REQUEST_LENGTH 4u
+#define BUS_PEER_NEXT_REQUEST_STATION 2u    // u16
+#define BUS_PEER_NEXT_REPLY_LENGTH 3u
+#define BUS_JOB_REQUEST_LENGTH 2u
+#define BUS_JOB_REPLY_LENGTH 13u
+#define BUS_JOB_REPLY_STATE 3u    // u8
+#define BUS_JOB_REPLY_CAUSE 4u    // u8
+#define BUS_JOB_REPLY_STATION 5u    // u16
+#define BUS_JOB_REPLY_STATIONS 7u    // u16
+#define BUS_JOB_REPLY_ANSWERS 9u    // u8
+#define BUS_JOB_REPLY_FLAGS 10u    // u8
+#define BUS_JOB_REPLY_TABLE_FAULTS 11u    // u16
+#define BUS_JOB_DO_REQUEST_LENGTH 3u
+#define BUS_JOB_DO_REQUEST_ACTION 2u    // u8
+#define BUS_JOB_DO_REPLY_LENGTH 3u
+#define BUS_JOB_STATIONS_REQUEST_LENGTH 2u
+#define BUS_JOB_STATIONS_REPLY_LENGTH 15u
+#define BUS_JOB_STATIONS_REPLY_WRITING 3u    // u8
+#define BUS_JOB_STATIONS_REPLY_ENDED 4u    // u8
+#define BUS_JOB_STATIONS_REPLY_GENERATION 5u    // u32
+#define BUS_JOB_STATIONS_REPLY_STATIONS 9u    // u16
+#define BUS_JOB_STATIONS_REPLY_JOURNAL 11u    // u32
+#define BUS_JOB_ANGLE_REQUEST_LENGTH 4u
+#define BUS_JOB_ANGLE_REQUEST_STATION 2u    // u16
+#define BUS_JOB_ANGLE_REPLY_LENGTH 7u
+#define BUS_JOB_ANGLE_REPLY_ANGLE 3u    // u32
+#define BUS_JOB_BEGIN_REQUEST_LENGTH 2u
+#define BUS_JOB_BEGIN_REPLY_LENGTH 3u
+#define BUS_JOB_ADD_REQUEST_LENGTH 8u
+#define BUS_JOB_ADD_REQUEST_STATION 2u    // u16
+#define BUS_JOB_ADD_REQUEST_ANGLE 4u    // u32
+#define BUS_JOB_ADD_REPLY_LENGTH 3u
+#define BUS_JOB_SAVE_REQUEST_LENGTH 2u
+#define BUS_JOB_SAVE_REPLY_LENGTH 3u
+#define BUS_SAVE_SETTINGS_REQUEST_LENGTH 3u
+#define BUS_SAVE_SETTINGS_REQUEST_ACTION 2u    // u8
+#define BUS_SAVE_SETTINGS_REPLY_LENGTH 3u
+#define BUS_SAVED_SETTINGS_REQUEST_LENGTH 2u
+#define BUS_SAVED_SETTINGS_REPLY_LENGTH 12u
+#define BUS_SAVED_SETTINGS_REPLY_WRITING 3u    // u8
+#define BUS_SAVED_SETTINGS_REPLY_CAUSE 4u    // u8
+#define BUS_SAVED_SETTINGS_REPLY_DAMAGED 5u    // u8
+#define BUS_SAVED_SETTINGS_REPLY_GENERATION 6u    // u32
+#define BUS_SAVED_SETTINGS_REPLY_VALUES 10u    // u16
+
+// X(name, code, length of the request body, length of the reply body if the cause is ok, 1: of an axis, its first field)
+#define BUS_OPERATIONS(X) \
+    X(identify, 1, 2, 27, 0) \
+    X(status, 2, 3, 41, 1) \
+    X(enable, 3, 4, 3, 1) \
+    X(home, 4, 3, 3, 1) \
+    X(move, 5, 11, 7, 1) \
+    X(stop, 6, 3, 3, 1) \
+    X(reset_faults, 7, 3, 3, 1) \
+    X(get_parameter, 8, 4, 11, 1) \
+    X(set_parameter, 9, 12, 3, 1) \
+    X(counters, 10, 2, 43, 0) \
+    X(encoder, 11, 3, 35, 1) \
+    X(read_register, 12, 4, 7, 0) \
+    X(calibration, 13, 4, 18, 1) \
+    X(get_correction, 14, 3, 15, 1) \
+    X(get_harmonic, 15, 4, 11, 1) \
+    X(set_correction, 16, 16, 3, 1) \
+    X(set_harmonic, 17, 12, 3, 1) \
+    X(signal, 18, 3, 7, 1) \
+    X(write_register, 19, 8, 3, 0) \
+    X(prepare, 20, 11, 7, 1) \
+    X(start, 21, 3, 3, 0) \
+    X(segments, 22, 3, 7, 1) \
+    X(set_segments, 23, 53, 3, 1) \
+    X(get_segments, 24, 4, 51, 1) \
+    X(position, 30, 3, 11, 1) \
+    X(follow, 34, 3, 11, 1) \
+    X(set_baud, 35, 6, 3, 0) \
+    X(start_at_sync, 36, 3, 3, 0) \
+    X(arm_scope, 31, 13, 3, 1) \
+    X(scope, 32, 2, 6, 0) \
+    X(read_scope, 33, 3, 63, 0) \
+    X(get_setting, 40, 3, 11, 0) \
+    X(set_setting, 41, 11, 3, 0) \
+    X(turn_to, 42, 6, 3, 0) \
+    X(turn_state, 43, 2, 19, 0) \
+    X(sensor, 44, 2, 28, 0) \
+    X(peer, 45, 2, 23, 0) \
+    X(peer_next, 47, 4, 3, 0) \
+    X(job, 48, 2, 13, 0) \
+    X(job_do, 49, 3, 3, 0) \
+    X(job_stations, 50, 2, 15, 0) \
+    X(job_angle, 51, 4, 7, 0) \
+    X(job_begin, 52, 2, 3, 0) \
+    X(job_add, 53, 8, 3, 0) \
+    X(job_save, 54, 2, 3, 0) \
+    X(save_settings, 58, 3, 3, 0) \
+    X(saved_settings, 59, 2, 12, 0)
+
+enum bus_parameter {
+    BUS_PARAMETER_PERIOD = 1,    // [1 pm] length of one signal period
+    BUS_PARAMETER_COUNTS_PER_PERIOD = 2,    // subdivision N of the read-out
+    BUS_PARAMETER_TRAVEL_LOW = 3,    // [1/65536 period] lowest target
+    BUS_PARAMETER_TRAVEL_HIGH = 4,    // [1/65536 period] highest target
+    BUS_PARAMETER_VELOCITY = 5,    // [1 period/s] top speed of a move
+    BUS_PARAMETER_ACCELERATION = 6,    // [1 period/s2] largest acceleration
+    BUS_PARAMETER_JERK = 7,    // [1 period/s3] largest jerk
+    BUS_PARAMETER_HOMING_SEARCH_SPEED = 8,    // [1 period/s] speed towards the limit switch
+    BUS_PARAMETER_HOMING_LATCH_SPEED = 9,    // [1 period/s] speed while the switch edge is sought
+    BUS_PARAMETER_HOME_DISTANCE = 10,    // [1/65536 period] from the switch edge to the zero
+    BUS_PARAMETER_HOME_END = 11,    // switch that homing uses: 0 low end, 1 high end
+    BUS_PARAMETER_SETTLE_WINDOW = 12,    // [1/65536 period] a move has ended when the error stays inside this
+    BUS_PARAMETER_SETTLE_TIME = 13,    // [0.001 s] for this long
+    BUS_PARAMETER_SETTLE_TIMEOUT = 14,    // [0.001 s] or is given up after this
+    BUS_PARAMETER_KP = 15,    // [1/65536] servo: proportional gain, see axis_registers.kp
+    BUS_PARAMETER_KI = 16,    // [1/16777216] servo: integral gain per tick
+    BUS_PARAMETER_KD = 17,    // [1/65536] servo: derivative gain
+    BUS_PARAMETER_KV = 18,    // [1/65536] servo: velocity feed-forward
+    BUS_PARAMETER_KA = 19,    // [1/256] servo: acceleration feed-forward
+    BUS_PARAMETER_OUTPUT_LIMIT = 20,    // [1/32768] servo: largest command, of full scale
+    BUS_PARAMETER_INTEGRAL_LIMIT = 21,    // [1/32768] servo: largest integral term, of full scale
+    BUS_PARAMETER_DEAD_BAND = 22,    // [1/65536 period] servo: the integrator rests inside this at standstill
+    BUS_PARAMETER_FOLLOWING_LIMIT = 23,    // [1/65536 period] guard: largest following error
+    BUS_PARAMETER_DEGLITCH = 24,    // [1e-9 s] deglitcher: a level must be stable this long
+    BUS_PARAMETER_OUTLIER_STEP = 25,    // limit filter 1: largest step between samples; 0 off
+    BUS_PARAMETER_OUTLIER_HOLD = 26,    // limit filter 1: samples in a row it may hold back
+    BUS_PARAMETER_AMPLITUDE_LOW = 27,    // encoder: smallest good amplitude, converter counts
+    BUS_PARAMETER_AMPLITUDE_HIGH = 28,    // encoder: largest good amplitude, converter counts
+    BUS_PARAMETER_DISAGREEMENT_LIMIT = 29,    // [1/65536 period] encoder: interpolated position against quadrature count; 0 off
+    BUS_PARAMETER_ENCODER_FAULT_MASK = 30,    // encoder: which events are a fault (bits of encoder_event)
+    BUS_PARAMETER_PWM_FREQUENCY = 31,    // [1 Hz] drive: PWM frequency
+    BUS_PARAMETER_WATCHDOG_TIME = 32,    // [0.001 s] guard: longest silence of the line while a drive is on (all axes); 0: for ever, for a machine that runs by itself
+    BUS_PARAMETER_AUTO_CALIBRATION = 33,    // correction of sine and cosine: 0 frozen, 1 learns
+    BUS_PARAMETER_DECODER_MODE = 34,    // decoder: 0 every edge, 1 every second, 2 every fourth, 3 pulses and direction; other than 0 needs disagreement_limit 0
+    BUS_PARAMETER_FILTER_SKIP = 35,    // [1e-9 s] deglitcher: time between two samples of a level; 0 every clk
+    BUS_PARAMETER_FILTER_TOLERATED = 36,    // deglitcher: samples of the old level that may lie between
+    BUS_PARAMETER_VELOCITY_QUANTUM = 37,    // [1/65536 period] velocity: smallest step of the position; 0 plain difference
+    BUS_PARAMETER_SIGNAL_FAULT_MASK = 38,    // signal: which faults take the drive (bits of signal_fault)
+    BUS_PARAMETER_SIGNAL_CLIP_LEVEL = 39,    // signal: largest good code, converter counts, as in all that follow; 65535 off
+    BUS_PARAMETER_SIGNAL_TOLERANCE = 40,    // signal: largest good distance from the circle; 65535 off
+    BUS_PARAMETER_SIGNAL_JUMP = 41,    // signal: smallest sudden step that is bad; 65535 off
+    BUS_PARAMETER_SIGNAL_NO_NOISE_SAMPLES = 42,    // signal: samples with the same code that are bad; 0 off. Needs noise: 1024 for 0.5 counts rms
+    BUS_PARAMETER_SIGNAL_SPAN = 43,    // signal: way of one leg in which the other must leave its band; 65535 off
+    BUS_PARAMETER_SIGNAL_BAND = 44,    // signal: noise of a leg that stands, largest deviation
+    BUS_PARAMETER_SIGNAL_SIGN_THRESHOLD = 45,    // signal: larger samples have a sure sign; 65535 off
+    BUS_PARAMETER_SIGNAL_OFFSET = 46,    // signal: largest good offset; 65535 off
+    BUS_PARAMETER_SIGNAL_BALANCE = 47,    // signal: largest good difference of the amplitudes; 65535 off
+    BUS_PARAMETER_SIGNAL_QUADRATURE_ERROR = 48,    // signal: largest good amplitude times sine of the phase error; 65535 off
+    BUS_PARAMETER_POSITION_SOURCE = 49,    // position from: 0 phases of sine and cosine (needs SINE, else 1 is the default), 1 counts of A/B, 2 the axis' own steps
+    BUS_PARAMETER_HOME_METHOD = 50,    // homing: CiA 402 methods 1, 2, 17, 18, 33, 34, 35, 37; -1 S0 (switch, way, phase zero), -2 S3 (index on either side)
+    BUS_PARAMETER_HOME_OFFSET = 51,    // [1 period] what the zero that homing finds is called
+    BUS_PARAMETER_DRIVE = 52,    // drive: 0 bridge, 1 steps, 2 converter
+    BUS_PARAMETER_STEPS_PER_PERIOD = 53,    // [1/4294967296] steps: in one period; the sign turns the direction
+    BUS_PARAMETER_STEP_HIGH = 54,    // [1e-9 s] steps: shortest pulse
+    BUS_PARAMETER_STEP_LOW = 55,    // [1e-9 s] steps: shortest gap
+    BUS_PARAMETER_STEP_SETUP = 56,    // [1e-9 s] steps: direction before a pulse
+    BUS_PARAMETER_STEP_HOLD = 57,    // [1e-9 s] steps: direction after a pulse
+    BUS_PARAMETER_STEP_OUTPUT = 58,    // steps: 0 step and direction, 1 quadrature, 2 pulses up and pulses down
+    BUS_PARAMETER_STEP_INVERT = 59,    // steps: 1 step is active low, 2 direction is low going up, 3 both
+    BUS_PARAMETER_STEP_TRIM = 60,    // steps: the servo's command moves the target by command 2^trim / 65536 period
+    BUS_PARAMETER_DAC_CLOCK = 61,    // [1 Hz] converter: highest clock of its frames
+    BUS_PARAMETER_DAC_TRIM = 62,    // [1/32768] converter: what puts out 0 V, of full scale
+    BUS_PARAMETER_FINE_KP = 63,    // [1/65536] fine stage: proportional gain
+    BUS_PARAMETER_FINE_KI = 64,    // [1/16777216] fine stage: integral gain per tick
+    BUS_PARAMETER_FINE_LIMIT = 65,    // [1/32768] fine stage: largest command, of full scale
+    BUS_PARAMETER_FINE_REACH = 66,    // [1/65536 period] fine stage: error inside which it takes over; 0 there is none
+    BUS_PARAMETER_FEED_OVERRIDE = 67,    // [1/65536] speed of all profiles, of full; 0 pauses; may change in motion
+    BUS_PARAMETER_FILTERS = 68,    // servo: which filters are in use, 1 the first, 2 the second, 3 both
+    BUS_PARAMETER_FILTER_1_B0 = 69,    // [1/1073741824] servo: filter 1, coefficient b0
+    BUS_PARAMETER_FILTER_1_B1 = 70,    // [1/1073741824] servo: filter 1, coefficient b1
+    BUS_PARAMETER_FILTER_1_B2 = 71,    // [1/1073741824] servo: filter 1, coefficient b2
+    BUS_PARAMETER_FILTER_1_A1 = 72,    // [1/1073741824] servo: filter 1, coefficient -a1
+    BUS_PARAMETER_FILTER_1_A2 = 73,    // [1/1073741824] servo: filter 1, coefficient -a2
+    BUS_PARAMETER_FILTER_2_B0 = 74,    // [1/1073741824] servo: filter 2, coefficient b0
+    BUS_PARAMETER_FILTER_2_B1 = 75,    // [1/1073741824] servo: filter 2, coefficient b1
+    BUS_PARAMETER_FILTER_2_B2 = 76,    // [1/1073741824] servo: filter 2, coefficient b2
+    BUS_PARAMETER_FILTER_2_A1 = 77,    // [1/1073741824] servo: filter 2, coefficient -a1
+    BUS_PARAMETER_FILTER_2_A2 = 78,    // [1/1073741824] servo: filter 2, coefficient -a2
+    BUS_PARAMETER_PROFILE = 79,    // profile of motions: 0 S-curve, 1 trapezoid (jerk does not count), 2 stairs (velocity and the stepped_ parameters)
+    BUS_PARAMETER_STEPPED_FIRST = 80,    // [1/65536 period/s] stairs (S4): speed of the first, f0
+    BUS_PARAMETER_STEPPED_TIME = 81,    // [0.00025 s] stairs: time on each
+    BUS_PARAMETER_STEPPED_RISE_1 = 82,    // [1/65536 period/s] stairs: height of those in section 1, the mirror of 7
+    BUS_PARAMETER_STEPPED_RISE_2 = 83,    // [1/65536 period/s] stairs: height in section 2, the mirror of 6
+    BUS_PARAMETER_STEPPED_RISE_3 = 84,    // [1/65536 period/s] stairs: height in section 3, the mirror of 5
+    BUS_PARAMETER_STEPPED_BORDER_2 = 85,    // [1/65536] stairs: where section 2 begins, of the way from stepped_first to velocity
+    BUS_PARAMETER_STEPPED_BORDER_3 = 86,    // [1/65536] stairs: where section 3 begins: 1/2 is 1:2:3, S4 prints 1/3
+    BUS_PARAMETER_SEGMENT_COUNT = 87,    // segment table: its segments
+    BUS_PARAMETER_SEGMENT_LENGTH = 88,    // [1/65536 period] segment table: length of a segment
+    BUS_PARAMETER_SEGMENT_FIRST = 89,    // [1/65536 period] segment table: first border, from the place that homing finds
+    BUS_PARAMETER_SEGMENTS = 90,    // segment table: 0 off, 1 a segment has the mean of its borders (S0), 2 straight lines; in force from homing on
+};
+#define BUS_PARAMETER_COUNT 90u
+
+// X(name, id, min, max, default): all int64_t, in counts of the wire
+#define BUS_PARAMETERS(X) \
+    X(period, 1, 1LL, 4000000000LL, 800000LL) \
+    X(counts_per_period, 2, 1LL, 65536LL, 160LL) \
+    X(travel_low, 3, -140737488355328LL, 140737488355327LL, -65536000LL) \
+    X(travel_high, 4, -140737488355328LL, 140737488355327LL, 9797632000LL) \
+    X(velocity, 5, 1LL, 1000000LL, 6000LL) \
+    X(acceleration, 6, 1LL, 100000000LL, 125000LL) \
+    X(jerk, 7, 1LL, 2000000000LL, 12500000LL) \
+    X(homing_search_speed, 8, 1LL, 1000000LL, 5000LL) \
+    X(homing_latch_speed, 9, 1LL, 1000000LL, 125LL) \
+    X(home_distance, 10, 65536LL, 1000000000LL, 81920000LL) \
+    X(home_end, 11, 0LL, 1LL, 0LL) \
+    X(settle_window, 12, 1LL, 65536000LL, 1638LL) \
+    X(settle_time, 13, 1LL, 10000LL, 20LL) \
+    X(settle_timeout, 14, 1LL, 60000LL, 2000LL) \
+    X(kp, 15, 0LL, 16777215LL, 1600LL) \
+    X(ki, 16, 0LL, 16777215LL, 16000LL) \
+    X(kd, 17, 0LL, 16777215LL, 20000LL) \
+    X(kv, 18, 0LL, 16777215LL, 4942LL) \
+    X(ka, 19, 0LL, 16777215LL, 643LL) \
+    X(output_limit, 20, 0LL, 32767LL, 32000LL) \
+    X(integral_limit, 21, 0LL, 32767LL, 20000LL) \
+    X(dead_band, 22, 0LL, 65535LL, 400LL) \
+    X(following_limit, 23, 1LL, 2147483647LL, 4096000LL) \
+    X(deglitch, 24, 0LL, 1000000LL, 10000LL) \
+    X(outlier_step, 25, 0LL, 255LL, 0LL) \
+    X(outlier_hold, 26, 0LL, 255LL, 3LL) \
+    X(amplitude_low, 27, 0LL, 65535LL, 32LL) \
+    X(amplitude_high, 28, 0LL, 65535LL, 160LL) \
+    X(disagreement_limit, 29, 0LL, 1048575LL, 32768LL) \
+    X(encoder_fault_mask, 30, 0LL, 31LL, 30LL) \
+    X(pwm_frequency, 31, 1000LL, 200000LL, 20000LL) \
+    X(watchdog_time, 32, 0LL, 65535LL, 500LL) \
+    X(auto_calibration, 33, 0LL, 1LL, 0LL) \
+    X(decoder_mode, 34, 0LL, 3LL, 0LL) \
+    X(filter_skip, 35, 0LL, 1000000LL, 0LL) \
+    X(filter_tolerated, 36, 0LL, 15LL, 0LL) \
+    X(velocity_quantum, 37, 0LL, 65535LL, 128LL) \
+    X(signal_fault_mask, 38, 0LL, 32767LL, 0LL) \
+    X(signal_clip_level, 39, 0LL, 65535LL, 126LL) \
+    X(signal_tolerance, 40, 0LL, 65535LL, 9LL) \
+    X(signal_jump, 41, 0LL, 65535LL, 13LL) \
+    X(signal_no_noise_samples, 42, 0LL, 65535LL, 0LL) \
+    X(signal_span, 43, 0LL, 65535LL, 80LL) \
+    X(signal_band, 44, 0LL, 255LL, 3LL) \
+    X(signal_sign_threshold, 45, 0LL, 65535LL, 20LL) \
+    X(signal_offset, 46, 0LL, 65535LL, 12LL) \
+    X(signal_balance, 47, 0LL, 65535LL, 16LL) \
+    X(signal_quadrature_error, 48, 0LL, 65535LL, 16LL) \
+    X(position_source, 49, 0LL, 2LL, 0LL) \
+    X(home_method, 50, -2LL, 37LL, -1LL) \
+    X(home_offset, 51, -1000000000LL, 1000000000LL, 0LL) \
+    X(drive, 52, 0LL, 2LL, 0LL) \
+    X(steps_per_period, 53, -140737488355328LL, 140737488355327LL, 0LL) \
+    X(step_high, 54, 0LL, 100000LL, 2000LL) \
+    X(step_low, 55, 0LL, 100000LL, 2000LL) \
+    X(step_setup, 56, 0LL, 100000LL, 5000LL) \
+    X(step_hold, 57, 0LL, 100000LL, 5000LL) \
+    X(step_output, 58, 0LL, 2LL, 0LL) \
+    X(step_invert, 59, 0LL, 3LL, 0LL) \
+    X(step_trim, 60, 0LL, 15LL, 0LL) \
+    X(dac_clock, 61, 10000LL, 50000000LL, 1000000LL) \
+    X(dac_trim, 62, -32768LL, 32767LL, 0LL) \
+    X(fine_kp, 63, 0LL, 16777215LL, 0LL) \
+    X(fine_ki, 64, 0LL, 16777215LL, 0LL) \
+    X(fine_limit, 65, 0LL, 32767LL, 30000LL) \
+    X(fine_reach, 66, 0LL, 65536000LL, 0LL) \
+    X(feed_override, 67, 0LL, 65536LL, 65536LL) \
+    X(filters, 68, 0LL, 3LL, 0LL) \
+    X(filter_1_b0, 69, -2147483648LL, 2147483647LL, 1073741824LL) \
+    X(filter_1_b1, 70, -2147483648LL, 2147483647LL, 0LL) \
+    X(filter_1_b2, 71, -2147483648LL, 2147483647LL, 0LL) \
+    X(filter_1_a1, 72, -2147483648LL, 2147483647LL, 0LL) \
+    X(filter_1_a2, 73, -2147483648LL, 2147483647LL, 0LL) \
+    X(filter_2_b0, 74, -2147483648LL, 2147483647LL, 1073741824LL) \
+    X(filter_2_b1, 75, -2147483648LL, 2147483647LL, 0LL) \
+    X(filter_2_b2, 76, -2147483648LL, 2147483647LL, 0LL) \
+    X(filter_2_a1, 77, -2147483648LL, 2147483647LL, 0LL) \
+    X(filter_2_a2, 78, -2147483648LL, 2147483647LL, 0LL) \
+    X(profile, 79, 0LL, 2LL, 0LL) \
+    X(stepped_first, 80, 1LL, 65536000000LL, 819200LL) \
+    X(stepped_time, 81, 1LL, 400000LL, 80LL) \
+    X(stepped_rise_1, 82, 1LL, 65536000000LL, 819200LL) \
+    X(stepped_rise_2, 83, 1LL, 65536000000LL, 1638400LL) \
+    X(stepped_rise_3, 84, 1LL, 65536000000LL, 3276800LL) \
+    X(stepped_border_2, 85, 0LL, 65536LL, 10923LL) \
+    X(stepped_border_3, 86, 0LL, 65536LL, 32768LL) \
+    X(segment_count, 87, 1LL, 255LL, 120LL) \
+    X(segment_length, 88, 1LL, 70368744177664LL, 81920000LL) \
+    X(segment_first, 89, -70368744177664LL, 70368744177664LL, 0LL) \
+    X(segments, 90, 0LL, 2LL, 0LL)
+
+// parameters of which a node without sine and cosine takes only 0 and the default
+#define BUS_PARAMETERS_OF_SINE 25, 26, 27, 28, 29, 33, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48
+
+enum bus_setting {
+    BUS_SETTING_TURN_TOLERANCE = 1,    // [0.01 arcsec] index: it has ended when no more than this is left by the sensor
+    BUS_SETTING_TURN_ALLOWANCE = 2,    // [0.01 arcsec] index: the long way ends so far below the target; more than the error of the worm
+    BUS_SETTING_TURN_TAKE_UP = 3,    // [0.01 arcsec] index: shortest way up before a reading counts; more than the backlash
+    BUS_SETTING_TURN_SHARE = 4,    // [1/100] index: each try goes this share of what is left
+    BUS_SETTING_TURN_TRIES = 5,    // index: tries before it is given up
+    BUS_SETTING_TURN_OVERSHOOTS = 6,    // index: how often it may back off from above the target and come again
+    BUS_SETTING_TURN_SETTLE = 7,    // [0.001 s] index: rest before a reading; more than the latency of the sensor
+    BUS_SETTING_TURN_FRAMES = 8,    // index: frames whose mean is a reading
+    BUS_SETTING_TURN_DISAGREEMENT = 9,    // [0.01 arcsec] index: largest difference of sensor and steps; more than worm error and backlash
+    BUS_SETTING_TURN_DIRECTION = 10,    // index: 0 not through angle 0, 1 the shorter way round, 2 always up
+    BUS_SETTING_PERIODS_PER_TURN = 11,    // periods of axis 0 in a turn of the table; four steps are a period
+    BUS_SETTING_SENSOR_TIMEOUT = 12,    // [0.001 s] sensor: dead when no good frame came for this long
+    BUS_SETTING_SENSOR_ZERO = 13,    // [0.01 arcsec] sensor: what it sends at angle 0
+    BUS_SETTING_READOUT_DECIMALS = 14,    // numeric display: decimals of the position in mm
+    BUS_SETTING_PEER_MODE = 15,    // peer port: 0 not in use, 1 S4's bytes as printed, 2 frames with CRC-32
+    BUS_SETTING_PEER_ROLE = 16,    // peer port: 0 this is the main node, 1 the sub-node that indexes
+    BUS_SETTING_PEER_TIMEOUT = 17,    // [0.001 s] peer port: in mode printed, an index that takes longer has failed
+    BUS_SETTING_JOB_START_LIMIT = 18,    // [1 s] job: longest time from the start keys to the beginning of the cut
+    BUS_SETTING_JOB_CUT_LIMIT = 19,    // [1 s] job: longest cut
+    BUS_SETTING_JOB_SPEED = 20,    // [1/100] job: speed of the table, of full; told to the sub-node with each order, in mode frames
+};
+#define BUS_SETTING_COUNT 20u
+
+// X(name, id, min, max, default): all int64_t, in counts of the wire
+#define BUS_SETTINGS(X) \
+    X(turn_tolerance, 1, 1LL, 360000LL, 50LL) \
+    X(turn_allowance, 2, 0LL, 3600000LL, 6000LL) \
+    X(turn_take_up, 3, 1LL, 3600000LL, 6000LL) \
+    X(turn_share, 4, 5LL, 95LL, 50LL) \
+    X(turn_tries, 5, 1LL, 255LL, 40LL) \
+    X(turn_overshoots, 6, 0LL, 255LL, 3LL) \
+    X(turn_settle, 7, 0LL, 10000LL, 100LL) \
+    X(turn_frames, 8, 1LL, 64LL, 4LL) \
+    X(turn_disagreement, 9, 100LL, 16000000LL, 12000LL) \
+    X(turn_direction, 10, 0LL, 2LL, 0LL) \
+    X(periods_per_turn, 11, 1LL, 2147483647LL, 1800000LL) \
+    X(sensor_timeout, 12, 10LL, 10000LL, 200LL) \
+    X(sensor_zero, 13, 0LL, 129599999LL, 0LL) \
+    X(readout_decimals, 14, 0LL, 6LL, 5LL) \
+    X(peer_mode, 15, 0LL, 2LL, 0LL) \
+    X(peer_role, 16, 0LL, 1LL, 0LL) \
+    X(peer_timeout, 17, 100LL, 3600000LL, 300000LL) \
+    X(job_start_limit, 18, 1LL, 3600LL, 30LL) \
+    X(job_cut_limit, 19, 1LL, 1000000LL, 14400LL) \
+    X(job_speed, 20, 1LL, 100LL, 100LL)
+
+#define BUS_VALUES_CRC 0x522AA65Du     // of all of both: what a kept number means
+
+#endif

@@ -1,0 +1,439 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A node without hardware: the registers as the firmware sees them, behind them a line, a clock and simple axes.
+
+An axis plays its profile exactly (the recursion of profile_player), its position follows the target by half the way each tick,
+a drive that is off stands, and a limit switch lets it slide a little into the blocked way. Faults latch as drive_interlock does it.
+"""
+import re
+import tomllib
+import zlib
+from collections import deque
+
+from twin.compiled.firmware import READ, ROOT, SOURCE, WRITE, library
+
+DEFINES = {name: int(value.rstrip("u"), 0)
+           for name, value in re.findall(r"^#define (\w+)\s+(0x[0-9a-fA-F]+u?|\d+u?)\b", (SOURCE / "made" / "registers.h").read_text(), re.M)}
+TABLE = tomllib.loads((ROOT / "tables" / "bus.toml").read_text())
+CAUSE = {code: name for name, (code, _) in TABLE["cause"].items()}
+STATE = {code: name for name, (code, _) in TABLE["state"].items()}
+FAULT = {name: 1 << bit for name, (bit, _) in TABLE["fault"].items()}
+FLAG = {name: 1 << bit for name, (bit, _) in TABLE["flag"].items()}
+PARAMETER = TABLE["parameter"]
+CLK_HZ = 4_000_000
+PERIOD = 65536
+SLIDE = 30 * PERIOD                                     # into a pressed switch
+BACKLASH = PERIOD // 2                                  # a switch opens so far from where it closed
+ALWAYS_LATCHED = FAULT["estop"] | FAULT["drive"] | FAULT["cpu"]
+
+
+def signed(value, bits):
+    return value - (1 << bits) if value >> bits - 1 & 1 else value
+
+
+def fields(declarations, data):
+    values, at = {}, 0
+    for declaration in declarations:
+        name, kind = declaration.split()
+        size = int(kind[1:]) // 8
+        values[name] = int.from_bytes(data[at:at + size], "little", signed=kind[0] == "i")
+        at += size
+    assert at == len(data)
+    return values
+
+
+class Player:
+    def __init__(self):
+        self.target = self.velocity = self.acceleration = self.jerk = self.left = self.last = 0     # target: 2^-40 period
+        self.queue, self.moving, self.braking, self.stop_deceleration = deque(), False, False, 0
+
+    def hold(self, position):
+        self.__init_motion()
+        self.target = position << 24
+
+    def __init_motion(self):
+        self.queue.clear()
+        self.moving = self.braking = False
+        self.left = self.last = self.velocity = 0
+
+    def controlled_stop(self):
+        self.queue.clear()
+        self.braking = self.moving
+
+    def tick(self):
+        """True if the segments ran out."""
+        if not self.moving:
+            return False
+        underrun = False
+        if not self.braking and self.left == 0:
+            if self.queue:
+                self.velocity, self.acceleration, self.jerk, self.left, self.last = self.queue.popleft()
+            else:
+                underrun = self.braking = True
+        self.target += self.velocity
+        if self.braking:
+            rate = self.stop_deceleration << 8
+            stop = rate == 0 or abs(self.velocity) <= rate
+            self.velocity -= self.velocity if stop else rate if self.velocity > 0 else -rate
+        else:
+            self.velocity, self.acceleration, self.left = self.velocity + self.acceleration, self.acceleration + self.jerk, self.left - 1
+            stop = self.last and self.left == 0
+        if stop:
+            self.target = self.target + (1 << 23) >> 24 << 24
+            self.__init_motion()
+        return underrun
+
+
+class Axis:
+    def __init__(self, position=0, low=None, high=None, index=()):
+        """Positions of the switches and of each index are those of the machine: the origin of the node does not move them."""
+        self.word = {}
+        self.machine, self.origin = position, 0                         # position = machine + origin
+        self.low_at, self.high_at = low, high
+        self.pressed_low = low is not None and position <= low
+        self.pressed_high = high is not None and position >= high
+        self.stuck_low = False
+        self.player = Player()
+        self.player.target = position << 24
+        self.faults = self.first_fault = self.fault_position = 0
+        self.causes = 0                                                 # those that the test sets
+        self.enabled = self.seized = False
+        self.speed, self.passed = 0, None                               # passed: position of the index met in the last tick
+        self.index = index
+        self.strobes = []                                               # (strobes, control) in order
+        self.pushed = []
+
+    @property
+    def position(self):
+        return self.machine + self.origin
+
+    @property
+    def target(self):
+        return self.player.target >> 24
+
+    @property
+    def error(self):
+        return self.target - self.position
+
+    @property
+    def control(self):
+        return self.word.get(DEFINES["AXIS_CONTROL"], 0)
+
+    def interlock(self, strobe_cause=0):
+        causes = self.causes | strobe_cause
+        if not self.control & DEFINES["AXIS_CONTROL_HOMING_MASK"]:
+            causes |= FAULT["limit_low"] * self.pressed_low | FAULT["limit_high"] * self.pressed_high
+        limit = self.word.get(DEFINES["AXIS_FOLLOWING_LIMIT"], 0)
+        if self.enabled and limit and abs(self.error) > limit:
+            causes |= FAULT["following_error"]
+        wants = self.control & DEFINES["AXIS_CONTROL_ENABLE_MASK"]
+        arrived = causes & (-1 if wants else ALWAYS_LATCHED)
+        if arrived and not self.faults:
+            self.first_fault, self.fault_position = arrived & -arrived, self.position
+        self.faults |= arrived
+        self.enabled = bool(wants) and not self.faults
+        return causes
+
+    def reset(self):
+        if not self.control & DEFINES["AXIS_CONTROL_ENABLE_MASK"]:
+            self.faults &= self.interlock()
+            if not self.faults:
+                self.first_fault = 0
+
+    def tick(self):
+        underrun = self.player.tick()
+        old = self.machine
+        if self.enabled and not self.seized:
+            step = self.error - self.error // 2 if self.error > 0 else -(-self.error - -self.error // 2)
+            limit = self.low_at - SLIDE if self.low_at is not None else None
+            self.machine = self.machine + step if limit is None else max(self.machine + step, min(limit, self.machine))
+        self.speed = self.machine - old
+        met = [place for place in self.index if min(old, self.machine) < place <= max(old, self.machine)]
+        self.passed = met[0 if self.speed > 0 else -1] + self.origin if met else None
+        if self.low_at is not None:
+            if self.machine <= self.low_at:
+                self.pressed_low = True
+            elif self.machine > self.low_at + BACKLASH and not self.stuck_low:
+                self.pressed_low = False
+        if self.high_at is not None:
+            if self.machine >= self.high_at:
+                self.pressed_high = True
+            elif self.machine < self.high_at - BACKLASH:
+                self.pressed_high = False
+        self.interlock(FAULT["profile_underrun"] if underrun else 0)
+
+    def read(self, offset):
+        d = DEFINES
+        wide = {d["AXIS_POSITION"]: self.position, d["AXIS_TARGET"]: self.target, d["AXIS_FAULT_POSITION"]: self.fault_position}
+        if offset in wide:
+            self.latch = wide[offset] >> 32 & 0xFFFF
+            return wide[offset] & 0xFFFFFFFF
+        if offset - 4 in wide:
+            return self.latch
+        if offset == d["AXIS_STATE"]:
+            return (d["AXIS_STATE_ENABLED_MASK"] * self.enabled | d["AXIS_STATE_LIMIT_LOW_MASK"] * self.pressed_low |
+                    d["AXIS_STATE_LIMIT_HIGH_MASK"] * self.pressed_high | d["AXIS_STATE_MOVING_MASK"] * self.player.moving |
+                    d["AXIS_STATE_ESTOP_MASK"] * bool(self.causes & FAULT["estop"]) |
+                    16 - len(self.player.queue) << d["AXIS_STATE_QUEUE_FREE_SHIFT"])
+        special = {d["AXIS_FAULTS"]: self.faults, d["AXIS_CAUSES_NOW"]: self.interlock(), d["AXIS_FIRST_FAULT"]: self.first_fault,
+                   d["AXIS_FOLLOWING_ERROR"]: max(-2**31, min(2**31 - 1, self.error)), d["AXIS_VELOCITY"]: self.speed}
+        return special.get(offset, self.word.get(offset, 0)) & 0xFFFFFFFF
+
+    def write(self, offset, value):
+        d = DEFINES
+        if offset == d["AXIS_STROBES"]:
+            self.strobes.append((value, self.control))
+            if value & d["AXIS_STROBES_SET_TARGET_TO_POSITION_MASK"]:
+                self.player.hold(self.position)
+            if value & d["AXIS_STROBES_CONTROLLED_STOP_MASK"]:
+                self.player.controlled_stop()
+            if value & d["AXIS_STROBES_START_MASK"] and self.player.queue:
+                self.player.moving = True
+            if value & d["AXIS_STROBES_RESET_FAULTS_MASK"]:
+                self.reset()
+            return
+        if offset == d["AXIS_SHIFT_ORIGIN"]:
+            self.origin += signed(value, 32) * PERIOD
+            self.player.target += signed(value, 32) << 40
+        self.word[offset] = value
+        if offset == d["AXIS_ENCODER_EVENTS"]:
+            self.word[offset] = 0
+        if offset == d["AXIS_STOP_DECELERATION"]:
+            self.player.stop_deceleration = value
+        if offset == d["AXIS_CONTROL"]:
+            self.interlock()
+        if offset == d["AXIS_SEGMENT_TICKS"]:
+            assert len(self.player.queue) < 16, "a segment was lost: the queue was full"
+            velocity, acceleration = (signed(self.word[d[f"AXIS_SEGMENT_{name}_HIGH"]] << 32 | self.word[d[f"AXIS_SEGMENT_{name}_LOW"]], 64)
+                                      for name in ("VELOCITY", "ACCELERATION"))
+            segment = velocity, acceleration, signed(self.word[d["AXIS_SEGMENT_JERK"]], 32), value & 0xFFFFFF, value >> 24 & 1
+            self.player.queue.append(segment)
+            self.pushed.append(segment)
+
+
+class FakeFeedbackChannel:
+    """The registers of a grating; `burst(phases, every)` gives the 1024 words of a burst, which is full after `delay` looks.
+    Without `sine` nothing of sine and cosine is built."""
+
+    def __init__(self, sine=True):
+        self.sine = sine
+        self.word, self.strobes, self.records = {}, [], []
+        self.burst, self.spoiled, self.delay = None, False, 0
+        self.waiting, self.words, self.taken, self.full = 0, [], 0, False
+        self.points, self.written = {}, {}                              # table in force, table being written
+        self.correction, self.loads = None, 0
+        self.armed, self.captured, self.latch = False, None, 0
+        self.most_segments, self.segments, self.use, self.uses = 255, {}, None, []         # use: None, or the settings in force
+
+    def index(self, position):
+        if self.armed and self.word.get(DEFINES["FEEDBACK_CAPTURE_SOURCES"], 0) & 1:
+            self.armed, self.captured = False, position
+
+    def read(self, offset):
+        d = DEFINES
+        if offset == d["FEEDBACK_RECORDER_STATE"]:
+            self.waiting -= 1
+            self.full = bool(self.records) and self.burst is not None and self.waiting < 0
+            return self.full | self.spoiled << 1
+        if offset == d["FEEDBACK_RECORDER_WORD"]:
+            assert self.full, "a word was read that is not there"
+            self.taken += 1
+            return self.words[(self.taken - 1) % len(self.words)]
+        if offset == d["FEEDBACK_CAPTURE_STATE"]:
+            return d["FEEDBACK_CAPTURE_STATE_PRESENT_MASK"] * (self.captured is not None)
+        if offset == d["FEEDBACK_CAPTURED_POSITION"]:
+            self.latch = self.captured >> 32 & 0xFFFF
+            return self.captured & 0xFFFFFFFF
+        if offset == d["FEEDBACK_CAPTURED_POSITION"] + 4:
+            return self.latch
+        if offset == d["FEEDBACK_SEGMENT_STATE"]:
+            return (self.most_segments | d["FEEDBACK_SEGMENT_STATE_IN_FORCE_MASK"] * (self.use is not None) |
+                    d["FEEDBACK_SEGMENT_STATE_KNOWN_MASK"])
+        if offset == d["FEEDBACK_SEGMENT_STORED"]:
+            return self.segments.get(self.word[d["FEEDBACK_SEGMENT_READ"]], 0) & 0xFFFFFFFF
+        if offset == d["FEEDBACK_POSITION_SOURCE"]:
+            return self.word.get(offset, 0) | d["FEEDBACK_POSITION_SOURCE_SINE_MASK"] * self.sine
+        return self.word.get(offset, 0)
+
+    def wide(self, name, bits):
+        return signed(self.word[DEFINES[f"{name}_HIGH"]] << 32 & (1 << bits) - 1 | self.word[DEFINES[f"{name}_LOW"]], bits)
+
+    def use_segments(self, value):
+        self.use = dict(linear=bool(value & 2), segments=value >> 2, length=self.wide("FEEDBACK_SEGMENT_LENGTH", 48),
+                        origin=self.wide("FEEDBACK_SEGMENT_ORIGIN", 48)) if value & 1 else None
+        self.uses.append(self.use and self.use["linear"])
+
+    def write(self, offset, value):
+        d = DEFINES
+        self.word[offset] = value
+        if offset == d["FEEDBACK_SEGMENT_POINT"]:
+            self.segments[value >> 24] = signed(value & 0xFFFFFF, 24)
+        if offset == d["FEEDBACK_SEGMENT_USE"]:
+            self.use_segments(value)
+        if offset == d["FEEDBACK_HARMONIC_POINT"]:
+            self.written[value >> 18 & 255] = signed(value & 0x3FFFF, 18)
+        if offset == d["FEEDBACK_STROBES"]:
+            self.strobes.append(value)
+            self.armed = self.armed or bool(value & d["FEEDBACK_STROBES_ARM_INDEX_MASK"])
+            if value & d["FEEDBACK_STROBES_CAPTURE_CLEAR_MASK"]:
+                self.captured = None
+            if value & d["FEEDBACK_STROBES_RECORD_MASK"]:
+                setting = self.word[d["FEEDBACK_RECORDER"]]
+                self.records.append((bool(setting >> 16 & 1), setting & 0xFFFF))
+                self.waiting, self.taken, self.full = self.delay, 0, False
+                self.words = self.burst(*self.records[-1]) if self.burst else []
+            if value & d["FEEDBACK_STROBES_LOAD_CORRECTION_MASK"]:
+                offsets = self.word[d["FEEDBACK_CORRECTION_OFFSET"]]
+                self.correction = dict(sin_offset=signed(offsets & 0xFFFF, 16), cos_offset=signed(offsets >> 16, 16),
+                                       gain=self.word[d["FEEDBACK_CORRECTION_GAIN"]],
+                                       quadrature_error=signed(self.word[d["FEEDBACK_CORRECTION_QUADRATURE_ERROR"]], 17))
+            if value & d["FEEDBACK_STROBES_SWAP_HARMONICS_MASK"]:
+                assert len(self.written) == 256, "a table was taken that was not written whole"
+                self.points, self.written, self.loads = self.written, {}, self.loads + 1
+
+
+class FakeNode:
+    """The node under the firmware; request() speaks to it as the master does."""
+
+    def __init__(self, *axes, map_crc=DEFINES["MAP_CRC"], address=2, image="axis", peripherals=None, sine=True):
+        self.axes, self.address, self.map_crc, self.clk = list(axes) or [Axis()], address, map_crc, 0
+        self.feedback_channels = [FakeFeedbackChannel(sine=sine) for _ in self.axes]
+        # words by their offset; all drives are built
+        self.actuators = [{DEFINES["ACTUATOR_DRIVE"]: DEFINES["ACTUATOR_DRIVE_BUILT_MASK"]} for _ in self.axes]
+        self.peripherals = peripherals
+        self.received, self.sent, self.word, self.crc_bytes = deque(), [], {}, b""
+        self.sequence = 0
+        self.answers = READ(self.read), WRITE(self.write)               # kept alive as long as the firmware may call
+        self.firmware = library(image)
+        self.firmware.register_bridge(*self.answers)
+        self.firmware.firmware_start()
+
+    def read(self, offset):
+        d = DEFINES
+        if offset >= d["ACTUATOR_BASE"]:
+            return self.actuators[(offset - d["ACTUATOR_BASE"]) // d["ACTUATOR_STRIDE"]].get(offset % d["ACTUATOR_STRIDE"], 0)
+        if offset >= d["FEEDBACK_BASE"]:
+            return self.feedback_channels[(offset - d["FEEDBACK_BASE"]) // d["FEEDBACK_STRIDE"]].read(offset % d["FEEDBACK_STRIDE"])
+        if offset >= d["AXIS_BASE"]:
+            axis = (offset - d["AXIS_BASE"]) // d["AXIS_STRIDE"]
+            return self.axes[axis].read(offset % d["AXIS_STRIDE"])
+        if offset >= d["PERIPHERALS_BASE"]:
+            return self.peripherals.read(offset - d["PERIPHERALS_BASE"]) if self.peripherals else 0
+        if offset >= d["BUS_BASE"]:
+            offset -= d["BUS_BASE"]
+            if offset == d["BUS_RECEIVE"]:
+                return self.received.popleft() | d["BUS_RECEIVE_PRESENT_MASK"] if self.received else 0
+            if offset == d["BUS_STATE"]:
+                return 128
+            if offset == d["BUS_CRC"]:
+                return zlib.crc32(self.crc_bytes)
+            return self.word.get(d["BUS_BASE"] + offset, 0)
+        build = len(self.axes) | self.address << 4 | 64 << 8
+        return {d["NODE_MAP_CRC"]: self.map_crc, d["NODE_CLK_HZ"]: CLK_HZ, d["NODE_BUILD"]: build,
+                d["NODE_TIME_STAMP"]: self.clk & 0xFFFFFFFF}.get(offset, self.word.get(offset, 0))
+
+    def write(self, offset, value):
+        d = DEFINES
+        if offset >= d["ACTUATOR_BASE"]:
+            built = d["ACTUATOR_DRIVE_BUILT_MASK"] if offset % d["ACTUATOR_STRIDE"] == d["ACTUATOR_DRIVE"] else 0
+            self.actuators[(offset - d["ACTUATOR_BASE"]) // d["ACTUATOR_STRIDE"]][offset % d["ACTUATOR_STRIDE"]] = value | built
+        elif offset >= d["FEEDBACK_BASE"]:
+            axis = (offset - d["FEEDBACK_BASE"]) // d["FEEDBACK_STRIDE"]
+            self.feedback_channels[axis].write(offset % d["FEEDBACK_STRIDE"], value)
+            if offset % d["FEEDBACK_STRIDE"] == d["FEEDBACK_ALIGN"]:
+                self.axes[axis].origin += signed(value & 7, 3) * (PERIOD // 4)
+        elif offset >= d["AXIS_BASE"]:
+            self.axes[(offset - d["AXIS_BASE"]) // d["AXIS_STRIDE"]].write(offset % d["AXIS_STRIDE"], value)
+        elif offset >= d["PERIPHERALS_BASE"]:
+            if self.peripherals:
+                self.peripherals.write(offset - d["PERIPHERALS_BASE"], value)
+        elif offset == d["BUS_BASE"] + d["BUS_TRANSMIT"]:
+            self.sent.append(value)
+        elif offset == d["BUS_BASE"] + d["BUS_CRC_START"]:
+            self.crc_bytes = b""
+        elif offset == d["BUS_BASE"] + d["BUS_CRC_BYTE"]:
+            self.crc_bytes += bytes([value])
+        else:
+            self.word[offset] = value
+            if offset == d["NODE_START_AXES"]:
+                for n, axis in enumerate(self.axes):
+                    axis.player.moving |= bool(value >> n & 1 and axis.player.queue)
+
+    def poll(self, times=1):
+        for _ in range(times):
+            self.firmware.firmware_poll()
+
+    def run(self, ms, until=None):
+        """One poll of the firmware a millisecond, four servo ticks between; True when `until` came."""
+        for _ in range(int(ms)):
+            for _ in range(4):
+                for axis, grating in zip(self.axes, self.feedback_channels, strict=True):
+                    axis.tick()
+                    if axis.passed is not None:
+                        grating.index(axis.passed)
+            self.clk += CLK_HZ // 1000
+            if self.peripherals:
+                self.peripherals.millisecond(self)
+            self.poll()
+            if until and until():
+                return True
+        return False
+
+    def hear(self, words):
+        """Put words on the line and return what the node sends."""
+        self.sent.clear()
+        for n in range(0, len(words), 8):
+            self.received.extend(words[n:n + 8])
+            self.poll()
+        return bytes(self.sent)
+
+    def frame(self, body, command=None):
+        """The words of a right frame, as the hardware passes them."""
+        command = 0x20 | self.address if command is None else command
+        payload = bytes([len(body)]) + body
+        payload += zlib.crc32(bytes([command]) + payload).to_bytes(4, "little")
+        words = [command | DEFINES["BUS_RECEIVE_COMMAND_MASK"], *payload]
+        words[-1] |= DEFINES["BUS_RECEIVE_GOOD_MASK"]
+        return words
+
+    def send(self, body):
+        assert self.hear(self.frame(body)) == bytes([0x60 | self.address])
+
+    def reply(self):
+        """The body that the node sends when it is asked for its reply."""
+        ready = 0x50 | self.address
+        sent = self.hear([0x10 | self.address | DEFINES["BUS_RECEIVE_COMMAND_MASK"]])
+        assert sent[0] == ready and len(sent) == sent[1] + 6
+        assert zlib.crc32(sent[:-4]) == int.from_bytes(sent[-4:], "little")
+        return sent[2:-4]
+
+    def request(self, name, **values):
+        """(cause, fields) of an operation of bus.toml."""
+        operation = TABLE["operation"][name]
+        self.sequence = (self.sequence + 1) % 256
+        body = bytes([self.sequence, operation["code"]])
+        for declaration in operation["request"]:
+            field, kind = declaration.split()
+            body += values.pop(field).to_bytes(int(kind[1:]) // 8, "little", signed=kind[0] == "i")
+        assert not values
+        self.send(body)
+        answer = self.reply()
+        assert answer[:2] == body[:2]
+        cause = CAUSE[answer[2]]
+        if cause != "ok":
+            assert len(answer) == 3, "a refusal has no fields"
+            return cause, {}
+        return cause, fields(operation["reply"], answer[3:])
+
+    def ask(self, name, **values):
+        cause, answer = self.request(name, **values)
+        assert cause == "ok", cause
+        return answer
+
+    def status(self, axis=0):
+        answer = self.ask("status", axis=axis)
+        return {**answer, "state": STATE[answer["state"]], "ended": CAUSE[answer["ended"]],
+                "flags": {name for name, bit in FLAG.items() if answer["flags"] & bit}}
+
+    def set(self, axis=0, **values):
+        for name, value in values.items():
+            self.ask("set_parameter", axis=axis, parameter=PARAMETER[name]["id"], value=value)

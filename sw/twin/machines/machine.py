@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The machines: what can be done with that of an axis, and one without a node, whose pins are driven from here."""
+import ctypes
+from contextlib import contextmanager
+from dataclasses import make_dataclass
+from functools import cache, partial
+
+import numpy
+
+from twin import build
+from twin.parameters import tables as parameters
+
+HANDLE, REAL, WHOLE, LONG, TEXT = ctypes.c_void_p, ctypes.c_double, ctypes.c_int, ctypes.c_uint64, ctypes.c_char_p
+FUNCTIONS = {
+    "machine_parameters": (WHOLE, [TEXT]), "machine_state_names": (TEXT, [HANDLE]), "machine_faults": (TEXT, [HANDLE]),
+    "machine_state": (None, [HANDLE, LONG, HANDLE]), "machine_set": (WHOLE, [HANDLE, TEXT, REAL]),
+    "machine_get": (WHOLE, [HANDLE, TEXT, HANDLE]), "machine_fault": (WHOLE, [HANDLE, TEXT, WHOLE, WHOLE]),
+    "machine_set_position": (None, [HANDLE, REAL]), "machine_push": (None, [HANDLE, REAL]), "machine_trace": (None, [HANDLE, LONG]),
+    "machine_trace_size": (WHOLE, [HANDLE]), "machine_trace_take": (None, [HANDLE, HANDLE])}
+BENCH_FUNCTIONS = {
+    "bench_new": (HANDLE, [TEXT, LONG, REAL, HANDLE]), "bench_delete": (None, [HANDLE]), "bench_machine": (HANDLE, [HANDLE]),
+    "bench_now": (LONG, [HANDLE]), "bench_levels": (ctypes.c_uint, [HANDLE]), "bench_pins": (None, [HANDLE, ctypes.c_uint, ctypes.c_uint]),
+    "bench_run": (None, [HANDLE, LONG]), "bench_watch": (None, [HANDLE, LONG, HANDLE]),
+    "bench_bridge": (None, [HANDLE, LONG, ctypes.c_uint32, ctypes.c_int32, WHOLE]),
+    "bench_steps": (None, [HANDLE, ctypes.c_int64, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32]),
+    "bench_frame": (None, [HANDLE, ctypes.c_uint32, WHOLE])}
+
+# pins, in the order of machine.h
+DRIVE = {name: 1 << n for n, name in enumerate(("adc_cs_n", "adc_sclk", "bridge_a", "bridge_b", "drive_enable", "step", "direction",
+                                               "dac_cs_n", "dac_sclk", "dac_sdi"))}
+SENSE = {name: 1 << n for n, name in enumerate(("encoder_a", "encoder_b", "encoder_z", "adc_sin", "adc_cos", "limit_low_open",
+                                               "limit_high_open", "drive_fault", "sensor_rx"))}
+DAC_ZERO, DAC_BITS = 32768, 16
+
+
+def declare(library, functions):
+    """functions: {name: (result, [arguments])}"""
+    for name, (result, arguments) in functions.items():
+        function = getattr(library, name)
+        function.restype, function.argtypes = result, arguments
+
+
+def pack(kind, overrides, library):
+    """The parameters of a machine as its C++ structure."""
+    values = list(parameters.values(overrides, kind).values())
+    if library.machine_parameters(kind.encode()) != len(values):
+        raise KeyError(f"the machine {kind} is no machine for an axis")
+    return (ctypes.c_double * len(values))(*values)
+
+
+class State:
+    """A machine as it truly is at a time: time_s and the values that machine.h's state_names lists for it."""
+
+    @property
+    def position_nm(self):
+        return self.position_m * 1e9
+
+
+@cache
+def state_class(names):
+    """A data class of the values, and how to make each of a double."""
+    makers = [{"?": bool, "#": int}.get(name[-1], float) for name in names.split()]
+    fields = [(name.rstrip("?#"), maker) for name, maker in zip(names.split(), makers)]
+    return make_dataclass("State", fields, bases=(State,), frozen=True), makers
+
+
+class MachineHandle:
+    """The machine of an axis, by its address in the library."""
+
+    def __init__(self, library, handle, kind, clk_hz, now):
+        self.library, self.handle, self.kind, self.clk_hz, self.now = library, handle, kind, clk_hz, now
+        self.names = library.machine_state_names(handle).decode()
+        self.faults = library.machine_faults(handle).decode().split()
+
+    @property
+    def state(self):
+        kind, makers = state_class(self.names)
+        out = (ctypes.c_double * len(makers))()
+        self.library.machine_state(self.handle, self.now(), out)
+        return kind(*(make(value) for make, value in zip(makers, out)))
+
+    def _unknown(self, name):
+        return KeyError(f"the machine {self.kind} has no parameter {name} to change while it runs; see {parameters.source(self.kind).name}")
+
+    def set(self, **values):
+        """Change parameters of the running machine; its time step is fixed."""
+        for name, value in values.items():
+            if not self.library.machine_set(self.handle, name.encode(), value):
+                raise self._unknown(name)
+
+    def get(self, name):
+        out = ctypes.c_double()
+        if not self.library.machine_get(self.handle, name.encode(), ctypes.addressof(out)):
+            raise self._unknown(name)
+        return out.value
+
+    def set_position(self, position):
+        """Carry it there by hand, m or rad: at rest, nothing wound up."""
+        self.library.machine_set_position(self.handle, position)
+
+    def push(self, force):
+        """An outside force, N or Nm, from now on."""
+        self.library.machine_push(self.handle, force)
+
+    def inject(self, fault, level=False):
+        """`level` is that of a stuck pin."""
+        self._fault(fault, True, level)
+
+    def clear(self, fault):
+        self._fault(fault, False, False)
+
+    @contextmanager
+    def fault(self, fault, level=False):
+        self.inject(fault, level)
+        try:
+            yield self
+        finally:
+            self.clear(fault)
+
+    def _fault(self, fault, on, level):
+        if not self.library.machine_fault(self.handle, fault.encode(), on, level):
+            raise KeyError(f"there is no fault {fault} of a machine {self.kind}: there are {', '.join(self.faults)}")
+
+    def trace(self, rate_hz=10_000):
+        """Record states from now on; the rate is rounded to whole time steps of the machine; 0 ends it."""
+        self.library.machine_trace(self.handle, max(1, round(self.clk_hz / rate_hz)) if rate_hz else 0)
+
+    def take_trace(self):
+        """{name: array} of what was recorded since the last take."""
+        values = numpy.empty(self.library.machine_trace_size(self.handle))
+        self.library.machine_trace_take(self.handle, values.ctypes.data)
+        names = [name.rstrip("?#") for name in self.names.split()]
+        return dict(zip(names, values.reshape(-1, len(names)).T.copy()))
+
+
+class Machine(MachineHandle):
+    """A machine without a node. Time passes in run, watch, bridge, steps and dac."""
+
+    PERIOD = 200                 # clk of the PWM: 20 kHz
+
+    def __init__(self, kind, seed=1, clk_hz=4_000_000, **values):
+        self.bench = None
+        library = ctypes.CDLL(str(build.machine_library()))
+        declare(library, {**FUNCTIONS, **BENCH_FUNCTIONS})
+        packed = pack(kind, values, library)
+        self.bench = library.bench_new(kind.encode(), seed, clk_hz, ctypes.addressof(packed))
+        super().__init__(library, library.bench_machine(self.bench), kind, clk_hz, partial(library.bench_now, self.bench))
+
+    def __del__(self):
+        if self.bench:
+            self.library.bench_delete(self.bench)
+        self.bench = None
+
+    def clk(self, seconds):
+        return round(seconds * self.clk_hz)
+
+    def pins(self, **levels):
+        """Set pins that the node would drive; they hold from the next clk on."""
+        which = sum(DRIVE[name] for name in levels)
+        self.library.bench_pins(self.bench, sum(DRIVE[name] for name, level in levels.items() if level), which)
+
+    def run(self, seconds):
+        self.library.bench_run(self.bench, self.clk(seconds))
+
+    def watch(self, seconds):
+        """Run; {pin: levels after each clk}."""
+        out = numpy.zeros(self.clk(seconds), dtype=numpy.uint16)
+        self.library.bench_watch(self.bench, len(out), out.ctypes.data)
+        return {name: (out & bit > 0).astype(numpy.int8) for name, bit in SENSE.items()}
+
+    def level(self, pin):
+        return bool(self.library.bench_levels(self.bench) & SENSE[pin])
+
+    def bridge(self, seconds, duty=0.0, brakes=True):
+        """Run with the drive enabled; duty -1..1 of the supply, the rest of the PWM period braking or coasting."""
+        self.library.bench_bridge(self.bench, self.clk(seconds), self.PERIOD, round(duty * self.PERIOD), brakes)
+
+    def steps(self, count, rate_hz, high_s=2e-6, setup_s=2e-6):
+        """`count` pulses of step, negative: down."""
+        self.library.bench_steps(self.bench, count, self.clk(1 / rate_hz), self.clk(high_s), self.clk(setup_s))
+
+    def dac(self, code, bits=DAC_BITS):
+        """One frame to the converter."""
+        self.library.bench_frame(self.bench, code, bits)

@@ -1,0 +1,336 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Makes of bus.toml the firmware's header, the host's tables and the made parts of the protocol page."""
+import re
+import sys
+import tomllib
+import zlib
+from fractions import Fraction
+from pathlib import Path
+
+from tables import made_files
+
+ROOT = Path(__file__).resolve().parent.parent
+SOURCE = ROOT / "tables" / "bus.toml"
+HEADER = ROOT / "sw" / "firmware" / "made" / "bus_protocol.h"
+HOST = ROOT / "sw" / "host" / "moire" / "made" / "bus_tables.py"
+PAGE = ROOT / "docs" / "protocol.md"
+
+SIZES = {"u8": 1, "i8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "u64": 8, "i64": 8}
+REQUEST_HEAD = ["sequence u8", "operation u8"]
+REPLY_HEAD = ["sequence u8", "operation u8", "cause u8"]
+AXIS = "axis u8"    # first field of what asks an axis
+LISTS = ("cause", "fault", "encoder_event", "state", "flag", "calibration_reason", "signal_fault", "calibration_action", "scope_trigger",
+         "scope_state", "turn_phase", "peer_phase", "job_state", "job_action", "save_action", "job_flag")
+CODES = ("cause", "state", "calibration_reason", "calibration_action", "scope_trigger", "scope_state", "turn_phase", "peer_phase",
+         "job_state", "job_action", "save_action")                                           # numbers; the others are bits
+WORDS = ("cause", "fault", "job_state")                                            # lists whose words the firmware shows on its panel
+
+
+def fields(head, declared):
+    """[(name, type, offset)] of a body, and its length."""
+    laid, offset = [], 0
+    for declaration in head + declared:
+        name, kind = declaration.split()
+        if kind not in SIZES:
+            raise ValueError(f"bus.toml: '{declaration}' has no known type ({', '.join(SIZES)})")
+        laid.append((name, kind, offset))
+        offset += SIZES[kind]
+    return laid, offset
+
+
+class Line:
+    """bus.toml, checked."""
+
+    def __init__(self, text: bytes):
+        # the bytes of the checkout may end in CR LF; the CRC is of the LF form
+        text = text.replace(b"\r\n", b"\n")
+        table = tomllib.loads(text.decode())
+        self.crc = zlib.crc32(text)
+        self.version = table["version"]
+        self.longest_body = table["longest_body"]
+        self.lists = {name: {key: tuple(value) for key, value in table[name].items()} for name in LISTS}
+        self.operations = table["operation"]
+        self.parameters, self.settings = table["parameter"], table["setting"]
+        self.values_crc = zlib.crc32(repr([(name, value["id"], value["unit"], value["lsb"], value["default"])
+                                           for name, value in [*self.parameters.items(), *self.settings.items()]]).encode())
+        self.layouts = {}
+        for name, operation in self.operations.items():
+            self.layouts[name] = (fields(REQUEST_HEAD, operation["request"]), fields(REPLY_HEAD, operation["reply"]))
+        self.check()
+
+    def check(self):
+        for name, entries in self.lists.items():
+            once(f"{name} codes", [code for code, _ in entries.values()])
+        once("operation codes", [operation["code"] for operation in self.operations.values()])
+        once("parameter ids", [parameter["id"] for parameter in self.parameters.values()])
+        once("setting ids", [setting["id"] for setting in self.settings.values()])
+        for name, (request, reply) in self.layouts.items():
+            if max(request[1], reply[1]) > self.longest_body:
+                raise ValueError(f"bus.toml: operation {name} needs more than {self.longest_body} bytes")
+        for name, parameter in {**self.parameters, **self.settings}.items():
+            if not parameter["min"] <= parameter["default"] <= parameter["max"]:
+                raise ValueError(f"bus.toml: the default of {name} is outside its range")
+            if parameter.get("needs", "SINE") != "SINE":
+                raise ValueError(f"bus.toml: {name} can need nothing but SINE")
+            Fraction(parameter["lsb"])
+
+
+def once(what, numbers):
+    if len(set(numbers)) != len(numbers):
+        raise ValueError(f"bus.toml: {what} repeat")
+
+
+# ------------------------------------------------------------------ firmware
+
+def header(line: Line) -> str:
+    out = [
+        "// SPDX-License-Identifier: Apache-2.0",
+        "// Made by tables/bus.py from tables/bus.toml: do not edit.",
+        "#ifndef MOIRE_BUS_PROTOCOL_H",
+        "#define MOIRE_BUS_PROTOCOL_H",
+        "",
+        f"#define PROTOCOL_CRC         0x{line.crc:08X}u    // CRC-32 of bus.toml",
+        f"#define BUS_VERSION         {line.version}u",
+        f"#define BUS_LONGEST_BODY    {line.longest_body}u",
+        f"#define BUS_REQUEST_HEAD    {fields(REQUEST_HEAD, [])[1]}u    // sequence, operation",
+        f"#define BUS_REPLY_HEAD      {fields(REPLY_HEAD, [])[1]}u    // sequence, operation, cause",
+        "",
+    ]
+    for name, entries in line.lists.items():
+        out.append(f"enum bus_{name} {{" + ("" if name in CODES else "    // bits"))
+        for key, (code, words) in entries.items():
+            value = str(code) if name in CODES else f"1 << {code}"
+            out.append(f"    BUS_{name}_{key}".upper() + f" = {value},    // {words}")
+        out += ["};", ""]
+    for name in WORDS:
+        out.append("// X(code, words), up to a colon")
+        out += macro(f"BUS_{name.upper()}_WORDS",
+                     [f"    X({code}, {quoted(words.partition(':')[0])})" for code, words in line.lists[name].values()])
+    out.append("enum bus_operation {")
+    for name, operation in line.operations.items():
+        out.append(f"    BUS_OPERATION_{name.upper()} = {operation['code']},    // {operation['text']}")
+    out += ["};", ""]
+    out.append("// Lengths of whole bodies and offsets of their fields, in bytes, little endian.")
+    for name, (request, reply) in line.layouts.items():
+        for way, (laid, length), head in (("REQUEST", request, 2), ("REPLY", reply, 3)):
+            out.append(f"#define BUS_{name.upper()}_{way}_LENGTH {length}u")
+            for field, kind, offset in laid[head:]:
+                out.append(f"#define BUS_{name.upper()}_{way}_{field.upper()} {offset}u    // {kind}")
+    out.append("")
+    out.append("// X(name, code, length of the request body, length of the reply body if the cause is ok, 1: of an axis, its first field)")
+    rows = [f"    X({name}, {operation['code']}, {line.layouts[name][0][1]}, {line.layouts[name][1][1]}, "
+            f"{int(operation['request'][:1] == [AXIS])})"
+            for name, operation in line.operations.items()]
+    out += macro("BUS_OPERATIONS", rows)
+    out += values("parameter", line.parameters) + values("setting", line.settings)
+    out += [f"#define BUS_VALUES_CRC 0x{line.values_crc:08X}u     // of all of both: what a kept number means", ""]
+    out += ["#endif", ""]
+    return "\n".join(out)
+
+
+def values(kind, parameters):
+    """Numbers and ranges of the parameters of an axis, or of the settings of a station."""
+    out = [f"enum bus_{kind} {{"]
+    for name, parameter in parameters.items():
+        out.append(f"    BUS_{kind}_{name}".upper() + f" = {parameter['id']},    // {of_one_count(parameter)}{parameter['text']}")
+    out += ["};", f"#define BUS_{kind.upper()}_COUNT {len(parameters)}u", ""]
+    out.append("// X(name, id, min, max, default): all int64_t, in counts of the wire")
+    rows = [f"    X({name}, {parameter['id']}, {parameter['min']}LL, {parameter['max']}LL, {parameter['default']}LL)"
+            for name, parameter in parameters.items()]
+    out += macro(f"BUS_{kind.upper()}S", rows)
+    if needy := [parameter["id"] for parameter in parameters.values() if "needs" in parameter]:
+        out += [f"// {kind}s of which a node without sine and cosine takes only 0 and the default",
+                f"#define BUS_{kind.upper()}S_OF_SINE {', '.join(map(str, needy))}", ""]
+    return out
+
+
+def of_one_count(parameter):
+    if not parameter["unit"] and parameter["lsb"] == "1":
+        return ""
+    return f"[{parameter['lsb']} {parameter['unit']}".rstrip() + "] "
+
+
+def macro(name, rows):
+    return [f"#define {name}(X) \\"] + [row + " \\" for row in rows[:-1]] + [rows[-1], ""]
+
+
+# ------------------------------------------------------------------ host
+
+def host(line: Line) -> str:
+    out = [
+        "# SPDX-License-Identifier: Apache-2.0",
+        '"""Made by tables/bus.py from tables/bus.toml: do not edit."""',
+        "from fractions import Fraction",
+        "from typing import NamedTuple",
+        "",
+        "",
+        "class Operation(NamedTuple):",
+        "    name: str",
+        "    code: int",
+        "    text: str",
+        "    request: tuple          # (field, type) after sequence and operation",
+        "    reply: tuple            # (field, type) after sequence, operation and cause",
+        "",
+        "",
+        "class Parameter(NamedTuple):",
+        "    name: str",
+        "    id: int",
+        "    unit: str",
+        "    lsb: Fraction           # value of one count of the wire, in unit",
+        "    min: int                # counts of the wire, as are max and default",
+        "    max: int",
+        "    default: int",
+        "    text: str",
+        "",
+        "",
+        f"PROTOCOL_CRC = 0x{line.crc:08X}",
+        f"VERSION = {line.version}",
+        f"LONGEST_BODY = {line.longest_body}",
+        "",
+    ]
+    for name, entries in line.lists.items():
+        out.append(f"# {'code' if name in CODES else 'bit'}: (name, words)")
+        out.append(f"{name.upper()}S = {{")
+        out += [f"    {code}: ({quoted(key)}, {quoted(words)})," for key, (code, words) in entries.items()]
+        out += ["}", ""]
+    out.append("OPERATIONS = {operation.name: operation for operation in (")
+    for name, operation in line.operations.items():
+        request, reply = (tuple(tuple(declaration.split()) for declaration in operation[way]) for way in ("request", "reply"))
+        out.append(f"    Operation({quoted(name)}, {operation['code']}, {quoted(operation['text'])},")
+        out.append(f"              {pairs(request)},")
+        out.append(f"              {pairs(reply)}),")
+    out += [")}", ""]
+    for table, parameters in (("PARAMETERS", line.parameters), ("SETTINGS", line.settings)):
+        out.append(f"{table} = {{parameter.name: parameter for parameter in (")
+        for name, parameter in parameters.items():
+            lsb = Fraction(parameter["lsb"])
+            value = f"Fraction({lsb.numerator}, {lsb.denominator})"
+            out.append(f"    Parameter({quoted(name)}, {parameter['id']}, {quoted(parameter['unit'])}, {value},")
+            out.append(f"              {parameter['min']}, {parameter['max']}, {parameter['default']},")
+            out.append(f"              {quoted(parameter['text'])}),")
+        out += [")}", ""]
+    return "\n".join(out)
+
+
+def quoted(text):
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def pairs(declared):
+    """A tuple of pairs, four on a line."""
+    each = [f"({quoted(name)}, {quoted(kind)})," for name, kind in declared]
+    rows = [" ".join(each[at:at + 4]) for at in range(0, len(each), 4)]
+    return "(" + ("\n" + 15 * " ").join(rows) + ")"
+
+
+# ------------------------------------------------------------------ page
+
+def diagram(laid):
+    """A body as one row of boxes: name above, first byte and type below."""
+    boxes = []
+    for name, kind, offset in laid:
+        below = f"{offset} {kind}"
+        width = max(len(name), len(below)) + 2
+        boxes.append((name.center(width), below.center(width), width))
+    lines, row, used = ["```"], [], 0
+    for box in boxes + [None]:
+        if box is None or (row and used + box[2] + 1 > 110):
+            edge = "+" + "+".join("-" * width for _, _, width in row) + "+"
+            lines += [edge, "|" + "|".join(name for name, _, _ in row) + "|", "|" + "|".join(below for _, below, _ in row) + "|", edge]
+            row, used = [], 0
+        if box is not None:
+            row.append(box)
+            used += box[2] + 1
+    return lines + ["```"]
+
+
+def table(head, rows):
+    out = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
+    return out + ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
+
+
+def page_parts(line: Line) -> dict:
+    parts = {}
+    parts["identity"] = [f"Version {line.version}, CRC-32 of `tables/bus.toml` `{line.crc:08X}`, longest body {line.longest_body} bytes."]
+    overview = [(operation["code"], f"[`{name}`](#{name})", operation["text"]) for name, operation in line.operations.items()]
+    body = table(("code", "operation", "purpose"), overview)
+    for name, operation in line.operations.items():
+        (request, request_length), (reply, reply_length) = line.layouts[name]
+        body += ["", f"### {name}", "", operation["text"][0].upper() + operation["text"][1:] + ".", ""]
+        body += [f"Request, {request_length} bytes:", ""] + diagram(request) + ["", f"Reply, {reply_length} bytes:", ""] + diagram(reply)
+    parts["operations"] = body
+    for name, entries in line.lists.items():
+        rows = [(code, f"`{key}`", words) for key, (code, words) in entries.items()]
+        parts[name + "s"] = table(("code" if name in CODES else "bit", "name", "words"), rows)
+    for kind, parameters in (("parameter", line.parameters), ("setting", line.settings)):
+        rows = []
+        for name, parameter in parameters.items():
+            lsb = Fraction(parameter["lsb"])
+            rows.append((parameter["id"], f"`{name}`", parameter["unit"] or "–", parameter["lsb"],
+                         *(decimal(parameter[key] * lsb) for key in ("min", "max", "default")),
+                         parameter["text"] + (f"; needs {parameter['needs']}" if "needs" in parameter else "")))
+        parts[kind + "s"] = table(("id", kind, "unit", "one count", "min", "max", "default", "purpose"), rows)
+    parts["example"] = example(line)
+    parts["packets"] = packets(line)
+    return parts
+
+
+def enable_frames(line: Line) -> tuple:
+    """Payloads of `enable` of axis 0 at address 1 and of its reply."""
+    code, ok = line.operations["enable"]["code"], line.lists["cause"]["ok"][0]
+
+    def frame(first, *body):
+        inside = bytes([first, len(body), *body])
+        return inside[1:] + zlib.crc32(inside).to_bytes(4, "little")
+
+    return frame(0x21, 7, code, 0, 1), frame(0x51, 7, code, ok)
+
+
+def example(line: Line) -> list:
+    """`enable`, byte by byte."""
+    request, reply = (payload.hex(" ").upper() for payload in enable_frames(line))
+    return ["`enable` of axis 0 of the node with address 1, sequence number 7:", "", "```",
+            "master  21*", "node    61", f"master  {request}",
+            "master  11*", f"node    51 {reply}", "```", "", "`*` has the 9th bit set."]
+
+
+def packets(line: Line) -> list:
+    """The same as packets; none of them is long enough for a run of 254."""
+    def packet(content):
+        return b"".join(bytes([len(part) + 1]) + part for part in content.split(b"\0")) + b"\0"
+
+    request, reply = enable_frames(line)
+    return ["The same `enable` as packets:", "", "```", f"client  00 {packet(bytes([0x21]) + request).hex(' ').upper()}",
+            f"node    00 {packet(bytes([0x51]) + reply).hex(' ').upper()}", "```"]
+
+
+def decimal(value: Fraction) -> str:
+    """Short and true to six digits."""
+    return str(value.numerator) if value.denominator == 1 else f"{float(value):.6g}"
+
+
+def page(line: Line, text: str) -> str:
+    """The page with its made parts replaced; everything outside the marks is kept."""
+    for name, lines in page_parts(line).items():
+        begin, end = f"<!-- made by tables/bus.py: {name} -->", f"<!-- end of {name} -->"
+        marked = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)
+        if len(marked.findall(text)) != 1:
+            raise ValueError(f"docs/protocol.md needs the marks '{begin}' and '{end}' exactly once")
+        before, after = marked.split(text)
+        text = before + "\n".join([begin, "", *lines, "", end]) + after
+    return text
+
+
+# ------------------------------------------------------------------ command line
+
+def made() -> dict:
+    line = Line(SOURCE.read_bytes())
+    return {HEADER: header(line), HOST: host(line), PAGE: page(line, PAGE.read_text(encoding="utf-8"))}
+
+
+def main(arguments=None) -> int:
+    return made_files.main(__doc__, made, arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

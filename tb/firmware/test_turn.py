@@ -1,0 +1,309 @@
+# SPDX-License-Identifier: Apache-2.0
+"""index.c and sensor.c: a worm table with errors, backlash and stiction is turned to angles of its sensor; each named cause provoked."""
+import random
+
+import pytest
+
+from tb.bench import seed
+from twin.compiled.node import CAUSE, FAULT, TABLE, Axis, FakeNode
+from twin.compiled.peripherals import TURN_ARCSEC, FakePeripherals, Sensor, Table
+
+PHASE = {code: name for name, (code, _) in TABLE["turn_phase"].items()}
+SETTING = TABLE["setting"]
+PER_ARCSEC = 100
+DEGREE = 3600
+AXIS = {"position_source": 2, "velocity": 30000, "acceleration": 500000, "jerk": 50000000, "homing_latch_speed": 300, "following_limit": 2**31 - 1}
+
+
+class Station(FakeNode):
+    def __init__(self, angle=0.0, sensor=None, parameters=None, **table):
+        self.random = random.Random(seed())
+        self.table = Table(self.random, angle=angle, **table)
+        self.sensor = Sensor(self.random, self.table, **(sensor or {}))
+        super().__init__(Axis(), image="station", peripherals=FakePeripherals(self.sensor))
+        self.set(**{**AXIS, **(parameters or {})})
+        self.run(50)
+
+    def tell(self, **settings):
+        for name, value in settings.items():
+            self.ask("set_setting", setting=SETTING[name]["id"], value=value)
+
+    def state(self):
+        state = self.ask("turn_state")
+        return {**state, "phase": PHASE[state["phase"]], "ended": CAUSE[state["ended"]]}
+
+    def begin(self, arcsec):
+        return self.request("turn_to", angle=round(arcsec * PER_ARCSEC))[0]
+
+    def until(self, phase, ms=60_000):
+        assert self.run(ms, until=lambda: self.state()["phase"] == phase), self.state()
+
+    def index(self, arcsec):
+        """How it ended."""
+        assert self.begin(arcsec) == "ok"
+        self.until("idle", 120_000)
+        return self.state()["ended"]
+
+    def error(self, arcsec):
+        """Of the true angle, the shorter way round."""
+        return (self.table.angle - arcsec + TURN_ARCSEC / 2) % TURN_ARCSEC - TURN_ARCSEC / 2
+
+
+def test_every_target_is_reached_within_two_arcsec_of_the_truth_from_either_side():
+    station, source = Station(), random.Random(seed())
+    for arcsec in [10 * DEGREE, 5 * DEGREE, 5 * DEGREE + 30, *(source.uniform(0, TURN_ARCSEC / 36) for _ in range(4))]:
+        assert station.index(arcsec) == "ok"
+        assert abs(station.state()["left"]) <= 50 and abs(station.error(arcsec)) <= 2
+
+
+def test_the_worm_always_pushes_up_at_the_end_so_backlash_is_taken_up():
+    station = Station(backlash=50)
+    for arcsec in (2 * DEGREE, DEGREE, DEGREE + 20, DEGREE - 20):
+        assert station.index(arcsec) == "ok"
+        worm = station.axes[0].machine / 65536 * 4 * 0.18
+        assert station.table.nut == worm
+
+
+def test_the_long_way_ends_below_the_target_and_the_tries_halve_what_is_left():
+    station = Station(worm_error=0, wheel_error=0, stick=0, sensor={"noise": 0, "wave": 0})
+    station.begin(DEGREE)
+    station.until("closing_in")
+    assert station.state()["left"] == pytest.approx(60 * PER_ARCSEC, abs=40)
+    left = []
+    while station.state()["phase"] != "idle":
+        station.until("reading")
+        station.run(500, until=lambda: station.state()["phase"] != "reading")
+        left.append(station.state()["left"])
+    assert len(left) == station.state()["tries"] == 7
+    assert all(now == pytest.approx(before / 2, abs=20) for before, now in zip([6000, *left], left, strict=False))
+
+
+def test_the_share_of_a_try_is_a_setting():
+    tries = []
+    for share in (30, 50, 80):
+        station = Station(stick=0, sensor={"noise": 0, "wave": 0})
+        station.tell(turn_share=share)
+        assert station.index(DEGREE) == "ok"
+        tries.append(station.state()["tries"])
+    assert tries[0] > tries[1] > tries[2] > 1
+
+
+def test_a_table_that_is_there_already_does_not_move():
+    station = Station(angle=DEGREE + 0.1, sensor={"noise": 0, "wave": 0})
+    assert station.index(DEGREE) == "ok"
+    assert station.axes[0].pushed == [] and station.state()["tries"] == 0 and station.axes[0].enabled
+
+
+@pytest.mark.parametrize(("way", "begin", "target", "turned"), [
+    (0, 1 * DEGREE, 359 * DEGREE, 358), (1, 1 * DEGREE, 359 * DEGREE, -2), (2, 1 * DEGREE, 359 * DEGREE, 358),
+    (0, 359 * DEGREE, 1 * DEGREE, -358), (1, 359 * DEGREE, 1 * DEGREE, 2), (2, 359 * DEGREE, 1 * DEGREE, 2),
+    (0, TURN_ARCSEC - 1, 1 * DEGREE, 1)])
+def test_the_way_round_is_a_setting_and_the_table_stands_at_zero_a_little_below_it_too(way, begin, target, turned):
+    station = Station(angle=begin, parameters={"velocity": 900_000, "acceleration": 90_000_000, "jerk": 2_000_000_000})
+    station.tell(turn_direction=way)
+    assert station.index(target) == "ok"
+    assert station.table.angle - begin == pytest.approx(turned * DEGREE, abs=5) and abs(station.error(target)) <= 2
+
+
+def test_an_overshoot_backs_off_below_and_comes_again():
+    station = Station(worm_error=30)
+    station.tell(turn_allowance=0, turn_overshoots=10)
+    assert all(station.index(arcsec) == "ok" for arcsec in (DEGREE, 2 * DEGREE, 3 * DEGREE, 4 * DEGREE))
+    met = []
+    for arcsec in range(5, 10):
+        assert station.index(arcsec * DEGREE) == "ok" and abs(station.error(arcsec * DEGREE)) <= 2
+        met.append(station.state()["overshoots"])
+    assert any(met)
+
+
+def test_overshoots_are_limited():
+    station = Station(worm_error=0, wheel_error=0)
+    station.tell(turn_allowance=0, turn_overshoots=0, turn_tolerance=1)
+    station.table.angle += 25                                   # an error of the worm that was not there before
+    station.table.offset += 25
+    assert "not_converged" in {station.index(arcsec * DEGREE) for arcsec in range(1, 9)}
+
+
+def test_the_zero_of_the_sensor_is_a_setting():
+    station = Station(angle=1000)
+    station.tell(sensor_zero=900 * PER_ARCSEC)
+    assert station.ask("sensor")["angle"] == pytest.approx(100 * PER_ARCSEC, abs=110)
+    assert station.index(500) == "ok" and abs(station.error(1400)) <= 2
+    station.tell(sensor_zero=1500 * PER_ARCSEC)
+    assert station.ask("sensor")["angle"] == pytest.approx((TURN_ARCSEC - 100) * PER_ARCSEC, abs=210)
+
+
+# frames that do not come, or come damaged
+
+def test_lost_and_damaged_frames_are_counted_and_change_nothing():
+    station = Station(sensor={"lost": 0.1, "damaged": 0.2})
+    assert station.index(3 * DEGREE) == "ok" and abs(station.error(3 * DEGREE)) <= 2
+    reported = station.ask("sensor")
+    assert reported["frames"] == station.sensor.frames and reported["timed_out"] == 0
+    assert reported["missed"] > reported["wrong_crc"] > 0.1 * reported["frames"]
+
+
+def test_a_reading_takes_only_frames_sent_after_the_table_had_settled():
+    station = Station(stick=0, sensor={"noise": 0, "wave": 0})
+    station.tell(turn_settle=0, turn_frames=1)
+    station.begin(DEGREE)
+    station.until("closing_in")
+    assert station.state()["reading"] / PER_ARCSEC == pytest.approx(station.table.angle, abs=0.7)
+
+
+# each named cause
+
+def test_a_sensor_that_never_spoke_is_dead():
+    station = Station()
+    station.sensor.dead = True
+    station.run(300)
+    assert station.ask("sensor")["timed_out"] == 1
+    assert station.begin(DEGREE) == "sensor_timed_out" and station.axes[0].pushed == []
+
+
+def test_a_sensor_that_dies_on_the_way_stops_the_table_under_control():
+    station = Station(parameters={"velocity": 2000})
+    station.begin(90 * DEGREE)
+    station.until("coming_up")
+    station.run(200)
+    station.sensor.dead = True
+    station.until("idle", 400)
+    assert station.state()["ended"] == "sensor_timed_out"
+    assert station.run(1000, until=lambda: station.status()["state"] == "holding") and station.axes[0].faults == 0
+    assert station.table.angle < 2 * DEGREE
+
+
+def test_a_sensor_that_dies_while_it_is_read_is_told():
+    station = Station()
+    station.begin(DEGREE)
+    station.until("closing_in")
+    station.until("reading")
+    station.sensor.dead = True
+    station.until("idle", 400)
+    assert station.state()["ended"] == "sensor_timed_out"
+
+
+def test_a_sensor_that_sends_one_angle_for_ever_is_stuck():
+    station = Station()
+    station.sensor.stuck = True
+    station.run(50)
+    assert station.index(DEGREE) == "sensor_stuck"
+
+
+def test_a_sensor_that_sticks_while_closing_in_is_told():
+    station = Station()
+    station.begin(DEGREE)
+    station.until("closing_in")
+    station.sensor.stuck = True
+    station.until("idle")
+    assert station.state()["ended"] == "sensor_stuck"
+
+
+def test_a_table_that_does_not_turn_is_told_from_a_stuck_sensor():
+    station = Station()
+    station.table.blocked = True
+    assert station.index(DEGREE) == "stiction"
+
+
+def test_a_table_that_sticks_at_the_end_is_told():
+    station = Station()
+    station.begin(DEGREE)
+    station.until("closing_in")
+    station.table.blocked = True
+    station.until("idle")
+    assert station.state()["ended"] == "stiction"
+
+
+@pytest.mark.parametrize("arcsec", [DEGREE, -DEGREE, 20])
+def test_a_motor_that_turns_the_wrong_way_is_told(arcsec):
+    station = Station(angle=10 * DEGREE, sign=-1)
+    assert station.index(10 * DEGREE + arcsec) == "wrong_sign"
+
+
+def test_a_wrong_number_of_steps_a_turn_shows_as_disagreement():
+    station = Station()
+    station.tell(periods_per_turn=2_000_000)
+    assert station.index(2 * DEGREE) == "sensor_disagrees"
+
+
+def test_a_tolerance_that_cannot_be_met_is_given_up():
+    station = Station(sensor={"noise": 3})
+    station.tell(turn_tolerance=1, turn_frames=1, turn_tries=10, turn_overshoots=1)
+    assert "not_converged" in {station.index(arcsec * DEGREE) for arcsec in (1, 2)}
+
+
+@pytest.mark.parametrize("hundredths", [129_600_000, 2**32 - 1])
+def test_an_angle_beyond_a_turn_is_refused(hundredths):
+    station = Station()
+    assert station.request("turn_to", angle=hundredths)[0] == "out_of_range"
+
+
+def test_a_node_without_a_sensor_says_so():
+    machine = FakeNode(image="station")
+    assert machine.request("turn_to", angle=0)[0] == "not_built" and machine.request("sensor")[0] == "not_built"
+
+
+# others who drive the axis
+
+def test_a_second_index_waits_for_the_first():
+    station = Station()
+    station.begin(DEGREE)
+    assert station.begin(2 * DEGREE) == "busy"
+    station.until("idle")
+    assert station.state()["ended"] == "ok" and abs(station.error(DEGREE)) <= 2
+
+
+@pytest.mark.parametrize("phase", ["reading", "going_below", "coming_up", "closing_in"])
+def test_the_host_stops_an_index_at_any_time(phase):
+    station = Station(angle=10 * DEGREE)
+    station.begin(5 * DEGREE)
+    station.until(phase)
+    station.ask("stop", axis=0)
+    station.run(20)
+    assert station.state()["phase"] == "idle" and station.state()["ended"] == "stopped"
+    assert station.run(2000, until=lambda: station.status()["state"] == "holding")
+    assert station.begin(9 * DEGREE) == "ok"
+
+
+def test_a_drive_that_is_switched_off_ends_the_index():
+    station = Station()
+    station.begin(DEGREE)
+    station.until("coming_up")
+    station.ask("enable", axis=0, on=0)
+    station.run(2)
+    assert station.state()["ended"] == "stopped" and not station.axes[0].enabled
+
+
+@pytest.mark.parametrize("phase", ["reading", "coming_up"])
+def test_a_fault_ends_the_index_and_stands_before_the_next(phase):
+    station = Station()
+    station.begin(DEGREE)
+    station.until(phase)
+    station.axes[0].causes = FAULT["estop"]
+    station.run(5)
+    assert station.state()["ended"] == "ended_by_fault"
+    assert station.begin(DEGREE) == "faulted"
+    station.axes[0].causes = 0
+    station.ask("reset_faults", axis=0)
+    assert station.index(DEGREE) == "ok"
+
+
+def test_an_axis_that_moves_for_the_host_is_not_taken():
+    station = Station()
+    station.set(home_method=35, travel_high=10**9)
+    station.ask("enable", axis=0, on=1)
+    station.ask("home", axis=0)
+    assert station.run(3000, until=lambda: station.status()["ended"] == "ok")
+    station.ask("move", axis=0, target=10**8)
+    assert station.begin(DEGREE) == "busy"
+
+
+def test_creep_is_the_speed_of_closing_in():
+    station = Station(parameters={"homing_latch_speed": 40})
+    station.begin(DEGREE)
+    station.until("closing_in")
+    speeds = []
+    while station.state()["phase"] == "closing_in":
+        station.run(1)
+        speeds.append(station.axes[0].player.velocity)
+    assert max(speeds) * 4000 / 2**40 == pytest.approx(40, rel=0.05)

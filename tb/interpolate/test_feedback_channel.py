@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""grating as a whole: the latency of its header, from the converter's pins on. What its blocks do is tested block by block; how they
+work together in motion, in tb/system."""
+import cocotb
+import pytest
+from cocotb.triggers import FallingEdge
+
+from tb.bench import run, start
+
+LATENCY = 22                                            # clk from a converter word to its position; 1 more with a segment table
+SETTINGS = dict(deglitch=0, outlier_step=0, outlier_hold=0, amplitude_low=0, amplitude_high=65535, disagreement_limit=0)
+INPUTS = dict(tick=0, sample_tick=0, sync=0, now=0, select=0, write=0, word=0, wdata=0, shift=0, shift_periods=0, a=0, b=0, z=0, probe=0,
+              adc_sin=1, adc_cos=1)
+
+
+async def converted(dut):
+    """Start a conversion and wait until its word stands in the converter's register."""
+    dut.sample_tick.value = 1
+    await FallingEdge(dut.clk)
+    dut.sample_tick.value = 0
+    for _ in range(100):
+        if int(dut.g_sine.converted.value):
+            return
+        await FallingEdge(dut.clk)
+    raise AssertionError("no word came from the converter")
+
+
+@cocotb.test()
+async def latency_is_22_clk_from_a_converter_word_to_position_and_1_more_with_a_segment_table(dut):
+    latency = LATENCY + bool(int(dut.SEGMENTS.value))
+    await start(dut, **SETTINGS, **INPUTS)
+    await FallingEdge(dut.clk)
+    for adc_cos, eighths in ((1, 1), (0, 3), (1, 1)):   # sin stands at its upper end
+        dut.adc_cos.value = adc_cos
+        await converted(dut)
+        for clk in range(1, latency + 4):
+            await FallingEdge(dut.clk)
+            assert int(dut.position_valid.value) == (clk == latency)
+        assert abs(dut.position.value.to_signed() - eighths * 8192) < 50        # the ends of 8 bits are 127 and -128
+        assert int(dut.phase.value) == dut.position.value.to_unsigned() % 65536
+
+
+@cocotb.test()
+async def reset_in_mid_flow_drops_the_word(dut):
+    await start(dut, **SETTINGS, **INPUTS)
+    await FallingEdge(dut.clk)
+    await converted(dut)
+    for clk in range(LATENCY + 4):
+        dut.rst.value = int(clk == 9)
+        await FallingEdge(dut.clk)
+        assert not int(dut.position_valid.value)
+    assert dut.position.value == 0
+
+
+@pytest.mark.parametrize("segments", [0, 255])
+def test_feedback_channel(segments):
+    run("feedback_channel", __file__, SEGMENTS=segments)

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""links: what was not built is idle, whatever is written and whatever comes at the pins; the build register tells."""
+import random
+
+import cocotb
+import pytest
+from cocotb.triggers import FallingEdge
+
+from moire.made.registers import BY_NAME
+from tb import bench
+
+INPUTS = "i2c_scl", "i2c_sda", "keyboard_clock", "keyboard_data", "edm_clock", "edm_data", "peer_rx", "sensor_rx", "edm_status"
+IDLE = [dict(i2c_scl_low=0, i2c_sda_low=0),                                # by the bits of PERIPHERALS
+        dict(keyboard_clock_low=0, keyboard_data_low=0, edm_clock_low=0, edm_data_low=0),
+        dict(peer_tx=1), {}, dict(display_cs_n=1, display_sclk=0, display_data=0), {}]
+BUILT = BY_NAME["peripherals", "built", "i2c"].offset // 4
+
+
+@cocotb.test()
+async def absent_links_are_idle(dut):
+    built = int(dut.PERIPHERALS.value)
+    await bench.start(dut, select=0, write=0, word=0, wdata=0, **dict.fromkeys(INPUTS, 0))
+    await FallingEdge(dut.clk)
+    await FallingEdge(dut.clk)
+    awake = set()
+    for n in range(6000):
+        dut.select.value, dut.write.value, dut.word.value = 1, n % 2, random.randrange(64)
+        dut.wdata.value = random.choice([0, 0xFFFFFFFF, random.getrandbits(32)])
+        for name in INPUTS:
+            getattr(dut, name).value = random.getrandbits(2 if name == "edm_status" else 1)
+        await FallingEdge(dut.clk)
+        if not built:
+            assert int(dut.rdata.value) == 0
+        for bit, idle in enumerate(IDLE):
+            for name, level in idle.items():
+                if int(getattr(dut, name).value) != level:
+                    awake.add(bit)
+    assert awake <= {bit for bit in range(6) if built >> bit & 1}
+    assert not built & 0b10000 or 4 in awake, "the writes reach what was built"
+    dut.write.value, dut.word.value = 0, BUILT
+    await FallingEdge(dut.clk)
+    assert int(dut.rdata.value) == built
+
+
+@pytest.mark.parametrize("peripherals", [0, 1, 2, 4, 8, 16, 32, 63])
+def test_absent_peripherals(links):
+    bench.run("peripherals", __file__, CLK_HZ=1_000_000, PERIPHERALS=links)

@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What rtl/serial/sync_fifo.sv does: step(push, word, pop) is one clk and returns (present, out, free, overrun) after it."""
+from collections import deque
+
+
+class SyncFifo:
+    def __init__(self, depth=64):
+        self.depth, self.words, self.present = depth, deque(), 0
+
+    def step(self, push, word, pop, rst=0):
+        if rst:
+            self.words.clear()
+            self.present = 0
+            return 0, None, self.depth, 0
+        full = len(self.words) == self.depth
+        if pop and self.present:
+            self.words.popleft()
+        self.present = int(len(self.words) > 0)               # a word pushed in this clk is not at the output yet
+        if push and not full:
+            self.words.append(word)
+        return self.present, self.words[0] if self.present else None, self.depth - len(self.words), int(bool(push and full))

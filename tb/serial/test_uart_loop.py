@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""uart_tx and uart_rx without the 9th bit (8N1): by hand, every byte, sigrok, noise against both models."""
+import random
+import re
+import shutil
+import subprocess
+from fractions import Fraction
+from pathlib import Path
+
+import cocotb
+from cocotb.triggers import FallingEdge
+
+from tb.bench import run, start
+from tb.serial.uart_rx import UartRx, character, line
+from tb.serial.uart_tx import UartTx
+
+
+class Loop:
+    def __init__(self, dut):
+        self.dut, self.sender, self.listener = dut, UartTx(0), UartRx(0)
+        self.heard, self.wave, self.errors = [], bytearray(), 0
+
+    async def begin(self):
+        await start(self.dut, bit_time=128, valid=0, data=0, rx=1)
+        self.dut.rst.value = 1
+        await FallingEdge(self.dut.clk)
+        await FallingEdge(self.dut.clk)
+        self.dut.rst.value = 0
+        return self
+
+    async def clk(self, bit_time, data=None, rx=None):
+        """One clk; rx None: the transmitter's own wire. Returns whether the byte was taken."""
+        d, taken = self.dut, data is not None and self.sender.ready()
+        rx = int(d.tx.value) if rx is None else rx
+        d.bit_time.value, d.valid.value, d.data.value, d.rx.value = bit_time, data is not None, data or 0, rx
+        await FallingEdge(d.clk)
+        got = int(d.ready.value), int(d.tx.value), int(d.driver_enable.value)
+        assert got == self.sender.step(data is not None, data or 0, 0, bit_time)
+        valid, byte, ninth, *flags = self.listener.step(rx, bit_time)
+        assert [int(p.value) for p in (d.received, d.framing_error, d.start_glitch, d.busy)] == [valid, *flags]
+        if valid:
+            assert (int(d.character.value), int(d.ninth.value)) == (byte, ninth) == (byte, 0)
+            self.heard.append(byte)
+        self.errors += flags[0]
+        self.wave.append(got[1])
+        return taken
+
+    async def send(self, data, bit_time, gaps=False):
+        for byte in data:
+            while not await self.clk(bit_time, byte):
+                pass
+            for _ in range(random.choice([0, 0, 300]) if gaps else 0):
+                await self.clk(bit_time)
+        for _ in range(12 * bit_time // 16 + 4):
+            await self.clk(bit_time)
+
+
+@cocotb.test()
+async def one_character_by_hand(dut):
+    loop = await Loop(dut).begin()
+    await loop.send([0xA5], 128)
+    first = loop.wave.index(0)
+    assert [loop.wave[first + 4 + 8 * n] for n in range(10)] == [0, 1, 0, 1, 0, 0, 1, 0, 1, 1]
+    assert loop.wave.count(0) == 5 * 8 and loop.heard == [0xA5]
+
+
+@cocotb.test()
+async def every_byte_without_any_gap_and_with_some(dut):
+    for bit_time, gaps in ((128, False), (139, True)):
+        loop = await Loop(dut).begin()
+        await loop.send(range(256), bit_time, gaps)
+        assert loop.heard == list(range(256)) and loop.errors == 0
+
+
+@cocotb.test()
+async def without_a_stop_bit_the_character_is_dropped_and_reported(dut):
+    loop = await Loop(dut).begin()
+    for level in line([1, *character(0x55, None, stop=0), 1, *character(0x5A, None), 1], 16):
+        await loop.clk(256, rx=level)
+    assert loop.heard == [0x5A] and loop.errors == 1
+
+
+@cocotb.test()
+async def bit_times_may_differ_by_4_percent(dut):
+    for percent in (96, 104):
+        loop = await Loop(dut).begin()
+        sent = [0x00, 0xFF, 0x80, 0x01]
+        for level in line([1, *(b for byte in sent for b in character(byte, None)), 1, 1], Fraction(16 * percent, 100)):
+            await loop.clk(256, rx=level)
+        assert loop.heard == sent
+
+
+@cocotb.test()
+async def noise_matches_the_models(dut):
+    loop = await Loop(dut).begin()
+    for _ in range(300):
+        bit_time, level = random.choice([128, 133, 256]), random.choice([None, 0, 1])
+        for _ in range(random.randrange(1, 60)):
+            await loop.clk(bit_time, random.choice([None, random.getrandbits(8)]), level)
+
+
+@cocotb.test(skip=not shutil.which("sigrok-cli"))
+async def sigrok_reads_8n1(dut):
+    """115 200 baud at 4 MHz."""
+    loop = await Loop(dut).begin()
+    sent = [0xA5, 0x00, 0xFF, *(random.getrandbits(8) for _ in range(20))]
+    await loop.send(sent, 555)
+    Path("loop.bin").write_bytes(loop.wave)
+    out = subprocess.run(["sigrok-cli", "-i", "loop.bin", "-I", "binary:numchannels=1:samplerate=4000000",
+                          "-P", "uart:rx=0:baudrate=115200", "-A", "uart=rx-data:rx-warnings"],
+                         capture_output=True, text=True, check=True, timeout=60)
+    assert re.findall(r"^uart-1: (.*)$", out.stdout, re.MULTILINE) == [f"{byte:02X}" for byte in sent]
+
+
+def test_character_loop():
+    run("character_loop", __file__)
