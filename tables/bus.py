@@ -38,7 +38,7 @@ def fields(head, declared):
     return laid, offset
 
 
-class Line:
+class Bus:
     """bus.toml, checked."""
 
     def __init__(self, text: bytes):
@@ -82,21 +82,21 @@ def once(what, numbers):
 
 # ------------------------------------------------------------------ firmware
 
-def header(line: Line) -> str:
+def header(bus: Bus) -> str:
     out = [
         "// SPDX-License-Identifier: Apache-2.0",
         "// Made by tables/bus.py from tables/bus.toml: do not edit.",
         "#ifndef MOIRE_BUS_PROTOCOL_H",
         "#define MOIRE_BUS_PROTOCOL_H",
         "",
-        f"#define PROTOCOL_CRC         0x{line.crc:08X}u    // CRC-32 of bus.toml",
-        f"#define BUS_VERSION         {line.version}u",
-        f"#define BUS_LONGEST_BODY    {line.longest_body}u",
+        f"#define PROTOCOL_CRC         0x{bus.crc:08X}u    // CRC-32 of bus.toml",
+        f"#define BUS_VERSION         {bus.version}u",
+        f"#define BUS_LONGEST_BODY    {bus.longest_body}u",
         f"#define BUS_REQUEST_HEAD    {fields(REQUEST_HEAD, [])[1]}u    // sequence, operation",
         f"#define BUS_REPLY_HEAD      {fields(REPLY_HEAD, [])[1]}u    // sequence, operation, cause",
         "",
     ]
-    for name, entries in line.lists.items():
+    for name, entries in bus.lists.items():
         out.append(f"enum bus_{name} {{" + ("" if name in CODES else "    // bits"))
         for key, (code, words) in entries.items():
             value = str(code) if name in CODES else f"1 << {code}"
@@ -105,25 +105,25 @@ def header(line: Line) -> str:
     for name in WORDS:
         out.append("// X(code, words), up to a colon")
         out += macro(f"BUS_{name.upper()}_WORDS",
-                     [f"    X({code}, {quoted(words.partition(':')[0])})" for code, words in line.lists[name].values()])
+                     [f"    X({code}, {quoted(words.partition(':')[0])})" for code, words in bus.lists[name].values()])
     out.append("enum bus_operation {")
-    for name, operation in line.operations.items():
+    for name, operation in bus.operations.items():
         out.append(f"    BUS_OPERATION_{name.upper()} = {operation['code']},    // {operation['text']}")
     out += ["};", ""]
     out.append("// Lengths of whole bodies and offsets of their fields, in bytes, little endian.")
-    for name, (request, reply) in line.layouts.items():
+    for name, (request, reply) in bus.layouts.items():
         for way, (laid, length), head in (("REQUEST", request, 2), ("REPLY", reply, 3)):
             out.append(f"#define BUS_{name.upper()}_{way}_LENGTH {length}u")
             for field, kind, offset in laid[head:]:
                 out.append(f"#define BUS_{name.upper()}_{way}_{field.upper()} {offset}u    // {kind}")
     out.append("")
     out.append("// X(name, code, length of the request body, length of the reply body if the cause is ok, 1: of an axis, its first field)")
-    rows = [f"    X({name}, {operation['code']}, {line.layouts[name][0][1]}, {line.layouts[name][1][1]}, "
+    rows = [f"    X({name}, {operation['code']}, {bus.layouts[name][0][1]}, {bus.layouts[name][1][1]}, "
             f"{int(operation['request'][:1] == [AXIS])})"
-            for name, operation in line.operations.items()]
+            for name, operation in bus.operations.items()]
     out += macro("BUS_OPERATIONS", rows)
-    out += values("parameter", line.parameters) + values("setting", line.settings)
-    out += [f"#define BUS_VALUES_CRC 0x{line.values_crc:08X}u     // of all of both: what a kept number means", ""]
+    out += values("parameter", bus.parameters) + values("setting", bus.settings)
+    out += [f"#define BUS_VALUES_CRC 0x{bus.values_crc:08X}u     // of all of both: what a kept number means", ""]
     out += ["#endif", ""]
     return "\n".join(out)
 
@@ -156,7 +156,7 @@ def macro(name, rows):
 
 # ------------------------------------------------------------------ host
 
-def host(line: Line) -> str:
+def host(bus: Bus) -> str:
     out = [
         "# SPDX-License-Identifier: Apache-2.0",
         '"""Made by tables/bus.py from tables/bus.toml: do not edit."""',
@@ -183,24 +183,24 @@ def host(line: Line) -> str:
         "    text: str",
         "",
         "",
-        f"PROTOCOL_CRC = 0x{line.crc:08X}",
-        f"VERSION = {line.version}",
-        f"LONGEST_BODY = {line.longest_body}",
+        f"PROTOCOL_CRC = 0x{bus.crc:08X}",
+        f"VERSION = {bus.version}",
+        f"LONGEST_BODY = {bus.longest_body}",
         "",
     ]
-    for name, entries in line.lists.items():
+    for name, entries in bus.lists.items():
         out.append(f"# {'code' if name in CODES else 'bit'}: (name, words)")
         out.append(f"{name.upper()}S = {{")
         out += [f"    {code}: ({quoted(key)}, {quoted(words)})," for key, (code, words) in entries.items()]
         out += ["}", ""]
     out.append("OPERATIONS = {operation.name: operation for operation in (")
-    for name, operation in line.operations.items():
+    for name, operation in bus.operations.items():
         request, reply = (tuple(tuple(declaration.split()) for declaration in operation[way]) for way in ("request", "reply"))
         out.append(f"    Operation({quoted(name)}, {operation['code']}, {quoted(operation['text'])},")
         out.append(f"              {pairs(request)},")
         out.append(f"              {pairs(reply)}),")
     out += [")}", ""]
-    for table, parameters in (("PARAMETERS", line.parameters), ("SETTINGS", line.settings)):
+    for table, parameters in (("PARAMETERS", bus.parameters), ("SETTINGS", bus.settings)):
         out.append(f"{table} = {{parameter.name: parameter for parameter in (")
         for name, parameter in parameters.items():
             lsb = Fraction(parameter["lsb"])
@@ -249,20 +249,20 @@ def table(head, rows):
     return out + ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
 
 
-def page_parts(line: Line) -> dict:
+def page_parts(bus: Bus) -> dict:
     parts = {}
-    parts["identity"] = [f"Version {line.version}, CRC-32 of `tables/bus.toml` `{line.crc:08X}`, longest body {line.longest_body} bytes."]
-    overview = [(operation["code"], f"[`{name}`](#{name})", operation["text"]) for name, operation in line.operations.items()]
+    parts["identity"] = [f"Version {bus.version}, CRC-32 of `tables/bus.toml` `{bus.crc:08X}`, longest body {bus.longest_body} bytes."]
+    overview = [(operation["code"], f"[`{name}`](#{name})", operation["text"]) for name, operation in bus.operations.items()]
     body = table(("code", "operation", "purpose"), overview)
-    for name, operation in line.operations.items():
-        (request, request_length), (reply, reply_length) = line.layouts[name]
+    for name, operation in bus.operations.items():
+        (request, request_length), (reply, reply_length) = bus.layouts[name]
         body += ["", f"### {name}", "", operation["text"][0].upper() + operation["text"][1:] + ".", ""]
         body += [f"Request, {request_length} bytes:", ""] + diagram(request) + ["", f"Reply, {reply_length} bytes:", ""] + diagram(reply)
     parts["operations"] = body
-    for name, entries in line.lists.items():
+    for name, entries in bus.lists.items():
         rows = [(code, f"`{key}`", words) for key, (code, words) in entries.items()]
         parts[name + "s"] = table(("code" if name in CODES else "bit", "name", "words"), rows)
-    for kind, parameters in (("parameter", line.parameters), ("setting", line.settings)):
+    for kind, parameters in (("parameter", bus.parameters), ("setting", bus.settings)):
         rows = []
         for name, parameter in parameters.items():
             lsb = Fraction(parameter["lsb"])
@@ -270,14 +270,14 @@ def page_parts(line: Line) -> dict:
                          *(decimal(parameter[key] * lsb) for key in ("min", "max", "default")),
                          parameter["text"] + (f"; needs {parameter['needs']}" if "needs" in parameter else "")))
         parts[kind + "s"] = table(("id", kind, "unit", "one count", "min", "max", "default", "purpose"), rows)
-    parts["example"] = example(line)
-    parts["packets"] = packets(line)
+    parts["example"] = example(bus)
+    parts["packets"] = packets(bus)
     return parts
 
 
-def enable_frames(line: Line) -> tuple:
+def enable_frames(bus: Bus) -> tuple:
     """Payloads of `enable` of axis 0 at address 1 and of its reply."""
-    code, ok = line.operations["enable"]["code"], line.lists["cause"]["ok"][0]
+    code, ok = bus.operations["enable"]["code"], bus.lists["cause"]["ok"][0]
 
     def frame(first, *body):
         inside = bytes([first, len(body), *body])
@@ -286,20 +286,20 @@ def enable_frames(line: Line) -> tuple:
     return frame(0x21, 7, code, 0, 1), frame(0x51, 7, code, ok)
 
 
-def example(line: Line) -> list:
+def example(bus: Bus) -> list:
     """`enable`, byte by byte."""
-    request, reply = (payload.hex(" ").upper() for payload in enable_frames(line))
+    request, reply = (payload.hex(" ").upper() for payload in enable_frames(bus))
     return ["`enable` of axis 0 of the node with address 1, sequence number 7:", "", "```",
             "master  21*", "node    61", f"master  {request}",
             "master  11*", f"node    51 {reply}", "```", "", "`*` has the 9th bit set."]
 
 
-def packets(line: Line) -> list:
+def packets(bus: Bus) -> list:
     """The same as packets; none of them is long enough for a run of 254."""
     def packet(content):
         return b"".join(bytes([len(part) + 1]) + part for part in content.split(b"\0")) + b"\0"
 
-    request, reply = enable_frames(line)
+    request, reply = enable_frames(bus)
     return ["The same `enable` as packets:", "", "```", f"client  00 {packet(bytes([0x21]) + request).hex(' ').upper()}",
             f"node    00 {packet(bytes([0x51]) + reply).hex(' ').upper()}", "```"]
 
@@ -309,9 +309,9 @@ def decimal(value: Fraction) -> str:
     return str(value.numerator) if value.denominator == 1 else f"{float(value):.6g}"
 
 
-def page(line: Line, text: str) -> str:
+def page(bus: Bus, text: str) -> str:
     """The page with its made parts replaced; everything outside the marks is kept."""
-    for name, lines in page_parts(line).items():
+    for name, lines in page_parts(bus).items():
         begin, end = f"<!-- made by tables/bus.py: {name} -->", f"<!-- end of {name} -->"
         marked = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)
         if len(marked.findall(text)) != 1:
@@ -324,8 +324,8 @@ def page(line: Line, text: str) -> str:
 # ------------------------------------------------------------------ command line
 
 def made() -> dict:
-    line = Line(SOURCE.read_bytes())
-    return {HEADER: header(line), HOST: host(line), PAGE: page(line, PAGE.read_text(encoding="utf-8"))}
+    bus = Bus(SOURCE.read_bytes())
+    return {HEADER: header(bus), HOST: host(bus), PAGE: page(bus, PAGE.read_text(encoding="utf-8"))}
 
 
 def main(arguments=None) -> int:

@@ -48,8 +48,8 @@ def check_of(path):
     if name.endswith("_rom"):                               # a made table: its generator is the model
         user = name.removesuffix("_rom")
         return Path("tables") / f"{user}.py", next((p.relative_to(ROOT) for p in (ROOT / "tb" / room).glob(f"test_{user}*.py")), None)
-    if name.endswith("_program"):                           # a made table too, of what its user does
-        user = name.removesuffix("_program")
+    if name.endswith("_microcode"):                           # a made table too, of what its user does
+        user = name.removesuffix("_microcode")
         return Path("tables") / f"{name}.py", next((p.relative_to(ROOT) for p in (ROOT / "tb" / room).glob(f"test_{user}*.py")), None)
     return Path("tb") / room / f"{name}.py", Path("tb") / room / f"test_{name}.py"
 

@@ -25,9 +25,9 @@ from experiments.report_page import ROOT, page, picture
 from moire.analysis import report
 from moire.bus.client import Bus
 from moire.bus.indexing_table import TURN, IndexingTable
+from moire.bus.job import Job, equal_parts
 from moire.bus.nonvolatile import SavedSettings
 from moire.bus.settings import Settings
-from moire.cli.job import Job, equal_parts
 from moire.errors import MoireError
 from twin import START_S, Axis, BuildError, Devices, Node, Twin, TwinTransport, build
 

@@ -85,7 +85,7 @@ def learn(seed, vibration_hz, vibration_nm=VIBRATION_NM, speeds=None, fringes=FR
     machine, gone, ellipse_nm = CalibrationRun(), 0.0, None
     machine.idle()
     while True:
-        need, speed = machine.learner.need, speeds()
+        need, speed = machine.calibration.need, speeds()
         count = compiled.BURST if need == SAMPLES else compiled.PHASES_OF_BURST
         every = max(1, int(SAMPLE_HZ * compiled.PERIODS / count / max(abs(speed), 1)))
         time = np.arange(count) * every / SAMPLE_HZ
@@ -101,7 +101,7 @@ def learn(seed, vibration_hz, vibration_nm=VIBRATION_NM, speeds=None, fringes=FR
             machine.burst(words_of(cos, sin), spoiled, every)
         else:
             machine.phases(phase_of(cos, sin, machine.values).tolist(), spoiled, every)
-        if ellipse_nm is None and machine.learner.harmonics:
+        if ellipse_nm is None and machine.calibration.harmonics:
             ellipse_nm = remaining_nm(machine.values, machine.table, curve, amplitude)
 
 
@@ -130,7 +130,7 @@ def sde(settings, progress):
     uncorrected = dict(cos_offset=0, sin_offset=0, gain=65536, quadrature_error=0)
     for hz, amplitude, seed in progress.track(settings):
         machine, ellipse_nm, _, curve = learn(1000 * hz + seed, hz, VIBRATION_NM if hz else 0, amplitude=amplitude)
-        if not machine.learner.complete:
+        if not machine.calibration.complete:
             console.print(f"{hz} Hz, {amplitude:.0%}, seed {seed}: not learned, {machine.words()}")
         left.append(remaining_nm(machine.values, machine.table, curve, amplitude))
         ellipse.append(ellipse_nm)
@@ -215,7 +215,7 @@ def twin_sde_nm():
 def acquire(count, amplitude, trials):
     """nm left by an ellipse of `count` samples in each of many trials; random start, 1 to 5 turns, random errors."""
     draw, library, left = np.random.default_rng(count), compiled.library(), []
-    learner = CalibrationRun().learner
+    learner = CalibrationRun().calibration
     identity = [0] * 256
     for _ in range(trials):
         setting = dict(harmonics={}, offset=draw.uniform(-0.05, 0.05, 2), gain=1 + draw.uniform(-0.06, 0.06),

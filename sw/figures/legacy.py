@@ -76,7 +76,7 @@ def compared():
         words = converted(*signal(2 * np.pi * place, **pure), np.random.default_rng(SEED), noise=noise, amplitude=1)
         told(what, "as printed", errors(readings(words, IDENTITY, filters)[0], place))
     machine, _, _, curve = learn(SEED, VIBRATION_HZ)
-    if not machine.learner.settled:
+    if not machine.calibration.complete:
         console.print(f"not learned: {machine.words()}")
     found = []
     for what, course in (("the test signal, vibration, there and back", dict(there_and_back=True)),

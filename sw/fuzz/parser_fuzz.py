@@ -16,16 +16,17 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 
+import moire
 from moire import units
 from moire.analysis import harmonic_fit as calibration
-from moire.bus import cobs, protocol, recording, rfc2217
+from moire.bus import cobs, protocol, recording, relay, rfc2217
 from moire.bus.client import Axis
 from moire.bus.transport import Transport
-from moire.cli import command_line, relay
+from moire.cli import command_line
 from moire.errors import MoireError
 from moire.made.bus_tables import OPERATIONS, PARAMETERS
 
-PACKAGE = str(Path(protocol.__file__).parent)
+PACKAGE = str(Path(moire.__file__).parent)
 LONGEST = 600
 HANG_S = 10
 

@@ -315,11 +315,11 @@ class FakeNode:
         known = next((known for known in PARAMETERS.values() if known.id == parameter), None)
         if known is None:
             return "unknown_parameter", {}
-        if axis.kind and known.name != "override":
+        if axis.kind and known.name != "feed_override":
             return "busy", {}
         if not known.min <= value <= known.max:
             return "out_of_range", {}
-        if known.name == "override":
+        if known.name == "feed_override":
             axis.change_override(self.now, value)
         axis.parameters[parameter] = value
         axis.writes.append(known.name)
@@ -341,7 +341,7 @@ class FakeNode:
             fault_position=65536,
         )
 
-    def do_learner(self, axis, action):
+    def do_calibration(self, axis, action):
         if action > 3:
             return "out_of_range", {}
         if action in (1, 2):

@@ -56,9 +56,9 @@ def test_the_firmware_stands_a_short_fuzz(image):
 def test_a_missing_bound_in_the_firmware_is_found(tmp_path):
     copy = tmp_path / "firmware"
     shutil.copytree(FIRMWARE, copy)
-    right = (copy / "line.c").read_text()
+    right = (copy / "bus" / "bus.c").read_text()
     wrong = right.replace("if (!receiving || received == sizeof request) continue;", "if (!receiving) continue;")
     assert wrong != right
-    (copy / "line.c").write_text(wrong)
+    (copy / "bus" / "bus.c").write_text(wrong)
     said = fuzz_firmware(60, "axis", firmware=copy).said
     assert said is not None and "index 69 out of bounds" in said and "input:" in said, said

@@ -9,7 +9,7 @@ import pytest
 
 from figures import calibration as signals
 from tb.bench import seed
-from twin.compiled import calibration as model
+from tb.firmware import calibration_model as model
 from twin.compiled.calibration import (
     LOADING,
     NOTHING,

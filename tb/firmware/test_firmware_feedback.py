@@ -77,7 +77,8 @@ def test_the_settings_of_the_user_reach_the_grating():
     assert word[DEFINES["FEEDBACK_EDGE_FILTER"]] == 0 and word[DEFINES["FEEDBACK_DECODER_MODE"]] == 0
     machine.set(signal_clip_level=100, signal_tolerance=7, signal_jump=8, signal_no_noise_samples=9, signal_span=10, signal_band=11, signal_sign_threshold=12,
                 signal_offset=13, signal_balance=14, signal_quadrature_error=15, signal_fault_mask=32767, velocity_quantum=0, decoder_mode=2)
-    for name, low, high in (("CIRCLE", 100, 7), ("STEP", 8, 9), ("LEG", 10, 11), ("DRIFT", 13, 14), ("SQUARE", 15, 12)):
+    for name, low, high in (("LISSAJOUS", 100, 7), ("JUMP", 8, 9), ("CHANNEL", 10, 11), ("DRIFT", 13, 14),
+                            ("QUADRATURE", 15, 12)):
         assert word[DEFINES[f"FEEDBACK_{name}_LIMITS"]] == low | high << 16
     assert word[DEFINES["FEEDBACK_SIGNAL_FAULT_MASK"]] == 32767 and word[DEFINES["FEEDBACK_VELOCITY_QUANTUM"]] == 0
     assert word[DEFINES["FEEDBACK_DECODER_MODE"]] == 2

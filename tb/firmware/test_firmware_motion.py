@@ -88,7 +88,7 @@ def test_a_move_that_settles_gives_way_to_the_next_one():
 def test_a_change_of_the_override_adds_no_more_than_a_quarter_of_acceleration_and_jerk(jerk):
     machine = homed(jerk=jerk)
     machine.ask("move", axis=0, target=3000 * PERIOD)
-    machine.set(override=32768)
+    machine.set(feed_override=32768)
     word = machine.axes[0].word
     assert word[DEFINES["AXIS_FEED_OVERRIDE"]] == 32768
     slope, curve = word[DEFINES["AXIS_FEED_OVERRIDE_SLOPE"]] / 2**32 * 4000, word[DEFINES["AXIS_FEED_OVERRIDE_CURVE"]] / 2**32 * 4000**2

@@ -15,7 +15,7 @@ def station():
 
 def test_a_node_without_a_program_says_so(station):
     assert station.shown() == ["ready", "no program of", "stations is stored", ""]
-    assert {"keypad", "display", "store"} <= station.job()["flags"]
+    assert {"keypad", "display", "eeprom"} <= station.job()["flags"]
 
 
 def test_the_display_gets_nothing_too_soon_and_rs_stands_before_e(station):

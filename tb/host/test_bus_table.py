@@ -17,7 +17,7 @@ from tables import bus as generator
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "tables" / "bus.toml"
 TABLE = tomllib.loads(SOURCE.read_text(encoding="utf-8"))
-HEADER = (ROOT / "sw" / "firmware" / "bus_protocol.h").read_text(encoding="utf-8")
+HEADER = (ROOT / "sw" / "firmware" / "made" / "bus_protocol.h").read_text(encoding="utf-8")
 
 
 
@@ -26,7 +26,7 @@ def test_the_made_files_are_fresh():
 
 
 def test_a_stale_file_is_found_named_and_made_again(tmp_path, monkeypatch, capsys):
-    copy = tmp_path / "sw" / "firmware" / "bus_protocol.h"
+    copy = tmp_path / "sw" / "firmware" / "made" / "bus_protocol.h"
     copy.parent.mkdir(parents=True)
     shutil.copy(generator.HEADER, copy)
     with open(copy, "a") as file:
@@ -84,7 +84,7 @@ def test_a_compiler_reads_the_header_and_gets_the_same_numbers(tmp_path):
         pytest.skip("no C compiler")
     source = tmp_path / "print.c"
     source.write_text(
-        '#include <stdio.h>\n#include <stdint.h>\n#include "bus_protocol.h"\n'
+        '#include <stdio.h>\n#include <stdint.h>\n#include "made/bus_protocol.h"\n'
         '#define P(name, id, min, max, default) printf("%s %d %lld %lld %lld\\n", #name, id, '
         "(long long)min, (long long)max, (long long)default);\n"
         '#define O(name, code, request, reply, of_axis) printf("%s %d %d %d %d\\n", #name, code, (int)request, (int)reply, of_axis);\n'

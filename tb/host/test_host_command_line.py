@@ -112,7 +112,7 @@ def test_registers_by_address_and_by_name():
     node.registers = {0x110: 258, 0x400: 5}
     call = Call("register 0x110 272 bus.frames_good axis.control", node)
     assert call.code == 0
-    assert "0x110 = 0x00000102 258\n272 = 0x00000102 258\nline.frames_good: value = 258\naxis.control: enable = 1" in call.out
+    assert "0x110 = 0x00000102 258\n272 = 0x00000102 258\nbus.frames_good: value = 258\naxis.control: enable = 1" in call.out
     assert "axis.position" in Call("register").out
     assert Call("register 0x110 --json", node).told[0]["registers"] == {"0x110": 258}
 
@@ -165,9 +165,9 @@ def test_the_drive_and_choices_in_words():
     node.registers.update({0x1400: 1 | 0b0111 << 2, 0x1420: 25, 0x143C: 0})
     call = Call("drive -- params set drive steps -- register actuator.steps", node)
     assert call.code == 0, call.err
-    assert "drive     steps; built: bridge, steps, converter\n" in call.out and "25 on the wire" in call.out and "fine" not in call.out
-    assert "bridge, steps, converter" in call.out and node.axes[0].parameters[PARAMETERS["drive"].id] == 1
-    assert "'sideways': allowed are bridge, steps, converter" in sentence(Call("params set drive sideways", node), 2)
+    assert "drive     steps; built: bridge, steps, dac\n" in call.out and "25 on the wire" in call.out and "fine" not in call.out
+    assert "bridge, steps, dac" in call.out and node.axes[0].parameters[PARAMETERS["drive"].id] == 1
+    assert "'sideways': allowed are bridge, steps, dac" in sentence(Call("params set drive sideways", node), 2)
 
 
 def test_tune_reads_a_record_tells_gains_and_writes_them(tmp_path):

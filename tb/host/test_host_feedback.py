@@ -87,9 +87,9 @@ def test_a_fault_while_learning_is_the_error_that_is_told():
 
 def test_the_learner_knows_its_actions():
     _, inside, axis = stage()
-    assert axis.calibration("commission").reason == "calibrating" and axis.calibration().frozen is False
+    assert axis.calibration("calibrate").reason == "calibrating" and axis.calibration().frozen is False
     assert axis.calibration("freeze").reason == "frozen"
-    with pytest.raises(OutOfRange, match="knows no 'rest': allowed are look, learn, freeze, forget"):
+    with pytest.raises(OutOfRange, match="knows no 'rest': allowed are read, calibrate, freeze, clear"):
         axis.calibration("rest")
 
 
@@ -189,7 +189,7 @@ def test_learn_save_forget_load_in_calls_of_moire(tmp_path):
     assert Call(["correction", "save", file], node).out == f"correction saved in {file}\n"
     other = FakeNode()
     assert Call(["correction", "load", file], other).code == 0 and other.axes[0].correction["sin_offset"] == 77
-    for action, frozen in (("commission", 0), ("freeze", 1), ("clear", 1)):
+    for action, frozen in (("calibrate", 0), ("freeze", 1), ("clear", 1)):
         assert Call(f"correction {action}", node).code == 0 and node.axes[0].learner["frozen"] == frozen
     assert "not settled" in Call("correction show", node).out
 
@@ -206,7 +206,7 @@ def test_a_person_sees_learning_go_on(monkeypatch):
         def isatty(self):
             return True
     err = Screen()
-    assert command_line.main(["home", "--", "commission"], lambda _: FakeBus(FakeNode()), io.StringIO(), err) == 0
+    assert command_line.main(["home", "--", "calibrate"], lambda _: FakeBus(FakeNode()), io.StringIO(), err) == 0
     assert "learning; not settled (0 accepted, 0 refused)" in err.getvalue()
 
 
@@ -237,7 +237,7 @@ def test_each_tells_one_json_object_a_line(text):
 
 
 @pytest.mark.parametrize("text, said", [
-    ("learn --distance 1", "has no unit"), ("learn --distance 0mm", "not above zero"), ("learn --timeout -1s", "not above zero"),
+    ("calibrate --distance 1", "has no unit"), ("calibrate --distance 0mm", "not above zero"), ("calibrate --timeout -1s", "not above zero"),
     ("correction", "required: ACTION"), ("correction load /no/such/file", "cannot be read"),
     ("capture from probe", "no capture source 'probe'"), ("compare from 1mm", "required: STEP"),
     ("compare from 1mm 0mm", "the step not zero"),

@@ -6,8 +6,8 @@ import json
 import pytest
 
 from moire.bus.client import Bus
+from moire.bus.job import Job, equal_parts, read_stations
 from moire.cli import command_line
-from moire.cli.job import Job, equal_parts, read_stations
 from moire.errors import BadFile, OutOfRange, Refused
 from tb.fakes.firmware_bus import FakeNodeBus
 from twin.compiled.station import OPERATION, Station, SubNode
@@ -91,7 +91,7 @@ def test_the_commands_do_a_whole_job(tmp_path):
     code, told, _ = workshop.call("job start --wait")
     assert code == 0 and told.startswith("all cut, station 4 of 4\n  takes    start\n") and len(workshop.station.edm.cuts) == 4
     told = json.loads(workshop.call("job status --json")[1])
-    assert told["state"] == "finished" and told["answers"] == ["start"] and told["flags"] == ["store"]
+    assert told["state"] == "finished" and told["answers"] == ["start"] and told["flags"] == ["eeprom"]
 
 
 def test_a_question_is_told_and_answered():

@@ -13,7 +13,7 @@ from tb.host.test_host_job import Workshop
 @pytest.fixture
 def workshop():
     made = Workshop()
-    made.kept = SavedSettings(made.job.node)
+    made.saved = SavedSettings(made.job.node)
     return made
 
 
@@ -46,7 +46,7 @@ def test_a_damaged_copy_is_told(workshop):
 def test_what_cannot_be_kept_is_said_in_words(workshop):
     workshop.saved.state()
     workshop.station.eeprom.worn[8192 + 1] = 0xA5
-    with pytest.raises(MotionFailed, match="node 2 did not keep its values: the EEPROM does not keep"):
+    with pytest.raises(MotionFailed, match="node 2 did not save its values: the EEPROM does not keep"):
         workshop.saved.save()
     workshop.station.bus.devices.pop(0x50)
     workshop.station.power_cut()

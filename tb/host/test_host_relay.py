@@ -10,9 +10,7 @@ import pytest
 
 from moire.analysis.harmonic_fit import fit, read_readings
 from moire.bus.protocol import NINTH
-from moire.bus.transport import Transport
-from moire.cli import relay as command_relay
-from moire.cli.relay import (
+from moire.bus.relay import (
     COUNTS,
     FIRST,
     SECOND,
@@ -24,6 +22,8 @@ from moire.cli.relay import (
     make_set,
     terms_of,
 )
+from moire.bus.transport import Transport
+from moire.cli import relay as command_relay
 from moire.errors import BadFile, BusGarbled, NoAnswer, OutOfRange
 from tb.bench import seed
 from tb.compensate.harmonic_map import exact, term_of
@@ -255,7 +255,7 @@ def call(transport, *words):
     parser = argparse.ArgumentParser()
     command_relay.add_to(parser.add_subparsers(), command)
     options = parser.parse_args(words)
-    session = SimpleNamespace(line=SimpleNamespace(transport=transport), say=lambda told, text: said.append((told, text)))
+    session = SimpleNamespace(bus=SimpleNamespace(transport=transport), say=lambda told, text: said.append((told, text)))
     options.handler(session, options)
     return said[0]
 

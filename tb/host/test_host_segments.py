@@ -6,7 +6,7 @@ from fractions import Fraction
 import pytest
 
 from moire.bus.client import Bus
-from moire.cli.segments import NotInForce, Segments, SegmentTable, read_table, text_of
+from moire.bus.segments import NotInForce, Segments, SegmentTable, read_table, text_of
 from moire.errors import BadFile, OutOfRange
 from tb.fakes.fake_node import FakeBus, FakeNode
 from tb.host.test_host_command_line import Call, sentence

@@ -9,9 +9,9 @@ import pytest
 
 from moire.bus.client import Bus
 from moire.bus.indexing_table import IndexingTable
+from moire.bus.job import Job
 from moire.bus.settings import Settings
 from moire.cli import command_line
-from moire.cli.job import Job
 from moire.errors import MotionFailed, OutOfRange, Refused, UnknownName
 from moire.made.bus_tables import SETTINGS
 from tb.fakes.firmware_bus import FakeNodeBus

@@ -224,7 +224,7 @@ def test_all_made_files_carry_the_crc_of_the_source():
 
 @pytest.mark.parametrize("axes", [1, 2, 4, 8])
 def test_host_and_firmware_find_every_register_at_every_axis_count(axes):
-    header = dict(re.findall(r"#define (\w+) +(0x[0-9a-fA-F]+)u", (ROOT / "sw" / "firmware" / "registers.h").read_text()))
+    header = dict(re.findall(r"#define (\w+) +(0x[0-9a-fA-F]+)u", (ROOT / "sw" / "firmware" / "made" / "registers.h").read_text()))
     taken = {}
     for block in tables.read(axes):
         assert block.count == (axes if block.name in ("axis", "feedback", "actuator") else 1)

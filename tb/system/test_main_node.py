@@ -5,8 +5,8 @@ import random
 
 from moire.bus.client import Bus
 from moire.bus.indexing_table import TURN, IndexingTable
+from moire.bus.job import Job
 from moire.bus.settings import Settings
-from moire.cli.job import Job
 from tb.bench import seed
 from twin import Twin, TwinTransport, build
 from twin.devices.devices import Devices

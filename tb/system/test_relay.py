@@ -6,7 +6,7 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from moire.cli.relay import (
+from moire.bus.relay import (
     BEGIN_SET,
     CLEAR,
     FLASH,

@@ -2,7 +2,7 @@
 """relay with a table of segments instead of harmonics, pins to pins: it corrects by it in both directions, and takes no other set."""
 import cocotb
 
-from moire.cli.relay import identity_of
+from moire.bus.relay import identity_of
 from tb.bench import run
 from tb.relay.relay_set import image
 from tb.system.test_relay import (

@@ -11,7 +11,7 @@ import random
 import pytest
 
 from moire.bus.client import Bus
-from moire.cli.segments import Segments, SegmentTable
+from moire.bus.segments import Segments, SegmentTable
 from moire.errors import Refused
 from twin import START_S, WITH_SEGMENTS, Twin, TwinTransport
 

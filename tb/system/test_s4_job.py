@@ -7,7 +7,7 @@ import random
 import pytest
 
 from experiments.s4_job import MAIN, SUB, TOLERANCE, Cut, IndexingMachine, Outcome, Trouble, apart, random_stations, random_worm
-from moire.cli.job import JobState
+from moire.bus.job import JobState
 
 SEED = int(os.environ.get("SEED") or 1)
 NEAR_BY = 0.004                      # of a turn: stations 0.7 degree apart

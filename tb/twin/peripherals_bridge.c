@@ -8,13 +8,13 @@ enum { WRITE = 0x80, BIT_TIME = 333 };  // 115200 baud at 2.4 MHz
 static uint8_t receive(void)
 {
     uint32_t word;
-    do word = links_read(PERIPHERALS_PEER_RECEIVE); while (!(word & PERIPHERALS_PEER_RECEIVE_PRESENT_MASK));
+    do word = peripherals_read(PERIPHERALS_PEER_RECEIVE); while (!(word & PERIPHERALS_PEER_RECEIVE_PRESENT_MASK));
     return (uint8_t)word;
 }
 
 int main(void)
 {
-    links_write(PERIPHERALS_PEER_BIT_TIME, BIT_TIME);
+    peripherals_write(PERIPHERALS_PEER_BIT_TIME, BIT_TIME);
     while (FIELD_GET(node_read(NODE_BUILD), NODE_BUILD_ADDRESS) != 1) ;
     for (;;) {
         const uint8_t request = receive();
@@ -22,10 +22,10 @@ int main(void)
         uint32_t value = 0;
         if (request & WRITE) {
             for (int bit = 0; bit < 32; bit += 8) value |= (uint32_t)receive() << bit;
-            links_write(offset, value);
+            peripherals_write(offset, value);
         } else {
-            value = links_read(offset);
-            for (int bit = 0; bit < 32; bit += 8) links_write(PERIPHERALS_PEER_TRANSMIT, value >> bit & 0xFF);
+            value = peripherals_read(offset);
+            for (int bit = 0; bit < 32; bit += 8) peripherals_write(PERIPHERALS_PEER_TRANSMIT, value >> bit & 0xFF);
         }
     }
 }

@@ -202,7 +202,7 @@ uint8_t axis_home(unsigned n)
     if (cause != BUS_CAUSE_OK) return cause;
 
     hand_over(n, false);
-    grating_write(n, FEEDBACK_SEGMENT_USE, 0);               // homing looks for phases; the target takes the step with it
+    feedback_write(n, FEEDBACK_SEGMENT_USE, 0);               // homing looks for phases; the target takes the step with it
     cause = homing_begin(n);
     if (cause != BUS_CAUSE_OK) return cause;
     a->homed = false;
@@ -369,7 +369,7 @@ static uint8_t check_parameter(unsigned n, uint8_t id, int64_t value)
         return on ? BUS_CAUSE_BUSY : BUS_CAUSE_OK;
     case BUS_PARAMETER_STEP_INVERT: return on ? BUS_CAUSE_BUSY : BUS_CAUSE_OK;
     case BUS_PARAMETER_SEGMENTS:
-        return value && !FIELD_GET(grating_read(n, FEEDBACK_SEGMENT_STATE), FEEDBACK_SEGMENT_STATE_BUILT) ? BUS_CAUSE_NOT_BUILT : BUS_CAUSE_OK;
+        return value && !FIELD_GET(feedback_read(n, FEEDBACK_SEGMENT_STATE), FEEDBACK_SEGMENT_STATE_BUILT) ? BUS_CAUSE_NOT_BUILT : BUS_CAUSE_OK;
     case BUS_PARAMETER_SEGMENT_COUNT:
     case BUS_PARAMETER_SEGMENT_LENGTH:
     case BUS_PARAMETER_SEGMENT_FIRST:

@@ -119,8 +119,8 @@ static uint8_t at_standstill(unsigned n)
 // Which way the index is taken; what else the register holds is the user's.
 static void take_index(unsigned n, uint32_t directions)
 {
-    uint32_t other = grating_read(n, FEEDBACK_INDEX) & ~(FEEDBACK_INDEX_UP_MASK | FEEDBACK_INDEX_DOWN_MASK);
-    grating_write(n, FEEDBACK_INDEX, other | directions);
+    uint32_t other = feedback_read(n, FEEDBACK_INDEX) & ~(FEEDBACK_INDEX_UP_MASK | FEEDBACK_INDEX_DOWN_MASK);
+    feedback_write(n, FEEDBACK_INDEX, other | directions);
 }
 
 // Only the way of the search counts: an axis that rests on the edge of its mark may go back over it before it sets off.
@@ -128,8 +128,8 @@ static void arm(unsigned n, bool up)
 {
     homings[n].up = up;
     take_index(n, up ? FEEDBACK_INDEX_UP_MASK : FEEDBACK_INDEX_DOWN_MASK);
-    grating_write(n, FEEDBACK_CAPTURE_SOURCES, CAPTURE_INDEX);
-    grating_write(n, FEEDBACK_STROBES, FEEDBACK_STROBES_CAPTURE_CLEAR_MASK | FEEDBACK_STROBES_ARM_INDEX_MASK);
+    feedback_write(n, FEEDBACK_CAPTURE_SOURCES, CAPTURE_INDEX);
+    feedback_write(n, FEEDBACK_STROBES, FEEDBACK_STROBES_CAPTURE_CLEAR_MASK | FEEDBACK_STROBES_ARM_INDEX_MASK);
 }
 
 static uint8_t seek(unsigned n, bool up, int64_t distance)
@@ -141,8 +141,8 @@ static uint8_t seek(unsigned n, bool up, int64_t distance)
 
 static void disarm(unsigned n)
 {
-    grating_write(n, FEEDBACK_CAPTURE_SOURCES, 0);
-    grating_write(n, FEEDBACK_STROBES, FEEDBACK_STROBES_CAPTURE_CLEAR_MASK);
+    feedback_write(n, FEEDBACK_CAPTURE_SOURCES, 0);
+    feedback_write(n, FEEDBACK_STROBES, FEEDBACK_STROBES_CAPTURE_CLEAR_MASK);
     take_index(n, FEEDBACK_INDEX_UP_MASK | FEEDBACK_INDEX_DOWN_MASK);
 }
 
@@ -165,7 +165,7 @@ static void zero(unsigned n)
         quarters = counts - 4 * periods;                                    // -2 .. 2
     }
     h->phase = (int32_t)(h->zero_position - (int64_t)periods * 65536 - quarters * 16384);
-    if (quarters) grating_write(n, FEEDBACK_ALIGN, (uint32_t)-quarters);
+    if (quarters) feedback_write(n, FEEDBACK_ALIGN, (uint32_t)-quarters);
     h->zero = (int32_t)parameters_get(n, BUS_PARAMETER_HOME_OFFSET);
     axis_write(n, AXIS_SHIFT_ORIGIN, (uint32_t)(h->zero - periods));
     if (quarters) motion_set_target_to_position(n);
@@ -221,8 +221,8 @@ static uint8_t released(unsigned n)
 static uint8_t seek_poll(unsigned n, uint32_t state)
 {
     struct homing *h = &homings[n];
-    if (FIELD_GET(grating_read(n, FEEDBACK_CAPTURE_STATE), FEEDBACK_CAPTURE_STATE_PRESENT)) {
-        h->zero_position = (int64_t)(grating_read_wide(n, FEEDBACK_CAPTURED_POSITION) << 16) >> 16;
+    if (FIELD_GET(feedback_read(n, FEEDBACK_CAPTURE_STATE), FEEDBACK_CAPTURE_STATE_PRESENT)) {
+        h->zero_position = (int64_t)(feedback_read_wide(n, FEEDBACK_CAPTURED_POSITION) << 16) >> 16;
         disarm(n);
         motion_controlled_stop(n);
         return go(n, MET);

@@ -26,7 +26,7 @@ static uint32_t saturate(uint64_t value, uint32_t mask)
 
 void parameters_set_baud(uint32_t baud)
 {
-    line_write(BUS_BIT_TIME, saturate((16 * (uint64_t)node_read(NODE_CLK_HZ) + baud / 2) / baud, BUS_BIT_TIME_MASK));
+    bus_write(BUS_BIT_TIME, saturate((16 * (uint64_t)node_read(NODE_CLK_HZ) + baud / 2) / baud, BUS_BIT_TIME_MASK));
 }
 
 void parameters_start_node(void)
@@ -67,7 +67,7 @@ static void apply_sensing(unsigned axis)
     const int64_t *p = parameters[axis];
     uint32_t skip = saturate(cycles_of(p[BUS_PARAMETER_FILTER_SKIP]), 0xFFFF);
     uint64_t samples = (cycles_of(p[BUS_PARAMETER_DEGLITCH]) + skip) / (skip + 1u);
-    grating_write(axis, FEEDBACK_EDGE_FILTER, FIELD_PUT(FEEDBACK_EDGE_FILTER_SKIP, skip) |
+    feedback_write(axis, FEEDBACK_EDGE_FILTER, FIELD_PUT(FEEDBACK_EDGE_FILTER_SKIP, skip) |
                                              FIELD_PUT(FEEDBACK_EDGE_FILTER_TOLERATED, p[BUS_PARAMETER_FILTER_TOLERATED]));
     axis_write(axis, AXIS_SENSING, FIELD_PUT(AXIS_SENSING_DEGLITCH, saturate(samples, 0xFFFF)) |
                                    FIELD_PUT(AXIS_SENSING_OUTLIER_STEP, p[BUS_PARAMETER_OUTLIER_STEP]) |
@@ -77,23 +77,23 @@ static void apply_sensing(unsigned axis)
 static void apply_source(unsigned axis)
 {
     int64_t source = parameters[axis][BUS_PARAMETER_POSITION_SOURCE];
-    grating_write(axis, FEEDBACK_POSITION_SOURCE, FIELD_PUT(FEEDBACK_POSITION_SOURCE_COUNTS, source != PHASES) |
+    feedback_write(axis, FEEDBACK_POSITION_SOURCE, FIELD_PUT(FEEDBACK_POSITION_SOURCE_COUNTS, source != PHASES) |
                                                  FIELD_PUT(FEEDBACK_POSITION_SOURCE_STEPS, source == OWN_STEPS));
-    grating_write(axis, FEEDBACK_DECODER_MODE, source == OWN_STEPS ? PULSES_AND_DIRECTION : (uint32_t)parameters[axis][BUS_PARAMETER_DECODER_MODE]);
+    feedback_write(axis, FEEDBACK_DECODER_MODE, source == OWN_STEPS ? PULSES_AND_DIRECTION : (uint32_t)parameters[axis][BUS_PARAMETER_DECODER_MODE]);
 }
 
 static void apply_signal(unsigned axis)
 {
     const int64_t *p = parameters[axis];
-    grating_write(axis, FEEDBACK_LISSAJOUS_LIMITS, FIELD_PUT(FEEDBACK_LISSAJOUS_LIMITS_CLIP_LEVEL, p[BUS_PARAMETER_SIGNAL_CLIP_LEVEL]) |
+    feedback_write(axis, FEEDBACK_LISSAJOUS_LIMITS, FIELD_PUT(FEEDBACK_LISSAJOUS_LIMITS_CLIP_LEVEL, p[BUS_PARAMETER_SIGNAL_CLIP_LEVEL]) |
                                                FIELD_PUT(FEEDBACK_LISSAJOUS_LIMITS_TOLERANCE, p[BUS_PARAMETER_SIGNAL_TOLERANCE]));
-    grating_write(axis, FEEDBACK_JUMP_LIMITS, FIELD_PUT(FEEDBACK_JUMP_LIMITS_JUMP, p[BUS_PARAMETER_SIGNAL_JUMP]) |
+    feedback_write(axis, FEEDBACK_JUMP_LIMITS, FIELD_PUT(FEEDBACK_JUMP_LIMITS_JUMP, p[BUS_PARAMETER_SIGNAL_JUMP]) |
                                              FIELD_PUT(FEEDBACK_JUMP_LIMITS_NO_NOISE_SAMPLES, p[BUS_PARAMETER_SIGNAL_NO_NOISE_SAMPLES]));
-    grating_write(axis, FEEDBACK_CHANNEL_LIMITS, FIELD_PUT(FEEDBACK_CHANNEL_LIMITS_SPAN, p[BUS_PARAMETER_SIGNAL_SPAN]) |
+    feedback_write(axis, FEEDBACK_CHANNEL_LIMITS, FIELD_PUT(FEEDBACK_CHANNEL_LIMITS_SPAN, p[BUS_PARAMETER_SIGNAL_SPAN]) |
                                             FIELD_PUT(FEEDBACK_CHANNEL_LIMITS_BAND, p[BUS_PARAMETER_SIGNAL_BAND]));
-    grating_write(axis, FEEDBACK_DRIFT_LIMITS, FIELD_PUT(FEEDBACK_DRIFT_LIMITS_OFFSET, p[BUS_PARAMETER_SIGNAL_OFFSET]) |
+    feedback_write(axis, FEEDBACK_DRIFT_LIMITS, FIELD_PUT(FEEDBACK_DRIFT_LIMITS_OFFSET, p[BUS_PARAMETER_SIGNAL_OFFSET]) |
                                               FIELD_PUT(FEEDBACK_DRIFT_LIMITS_BALANCE, p[BUS_PARAMETER_SIGNAL_BALANCE]));
-    grating_write(axis, FEEDBACK_QUADRATURE_LIMITS, FIELD_PUT(FEEDBACK_QUADRATURE_LIMITS_QUADRATURE_ERROR, p[BUS_PARAMETER_SIGNAL_QUADRATURE_ERROR]) |
+    feedback_write(axis, FEEDBACK_QUADRATURE_LIMITS, FIELD_PUT(FEEDBACK_QUADRATURE_LIMITS_QUADRATURE_ERROR, p[BUS_PARAMETER_SIGNAL_QUADRATURE_ERROR]) |
                                                FIELD_PUT(FEEDBACK_QUADRATURE_LIMITS_SIGN_THRESHOLD, p[BUS_PARAMETER_SIGNAL_SIGN_THRESHOLD]));
 }
 
@@ -172,11 +172,11 @@ static void apply(unsigned axis, uint8_t id)
     case BUS_PARAMETER_DISAGREEMENT_LIMIT: axis_write(axis, AXIS_DISAGREEMENT_LIMIT, value); break;
     case BUS_PARAMETER_ENCODER_FAULT_MASK: axis_write(axis, AXIS_ENCODER_FAULT_MASK, value); break;
     case BUS_PARAMETER_PWM_FREQUENCY: actuator_write(axis, ACTUATOR_PWM_PERIOD, saturate(node_read(NODE_CLK_HZ) / value, ACTUATOR_PWM_PERIOD_MASK)); break;
-    case BUS_PARAMETER_WATCHDOG_TIME: line_write(BUS_WATCHDOG_TIME, value); break;
+    case BUS_PARAMETER_WATCHDOG_TIME: bus_write(BUS_WATCHDOG_TIME, value); break;
     case BUS_PARAMETER_POSITION_SOURCE:
     case BUS_PARAMETER_DECODER_MODE: apply_source(axis); break;
-    case BUS_PARAMETER_VELOCITY_QUANTUM: grating_write(axis, FEEDBACK_VELOCITY_QUANTUM, value); break;
-    case BUS_PARAMETER_SIGNAL_FAULT_MASK: grating_write(axis, FEEDBACK_SIGNAL_FAULT_MASK, value); break;
+    case BUS_PARAMETER_VELOCITY_QUANTUM: feedback_write(axis, FEEDBACK_VELOCITY_QUANTUM, value); break;
+    case BUS_PARAMETER_SIGNAL_FAULT_MASK: feedback_write(axis, FEEDBACK_SIGNAL_FAULT_MASK, value); break;
     case BUS_PARAMETER_SIGNAL_CLIP_LEVEL:
     case BUS_PARAMETER_SIGNAL_TOLERANCE:
     case BUS_PARAMETER_SIGNAL_JUMP:

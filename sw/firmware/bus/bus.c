@@ -140,16 +140,16 @@ static uint8_t set_parameter(unsigned axis)
 
 static uint8_t counters(void)
 {
-    put(BUS_COUNTERS_REPLY_FRAMES_GOOD, line_read(BUS_FRAMES_GOOD), 4);
-    put(BUS_COUNTERS_REPLY_FRAMES_BAD, line_read(BUS_FRAMES_BAD), 4);
-    put(BUS_COUNTERS_REPLY_FRAMING_ERRORS, line_read(BUS_FRAMING_ERRORS), 4);
-    put(BUS_COUNTERS_REPLY_START_GLITCHES, line_read(BUS_START_GLITCHES), 4);
-    put(BUS_COUNTERS_REPLY_OVERRUNS, line_read(BUS_OVERRUNS), 4);
+    put(BUS_COUNTERS_REPLY_FRAMES_GOOD, bus_read(BUS_FRAMES_GOOD), 4);
+    put(BUS_COUNTERS_REPLY_FRAMES_BAD, bus_read(BUS_FRAMES_BAD), 4);
+    put(BUS_COUNTERS_REPLY_FRAMING_ERRORS, bus_read(BUS_FRAMING_ERRORS), 4);
+    put(BUS_COUNTERS_REPLY_START_GLITCHES, bus_read(BUS_START_GLITCHES), 4);
+    put(BUS_COUNTERS_REPLY_OVERRUNS, bus_read(BUS_OVERRUNS), 4);
     put(BUS_COUNTERS_REPLY_REPEATED, repeated, 4);
     put(BUS_COUNTERS_REPLY_REFUSED, refused, 4);
-    put(BUS_COUNTERS_REPLY_BREAKS, line_read(BUS_BREAKS), 4);
-    put(BUS_COUNTERS_REPLY_TRANSMIT_TIMEOUTS, line_read(BUS_TRANSMIT_TIMEOUTS), 4);
-    put(BUS_COUNTERS_REPLY_SYNCS, line_read(BUS_SYNCS), 4);
+    put(BUS_COUNTERS_REPLY_BREAKS, bus_read(BUS_BREAKS), 4);
+    put(BUS_COUNTERS_REPLY_TRANSMIT_TIMEOUTS, bus_read(BUS_TRANSMIT_TIMEOUTS), 4);
+    put(BUS_COUNTERS_REPLY_SYNCS, bus_read(BUS_SYNCS), 4);
     return BUS_CAUSE_OK;
 }
 
@@ -208,8 +208,8 @@ static uint8_t reset_faults(unsigned axis)
 static uint8_t signal(unsigned axis)
 {
     if (!hardware_has_sine(axis)) return BUS_CAUSE_NOT_BUILT;
-    put(BUS_SIGNAL_REPLY_FAULTS, grating_read(axis, FEEDBACK_SIGNAL_FAULTS), 2);
-    put(BUS_SIGNAL_REPLY_FIRST, grating_read(axis, FEEDBACK_FIRST_SIGNAL_FAULTS), 2);
+    put(BUS_SIGNAL_REPLY_FAULTS, feedback_read(axis, FEEDBACK_SIGNAL_FAULTS), 2);
+    put(BUS_SIGNAL_REPLY_FIRST, feedback_read(axis, FEEDBACK_FIRST_SIGNAL_FAULTS), 2);
     return BUS_CAUSE_OK;
 }
 
@@ -232,16 +232,16 @@ static uint8_t start_at_sync(uint32_t mask)
 {
     uint8_t cause = mask ? axis_may_start(axes, mask) : BUS_CAUSE_OK;
     if (cause != BUS_CAUSE_OK) return cause;
-    syncs = line_read(BUS_SYNCS);
-    line_write(BUS_SYNC_AXES, mask);
+    syncs = bus_read(BUS_SYNCS);
+    bus_write(BUS_SYNC_AXES, mask);
     sync_axes = mask;
     return BUS_CAUSE_OK;
 }
 
 static void poll_sync(void)
 {
-    if (!sync_axes || line_read(BUS_SYNCS) == syncs) return;
-    line_write(BUS_SYNC_AXES, 0);
+    if (!sync_axes || bus_read(BUS_SYNCS) == syncs) return;
+    bus_write(BUS_SYNC_AXES, 0);
     axis_started(axes, sync_axes);
     sync_axes = 0;
 }
@@ -295,13 +295,13 @@ static uint8_t own_address(void)
 
 static uint32_t crc_of(const uint8_t *bytes, uint32_t count)    // of what went before, and of these
 {
-    while (count--) line_write(BUS_CRC_BYTE, *bytes++);
-    return line_read(BUS_CRC);
+    while (count--) bus_write(BUS_CRC_BYTE, *bytes++);
+    return bus_read(BUS_CRC);
 }
 
 uint32_t bus_crc(const uint8_t *bytes, uint32_t count)
 {
-    line_write(BUS_CRC_START, BUS_CRC_START_START_MASK);
+    bus_write(BUS_CRC_START, BUS_CRC_START_START_MASK);
     return crc_of(bytes, count);
 }
 
@@ -344,7 +344,7 @@ static void frame(void)
 
 static void send(uint8_t data)
 {
-    line_write(BUS_TRANSMIT, data);
+    bus_write(BUS_TRANSMIT, data);
 }
 
 static void command_byte(uint8_t data)
@@ -356,7 +356,7 @@ static void command_byte(uint8_t data)
     receiving = (data & DIRECTION_MASK) == DIRECTION_TO_NODE;
     received = 0;
     if (!receiving) bytes += 1 + reply[0] + CRC_BYTES;
-    if (FIELD_GET(line_read(BUS_STATE), BUS_STATE_TRANSMIT_FREE) < bytes) return;    // silence, rather than half an current_reply
+    if (FIELD_GET(bus_read(BUS_STATE), BUS_STATE_TRANSMIT_FREE) < bytes) return;    // silence, rather than half an current_reply
     send(READY | (data & 0x3F));
     if (!receiving && followed != NO_AXIS) {                    // while the ready byte is under way
         current_reply = &reply[1];
@@ -373,7 +373,7 @@ void bus_start(unsigned served_axes)
     wrong_map = !hardware_map_fits();
     receiving = answered = reply_sent = false;
     followed = NO_AXIS;
-    line_write(BUS_SYNC_AXES, 0);
+    bus_write(BUS_SYNC_AXES, 0);
     sync_axes = 0;
     baud = BAUD;
     next_baud = 0;
@@ -390,13 +390,13 @@ static void switch_baud(uint32_t requested)
     baud = requested;
     next_baud = 0;
     last_command_ms = clock_ms();
-    breaks = line_read(BUS_BREAKS);
+    breaks = bus_read(BUS_BREAKS);
 }
 
 static void update_baud(void)
 {
-    if (next_baud && reply_sent && !FIELD_GET(line_read(BUS_STATE), BUS_STATE_SENDING)) switch_baud(next_baud);
-    else if (baud != BAUD && (clock_ms() - last_command_ms > BAUD_TIMEOUT_MS || line_read(BUS_BREAKS) != breaks)) switch_baud(BAUD);
+    if (next_baud && reply_sent && !FIELD_GET(bus_read(BUS_STATE), BUS_STATE_SENDING)) switch_baud(next_baud);
+    else if (baud != BAUD && (clock_ms() - last_command_ms > BAUD_TIMEOUT_MS || bus_read(BUS_BREAKS) != breaks)) switch_baud(BAUD);
 }
 
 void bus_poll(void)
@@ -404,7 +404,7 @@ void bus_poll(void)
     update_baud();
     poll_sync();
     for (uint32_t words = 0; words < WORDS_PER_POLL; words++) {
-        uint32_t word = line_read(BUS_RECEIVE);
+        uint32_t word = bus_read(BUS_RECEIVE);
         if (!FIELD_GET(word, BUS_RECEIVE_PRESENT)) return;
         uint8_t data = (uint8_t)FIELD_GET(word, BUS_RECEIVE_DATA);
         if (FIELD_GET(word, BUS_RECEIVE_COMMAND)) {

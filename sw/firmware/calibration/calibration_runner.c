@@ -73,8 +73,8 @@ static void record(unsigned n)
     if (!g->moving) return;
     if (g->phases && pass->spectra && near(pass->every, every)) every = pass->every;        // spectra of one pass are compared
     g->every = (uint16_t)every;
-    grating_write(n, FEEDBACK_RECORDER, FIELD_PUT(FEEDBACK_RECORDER_DECIMATION, every) | FIELD_PUT(FEEDBACK_RECORDER_PHASES, g->phases));
-    grating_write(n, FEEDBACK_STROBES, FEEDBACK_STROBES_RECORD_MASK);
+    feedback_write(n, FEEDBACK_RECORDER, FIELD_PUT(FEEDBACK_RECORDER_DECIMATION, every) | FIELD_PUT(FEEDBACK_RECORDER_PHASES, g->phases));
+    feedback_write(n, FEEDBACK_STROBES, FEEDBACK_STROBES_RECORD_MASK);
 }
 
 static bool time_left(uint32_t began, uint32_t pieces)
@@ -89,7 +89,7 @@ static void burst_poll(unsigned n)
         record(n);
         return;
     }
-    uint32_t state = grating_read(n, FEEDBACK_RECORDER_STATE), every = every_now(n, g->phases);
+    uint32_t state = feedback_read(n, FEEDBACK_RECORDER_STATE), every = every_now(n, g->phases);
     if (state & FEEDBACK_RECORDER_STATE_FULL_MASK)
         g->recording = !calibration_open(&g->calibration, g->every, state & FEEDBACK_RECORDER_STATE_INVALID_MASK);
     else if (every == 0 || every > 2u * g->every || 2u * every < g->every)
@@ -102,7 +102,7 @@ static void words_poll(unsigned n)
     uint32_t began = node_read(NODE_TIME_STAMP_LOW), count = runners[n].phases ? CALIBRATION_WORDS : 1;
     for (uint32_t pieces = 0; calibration->need == CALIBRATION_NEEDS_WORDS && time_left(began, pieces); pieces++) {
         uint32_t words[CALIBRATION_WORDS];
-        for (uint32_t i = 0; i < count; i++) words[i] = grating_read(n, FEEDBACK_RECORDER_WORD);
+        for (uint32_t i = 0; i < count; i++) words[i] = feedback_read(n, FEEDBACK_RECORDER_WORD);
         calibration_take(calibration, words);
     }
 }
@@ -120,15 +120,15 @@ static void loading_poll(unsigned n)
     const struct calibration_values *values = &g->calibration.values;
     uint32_t began = node_read(NODE_TIME_STAMP_LOW);
     for (uint32_t pieces = 0; g->point < CALIBRATION_POINTS && time_left(began, pieces); pieces++, g->point++)
-        grating_write(n, FEEDBACK_HARMONIC_POINT, FIELD_PUT(FEEDBACK_HARMONIC_POINT, calibration_table_entry(values, g->point)) |
+        feedback_write(n, FEEDBACK_HARMONIC_POINT, FIELD_PUT(FEEDBACK_HARMONIC_POINT, calibration_table_entry(values, g->point)) |
                                                  FIELD_PUT(FEEDBACK_HARMONIC_POINT_POINT, g->point));
     if (g->point < CALIBRATION_POINTS) return;
     g->point = 0;
-    grating_write(n, FEEDBACK_CORRECTION_OFFSET, FIELD_PUT(FEEDBACK_CORRECTION_OFFSET_SIN, values->sin_offset) |
+    feedback_write(n, FEEDBACK_CORRECTION_OFFSET, FIELD_PUT(FEEDBACK_CORRECTION_OFFSET_SIN, values->sin_offset) |
                                                 FIELD_PUT(FEEDBACK_CORRECTION_OFFSET_COS, values->cos_offset));
-    grating_write(n, FEEDBACK_CORRECTION_GAIN, FIELD_PUT(FEEDBACK_CORRECTION_GAIN, values->gain));
-    grating_write(n, FEEDBACK_CORRECTION_QUADRATURE_ERROR, FIELD_PUT(FEEDBACK_CORRECTION_QUADRATURE_ERROR, values->quadrature_error));
-    grating_write(n, FEEDBACK_STROBES, FEEDBACK_STROBES_LOAD_CORRECTION_MASK | FEEDBACK_STROBES_SWAP_HARMONICS_MASK);
+    feedback_write(n, FEEDBACK_CORRECTION_GAIN, FIELD_PUT(FEEDBACK_CORRECTION_GAIN, values->gain));
+    feedback_write(n, FEEDBACK_CORRECTION_QUADRATURE_ERROR, FIELD_PUT(FEEDBACK_CORRECTION_QUADRATURE_ERROR, values->quadrature_error));
+    feedback_write(n, FEEDBACK_STROBES, FEEDBACK_STROBES_LOAD_CORRECTION_MASK | FEEDBACK_STROBES_SWAP_HARMONICS_MASK);
     calibration_loaded(&g->calibration);
 }
 
@@ -141,9 +141,9 @@ void calibration_runner_start(unsigned n)
     g->waiting = calibration_identity;
     g->moving = false;
     restart(g);
-    grating_write(n, FEEDBACK_HARMONIC_ENABLE, 1);
-    grating_write(n, FEEDBACK_CAPTURE_SOURCES, 0);
-    grating_write(n, FEEDBACK_STROBES, FEEDBACK_STROBES_CAPTURE_CLEAR_MASK | FEEDBACK_STROBES_COMPARE_DISARM_MASK);
+    feedback_write(n, FEEDBACK_HARMONIC_ENABLE, 1);
+    feedback_write(n, FEEDBACK_CAPTURE_SOURCES, 0);
+    feedback_write(n, FEEDBACK_STROBES, FEEDBACK_STROBES_CAPTURE_CLEAR_MASK | FEEDBACK_STROBES_COMPARE_DISARM_MASK);
     feedback_clear_signal_faults(n);
 }
 
@@ -228,7 +228,7 @@ uint8_t calibration_runner_set_correction(unsigned n, const struct calibration_v
 
 void feedback_clear_signal_faults(unsigned n)
 {
-    grating_write(n, FEEDBACK_STROBES, FEEDBACK_STROBES_CLEAR_SIGNAL_FAULTS_MASK);
+    feedback_write(n, FEEDBACK_STROBES, FEEDBACK_STROBES_CLEAR_SIGNAL_FAULTS_MASK);
 }
 
 uint8_t feedback_write_register(uint32_t offset, unsigned n, uint32_t value)
@@ -252,7 +252,7 @@ uint8_t feedback_write_register(uint32_t offset, unsigned n, uint32_t value)
     case FEEDBACK_COMPARE_STATE: break;
     default: return BUS_CAUSE_NO_SUCH_REGISTER;
     }
-    grating_write(n, offset, value);
+    feedback_write(n, offset, value);
     return BUS_CAUSE_OK;
 }
 

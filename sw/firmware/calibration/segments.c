@@ -36,7 +36,7 @@ static uint8_t required_use(unsigned n)
 
 static uint8_t in_force(unsigned n)
 {
-    return grating_read(n, FEEDBACK_SEGMENT_STATE) & FEEDBACK_SEGMENT_STATE_IN_FORCE_MASK ? tables[n].use : OFF;
+    return feedback_read(n, FEEDBACK_SEGMENT_STATE) & FEEDBACK_SEGMENT_STATE_IN_FORCE_MASK ? tables[n].use : OFF;
 }
 
 // ok, or why the use that is required_use is not in force.
@@ -51,9 +51,9 @@ static void put_in_force(unsigned n, uint8_t use)
 {
     int64_t first = parameters_get(n, BUS_PARAMETER_SEGMENT_FIRST) + (int64_t)homing_zero(n) * 65536;
     tables[n].use = use;
-    grating_write_wide(n, FEEDBACK_SEGMENT_ORIGIN, (uint64_t)first);
-    grating_write_wide(n, FEEDBACK_SEGMENT_LENGTH, (uint64_t)parameters_get(n, BUS_PARAMETER_SEGMENT_LENGTH));
-    grating_write(n, FEEDBACK_SEGMENT_USE, FIELD_PUT(FEEDBACK_SEGMENT_USE_ENABLE, 1) | FIELD_PUT(FEEDBACK_SEGMENT_USE_LINEAR, use == LINEAR) |
+    feedback_write_wide(n, FEEDBACK_SEGMENT_ORIGIN, (uint64_t)first);
+    feedback_write_wide(n, FEEDBACK_SEGMENT_LENGTH, (uint64_t)parameters_get(n, BUS_PARAMETER_SEGMENT_LENGTH));
+    feedback_write(n, FEEDBACK_SEGMENT_USE, FIELD_PUT(FEEDBACK_SEGMENT_USE_ENABLE, 1) | FIELD_PUT(FEEDBACK_SEGMENT_USE_LINEAR, use == LINEAR) |
                                           FIELD_PUT(FEEDBACK_SEGMENT_USE_SEGMENTS, parameters_get(n, BUS_PARAMETER_SEGMENT_COUNT)));
 }
 
@@ -64,7 +64,7 @@ void segments_start(unsigned served_axes)
     for (unsigned n = 0; n < axes; n++) {
         tables[n].loaded = 0;
         tables[n].use = OFF;
-        grating_write(n, FEEDBACK_SEGMENT_USE, 0);
+        feedback_write(n, FEEDBACK_SEGMENT_USE, 0);
     }
 }
 
@@ -77,7 +77,7 @@ void segments_work(void)
     uint8_t now = in_force(turn), use = axis_homed(turn) ? required_use(turn) : OFF;
     if (now == use) return;
     if (now != OFF) {
-        grating_write(turn, FEEDBACK_SEGMENT_USE, 0);
+        feedback_write(turn, FEEDBACK_SEGMENT_USE, 0);
         tables[turn].use = OFF;
     } else if (reason(turn) == BUS_CAUSE_BUSY) {
         put_in_force(turn, use);
@@ -95,7 +95,7 @@ static uint8_t segments(unsigned n)
 static uint8_t set_segments(unsigned n)
 {
     uint32_t border = (uint32_t)bus_request_field(BUS_SET_SEGMENTS_REQUEST_BORDER, 1), points = (uint32_t)bus_request_field(BUS_SET_SEGMENTS_REQUEST_POINTS, 1);
-    uint32_t most = FIELD_GET(grating_read(n, FEEDBACK_SEGMENT_STATE), FEEDBACK_SEGMENT_STATE_BUILT);
+    uint32_t most = FIELD_GET(feedback_read(n, FEEDBACK_SEGMENT_STATE), FEEDBACK_SEGMENT_STATE_BUILT);
     if (most == 0) return BUS_CAUSE_NOT_BUILT;
     if (required_use(n) != OFF || in_force(n) != OFF) return BUS_CAUSE_SEGMENTS_IN_USE;
     if ((border && border != tables[n].loaded) || points > POINTS || border + points > most + 1) return BUS_CAUSE_OUT_OF_RANGE;
@@ -103,7 +103,7 @@ static uint8_t set_segments(unsigned n)
     for (uint32_t i = 0; i < points; i++) {
         int32_t point = (int32_t)bus_request_field(BUS_SET_SEGMENTS_REQUEST_POINT_0 + 4 * i, 4);
         if (point > LARGEST || point < -LARGEST) return BUS_CAUSE_OUT_OF_RANGE;
-        grating_write(n, FEEDBACK_SEGMENT_POINT, FIELD_PUT(FEEDBACK_SEGMENT_POINT, point) | FIELD_PUT(FEEDBACK_SEGMENT_POINT_BORDER, border + i));
+        feedback_write(n, FEEDBACK_SEGMENT_POINT, FIELD_PUT(FEEDBACK_SEGMENT_POINT, point) | FIELD_PUT(FEEDBACK_SEGMENT_POINT_BORDER, border + i));
     }
     tables[n].loaded = (uint16_t)(border + points);
     return BUS_CAUSE_OK;
@@ -114,9 +114,9 @@ static uint8_t get_segments(unsigned n)
 {
     uint32_t border = (uint32_t)bus_request_field(BUS_GET_SEGMENTS_REQUEST_BORDER, 1);
     for (uint32_t i = 0; i < POINTS; i++) {
-        grating_write(n, FEEDBACK_SEGMENT_READ, border + i);
-        for (uint32_t poll = 0; poll < READ_BACK_POLLS && !(grating_read(n, FEEDBACK_SEGMENT_STATE) & FEEDBACK_SEGMENT_STATE_KNOWN_MASK); poll++) {}
-        bus_reply_field(BUS_GET_SEGMENTS_REPLY_POINT_0 + 4 * i, grating_read(n, FEEDBACK_SEGMENT_STORED), 4);
+        feedback_write(n, FEEDBACK_SEGMENT_READ, border + i);
+        for (uint32_t poll = 0; poll < READ_BACK_POLLS && !(feedback_read(n, FEEDBACK_SEGMENT_STATE) & FEEDBACK_SEGMENT_STATE_KNOWN_MASK); poll++) {}
+        bus_reply_field(BUS_GET_SEGMENTS_REPLY_POINT_0 + 4 * i, feedback_read(n, FEEDBACK_SEGMENT_STORED), 4);
     }
     return BUS_CAUSE_OK;
 }

@@ -22,7 +22,7 @@ static inline int64_t axis_read_position(unsigned axis, uint32_t offset)
 
 static inline bool hardware_has_sine(unsigned axis)
 {
-    return grating_read(axis, FEEDBACK_POSITION_SOURCE) & FEEDBACK_POSITION_SOURCE_SINE_MASK;
+    return feedback_read(axis, FEEDBACK_POSITION_SOURCE) & FEEDBACK_POSITION_SOURCE_SINE_MASK;
 }
 
 static inline bool hardware_map_fits(void)

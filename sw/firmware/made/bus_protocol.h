@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x51AFEE9Du    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0x08F93E09u    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u    // sequence, operation
@@ -793,7 +793,7 @@ enum bus_parameter {
     BUS_PARAMETER_POSITION_SOURCE = 49,    // position from: 0 phases of sine and cosine (needs SINE, else 1 is the default), 1 counts of A/B, 2 the axis' own steps
     BUS_PARAMETER_HOME_METHOD = 50,    // homing: CiA 402 methods 1, 2, 17, 18, 33, 34, 35, 37; -1 S0 (switch, way, phase zero), -2 S3 (index on either side)
     BUS_PARAMETER_HOME_OFFSET = 51,    // [1 period] what the zero that homing finds is called
-    BUS_PARAMETER_DRIVE = 52,    // drive: 0 bridge, 1 steps, 2 converter
+    BUS_PARAMETER_DRIVE = 52,    // drive: 0 bridge, 1 steps, 2 DAC
     BUS_PARAMETER_STEPS_PER_PERIOD = 53,    // [1/4294967296] steps: in one period; the sign turns the direction
     BUS_PARAMETER_STEP_HIGH = 54,    // [1e-9 s] steps: shortest pulse
     BUS_PARAMETER_STEP_LOW = 55,    // [1e-9 s] steps: shortest gap

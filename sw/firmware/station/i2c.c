@@ -78,7 +78,7 @@ static void take_answer(const struct i2c_transfer *t, uint32_t word)
 static void send_next(const struct i2c_transfer *t)
 {
     unsigned most = answered < 2u ? 2u : answered + AHEAD;
-    for (unsigned n = 0; n < PER_POLL && asked < most && asked < command_count(t); n++) links_write(PERIPHERALS_I2C, command_at(t, asked++));
+    for (unsigned n = 0; n < PER_POLL && asked < most && asked < command_count(t); n++) peripherals_write(PERIPHERALS_I2C, command_at(t, asked++));
 }
 
 void i2c_start(unsigned axes)
@@ -89,7 +89,7 @@ void i2c_start(unsigned axes)
         outcomes[n] = I2C_OK;
     }
     serving = I2C_CLIENTS;
-    links_write(PERIPHERALS_I2C, byte_command(RECOVER, 0));          // a device may have been left in the middle of a byte
+    peripherals_write(PERIPHERALS_I2C, byte_command(RECOVER, 0));          // a device may have been left in the middle of a byte
 }
 
 void i2c_begin(enum i2c_client client, const struct i2c_transfer *transfer)
@@ -105,17 +105,17 @@ enum i2c_outcome i2c_outcome(enum i2c_client client)
 void i2c_work(void)
 {
     if (serving == I2C_CLIENTS) {                               // what is left of a former life is thrown away
-        if (links_read(PERIPHERALS_I2C_ANSWER) & PERIPHERALS_I2C_ANSWER_PRESENT_MASK || links_read(PERIPHERALS_I2C_STATE) & PERIPHERALS_I2C_STATE_BUSY_MASK) return;
+        if (peripherals_read(PERIPHERALS_I2C_ANSWER) & PERIPHERALS_I2C_ANSWER_PRESENT_MASK || peripherals_read(PERIPHERALS_I2C_STATE) & PERIPHERALS_I2C_STATE_BUSY_MASK) return;
         next_client();
         if (serving == I2C_CLIENTS) return;
-        if (!(links_read(PERIPHERALS_BUILT) & PERIPHERALS_BUILT_I2C_MASK)) {
+        if (!(peripherals_read(PERIPHERALS_BUILT) & PERIPHERALS_BUILT_I2C_MASK)) {
             outcomes[serving] = I2C_ABSENT;
             return end_transfer();
         }
     }
     const struct i2c_transfer *t = transfers[serving];
     for (unsigned n = 0; n < PER_POLL && answered < asked; n++) {
-        uint32_t word = links_read(PERIPHERALS_I2C_ANSWER);
+        uint32_t word = peripherals_read(PERIPHERALS_I2C_ANSWER);
         if (!(word & PERIPHERALS_I2C_ANSWER_PRESENT_MASK)) break;
         take_answer(t, word);
     }
@@ -126,6 +126,6 @@ void i2c_work(void)
     if (answered < asked) return;
     if (closing) return end_transfer();
     closing = true;                                             // the device lets go of the bus
-    links_write(PERIPHERALS_I2C, byte_command(outcomes[serving] == I2C_ABSENT ? STOP : RECOVER, 0));
+    peripherals_write(PERIPHERALS_I2C, byte_command(outcomes[serving] == I2C_ABSENT ? STOP : RECOVER, 0));
     asked++;
 }

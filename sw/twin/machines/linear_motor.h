@@ -9,7 +9,7 @@
 #include "parts/incremental_scale.h"
 #include "parts/limit_switches.h"
 #include "machines/machine.h"
-#include "axis/parameters.h"
+#include "parameters.h"
 
 namespace twin {
 

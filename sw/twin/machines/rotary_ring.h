@@ -9,7 +9,7 @@
 #include <array>
 #include <cstdint>
 
-#include "axis/parameters.h"
+#include "parameters.h"
 
 namespace twin {
 

@@ -5,7 +5,7 @@
 #include "parts/incremental_scale.h"
 #include "parts/limit_switches.h"
 #include "machines/machine.h"
-#include "axis/parameters.h"
+#include "parameters.h"
 #include "parts/stepper_motor.h"
 
 namespace twin {

@@ -4,7 +4,7 @@
 #include "parts/angle_sensor.h"
 #include "parts/drivetrain.h"
 #include "machines/machine.h"
-#include "axis/parameters.h"
+#include "parameters.h"
 #include "parts/stepper_motor.h"
 
 namespace twin {

@@ -244,7 +244,7 @@ class Twin:
 
     def set_position(self, axis, position_m):
         """Carry the table here by hand: at rest, nothing wound up. The node sees a jump."""
-        self.machine(axis).place(position_m)
+        self.machine(axis).set_position(position_m)
 
     def push(self, axis, newton):
         """An outside force on the table, from now on."""

@@ -10,7 +10,7 @@
 #pragma once
 #include <cstdint>
 
-#include "axis/parameters.h"
+#include "parameters.h"
 #include "parts/random_source.h"
 #include "parts/scale_error.h"
 

@@ -14,7 +14,7 @@ public:
         hysteresis_ = p.switch_hysteresis;
         scatter_ = p.switch_scatter;
     }
-    void place(double position, RandomSource& random) {
+    void set_position(double position, RandomSource& random) {
         low_pressed = position < low_ - hysteresis_;
         high_pressed = position > high_ + hysteresis_;
         low_edge_ = next_low(random);

@@ -9,7 +9,7 @@
 #include <array>
 #include <cmath>
 
-#include "axis/parameters.h"
+#include "parameters.h"
 
 namespace twin {
 

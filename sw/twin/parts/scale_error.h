@@ -8,7 +8,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "axis/parameters.h"
+#include "parameters.h"
 #include "parts/random_source.h"
 
 namespace twin {

@@ -28,7 +28,7 @@ public:
         setup_cycles_ = clk(p.stepper_direction_setup);
         hold_cycles_ = clk(p.stepper_direction_hold);
     }
-    void place(double angle) {                                // the field where the rotor is
+    void set_position(double angle) {                             // the field where the rotor is
         origin_ = angle - double(steps) * microstep_;
         field_speed_ = 0;
     }

@@ -25,7 +25,7 @@ static uint32_t since_ms, begun_ms, typed;
 
 static uint32_t status(void)
 {
-    return links_read(PERIPHERALS_EDM_STATUS);
+    return peripherals_read(PERIPHERALS_EDM_STATUS);
 }
 
 static bool input(unsigned bit)
@@ -35,7 +35,7 @@ static bool input(unsigned bit)
 
 static bool queued(void)
 {
-    uint32_t ps2 = links_read(PERIPHERALS_PS2_STATE);
+    uint32_t ps2 = peripherals_read(PERIPHERALS_PS2_STATE);
     return FIELD_GET(ps2, PERIPHERALS_PS2_STATE_FREE) != QUEUE || ps2 & PERIPHERALS_PS2_STATE_INJECTING_MASK;
 }
 
@@ -47,7 +47,7 @@ static void go(enum edm_state to)
 
 static void take_keys_back(void)
 {
-    links_write(PERIPHERALS_PS2_STATE, PERIPHERALS_PS2_STATE_DROP_MASK);
+    peripherals_write(PERIPHERALS_PS2_STATE, PERIPHERALS_PS2_STATE_DROP_MASK);
 }
 
 static void fail(uint8_t with)
@@ -76,7 +76,7 @@ static bool longer_than(uint32_t ms)
 bool edm_built(void)
 {
     uint32_t needed = PERIPHERALS_BUILT_PS2_MASK | PERIPHERALS_BUILT_EDM_MASK;
-    return (links_read(PERIPHERALS_BUILT) & needed) == needed;
+    return (peripherals_read(PERIPHERALS_BUILT) & needed) == needed;
 }
 
 bool edm_cuts(void)
@@ -120,23 +120,23 @@ void edm_begin(void)
 {
     if (edm_alarms()) return fail(BUS_CAUSE_EDM_ALARM);
     if (!edm_rests()) return fail(BUS_CAUSE_EDM_BUSY);
-    links_write(PERIPHERALS_EDM_STATUS, PERIPHERALS_EDM_STATUS_ROSE_1_MASK);
-    typed = links_read(PERIPHERALS_PS2_TYPED);
+    peripherals_write(PERIPHERALS_EDM_STATUS, PERIPHERALS_EDM_STATUS_ROSE_1_MASK);
+    typed = peripherals_read(PERIPHERALS_PS2_TYPED);
     go(EDM_QUIET);
 }
 
 static void send_keys(void)
 {
-    links_write(PERIPHERALS_EDM_STATUS, PERIPHERALS_EDM_STATUS_ROSE_0_MASK);
+    peripherals_write(PERIPHERALS_EDM_STATUS, PERIPHERALS_EDM_STATUS_ROSE_0_MASK);
     for (unsigned n = 0; n < sizeof start_keys; n++)
-        links_write(PERIPHERALS_PS2_INJECT, FIELD_PUT(PERIPHERALS_PS2_INJECT_DATA, start_keys[n]) |
+        peripherals_write(PERIPHERALS_PS2_INJECT, FIELD_PUT(PERIPHERALS_PS2_INJECT_DATA, start_keys[n]) |
                                       FIELD_PUT(PERIPHERALS_PS2_INJECT_LAST, n + 1 == sizeof start_keys));
     go(MACHINE_KEYS_PENDING);
 }
 
 void edm_follow(void)
 {
-    links_write(PERIPHERALS_EDM_STATUS, PERIPHERALS_EDM_STATUS_ROSE_1_MASK);
+    peripherals_write(PERIPHERALS_EDM_STATUS, PERIPHERALS_EDM_STATUS_ROSE_1_MASK);
     begun();
 }
 
@@ -148,7 +148,7 @@ void edm_leave(void)
 
 static bool person_types(void)
 {
-    uint32_t now = links_read(PERIPHERALS_PS2_TYPED);
+    uint32_t now = peripherals_read(PERIPHERALS_PS2_TYPED);
     bool types = now != typed;
     typed = now;
     return types;

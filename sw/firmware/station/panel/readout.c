@@ -31,7 +31,7 @@ static uint32_t power_of_ten(uint32_t exponent)
 
 static void show(uint32_t digit, uint32_t code)
 {
-    links_write(PERIPHERALS_DISPLAY, (digit + 1) << 8 | code);
+    peripherals_write(PERIPHERALS_DISPLAY, (digit + 1) << 8 | code);
 }
 
 static void show_number(int64_t number, uint32_t decimals)
@@ -60,11 +60,11 @@ void readout_work(void)
 {
     if (clock_ms() - shown_ms < PERIOD_MS) return;
     shown_ms = clock_ms();
-    if (!(links_read(PERIPHERALS_BUILT) & PERIPHERALS_BUILT_DISPLAY_MASK)) return;
-    if (FIELD_GET(links_read(PERIPHERALS_DISPLAY_STATE), PERIPHERALS_DISPLAY_STATE_FREE) < WORDS) return;
+    if (!(peripherals_read(PERIPHERALS_BUILT) & PERIPHERALS_BUILT_DISPLAY_MASK)) return;
+    if (FIELD_GET(peripherals_read(PERIPHERALS_DISPLAY_STATE), PERIPHERALS_DISPLAY_STATE_FREE) < WORDS) return;
     uint32_t decimals = (uint32_t)settings_get(BUS_SETTING_READOUT_DECIMALS);
     int64_t position = axis_read_position(0, AXIS_POSITION), period = parameters_get(0, BUS_PARAMETER_PERIOD);
     int64_t pm = (position >> 16) * period + ((position & 0xFFFF) * period >> 16), unit = power_of_ten(PM_PER_MM_DIGITS - decimals);
-    for (uint32_t n = 0; n < WORDS - DIGITS; n++) links_write(PERIPHERALS_DISPLAY, set_up[n]);
+    for (uint32_t n = 0; n < WORDS - DIGITS; n++) peripherals_write(PERIPHERALS_DISPLAY, set_up[n]);
     show_number((pm < 0 ? pm - unit / 2 : pm + unit / 2) / unit, decimals);
 }

@@ -90,7 +90,7 @@ static void end(uint8_t phase, uint8_t cause)
 static void say(uint8_t what)
 {
     const uint8_t bytes[] = {HEAD, HEAD, what};
-    for (uint32_t n = 0; n < sizeof bytes; n++) links_write(PERIPHERALS_PEER_TRANSMIT, bytes[n]);
+    for (uint32_t n = 0; n < sizeof bytes; n++) peripherals_write(PERIPHERALS_PEER_TRANSMIT, bytes[n]);
 }
 
 // Of this sub-node: what was indexed last is in the journal.
@@ -159,7 +159,7 @@ static void send_frame(const uint8_t *body, uint32_t length)
 {
     uint8_t part[LONGEST_PART];
     uint32_t crc = bus_crc(body, length), whole = length + CRC_BYTES, code = 0;
-    if (FIELD_GET(links_read(PERIPHERALS_PEER_STATE), PERIPHERALS_PEER_STATE_TRANSMIT_FREE) < whole + 3u) return;      // silence, rather than half of it
+    if (FIELD_GET(peripherals_read(PERIPHERALS_PEER_STATE), PERIPHERALS_PEER_STATE_TRANSMIT_FREE) < whole + 3u) return;      // silence, rather than half of it
     for (uint32_t n = 0; n < whole; n++) {
         uint8_t byte = (uint8_t)(n < length ? body[n] : crc >> 8 * (n - length));
         part[n + 1] = byte;
@@ -168,9 +168,9 @@ static void send_frame(const uint8_t *body, uint32_t length)
         code = n + 1;
     }
     part[code] = (uint8_t)(whole + 1 - code);
-    links_write(PERIPHERALS_PEER_TRANSMIT, 0);
-    for (uint32_t n = 0; n <= whole; n++) links_write(PERIPHERALS_PEER_TRANSMIT, part[n]);
-    links_write(PERIPHERALS_PEER_TRANSMIT, 0);
+    peripherals_write(PERIPHERALS_PEER_TRANSMIT, 0);
+    for (uint32_t n = 0; n <= whole; n++) peripherals_write(PERIPHERALS_PEER_TRANSMIT, part[n]);
+    peripherals_write(PERIPHERALS_PEER_TRANSMIT, 0);
 }
 
 // In place, from the second byte on; the length of body and CRC-32, 0 if the codes do not lead to the end.
@@ -357,7 +357,7 @@ void peer_start(unsigned axes)
     replies.any = false;
     incoming.heads = 0;
     incoming.count = 0;
-    links_write(PERIPHERALS_PEER_BIT_TIME, (uint32_t)((sixteenths + BAUD / 2) / BAUD));
+    peripherals_write(PERIPHERALS_PEER_BIT_TIME, (uint32_t)((sixteenths + BAUD / 2) / BAUD));
 }
 
 void peer_work(void)
@@ -365,7 +365,7 @@ void peer_work(void)
     uint8_t used = mode();
     if (used == NOT_IN_USE || (used == LEGACY && store_state() == STORE_LOADING)) return;     // what comes waits in its queue
     for (uint32_t n = 0; n < BYTES_PER_POLL; n++) {
-        uint32_t received = links_read(PERIPHERALS_PEER_RECEIVE);
+        uint32_t received = peripherals_read(PERIPHERALS_PEER_RECEIVE);
         if (!(received & PERIPHERALS_PEER_RECEIVE_PRESENT_MASK)) break;
         uint8_t byte = (uint8_t)FIELD_GET(received, PERIPHERALS_PEER_RECEIVE_DATA);
         if (used == LEGACY)
@@ -381,7 +381,7 @@ void peer_work(void)
 
 uint8_t peer_turn_to(uint16_t station, uint32_t angle)
 {
-    if (!(links_read(PERIPHERALS_BUILT) & PERIPHERALS_BUILT_PEER_MASK)) return BUS_CAUSE_NOT_BUILT;
+    if (!(peripherals_read(PERIPHERALS_BUILT) & PERIPHERALS_BUILT_PEER_MASK)) return BUS_CAUSE_NOT_BUILT;
     if (mode() == NOT_IN_USE || role() != MAIN) return BUS_CAUSE_PEER_OFF;
     if (peer.phase == BUS_PEER_PHASE_TURNING) return BUS_CAUSE_BUSY;
     peer.phase = BUS_PEER_PHASE_TURNING;

@@ -28,7 +28,7 @@ static struct measurement {
 
 bool sensor_built(void)
 {
-    return links_read(PERIPHERALS_BUILT) & PERIPHERALS_BUILT_SENSOR_MASK;
+    return peripherals_read(PERIPHERALS_BUILT) & PERIPHERALS_BUILT_SENSOR_MASK;
 }
 
 void sensor_start(unsigned axes)
@@ -36,20 +36,20 @@ void sensor_start(unsigned axes)
     uint32_t clk_hz = node_read(NODE_CLK_HZ);
     (void)axes;
     cycles_per_ms = clk_hz / 1000u;
-    frames = links_read(PERIPHERALS_SENSOR_FRAMES);
+    frames = peripherals_read(PERIPHERALS_SENSOR_FRAMES);
     fresh_ms = clock_ms();
     word = changes = wrong_crc = broken = missed = 0;
     measurement = (struct measurement){0};
-    links_write(PERIPHERALS_SENSOR_BIT_TIME, (uint32_t)((16 * (uint64_t)clk_hz + BAUD / 2) / BAUD));
-    links_write(PERIPHERALS_SENSOR_GAP, clk_hz / BAUD * CHARACTER_BITS * GAP_CHARACTERS);
-    links_write(PERIPHERALS_SENSOR_ERRORS, PERIPHERALS_SENSOR_ERRORS_CLEAR_MASK);
+    peripherals_write(PERIPHERALS_SENSOR_BIT_TIME, (uint32_t)((16 * (uint64_t)clk_hz + BAUD / 2) / BAUD));
+    peripherals_write(PERIPHERALS_SENSOR_GAP, clk_hz / BAUD * CHARACTER_BITS * GAP_CHARACTERS);
+    peripherals_write(PERIPHERALS_SENSOR_ERRORS, PERIPHERALS_SENSOR_ERRORS_CLEAR_MASK);
 }
 
 static void count_errors(void)                  // before they reach their end
 {
-    uint32_t errors = links_read(PERIPHERALS_SENSOR_ERRORS);
+    uint32_t errors = peripherals_read(PERIPHERALS_SENSOR_ERRORS);
     if (errors == 0) return;
-    links_write(PERIPHERALS_SENSOR_ERRORS, PERIPHERALS_SENSOR_ERRORS_CLEAR_MASK);
+    peripherals_write(PERIPHERALS_SENSOR_ERRORS, PERIPHERALS_SENSOR_ERRORS_CLEAR_MASK);
     wrong_crc += FIELD_GET(errors, PERIPHERALS_SENSOR_ERRORS_CRC);
     broken += FIELD_GET(errors, PERIPHERALS_SENSOR_ERRORS_BROKEN);
     missed += FIELD_GET(errors, PERIPHERALS_SENSOR_ERRORS_MISSED);
@@ -66,9 +66,9 @@ static void measure(void)
 
 void sensor_work(void)
 {
-    uint32_t now = links_read(PERIPHERALS_SENSOR_FRAMES);
+    uint32_t now = peripherals_read(PERIPHERALS_SENSOR_FRAMES);
     if (now == frames) return;
-    uint64_t reading = links_read_wide(PERIPHERALS_SENSOR_READING);
+    uint64_t reading = peripherals_read_wide(PERIPHERALS_SENSOR_READING);
     frames = now;
     changes += word != (uint32_t)reading;
     word = (uint32_t)reading;
@@ -115,7 +115,7 @@ uint8_t sensor_operation(uint8_t operation)
     if (operation != BUS_OPERATION_SENSOR || !sensor_built()) return BUS_CAUSE_NOT_BUILT;
     count_errors();
     bus_reply_field(BUS_SENSOR_REPLY_ANGLE, angle_of(word), 4);
-    bus_reply_field(BUS_SENSOR_REPLY_AGE, links_read_wide(PERIPHERALS_SENSOR_READING) >> 32, 4);
+    bus_reply_field(BUS_SENSOR_REPLY_AGE, peripherals_read_wide(PERIPHERALS_SENSOR_READING) >> 32, 4);
     bus_reply_field(BUS_SENSOR_REPLY_TIMED_OUT, sensor_timed_out(), 1);
     bus_reply_field(BUS_SENSOR_REPLY_FRAMES, frames, 4);
     bus_reply_field(BUS_SENSOR_REPLY_WRONG_CRC, wrong_crc, 4);

@@ -128,7 +128,7 @@ def excite(axis: Axis, amplitude="20%", every="2ms", reach="1mm") -> Record:
     """A record of how the axis answers in open loop; it must be enabled and at rest, and ends held where it is."""
     scope = Scope(axis)
     scope.arm("now", every=every, level=reach, amplitude=amplitude)
-    return axis.guarded(scope.wait)
+    return axis.stopping_on_error(scope.wait)
 
 
 def lsb(record: Record) -> tuple:

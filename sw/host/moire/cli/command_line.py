@@ -23,6 +23,7 @@ from moire.bus.client import (
     whole,
 )
 from moire.bus.protocol import ADDRESSES
+from moire.bus.segments import Segments
 from moire.bus.transport import BAUD, PARITIES, open_bus
 from moire.cli import job as command_job
 from moire.cli import nonvolatile as command_keep
@@ -33,7 +34,6 @@ from moire.cli import segments as command_segments
 from moire.cli import turn as command_index
 from moire.cli import twin as command_twin
 from moire.cli import watch as command_look
-from moire.cli.segments import Segments
 from moire.errors import BadFile, BusError, MoireError, OutOfRange, PortError, Refused, UnitError
 from moire.made.bus_tables import PARAMETERS
 from moire.made.registers import FIELDS
@@ -635,7 +635,7 @@ def do_drive(session, command):
 
 def do_tune(session, command):
     from moire.analysis import tune
-    from moire.cli import scope
+    from moire.analysis import scope
 
     tick_s = float(command.tick or Fraction(1, session.bus.node(command.address).identity.tick_hz))
     if command.file is None:

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from moire.bus.client import CAUSE_CODES
-from moire.cli.job import Job, equal_parts, read_stations, said
+from moire.bus.job import Job, equal_parts, read_stations, said
 from moire.errors import BadFile, MotionFailed
 
 ANSWERS = ("again", "next", "resume", "stop")

@@ -6,7 +6,7 @@
 from pathlib import Path
 
 from moire.analysis import report
-from moire.cli.relay import Relay, Settings, make_set, terms_of
+from moire.bus.relay import Relay, Settings, make_set, terms_of
 from moire.errors import BadFile
 
 

@@ -3,7 +3,7 @@
 from dataclasses import asdict
 
 from moire import units
-from moire.cli.scope import SAMPLES, TRIGGERS, Scope
+from moire.analysis.scope import SAMPLES, TRIGGERS, Scope
 from moire.made.bus_tables import SCOPE_STATES
 
 

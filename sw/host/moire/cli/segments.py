@@ -3,7 +3,7 @@
 from dataclasses import asdict
 
 from moire.analysis import report
-from moire.cli.segments import USES, Segments, read_table, text_of
+from moire.bus.segments import USES, Segments, read_table, text_of
 from moire.units import format_length
 
 

@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x51AFEE9D
+PROTOCOL_CRC = 0x08F93E09
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -592,7 +592,7 @@ PARAMETERS = {parameter.name: parameter for parameter in (
               "what the zero that homing finds is called"),
     Parameter("drive", 52, "", Fraction(1, 1),
               0, 2, 0,
-              "drive: 0 bridge, 1 steps, 2 converter"),
+              "drive: 0 bridge, 1 steps, 2 DAC"),
     Parameter("steps_per_period", 53, "", Fraction(1, 4294967296),
               -140737488355328, 140737488355327, 0,
               "steps: in one period; the sign turns the direction"),
