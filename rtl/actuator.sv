@@ -69,15 +69,15 @@ module actuator #(
 
     // steps
     if (DRIVES[1]) begin : g_steps
-        wire               go, restart;
+        wire               go, restart, driven, allowed;
         wire signed [47:0] step_target;
         assign upward = direction ^ direction_low;
-        wire               blocked = target_velocity < 0 ? block_down : target_velocity > 0 && block_up;
 
-        step_follower u_follower (.clk, .rst, .ratio(step_ratio), .shift(trim_shift), .enable(enable && by_steps), .rebase, .tick, .target,
+        step_permission u_permission (.enable, .by_steps, .block_up, .block_down, .target_velocity, .driven, .allowed);
+        step_follower u_follower (.clk, .rst, .ratio(step_ratio), .shift(trim_shift), .enable(driven), .rebase, .tick, .target,
                                   .trim(command), .go, .restart, .position(step_target));
         step_generator #(.PERIOD_W(18)) u_steps (.clk, .rst, .period(tick_period[17:0]), .high_cycles, .low_cycles, .setup_cycles, .hold_cycles, .mode,
-                                                 .step_low, .direction_low, .enable(enable && by_steps && !blocked), .load(restart), .tick(go),
+                                                 .step_low, .direction_low, .enable(allowed), .load(restart), .tick(go),
                                                  .target(step_target), .step, .direction, .steps, .overrun(step_overrun));
     end else begin : g_no_steps
         assign {step, direction, upward, step_overrun, steps} = '0;

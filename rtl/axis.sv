@@ -72,7 +72,7 @@ module axis #(
     wire        [15:0] deglitch, amplitude_low, amplitude_high, dead_band;
     wire        [7:0]  outlier_step, outlier_hold;
     wire        [19:0] disagreement_limit;
-    wire        [4:0]  encoder_fault_mask;
+    wire        [5:0]  encoder_fault_mask;
     wire        [23:0] kp, ki, kd, kv, ka, segment_ticks;
     wire        [14:0] output_limit, integral_limit;
     wire signed [15:0] open_command;
@@ -93,7 +93,7 @@ module axis #(
     wire        [2:0]   edge_rejected;
     wire        [15:0]  phase, amplitude;
     wire signed [31:0]  quadrature_count, velocity;
-    wire        [4:0]   encoder_events;                         // in the order of axis_registers
+    wire        [5:0]   encoder_events;                         // in the order of axis_registers
     wire signed [47:0]  position;
     wire                moved;                                  // shift_origin, or the segment table coming into force
     wire signed [47:0]  moved_by;
@@ -161,7 +161,8 @@ module axis #(
         .sample_sin(16'(sin)), .sample_cos(16'(cos)), .phase_phase(phase), .phase_amplitude(amplitude), .quadrature_count,
         .encoder_events_illegal_edge(encoder_events[0]), .encoder_events_overspeed(encoder_events[1]),
         .encoder_events_amplitude_low(encoder_events[2]), .encoder_events_amplitude_high(encoder_events[3]),
-        .encoder_events_disagreement(encoder_events[4]), .encoder_fault_mask, .rejected_pulses(|edge_rejected), .rejected_samples(sample_rejected),
+        .encoder_events_disagreement(encoder_events[4]), .encoder_events_pulse_too_short(encoder_events[5]),
+        .encoder_fault_mask, .rejected_pulses(|edge_rejected), .rejected_samples(sample_rejected),
         .kp, .kp_written, .ki, .kd, .kd_written, .kv, .kv_written, .ka, .ka_written, .servo_limits_output(output_limit), .servo_limits_integral(integral_limit), .dead_band,
         .following_error(error), .command, .open_command, .filters_in_use, .filters_address, .filter_coefficient,
         .filter_coefficient_written,

@@ -35,7 +35,7 @@ module feedback_channel #(
     input  wire                  b,
     input  wire                  z,
     input  wire        [1:0]     probe,
-    input  wire                  own_step,      // pins of the axis itself, which may take the place of a and b
+    input  wire                  own_step,      // pins of the axis itself, which may be counted in place of a and b; not filtered
     input  wire                  own_direction,
     input  wire                  adc_sin,       // serial data, synchronous to adc_sclk
     input  wire                  adc_cos,
@@ -49,7 +49,7 @@ module feedback_channel #(
     output logic       [15:0]    phase,         // corrected
     output logic       [15:0]    amplitude,
     output logic signed [31:0]   quadrature_count,
-    output logic       [4:0]     events,        // in the order of axis_registers.encoder_events
+    output logic       [5:0]     events,        // in the order of axis_registers.encoder_events
     output logic                 signal_fault,  // level: a masked signal fault stands
     output logic                 position_valid,
     output logic signed [47:0]   position,      // Q32.16 periods, less the error of the segment table
@@ -86,17 +86,19 @@ module feedback_channel #(
     wire signed [23:0] segment_point;
 
     // decode
+    localparam [1:0]   PULSES = 2'd3;                           // decoder_mode: pulses and direction
     wire        [2:0]  levels;                                  // {z, b, a}, filtered
     wire signed [31:0] index_count;
     wire        [31:0] edge_time;
     wire               index_found, index_armed, illegal, revolution_wrong;
     wire signed [1:0]  quadrature_step;
     wire               direction, illegal_seen, illegal_fault, revolution_fault;
+    wire               too_short = mode == PULSES && !by_steps && edge_rejected[0];     // a step lost, where elsewhere it is a glitch
 
     incremental_encoder #(.FILTER_W(16)) u_encoder (.clk, .rst, .filter_skip, .filter_required(deglitch), .filter_tolerated, .mode, .index_low,
         .index_gate_mask(gate_mask), .index_gate(gate), .index_up, .index_down, .index_each, .index_clears(1'b0), .counts_per_revolution,
-        .illegal_enable(1'b0), .arm_index, .clear_flags(1'b0), .now, .a(by_steps ? own_step : a),
-        .b(by_steps ? !own_direction : b), .z, .count(quadrature_count), .step(quadrature_step), .direction,
+        .illegal_enable(1'b0), .arm_index, .clear_flags(1'b0), .now, .a, .b, .z,
+        .own(by_steps), .own_a(own_step), .own_b(!own_direction), .count(quadrature_count), .step(quadrature_step), .direction,
         .edge_time, .index_found, .index_armed, .index_count, .filtered(levels), .rejected(edge_rejected), .illegal, .illegal_seen, .illegal_fault,
         .revolution_wrong, .revolution_fault);
 
@@ -202,7 +204,7 @@ module feedback_channel #(
                                 .armed, .pulse(compare_pulse), .late, .passed);
 
     // registers
-    assign events       = {disagreement, signal_faults[1], signal_faults[0], overspeed, illegal};
+    assign events       = {too_short, disagreement, signal_faults[1], signal_faults[0], overspeed, illegal};
     assign signal_fault = |(signal_faults & signal_fault_mask);
 
     feedback_registers #(.SINE(SINE)) u_registers (.clk, .rst, .select, .write, .word, .wdata, .rdata,

@@ -72,7 +72,8 @@ module relay #(
     incremental_encoder #(.W(W), .TIME_W(1), .FILTER_W(8), .TOLERATED_W(1), .SKIP_W(1)) u_encoder
         (.clk, .rst, .filter_skip(1'b0), .filter_required, .filter_tolerated(1'b0), .mode(2'd0), .index_low, .index_gate_mask, .index_gate,
          .index_up(1'b1), .index_down(1'b1), .index_each(1'b1), .index_clears(1'b0), .counts_per_revolution(counts_per_turn),
-         .illegal_enable(1'b0), .arm_index(1'b0), .clear_flags(1'b0), .now(1'b0), .a, .b, .z, .count(unused_count), .step,
+         .illegal_enable(1'b0), .arm_index(1'b0), .clear_flags(1'b0), .now(1'b0), .a, .b, .z, .own(1'b0), .own_a(1'b0), .own_b(1'b0),
+         .count(unused_count), .step,
          .direction(unused_direction), .edge_time(unused_time), .index_found, .index_armed(unused_armed), .index_count(unused_index_count),
          .filtered, .rejected, .illegal, .illegal_seen(unused_seen), .illegal_fault(unused_illegal_fault), .revolution_wrong,
          .revolution_fault(unused_revolution_fault));

@@ -9,33 +9,64 @@ from tables import made_files
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "rtl" / "README.md"
 BEGIN, END = "<!-- modules -->", "<!-- /modules -->"
-COLUMNS = ["room", "module", "purpose", "latency", "rate", "source", "proved", "model", "test"]
+COLUMNS = ["directory", "module", "purpose", "latency", "model and test"]
+LONGEST_CELL = 160                   # characters of a cell without its links; details stay in the headers
+# A line of the facts begins with one of these keys; its further lines are indented.
+KEYS = set("""
+    latency rate accuracy exact source method model proved proof made built
+    again align anew angle answer armed body bound bounds brake bumpless bypass code copies crowded decay duty enable entry
+    expects faults finest fits flags frozen index joint jump law learns limit limits map modes moved off opposed options
+    overrun override passed place points quiet reading refresh request reset rounding safety scale segments set shift sign
+    slower sources spikes start strays table terms through timings used windup
+    """.split())
+REQUIRED = ("purpose", "latency", "model")
 
 
-def header(text):
-    """Name, purpose and facts from the comment at the head of a module; a fact may go on in indented lines."""
-    lines = []
-    for line in text.splitlines()[1:]:
+def header(text, where="header"):
+    """Name, purpose and facts from the comment at the head of a module: `name -- purpose`, then lines of `key text`, of which a
+    fact may go on in indented lines. Formulae are indented behind an empty line; a free sentence begins with a capital letter.
+    A ValueError names each line that is none of these."""
+    lines, wrong = [], []
+    for number, line in enumerate(text.splitlines()[1:], 2):
         if not line.startswith("//"):
             break
-        lines.append(line[2:].removeprefix(" ").rstrip())
-    first = re.match(r"(\w+) -- (.*)", lines[0]) if lines else None
-    facts, key = {"purpose": first.group(2)} if first else {}, "purpose"
-    for line in lines[1:]:
-        new = re.match(r"([a-z]+)\s{2,}(\S.*)", line)
-        if new:
-            key, words = new.groups()
-            words, both, rate = words.partition(" rate  ") if key == "latency" else (words, "", "")
-            facts[key] = words.strip()
-            if both:
-                facts["rate"], key = rate.strip(), "rate"
-        elif line.startswith("  ") and key:
-            facts[key] += " " + line.strip()
-        elif not line.strip():
+        lines.append((number, line[2:].removeprefix(" ").rstrip()))
+    first = re.match(r"(\w+) -- (.*)", lines[0][1]) if lines else None
+    facts, key = {"purpose": first.group(2)} if first else {}, "purpose" if first else None
+    for number, line in lines[1:]:
+        new = re.match(r"([a-z]\S*)\s+(\S.*)", line)
+        if not line:
             key = None
+        elif line.startswith("  "):
+            if key in facts:
+                facts[key] += " " + line.strip()
         elif key == "purpose":
-            facts[key] += " " + line.strip()
+            facts[key] += " " + line
+        elif key == "sentence" or (key is None and re.match(r"[A-Z`]", line)):
+            key = "sentence"
+        elif new and new.group(1) in KEYS:
+            key = new.group(1)
+            if key in facts:
+                wrong.append(f"{where}:{number}: the key `{key}` stands twice")
+            facts[key] = new.group(2)
+        else:
+            wrong.append(f"{where}:{number}: `{line.split()[0]}` is no known key of a header; tables/modules.py has the list")
+        if key == "latency":                                # the rate may stand in the same line
+            latency, both, rate = facts[key].partition(" rate  ")
+            if both:
+                facts["latency"], facts["rate"], key = latency.rstrip(), rate.strip(), "rate"
+    if wrong:
+        raise ValueError("\n".join(wrong))
     return first.group(1) if first else None, facts
+
+
+def brief(text):
+    """The first sentence of a fact, without what goes into detail behind a semicolon or a colon, if it is too long with that."""
+    sentence = re.split(r"(?<=\.) (?=[A-Z`])", text)[0].rstrip(".")
+    for border in (";", ":"):
+        if len(sentence) > LONGEST_CELL:
+            sentence = sentence.split(border + " ")[0]
+    return sentence
 
 
 def check_of(path):
@@ -57,7 +88,11 @@ def check_of(path):
 def row(path, wrong):
     """The cells of a module; what breaks a rule goes into `wrong`."""
     text, here = path.read_text(), path.relative_to(ROOT)
-    name, facts = header(text)
+    try:
+        name, facts = header(text, here)
+    except ValueError as why:
+        wrong.append(str(why))
+        return []
     model, test = check_of(path)
     named = re.search(r"tb/[\w/]+\.\w+", facts.get("model", ""))
     if facts.get("model", "").startswith("the models of its blocks"):        # wiring in a room
@@ -76,10 +111,17 @@ def row(path, wrong):
         wrong.append(f"{here}: its test {test or ''} is missing")
     if ("`ifdef FORMAL" in text) != ("proved" in facts):
         wrong.append(f"{here}: `proved` in the header and properties in the module go together")
+    for key in REQUIRED:
+        if key not in facts:
+            wrong.append(f"{here}: the header must tell its `{key}`")
+    purpose, latency = (brief(facts.get(key, "")) for key in ("purpose", "latency"))
+    for key, text in (("purpose", purpose), ("latency", latency)):
+        if len(text) > LONGEST_CELL:
+            wrong.append(f"{here}: `{key}` must begin with a sentence of at most {LONGEST_CELL} characters, it has {len(text)}")
     room = path.parent.name if path.parent != ROOT / "rtl" else ""
     link = lambda p: f"[{p.name}](../{p.as_posix()})" if p else ""
     place = path.relative_to(ROOT / "rtl").as_posix()
-    return [room, f"[{path.stem}]({place})", *(facts.get(c, "") for c in COLUMNS[2:7]), link(model), link(test)]
+    return [room, f"[{path.stem}]({place})", purpose, latency, ", ".join(filter(None, (link(model), link(test))))]
 
 
 def made() -> dict:

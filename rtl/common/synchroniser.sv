@@ -4,6 +4,8 @@
 // latency  STAGES clk                      rate  each bit by itself: bits of one word may arrive one clk apart
 // source   a row of flops; 2 stages below 100 MHz, 3 from there up
 // model    tb/common/synchroniser.py, equal in every bit of every cycle
+// proved   q is d of STAGES clk before, and RESET until a level taken after reset has come through
+// proof    W = 2, STAGES = 3, RESET = 1
 `default_nettype none
 
 module synchroniser #(
@@ -26,6 +28,22 @@ module synchroniser #(
         stages <= {stages[W*(STAGES-1)-1:0], d};
         if (rst) stages <= {STAGES{W'(RESET)}};
     end
+
+`ifdef FORMAL
+    logic              past = 1'b0;
+    logic [STAGES-1:0] taken;                   // q of 0, 1, … clk from now comes of a level, not of reset
+    always @(posedge clk) begin
+        past  <= 1'b1;
+        taken <= rst ? '0 : {taken[STAGES-2:0], 1'b1};
+        if (!past) assume (rst);
+        if (past) begin
+            for (int n = 0; n < STAGES; n++) if (!taken[n]) assert (stages[W*n +: W] == W'(RESET));
+            if (taken[STAGES-1]) assert (q == $past(d, STAGES));
+            else assert (q == W'(RESET));
+            cover (taken[STAGES-1] && q == 2 && $past(q) == 1);
+        end
+    end
+`endif
 endmodule
 
 `default_nettype wire

@@ -13,6 +13,8 @@
 //          change in bypass only
 // source   direct form I with first-order error feedback
 // model    tb/control/biquad_cascade.py, equal in every bit of every cycle
+// proved   a sample is taken only when ready said so, and not before the one taken last has come out; y changes only with valid
+// proof    depth 10
 `default_nettype none
 
 module biquad_cascade #(
@@ -147,6 +149,26 @@ module biquad_cascade #(
             filtering <= '0;
         end
     end
+
+`ifdef FORMAL
+    logic past = 1'b0;
+    logic owed;                                 // a sample was taken, its y has not come yet
+    always @(posedge clk) begin
+        past <= 1'b1;
+        owed <= !rst && (starts || (owed && !(state == STORE && last && term == NOW)));
+        if (!past) assume (rst);
+        if (past) begin
+            assert (state <= STORE && section < SECTIONS && term <= LAST_TERM);
+            if (state == STORE) assert (term == NOW || term == LAST_TERM);
+            assert (ready == (state == WAIT));
+            assert (owed == (state != WAIT && term == NOW));        // the terms of the past are added up after y
+            if (valid) assert ($past(owed));
+            if (!valid && !$past(rst)) assert (y == $past(y));
+            if (state == WAIT) assert (section == 0 && term == NOW);
+            cover (state == MULTIPLY && step == 3 && owed);
+        end
+    end
+`endif
 endmodule
 
 `default_nettype wire

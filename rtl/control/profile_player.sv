@@ -12,7 +12,7 @@
 //          rate from 0 to 100 % |velocity|, |acceleration| and |jerk| stay below those of the segments times rate,
 //          rate^2, rate^2; at 100 % each step is the mean of two of the profile. The lengths are those of the profile.
 //          Where the velocity itself steps between two segments, one step below 100 % may exceed it by half of that
-// rate's   way to `feed_fraction`: it changes by `slope` a tick at most, its change by `curve`, and it ends at the setting exactly,
+// override the rate goes to `feed_fraction`: it changes by `slope` a tick at most, its change by `curve`, and it ends at the setting exactly,
 //          whatever the setting did on the way; a profile begins at the setting
 // brake    from the step and the acceleration made last: the acceleration changes by stop_jerk a tick at most, a part of
 //          stop_jerk in the first and the last, is brought below stop_deceleration, and both end at zero

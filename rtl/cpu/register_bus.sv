@@ -5,6 +5,9 @@
 // source   the addresses of tables/registers.rdl: node at 0x000, line at 0x100, links at 0x200, axis n at 0x400 + n * 0x100,
 //          its grating at 0xC00 + n * 0x100, its actuator at 0x1400 + n * 0x100
 // model    tb/cpu/register_bus.py, equal in every bit of every cycle
+// proved   an access reaches at most one block, the one that holds its address, and none without select; rdata is the answer of
+//          the block that was selected one clk before, and 0 if there was none
+// proof    depth 4, AXES = 2
 `default_nettype none
 
 module register_bus #(
@@ -62,6 +65,24 @@ module register_bus #(
     end
 
     wire unused = &{1'b0, address[7:0]};
+
+`ifdef FORMAL
+    localparam int BLOCKS = 3 + 3 * AXES;
+    logic past = 1'b0;
+    wire  [BLOCKS-1:0]    chosen  = {actuator_select, feedback_select, axis_select, peripherals_select, bus_select, node_select};
+    wire  [32*BLOCKS-1:0] answers = {actuator_rdata, feedback_rdata, axis_rdata, peripherals_rdata, bus_rdata, node_rdata};
+    logic [BLOCKS-1:0]    chosen_q;
+    always @(posedge clk) begin
+        past     <= 1'b1;
+        chosen_q <= chosen;
+        assert ((chosen & (chosen - 1'b1)) == '0);
+        assert (select || chosen == '0);
+        assert (node_select == (select && block == 0) && bus_select == (select && block == 1));
+        for (int n = 0; n < BLOCKS; n++) if (past && chosen_q[n]) assert (rdata == answers[32*n +: 32]);
+        if (past && chosen_q == '0) assert (rdata == 0);
+        cover (past && chosen_q[BLOCKS-1] && chosen[0] && rdata == 3);
+    end
+`endif
 endmodule
 
 `default_nettype wire

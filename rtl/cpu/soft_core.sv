@@ -5,6 +5,9 @@
 // rate     an operation takes 3 clk, a memory access 5, a register access or a product 6, a quotient 40
 // source   PicoRV32, from the package pythondata_cpu_picorv32; its look-ahead address reaches the memory one clk early
 // model    tb/cpu/soft_core.py, the results of the program tb/cpu/core_test.c
+// proved   whatever the core does: an access that goes nowhere raises trap in the next clk, and trap stands until rst; select is a
+//          strobe, only of an access to a whole word of the registers, and never of an instruction
+// proof    depth 6, MEMORY_BYTES = 1024
 //
 // map      0000_0000 memory (start address 0, stack from its end), 8000_0000 registers (64 KiB, whole words only).
 //          Anything else, a misaligned access and an illegal instruction stop the core: trap stands until rst.
@@ -65,6 +68,23 @@ module soft_core #(
         // verilator lint_off PINCONNECTEMPTY
         .pcpi_valid(), .pcpi_insn(), .pcpi_rs1(), .pcpi_rs2(), .eoi(), .trace_valid(), .trace_data());
         // verilator lint_on PINCONNECTEMPTY
+
+`ifdef FORMAL
+    logic past = 1'b0;
+    always @(posedge clk) begin
+        past <= 1'b1;
+        if (!past) assume (rst);
+        if (past && !$past(rst)) begin
+            if ($past(mem_valid && !in_memory && !in_registers)) assert (trap);
+            if ($past(lost)) assert (trap);
+            assert (!(select && $past(select)));
+            if (select) assert (mem_valid && !in_memory && !mem_instr && (mem_wstrb == '0 || mem_wstrb == '1));
+            if (write && select) assert (mem_wstrb == '1);
+            assert (!(answered && lost && !$past(lost)));       // no access is both answered and lost
+            cover (mem_valid && in_memory && mem_instr);
+        end
+    end
+`endif
 endmodule
 
 `default_nettype wire

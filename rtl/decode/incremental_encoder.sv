@@ -2,11 +2,13 @@
 // incremental_encoder -- everything between the synchronised pins of an A/B/Z encoder and its count: filter, decoder, index,
 // flags, time of the last edge.
 //
-// latency  N samples of the filter and 2 clk from a, b, z to count and index_found
+// latency  N samples of the filter and 2 clk from a, b, z to count and index_found; 3 clk from own_a, own_b to count
 // rate     one edge per clk with the filter in bypass, else one edge of each level per N samples
+// own      levels that are made in clk have no disturbances, and may be shorter than the filter passes: with own = 1 own_a
+//          and own_b are counted in place of the filtered a and b. The filter goes on for a, b and z
 // source   the features of HostMot2's encoder counter, with N-of-M, more modes, direction and revolution checks added
 // model    tb/decode/incremental_encoder.py, equal in every bit of every cycle
-// proved   a fault only by an event after it was enabled; edge_time changes with a step of count and at no other time
+// proved   with own, the decoder gets own_a and own_b as they were 2 clk before, whatever the filter is set to; a fault only by an event after it was enabled; edge_time changes with a step of count and at no other time
 // proof    W = 4, TIME_W = 4, FILTER_W = 2, TOLERATED_W = 1, SKIP_W = 1
 `default_nettype none
 
@@ -39,6 +41,9 @@ module incremental_encoder #(
     input  wire                  a,         // levels, synchronous to clk
     input  wire                  b,
     input  wire                  z,
+    input  wire                  own,       // 1: own_a and own_b are counted, and gate the index; 0: a and b
+    input  wire                  own_a,     // levels made in clk, not filtered
+    input  wire                  own_b,
     output logic signed [W-1:0]  count,
     output logic signed [1:0]    step,
     output logic                 direction,   // as in quadrature_decoder
@@ -46,7 +51,7 @@ module incremental_encoder #(
     output logic                 index_found, // strobe
     output logic                 index_armed,
     output logic signed [W-1:0]  index_count,
-    output logic [2:0]           filtered,  // {z, b, a}, levels after the filter
+    output logic [2:0]           filtered,  // {z, b, a}, levels after the filter, whatever own is
     output logic [2:0]           rejected,  // {z, b, a}, strobes of the filter
     output logic                 illegal,   // strobe
     output logic                 illegal_seen, // flag: an illegal edge since clear_flags
@@ -54,7 +59,9 @@ module incremental_encoder #(
     output logic                 revolution_wrong, // strobe
     output logic                 revolution_fault // flag: a wrong revolution since clear_flags
 );
-    wire a_later, b_later, ready, stepping, clear;
+    wire        a_later, b_later, ready, stepping, clear;
+    logic [1:0] own_q;                      // {b, a}
+    wire  [1:0] counted = own ? own_q : filtered[1:0];
 
     event_filter #(.LEVELS(3), .W(FILTER_W), .TOLERATED_W(TOLERATED_W), .SKIP_W(SKIP_W)) u_filter
         (.clk, .rst, .skip(filter_skip), .required(filter_required), .tolerated(filter_tolerated), .level({z, b, a}),
@@ -64,10 +71,11 @@ module incremental_encoder #(
     index_latch #(.W(W), .CHECK(CHECK)) u_index
         (.clk, .rst, .active_low(index_low), .gate_mask(index_gate_mask), .gate(index_gate), .take_up(index_up), .take_down(index_down),
          .each(index_each), .clears(index_clears), .counts_per_revolution, .arm(arm_index), .probe(1'b0), .ready, .direction, .stepping,
-         .count, .a(filtered[0]), .b(filtered[1]), .z(filtered[2]), .a_later, .b_later, .clear, .armed(index_armed), .found(index_found),
+         .count, .a(counted[0]), .b(counted[1]), .z(filtered[2]), .a_later, .b_later, .clear, .armed(index_armed), .found(index_found),
          .index_count, .revolution_wrong);
 
     always_ff @(posedge clk) begin
+        own_q <= {own_b, own_a};
         if (stepping) edge_time <= now;
         illegal_seen     <= illegal || (illegal_seen && !clear_flags);
         illegal_fault    <= illegal_enable && (illegal || (illegal_fault && !clear_flags));
@@ -81,6 +89,7 @@ module incremental_encoder #(
 
 `ifdef FORMAL
     logic past = 1'b0;
+    logic [2:0] own_before;                 // {b, a} of own_q and own, one clk ago
     logic seen_enabled;                     // an illegal edge since the enable rose
     always @(posedge clk) begin
         past         <= 1'b1;
@@ -95,7 +104,10 @@ module incremental_encoder #(
             if (step != 0) assert (edge_time == $past(now));
             if ($past(illegal)) assert (illegal_seen);
             cover (index_found && step == -1);
+            cover (own && $past(own) && step == 1 && filter_required == 3);
         end
+        own_before <= {own_q, own};
+        if (past && own_before[0]) assert ({b_later, a_later} == own_before[2:1]);     // from here on the decoder counts them
         cover (illegal_fault);
     end
 `endif

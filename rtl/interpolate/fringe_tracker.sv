@@ -2,7 +2,8 @@
 // fringe_tracker -- the signed step from phase to phase, its whole periods found by foreseeing the next phase.
 //
 // latency  1 clk from valid to done, no lag in the step        rate  one phase per clk
-// foresees the last step again. Less than a quarter period from that: the step, at any speed below a period a sample.
+// method   The tracker predicts that the last step comes again. Less than a quarter period from that: the step, at any speed
+//          below a period a sample.
 // strays   Farther away it is an overspeed. The step still ends on the phase, and the next phase is awaited where it would
 //          be without this one, so one bad sample costs nothing but itself (below a quarter period a sample; proved there).
 //          A second one in a row, or a step of a period or more: the nearest step is taken, from then on as from standstill;

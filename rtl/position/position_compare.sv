@@ -12,7 +12,8 @@
 // model    tb/position/position_compare.py, equal in every bit of every cycle
 // proof    depth 16
 // proved   pulses and points passed are equal in number for ever; a pulse begins only when the farthest position has reached its
-//          point, and begins at once then unless one is running; every pulse has its length and its gap
+//          point, and begins at once then unless one is running; every pulse has its length and at least its gap behind it,
+//          whatever the lengths are and whenever they change: those count that stood as the pulse, or its gap, began
 `default_nettype none
 
 module position_compare (
@@ -117,6 +118,7 @@ module position_compare (
     logic        high;                          // pulse one clk ago
     logic [31:0] pulses;                        // that began since arm
     logic [23:0] high_for, low_for;             // clk that pulse has stood before this one, low_for stops at its end
+    logic [23:0] pulse_taken, gap_taken;        // lengths as the pulse, as its gap began; 0 acts as 1
     wire         rises = pulse && !high;
     wire  [31:0] pulses_now = pulses + 32'(rises);
     always @(posedge clk) begin
@@ -126,14 +128,17 @@ module position_compare (
         high_for <= rst || !pulse ? 0 : high_for + 1'b1;
         low_for  <= rst ? '1 : pulse ? 0 : low_for + !(&low_for);
         if (!past) assume (rst);
-        assume (pulse_length == 3 && gap_length == 2);
+        if (begins) pulse_taken <= pulse_length + 24'(pulse_length == 0);
+        if (rst)                      gap_taken <= 1;
+        else if (pulse && timer == 0) gap_taken <= gap_length + 24'(gap_length == 0);
         if (past) begin
             assert (pulses_now == passed);
             assert (!(pulse && resting));
-            if (high && !pulse) assert (high_for == 3);
-            if (rises) assert (low_for >= 2);
-            if (pulse) assert (timer < 3 && high_for == 2 - timer && high == (timer != 2));
-            else assert (resting ? timer < 2 && low_for == 1 - timer : low_for >= 2);
+            assert (gap_taken != 0 && (!pulse || pulse_taken != 0));
+            if (high && !pulse) assert (high_for == pulse_taken);
+            if (rises) assert (low_for >= gap_taken);
+            if (pulse) assert (timer < pulse_taken && high_for == pulse_taken - 1'b1 - timer && high == (high_for != 0));
+            else assert (resting ? timer < gap_taken && low_for == gap_taken - 1'b1 - timer : low_for >= gap_taken);
         end
         if (past && !$past(rst)) begin
             if (rises) begin
@@ -145,6 +150,8 @@ module position_compare (
                 assert (!(48'(reach - $past(reach)) >> 47));
             end
             cover (rises && late && passed == 2 && down);
+            cover (rises && low_for == 4 && gap_taken == 4 && late);
+            cover (high && !pulse && pulse_taken == 5);
             cover (!armed && passed == 2 && !pulse && !$past(disarm) && !$past(arm));
         end
     end

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // relay_store -- read the set of a relay from SPI flash at power-up: the first copy, and if that is broken the second.
 //
-// latency  from reset to the last byte 2048 + 65 (LENGTH + 5) clk a copy          rate  one bit per 8 clk
+// latency  2048 + 66 (LENGTH + 5) clk from reset to the last byte of the first copy; 2048 + 66 (LENGTH + 4) clk from `bad` to that of
+//          the second
+// rate     one bit per 8 clk, one byte per 66 clk
 // fits     any serial flash with command 03 (read, 24-bit address) and AB (wake), SPI mode 0: the chip that an iCE40 boots from
 // copies   who saves writes the second copy first, looks whether it stands, then the first: whenever power fails, one of the two
 //          is whole, and what is read is all old or all new

@@ -5,7 +5,8 @@
 // source   after a command byte `00 10 address`: length (1..LONGEST), body, CRC-32 over command, length and body, low byte first.
 //          Taking the CRC in as well leaves a constant remainder behind when all is right
 // model    tb/serial/frame_check.py, equal in every bit of every cycle
-// proved   each frame ends once: good, bad or unfinished; `good` only on the byte where its length says
+// proved   each frame ends once: good, bad or unfinished; `good` only on the byte where its length says, and only if all
+//          32 bits of the remainder are right
 //
 // Words pass while a payload is awaited or runs. After its end, after `00 01 address`, which has none, and after a broken
 // one, data words are dropped until the next command byte: a lost command byte of another node must not fill the queue.
@@ -100,6 +101,7 @@ module frame_check #(
             if (state == PAYLOAD) assert (length >= 1 && length <= 8'(LONGEST));
             if (state == PAYLOAD) assert (taken <= length + 8'd4 && taken + {1'b0, left} == length + 8'd4);
             assert (!(frame_good && frame_bad));
+            assert (frame_good == (ended && crc == 32'h2144DF1C));        // all bits of it
             if (good) assert (valid && !command && taken == length + 8'd5);
             if (frame_good) assert ($past(running) && !running);
             if (sync) assert (frame_good && to_all);

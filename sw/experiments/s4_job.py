@@ -38,7 +38,7 @@ PEER_BAUD = 115200
 NODE = {"DRIVES": 2, "FILTERS": 0, "SINE": 0}
 AXIS = {"drive": "steps", "position_source": "own_steps", "steps_per_period": 4, "counts_per_period": 4, "period": "1um",
         "velocity": "50mm/s", "acceleration": "200mm/s2", "jerk": "1000mm/s3", "homing_latch_speed": "0.4mm/s", "following_limit": "10mm",
-        "disagreement_limit": 0, "encoder_fault_mask": 0, "deglitch": 0, "kp": 0, "ki": 0, "kd": 0, "kv": 0, "ka": 0,
+        "disagreement_limit": 0, "encoder_fault_mask": 0, "kp": 0, "ki": 0, "kd": 0, "kv": 0, "ka": 0,
         "settle_window": "1um", "settle_time": "5ms", "step_high": "1us", "step_low": "1us", "watchdog_time": 0}
 WORM = {"worm_error": (4, 12), "worm_second_error": (0, 4), "worm_wheel_error": (5, 25), "worm_backlash": (5, 40)}     # arcsec
 CUT_S = 0.3

@@ -44,7 +44,7 @@ int main(int count, char **words) {
     Random random{std::strtoull(words[2], nullptr, 10) * 0x9E3779B97F4A7C15ULL + 1};
     auto context = std::make_unique<VerilatedContext>();
     auto pins = std::make_unique<Vtop>(context.get());
-    pins->filter_required = REQUIRED, pins->filter_skip = 0, pins->filter_tolerated = 0, pins->mode = 0;
+    pins->filter_required = REQUIRED, pins->filter_skip = 0, pins->filter_tolerated = 0, pins->mode = 0, pins->own = 0;
     pins->index_up = pins->index_down = pins->index_each = 1, pins->index_low = pins->index_clears = 0;
     pins->counts_per_revolution = PER_REVOLUTION, pins->illegal_enable = 1;
 

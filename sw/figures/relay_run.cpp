@@ -153,7 +153,7 @@ struct Relay {
     unsigned flags() { return ask(0)[0]; }
     Relay(int64_t counts, int64_t place) : counts(counts), place(place), counted(place) {
         pins.rs485_rx = pins.flash_sdi = 1, pins.rst = 1, show(), wait(4), pins.rst = 0;
-        wait(2 * (2048 + 65 * (4 * (7 + 2 * K) + 5)) + 1000);            // both copies of an empty flash
+        wait(2 * (2048 + 66 * (4 * (7 + 2 * K) + 5)) + 1000);            // both copies of an empty flash
         watch = true;
     }
     explicit Relay(const Ring &ring) : Relay(COUNTS, -8) {

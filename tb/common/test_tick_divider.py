@@ -7,7 +7,7 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from tb.bench import run, start
+from tb.bench import needs, run, start
 from tb.common.tick_divider import TickDivider
 
 
@@ -35,9 +35,9 @@ async def a_tick_comes_each_period_and_the_first_a_period_after_reset(dut):
 @cocotb.test()
 async def the_longest_period_is_exact(dut):
     longest = (1 << int(dut.W.value)) - 1
+    needs(longest < 1 << 10, "the longest period takes too long, and a narrow build shows as much")
     await start(dut, period=0, restart=0)
-    if longest < 1 << 10:
-        assert await ticks(dut, longest, 2 * longest) == [longest, 2 * longest]
+    assert await ticks(dut, longest, 2 * longest) == [longest, 2 * longest]
 
 
 @cocotb.test()

@@ -14,16 +14,17 @@ class Setup:
     tolerated: int = 0
     mode: int = 0
     illegal_enable: int = 0
+    own: int = 0
     index: Settings = field(default_factory=Settings)
 
 
 class IncrementalEncoder:
     def __init__(self, w=32, check=1):
         self.filter, self.decoder, self.index = EventFilter(3), QuadratureDecoder(w), IndexLatch(w, check)
-        self.clean, self.edge_time, self.illegal, self.wrong = [0, 0, 0], None, 0, 0
+        self.clean, self.own, self.edge_time, self.illegal, self.wrong = [0, 0, 0], [0, 0], None, 0, 0
         self.seen = self.fault = self.revolution = 0
 
-    def step(self, setup, a, b, z, now, arm=0, clear_flags=0, rst=0):
+    def step(self, setup, a, b, z, now, arm=0, clear_flags=0, rst=0, own_a=0, own_b=0):
         """One clk; the pins after it by name. edge_time is None while it means nothing."""
         later, decoder = self.index.later, self.decoder
         direction, moves, _ = decoder.look(later[0], later[1], setup.mode)
@@ -35,8 +36,10 @@ class IncrementalEncoder:
         self.fault = int(setup.illegal_enable and (self.illegal or (self.fault and not clear_flags)))
         self.revolution = int(self.wrong or (self.revolution and not clear_flags))
         count_before = decoder.count
+        levels = [*self.own, self.clean[2]] if setup.own else self.clean
+        self.own = [own_a, own_b]
         count, step, self.illegal = decoder.step(later[0], later[1], setup.mode, clear, rst)
-        armed, found, index_count, self.wrong = self.index.step(setup.index, self.clean, ready, direction, moves if ready else 0,
+        armed, found, index_count, self.wrong = self.index.step(setup.index, levels, ready, direction, moves if ready else 0,
                                                                 count_before, arm, rst)
         self.clean, rejected = self.filter.step(setup.skip, setup.required, setup.tolerated, [a, b, z], rst)
         if rst:

@@ -6,7 +6,7 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from tb.bench import run, start
+from tb.bench import needs, run, start
 from tb.decode.incremental_encoder import IncrementalEncoder, Setup
 from tb.decode.index_latch import Settings
 
@@ -24,33 +24,36 @@ class Bench:
         bench.dut, bench.setup, bench.now, bench.place = dut, setup or Setup(), 0, 0
         bench.model = IncrementalEncoder(int(dut.W.value), int(dut.CHECK.value))
         bench.put(levels)
-        await start(dut, a=levels[0], b=levels[1], z=levels[2], now=0)
+        await start(dut, a=levels[0], b=levels[1], z=levels[2], own_a=0, own_b=0, now=0)
         bench.model.step(bench.setup, *levels, 0, rst=1)
         bench.model.step(bench.setup, *levels, 0, rst=1)
         if ready:
             await bench.play([levels] * 12)
         return bench
 
-    def put(self, levels, rst=0, arm=0, clear_flags=0):
+    def put(self, levels, rst=0, arm=0, clear_flags=0, own=(0, 0)):
         dut, setup, index = self.dut, self.setup, self.setup.index
         values = {"filter_skip": setup.skip, "filter_required": setup.required, "filter_tolerated": setup.tolerated, "mode": setup.mode,
                   "index_low": index.active_low, "index_gate_mask": index.gate_mask, "index_gate": index.gate, "index_up": index.take_up,
                   "index_down": index.take_down, "index_each": index.each, "index_clears": index.clears,
                   "counts_per_revolution": index.counts_per_revolution, "illegal_enable": setup.illegal_enable, "arm_index": arm,
-                  "clear_flags": clear_flags, "now": self.now, "a": levels[0], "b": levels[1], "z": levels[2], "rst": rst}
+                  "clear_flags": clear_flags, "now": self.now, "a": levels[0], "b": levels[1], "z": levels[2],
+                  "own": setup.own, "own_a": own[0], "own_b": own[1], "rst": rst}
         for name, value in values.items():
             getattr(dut, name).value = value
 
-    async def play(self, rows, rst=0, arm=0, clear_flags=0):
-        """Levels (a, b, z), one row a clk; the strobes stand in the first of them. Returns the pins of each clk by name."""
+    async def play(self, rows, rst=0, arm=0, clear_flags=0, own=None):
+        """Levels (a, b, z), one row a clk; the strobes stand in the first of them. `own` are the node's own levels (a, b) in each
+        clk. Returns the pins of each clk by name."""
         out = []
         for clk, levels in enumerate(rows):
             self.now = (self.now + 1) % (1 << int(self.dut.TIME_W.value))
             strobes = {"arm": arm, "clear_flags": clear_flags} if clk == 0 else {}
-            self.put(levels, rst, **strobes)
+            own_now = own[clk] if own else (0, 0)
+            self.put(levels, rst, **strobes, own=own_now)
             await RisingEdge(self.dut.clk)
             await FallingEdge(self.dut.clk)
-            want = self.model.step(self.setup, *levels, self.now, rst=rst, **strobes)
+            want = self.model.step(self.setup, *levels, self.now, rst=rst, **strobes, own_a=own_now[0], own_b=own_now[1])
             got = {name: self.read(name) for name in want if want[name] is not None}
             wrong = {name: (value, want[name]) for name, value in got.items() if value != want[name]}
             assert not wrong, f"clk {clk}, {self.setup}: (design, model) {wrong}"
@@ -184,8 +187,7 @@ async def an_index_that_stands_at_power_up_and_new_settings_make_no_event(dut):
 
 @cocotb.test()
 async def counts_per_revolution_are_checked_at_any_number(dut):
-    if not int(dut.CHECK.value):
-        return
+    needs(int(dut.CHECK.value), "built without the check of revolutions")
     for per, clears in ((10, 0), (10, 1), (7, 0), (16, 1)):     # not a power of two, not even a whole period
         setup = Setup(index=EACH.but(counts_per_revolution=per, clears=clears))
         bench = await Bench.begin(dut, setup)
@@ -262,6 +264,30 @@ async def reset_in_mid_flow_makes_zero_of_where_it_is(dut):
 
 
 @cocotb.test()
+async def own_steps_of_one_clk_are_all_counted_whatever_the_filter_is_set_to(dut):
+    for required, skip in ((0, 0), (255, 0), (3, 200)):
+        bench = await Bench.begin(dut, Setup(skip=skip, required=required, tolerated=2, mode=3, own=1))
+        for down, steps, count in ((0, 7, 7), (1, 12, -5)):
+            own = [(0, down)] * 2 + [(1, down), (0, down)] * steps + [(0, down)] * 4
+            out = await bench.play([(0, 0, 0)] * len(own), own=own)
+            assert out[-1]["count"] == count and not any(row["rejected"] for row in out)
+
+
+@cocotb.test()
+async def latency_is_3_clk_from_own_a_to_count(dut):
+    bench = await Bench.begin(dut, Setup(required=200, own=1))
+    out = await bench.play([(0, 0, 0)] * 8, own=[(1, 0)] * 8)
+    assert [row["count"] for row in out].index(1) + 1 == 3
+
+
+@cocotb.test()
+async def the_pins_are_filtered_and_not_counted_while_own_steps_are(dut):
+    bench = await Bench.begin(dut, Setup(required=3, own=1))
+    out = await bench.play([(1, 0, 0)] * 2 + [(0, 0, 0)] * 6 + [(1, 0, 0)] * 8)
+    assert sum(row["rejected"] for row in out) == 1 and out[-1]["filtered"] == 1 and not any(row["count"] for row in out)
+
+
+@cocotb.test()
 async def any_pins_settings_and_strobes_match_the_model(dut):
     bench = await Bench.begin(dut)
     bits = random.getrandbits
@@ -270,7 +296,8 @@ async def any_pins_settings_and_strobes_match_the_model(dut):
         index = Settings(bits(1), bits(2) & bits(2), bits(2), bits(1) | bits(1), bits(1) | bits(1), bits(1), bits(1),
                          random.choice([0, 5, 8, 12]) % top)
         skip, required, tolerated = random.choice([0, 0, 1, 3]), random.choice([0, 1, 1, 2, 3]), random.choice([0, 0, 1, 2])
-        bench.setup = Setup(skip, required, tolerated, bits(2), bits(1), index)
+        own = random.random() < 0.3
+        bench.setup = Setup(skip, required, tolerated, bits(2), bits(1), int(own), index)
         if random.random() < 0.3:
             rows = [(bits(1), bits(1), bits(1)) for _ in range(60)]
         else:
@@ -281,7 +308,8 @@ async def any_pins_settings_and_strobes_match_the_model(dut):
                 place += way
                 rows += [(*TURN[place % 4], int(place % 12 in (0, 1)))] * clk
         for first in range(0, len(rows), 15):
-            await bench.play(rows[first:first + 15], rst=int(random.random() < 0.01), arm=bits(1), clear_flags=bits(1) & bits(1))
+            await bench.play(rows[first:first + 15], rst=int(random.random() < 0.01), arm=bits(1), clear_flags=bits(1) & bits(1),
+                             own=[(bits(1), bits(1)) for _ in range(15)])
 
 
 @pytest.mark.parametrize("w, time_w, check", [(32, 32, 1), (8, 16, 0)])

@@ -24,13 +24,6 @@ from twin.compiled.calibration import (
     library,
 )
 
-TOLD = {model.RUNNING: "learning", model.FROZEN: "frozen", model.STANDSTILL: "the scale stands still",
-        model.PARTIAL_CIRCLE: "too little motion: no whole circles", model.AMPLITUDE: "amplitude outside its window",
-        model.DISTORTED: "offset, gain or phase farther off than can be corrected", model.TOO_FAST: "fewer than eight samples a period",
-        model.UNSTEADY: "the speed changes too much",
-        model.ONE_SPEED: "all at one speed: a vibration locked to the fringe would not show",
-        model.VIBRATION: "vibration locked to the fringe: the bursts disagree"}
-
 
 def circle(turns, count=1024, size=0.8, gain=1.0, phase=0.0, offset=(0.0, 0.0)):
     """Samples (cos, sin) at equal steps over so many turns, full scale 2^15."""
@@ -206,7 +199,7 @@ def test_the_ellipse_is_refused(samples, spoiled, reason):
     before = machine.values
     for _ in range(2):
         got = machine.burst(words(samples), spoiled)
-    assert got == reason and machine.words() == TOLD[reason]
+    assert got == reason
     assert machine.values == before and machine.calibration.accepted == 0 and machine.calibration.refused >= 1 and machine.calibration.need == SAMPLES
     for _ in range(2):
         machine.burst(words(circle(3)))
@@ -227,7 +220,7 @@ def test_the_ellipse_is_refused(samples, spoiled, reason):
 def test_a_burst_of_phases_is_refused(phases, spoiled, reason):
     machine = fresh(complete=True)
     assert machine.phases(phases, spoiled) == reason == model.judge(phases, spoiled)[0]
-    assert machine.words() == TOLD[reason] and machine.calibration.pass_.bursts == 0 and machine.calibration.refused == 1
+    assert machine.calibration.pass_.bursts == 0 and machine.calibration.refused == 1
     assert machine.phases(line(-15)) == model.RUNNING and machine.calibration.pass_.bursts == 1
 
 
@@ -241,13 +234,13 @@ def test_a_vibration_locked_to_the_fringe_at_one_of_two_speeds_is_taken_off(mult
 def test_vibrations_locked_to_the_fringe_at_each_speed_are_refused():
     speeds = iter([600, 700] * 100)
     machine, *_ = signals.learn(3, (600, 700), speeds=lambda: next(speeds))
-    assert machine.calibration.reason == model.VIBRATION and machine.words() == TOLD[model.VIBRATION]
+    assert machine.calibration.reason == model.VIBRATION
     assert not machine.calibration.complete and not any(machine.values["cosine"])
 
 
 def test_one_speed_is_refused_since_a_locked_vibration_would_not_show():
     machine, *_ = signals.learn(3, 0, 0, speeds=lambda: 600)
-    assert machine.calibration.reason == model.ONE_SPEED and machine.words() == TOLD[model.ONE_SPEED]
+    assert machine.calibration.reason == model.ONE_SPEED
     assert not machine.calibration.complete and not any(machine.values["cosine"])
     draw = random.Random(1)
     machine.call("freeze", True)                                # a pass of the same signal from its start
@@ -256,11 +249,6 @@ def test_one_speed_is_refused_since_a_locked_vibration_would_not_show():
     for _ in range(model.PASS - 1):                             # what the pass was refused for stands while the next one runs
         assert machine.phases(line(draw.uniform(12, 18))) == model.ONE_SPEED
     assert machine.phases(line(15)) == model.RUNNING and machine.calibration.complete
-
-
-def test_every_reason_has_its_words():
-    assert {reason: library().calibration_words(reason).decode() for reason in range(10)} == TOLD
-    assert library().calibration_words(10) == b"unknown"
 
 
 # ---- read, freeze, store, restore
@@ -287,7 +275,7 @@ def test_frozen_values_stand_and_learning_goes_on_when_thawed():
     machine, _ = learned()
     values = machine.values
     machine.call("freeze", True)
-    assert machine.calibration.need == NOTHING and machine.words() == "frozen"
+    assert machine.calibration.need == NOTHING
     for periods in (12, 15, 18) * 20:
         machine.phases(line(periods))
     assert machine.values == values and machine.calibration.reason == model.FROZEN

@@ -470,10 +470,17 @@ def test_reset_without_a_fault_does_not_switch_the_drive_off():
     assert machine.status()["state"] == "holding" and machine.axes[0].strobes == []
 
 
+def test_a_pulse_that_was_too_short_is_a_fault_only_where_the_mask_says_so():
+    machine, short = FakeNode(), DEFINES["AXIS_ENCODER_EVENTS_PULSE_TOO_SHORT_MASK"]
+    assert machine.axes[0].word[DEFINES["AXIS_ENCODER_FAULT_MASK"]] & short == 0
+    machine.set(encoder_fault_mask=short)
+    assert machine.axes[0].word[DEFINES["AXIS_ENCODER_FAULT_MASK"]] == short == 32
+
+
 def test_reset_forgets_the_encoder_events():
     machine = FakeNode()
-    machine.axes[0].word[DEFINES["AXIS_ENCODER_EVENTS"]] = 0b10101
-    assert machine.status()["encoder_events"] == 0b10101
+    machine.axes[0].word[DEFINES["AXIS_ENCODER_EVENTS"]] = 0b110101
+    assert machine.status()["encoder_events"] == 0b110101
     machine.ask("reset_faults", axis=0)
     assert machine.status()["encoder_events"] == 0
 

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """cobs: stuffing against the published examples and its own inverse, and a reader that nothing can throw off."""
-import os
 import random
 from pathlib import Path
 
@@ -8,8 +7,9 @@ import pytest
 
 from moire.bus import cobs
 from moire.bus.protocol import FROM_NODE, TO_NODE, frame
+from tb.bench import seed
 
-SEED = int(os.environ.get("SEED") or 1)
+SEED = seed()
 BODY = b"\x07\x03\x00\x01"
 
 

@@ -4,7 +4,6 @@ and pseudo terminals of this computer."""
 import contextlib
 import io
 import json
-import os
 import random
 import socket
 import threading
@@ -22,10 +21,11 @@ from moire.bus.protocol import request_body
 from moire.bus.transport import CobsBus, SerialBus, open_bus
 from moire.cli import command_line
 from moire.errors import BusGarbled, MoireError, NoAnswer, PortError
+from tb.bench import seed
 from tb.fakes.fake_node import FakeBus, FakeNode
 
 pytestmark = pytest.mark.filterwarnings("ignore:set(Daemon|Name).. is deprecated:DeprecationWarning")      # in pyserial
-SEED = int(os.environ.get("SEED") or 1)
+SEED = seed()
 HANG_S = 60                      # what has not come by then never will
 
 

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """rfc2217: what RFC 854 and RFC 2217 say of single bytes; test_host_door has the stock client against it."""
-import os
 import random
 
 import pytest
 
 from moire.bus import rfc2217
+from tb.bench import seed
 
-SEED = int(os.environ.get("SEED") or 1)
+SEED = seed()
 IAC, SB, SE, COM_PORT = 0xFF, 0xFA, 0xF0, 44
 
 

@@ -7,7 +7,7 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from tb.bench import run, start
+from tb.bench import needs, run, start
 from tb.relay.relay_set import RelaySet, image
 
 SETTINGS = "counts_per_turn", "angle_per_count", "minimum_edge_separation", "radians_per_count", "hysteresis", "filter_required", "index_gate", \
@@ -124,8 +124,7 @@ async def counts_per_turn_outside_their_range_are_refused(dut):
 @cocotb.test()
 async def amplitudes_that_may_overflow_the_map_are_refused(dut):
     row = await Bytes(dut).reset()
-    if row.segments:
-        return
+    needs(not row.segments, "a table has no amplitudes")
     for sign in (1, -1):
         share, rest = divmod(2**29 - 1, row.k)
         sizes = [share] * (row.k - 1) + [share + rest]
@@ -142,8 +141,7 @@ async def amplitudes_that_may_overflow_the_map_are_refused(dut):
 @cocotb.test()
 async def points_of_128_counts_are_refused(dut):
     row = await Bytes(dut).reset()
-    if not row.segments:
-        return
+    needs(row.segments, "a map of harmonics has no points")
     for value, verdict in ((2**23 - 1, 1), (2**23, -1), (-2**23, 1), (-2**23 - 1, -1), (2**31 - 1, -1), (-2**31, -1)):
         for place in (0, 2 * row.k - 1):
             words = [0] * (2 * row.k)

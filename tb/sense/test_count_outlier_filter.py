@@ -69,13 +69,12 @@ async def a_gap_between_counts_changes_nothing(dut):
 @cocotb.test()
 async def it_lags_v_counts_going_up_and_one_less_going_down(dut):
     await begin(dut)
-    for v in (2, 3, 10, 31):
+    for v in (2, 3, 10):
         for sign, lag in ((1, v), (-1, v - 1)):
             await again(dut)
             counts = [sign * v * n for n in range(-50, 10) if sign * v * n in range(-120, 121)]
             seen = await feed(dut, [counts[0]] * 2 + counts)
-            if len(counts) > 12:
-                assert abs(counts[-1] - seen[-1]) == lag
+            assert abs(counts[-1] - seen[-1]) == lag
 
 
 @cocotb.test()

@@ -3,6 +3,7 @@
 
 The filter is its model, which test_address_filter holds equal to the design in every clk."""
 import random
+import zlib
 from itertools import combinations
 
 import cocotb
@@ -124,6 +125,35 @@ async def no_flip_of_one_or_two_bits_is_ever_good_and_the_next_frame_is(dut):
         assert (await line.hear([(b & 255, b >> 8) for b in bent]))[1] == 0, f"flipped (word, bit): {flip}"
         if len(flip) == 1 or k % 10 == 0:
             assert (await line.hear(words))[1] == 1, f"the frame after the flipped (word, bit): {flip}"
+
+
+def with_remainder_off(words, bit):
+    """The words with a CRC that leaves a remainder with just this bit wrong. The remainder is linear in the flips of the four CRC
+    bytes, so those flips are found by elimination."""
+    data = bytes(word[0] for word in words)
+    remainder = lambda flips: zlib.crc32(data[:-4] + (int.from_bytes(data[-4:], "little") ^ flips).to_bytes(4, "little"))
+    base, rows = remainder(0), {}                           # rows: {highest bit of a change of the remainder: (change, flips)}
+    for n in range(32):
+        change, flips = remainder(1 << n) ^ base, 1 << n
+        while change.bit_length() in rows:
+            row = rows[change.bit_length()]
+            change, flips = change ^ row[0], flips ^ row[1]
+        rows[change.bit_length()] = change, flips
+    change, flips = 1 << bit, 0
+    while change:
+        row = rows[change.bit_length()]
+        change, flips = change ^ row[0], flips ^ row[1]
+    assert remainder(flips) ^ base == 1 << bit
+    return words[:-4] + [(byte, 0) for byte in (int.from_bytes(data[-4:], "little") ^ flips).to_bytes(4, "little")]
+
+
+@cocotb.test()
+async def each_of_the_32_bits_of_the_remainder_is_compared(dut):
+    line = await begin(dut)
+    for bit in range(32):
+        words = frame(0x25, random.randbytes(random.choice((1, 5, 64))))
+        assert (await line.hear(with_remainder_off(words, bit)))[1:] == (0, 1), f"bit {bit}"
+        assert (await line.hear(words))[1:] == (1, 0)
 
 
 @cocotb.test()

@@ -8,7 +8,7 @@ import pytest
 from cocotb.triggers import FallingEdge
 
 from moire.made.registers import FIELDS
-from tb.bench import run, seed, start
+from tb.bench import needs, run, seed, start
 
 TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]                 # a leads b: up
 QUARTER = 1 << 14
@@ -196,8 +196,9 @@ async def shift_moves_the_origin_by_whole_periods_also_together_with_an_edge(dut
 
 
 @cocotb.test()
-async def own_steps_come_back_as_counts_up_while_the_direction_is_high(dut):
+async def own_steps_come_back_as_counts_up_while_the_direction_is_high_whatever_the_edge_filter_is_set_to(dut):
     bench = await Bench.begin(dut, mode=3, steps=1)
+    dut.deglitch.value = 1000
     place = 0
     for direction in (1, 0, 0, 1):
         dut.own_direction.value = direction
@@ -209,6 +210,41 @@ async def own_steps_come_back_as_counts_up_while_the_direction_is_high(dut):
             place += 1 if direction else -1
         await bench.go([])
         assert bench.position() == place * QUARTER
+
+
+PULSE_TOO_SHORT = 5                                     # of encoder_events
+
+
+async def pulses(dut, pulse, gap, number=20):
+    """Pulses of a so many clk long and apart; how many of the events pulse_too_short they raise."""
+    told = 0
+    for level, clk in [(1, pulse), (0, gap)] * number + [(0, 300)]:
+        dut.a.value = level
+        for _ in range(clk):
+            await FallingEdge(dut.clk)
+            told += int(dut.events.value) >> PULSE_TOO_SHORT & 1
+    return told
+
+
+@cocotb.test()
+async def pulses_and_gaps_too_short_for_the_edge_filter_are_told_each(dut):
+    bench = await Bench.begin(dut, mode=3)
+    grbl = 244                                          # clk of 25 MHz: its pulses are high for 9.76 us
+    for needed, pulse, gap, counted, told in ((10, 10, 10, 20, 0), (10, 9, 30, 0, 20), (10, 30, 9, 1, 19),
+                                              (250, grbl, 756, 0, 20), (125, grbl, 756, 20, 0)):
+        dut.deglitch.value = needed
+        before = bench.position()
+        assert await pulses(dut, pulse, gap) == told
+        await bench.sample()
+        assert abs(bench.position() - before) == counted * QUARTER and counted + told == 20
+
+
+@cocotb.test()
+async def glitches_of_a_scale_and_of_pins_that_are_not_counted_raise_no_pulse_too_short(dut):
+    for mode, steps in ((0, 0), (1, 0), (2, 0), (3, 1)):
+        await Bench.begin(dut, mode=mode, steps=steps)
+        dut.deglitch.value = 10
+        assert await pulses(dut, 5, 30) == 0
 
 
 @cocotb.test()
@@ -228,8 +264,7 @@ async def reset_in_mid_flow_drops_the_edge(dut):
 
 @cocotb.test()
 async def with_a_segment_table_positions_captures_and_compare_points_are_on_the_corrected_scale(dut):
-    if not int(dut.SEGMENTS.value):
-        return
+    needs(int(dut.SEGMENTS.value), "built without a segment table")
     bench, errors = await Bench.begin(dut), [0, 900, -1500, 700]       # of three segments of 8 counts
     for border, error in enumerate(errors):
         await bench.write("segment_point", value=error & 0xFFFFFF, border=border)
@@ -273,8 +308,7 @@ async def with_a_segment_table_positions_captures_and_compare_points_are_on_the_
 
 @cocotb.test()
 async def a_shift_moves_the_segment_table_with_the_scale(dut):
-    if not int(dut.SEGMENTS.value):
-        return
+    needs(int(dut.SEGMENTS.value), "built without a segment table")
     bench = await Bench.begin(dut)
     for border, error in enumerate((0, 800)):
         await bench.write("segment_point", value=error, border=border)
@@ -301,8 +335,7 @@ async def the_register_tells_whether_sine_and_cosine_were_built(dut):
 
 @cocotb.test()
 async def without_sine_and_cosine_the_converter_rests_and_all_that_comes_of_it_is_zero(dut):
-    if int(dut.SINE.value):
-        return
+    needs(not int(dut.SINE.value), "built with sine and cosine")
     bench, source = await Bench.begin(dut), random.Random(seed())
     settings = ("correction_offset", "correction_gain", "correction_quadrature_error", "recorder", "signal_fault_mask", "lissajous_limits", "jump_limits",
                 "channel_limits", "drift_limits", "quadrature_limits", "harmonic_point", "harmonic_enable")

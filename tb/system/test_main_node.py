@@ -15,7 +15,7 @@ from twin.nodes.twin import Axis, Node
 MAIN, SUB = 0, 1                 # places
 NODE = {"DRIVES": 2, "FILTERS": 0, "SINE": 0}
 AXIS = {"period": "1um", "drive": "steps", "position_source": "own_steps", "steps_per_period": 4, "counts_per_period": 4,
-        "disagreement_limit": 0, "encoder_fault_mask": 0, "deglitch": 0, "kp": 0, "ki": 0, "kd": 0, "kv": 0, "ka": 0,
+        "disagreement_limit": 0, "encoder_fault_mask": 0, "kp": 0, "ki": 0, "kd": 0, "kv": 0, "ka": 0,
         "following_limit": "10mm", "velocity": "20mm/s", "acceleration": "100mm/s2", "jerk": "1000mm/s3", "homing_latch_speed": "0.2mm/s",
         "settle_window": "1um", "settle_time": "5ms", "watchdog_time": "60s"}
 AROUND = Devices(eeprom=True, keypad=True, display=True, keyboard=True, edm=True, table=SUB, parameters={"edm_cut_time": 0.3})

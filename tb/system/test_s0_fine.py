@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """S0 with its fine stage: RTL and firmware of a node, the stage with a piezo on its table, the host package."""
-import os
 
 import numpy as np
 import pytest
 
 from experiments.s0_fine import FINE, FineStage
 from moire.errors import MotionFailed
+from tb.bench import seed
 
-SEED = int(os.environ.get("SEED") or 1)
+SEED = seed()
 X = "X"
 BOUND_NM = 5.0
 ZERO_VOLT = 32768                    # code of the converter

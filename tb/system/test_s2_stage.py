@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """S2 as shipped: three stepper axes with scales in one node; and its counters in front of pulses from C++."""
-import os
 
 import pytest
 
 from experiments.s2_stage import SCALES, WORD, Stage
 from figures import s2s3 as figures_s2s3
+from tb.bench import seed
 
-SEED = int(os.environ.get("SEED") or 1)
+SEED = seed()
 NEAR = 4                                                        # counts within which a move settles
 
 
@@ -62,7 +62,7 @@ def test_without_a_scale_its_own_steps_are_the_position(stage):
     axis, number = stage.axes["Y"], stage.number("Y")
     axis.disable()
     for name, value in {"position_source": 2, "period": "5um", "steps_per_period": 4, "ki": 0, "home_method": 35, "home_offset": 0,
-                        "travel_low": "-10mm", "travel_high": "10mm"}.items():
+                        "travel_low": "-10mm", "travel_high": "10mm", "deglitch": "10us"}.items():     # longer than a step is high
         axis.set_parameter(name, value)
     axis.enable()
     axis.home()

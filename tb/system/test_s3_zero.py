@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """S3 as shipped: a linear motor behind its converter, RTL and firmware, and every way to find its zero."""
-import os
 import random
 
 import pytest
 
 from experiments import s3_zero
 from moire.errors import MotionFailed
+from tb.bench import seed
 
-SEED = int(os.environ.get("SEED") or 1)
+SEED = seed()
 AT_MARK = {"switch_low": -1.5e-3, "switch_high": 1.5e-3}       # switches near enough for a short test
 LOW, HIGH = -1500, 1500                                         # counts at which they open
 

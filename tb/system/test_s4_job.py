@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """S4's unattended job as experiments.s4_job runs it: small ones, and how it judges them."""
 import math
-import os
 import random
 
 import pytest
 
 from experiments.s4_job import MAIN, SUB, TOLERANCE, Cut, IndexingMachine, Outcome, Trouble, apart, random_stations, random_worm
 from moire.bus.job import JobState
+from tb.bench import seed
 
-SEED = int(os.environ.get("SEED") or 1)
+SEED = seed()
 NEAR_BY = 0.004                      # of a turn: stations 0.7 degree apart
 
 

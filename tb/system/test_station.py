@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A sub-node of S4 as it ships, image `station` on the RTL: its worm table in the twin goes to angles of its sensor."""
+import io
 import math
 import random
+import re
+from pathlib import Path
 
 import pytest
 
@@ -9,17 +12,19 @@ from moire.bus.client import Bus
 from moire.bus.indexing_table import TURN, IndexingTable
 from moire.bus.job import Job
 from moire.bus.settings import Settings
+from moire.cli import command_line
 from moire.made.bus_tables import CAUSES, FAULTS
 from tb.bench import seed
 from tb.firmware.test_firmware_peer import OPERATION, bodies, frame, look, turn_to
 from twin import Devices, Twin, TwinTransport, build
 from twin.nodes.twin import Axis, Node
 
+RECIPE = Path(__file__).resolve().parents[2] / "docs" / "indexing.md"
 SUB, MAIN = 0, 1                 # places
 ESTOP = next(bit for bit, (name, _) in FAULTS.items() if name == "estop")
 NODE = {"DRIVES": 2, "FILTERS": 0, "SINE": 0}
 AXIS = {"period": "1um", "drive": "steps", "position_source": "own_steps", "steps_per_period": 4, "counts_per_period": 4,
-        "disagreement_limit": 0, "encoder_fault_mask": 0, "deglitch": 0, "kp": 0, "ki": 0, "kd": 0, "kv": 0, "ka": 0,
+        "disagreement_limit": 0, "encoder_fault_mask": 0, "kp": 0, "ki": 0, "kd": 0, "kv": 0, "ka": 0,
         "following_limit": "10mm", "velocity": "20mm/s", "acceleration": "100mm/s2", "jerk": "1000mm/s3", "homing_latch_speed": "0.2mm/s",
         "settle_window": "1um", "settle_time": "5ms", "watchdog_time": "60s"}
 QUICK = {"turn_allowance": "40arcsec", "turn_take_up": "40arcsec", "turn_share": "0.7", "turn_settle": "50ms"}
@@ -113,3 +118,29 @@ def test_the_bytes_as_printed_turn_the_table_to_its_next_station(station):
     assert station.table.peer().phase == "turning" and station.table.wait().ended == "ok"
     station.twin.run(0.01)
     assert bytes(station.from_sub.take_heard()) == b"\xFF\xFF\x55" and abs(station.error(target)) <= 2
+
+
+class Kept(TwinTransport):
+    """The machine goes on when a call of the command line is over: nothing is closed."""
+
+    def close(self):
+        self.twin.run(0.01)
+
+
+def test_the_recipe_of_indexing_md_turns_the_table_as_it_is_printed():
+    commands = re.findall(r"^    moire (.+)$", RECIPE.read_text(), re.MULTILINE)
+    target = 3600 * 12.5
+    assert len(commands) == 3 and commands[-1].endswith("turn to 12.5deg")
+    nodes = [Node(1, []), Node(2, [Axis("worm_table")], Devices(eeprom=True))]
+    with Twin(nodes, seed=seed() % 1000, node_parameters=NODE, firmware=build.firmware("station"), clk_hz=1_840_000) as twin:
+        twin.set_position(1, math.radians(12.3))                   # near, so that the way is short
+        twin.run(0.1)
+        before = twin.truth(1)
+        for command in commands:
+            out, err = io.StringIO(), io.StringIO()
+            assert command_line.main(command.split(), lambda options: Kept(twin), out, err) == 0, err.getvalue()
+        told = twin.truth(1)
+        assert told.steps - before.steps > 3000 and told.lost_steps == 0
+        assert abs(math.degrees(told.position_rad) * 3600 - target) <= 2
+        axis = Bus(TwinTransport(twin)).axis(2)
+        assert axis.get_parameter("deglitch").written() == "10us" and axis.status().faults == ()

@@ -8,7 +8,6 @@ import pytest
 from twin import Machine
 
 ARC_SECOND = math.pi / 180 / 3600
-PULSE = 0.18 * ARC_SECOND
 TURN = 40_000                    # pulses of a turn of the worm: 2 degree
 
 

@@ -161,23 +161,6 @@ static int64_t root_of(int64_t square)
     return root;
 }
 
-const char *calibration_words(enum calibration_reason reason)
-{
-    static const char *const words[CALIBRATION_REASONS] = {
-        [CALIBRATION_RUNNING] = "learning",
-        [CALIBRATION_FROZEN] = "frozen",
-        [CALIBRATION_STANDSTILL] = "the scale stands still",
-        [CALIBRATION_PARTIAL_CIRCLE] = "too little motion: no whole circles",
-        [CALIBRATION_AMPLITUDE] = "amplitude outside its window",
-        [CALIBRATION_DISTORTED] = "offset, gain or phase farther off than can be corrected",
-        [CALIBRATION_TOO_FAST] = "fewer than eight samples a period",
-        [CALIBRATION_UNSTEADY] = "the speed changes too much",
-        [CALIBRATION_ONE_SPEED] = "all at one speed: a vibration locked to the fringe would not show",
-        [CALIBRATION_VIBRATION] = "vibration locked to the fringe: the bursts disagree",
-    };
-    return reason < CALIBRATION_REASONS ? words[reason] : "unknown";
-}
-
 // ---- the ellipse
 
 void calibration_ellipse_start(struct calibration_ellipse *ellipse)

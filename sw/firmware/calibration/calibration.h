@@ -97,8 +97,6 @@ struct calibration {
 
 extern const struct calibration_values calibration_identity;            // corrects nothing
 
-const char *calibration_words(enum calibration_reason reason);
-
 void calibration_start(struct calibration *calibration);                    // from reset: nothing is known
 void calibration_forget(struct calibration *calibration);                   // the same, but window, limit and counters stay
 bool calibration_restore(struct calibration *calibration, const struct calibration_values *values);     // false: out of range, nothing changed

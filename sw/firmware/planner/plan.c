@@ -47,7 +47,8 @@ void plan_advance(struct planner_progress *at, uint32_t ticks)
     at->tick += ticks;
 }
 
-void plan_settle(const struct plan *plan, struct planner_progress *at, uint8_t *next)
+// What begins at the instant of this slot, which may be a copy of the plan's own.
+static void plan_settle(const struct plan *plan, struct planner_progress *at, uint8_t *next)
 {
     if (plan->stepped) {
         const struct planner_segment *section = &plan->section[*next];
@@ -91,20 +92,4 @@ bool plan_walk(const struct plan *plan, struct planner_progress *at, uint8_t *ne
 bool planner_take_up_to(struct plan *plan, struct planner_segment *piece, bool *last, uint32_t longest)
 {
     return plan_walk(plan, &plan->at, &plan->next, piece, last, longest);
-}
-
-bool planner_take(struct plan *plan, struct planner_segment *piece, bool *last)
-{
-    return planner_take_up_to(plan, piece, last, PLANNER_LONGEST_PIECE);
-}
-
-struct planner_state planner_state_after(const struct plan *plan, uint32_t ticks)
-{
-    struct planner_progress at = plan->at;
-    struct planner_segment piece;
-    uint8_t next = plan->next;
-    bool last;
-    while (ticks && plan_walk(plan, &at, &next, &piece, &last, ticks)) ticks -= piece.ticks;
-    plan_settle(plan, &at, &next);
-    return at.state;
 }

@@ -9,9 +9,6 @@ void plan_clear(struct plan *plan);                                         // n
 bool plan_refuse(struct plan *plan, enum planner_cause cause);              // false
 void plan_add(struct plan *plan, uint32_t tick, struct planner_event event);
 
-// What begins at the instant of this place, which may be a copy of the plan's own.
-void plan_settle(const struct plan *plan, struct planner_progress *at, uint8_t *next);
-
 // So many ticks on, in which nothing changes.
 void plan_advance(struct planner_progress *at, uint32_t ticks);
 

@@ -102,9 +102,6 @@ bool planner_stepped_move(struct plan *plan, const struct planner_stepped_profil
 // Where sections 2 and 3 begin, 2^-16 of the way from first to top. S4: 1/6 and 1/2, which is 1:2:3; 1/6 and 1/3 as its paper prints it.
 void planner_stepped_borders(struct planner_stepped_profile *stepped, uint32_t second, uint32_t third);
 
-// Where the plan is when `ticks` more than those taken have been played.
-struct planner_state planner_state_after(const struct plan *plan, uint32_t ticks);
-
 // The plan that goes on from where `plan` is when `ticks` more than those taken have been played, which must not be its end, to
 // rest at `distance` (2^-16 period) from where `plan` began. false: refused, made->cause says why. It takes its time, so it calls
 // `meanwhile` now and then, if that is not null; this may take pieces of `plan`.
@@ -113,8 +110,5 @@ bool planner_retarget(struct plan *made, const struct plan *plan, uint32_t ticks
 
 // The next piece to queue, of so many ticks at most; *last tells that the plan ends with it. false: nothing is left.
 bool planner_take_up_to(struct plan *plan, struct planner_segment *piece, bool *last, uint32_t longest);
-
-// The same, as long as the player takes them.
-bool planner_take(struct plan *plan, struct planner_segment *piece, bool *last);
 
 #endif

@@ -62,7 +62,6 @@ def library():
                            check=True)
             os.replace(made, LIBRARY)
     loaded = ctypes.CDLL(str(LIBRARY))
-    loaded.calibration_words.restype = ctypes.c_char_p
     loaded.calibration_restore.restype = loaded.calibration_values_fit.restype = loaded.calibration_open.restype = c_bool
     loaded.calibration_table_entry.restype = c_int32
     return loaded
@@ -106,6 +105,3 @@ class CalibrationRun:
     def phases(self, phases, spoiled=False, every=1):
         """The same from single phases: calibration_recorder packs two into a word."""
         return self.burst([later << 16 | earlier for earlier, later in zip(phases[::2], phases[1::2])], spoiled, every)
-
-    def words(self):
-        return library().calibration_words(self.calibration.reason).decode()

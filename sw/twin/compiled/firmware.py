@@ -74,7 +74,6 @@ def library(image="axis"):
             os.replace(made, result)
     loaded = ctypes.CDLL(str(result))
     loaded.planner_limits.restype = Limits
-    loaded.planner_move.restype = loaded.planner_take.restype = ctypes.c_bool
     loaded.planner_move.argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Limits), ctypes.c_int64]
     loaded.planner_retarget.argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Plan), ctypes.c_uint32, ctypes.POINTER(Limits),
                                         ctypes.c_int64, ctypes.c_void_p]
@@ -82,7 +81,6 @@ def library(image="axis"):
     loaded.planner_stepped_move.argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(SteppedProfile), ctypes.c_int64]
     loaded.planner_stepped_move.restype = ctypes.c_bool
     loaded.planner_stepped_borders.argtypes, loaded.planner_stepped_borders.restype = [ctypes.POINTER(SteppedProfile), ctypes.c_uint32, ctypes.c_uint32], None
-    loaded.planner_state_after.argtypes, loaded.planner_state_after.restype = [ctypes.POINTER(Plan), ctypes.c_uint32], State
     loaded.planner_feed_override.argtypes = [ctypes.POINTER(Limits), ctypes.POINTER(ctypes.c_uint32), ctypes.POINTER(ctypes.c_uint32)]
     loaded.planner_feed_override.restype = None
     loaded.planner_take_up_to.argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Segment), ctypes.POINTER(ctypes.c_bool), ctypes.c_uint32]

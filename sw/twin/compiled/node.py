@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A node without hardware: the registers as the firmware sees them, behind them a line, a clock and simple axes.
 
-An axis plays its profile exactly (the recursion of profile_player), its position follows the target by half the way each tick,
-a drive that is off stands, and a limit switch lets it slide a little into the blocked way. Faults latch as drive_interlock does it.
+The player adds up the segments as they were pushed, with no B-spline between their steps, no override and no limit of jerk: a brake
+takes stop_deceleration off the velocity each tick, and a profile starts at full speed. What rtl/control/profile_player.sv does beyond this
+is tested with its own model and with the RTL in tb/system. The position follows the target by half the way each tick, a drive that is
+off stands, and a limit switch lets it slide a little into the blocked way. Faults latch as drive_interlock does it.
 """
 import re
 import tomllib

@@ -256,11 +256,6 @@ uint8_t turn_ended(void)
     return turn.ended;
 }
 
-uint32_t turn_reading(void)
-{
-    return turn.now.angle;
-}
-
 uint8_t turn_operation(uint8_t operation)
 {
     if (operation == BUS_OPERATION_TURN_TO) return turn_to((uint32_t)bus_request_field(BUS_TURN_TO_REQUEST_ANGLE, 4));

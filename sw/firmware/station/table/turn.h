@@ -11,6 +11,5 @@ uint8_t turn_operation(uint8_t operation);
 
 uint8_t turn_to(uint32_t angle);       // a bus_cause at once: ok if it has begun
 uint8_t turn_ended(void);              // running, or how it ended
-uint32_t turn_reading(void);           // last angle that was read at rest
 
 #endif

@@ -29,10 +29,8 @@ PIECE = LONGEST_BODY - HEAD
 
 MARKER = 0x4D4F4900
 MOST_ORDERS = 32
-MOST_SEGMENTS = 64
 COUNTS = range(1609, (1 << 25) + 1)  # per turn
 GAIN = math.prod(math.sqrt(1 + 4.0**-n) for n in range(22))      # of the rotations in the relay
-LARGEST_POINT = (1 << 23) - 1
 LARGEST = (1 << 29) - 1              # of the amplitudes, summed as they are written
 ARCSEC_PER_TURN = 1_296_000
 
@@ -108,15 +106,6 @@ def make_set(terms, settings: Settings, orders: int) -> bytes:
     if (total := sum(abs(amplitude) for amplitude, _ in written)) > LARGEST:
         raise OutOfRange(f"the amplitudes are {total * GAIN / 65536:.0f} counts together; at most {LARGEST * GAIN / 65536:.0f} are taken")
     return packed(MARKER + orders, settings, [word for term in written + [(0, 0)] * (orders - len(written)) for word in term])
-
-
-def make_table(points, settings: Settings) -> bytes:
-    """The bytes of a set for a relay with a table: points are the errors in counts at equal distances, from the index once round."""
-    ranged(len(points), 2, MOST_SEGMENTS, "a number of segments")
-    if not all(math.isfinite(point) for point in points):
-        raise OutOfRange("a point of the table is no number")
-    words = [ranged(round(point * 65536), -LARGEST_POINT - 1, LARGEST_POINT, "a point of 2^-16 count") for point in points]
-    return packed(MARKER + 128 + len(points), settings, words + [0] * (len(words) % 2))
 
 
 def identity_of(whole: bytes) -> int:

@@ -634,8 +634,7 @@ def do_drive(session, command):
 
 
 def do_tune(session, command):
-    from moire.analysis import tune
-    from moire.analysis import scope
+    from moire.analysis import scope, tune
 
     tick_s = float(command.tick or Fraction(1, session.bus.node(command.address).identity.tick_hz))
     if command.file is None:

@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The seed is decided here once, before any worker of pytest-xdist starts."""
+import os
+
+from tb.bench import seed
+
+DRAWN = os.environ.get("SEED") == "random"
+SEED = seed()
+
+
+def pytest_terminal_summary(terminalreporter):
+    if DRAWN:
+        terminalreporter.write_line(f"SEED=random drew {SEED}. The same run again: SEED={SEED}")

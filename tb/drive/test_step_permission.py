@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""step_permission: all levels at the ends of every range of velocity, and random velocities, against the model."""
+import itertools
+import random
+
+import cocotb
+from cocotb.triggers import Timer
+
+from tb.bench import run
+from tb.drive.step_permission import permission
+
+LEVELS = ("enable", "by_steps", "block_up", "block_down")
+
+
+async def answer(dut, levels, velocity):
+    for name, level in zip(LEVELS, levels, strict=True):
+        getattr(dut, name).value = level
+    dut.target_velocity.value = velocity
+    await Timer(1, "ns")
+    return int(dut.driven.value), int(dut.allowed.value)
+
+
+@cocotb.test()
+async def nothing_goes_into_a_blocked_side_and_everything_away_from_it(dut):
+    assert await answer(dut, (1, 1, 1, 0), 1) == (1, 0)
+    assert await answer(dut, (1, 1, 1, 0), -1) == (1, 1)
+    assert await answer(dut, (1, 1, 0, 1), -1) == (1, 0)
+    assert await answer(dut, (1, 1, 0, 1), 1) == (1, 1)
+    assert await answer(dut, (1, 1, 1, 1), 0) == (1, 1)
+
+
+@cocotb.test()
+async def without_the_drive_or_with_another_kind_of_it_nothing_is_followed(dut):
+    for levels in ((0, 1, 0, 0), (1, 0, 0, 0), (0, 0, 0, 0)):
+        for velocity in (-1, 0, 1):
+            assert await answer(dut, levels, velocity) == (0, 0)
+
+
+@cocotb.test()
+async def all_levels_and_any_velocity_match_the_model(dut):
+    velocities = [-1 << 31, -1, 0, 1, (1 << 31) - 1, *(random.getrandbits(32) - (1 << 31) for _ in range(50))]
+    for levels in itertools.product((0, 1), repeat=len(LEVELS)):
+        for velocity in velocities:
+            assert await answer(dut, levels, velocity) == permission(*levels, velocity)
+
+
+def test_step_permission():
+    run("step_permission", __file__)
