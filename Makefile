@@ -31,10 +31,23 @@ test: $(SETUP) $(FIRMWARE)   ## all tests; K=part of a name, SIM=icarus|verilato
 check: fresh lint test prove  ## what every change must pass: made files fresh, lint, tests, proofs
 	@echo 'check: all passed'
 
-lint: $(SETUP)   ## verilator -Wall over every module, ruff over the Python
-	$(call say,lint: verilator -Wall over $(words $(RTL)) modules; ruff)
+lint: $(SETUP)   ## verilator -Wall over every module, ruff over the Python, the layout of all code
+	$(call say,lint: verilator -Wall over $(words $(RTL)) modules; ruff; the formatters)
 	@$(MAKE) -k -j$(JOBS) $(LINTED)
 	@$(PYTHON) -m ruff check -q --output-format concise .
+	@$(PYTHON) -m ruff format -q --check .
+	@$(CLANG_FORMAT) --dry-run -Werror $(C_SOURCES)
+	@$(VERIBLE) --verify $(SV_SOURCES)
+
+format: $(SETUP) ## lay out all code as `make lint` wants it
+	@$(PYTHON) -m ruff format -q .
+	@$(CLANG_FORMAT) -i $(C_SOURCES)
+	@$(VERIBLE) --inplace $(SV_SOURCES)
+
+C_SOURCES    = $(shell git ls-files '*.c' '*.h' '*.cpp' ':!sw/firmware/made')
+SV_SOURCES   = $(shell git ls-files '*.sv')
+CLANG_FORMAT = $(VENV)/bin/clang-format
+VERIBLE      = $(VENV)/bin/verible-verilog-format --flagfile=tools/verible.flags
 
 VERILATOR = VERILATOR_ROOT=$$(echo $(CURDIR)/$(VENV)/lib/python3*/site-packages/verilator); \
             $$VERILATOR_ROOT/bin/verilator_bin
@@ -92,4 +105,4 @@ clean:            ## remove what was built; the tools in build/venv stay (rm -rf
 $(SETUP): requirements.lock pyproject.toml sw/host/pyproject.toml tools/setup.sh
 	@tools/setup.sh
 
-.PHONY: help demo test check lint prove tables fresh firmware figure figures soak board clean
+.PHONY: help demo test check lint format prove tables fresh firmware figure figures soak board clean

@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Make rtl/interpolate/arctan_rotation_rom.sv: the angles by which arctan_pipelined and arctan_iterative turn, 2^-48 turn each.
+"""Make rtl/interpolate/arctan_rotation_rom.sv: the angles by which arctan_pipelined and
+arctan_iterative turn, 2^-48 turn each.
 
-Of the two legs of a vector the longer is turned to become the amplitude, the shorter until it is gone. Digit i turns by
-atan(2^-i) up to i = TURNS. Then q = shorter / longer is below h = 2^-TURNS, the longer leg stays, and digit i means 2^-i of q:
+Of the two legs of a vector the longer is turned to become the amplitude, the shorter until it is
+gone. Digit i turns by
+atan(2^-i) up to i = TURNS. Then q = shorter / longer is below h = 2^-TURNS, the longer leg stays,
+and digit i means 2^-i of q:
 atan(q) = q - q^3/3 is met by (1 - h^2/4) q within h^3/12.
 """
+
 import math
 import sys
 from fractions import Fraction
@@ -12,18 +16,25 @@ from pathlib import Path
 
 from tables import made_files
 
-PHASE = 16                              # bits of a phase; 2^PHASE = one turn
-UNIT = 48                               # the made angles are in 2^-UNIT turn
-LONGEST = 10                            # digits that have an angle of their own
+PHASE = 16  # bits of a phase; 2^PHASE = one turn
+UNIT = 48  # the made angles are in 2^-UNIT turn
+LONGEST = 10  # digits that have an angle of their own
 
-# width of a sample: TURNS, DIGITS, HEAD (fraction bits of the shorter leg + digits found + 1), GUARD bits below the LSB
-PIPELINED = {8: (8, 23, 19, 12), 9: (9, 27, 22, 15), 10: (10, 28, 24, 16)} | {w: (6, 22, 26 - w, 9) for w in range(11, 17)}
+# width of a sample: TURNS, DIGITS, HEAD (fraction bits of the shorter leg + digits found + 1),
+# GUARD bits below the LSB
+PIPELINED = {8: (8, 23, 19, 12), 9: (9, 27, 22, 15), 10: (10, 28, 24, 16)} | {
+    w: (6, 22, 26 - w, 9) for w in range(11, 17)
+}
 # width of a sample: TURNS, DIGITS, F fraction bits of both legs, GUARD
-ITERATIVE = {8: (7, 23, 12, 14), 9: (9, 27, 14, 16), 10: (9, 29, 16, 17)} | {w: (7, 22, 10, 11) for w in range(11, 17)}
+ITERATIVE = {8: (7, 23, 12, 14), 9: (9, 27, 14, 16), 10: (9, 29, 16, 17)} | {
+    w: (7, 22, 10, 11) for w in range(11, 17)
+}
 
 
 def angles_by_hand():
-    """pi by Machin and arctan by its series, in whole 2^-UNIT turns: no float stands behind the made numbers."""
+    """pi by Machin and arctan by its series, in whole 2^-UNIT turns: no float stands behind the
+    made numbers.
+    """
     one = 1 << UNIT + 32
 
     def arctan(inverse):
@@ -35,7 +46,9 @@ def angles_by_hand():
         return total
 
     turn = 8 * (4 * arctan(5) - arctan(239))
-    return [round(arctan(1 << i) / turn * (1 << UNIT)) for i in range(1, LONGEST + 1)], round((1 << UNIT) / turn)
+    return [round(arctan(1 << i) / turn * (1 << UNIT)) for i in range(1, LONGEST + 1)], round(
+        (1 << UNIT) / turn
+    )
 
 
 ANGLE, RADIAN = angles_by_hand()
@@ -48,29 +61,44 @@ def angle(digit, turns):
 
 
 def entry(turns, first, negative, count, guard):
-    """Sum of `count` digits from `first` on, each negative where its bit is set, in 2^-guard LSB; rounded, but the first digits' sum
+    """Sum of `count` digits from `first` on, each negative where its bit is set, in 2^-guard LSB;
+    rounded, but the first digits' sum
     is cut off and has half an LSB added for rounding the phase."""
-    total = sum(-angle(first + j, turns) if negative >> j & 1 else angle(first + j, turns) for j in range(count))
+    total = sum(
+        -angle(first + j, turns) if negative >> j & 1 else angle(first + j, turns)
+        for j in range(count)
+    )
     cut = UNIT - PHASE - guard
     return total + (1 << UNIT - PHASE - 1 if first == 1 else 1 << cut - 1) >> cut
 
 
 def groups(digits):
-    """(first, count) of the sums: the last two have five digits, those before them four, the first what is left."""
+    """(first, count) of the sums: the last two have five digits, those before them four, the first
+    what is left.
+    """
     head = (digits - 11) % 4 + 1
-    return [(1, head), *((first, 4) for first in range(head + 1, digits - 9, 4)), (digits - 9, 5), (digits - 4, 5)]
+    return [
+        (1, head),
+        *((first, 4) for first in range(head + 1, digits - 9, 4)),
+        (digits - 9, 5),
+        (digits - 4, 5),
+    ]
 
 
 def bound(plan, w, radius, iterative=False):
-    """LSB from the true phase of a sample of this radius, in counts; what each cause may do at most, added up."""
+    """LSB from the true phase of a sample of this radius, in counts; what each cause may do at
+    most, added up.
+    """
     turns, digits, head, guard = plan
-    unit = (1 << PHASE) / math.tau                                  # LSB a radian
-    rest = unit * 2.0 ** -digits                                    # what is left across
-    cubic = unit * 2.0 ** (-3 * turns) / 11                         # h^3 / 12, and what stands behind it
-    table = (1 + (digits if iterative else len(groups(digits))) / 2) / (1 << guard)     # the made angles are rounded
-    if iterative:                                                   # half a unit in the longer leg at each turn, seen by later digits
-        cut = sum(2.0 ** -digit for digit in range(2, turns + 1)) / 2 * 2.0 ** -head
-    else:                                                           # one unit in the longer leg at each turn, half in the shorter after
+    unit = (1 << PHASE) / math.tau  # LSB a radian
+    rest = unit * 2.0**-digits  # what is left across
+    cubic = unit * 2.0 ** (-3 * turns) / 11  # h^3 / 12, and what stands behind it
+    table = (1 + (digits if iterative else len(groups(digits))) / 2) / (
+        1 << guard
+    )  # the made angles are rounded
+    if iterative:  # half a unit in the longer leg at each turn, seen by later digits
+        cut = sum(2.0**-digit for digit in range(2, turns + 1)) / 2 * 2.0**-head
+    else:  # one unit in the longer leg at each turn, half in the shorter after
         cut = 2.0 ** (1 - head) * (2 * (turns - 2) + (digits - turns - 1) / 2 + 1)
     return 0.5 + rest + cubic + table + unit * cut / (1.16 * radius)
 
@@ -86,7 +114,9 @@ def quarter_bound(plans, w):
 
 
 def text():
-    cases = "\n".join(f"            {i:<7}: angle = 64'd{ANGLE[i - 1]};" for i in range(1, LONGEST + 1))
+    cases = "\n".join(
+        f"            {i:<7}: angle = 64'd{ANGLE[i - 1]};" for i in range(1, LONGEST + 1)
+    )
     return f"""\
 // SPDX-License-Identifier: Apache-2.0
 // arctan_rotation_rom -- the sum of a few of the angles that a vector was turned by; made by tables/arctan_rotation.py, not to be edited.
@@ -139,8 +169,10 @@ endmodule
 
 
 def bounds():
-    return "\n".join(f"{w} bits: pipelined {quarter_bound(PIPELINED, w):.3f}, iterative {quarter_bound(ITERATIVE, w):.3f} LSB"
-                     for w in PIPELINED)
+    return "\n".join(
+        f"{w} bits: pipelined {quarter_bound(PIPELINED, w):.3f}, iterative {quarter_bound(ITERATIVE, w):.3f} LSB"
+        for w in PIPELINED
+    )
 
 
 def main(arguments=None) -> int:

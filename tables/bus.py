@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Makes of bus.toml the firmware's header, the host's tables and the made parts of the protocol page."""
+"""Makes of bus.toml the firmware's header, the host's tables and the made parts of the protocol
+page.
+"""
+
 import re
 import sys
 import tomllib
@@ -18,12 +21,39 @@ PAGE = ROOT / "docs" / "protocol.md"
 SIZES = {"u8": 1, "i8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "u64": 8, "i64": 8}
 REQUEST_HEAD = ["sequence u8", "operation u8"]
 REPLY_HEAD = ["sequence u8", "operation u8", "cause u8"]
-AXIS = "axis u8"    # first field of what asks an axis
-LISTS = ("cause", "fault", "encoder_event", "state", "flag", "calibration_reason", "signal_fault", "calibration_action", "scope_trigger",
-         "scope_state", "turn_phase", "peer_phase", "job_state", "job_action", "save_action", "job_flag")
-CODES = ("cause", "state", "calibration_reason", "calibration_action", "scope_trigger", "scope_state", "turn_phase", "peer_phase",
-         "job_state", "job_action", "save_action")                                           # numbers; the others are bits
-WORDS = ("cause", "fault", "job_state")                                            # lists whose words the firmware shows on its panel
+AXIS = "axis u8"  # first field of what asks an axis
+LISTS = (
+    "cause",
+    "fault",
+    "encoder_event",
+    "state",
+    "flag",
+    "calibration_reason",
+    "signal_fault",
+    "calibration_action",
+    "scope_trigger",
+    "scope_state",
+    "turn_phase",
+    "peer_phase",
+    "job_state",
+    "job_action",
+    "save_action",
+    "job_flag",
+)
+CODES = (
+    "cause",
+    "state",
+    "calibration_reason",
+    "calibration_action",
+    "scope_trigger",
+    "scope_state",
+    "turn_phase",
+    "peer_phase",
+    "job_state",
+    "job_action",
+    "save_action",
+)  # numbers; the others are bits
+WORDS = ("cause", "fault", "job_state")  # lists whose words the firmware shows on its panel
 
 
 def fields(head, declared):
@@ -48,14 +78,25 @@ class Bus:
         self.crc = zlib.crc32(text)
         self.version = table["version"]
         self.longest_body = table["longest_body"]
-        self.lists = {name: {key: tuple(value) for key, value in table[name].items()} for name in LISTS}
+        self.lists = {
+            name: {key: tuple(value) for key, value in table[name].items()} for name in LISTS
+        }
         self.operations = table["operation"]
         self.parameters, self.settings = table["parameter"], table["setting"]
-        self.values_crc = zlib.crc32(repr([(name, value["id"], value["unit"], value["lsb"], value["default"])
-                                           for name, value in [*self.parameters.items(), *self.settings.items()]]).encode())
+        self.values_crc = zlib.crc32(
+            repr(
+                [
+                    (name, value["id"], value["unit"], value["lsb"], value["default"])
+                    for name, value in [*self.parameters.items(), *self.settings.items()]
+                ]
+            ).encode()
+        )
         self.layouts = {}
         for name, operation in self.operations.items():
-            self.layouts[name] = (fields(REQUEST_HEAD, operation["request"]), fields(REPLY_HEAD, operation["reply"]))
+            self.layouts[name] = (
+                fields(REQUEST_HEAD, operation["request"]),
+                fields(REPLY_HEAD, operation["reply"]),
+            )
         self.check()
 
     def check(self):
@@ -66,7 +107,9 @@ class Bus:
         once("setting ids", [setting["id"] for setting in self.settings.values()])
         for name, (request, reply) in self.layouts.items():
             if max(request[1], reply[1]) > self.longest_body:
-                raise ValueError(f"bus.toml: operation {name} needs more than {self.longest_body} bytes")
+                raise ValueError(
+                    f"bus.toml: operation {name} needs more than {self.longest_body} bytes"
+                )
         for name, parameter in {**self.parameters, **self.settings}.items():
             if not parameter["min"] <= parameter["default"] <= parameter["max"]:
                 raise ValueError(f"bus.toml: the default of {name} is outside its range")
@@ -81,6 +124,7 @@ def once(what, numbers):
 
 
 # ------------------------------------------------------------------ firmware
+
 
 def header(bus: Bus) -> str:
     out = [
@@ -104,26 +148,42 @@ def header(bus: Bus) -> str:
         out += ["};", ""]
     for name in WORDS:
         out.append("// X(code, words), up to a colon")
-        out += macro(f"BUS_{name.upper()}_WORDS",
-                     [f"    X({code}, {quoted(words.partition(':')[0])})" for code, words in bus.lists[name].values()])
+        out += macro(
+            f"BUS_{name.upper()}_WORDS",
+            [
+                f"    X({code}, {quoted(words.partition(':')[0])})"
+                for code, words in bus.lists[name].values()
+            ],
+        )
     out.append("enum bus_operation {")
     for name, operation in bus.operations.items():
-        out.append(f"    BUS_OPERATION_{name.upper()} = {operation['code']},    // {operation['text']}")
+        out.append(
+            f"    BUS_OPERATION_{name.upper()} = {operation['code']},    // {operation['text']}"
+        )
     out += ["};", ""]
     out.append("// Lengths of whole bodies and offsets of their fields, in bytes, little endian.")
     for name, (request, reply) in bus.layouts.items():
         for way, (laid, length), head in (("REQUEST", request, 2), ("REPLY", reply, 3)):
             out.append(f"#define BUS_{name.upper()}_{way}_LENGTH {length}u")
             for field, kind, offset in laid[head:]:
-                out.append(f"#define BUS_{name.upper()}_{way}_{field.upper()} {offset}u    // {kind}")
+                out.append(
+                    f"#define BUS_{name.upper()}_{way}_{field.upper()} {offset}u    // {kind}"
+                )
     out.append("")
-    out.append("// X(name, code, length of the request body, length of the reply body if the cause is ok, 1: of an axis, its first field)")
-    rows = [f"    X({name}, {operation['code']}, {bus.layouts[name][0][1]}, {bus.layouts[name][1][1]}, "
-            f"{int(operation['request'][:1] == [AXIS])})"
-            for name, operation in bus.operations.items()]
+    out.append(
+        "// X(name, code, length of the request body, length of the reply body if the cause is ok, 1: of an axis, its first field)"
+    )
+    rows = [
+        f"    X({name}, {operation['code']}, {bus.layouts[name][0][1]}, {bus.layouts[name][1][1]}, "
+        f"{int(operation['request'][:1] == [AXIS])})"
+        for name, operation in bus.operations.items()
+    ]
     out += macro("BUS_OPERATIONS", rows)
     out += values("parameter", bus.parameters) + values("setting", bus.settings)
-    out += [f"#define BUS_VALUES_CRC 0x{bus.values_crc:08X}u     // of all of both: what a kept number means", ""]
+    out += [
+        f"#define BUS_VALUES_CRC 0x{bus.values_crc:08X}u     // of all of both: what a kept number means",
+        "",
+    ]
     out += ["#endif", ""]
     return "\n".join(out)
 
@@ -132,15 +192,23 @@ def values(kind, parameters):
     """Numbers and ranges of the parameters of an axis, or of the settings of a station."""
     out = [f"enum bus_{kind} {{"]
     for name, parameter in parameters.items():
-        out.append(f"    BUS_{kind}_{name}".upper() + f" = {parameter['id']},    // {of_one_count(parameter)}{parameter['text']}")
+        out.append(
+            f"    BUS_{kind}_{name}".upper()
+            + f" = {parameter['id']},    // {of_one_count(parameter)}{parameter['text']}"
+        )
     out += ["};", f"#define BUS_{kind.upper()}_COUNT {len(parameters)}u", ""]
     out.append("// X(name, id, min, max, default): all int64_t, in counts of the wire")
-    rows = [f"    X({name}, {parameter['id']}, {parameter['min']}LL, {parameter['max']}LL, {parameter['default']}LL)"
-            for name, parameter in parameters.items()]
+    rows = [
+        f"    X({name}, {parameter['id']}, {parameter['min']}LL, {parameter['max']}LL, {parameter['default']}LL)"
+        for name, parameter in parameters.items()
+    ]
     out += macro(f"BUS_{kind.upper()}S", rows)
     if needy := [parameter["id"] for parameter in parameters.values() if "needs" in parameter]:
-        out += [f"// {kind}s of which a node without sine and cosine takes only 0 and the default",
-                f"#define BUS_{kind.upper()}S_OF_SINE {', '.join(map(str, needy))}", ""]
+        out += [
+            f"// {kind}s of which a node without sine and cosine takes only 0 and the default",
+            f"#define BUS_{kind.upper()}S_OF_SINE {', '.join(map(str, needy))}",
+            "",
+        ]
     return out
 
 
@@ -155,6 +223,7 @@ def macro(name, rows):
 
 
 # ------------------------------------------------------------------ host
+
 
 def host(bus: Bus) -> str:
     out = [
@@ -191,12 +260,20 @@ def host(bus: Bus) -> str:
     for name, entries in bus.lists.items():
         out.append(f"# {'code' if name in CODES else 'bit'}: (name, words)")
         out.append(f"{name.upper()}S = {{")
-        out += [f"    {code}: ({quoted(key)}, {quoted(words)})," for key, (code, words) in entries.items()]
+        out += [
+            f"    {code}: ({quoted(key)}, {quoted(words)}),"
+            for key, (code, words) in entries.items()
+        ]
         out += ["}", ""]
     out.append("OPERATIONS = {operation.name: operation for operation in (")
     for name, operation in bus.operations.items():
-        request, reply = (tuple(tuple(declaration.split()) for declaration in operation[way]) for way in ("request", "reply"))
-        out.append(f"    Operation({quoted(name)}, {operation['code']}, {quoted(operation['text'])},")
+        request, reply = (
+            tuple(tuple(declaration.split()) for declaration in operation[way])
+            for way in ("request", "reply")
+        )
+        out.append(
+            f"    Operation({quoted(name)}, {operation['code']}, {quoted(operation['text'])},"
+        )
         out.append(f"              {pairs(request)},")
         out.append(f"              {pairs(reply)}),")
     out += [")}", ""]
@@ -205,8 +282,12 @@ def host(bus: Bus) -> str:
         for name, parameter in parameters.items():
             lsb = Fraction(parameter["lsb"])
             value = f"Fraction({lsb.numerator}, {lsb.denominator})"
-            out.append(f"    Parameter({quoted(name)}, {parameter['id']}, {quoted(parameter['unit'])}, {value},")
-            out.append(f"              {parameter['min']}, {parameter['max']}, {parameter['default']},")
+            out.append(
+                f"    Parameter({quoted(name)}, {parameter['id']}, {quoted(parameter['unit'])}, {value},"
+            )
+            out.append(
+                f"              {parameter['min']}, {parameter['max']}, {parameter['default']},"
+            )
             out.append(f"              {quoted(parameter['text'])}),")
         out += [")}", ""]
     return "\n".join(out)
@@ -219,11 +300,12 @@ def quoted(text):
 def pairs(declared):
     """A tuple of pairs, four on a line."""
     each = [f"({quoted(name)}, {quoted(kind)})," for name, kind in declared]
-    rows = [" ".join(each[at:at + 4]) for at in range(0, len(each), 4)]
+    rows = [" ".join(each[at : at + 4]) for at in range(0, len(each), 4)]
     return "(" + ("\n" + 15 * " ").join(rows) + ")"
 
 
 # ------------------------------------------------------------------ page
+
 
 def diagram(laid):
     """A body as one row of boxes: name above, first byte and type below."""
@@ -236,7 +318,12 @@ def diagram(laid):
     for box in boxes + [None]:
         if box is None or (row and used + box[2] + 1 > 110):
             edge = "+" + "+".join("-" * width for _, _, width in row) + "+"
-            lines += [edge, "|" + "|".join(name for name, _, _ in row) + "|", "|" + "|".join(below for _, below, _ in row) + "|", edge]
+            lines += [
+                edge,
+                "|" + "|".join(name for name, _, _ in row) + "|",
+                "|" + "|".join(below for _, below, _ in row) + "|",
+                edge,
+            ]
             row, used = [], 0
         if box is not None:
             row.append(box)
@@ -251,13 +338,29 @@ def table(head, rows):
 
 def page_parts(bus: Bus) -> dict:
     parts = {}
-    parts["identity"] = [f"Version {bus.version}, CRC-32 of `tables/bus.toml` `{bus.crc:08X}`, longest body {bus.longest_body} bytes."]
-    overview = [(operation["code"], f"[`{name}`](#{name})", operation["text"]) for name, operation in bus.operations.items()]
+    parts["identity"] = [
+        f"Version {bus.version}, CRC-32 of `tables/bus.toml` `{bus.crc:08X}`, longest body {bus.longest_body} bytes."
+    ]
+    overview = [
+        (operation["code"], f"[`{name}`](#{name})", operation["text"])
+        for name, operation in bus.operations.items()
+    ]
     body = table(("code", "operation", "purpose"), overview)
     for name, operation in bus.operations.items():
         (request, request_length), (reply, reply_length) = bus.layouts[name]
-        body += ["", f"### {name}", "", operation["text"][0].upper() + operation["text"][1:] + ".", ""]
-        body += [f"Request, {request_length} bytes:", ""] + diagram(request) + ["", f"Reply, {reply_length} bytes:", ""] + diagram(reply)
+        body += [
+            "",
+            f"### {name}",
+            "",
+            operation["text"][0].upper() + operation["text"][1:] + ".",
+            "",
+        ]
+        body += (
+            [f"Request, {request_length} bytes:", ""]
+            + diagram(request)
+            + ["", f"Reply, {reply_length} bytes:", ""]
+            + diagram(reply)
+        )
     parts["operations"] = body
     for name, entries in bus.lists.items():
         rows = [(code, f"`{key}`", words) for key, (code, words) in entries.items()]
@@ -266,10 +369,20 @@ def page_parts(bus: Bus) -> dict:
         rows = []
         for name, parameter in parameters.items():
             lsb = Fraction(parameter["lsb"])
-            rows.append((parameter["id"], f"`{name}`", parameter["unit"] or "–", parameter["lsb"],
-                         *(decimal(parameter[key] * lsb) for key in ("min", "max", "default")),
-                         parameter["text"] + (f"; needs {parameter['needs']}" if "needs" in parameter else "")))
-        parts[kind + "s"] = table(("id", kind, "unit", "one count", "min", "max", "default", "purpose"), rows)
+            rows.append(
+                (
+                    parameter["id"],
+                    f"`{name}`",
+                    parameter["unit"] or "–",
+                    parameter["lsb"],
+                    *(decimal(parameter[key] * lsb) for key in ("min", "max", "default")),
+                    parameter["text"]
+                    + (f"; needs {parameter['needs']}" if "needs" in parameter else ""),
+                )
+            )
+        parts[kind + "s"] = table(
+            ("id", kind, "unit", "one count", "min", "max", "default", "purpose"), rows
+        )
     parts["example"] = example(bus)
     parts["packets"] = packets(bus)
     return parts
@@ -289,19 +402,36 @@ def enable_frames(bus: Bus) -> tuple:
 def example(bus: Bus) -> list:
     """`enable`, byte by byte."""
     request, reply = (payload.hex(" ").upper() for payload in enable_frames(bus))
-    return ["`enable` of axis 0 of the node with address 1, sequence number 7:", "", "```",
-            "master  21*", "node    61", f"master  {request}",
-            "master  11*", f"node    51 {reply}", "```", "", "`*` has the 9th bit set."]
+    return [
+        "`enable` of axis 0 of the node with address 1, sequence number 7:",
+        "",
+        "```",
+        "master  21*",
+        "node    61",
+        f"master  {request}",
+        "master  11*",
+        f"node    51 {reply}",
+        "```",
+        "",
+        "`*` has the 9th bit set.",
+    ]
 
 
 def packets(bus: Bus) -> list:
     """The same as packets; none of them is long enough for a run of 254."""
+
     def packet(content):
         return b"".join(bytes([len(part) + 1]) + part for part in content.split(b"\0")) + b"\0"
 
     request, reply = enable_frames(bus)
-    return ["The same `enable` as packets:", "", "```", f"client  00 {packet(bytes([0x21]) + request).hex(' ').upper()}",
-            f"node    00 {packet(bytes([0x51]) + reply).hex(' ').upper()}", "```"]
+    return [
+        "The same `enable` as packets:",
+        "",
+        "```",
+        f"client  00 {packet(bytes([0x21]) + request).hex(' ').upper()}",
+        f"node    00 {packet(bytes([0x51]) + reply).hex(' ').upper()}",
+        "```",
+    ]
 
 
 def decimal(value: Fraction) -> str:
@@ -322,6 +452,7 @@ def page(bus: Bus, text: str) -> str:
 
 
 # ------------------------------------------------------------------ command line
+
 
 def made() -> dict:
     bus = Bus(SOURCE.read_bytes())

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Makes docs/commands, one page a command of `moire`, of the parser of the command line."""
+
 import argparse
 import sys
 from pathlib import Path
@@ -10,7 +11,10 @@ from tables import made_files
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ROOT / "docs" / "commands"
 
-HEAD = ["<!-- SPDX-License-Identifier: Apache-2.0 -->", "<!-- Made by tables/commands.py of the parser in sw/host/moire: do not edit. -->"]
+HEAD = [
+    "<!-- SPDX-License-Identifier: Apache-2.0 -->",
+    "<!-- Made by tables/commands.py of the parser in sw/host/moire: do not edit. -->",
+]
 COMMON = {option for action in common_options()._actions for option in action.option_strings}
 
 
@@ -25,10 +29,14 @@ def words(text: str) -> str:
 
 
 def name_of(action) -> str:
-    value = action.metavar or (",".join(map(str, action.choices)) if action.choices else action.dest.upper())
+    value = action.metavar or (
+        ",".join(map(str, action.choices)) if action.choices else action.dest.upper()
+    )
     if not action.option_strings:
         return value + {"*": " …", "+": " …"}.get(action.nargs, "")
-    return action.option_strings[-1] + ("" if action.nargs == 0 else f" {value}" + (" …" if action.nargs == "+" else ""))
+    return action.option_strings[-1] + (
+        "" if action.nargs == 0 else f" {value}" + (" …" if action.nargs == "+" else "")
+    )
 
 
 def arguments(actions) -> list:
@@ -36,13 +44,20 @@ def arguments(actions) -> list:
     rows = []
     for action in actions:
         may_miss = action.option_strings and not action.required or action.nargs in ("?", "*")
-        rows.append(f"| `{f'[{name_of(action)}]' if may_miss else name_of(action)}` | {words(action.help or '')} |")
+        rows.append(
+            f"| `{f'[{name_of(action)}]' if may_miss else name_of(action)}` | {words(action.help or '')} |"
+        )
     return ["", "| argument | |", "| --- | --- |", *rows] if rows else []
 
 
 def own(parser) -> list:
-    return [action for action in parser._actions
-            if not isinstance(action, argparse._SubParsersAction) and not COMMON & set(action.option_strings) and action.dest != "help"]
+    return [
+        action
+        for action in parser._actions
+        if not isinstance(action, argparse._SubParsersAction)
+        and not COMMON & set(action.option_strings)
+        and action.dest != "help"
+    ]
 
 
 def section(parser) -> list:
@@ -60,15 +75,41 @@ def page(name: str, parser) -> str:
 
 
 def first_page(parser) -> str:
-    rows = [f"| [`{name}`]({name}.md) | {words(made.description)} |" for name, made in below(parser).items()]
+    rows = [
+        f"| [`{name}`]({name}.md) | {words(made.description)} |"
+        for name, made in below(parser).items()
+    ]
     common = [action for action in common_options()._actions if action.option_strings]
-    return "\n".join([*HEAD, "# The commands of moire", "", parser.description, "", "| command | |", "| --- | --- |", *rows, "",
-                      "## With every command", *arguments(common), "", "## How they go together", "", "```", EXAMPLES.strip(), "```", ""])
+    return "\n".join(
+        [
+            *HEAD,
+            "# The commands of moire",
+            "",
+            parser.description,
+            "",
+            "| command | |",
+            "| --- | --- |",
+            *rows,
+            "",
+            "## With every command",
+            *arguments(common),
+            "",
+            "## How they go together",
+            "",
+            "```",
+            EXAMPLES.strip(),
+            "```",
+            "",
+        ]
+    )
 
 
 def pages() -> dict:
     parser = make_parser()
-    return {PAGES / "README.md": first_page(parser), **{PAGES / f"{name}.md": page(name, made) for name, made in below(parser).items()}}
+    return {
+        PAGES / "README.md": first_page(parser),
+        **{PAGES / f"{name}.md": page(name, made) for name, made in below(parser).items()},
+    }
 
 
 def made() -> dict:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The picture of the job's states in docs/job.md, made of the table of transitions in sw/firmware/station/job/job.c; and the rules it keeps."""
+"""The picture of the job's states in docs/job.md, made of the table of transitions in
+sw/firmware/station/job/job.c; and the rules it keeps.
+"""
+
 import re
 import sys
 import tomllib
@@ -12,7 +15,7 @@ SOURCE = ROOT / "sw" / "firmware" / "station" / "job" / "job.c"
 LINE = ROOT / "tables" / "bus.toml"
 PAGE = ROOT / "docs" / "job.md"
 BEGIN, END = "<!-- made by tables/job_states.py -->", "<!-- end of job_states -->"
-UNDER_WAY = "UNDER_WAY"                     # in the table: from any state in which a job is under way
+UNDER_WAY = "UNDER_WAY"  # in the table: from any state in which a job is under way
 FIRST = "LOADING"
 TABLE = tomllib.loads(LINE.read_text(encoding="utf-8"))
 ACTIONS = {name.upper() for name in TABLE["job_action"]}
@@ -33,10 +36,14 @@ def transitions(text):
 
 
 def check(rows, states):
-    """Every state is in bus.toml, can be reached and left; what waits for a person goes on by a person only."""
+    """Every state is in bus.toml, can be reached and left; what waits for a person goes on by a
+    person only.
+    """
     used = {row[0] for row in rows if row[0] != UNDER_WAY} | {row[2] for row in rows}
     if used != states:
-        raise ValueError(f"job.c and the job_state of bus.toml differ: {', '.join(sorted(used ^ states))}")
+        raise ValueError(
+            f"job.c and the job_state of bus.toml differ: {', '.join(sorted(used ^ states))}"
+        )
     reached = {FIRST}
     while more := {to for start, _, to in rows if start in reached | {UNDER_WAY}} - reached:
         reached |= more
@@ -61,7 +68,9 @@ def picture(rows):
         if start != UNDER_WAY:
             joined.setdefault((start, to), []).append(event)
     for (start, to), events in joined.items():
-        out.append(f"    {start.lower()} --> {to.lower()} : {', '.join(label(event) for event in events)}")
+        out.append(
+            f"    {start.lower()} --> {to.lower()} : {', '.join(label(event) for event in events)}"
+        )
     return [*out, "```"]
 
 
@@ -70,8 +79,11 @@ def label(event):
 
 
 def from_anywhere(rows):
-    return [f"From every state in which a job is under way {event} leads to {to.lower()}." for start, event, to in rows
-            if start == UNDER_WAY]
+    return [
+        f"From every state in which a job is under way {event} leads to {to.lower()}."
+        for start, event, to in rows
+        if start == UNDER_WAY
+    ]
 
 
 def made():
@@ -81,7 +93,9 @@ def made():
     if text.count(BEGIN) != 1 or text.count(END) != 1:
         raise ValueError(f"docs/job.md needs the marks '{BEGIN}' and '{END}' exactly once")
     before, after = text.split(BEGIN)[0], text.split(END)[1]
-    return before + "\n".join([BEGIN, "", *picture(rows), "", *from_anywhere(rows), "", END]) + after
+    return (
+        before + "\n".join([BEGIN, "", *picture(rows), "", *from_anywhere(rows), "", END]) + after
+    )
 
 
 def main(arguments=None) -> int:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every generator of this folder does with the files that it makes: write those that are stale, or only tell them."""
+"""What every generator of this folder does with the files that it makes: write those that are
+stale, or only tell them.
+"""
+
 import argparse
 import os
 import sys
@@ -9,18 +12,31 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def stale(made: dict) -> dict:
-    """{path: text} of files that do not hold their text; a text of None: the file should not be there."""
-    return {path: text for path, text in made.items() if (path.read_text(encoding="utf-8") if path.exists() else None) != text}
+    """{path: text} of files that do not hold their text; a text of None: the file should not be
+    there.
+    """
+    return {
+        path: text
+        for path, text in made.items()
+        if (path.read_text(encoding="utf-8") if path.exists() else None) != text
+    }
 
 
 def main(about: str, make, arguments=None, figures=None) -> int:
-    """Exit code of a generator: make() returns {path: text}, figures() what `--bound` prints. A ValueError says what is wrong with
+    """Exit code of a generator: make() returns {path: text}, figures() what `--bound` prints. A
+    ValueError says what is wrong with
     the table, and nothing is written."""
-    parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=about, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     only = parser.add_mutually_exclusive_group()
-    only.add_argument("--check", action="store_true", help="write nothing, exit with 1 when a made file is stale")
+    only.add_argument(
+        "--check", action="store_true", help="write nothing, exit with 1 when a made file is stale"
+    )
     if figures:
-        only.add_argument("--bound", action="store_true", help="print the bound of the error and write nothing")
+        only.add_argument(
+            "--bound", action="store_true", help="print the bound of the error and write nothing"
+        )
     wanted = parser.parse_args(arguments)
     if figures and wanted.bound:
         print(figures())

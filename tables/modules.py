@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of modules in rtl/README.md, made of the modules' own headers; and the rules that every module keeps."""
+"""The table of modules in rtl/README.md, made of the modules' own headers; and the rules that every
+module keeps.
+"""
+
 import re
 import sys
 from pathlib import Path
@@ -10,21 +13,25 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "rtl" / "README.md"
 BEGIN, END = "<!-- modules -->", "<!-- /modules -->"
 COLUMNS = ["directory", "module", "purpose", "latency", "model and test"]
-LONGEST_CELL = 160                   # characters of a cell without its links; details stay in the headers
+LONGEST_CELL = 160  # characters of a cell without its links; details stay in the headers
 # A line of the facts begins with one of these keys; its further lines are indented.
-KEYS = set("""
+KEYS = set(
+    """
     latency rate accuracy exact source method model proved proof made built
     again align anew angle answer armed body bound bounds brake bumpless bypass code copies crowded decay duty enable entry
     expects faults finest fits flags frozen index joint jump law learns limit limits map modes moved off opposed options
     overrun override passed place points quiet reading refresh request reset rounding safety scale segments set shift sign
     slower sources spikes start strays table terms through timings used windup
-    """.split())
+    """.split()
+)
 REQUIRED = ("purpose", "latency", "model")
 
 
 def header(text, where="header"):
-    """Name, purpose and facts from the comment at the head of a module: `name -- purpose`, then lines of `key text`, of which a
-    fact may go on in indented lines. Formulae are indented behind an empty line; a free sentence begins with a capital letter.
+    """Name, purpose and facts from the comment at the head of a module: `name -- purpose`, then
+    lines of `key text`, of which a
+    fact may go on in indented lines. Formulae are indented behind an empty line; a free sentence
+    begins with a capital letter.
     A ValueError names each line that is none of these."""
     lines, wrong = [], []
     for number, line in enumerate(text.splitlines()[1:], 2):
@@ -50,8 +57,10 @@ def header(text, where="header"):
                 wrong.append(f"{where}:{number}: the key `{key}` stands twice")
             facts[key] = new.group(2)
         else:
-            wrong.append(f"{where}:{number}: `{line.split()[0]}` is no known key of a header; tables/modules.py has the list")
-        if key == "latency":                                # the rate may stand in the same line
+            wrong.append(
+                f"{where}:{number}: `{line.split()[0]}` is no known key of a header; tables/modules.py has the list"
+            )
+        if key == "latency":  # the rate may stand in the same line
             latency, both, rate = facts[key].partition(" rate  ")
             if both:
                 facts["latency"], facts["rate"], key = latency.rstrip(), rate.strip(), "rate"
@@ -61,7 +70,9 @@ def header(text, where="header"):
 
 
 def brief(text):
-    """The first sentence of a fact, without what goes into detail behind a semicolon or a colon, if it is too long with that."""
+    """The first sentence of a fact, without what goes into detail behind a semicolon or a colon, if
+    it is too long with that.
+    """
     sentence = re.split(r"(?<=\.) (?=[A-Z`])", text)[0].rstrip(".")
     for border in (";", ":"):
         if len(sentence) > LONGEST_CELL:
@@ -72,16 +83,20 @@ def brief(text):
 def check_of(path):
     """(model, test) of a module as paths from ROOT, made of its place."""
     room, name = path.parent.relative_to(ROOT / "rtl"), path.stem
-    if not room.name:                                       # axis, node: block diagrams; whole-system tests are theirs
+    if not room.name:  # axis, node: block diagrams; whole-system tests are theirs
         return None, Path("tb/system")
     if name.endswith("_registers"):
         return Path("tb/registers/register_block.py"), Path("tb/registers/test_registers.py")
-    if name.endswith("_rom"):                               # a made table: its generator is the model
+    if name.endswith("_rom"):  # a made table: its generator is the model
         user = name.removesuffix("_rom")
-        return Path("tables") / f"{user}.py", next((p.relative_to(ROOT) for p in (ROOT / "tb" / room).glob(f"test_{user}*.py")), None)
-    if name.endswith("_microcode"):                           # a made table too, of what its user does
+        return Path("tables") / f"{user}.py", next(
+            (p.relative_to(ROOT) for p in (ROOT / "tb" / room).glob(f"test_{user}*.py")), None
+        )
+    if name.endswith("_microcode"):  # a made table too, of what its user does
         user = name.removesuffix("_microcode")
-        return Path("tables") / f"{name}.py", next((p.relative_to(ROOT) for p in (ROOT / "tb" / room).glob(f"test_{user}*.py")), None)
+        return Path("tables") / f"{name}.py", next(
+            (p.relative_to(ROOT) for p in (ROOT / "tb" / room).glob(f"test_{user}*.py")), None
+        )
     return Path("tb") / room / f"{name}.py", Path("tb") / room / f"test_{name}.py"
 
 
@@ -95,7 +110,7 @@ def row(path, wrong):
         return []
     model, test = check_of(path)
     named = re.search(r"tb/[\w/]+\.\w+", facts.get("model", ""))
-    if facts.get("model", "").startswith("the models of its blocks"):        # wiring in a room
+    if facts.get("model", "").startswith("the models of its blocks"):  # wiring in a room
         model, test = None, Path(named.group(0)) if named else Path("tb/system")
     elif named and model:
         model = Path(named.group(0))
@@ -117,20 +132,33 @@ def row(path, wrong):
     purpose, latency = (brief(facts.get(key, "")) for key in ("purpose", "latency"))
     for key, text in (("purpose", purpose), ("latency", latency)):
         if len(text) > LONGEST_CELL:
-            wrong.append(f"{here}: `{key}` must begin with a sentence of at most {LONGEST_CELL} characters, it has {len(text)}")
+            wrong.append(
+                f"{here}: `{key}` must begin with a sentence of at most {LONGEST_CELL} characters, it has {len(text)}"
+            )
     room = path.parent.name if path.parent != ROOT / "rtl" else ""
     link = lambda p: f"[{p.name}](../{p.as_posix()})" if p else ""
     place = path.relative_to(ROOT / "rtl").as_posix()
-    return [room, f"[{path.stem}]({place})", purpose, latency, ", ".join(filter(None, (link(model), link(test))))]
+    return [
+        room,
+        f"[{path.stem}]({place})",
+        purpose,
+        latency,
+        ", ".join(filter(None, (link(model), link(test)))),
+    ]
 
 
 def made() -> dict:
     wrong = []
-    rows = [row(p, wrong) for p in sorted((ROOT / "rtl").rglob("*.sv"), key=lambda p: (p.parent != ROOT / "rtl", p))]
+    rows = [
+        row(p, wrong)
+        for p in sorted((ROOT / "rtl").rglob("*.sv"), key=lambda p: (p.parent != ROOT / "rtl", p))
+    ]
     if wrong:
         raise ValueError("\n".join(wrong))
     cell = lambda text: text.replace("|", "\\|")
-    table = ["| " + " | ".join(COLUMNS) + " |", "|" + " --- |" * len(COLUMNS)] + ["| " + " | ".join(map(cell, r)) + " |" for r in rows]
+    table = ["| " + " | ".join(COLUMNS) + " |", "|" + " --- |" * len(COLUMNS)] + [
+        "| " + " | ".join(map(cell, r)) + " |" for r in rows
+    ]
     before, begin, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:

@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Make rtl/control/profile_microcode.sv: what profile_player does between two ticks, one addition or subtraction a clk.
+"""Make rtl/control/profile_microcode.sv: what profile_player does between two ticks, one addition
+or subtraction a clk.
 
-A line is  TERMS [>> 1] [-> WORD] [; JOB [LABEL]]. TERMS are `acc`, the sum of the line before, and one place with + or -, or with
-`along` (+ if upward, else -) or `against` (the reverse). The sum goes to acc, halved with >> 1, and unhalved to a word. A condition
+A line is  TERMS [>> 1] [-> WORD] [; JOB [LABEL]]. TERMS are `acc`, the sum of the line before, and
+one place with + or -, or with
+`along` (+ if upward, else -) or `against` (the reverse). The sum goes to acc, halved with >> 1, and
+unhalved to a word. A condition
 `negative` or `positive` asks for the sign of the sum of the line before.
 """
+
 import re
 import sys
 from pathlib import Path
@@ -13,16 +17,64 @@ from tables import made_files
 
 MADE = Path(__file__).resolve().parent.parent / "rtl" / "control" / "profile_microcode.sv"
 
-# words of the player's memory; four of them are shared by the profile (or brake) and, from `area` on, chosen by what is at work
-WORDS = ("velocity", "acceleration", "jerk", "step", "ramp_area", "ramp_slope", "ramp_pace", "distance",
-         "change", "low", "offset", "fraction", "left", "rate", "part", "base")
-SHARED = ("area", "slope", "pace", "value")                     # brake: words 0 to 3, ramp of the rate: words 4 to 7
+# words of the player's memory; four of them are shared by the profile (or brake) and, from `area`
+# on, chosen by what is at work
+WORDS = (
+    "velocity",
+    "acceleration",
+    "jerk",
+    "step",
+    "ramp_area",
+    "ramp_slope",
+    "ramp_pace",
+    "distance",
+    "change",
+    "low",
+    "offset",
+    "fraction",
+    "left",
+    "rate",
+    "part",
+    "base",
+)
+SHARED = ("area", "slope", "pace", "value")  # brake: words 0 to 3, ramp of the rate: words 4 to 7
 OUTSIDE = ("nothing", "limit", "curve", "setting", "full", "half", "queue_low", "queue_high")
-PLACES = {name: first + n for first, names in ((0, WORDS), (16, SHARED), (24, OUTSIDE)) for n, name in enumerate(names)}
+PLACES = {
+    name: first + n
+    for first, names in ((0, WORDS), (16, SHARED), (24, OUTSIDE))
+    for n, name in enumerate(names)
+}
 SIGNS = {"+": 0, "-": 1, "along": 2, "against": 3}
-JOBS = ("next", "goto", "negative", "positive", "quotient", "loop", "multiply", "factor", "count_31", "word", "pop", "last", "starved",
-        "ready", "cross", "crossed", "first", "later", "stopping", "wide", "arrived", "set_upward", "end", "arrive", "prepared", "wait",
-        "make", "dispatch")
+JOBS = (
+    "next",
+    "goto",
+    "negative",
+    "positive",
+    "quotient",
+    "loop",
+    "multiply",
+    "factor",
+    "count_31",
+    "word",
+    "pop",
+    "last",
+    "starved",
+    "ready",
+    "cross",
+    "crossed",
+    "first",
+    "later",
+    "stopping",
+    "wide",
+    "arrived",
+    "set_upward",
+    "end",
+    "arrive",
+    "prepared",
+    "wait",
+    "make",
+    "dispatch",
+)
 
 PROGRAM = """
 wait:   acc                             ; wait begin            # acc is what target grows by: kept
@@ -179,25 +231,40 @@ def assembled():
         if line:
             lines.append(" ".join(line.split()))
     names = {address: label for label, address in labels.items()}
-    return [(names.get(address, ""), line, code_of(line, labels)) for address, line in enumerate(lines)]
+    return [
+        (names.get(address, ""), line, code_of(line, labels)) for address, line in enumerate(lines)
+    ]
 
 
 def code_of(line, labels):
     """target 7, job 5, halved 1, acc 1, sign 2, place 5, word 5."""
-    found = re.fullmatch(r"(?:(acc)\b ?)?(?:(\+|-|along|against)? ?(\w+))?( >> 1)?(?: -> (\w+))?(?: ; (\w+)(?: (\w+))?)?", line)
+    found = re.fullmatch(
+        r"(?:(acc)\b ?)?(?:(\+|-|along|against)? ?(\w+))?( >> 1)?(?: -> (\w+))?(?: ; (\w+)(?: (\w+))?)?",
+        line,
+    )
     acc, sign, place, halved, word, job, label = found.groups()
     place = "nothing" if place in (None, "0") else place
     code = labels[label] if label else 0
-    for value, width in ((JOBS.index(job or "next"), 5), (bool(halved), 1), (bool(acc), 1), (SIGNS[sign or "+"], 2), (PLACES[place], 5),
-                         (PLACES[word or "nothing"], 5)):
+    for value, width in (
+        (JOBS.index(job or "next"), 5),
+        (bool(halved), 1),
+        (bool(acc), 1),
+        (SIGNS[sign or "+"], 2),
+        (PLACES[place], 5),
+        (PLACES[word or "nothing"], 5),
+    ):
         code = code << width | value
     return code
 
 
 def text():
-    rows = [f"        lines[{n:3}] = 26'h{code:07x};   // {label + ':' if label else '':14} {line}"
-            for n, (label, line, code) in enumerate(assembled())]
-    return "\n".join(["""// SPDX-License-Identifier: Apache-2.0
+    rows = [
+        f"        lines[{n:3}] = 26'h{code:07x};   // {label + ':' if label else '':14} {line}"
+        for n, (label, line, code) in enumerate(assembled())
+    ]
+    return "\n".join(
+        [
+            """// SPDX-License-Identifier: Apache-2.0
 // profile_microcode -- what profile_player does between two ticks, a line a clk; made by tables/profile_microcode.py, not to be edited.
 //
 // latency  1 clk from next to code      rate  one line per clk
@@ -212,14 +279,18 @@ module profile_microcode (
 );
     (* rom_style = "logic" *) logic [25:0] lines [0:127];       // block memory would answer too late for the adder behind it
 
-    initial begin""", *rows, f"""        for (int n = {len(rows)}; n < 128; n++) lines[n] = '0;
+    initial begin""",
+            *rows,
+            f"""        for (int n = {len(rows)}; n < 128; n++) lines[n] = '0;
     end
 
     always_ff @(posedge clk) code <= lines[next];
 endmodule
 
 `default_nettype wire
-"""])
+""",
+        ]
+    )
 
 
 def main(arguments=None) -> int:

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The one way a test reaches the simulator, and the few gestures every test shares.
 
-SIM=icarus|verilator   SEED=number|random   WAVES=1 (the wave file lies beside the results, under build/)
+SIM=icarus|verilator   SEED=number|random   WAVES=1 (the wave file lies beside the results, under
+                                            build/)
 """
+
 import fcntl
 import hashlib
 import os
@@ -18,7 +20,9 @@ from cocotb.triggers import RisingEdge
 from cocotb_tools.runner import as_sv_literal, get_runner
 
 ROOT = Path(__file__).resolve().parent.parent
-WAIVERS = [ROOT / "rtl" / "cpu" / "picorv32.vlt"]        # foreign sources only; our own waivers stand in the line they excuse
+WAIVERS = [
+    ROOT / "rtl" / "cpu" / "picorv32.vlt"
+]  # foreign sources only; our own waivers stand in the line they excuse
 
 
 def package(name):
@@ -28,7 +32,9 @@ def package(name):
 
 
 def search_path():
-    """Every folder in which a module is found by its name: the rooms of rtl/, and the soft core's package."""
+    """Every folder in which a module is found by its name: the rooms of rtl/, and the soft core's
+    package.
+    """
     rooms = sorted({p.parent for p in (ROOT / "rtl").rglob("*.sv")})
     core = package("pythondata_cpu_picorv32")
     return rooms + ([core / "verilog"] if core else [])
@@ -36,32 +42,47 @@ def search_path():
 
 def source_of(top):
     found = list((ROOT / "rtl").rglob(f"{top}.sv"))
-    assert len(found) == 1, f"there must be exactly one {top}.sv under rtl/, found {[str(p.relative_to(ROOT)) for p in found]}"
+    assert len(found) == 1, (
+        f"there must be exactly one {top}.sv under rtl/, found {[str(p.relative_to(ROOT)) for p in found]}"
+    )
     return found[0]
 
 
 def seed():
-    """The seed of all tests: SEED of the environment, or 1 without it. `random` is replaced in the environment by the number that is
-    drawn for it, so every later caller, the workers of pytest-xdist and the simulators all use the same number."""
+    """The seed of all tests: SEED of the environment, or 1 without it. `random` is replaced in the
+    environment by the number that is
+    drawn for it, so every later caller, the workers of pytest-xdist and the simulators all use the
+    same number."""
     if os.environ.get("SEED") == "random":
         os.environ["SEED"] = str(random.SystemRandom().randrange(1, 2**31))
     return int(os.environ.get("SEED") or 1)
 
 
 def direct_verilator(runner):
-    """Call the compiler itself: Verilator's Perl front end is not needed, and a minimal system has no Pod::Usage for it."""
+    """Call the compiler itself: Verilator's Perl front end is not needed, and a minimal system has
+    no Pod::Usage for it.
+    """
     folder = package("verilator")
     if folder and (folder / "bin" / "verilator_bin").exists():
         os.environ["VERILATOR_ROOT"] = str(folder)
-        runner._simulator_in_path_build_only = lambda: setattr(runner, "executable", str(folder / "bin" / "verilator_bin"))
-    os.environ["MAKEFLAGS"] = "CFG_CXXFLAGS_PCH_I=-include"           # else larger designs miss their precompiled header
+        runner._simulator_in_path_build_only = lambda: setattr(
+            runner, "executable", str(folder / "bin" / "verilator_bin")
+        )
+    os.environ["MAKEFLAGS"] = (
+        "CFG_CXXFLAGS_PCH_I=-include"  # else larger designs miss their precompiled header
+    )
 
 
 def run(top, test, **parameters):
-    """Build module `top` with `parameters` and run the cocotb tests in the file `test`. Files are found by name: a bench top beside
+    """Build module `top` with `parameters` and run the cocotb tests in the file `test`. Files are
+    found by name: a bench top beside
     the test, every other module under rtl/."""
     __tracebackhide__ = True
-    sim, waves, here = os.environ.get("SIM") or "icarus", bool(os.environ.get("WAVES")), Path(test).resolve()
+    sim, waves, here = (
+        os.environ.get("SIM") or "icarus",
+        bool(os.environ.get("WAVES")),
+        Path(test).resolve(),
+    )
     source = here.with_name(f"{top}.sv") if here.with_name(f"{top}.sv").exists() else source_of(top)
     name = os.environ.get("PYTEST_CURRENT_TEST", "run").split("::")[-1].split(" ")[0]
     values = {k: as_sv_literal(v) for k, v in parameters.items()}
@@ -71,46 +92,84 @@ def run(top, test, **parameters):
     shared = ROOT / "build" / sim / tag
     own = shared / re.sub(r"[^\w.-]", "_", f"{here.stem}.{name}")
     own.mkdir(parents=True, exist_ok=True)
-    runner, build = get_runner(sim), own if sim == "icarus" else shared   # Icarus compiles at once: nothing to share
+    runner, build = (
+        get_runner(sim),
+        own if sim == "icarus" else shared,
+    )  # Icarus compiles at once: nothing to share
     args = [a for d in search_path() for a in ("-y", str(d))]
     if sim == "icarus":
         sources, args = [], [*args, "-Y.sv", "-Y.v", "-Wall", "-Wno-timescale"]
     else:
         sources, args = [w for w in WAIVERS if w.exists()], [*args, "+libext+.sv+.v", "-Wall"]
         direct_verilator(runner)
-    with open(shared / "lock", "w") as lock:              # parallel workers may want the same build
+    with open(shared / "lock", "w") as lock:  # parallel workers may want the same build
         fcntl.flock(lock, fcntl.LOCK_EX)
-        runner.build(sources=[*sources, source], hdl_toplevel=top, parameters=values, always=True,
-                     build_args=args, build_dir=build, timescale=("1ns", "1ps"), waves=waves)
+        runner.build(
+            sources=[*sources, source],
+            hdl_toplevel=top,
+            parameters=values,
+            always=True,
+            build_args=args,
+            build_dir=build,
+            timescale=("1ns", "1ps"),
+            waves=waves,
+        )
     module = ".".join(here.relative_to(ROOT).with_suffix("").parts)
     number = seed()
     print(f"{top} under {sim}, SEED={number}", flush=True)
-    failed = f"{top} under {sim}: {{}}. Again: make test K={name.split('[')[0]} SIM={sim} SEED={number}"
+    failed = (
+        f"{top} under {sim}: {{}}. Again: make test K={name.split('[')[0]} SIM={sim} SEED={number}"
+    )
     try:
-        count, wrong = results(runner.test(hdl_toplevel=top, test_module=module, build_dir=build, test_dir=own, seed=number,
-                                           waves=waves))
-    except (SystemExit, RuntimeError, FileNotFoundError): # the runner's words for a failed test and for no result at all
+        count, wrong = results(
+            runner.test(
+                hdl_toplevel=top,
+                test_module=module,
+                build_dir=build,
+                test_dir=own,
+                seed=number,
+                waves=waves,
+            )
+        )
+    except (
+        SystemExit,
+        RuntimeError,
+        FileNotFoundError,
+    ):  # the runner's words for a failed test and for no result at all
         count, wrong = None, None
     if wrong != 0 or not count:
-        pytest.fail(failed.format(f"no test ran from {here.name}" if count == 0 else "failed, see its output"), pytrace=False)
+        pytest.fail(
+            failed.format(
+                f"no test ran from {here.name}" if count == 0 else "failed, see its output"
+            ),
+            pytrace=False,
+        )
 
 
 def results(path):
-    """(how many tests ran, how many of them were wrong) from the file of results; what was skipped did not run."""
+    """(how many tests ran, how many of them were wrong) from the file of results; what was skipped
+    did not run.
+    """
     suites = xml.etree.ElementTree.parse(path).getroot().findall("testsuite")
-    count, skipped, *wrong = (sum(int(suite.get(name, 0)) for suite in suites) for name in ("tests", "skipped", "failures", "errors"))
+    count, skipped, *wrong = (
+        sum(int(suite.get(name, 0)) for suite in suites)
+        for name in ("tests", "skipped", "failures", "errors")
+    )
     return count - skipped, sum(wrong)
 
 
 def needs(condition, reason):
-    """In a cocotb test: skip it unless the parameters that the design was built with fulfil its condition; a test that returns early
+    """In a cocotb test: skip it unless the parameters that the design was built with fulfil its
+    condition; a test that returns early
     would count as passed."""
     if not condition:
         pytest.skip(reason)
 
 
 async def start(dut, period_ns=10, **inputs):
-    """Clock running, inputs at the given levels, two cycles of reset; returns just after reset falls."""
+    """Clock running, inputs at the given levels, two cycles of reset; returns just after reset
+    falls.
+    """
     for name, level in inputs.items():
         getattr(dut, name).value = level
     dut.rst.value = 1

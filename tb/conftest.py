@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The seed is decided here once, before any worker of pytest-xdist starts."""
+
 import os
 
 from tb.bench import seed

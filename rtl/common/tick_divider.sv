@@ -1,24 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 // tick_divider -- a strobe every `period` clk.
 //
-// latency  the first tick comes `period` clk after reset or restart   rate  one tick each `period` clk, exactly
+// latency  the first tick comes `period` clk after reset or restart   rate  one tick each `period`
+//          clk, exactly
 // model    tb/common/tick_divider.py, equal in every bit of every cycle
-// proved   two ticks are never nearer than the shortest period in force between them, nor to a restart; no tick while period is 0
+// proved   two ticks are never nearer than the shortest period in force between them, nor to a
+//          restart; no tick while period is 0
 `default_nettype none
 
 module tick_divider #(
-    parameter int W = 24                        // bits of period
+    parameter int W = 24  // bits of period
 ) (
-    input  wire                  clk,
-    input  wire                  rst,
-    input  wire        [W-1:0]   period,        // clk; 0: no ticks. A shorter one counts at once
-    input  wire                  restart,       // strobe: a period begins here; a tick that is due now is left out
-    output logic                 tick           // strobe
+    input wire clk,
+    input wire rst,
+    input wire [W-1:0] period,  // clk; 0: no ticks. A shorter one counts at once
+    input wire restart,  // strobe: a period begins here; a tick that is due now is left out
+    output logic tick  // strobe
 );
-    logic [W-1:0] elapsed;                      // clk since the last tick
+    logic [W-1:0] elapsed;  // clk since the last tick
 
-    wire on  = |period;
-    wire due = elapsed >= period - 1'b1;
+    wire          on = |period;
+    wire          due = elapsed >= period - 1'b1;
 
     always_ff @(posedge clk) begin
         tick    <= on && due && !restart;
@@ -30,8 +32,9 @@ module tick_divider #(
     end
 
 `ifdef FORMAL
-    logic         past = 1'b0;
-    logic [W-1:0] since, shortest;              // clk since the last tick, least period seen in that time
+    logic past = 1'b0;
+    // clk since the last tick, least period seen in that time
+    logic [W-1:0] since, shortest;
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);

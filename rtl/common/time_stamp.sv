@@ -7,11 +7,11 @@
 `default_nettype none
 
 module time_stamp #(
-    parameter int W = 64                    // bits of the count
+    parameter int W = 64  // bits of the count
 ) (
-    input  wire                  clk,
-    input  wire                  rst,       // the count starts again from 0
-    output logic       [W-1:0]   now        // clk, wraps
+    input  wire          clk,
+    input  wire          rst,  // the count starts again from 0
+    output logic [W-1:0] now   // clk, wraps
 );
     always_ff @(posedge clk) begin
         now <= now + 1'b1;

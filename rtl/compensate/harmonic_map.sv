@@ -1,91 +1,115 @@
 // SPDX-License-Identifier: Apache-2.0
-// harmonic_map -- take a sum of harmonics of the angle off a position: sum over k = 1..K of amplitude sin(k angle + phase).
+// harmonic_map -- take a sum of harmonics of the angle off a position: sum over k = 1..K of
+// amplitude sin(k angle + phase).
 //
 // latency  3 clk from step to corrected                 rate  one step per clk
-// method   the whole sum is worked out again and again, each time anew for the angle of that clk, (STEPS + 2) K + 35 clk a round,
-//          K one more if it is odd: two terms share the rotator, one is shifted while the other is added;
-//          between two sums each step adds the slope of the last one. After T = 2 rounds at rest the correction is that of the
-//          angle to 2^-17 count plus the arithmetic; moving m counts a round it is behind by at most
-//          3 m^2 sum(k^2 amplitude) (2 pi / counts_per_turn)^2 counts, which is of second order
-// terms    two sets. One is in force, the other is written; swap exchanges them and begins a round anew, so no sum ever mixes
-//          them. Until the first swap nothing is corrected. |amplitude| in sum must stay below 2^14 counts
-// source   S1: theta_1 = theta - sum C_s sin(t_s theta + phi_s); Volder, IRE Trans. EC-8 (1959) 330: rotation by atan 2^-n makes
-//          sine and cosine, and so value and slope, at once. Its gain 1.64676 is to be taken off the amplitude by who writes it
+// method   the whole sum is worked out again and again, each time anew for the angle of that clk,
+//          (STEPS + 2) K + 35 clk a round, K one more if it is odd: two terms share the rotator,
+//          one is shifted while the other is added; between two sums each step adds the slope of
+//          the last one. After T = 2 rounds at rest the correction is that of the angle to 2^-17
+//          count plus the arithmetic; moving m counts a round it is behind by at most 3 m^2 sum(k^2
+//          amplitude) (2 pi / counts_per_turn)^2 counts, which is of second order
+// terms    two sets. One is in force, the other is written; swap exchanges them and begins a round
+//          anew, so no sum ever mixes them. Until the first swap nothing is corrected. |amplitude|
+//          in sum must stay below 2^14 counts
+// source   S1: theta_1 = theta - sum C_s sin(t_s theta + phi_s); Volder, IRE Trans. EC-8 (1959)
+//          330: rotation by atan 2^-n makes sine and cosine, and so value and slope, at once. Its
+//          gain 1.64676 is to be taken off the amplitude by who writes it
 // model    tb/compensate/harmonic_map.py, equal in every bit of every cycle
-// proved   nothing is corrected before the first swap; the set in force changes with swap only, and swap ends the round that runs;
-//          the sum changes only at the end of a round
+// proved   nothing is corrected before the first swap; the set in force changes with swap only, and
+//          swap ends the round that runs; the sum changes only at the end of a round
 // proof    depth 12, K = 2, STEPS = 8
 `default_nettype none
 
 module harmonic_map #(
-    parameter int K     = 16,                       // orders
-    parameter int W     = 32,                       // bits of position
-    parameter int STEPS = 22                        // rotations a term
+    parameter int K     = 16,  // orders
+    parameter int W     = 32,  // bits of position
+    parameter int STEPS = 22   // rotations a term
 ) (
-    input  wire                   clk,
-    input  wire                   rst,
-    input  wire                   enable,           // level: angle is known; 0: nothing is corrected
+    input wire clk,
+    input wire rst,
+    input wire enable,  // level: angle is known; 0: nothing is corrected
     input  wire         [31:0]    radians_per_count, // 2^-40: 2 pi 2^40 / counts_per_turn, rounded; counts_per_turn from 1609 up
-    input  wire                   write,            // strobe: amplitude and phase go into the set not in force
-    input  wire         [4:0]     term,             // order - 1
-    input  wire signed  [31:0]    amplitude,        // 2^-16 count, less the gain of the rotations
-    input  wire         [31:0]    phase,            // 2^-32 turn
-    input  wire                   swap,             // strobe: exchange the sets
-    input  wire         [31:0]    angle,            // 2^-32 turn; step changes it one clk later, as it does position
-    input  wire signed  [1:0]     step,             // counts: -1, 0, +1
-    input  wire         [W-1:0]   position,         // counts
-    output logic signed [31:0]    correction,       // 2^-16 count
-    output logic signed [W+15:0]  corrected,        // 2^-16 count: position - correction of one clk before
-    output logic                  refreshed         // strobe: a sum has come in
+    input wire write,  // strobe: amplitude and phase go into the set not in force
+    input wire [4:0] term,  // order - 1
+    input wire signed [31:0] amplitude,  // 2^-16 count, less the gain of the rotations
+    input wire [31:0] phase,  // 2^-32 turn
+    input wire swap,  // strobe: exchange the sets
+    input wire [31:0] angle,  // 2^-32 turn; step changes it one clk later, as it does position
+    input wire signed [1:0] step,  // counts: -1, 0, +1
+    input wire [W-1:0] position,  // counts
+    output logic signed [31:0] correction,  // 2^-16 count
+    output logic signed [W+15:0] corrected,  // 2^-16 count: position - correction of one clk before
+    output logic refreshed  // strobe: a sum has come in
 );
-    if (K < 1 || K > 32)            begin : g_check_k K_MUST_BE_FROM_1_TO_32 u_error (); end
-    if (STEPS < 8 || STEPS > 24)    begin : g_check_steps STEPS_MUST_BE_FROM_8_TO_24 u_error (); end
+    if (K < 1 || K > 32) begin : g_check_k
+        K_MUST_BE_FROM_1_TO_32 u_error ();
+    end
+    if (STEPS < 8 || STEPS > 24) begin : g_check_steps
+        STEPS_MUST_BE_FROM_8_TO_24 u_error ();
+    end
 
-    localparam int V = 40;                          // a vector: 2^-24 count
-    localparam int TERMS = K + K % 2;               // they come in pairs
+    localparam int V = 40;  // a vector: 2^-24 count
+    localparam int TERMS = K + K % 2;  // they come in pairs
     localparam int P = $clog2(TERMS + 1);
 
-    typedef enum logic [2:0] {IDLE, READ, LOAD, ROTATE, ADD, WEIGH, MULTIPLY, APPLY} state_t;
+    typedef enum logic [2:0] {
+        IDLE,
+        READ,
+        LOAD,
+        ROTATE,
+        ADD,
+        WEIGH,
+        MULTIPLY,
+        APPLY
+    } state_t;
 
-    logic [63:0]         terms [0:2*(1<<P)-1];      // {amplitude, phase}
-    logic [63:0]         read;
-    logic                page, swapped;             // the set in force; there is one
+    logic [63:0] terms[0:2*(1<<P)-1];  // {amplitude, phase}
+    logic [63:0] read;
+    logic page, swapped;  // the set in force; there is one
 
-    state_t              state;
-    logic [P-1:0]        left;                      // term to be read, the highest comes first
-    logic                second;                    // of the pair
-    logic [4:0]          count;                     // rotations, then bits of the product
-    logic [31:0]         multiple;                  // of angle, for the term to come
-    logic [31:0]         from;                      // angle of this round
-    logic signed [V-1:0] x, y;                      // the vector of one term
-    logic signed [V-1:0] x_held, y_held, x_turn, y_turn;                    // that of the other, and what its rotation adds
-    logic signed [V-1:0] sum, run;                  // run: sum of x so far, so that the sum of run weighs each x with its order
-    logic [31:0]         rest, rest_held, rest_turn;                        // 2^-32 turn still to rotate
-    logic signed [31:0]  weighted;                  // 2^-10 count
-    logic signed [31:0]  high;                      // of the product
-    logic [31:0]         low;                       // of the product, behind the bits of the multiplier that are left
+    state_t         state;
+    logic   [P-1:0] left;  // term to be read, the highest comes first
+    logic           second;  // of the pair
+    logic   [  4:0] count;  // rotations, then bits of the product
+    logic   [ 31:0] multiple;  // of angle, for the term to come
+    logic   [ 31:0] from;  // angle of this round
+    logic signed [V-1:0] x, y;  // the vector of one term
+    // that of the other, and what its rotation adds
+    logic signed [V-1:0] x_held, y_held, x_turn, y_turn;
+    // run: sum of x so far, so that the sum of run weighs each x with its order
+    logic signed [V-1:0] sum, run;
+    // 2^-32 turn still to rotate
+    logic [31:0] rest, rest_held, rest_turn;
+    logic signed [ 31:0] weighted;  // 2^-10 count
+    logic signed [ 31:0] high;  // of the product
+    // of the product, behind the bits of the multiplier that are left
+    logic        [ 31:0] low;
 
-    logic signed [V-1:0] base;                      // the last sum
-    logic signed [28:0]  slope;                     // 2^-28 count per count
-    logic [W-1:0]        position_q;
-    logic signed [39:0]  offset, since;             // 2^-28 count: of the steps since the angle of base, since that of this round
+    logic signed [V-1:0] base;  // the last sum
+    logic signed [ 28:0] slope;  // 2^-28 count per count
+    logic        [W-1:0] position_q;
+    // 2^-28 count: of the steps since the angle of base, since that of this round
+    logic signed [39:0] offset, since;
 
-    wire                 on        = enable && swapped;
-    wire                 applies   = state == APPLY;
-    wire                 begins    = on && (state == IDLE || applies);
-    wire                 rotates   = state == LOAD || state == ROTATE || state == ADD;
-    wire                 spare     = K % 2 == 1 && left == P'(K - 1) && !second;    // the term that makes an odd K even
-    wire [63:0]          given     = spare ? 64'd0 : read;
-    wire [31:0]          wanted    = multiple + given[31:0];
-    wire                 backward  = wanted[31] ^ wanted[30];               // beyond a quarter turn: turn by half, start reversed
-    wire signed [V-1:0]  vector    = {given[63:32], 8'd0};
-    wire signed [V-1:0]  x_shifted = x >>> count;
-    wire signed [V-1:0]  y_shifted = y >>> count;
-    wire signed [32:0]   partial   = {high[31], high} + (low[0] ? {weighted[31], weighted} : 33'd0);
-    wire [63:0]          product   = {partial, low[31:1]};
-    wire signed [39:0]   climb     = {{11{slope[28]}}, slope};
-    wire signed [39:0]   change    = step[1] ? -climb : step[0] ? climb : 40'sd0;
-    wire signed [V-1:0]  total     = base + V'(offset >>> 4);
+    wire                on = enable && swapped;
+    wire                applies = state == APPLY;
+    wire                begins = on && (state == IDLE || applies);
+    wire                rotates = state == LOAD || state == ROTATE || state == ADD;
+    // the term that makes an odd K even
+    wire                spare = K % 2 == 1 && left == P'(K - 1) && !second;
+    wire        [ 63:0] given = spare ? 64'd0 : read;
+    wire        [ 31:0] wanted = multiple + given[31:0];
+    // beyond a quarter turn: turn by half, start reversed
+    wire                backward = wanted[31] ^ wanted[30];
+    wire signed [V-1:0] vector = {given[63:32], 8'd0};
+    wire signed [V-1:0] x_shifted = x >>> count;
+    wire signed [V-1:0] y_shifted = y >>> count;
+    wire signed [ 32:0] partial = {high[31], high} + (low[0] ? {weighted[31], weighted} : 33'd0);
+    wire        [ 63:0] product = {partial, low[31:1]};
+    wire signed [ 39:0] climb = {{11{slope[28]}}, slope};
+    wire signed [ 39:0] change = step[1] ? -climb : step[0] ? climb : 40'sd0;
+    wire signed [V-1:0] total = base + V'(offset >>> 4);
 
     // atan 2^-n in 2^-32 turn, rounded
     function automatic [31:0] rotation(input [4:0] n);
@@ -125,7 +149,8 @@ module harmonic_map #(
     end
 
     always_ff @(posedge clk)
-        if (rotates) begin                                                  // a complement is less by 1 than a negative: it saves an adder
+        // a complement is less by 1 than a negative: it saves an adder
+        if (rotates) begin
             x         <= x_held + x_turn;
             y         <= y_held + y_turn;
             rest      <= rest_held + rest_turn;
@@ -156,7 +181,7 @@ module harmonic_map #(
             LOAD: begin
                 multiple <= multiple - from;
                 if (second) state <= ROTATE;
-                else        left  <= left - 1'b1;
+                else left <= left - 1'b1;
             end
             ROTATE: if (second && count == 5'(STEPS - 1)) state <= ADD;
             ADD: begin
@@ -228,12 +253,19 @@ module harmonic_map #(
         past <= 1'b1;
         if (!past) assume (rst);
         if (past && !$past(rst)) begin
-            if (!swapped) assert (state == IDLE && base == '0 && slope == '0 && offset == '0 && since == '0 && correction == '0);
+            if (!swapped)
+                assert (state == IDLE && base == '0 && slope == '0 && offset == '0 && since == '0 && correction == '0);
             if (page != $past(page)) assert ($past(swap));
             if ($past(swap)) assert (state == IDLE);
             if (refreshed) assert ($past(state) == APPLY && $past(on));
             if (base != $past(base)) assert (refreshed || !$past(enable));
-            assert (corrected == {$past(position_q), 16'd0} - {{(W-16){$past(correction[31])}}, $past(correction)});
+            assert (corrected == {$past(
+                position_q
+            ), 16'd0} - {{(W - 16) {$past(
+                correction[31]
+            )}}, $past(
+                correction
+            )});
             cover (state == ROTATE && count == 5'd2);
         end
     end

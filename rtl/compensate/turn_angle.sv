@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// turn_angle -- follow an incremental encoder through the turn: position, angle from the index, and whether the index comes.
+// turn_angle -- follow an incremental encoder through the turn: position, angle from the index, and
+// whether the index comes.
 //
 // latency  1 clk from step or index to all outputs      rate  one step per clk
-// angle    an accumulator of 2^-48 turn, zeroed at the index: counts_per_turn steps away it is wrong by counts_per_turn * 2^-49
-//          turn at most, by 2^-24 turn for 2^25 counts; any counts_per_turn, not only powers of two
-// start    until the first step position is the quarter that a, b show, so that who makes a, b of position again makes the
-//          same levels; until the first index angle is not known
+// angle    an accumulator of 2^-48 turn, zeroed at the index: counts_per_turn steps away it is
+//          wrong by counts_per_turn * 2^-49 turn at most, by 2^-24 turn for 2^25 counts; any
+//          counts_per_turn, not only powers of two
+// start    until the first step position is the quarter that a, b show, so that who makes a, b of
+//          position again makes the same levels; until the first index angle is not known
 // source   S1: theta of its error model, from A/B/Z
 // model    tb/compensate/turn_angle.py, equal in every bit of every cycle
 // proved   place stays below counts_per_turn; known comes with an index only
@@ -13,37 +15,37 @@
 `default_nettype none
 
 module turn_angle #(
-    parameter int W = 32                            // bits of position
+    parameter int W = 32  // bits of position
 ) (
-    input  wire                 clk,
-    input  wire                 rst,
-    input  wire        [W-1:0]  counts_per_turn,    // 0: angle is never known
-    input  wire        [47:0]   angle_per_count,    // 2^-48 turn: 2^48 / counts_per_turn, rounded
-    input  wire                 a,                  // levels, not newer than 1 clk before step tells of them
-    input  wire                 b,
-    input  wire signed [1:0]    step,               // counts: -1, 0, +1
-    input  wire                 index,              // strobe: the step of this clk came onto the index
-    output logic                moved,              // level: there was a step
-    output logic       [W-1:0]  position,           // counts; wraps
-    output logic       [31:0]   angle,              // 2^-32 turn from the index up
-    output logic                known,              // level: there was an index
-    output logic                referenced,         // strobe: position is that of the index
-    output logic                missing             // strobe: a whole turn without its index
+    input wire clk,
+    input wire rst,
+    input wire [W-1:0] counts_per_turn,  // 0: angle is never known
+    input wire [47:0] angle_per_count,  // 2^-48 turn: 2^48 / counts_per_turn, rounded
+    input wire a,  // levels, not newer than 1 clk before step tells of them
+    input wire b,
+    input wire signed [1:0] step,  // counts: -1, 0, +1
+    input wire index,  // strobe: the step of this clk came onto the index
+    output logic moved,  // level: there was a step
+    output logic [W-1:0] position,  // counts; wraps
+    output logic [31:0] angle,  // 2^-32 turn from the index up
+    output logic known,  // level: there was an index
+    output logic referenced,  // strobe: position is that of the index
+    output logic missing  // strobe: a whole turn without its index
 );
     localparam logic [W-1:0] ONE = W'(1);
 
-    logic [W-1:0]      place;                       // counts from the index, or from the start
-    logic [W-1:0]      highest;                     // that place takes
-    logic [47:0]       turned;                      // 2^-48 turn
-    logic signed [1:0] turns;                       // borders of a turn passed since the last index
+    logic        [W-1:0] place;  // counts from the index, or from the start
+    logic        [W-1:0] highest;  // that place takes
+    logic        [ 47:0] turned;  // 2^-48 turn
+    logic signed [  1:0] turns;  // borders of a turn passed since the last index
 
-    wire up      = step == 2'sd1;
-    wire down    = step[1];
-    wire used    = counts_per_turn != '0;
-    wire over    = up   && (place >= highest || !used);
-    wire under   = down && place == '0;
-    wire to_zero = over || (down && place == ONE);
-    wire lost    = (over && turns == 2'sd0) || (under && turns == -2'sd1);
+    wire                 up = step == 2'sd1;
+    wire                 down = step[1];
+    wire                 used = counts_per_turn != '0;
+    wire                 over = up && (place >= highest || !used);
+    wire                 under = down && place == '0;
+    wire                 to_zero = over || (down && place == ONE);
+    wire                 lost = (over && turns == 2'sd0) || (under && turns == -2'sd1);
 
     assign angle = turned[47:16];
 
@@ -52,13 +54,13 @@ module turn_angle #(
         referenced <= index && used;
         missing    <= lost && !index && used;
         highest    <= counts_per_turn - ONE;
-        if (over)       place <= '0;
+        if (over) place <= '0;
         else if (under) place <= used ? highest : '0;
-        else            place <= place + {{W-1{down}}, up || down};
-        if (to_zero)          turned <= '0;
-        else if (up || down)  turned <= down ? turned - angle_per_count : turned + angle_per_count;
-        if (lost)       turns <= '0;
-        else if (over)  turns <= turns + 2'sd1;
+        else place <= place + {{W - 1{down}}, up || down};
+        if (to_zero) turned <= '0;
+        else if (up || down) turned <= down ? turned - angle_per_count : turned + angle_per_count;
+        if (lost) turns <= '0;
+        else if (over) turns <= turns + 2'sd1;
         else if (under) turns <= turns - 2'sd1;
         if (index) begin
             place  <= '0;

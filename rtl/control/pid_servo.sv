@@ -1,113 +1,141 @@
 // SPDX-License-Identifier: Apache-2.0
-// pid_servo -- PID with feed-forward of velocity and acceleration and two filters, once a tick, all in serial arithmetic.
+// pid_servo -- PID with feed-forward of velocity and acceleration and two filters, once a tick, all
+// in serial arithmetic.
 //
-//   2^16 command = kp e + integral + kd (target_velocity - velocity) + kv target_velocity + ka target_acceleration
-//   with e = target - position, integral += ki e, the units of axis_registers, held inside output_limit, then filtered
+//   2^16 command = kp e + integral + kd (target_velocity - velocity) + kv target_velocity + ka
+//   target_acceleration
+//   with e = target - position, integral += ki e, the units of axis_registers, held inside
+//   output_limit, then filtered
 //   (biquad_cascade, 16 fraction bits), rounded down and held inside output_limit again.
 //
-// latency  11 + 25 * TERMS + 36 * BIQUADS clk from tick to valid, 208 for all of it; the inputs are taken 8 clk after tick,
-//          when target and velocity of this tick stand
-// rate     one command per tick, a tick at most every 10 + 25 * TERMS + 177 * BIQUADS clk, 489 for all of it, and 136 for five
-//          terms without filters (an earlier one is ignored)
-// windup   the integral stays inside integral_limit; it does not grow in a direction in which the last command stood at
-//          its limit or the guard blocks; it rests while |e| <= dead_band and the profile stands; it is zero in open loop
-//          and while the guard blocks both directions (drive off)
-// bumpless after the loop was closed, the drive came on or a gain changed, the command stands for one tick as it stood (0
-//          while the drive was off), and the integral takes what makes the next one go on from there, as far as integral_limit
-//          reaches; with ki = 0 there is nothing to take it, and the command follows the gains at once. A tick whose inputs
-//          were taken without power does not count: the command stands. Opening the loop gives open_command at once
-// options  TERMS = 2: PI, 3: PID, 5: with feed-forward; BIQUADS = 0: no filters. Ports of what is left out are not read
+// latency  11 + 25 * TERMS + 36 * BIQUADS clk from tick to valid, 208 for all of it; the inputs are
+//          taken 8 clk after tick, when target and velocity of this tick stand
+// rate     one command per tick, a tick at most every 10 + 25 * TERMS + 177 * BIQUADS clk, 489 for
+//          all of it, and 136 for five terms without filters (an earlier one is ignored)
+// windup   the integral stays inside integral_limit; it does not grow in a direction in which the
+//          last command stood at its limit or the guard blocks; it rests while |e| <= dead_band and
+//          the profile stands; it is zero in open loop and while the guard blocks both directions
+//          (drive off)
+// bumpless after the loop was closed, the drive came on or a gain changed, the command stands for
+// one tick as it stood (0
+//          while the drive was off), and the integral takes what makes the next one go on from
+//          there, as far as integral_limit
+//          reaches; with ki = 0 there is nothing to take it, and the command follows the gains at
+//          once. A tick whose inputs
+//          were taken without power does not count: the command stands. Opening the loop gives
+//          open_command at once
+// options  TERMS = 2: PI, 3: PID, 5: with feed-forward; BIQUADS = 0: no filters. Ports of what is
+//          left out are not read
 // model    tb/control/pid_servo.py, equal in every bit of every cycle
-// proved   a command of the closed loop is inside output_limit, whatever the gains, inputs and filters do, and saturated whenever it
-//          stands at a limit that held it; an open command is passed on as it is; command changes only with valid
+// proved   a command of the closed loop is inside output_limit, whatever the gains, inputs and
+//          filters do, and saturated whenever it stands at a limit that held it; an open command is
+//          passed on as it is; command changes only with valid
 // proof    depth 12, TERMS = 2, BIQUADS = 0
 `default_nettype none
 
 module pid_servo #(
-    parameter int TERMS = 5,                                // 2 to 5
-    parameter int BIQUADS = 2                               // 0 to 4
+    parameter int TERMS   = 5,  // 2 to 5
+    parameter int BIQUADS = 2   // 0 to 4
 ) (
-    input  wire                  clk,
-    input  wire                  rst,
-    input  wire                  closed_loop,               // 0: command is open_command; error is still measured
-    input  wire        [23:0]    kp,                        // 2^-16 command/LSB of position
-    input  wire        [23:0]    ki,                        // 2^-24 command/LSB of position, each tick
-    input  wire        [23:0]    kd,                        // 2^-16 command/(LSB/tick)
-    input  wire        [23:0]    kv,                        // 2^-16 command/(LSB/tick)
-    input  wire        [23:0]    ka,                        // 2^-8 command/(LSB/tick2)
-    input  wire        [14:0]    output_limit,              // largest |command|
-    input  wire        [14:0]    integral_limit,            // largest |integral|, of command
-    input  wire        [15:0]    dead_band,                 // 2^-16 period
-    input  wire                  gains_changed,             // strobe: kp, kd, kv or ka is new, in this clk or the next or last
-    input  wire        [3:0]     filters_in_use,            // level: of each section, see biquad_cascade
-    input  wire                  coefficient_write,         // strobe
-    input  wire        [4:0]     coefficient_address,       // section * 8 + 0: b0, 1: b1, 2: b2, 3: -a1, 4: -a2
-    input  wire signed [31:0]    coefficient,               // 2^-30
-    input  wire                  tick,                      // strobe: servo tick
-    input  wire signed [47:0]    target,                    // 2^-16 period
-    input  wire signed [31:0]    target_velocity,           // 2^-16 period/tick
-    input  wire signed [31:0]    target_acceleration,       // 2^-16 period/tick2
-    input  wire                  moving,                    // a profile is being played
-    input  wire signed [47:0]    position,                  // 2^-16 period
-    input  wire signed [31:0]    velocity,                  // 2^-16 period/tick
-    input  wire signed [15:0]    open_command,              // full scale 2^15; passed on as it is in open loop
-    input  wire                  block_up,                  // level: the guard passes no positive command
-    input  wire                  block_down,                // level: the guard passes no negative command
-    output logic                 valid,                     // strobe: command is new, error belongs to it
-    output logic signed [15:0]   command,                   // full scale 2^15
-    output logic signed [31:0]   error,                     // 2^-16 period, target - position, held inside 32 bits
-    output logic                 saturated                  // command stands at output_limit
+    input wire clk,
+    input wire rst,
+    input wire closed_loop,  // 0: command is open_command; error is still measured
+    input wire [23:0] kp,  // 2^-16 command/LSB of position
+    input wire [23:0] ki,  // 2^-24 command/LSB of position, each tick
+    input wire [23:0] kd,  // 2^-16 command/(LSB/tick)
+    input wire [23:0] kv,  // 2^-16 command/(LSB/tick)
+    input wire [23:0] ka,  // 2^-8 command/(LSB/tick2)
+    input wire [14:0] output_limit,  // largest |command|
+    input wire [14:0] integral_limit,  // largest |integral|, of command
+    input wire [15:0] dead_band,  // 2^-16 period
+    input wire gains_changed,  // strobe: kp, kd, kv or ka is new, in this clk or the next or last
+    input wire [3:0] filters_in_use,  // level: of each section, see biquad_cascade
+    input wire coefficient_write,  // strobe
+    input wire [4:0] coefficient_address,  // section * 8 + 0: b0, 1: b1, 2: b2, 3: -a1, 4: -a2
+    input wire signed [31:0] coefficient,  // 2^-30
+    input wire tick,  // strobe: servo tick
+    input wire signed [47:0] target,  // 2^-16 period
+    input wire signed [31:0] target_velocity,  // 2^-16 period/tick
+    input wire signed [31:0] target_acceleration,  // 2^-16 period/tick2
+    input wire moving,  // a profile is being played
+    input wire signed [47:0] position,  // 2^-16 period
+    input wire signed [31:0] velocity,  // 2^-16 period/tick
+    input wire signed [15:0] open_command,  // full scale 2^15; passed on as it is in open loop
+    input wire block_up,  // level: the guard passes no positive command
+    input wire block_down,  // level: the guard passes no negative command
+    output logic valid,  // strobe: command is new, error belongs to it
+    output logic signed [15:0] command,  // full scale 2^15
+    output logic signed [31:0] error,  // 2^-16 period, target - position, held inside 32 bits
+    output logic saturated  // command stands at output_limit
 );
     localparam [2:0] INTEGRAL = 3'd0, PROPORTIONAL = 3'd1, DERIVATIVE = 3'd2, VELOCITY = 3'd3;
     localparam [2:0] LAST_TERM = 3'(TERMS - 1);
 
-    if (TERMS < 2 || TERMS > 5) begin : g_check_terms TERMS_MUST_BE_FROM_2_TO_5 u_error (); end
-    if (BIQUADS < 0 || BIQUADS > 4) begin : g_check_biquads BIQUADS_MUST_BE_FROM_0_TO_4 u_error (); end
+    if (TERMS < 2 || TERMS > 5) begin : g_check_terms
+        TERMS_MUST_BE_FROM_2_TO_5 u_error ();
+    end
+    if (BIQUADS < 0 || BIQUADS > 4) begin : g_check_biquads
+        BIQUADS_MUST_BE_FROM_0_TO_4 u_error ();
+    end
 
-    enum logic [2:0] {WAIT, SETTLE, TAKE, LOAD, MULTIPLY, LIMIT, FILTER} state;
+    enum logic [2:0] {
+        WAIT,
+        SETTLE,
+        TAKE,
+        LOAD,
+        MULTIPLY,
+        LIMIT,
+        FILTER
+    } state;
 
-    logic [4:0]         step;                               // clk within a state
-    logic [2:0]         term;
+    logic [4:0] step;  // clk within a state
+    logic [2:0] term;
     logic signed [32:0] velocity_error;
     logic signed [31:0] velocity_taken, acceleration_taken;
-    logic               standing;                           // no profile was being played
-    logic               stale;                              // power was missing at some clk since the inputs were taken
-    logic signed [63:0] operand;                            // shifted left
-    logic [23:0]        gain;                               // shifted right
-    logic signed [65:0] total;                              // 2^-16 command; of the integral: 2^-24 command
-    logic signed [39:0] integral;                           // 2^-24 command
-    logic               limited_up, limited_down;           // the last command stood at its limit
-    logic               fresh;                              // power was missing since the last command that was worked out
-    logic               changed, changed_taken;             // a gain changed since, before the inputs were taken
-    logic               retaking;                           // the integral takes the jump
-    logic signed [31:0] sum;                                // 2^-16 command; inside the limit, before the filters
+    logic               standing;  // no profile was being played
+    // power was missing at some clk since the inputs were taken
+    logic               stale;
+    logic signed [63:0] operand;  // shifted left
+    logic        [23:0] gain;  // shifted right
+    // 2^-16 command; of the integral: 2^-24 command
+    logic signed [65:0] total;
+    logic signed [39:0] integral;  // 2^-24 command
+    logic limited_up, limited_down;  // the last command stood at its limit
+    // power was missing since the last command that was worked out
+    logic fresh;
+    // a gain changed since, before the inputs were taken
+    logic changed, changed_taken;
+    logic retaking;  // the integral takes the jump
+    // 2^-16 command; inside the limit, before the filters
+    logic signed [31:0] sum;
 
-    wire signed [48:0] distance      = {target[47], target} - {position[47], position};
-    wire               distance_fits = distance[48:31] == {18{distance[48]}};
-    wire        [31:0] magnitude     = error[31] ? -error : error;
-    wire               powerless     = !closed_loop || (block_up && block_down);
-    wire               into_limit    = error[31] ? block_down || limited_down : block_up || limited_up;
+    wire signed [48:0] distance = {target[47], target} - {position[47], position};
+    wire distance_fits = distance[48:31] == {18{distance[48]}};
+    wire [31:0] magnitude = error[31] ? -error : error;
+    wire powerless = !closed_loop || (block_up && block_down);
+    wire into_limit = error[31] ? block_down || limited_down : block_up || limited_up;
 
     wire signed [65:0] integral_high = {27'd0, integral_limit, 24'd0};
     wire signed [65:0] new_integral  = total > integral_high ? integral_high : total < -integral_high ? -integral_high : total;
 
     // the command before the filters: worked out, or as it stood
-    wire               no_power = stale || powerless;
-    wire               retakes  = (fresh || changed || changed_taken || gains_changed) && ki != '0;
-    wire               stands   = no_power || retakes;
-    wire signed [49:0] asked    = stands ? {{34{sum[31]}}, sum[31:16]} : total[65:16];      // 2^0 command
-    wire signed [49:0] high     = {35'd0, output_limit};
-    wire               too_high = asked > high;
-    wire               too_low  = asked < -high;
+    wire no_power = stale || powerless;
+    wire retakes = (fresh || changed || changed_taken || gains_changed) && ki != '0;
+    wire stands = no_power || retakes;
+    // 2^0 command
+    wire signed [49:0] asked = stands ? {{34{sum[31]}}, sum[31:16]} : total[65:16];
+    wire signed [49:0] high = {35'd0, output_limit};
+    wire too_high = asked > high;
+    wire too_low = asked < -high;
     wire signed [31:0] held     = too_high ? {1'b0, output_limit, 16'd0} : too_low ? -{1'b0, output_limit, 16'd0} :
                                   {asked[15:0], stands ? sum[15:0] : total[15:0]};
 
-    wire               total_fits = total[65:33] == {33{total[65]}};
+    wire total_fits = total[65:33] == {33{total[65]}};
     wire signed [33:0] total_near = total_fits ? total[33:0] : {total[65], {33{~total[65]}}};
-    wire signed [34:0] jump       = {{3{sum[31]}}, sum} - {total_near[33], total_near};
+    wire signed [34:0] jump = {{3{sum[31]}}, sum} - {total_near[33], total_near};
 
     // filters
-    wire               filter_ready, filtered_valid;
+    wire filter_ready, filtered_valid;
     wire signed [31:0] filtered;
 
     if (BIQUADS == 0) begin : g_plain
@@ -116,22 +144,35 @@ module pid_servo #(
         assign filtered       = sum;
         wire unused = &{1'b0, filters_in_use, coefficient_write, coefficient_address, coefficient};
     end else begin : g_filters
-        biquad_cascade #(.SECTIONS(BIQUADS)) u_filters (.clk, .rst, .in_use(filters_in_use[BIQUADS-1:0]), .coefficient_write,
-            .coefficient_address, .coefficient, .valid_in(state == LIMIT), .track(no_power), .x(closed_loop ? held : {open_command, 16'd0}),
-            .ready(filter_ready), .valid(filtered_valid), .y(filtered));
+        biquad_cascade #(
+            .SECTIONS(BIQUADS)
+        ) u_filters (
+            .clk,
+            .rst,
+            .in_use  (filters_in_use[BIQUADS-1:0]),
+            .coefficient_write,
+            .coefficient_address,
+            .coefficient,
+            .valid_in(state == LIMIT),
+            .track   (no_power),
+            .x       (closed_loop ? held : {open_command, 16'd0}),
+            .ready   (filter_ready),
+            .valid   (filtered_valid),
+            .y       (filtered)
+        );
         if (BIQUADS < 4) begin : g_fewer
             wire unused = &{1'b0, filters_in_use[3:BIQUADS]};
         end
     end
 
-    wire signed [15:0] wanted     = no_power ? sum[31:16] : filtered[31:16];
-    wire               wants_high = wanted > $signed({1'b0, output_limit});
-    wire               wants_low  = wanted < -$signed({1'b0, output_limit});
+    wire signed [15:0] wanted = no_power ? sum[31:16] : filtered[31:16];
+    wire wants_high = wanted > $signed({1'b0, output_limit});
+    wire wants_low = wanted < -$signed({1'b0, output_limit});
     wire signed [15:0] new_command = !closed_loop ? open_command :
                                      wants_high   ? {1'b0, output_limit} :
                                      wants_low    ? -{1'b0, output_limit} : wanted;
-    wire               gives      = state == FILTER && filtered_valid;
-    wire               unused_low = &{1'b0, filtered[15:0]};              // rounded down
+    wire gives = state == FILTER && filtered_valid;
+    wire unused_low = &{1'b0, filtered[15:0]};  // rounded down
 
     always_ff @(posedge clk) begin
         valid <= 1'b0;
@@ -241,7 +282,11 @@ module pid_servo #(
         if (!past) assume (rst);
         if (past && !$past(rst)) begin
             if (valid && $past(closed_loop)) begin
-                assert (command <= $signed({1'b0, $past(output_limit)}) && command >= -$signed({1'b0, $past(output_limit)}));
+                assert (command <= $signed(
+                    {1'b0, $past(output_limit)}
+                ) && command >= -$signed(
+                    {1'b0, $past(output_limit)}
+                ));
                 assert (saturated || $past(wanted) == command);
             end
             if (valid && !$past(closed_loop)) assert (command == $past(open_command) && !saturated);

@@ -2,41 +2,46 @@
 // soft_core -- RISC-V processor (rv32im) with its memory, and the master of the register bus.
 //
 // latency  memory answers without a wait, registers with one of 1 clk
-// rate     an operation takes 3 clk, a memory access 5, a register access or a product 6, a quotient 40
-// source   PicoRV32, from the package pythondata_cpu_picorv32; its look-ahead address reaches the memory one clk early
+// rate     an operation takes 3 clk, a memory access 5, a register access or a product 6, a
+//          quotient 40
+// source   PicoRV32, from the package pythondata_cpu_picorv32; its look-ahead address reaches the
+//          memory one clk early
 // model    tb/cpu/soft_core.py, the results of the program tb/cpu/core_test.c
-// proved   whatever the core does: an access that goes nowhere raises trap in the next clk, and trap stands until rst; select is a
-//          strobe, only of an access to a whole word of the registers, and never of an instruction
+// proved   whatever the core does: an access that goes nowhere raises trap in the next clk, and
+//          trap stands until rst; select is a strobe, only of an access to a whole word of the
+//          registers, and never of an instruction
 // proof    depth 6, MEMORY_BYTES = 1024
 //
-// map      0000_0000 memory (start address 0, stack from its end), 8000_0000 registers (64 KiB, whole words only).
-//          Anything else, a misaligned access and an illegal instruction stop the core: trap stands until rst.
+// map      0000_0000 memory (start address 0, stack from its end), 8000_0000 registers (64 KiB,
+//          whole words only). Anything else, a misaligned access and an illegal instruction stop
+//          the core: trap stands until rst.
 `default_nettype none
 
 module soft_core #(
-    parameter int MEMORY_BYTES = 32768,         // a multiple of 1024
-    parameter FIRMWARE = ""                     // file of its contents at power-up, see node_memory
+    parameter int MEMORY_BYTES = 32768,  // a multiple of 1024
+    parameter     FIRMWARE     = ""      // file of its contents at power-up, see node_memory
 ) (
-    input  wire                  clk,
-    input  wire                  rst,           // starts the core at address 0; memory keeps what it holds
-    output logic                 select,        // strobe: one access to the registers
-    output logic                 write,         // with select: wdata is to be written, else read
-    output logic       [15:0]    address,       // of a register, bytes
-    output logic       [31:0]    wdata,
-    input  wire        [31:0]    rdata,         // stands the clk after select
-    output logic                 trap           // level: the core has stopped
+    input  wire         clk,
+    input  wire         rst,      // starts the core at address 0; memory keeps what it holds
+    output logic        select,   // strobe: one access to the registers
+    output logic        write,    // with select: wdata is to be written, else read
+    output logic [15:0] address,  // of a register, bytes
+    output logic [31:0] wdata,
+    input  wire  [31:0] rdata,    // stands the clk after select
+    output logic        trap      // level: the core has stopped
 );
     localparam int A = $clog2(MEMORY_BYTES);
 
-    wire        core_trap, mem_valid, mem_instr, mem_la_read, mem_la_write;
+    wire core_trap, mem_valid, mem_instr, mem_la_read, mem_la_write;
     wire [31:0] mem_addr, mem_wdata, mem_la_wdata, memory_rdata;
     // verilator lint_off UNUSEDSIGNAL
-    wire [31:0] mem_la_addr;                    // of a word: bits 1:0 are zero
+    wire [31:0] mem_la_addr;  // of a word: bits 1:0 are zero
     // verilator lint_on UNUSEDSIGNAL
-    wire [3:0]  mem_wstrb, mem_la_wstrb;
-    logic       answered, lost;                 // the registers have answered; an access went nowhere
+    wire [3:0] mem_wstrb, mem_la_wstrb;
+    // the registers have answered; an access went nowhere
+    logic answered, lost;
 
-    wire in_memory    = mem_addr < 32'(MEMORY_BYTES);
+    wire in_memory = mem_addr < 32'(MEMORY_BYTES);
     wire in_registers = mem_addr[31:16] == 16'h8000 && !mem_instr && (&mem_wstrb || ~|mem_wstrb);
     wire la_in_memory = mem_la_addr < 32'(MEMORY_BYTES);
 
@@ -55,19 +60,61 @@ module soft_core #(
         end
     end
 
-    node_memory #(.BYTES(MEMORY_BYTES), .FIRMWARE(FIRMWARE)) u_memory (
-        .clk, .read(mem_la_read), .write(mem_la_wstrb & {4{mem_la_write && la_in_memory}}), .address(mem_la_addr[A-1:2]),
-        .wdata(mem_la_wdata), .rdata(memory_rdata));
+    node_memory #(
+        .BYTES   (MEMORY_BYTES),
+        .FIRMWARE(FIRMWARE)
+    ) u_memory (
+        .clk,
+        .read   (mem_la_read),
+        .write  (mem_la_wstrb & {4{mem_la_write && la_in_memory}}),
+        .address(mem_la_addr[A-1:2]),
+        .wdata  (mem_la_wdata),
+        .rdata  (memory_rdata)
+    );
 
-    picorv32 #(.ENABLE_COUNTERS(0), .ENABLE_COUNTERS64(0), .BARREL_SHIFTER(1), .ENABLE_MUL(1), .ENABLE_FAST_MUL(1), .ENABLE_DIV(1),
-               .CATCH_MISALIGN(1), .CATCH_ILLINSN(1), .REGS_INIT_ZERO(1), .STACKADDR(32'(MEMORY_BYTES))) u_core (
-        .clk, .resetn(!rst), .trap(core_trap), .mem_valid, .mem_instr, .mem_ready(answered || (mem_valid && in_memory)), .mem_addr,
-        .mem_wdata, .mem_wstrb, .mem_rdata(answered ? rdata : memory_rdata), .mem_la_read, .mem_la_write, .mem_la_addr,
-        .mem_la_wdata, .mem_la_wstrb, .pcpi_wr(1'b0), .pcpi_rd(32'd0), .pcpi_wait(1'b0), .pcpi_ready(1'b0), .irq(32'd0),
+    picorv32 #(
+        .ENABLE_COUNTERS  (0),
+        .ENABLE_COUNTERS64(0),
+        .BARREL_SHIFTER   (1),
+        .ENABLE_MUL       (1),
+        .ENABLE_FAST_MUL  (1),
+        .ENABLE_DIV       (1),
+        .CATCH_MISALIGN   (1),
+        .CATCH_ILLINSN    (1),
+        .REGS_INIT_ZERO   (1),
+        .STACKADDR        (32'(MEMORY_BYTES))
+    ) u_core (
+        .clk,
+        .resetn     (!rst),
+        .trap       (core_trap),
+        .mem_valid,
+        .mem_instr,
+        .mem_ready  (answered || (mem_valid && in_memory)),
+        .mem_addr,
+        .mem_wdata,
+        .mem_wstrb,
+        .mem_rdata  (answered ? rdata : memory_rdata),
+        .mem_la_read,
+        .mem_la_write,
+        .mem_la_addr,
+        .mem_la_wdata,
+        .mem_la_wstrb,
+        .pcpi_wr    (1'b0),
+        .pcpi_rd    (32'd0),
+        .pcpi_wait  (1'b0),
+        .pcpi_ready (1'b0),
+        .irq        (32'd0),
         // no co-processor, no interrupts, no trace:
         // verilator lint_off PINCONNECTEMPTY
-        .pcpi_valid(), .pcpi_insn(), .pcpi_rs1(), .pcpi_rs2(), .eoi(), .trace_valid(), .trace_data());
-        // verilator lint_on PINCONNECTEMPTY
+        .pcpi_valid (),
+        .pcpi_insn  (),
+        .pcpi_rs1   (),
+        .pcpi_rs2   (),
+        .eoi        (),
+        .trace_valid(),
+        .trace_data ()
+    );
+    // verilator lint_on PINCONNECTEMPTY
 
 `ifdef FORMAL
     logic past = 1'b0;
@@ -78,9 +125,11 @@ module soft_core #(
             if ($past(mem_valid && !in_memory && !in_registers)) assert (trap);
             if ($past(lost)) assert (trap);
             assert (!(select && $past(select)));
-            if (select) assert (mem_valid && !in_memory && !mem_instr && (mem_wstrb == '0 || mem_wstrb == '1));
+            if (select)
+                assert (mem_valid && !in_memory && !mem_instr && (mem_wstrb == '0 || mem_wstrb == '1));
             if (write && select) assert (mem_wstrb == '1);
-            assert (!(answered && lost && !$past(lost)));       // no access is both answered and lost
+            // no access is both answered and lost
+            assert (!(answered && lost && !$past(lost)));
             cover (mem_valid && in_memory && mem_instr);
         end
     end

@@ -1,69 +1,139 @@
 // SPDX-License-Identifier: Apache-2.0
-// encoder_counter -- an incremental encoder behind three words of a bus: for who wants a counter and not an axis.
+// encoder_counter -- an incremental encoder behind three words of a bus: for who wants a counter
+// and not an axis.
 //
 //   word 0  read   {time of the last edge, count}, both of one clk
-//   word 1  read   {latched count, 8'b0, illegal, probed, found, armed, probe, z, b, a}: flags that stand, levels behind the filter
-//           write  bit 4: arm the index; bit 5, 6, 7: found, probed, illegal fall, unless they come again in that clk
-//   word 2  both   settings, 0 after reset: [3:0] filter_required [5:4] mode [6] index_low [7] index needs [9:8] = {b, a}
-//                  [10] index_up [11] index_down [12] index_each [13] index_clears [14] probe_latches [15] probe_low
-//                  [19:16] filter_tolerated [31:20] filter_skip, as far as there are any; meaning as in incremental_encoder
+//   word 1  read   {latched count, 8'b0, illegal, probed, found, armed, probe, z, b, a}: flags that
+//   stand, levels behind the filter
+//           write  bit 4: arm the index; bit 5, 6, 7: found, probed, illegal fall, unless they come
+//           again in that clk
+//   word 2  both   settings, 0 after reset: [3:0] filter_required [5:4] mode [6] index_low [7]
+//   index needs [9:8] = {b, a}
+//                  [10] index_up [11] index_down [12] index_each [13] index_clears [14]
+//                  probe_latches [15] probe_low
+//                  [19:16] filter_tolerated [31:20] filter_skip, as far as there are any; meaning
+//                  as in incremental_encoder
 //
-// latency  1 clk from select to rdata, and from a write to the new value. N samples of the filter and 2 clk from a, b, z to
-//          count and latched count, 3 clk from probe: with the filter in bypass the count of the same pins
+// latency  1 clk from select to rdata, and from a write to the new value. N samples of the filter
+//          and 2 clk from a, b, z to count and latched count, 3 clk from probe: with the filter in
+//          bypass the count of the same pins
 // rate     one access per clk
-// source   the features of HostMot2's encoder counter: count, time of its last edge, count latched by index or probe, flags
+// source   the features of HostMot2's encoder counter: count, time of its last edge, count latched
+//          by index or probe, flags
 // model    tb/decode/encoder_counter.py, equal in every bit of every cycle
-// proved   a flag falls only when told to; the latched count changes only with a flag, the time only with a step of count
+// proved   a flag falls only when told to; the latched count changes only with a flag, the time
+//          only with a step of count
 // proof    FILTER_W = 1
 `default_nettype none
 
 module encoder_counter #(
-    parameter int FILTER_W = 4,             // bits of filter_required, 1 to 4
+    parameter int FILTER_W = 4,  // bits of filter_required, 1 to 4
     parameter int TOLERATED_W  = 0,             // bits of filter_tolerated, 0 to 4; 0: N samples in a row, no N of M
-    parameter int SKIP_W   = 0              // bits of filter_skip, 0 to 12; 0: a sample every clk
+    parameter int SKIP_W = 0  // bits of filter_skip, 0 to 12; 0: a sample every clk
 ) (
-    input  wire         clk,
-    input  wire         rst,                // count and settings become zero
-    input  wire         select,             // an access to this block
-    input  wire         write,              // with select: wdata goes into the word
-    input  wire  [1:0]  word,               // word 3 reads 0
-    input  wire  [31:0] wdata,
-    input  wire  [15:0] now,                // the time, in any unit
-    input  wire         a,                  // levels, synchronous to clk
-    input  wire         b,
-    input  wire         z,
-    input  wire         probe,              // level, synchronous to clk and clean: its rising edge latches the count
-    output logic [31:0] rdata               // what was read, for one clk; 0 in every other
+    input wire clk,
+    input wire rst,  // count and settings become zero
+    input wire select,  // an access to this block
+    input wire write,  // with select: wdata goes into the word
+    input wire [1:0] word,  // word 3 reads 0
+    input wire [31:0] wdata,
+    input wire [15:0] now,  // the time, in any unit
+    input wire a,  // levels, synchronous to clk
+    input wire b,
+    input wire z,
+    input wire probe,  // level, synchronous to clk and clean: its rising edge latches the count
+    output logic [31:0] rdata  // what was read, for one clk; 0 in every other
 );
-    if (FILTER_W < 1 || FILTER_W > 4) begin : g_check_filter FILTER_W_MUST_BE_FROM_1_TO_4 u_error (); end
-    if (TOLERATED_W < 0 || TOLERATED_W > 4)   begin : g_check_spare TOLERATED_W_MUST_BE_FROM_0_TO_4 u_error (); end
-    if (SKIP_W < 0 || SKIP_W > 12)    begin : g_check_skip SKIP_W_MUST_BE_FROM_0_TO_12 u_error (); end
+    if (FILTER_W < 1 || FILTER_W > 4) begin : g_check_filter
+        FILTER_W_MUST_BE_FROM_1_TO_4 u_error ();
+    end
+    if (TOLERATED_W < 0 || TOLERATED_W > 4) begin : g_check_spare
+        TOLERATED_W_MUST_BE_FROM_0_TO_4 u_error ();
+    end
+    if (SKIP_W < 0 || SKIP_W > 12) begin : g_check_skip
+        SKIP_W_MUST_BE_FROM_0_TO_12 u_error ();
+    end
 
     localparam logic [3:0]  REQUIRED = 4'((1 << FILTER_W) - 1);           // the bits of the settings that there are
-    localparam logic [3:0]  TOLERATED  = 4'((1 << TOLERATED_W) - 1);
-    localparam logic [11:0] SKIP   = 12'((1 << SKIP_W) - 1);
+    localparam logic [3:0] TOLERATED = 4'((1 << TOLERATED_W) - 1);
+    localparam logic [11:0] SKIP = 12'((1 << SKIP_W) - 1);
 
     logic [31:0] settings;
     logic [15:0] edge_time;
-    logic        illegal_seen, found_seen, probed_seen;
-    logic        probe_q, probe_2q, probing;
+    logic illegal_seen, found_seen, probed_seen;
+    logic probe_q, probe_2q, probing;
 
-    wire         [2:0]  filtered, rejected;
-    wire signed  [15:0] count, index_count;
-    wire signed  [1:0]  step;
+    wire [2:0] filtered, rejected;
+    wire signed [15:0] count, index_count;
+    wire signed [1:0] step;
     wire                a_later, b_later, ready, stepping, direction, illegal, clear, armed, found, revolution_wrong;
 
     wire told = select && write && word == 2'd1;
 
-    event_filter #(.LEVELS(3), .W(4), .TOLERATED_W(4), .SKIP_W(12), .SETTLE(3)) u_filter
-        (.clk, .rst, .skip(settings[31:20]), .required(settings[3:0]), .tolerated(settings[19:16]), .level({z, b, a}), .filtered, .rejected);
-    quadrature_decoder #(.W(16), .SETTLE(7)) u_decoder
-        (.clk, .rst, .mode(settings[5:4]), .clear, .a(a_later), .b(b_later), .ready, .stepping, .count, .step, .direction, .illegal);
-    index_latch #(.W(16), .CHECK(0)) u_index
-        (.clk, .rst, .active_low(settings[6]), .gate_mask({2{settings[7]}}), .gate(settings[9:8]), .take_up(settings[10]),
-         .take_down(settings[11]), .each(settings[12]), .clears(settings[13]), .counts_per_revolution(16'd0), .arm(told && wdata[4]),
-         .probe(probing), .ready, .direction, .stepping, .count, .a(filtered[0]), .b(filtered[1]), .z(filtered[2]), .a_later, .b_later,
-         .clear, .armed, .found, .index_count, .revolution_wrong);
+    event_filter #(
+        .LEVELS     (3),
+        .W          (4),
+        .TOLERATED_W(4),
+        .SKIP_W     (12),
+        .SETTLE     (3)
+    ) u_filter (
+        .clk,
+        .rst,
+        .skip     (settings[31:20]),
+        .required (settings[3:0]),
+        .tolerated(settings[19:16]),
+        .level    ({z, b, a}),
+        .filtered,
+        .rejected
+    );
+    quadrature_decoder #(
+        .W     (16),
+        .SETTLE(7)
+    ) u_decoder (
+        .clk,
+        .rst,
+        .mode(settings[5:4]),
+        .clear,
+        .a   (a_later),
+        .b   (b_later),
+        .ready,
+        .stepping,
+        .count,
+        .step,
+        .direction,
+        .illegal
+    );
+    index_latch #(
+        .W    (16),
+        .CHECK(0)
+    ) u_index (
+        .clk,
+        .rst,
+        .active_low           (settings[6]),
+        .gate_mask            ({2{settings[7]}}),
+        .gate                 (settings[9:8]),
+        .take_up              (settings[10]),
+        .take_down            (settings[11]),
+        .each                 (settings[12]),
+        .clears               (settings[13]),
+        .counts_per_revolution(16'd0),
+        .arm                  (told && wdata[4]),
+        .probe                (probing),
+        .ready,
+        .direction,
+        .stepping,
+        .count,
+        .a                    (filtered[0]),
+        .b                    (filtered[1]),
+        .z                    (filtered[2]),
+        .a_later,
+        .b_later,
+        .clear,
+        .armed,
+        .found,
+        .index_count,
+        .revolution_wrong
+    );
 
     wire unused = &{1'b0, rejected, step, revolution_wrong};
 
@@ -75,14 +145,16 @@ module encoder_counter #(
         found_seen   <= found || (found_seen && !(told && wdata[5]));
         probed_seen  <= probing || (probed_seen && !(told && wdata[6]));
         illegal_seen <= illegal || (illegal_seen && !(told && wdata[7]));
-        if (select && write && word == 2'd2) settings <= wdata & {SKIP, TOLERATED, 12'hFFF, REQUIRED};
+        if (select && write && word == 2'd2)
+            settings <= wdata & {SKIP, TOLERATED, 12'hFFF, REQUIRED};
         rdata <= '0;
-        if (select) case (word)
-            2'd0:    rdata <= {edge_time, count};
-            2'd1:    rdata <= {index_count, 8'd0, illegal_seen, probed_seen, found_seen, armed, probe_q, filtered};
-            2'd2:    rdata <= settings;
-            default: rdata <= '0;
-        endcase
+        if (select)
+            case (word)
+                2'd0:    rdata <= {edge_time, count};
+                2'd1:    rdata <= {index_count, 8'd0, illegal_seen, probed_seen, found_seen, armed, probe_q, filtered};
+                2'd2:    rdata <= settings;
+                default: rdata <= '0;
+            endcase
         if (rst) begin
             settings     <= '0;
             found_seen   <= 1'b0;

@@ -1,52 +1,58 @@
 // SPDX-License-Identifier: Apache-2.0
-// bridge_pwm -- edge-aligned sign-magnitude PWM for an H-bridge driver with two inputs: drives, else brakes; off it coasts.
+// bridge_pwm -- edge-aligned sign-magnitude PWM for an H-bridge driver with two inputs: drives,
+// else brakes; off it coasts.
 //
-// latency  10 clk from valid to the earliest period border that drives it; off 1 clk after enable falls
+// latency  10 clk from valid to the earliest period border that drives it; off 1 clk after enable
+//          falls
 // rate     one command per 9 clk; one that comes earlier replaces the one before it; any period
-// duty     |command| * period / 2^15 clk per period; the fraction goes on into the next period (first-order noise
-//          shaping), so that over n periods the time driven is right to 1 clk in all
-// decay    slow: between pulses both pins are high and the bridge shorts the motor, so that its mean voltage is linear in
-//          the command. Coasting there would make the current at small duty go as its square
-// fits     TI DRV8870 (SLVSCY8A table 1: IN1 IN2 = 10 forward, 01 reverse, 11 brake, 00 coast) and its relatives; the
-//          dead time is the driver's own. It sleeps after 1 ms of 00 and wakes in 50 us
+// duty     |command| * period / 2^15 clk per period; the fraction goes on into the next period
+//          (first-order noise shaping), so that over n periods the time driven is right to 1 clk in
+//          all
+// decay    slow: between pulses both pins are high and the bridge shorts the motor, so that its
+//          mean voltage is linear in the command. Coasting there would make the current at small
+//          duty go as its square
+// fits     TI DRV8870 (SLVSCY8A table 1: IN1 IN2 = 10 forward, 01 reverse, 11 brake, 00 coast) and
+//          its relatives; the dead time is the driver's own. It sleeps after 1 ms of 00 and wakes
+//          in 50 us
 // model    tb/drive/bridge_pwm.py, equal in every bit of every cycle
-// proved   both low one clk after enable falls or is low; a pulse has one direction, changed only at a period border
+// proved   both low one clk after enable falls or is low; a pulse has one direction, changed only
+//          at a period border
 `default_nettype none
 
 module bridge_pwm (
-    input  wire                  clk,
-    input  wire                  rst,
-    input  wire        [15:0]    period,                    // clk; taken with a command; 0: off
-    input  wire                  enable,                    // 0: both low (coast), and a command given before is forgotten
-    input  wire                  valid,                     // strobe: command is new
-    input  wire signed [15:0]    command,                   // full scale 2^15
-    output logic                 bridge_a,                  // pin: alone high while a positive command drives
-    output logic                 bridge_b                   // pin: alone high while a negative command drives; both: brake
+    input wire clk,
+    input wire rst,
+    input wire [15:0] period,  // clk; taken with a command; 0: off
+    input wire enable,  // 0: both low (coast), and a command given before is forgotten
+    input wire valid,  // strobe: command is new
+    input wire signed [15:0] command,  // full scale 2^15
+    output logic bridge_a,  // pin: alone high while a positive command drives
+    output logic bridge_b  // pin: alone high while a negative command drives; both: brake
 );
     // the multiplier: |command| * period, in 2^-15 clk
-    logic        busy, asked_reverse;
-    logic [2:0]  step;
+    logic busy, asked_reverse;
+    logic [2:0] step;
     logic [15:0] asked_period, multiplier;
     logic [30:0] multiplicand, product;
 
     // what the next border takes
     logic        next_reverse;
     logic [15:0] next_period;
-    logic [30:0] next_on;                                   // 2^-15 clk
+    logic [30:0] next_on;  // 2^-15 clk
 
     // the period that runs
-    logic        powered, reverse;                          // powered: there is a period
-    logic [15:0] left, on_left;                             // clk after this one
-    logic [14:0] fraction;                                  // 2^-15 clk that were not driven yet
+    logic powered, reverse;  // powered: there is a period
+    logic [15:0] left, on_left;  // clk after this one
+    logic [14:0] fraction;  // 2^-15 clk that were not driven yet
 
     wire [30:0] sum    = product + (multiplier[0] ? multiplicand : '0) + (multiplier[1] ? multiplicand << 1 : '0);
     wire [15:0] shaped = {1'b0, next_on[14:0]} + {1'b0, fraction};
-    wire [15:0] on     = next_on[30:15] + {15'd0, shaped[15]};
+    wire [15:0] on = next_on[30:15] + {15'd0, shaped[15]};
 
-    wire        border    = left == 16'd0;
-    wire        drives    = border ? on != 16'd0  : on_left != 16'd0;
-    wire        direction = border ? next_reverse : reverse;
-    wire        on_power  = border ? next_period != 16'd0 : powered;
+    wire border = left == 16'd0;
+    wire drives = border ? on != 16'd0 : on_left != 16'd0;
+    wire direction = border ? next_reverse : reverse;
+    wire on_power = border ? next_period != 16'd0 : powered;
 
     always_ff @(posedge clk) begin
         if (valid) begin
@@ -100,7 +106,8 @@ module bridge_pwm (
         if (!past) assume (rst);
         if (past) begin
             if (!$past(enable)) assert (!bridge_a && !bridge_b);
-            if ($past(left) != 0 && $past(enable) && !$past(rst)) assert (reverse == $past(reverse));
+            if ($past(left) != 0 && $past(enable) && !$past(rst))
+                assert (reverse == $past(reverse));
             if (bridge_a && !bridge_b) assert (!reverse);
             if (bridge_b && !bridge_a) assert (reverse);
             if (!powered) assert (!bridge_a && !bridge_b);

@@ -1,66 +1,76 @@
 // SPDX-License-Identifier: Apache-2.0
-// quadrature_encoder -- turn a target position into the A/B/Z of an incremental encoder, one edge at a time.
+// quadrature_encoder -- turn a target position into the A/B/Z of an incremental encoder, one edge
+// at a time.
 //
 // latency  2 clk from target to the edge, if `minimum_edge_separation` allows it
-// rate     one edge per `minimum_edge_separation` clk; a target further off is made up at that rate, the way back too
-// rounding a settled position is target rounded to the nearest count, a half goes up. Around it `hysteresis` widens the band
-//          in which nothing moves to 1/2 + hysteresis each way: a target that trembles by less than twice that makes no edge
+// rate     one edge per `minimum_edge_separation` clk; a target further off is made up at that
+//          rate, the way back too
+// rounding a settled position is target rounded to the nearest count, a half goes up. Around it
+// `hysteresis` widens the band
+//          in which nothing moves to 1/2 + hysteresis each way: a target that trembles by less than
+//          twice that makes no edge
 //          but the first one
-// index    z is high while position is home_position plus any number of counts_per_turn, once home has come; it changes
-//          together with the edge. home waits for a clk without an edge
+// index    z is high while position is home_position plus any number of counts_per_turn, once home
+//          has come; it changes together with the edge. home waits for a clk without an edge
 // source   S1: A/B/Z sent on as if the relay were the encoder
 // model    tb/drive/quadrature_encoder.py, equal in every bit of every cycle
-// proved   a and b never change both in one clk, no edge sooner than `minimum_edge_separation` after the one before, pins and position agree
-//          for ever, a target that moves no faster than the minimum_edge_separation is followed within 1/2 + hysteresis + 1 count
+// proved   a and b never change both in one clk, no edge sooner than `minimum_edge_separation`
+//          after the one before, pins and position agree for ever, a target that moves no faster
+//          than the minimum_edge_separation is followed within 1/2 + hysteresis + 1 count
 // proof    W = 6, F = 2, SEPARATION_W = 3
 `default_nettype none
 
 module quadrature_encoder #(
-    parameter int W         = 32,                   // bits of position
-    parameter int F         = 16,                   // fraction bits of target
-    parameter int SEPARATION_W = 16                    // bits of minimum_edge_separation
+    parameter int W            = 32,  // bits of position
+    parameter int F            = 16,  // fraction bits of target
+    parameter int SEPARATION_W = 16   // bits of minimum_edge_separation
 ) (
-    input  wire                  clk,
-    input  wire                  rst,
+    input wire clk,
+    input wire rst,
     input  wire [SEPARATION_W-1:0]  minimum_edge_separation,           // clk between two edges at least; 0 is taken as 1
-    input  wire        [F-1:0]   hysteresis,        // 2^-F count
-    input  wire        [W-1:0]   counts_per_turn,   // 0: z stays low
-    input  wire                  load,              // level: position is home_position without edges: only while nobody looks
-    input  wire signed [W+F-1:0] target,            // 2^-F count; wraps
-    input  wire                  home,              // strobe: z belongs at home_position; less than a turn away
-    input  wire        [W-1:0]   home_position,     // count
-    output logic                 a,                 // pin; a leading b counts up
-    output logic                 b,                 // pin
-    output logic                 z,                 // pin
-    output logic       [W-1:0]   position,          // count that a, b stand for
-    output logic                 behind             // level: it was more than 4 counts from the target, 2 clk before
+    input wire [F-1:0] hysteresis,  // 2^-F count
+    input wire [W-1:0] counts_per_turn,  // 0: z stays low
+    input wire load,  // level: position is home_position without edges: only while nobody looks
+    input wire signed [W+F-1:0] target,  // 2^-F count; wraps
+    input wire home,  // strobe: z belongs at home_position; less than a turn away
+    input wire [W-1:0] home_position,  // count
+    output logic a,  // pin; a leading b counts up
+    output logic b,  // pin
+    output logic z,  // pin
+    output logic [W-1:0] position,  // count that a, b stand for
+    output logic behind  // level: it was more than 4 counts from the target, 2 clk before
 );
-    if (W < 4) begin : g_check_w W_MUST_BE_AT_LEAST_4 u_error (); end
-    if (F < 1) begin : g_check_f F_MUST_BE_AT_LEAST_1 u_error (); end
+    if (W < 4) begin : g_check_w
+        W_MUST_BE_AT_LEAST_4 u_error ();
+    end
+    if (F < 1) begin : g_check_f
+        F_MUST_BE_AT_LEAST_1 u_error ();
+    end
 
-    localparam logic [W-1:0]   ONE  = W'(1);
-    localparam logic [W+F-1:0] HALF = (W+F)'(1) << (F - 1);
+    localparam logic [W-1:0] ONE = W'(1);
+    localparam logic [W+F-1:0] HALF = (W + F)'(1) << (F - 1);
 
-    logic [W-1:0]         reach_up, reach_down;     // the highest position that still goes up, the lowest that need not go down
-    logic                 aimed;                    // they stand
-    logic [W-1:2]         ahead_q, back_q;          // of the clk before, for behind
-    logic                 aimed_q;
-    logic [SEPARATION_W-1:0] left;                     // clk until an edge is allowed
-    logic [W-1:0]         place;                    // count from the index up
-    logic [W-1:0]         highest;                  // that place takes
-    logic                 placed, waiting;          // place is known; home has not been taken yet
-    logic [W-1:0]         home_q;
+    // the highest position that still goes up, the lowest that need not go down
+    logic [W-1:0] reach_up, reach_down;
+    logic aimed;  // they stand
+    logic [W-1:2] ahead_q, back_q;  // of the clk before, for behind
+    logic                    aimed_q;
+    logic [SEPARATION_W-1:0] left;  // clk until an edge is allowed
+    logic [           W-1:0] place;  // count from the index up
+    logic [           W-1:0] highest;  // that place takes
+    logic placed, waiting;  // place is known; home has not been taken yet
+    logic [  W-1:0] home_q;
 
-    wire [W-1:0]   ahead  = reach_up - position;
-    wire [W-1:0]   back   = reach_down - position;
-    wire           free   = left == '0 && aimed && !load;
-    wire           up     = free && !ahead[W-1];
-    wire           down   = free && ahead[W-1] && back[W-1];
-    wire [W+F-1:0] band   = HALF + {{W{1'b0}}, hysteresis};
-    wire [W-1:0]   lower  = W'((target - band) >> F);
-    wire [W-1:0]   upper  = W'((target + band) >> F);
-    wire [W-1:0]   from   = position - home_q;
-    wire           take   = waiting && !up && !down;
+    wire  [  W-1:0] ahead = reach_up - position;
+    wire  [  W-1:0] back = reach_down - position;
+    wire            free = left == '0 && aimed && !load;
+    wire            up = free && !ahead[W-1];
+    wire            down = free && ahead[W-1] && back[W-1];
+    wire  [W+F-1:0] band = HALF + {{W{1'b0}}, hysteresis};
+    wire  [  W-1:0] lower = W'((target - band) >> F);
+    wire  [  W-1:0] upper = W'((target + band) >> F);
+    wire  [  W-1:0] from = position - home_q;
+    wire            take = waiting && !up && !down;
 
     assign b = position[1];
     assign a = position[1] ^ position[0];
@@ -75,15 +85,15 @@ module quadrature_encoder #(
         back_q     <= back[W-1:2];
         behind     <= aimed_q && ((!ahead_q[W-1] && |ahead_q[W-2:2]) || (back_q[W-1] && !(&back_q[W-2:2])));
 
-        if (up || down)       left <= minimum_edge_separation == '0 ? '0 : minimum_edge_separation - 1'b1;
-        else if (left != '0)  left <= left - 1'b1;
+        if (up || down) left <= minimum_edge_separation == '0 ? '0 : minimum_edge_separation - 1'b1;
+        else if (left != '0) left <= left - 1'b1;
 
-        if (load)      position <= home_position;
-        else if (up)   position <= position + ONE;
+        if (load) position <= home_position;
+        else if (up) position <= position + ONE;
         else if (down) position <= position - ONE;
 
-        if (take)      place <= from[W-1] ? from + counts_per_turn : from;
-        else if (up)   place <= place == highest ? '0 : place + ONE;
+        if (take) place <= from[W-1] ? from + counts_per_turn : from;
+        else if (up) place <= place == highest ? '0 : place + ONE;
         else if (down) place <= place == '0 ? highest : place - ONE;
 
         highest <= counts_per_turn - ONE;
@@ -102,9 +112,10 @@ module quadrature_encoder #(
     end
 
 `ifdef FORMAL
-    logic                 past = 1'b0;
-    logic                 loaded;                   // position was loaded, and nobody has looked since
-    logic [SEPARATION_W-1:0] stood;                    // clk since the last edge
+    logic                    past = 1'b0;
+    // position was loaded, and nobody has looked since
+    logic                    loaded;
+    logic [SEPARATION_W-1:0] stood;  // clk since the last edge
     always @(posedge clk) begin
         past   <= 1'b1;
         loaded <= rst || load;
@@ -115,7 +126,13 @@ module quadrature_encoder #(
         end
         if (past && !$past(rst) && !$past(load)) begin
             assert (!(a != $past(a) && b != $past(b)));
-            assert (position == $past(position) || position == W'($past(position) + 1) || position == W'($past(position) - 1));
+            assert (position == $past(
+                position
+            ) || position == W'($past(
+                position
+            ) + 1) || position == W'($past(
+                position
+            ) - 1));
             if (position != $past(position)) assert ((a != $past(a)) ^ (b != $past(b)));
             if (z && !$past(z)) assert (place == 0 && placed);
             cover (z && a != $past(a));
@@ -125,7 +142,7 @@ module quadrature_encoder #(
 
     // one minimum_edge_separation for ever: no edge comes too soon
     logic [SEPARATION_W-1:0] agreed;
-    logic                 steady;
+    logic                    steady;
     wire  [SEPARATION_W-1:0] least = agreed == '0 ? '0 : agreed - 1'b1;
     always @(posedge clk) begin
         steady <= rst ? 1'b1 : steady && minimum_edge_separation == agreed;
@@ -137,17 +154,19 @@ module quadrature_encoder #(
         end
     end
 
-    // a target that takes one count at a time and no sooner than the minimum_edge_separation is never lost
-    logic           calm;                           // it has done so since the start, hysteresis at rest
-    logic [SEPARATION_W:0] quiet;                      // clk since it moved
-    logic [F-1:0]   hysteresis_q;
-    logic [W+F-1:0] target_q;
-    wire  signed [W+F-1:0] moved = target - target_q;
-    wire  signed [W+F-1:0] away  = target_q - {position, {F{1'b0}}};
-    wire  signed [W+F-1:0] reach = {{W{1'b0}}, hysteresis_q} + HALF;
-    wire  signed [W+F-1:0] unit  = HALF << 1;
-    wire               still = moved == 0;
-    wire               slow  = moved <= unit && moved >= -unit && quiet >= {1'b0, least};
+    // a target that takes one count at a time and no sooner than the minimum_edge_separation is
+    // never lost
+    // it has done so since the start, hysteresis at rest
+    logic                        calm;
+    logic       [SEPARATION_W:0] quiet;  // clk since it moved
+    logic       [         F-1:0] hysteresis_q;
+    logic       [       W+F-1:0] target_q;
+    wire signed [       W+F-1:0] moved = target - target_q;
+    wire signed [       W+F-1:0] away = target_q - {position, {F{1'b0}}};
+    wire signed [       W+F-1:0] reach = {{W{1'b0}}, hysteresis_q} + HALF;
+    wire signed [       W+F-1:0] unit = HALF << 1;
+    wire                         still = moved == 0;
+    wire                         slow = moved <= unit && moved >= -unit && quiet >= {1'b0, least};
     always @(posedge clk) begin
         target_q     <= target;
         hysteresis_q <= hysteresis;
@@ -157,11 +176,12 @@ module quadrature_encoder #(
         if (past && calm) begin
             assert (loaded || aimed);
             if (!loaded) begin
-                assert (reach_up   == W'((target_q - reach) >> F));
+                assert (reach_up == W'((target_q - reach) >> F));
                 assert (reach_down == W'((target_q + reach) >> F));
             end
             assert (away < reach + unit && away >= -reach - unit);
-            if (away >= reach || away < -reach) assert ({1'b0, quiet} + {2'b0, left} <= {2'b0, least});
+            if (away >= reach || away < -reach)
+                assert ({1'b0, quiet} + {2'b0, left} <= {2'b0, least});
             cover (quiet == 0 && away > reach && position == 5);
         end
     end

@@ -1,37 +1,49 @@
 // SPDX-License-Identifier: Apache-2.0
-// step_follower -- tell a step generator each tick where to go: the target and a trim, in motor steps, and when to begin restart there.
+// step_follower -- tell a step generator each tick where to go: the target and a trim, in motor
+// steps, and when to begin restart there.
 //
-// latency  57 clk from tick to go or restart; target and trim are taken in the 8th clk after tick, when those of this tick stand
+// latency  57 clk from tick to go or restart; target and trim are taken in the 8th clk after tick,
+//          when those of this tick stand
 // rate     a tick per 57 clk at most
-// restart     the first position after the drive came on, and after the target was moved by other than motion (rebase), is where
+// restart     the first position after the drive came on, and after the target was moved by other
+//             than motion (rebase), is where
 //          the generator begins, without a step
 // model    tb/drive/step_follower.py, equal in every bit of every cycle
-// proved   never go and restart at once; after a rebase, or with the drive off, no go before an restart
+// proved   never go and restart at once; after a rebase, or with the drive off, no go before an
+//          restart
 // proof    depth 125
 `default_nettype none
 
 module step_follower (
-    input  wire                  clk,
-    input  wire                  rst,
-    input  wire signed [47:0]    ratio,         // 2^-32 step per period, either sign
-    input  wire        [3:0]     shift,         // of trim
-    input  wire                  enable,        // level: the drive is on
-    input  wire                  rebase,        // strobe: target := position, or the origin moves
-    input  wire                  tick,          // strobe: servo tick
-    input  wire signed [47:0]    target,        // 2^-16 period
-    input  wire signed [15:0]    trim,          // 2^(shift - 16) period
-    output logic                 go,            // strobe: draw a line to position
-    output logic                 restart,          // strobe: begin a line at position
-    output logic signed [47:0]   position          // Q32.16 steps
+    input  wire                clk,
+    input  wire                rst,
+    input  wire signed  [47:0] ratio,    // 2^-32 step per period, either sign
+    input  wire         [ 3:0] shift,    // of trim
+    input  wire                enable,   // level: the drive is on
+    input  wire                rebase,   // strobe: target := position, or the origin moves
+    input  wire                tick,     // strobe: servo tick
+    input  wire signed  [47:0] target,   // 2^-16 period
+    input  wire signed  [15:0] trim,     // 2^(shift - 16) period
+    output logic               go,       // strobe: draw a line to position
+    output logic               restart,  // strobe: begin a line at position
+    output logic signed [47:0] position  // Q32.16 steps
 );
     logic [3:0] wait_cycles;
-    logic       rebased, pending;               // since the position was taken; before
+    logic rebased, pending;  // since the position was taken; before
 
-    wire take = wait_cycles == 4'd1;
-    wire done;
+    wire               take = wait_cycles == 4'd1;
+    wire               done;
     wire signed [47:0] required = target + (48'(trim) <<< shift);
 
-    step_scaler u_scaler (.clk, .rst, .ratio, .valid(take), .position(required), .done, .steps(position));
+    step_scaler u_scaler (
+        .clk,
+        .rst,
+        .ratio,
+        .valid   (take),
+        .position(required),
+        .done,
+        .steps   (position)
+    );
 
     wire fresh = pending || rebased || rebase || !enable;
 
@@ -50,7 +62,8 @@ module step_follower (
     end
 
 `ifdef FORMAL
-    logic past = 1'b0, moved = 1'b1;            // target was moved, or the drive was off, since a position was begun at
+    // target was moved, or the drive was off, since a position was begun at
+    logic past = 1'b0, moved = 1'b1;
     always @(posedge clk) begin
         past  <= 1'b1;
         moved <= rst || rebase || !enable || (moved && !restart);

@@ -1,34 +1,39 @@
 // SPDX-License-Identifier: Apache-2.0
-// heartbeat_watchdog -- tells when a kick of life has been missing for too long while a drive is on.
+// heartbeat_watchdog -- tells when a kick of life has been missing for too long while a drive is
+// on.
 //
-// latency  expired rises time_ms * (CLK_HZ / 1000) + 1 clk after the last kick, or after armed rose if that came later;
-//          it falls 1 clk after a kick or after armed fell
-// used     for the master on the line (a good frame is the kick) and for the soft core (its firmware gives one each round)
+// latency  expired rises time_ms * (CLK_HZ / 1000) + 1 clk after the last kick, or after armed rose
+//          if that came later; it falls 1 clk after a kick or after armed fell
+// used     for the master on the line (a good frame is the kick) and for the soft core (its
+//          firmware gives one each round)
 // model    tb/interlock/heartbeat_watchdog.py, equal in every bit of every cycle
-// proved   expired only while armed and only without a kick in the clk before; once up it stays until one of them
+// proved   expired only while armed and only without a kick in the clk before; once up it stays
+//          until one of them
 `default_nettype none
 
 module heartbeat_watchdog #(
-    parameter int CLK_HZ = 4_000_000                        // a multiple of 1000
+    parameter int CLK_HZ = 4_000_000  // a multiple of 1000
 ) (
-    input  wire                  clk,
-    input  wire                  rst,
-    input  wire        [15:0]    time_ms,                   // longest silence; 0: for ever; a new one counts at once
-    input  wire                  kick,                      // strobe: of life
-    input  wire                  armed,                     // level: a drive is enabled
-    output logic                 expired                    // level: no kick for time_ms
+    input  wire         clk,
+    input  wire         rst,
+    input  wire  [15:0] time_ms,  // longest silence; 0: for ever; a new one counts at once
+    input  wire         kick,     // strobe: of life
+    input  wire         armed,    // level: a drive is enabled
+    output logic        expired   // level: no kick for time_ms
 );
-    if (CLK_HZ < 1000 || CLK_HZ % 1000 != 0) begin : g_check CLK_HZ_MUST_BE_A_MULTIPLE_OF_1000 u_error (); end
+    if (CLK_HZ < 1000 || CLK_HZ % 1000 != 0) begin : g_check
+        CLK_HZ_MUST_BE_A_MULTIPLE_OF_1000 u_error ();
+    end
 
     localparam int CLK_MS = CLK_HZ / 1000;
-    localparam int P      = CLK_MS > 1 ? $clog2(CLK_MS) : 1;
+    localparam int P = CLK_MS > 1 ? $clog2(CLK_MS) : 1;
 
-    logic [P-1:0]  part;                                    // clk of the running millisecond
-    logic [15:0]   silent;                                  // ms, stops at its end
+    logic [P-1:0] part;  // clk of the running millisecond
+    logic [ 15:0] silent;  // ms, stops at its end
 
-    wire whole = part == P'(CLK_MS - 1);
-    wire over  = silent >= time_ms && time_ms != '0;
-    wire full  = silent == '1;
+    wire          whole = part == P'(CLK_MS - 1);
+    wire          over = silent >= time_ms && time_ms != '0;
+    wire          full = silent == '1;
 
     always_ff @(posedge clk) begin
         if (kick || !armed || rst) begin
@@ -50,7 +55,8 @@ module heartbeat_watchdog #(
         if (past) begin
             if (expired) assert ($past(armed) && !$past(kick));
             if ($past(expired) && $past(armed) && !$past(kick) && !$past(rst)) assert (expired);
-            if (expired && !$past(expired)) assert ($past(time_ms) != 0 && $past(silent) >= $past(time_ms));
+            if (expired && !$past(expired))
+                assert ($past(time_ms) != 0 && $past(silent) >= $past(time_ms));
             cover (part == 3 && $past(kick, 4));
         end
     end

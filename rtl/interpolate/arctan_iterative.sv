@@ -3,65 +3,82 @@
 //
 // latency  24, 28, 30 clk from valid to done for W = 8, 9, 10, 23 clk for wider samples
 // rate     one sample per latency; one that comes sooner is not taken
-// accuracy phase: every sample of 8, 9 and 10 bits is correctly rounded; wider ones are within 0.517 LSB of the true phase from a
-//          quarter of full scale on. amplitude: within 1.5 counts and 0.00015 of itself. (0, 0) gives 0 and 0
-// source   CORDIC in vectoring mode, after TURNS digits as a division; the shorter leg is doubled at each digit (Y = 2^i y)
-// model    tb/interpolate/arctan_iterative.py, equal in every bit of every cycle; bound and angles from tables/arctan_rotation.py
+// accuracy phase: every sample of 8, 9 and 10 bits is correctly rounded; wider ones are within
+// 0.517 LSB of the true phase from a
+//          quarter of full scale on. amplitude: within 1.5 counts and 0.00015 of itself. (0, 0)
+//          gives 0 and 0
+// source   CORDIC in vectoring mode, after TURNS digits as a division; the shorter leg is doubled
+//          at each digit (Y = 2^i y)
+// model    tb/interpolate/arctan_iterative.py, equal in every bit of every cycle; bound and angles
+//          from tables/arctan_rotation.py
 `default_nettype none
 
 module arctan_iterative #(
-    parameter int W = 8                     // bits of a sample, 8 to 16
+    parameter int W = 8  // bits of a sample, 8 to 16
 ) (
-    input  wire                  clk,
-    input  wire                  rst,       // drops the sample in work; phase and amplitude become 0
-    input  wire                  valid,     // strobe: sin and cos are a new sample
-    input  wire signed [W-1:0]   sin,       // full scale = 2^(W-1)
-    input  wire signed [W-1:0]   cos,       // full scale = 2^(W-1)
-    output logic                 done,      // strobe: phase and amplitude are new
-    output logic       [15:0]    phase,     // one signal period = 2^16; stands until the next
-    output logic       [W-1:0]   amplitude  // counts of the converter; stands until the next
+    input  wire                clk,
+    input  wire                rst,       // drops the sample in work; phase and amplitude become 0
+    input  wire                valid,     // strobe: sin and cos are a new sample
+    input  wire signed [W-1:0] sin,       // full scale = 2^(W-1)
+    input  wire signed [W-1:0] cos,       // full scale = 2^(W-1)
+    output logic               done,      // strobe: phase and amplitude are new
+    output logic       [ 15:0] phase,     // one signal period = 2^16; stands until the next
+    output logic       [W-1:0] amplitude  // counts of the converter; stands until the next
 );
-    if (W < 8 || W > 16) begin : g_check W_MUST_BE_FROM_8_TO_16 u_error (); end
+    if (W < 8 || W > 16) begin : g_check
+        W_MUST_BE_FROM_8_TO_16 u_error ();
+    end
 
     localparam int TURNS  = W == 9 ? 9 : W == 10 ? 9 : 7;               // these four as in tables/arctan_rotation.py
     localparam int DIGITS = W == 8 ? 23 : W == 9 ? 27 : W == 10 ? 29 : 22;
-    localparam int F      = W == 8 ? 12 : W == 9 ? 14 : W == 10 ? 16 : 10;
-    localparam int GUARD  = W == 8 ? 14 : W == 9 ? 16 : W == 10 ? 17 : 11;
-    localparam int Z      = 16 + GUARD;
-    localparam int P      = $clog2(TURNS);
+    localparam int F = W == 8 ? 12 : W == 9 ? 14 : W == 10 ? 16 : 10;
+    localparam int GUARD = W == 8 ? 14 : W == 9 ? 16 : W == 10 ? 17 : 11;
+    localparam int Z = 16 + GUARD;
+    localparam int P = $clog2(TURNS);
 
-    logic [4:0]          digit;                     // to be found in this clk; 0: at rest
-    logic [W+F-1:0]      longer;                    // turned to the axis it becomes the amplitude
-    logic signed [W+F:0] shorter;                   // 2^(digit - 2) times what is left across, less 1; at digit 1 the leg itself
-    logic                frame, zero;               // frame: sign of the digit before
-    logic [Z-1:0]        angle;                     // sum of the angles, half an LSB included
-    logic [W+2:0]        size;                      // amplitude in eighths
+    logic        [    4:0] digit;  // to be found in this clk; 0: at rest
+    logic        [W+F-1:0] longer;  // turned to the axis it becomes the amplitude
+    // 2^(digit - 2) times what is left across, less 1; at digit 1 the leg itself
+    logic signed [  W+F:0] shorter;
+    logic frame, zero;  // frame: sign of the digit before
+    logic [Z-1:0] angle;  // sum of the angles, half an LSB included
+    logic [W+2:0] size;  // amplitude in eighths
 
-    wire [W-1:0]    sin_size = sin[W-1] ? -sin : sin;
-    wire [W-1:0]    cos_size = cos[W-1] ? -cos : cos;
-    wire            steep    = sin_size > cos_size;
+    wire [W-1:0] sin_size = sin[W-1] ? -sin : sin;
+    wire [W-1:0] cos_size = cos[W-1] ? -cos : cos;
+    wire steep = sin_size > cos_size;
 
-    wire            first    = digit == 5'd1;
-    wire            negative = shorter[W+F];
-    wire [W+F-1:0]  rest     = shorter[W+F-1:0] ^ {(W + F){negative}};  // with `one` added: the shorter leg without its sign
-    wire            one      = !negative && !first;
-    wire            turned   = frame ^ negative;
-    wire [P-1:0]    passed   = P'(digit - 5'd1);                        // digits; used up to TURNS
-    wire [W+F:0]    along    = {1'b0, rest} >> {passed, 1'b0};          // in halves: its last bit rounds
+    wire first = digit == 5'd1;
+    wire negative = shorter[W+F];
+    // with `one` added: the shorter leg without its sign
+    wire [W+F-1:0] rest = shorter[W+F-1:0] ^ {(W + F) {negative}};
+    wire one = !negative && !first;
+    wire turned = frame ^ negative;
+    wire [P-1:0] passed = P'(digit - 5'd1);  // digits; used up to TURNS
+    // in halves: its last bit rounds
+    wire [W+F:0] along = {1'b0, rest} >> {passed, 1'b0};
 
-    wire [Z-1:0]    turn [0:31];                                        // what each digit turns by
+    wire [Z-1:0] turn[0:31];  // what each digit turns by
     for (genvar n = 0; n < 32; n++) begin : g_turn
         if (n > 0 && n <= DIGITS) begin : g_digit
             wire signed [Z-n-1:0] by;
-            arctan_rotation_rom #(.TURNS(TURNS), .FIRST(n), .COUNT(1), .GUARD(GUARD)) u_rom (.negative(1'b0), .sum(by));
+            arctan_rotation_rom #(
+                .TURNS(TURNS),
+                .FIRST(n),
+                .COUNT(1),
+                .GUARD(GUARD)
+            ) u_rom (
+                .negative(1'b0),
+                .sum     (by)
+            );
             assign turn[n] = Z'(by) - Z'(n == 1 ? 1 << (GUARD - 1) : 0);
         end else begin : g_none
             assign turn[n] = '0;
         end
     end
-    wire [Z-1:0]    sum      = Z'(({angle, 1'b1} + {turn[digit] ^ {Z{turned}}, turned}) >> 1);
+    wire [Z-1:0] sum = Z'(({angle, 1'b1} + {turn[digit] ^ {Z{turned}}, turned}) >> 1);
 
-    wire [W+2:0]    eighths  = longer[W+F-1:F-3];
+    wire [W+2:0] eighths = longer[W+F-1:F-3];
     wire [W-1:0]    part     = W'(eighths >> (digit == 5'(TURNS + 2) ? 3 : digit == 5'(TURNS + 3) ? 6 : 11));
 
     always_ff @(posedge clk) begin
@@ -78,10 +95,10 @@ module arctan_iterative #(
             frame   <= turned;
             angle   <= sum;
             shorter <= (W+F+1)'(({rest, one, 1'b0} - {1'b0, longer, !one}) >> 1);
-            if (digit <= 5'(TURNS)) longer <= (W+F)'(({longer, 1'b1} + along) >> 1);
+            if (digit <= 5'(TURNS)) longer <= (W + F)'(({longer, 1'b1} + along) >> 1);
             // 1 / gain of the turns = 1 - 2^-3 - 2^-6 - 2^-11
             if (digit == 5'(TURNS + 1)) size <= {eighths[W+2:3], 3'd4};
-            else if (digit <= 5'(TURNS + 4)) size <= size - (W+3)'(part);
+            else if (digit <= 5'(TURNS + 4)) size <= size - (W + 3)'(part);
             if (digit == 5'(DIGITS)) begin
                 digit     <= '0;
                 done      <= 1'b1;

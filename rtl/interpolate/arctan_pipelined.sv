@@ -1,42 +1,53 @@
 // SPDX-License-Identifier: Apache-2.0
-// arctan_pipelined -- phase and amplitude of a sine and a cosine sample: 2^16 atan2(sin, cos) / 2 pi, and their length.
+// arctan_pipelined -- phase and amplitude of a sine and a cosine sample: 2^16 atan2(sin, cos) / 2
+// pi, and their length.
 //
-// latency  24, 28, 29 clk from valid to done for W = 8, 9, 10, 23 clk for wider samples; divided by STEPS, rounded up
+// latency  24, 28, 29 clk from valid to done for W = 8, 9, 10, 23 clk for wider samples; divided by
+//          STEPS, rounded up
 // rate     one sample per clk
-// accuracy phase: every sample of 8, 9 and 10 bits is correctly rounded; wider ones are within 0.548 LSB of the true phase from a
-//          quarter of full scale on (of 12 bits, all tried: 0.510). amplitude: within 1.5 counts and 0.00015 of itself.
+// accuracy phase: every sample of 8, 9 and 10 bits is correctly rounded; wider ones are within
+// 0.548 LSB of the true phase from a
+//          quarter of full scale on (of 12 bits, all tried: 0.510). amplitude: within 1.5 counts
+//          and 0.00015 of itself.
 //          (0, 0) gives 0 and 0
-// source   CORDIC in vectoring mode, after TURNS digits as a division; the shorter leg is doubled at each digit (Y = 2^i y), so
-//          that both legs lose a bit a digit; the angles of four or five digits come from one look-up
-// model    tb/interpolate/arctan_pipelined.py, equal in every bit of every cycle; bound and angles from tables/arctan_rotation.py
+// source   CORDIC in vectoring mode, after TURNS digits as a division; the shorter leg is doubled
+//          at each digit (Y = 2^i y), so that both legs lose a bit a digit; the angles of four or
+//          five digits come from one look-up
+// model    tb/interpolate/arctan_pipelined.py, equal in every bit of every cycle; bound and angles
+//          from tables/arctan_rotation.py
 `default_nettype none
 
 module arctan_pipelined #(
-    parameter int W     = 12,               // bits of a sample, 8 to 16
-    parameter int STEPS = 1                 // steps from register to register
+    parameter int W     = 12,  // bits of a sample, 8 to 16
+    parameter int STEPS = 1    // steps from register to register
 ) (
-    input  wire                  clk,
-    input  wire                  rst,       // drops the samples in work; phase and amplitude become 0
-    input  wire                  valid,     // strobe: sin and cos are a new sample
-    input  wire signed [W-1:0]   sin,       // full scale = 2^(W-1)
-    input  wire signed [W-1:0]   cos,       // full scale = 2^(W-1)
-    output logic                 done,      // strobe: phase and amplitude are new
-    output logic       [15:0]    phase,     // one signal period = 2^16; stands until the next
-    output logic       [W-1:0]   amplitude  // counts of the converter; stands until the next
+    input  wire                clk,
+    input  wire                rst,       // drops the samples in work; phase and amplitude become 0
+    input  wire                valid,     // strobe: sin and cos are a new sample
+    input  wire signed [W-1:0] sin,       // full scale = 2^(W-1)
+    input  wire signed [W-1:0] cos,       // full scale = 2^(W-1)
+    output logic               done,      // strobe: phase and amplitude are new
+    output logic       [ 15:0] phase,     // one signal period = 2^16; stands until the next
+    output logic       [W-1:0] amplitude  // counts of the converter; stands until the next
 );
-    if (W < 8 || W > 16) begin : g_check_w W_MUST_BE_FROM_8_TO_16 u_error (); end
-    if (STEPS < 1)       begin : g_check_steps STEPS_MUST_BE_AT_LEAST_1 u_error (); end
+    if (W < 8 || W > 16) begin : g_check_w
+        W_MUST_BE_FROM_8_TO_16 u_error ();
+    end
+    if (STEPS < 1) begin : g_check_steps
+        STEPS_MUST_BE_AT_LEAST_1 u_error ();
+    end
 
-    localparam int TURNS   = W < 11 ? W : 6;                            // these four as in tables/arctan_rotation.py
-    localparam int DIGITS  = W == 8 ? 23 : W == 9 ? 27 : W == 10 ? 28 : 22;
-    localparam int HEAD    = W == 8 ? 19 : W == 9 ? 22 : W == 10 ? 24 : 26 - W;
-    localparam int GUARD   = W == 8 ? 12 : W == 9 ? 15 : W == 10 ? 16 : 9;
-    localparam int LEAD    = (DIGITS - 11) % 4 + 1;                     // digits in the first sum of angles
-    localparam int LAST    = DIGITS + 1;                                // the last step
+    localparam int TURNS = W < 11 ? W : 6;  // these four as in tables/arctan_rotation.py
+    localparam int DIGITS = W == 8 ? 23 : W == 9 ? 27 : W == 10 ? 28 : 22;
+    localparam int HEAD = W == 8 ? 19 : W == 9 ? 22 : W == 10 ? 24 : 26 - W;
+    localparam int GUARD = W == 8 ? 12 : W == 9 ? 15 : W == 10 ? 16 : 9;
+    localparam int LEAD = (DIGITS - 11) % 4 + 1;  // digits in the first sum of angles
+    localparam int LAST = DIGITS + 1;  // the last step
     localparam int LATENCY = (LAST + STEPS - 1) / STEPS;
-    localparam int Z       = 16 + GUARD;
+    localparam int Z = 16 + GUARD;
 
-    // bits behind the point of longer and of shorter when a step is done; step 1 folds, step t finds digit t - 1
+    // bits behind the point of longer and of shorter when a step is done; step 1 folds, step t
+    // finds digit t - 1
     function int fraction(input int stage, input bit of_longer);
         int l, s, l_now;
         begin
@@ -57,39 +68,45 @@ module arctan_pipelined #(
         end
     endfunction
 
-    function int summed(input int stage);    // digits whose angles are in the sum when this step is done
+    // digits whose angles are in the sum when this step is done
+    function int summed(input int stage);
         summed = stage < LEAD + 2 ? 0 : stage > DIGITS - 4 ? DIGITS - 5 : stage > DIGITS - 9 ? DIGITS - 10 : LEAD + (stage - LEAD - 2) / 4 * 4;
     endfunction
 
     logic [LATENCY-1:0] coming;
-    wire  [LATENCY:0]   strobes = {coming, valid};
+    wire  [  LATENCY:0] strobes = {coming, valid};
 
     for (genvar t = 1; t < LAST; t++) begin : g_step
         localparam int L = fraction(t, 1'b1), L_IN = fraction(t - 1, 1'b1);
         localparam int S = fraction(t, 1'b0), S_IN = fraction(t - 1, 1'b0);
         localparam int SUM = summed(t), SUM_IN = summed(t - 1);
         /* verilator lint_off UNUSEDSIGNAL */           // what no later step needs is left to the synthesis to leave out
-        logic [W+L-1:0]      longer, longer_q;          // turned to the axis it becomes the amplitude
-        logic signed [W+S:0] shorter, shorter_q;        // 2^(t-2) times what is left across, less 1 (less 1/2 from TURNS + 3 on)
-        logic [DIGITS:1]     turned, turned_q;          // digits: 1 is a negative one
-        logic [1:0]          quadrant, quadrant_q;      // angle from which, and in which direction, digits count
-        logic                zero, zero_q;              // the sample is (0, 0)
-        logic [Z-1:0]        angle, angle_q;            // sum of the angles, half an LSB included
-        logic [W:0]          size, size_q;              // amplitude in halves
-        logic [W-2:0]        part, part_q;              // what is to be taken off it for the gain of the turns
+        // turned to the axis it becomes the amplitude
+        logic [W+L-1:0] longer, longer_q;
+        // 2^(t-2) times what is left across, less 1 (less 1/2 from TURNS + 3 on)
+        logic signed [W+S:0] shorter, shorter_q;
+        logic [DIGITS:1] turned, turned_q;  // digits: 1 is a negative one
+        // angle from which, and in which direction, digits count
+        logic [1:0] quadrant, quadrant_q;
+        logic zero, zero_q;  // the sample is (0, 0)
+        logic [Z-1:0] angle, angle_q;  // sum of the angles, half an LSB included
+        logic [W:0] size, size_q;  // amplitude in halves
+        // what is to be taken off it for the gain of the turns
+        logic [W-2:0] part, part_q;
         /* verilator lint_on UNUSEDSIGNAL */
 
         if (t % STEPS == 0) begin : g_held
-            always_ff @(posedge clk) if (strobes[t/STEPS-1]) begin
-                longer_q   <= longer;
-                shorter_q  <= shorter;
-                turned_q   <= turned;
-                quadrant_q <= quadrant;
-                zero_q     <= zero;
-                angle_q    <= angle;
-                size_q     <= size;
-                part_q     <= part;
-            end
+            always_ff @(posedge clk)
+                if (strobes[t/STEPS-1]) begin
+                    longer_q   <= longer;
+                    shorter_q  <= shorter;
+                    turned_q   <= turned;
+                    quadrant_q <= quadrant;
+                    zero_q     <= zero;
+                    angle_q    <= angle;
+                    size_q     <= size;
+                    part_q     <= part;
+                end
         end else begin : g_passed
             assign longer_q   = longer;
             assign shorter_q  = shorter;
@@ -102,9 +119,9 @@ module arctan_pipelined #(
         end
 
         if (t == 1) begin : g_fold
-            wire [W-1:0] sin_size = sin ^ {W{sin[W-1]}};            // 1 short if negative
+            wire [W-1:0] sin_size = sin ^ {W{sin[W-1]}};  // 1 short if negative
             wire [W-1:0] cos_size = cos ^ {W{cos[W-1]}};
-            wire         steep    = 1'(({1'b0, cos_size, cos[W-1]} - {1'b0, sin_size, sin[W-1]}) >> (W + 1));
+            wire steep = 1'(({1'b0, cos_size, cos[W-1]} - {1'b0, sin_size, sin[W-1]}) >> (W + 1));
             assign longer   = sin_size + W'(sin[W-1]);              // not yet in order
             assign shorter  = {1'b0, cos_size + W'(cos[W-1])};
             assign turned   = {{(DIGITS - 1){1'b0}}, steep ^ sin[W-1] ^ cos[W-1]};
@@ -115,7 +132,8 @@ module arctan_pipelined #(
             assign zero     = t == 3 ? g_step[t-1].longer_q == '0 : g_step[t-1].zero_q;
         end
 
-        if (t == 2) begin : g_first                                 // digit 1 is the direction: above the axis it is positive
+        // digit 1 is the direction: above the axis it is positive
+        if (t == 2) begin : g_first
             wire [W-1:0] x = quadrant[0] ? g_step[1].longer_q : g_step[1].shorter_q[W-1:0];
             wire [W-1:0] y = quadrant[0] ? g_step[1].shorter_q[W-1:0] : g_step[1].longer_q;
             assign longer  = {x, 1'b0} + {1'b0, y};
@@ -124,22 +142,22 @@ module arctan_pipelined #(
         end
 
         if (t > 2) begin : g_digit
-            wire [W+L_IN-1:0] x        = g_step[t-1].longer_q;
+            wire [W+L_IN-1:0] x = g_step[t-1].longer_q;
             wire              negative = g_step[t-1].shorter_q[W+S_IN];
-            wire [W+S_IN-1:0] y        = g_step[t-1].shorter_q[W+S_IN-1:0] ^ {(W + S_IN){negative}};
-            wire [W+S:0]      y_twice  = (W+S+1)'({y, {20{!negative}}} >> (19 + S_IN - S));
-            wire [W+S:0]      x_once   = (W+S+1)'({x, 20'd0} >> (20 + L_IN - S));
-            wire              x_half   = 1'({x, 20'd0} >> (19 + L_IN - S));
-            wire              less     = t <= TURNS + 3 ? negative : x_half;
+            wire [W+S_IN-1:0] y = g_step[t-1].shorter_q[W+S_IN-1:0] ^ {(W + S_IN) {negative}};
+            wire [     W+S:0] y_twice = (W + S + 1)'({y, {20{!negative}}} >> (19 + S_IN - S));
+            wire [     W+S:0] x_once = (W + S + 1)'({x, 20'd0} >> (20 + L_IN - S));
+            wire              x_half = 1'({x, 20'd0} >> (19 + L_IN - S));
+            wire              less = t <= TURNS + 3 ? negative : x_half;
             assign shorter = (W+S+1)'(({y_twice, 1'b0} - {x_once, less}) >> 1);
             assign turned  = g_step[t-1].turned_q | {{(DIGITS - 1){1'b0}}, g_step[t-1].turned_q[t-2] ^ negative} << (t - 2);
             if (t <= TURNS + 1) begin : g_turn
                 localparam int DOWN = S_IN + 2 * t - 3 - L;
-                wire [W+L-1:0] x_now = (W+L)'({x, 20'd0} >> (20 + L_IN - L));
-                wire           more  = DOWN == 0 ? !negative : 1'({y, 1'b0} >> DOWN);
-                assign longer = (W+L)'(({x_now, 1'b1} + {(W+L)'(y >> DOWN), more}) >> 1);
+                wire [W+L-1:0] x_now = (W + L)'({x, 20'd0} >> (20 + L_IN - L));
+                wire           more = DOWN == 0 ? !negative : 1'({y, 1'b0} >> DOWN);
+                assign longer = (W + L)'(({x_now, 1'b1} + {(W + L)'(y >> DOWN), more}) >> 1);
             end else begin : g_turned
-                assign longer = (W+L)'(x >> (L_IN - L));
+                assign longer = (W + L)'(x >> (L_IN - L));
             end
         end
 
@@ -149,8 +167,15 @@ module arctan_pipelined #(
             assign angle = g_step[t-1].angle_q;
         end else begin : g_sum
             wire signed [Z-SUM_IN-2:0] sum;
-            arctan_rotation_rom #(.TURNS(TURNS), .FIRST(SUM_IN + 1), .COUNT(SUM - SUM_IN), .GUARD(GUARD)) u_rom (
-                .negative(g_step[t-1].turned_q[SUM:SUM_IN+1]), .sum);
+            arctan_rotation_rom #(
+                .TURNS(TURNS),
+                .FIRST(SUM_IN + 1),
+                .COUNT(SUM - SUM_IN),
+                .GUARD(GUARD)
+            ) u_rom (
+                .negative(g_step[t-1].turned_q[SUM:SUM_IN+1]),
+                .sum
+            );
             if (SUM_IN == 0) begin : g_base
                 assign angle = {quadrant - 2'(sum[Z-2]), sum[Z-3:0]};
             end else begin : g_more
@@ -178,8 +203,17 @@ module arctan_pipelined #(
 
     wire signed [Z-DIGITS+3:0] rest;
     wire                       negative = g_step[LAST-1].shorter_q[W+fraction(LAST-1, 1'b0)];
-    arctan_rotation_rom #(.TURNS(TURNS), .FIRST(DIGITS - 4), .COUNT(5), .GUARD(GUARD)) u_rest (
-        .negative({g_step[LAST-1].turned_q[DIGITS-1] ^ negative, g_step[LAST-1].turned_q[DIGITS-1:DIGITS-4]}), .sum(rest));
+    arctan_rotation_rom #(
+        .TURNS(TURNS),
+        .FIRST(DIGITS - 4),
+        .COUNT(5),
+        .GUARD(GUARD)
+    ) u_rest (
+        .negative({
+            g_step[LAST-1].turned_q[DIGITS-1] ^ negative, g_step[LAST-1].turned_q[DIGITS-1:DIGITS-4]
+        }),
+        .sum(rest)
+    );
     wire [Z-1:0] angle = g_step[LAST-1].angle_q + Z'(rest);
 
     always_ff @(posedge clk) begin

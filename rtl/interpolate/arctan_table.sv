@@ -1,52 +1,66 @@
 // SPDX-License-Identifier: Apache-2.0
-// arctan_table -- the phase of a sine and a cosine sample: 2^16 atan2(sin, cos) / 2 pi, from 0 to one LSB below a period.
+// arctan_table -- the phase of a sine and a cosine sample: 2^16 atan2(sin, cos) / 2 pi, from 0 to
+// one LSB below a period.
 //
-// latency  23 clk from valid to done       rate  one sample per 23 clk; one that comes sooner is not taken
-// accuracy 0.633 LSB of the true phase of any sample but (0, 0), for any W; exact at every octant border; (0, 0) gives 0
-// source   S0: octant-folded arctan look-up, its constants 0, n/4, n/2, 3n/4; the ratio by restoring division, one bit a clk
-// model    tb/interpolate/arctan_table.py, equal in every bit of every cycle; bound and table from tables/arctan.py
+// latency  23 clk from valid to done       rate  one sample per 23 clk; one that comes sooner is
+//          not taken
+// accuracy 0.633 LSB of the true phase of any sample but (0, 0), for any W; exact at every octant
+// border; (0, 0) gives 0
+// source   S0: octant-folded arctan look-up, its constants 0, n/4, n/2, 3n/4; the ratio by
+//          restoring division, one bit a clk
+// model    tb/interpolate/arctan_table.py, equal in every bit of every cycle; bound and table from
+//          tables/arctan.py
 `default_nettype none
 
 module arctan_table #(
-    parameter int W = 8                     // bits of a sample, 8 to 16
+    parameter int W = 8  // bits of a sample, 8 to 16
 ) (
-    input  wire                  clk,
-    input  wire                  rst,       // drops the sample in work; phase becomes 0
-    input  wire                  valid,     // strobe: sin and cos are a new sample
-    input  wire signed [W-1:0]   sin,       // full scale = 2^(W-1)
-    input  wire signed [W-1:0]   cos,       // full scale = 2^(W-1)
-    output logic                 done,      // strobe: phase is new
-    output logic       [15:0]    phase      // one signal period = 2^16; stands until the next
+    input  wire                clk,
+    input  wire                rst,    // drops the sample in work; phase becomes 0
+    input  wire                valid,  // strobe: sin and cos are a new sample
+    input  wire signed [W-1:0] sin,    // full scale = 2^(W-1)
+    input  wire signed [W-1:0] cos,    // full scale = 2^(W-1)
+    output logic               done,   // strobe: phase is new
+    output logic       [ 15:0] phase   // one signal period = 2^16; stands until the next
 );
-    if (W < 8 || W > 16) begin : g_check W_MUST_BE_FROM_8_TO_16 u_error (); end
+    if (W < 8 || W > 16) begin : g_check
+        W_MUST_BE_FROM_8_TO_16 u_error ();
+    end
 
-    localparam int RATIO = 16;              // bits behind the point; these three as in tables/arctan.py
+    localparam int RATIO = 16;  // bits behind the point; these three as in tables/arctan.py
     localparam int FRACTION = 9;
     localparam int GUARD = 5;
 
     localparam [4:0] IDLE = 5'd0, FOLD = 5'd1, DIVIDE = 5'd2, LOOK_UP = DIVIDE + 5'(RATIO + 1), MULTIPLY = LOOK_UP + 5'd1,
                      ADD = MULTIPLY + 5'd1, UNFOLD = ADD + 5'd1;
 
-    logic [4:0]     stage;
-    logic           sin_negative, cos_negative, steep;      // steep: |sin| > |cos|, octants 2, 3, 6, 7
-    logic [W-1:0]   sin_size, cos_size, divisor;            // |-2^(W-1)| fits without a sign
-    logic [W:0]     remainder;
-    logic [RATIO:0] ratio;                                  // smaller / larger, 1.0 = 2^RATIO
-    logic [27:0]    product;                                // along the chord, LSB / 2^(GUARD + FRACTION)
-    logic [13:0]    octant;                                 // LSB of phase, 0 to 2^13
+    logic [4:0] stage;
+    // steep: |sin| > |cos|, octants 2, 3, 6, 7
+    logic sin_negative, cos_negative, steep;
+    logic [W-1:0] sin_size, cos_size, divisor;  // |-2^(W-1)| fits without a sign
+    logic [    W:0] remainder;
+    logic [RATIO:0] ratio;  // smaller / larger, 1.0 = 2^RATIO
+    // along the chord, LSB / 2^(GUARD + FRACTION)
+    logic [   27:0] product;
+    logic [   13:0] octant;  // LSB of phase, 0 to 2^13
 
     wire            steeper = sin_size > cos_size;
-    wire [W-1:0]    larger  = steeper ? sin_size : cos_size;
-    wire            goes    = remainder >= {1'b0, divisor};
-    wire [W-1:0]    rest    = W'(goes ? remainder - {1'b0, divisor} : remainder);
+    wire  [  W-1:0] larger = steeper ? sin_size : cos_size;
+    wire            goes = remainder >= {1'b0, divisor};
+    wire  [  W-1:0] rest = W'(goes ? remainder - {1'b0, divisor} : remainder);
 
-    wire [18:0]     base;
-    wire [11:0]     slope;
-    arctan_rom u_rom (.clk, .index(ratio[RATIO:FRACTION]), .base, .slope);
+    wire  [   18:0] base;
+    wire  [   11:0] slope;
+    arctan_rom u_rom (
+        .clk,
+        .index(ratio[RATIO:FRACTION]),
+        .base,
+        .slope
+    );
 
-    wire [27:0]     chord = {base, FRACTION'(0)} + product;
-    wire [15:0]     first = steep ? 16'h4000 - 16'(octant) : 16'(octant);
-    wire [15:0]     half  = cos_negative ? 16'h8000 - first : first;
+    wire [27:0] chord = {base, FRACTION'(0)} + product;
+    wire [15:0] first = steep ? 16'h4000 - 16'(octant) : 16'(octant);
+    wire [15:0] half = cos_negative ? 16'h8000 - first : first;
 
     always_ff @(posedge clk) begin
         done  <= stage == UNFOLD;

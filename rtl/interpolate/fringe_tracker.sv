@@ -1,42 +1,48 @@
 // SPDX-License-Identifier: Apache-2.0
-// fringe_tracker -- the signed step from phase to phase, its whole periods found by foreseeing the next phase.
+// fringe_tracker -- the signed step from phase to phase, its whole periods found by foreseeing the
+// next phase.
 //
 // latency  1 clk from valid to done, no lag in the step        rate  one phase per clk
-// method   The tracker predicts that the last step comes again. Less than a quarter period from that: the step, at any speed
-//          below a period a sample.
-// strays   Farther away it is an overspeed. The step still ends on the phase, and the next phase is awaited where it would
-//          be without this one, so one bad sample costs nothing but itself (below a quarter period a sample; proved there).
-//          A second one in a row, or a step of a period or more: the nearest step is taken, from then on as from standstill;
-//          whole periods may then be lost, and the overspeed says so.
-// source   S0 limit filter 2 (a count is held against the one before it), with the speed in the prediction
+// method   The tracker predicts that the last step comes again. Less than a quarter period from
+//          that: the step, at any speed below a period a sample.
+// strays   Farther away it is an overspeed. The step still ends on the phase, and the next phase is
+//          awaited where it would be without this one, so one bad sample costs nothing but itself
+//          (below a quarter period a sample; proved there). A second one in a row, or a step of a
+//          period or more: the nearest step is taken, from then on as from standstill; whole
+//          periods may then be lost, and the overspeed says so.
+// source   S0 limit filter 2 (a count is held against the one before it), with the speed in the
+//          prediction
 // model    tb/interpolate/fringe_tracker.py, equal in every bit of every cycle
 // proof    depth 6
-// proved   modulo a period the step is the phase less the phase before; without overspeed it is less than a quarter period
-//          from the one predicted_step; at any constant speed below a quarter period a sample, one bad sample in four moves nothing
+// proved   modulo a period the step is the phase less the phase before; without overspeed it is
+//          less than a quarter period from the one predicted_step; at any constant speed below a
+//          quarter period a sample, one bad sample in four moves nothing
 `default_nettype none
 
 module fringe_tracker (
-    input  wire                  clk,
-    input  wire                  rst,       // forgets the phase; the next one is the first, with step 0
-    input  wire                  valid,     // strobe: phase is new
-    input  wire        [15:0]    phase,     // one signal period = 2^16
-    output logic                 done,      // strobe: step is new
-    output logic signed [16:0]   step,      // 2^-16 period since the phase before
-    output logic        [15:0]   phase_out, // the phase that step leads to; stands until the next
+    input wire clk,
+    input wire rst,  // forgets the phase; the next one is the first, with step 0
+    input wire valid,  // strobe: phase is new
+    input wire [15:0] phase,  // one signal period = 2^16
+    output logic done,  // strobe: step is new
+    output logic signed [16:0] step,  // 2^-16 period since the phase before
+    output logic [15:0] phase_out,  // the phase that step leads to; stands until the next
     output logic                 overspeed  // strobe, with done: a quarter period or more from where it was expected
 );
     localparam signed [15:0] QUARTER = 16'sd16384;
 
-    logic               started, outlier;   // outlier: the last phase was an overspeed
-    logic        [15:0] last, predicted_phase;          // predicted_phase: the phase that is predicted_step
-    logic signed [16:0] speed;              // step per sample, of the samples that did not stray
-    logic signed [17:0] predicted_step;           // step: speed, or what leads back to the line after a stray one
+    logic started, outlier;  // outlier: the last phase was an overspeed
+    // predicted_phase: the phase that is predicted_step
+    logic [15:0] last, predicted_phase;
+    logic signed [16:0] speed;  // step per sample, of the samples that did not stray
+    // step: speed, or what leads back to the line after a stray one
+    logic signed [17:0] predicted_step;
 
-    wire signed [15:0] deviation = $signed(phase - predicted_phase);
-    wire signed [18:0] measured_step    = 19'(predicted_step) + 19'(deviation);
-    wire               near      = deviation > -QUARTER && deviation < QUARTER;
-    wire               fits      = measured_step[18:16] == {3{measured_step[16]}};
-    wire signed [15:0] nearest   = $signed(phase - last);
+    wire signed  [15:0] deviation = $signed(phase - predicted_phase);
+    wire signed  [18:0] measured_step = 19'(predicted_step) + 19'(deviation);
+    wire                near = deviation > -QUARTER && deviation < QUARTER;
+    wire                fits = measured_step[18:16] == {3{measured_step[16]}};
+    wire signed  [15:0] nearest = $signed(phase - last);
 
     assign phase_out = last;
 
@@ -100,15 +106,19 @@ module fringe_tracker (
         end
     end
 
-    // a scale that moves by `increment` a sample, seen with now and then a bad sample: three good ones at least in between
-    (* anyconst *) logic signed [16:0] increment;
-    (* anyconst *) logic               lawful;     // 0: any phase may come
-    (* anyseq *)   logic               bad;
-    logic signed [23:0] scale, seen;        // where the scale will be at the next sample; the sum of the steps
-    logic        [1:0]  good, settled;      // samples since the last bad one, up to 3; since reset, up to 2: phase and speed are known
-    wire  signed [23:0] sum  = done ? seen + 24'(step) : seen;
-    wire  signed [23:0] away = sum - (scale - 24'(increment));
-    wire  signed [23:0] drag = 24'(speed) - 24'(increment);      // what a bad sample that did not stray left in the speed
+    // a scale that moves by `increment` a sample, seen with now and then a bad sample: three good
+    // ones at least in between
+    (* anyconst *)logic signed [16:0] increment;
+    (* anyconst *)logic               lawful;  // 0: any phase may come
+    (* anyseq *)logic               bad;
+    // where the scale will be at the next sample; the sum of the steps
+    logic signed [23:0] scale, seen;
+    // samples since the last bad one, up to 3; since reset, up to 2: phase and speed are known
+    logic [1:0] good, settled;
+    wire signed [23:0] sum = done ? seen + 24'(step) : seen;
+    wire signed [23:0] away = sum - (scale - 24'(increment));
+    // what a bad sample that did not stray left in the speed
+    wire signed [23:0] drag = 24'(speed) - 24'(increment);
     always @(posedge clk) begin
         if (lawful) begin
             assume (increment > -17'sd16384 && increment < 17'sd16384);
@@ -128,20 +138,24 @@ module fringe_tracker (
             settled <= '0;
         end
         if (past && lawful) begin
-            if (settled != 0 && good != 0) assert (away == 0);      // the claim; what follows only leads to it
+            // the claim; what follows only leads to it
+            if (settled != 0 && good != 0) assert (away == 0);
             assert (started == (settled != 0) && settled <= 2);
-            if (started) assert (sum[15:0] == last);
-            else assert (sum == 0 && scale == 0);
-            if (settled < 2) assert (!outlier && speed == 0 && predicted_step == 0 && good == 3);
-            else case (good)
-                0: if (outlier) assert (speed == increment && 24'(predicted_step) == 24'(increment) - away && away >= -32768 && away < 32768);
+            if (started)
+                assert (sum[15:0] == last);
+                else assert (sum == 0 && scale == 0);
+            if (settled < 2)
+                assert (!outlier && speed == 0 && predicted_step == 0 && good == 3);
+                else
+                    case (good)
+                        0: if (outlier) assert (speed == increment && 24'(predicted_step) == 24'(increment) - away && away >= -32768 && away < 32768);
                    else assert (drag == away && predicted_step == 18'(speed) && away > -16384 && away < 16384);
-                1: if (outlier) assert (24'(predicted_step) == 24'(increment) + drag + drag + drag && drag > -16384 && drag < 16384
+                        1: if (outlier) assert (24'(predicted_step) == 24'(increment) + drag + drag + drag && drag > -16384 && drag < 16384
                                         && (drag >= 8192 || drag <= -8192));
                    else assert (predicted_step == 18'(speed) && drag > -8192 && drag < 8192);
-                2: assert (!outlier && predicted_step == 18'(speed) && (speed == increment || speed == 0));
-                default: assert (!outlier && predicted_step == 18'(speed) && speed == increment);
-            endcase
+                        2: assert (!outlier && predicted_step == 18'(speed) && (speed == increment || speed == 0));
+                        default: assert (!outlier && predicted_step == 18'(speed) && speed == increment);
+                    endcase
         end
         cover (past && lawful && good == 0 && outlier && increment == 17'sd1000);
     end

@@ -1,43 +1,47 @@
 // SPDX-License-Identifier: Apache-2.0
-// signal_correction -- take offset, gain and phase error off a sine and a cosine sample: an ellipse becomes a circle.
+// signal_correction -- take offset, gain and phase error off a sine and a cosine sample: an ellipse
+// becomes a circle.
 //
 // latency  3 clk from valid to done        rate  one sample per clk
-// source   Heydemann, Appl. Opt. 20 (1981) 3382: cos' = cos - cos_offset, sin' = gain (sin - sin_offset) + quadrature_error cos'. Both
-//          come out at half the size, so that a corrected channel may be larger than full scale; what is still too large is held
+// source   Heydemann, Appl. Opt. 20 (1981) 3382: cos' = cos - cos_offset, sin' = gain (sin -
+//          sin_offset) + quadrature_error cos'. Both come out at half the size, so that a corrected
+//          channel may be larger than full scale; what is still too large is held
 // model    tb/interpolate/signal_correction.py, equal in every bit of every cycle
 `default_nettype none
 
 module signal_correction #(
-    parameter int W = 8                     // bits of a sample
+    parameter int W = 8  // bits of a sample
 ) (
-    input  wire                  clk,
-    input  wire                  rst,       // nothing is corrected until load
-    input  wire                  load,      // strobe: take the four settings, for the samples from this clk on
-    input  wire signed [15:0]    sin_offset, // full scale = 2^15
-    input  wire signed [15:0]    cos_offset, // full scale = 2^15
-    input  wire        [16:0]    gain,      // 1.0 = 2^16
-    input  wire signed [16:0]    quadrature_error,     // 1.0 = 2^16
-    input  wire                  valid,     // strobe: sin and cos are a new sample
-    input  wire signed [W-1:0]   sin,       // full scale = 2^(W-1)
-    input  wire signed [W-1:0]   cos,
-    output logic                 done,      // strobe: sin_out and cos_out are new
-    output logic signed [15:0]   sin_out,   // full scale of sin = 2^14
-    output logic signed [15:0]   cos_out
+    input wire clk,
+    input wire rst,  // nothing is corrected until load
+    input wire load,  // strobe: take the four settings, for the samples from this clk on
+    input wire signed [15:0] sin_offset,  // full scale = 2^15
+    input wire signed [15:0] cos_offset,  // full scale = 2^15
+    input wire [16:0] gain,  // 1.0 = 2^16
+    input wire signed [16:0] quadrature_error,  // 1.0 = 2^16
+    input wire valid,  // strobe: sin and cos are a new sample
+    input wire signed [W-1:0] sin,  // full scale = 2^(W-1)
+    input wire signed [W-1:0] cos,
+    output logic done,  // strobe: sin_out and cos_out are new
+    output logic signed [15:0] sin_out,  // full scale of sin = 2^14
+    output logic signed [15:0] cos_out
 );
-    if (W < 8 || W > 16) begin : g_check W_MUST_BE_FROM_8_TO_16 u_error (); end
+    if (W < 8 || W > 16) begin : g_check
+        W_MUST_BE_FROM_8_TO_16 u_error ();
+    end
 
-    logic               centred, multiplied;            // strobes
+    logic centred, multiplied;  // strobes
     logic signed [15:0] sin_centre, cos_centre;
     logic signed [17:0] sin_factor, cos_factor;
-    logic signed [16:0] sin_channel, cos_channel, cos_kept;     // full scale of sin = 2^15
+    logic signed [16:0] sin_channel, cos_channel, cos_kept;  // full scale of sin = 2^15
     logic signed [34:0] sin_part, cos_part;
 
     wire signed [15:0] sin_wide = 16'(sin) <<< (16 - W);
     wire signed [15:0] cos_wide = 16'(cos) <<< (16 - W);
     wire signed [15:0] sin_zero = load ? sin_offset : sin_centre;
     wire signed [15:0] cos_zero = load ? cos_offset : cos_centre;
-    wire signed [35:0] sum      = 36'(sin_part) + 36'(cos_part) + 36'sd65536;
-    wire signed [18:0] sin_half = 19'(sum >>> 17);      // rounded
+    wire signed [35:0] sum = 36'(sin_part) + 36'(cos_part) + 36'sd65536;
+    wire signed [18:0] sin_half = 19'(sum >>> 17);  // rounded
     wire signed [16:0] cos_half = 17'((18'(cos_kept) + 18'sd1) >>> 1);
 
     always_ff @(posedge clk) begin

@@ -1,15 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-// i2c_master -- I2C by the byte: start, write and read with their acknowledge, stop, and the recovery of a stuck bus.
+// i2c_master -- I2C by the byte: start, write and read with their acknowledge, stop, and the
+// recovery of a stuck bus.
 //
-// latency  one command: start, stop about 1 bit, a byte 9 bits, recovery at most 10 bits; a device may stretch each of them
-// rate     BUS_HZ or a little less: the clock is low for 11/20 of a bit, high for 9/20, and the lines' rise comes on top
-// source   NXP UM10204: low at least 4.7 us, high 4.0 us at 100 kHz; 1.3 us and 0.6 us at 400 kHz; nine clocks free a device that holds
-//          data low. Another master's low on a released data line loses the bus
+// latency  one command: start, stop about 1 bit, a byte 9 bits, recovery at most 10 bits; a device
+//          may stretch each of them
+// rate     BUS_HZ or a little less: the clock is low for 11/20 of a bit, high for 9/20, and the
+//          lines' rise comes on top
+// source   NXP UM10204: low at least 4.7 us, high 4.0 us at 100 kHz; 1.3 us and 0.6 us at 400 kHz;
+//          nine clocks free a device that holds data low. Another master's low on a released data
+//          line loses the bus
 // model    tb/peripheral/i2c_master.py, equal in every bit of every cycle
 // proof    depth 60, CLK_HZ = 400000, BUS_HZ = 50000, STRETCH_US = 40, CHECKED = 0
-// proved   data changes with the clock released only for a start and a stop; the clock is pulled for 11/20 of a bit at least; between
-//          commands the bus is ours, or both lines are free; one done a command
-// bounds   a device may stretch the clock for STRETCH_US, then the command ends in NO_BUS and both lines are free
+// proved   data changes with the clock released only for a start and a stop; the clock is pulled
+//          for 11/20 of a bit at least; between commands the bus is ours, or both lines are free;
+//          one done a command
+// bounds   a device may stretch the clock for STRETCH_US, then the command ends in NO_BUS and both
+//          lines are free
 `default_nettype none
 
 module i2c_master #(
@@ -18,50 +24,64 @@ module i2c_master #(
     parameter int STRETCH_US = 25_000,      // longest wait for a released line to be high
     parameter int CHECKED    = 1            // 0: any CLK_HZ, for the proof
 ) (
-    input  wire          clk,
-    input  wire          rst,               // lets go of both lines
-    input  wire          scl,               // levels of the lines, synchronous; deglitched where the bus is long
-    input  wire          sda,
-    input  wire          command_valid,
-    output logic         command_ready,     // with command_valid: taken in this clk
+    input wire clk,
+    input wire rst,  // lets go of both lines
+    input wire scl,  // levels of the lines, synchronous; deglitched where the bus is long
+    input wire sda,
+    input wire command_valid,
+    output logic command_ready,  // with command_valid: taken in this clk
     input  wire  [2:0]   command,           // 0 start, also repeated; 1 stop, 2 write, 3 read; else recover: 9 clocks and a stop
-    input  wire  [7:0]   write_data,
-    input  wire          acknowledge,       // of a read: more is wanted
-    output logic         done,              // strobe: the command has ended
+    input wire [7:0] write_data,
+    input wire acknowledge,  // of a read: more is wanted
+    output logic done,  // strobe: the command has ended
     output logic [1:0]   result,            // with done: 0 ok, 1 not acknowledged, 2 bus lost (or not ours), 3 no bus: a line stays low
-    output logic [7:0]   read_data,         // with done of a read, and later
-    output logic         owned,             // level: the bus is ours, from start to stop
-    output logic         scl_low,           // pull the lines low
-    output logic         sda_low
+    output logic [7:0] read_data,  // with done of a read, and later
+    output logic owned,  // level: the bus is ours, from start to stop
+    output logic scl_low,  // pull the lines low
+    output logic sda_low
 );
-    if (BUS_HZ < 1000 || BUS_HZ > 400_000)        begin : g_check_bus BUS_HZ_MUST_BE_FROM_1000_TO_400_000 u_error (); end
-    if (CHECKED != 0 && CLK_HZ < 10 * BUS_HZ)     begin : g_check_clk CLK_HZ_MUST_BE_AT_LEAST_10_TIMES_BUS_HZ u_error (); end
+    if (BUS_HZ < 1000 || BUS_HZ > 400_000) begin : g_check_bus
+        BUS_HZ_MUST_BE_FROM_1000_TO_400_000 u_error ();
+    end
+    if (CHECKED != 0 && CLK_HZ < 10 * BUS_HZ) begin : g_check_clk
+        CLK_HZ_MUST_BE_AT_LEAST_10_TIMES_BUS_HZ u_error ();
+    end
 
     localparam int LOW     = (CLK_HZ / 10 * 11 + 2 * BUS_HZ - 1) / (2 * BUS_HZ);    // clk: 11/20 bit, rounded up
-    localparam int HIGH    = (CLK_HZ / 10 * 9 + 2 * BUS_HZ - 1) / (2 * BUS_HZ);     // 9/20 bit
-    localparam int TURN    = LOW / 4;                                               // data changes so long after the clock fell
+    localparam int HIGH = (CLK_HZ / 10 * 9 + 2 * BUS_HZ - 1) / (2 * BUS_HZ);  // 9/20 bit
+    localparam int TURN = LOW / 4;  // data changes so long after the clock fell
     localparam int STRETCH = (CLK_HZ / 1_000) * STRETCH_US / 1_000;
-    localparam int W       = $clog2(STRETCH + 2);
-    localparam int L       = $clog2(LOW + 1);
+    localparam int W = $clog2(STRETCH + 2);
+    localparam int L = $clog2(LOW + 1);
 
-    if (STRETCH < 3 * LOW) begin : g_check_stretch STRETCH_US_MUST_BE_AT_LEAST_2_BITS u_error (); end
+    if (STRETCH < 3 * LOW) begin : g_check_stretch
+        STRETCH_US_MUST_BE_AT_LEAST_2_BITS u_error ();
+    end
 
     localparam logic [2:0] START = 3'd0, STOP = 3'd1, WRITE = 3'd2, READ = 3'd3;
     localparam logic [1:0] OK = 2'd0, NOT_ACKNOWLEDGED = 2'd1, LOST = 2'd2, NO_BUS = 2'd3;
 
-    typedef enum logic [2:0] {IDLE, PULLED, RISE, RAISED, WAIT_FREE, BEGUN, ENDED} state_t;
+    typedef enum logic [2:0] {
+        IDLE,
+        PULLED,
+        RISE,
+        RAISED,
+        WAIT_FREE,
+        BEGUN,
+        ENDED
+    } state_t;
 
-    state_t       state;
-    logic [2:0]   kind;
-    logic [W-1:0] elapsed;                              // clk in this state
-    logic [L-1:0] free;                                 // clk that both lines have been high
-    logic [3:0]   place;                                // bit of the byte; 8 is the acknowledge
-    logic [8:0]   shifted;                              // released data bits are 1
+    state_t         state;
+    logic   [  2:0] kind;
+    logic   [W-1:0] elapsed;  // clk in this state
+    logic   [L-1:0] free;  // clk that both lines have been high
+    logic   [  3:0] place;  // bit of the byte; 8 is the acknowledge
+    logic   [  8:0] shifted;  // released data bits are 1
 
-    wire bytes    = kind == WRITE || kind == READ;
-    wire late     = elapsed >= W'(STRETCH);
-    wire high_end = state == RAISED && elapsed >= W'(HIGH - 1);
-    wire taken_by_another = kind == WRITE && place != 4'd8 && !sda_low && !sda;
+    wire            bytes = kind == WRITE || kind == READ;
+    wire            late = elapsed >= W'(STRETCH);
+    wire            high_end = state == RAISED && elapsed >= W'(HIGH - 1);
+    wire            taken_by_another = kind == WRITE && place != 4'd8 && !sda_low && !sda;
 
     assign command_ready = state == IDLE;
 
@@ -96,60 +116,60 @@ module i2c_master #(
                 end
             end
             RISE:
-                if (scl) begin
-                    elapsed <= '0;
-                    state   <= RAISED;
-                end
+            if (scl) begin
+                elapsed <= '0;
+                state   <= RAISED;
+            end
             RAISED:
-                if (high_end) begin
-                    elapsed <= '0;
-                    if (bytes) begin
-                        shifted <= {shifted[7:0], sda};
-                        place   <= place + 1'b1;
-                        scl_low <= 1'b1;
-                        state   <= PULLED;
-                        if (place == 4'd8) begin
-                            read_data <= kind == READ ? shifted[7:0] : read_data;
-                            result    <= kind == WRITE && sda ? NOT_ACKNOWLEDGED : OK;
-                            done      <= 1'b1;
-                            state     <= IDLE;
-                        end
-                        if (taken_by_another) begin
-                            result  <= LOST;
-                            owned   <= 1'b0;
-                            scl_low <= 1'b0;
-                            done    <= 1'b1;
-                            state   <= IDLE;
-                        end
-                    end else if (kind == STOP) begin
-                        sda_low <= 1'b0;
-                        owned   <= 1'b0;
-                        state   <= ENDED;
-                    end else begin                      // recover: a stop as soon as data is free, or after nine clocks
-                        place   <= place + 1'b1;
-                        scl_low <= 1'b1;
-                        state   <= PULLED;
-                        if (sda || place == 4'd8) kind <= STOP;
-                    end
-                end
-            WAIT_FREE:
-                if (free == L'(LOW)) begin
-                    sda_low <= 1'b1;
-                    elapsed <= '0;
-                    state   <= BEGUN;
-                end
-            BEGUN:
-                if (elapsed >= W'(HIGH - 1)) begin
+            if (high_end) begin
+                elapsed <= '0;
+                if (bytes) begin
+                    shifted <= {shifted[7:0], sda};
+                    place   <= place + 1'b1;
                     scl_low <= 1'b1;
-                    owned   <= 1'b1;
-                    done    <= 1'b1;
-                    state   <= IDLE;
+                    state   <= PULLED;
+                    if (place == 4'd8) begin
+                        read_data <= kind == READ ? shifted[7:0] : read_data;
+                        result    <= kind == WRITE && sda ? NOT_ACKNOWLEDGED : OK;
+                        done      <= 1'b1;
+                        state     <= IDLE;
+                    end
+                    if (taken_by_another) begin
+                        result  <= LOST;
+                        owned   <= 1'b0;
+                        scl_low <= 1'b0;
+                        done    <= 1'b1;
+                        state   <= IDLE;
+                    end
+                end else if (kind == STOP) begin
+                    sda_low <= 1'b0;
+                    owned   <= 1'b0;
+                    state   <= ENDED;
+                end else begin  // recover: a stop as soon as data is free, or after nine clocks
+                    place   <= place + 1'b1;
+                    scl_low <= 1'b1;
+                    state   <= PULLED;
+                    if (sda || place == 4'd8) kind <= STOP;
                 end
+            end
+            WAIT_FREE:
+            if (free == L'(LOW)) begin
+                sda_low <= 1'b1;
+                elapsed <= '0;
+                state   <= BEGUN;
+            end
+            BEGUN:
+            if (elapsed >= W'(HIGH - 1)) begin
+                scl_low <= 1'b1;
+                owned   <= 1'b1;
+                done    <= 1'b1;
+                state   <= IDLE;
+            end
             ENDED:
-                if (free == L'(LOW)) begin
-                    done  <= 1'b1;
-                    state <= IDLE;
-                end
+            if (free == L'(LOW)) begin
+                done  <= 1'b1;
+                state <= IDLE;
+            end
             default:
                 state <= IDLE;
         endcase
@@ -181,7 +201,8 @@ module i2c_master #(
             if (state == RAISED) assert (!scl_low && elapsed < W'(HIGH));
             if (state == BEGUN) assert (!scl_low && sda_low && elapsed < W'(HIGH));
             if (state == IDLE) assert (scl_low == owned && (owned || !sda_low));
-            if (state == RISE || state == WAIT_FREE || state == ENDED) assert (!scl_low && elapsed <= W'(STRETCH));
+            if (state == RISE || state == WAIT_FREE || state == ENDED)
+                assert (!scl_low && elapsed <= W'(STRETCH));
             if (state == WAIT_FREE || state == ENDED) assert (!sda_low);
             if (state == ENDED) assert (!owned);
             if (bytes && (state == PULLED || state == RISE || state == RAISED)) assert (owned);

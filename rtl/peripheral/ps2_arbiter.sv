@@ -1,78 +1,87 @@
 // SPDX-License-Identifier: Apache-2.0
-// ps2_arbiter -- who speaks to the PS/2 host: the keyboard, whose bytes pass untouched, or a source that injects sequences of its own.
+// ps2_arbiter -- who speaks to the PS/2 host: the keyboard, whose bytes pass untouched, or a source
+// that injects sequences of its own.
 //
-// latency  none: a byte that stands is offered, and taken, in the same clk          rate  as the lines
-// source   S4: the controller is a keyboard of the EDM machine. E0 and F0 announce one code more, E1 two; FF is answered by FA and
-//          later AA, F2 by three bytes, F0 00 by two, every other command by one. FE from the host after an injected byte asks for that
-//          byte again and never reaches the keyboard
+// latency  none: a byte that stands is offered, and taken, in the same clk          rate  as the
+//          lines
+// source   S4: the controller is a keyboard of the EDM machine. E0 and F0 announce one code more,
+//          E1 two; FF is answered by FA and later AA, F2 by three bytes, F0 00 by two, every other
+//          command by one. FE from the host after an injected byte asks for that byte again and
+//          never reaches the keyboard
 // model    tb/peripheral/ps2_arbiter.py, equal in every bit of every cycle
 // proof    depth 32, CLK_HZ = 1000
-// proved   an injection begins only between the keyboard's sequences, with no command open and the keyboard held; meanwhile the keyboard is
-//          heard only in answer to a command; each byte that is taken is the one that was sent
-// bounds   an exchange closes 20 ms after its last byte; what is still missing after 1 s (an answer, the rest of a sequence) is given up
+// proved   an injection begins only between the keyboard's sequences, with no command open and the
+//          keyboard held; meanwhile the keyboard is heard only in answer to a command; each byte
+//          that is taken is the one that was sent
+// bounds   an exchange closes 20 ms after its last byte; what is still missing after 1 s (an
+//          answer, the rest of a sequence) is given up
 `default_nettype none
 
 module ps2_arbiter #(
     parameter int CLK_HZ = 50_000_000
 ) (
-    input  wire          clk,
-    input  wire          rst,
+    input wire clk,
+    input wire rst,
     input  wire  [15:0]  idle_ms,           // silence of keyboard and host before an injection; less than 20 counts as 20
     input  wire          inject_valid,      // level: a byte stands; a sequence holds the keyboard until its last byte
-    output logic         inject_ready,      // with inject_valid: sent in this clk
-    input  wire  [7:0]   inject,
-    input  wire          inject_last,       // of its sequence
-    output logic         injecting,         // level: a sequence is under way
-    output logic         typed,             // strobe: a byte of the keyboard that answers no command
+    output logic inject_ready,  // with inject_valid: sent in this clk
+    input wire [7:0] inject,
+    input wire inject_last,  // of its sequence
+    output logic injecting,  // level: a sequence is under way
+    output logic typed,  // strobe: a byte of the keyboard that answers no command
 
-    input  wire          keyboard_valid,    // ps2_host
-    output logic         keyboard_ready,
-    input  wire  [7:0]   keyboard,
-    input  wire          keyboard_damaged,
-    input  wire          keyboard_busy,
-    input  wire          keyboard_held,
-    output logic         keyboard_hold,
-    output logic         command_valid,
-    input  wire          command_ready,
-    output logic [7:0]   command,
-    output logic         command_damaged,
-    input  wire          command_sent,
-    input  wire          command_unsent,
+    input  wire        keyboard_valid,    // ps2_host
+    output logic       keyboard_ready,
+    input  wire  [7:0] keyboard,
+    input  wire        keyboard_damaged,
+    input  wire        keyboard_busy,
+    input  wire        keyboard_held,
+    output logic       keyboard_hold,
+    output logic       command_valid,
+    input  wire        command_ready,
+    output logic [7:0] command,
+    output logic       command_damaged,
+    input  wire        command_sent,
+    input  wire        command_unsent,
 
-    output logic         send_valid,        // ps2_device
-    input  wire          send_ready,
-    output logic [7:0]   send,
-    output logic         send_damaged,
-    input  wire          host_valid,
-    output logic         host_ready,
-    input  wire  [7:0]   host,
-    input  wire          host_damaged
+    output logic       send_valid,    // ps2_device
+    input  wire        send_ready,
+    output logic [7:0] send,
+    output logic       send_damaged,
+    input  wire        host_valid,
+    output logic       host_ready,
+    input  wire  [7:0] host,
+    input  wire        host_damaged
 );
-    if (CLK_HZ < 1000) begin : g_check CLK_HZ_MUST_BE_AT_LEAST_1000 u_error (); end
+    if (CLK_HZ < 1000) begin : g_check
+        CLK_HZ_MUST_BE_AT_LEAST_1000 u_error ();
+    end
 
-    localparam int MS       = CLK_HZ / 1000;
-    localparam int EXCHANGE = 20;                       // ms
-    localparam int LONGEST  = 1000;                     // ms
-    localparam int W        = $clog2(MS + 1);
+    localparam int MS = CLK_HZ / 1000;
+    localparam int EXCHANGE = 20;  // ms
+    localparam int LONGEST = 1000;  // ms
+    localparam int W = $clog2(MS + 1);
     localparam logic [7:0] RESEND = 8'hFE;
 
-    logic [W-1:0] part;                                 // clk of this ms
-    logic [15:0]  quiet;                                // ms since the last byte of keyboard or host
-    logic [1:0]   left;                                 // codes until the keyboard's sequence is complete
-    logic [1:0]   awaited;                              // answers of the keyboard still to come
-    logic [7:0]   order, order_before;                  // the last two commands
-    logic         ordered;                              // a command is on its way to the keyboard
-    logic         keyboard_q;
-    logic [7:0]   injected;                             // the last byte
-    logic         own;                                  // the host heard that one last
-    logic         again;                                // and wants it once more
+    logic [W-1:0] part;  // clk of this ms
+    // ms since the last byte of keyboard or host
+    logic [ 15:0] quiet;
+    // codes until the keyboard's sequence is complete
+    logic [  1:0] left;
+    logic [  1:0] awaited;  // answers of the keyboard still to come
+    logic [7:0] order, order_before;  // the last two commands
+    logic ordered;  // a command is on its way to the keyboard
+    logic keyboard_q;
+    logic [7:0] injected;  // the last byte
+    logic own;  // the host heard that one last
+    logic again;  // and wants it once more
 
-    wire resend   = host_valid && host == RESEND && !host_damaged && own;
-    wire arrived  = keyboard_valid && !keyboard_q;
-    wire active   = host_valid || ordered || keyboard_valid || keyboard_busy;
-    wire open     = active || awaited != '0 || quiet < 16'(EXCHANGE);
-    wire may      = inject_valid && !injecting && left == '0 && !open && quiet >= idle_ms && !again;
-    wire ms       = part == W'(MS - 1);
+    wire resend = host_valid && host == RESEND && !host_damaged && own;
+    wire arrived = keyboard_valid && !keyboard_q;
+    wire active = host_valid || ordered || keyboard_valid || keyboard_busy;
+    wire open = active || awaited != '0 || quiet < 16'(EXCHANGE);
+    wire may = inject_valid && !injecting && left == '0 && !open && quiet >= idle_ms && !again;
+    wire ms = part == W'(MS - 1);
     wire given_up = quiet >= 16'(LONGEST);
     wire from_injection = injecting && inject_valid && !open && !again;
 
@@ -91,8 +100,8 @@ module ps2_arbiter #(
     always_ff @(posedge clk) begin
         keyboard_q <= keyboard_valid;
         part       <= active || ms ? '0 : part + 1'b1;
-        if (active)                quiet <= '0;
-        else if (ms && !(&quiet))  quiet <= quiet + 1'b1;
+        if (active) quiet <= '0;
+        else if (ms && !(&quiet)) quiet <= quiet + 1'b1;
 
         if (command_valid && command_ready) begin
             ordered      <= 1'b1;
@@ -110,7 +119,8 @@ module ps2_arbiter #(
                 default: awaited <= 2'd1;
             endcase
         else if (arrived && !keyboard_damaged) begin
-            if (awaited != '0) awaited <= keyboard == RESEND || keyboard == 8'hFC ? 2'd0 : awaited - 1'b1;
+            if (awaited != '0)
+                awaited <= keyboard == RESEND || keyboard == 8'hFC ? 2'd0 : awaited - 1'b1;
         end else if (given_up) awaited <= '0;
 
         if (arrived && !keyboard_damaged)
@@ -123,12 +133,12 @@ module ps2_arbiter #(
             endcase
         else if (given_up) left <= '0;
 
-        if (may && keyboard_held)           injecting <= 1'b1;
-        if (inject_ready && inject_last)    injecting <= 1'b0;
-        if (inject_ready)                   injected  <= inject;
-        if (send_ready)                     own       <= again || !keyboard_valid;
-        if (send_ready)                     again     <= 1'b0;
-        else if (resend)                    again     <= 1'b1;
+        if (may && keyboard_held) injecting <= 1'b1;
+        if (inject_ready && inject_last) injecting <= 1'b0;
+        if (inject_ready) injected <= inject;
+        if (send_ready) own <= again || !keyboard_valid;
+        if (send_ready) again <= 1'b0;
+        else if (resend) again <= 1'b1;
         if (rst) begin
             part       <= '0;
             quiet      <= '0;
@@ -147,18 +157,22 @@ module ps2_arbiter #(
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
-        assume (!send_ready || send_valid);                             // as ps2_device does
+        assume (!send_ready || send_valid);  // as ps2_device does
         assume (!(keyboard_held && (keyboard_valid || keyboard_busy)));
         if (past && !$past(rst)) begin
             if (injecting && !$past(injecting))
-                assert ($past(left == '0 && awaited == '0 && !host_valid && !ordered && !keyboard_valid && keyboard_held
-                              && quiet >= idle_ms && quiet >= 16'd20));
+                assert ($past(
+                    left == '0 && awaited == '0 && !host_valid && !ordered && !keyboard_valid && keyboard_held
+                              && quiet >= idle_ms && quiet >= 16'd20
+                ));
             if (injecting && awaited == '0) assert (keyboard_hold);
-            if ($past(inject_ready)) assert (own && injected == $past(send) && !$past(send_damaged));
+            if ($past(inject_ready))
+                assert (own && injected == $past(send) && !$past(send_damaged));
             if (own && $past(own) && !$past(send_ready)) assert ($stable(injected));
         end
         if (past) begin
-            if (keyboard_ready && keyboard_valid) assert (!inject_ready && send == keyboard && send_damaged == keyboard_damaged);
+            if (keyboard_ready && keyboard_valid)
+                assert (!inject_ready && send == keyboard && send_damaged == keyboard_damaged);
             if (inject_ready) assert (injecting && send == inject);
             if (send_ready) assert ((keyboard_valid && keyboard_ready) + inject_ready + again == 1);
             if (again) assert (own);

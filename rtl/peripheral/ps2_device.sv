@@ -1,58 +1,70 @@
 // SPDX-License-Identifier: Apache-2.0
-// ps2_device -- a PS/2 keyboard's side of the lines: makes the clock, sends bytes, receives the host's commands and acknowledges them.
+// ps2_device -- a PS/2 keyboard's side of the lines: makes the clock, sends bytes, receives the
+// host's commands and acknowledges them.
 //
-// latency  70 us of free lines before a byte's first falling clock edge, 20 us if they have been free for 50 us before send_valid
+// latency  70 us of free lines before a byte's first falling clock edge, 20 us if they have been
+//          free for 50 us before send_valid
 // rate     80 us a bit (12.5 kHz), 11 bits a byte; send_ready comes with the eleventh falling edge
-// source   IBM PS/2 keyboard interface. A host that pulls the clock low before the eleventh edge has not heard the byte: it is sent again
-//          from its start. Data low with the clock high asks for a command's clock
+// source   IBM PS/2 keyboard interface. A host that pulls the clock low before the eleventh edge
+//          has not heard the byte: it is sent again from its start. Data low with the clock high
+//          asks for a command's clock
 // model    tb/peripheral/ps2_device.py, equal in every bit of every cycle
 // proof    depth 40, CLK_HZ = 100000, CHECKED = 0
-// proved   the clock is pulled for 40 us, data has stood for 20 us before and does not change meanwhile; a received byte stands until it
-//          is taken; no line is pulled outside a frame
-// bounds   no device can tell a host that pulls the clock in the last microsecond before its own eleventh edge from one that does so after
+// proved   the clock is pulled for 40 us, data has stood for 20 us before and does not change
+//          meanwhile; a received byte stands until it is taken; no line is pulled outside a frame
+// bounds   no device can tell a host that pulls the clock in the last microsecond before its own
+//          eleventh edge from one that does so after
 `default_nettype none
 
 module ps2_device #(
     parameter int CLK_HZ  = 50_000_000,
-    parameter int CHECKED = 1               // 0: any CLK_HZ, for the proof
+    parameter int CHECKED = 1            // 0: any CLK_HZ, for the proof
 ) (
-    input  wire          clk,
-    input  wire          rst,               // lets go of both lines, drops what is in flight
-    input  wire          clock,             // levels of the lines, synchronous and deglitched
-    input  wire          data,
+    input wire clk,
+    input wire rst,  // lets go of both lines, drops what is in flight
+    input wire clock,  // levels of the lines, synchronous and deglitched
+    input wire data,
     input  wire          send_valid,        // level: a byte stands, and until send_ready; it may change while receiving and after it
-    output logic         send_ready,        // strobe: sent
-    input  wire  [7:0]   send,
-    input  wire          send_damaged,      // send it with wrong parity
-    output logic         received_valid,    // level: a command byte stands
-    input  wire          received_ready,    // with received_valid: taken in this clk
-    output logic [7:0]   received,
-    output logic         received_damaged,  // wrong parity or no stop bit
-    output logic         aborted,           // strobe: the host cut a frame short
-    output logic         busy,              // level: a frame is under way, either way
-    output logic         clock_low,         // pull the lines low
-    output logic         data_low
+    output logic send_ready,  // strobe: sent
+    input wire [7:0] send,
+    input wire send_damaged,  // send it with wrong parity
+    output logic received_valid,  // level: a command byte stands
+    input wire received_ready,  // with received_valid: taken in this clk
+    output logic [7:0] received,
+    output logic received_damaged,  // wrong parity or no stop bit
+    output logic aborted,  // strobe: the host cut a frame short
+    output logic busy,  // level: a frame is under way, either way
+    output logic clock_low,  // pull the lines low
+    output logic data_low
 );
-    if (CHECKED != 0 && CLK_HZ < 400_000) begin : g_check CLK_HZ_MUST_BE_AT_LEAST_400_000 u_error (); end
+    if (CHECKED != 0 && CLK_HZ < 400_000) begin : g_check
+        CLK_HZ_MUST_BE_AT_LEAST_400_000 u_error ();
+    end
 
-    localparam int QUARTER = CLK_HZ / 50_000;           // clk: 20 us
-    localparam int FREE    = CLK_HZ / 20_000;           // 50 us
-    localparam int W       = $clog2(FREE + 1);
+    localparam int QUARTER = CLK_HZ / 50_000;  // clk: 20 us
+    localparam int FREE = CLK_HZ / 20_000;  // 50 us
+    localparam int W = $clog2(FREE + 1);
 
-    typedef enum logic [1:0] {IDLE, SEND, RECEIVE, RELEASE} state_t;
+    typedef enum logic [1:0] {
+        IDLE,
+        SEND,
+        RECEIVE,
+        RELEASE
+    } state_t;
 
-    state_t       state;
-    logic [W-1:0] elapsed;                              // clk in this quarter, or with both lines free
-    logic [1:0]   quarter;                              // of a bit: 0 high, 1 and 2 low, 3 high
-    logic [3:0]   place;                                // bit of the frame
-    logic [9:0]   shifted;
+    state_t state;
+    // clk in this quarter, or with both lines free
+    logic [W-1:0] elapsed;
+    logic [1:0] quarter;  // of a bit: 0 high, 1 and 2 low, 3 high
+    logic [3:0] place;  // bit of the frame
+    logic [9:0] shifted;
 
-    wire        next     = elapsed == W'(QUARTER - 1);
-    wire        free     = elapsed >= W'(FREE);
+    wire next = elapsed == W'(QUARTER - 1);
+    wire free = elapsed >= W'(FREE);
     wire        cut      = (state == SEND || state == RECEIVE) && !clock &&
                           (quarter == 2'd0 || (quarter == 2'd3 && next && place != 4'd10));
-    wire        eleventh = next && quarter == 2'd0 && place == 4'd10;
-    wire [9:0]  frame    = {1'b1, ~^send ^ send_damaged, send};
+    wire eleventh = next && quarter == 2'd0 && place == 4'd10;
+    wire [9:0] frame = {1'b1, ~^send ^ send_damaged, send};
 
     assign busy       = state == SEND || state == RECEIVE;
     assign send_ready = state == SEND && eleventh && clock;
@@ -128,9 +140,10 @@ module ps2_device #(
 
 `ifdef FORMAL
     logic       past = 1'b0;
-    logic [7:0] pulled;                                 // clk that the clock has been pulled
+    logic [7:0] pulled;  // clk that the clock has been pulled
     logic       data_low_q;
-    logic [7:0] stood = '0;                             // clk before this one in which data_low was as in the last one
+    // clk before this one in which data_low was as in the last one
+    logic [7:0] stood = '0;
     always @(posedge clk) begin
         past   <= 1'b1;
         pulled <= rst || !clock_low ? 8'd0 : pulled + 1'b1;
@@ -142,16 +155,20 @@ module ps2_device #(
             if (!busy) assert (!data_low && elapsed <= W'(FREE));
             if (busy) begin
                 assert (place <= 4'd10 && elapsed < W'(QUARTER));
-                if (quarter == 2'd0) assert (stood >= 8'(elapsed) && (elapsed == '0 || data_low == data_low_q));
-                if (clock_low) assert (32'(pulled) == 32'(elapsed) + (quarter == 2'd2 ? QUARTER : 0));
+                if (quarter == 2'd0)
+                    assert (stood >= 8'(elapsed) && (elapsed == '0 || data_low == data_low_q));
+                if (clock_low)
+                    assert (32'(pulled) == 32'(elapsed) + (quarter == 2'd2 ? QUARTER : 0));
             end
             if (state == RECEIVE && (place != 4'd10 || quarter == 2'd0)) assert (!received_valid);
-            if (state == SEND) assert ((shifted | 10'((11'd1 << (4'd10 - place)) - 1'b1)) == 10'h3FF);
+            if (state == SEND)
+                assert ((shifted | 10'((11'd1 << (4'd10 - place)) - 1'b1)) == 10'h3FF);
         end
         if (past && !$past(rst) && !rst) begin
             if ($past(clock_low) && !clock_low) assert (32'($past(pulled)) == 2 * QUARTER - 1);
             if (clock_low && $past(clock_low)) assert ($stable(data_low));
-            if ($past(received_valid && !received_ready)) assert (received_valid && $stable(received) && $stable(received_damaged));
+            if ($past(received_valid && !received_ready))
+                assert (received_valid && $stable(received) && $stable(received_damaged));
             if ($past(send_ready)) assert ($past(state) == SEND && clock_low);
             if (clock_low && !$past(clock_low)) assert (32'(stood) >= QUARTER);
             if (aborted) assert (!clock_low && !data_low);

@@ -1,61 +1,74 @@
 // SPDX-License-Identifier: Apache-2.0
-// ps2_host -- towards a PS/2 keyboard: receives its bytes, sends it commands, holds it back by pulling the clock low.
+// ps2_host -- towards a PS/2 keyboard: receives its bytes, sends it commands, holds it back by
+// pulling the clock low.
 //
 // latency  a byte stands 2 clk after the eleventh falling clock edge
 // rate     one byte a frame; a byte that stands holds the keyboard back until it is taken
-// source   IBM PS/2 keyboard interface: 11 bits at 10 to 16.7 kHz, start, 8 data bits LSB first, odd parity, stop; the keyboard makes
-//          the clock. A command: clock low for 100 us, then data low, clock let go; the keyboard clocks 10 bits in and pulls the 11th low
+// source   IBM PS/2 keyboard interface: 11 bits at 10 to 16.7 kHz, start, 8 data bits LSB first,
+//          odd parity, stop; the keyboard makes the clock. A command: clock low for 100 us, then
+//          data low, clock let go; the keyboard clocks 10 bits in and pulls the 11th low
 // model    tb/peripheral/ps2_host.py, equal in every bit of every cycle
 // proof    depth 44, CLK_HZ = 40000, CHECKED = 0
-// proved   the clock is pulled for 100 us at least; data only for a command, first with the clock low; a byte stands until it is taken, and
-//          while one does the keyboard is held
-// bounds   time-outs: 300 us between two edges, 15 ms to the first edge of a command. A byte that ends in one is damaged
+// proved   the clock is pulled for 100 us at least; data only for a command, first with the clock
+//          low; a byte stands until it is taken, and while one does the keyboard is held
+// bounds   time-outs: 300 us between two edges, 15 ms to the first edge of a command. A byte that
+//          ends in one is damaged
 `default_nettype none
 
 module ps2_host #(
     parameter int CLK_HZ  = 50_000_000,
-    parameter int CHECKED = 1               // 0: any CLK_HZ, for the proof
+    parameter int CHECKED = 1            // 0: any CLK_HZ, for the proof
 ) (
-    input  wire          clk,
-    input  wire          rst,               // lets go of both lines, drops what is in flight
-    input  wire          hold,              // level: no new frame; one in flight still ends
-    input  wire          clock,             // levels of the lines, synchronous and deglitched
-    input  wire          data,
-    input  wire          command_valid,
-    output logic         command_ready,     // with command_valid: taken in this clk
-    input  wire  [7:0]   command,
-    input  wire          command_damaged,   // send it with wrong parity
-    output logic         received_valid,    // level: a byte stands
-    input  wire          received_ready,    // with received_valid: taken in this clk
-    output logic [7:0]   received,
-    output logic         received_damaged,  // wrong parity, no stop bit, or cut short
-    output logic         sent,              // strobe: the command was acknowledged by the keyboard's bit
-    output logic         unsent,            // strobe: it was not, or the time ran out
-    output logic         held,              // level: the keyboard is held back, nothing stands and nothing moves
-    output logic         busy,              // level: a frame is under way, either way
-    output logic         clock_low,         // pull the lines low
-    output logic         data_low
+    input wire clk,
+    input wire rst,  // lets go of both lines, drops what is in flight
+    input wire hold,  // level: no new frame; one in flight still ends
+    input wire clock,  // levels of the lines, synchronous and deglitched
+    input wire data,
+    input wire command_valid,
+    output logic command_ready,  // with command_valid: taken in this clk
+    input wire [7:0] command,
+    input wire command_damaged,  // send it with wrong parity
+    output logic received_valid,  // level: a byte stands
+    input wire received_ready,  // with received_valid: taken in this clk
+    output logic [7:0] received,
+    output logic received_damaged,  // wrong parity, no stop bit, or cut short
+    output logic sent,  // strobe: the command was acknowledged by the keyboard's bit
+    output logic unsent,  // strobe: it was not, or the time ran out
+    output logic held,  // level: the keyboard is held back, nothing stands and nothing moves
+    output logic busy,  // level: a frame is under way, either way
+    output logic clock_low,  // pull the lines low
+    output logic data_low
 );
-    if (CHECKED != 0 && CLK_HZ < 400_000) begin : g_check CLK_HZ_MUST_BE_AT_LEAST_400_000 u_error (); end
+    if (CHECKED != 0 && CLK_HZ < 400_000) begin : g_check
+        CLK_HZ_MUST_BE_AT_LEAST_400_000 u_error ();
+    end
 
-    localparam int HOLD  = CLK_HZ / 10_000;             // clk: 100 us
+    localparam int HOLD = CLK_HZ / 10_000;  // clk: 100 us
     localparam int SETUP = (CLK_HZ / 1_000) / 50 + 1;   // 20 us of data low before the clock is let go
-    localparam int GAP   = (CLK_HZ / 1_000) * 3 / 10;   // 300 us between two edges
-    localparam int FIRST = (CLK_HZ / 1_000) * 15;       // 15 ms to the first edge of a command
-    localparam int W     = $clog2(FIRST + 1);
+    localparam int GAP = (CLK_HZ / 1_000) * 3 / 10;  // 300 us between two edges
+    localparam int FIRST = (CLK_HZ / 1_000) * 15;  // 15 ms to the first edge of a command
+    localparam int W = $clog2(FIRST + 1);
 
-    typedef enum logic [2:0] {IDLE, RECEIVE, HELD, REQUEST, COMMAND, RELEASE} state_t;
+    typedef enum logic [2:0] {
+        IDLE,
+        RECEIVE,
+        HELD,
+        REQUEST,
+        COMMAND,
+        RELEASE
+    } state_t;
 
-    state_t       state;
-    logic [W-1:0] elapsed;                              // clk in this state, or since the last edge of a frame
-    logic [3:0]   place;                                // edges of this frame
-    logic [9:0]   shifted;
-    logic         clock_q;
+    state_t         state;
+    // clk in this state, or since the last edge of a frame
+    logic   [W-1:0] elapsed;
+    logic   [  3:0] place;  // edges of this frame
+    logic   [  9:0] shifted;
+    logic           clock_q;
 
-    wire       fall    = clock_q && !clock;
-    wire [9:0] frame   = {data, shifted[9:1]};          // stop, parity, data
-    wire       cut     = elapsed >= W'(GAP);
-    wire       rested  = state == HELD && elapsed >= W'(HOLD) && !received_valid;
+    wire            fall = clock_q && !clock;
+    wire    [  9:0] frame = {data, shifted[9:1]};  // stop, parity, data
+    wire            cut = elapsed >= W'(GAP);
+    wire            rested = state == HELD && elapsed >= W'(HOLD) && !received_valid;
 
     assign command_ready = rested;
     assign held          = rested && !command_valid;
@@ -72,7 +85,7 @@ module ps2_host #(
             IDLE: begin
                 place   <= 4'd1;
                 elapsed <= '0;
-                if (fall && !data)              state <= RECEIVE;
+                if (fall && !data) state <= RECEIVE;
                 else if (hold || command_valid) state <= HELD;
             end
             RECEIVE: begin
@@ -99,27 +112,27 @@ module ps2_host #(
                 end else if (rested && !hold) state <= RELEASE;
             end
             REQUEST:
-                if (elapsed >= W'(SETUP)) begin
-                    elapsed <= '0;
-                    state   <= COMMAND;
-                end
+            if (elapsed >= W'(SETUP)) begin
+                elapsed <= '0;
+                state   <= COMMAND;
+            end
             COMMAND:
-                if (fall) begin
-                    data_low <= place < 4'd10 && !shifted[0];
-                    shifted  <= {1'b1, shifted[9:1]};
-                    place    <= place + 1'b1;
-                    elapsed  <= '0;
-                    if (place == 4'd10) begin
-                        sent   <= !data;
-                        unsent <= data;
-                        state  <= RELEASE;
-                    end
-                end else if (elapsed >= (place == 4'd0 ? W'(FIRST) : W'(GAP))) begin
-                    data_low <= 1'b0;
-                    unsent   <= 1'b1;
-                    elapsed  <= '0;
-                    state    <= HELD;
+            if (fall) begin
+                data_low <= place < 4'd10 && !shifted[0];
+                shifted  <= {1'b1, shifted[9:1]};
+                place    <= place + 1'b1;
+                elapsed  <= '0;
+                if (place == 4'd10) begin
+                    sent   <= !data;
+                    unsent <= data;
+                    state  <= RELEASE;
                 end
+            end else if (elapsed >= (place == 4'd0 ? W'(FIRST) : W'(GAP))) begin
+                data_low <= 1'b0;
+                unsent   <= 1'b1;
+                elapsed  <= '0;
+                state    <= HELD;
+            end
             RELEASE:
                 if (clock) state <= IDLE;
             default:
@@ -136,7 +149,7 @@ module ps2_host #(
 
 `ifdef FORMAL
     logic       past = 1'b0;
-    logic [7:0] pulled;                                 // clk that the clock has been pulled
+    logic [7:0] pulled;  // clk that the clock has been pulled
     always @(posedge clk) begin
         past   <= 1'b1;
         pulled <= rst || !clock_low ? 8'd0 : pulled + !(&pulled);

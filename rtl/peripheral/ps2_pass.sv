@@ -1,75 +1,167 @@
 // SPDX-License-Identifier: Apache-2.0
-// ps2_pass -- between a PS/2 keyboard and its host: everything passes both ways untouched, and sequences can be injected.
+// ps2_pass -- between a PS/2 keyboard and its host: everything passes both ways untouched, and
+// sequences can be injected.
 //
-// latency  less than 200 us from a byte's eleventh edge to our eleventh edge, beyond the ten bits of our frame
-// rate     one byte each way at a time; a keyboard waits, held by its clock, until its last byte has been passed on
-// source   S4: the main controller is a keyboard of the EDM machine; 14 1D F0 1D F0 14 starts the cut
+// latency  less than 200 us from a byte's eleventh edge to our eleventh edge, beyond the ten bits
+//          of our frame
+// rate     one byte each way at a time; a keyboard waits, held by its clock, until its last byte
+//          has been passed on
+// source   S4: the main controller is a keyboard of the EDM machine; 14 1D F0 1D F0 14 starts the
+//          cut
 // model    tb/peripheral/ps2_pass.py, equal in every bit of every cycle
-// bounds   what comes damaged leaves damaged (wrong parity), so that its receiver asks for it again; a command that the keyboard does not
-//          take has no answer, as without a keyboard
+// bounds   what comes damaged leaves damaged (wrong parity), so that its receiver asks for it
+//          again; a command that the keyboard does not take has no answer, as without a keyboard
 `default_nettype none
 
 module ps2_pass #(
     parameter int CLK_HZ = 50_000_000,
-    parameter int STAGES = 2                // of the synchronisers
+    parameter int STAGES = 2            // of the synchronisers
 ) (
-    input  wire          clk,
-    input  wire          rst,
-    input  wire  [15:0]  idle_ms,           // silence of keyboard and host before an injection
-    input  wire          keyboard_clock,    // levels of the lines, asynchronous
-    input  wire          keyboard_data,
-    output logic         keyboard_clock_low,// pull the lines low
-    output logic         keyboard_data_low,
-    input  wire          host_clock,
-    input  wire          host_data,
-    output logic         host_clock_low,
-    output logic         host_data_low,
-    input  wire          inject_valid,      // level: a byte stands
-    output logic         inject_ready,      // with inject_valid: sent in this clk
-    input  wire  [7:0]   inject,
-    input  wire          inject_last,       // of its sequence
-    output logic         injecting,         // level: a sequence is under way, the keyboard is held
-    output logic         typed,             // strobe: a byte of the keyboard that answers no command
-    output logic         keyboard_damaged,  // strobe: a byte of the keyboard came damaged
-    output logic         command_damaged,   // strobe: a command of the host came damaged
-    output logic         command_unsent,    // strobe: the keyboard did not take a command
-    output logic         aborted,           // strobe: the host cut a frame short
-    output logic         glitch,            // strobe: a pulse of less than 1 us on a line
-    output logic         busy               // level: a frame is under way on either side
+    input wire clk,
+    input wire rst,
+    input wire [15:0] idle_ms,  // silence of keyboard and host before an injection
+    input wire keyboard_clock,  // levels of the lines, asynchronous
+    input wire keyboard_data,
+    output logic keyboard_clock_low,  // pull the lines low
+    output logic keyboard_data_low,
+    input wire host_clock,
+    input wire host_data,
+    output logic host_clock_low,
+    output logic host_data_low,
+    input wire inject_valid,  // level: a byte stands
+    output logic inject_ready,  // with inject_valid: sent in this clk
+    input wire [7:0] inject,
+    input wire inject_last,  // of its sequence
+    output logic injecting,  // level: a sequence is under way, the keyboard is held
+    output logic typed,  // strobe: a byte of the keyboard that answers no command
+    output logic keyboard_damaged,  // strobe: a byte of the keyboard came damaged
+    output logic command_damaged,  // strobe: a command of the host came damaged
+    output logic command_unsent,  // strobe: the keyboard did not take a command
+    output logic aborted,  // strobe: the host cut a frame short
+    output logic glitch,  // strobe: a pulse of less than 1 us on a line
+    output logic busy  // level: a frame is under way on either side
 );
-    localparam int FILTER = CLK_HZ / 1_000_000; // clk: 1 us
+    localparam int FILTER = CLK_HZ / 1_000_000;  // clk: 1 us
 
     logic [3:0] level, line, rejected;
-    logic       received_valid, received_ready, received_damaged, hold, held, keyboard_busy, command_valid, command_ready, damaged, sent;
-    logic       send_valid, send_ready, send_damaged, host_valid, host_ready, host_byte_damaged, host_busy;
+    logic
+        received_valid,
+        received_ready,
+        received_damaged,
+        hold,
+        held,
+        keyboard_busy,
+        command_valid,
+        command_ready,
+        damaged,
+        sent;
+    logic
+        send_valid, send_ready, send_damaged, host_valid, host_ready, host_byte_damaged, host_busy;
     logic [7:0] received, command, send, host_byte;
 
-    synchroniser #(.W(4), .STAGES(STAGES), .RESET(15)) u_synchroniser (
-        .clk, .rst, .d({keyboard_clock, keyboard_data, host_clock, host_data}), .q(level));
+    synchroniser #(
+        .W     (4),
+        .STAGES(STAGES),
+        .RESET (15)
+    ) u_synchroniser (
+        .clk,
+        .rst,
+        .d({keyboard_clock, keyboard_data, host_clock, host_data}),
+        .q(level)
+    );
 
     for (genvar n = 0; n < 4; n++) begin : g_line
-        deglitcher #(.W(8)) u_deglitcher (
-            .clk, .rst, .stable_cycles(8'(FILTER)), .level(level[n]), .filtered(line[n]), .rejected(rejected[n]));
+        deglitcher #(
+            .W(8)
+        ) u_deglitcher (
+            .clk,
+            .rst,
+            .stable_cycles(8'(FILTER)),
+            .level        (level[n]),
+            .filtered     (line[n]),
+            .rejected     (rejected[n])
+        );
     end
 
-    ps2_host #(.CLK_HZ(CLK_HZ)) u_host (
-        .clk, .rst, .hold, .clock(line[3]), .data(line[2]),
-        .command_valid, .command_ready, .command, .command_damaged(damaged),
-        .received_valid, .received_ready, .received, .received_damaged,
-        .sent, .unsent(command_unsent), .held, .busy(keyboard_busy), .clock_low(keyboard_clock_low), .data_low(keyboard_data_low));
+    ps2_host #(
+        .CLK_HZ(CLK_HZ)
+    ) u_host (
+        .clk,
+        .rst,
+        .hold,
+        .clock          (line[3]),
+        .data           (line[2]),
+        .command_valid,
+        .command_ready,
+        .command,
+        .command_damaged(damaged),
+        .received_valid,
+        .received_ready,
+        .received,
+        .received_damaged,
+        .sent,
+        .unsent         (command_unsent),
+        .held,
+        .busy           (keyboard_busy),
+        .clock_low      (keyboard_clock_low),
+        .data_low       (keyboard_data_low)
+    );
 
-    ps2_arbiter #(.CLK_HZ(CLK_HZ)) u_arbiter (
-        .clk, .rst, .idle_ms, .inject_valid, .inject_ready, .inject, .inject_last, .injecting, .typed,
-        .keyboard_valid(received_valid), .keyboard_ready(received_ready), .keyboard(received), .keyboard_damaged(received_damaged),
-        .keyboard_busy, .keyboard_held(held), .keyboard_hold(hold),
-        .command_valid, .command_ready, .command, .command_damaged(damaged), .command_sent(sent), .command_unsent,
-        .send_valid, .send_ready, .send, .send_damaged, .host_valid, .host_ready, .host(host_byte), .host_damaged(host_byte_damaged));
+    ps2_arbiter #(
+        .CLK_HZ(CLK_HZ)
+    ) u_arbiter (
+        .clk,
+        .rst,
+        .idle_ms,
+        .inject_valid,
+        .inject_ready,
+        .inject,
+        .inject_last,
+        .injecting,
+        .typed,
+        .keyboard_valid  (received_valid),
+        .keyboard_ready  (received_ready),
+        .keyboard        (received),
+        .keyboard_damaged(received_damaged),
+        .keyboard_busy,
+        .keyboard_held   (held),
+        .keyboard_hold   (hold),
+        .command_valid,
+        .command_ready,
+        .command,
+        .command_damaged (damaged),
+        .command_sent    (sent),
+        .command_unsent,
+        .send_valid,
+        .send_ready,
+        .send,
+        .send_damaged,
+        .host_valid,
+        .host_ready,
+        .host            (host_byte),
+        .host_damaged    (host_byte_damaged)
+    );
 
-    ps2_device #(.CLK_HZ(CLK_HZ)) u_device (
-        .clk, .rst, .clock(line[1]), .data(line[0]),
-        .send_valid, .send_ready, .send, .send_damaged,
-        .received_valid(host_valid), .received_ready(host_ready), .received(host_byte), .received_damaged(host_byte_damaged),
-        .aborted, .busy(host_busy), .clock_low(host_clock_low), .data_low(host_data_low));
+    ps2_device #(
+        .CLK_HZ(CLK_HZ)
+    ) u_device (
+        .clk,
+        .rst,
+        .clock           (line[1]),
+        .data            (line[0]),
+        .send_valid,
+        .send_ready,
+        .send,
+        .send_damaged,
+        .received_valid  (host_valid),
+        .received_ready  (host_ready),
+        .received        (host_byte),
+        .received_damaged(host_byte_damaged),
+        .aborted,
+        .busy            (host_busy),
+        .clock_low       (host_clock_low),
+        .data_low        (host_data_low)
+    );
 
     assign glitch           = |rejected;
     assign busy             = keyboard_busy || host_busy;

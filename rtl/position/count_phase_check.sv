@@ -1,37 +1,40 @@
 // SPDX-License-Identifier: Apache-2.0
-// count_phase_check -- hold the interpolated position against the x4 count of the same signals: a lost fringe shows.
+// count_phase_check -- hold the interpolated position against the x4 count of the same signals: a
+// lost fringe shows.
 //
 // latency  3 clk from valid to disagreement    rate  one position per clk
-// limit    must cover the quarter period between two counts, the offset of the two comparators, and twice the way that is
-//          covered while the deglitchers hold an edge back: the count lags one way going up and the other going down
-// learns   the constant between the two at the first position after reset, while limit is 0, and at the next position after
-//          a shift by 0 periods. A shift by other periods is taken along exactly: moving the origin hides no disagreement.
+// limit    must cover the quarter period between two counts, the offset of the two comparators, and
+//          twice the way that is covered while the deglitchers hold an edge back: the count lags
+//          one way going up and the other going down
+// learns   the constant between the two at the first position after reset, while limit is 0, and at
+//          the next position after a shift by 0 periods. A shift by other periods is taken along
+//          exactly: moving the origin hides no disagreement.
 // source   S0: fringe count and arctan come from the same two photo-receivers
 // model    tb/position/count_phase_check.py, equal in every bit of every cycle
 // proved   no disagreement while limit is 0, nor from any shift
 `default_nettype none
 
 module count_phase_check (
-    input  wire                  clk,
-    input  wire                  rst,           // disagreement falls, the next position is learnt
-    input  wire        [19:0]    limit,         // 2^-16 period; 0: not checked
-    input  wire                  valid,         // strobe: position is that of a new sample
-    /* verilator lint_off UNUSEDSIGNAL */       // the count has no more than 46 bits to compare with
-    input  wire signed [47:0]    position,      // Q32.16 periods
+    input wire clk,
+    input wire rst,  // disagreement falls, the next position is learnt
+    input wire [19:0] limit,  // 2^-16 period; 0: not checked
+    input wire valid,  // strobe: position is that of a new sample
+    /* verilator lint_off UNUSEDSIGNAL */  // the count has no more than 46 bits to compare with
+    input wire signed [47:0] position,  // Q32.16 periods
     /* verilator lint_on UNUSEDSIGNAL */
-    input  wire signed [31:0]    count,         // 1/4 period, wraps
-    input  wire                  shift,         // strobe: position grows by shift_periods in the next clk
-    input  wire signed [31:0]    shift_periods, // periods; 0: learn anew
-    output logic                 disagreement   // level: they differ by more than limit
+    input wire signed [31:0] count,  // 1/4 period, wraps
+    input wire shift,  // strobe: position grows by shift_periods in the next clk
+    input wire signed [31:0] shift_periods,  // periods; 0: learn anew
+    output logic disagreement  // level: they differ by more than limit
 );
-    localparam int D = 46;                      // bits of the difference: the count wraps at 2^32 / 4 periods
+    localparam int D = 46;  // bits of the difference: the count wraps at 2^32 / 4 periods
 
-    logic                known, measured, compared;
+    logic known, measured, compared;
     logic signed [D-1:0] between, constant, difference;
 
     wire signed [D-1:0] moved = shift ? {shift_periods[D-17:0], 16'b0} : '0;
     wire                learn = !known || limit == '0;
-    wire        [D-1:0] size  = difference < 0 ? -difference : difference;
+    wire        [D-1:0] size = difference < 0 ? -difference : difference;
 
     always_ff @(posedge clk) begin
         measured   <= valid;
@@ -52,14 +55,20 @@ module count_phase_check (
     end
 
 `ifdef FORMAL
-    (* anyconst *) logic still;                 // nothing moves but the origin
+    (* anyconst *)logic still;  // nothing moves but the origin
     logic past = 1'b0;
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
         if (past && still) begin
             assume (count == $past(count));
-            assume (position == $past(position) + ($past(shift) ? $signed({$past(shift_periods), 16'b0}) : 48'sd0));
+            assume (position == $past(
+                position
+            ) + ($past(
+                shift
+            ) ? $signed(
+                {$past(shift_periods), 16'b0}
+            ) : 48'sd0));
         end
         if (past) begin
             if ($past(limit) == 0) assert (!disagreement);

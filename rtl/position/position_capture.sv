@@ -1,65 +1,75 @@
 // SPDX-License-Identifier: Apache-2.0
-// position_capture -- latch position and time at events, and keep them in order until they are read.
+// position_capture -- latch position and time at events, and keep them in order until they are
+// read.
 //
 // latency  2 clk from event to present in an empty queue        rate  one entry per clk
-// sources  bit 0 index, 1 tick, 2 software, then a rising edge of each probe, then a falling edge of each; events of one clk
-//          make one entry with all their bits set
-// entry    the position that stood on the port in the clk of the event, together with the time of that clk and the clk that
-//          have passed since that position came: at velocity v the scale has moved on by v * (age + latency of the measuring
-//          path). The origin is that of the event: read out or clear before it is moved
-// reading  the head stands still until pop, so it may be read word by word; an event in a full queue is dropped and told
+// sources  bit 0 index, 1 tick, 2 software, then a rising edge of each probe, then a falling edge
+//          of each; events of one clk make one entry with all their bits set
+// entry    the position that stood on the port in the clk of the event, together with the time of
+//          that clk and the clk that have passed since that position came: at velocity v the scale
+//          has moved on by v * (age + latency of the measuring path). The origin is that of the
+//          event: read out or clear before it is moved
+// reading  the head stands still until pop, so it may be read word by word; an event in a full
+//          queue is dropped and told
 // source   S3: an edge of the reference mark latches the position counter and sets a flag
 // model    tb/position/position_capture.py, equal in every bit of every cycle
 // proof    depth 12, PROBES = 1, TIME_W = 4, DEPTH = 4
-// proved   an entry is never torn: position, time, age and sources are those of one clk, and the head moves only by pop or clear;
-//          no event is lost without overrun, none is doubled, invented or overtaken
+// proved   an entry is never torn: position, time, age and sources are those of one clk, and the
+//          head moves only by pop or clear; no event is lost without overrun, none is doubled,
+//          invented or overtaken
 `default_nettype none
 
 module position_capture #(
-    parameter int PROBES = 2,                       // inputs
-    parameter int TIME_W = 32,                      // bits of the time
-    parameter int DEPTH = 16                        // entries, a power of two from 4 up
+    parameter int PROBES = 2,   // inputs
+    parameter int TIME_W = 32,  // bits of the time
+    parameter int DEPTH  = 16   // entries, a power of two from 4 up
 ) (
-    input  wire                  clk,
-    input  wire                  rst,               // empties the queue
-    input  wire [2*PROBES+2:0]   enabled,           // sources that make entries
-    input  wire                  index,             // strobe
-    input  wire                  tick,              // strobe
-    input  wire                  software,          // strobe
-    input  wire [PROBES-1:0]     probe,             // levels, synchronous to clk; the first after reset is no edge
-    input  wire [TIME_W-1:0]     now,               // clk
-    input  wire                  valid,             // strobe: position is new
-    input  wire signed [47:0]    position,          // Q32.16 periods
-    input  wire                  pop,               // strobe: done with the head; without present it does nothing
-    input  wire                  clear,             // strobe: empties the queue; an event of the same clk is not kept
-    output logic                 present,           // level: the four outputs below are the oldest entry
-    output logic [2*PROBES+2:0]  captured_sources,
-    output logic [15:0]          captured_age,      // clk; 65535: that or more, or no position since reset
-    output logic [TIME_W-1:0]    captured_time,     // clk
-    output logic signed [47:0]   captured_position, // Q32.16 periods
-    output logic [$clog2(DEPTH):0] free,            // entries that still fit
-    output logic                 overrun            // strobe: an event was dropped
+    input wire clk,
+    input wire rst,  // empties the queue
+    input wire [2*PROBES+2:0] enabled,  // sources that make entries
+    input wire index,  // strobe
+    input wire tick,  // strobe
+    input wire software,  // strobe
+    input wire [PROBES-1:0] probe,  // levels, synchronous to clk; the first after reset is no edge
+    input wire [TIME_W-1:0] now,  // clk
+    input wire valid,  // strobe: position is new
+    input wire signed [47:0] position,  // Q32.16 periods
+    input wire pop,  // strobe: done with the head; without present it does nothing
+    input wire clear,  // strobe: empties the queue; an event of the same clk is not kept
+    output logic present,  // level: the four outputs below are the oldest entry
+    output logic [2*PROBES+2:0] captured_sources,
+    output logic [15:0] captured_age,  // clk; 65535: that or more, or no position since reset
+    output logic [TIME_W-1:0] captured_time,  // clk
+    output logic signed [47:0] captured_position,  // Q32.16 periods
+    output logic [$clog2(DEPTH):0] free,  // entries that still fit
+    output logic overrun  // strobe: an event was dropped
 );
     localparam int A = $clog2(DEPTH), S = 2 * PROBES + 3, W = S + 16 + TIME_W + 48;
 
-    if (PROBES < 1) begin : g_check_probes PROBES_MUST_BE_AT_LEAST_1 u_error (); end
-    if (DEPTH < 4 || DEPTH != 1 << A) begin : g_check_depth DEPTH_MUST_BE_A_POWER_OF_TWO_FROM_4_UP u_error (); end
+    if (PROBES < 1) begin : g_check_probes
+        PROBES_MUST_BE_AT_LEAST_1 u_error ();
+    end
+    if (DEPTH < 4 || DEPTH != 1 << A) begin : g_check_depth
+        DEPTH_MUST_BE_A_POWER_OF_TWO_FROM_4_UP u_error ();
+    end
 
-    logic [W-1:0]      memory [0:DEPTH-1];
-    logic [W-1:0]      head;
-    logic [A:0]        written, read;               // entries so far; one bit more than an address tells full from empty
-    logic              known;                       // probe_q is a level since reset
+    logic [W-1:0] memory[0:DEPTH-1];
+    logic [W-1:0] head;
+    // entries so far; one bit more than an address tells full from empty
+    logic [A:0] written, read;
+    logic known;  // probe_q is a level since reset
     logic [PROBES-1:0] probe_q;
-    logic [15:0]       since;                       // clk since the position came, in a clk without a new one
+    // clk since the position came, in a clk without a new one
+    logic [15:0] since;
 
-    wire [PROBES-1:0] changed   = known ? probe ^ probe_q : '0;
-    wire [S-1:0]      events    = {changed & ~probe, changed & probe, software, tick, index} & enabled;
-    wire [15:0]       age       = valid ? 16'd0 : since;
-    wire [W-1:0]      entry     = {events, age, now, position};
-    wire              full      = free == '0;
-    wire              take      = events != '0 && !full && !clear;
-    wire              drop      = pop && present;
-    wire [A:0]        read_next = read + (A + 1)'(drop);
+    wire [PROBES-1:0] changed = known ? probe ^ probe_q : '0;
+    wire [S-1:0] events = {changed & ~probe, changed & probe, software, tick, index} & enabled;
+    wire [15:0] age = valid ? 16'd0 : since;
+    wire [W-1:0] entry = {events, age, now, position};
+    wire full = free == '0;
+    wire take = events != '0 && !full && !clear;
+    wire drop = pop && present;
+    wire [A:0] read_next = read + (A + 1)'(drop);
 
     assign {captured_sources, captured_age, captured_time, captured_position} = head;
 
@@ -91,15 +101,17 @@ module position_capture #(
     end
 
 `ifdef FORMAL
-    // Any one entry since the queue was emptied, the `chosen`-th, is followed from its event until it is popped.
-    (* anyconst *) logic [A:0] chosen;
-    logic              past = 1'b0;
-    logic              waiting;                     // the chosen entry is in the queue
-    logic [S-1:0]      then_events;                 // the inputs in the clk of its event, one by one
-    logic [15:0]       then_age;
-    logic [TIME_W-1:0] then_time;
-    logic signed [47:0] then_position;
-    wire  [A:0]        stored = written - read;
+    // Any one entry since the queue was emptied, the `chosen`-th, is followed from its event until
+    // it is popped.
+    (* anyconst *)logic        [       A:0] chosen;
+    logic                     past = 1'b0;
+    logic                     waiting;  // the chosen entry is in the queue
+    // the inputs in the clk of its event, one by one
+    logic        [     S-1:0] then_events;
+    logic        [      15:0] then_age;
+    logic        [TIME_W-1:0] then_time;
+    logic signed [      47:0] then_position;
+    wire         [       A:0] stored = written - read;
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
@@ -120,13 +132,16 @@ module position_capture #(
             if (present) assert (stored != 0);
             if (stored != 0 && !present) assert (stored == 1 && $past(take));
             assert (waiting == ((A + 1)'(chosen - read) < stored));
-            if (waiting) assert (memory[chosen[A-1:0]] == {then_events, then_age, then_time, then_position});
+            if (waiting)
+                assert (memory[chosen[A-1:0]] == {then_events, then_age, then_time, then_position});
             if (waiting && present && read == chosen)
                 assert (captured_sources == then_events && captured_age == then_age && captured_time == then_time
                         && captured_position == then_position && captured_sources != 0);
             if (waiting) assert (then_events != 0);
-            if ($past(present) && !$past(pop) && !$past(clear)) assert (present && read == $past(read));
-            if ($past(events) != 0 && !$past(clear)) assert (overrun || written == $past(written) + 1'b1);
+            if ($past(present) && !$past(pop) && !$past(clear))
+                assert (present && read == $past(read));
+            if ($past(events) != 0 && !$past(clear))
+                assert (overrun || written == $past(written) + 1'b1);
             if (overrun) assert ($past(events) != 0 && $past(stored) == (A + 1)'(DEPTH));
             if ($past(events) == 0 && !$past(clear)) assert (written == $past(written) && !overrun);
             cover (drop && take && read == chosen);

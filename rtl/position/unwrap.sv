@@ -1,29 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
-// unwrap -- add up steps to a position whose fraction is always the phase; its origin moves by whole periods only.
+// unwrap -- add up steps to a position whose fraction is always the phase; its origin moves by
+// whole periods only.
 //
-// latency  1 clk from valid, shift to position     rate  one step and one shift per clk, also both at once
-// start    position is 0 until the first phase after reset, then that phase; its step is not looked at
+// latency  1 clk from valid, shift to position     rate  one step and one shift per clk, also both
+//          at once
+// start    position is 0 until the first phase after reset, then that phase; its step is not looked
+//          at
 // source   S0: fringes counted by a reversible counter, the phase between them from the arctan
 // model    tb/position/unwrap.py, equal in every bit of every cycle
-// proved   the fraction is the last phase; a step moves the position by itself and a shift by its periods, also both at once
+// proved   the fraction is the last phase; a step moves the position by itself and a shift by its
+//          periods, also both at once
 `default_nettype none
 
 module unwrap (
-    input  wire                  clk,
-    input  wire                  rst,           // position becomes 0, the next phase is the first
-    input  wire                  valid,         // strobe: step leads to phase
-    input  wire signed [16:0]    step,          // 2^-16 period; equal to the change of phase modulo a period
-    input  wire        [15:0]    phase,         // 2^-16 period; the fraction of position from now on
-    input  wire                  shift,         // strobe: move the origin
-    input  wire signed [31:0]    shift_periods, // position grows by this many periods
-    output logic                 done,          // strobe: position is that of a new phase; no strobe for a shift alone
-    output logic signed [47:0]   position       // Q32.16 periods, wraps
+    input wire clk,
+    input wire rst,  // position becomes 0, the next phase is the first
+    input wire valid,  // strobe: step leads to phase
+    input wire signed [16:0] step,  // 2^-16 period; equal to the change of phase modulo a period
+    input wire [15:0] phase,  // 2^-16 period; the fraction of position from now on
+    input wire shift,  // strobe: move the origin
+    input wire signed [31:0] shift_periods,  // position grows by this many periods
+    output logic done,  // strobe: position is that of a new phase; no strobe for a shift alone
+    output logic signed [47:0] position  // Q32.16 periods, wraps
 );
-    logic               started;
+    logic started;
     logic signed [31:0] periods;
-    logic        [15:0] fraction;
+    logic [15:0] fraction;
 
-    wire signed [31:0] carry = started && valid ? (32'(step) + $signed({16'b0, fraction})) >>> 16 : 32'sd0;
+    wire signed [31:0] carry = started && valid ? (32'(step) + $signed(
+        {16'b0, fraction}
+    )) >>> 16 : 32'sd0;
 
     assign position = {periods, fraction};
 
@@ -43,8 +49,8 @@ module unwrap (
     end
 
 `ifdef FORMAL
-    logic past = 1'b0;
-    logic [15:0] last;                          // the phase that came last
+    logic        past = 1'b0;
+    logic [15:0] last;  // the phase that came last
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
@@ -54,9 +60,26 @@ module unwrap (
         if (past) assert (position[15:0] == last);
         if (past && !$past(rst)) begin
             assert (done == $past(valid));
-            if ($past(started)) assert (position == $past(position) + ($past(valid) ? 48'($past(step)) : 48'sd0)
-                                                    + ($past(shift) ? $signed({$past(shift_periods), 16'b0}) : 48'sd0));
-            else assert (position[47:16] == $past(position[47:16]) + ($past(shift) ? $past(shift_periods) : 32'sd0));
+            if ($past(started))
+                assert (position == $past(
+                    position
+                ) + ($past(
+                    valid
+                ) ? 48'($past(
+                    step
+                )) : 48'sd0) + ($past(
+                    shift
+                ) ? $signed(
+                    {$past(shift_periods), 16'b0}
+                ) : 48'sd0));
+                else
+                    assert (position[47:16] == $past(
+                        position[47:16]
+                    ) + ($past(
+                        shift
+                    ) ? $past(
+                        shift_periods
+                    ) : 32'sd0));
             cover (position == 48'sh0003_8000 && done && $past(shift) && $past(step) < 0);
             cover (position < 0 && !$past(shift));
         end

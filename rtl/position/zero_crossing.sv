@@ -3,25 +3,28 @@
 //
 // latency  1 clk from valid to up, down        rate  one position per clk
 // source   S0: the borrow of the last decade interrupts the 8031 at every pass of the absolute zero
-// shift    the position that stands in the clk after a shift is only learnt: moving the origin is no crossing
+// shift    the position that stands in the clk after a shift is only learnt: moving the origin is
+//          no crossing
 // model    tb/position/zero_crossing.py, equal in every bit of every cycle
-// proved   never up and down at once; without a shift they come by turns; none from a shift, nor where the position wraps
+// proved   never up and down at once; without a shift they come by turns; none from a shift, nor
+//          where the position wraps
 `default_nettype none
 
 module zero_crossing (
-    input  wire                  clk,
-    input  wire                  rst,       // the next position is only learnt
-    input  wire                  valid,     // strobe: position is new
-    /* verilator lint_off UNUSEDSIGNAL */   // the sign and the bit below it tell all; the port is the whole stream
-    input  wire signed [47:0]    position,  // Q32.16 periods
+    input wire clk,
+    input wire rst,  // the next position is only learnt
+    input wire valid,  // strobe: position is new
+    /* verilator lint_off UNUSEDSIGNAL */  // the sign and the bit below it tell all; the port is the whole stream
+    input wire signed [47:0] position,  // Q32.16 periods
     /* verilator lint_on UNUSEDSIGNAL */
-    input  wire                  shift,     // strobe: the position will be of another origin in the next clk
-    output logic                 up,        // strobe: from below 0 to 0 or above
-    output logic                 down       // strobe: from 0 or above to below 0
+    input wire shift,  // strobe: the position will be of another origin in the next clk
+    output logic up,  // strobe: from below 0 to 0 or above
+    output logic down  // strobe: from 0 or above to below 0
 );
-    logic known, below, shifted;            // known: below is that of a position; shifted: the clk after a shift
+    // known: below is that of a position; shifted: the clk after a shift
+    logic known, below, shifted;
 
-    wire near_above = position[47:46] == 2'b00;     // not where the position wraps
+    wire near_above = position[47:46] == 2'b00;  // not where the position wraps
     wire near_below = position[47:46] == 2'b11;
 
     always_ff @(posedge clk) begin
@@ -39,8 +42,9 @@ module zero_crossing (
     end
 
 `ifdef FORMAL
-    logic past = 1'b0;
-    logic [1:0] turn;                       // the last strobe since reset, shift or wrap: 1 up, 2 down, 0 none
+    logic       past = 1'b0;
+    // the last strobe since reset, shift or wrap: 1 up, 2 down, 0 none
+    logic [1:0] turn;
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);

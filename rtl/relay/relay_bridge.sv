@@ -1,57 +1,128 @@
 // SPDX-License-Identifier: Apache-2.0
-// relay_bridge -- the line of a relay: a 9-bit UART, whole frames to address 1 out of it, and the answers into it.
+// relay_bridge -- the line of a relay: a 9-bit UART, whole frames to address 1 out of it, and the
+// answers into it.
 //
-// latency  the answer begins one bit after a request is done; SPI takes 66 clk a byte       rate  one request at a time
-// request  `00 10 0001` with the 9th bit, length 1..LONGEST, body, CRC-32 of all before, as on the house's line
-// answer   `01 10 0001`, length, body, CRC-32; the bodies are those of relay_requests; no answer to what is broken
+// latency  the answer begins one bit after a request is done; SPI takes 66 clk a byte       rate
+//          one request at a time
+// request  `00 10 0001` with the 9th bit, length 1..LONGEST, body, CRC-32 of all before, as on the
+//          house's line
+// answer   `01 10 0001`, length, body, CRC-32; the bodies are those of relay_requests; no answer to
+//          what is broken
 // model    the models of its blocks; proved in motion by tb/system/test_relay.py
 `default_nettype none
 
 module relay_bridge #(
-    parameter int LONGEST = 64                      // bytes of a body
+    parameter int LONGEST = 64  // bytes of a body
 ) (
-    input  wire                  clk,
-    input  wire                  rst,
-    input  wire        [19:0]    bit_time,          // 1/16 clk
-    input  wire                  rx,                // level, synchronous to clk
-    output logic                 tx,                // pin
-    output logic                 driver_enable,     // pin: of the line driver
-    input  wire        [7:0]     events,            // strobes or levels: each sets its flag
-    input  wire        [7:0]     levels,
-    input  wire        [1:0]     source,            // of relay_store
-    input  wire        [5:0]     orders,            // of harmonic_map
-    input  wire        [31:0]    identity,          // of relay_set
-    input  wire        [31:0]    position,          // counts
-    input  wire signed [31:0]    correction,        // 2^-16 count
-    output logic       [7:0]     flags,             // sticky
-    output logic                 set_start,         // strobe
-    output logic                 set_valid,         // strobe
-    output logic       [7:0]     set_data,
-    output logic                 pass_select,       // level: to relay_store
-    input  wire                  pass_ready,        // level
-    output logic                 pass_valid,        // strobe
-    input  wire                  pass_done,         // strobe
-    input  wire        [7:0]     pass_data
+    input  wire               clk,
+    input  wire               rst,
+    input  wire        [19:0] bit_time,       // 1/16 clk
+    input  wire               rx,             // level, synchronous to clk
+    output logic              tx,             // pin
+    output logic              driver_enable,  // pin: of the line driver
+    input  wire        [ 7:0] events,         // strobes or levels: each sets its flag
+    input  wire        [ 7:0] levels,
+    input  wire        [ 1:0] source,         // of relay_store
+    input  wire        [ 5:0] orders,         // of harmonic_map
+    input  wire        [31:0] identity,       // of relay_set
+    input  wire        [31:0] position,       // counts
+    input  wire signed [31:0] correction,     // 2^-16 count
+    output logic       [ 7:0] flags,          // sticky
+    output logic              set_start,      // strobe
+    output logic              set_valid,      // strobe
+    output logic       [ 7:0] set_data,
+    output logic              pass_select,    // level: to relay_store
+    input  wire               pass_ready,     // level
+    output logic              pass_valid,     // strobe
+    input  wire               pass_done,      // strobe
+    input  wire        [ 7:0] pass_data
 );
     wire         received, ninth, framing_error, own, own_command, passed, command, good, answer_valid, answer_ready;
-    wire  [7:0]  character, own_data, data, answer;
-    wire         unused_glitch, unused_receiving, unused_good, unused_bad, unused_sync, unused_sending;
+    wire [7:0] character, own_data, data, answer;
+    wire unused_glitch, unused_receiving, unused_good, unused_bad, unused_sync, unused_sending;
     wire         unused = &{1'b0, unused_glitch, unused_receiving, unused_good, unused_bad, unused_sync, unused_sending};
 
-    uart_rx u_receiver
-        (.clk, .rst, .bit_time, .rx, .valid(received), .data(character), .ninth, .framing_error, .start_glitch(unused_glitch),
-         .busy(unused_receiving));
-    address_filter u_filter
-        (.clk, .rst, .address(4'd1), .valid_in(received), .data_in(character), .ninth, .valid(own), .data(own_data), .command(own_command));
-    frame_check #(.LONGEST(LONGEST)) u_check
-        (.clk, .rst, .valid_in(own), .data_in(own_data), .command_in(own_command), .framing_error, .valid(passed), .data, .command, .good,
-         .frame_good(unused_good), .frame_bad(unused_bad), .sync(unused_sync));
-    relay_requests #(.LONGEST(LONGEST)) u_requests
-        (.clk, .rst, .valid(passed), .data, .command, .good, .events, .levels, .source, .orders, .identity, .position, .correction, .flags, .set_start,
-         .set_valid, .set_data, .pass_select, .pass_ready, .pass_valid, .pass_done, .pass_data, .answer_valid, .answer_ready, .answer);
-    uart_tx u_transmitter
-        (.clk, .rst, .bit_time, .valid(answer_valid), .ready(answer_ready), .data(answer), .ninth(1'b0), .tx, .driver_enable,
-         .busy(unused_sending));
+    uart_rx u_receiver (
+        .clk,
+        .rst,
+        .bit_time,
+        .rx,
+        .valid       (received),
+        .data        (character),
+        .ninth,
+        .framing_error,
+        .start_glitch(unused_glitch),
+        .busy        (unused_receiving)
+    );
+    address_filter u_filter (
+        .clk,
+        .rst,
+        .address (4'd1),
+        .valid_in(received),
+        .data_in (character),
+        .ninth,
+        .valid   (own),
+        .data    (own_data),
+        .command (own_command)
+    );
+    frame_check #(
+        .LONGEST(LONGEST)
+    ) u_check (
+        .clk,
+        .rst,
+        .valid_in  (own),
+        .data_in   (own_data),
+        .command_in(own_command),
+        .framing_error,
+        .valid     (passed),
+        .data,
+        .command,
+        .good,
+        .frame_good(unused_good),
+        .frame_bad (unused_bad),
+        .sync      (unused_sync)
+    );
+    relay_requests #(
+        .LONGEST(LONGEST)
+    ) u_requests (
+        .clk,
+        .rst,
+        .valid(passed),
+        .data,
+        .command,
+        .good,
+        .events,
+        .levels,
+        .source,
+        .orders,
+        .identity,
+        .position,
+        .correction,
+        .flags,
+        .set_start,
+        .set_valid,
+        .set_data,
+        .pass_select,
+        .pass_ready,
+        .pass_valid,
+        .pass_done,
+        .pass_data,
+        .answer_valid,
+        .answer_ready,
+        .answer
+    );
+    uart_tx u_transmitter (
+        .clk,
+        .rst,
+        .bit_time,
+        .valid(answer_valid),
+        .ready(answer_ready),
+        .data (answer),
+        .ninth(1'b0),
+        .tx,
+        .driver_enable,
+        .busy (unused_sending)
+    );
 endmodule
 
 `default_nettype wire

@@ -1,91 +1,113 @@
 // SPDX-License-Identifier: Apache-2.0
-// relay_requests -- do what the host of a relay asks in whole frames, and answer: status, flags, set of coefficients, flash.
+// relay_requests -- do what the host of a relay asks in whole frames, and answer: status, flags,
+// set of coefficients, flash.
 //
-// latency  2 clk a byte of the request, then the first byte of the answer 3 clk later; what goes to the flash as long as that takes
+// latency  2 clk a byte of the request, then the first byte of the answer 3 clk later; what goes to
+//          the flash as long as that takes
 // rate     one request at a time; what comes before its answer is out is dropped whole
-// body     sequence, kind, the rest. 0: status. 1: the flags fall that are set in the next byte. 2: a set begins with the bytes that
-//          follow, 3: it goes on with them. 4: a row of bytes to the flash under one select. Another kind has no answer
-// again    a sequence equal to that of the request before is answered and not acted on. Flash bytes go through again: a chip
-//          writes only after a write enable, which the first time used up
-// answer   `01 10 0001`, length, sequence, kind, then flags, levels, source with orders above, identity, position, correction as they stand when the
-//          answer begins, low byte first, or the bytes from the flash; CRC-32 of all before
+// body     sequence, kind, the rest. 0: status. 1: the flags fall that are set in the next byte. 2:
+//          a set begins with the bytes that follow, 3: it goes on with them. 4: a row of bytes to
+//          the flash under one select. Another kind has no answer
+// again    a sequence equal to that of the request before is answered and not acted on. Flash bytes
+//          go through again: a chip writes only after a write enable, which the first time used up
+// answer   `01 10 0001`, length, sequence, kind, then flags, levels, source with orders above,
+//          identity, position, correction as they stand when the answer begins, low byte first, or
+//          the bytes from the flash; CRC-32 of all before
 // model    tb/relay/relay_requests.py, equal in every bit of every cycle
-// proved   the set and the flash get nothing but by a good frame, never while an answer goes out; a flag falls only by a request;
-//          a repeated request moves neither set nor flags
+// proved   the set and the flash get nothing but by a good frame, never while an answer goes out; a
+//          flag falls only by a request; a repeated request moves neither set nor flags
 `default_nettype none
 
 module relay_requests #(
-    parameter int LONGEST = 64                      // bytes of a body
+    parameter int LONGEST = 64  // bytes of a body
 ) (
-    input  wire                  clk,
-    input  wire                  rst,
-    input  wire                  valid,             // strobe, from frame_check as the three below
-    input  wire        [7:0]     data,
-    input  wire                  command,
-    input  wire                  good,
-    input  wire        [7:0]     events,            // strobes or levels: each sets its flag
-    input  wire        [7:0]     levels,
-    input  wire        [1:0]     source,            // of relay_store
-    input  wire        [5:0]     orders,            // of harmonic_map
-    input  wire        [31:0]    identity,          // of relay_set
-    input  wire        [31:0]    position,          // counts
-    input  wire signed [31:0]    correction,        // 2^-16 count
-    output logic       [7:0]     flags,             // sticky
-    output logic                 set_start,         // strobe
-    output logic                 set_valid,         // strobe
-    output logic       [7:0]     set_data,
-    output logic                 pass_select,       // level: to relay_store
-    input  wire                  pass_ready,        // level
-    output logic                 pass_valid,        // strobe
-    input  wire                  pass_done,         // strobe
-    input  wire        [7:0]     pass_data,
-    output logic                 answer_valid,      // level
-    input  wire                  answer_ready,      // with answer_valid: taken in this clk
-    output logic       [7:0]     answer
+    input  wire               clk,
+    input  wire               rst,
+    input  wire               valid,         // strobe, from frame_check as the three below
+    input  wire        [ 7:0] data,
+    input  wire               command,
+    input  wire               good,
+    input  wire        [ 7:0] events,        // strobes or levels: each sets its flag
+    input  wire        [ 7:0] levels,
+    input  wire        [ 1:0] source,        // of relay_store
+    input  wire        [ 5:0] orders,        // of harmonic_map
+    input  wire        [31:0] identity,      // of relay_set
+    input  wire        [31:0] position,      // counts
+    input  wire signed [31:0] correction,    // 2^-16 count
+    output logic       [ 7:0] flags,         // sticky
+    output logic              set_start,     // strobe
+    output logic              set_valid,     // strobe
+    output logic       [ 7:0] set_data,
+    output logic              pass_select,   // level: to relay_store
+    input  wire               pass_ready,    // level
+    output logic              pass_valid,    // strobe
+    input  wire               pass_done,     // strobe
+    input  wire        [ 7:0] pass_data,
+    output logic              answer_valid,  // level
+    input  wire               answer_ready,  // with answer_valid: taken in this clk
+    output logic       [ 7:0] answer
 );
-    if (LONGEST < 17 || LONGEST > 124) begin : g_check LONGEST_MUST_BE_FROM_17_TO_124 u_error (); end
+    if (LONGEST < 17 || LONGEST > 124) begin : g_check
+        LONGEST_MUST_BE_FROM_17_TO_124 u_error ();
+    end
 
     localparam int P = $clog2(LONGEST + 6);
     localparam logic [7:0] CLEAR = 8'd1, BEGIN_SET = 8'd2, SET = 8'd3, FLASH = 8'd4;
     localparam logic [7:0] REPLY = 8'h61;
-    localparam int         TOLD  = 17;              // bytes of a status
+    localparam int TOLD = 17;  // bytes of a status
 
-    typedef enum logic [2:0] {LISTEN, READ, ACT, WAIT, FETCH, SPEAK} state_t;
+    typedef enum logic [2:0] {
+        LISTEN,
+        READ,
+        ACT,
+        WAIT,
+        FETCH,
+        SPEAK
+    } state_t;
 
-    state_t                state;
-    logic [7:0]            buffer [0:(1<<P)-1];     // the body from 0 up, then its CRC-32
-    logic [7:0]            read, sequence_q, kind;
-    logic [P-1:0]          at, taken, length;       // byte of the body, or of the answer; bytes taken in; of the request
-    logic [1:0]            tail;                    // byte of the CRC-32
+    state_t       state;
+    logic   [7:0] buffer[0:(1<<P)-1];  // the body from 0 up, then its CRC-32
+    logic [7:0] read, sequence_q, kind;
+    // byte of the body, or of the answer; bytes taken in; of the request
+    logic [P-1:0] at, taken, length;
+    logic [           1:0] tail;  // byte of the CRC-32
     logic [8*(TOLD-2)-1:0] told;
-    logic                  open, heard, again;      // a frame runs since its command byte; there was a request; this one repeats it
-    logic                  closing;                 // the CRC-32 goes out
-    logic                  sum_start, sum_valid;    // of the CRC-32, one clk behind the answer
-    logic [7:0]            answer_q;
+    // a frame runs since its command byte; there was a request; this one repeats it
+    logic open, heard, again;
+    logic closing;  // the CRC-32 goes out
+    logic sum_start, sum_valid;  // of the CRC-32, one clk behind the answer
+    logic [  7:0] answer_q;
 
-    wire         keep   = valid && !command && open;
-    wire         flash  = kind == FLASH;
-    wire [P-1:0] words  = flash ? length : P'(TOLD);        // bytes of the answer's body
-    wire         first  = at == '0;
-    wire         second = at == P'(1);
-    wire         early  = at < P'(4);               // of the answer: before flags
-    wire         last   = at + 1'b1 == length;
-    wire         known  = second ? read <= FLASH : kind <= FLASH;
-    wire         sent   = answer_valid && answer_ready;
-    wire         passes = flash && !first && !second;
-    wire [31:0]  crc;
-    wire [7:0]   crc_byte = crc[8*tail +: 8];
-    wire [7:0]   body     = flash || early ? read : told[7:0];
+    wire          keep = valid && !command && open;
+    wire          flash = kind == FLASH;
+    wire  [P-1:0] words = flash ? length : P'(TOLD);  // bytes of the answer's body
+    wire          first = at == '0;
+    wire          second = at == P'(1);
+    wire          early = at < P'(4);  // of the answer: before flags
+    wire          last = at + 1'b1 == length;
+    wire          known = second ? read <= FLASH : kind <= FLASH;
+    wire          sent = answer_valid && answer_ready;
+    wire          passes = flash && !first && !second;
+    wire  [ 31:0] crc;
+    wire  [  7:0] crc_byte = crc[8*tail+:8];
+    wire  [  7:0] body = flash || early ? read : told[7:0];
 
     assign answer_valid = state == SPEAK;
     assign answer       = first ? REPLY : second ? 8'(words) : closing ? crc_byte : body;
 
-    crc32_stream u_crc (.clk, .rst, .start(sum_start), .valid(sum_valid), .data(answer_q), .crc);
+    crc32_stream u_crc (
+        .clk,
+        .rst,
+        .start(sum_start),
+        .valid(sum_valid),
+        .data (answer_q),
+        .crc
+    );
 
     always_ff @(posedge clk) begin
-        if (keep)           buffer[taken - 1'b1] <= data;
+        if (keep) buffer[taken-1'b1] <= data;
         else if (pass_done) buffer[at] <= pass_data;
-        read <= buffer[state == FETCH || state == SPEAK ? at - P'(2) : at];
+        read <= buffer[state==FETCH||state==SPEAK?at-P'(2) : at];
     end
 
     always_ff @(posedge clk) begin
@@ -167,26 +189,29 @@ module relay_requests #(
 
 `ifdef FORMAL
     logic past = 1'b0;
-    logic asked;                                    // a good frame came, its answer is not out yet
+    logic asked;  // a good frame came, its answer is not out yet
     always @(posedge clk) begin
         past  <= 1'b1;
         asked <= !rst && (state == LISTEN ? good && open : state != SPEAK || !sent || !closing || tail != 2'd3);
         if (!past) assume (rst);
-        assume (!good || (valid && !command && taken != '0));          // so does frame_check
+        assume (!good || (valid && !command && taken != '0));  // so does frame_check
         if (keep && taken == '0) assume (data != 8'd0 && data <= 8'(LONGEST));
         if (past && !$past(rst)) begin
             assert (state <= SPEAK);
             assert (asked || state == LISTEN);
             assert (!open || state == LISTEN);
-            if (state != LISTEN || (open && taken != '0)) assert (length != '0 && length <= P'(LONGEST));
+            if (state != LISTEN || (open && taken != '0))
+                assert (length != '0 && length <= P'(LONGEST));
             if (state == READ || state == ACT || state == WAIT) assert (at < length);
             if (state == WAIT) assert (flash && at >= P'(2));
             if (set_start || set_valid || pass_valid) assert ($past(state) == ACT && $past(asked));
             if ((set_start || set_valid) && $past(state) == ACT) assert (!again);
             if (pass_valid) assert (pass_select && $past(pass_ready));
             if (pass_select) assert (kind == FLASH && (state == FETCH || at >= P'(2)));
-            if (flash && at >= P'(2) && (state == READ || state == ACT || state == WAIT)) assert (pass_select);
-            if (pass_select) assert (state == READ || state == ACT || state == WAIT || state == FETCH);
+            if (flash && at >= P'(2) && (state == READ || state == ACT || state == WAIT))
+                assert (pass_select);
+            if (pass_select)
+                assert (state == READ || state == ACT || state == WAIT || state == FETCH);
             if (($past(flags) & ~flags) != 0) assert ($past(state) == ACT && !again);
             cover (answer_valid && second);
             cover (set_valid && $past(set_start, 2));

@@ -1,77 +1,93 @@
 // SPDX-License-Identifier: Apache-2.0
-// relay_set -- take the settings and coefficients of a relay as a row of bytes, and put them in force only as a whole.
+// relay_set -- take the settings and coefficients of a relay as a row of bytes, and put them in
+// force only as a whole.
 //
-// latency  2 clk from the last byte to good or bad, swap and settings          rate  one byte per clk
-// set      32-bit words, low byte first: marker 4D4F49 and K in its low byte; counts_per_turn; angle_per_count, low word; its
-//          high half and minimum_edge_separation above; radians_per_count; hysteresis, filter_required from bit 16, {index_low, gate_mask, gate}
+// latency  2 clk from the last byte to good or bad, swap and settings          rate  one byte per
+//          clk
+// set      32-bit words, low byte first: marker 4D4F49 and K in its low byte; counts_per_turn;
+//          angle_per_count, low word; its high half and minimum_edge_separation above;
+//          radians_per_count; hysteresis, filter_required from bit 16, {index_low, gate_mask, gate}
 //          from bit 24; amplitude and phase of each order from 1 up; CRC-32 of all before
-// segments with SEGMENTS the map is a table: the low byte of the marker is 128 + SEGMENTS, and K = (SEGMENTS + 1) / 2 terms hold two
+// segments with SEGMENTS the map is a table: the low byte of the marker is 128 + SEGMENTS, and K =
+// (SEGMENTS + 1) / 2 terms hold two
 //          of its points each
-// safety   what a broken row leaves behind is never in force: settings change in one clk, together with swap. A whole row is refused
-//          too if its counts_per_turn are not 1609 to 2^25, or if its amplitudes, without sign, are 2^29 or more together, or a
-//          point 2^23 or more
+// safety   what a broken row leaves behind is never in force: settings change in one clk, together
+//          with swap. A whole row is refused too if its counts_per_turn are not 1609 to 2^25, or if
+//          its amplitudes, without sign, are 2^29 or more together, or a point 2^23 or more
 // model    tb/relay/relay_set.py, equal in every bit of every cycle
 // proved   swap comes with good only, and settings change with it only
 // proof    K = 1
 `default_nettype none
 
 module relay_set #(
-    parameter int K        = 16,                    // orders
-    parameter int SEGMENTS = 0                      // of a table instead of them
+    parameter int K        = 16,  // orders
+    parameter int SEGMENTS = 0    // of a table instead of them
 ) (
-    input  wire                  clk,
-    input  wire                  rst,               // no set is in force: settings are zero
-    input  wire                  start,             // strobe: the row begins anew, after what comes in this clk
-    input  wire                  valid,             // strobe
-    input  wire        [7:0]     data,
-    output logic                 write,             // strobe: to the set not in force of harmonic_map
-    output logic       [4:0]     term,
-    output logic signed [31:0]   amplitude,
-    output logic       [31:0]    phase,
-    output logic                 swap,              // strobe
-    output logic                 good,              // strobe: the row was whole and is in force now
-    output logic                 bad,               // strobe: it was not
-    output logic                 loaded,            // level: there is a set in force
-    output logic       [31:0]    identity,          // CRC-32 of the set in force
-    output logic       [31:0]    counts_per_turn,
-    output logic       [47:0]    angle_per_count,   // 2^-48 turn
-    output logic       [15:0]    minimum_edge_separation,           // clk
-    output logic       [31:0]    radians_per_count, // 2^-40
-    output logic       [15:0]    hysteresis,        // 2^-16 count
-    output logic       [7:0]     filter_required,     // samples
-    output logic                 index_low,         // the index is 0
-    output logic       [1:0]     index_gate_mask,
-    output logic       [1:0]     index_gate
+    input wire clk,
+    input wire rst,  // no set is in force: settings are zero
+    input wire start,  // strobe: the row begins anew, after what comes in this clk
+    input wire valid,  // strobe
+    input wire [7:0] data,
+    output logic write,  // strobe: to the set not in force of harmonic_map
+    output logic [4:0] term,
+    output logic signed [31:0] amplitude,
+    output logic [31:0] phase,
+    output logic swap,  // strobe
+    output logic good,  // strobe: the row was whole and is in force now
+    output logic bad,  // strobe: it was not
+    output logic loaded,  // level: there is a set in force
+    output logic [31:0] identity,  // CRC-32 of the set in force
+    output logic [31:0] counts_per_turn,
+    output logic [47:0] angle_per_count,  // 2^-48 turn
+    output logic [15:0] minimum_edge_separation,  // clk
+    output logic [31:0] radians_per_count,  // 2^-40
+    output logic [15:0] hysteresis,  // 2^-16 count
+    output logic [7:0] filter_required,  // samples
+    output logic index_low,  // the index is 0
+    output logic [1:0] index_gate_mask,
+    output logic [1:0] index_gate
 );
-    if (K < 1 || K > 32) begin : g_check K_MUST_BE_FROM_1_TO_32 u_error (); end
-    if (SEGMENTS != 0 && K != (SEGMENTS + 1) / 2) begin : g_check_segments K_MUST_BE_HALF_THE_SEGMENTS u_error (); end
+    if (K < 1 || K > 32) begin : g_check
+        K_MUST_BE_FROM_1_TO_32 u_error ();
+    end
+    if (SEGMENTS != 0 && K != (SEGMENTS + 1) / 2) begin : g_check_segments
+        K_MUST_BE_HALF_THE_SEGMENTS u_error ();
+    end
 
-    localparam logic [31:0] WHOLE    = 32'h2144DF1C;    // CRC-32 of anything followed by its own CRC-32
-    localparam logic [31:0] MARKER   = 32'h4D4F4900 + 32'(SEGMENTS == 0 ? K : 128 + SEGMENTS);
-    localparam logic [31:0] FEWEST   = 32'd1609, MOST = 32'd1 << 25;
-    localparam int          SETTINGS = 5;               // words after the marker
-    localparam int          LAST     = 1 + SETTINGS + 2 * K;
+    localparam logic [31:0] WHOLE = 32'h2144DF1C;  // CRC-32 of anything followed by its own CRC-32
+    localparam logic [31:0] MARKER = 32'h4D4F4900 + 32'(SEGMENTS == 0 ? K : 128 + SEGMENTS);
+    localparam logic [31:0] FEWEST = 32'd1609, MOST = 32'd1 << 25;
+    localparam int SETTINGS = 5;  // words after the marker
+    localparam int LAST = 1 + SETTINGS + 2 * K;
 
-    logic [6:0]            at;                          // word
-    logic [1:0]            part;                        // byte of it
-    logic [31:0]           word;
-    logic                  open, fits, ended;           // a row runs; what it says is sensible; it has just ended
-    logic [28:0]           reach;                       // of the amplitudes together
+    logic [ 6:0] at;  // word
+    logic [ 1:0] part;  // byte of it
+    logic [31:0] word;
+    // a row runs; what it says is sensible; it has just ended
+    logic open, fits, ended;
+    logic [28:0] reach;  // of the amplitudes together
     logic [32*SETTINGS-1:0] shadow, settings;
-    wire  [31:0]           crc;
+    wire [31:0] crc;
 
-    wire [31:0] full   = {data, word[31:8]};
-    wire        take   = valid && open;
+    wire [31:0] full = {data, word[31:8]};
+    wire        take = valid && open;
     wire        filled = take && part == 2'd3;
-    wire        terms  = filled && at > 7'(SETTINGS) && at != 7'(LAST);
-    wire        term_0 = terms && !at[0];               // first word of a term
-    wire        whole  = ended && crc == WHOLE && fits;
-    wire [31:0] size   = full ^ {32{full[31]}};
-    wire [32:0] sum    = 33'(reach) + {1'b0, size};
+    wire        terms = filled && at > 7'(SETTINGS) && at != 7'(LAST);
+    wire        term_0 = terms && !at[0];  // first word of a term
+    wire        whole = ended && crc == WHOLE && fits;
+    wire [31:0] size = full ^ {32{full[31]}};
+    wire [32:0] sum = 33'(reach) + {1'b0, size};
     wire        absurd = SEGMENTS == 0 ? term_0 && |sum[32:29] : terms && |size[31:23];
-    wire        turns  = full >= FEWEST && full <= MOST;
+    wire        turns = full >= FEWEST && full <= MOST;
 
-    crc32_stream u_crc (.clk, .rst, .start, .valid(take && !start), .data, .crc);
+    crc32_stream u_crc (
+        .clk,
+        .rst,
+        .start,
+        .valid(take && !start),
+        .data,
+        .crc
+    );
 
     assign {index_low, index_gate_mask, index_gate, filter_required, hysteresis, radians_per_count, minimum_edge_separation, angle_per_count, counts_per_turn}
         = settings[156:0];
@@ -92,9 +108,9 @@ module relay_set #(
         end
         if (filled) begin
             at <= at + 1'b1;
-            if (at == 7'd0)                 fits <= full == MARKER;
-            else if (at == 7'd1 && !turns)  fits <= 1'b0;
-            else if (absurd)                fits <= 1'b0;
+            if (at == 7'd0) fits <= full == MARKER;
+            else if (at == 7'd1 && !turns) fits <= 1'b0;
+            else if (absurd) fits <= 1'b0;
             if (at != 7'd0 && at <= 7'(SETTINGS)) shadow <= {full, shadow[32*SETTINGS-1:32]};
             if (!at[0]) amplitude <= full;
             if (term_0) reach <= sum[28:0];
@@ -131,7 +147,14 @@ module relay_set #(
         if (!past) assume (rst);
         if (past && !$past(rst)) begin
             assert (swap == good && !(good && bad));
-            if (!good) assert (settings == $past(settings) && identity == $past(identity) && loaded == $past(loaded));
+            if (!good)
+                assert (settings == $past(
+                    settings
+                ) && identity == $past(
+                    identity
+                ) && loaded == $past(
+                    loaded
+                ));
             if (good) assert ($past(crc) == WHOLE && $past(fits));
             cover (open && fits && at == 3);
         end

@@ -1,61 +1,74 @@
 // SPDX-License-Identifier: Apache-2.0
-// channel_monitor -- what is wrong with one channel (sine or cosine) of a signal, told from its samples, the other channel and the comparators.
+// channel_monitor -- what is wrong with one channel (sine or cosine) of a signal, told from its
+// samples, the other channel and the comparators.
 //
 // latency  1 clk                                           rate  one sample per clk
-// channel_stuck   The channel stays within `band` of a sample for four samples and more while the other channel is over `span` away, twice within four. Beside
-//          the top of a circle of amplitude A, where the good channel stays so, the other one moves by 4 sqrt(A band) at most.
-// no_noise_samples    The same code for `no_noise_samples` samples, moving or not: the noise of a living converter is missing. With 0.5 LSB of
-//          noise a code lives 256 samples once in 10^42, with 0.2 LSB 4096 samples once in 10^21; with less, leave no_noise_samples 0.
-// comparator_mismatch  Three samples in a row have the same sign and are beyond `sign_threshold`, and the comparator has the other one in the midst
+// channel_stuck   The channel stays within `band` of a sample for four samples and more while the
+// other channel is over `span` away, twice within four. Beside
+//          the top of a circle of amplitude A, where the good channel stays so, the other one moves
+//          by 4 sqrt(A band) at most.
+// no_noise_samples    The same code for `no_noise_samples` samples, moving or not: the noise of a
+// living converter is missing. With 0.5 LSB of
+//          noise a code lives 256 samples once in 10^42, with 0.2 LSB 4096 samples once in 10^21;
+//          with less, leave no_noise_samples 0.
+// comparator_mismatch  Three samples in a row have the same sign and are beyond `sign_threshold`,
+// and the comparator has the other one in the midst
 //          of them: so it may be early or late by a sample.
 // source   S0: comparators and converter look at the same photo-receiver
 // model    tb/sense/channel_monitor.py, equal in every bit of every cycle
 // proof    depth 12
-// proved   a comparator that has the sign of every sample is never found comparator_mismatch nor stuck, whatever the settings
+// proved   a comparator that has the sign of every sample is never found comparator_mismatch nor
+//          stuck, whatever the settings
 `default_nettype none
 
 module channel_monitor #(
-    parameter int W = 8                     // bits of a sample
+    parameter int W = 8  // bits of a sample
 ) (
-    input  wire                clk,
-    input  wire                rst,         // all flags fall, all that was seen is forgotten
-    input  wire        [15:0]  clip_level,        // largest good size of a code; 65535: not judged
-    input  wire        [7:0]   band,        // noise of a channel that stands, its largest deviation
-    input  wire        [15:0]  span,        // way of the other channel while this one stands; 65535: not judged
-    input  wire        [15:0]  no_noise_samples,       // samples; 0: not judged
+    input wire clk,
+    input wire rst,  // all flags fall, all that was seen is forgotten
+    input wire [15:0] clip_level,  // largest good size of a code; 65535: not judged
+    input wire [7:0] band,  // noise of a channel that stands, its largest deviation
+    input wire [15:0] span,  // way of the other channel while this one stands; 65535: not judged
+    input wire [15:0] no_noise_samples,  // samples; 0: not judged
     input  wire        [15:0]  sign_threshold,        // larger samples have a sure sign; 65535: comparators are not judged
-    input  wire                valid,       // strobe: channel and other are new
-    input  wire signed [W-1:0] channel,         // full scale = 2^(W-1)
-    input  wire signed [W-1:0] other,
-    input  wire                level,       // comparator of this channel: 1 above zero
-    input  wire                other_level,
-    output logic               clipped,     // level: this sample is
-    output logic               channel_stuck,      // level: until it leaves the band
-    output logic               no_noise,      // level: until the code changes
-    output logic               comparator_mismatch,     // level: this sample and the two before it
+    input wire valid,  // strobe: channel and other are new
+    input wire signed [W-1:0] channel,  // full scale = 2^(W-1)
+    input wire signed [W-1:0] other,
+    input wire level,  // comparator of this channel: 1 above zero
+    input wire other_level,
+    output logic clipped,  // level: this sample is
+    output logic channel_stuck,  // level: until it leaves the band
+    output logic no_noise,  // level: until the code changes
+    output logic comparator_mismatch,  // level: this sample and the two before it
     output logic               comparator_stuck, // level: the channel changed sign three times, its comparator never
     output logic               channel_missing  // level: the comparators went through three half periods, the channel never changed sign
 );
-    if (W < 8 || W > 16) begin : g_check W_MUST_BE_FROM_8_TO_16 u_error (); end
+    if (W < 8 || W > 16) begin : g_check
+        W_MUST_BE_FROM_8_TO_16 u_error ();
+    end
 
-    logic                started;           // there was a sample
+    logic                started;  // there was a sample
     logic signed [W-1:0] last;
-    logic signed [17:0]  home_low, home_high, far_low, far_high;    // band about where the channel stands; span about the other channel then
-    logic        [1:0]   stood;             // samples since it came there, up to 3
-    logic        [1:0]   recent;            // samples for which the other channel's last time far away counts
-    logic        [15:0]  same;              // samples since the code changed
-    logic        [1:0]   sign, sign_q;      // of the last two samples: 1 plus, 3 minus, 0 not sure
-    logic        [1:0]   side;              // the last sure sign
-    logic                level_q, edge_other;           // edge_other: other_level when level changed last
-    logic        [1:0]   changes, turns;    // of the channel since its comparator's; of the comparators since the channel's; up to 3
+    // band about where the channel stands; span about the other channel then
+    logic signed [17:0] home_low, home_high, far_low, far_high;
+    logic [ 1:0] stood;  // samples since it came there, up to 3
+    // samples for which the other channel's last time far away counts
+    logic [ 1:0] recent;
+    logic [15:0] same;  // samples since the code changed
+    logic [1:0] sign, sign_q;  // of the last two samples: 1 plus, 3 minus, 0 not sure
+    logic [1:0] side;  // the last sure sign
+    // edge_other: other_level when level changed last
+    logic level_q, edge_other;
+    // of the channel since its comparator's; of the comparators since the channel's; up to 3
+    logic [1:0] changes, turns;
 
-    wire        [W-1:0] size     = channel < 0 ? -channel : channel;
-    wire              homely     = started && 18'(channel) >= home_low && 18'(channel) <= home_high;
-    wire              far        = span != '1 && (18'(other) < far_low || 18'(other) > far_high);
-    wire        [1:0] sign_now   = 17'(size) <= {1'b0, sign_threshold} ? 2'd0 : {channel[W-1], 1'b1};
-    wire              crossing   = sign_now[0] && side[0] && sign_now != side;
-    wire              toggled    = started && level != level_q;
-    wire       [15:0] same_now   = !started || channel != last ? '0 : &same ? same : same + 1'b1;
+    wire [W-1:0] size = channel < 0 ? -channel : channel;
+    wire homely = started && 18'(channel) >= home_low && 18'(channel) <= home_high;
+    wire far = span != '1 && (18'(other) < far_low || 18'(other) > far_high);
+    wire [1:0] sign_now = 17'(size) <= {1'b0, sign_threshold} ? 2'd0 : {channel[W-1], 1'b1};
+    wire crossing = sign_now[0] && side[0] && sign_now != side;
+    wire toggled = started && level != level_q;
+    wire [15:0] same_now = !started || channel != last ? '0 : &same ? same : same + 1'b1;
     wire        [1:0] changes_now = toggled ? 2'd0 : crossing && changes != 2'd3 ? changes + 1'b1 : changes;
     wire        [1:0] turns_now  = crossing ? 2'd0 : !toggled ? turns : other_level == edge_other ? 2'd0 : turns == 2'd3 ? turns
                                  : turns + 1'b1;
@@ -118,10 +131,12 @@ module channel_monitor #(
         if (valid) assume (level == !channel[W-1]);
         if (past) begin
             assert (!comparator_mismatch && !comparator_stuck);
-            if (sign[0])   assert (started && level_q == !sign[1]);     // what follows leads to the claim
+            // what follows leads to the claim
+            if (sign[0]) assert (started && level_q == !sign[1]);
             if (sign_q[0]) assert (started);
-            if (!side[0])  assert (changes == 0 && !sign[0]);
-            else           assert (started && changes <= (level_q == !side[1]));
+            if (!side[0])
+                assert (changes == 0 && !sign[0]);
+                else assert (started && changes <= (level_q == !side[1]));
             cover (crossing && changes == 1);
             cover (channel_missing);
         end

@@ -2,33 +2,36 @@
 // count_outlier_filter -- hold a count against the one before it, as S0 printed it.
 //
 // latency  1 clk from valid to done        rate  one count per clk
-// source   S0, limit filter 2, its equation 9: a difference of 0 leaves the count, of 1 takes the count before, of more takes
-//          the mean of both, rounded down. S0 prints no sign: here the size of the difference decides; the count before is the
-//          one that came out. The price: a read-out at rest may stay one count off, and at v counts a sample it lags v counts
-//          going up and v - 1 going down, where v is 2 or more
+// source   S0, limit filter 2, its equation 9: a difference of 0 leaves the count, of 1 takes the
+//          count before, of more takes the mean of both, rounded down. S0 prints no sign: here the
+//          size of the difference decides; the count before is the one that came out. The price: a
+//          read-out at rest may stay one count off, and at v counts a sample it lags v counts going
+//          up and v - 1 going down, where v is 2 or more
 // model    tb/sense/count_outlier_filter.py, equal in every bit of every cycle
-// proved   what comes out lies between the count before and the new one, at most one count, or half the way, from the new one;
-//          out of use nothing is changed
+// proved   what comes out lies between the count before and the new one, at most one count, or half
+//          the way, from the new one; out of use nothing is changed
 `default_nettype none
 
 module count_outlier_filter #(
-    parameter int W = 32                    // bits of a count
+    parameter int W = 32  // bits of a count
 ) (
-    input  wire                  clk,
-    input  wire                  rst,       // the next count is taken as it is
-    input  wire                  enable,    // level; 0: counts pass as they are
-    input  wire                  valid,     // strobe: count is new
-    input  wire signed [W-1:0]   count,     // wraps
-    output logic                 done,      // strobe: count_out is new
-    output logic signed [W-1:0]  count_out
+    input  wire                 clk,
+    input  wire                 rst,       // the next count is taken as it is
+    input  wire                 enable,    // level; 0: counts pass as they are
+    input  wire                 valid,     // strobe: count is new
+    input  wire signed  [W-1:0] count,     // wraps
+    output logic                done,      // strobe: count_out is new
+    output logic signed [W-1:0] count_out
 );
-    if (W < 2) begin : g_check W_MUST_BE_AT_LEAST_2 u_error (); end
+    if (W < 2) begin : g_check
+        W_MUST_BE_AT_LEAST_2 u_error ();
+    end
 
-    logic known;                            // count_out is a count
+    logic               known;  // count_out is a count
 
     wire signed [W-1:0] difference = count - count_out;
-    wire signed [W-1:0] half_way   = count_out + (difference >>> 1);
-    wire                near       = difference == W'(1) || difference == '1;
+    wire signed [W-1:0] half_way = count_out + (difference >>> 1);
+    wire                near = difference == W'(1) || difference == '1;
 
     always_ff @(posedge clk) begin
         done <= valid;
@@ -45,9 +48,9 @@ module count_outlier_filter #(
 
 `ifdef FORMAL
     logic past = 1'b0;
-    logic limited;                          // count_out was made of two counts
+    logic limited;  // count_out was made of two counts
     logic signed [W-1:0] whole, new_count;  // from the count before to the new one
-    wire  signed [W-1:0] left = new_count - count_out;
+    wire signed [W-1:0] left = new_count - count_out;
     always @(posedge clk) begin
         past      <= 1'b1;
         limited   <= enable && known;
@@ -56,11 +59,16 @@ module count_outlier_filter #(
         if (!past) assume (rst);
         if (past && !$past(rst)) begin
             assert (done == $past(valid));
-            if (!done) assert (count_out == $past(count_out));
-            else if (!limited || whole == 0) assert (left == 0);
-            else if (whole == 1 || whole == -1) assert (left == whole);
-            else if (whole > 0) assert (left > 0 && left - (whole - left) <= 1 && left >= whole - left);
-            else assert (left <= 0 && whole - left - left <= 0 && whole - left - left >= -1);
+            if (!done)
+                assert (count_out == $past(count_out));
+                else if (!limited || whole == 0)
+                    assert (left == 0);
+                    else if (whole == 1 || whole == -1)
+                        assert (left == whole);
+                        else if (whole > 0)
+                            assert (left > 0 && left - (whole - left) <= 1 && left >= whole - left);
+                            else
+                                assert (left <= 0 && whole - left - left <= 0 && whole - left - left >= -1);
             cover (done && limited && whole == 7);
             cover (done && limited && whole == -7);
         end

@@ -1,34 +1,43 @@
 // SPDX-License-Identifier: Apache-2.0
-// deglitcher -- let a level change only after it has stood still for a set time, and report what came back too soon.
+// deglitcher -- let a level change only after it has stood still for a set time, and report what
+// came back too soon.
 //
-// latency  `stable_cycles` clk from level to filtered, 1 clk for stable_cycles = 0; 1 clk while it settles after reset
+// latency  `stable_cycles` clk from level to filtered, 1 clk for stable_cycles = 0; 1 clk while it
+//          settles after reset
 // rate     pulses of `stable_cycles` clk and longer pass, shorter ones never do
-// source   S0: a monostable longer than a noise spike and shorter than a data pulse; S2: N equal samples in a row
+// source   S0: a monostable longer than a noise spike and shorter than a data pulse; S2: N equal
+//          samples in a row
 // model    tb/sense/deglitcher.py, equal in every bit of every cycle
-// proved   a change passes only after `stable_cycles` equal clk, at once then, and never sooner after the change before it
+// proved   a change passes only after `stable_cycles` equal clk, at once then, and never sooner
+//          after the change before it
 `default_nettype none
 
 module deglitcher #(
-    parameter int W      = 16,              // bits of stable_cycles
+    parameter int W = 16,  // bits of stable_cycles
     parameter int SETTLE = 4                // clk after reset in which filtered follows level: synchronisers fill meanwhile
 ) (
-    input  wire          clk,
-    input  wire          rst,               // filtered follows level, nothing is reported
+    input wire clk,
+    input wire rst,  // filtered follows level, nothing is reported
     input  wire  [W-1:0] stable_cycles,            // clk in a row that level must differ; 0 is taken as 1; new values act at once
-    input  wire          level,             // synchronous to clk
-    output logic         filtered,          // level without its short pulses
-    output logic         rejected           // strobe: level changed and came back before its time
+    input wire level,  // synchronous to clk
+    output logic filtered,  // level without its short pulses
+    output logic rejected  // strobe: level changed and came back before its time
 );
-    if (W < 1)      begin : g_check_w W_MUST_BE_AT_LEAST_1 u_error (); end
-    if (SETTLE < 1) begin : g_check_settle SETTLE_MUST_BE_AT_LEAST_1 u_error (); end
+    if (W < 1) begin : g_check_w
+        W_MUST_BE_AT_LEAST_1 u_error ();
+    end
+    if (SETTLE < 1) begin : g_check_settle
+        SETTLE_MUST_BE_AT_LEAST_1 u_error ();
+    end
 
     localparam int S = $clog2(SETTLE + 1);
 
-    logic [S-1:0] settle;                   // clk left of settling
-    logic [W-1:0] age;                      // clk in a row that level has differed; below stable_cycles, so it cannot overflow
+    logic [S-1:0] settle;  // clk left of settling
+    // clk in a row that level has differed; below stable_cycles, so it cannot overflow
+    logic [W-1:0] age;
 
-    wire differs = level ^ filtered;
-    wire ripe    = {1'b0, age} + 1'b1 >= {1'b0, stable_cycles};
+    wire          differs = level ^ filtered;
+    wire          ripe = {1'b0, age} + 1'b1 >= {1'b0, stable_cycles};
 
     always_ff @(posedge clk) begin
         rejected <= 1'b0;
@@ -42,21 +51,23 @@ module deglitcher #(
             filtered <= level;
             age      <= '0;
         end else begin
-            age      <= age + 1'b1;
+            age <= age + 1'b1;
         end
         if (rst) begin
             settle   <= S'(SETTLE);
             age      <= '0;
             rejected <= 1'b0;
-            filtered <= level;              // who is reset together with this block never sees a made-up edge
+            // who is reset together with this block never sees a made-up edge
+            filtered <= level;
         end
     end
 
 `ifdef FORMAL
     logic       past = 1'b0;
     logic       level_q;
-    logic [W:0] same;                       // clk in a row, up to the last one, that level was level_q
-    logic [W:0] stood;                      // clk since filtered changed
+    // clk in a row, up to the last one, that level was level_q
+    logic [W:0] same;
+    logic [W:0] stood;  // clk since filtered changed
     always @(posedge clk) begin
         past    <= 1'b1;
         level_q <= level;

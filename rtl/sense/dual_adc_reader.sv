@@ -1,41 +1,51 @@
 // SPDX-License-Identifier: Apache-2.0
-// dual_adc_reader -- read both halves of a simultaneously sampling serial converter, and make its straight binary signed.
+// dual_adc_reader -- read both halves of a simultaneously sampling serial converter, and make its
+// straight binary signed.
 //
-// latency  2 * (LEADING + W) clk from start to valid; cs_n falls, and the converter samples, 1 clk after start
+// latency  2 * (LEADING + W) clk from start to valid; cs_n falls, and the converter samples, 1 clk
+//          after start
 // rate     one conversion per 2 * FRAME + 1 clk: 29 for a 14 clock frame, 33 for one of 16
-// source   AD7352, AD7356 (12 bit: LEADING 2, FRAME 14) and AD7357 (14 bit: LEADING 2, FRAME 16), Analog Devices: cs_n
-//          brings the first leading zero, each falling edge of sclk the next bit; bit n is read at falling edge n
+// source   AD7352, AD7356 (12 bit: LEADING 2, FRAME 14) and AD7357 (14 bit: LEADING 2, FRAME 16),
+//          Analog Devices: cs_n brings the first leading zero, each falling edge of sclk the next
+//          bit; bit n is read at falling edge n
 // model    tb/sense/dual_adc_reader.py, equal in every bit of every cycle
-// proved   sclk rests high outside a frame, a frame has FRAME falling edges, and the first is a clk after that of cs_n
+// proved   sclk rests high outside a frame, a frame has FRAME falling edges, and the first is a clk
+//          after that of cs_n
 `default_nettype none
 
 module dual_adc_reader #(
-    parameter int W       = 8,              // bits of a sample, the top ones of the converter
-    parameter int LEADING = 2,              // bits before the most significant one
-    parameter int FRAME   = 14              // sclk cycles of a conversion
+    parameter int W       = 8,  // bits of a sample, the top ones of the converter
+    parameter int LEADING = 2,  // bits before the most significant one
+    parameter int FRAME   = 14  // sclk cycles of a conversion
 ) (
-    input  wire                  clk,       // twice sclk: a bit has one whole sclk cycle to arrive
-    input  wire                  rst,       // ends a frame at once
-    input  wire                  start,     // strobe; not heard while a conversion is under way
-    input  wire                  sdata_a,   // serial data of converter A, the sine
-    input  wire                  sdata_b,   // serial data of converter B, the cosine
-    output logic                 cs_n,      // falling: the converter samples
-    output logic                 sclk,      // half of clk while cs_n is low, else high
-    output logic                 valid,     // strobe: sin and cos are new
-    output logic signed [W-1:0]  sin,       // full scale = 2^(W-1); stands until the next valid
-    output logic signed [W-1:0]  cos        // taken at the same moment as sin
+    input  wire                 clk,      // twice sclk: a bit has one whole sclk cycle to arrive
+    input  wire                 rst,      // ends a frame at once
+    input  wire                 start,    // strobe; not heard while a conversion is under way
+    input  wire                 sdata_a,  // serial data of converter A, the sine
+    input  wire                 sdata_b,  // serial data of converter B, the cosine
+    output logic                cs_n,     // falling: the converter samples
+    output logic                sclk,     // half of clk while cs_n is low, else high
+    output logic                valid,    // strobe: sin and cos are new
+    output logic signed [W-1:0] sin,      // full scale = 2^(W-1); stands until the next valid
+    output logic signed [W-1:0] cos       // taken at the same moment as sin
 );
-    if (W < 3)               begin : g_check_w W_MUST_BE_AT_LEAST_3 u_error (); end
-    if (LEADING < 0)         begin : g_check_leading LEADING_MUST_NOT_BE_NEGATIVE u_error (); end
-    if (FRAME < LEADING + W) begin : g_check_frame FRAME_MUST_HOLD_LEADING_AND_W u_error (); end
+    if (W < 3) begin : g_check_w
+        W_MUST_BE_AT_LEAST_3 u_error ();
+    end
+    if (LEADING < 0) begin : g_check_leading
+        LEADING_MUST_NOT_BE_NEGATIVE u_error ();
+    end
+    if (FRAME < LEADING + W) begin : g_check_frame
+        FRAME_MUST_HOLD_LEADING_AND_W u_error ();
+    end
 
     localparam int B = $clog2(FRAME + 1);
 
-    logic [B-1:0] bits;                     // falling edges of sclk so far
-    logic [W-2:0] word_a, word_b;           // the last bits so far
+    logic [B-1:0] bits;  // falling edges of sclk so far
+    logic [W-2:0] word_a, word_b;  // the last bits so far
 
-    wire bit_now = !cs_n && sclk;           // sclk falls with this clk: the bit on the wire is good
-    wire last    = bits == B'(LEADING + W - 1);
+    wire bit_now = !cs_n && sclk;  // sclk falls with this clk: the bit on the wire is good
+    wire last = bits == B'(LEADING + W - 1);
 
     always_ff @(posedge clk) begin
         valid <= bit_now && last;

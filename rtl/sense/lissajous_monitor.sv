@@ -1,66 +1,71 @@
 // SPDX-License-Identifier: Apache-2.0
-// lissajous_monitor -- learns the length of the signal vector in eight directions, and tells how round and centred they are and
-// whether a sample lies off the circle they draw.
+// lissajous_monitor -- learns the length of the signal vector in eight directions, and tells how
+// round and centred they are and whether a sample lies off the circle they draw.
 //
 // latency  5 clk from valid to the verdicts, 1 clk to ready    rate  one sample per clk
-// learns   a direction is ready when its sector has been crossed from one side to the other and a sample came within 1/8 of
-//          its axis or diagonal: what stands, or trembles about a place, teaches nothing. The mean with the value before.
-// expects  between axis and diagonal the straight line from one length to the other: no more than 5 % wrong for 5 % offsets,
-//          6 % gain, 4 degrees of phase and harmonics of 1 %
-// source   |v| = A + offset · direction + (A / 2) (gain error cos 2p + sin phase error · sin 2p) to first order
+// learns   a direction is ready when its sector has been crossed from one side to the other and a
+//          sample came within 1/8 of its axis or diagonal: what stands, or trembles about a place,
+//          teaches nothing. The mean with the value before.
+// expects  between axis and diagonal the straight line from one length to the other: no more than 5
+//          % wrong for 5 % offsets, 6 % gain, 4 degrees of phase and harmonics of 1 %
+// source   |v| = A + offset · direction + (A / 2) (gain error cos 2p + sin phase error · sin 2p) to
+//          first order
 // model    tb/sense/lissajous_monitor.py, equal in every bit of every cycle
 // proof    depth 30
-// proved   a length changes only when its sector is left on the side opposite to where it was entered, after a sample near its
-//          middle; nothing is judged before all eight are known
+// proved   a length changes only when its sector is left on the side opposite to where it was
+//          entered, after a sample near its middle; nothing is judged before all eight are known
 `default_nettype none
 
 module lissajous_monitor #(
-    parameter int R = 8                     // bits of a length
+    parameter int R = 8  // bits of a length
 ) (
-    input  wire         clk,
-    input  wire         rst,                // all is forgotten
+    input wire clk,
+    input wire rst,  // all is forgotten
     input  wire [15:0]  tolerance,          // largest good distance from the circle; 65535: not judged, here and below
-    input  wire [15:0]  offset_limit,       // largest good offset, in any of four directions
-    input  wire [15:0]  balance_limit,      // largest good difference of the two channels' amplitudes
+    input wire [15:0] offset_limit,  // largest good offset, in any of four directions
+    input wire [15:0] balance_limit,  // largest good difference of the two channels' amplitudes
     input  wire [15:0]  quadrature_limit,       // largest good amplitude · sine of the phase error between the channels
-    input  wire         valid,              // strobe: what follows is new
-    input  wire [R-1:0] length,             // in units of a sample, as all above
-    input  wire [1:0]   axis,               // as from vector_length
-    input  wire [1:0]   quadrant,
-    input  wire [2:0]   tilt,
-    output logic        ready,             // level: all eight directions are known
-    output logic        done,               // strobe: the verdicts below are those of a new sample
-    output logic        off_circle,         // level: this sample is too far away; 0 until ready
-    output logic        offset_drift,       // level: judged, as all here, by what was ready before the sample
-    output logic        unbalanced,
-    output logic        not_in_quadrature
+    input wire valid,  // strobe: what follows is new
+    input wire [R-1:0] length,  // in units of a sample, as all above
+    input wire [1:0] axis,  // as from vector_length
+    input wire [1:0] quadrant,
+    input wire [2:0] tilt,
+    output logic ready,  // level: all eight directions are known
+    output logic done,  // strobe: the verdicts below are those of a new sample
+    output logic off_circle,  // level: this sample is too far away; 0 until ready
+    output logic offset_drift,  // level: judged, as all here, by what was ready before the sample
+    output logic unbalanced,
+    output logic not_in_quadrature
 );
-    if (R < 8 || R > 16) begin : g_check R_MUST_BE_FROM_8_TO_16 u_error (); end
+    if (R < 8 || R > 16) begin : g_check
+        R_MUST_BE_FROM_8_TO_16 u_error ();
+    end
 
-    wire [4*R-1:0] lengths [0:1];           // of the four axes, of the four diagonals
-    wire [3:0]     known   [0:1];
+    wire [4*R-1:0] lengths[0:1];  // of the four axes, of the four diagonals
+    wire [    3:0] known  [0:1];
 
 `ifdef FORMAL
     logic past = 1'b0;
     always @(posedge clk) past <= 1'b1;
 `endif
     for (genvar kind = 0; kind < 2; kind++) begin : g_kind
-        logic [4*R-1:0] learned;            // four lengths
-        logic [3:0]   have;                 // which of them
-        logic         started;              // there was a sample
-        logic [1:0]   sector;               // of the last sample
-        logic [1:0]   side;                 // 0: not crossing it, 1: came from the sector before, 3: from the one after
-        logic         met;                  // a sample of this crossing came close to the middle
-        logic [R-1:0] middle;               // its length
+        logic [4*R-1:0] learned;  // four lengths
+        logic [    3:0] have;  // which of them
+        logic           started;  // there was a sample
+        logic [    1:0] sector;  // of the last sample
+        // 0: not crossing it, 1: came from the sector before, 3: from the one after
+        logic [    1:0] side;
+        logic           met;  // a sample of this crossing came close to the middle
+        logic [  R-1:0] middle;  // its length
 
         assign lengths[kind] = learned;
         assign known[kind]   = have;
 
-        wire [1:0]    new_sector = kind == 0 ? axis : quadrant;
-        wire          close      = kind == 0 ? tilt == 3'd0 : tilt == 3'd4;
-        wire [1:0]    onward     = started ? new_sector - sector : 2'd2;
-        wire          crossed    = onward[0] && side == onward && met;
-        wire [R-1:0]  mean       = R'(((R+1)'(learned[sector * R +: R]) + (R+1)'(middle) + 1'b1) >> 1);
+        wire [  1:0] new_sector = kind == 0 ? axis : quadrant;
+        wire         close = kind == 0 ? tilt == 3'd0 : tilt == 3'd4;
+        wire [  1:0] onward = started ? new_sector - sector : 2'd2;
+        wire         crossed = onward[0] && side == onward && met;
+        wire [R-1:0] mean = R'(((R + 1)'(learned[sector*R+:R]) + (R + 1)'(middle) + 1'b1) >> 1);
 
         always_ff @(posedge clk) begin
             if (valid) begin
@@ -86,8 +91,18 @@ module lissajous_monitor #(
         always @(posedge clk)
             if (past && !$past(rst)) begin
                 for (int n = 0; n < 4; n++)
-                    if (learned[n*R +: R] != $past(learned[n*R +: R]) || have[n] != $past(have[n]))
-                        assert ($past(valid && started) && $past(sector) == n && $past(met) && $past(side[0]) && sector == 2'(n) + $past(side));
+                if (learned[n*R+:R] != $past(learned[n*R+:R]) || have[n] != $past(have[n]))
+                    assert ($past(
+                        valid && started
+                    ) && $past(
+                        sector
+                    ) == n && $past(
+                        met
+                    ) && $past(
+                        side[0]
+                    ) && sector == 2'(n) + $past(
+                        side
+                    ));
             end
 `endif
     end
@@ -95,11 +110,11 @@ module lissajous_monitor #(
     assign ready = &{known[1], known[0]};
 
     // the circle at this sample, step by step
-    logic        [R-1:0] length_1, at_axis, at_diagonal;
-    logic        [2:0]   tilt_1, tilt_2;
+    logic [R-1:0] length_1, at_axis, at_diagonal;
+    logic [2:0] tilt_1, tilt_2;
     logic signed [R+3:0] rise, gap_2, gap_3, climbed, away;
-    logic        [3:0]   on_way, judge;     // a sample, and the circle was known
-    wire         [R+3:0] distance = away < 0 ? -away : away;
+    logic [3:0] on_way, judge;  // a sample, and the circle was known
+    wire [R+3:0] distance = away < 0 ? -away : away;
 
     always_ff @(posedge clk) begin
         on_way <= {on_way[2:0], valid};
@@ -127,8 +142,9 @@ module lissajous_monitor #(
     wire [1:0] uncentred, beyond;
     for (genvar kind = 0; kind < 2; kind++) begin : g_shape
         logic signed [R+1:0] east, north, west, south;
-        logic signed [R+1:0] along, across, oval;               // twice the offset, and twice the difference of amplitudes
-        logic        [R+1:0] along_size, across_size, oval_size, offset_size, oval_size_4;
+        // twice the offset, and twice the difference of amplitudes
+        logic signed [R+1:0] along, across, oval;
+        logic [R+1:0] along_size, across_size, oval_size, offset_size, oval_size_4;
         always_ff @(posedge clk) begin
             if (valid) begin
                 east        <= $signed({2'b0, lengths[kind][0 +: R]});
@@ -151,7 +167,7 @@ module lissajous_monitor #(
                 oval_size_4 <= oval_size;
             end
         end
-        wire         [15:0]  limit  = kind == 0 ? balance_limit : quadrature_limit;
+        wire [15:0] limit = kind == 0 ? balance_limit : quadrature_limit;
         assign uncentred[kind] = offset_limit != '1 && 19'(offset_size) > {2'b0, offset_limit, 1'b0};
         assign beyond[kind]    = limit != '1 && 19'(oval_size_4) > {2'b0, limit, 1'b0};
     end
@@ -174,14 +190,15 @@ module lissajous_monitor #(
     end
 
 `ifdef FORMAL
-    logic [4:0] since;                      // clk since reset in which all were known, up to 5
+    logic [4:0] since;  // clk since reset in which all were known, up to 5
     always @(posedge clk) begin
         since <= rst || !ready ? '0 : since == 5 ? since : since + 1'b1;
         if (!past) assume (rst);
         if (past) begin
             assert (ready || since == 0);
             for (int n = 0; n < 4; n++) assert (!judge[n] || since > 5'(n) || !on_way[n]);
-            if (since < 5) assert (!off_circle && !offset_drift && !unbalanced && !not_in_quadrature);
+            if (since < 5)
+                assert (!off_circle && !offset_drift && !unbalanced && !not_in_quadrature);
         end
         cover (past && offset_drift && !off_circle);
     end

@@ -1,42 +1,47 @@
 // SPDX-License-Identifier: Apache-2.0
-// outlier_filter -- hold back a sample that jumps further than the signal can, each channel for itself.
+// outlier_filter -- hold back a sample that jumps further than the signal can, each channel for
+// itself.
 //
 // latency  1 clk from valid to done        rate  one sample per clk
-// source   S0, limit filter 1: |Yn - Yn-1| <= dY takes Yn, else keeps Yn-1. As printed (hold = 255) a signal that once got
-//          away by more than dY never comes back; so after `hold` samples held back in a row the next one is taken
+// source   S0, limit filter 1: |Yn - Yn-1| <= dY takes Yn, else keeps Yn-1. As printed (hold = 255)
+//          a signal that once got away by more than dY never comes back; so after `hold` samples
+//          held back in a row the next one is taken
 // model    tb/sense/outlier_filter.py, equal in every bit of every cycle
-// proved   a channel moves by at most `step`, but for the first sample and after `hold` samples held back; never are more held back
+// proved   a channel moves by at most `step`, but for the first sample and after `hold` samples
+//          held back; never are more held back
 `default_nettype none
 
 module outlier_filter #(
-    parameter int W = 8                     // bits of a sample
+    parameter int W = 8  // bits of a sample
 ) (
-    input  wire                  clk,
-    input  wire                  rst,       // the next sample is taken whatever it is
-    input  wire        [7:0]     step,      // largest move from sample to sample, in units of sin; 0: all are taken
-    input  wire        [7:0]     hold,      // samples in a row that may be held back; 255: any number
-    input  wire                  valid,     // strobe: sin and cos are new
-    input  wire signed [W-1:0]   sin,       // full scale = 2^(W-1)
-    input  wire signed [W-1:0]   cos,
-    output logic                 done,      // strobe: sin_out and cos_out are new
-    output logic signed [W-1:0]  sin_out,   // sin, or what it was before; stands until the next done
-    output logic signed [W-1:0]  cos_out,
-    output logic                 rejected   // strobe, with done: sin or cos or both were held back
+    input wire clk,
+    input wire rst,  // the next sample is taken whatever it is
+    input wire [7:0] step,  // largest move from sample to sample, in units of sin; 0: all are taken
+    input wire [7:0] hold,  // samples in a row that may be held back; 255: any number
+    input wire valid,  // strobe: sin and cos are new
+    input wire signed [W-1:0] sin,  // full scale = 2^(W-1)
+    input wire signed [W-1:0] cos,
+    output logic done,  // strobe: sin_out and cos_out are new
+    output logic signed [W-1:0] sin_out,  // sin, or what it was before; stands until the next done
+    output logic signed [W-1:0] cos_out,
+    output logic rejected  // strobe, with done: sin or cos or both were held back
 );
-    if (W < 8) begin : g_check W_MUST_BE_AT_LEAST_8 u_error (); end
+    if (W < 8) begin : g_check
+        W_MUST_BE_AT_LEAST_8 u_error ();
+    end
 
-    logic       taken;                      // there was a sample since reset
-    logic [7:0] sin_held, cos_held;         // samples held back in a row, stops at 255
+    logic taken;  // there was a sample since reset
+    logic [7:0] sin_held, cos_held;  // samples held back in a row, stops at 255
 
     wire signed [W:0] sin_move = sin - sin_out;
     wire signed [W:0] cos_move = cos - cos_out;
-    wire        [W:0] sin_size = sin_move[W] ? -sin_move : sin_move;
-    wire        [W:0] cos_size = cos_move[W] ? -cos_move : cos_move;
+    wire [W:0] sin_size = sin_move[W] ? -sin_move : sin_move;
+    wire [W:0] cos_size = cos_move[W] ? -cos_move : cos_move;
 
-    wire active    = taken && step != '0;
-    wire no_end    = hold == '1;
-    wire sin_stays = active && sin_size > {{(W-7){1'b0}}, step} && (no_end || sin_held < hold);
-    wire cos_stays = active && cos_size > {{(W-7){1'b0}}, step} && (no_end || cos_held < hold);
+    wire active = taken && step != '0;
+    wire no_end = hold == '1;
+    wire sin_stays = active && sin_size > {{(W - 7) {1'b0}}, step} && (no_end || sin_held < hold);
+    wire cos_stays = active && cos_size > {{(W - 7) {1'b0}}, step} && (no_end || cos_held < hold);
 
     always_ff @(posedge clk) begin
         done     <= valid;
@@ -58,7 +63,7 @@ module outlier_filter #(
     end
 
 `ifdef FORMAL
-    logic                past = 1'b0;
+    logic past = 1'b0;
     logic signed [W-1:0] sin_before, cos_before;
     wire signed [W:0] sin_jump = sin_out - sin_before;
     wire signed [W:0] cos_jump = cos_out - cos_before;
@@ -69,15 +74,51 @@ module outlier_filter #(
         if (!past) assume (rst);
         if (past && !$past(rst)) begin
             if (sin_jump > $signed({1'b0, $past(step)}) || -sin_jump > $signed({1'b0, $past(step)}))
-                assert (done && (!$past(taken) || $past(step) == 0 || ($past(sin_held) >= $past(hold) && !$past(no_end))));
+                assert (done && (!$past(
+                    taken
+                ) || $past(
+                    step
+                ) == 0 || ($past(
+                    sin_held
+                ) >= $past(
+                    hold
+                ) && !$past(
+                    no_end
+                ))));
             if (cos_jump > $signed({1'b0, $past(step)}) || -cos_jump > $signed({1'b0, $past(step)}))
-                assert (done && (!$past(taken) || $past(step) == 0 || ($past(cos_held) >= $past(hold) && !$past(no_end))));
+                assert (done && (!$past(
+                    taken
+                ) || $past(
+                    step
+                ) == 0 || ($past(
+                    cos_held
+                ) >= $past(
+                    hold
+                ) && !$past(
+                    no_end
+                ))));
             if (rejected) assert (done && $past(taken) && (sin_jump == 0 || cos_jump == 0));
             if (done && !rejected) assert (sin_out == $past(sin) && cos_out == $past(cos));
             if (sin_held != 0 && sin_held != $past(sin_held))
-                assert (rejected && sin_held == $past(sin_held) + 1 && ($past(sin_held) < $past(hold) || $past(no_end)));
+                assert (rejected && sin_held == $past(
+                    sin_held
+                ) + 1 && ($past(
+                    sin_held
+                ) < $past(
+                    hold
+                ) || $past(
+                    no_end
+                )));
             if (cos_held != 0 && cos_held != $past(cos_held))
-                assert (rejected && cos_held == $past(cos_held) + 1 && ($past(cos_held) < $past(hold) || $past(no_end)));
+                assert (rejected && cos_held == $past(
+                    cos_held
+                ) + 1 && ($past(
+                    cos_held
+                ) < $past(
+                    hold
+                ) || $past(
+                    no_end
+                )));
             cover (rejected && sin_held == 3);
             cover (done && !rejected && $past(sin_held) == 3 && $past(step) != 0);
         end

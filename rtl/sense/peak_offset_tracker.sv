@@ -1,38 +1,47 @@
 // SPDX-License-Identifier: Apache-2.0
-// peak_offset_tracker -- take the offset off sine and cosine by their last turning points, as S0 printed it.
+// peak_offset_tracker -- take the offset off sine and cosine by their last turning points, as S0
+// printed it.
 //
-//   fell and now above the sample before: that one is Pmin, it rises;   rose and now below it: that one is Pmax, it falls
-//   offset = |full - Pmax - Pmin| / 2, rounded down, with the samples counted from 0 to full = 2^W - 1
+//   fell and now above the sample before: that one is Pmin, it rises;   rose and now below it: that
+//   one is Pmax, it falls
+//   offset = |full - Pmax - Pmin| / 2, rounded down, with the samples counted from 0 to full = 2^W
+//   - 1
 //
 // latency  2 clk from valid to done        rate  one sample per clk
-// sign     S0 prints the size of the offset; which way it lies is what full - Pmax - Pmin says without the bars. Nothing is
-//          taken off before both turning points of a channel are known; a corrected sample stops at full scale
-// limits   of the method, not of the module: it knows a fringe late by a fringe, each noisy sample makes a turning point of its
-//          own, and of gain and phase it knows nothing. Made to be run beside the learner, not instead of it
+// sign     S0 prints the size of the offset; which way it lies is what full - Pmax - Pmin says
+//          without the bars. Nothing is taken off before both turning points of a channel are
+//          known; a corrected sample stops at full scale
+// limits   of the method, not of the module: it knows a fringe late by a fringe, each noisy sample
+//          makes a turning point of its own, and of gain and phase it knows nothing. Made to be run
+//          beside the learner, not instead of it
 // source   S0, chapter 4.4
 // model    tb/sense/peak_offset_tracker.py, equal in every bit of every cycle
 // proof    W = 8
-// proved   each sample leaves less its offset, or unchanged out of use; an offset comes of two samples that were turning points
+// proved   each sample leaves less its offset, or unchanged out of use; an offset comes of two
+//          samples that were turning points
 `default_nettype none
 
 module peak_offset_tracker #(
-    parameter int W = 8                         // bits of a sample
+    parameter int W = 8  // bits of a sample
 ) (
-    input  wire                  clk,
-    input  wire                  rst,           // forgets the turning points
-    input  wire                  enable,        // level; 0: samples pass as they are, the turning points are still found
-    input  wire                  valid,         // strobe: sin and cos are new
-    input  wire signed [W-1:0]   sin,           // full scale = 2^(W-1)
-    input  wire signed [W-1:0]   cos,
-    output logic                 done,          // strobe: sin_out and cos_out are new
-    output logic signed [W-1:0]  sin_out,       // full scale = 2^(W-1)
-    output logic signed [W-1:0]  cos_out,
-    output logic signed [W-1:0]  sin_offset,    // with done: what was taken off, or would have been
-    output logic signed [W-1:0]  cos_offset
+    input wire clk,
+    input wire rst,  // forgets the turning points
+    input wire enable,  // level; 0: samples pass as they are, the turning points are still found
+    input wire valid,  // strobe: sin and cos are new
+    input wire signed [W-1:0] sin,  // full scale = 2^(W-1)
+    input wire signed [W-1:0] cos,
+    output logic done,  // strobe: sin_out and cos_out are new
+    output logic signed [W-1:0] sin_out,  // full scale = 2^(W-1)
+    output logic signed [W-1:0] cos_out,
+    output logic signed [W-1:0] sin_offset,  // with done: what was taken off, or would have been
+    output logic signed [W-1:0] cos_offset
 );
-    if (W < 2) begin : g_check W_MUST_BE_AT_LEAST_2 u_error (); end
+    if (W < 2) begin : g_check
+        W_MUST_BE_AT_LEAST_2 u_error ();
+    end
 
-    logic held, taken;                          // the channel's sample is a new one; there was one since reset
+    // the channel's sample is a new one; there was one since reset
+    logic held, taken;
 
     always_ff @(posedge clk) begin
         held <= valid;
@@ -46,15 +55,16 @@ module peak_offset_tracker #(
     end
 
     for (genvar channel = 0; channel < 2; channel++) begin : g_channel
-        logic                rising, high_known, low_known;     // rising: f1 of S0
-        logic signed [W-1:0] sample, high, low, sample_out, offset;     // high, low: Pmax, Pmin
+        logic rising, high_known, low_known;  // rising: f1 of S0
+        logic signed [W-1:0] sample, high, low, sample_out, offset;  // high, low: Pmax, Pmin
 
-        wire signed [W-1:0]  new_sample = channel == 0 ? sin : cos;
-        wire signed [W:0]    span   = {high[W-1], high} + {low[W-1], low} + (W + 1)'(1);    // Pmax + Pmin - full
-        wire        [W:0]    size   = (span[W] ? -span : span) >> 1;
-        wire signed [W:0]    drift  = !(high_known && low_known) ? '0 : span[W] ? -size : size;
-        wire signed [W+1:0]  less   = {{2{sample[W-1]}}, sample} - {drift[W], drift};
-        wire                 fits   = less[W+1:W-1] == {3{less[W-1]}};
+        wire signed [W-1:0] new_sample = channel == 0 ? sin : cos;
+        // Pmax + Pmin - full
+        wire signed [  W:0] span = {high[W-1], high} + {low[W-1], low} + (W + 1)'(1);
+        wire        [  W:0] size = (span[W] ? -span : span) >> 1;
+        wire signed [  W:0] drift = !(high_known && low_known) ? '0 : span[W] ? -size : size;
+        wire signed [W+1:0] less = {{2{sample[W-1]}}, sample} - {drift[W], drift};
+        wire                fits = less[W+1:W-1] == {3{less[W-1]}};
 
         always_ff @(posedge clk) begin
             if (valid) begin
@@ -88,14 +98,15 @@ module peak_offset_tracker #(
     assign cos_offset = g_channel[1].offset;
 
 `ifdef FORMAL
-    logic                past = 1'b0;
-    logic signed [W-1:0] old_sin, old_2_sin, old_cos;           // the last sample, the one before it
-    logic         [1:0]  samples;               // since reset, up to 2
-    logic                enable_q;
+    logic past = 1'b0;
+    // the last sample, the one before it
+    logic signed [W-1:0] old_sin, old_2_sin, old_cos;
+    logic [1:0] samples;  // since reset, up to 2
+    logic       enable_q;
     logic signed [W-1:0] whole_sin, whole_cos;  // the sample that goes with done
-    wire signed [W+1:0]  sin_less = whole_sin - sin_offset;
-    wire signed [W+1:0]  cos_less = whole_cos - cos_offset;
-    wire signed [W+1:0]  most = (1 <<< (W-1)) - 1, least = -(1 <<< (W-1));
+    wire signed [W+1:0] sin_less = whole_sin - sin_offset;
+    wire signed [W+1:0] cos_less = whole_cos - cos_offset;
+    wire signed [W+1:0] most = (1 <<< (W - 1)) - 1, least = -(1 <<< (W - 1));
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
@@ -111,9 +122,11 @@ module peak_offset_tracker #(
         if (rst) samples <= '0;
         if (past) begin
             assert (samples <= 2 && taken == (samples != 0));
-            if (samples != 0) assert (g_channel[0].sample == old_sin && g_channel[1].sample == old_cos);
+            if (samples != 0)
+                assert (g_channel[0].sample == old_sin && g_channel[1].sample == old_cos);
             if (held) assert (taken);
-            if (samples < 2) assert (!g_channel[0].high_known && !g_channel[0].low_known && !g_channel[0].rising);
+            if (samples < 2)
+                assert (!g_channel[0].high_known && !g_channel[0].low_known && !g_channel[0].rising);
         end
         if (past && !$past(rst)) begin
             if (done && enable_q) begin
@@ -121,8 +134,10 @@ module peak_offset_tracker #(
                 assert (cos_out == (cos_less > most ? most : cos_less < least ? least : cos_less));
             end
             if (done && !enable_q) assert (sin_out == whole_sin && cos_out == whole_cos);
-            if (g_channel[0].high != $past(g_channel[0].high)) assert (samples == 2 && g_channel[0].high == old_2_sin && old_sin < old_2_sin);
-            if (g_channel[0].low != $past(g_channel[0].low)) assert (samples == 2 && g_channel[0].low == old_2_sin && old_sin > old_2_sin);
+            if (g_channel[0].high != $past(g_channel[0].high))
+                assert (samples == 2 && g_channel[0].high == old_2_sin && old_sin < old_2_sin);
+            if (g_channel[0].low != $past(g_channel[0].low))
+                assert (samples == 2 && g_channel[0].low == old_2_sin && old_sin > old_2_sin);
             cover (done && sin_offset == 10 && cos_offset == -7);
         end
     end

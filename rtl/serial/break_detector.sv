@@ -2,7 +2,8 @@
 // break_detector -- tells when a line has been low for longer than any character at any baud rate.
 //
 // latency  found comes TIME_US after the line went low, and 1 clk     rate  once a break
-// source   of a UART line: a master that does not know the baud rate of its nodes can still send a break
+// source   of a UART line: a master that does not know the baud rate of its nodes can still send a
+//          break
 // model    tb/serial/break_detector.py, equal in every bit of every cycle
 // proof    depth 20, CLK_HZ = 1000000, TIME_US = 5
 // proved   found only while the line is low, and once until it is high again
@@ -10,21 +11,23 @@
 
 module break_detector #(
     parameter int CLK_HZ  = 4_000_000,
-    parameter int TIME_US = 2000                // nine low bits and a start bit at 9600 baud take 1042 us
+    parameter int TIME_US = 2000        // nine low bits and a start bit at 9600 baud take 1042 us
 ) (
-    input  wire                  clk,
-    input  wire                  rst,
-    input  wire                  rx,            // level, synchronous to clk, idles high
-    output logic                 found          // strobe: a break
+    input  wire  clk,
+    input  wire  rst,
+    input  wire  rx,    // level, synchronous to clk, idles high
+    output logic found  // strobe: a break
 );
     localparam int LONGEST = CLK_HZ / 1000 * TIME_US / 1000;
-    localparam int W       = $clog2(LONGEST + 1);
+    localparam int W = $clog2(LONGEST + 1);
 
-    if (LONGEST < 1) begin : g_check TIME_US_MUST_BE_AT_LEAST_ONE_CLK u_error (); end
+    if (LONGEST < 1) begin : g_check
+        TIME_US_MUST_BE_AT_LEAST_ONE_CLK u_error ();
+    end
 
-    logic [W-1:0] low;                          // clk that the line has been low, stops at LONGEST
+    logic [W-1:0] low;  // clk that the line has been low, stops at LONGEST
 
-    wire last = low == W'(LONGEST - 1);
+    wire          last = low == W'(LONGEST - 1);
 
     always_ff @(posedge clk) begin
         if (rx) low <= '0;
@@ -38,7 +41,7 @@ module break_detector #(
 
 `ifdef FORMAL
     logic past = 1'b0;
-    logic told;                                 // of this break
+    logic told;  // of this break
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);

@@ -2,17 +2,18 @@
 // crc32_stream -- CRC-32 of a row of bytes, as they come.
 //
 // latency  1 clk from a byte to crc        rate  one byte per clk
-// source   CRC-32/ISO-HDLC (Ethernet, zlib): polynomial 04C11DB7 reflected, starts with all ones, inverted at the end
+// source   CRC-32/ISO-HDLC (Ethernet, zlib): polynomial 04C11DB7 reflected, starts with all ones,
+//          inverted at the end
 // model    zlib.crc32
 `default_nettype none
 
 module crc32_stream (
-    input  wire                  clk,
-    input  wire                  rst,           // as start
-    input  wire                  start,         // strobe: begin anew; a byte of the same clk is the first
-    input  wire                  valid,         // strobe: take data in
-    input  wire        [7:0]     data,
-    output logic       [31:0]    crc            // of the bytes since start
+    input  wire         clk,
+    input  wire         rst,    // as start
+    input  wire         start,  // strobe: begin anew; a byte of the same clk is the first
+    input  wire         valid,  // strobe: take data in
+    input  wire  [ 7:0] data,
+    output logic [31:0] crc     // of the bytes since start
 );
     localparam logic [31:0] POLYNOMIAL = 32'hEDB88320;
 
@@ -22,15 +23,16 @@ module crc32_stream (
 
     function automatic [31:0] divided(input [31:0] dividend);
         divided = dividend;
-        for (int n = 0; n < 8; n++) divided = {1'b0, divided[31:1]} ^ (divided[0] ? POLYNOMIAL : 32'd0);
+        for (int n = 0; n < 8; n++)
+        divided = {1'b0, divided[31:1]} ^ (divided[0] ? POLYNOMIAL : 32'd0);
     endfunction
 
     assign crc = ~remainder;
 
     always_ff @(posedge clk) begin
-        if (valid)      remainder <= divided(from ^ {24'd0, data});
+        if (valid) remainder <= divided(from ^ {24'd0, data});
         else if (start) remainder <= '1;
-        if (rst)        remainder <= '1;
+        if (rst) remainder <= '1;
     end
 endmodule
 

@@ -8,29 +8,32 @@
 `default_nettype none
 
 module sync_fifo #(
-    parameter int W = 11,                       // bits of a word
-    parameter int DEPTH = 64                    // words, a power of two from 4 up
+    parameter int W     = 11,  // bits of a word
+    parameter int DEPTH = 64   // words, a power of two from 4 up
 ) (
-    input  wire                  clk,
-    input  wire                  rst,           // empties the queue
-    input  wire                  push,          // strobe: take `in`
-    input  wire        [W-1:0]   in,
-    input  wire                  pop,           // strobe: done with `out`; without present it does nothing
-    output logic                 present,       // level: out is a word
-    output logic       [W-1:0]   out,
-    output logic       [$clog2(DEPTH):0] free,  // words that still fit
-    output logic                 overrun        // strobe: pushed into the full queue and dropped
+    input wire clk,
+    input wire rst,  // empties the queue
+    input wire push,  // strobe: take `in`
+    input wire [W-1:0] in,
+    input wire pop,  // strobe: done with `out`; without present it does nothing
+    output logic present,  // level: out is a word
+    output logic [W-1:0] out,
+    output logic [$clog2(DEPTH):0] free,  // words that still fit
+    output logic overrun  // strobe: pushed into the full queue and dropped
 );
     localparam int A = $clog2(DEPTH);
 
-    if (DEPTH < 4 || DEPTH != 1 << A) begin : g_check DEPTH_MUST_BE_A_POWER_OF_TWO_FROM_4_UP u_error (); end
+    if (DEPTH < 4 || DEPTH != 1 << A) begin : g_check
+        DEPTH_MUST_BE_A_POWER_OF_TWO_FROM_4_UP u_error ();
+    end
 
-    logic [W-1:0] memory [0:DEPTH-1];
-    logic [A:0]   written, read;                // words so far; one bit more than an address tells full from empty
+    logic [W-1:0] memory[0:DEPTH-1];
+    // words so far; one bit more than an address tells full from empty
+    logic [A:0] written, read;
 
-    wire         full      = free == '0;
-    wire         take      = push && !full;
-    wire [A:0]   read_next = read + (A + 1)'(pop && present);
+    wire       full = free == '0;
+    wire       take = push && !full;
+    wire [A:0] read_next = read + (A + 1)'(pop && present);
 
     always_ff @(posedge clk) begin
         if (take) memory[written[A-1:0]] <= in;
@@ -53,12 +56,13 @@ module sync_fifo #(
     end
 
 `ifdef FORMAL
-    // Any one word, the `chosen`-th, is followed from its push to its pop: it comes out at its turn and unchanged.
-    (* anyconst *) logic [A:0] chosen;
+    // Any one word, the `chosen`-th, is followed from its push to its pop: it comes out at its turn
+    // and unchanged.
+    (* anyconst *)logic [  A:0] chosen;
     logic         past = 1'b0;
-    logic         waiting;                      // the chosen word is in the queue
+    logic         waiting;  // the chosen word is in the queue
     logic [W-1:0] value;
-    wire  [A:0]   stored = written - read;
+    wire  [  A:0] stored = written - read;
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);

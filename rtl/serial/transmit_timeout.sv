@@ -1,30 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
-// transmit_timeout -- switch off the driver of a shared line that has been on for longer than any reply takes.
+// transmit_timeout -- switch off the driver of a shared line that has been on for longer than any
+// reply takes.
 //
 // latency  0; expired off after BITS bit times and 1 clk     rate  -
 // source   RS-485: one driver that stays on silences the line for everybody
 // model    tb/serial/transmit_timeout.py, equal in every bit of every cycle
-// proved   the driver is on only while it is requested; once expired off it rests until it is no longer requested
+// proved   the driver is on only while it is requested; once expired off it rests until it is no
+//          longer requested
 `default_nettype none
 
 module transmit_timeout #(
-    parameter int BITS = 1024                   // a power of two from 16 up; the longest reply has 770
+    parameter int BITS = 1024  // a power of two from 16 up; the longest reply has 770
 ) (
-    input  wire                  clk,
-    input  wire                  rst,
-    input  wire        [19:0]    bit_time,      // 1/16 clk; less than 8 clk counts as 8
-    input  wire                  requested,        // level: something is being sent
-    output logic                 driver_enable,
-    output logic                 expired            // strobe: it has been expired off
+    input  wire         clk,
+    input  wire         rst,
+    input  wire  [19:0] bit_time,       // 1/16 clk; less than 8 clk counts as 8
+    input  wire         requested,      // level: something is being sent
+    output logic        driver_enable,
+    output logic        expired         // strobe: it has been expired off
 );
     localparam int E = $clog2(BITS) - 4;
 
-    if (BITS < 16 || BITS != 1 << $clog2(BITS)) begin : g_check BITS_MUST_BE_A_POWER_OF_2_FROM_16_UP u_error (); end
+    if (BITS < 16 || BITS != 1 << $clog2(BITS)) begin : g_check
+        BITS_MUST_BE_A_POWER_OF_2_FROM_16_UP u_error ();
+    end
 
-    logic [19+E:0] spent;                       // clk that it has been on
+    logic [19+E:0] spent;  // clk that it has been on
     logic          off;
 
-    wire [19:0] whole = |bit_time[19:7] ? bit_time : 20'd128;
+    wire  [  19:0] whole = |bit_time[19:7] ? bit_time : 20'd128;
 
     assign driver_enable = requested && !off;
 

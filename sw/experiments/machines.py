@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The machines of the experiments for any client: `moire twin --machine s2`, `moire --port twin:s2`.
+"""The machines of the experiments for any client: `moire twin --machine s2`, `moire --port
+twin:s2`.
 
-Each is powered up, with the parameters of its experiment in force; the names are those of moire.cli.twin.
+Each is powered up, with the parameters of its experiment in force; the names are those of
+moire.cli.twin.
 """
+
 from experiments import s0_fine, s2_stage, s3_zero, s4_job
 from experiments.s0_stage import ADDRESSES
 from moire.errors import TwinNotBuilt
@@ -16,7 +19,9 @@ def fine_stage(seed):
 
 
 MACHINES = {
-    "s0": lambda seed, nodes=tuple(ADDRESSES.values()): Twin(nodes=nodes, seed=seed, node_parameters=WITH_SEGMENTS),
+    "s0": lambda seed, nodes=tuple(ADDRESSES.values()): Twin(
+        nodes=nodes, seed=seed, node_parameters=WITH_SEGMENTS
+    ),
     "s0_fine": fine_stage,
     "s2": lambda seed: s2_stage.Stage.power_up(seed).twin,
     "s3": lambda seed: s3_zero.Motor(seed).twin,
@@ -25,8 +30,12 @@ MACHINES = {
 
 
 def open_port(machine: str, seed: int, **settings) -> TwinTransport:
-    """The port `twin:MACHINE` of the host package (entry point of the group moire.ports); TwinNotBuilt where it cannot be built."""
+    """The port `twin:MACHINE` of the host package (entry point of the group moire.ports);
+    TwinNotBuilt where it cannot be built.
+    """
     try:
         return TwinTransport(MACHINES[machine](seed, **settings))
     except (BuildError, OSError) as error:
-        raise TwinNotBuilt(f"the simulated machine cannot be built: {str(error).strip().splitlines()[-1]}") from None
+        raise TwinNotBuilt(
+            f"the simulated machine cannot be built: {str(error).strip().splitlines()[-1]}"
+        ) from None

@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""S1: a circular grating of 8192 lines with 134.59 arcsec of error, corrected between its read head and its controller.
+"""S1: a circular grating of 8192 lines with 134.59 arcsec of error, corrected between its read head
+and its controller.
 
     python -m experiments.s1_ring
 
-Takes 37 readings of the twin's ring, fits what they carry, writes the coefficients over the line into the Verilated relay, and
-judges the A/B that it sends on a second pass, at angles between the readings; the paper's way (3 orders) beside ours. Writes
-build/report/s1_ring.html and the readings as build/report/s1_readings.csv. The paper came from 134.59 to 12.62 arcsec.
+Takes 37 readings of the twin's ring, fits what they carry, writes the coefficients over the line
+into the Verilated relay, and
+judges the A/B that it sends on a second pass, at angles between the readings; the paper's way (3
+orders) beside ours. Writes
+build/report/s1_ring.html and the readings as build/report/s1_readings.csv. The paper came from
+134.59 to 12.62 arcsec.
 """
+
 import argparse
 import base64
 import html
@@ -31,27 +36,34 @@ from twin.machines.ring import ARC_SECOND, RotaryRing
 
 ROOT = Path(__file__).resolve().parents[2]
 DRIVER, RELAY = Path(__file__).with_name("relay_run.cpp"), ROOT / "rtl" / "relay.sv"
-ORDERS = 16                          # of the relay
+ORDERS = 16  # of the relay
 CLK_HZ, BAUD = 48_000_000, 3_000_000
-SUBDIVISION = 200                    # of a line, in the read head: 0.2 arcsec a count
+SUBDIVISION = 200  # of a line, in the read head: 0.2 arcsec a count
 PAPER_PEAK, PAPER_AFTER, PAPER_RESIDUAL = 134.59, 12.62, 5.79
 PAPER_ORDERS = 3
-SCATTER = 2.0                        # arcsec: readings lie evenly within +- this of the truth, as far as the paper's drift goes
+SCATTER = (
+    2.0  # arcsec: readings lie evenly within +- this of the truth, as far as the paper's drift goes
+)
 SCATTER_RMS = SCATTER / 3**0.5
 TEN_DEGREES = np.arange(0.0, 361.0, 10.0)
-DWELL_S = 15.0                       # from one reading to the next
-EARLY = 400                          # counts before its index at which the ring rests at power-up
+DWELL_S = 15.0  # from one reading to the next
+EARLY = 400  # counts before its index at which the ring rests at power-up
 HIGH_ORDERS = slice(PAPER_ORDERS + 1, None)
 
 
 # ------------------------------------------------------------------ the ring
 
+
 def paper_ring(seed: int, **values) -> RotaryRing:
-    """A ring with both numbers of the paper: 134.59 arcsec at its peak, 5.79 of them in what 3 orders leave."""
+    """A ring with both numbers of the paper: 134.59 arcsec at its peak, 5.79 of them in what 3
+    orders leave.
+    """
     values = {"ring_subdivision": SUBDIVISION, "ring_higher": 1.63, **values}
-    for _ in range(3):               # the peak is scaled after the shares of the orders
+    for _ in range(3):  # the peak is scaled after the shares of the orders
         ring = RotaryRing(seed, **values)
-        values["ring_higher"] *= PAPER_RESIDUAL / np.abs(error_of(ring, np.arange(0, 360, 0.1), HIGH_ORDERS)).max()
+        values["ring_higher"] *= (
+            PAPER_RESIDUAL / np.abs(error_of(ring, np.arange(0, 360, 0.1), HIGH_ORDERS)).max()
+        )
     return RotaryRing(seed, **values)
 
 
@@ -59,7 +71,9 @@ def error_of(ring, angle, orders=slice(1, None)):
     """What repeats with the true angle (degrees), arcsec."""
     amplitude, phase = ring.orders()
     number = np.arange(len(amplitude))[orders]
-    return np.sin(np.radians(angle)[:, None] * number + phase[orders]) @ amplitude[orders] / ARC_SECOND
+    return (
+        np.sin(np.radians(angle)[:, None] * number + phase[orders]) @ amplitude[orders] / ARC_SECOND
+    )
 
 
 def true_angle(ring, encoder, time_s=0.0):
@@ -72,7 +86,9 @@ def true_angle(ring, encoder, time_s=0.0):
 
 
 def measure(ring, angles, source, scatter=SCATTER, start_s=0.0) -> Readings:
-    """Stand where the encoder shows these angles, anywhere within the count, and hold a reference beside it."""
+    """Stand where the encoder shows these angles, anywhere within the count, and hold a reference
+    beside it.
+    """
     stands = angles + source.uniform(-0.5, 0.5, len(angles)) * 360 / ring.counts_per_turn
     true = true_angle(ring, stands, start_s + DWELL_S * np.arange(len(angles)))
     error = 3600 * (angles - true) + source.uniform(-scatter, scatter, len(angles))
@@ -95,10 +111,12 @@ def as_in_the_paper(readings):
 
 # ------------------------------------------------------------------ the relay
 
+
 @cache
 def harmonic_model():
     """tb/compensate/harmonic_map.py: integers, equal to the RTL in every bit."""
     from tb.compensate import harmonic_map
+
     return harmonic_map
 
 
@@ -109,14 +127,23 @@ def set_of(found, counts_per_turn):
 def corrections_of(whole: bytes, counts):
     """Counts that a relay with this set takes off at these counts, by the integers of its RTL."""
     model, words = harmonic_model(), np.frombuffer(whole, "<u4").astype(np.int64)
-    terms = [(model.signed(int(words[n]), 32), int(words[n + 1])) for n in range(6, len(words) - 1, 2)]
+    terms = [
+        (model.signed(int(words[n]), 32), int(words[n + 1])) for n in range(6, len(words) - 1, 2)
+    ]
     turn, step = int(words[1]), int(words[2] | (words[3] & 0xFFFF) << 32)
     angles = [(int(count) % turn * step >> 16) % 2**32 for count in counts]
-    return np.array([(model.summed(terms, angle, int(words[4]), model.STEPS)[0] + 128 >> 8) / 65536 for angle in angles])
+    return np.array(
+        [
+            (model.summed(terms, angle, int(words[4]), model.STEPS)[0] + 128 >> 8) / 65536
+            for angle in angles
+        ]
+    )
 
 
 def each_left_by_model(ring, found, angles):
-    """Error that is left at these true angles, arcsec: the ring's truth less what the RTL's integers take off."""
+    """Error that is left at these true angles, arcsec: the ring's truth less what the RTL's
+    integers take off.
+    """
     error, turn = error_of(ring, angles), ring.counts_per_turn
     counts = np.round((angles + error / 3600) / 360 * turn)
     left = error - corrections_of(set_of(found, turn), counts) * 1_296_000 / turn
@@ -129,15 +156,21 @@ def left_by_model(ring, found, angles):
 
 
 class VerilatedRelay(Transport):
-    """The RTL of the relay with a ring before it, a counter behind it and its UART as the line; time passes only by what is sent."""
+    """The RTL of the relay with a ring before it, a counter behind it and its UART as the line;
+    time passes only by what is sent.
+    """
 
     character_s = BITS * 16 / CLK_HZ
     time_is_stopped = True
 
     def __init__(self, counts_per_turn: int, place: int):
         program = simulation(DRIVER, RELAY, K=ORDERS, BAUD=BAUD)
-        self.process = subprocess.Popen([program, "serve", str(counts_per_turn), str(place)], stdin=subprocess.PIPE,
-                                        stdout=subprocess.PIPE, text=True)
+        self.process = subprocess.Popen(
+            [program, "serve", str(counts_per_turn), str(place)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
         self.heard, self.passed = [], 0.0
 
     def tell(self, *words) -> list:
@@ -173,13 +206,15 @@ class VerilatedRelay(Transport):
 
 
 def left_by_relay(ring, found, angles, start_s=0.0):
-    """Error of what leaves the Verilated relay (arcsec) at these true angles of its second turn, and its last status."""
+    """Error of what leaves the Verilated relay (arcsec) at these true angles of its second turn,
+    and its last status.
+    """
     turn, times = ring.counts_per_turn, start_s + DWELL_S * np.arange(len(angles))
     places = np.floor(np.degrees(ring.measured(np.radians(angles), times)) / 360 * turn).astype(int)
     with VerilatedRelay(turn, -EARLY) as pins:
         relay = Relay(pins)
         relay.write(set_of(found, turn))
-        pins.go(EARLY)                                          # over the index: from here on it corrects
+        pins.go(EARLY)  # over the index: from here on it corrects
         counted = []
         for place in places:
             out, correcting, fault = pins.go(place)
@@ -193,11 +228,12 @@ def left_by_relay(ring, found, angles, start_s=0.0):
 
 # ------------------------------------------------------------------ the experiment
 
+
 @dataclass(frozen=True)
 class Method:
     name: str
     found: object
-    left: np.ndarray                 # arcsec, at the angles of the second pass
+    left: np.ndarray  # arcsec, at the angles of the second pass
 
     @property
     def peak(self):
@@ -205,7 +241,13 @@ class Method:
 
 
 def save_readings(readings, path):
-    lines = ["angle_deg,error_arcsec", *(f"{angle:g},{error:.3f}" for angle, error in zip(readings.angle, readings.error, strict=True))]
+    lines = [
+        "angle_deg,error_arcsec",
+        *(
+            f"{angle:g},{error:.3f}"
+            for angle, error in zip(readings.angle, readings.error, strict=True)
+        ),
+    ]
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -216,14 +258,30 @@ def save_readings(readings, path):
 def picture(readings, angles, before, ways) -> bytes:
     figure, (whole, fine) = report.drawing(height=6.4, nrows=2, sharex=True)
     whole.plot(angles, before, color="#999999", linewidth=1.2, label="before")
-    whole.plot(readings.angle, readings.error - readings.error.mean(), linestyle="", marker="o", markersize=3.5, color="#555555",
-               label="readings")
+    whole.plot(
+        readings.angle,
+        readings.error - readings.error.mean(),
+        linestyle="",
+        marker="o",
+        markersize=3.5,
+        color="#555555",
+        label="readings",
+    )
     for number, way in enumerate(ways):
         for panel in (whole, fine):
-            panel.plot(angles, way.left, color=report.colour(number), linewidth=1.1, label=way.name if panel is whole else None)
+            panel.plot(
+                angles,
+                way.left,
+                color=report.colour(number),
+                linewidth=1.1,
+                label=way.name if panel is whole else None,
+            )
     fine.axhline(PAPER_AFTER, color="#b00020", linewidth=1.0, linestyle="--")
     fine.axhline(-PAPER_AFTER, color="#b00020", linewidth=1.0, linestyle="--")
-    fine.set_title(f"closer; dashed: what the paper reached, \N{PLUS-MINUS SIGN}{PAPER_AFTER}", fontsize="medium")
+    fine.set_title(
+        f"closer; dashed: what the paper reached, \N{PLUS-MINUS SIGN}{PAPER_AFTER}",
+        fontsize="medium",
+    )
     fine.set_xlabel("angle / degrees")
     for panel in (whole, fine):
         panel.set_ylabel("error / arcsec")
@@ -234,37 +292,102 @@ def picture(readings, angles, before, ways) -> bytes:
 def page(seed, readings, angles, before, ways, status) -> str:
     best = ways[-1]
     image = base64.b64encode(picture(readings, angles, before, ways)).decode()
-    tiles = "".join(f"<div><b>{value}</b><span>{name}</span></div>" for value, name in (
-        (f"{np.abs(before).max():.2f}\N{DOUBLE PRIME}", "largest error before"), (f"{best.peak:.2f}\N{DOUBLE PRIME}", "after, our way"),
-        (f"{ways[0].peak:.2f}\N{DOUBLE PRIME}", "after, the paper's way"), (f"{len(angles)}", "places of the second pass")))
-    rows = [("largest error before", f"{PAPER_PEAK}\N{DOUBLE PRIME}", f"{np.abs(before).max():.2f}\N{DOUBLE PRIME}", report.verdict(None)),
-            *((way.name, f"{PAPER_AFTER}\N{DOUBLE PRIME}", f"{way.peak:.2f}\N{DOUBLE PRIME}", report.verdict(way.peak < PAPER_AFTER))
-              for way in ways)]
-    rest = [(f"{angle:.3f}", f"{raw:+.2f}", *(f"{way.left[n]:+.2f}" for way in ways))
-            for n, (angle, raw) in enumerate(zip(angles, before, strict=True))]
-    facts = [("seed", seed), ("ring", f"8192 lines, subdivided {SUBDIVISION} times; both of the paper's numbers for its error"),
-             ("readings", f"{len(readings.angle)}, every 10 degrees, by an encoder that drifts; one each {DWELL_S:g} s"),
-             ("second pass", "other angles, other times, the same drift going on; mean error taken off: it is where zero was put"),
-             ("relay", f"RTL, Verilated, {ORDERS} orders; set {status.identity:08X} written over its UART"), ("fit", best.found.words())]
+    tiles = "".join(
+        f"<div><b>{value}</b><span>{name}</span></div>"
+        for value, name in (
+            (f"{np.abs(before).max():.2f}\N{DOUBLE PRIME}", "largest error before"),
+            (f"{best.peak:.2f}\N{DOUBLE PRIME}", "after, our way"),
+            (f"{ways[0].peak:.2f}\N{DOUBLE PRIME}", "after, the paper's way"),
+            (f"{len(angles)}", "places of the second pass"),
+        )
+    )
+    rows = [
+        (
+            "largest error before",
+            f"{PAPER_PEAK}\N{DOUBLE PRIME}",
+            f"{np.abs(before).max():.2f}\N{DOUBLE PRIME}",
+            report.verdict(None),
+        ),
+        *(
+            (
+                way.name,
+                f"{PAPER_AFTER}\N{DOUBLE PRIME}",
+                f"{way.peak:.2f}\N{DOUBLE PRIME}",
+                report.verdict(way.peak < PAPER_AFTER),
+            )
+            for way in ways
+        ),
+    ]
+    rest = [
+        (f"{angle:.3f}", f"{raw:+.2f}", *(f"{way.left[n]:+.2f}" for way in ways))
+        for n, (angle, raw) in enumerate(zip(angles, before, strict=True))
+    ]
+    facts = [
+        ("seed", seed),
+        (
+            "ring",
+            f"8192 lines, subdivided {SUBDIVISION} times; both of the paper's numbers for its error",
+        ),
+        (
+            "readings",
+            f"{len(readings.angle)}, every 10 degrees, by an encoder that drifts; one each {DWELL_S:g} s",
+        ),
+        (
+            "second pass",
+            "other angles, other times, the same drift going on; mean error taken off: it is where zero was put",
+        ),
+        (
+            "relay",
+            f"RTL, Verilated, {ORDERS} orders; set {status.identity:08X} written over its UART",
+        ),
+        ("fit", best.found.words()),
+    ]
     title = "S1: circular grating, corrected on the fly"
-    return "\n".join([
-        '<!DOCTYPE html>', '<html lang="en"><head><meta charset="utf-8">', f"<title>{title}</title>",
-        f"<style>\n{report.STYLE}pre {{ margin: 0; font-size: .85rem; }}</style></head>", "<body><main>", f"<h1>{title}</h1>",
-        '<p class="summary">37 readings of a simulated ring, fitted by the host, written into the relay; then A/B counted behind it.</p>',
-        f'<div class="numbers">{tiles}</div>', "<h2>Against the paper</h2>", report.table(("", "paper", "here", ""), rows),
-        "<h2>Before and after</h2>", f'<figure><img alt="error over the turn" src="data:image/png;base64,{image}">',
-        "<figcaption>Error over the turn: behind the relay minus true</figcaption></figure>", "<h2>Second pass</h2>",
-        report.table(("true angle / degrees", "before / arcsec", *(f"{way.name} / arcsec" for way in ways)), rest, tall=True),
-        "<h2>How it was measured</h2>", "<section><table><tbody>",
-        *(f'<tr><td class="text">{name}</td><td class="text"><pre>{html.escape(str(words))}</pre></td></tr>' for name, words in facts),
-        "</tbody></table></section>", "</main></body></html>", ""])
+    return "\n".join(
+        [
+            "<!DOCTYPE html>",
+            '<html lang="en"><head><meta charset="utf-8">',
+            f"<title>{title}</title>",
+            f"<style>\n{report.STYLE}pre {{ margin: 0; font-size: .85rem; }}</style></head>",
+            "<body><main>",
+            f"<h1>{title}</h1>",
+            '<p class="summary">37 readings of a simulated ring, fitted by the host, written into the relay; then A/B counted behind it.</p>',
+            f'<div class="numbers">{tiles}</div>',
+            "<h2>Against the paper</h2>",
+            report.table(("", "paper", "here", ""), rows),
+            "<h2>Before and after</h2>",
+            f'<figure><img alt="error over the turn" src="data:image/png;base64,{image}">',
+            "<figcaption>Error over the turn: behind the relay minus true</figcaption></figure>",
+            "<h2>Second pass</h2>",
+            report.table(
+                (
+                    "true angle / degrees",
+                    "before / arcsec",
+                    *(f"{way.name} / arcsec" for way in ways),
+                ),
+                rest,
+                tall=True,
+            ),
+            "<h2>How it was measured</h2>",
+            "<section><table><tbody>",
+            *(
+                f'<tr><td class="text">{name}</td><td class="text"><pre>{html.escape(str(words))}</pre></td></tr>'
+                for name, words in facts
+            ),
+            "</tbody></table></section>",
+            "</main></body></html>",
+            "",
+        ]
+    )
 
 
 def run(seed=1, places=180, folder=ROOT / "build" / "report", console=None):
     """The whole experiment; returns both ways and the path of the report."""
     console = console or Console()
     source, ring = np.random.default_rng(seed), paper_ring(seed)
-    console.print(f"[bold]S1: ring of 8192 lines, {ring.counts_per_turn} counts a turn, relay of {ORDERS} orders[/] (seed {seed})")
+    console.print(
+        f"[bold]S1: ring of 8192 lines, {ring.counts_per_turn} counts a turn, relay of {ORDERS} orders[/] (seed {seed})"
+    )
     taken = measure(ring, TEN_DEGREES, source, scatter=0.0)
     save_readings(taken, folder / "s1_readings.csv")
     readings = read_readings(folder / "s1_readings.csv")
@@ -274,13 +397,24 @@ def run(seed=1, places=180, folder=ROOT / "build" / "report", console=None):
     before = 3600 * (raw - angles)
     before -= before.mean()
     ways = []
-    for name, found in ((f"the paper's way, {PAPER_ORDERS} orders", as_in_the_paper(readings)), (f"ours, {ORDERS} orders", ours(readings))):
+    for name, found in (
+        (f"the paper's way, {PAPER_ORDERS} orders", as_in_the_paper(readings)),
+        (f"ours, {ORDERS} orders", ours(readings)),
+    ):
         with console.status(f"{name}: through the Verilated relay"):
             left, status = left_by_relay(ring, found, angles, start)
         ways.append(Method(name, found, left))
-    made = Table("", "largest error / arcsec", title=f"second pass, {places} angles between those of the readings")
+    made = Table(
+        "",
+        "largest error / arcsec",
+        title=f"second pass, {places} angles between those of the readings",
+    )
     made.columns[1].justify = "right"
-    for name, value in (("before", np.abs(before).max()), *((way.name, way.peak) for way in ways), ("the paper", PAPER_AFTER)):
+    for name, value in (
+        ("before", np.abs(before).max()),
+        *((way.name, way.peak) for way in ways),
+        ("the paper", PAPER_AFTER),
+    ):
         made.add_row(name, f"{value:.2f}")
     console.print(made)
     path = folder / "s1_ring.html"
@@ -290,10 +424,21 @@ def run(seed=1, places=180, folder=ROOT / "build" / "report", console=None):
 
 
 def main(arguments=None):
-    parser = argparse.ArgumentParser(prog="python -m experiments.s1_ring", description="The ring of S1: read, fit, write, judge.")
-    parser.add_argument("--seed", type=int, default=1, help="of the ring and its readings (default 1)")
-    parser.add_argument("--places", type=int, default=180, help="of the second pass, 8 to 10000 (default 180)")
-    parser.add_argument("--report", type=Path, default=ROOT / "build" / "report", help="folder of the page (default build/report)")
+    parser = argparse.ArgumentParser(
+        prog="python -m experiments.s1_ring", description="The ring of S1: read, fit, write, judge."
+    )
+    parser.add_argument(
+        "--seed", type=int, default=1, help="of the ring and its readings (default 1)"
+    )
+    parser.add_argument(
+        "--places", type=int, default=180, help="of the second pass, 8 to 10000 (default 180)"
+    )
+    parser.add_argument(
+        "--report",
+        type=Path,
+        default=ROOT / "build" / "report",
+        help="folder of the page (default build/report)",
+    )
     options = parser.parse_args(arguments)
     if not 8 <= options.places <= 10000:
         parser.error(f"--places takes 8 to 10000, not {options.places}")

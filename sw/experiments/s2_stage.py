@@ -3,13 +3,18 @@
 
     python -m experiments.s2_stage
 
-Homes all three at the switch and the index (method 1), puts the origin in the middle of each travel, moves at 30 mm/min and faster, to
-both sides of the origin and over the borders of a 16-bit and a 32-bit counter, and holds every move against the pulses that the scale
+Homes all three at the switch and the index (method 1), puts the origin in the middle of each
+travel, moves at 30 mm/min and faster, to
+both sides of the origin and over the borders of a 16-bit and a 32-bit counter, and holds every move
+against the pulses that the scale
 gave. Writes build/report/s2.html.
 
-The scale speeds that the node takes are a matter of its clk: one count a clk. The twin runs at 1.5 MHz, so X and Y go 100 mm/s and Z
-25 mm/s here; 500 mm/s, 1000 times the paper's top speed, is 1 and 5 million counts a second: figure s2_count_errors.
+The scale speeds that the node takes are a matter of its clk: one count a clk. The twin runs at 1.5
+MHz, so X and Y go 100 mm/s and Z
+25 mm/s here; 500 mm/s, 1000 times the paper's top speed, is 1 and 5 million counts a second: figure
+s2_count_errors.
 """
+
 import argparse
 import random
 import sys
@@ -29,9 +34,9 @@ from twin.nodes.twin import Axis, Node
 CLK_HZ = 3_000_000
 NODE = {"DRIVES": 2, "FILTERS": 0, "SINE": 0}
 POLL_S = 0.02
-SLOW_MM_S = 0.5                      # the paper's top speed, 30 mm/min
-WORD = 1 << 16                       # counts of the paper's counter
-PAPER_SHARE = 1e-4                   # against a digital read-out
+SLOW_MM_S = 0.5  # the paper's top speed, 30 mm/min
+WORD = 1 << 16  # counts of the paper's counter
+PAPER_SHARE = 1e-4  # against a digital read-out
 
 
 @dataclass(frozen=True)
@@ -40,7 +45,7 @@ class Scale:
 
     count_um: Fraction
     travel_mm: int
-    step_um: Fraction                # of the driver's microsteps on the 5 mm screw
+    step_um: Fraction  # of the driver's microsteps on the 5 mm screw
     top_mm_s: int
 
     @property
@@ -58,26 +63,60 @@ class Scale:
 
     def machine(self):
         count = float(self.count_um) * 1e-6
-        return Axis("stepper_stage", {
-            "scale_count": count, "scale_index_position": count / 2, "scale_index_width": count, "scale_index_scatter": count / 25,
-            "stepper_microsteps": round(Fraction(5000, 200) / self.step_um), "switch_high": self.travel_mm * 1e-3 + 2e-3,
-            "travel_high_stop": self.travel_mm * 1e-3 + 3e-3})
+        return Axis(
+            "stepper_stage",
+            {
+                "scale_count": count,
+                "scale_index_position": count / 2,
+                "scale_index_width": count,
+                "scale_index_scatter": count / 25,
+                "stepper_microsteps": round(Fraction(5000, 200) / self.step_um),
+                "switch_high": self.travel_mm * 1e-3 + 2e-3,
+                "travel_high_stop": self.travel_mm * 1e-3 + 3e-3,
+            },
+        )
 
     def settings(self):
         edge = Fraction(self.travel_mm, 2) + 1
         return {
-            "period": f"{float(self.period_um)}um", "counts_per_period": 4, "position_source": 1, "drive": 1, "disagreement_limit": 0,
-            "encoder_fault_mask": 1, "deglitch": 0, "velocity_quantum": f"{float(self.count_um)}um",
-            "steps_per_period": self.period_um / self.step_um, "step_trim": 5, "kp": 0, "kd": 0, "kv": 0, "ka": 0, "ki": 0.0004,
-            "integral_limit": 0.99, "output_limit": 0.99, "dead_band": f"{float(3 * self.count_um)}um",
-            "settle_window": f"{float(4 * self.count_um)}um", "settle_time": "20ms", "following_limit": "1mm",
-            "travel_low": f"{float(-edge)}mm", "travel_high": f"{float(edge)}mm", "acceleration": "1m/s2", "jerk": "50m/s3",
-            "velocity": f"{self.top_mm_s}mm/s", "home_method": 1, "homing_search_speed": "20mm/s", "homing_latch_speed": "5mm/s",
-            "home_distance": "4mm"}
+            "period": f"{float(self.period_um)}um",
+            "counts_per_period": 4,
+            "position_source": 1,
+            "drive": 1,
+            "disagreement_limit": 0,
+            "encoder_fault_mask": 1,
+            "deglitch": 0,
+            "velocity_quantum": f"{float(self.count_um)}um",
+            "steps_per_period": self.period_um / self.step_um,
+            "step_trim": 5,
+            "kp": 0,
+            "kd": 0,
+            "kv": 0,
+            "ka": 0,
+            "ki": 0.0004,
+            "integral_limit": 0.99,
+            "output_limit": 0.99,
+            "dead_band": f"{float(3 * self.count_um)}um",
+            "settle_window": f"{float(4 * self.count_um)}um",
+            "settle_time": "20ms",
+            "following_limit": "1mm",
+            "travel_low": f"{float(-edge)}mm",
+            "travel_high": f"{float(edge)}mm",
+            "acceleration": "1m/s2",
+            "jerk": "50m/s3",
+            "velocity": f"{self.top_mm_s}mm/s",
+            "home_method": 1,
+            "homing_search_speed": "20mm/s",
+            "homing_latch_speed": "5mm/s",
+            "home_distance": "4mm",
+        }
 
 
-SCALES = {"X": Scale(Fraction(1, 2), 150, Fraction(5, 4), 100), "Y": Scale(Fraction(1, 2), 150, Fraction(5, 4), 100),
-          "Z": Scale(Fraction(1, 10), 50, Fraction(1, 4), 25)}
+SCALES = {
+    "X": Scale(Fraction(1, 2), 150, Fraction(5, 4), 100),
+    "Y": Scale(Fraction(1, 2), 150, Fraction(5, 4), 100),
+    "Z": Scale(Fraction(1, 10), 50, Fraction(1, 4), 25),
+}
 
 
 @dataclass(frozen=True)
@@ -86,10 +125,10 @@ class Move:
     what: str
     speed_mm_s: float
     target_um: float
-    counts: int                      # of the node, where it ended
-    given: int                       # counts that the scale went in this move
-    counted: int                     # counts that the node went
-    apart_um: float                  # way of the table by the model less way by the node
+    counts: int  # of the node, where it ended
+    given: int  # counts that the scale went in this move
+    counted: int  # counts that the node went
+    apart_um: float  # way of the table by the model less way by the node
     heading: str
 
     @property
@@ -104,18 +143,25 @@ class Stage:
     twin: object
     bus: Bus
     axes: dict
-    seen: dict = field(default_factory=lambda: {name: [] for name in SCALES})       # (time, counts)
+    seen: dict = field(default_factory=lambda: {name: [] for name in SCALES})  # (time, counts)
 
     @classmethod
     def power_up(cls, seed=1):
-        twin = Twin([Node(1, [scale.machine() for scale in SCALES.values()])], seed=seed, clk_hz=CLK_HZ, node_parameters=NODE)
+        twin = Twin(
+            [Node(1, [scale.machine() for scale in SCALES.values()])],
+            seed=seed,
+            clk_hz=CLK_HZ,
+            node_parameters=NODE,
+        )
         bus = Bus(TwinTransport(twin), random_source=random.Random(seed), poll_s=POLL_S)
         bus.transport.wait(START_S)
         stage = cls(twin, bus, {name: bus.axis(1, number) for number, name in enumerate(SCALES)})
         for name, scale in SCALES.items():
             for parameter, value in scale.settings().items():
                 stage.axes[name].set_parameter(parameter, value)
-            stage.axes[name].set_parameter("home_offset", f"{float(-scale.middle * scale.period_um)}um")
+            stage.axes[name].set_parameter(
+                "home_offset", f"{float(-scale.middle * scale.period_um)}um"
+            )
         return stage
 
     def number(self, name):
@@ -134,7 +180,7 @@ class Stage:
                 if status.ended != "running":
                     waiting.discard(name)
         for name in names:
-            ended[name] = self.axes[name].wait()            # raises unless it ended well
+            ended[name] = self.axes[name].wait()  # raises unless it ended well
         return ended
 
     def home(self):
@@ -143,7 +189,9 @@ class Stage:
         return self.together(lambda name, axis: axis.request("home"), self.axes)
 
     def both(self, name):
-        """(counts of the scale, counts of the node, true place in um), once the table has stopped: the same twice in a row."""
+        """(counts of the scale, counts of the node, true place in um), once the table has stopped:
+        the same twice in a row.
+        """
         number, seen = self.number(name), None
         while True:
             counts = self.axes[name].status().counts
@@ -157,17 +205,33 @@ class Stage:
         before, made = {name: self.both(name) for name in targets_um}, []
         for name in targets_um:
             self.axes[name].set_parameter("velocity", f"{speed_mm_s or SCALES[name].top_mm_s}mm/s")
-        self.together(lambda name, axis: axis.request("move", target=axis.to_counts(targets_um[name] * 1000)), targets_um)
+        self.together(
+            lambda name, axis: axis.request("move", target=axis.to_counts(targets_um[name] * 1000)),
+            targets_um,
+        )
         for name, target in targets_um.items():
             now = self.both(name)
             given, counted, went = (b - a for a, b in zip(before[name], now))
             apart = went - counted * float(SCALES[name].count_um)
-            made.append(Move(name, what, speed_mm_s or SCALES[name].top_mm_s, target, now[1], given, counted, apart,
-                             "up" if given > 0 else "down"))
+            made.append(
+                Move(
+                    name,
+                    what,
+                    speed_mm_s or SCALES[name].top_mm_s,
+                    target,
+                    now[1],
+                    given,
+                    counted,
+                    apart,
+                    "up" if given > 0 else "down",
+                )
+            )
         return made
 
     def call_here(self, name, periods):
-        """Home by method 35: the place where the axis stands gets this name; the travel goes with it."""
+        """Home by method 35: the place where the axis stands gets this name; the travel goes with
+        it.
+        """
         axis, scale = self.axes[name], SCALES[name]
         for end, side in (("travel_low", -1), ("travel_high", 1)):
             axis.write_parameter(end, (periods + side * scale.middle) << 16)
@@ -181,9 +245,16 @@ def moves(stage, done=None):
     made = []
 
     def go(what, share, speed=None, by_um=0.0):
-        made.extend(stage.move(what, {name: share * scale.word_mm * 1000 + by_um for name, scale in SCALES.items()}, speed))
+        made.extend(
+            stage.move(
+                what,
+                {name: share * scale.word_mm * 1000 + by_um for name, scale in SCALES.items()},
+                speed,
+            )
+        )
         if done is not None:
             done()
+
     go("to point A, half a 16-bit counter above the origin", 0.5)
     go("through the origin to point B, as far below it", -0.5)
     go("30 mm/min", -0.5, SLOW_MM_S, 200.0)
@@ -191,7 +262,7 @@ def moves(stage, done=None):
     go("over a border of 16 bits", 0.75)
     go("back to the origin", 0.0)
     for name in SCALES:
-        stage.call_here(name, 1 << 29)                      # 2^31 counts: the border of a signed 32-bit counter
+        stage.call_here(name, 1 << 29)  # 2^31 counts: the border of a signed 32-bit counter
     border = {name: (1 << 31) * float(scale.count_um) for name, scale in SCALES.items()}
     for what, side in (("below 2^31 counts", -1), ("over 2^31 counts", 1)):
         made.extend(stage.move(what, {name: border[name] + side * 1000 for name in SCALES}))
@@ -202,27 +273,63 @@ def moves(stage, done=None):
 
 # ------------------------------------------------------------------ the experiment
 
-HEAD = ("axis", "move", "speed / mm/s", "pulses given", "counted", "wrong", "table less node / um", "counts", "16-bit counter", "came")
+HEAD = (
+    "axis",
+    "move",
+    "speed / mm/s",
+    "pulses given",
+    "counted",
+    "wrong",
+    "table less node / um",
+    "counts",
+    "16-bit counter",
+    "came",
+)
 
 
 def rows(made):
-    return [(move.axis, move.what, f"{move.speed_mm_s:g}", f"{move.given:+d}", f"{move.counted:+d}",
-             (str(move.wrong), "bad" if move.wrong else "good"), f"{move.apart_um:+.2f}", f"{move.counts:+d}", str(move.counts % WORD),
-             move.heading) for move in made]
+    return [
+        (
+            move.axis,
+            move.what,
+            f"{move.speed_mm_s:g}",
+            f"{move.given:+d}",
+            f"{move.counted:+d}",
+            (str(move.wrong), "bad" if move.wrong else "good"),
+            f"{move.apart_um:+.2f}",
+            f"{move.counts:+d}",
+            str(move.counts % WORD),
+            move.heading,
+        )
+        for move in made
+    ]
 
 
 def pictures(stage):
     figure, (places, words) = report.drawing(height=4.2, ncols=2)
     for number, (name, seen) in enumerate(stage.seen.items()):
-        seen = [(time, counts) for time, counts in seen if abs(counts) < 1 << 20]         # before the place is called 2^31
+        seen = [
+            (time, counts) for time, counts in seen if abs(counts) < 1 << 20
+        ]  # before the place is called 2^31
         times, counts = zip(*seen)
         positions = [count * float(SCALES[name].count_um) / 1000 for count in counts]
         places.plot(times, positions, color=report.colour(number), linewidth=0.9, label=name)
         if name == "X":
-            words.plot(times, [count % WORD for count in counts], color=report.colour(number), linewidth=0.9)
-    places.set(xlabel="time / s", ylabel="position / mm", title="homing, and moves on both sides of the origin")
+            words.plot(
+                times,
+                [count % WORD for count in counts],
+                color=report.colour(number),
+                linewidth=0.9,
+            )
+    places.set(
+        xlabel="time / s",
+        ylabel="position / mm",
+        title="homing, and moves on both sides of the origin",
+    )
     places.legend(frameon=False, fontsize="small")
-    words.set(xlabel="time / s", ylabel="16-bit counter", title="what the paper's counter would read of X")
+    words.set(
+        xlabel="time / s", ylabel="16-bit counter", title="what the paper's counter would read of X"
+    )
     caption = "Positions of the three axes, and the reading that cannot tell the sides of the origin apart"
     return picture("moves", caption, report.png(figure))
 
@@ -241,27 +348,64 @@ def run(seed=1, path=ROOT / "build" / "report" / "s2.html", console=None):
     wrong, pulses = sum(move.wrong for move in made), sum(abs(move.given) for move in made)
     widest = max(abs(move.apart_um) / float(SCALES[move.axis].count_um) for move in made)
     long = [move for move in made if abs(move.given) > 10_000]
-    share = max(abs(move.apart_um) / (abs(move.counted) * float(SCALES[move.axis].count_um)) for move in long)
+    share = max(
+        abs(move.apart_um) / (abs(move.counted) * float(SCALES[move.axis].count_um))
+        for move in long
+    )
     compared = [
-        ("pulses given less pulses counted", "0", f"{wrong} of {pulses}", report.verdict(wrong == 0)),
-        ("against a digital read-out, share of the way", "within 1/10 000", f"1/{1 / share:,.0f}".replace(",", " "),
-         report.verdict(share < PAPER_SHARE)),
-        ("largest difference of table and node", "not given", f"{widest:.2f} counts", report.verdict(None)),
-        ("side of the origin", "sum of 10 ms readings, by a direction bit", "sign of the position", report.verdict(None))]
-    path = page(path, "S2: three axes with direct scale input",
-                "Three stepper axes in one node, simulated from the very RTL and firmware that go into the FPGA. Points A and B lie half a "
-                "16-bit counter above and below the origin: the paper's counter reads the same at both, and its direction bit only tells "
-                "the way of the last pulse. The node's position has 48 bits and a sign.",
-                [report.table(("", "paper", "here", ""), compared), pictures(stage), report.table(HEAD, rows(made), text_columns=2)],
-                {"simulated time": f"{stage.bus.transport.now():.1f} s",
-                 "again": f"build/venv/bin/python -m experiments.s2_stage --seed {seed}"})
-    console.print(f"{wrong} of {pulses} pulses counted wrongly; table and node differ by {widest:.2f} counts at most")
+        (
+            "pulses given less pulses counted",
+            "0",
+            f"{wrong} of {pulses}",
+            report.verdict(wrong == 0),
+        ),
+        (
+            "against a digital read-out, share of the way",
+            "within 1/10 000",
+            f"1/{1 / share:,.0f}".replace(",", " "),
+            report.verdict(share < PAPER_SHARE),
+        ),
+        (
+            "largest difference of table and node",
+            "not given",
+            f"{widest:.2f} counts",
+            report.verdict(None),
+        ),
+        (
+            "side of the origin",
+            "sum of 10 ms readings, by a direction bit",
+            "sign of the position",
+            report.verdict(None),
+        ),
+    ]
+    path = page(
+        path,
+        "S2: three axes with direct scale input",
+        "Three stepper axes in one node, simulated from the very RTL and firmware that go into the FPGA. Points A and B lie half a "
+        "16-bit counter above and below the origin: the paper's counter reads the same at both, and its direction bit only tells "
+        "the way of the last pulse. The node's position has 48 bits and a sign.",
+        [
+            report.table(("", "paper", "here", ""), compared),
+            pictures(stage),
+            report.table(HEAD, rows(made), text_columns=2),
+        ],
+        {
+            "simulated time": f"{stage.bus.transport.now():.1f} s",
+            "again": f"build/venv/bin/python -m experiments.s2_stage --seed {seed}",
+        },
+    )
+    console.print(
+        f"{wrong} of {pulses} pulses counted wrongly; table and node differ by {widest:.2f} counts at most"
+    )
     console.print(f"report with pictures: {path}", soft_wrap=True)
     return made, path
 
 
 def main(arguments=None):
-    parser = argparse.ArgumentParser(prog="python -m experiments.s2_stage", description="S2 in the twin: home, move, count, report.")
+    parser = argparse.ArgumentParser(
+        prog="python -m experiments.s2_stage",
+        description="S2 in the twin: home, move, count, report.",
+    )
     parser.add_argument("--seed", type=int, default=1, help="of the machine (default 1)")
     options = parser.parse_args(arguments)
     try:

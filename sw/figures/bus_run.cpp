@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// bus_run -- drive the Verilated line of a node, its firmware behind the registers, with good, damaged and senseless frames.
+// bus_run -- drive the Verilated line of a node, its firmware behind the registers, with good,
+// damaged and senseless frames.
 //
-//   bus_run flips FRAME          every flip of 1, 2 and 3 bits of one of ten frames, start and stop bits too
-//   bus_run bursts FRAME SEED    bursts of 2 to 16 bits at every place of it: turned over, stuck at 0, stuck at 1, random
-//   bus_run random COUNT SEED    frames of a right command byte and random bytes, most of them with a length that fits
-//       prints `tried wrong missed`. tried: the words on the line were others than those sent; wrong: taken for good, or something moved;
-//       missed: good ones between them that were not taken
-//   bus_run disturb COUNT SEED   anything at all, a character of silence, then a good exchange; prints `tried refused`
-//   bus_run baud BIT_CLK SEED    prints the mismatch from which on a frame is lost, percent: sender too slow, sender too fast
+//   bus_run flips FRAME          every flip of 1, 2 and 3 bits of one of ten frames, start and stop
+//   bits too bus_run bursts FRAME SEED    bursts of 2 to 16 bits at every place of it: turned over,
+//   stuck at 0, stuck at 1, random bus_run random COUNT SEED    frames of a right command byte and
+//   random bytes, most of them with a length that fits
+//       prints `tried wrong missed`. tried: the words on the line were others than those sent;
+//       wrong: taken for good, or something moved; missed: good ones between them that were not
+//       taken
+//   bus_run disturb COUNT SEED   anything at all, a character of silence, then a good exchange;
+//   prints `tried refused` bus_run baud BIT_CLK SEED    prints the mismatch from which on a frame
+//   is lost, percent: sender too slow, sender too fast
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -30,16 +34,16 @@ void firmware_start(void);
 namespace {
 
 constexpr unsigned ADDRESS = 1, TO_NODE = 0x20 | ADDRESS, FROM_NODE = 0x10 | ADDRESS, READY = 0x40;
-constexpr unsigned CELLS = 11;           // of a character
-constexpr unsigned ANSWER = 20;          // cells: the ready byte, with the lead and the trail of the driver
-constexpr uint64_t POLL_CLK = 64;        // the firmware looks at the line so often
-constexpr unsigned ACCESS_CLK = 4;       // a register access with the instructions around it
+constexpr unsigned CELLS = 11;   // of a character
+constexpr unsigned ANSWER = 20;  // cells: the ready byte, with the lead and the trail of the driver
+constexpr uint64_t POLL_CLK = 64;   // the firmware looks at the line so often
+constexpr unsigned ACCESS_CLK = 4;  // a register access with the instructions around it
 constexpr uint32_t BAUD = 115200;
 
 using Levels = std::vector<uint8_t>;
 using Bytes = std::vector<uint8_t>;
 
-struct Random {                          // xorshift64*
+struct Random {  // xorshift64*
     uint64_t state;
     uint64_t operator()() {
         state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
@@ -49,7 +53,7 @@ struct Random {                          // xorshift64*
     double between(double a, double b) { return a + (b - a) * below(1 << 20) / (1 << 20); }
 };
 
-uint32_t crc32(const Bytes &bytes) {
+uint32_t crc32(const Bytes& bytes) {
     uint32_t crc = ~0u;
     for (const uint8_t byte : bytes) {
         crc ^= byte;
@@ -58,7 +62,7 @@ uint32_t crc32(const Bytes &bytes) {
     return ~crc;
 }
 
-void add_character(Levels &cells, unsigned word) {               // bit 8: the 9th
+void add_character(Levels& cells, unsigned word) {  // bit 8: the 9th
     cells.push_back(0);
     for (int n = 0; n < 9; n++) cells.push_back(word >> n & 1);
     cells.push_back(1);
@@ -70,7 +74,7 @@ Levels command(unsigned byte) {
     return cells;
 }
 
-Levels payload(const Bytes &body) {
+Levels payload(const Bytes& body) {
     Bytes bytes = {TO_NODE, uint8_t(body.size())};
     bytes.insert(bytes.end(), body.begin(), body.end());
     const uint32_t crc = crc32(bytes);
@@ -80,16 +84,18 @@ Levels payload(const Bytes &body) {
     return cells;
 }
 
-Bytes frame_of(unsigned number) {                                // the bodies of the ten frames
+Bytes frame_of(unsigned number) {  // the bodies of the ten frames
     static const Bytes bodies[] = {
-        {1, BUS_OPERATION_IDENTIFY}, {0x55, BUS_OPERATION_COUNTERS}, {3, BUS_OPERATION_STATUS, 0}, {0xFF, BUS_OPERATION_STOP, 0},
-        {0, BUS_OPERATION_HOME, 0}, {0x80, BUS_OPERATION_RESET_FAULTS, 0}, {7, BUS_OPERATION_POSITION, 0},
-        {0xAA, BUS_OPERATION_START, 1}, {9, BUS_OPERATION_ENABLE, 0, 1}, {10, BUS_OPERATION_GET_PARAMETER, 0, 15}};
+        {1, BUS_OPERATION_IDENTIFY},     {0x55, BUS_OPERATION_COUNTERS},
+        {3, BUS_OPERATION_STATUS, 0},    {0xFF, BUS_OPERATION_STOP, 0},
+        {0, BUS_OPERATION_HOME, 0},      {0x80, BUS_OPERATION_RESET_FAULTS, 0},
+        {7, BUS_OPERATION_POSITION, 0},  {0xAA, BUS_OPERATION_START, 1},
+        {9, BUS_OPERATION_ENABLE, 0, 1}, {10, BUS_OPERATION_GET_PARAMETER, 0, 15}};
     return bodies[number % (sizeof bodies / sizeof *bodies)];
 }
 
 class Node {
-public:
+ public:
     explicit Node(unsigned bit_clk) : bit_clk_(bit_clk) {
         top_.address = ADDRESS;
         top_.rs485_rx = 1;
@@ -101,8 +107,8 @@ public:
         set_bit_time(16 * bit_clk);
         rest(CELLS);
     }
-    static inline Node *now;             // whose registers the firmware accesses
-    std::vector<unsigned> heard;         // words that the master hears
+    static inline Node* now;      // whose registers the firmware accesses
+    std::vector<unsigned> heard;  // words that the master hears
 
     uint32_t access(bool write, uint32_t offset, uint32_t value) {
         top_.select = 1, top_.write = write, top_.word = uint8_t(offset / 4), top_.wdata = value;
@@ -113,26 +119,30 @@ public:
         return read;
     }
     // One level a cell, or a cell_clk of its own; it begins `phase` of a cell after a clk.
-    void send(const Levels &cells, double cell_clk = 0, double phase = 0) {
+    void send(const Levels& cells, double cell_clk = 0, double phase = 0) {
         if (cell_clk == 0) cell_clk = bit_clk_;
         Levels levels;
         for (size_t n = 0; n < cells.size(); n++)
-            while (double(levels.size()) < (double(n + 1) + phase) * cell_clk) levels.push_back(n || double(levels.size()) >= phase * cell_clk ? cells[n] : 1);
+            while (double(levels.size()) < (double(n + 1) + phase) * cell_clk)
+                levels.push_back(n || double(levels.size()) >= phase * cell_clk ? cells[n] : 1);
         send_levels(levels);
     }
-    void send_levels(const Levels &levels) {                     // a level a clk
+    void send_levels(const Levels& levels) {  // a level a clk
         wave_ = &levels, place_ = 0;
         while (place_ < levels.size()) step();
         wave_ = nullptr;
     }
-    void rest(unsigned cells) {                                  // until the line was silent for so long
-        for (uint64_t silent = 0; silent < uint64_t(cells) * bit_clk_; silent = top_.rs485_driver_enable ? 0 : silent + 1) step();
+    void rest(unsigned cells) {  // until the line was silent for so long
+        for (uint64_t silent = 0; silent < uint64_t(cells) * bit_clk_;
+             silent = top_.rs485_driver_enable ? 0 : silent + 1)
+            step();
     }
     uint32_t frames_good() { return access(false, BUS_FRAMES_GOOD, 0); }
     void set_bit_time(uint32_t sixteenths) { access(true, BUS_BIT_TIME, sixteenths); }
 
-    // A master that heard nothing wrong: both halves of an exchange; the reply must be that of this request.
-    bool exchange(const Bytes &body) {
+    // A master that heard nothing wrong: both halves of an exchange; the reply must be that of this
+    // request.
+    bool exchange(const Bytes& body) {
         heard.clear();
         send(command(TO_NODE));
         rest(ANSWER);
@@ -142,18 +152,20 @@ public:
         heard.clear();
         send(command(FROM_NODE));
         rest(ANSWER);
-        if (heard.size() < 9 || heard.size() != heard[1] + 6u || heard[0] != (READY | FROM_NODE)) return false;
+        if (heard.size() < 9 || heard.size() != heard[1] + 6u || heard[0] != (READY | FROM_NODE))
+            return false;
         Bytes reply(heard.begin(), heard.end() - 4);
         uint32_t crc = 0;
         for (size_t n = 0; n < 4; n++) crc |= uint32_t(heard[heard.size() - 4 + n]) << 8 * n;
         return crc == crc32(reply) && reply[2] == body[0] && reply[3] == body[1];
     }
 
-private:
+ private:
     void clk() {
-        const bool driven = top_.rs485_driver_enable, level = !wave_ || place_ >= wave_->size() || (*wave_)[place_];
+        const bool driven = top_.rs485_driver_enable,
+                   level = !wave_ || place_ >= wave_->size() || (*wave_)[place_];
         place_++;
-        top_.rs485_rx = level && (!driven || top_.rs485_tx);       // both at once: low wins
+        top_.rs485_rx = level && (!driven || top_.rs485_tx);  // both at once: low wins
         top_.clk = 1;
         top_.eval();
         top_.clk = 0;
@@ -167,7 +179,7 @@ private:
             bus_poll();
         }
     }
-    void hear(bool level) {                                      // each bit in its middle
+    void hear(bool level) {  // each bit in its middle
         if (age_ < 0) {
             if (!level) age_ = 0, word_ = 0;
             return;
@@ -182,14 +194,14 @@ private:
 
     Vtop top_;
     unsigned bit_clk_;
-    const Levels *wave_ = nullptr;
+    const Levels* wave_ = nullptr;
     size_t place_ = 0;
     uint64_t since_poll_ = 0;
     int age_ = -1;
     unsigned word_ = 0;
 };
 
-uint32_t held[0x2000 / 4], moved;        // registers outside the line; writes to them
+uint32_t held[0x2000 / 4], moved;  // registers outside the line; writes to them
 uint64_t stamp;
 
 // ------------------------------------------------------------------ damaged frames
@@ -198,9 +210,9 @@ struct Count {
     uint64_t tried = 0, wrong = 0, missed = 0;
 };
 
-// What a receiver makes of the two halves of an exchange: words with a stop bit. A burst may turn a character into the very same one a
-// bit later: then nothing is damaged.
-std::vector<unsigned> words_of(const Levels &cells) {
+// What a receiver makes of the two halves of an exchange: words with a stop bit. A burst may turn a
+// character into the very same one a bit later: then nothing is damaged.
+std::vector<unsigned> words_of(const Levels& cells) {
     Levels line(cells.begin(), cells.begin() + CELLS);
     line.insert(line.end(), ANSWER, 1);
     line.insert(line.end(), cells.begin() + CELLS, cells.end());
@@ -222,9 +234,9 @@ std::vector<unsigned> words_of(const Levels &cells) {
 }
 
 class Campaign {
-public:
+ public:
     // The master sends the payload whether or not the node said that it is ready.
-    void damaged(const Levels &cells, const std::vector<unsigned> &sent) {
+    void damaged(const Levels& cells, const std::vector<unsigned>& sent) {
         if (words_of(cells) == sent) return;
         play(cells);
         count_.tried++;
@@ -238,10 +250,13 @@ public:
         play(cells);
         count_.missed += good_ != 1;
     }
-    void print() const { std::printf("%llu %llu %llu\n", (unsigned long long)count_.tried, (unsigned long long)count_.wrong, (unsigned long long)count_.missed); }
+    void print() const {
+        std::printf("%llu %llu %llu\n", (unsigned long long)count_.tried,
+                    (unsigned long long)count_.wrong, (unsigned long long)count_.missed);
+    }
 
-private:
-    void play(const Levels &cells) {
+ private:
+    void play(const Levels& cells) {
         const uint32_t before = node_.frames_good();
         moved_ = moved;
         node_.heard.clear();
@@ -297,7 +312,10 @@ void bursts(unsigned number, Random random) {
                 Levels damaged = cells;
                 for (size_t n = first; n < first + length; n++) {
                     const bool end = n == first || n == first + length - 1;
-                    damaged[n] = kind == 0 ? !cells[n] : kind < 3 ? uint8_t(kind - 1) : end ? !cells[n] : uint8_t(random.below(2));
+                    damaged[n] = kind == 0  ? !cells[n]
+                                 : kind < 3 ? uint8_t(kind - 1)
+                                 : end      ? !cells[n]
+                                            : uint8_t(random.below(2));
                 }
                 campaign.damaged(damaged, sent);
             }
@@ -323,14 +341,14 @@ void random_frames(uint64_t count, Random random) {
 
 constexpr unsigned BIT_CLK = 16;
 
-Levels in_clk(const Levels &cells, double cell_clk) {
+Levels in_clk(const Levels& cells, double cell_clk) {
     Levels levels;
     for (size_t n = 0; n < cells.size(); n++)
         while (double(levels.size()) < double(n + 1) * cell_clk) levels.push_back(cells[n]);
     return levels;
 }
 
-Levels some_frame(Random &random) {
+Levels some_frame(Random& random) {
     Levels cells = command(random.below(4) ? TO_NODE : random.below(256));
     if (random.below(2)) cells.insert(cells.end(), ANSWER, 1);
     const Levels more = payload(frame_of(random.below(10)));
@@ -338,45 +356,51 @@ Levels some_frame(Random &random) {
     return cells;
 }
 
-Levels disturbance(Random &random) {                             // a level a clk
+Levels disturbance(Random& random) {  // a level a clk
     Levels cells = some_frame(random), levels = in_clk(cells, BIT_CLK), other;
-    const auto place = [&](const Levels &of) { return random.below(unsigned(of.size())); };
+    const auto place = [&](const Levels& of) { return random.below(unsigned(of.size())); };
     switch (random.below(10)) {
-    case 0:                                                      // flips
+    case 0:  // flips
         for (unsigned n = 1 + random.below(3); n--;) cells[place(cells)] ^= 1;
         return in_clk(cells, BIT_CLK);
-    case 1: {                                                    // a burst
-        const unsigned first = place(cells), last = std::min(unsigned(cells.size()), first + 2 + random.below(15));
+    case 1: {  // a burst
+        const unsigned first = place(cells),
+                       last = std::min(unsigned(cells.size()), first + 2 + random.below(15));
         for (unsigned n = first; n < last; n++) cells[n] = uint8_t(random.below(2));
         return in_clk(cells, BIT_CLK);
     }
-    case 2:                                                      // a slip of a cell
-        if (random.below(2)) cells.erase(cells.begin() + place(cells));
-        else cells.insert(cells.begin() + place(cells), uint8_t(random.below(2)));
+    case 2:  // a slip of a cell
+        if (random.below(2))
+            cells.erase(cells.begin() + place(cells));
+        else
+            cells.insert(cells.begin() + place(cells), uint8_t(random.below(2)));
         return in_clk(cells, BIT_CLK);
-    case 3:                                                      // babble
+    case 3:  // babble
         cells.resize(1 + random.below(400));
-        for (auto &cell : cells) cell = uint8_t(random.below(2));
+        for (auto& cell : cells) cell = uint8_t(random.below(2));
         return in_clk(cells, BIT_CLK);
-    case 4:                                                      // half a frame
+    case 4:  // half a frame
         levels.resize(1 + place(levels));
         return levels;
-    case 5:                                                      // another baud rate
+    case 5:  // another baud rate
         return in_clk(cells, BIT_CLK * random.between(0.2, 4));
-    case 6:                                                      // a second master; a low wins
+    case 6:  // a second master; a low wins
         other = in_clk(some_frame(random), BIT_CLK);
-        for (size_t n = 0, from = place(levels); n < other.size() && from + n < levels.size(); n++) levels[from + n] &= other[n];
+        for (size_t n = 0, from = place(levels); n < other.size() && from + n < levels.size(); n++)
+            levels[from + n] &= other[n];
         return levels;
-    case 7:                                                      // a break
+    case 7:  // a break
         return Levels(BIT_CLK * (CELLS + random.below(300)), 0);
-    case 8:                                                      // spikes, shorter than a bit
+    case 8:  // spikes, shorter than a bit
         levels.assign(1 + random.below(4000), 1);
         for (unsigned n = 1 + random.below(20); n--;)
-            for (unsigned at = place(levels), left = 1 + random.below(BIT_CLK); left-- && at < levels.size();) levels[at++] = 0;
+            for (unsigned at = place(levels), left = 1 + random.below(BIT_CLK);
+                 left-- && at < levels.size();)
+                levels[at++] = 0;
         return levels;
-    default:                                                     // noise
+    default:  // noise
         levels.resize(1 + random.below(3000));
-        for (auto &level : levels) level = uint8_t(random.below(2));
+        for (auto& level : levels) level = uint8_t(random.below(2));
         return levels;
     }
 }
@@ -394,12 +418,12 @@ void disturb(uint64_t count, Random random) {
 
 // ------------------------------------------------------------------ baud rate
 
-// The first frames that the node does not take, as the sender gets slower or faster by 0.1 % of its bit time: characters without any gap,
-// since then the error of one is the beginning of the next.
-double mismatch(Node &node, double bit_clk, int sign, const std::vector<Bytes> &bodies) {
+// The first frames that the node does not take, as the sender gets slower or faster by 0.1 % of its
+// bit time: characters without any gap, since then the error of one is the beginning of the next.
+double mismatch(Node& node, double bit_clk, int sign, const std::vector<Bytes>& bodies) {
     for (int permille = 0;; permille++) {
         const double cell = bit_clk * (1 + sign * permille / 1000.0);
-        for (const Bytes &body : bodies)
+        for (const Bytes& body : bodies)
             for (int phase = 0; phase < 8; phase++) {
                 const uint32_t before = node.frames_good();
                 node.send(command(TO_NODE), cell, phase / 8.0 / cell);
@@ -413,10 +437,11 @@ double mismatch(Node &node, double bit_clk, int sign, const std::vector<Bytes> &
 
 void baud(double bit_clk, Random random) {
     Node node(unsigned(bit_clk + 0.5));
-    std::vector<Bytes> bodies = {Bytes(16, 0x00), Bytes(16, 0xFF), Bytes(16, 0x55), Bytes(16, 0xAA), Bytes(16, 0x80), Bytes(16, 0x7F)};
+    std::vector<Bytes> bodies = {Bytes(16, 0x00), Bytes(16, 0xFF), Bytes(16, 0x55),
+                                 Bytes(16, 0xAA), Bytes(16, 0x80), Bytes(16, 0x7F)};
     for (int n = 0; n < 3; n++) {
         bodies.push_back(Bytes(16));
-        for (auto &byte : bodies.back()) byte = uint8_t(random.below(256));
+        for (auto& byte : bodies.back()) byte = uint8_t(random.below(256));
     }
     node.set_bit_time(uint32_t(bit_clk * 16 + 0.5));
     const double slow = mismatch(node, bit_clk, 1, bodies);
@@ -432,7 +457,10 @@ extern "C" uint32_t register_read(uint32_t offset) {
     case NODE_BUILD: return FIELD_PUT(NODE_BUILD_AXES, 1) | FIELD_PUT(NODE_BUILD_ADDRESS, ADDRESS);
     case NODE_TIME_STAMP_LOW: return uint32_t(stamp++);
     case AXIS_BASE + AXIS_STATE: return FIELD_PUT(AXIS_STATE_QUEUE_FREE, 16);
-    default: return offset >= BUS_BASE && offset < BUS_BASE + 0x100 ? Node::now->access(false, offset - BUS_BASE, 0) : held[offset / 4 % (0x2000 / 4)];
+    default:
+        return offset >= BUS_BASE && offset < BUS_BASE + 0x100
+                   ? Node::now->access(false, offset - BUS_BASE, 0)
+                   : held[offset / 4 % (0x2000 / 4)];
     }
 }
 
@@ -445,15 +473,23 @@ extern "C" void register_write(uint32_t offset, uint32_t value) {
     }
 }
 
-int main(int count, char **arguments) {
+int main(int count, char** arguments) {
     const std::string what = count > 1 ? arguments[1] : "";
     const auto number = [&](int n) { return std::strtoull(arguments[n], nullptr, 10); };
     const auto random = [&](int n) { return Random{number(n) * 0x9E3779B97F4A7C15ULL + 1}; };
-    if (what == "flips" && count == 3) flips(unsigned(number(2)));
-    else if (what == "bursts" && count == 4) bursts(unsigned(number(2)), random(3));
-    else if (what == "random" && count == 4) random_frames(number(2), random(3));
-    else if (what == "disturb" && count == 4) disturb(number(2), random(3));
-    else if (what == "baud" && count == 4) baud(std::strtod(arguments[2], nullptr), random(3));
-    else return std::fprintf(stderr, "bus_run flips|bursts|random|disturb|baud …, see its first lines\n"), 2;
+    if (what == "flips" && count == 3)
+        flips(unsigned(number(2)));
+    else if (what == "bursts" && count == 4)
+        bursts(unsigned(number(2)), random(3));
+    else if (what == "random" && count == 4)
+        random_frames(number(2), random(3));
+    else if (what == "disturb" && count == 4)
+        disturb(number(2), random(3));
+    else if (what == "baud" && count == 4)
+        baud(std::strtod(arguments[2], nullptr), random(3));
+    else
+        return std::fprintf(stderr,
+                            "bus_run flips|bursts|random|disturb|baud …, see its first lines\n"),
+               2;
     return 0;
 }

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What every figure is made of."""
+
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -9,9 +10,16 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 HERE = Path(__file__).parent
-TOOLS = {"__init__", "common", "comparison", "figure", "soak", "synthesis"}      # modules here that measure nothing
+TOOLS = {
+    "__init__",
+    "common",
+    "comparison",
+    "figure",
+    "soak",
+    "synthesis",
+}  # modules here that measure nothing
 
-console = Console(stderr=True)       # facts and progress; the figure itself goes to standard output
+console = Console(stderr=True)  # facts and progress; the figure itself goes to standard output
 
 
 @dataclass(frozen=True)
@@ -19,14 +27,16 @@ class Figure:
     measure: Callable[[], float]
     unit: str
     what: str
-    wanted: str                      # in words, with its comparison
+    wanted: str  # in words, with its comparison
     good: Callable[[float], bool]
     digits: int = 3
 
 
 def bar(text):
     """A progress bar for long work."""
-    return Progress(TextColumn(text), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=console)
+    return Progress(
+        TextColumn(text), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=console
+    )
 
 
 def collected(attribute):

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// counts_run -- move three scales in front of three Verilated axes, and hold their position registers against the pulses given.
+// counts_run -- move three scales in front of three Verilated axes, and hold their position
+// registers against the pulses given.
 //
-//   counts_run PULSES SEED [too_fast]     until each axis had so many; too_fast: edges closer than the edge filter passes
+//   counts_run PULSES SEED [too_fast]     until each axis had so many; too_fast: edges closer than
+//   the edge filter passes
 //
-// Each axis goes its own way: runs of random direction, length and speed, from the fastest that its edge filter passes to a thousandth
-// of it. At the end of each run its registers are read, while the other axes move. Now and then the origin moves, in motion too, so
-// that the next runs cross 0, a multiple of 2^16, +-2^31, +-2^32 or the +-2^33 counts where the register itself wraps.
+// Each axis goes its own way: runs of random direction, length and speed, from the fastest that its
+// edge filter passes to a thousandth of it. At the end of each run its registers are read, while
+// the other axes move. Now and then the origin moves, in motion too, so that the next runs cross 0,
+// a multiple of 2^16, +-2^31, +-2^32 or the +-2^33 counts where the register itself wraps.
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -20,11 +23,12 @@
 namespace {
 
 constexpr int AXES = 3, REST_CLK = 64, TICK_CLK = 15000, SAMPLE_CLK = 600;
-constexpr unsigned NEEDED[AXES] = {1, 3, 5};             // equal samples that the edge filter wants; 1: every clk
-constexpr int64_t COUNT = 1 << 14, PERIOD = 1 << 16;     // of the position
+constexpr unsigned NEEDED[AXES] = {1, 3,
+                                   5};  // equal samples that the edge filter wants; 1: every clk
+constexpr int64_t COUNT = 1 << 14, PERIOD = 1 << 16;  // of the position
 constexpr int64_t POSITIONS = 1LL << 48, COUNTS = POSITIONS / COUNT;
 
-struct Random {                                          // xorshift64*
+struct Random {  // xorshift64*
     uint64_t state;
     uint64_t operator()() {
         state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
@@ -35,21 +39,22 @@ struct Random {                                          // xorshift64*
     bool one_in(int64_t n) { return below(n) == 0; }
 };
 
-int64_t wrapped(int64_t value, int64_t whole) {          // to -whole/2 .. whole/2 - 1
+int64_t wrapped(int64_t value, int64_t whole) {  // to -whole/2 .. whole/2 - 1
     value &= whole - 1;
     return value >= whole / 2 ? value - whole : value;
 }
 
 struct Scale {
-    int64_t counts = 0;                                  // since reset
-    int64_t origin = 0;                                  // periods by which the node's origin was moved
-    int64_t direction = 1, left = 0;                     // pulses of this run
-    double spacing = 1, next = 0;                        // clk
-    uint64_t pulses = 0, reversals = 0, checks = 0, wrong = 0, zero = 0, word = 0, long_word = 0, whole = 0, moved = 0;
+    int64_t counts = 0;               // since reset
+    int64_t origin = 0;               // periods by which the node's origin was moved
+    int64_t direction = 1, left = 0;  // pulses of this run
+    double spacing = 1, next = 0;     // clk
+    uint64_t pulses = 0, reversals = 0, checks = 0, wrong = 0, zero = 0, word = 0, long_word = 0,
+             whole = 0, moved = 0;
 
     int64_t place() const { return counts + origin * (PERIOD / COUNT); }
     void step() {
-        const int64_t border = place() + (direction > 0);               // the count whose lower edge is passed
+        const int64_t border = place() + (direction > 0);  // the count whose lower edge is passed
         zero += (border & (COUNTS - 1)) == 0;
         word += (border & 0xFFFF) == 0;
         long_word += (border & 0x7FFFFFFF) == 0;
@@ -67,7 +72,7 @@ struct Bench {
     void clk() {
         unsigned a = 0, b = 0;
         for (int n = 0; n < AXES; n++) {
-            Scale &scale = scales[n];
+            Scale& scale = scales[n];
             if (scale.left && double(now) >= scale.next) scale.step(), scale.next += scale.spacing;
             const unsigned quarter = unsigned(scale.counts) & 3;
             a |= ((quarter ^ quarter >> 1) & 1) << n, b |= (quarter >> 1) << n;
@@ -100,26 +105,30 @@ struct Bench {
         for (int n = 0; n < 2 * SAMPLE_CLK; n++) clk();
     }
     void check(int axis) {
-        Scale &scale = scales[axis];
+        Scale& scale = scales[axis];
         const uint64_t low = read(axis, AXIS_POSITION_LOW), high = read(axis, AXIS_POSITION_HIGH);
         const int64_t apart = wrapped(int64_t(high << 32 | low) - scale.place() * COUNT, POSITIONS);
         const int32_t counted = int32_t(read(axis, AXIS_QUADRATURE_COUNT));
-        const bool illegal = read(axis, AXIS_ENCODER_EVENTS) & AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_MASK;
+        const bool illegal =
+            read(axis, AXIS_ENCODER_EVENTS) & AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_MASK;
         scale.checks++;
         if (apart == 0 && counted == int32_t(scale.counts) && !illegal) return;
         scale.wrong += apart ? uint64_t(std::llabs(apart) + COUNT - 1) / COUNT : 1;
-        scale.counts += apart / COUNT;                    // each wrong count is told once
+        scale.counts += apart / COUNT;  // each wrong count is told once
         access(axis, false, AXIS_ENCODER_EVENTS, true, AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_MASK);
     }
-    void move_origin(int axis, Random &random) {         // near one border after the other
-        const int64_t borders[] = {0, random.below(COUNTS >> 16) << 16, 1LL << 31, -(1LL << 31), 1LL << 32, -(1LL << 32), COUNTS / 2};
+    void move_origin(int axis, Random& random) {  // near one border after the other
+        const int64_t borders[] = {0,         random.below(COUNTS >> 16) << 16,
+                                   1LL << 31, -(1LL << 31),
+                                   1LL << 32, -(1LL << 32),
+                                   COUNTS / 2};
         const int64_t near = borders[scales[axis].moved++ % 7] + random.below(201) - 100;
         const int32_t periods = int32_t(uint64_t(near - scales[axis].place()) >> 2);
         scales[axis].origin += periods;
         access(axis, false, AXIS_SHIFT_ORIGIN, true, uint32_t(periods));
     }
-    void begin_run(int axis, Random &random, bool too_fast) {
-        Scale &scale = scales[axis];
+    void begin_run(int axis, Random& random, bool too_fast) {
+        Scale& scale = scales[axis];
         const double fastest = (NEEDED[axis] + 1) / 2.0;
         const double slower = std::pow(random.one_in(2) ? 4 : 1000, random.share());
         const double clk = random.one_in(500) ? 60000 : 30 * std::pow(100, random.share());
@@ -134,13 +143,13 @@ struct Bench {
 
 }  // namespace
 
-int main(int count, char **words) {
+int main(int count, char** words) {
     if (count < 3) return 2;
     const uint64_t wanted = std::strtoull(words[1], nullptr, 10);
     const bool too_fast = count > 3 && !std::strcmp(words[3], "too_fast");
     Random random{std::strtoull(words[2], nullptr, 10) * 0x9E3779B97F4A7C15ULL + 1};
     Bench bench;
-    uint64_t resting[AXES] = {};                          // until then; 0: not
+    uint64_t resting[AXES] = {};  // until then; 0: not
     int at_work = AXES;
     bench.reset();
     for (int n = 0; n < AXES; n++) bench.begin_run(n, random, too_fast);
@@ -148,7 +157,7 @@ int main(int count, char **words) {
         bench.clk();
         at_work = 0;
         for (int n = 0; n < AXES; n++) {
-            Scale &scale = bench.scales[n];
+            Scale& scale = bench.scales[n];
             if (scale.left) {
                 if (random.one_in(100000)) bench.move_origin(n, random);
             } else if (!resting[n]) {
@@ -163,11 +172,14 @@ int main(int count, char **words) {
         }
     }
     for (int n = 0; n < AXES; n++) bench.check(n);
-    for (const Scale &scale : bench.scales)
-        std::printf("%llu pulses %llu wrong %llu checks %llu reversals %llu zero %llu word %llu long_word %llu whole\n",
-                    (unsigned long long)scale.pulses, (unsigned long long)scale.wrong, (unsigned long long)scale.checks,
-                    (unsigned long long)scale.reversals, (unsigned long long)scale.zero, (unsigned long long)scale.word,
-                    (unsigned long long)scale.long_word, (unsigned long long)scale.whole);
+    for (const Scale& scale : bench.scales)
+        std::printf(
+            "%llu pulses %llu wrong %llu checks %llu reversals %llu zero %llu word %llu long_word "
+            "%llu whole\n",
+            (unsigned long long)scale.pulses, (unsigned long long)scale.wrong,
+            (unsigned long long)scale.checks, (unsigned long long)scale.reversals,
+            (unsigned long long)scale.zero, (unsigned long long)scale.word,
+            (unsigned long long)scale.long_word, (unsigned long long)scale.whole);
     std::printf("%llu clk\n", (unsigned long long)bench.now);
     return 0;
 }

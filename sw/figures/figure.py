@@ -8,6 +8,7 @@
 
 The exit code is 0 when the figure is what is wanted of it, 1 when it is not.
 """
+
 import argparse
 import sys
 import time
@@ -36,9 +37,13 @@ def measure(name, figure):
 
 def main(arguments=None):
     figures = collected("FIGURES")
-    parser = argparse.ArgumentParser(prog="python -m figures.figure", description="Measure a figure afresh on this machine.")
+    parser = argparse.ArgumentParser(
+        prog="python -m figures.figure", description="Measure a figure afresh on this machine."
+    )
     parser.add_argument("names", nargs="*", metavar="NAME", help="of a figure; see --list")
-    parser.add_argument("--all", action="store_true", help="measure all, and write build/report/figures.html")
+    parser.add_argument(
+        "--all", action="store_true", help="measure all, and write build/report/figures.html"
+    )
     parser.add_argument("--list", action="store_true", help="say which figures there are")
     options = parser.parse_args(arguments)
     if options.list:

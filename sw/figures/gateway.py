@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of the front gateway: how fast a stock client reads through it, and that nothing fed to a parser brings one down."""
+"""Figures of the front gateway: how fast a stock client reads through it, and that nothing fed to a
+parser brings one down.
+"""
+
 import json
 import os
 import shutil
@@ -23,10 +26,19 @@ from moire.errors import MoireError
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "sw" / "firmware"
 READ_S = 10
-START_S = 3                  # the firmware starts, and loads its tables
+START_S = 3  # the firmware starts, and loads its tables
 FUZZ_S = 600
-SANITIZED = ["-std=gnu11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined", "-fno-sanitize-recover=all",
-             "-DMOIRE_REGISTER_ACCESS"]
+SANITIZED = [
+    "-std=gnu11",
+    "-O1",
+    "-g",
+    "-Wall",
+    "-Wextra",
+    "-Werror",
+    "-fsanitize=address,undefined",
+    "-fno-sanitize-recover=all",
+    "-DMOIRE_REGISTER_ACCESS",
+]
 
 
 class NotMeasured(MoireError):
@@ -35,9 +47,24 @@ class NotMeasured(MoireError):
 
 # ------------------------------------------------------------------ reads
 
+
 def rfc2217_reads_per_s(seconds=READ_S):
-    """Positions of a node of the twin, read one after the other by pyserial alone over RFC 2217 in 8N1."""
-    command = [sys.executable, "-m", "moire.cli.command_line", "twin", "--nodes", "1", "--rfc2217", "0", "--tcp", "0", "--json"]
+    """Positions of a node of the twin, read one after the other by pyserial alone over RFC 2217 in
+    8N1.
+    """
+    command = [
+        sys.executable,
+        "-m",
+        "moire.cli.command_line",
+        "twin",
+        "--nodes",
+        "1",
+        "--rfc2217",
+        "0",
+        "--tcp",
+        "0",
+        "--json",
+    ]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as twin:
         told = twin.stdout.readline()
         if not told.startswith('{"command": "twin"'):
@@ -69,8 +96,11 @@ def read_positions(port, seconds):
 
 # ------------------------------------------------------------------ fuzzing
 
+
 def build_firmware_fuzz(folder: Path, image, firmware=FIRMWARE) -> Path:
-    """An image of the firmware of this folder and its fuzzer as a program of this computer, by gcc with its sanitizers."""
+    """An image of the firmware of this folder and its fuzzer as a program of this computer, by gcc
+    with its sanitizers.
+    """
     if shutil.which("gcc") is None:
         raise NotMeasured("gcc is missing: fuzzing the firmware needs its sanitizers")
     traced = ["-Dmain=firmware_main", "-fsanitize-coverage=trace-pc"]
@@ -80,7 +110,19 @@ def build_firmware_fuzz(folder: Path, image, firmware=FIRMWARE) -> Path:
     objects = []
     for path, more in jobs:
         objects.append(folder / f"{path.stem}.o")
-        run(["gcc", *SANITIZED, *tools.defines_of(image), *more, f"-I{firmware}", "-c", path, "-o", objects[-1]])
+        run(
+            [
+                "gcc",
+                *SANITIZED,
+                *tools.defines_of(image),
+                *more,
+                f"-I{firmware}",
+                "-c",
+                path,
+                "-o",
+                objects[-1],
+            ]
+        )
     run(["gcc", "-fsanitize=address,undefined", *objects, "-o", folder / "fuzz"])
     return folder / "fuzz"
 
@@ -88,11 +130,15 @@ def build_firmware_fuzz(folder: Path, image, firmware=FIRMWARE) -> Path:
 def run(command):
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
     if done.returncode:
-        raise NotMeasured(f"the fuzzer does not build: {(done.stderr.splitlines() or ['no word'])[0]}")
+        raise NotMeasured(
+            f"the fuzzer does not build: {(done.stderr.splitlines() or ['no word'])[0]}"
+        )
 
 
 def images(firmware=FIRMWARE):
-    return sorted(path.stem.removeprefix("image_") for path in (Path(firmware) / "images").glob("image_*.c"))
+    return sorted(
+        path.stem.removeprefix("image_") for path in (Path(firmware) / "images").glob("image_*.c")
+    )
 
 
 class Outcome(NamedTuple):
@@ -100,14 +146,23 @@ class Outcome(NamedTuple):
     runs: int
     edges: int
     kept: int
-    said: str | None                     # by a sanitizer, or about an input that took too long
+    said: str | None  # by a sanitizer, or about an input that took too long
 
 
 def fuzz_firmware(seconds, image, seed=1, firmware=FIRMWARE) -> Outcome:
     with tempfile.TemporaryDirectory() as folder:
         program = build_firmware_fuzz(Path(folder), image, firmware)
-        done = subprocess.run([program, str(seconds), str(seed)], capture_output=True, text=True, check=False,
-                              env={**os.environ, "ASAN_OPTIONS": "detect_leaks=0:abort_on_error=1", "UBSAN_OPTIONS": "abort_on_error=1"})
+        done = subprocess.run(
+            [program, str(seconds), str(seed)],
+            capture_output=True,
+            text=True,
+            check=False,
+            env={
+                **os.environ,
+                "ASAN_OPTIONS": "detect_leaks=0:abort_on_error=1",
+                "UBSAN_OPTIONS": "abort_on_error=1",
+            },
+        )
     if done.returncode:
         return Outcome(image, 0, 0, 0, done.stderr)
     return Outcome(image, *map(int, done.stdout.split()), None)
@@ -117,17 +172,23 @@ def host_parser_crashes(seconds=FUZZ_S, seed=1):
     """Both at once, each on a processor of its own."""
     with ThreadPoolExecutor(1) as beside:
         names = images()
-        firmware = beside.submit(lambda: [fuzz_firmware(seconds / len(names), image, seed) for image in names])
+        firmware = beside.submit(
+            lambda: [fuzz_firmware(seconds / len(names), image, seed) for image in names]
+        )
         targets = parser_fuzz.fuzz(seconds, seed)
         outcomes = firmware.result()
     crashes = 0
     for outcome in outcomes:
-        console.print(f"firmware, image {outcome.image}: {outcome.runs} scripts, {outcome.edges} edges, {outcome.kept} kept")
+        console.print(
+            f"firmware, image {outcome.image}: {outcome.runs} scripts, {outcome.edges} edges, {outcome.kept} kept"
+        )
         if outcome.said is not None:
             crashes += 1
             console.print(outcome.said, markup=False)
     for target in targets:
-        console.print(f"{target.parse.__name__}: {target.runs} inputs, {len(target.seen)} pairs of lines, {len(target.corpus)} kept")
+        console.print(
+            f"{target.parse.__name__}: {target.runs} inputs, {len(target.seen)} pairs of lines, {len(target.corpus)} kept"
+        )
         for where, data in target.crashes.items():
             crashes += 1
             console.print(f"{where}: {data!r}", markup=False)
@@ -135,9 +196,22 @@ def host_parser_crashes(seconds=FUZZ_S, seed=1):
 
 
 FIGURES = {
-    "rfc2217_reads_per_s": Figure(rfc2217_reads_per_s, "1/s", "position reads from the twin by stock pyserial over RFC 2217, in 8N1",
-                                  ">= 100", lambda value: value >= 100, 0),
-    "host_parser_crashes": Figure(host_parser_crashes, "crashes", "coverage-guided fuzzing of host and firmware parsers under sanitizers, "
-                                  f"{FUZZ_S // 60} minutes", "0", lambda value: value == 0, 0),
+    "rfc2217_reads_per_s": Figure(
+        rfc2217_reads_per_s,
+        "1/s",
+        "position reads from the twin by stock pyserial over RFC 2217, in 8N1",
+        ">= 100",
+        lambda value: value >= 100,
+        0,
+    ),
+    "host_parser_crashes": Figure(
+        host_parser_crashes,
+        "crashes",
+        "coverage-guided fuzzing of host and firmware parsers under sanitizers, "
+        f"{FUZZ_S // 60} minutes",
+        "0",
+        lambda value: value == 0,
+        0,
+    ),
 }
 SOAK = {"parsers": lambda: (crashes := host_parser_crashes(24 * 3600), crashes == 0)}

@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figure of the guard: does any fault, at whatever clk it comes, leave the drive on, or tell the wrong story afterwards.
+"""Figure of the guard: does any fault, at whatever clk it comes, leave the drive on, or tell the
+wrong story afterwards.
 
-Most faults are injected into the Verilated axis, whose registers are driven over its bus (interlock_run.cpp); some into the whole node
-with its firmware, in the twin, where a person at the host resets them; and some stop the soft core itself.
+Most faults are injected into the Verilated axis, whose registers are driven over its bus
+(interlock_run.cpp); some into the whole node
+with its firmware, in the twin, where a person at the host resets them; and some stop the soft core
+itself.
 The soak of 10^6 faults of the axis is `make soak K=guard`.
 """
+
 import random
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -17,23 +21,40 @@ from twin import START_S, Axis, Node, Twin, TwinTransport, build
 
 ROOT = Path(__file__).resolve().parents[2]
 DRIVER = Path(__file__).with_name("interlock_run.cpp")
-FAULTS, NODE_FAULTS, CORE_FAULTS = 10**4, 300, 100     # in all; of them in the node; of them in its soft core
-SHARE = 400                                            # of the axis' faults in one run, with a seed of its own
+FAULTS, NODE_FAULTS, CORE_FAULTS = (
+    10**4,
+    300,
+    100,
+)  # in all; of them in the node; of them in its soft core
+SHARE = 400  # of the axis' faults in one run, with a seed of its own
 CLK_HZ = 1_500_000
 TICK_S = 1 / 4000
 WATCHDOG_S = 0.04
-ANSWER_S = 0.01                                        # that the longest answer takes on the line, after its request
-CORE_SILENCE_S = 0.02 + 1_200_000 / CLK_HZ             # the node's watchdog of its soft core
-ROUND_S = 0.005                                        # a request on the line, and the round of the firmware that finds it
-FORGIVEN_NM = {"encoder_cut": 400}                     # between the position told last and that of the fault: a cut signal has any phase
-HELD_NM = 100                                          # while the axis holds and its scale is sound
-CAUSES = {"estop": "estop", "limit_low": "limit_low", "limit_high": "limit_high", "drive_fault": "drive", "encoder_cut": "encoder",
-          "line": "bus_watchdog"}                     # what is injected: what must be told
-STANDS = ("estop", "drive_fault", "encoder_cut")       # no reset while it does; after one a pressed switch only blocks the way into it
-INSTRUCTIONS = {"hang": 0x0000006F, "trap": 0x00000000}     # jump to itself; none at all
+ANSWER_S = 0.01  # that the longest answer takes on the line, after its request
+CORE_SILENCE_S = 0.02 + 1_200_000 / CLK_HZ  # the node's watchdog of its soft core
+ROUND_S = 0.005  # a request on the line, and the round of the firmware that finds it
+FORGIVEN_NM = {
+    "encoder_cut": 400
+}  # between the position told last and that of the fault: a cut signal has any phase
+HELD_NM = 100  # while the axis holds and its scale is sound
+CAUSES = {
+    "estop": "estop",
+    "limit_low": "limit_low",
+    "limit_high": "limit_high",
+    "drive_fault": "drive",
+    "encoder_cut": "encoder",
+    "line": "bus_watchdog",
+}  # what is injected: what must be told
+STANDS = (
+    "estop",
+    "drive_fault",
+    "encoder_cut",
+)  # no reset while it does; after one a pressed switch only blocks the way into it
+INSTRUCTIONS = {"hang": 0x0000006F, "trap": 0x00000000}  # jump to itself; none at all
 
 
 # ------------------------------------------------------------------ the axis
+
 
 def axis_faults(count, done=lambda n: None):
     """{name: number} over so many faults of the axis: faults, failures, and how many of each cause."""
@@ -54,10 +75,16 @@ def axis_faults(count, done=lambda n: None):
 
 # ------------------------------------------------------------------ the node
 
+
 def powered_up(source, firmware=None):
     """A twin of one node and its axis with the drive on."""
-    twin = Twin([Node(1, [Axis("stage")])], seed=source.randrange(1 << 31), clk_hz=CLK_HZ, node_parameters={"FILTERS": 0},
-                firmware=firmware)
+    twin = Twin(
+        [Node(1, [Axis("stage")])],
+        seed=source.randrange(1 << 31),
+        clk_hz=CLK_HZ,
+        node_parameters={"FILTERS": 0},
+        firmware=firmware,
+    )
     twin.run(START_S)
     axis = Bus(TwinTransport(twin)).axis(1)
     axis.enable()
@@ -73,14 +100,16 @@ def refused(request, cause):
 
 
 def node_fault(twin, axis, fault, source):
-    """What was wrong with one fault, None if nothing was: the drive off in time, cause, position, and that only a person brings it back."""
+    """What was wrong with one fault, None if nothing was: the drive off in time, cause, position,
+    and that only a person brings it back.
+    """
     told = CAUSES[fault]
     axis.dwell(0.002 + source.random() * 0.005)
     before = axis.status()
     if not before.enabled or before.faults:
         return f"not on before: {before.fault_words}"
     if fault == "line":
-        twin.run(WATCHDOG_S - ANSWER_S)                # the last good frame ended before its answer
+        twin.run(WATCHDOG_S - ANSWER_S)  # the last good frame ended before its answer
         if not twin.truth().enabled:
             return "off too soon"
         twin.run(ANSWER_S)
@@ -93,7 +122,9 @@ def node_fault(twin, axis, fault, source):
     status = axis.status()
     if status.first_fault != (told,):
         return f"told as {status.first_fault}"
-    if (off_nm := abs(axis.encoder().fault_position_nm - before.position_nm)) > FORGIVEN_NM.get(fault, HELD_NM):
+    if (off_nm := abs(axis.encoder().fault_position_nm - before.position_nm)) > FORGIVEN_NM.get(
+        fault, HELD_NM
+    ):
         return f"latched position {off_nm:.0f} nm off"
     if not refused(axis.enable, "faulted"):
         return "enabled with a fault latched"
@@ -129,14 +160,18 @@ def node_faults(count, seed, done):
 def spoilt_firmware(instruction):
     """The firmware's words, with an instruction in the way of the request to reset faults."""
     words = list(build.firmware())
-    _, symbols = firmware_build.load_segments((ROOT / "build" / "firmware" / "firmware.elf").read_bytes())
+    _, symbols = firmware_build.load_segments(
+        (ROOT / "build" / "firmware" / "firmware.elf").read_bytes()
+    )
     words[symbols["axis_reset_faults"] // 4] = instruction
     return words
 
 
 def core_fault(twin, axis, kind):
     """What was wrong with a soft core that stops, None if nothing was."""
-    axis.set_parameter("watchdog_time", f"{2 * CORE_SILENCE_S:.1f}s")     # that of the line is not to be the first
+    axis.set_parameter(
+        "watchdog_time", f"{2 * CORE_SILENCE_S:.1f}s"
+    )  # that of the line is not to be the first
     begun = twin.time()
     if answers(axis, "reset_faults"):
         return "the soft core still answers"
@@ -186,7 +221,9 @@ def guard_failures():
         wrong = node_faults(NODE_FAULTS - CORE_FAULTS, 1, done) + core_faults(CORE_FAULTS, 2, done)
         totals = axis_faults(FAULTS - NODE_FAULTS, done)
     console.print("axis: " + ", ".join(f"{value} {name}" for name, value in totals.items()))
-    console.print(f"node: {NODE_FAULTS - CORE_FAULTS} faults, {CORE_FAULTS} of its soft core, {len(wrong)} failures")
+    console.print(
+        f"node: {NODE_FAULTS - CORE_FAULTS} faults, {CORE_FAULTS} of its soft core, {len(wrong)} failures"
+    )
     for sentence in wrong:
         console.print(f"  {sentence}")
     return float(totals["failures"] + len(wrong))
@@ -198,8 +235,15 @@ def soak():
 
 
 FIGURES = {
-    "guard_failures": Figure(guard_failures, "faults", "of 10^4 faults at random clk: drive not off within a tick, wrong first cause or "
-                             "position, or gone without a person", "0", lambda value: value == 0, 0),
+    "guard_failures": Figure(
+        guard_failures,
+        "faults",
+        "of 10^4 faults at random clk: drive not off within a tick, wrong first cause or "
+        "position, or gone without a person",
+        "0",
+        lambda value: value == 0,
+        0,
+    ),
 }
 
 SOAK = {"guard": soak}

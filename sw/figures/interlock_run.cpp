@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// interlock_run -- inject faults into the Verilated axis at random clk and judge its drive_enable, its registers and its pins from outside.
+// interlock_run -- inject faults into the Verilated axis at random clk and judge its drive_enable,
+// its registers and its pins from outside.
 //
 //   interlock_run COUNT SEED               faults; prints how many of each cause, and what failed
 //
-// The axis has a scale that counts (a and b), and a machine that goes wherever the target is until something is wrong with it. Each
-// fault has a window of clk in which it may take the drive: from its first sign on a pin, until the latest that its cause allows. What
-// the guard tells must agree with that: the drive off within one servo tick of the cause, the cause that came first, the position there.
+// The axis has a scale that counts (a and b), and a machine that goes wherever the target is until
+// something is wrong with it. Each fault has a window of clk in which it may take the drive: from
+// its first sign on a pin, until the latest that its cause allows. What the guard tells must agree
+// with that: the drive off within one servo tick of the cause, the cause that came first, the
+// position there.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -20,19 +23,33 @@
 
 namespace {
 
-constexpr int64_t COUNT = 1 << 14;                  // position, in 2^-16 period
-constexpr int LIMIT_CLK = 4'000'000 / 10'000;       // the axis wants its limit switches stable for 0.1 ms of 4 MHz
-constexpr int SENSED = 24;                          // clk from a and b to position, at most; 3 at least
+constexpr int64_t COUNT = 1 << 14;  // position, in 2^-16 period
+constexpr int LIMIT_CLK =
+    4'000'000 / 10'000;     // the axis wants its limit switches stable for 0.1 ms of 4 MHz
+constexpr int SENSED = 24;  // clk from a and b to position, at most; 3 at least
 constexpr int HISTORY = 1 << 15;
 constexpr int64_t NEVER = INT64_MAX / 2;
 
-enum Cause { LIMIT_LOW, LIMIT_HIGH, ESTOP, FOLLOWING, ENCODER, WATCHDOG, DRIVE, CPU, UNDERRUN, OVERRUN, CAUSES };
-const char *const NAMES[CAUSES] = {"limit_low", "limit_high", "estop", "following_error", "encoder", "bus_watchdog", "drive", "cpu",
+enum Cause {
+    LIMIT_LOW,
+    LIMIT_HIGH,
+    ESTOP,
+    FOLLOWING,
+    ENCODER,
+    WATCHDOG,
+    DRIVE,
+    CPU,
+    UNDERRUN,
+    OVERRUN,
+    CAUSES
+};
+const char* const NAMES[CAUSES] = {"limit_low",        "limit_high",   "estop", "following_error",
+                                   "encoder",          "bus_watchdog", "drive", "cpu",
                                    "profile_underrun", "step_overrun"};
 constexpr Cause LEVELS[] = {LIMIT_LOW, LIMIT_HIGH, ESTOP, WATCHDOG, DRIVE, CPU};
 constexpr unsigned LATCH_ALWAYS = 1 << ESTOP | 1 << DRIVE | 1 << CPU;
 
-struct Random {                                     // xorshift64*
+struct Random {  // xorshift64*
     uint64_t state;
     uint64_t operator()() {
         state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
@@ -43,7 +60,7 @@ struct Random {                                     // xorshift64*
     bool one_in(unsigned n) { return below(n) == 0; }
 };
 
-struct Window {                                     // clk in which a cause takes the drive
+struct Window {  // clk in which a cause takes the drive
     int64_t first = NEVER, last = NEVER;
 };
 
@@ -55,10 +72,10 @@ struct Bench {
     // the machine: count is what a and b have shown, skew what they jumped by at once
     int64_t count = 0, wanted = 0, moved_at = 0;
     int skew = 0;
-    bool follows = true, jammed = false;            // goes where the target is; stands
+    bool follows = true, jammed = false;  // goes where the target is; stands
     std::vector<int64_t> counts = std::vector<int64_t>(HISTORY);
     // what was seen
-    int64_t target = 0, target_before = 0;          // of this tick and the last, 2^-16 period
+    int64_t target = 0, target_before = 0;  // of this tick and the last, 2^-16 period
     int64_t steps = 0, off_at = NEVER, on_clk = 0;
     bool was_on = false, step_was = false;
 
@@ -66,7 +83,8 @@ struct Bench {
         pins->tick = now - tick_at >= period;
         if (pins->tick) tick_at = now, ticks++;
         pins->sample_tick = now % sample_period == 0;
-        if (!jammed && count != wanted && now - moved_at >= pace) count += wanted > count ? 1 : -1, moved_at = now;
+        if (!jammed && count != wanted && now - moved_at >= pace)
+            count += wanted > count ? 1 : -1, moved_at = now;
         const int gray = int(count + skew) & 3;
         pins->encoder_a = gray == 1 || gray == 2, pins->encoder_b = gray >= 2;
         pins->now = uint32_t(now);
@@ -86,8 +104,12 @@ struct Bench {
         pins->select = pins->feedback_select = pins->actuator_select = 0;
     }
     void put(unsigned word, uint32_t data) { pins->select = 1, access(true, word, data); }
-    void put_actuator(unsigned word, uint32_t data) { pins->actuator_select = 1, access(true, word, data); }
-    void put_wide(unsigned word, int64_t data) { put(word, uint32_t(data)), put(word + 4, uint32_t(data >> 32)); }
+    void put_actuator(unsigned word, uint32_t data) {
+        pins->actuator_select = 1, access(true, word, data);
+    }
+    void put_wide(unsigned word, int64_t data) {
+        put(word, uint32_t(data)), put(word + 4, uint32_t(data >> 32));
+    }
     uint32_t get(unsigned word) { return pins->select = 1, access(false, word, 0), pins->rdata; }
     int64_t get_place(unsigned word) {
         const uint64_t low = get(word), high = get(word + 4);
@@ -135,39 +157,47 @@ struct Campaign {
     std::unique_ptr<Bench> bench;
     std::map<Cause, uint64_t> injected;
     uint64_t faults = 0, harmless = 0, failures = 0;
-    int64_t ratio = 0, clk_before = 0;              // ratio: steps a period
-    Cause cause = ESTOP;                            // of this fault
-    bool good = true;                               // so far
+    int64_t ratio = 0, clk_before = 0;  // ratio: steps a period
+    Cause cause = ESTOP;                // of this fault
+    bool good = true;                   // so far
 
-    void fail(const char *what) {
-        if (good) std::fprintf(stderr, "%s, clk %lld of its axis: %s\n", NAMES[cause], (long long)bench->now, what);
+    void fail(const char* what) {
+        if (good)
+            std::fprintf(stderr, "%s, clk %lld of its axis: %s\n", NAMES[cause],
+                         (long long)bench->now, what);
         good = false;
     }
 
-    void begin() {                                  // a new axis, with other settings
+    void begin() {  // a new axis, with other settings
         if (bench) clk_before += bench->now;
         bench = std::make_unique<Bench>();
-        Bench &b = *bench;
+        Bench& b = *bench;
         b.pins->drive_fault_n = 1, b.pins->rst = 1;
-        b.period = int(random.from(600, 1600)), b.sample_period = int(random.from(20, 90)), b.pace = int(random.from(6, 14));
+        b.period = int(random.from(600, 1600)), b.sample_period = int(random.from(20, 90)),
+        b.pace = int(random.from(6, 14));
         b.pins->tick_period = uint32_t(b.period);
         for (int n = 0; n < 8; n++) b.clk();
         b.pins->rst = 0;
         for (int n = 0; n < 20; n++) b.clk();
         b.put(AXIS_SENSING, FIELD_PUT(AXIS_SENSING_DEGLITCH, 2));
         b.put(AXIS_ENCODER_FAULT_MASK, 31), b.put(AXIS_DISAGREEMENT_LIMIT, 0);
-        b.pins->feedback_select = 1, b.access(true, FEEDBACK_POSITION_SOURCE, FEEDBACK_POSITION_SOURCE_COUNTS_MASK);
+        b.pins->feedback_select = 1,
+        b.access(true, FEEDBACK_POSITION_SOURCE, FEEDBACK_POSITION_SOURCE_COUNTS_MASK);
         b.put(AXIS_KP, 1600), b.put(AXIS_KI, uint32_t(random.below(30000)));
-        b.put(AXIS_SERVO_LIMITS, FIELD_PUT(AXIS_SERVO_LIMITS_OUTPUT, 30000) | FIELD_PUT(AXIS_SERVO_LIMITS_INTEGRAL, 20000));
+        b.put(AXIS_SERVO_LIMITS, FIELD_PUT(AXIS_SERVO_LIMITS_OUTPUT, 30000) |
+                                     FIELD_PUT(AXIS_SERVO_LIMITS_INTEGRAL, 20000));
         b.put_actuator(ACTUATOR_PWM_PERIOD, 200), b.put_actuator(ACTUATOR_DAC, 2 | 500 << 8);
-        b.put_actuator(ACTUATOR_STEP_PULSE, FIELD_PUT(ACTUATOR_STEP_PULSE_HIGH, 20) | FIELD_PUT(ACTUATOR_STEP_PULSE_LOW, 20));
-        b.put_actuator(ACTUATOR_STEP_DIRECTION, FIELD_PUT(ACTUATOR_STEP_DIRECTION_SETUP, 20) | FIELD_PUT(ACTUATOR_STEP_DIRECTION_HOLD, 20));
+        b.put_actuator(ACTUATOR_STEP_PULSE, FIELD_PUT(ACTUATOR_STEP_PULSE_HIGH, 20) |
+                                                FIELD_PUT(ACTUATOR_STEP_PULSE_LOW, 20));
+        b.put_actuator(ACTUATOR_STEP_DIRECTION, FIELD_PUT(ACTUATOR_STEP_DIRECTION_SETUP, 20) |
+                                                    FIELD_PUT(ACTUATOR_STEP_DIRECTION_HOLD, 20));
     }
 
     // A segment at an even speed, in counts a tick.
     void push(int64_t speed_counts, int64_t ticks, bool last) {
-        Bench &b = *bench;
-        b.put_wide(AXIS_SEGMENT_VELOCITY_LOW, speed_counts << 38), b.put_wide(AXIS_SEGMENT_ACCELERATION_LOW, 0), b.put(AXIS_SEGMENT_JERK, 0);
+        Bench& b = *bench;
+        b.put_wide(AXIS_SEGMENT_VELOCITY_LOW, speed_counts << 38),
+            b.put_wide(AXIS_SEGMENT_ACCELERATION_LOW, 0), b.put(AXIS_SEGMENT_JERK, 0);
         b.put(AXIS_SEGMENT_TICKS, uint32_t(ticks) | (last ? AXIS_SEGMENT_TICKS_LAST_MASK : 0));
     }
     void control(bool on, bool homing = false) {
@@ -177,28 +207,30 @@ struct Campaign {
 
     void kind_of_drive(unsigned kind) {
         bench->put_actuator(ACTUATOR_DRIVE, kind);
-        ratio = random.from(400, 8000) * (random.one_in(2) ? 1 : -1);           // steps a period
+        ratio = random.from(400, 8000) * (random.one_in(2) ? 1 : -1);  // steps a period
         if (kind != 1) ratio = 0;
         const int64_t word = ratio * (int64_t(1) << 32);
-        bench->put_actuator(ACTUATOR_STEP_RATIO_LOW, uint32_t(word)), bench->put_actuator(ACTUATOR_STEP_RATIO_HIGH, uint32_t(word >> 32));
+        bench->put_actuator(ACTUATOR_STEP_RATIO_LOW, uint32_t(word)),
+            bench->put_actuator(ACTUATOR_STEP_RATIO_HIGH, uint32_t(word >> 32));
     }
 
     // At rest with the drive off, nothing latched, the machine sound.
     void calm() {
-        Bench &b = *bench;
+        Bench& b = *bench;
         for (Cause cause : LEVELS) b.pin(cause, false);
         b.jammed = false, b.follows = true;
         control(false);
         b.put(AXIS_STROBES, AXIS_STROBES_SET_TARGET_TO_POSITION_MASK);
         b.wanted = b.count;
         b.run(LIMIT_CLK + 40);
-        b.put(AXIS_STROBES, AXIS_STROBES_SET_TARGET_TO_POSITION_MASK | AXIS_STROBES_RESET_FAULTS_MASK);
+        b.put(AXIS_STROBES,
+              AXIS_STROBES_SET_TARGET_TO_POSITION_MASK | AXIS_STROBES_RESET_FAULTS_MASK);
         b.run_ticks(2);
         b.wanted = b.count;
     }
 
     bool person_resets() {
-        Bench &b = *bench;
+        Bench& b = *bench;
         calm();
         b.run(random.below(300));
         return b.get(AXIS_FAULTS) == 0 && b.get(AXIS_FIRST_FAULT) == 0 && !b.pins->drive_enable;
@@ -206,26 +238,30 @@ struct Campaign {
 
     // The drive on, at rest or under way at `speed` counts a tick for `ticks`.
     void under_way(int64_t speed, int64_t ticks) {
-        Bench &b = *bench;
+        Bench& b = *bench;
         control(true);
         b.run_ticks(3);
         if (!speed) return;
         push(speed, ticks, true), b.put(AXIS_STROBES, AXIS_STROBES_START_MASK);
     }
 
-    // Bus writes of a program gone wrong: whatever it does, but for a reset with enable low, no fault goes and the drive stays off.
+    // Bus writes of a program gone wrong: whatever it does, but for a reset with enable low, no
+    // fault goes and the drive stays off.
     void nonsense(Cause stands) {
-        Bench &b = *bench;
+        Bench& b = *bench;
         const uint32_t before = b.get(AXIS_FAULTS), first = b.get(AXIS_FIRST_FAULT);
         const int64_t place = b.get_place(AXIS_FAULT_POSITION_LOW), on = b.on_clk;
-        const bool level = std::find(std::begin(LEVELS), std::end(LEVELS), stands) != std::end(LEVELS);
+        const bool level =
+            std::find(std::begin(LEVELS), std::end(LEVELS), stands) != std::end(LEVELS);
         bool asked = true;
         for (int n = 0; n < 24; n++) {
             if (random.one_in(2)) {
                 asked = random.one_in(2);
-                b.put(AXIS_CONTROL, (uint32_t(random.below(16)) & ~1u & ~AXIS_CONTROL_HOMING_MASK) | asked);    // homing: a switch is no cause
+                b.put(AXIS_CONTROL, (uint32_t(random.below(16)) & ~1u & ~AXIS_CONTROL_HOMING_MASK) |
+                                        asked);  // homing: a switch is no cause
             }
-            const bool resets = (level || asked) && random.one_in(2);           // with its cause standing no one resets a fault
+            const bool resets = (level || asked) &&
+                                random.one_in(2);  // with its cause standing no one resets a fault
             b.put(AXIS_STROBES, (uint32_t(random.below(16)) << 1) | resets);
             if (random.one_in(4)) push(random.from(-4, 4), random.from(1, 9), random.one_in(2));
             if (random.one_in(4)) b.run(random.below(200));
@@ -239,16 +275,17 @@ struct Campaign {
     }
 
     // The drive was on at `since`. What the guard has to tell of these causes.
-    void judge(const std::map<Cause, Window> &causes, int64_t since) {
-        Bench &b = *bench;
+    void judge(const std::map<Cause, Window>& causes, int64_t since) {
+        Bench& b = *bench;
         int64_t first = NEVER, last = NEVER;
-        for (auto &[cause, window] : causes) first = std::min(first, window.first), last = std::min(last, window.last);
+        for (auto& [cause, window] : causes)
+            first = std::min(first, window.first), last = std::min(last, window.last);
         if (b.off_at == NEVER || b.off_at < since) return fail("drive not off");
         if (b.off_at < first) return fail("drive off before the cause");
         if (b.off_at > last) return fail("drive off late");
         unsigned may = 0;
-        bool known = false;                          // of several at the very same clk the lowest bit comes first
-        for (auto &[cause, window] : causes) {
+        bool known = false;  // of several at the very same clk the lowest bit comes first
+        for (auto& [cause, window] : causes) {
             const bool exact = window.first == window.last;
             if (window.first <= last && !(exact && known)) may |= 1 << cause, known |= exact;
         }
@@ -257,25 +294,27 @@ struct Campaign {
         if ((b.get(AXIS_FAULTS) & told) != told) fail("first cause not among the faults");
         const int64_t place = b.get_place(AXIS_FAULT_POSITION_LOW);
         bool there = false;
-        for (int64_t t = b.off_at - SENSED; t <= b.off_at - 3; t++) there |= place == b.count_at(t) * COUNT;
+        for (int64_t t = b.off_at - SENSED; t <= b.off_at - 3; t++)
+            there |= place == b.count_at(t) * COUNT;
         if (!there) fail("wrong latched position");
     }
 
     // Off also at the pins of bridge and step driver.
     void pins_rest() {
-        Bench &b = *bench;
-        b.run(2 * 40 + 40);                          // the step in hand, and its times
+        Bench& b = *bench;
+        b.run(2 * 40 + 40);  // the step in hand, and its times
         const int64_t steps = b.steps;
         for (int n = 0; n < 200; n++) {
             b.step();
-            if (b.pins->bridge_a || b.pins->bridge_b) return fail("bridge driven with the drive off");
+            if (b.pins->bridge_a || b.pins->bridge_b)
+                return fail("bridge driven with the drive off");
         }
         if (b.steps != steps) fail("steps with the drive off");
     }
 
     // One level, pressed while the drive is on; another one may follow.
     void level(Cause cause) {
-        Bench &b = *bench;
+        Bench& b = *bench;
         const bool moves = random.one_in(2);
         under_way(moves ? random.from(-9, 9) : 0, 40);
         b.run(random.below(3 * b.period));
@@ -299,12 +338,13 @@ struct Campaign {
         b.run(LIMIT_CLK + 20);
         control(true);
         b.run_ticks(1);
-        if (b.pins->drive_enable || !(b.get(AXIS_FAULTS) >> cause & 1)) fail("the cause went, and the fault with it");
+        if (b.pins->drive_enable || !(b.get(AXIS_FAULTS) >> cause & 1))
+            fail("the cause went, and the fault with it");
     }
 
     // A level that was there before the drive is asked for.
     void before_enable(Cause cause) {
-        Bench &b = *bench;
+        Bench& b = *bench;
         b.run(random.below(b.period));
         b.pin(cause, true);
         b.run(LIMIT_CLK + 20);
@@ -314,7 +354,8 @@ struct Campaign {
         control(true);
         b.run(random.from(10, 2 * b.period));
         if (b.on_clk != on) fail("drive on with its cause there");
-        if (!(b.get(AXIS_FAULTS) >> cause & 1) || b.get(AXIS_FIRST_FAULT) != 1u << cause) fail("wrong first cause");
+        if (!(b.get(AXIS_FAULTS) >> cause & 1) || b.get(AXIS_FIRST_FAULT) != 1u << cause)
+            fail("wrong first cause");
         nonsense(cause);
         b.pin(cause, false);
         b.run(LIMIT_CLK + 20);
@@ -323,7 +364,7 @@ struct Campaign {
 
     // Pushed away, or held while the target goes on.
     void following() {
-        Bench &b = *bench;
+        Bench& b = *bench;
         const bool moves = random.one_in(2);
         const int64_t limit = COUNT * random.from(moves ? 30 : 2, 60) - COUNT / 2;
         b.put(AXIS_FOLLOWING_LIMIT, uint32_t(limit));
@@ -333,16 +374,21 @@ struct Campaign {
         const int64_t since = b.now, end = b.now + 60 * b.period;
         if (!b.pins->drive_enable) return fail("drive off without a cause");
         b.off_at = NEVER, b.follows = false;
-        if (moves) b.jammed = true;
-        else b.wanted = b.count + random.from(100, 300) * (random.one_in(2) ? 1 : -1);
+        if (moves)
+            b.jammed = true;
+        else
+            b.wanted = b.count + random.from(100, 300) * (random.one_in(2) ? 1 : -1);
         Window window;
         while (b.now < end && b.off_at == NEVER) {
             b.step();
-            if (std::abs(b.target - b.count * COUNT) > limit) window.first = std::min(window.first, b.now - SENSED);
-            // the target of this tick is known here; the place that the tick measured is one of these two or between them
+            if (std::abs(b.target - b.count * COUNT) > limit)
+                window.first = std::min(window.first, b.now - SENSED);
+            // the target of this tick is known here; the place that the tick measured is one of
+            // these two or between them
             const bool sure = std::abs(b.target - b.count_at(b.tick_at - SENSED) * COUNT) > limit &&
                               std::abs(b.target - b.count_at(b.tick_at + 8) * COUNT) > limit;
-            if (b.now - b.tick_at == 24 && sure && window.last == NEVER) window.last = b.tick_at + b.period;
+            if (b.now - b.tick_at == 24 && sure && window.last == NEVER)
+                window.last = b.tick_at + b.period;
         }
         judge({{FOLLOWING, window}}, since);
         pins_rest();
@@ -352,10 +398,10 @@ struct Campaign {
 
     // Both levels at once: the count can no longer be trusted.
     void encoder() {
-        Bench &b = *bench;
+        Bench& b = *bench;
         under_way(random.one_in(2) ? random.from(-9, 9) : 0, 40);
         b.run(random.below(3 * b.period));
-        while (b.now - b.moved_at < b.pace / 2) b.step();                       // between two edges
+        while (b.now - b.moved_at < b.pace / 2) b.step();  // between two edges
         const int64_t since = b.now;
         if (!b.pins->drive_enable) return fail("drive off without a cause");
         b.off_at = NEVER, b.moved_at = b.now, b.skew += 2;
@@ -367,20 +413,23 @@ struct Campaign {
     }
 
     void underrun() {
-        Bench &b = *bench;
+        Bench& b = *bench;
         const int64_t ticks = random.from(1, 9);
         control(true);
         b.run_ticks(3);
         b.run(random.below(b.period));
-        if (b.now - b.tick_at > b.period - 30) b.run(40);                       // the segment is there before the next tick
+        if (b.now - b.tick_at > b.period - 30)
+            b.run(40);  // the segment is there before the next tick
         push(random.from(-9, 9), ticks, false), b.put(AXIS_STROBES, AXIS_STROBES_START_MASK);
         const int64_t since = b.now, begun = b.ticks;
         b.off_at = NEVER;
         Window window;
         while (b.ticks < begun + ticks + 5) {
             b.step();
-            if (window.first == NEVER && b.ticks == begun + ticks) window.first = b.tick_at;            // its last tick
-            if (window.last == NEVER && b.ticks == begun + ticks + 1) window.last = b.tick_at + b.period; // one without a segment
+            if (window.first == NEVER && b.ticks == begun + ticks)
+                window.first = b.tick_at;  // its last tick
+            if (window.last == NEVER && b.ticks == begun + ticks + 1)
+                window.last = b.tick_at + b.period;  // one without a segment
         }
         judge({{UNDERRUN, window}}, since);
         pins_rest();
@@ -389,21 +438,28 @@ struct Campaign {
 
     // More steps than the wire can carry: the generator owes 2^22 / tick_period at most.
     void overrun() {
-        Bench &b = *bench;
+        Bench& b = *bench;
         kind_of_drive(1);
         under_way(0, 0);
         b.run_ticks(2);
         const int64_t owed_most = (int64_t(1) << 22) / b.period, origin = b.steps, place = b.target;
-        const auto owes = [&](int64_t target) { return std::abs((((target - place) * ratio) >> 16) - (b.steps - origin)); };
-        push(random.from(8, 14) * (random.one_in(2) ? 1 : -1), 4000, true), b.put(AXIS_STROBES, AXIS_STROBES_START_MASK);
+        const auto owes = [&](int64_t target) {
+            return std::abs((((target - place) * ratio) >> 16) - (b.steps - origin));
+        };
+        push(random.from(8, 14) * (random.one_in(2) ? 1 : -1), 4000, true),
+            b.put(AXIS_STROBES, AXIS_STROBES_START_MASK);
         const int64_t since = b.now, end = b.now + 400 * b.period;
         b.off_at = NEVER;
         Window window;
         while (b.now < end && b.off_at == NEVER) {
             b.step();
-            if (window.first == NEVER && std::max(owes(b.target), owes(b.target_before)) > owed_most - 3) window.first = b.now - b.period;
+            if (window.first == NEVER &&
+                std::max(owes(b.target), owes(b.target_before)) > owed_most - 3)
+                window.first = b.now - b.period;
             // the line to the target of a tick ends in the next, 60 clk after it at the latest
-            if (window.last == NEVER && b.now - b.tick_at == 62 && owes(b.target_before) > owed_most + 3) window.last = b.tick_at + b.period;
+            if (window.last == NEVER && b.now - b.tick_at == 62 &&
+                owes(b.target_before) > owed_most + 3)
+                window.last = b.tick_at + b.period;
         }
         judge({{OVERRUN, window}}, since);
         pins_rest();
@@ -414,7 +470,7 @@ struct Campaign {
 
     // What is no fault: a glitch of a switch, and a switch while homing.
     void no_fault() {
-        Bench &b = *bench;
+        Bench& b = *bench;
         const Cause cause = random.one_in(2) ? LIMIT_LOW : LIMIT_HIGH;
         const bool homing = random.one_in(2);
         control(true, homing);
@@ -430,14 +486,21 @@ struct Campaign {
     void one() {
         good = true;
         cause = Cause(random.below(CAUSES));
-        const bool is_level = std::find(std::begin(LEVELS), std::end(LEVELS), cause) != std::end(LEVELS);
+        const bool is_level =
+            std::find(std::begin(LEVELS), std::end(LEVELS), cause) != std::end(LEVELS);
         kind_of_drive(unsigned(random.below(3)) & 2);
-        if (is_level && random.one_in(5)) before_enable(cause);
-        else if (is_level) level(cause);
-        else if (cause == FOLLOWING) following();
-        else if (cause == ENCODER) encoder();
-        else if (cause == UNDERRUN) underrun();
-        else overrun();
+        if (is_level && random.one_in(5))
+            before_enable(cause);
+        else if (is_level)
+            level(cause);
+        else if (cause == FOLLOWING)
+            following();
+        else if (cause == ENCODER)
+            encoder();
+        else if (cause == UNDERRUN)
+            underrun();
+        else
+            overrun();
         faults++, injected[cause]++;
         if (!person_resets()) fail("a person cannot reset it");
         if (random.one_in(10)) harmless++, no_fault(), calm();
@@ -449,9 +512,11 @@ struct Campaign {
             if (faults % 40 == 0) begin(), calm();
             one();
         }
-        std::printf("%llu faults %llu failures %llu harmless %lld clk", (unsigned long long)faults, (unsigned long long)failures,
-                    (unsigned long long)harmless, (long long)(clk_before + bench->now));
-        for (auto &[cause, times] : injected) std::printf(" %llu %s", (unsigned long long)times, NAMES[cause]);
+        std::printf("%llu faults %llu failures %llu harmless %lld clk", (unsigned long long)faults,
+                    (unsigned long long)failures, (unsigned long long)harmless,
+                    (long long)(clk_before + bench->now));
+        for (auto& [cause, times] : injected)
+            std::printf(" %llu %s", (unsigned long long)times, NAMES[cause]);
         std::printf("\n");
         return 0;
     }
@@ -461,7 +526,7 @@ struct Campaign {
 
 double sc_time_stamp() { return 0; }
 
-int main(int count, char **words) {
+int main(int count, char** words) {
     if (count != 3) return std::fprintf(stderr, "usage: interlock_run COUNT SEED\n"), 2;
     Campaign campaign{Random{std::strtoull(words[2], nullptr, 10) * 0x9E3779B97F4A7C15ULL + 1}};
     return campaign.run(std::strtoull(words[1], nullptr, 10));

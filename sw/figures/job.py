@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figure of a station's memory (S4): what is in the EEPROM after the power went at any moment.
 
-The firmware runs on this computer around a model of the EEPROM, in which a page that is being written when the power goes holds a
+The firmware runs on this computer around a model of the EEPROM, in which a page that is being
+written when the power goes holds a
 mixture of what was there, what was to be there, and noise.
 """
+
 import random
 from pathlib import Path
 
@@ -11,10 +13,13 @@ from figures.common import Figure, bar, console
 
 ROOT = Path(__file__).resolve().parents[2]
 CUTS = 1000
-JOURNAL_SHARE, KEPT_SHARE = 0.2, 0.3  # of the cuts, into a line and into the keeping of values; the others fall into that of a program
-SPARE = 1.1                          # some cuts come when all has been written
-STORE_STOPPED = 6                    # a step of the journal that leaves no job open
-VALUE_STATIONS = 4                   # a kept value takes as long as so many stations: 16 bytes
+JOURNAL_SHARE, KEPT_SHARE = (
+    0.2,
+    0.3,
+)  # of the cuts, into a line and into the keeping of values; the others fall into that of a program
+SPARE = 1.1  # some cuts come when all has been written
+STORE_STOPPED = 6  # a step of the journal that leaves no job open
+VALUE_STATIONS = 4  # a kept value takes as long as so many stations: 16 bytes
 
 
 def begin(station, angles):
@@ -38,17 +43,26 @@ def writing_ms(station):
 
 
 def torn(cuts=CUTS, seed=1):
-    """Power cuts of so many after which program, journal or values were neither those of before nor the new ones, whole."""
+    """Power cuts of so many after which program, journal or values were neither those of before nor
+    the new ones, whole.
+    """
     from twin.compiled.node import PARAMETER
     from twin.compiled.station import TURN, Station
 
     def values():
-        return [station.ask("get_parameter", axis=0, parameter=number)["value"] for number in kept_numbers]
+        return [
+            station.ask("get_parameter", axis=0, parameter=number)["value"]
+            for number in kept_numbers
+        ]
 
     def state():
         return station.program(), station.ask("job_stations")["journal"], values()
 
-    kept_numbers = [PARAMETER[f"filter_{n}_{name}"]["id"] for n in (1, 2) for name in ("b0", "b1", "b2", "a1", "a2")]
+    kept_numbers = [
+        PARAMETER[f"filter_{n}_{name}"]["id"]
+        for n in (1, 2)
+        for name in ("b0", "b1", "b2", "a1", "a2")
+    ]
     source, station = random.Random(seed), Station(seed=seed)
     station.ready()
     duration, invalid, found, pages = writing_ms(station), 0, {"old": 0, "new": 0}, 0
@@ -57,14 +71,20 @@ def torn(cuts=CUTS, seed=1):
     with bar(f"{cuts} power cuts") as progress:
         for _ in progress.track(range(cuts)):
             new_program, new_line, new_kept = program, line, kept
-            what = source.random() if program else 1.0         # without a program there is no line to write about one: a new one
+            what = (
+                source.random() if program else 1.0
+            )  # without a program there is no line to write about one: a new one
             if what < JOURNAL_SHARE:
                 new_line = line + 1
-                assert station.firmware.store_note(source.randrange(len(program)), STORE_STOPPED) == 0
+                assert (
+                    station.firmware.store_note(source.randrange(len(program)), STORE_STOPPED) == 0
+                )
                 span = duration(1) / 2
             elif what < JOURNAL_SHARE + KEPT_SHARE:
                 for number in source.sample(kept_numbers, source.randrange(1, len(kept_numbers))):
-                    station.ask("set_parameter", axis=0, parameter=number, value=source.randrange(2**30))
+                    station.ask(
+                        "set_parameter", axis=0, parameter=number, value=source.randrange(2**30)
+                    )
                 new_kept = values()
                 station.ask("save_settings", action=0)
                 span = duration(len(kept_numbers) * VALUE_STATIONS)
@@ -81,11 +101,19 @@ def torn(cuts=CUTS, seed=1):
             invalid += not whole
             found["new" if now == new else "old"] += whole
             program, line, kept = now
-    console.print(f"{pages} pages torn; {found['old']} times as before, {found['new']} times the new one, {invalid} times neither")
+    console.print(
+        f"{pages} pages torn; {found['old']} times as before, {found['new']} times the new one, {invalid} times neither"
+    )
     return float(invalid)
 
 
 FIGURES = {
-    "eeprom_torn": Figure(torn, "programs", f"invalid program, journal or values after a power cut at each of {CUTS} random moments", "0",
-                          lambda value: value == 0, 0),
+    "eeprom_torn": Figure(
+        torn,
+        "programs",
+        f"invalid program, journal or values after a power cut at each of {CUTS} random moments",
+        "0",
+        lambda value: value == 0,
+        0,
+    ),
 }

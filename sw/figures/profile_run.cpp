@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// profile_run -- random moves planned by the firmware's planner, played by the Verilated player, every step held against the limits.
+// profile_run -- random moves planned by the firmware's planner, played by the Verilated player,
+// every step held against the limits.
 //
-// A move: S-curve, trapezoid or stepped; then, by chance, retargeted in flight up to three times, slowed down by overrides and
-// pauses, or stopped by a brake. From its first change on an override may add the quarter of acceleration and jerk that
-// planner_feed_override grants it. A refusal is a miss too.
+// A move: S-curve, trapezoid or stepped; then, by chance, retargeted in flight up to three times,
+// slowed down by overrides and pauses, or stopped by a brake. From its first change on an override
+// may add the quarter of acceleration and jerk that planner_feed_override grants it. A refusal is a
+// miss too.
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -19,16 +21,19 @@ extern "C" {
 
 namespace {
 
-constexpr int64_t ROUNDING = 8;          // 2^-40 period that the rounding of a step to 2^-40 adds to its third difference
+constexpr int64_t ROUNDING =
+    8;  // 2^-40 period that the rounding of a step to 2^-40 adds to its third difference
 
-struct Random {                          // xorshift64*
+struct Random {  // xorshift64*
     uint64_t state;
     uint64_t operator()() {
         state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
         return state * 2685821657736338717ULL;
     }
     bool one_in(unsigned n) { return (*this)() % n == 0; }
-    double spread(double low, double high) { return low * std::pow(high / low, double((*this)() >> 11) / 9007199254740992.0); }
+    double spread(double low, double high) {
+        return low * std::pow(high / low, double((*this)() >> 11) / 9007199254740992.0);
+    }
 };
 
 struct Bench {
@@ -50,7 +55,8 @@ struct Bench {
     void tick() {
         pins.tick = 1, clk();
         pins.tick = 0;
-        do clk(); while (!pins.prepared);
+        do clk();
+        while (!pins.prepared);
     }
 };
 
@@ -58,19 +64,22 @@ struct Bench {
 
 double sc_time_stamp() { return 0; }
 
-int main(int count, char **words) {
+int main(int count, char** words) {
     if (count != 3) return std::fprintf(stderr, "usage: profile_run MOVES SEED\n"), 2;
-    const uint64_t wanted = std::strtoull(words[1], nullptr, 10), seed = std::strtoull(words[2], nullptr, 10);
+    const uint64_t wanted = std::strtoull(words[1], nullptr, 10),
+                   seed = std::strtoull(words[2], nullptr, 10);
     Random random{seed * 0x9E3779B97F4A7C15ULL + 1};
     auto bench = std::make_unique<Bench>();
-    auto &pins = bench->pins;
+    auto& pins = bench->pins;
     pins.rst = 1, bench->clk(), bench->clk(), pins.rst = 0;
 
-    uint64_t moves = 0, misses = 0, ticks = 0, retargets = 0, refused = 0, overridden = 0, brakes = 0, landed_wrong = 0, above = 0;
+    uint64_t moves = 0, misses = 0, ticks = 0, retargets = 0, refused = 0, overridden = 0,
+             brakes = 0, landed_wrong = 0, above = 0;
     while (moves < wanted) {
-        const unsigned kind = random() % 8;                                   // 0 stepped, 1 trapezoid, else S-curve
+        const unsigned kind = random() % 8;  // 0 stepped, 1 trapezoid, else S-curve
         const bool slowed = kind > 0 && random.one_in(4), braked = random.one_in(5);
-        const auto velocity = uint32_t(random.spread(10, 50000)), acceleration = uint32_t(random.spread(1000, 1e7));
+        const auto velocity = uint32_t(random.spread(10, 50000)),
+                   acceleration = uint32_t(random.spread(1000, 1e7));
         const auto jerk = uint32_t(random.spread(1e5, 1e9));
         struct planner_limits limits = planner_limits(velocity, acceleration, jerk);
         struct planner_limits planned = limits;
@@ -81,42 +90,61 @@ int main(int count, char **words) {
         struct plan plan;
         planner_stepped_profile stepped{};
         if (kind == 0) {
-            stepped.first = random.one_in(8) ? limits.velocity : limits.velocity / 16 + 1, stepped.top = limits.velocity, stepped.ticks = 1 + random() % 40;
-            for (auto &rise : stepped.rise) rise = limits.velocity / (8 + random() % 40) + 1;
+            stepped.first = random.one_in(8) ? limits.velocity : limits.velocity / 16 + 1,
+            stepped.top = limits.velocity, stepped.ticks = 1 + random() % 40;
+            for (auto& rise : stepped.rise) rise = limits.velocity / (8 + random() % 40) + 1;
             planner_stepped_borders(&stepped, 10923, random.one_in(2) ? 32768 : 21846);
-            if (!planner_stepped_move(&plan, &stepped, distance)) { refused++, misses++; continue; }
-        } else if (!planner_move(&plan, &planned, distance)) { refused++, misses++; continue; }
+            if (!planner_stepped_move(&plan, &stepped, distance)) {
+                refused++, misses++;
+                continue;
+            }
+        } else if (!planner_move(&plan, &planned, distance)) {
+            refused++, misses++;
+            continue;
+        }
         if (plan.ticks > 4000) continue;
         moves++;
 
         pins.slope = ramp, pins.curve = curve;
         pins.feed_fraction = 65536, pins.pause = 0;
-        pins.stop_deceleration = kind == 0 ? 0 : uint32_t(std::fmin(double(limits.acceleration >> 8), 4294967295.0));     // stepped stop in a step
+        pins.stop_deceleration = kind == 0
+                                     ? 0
+                                     : uint32_t(std::fmin(double(limits.acceleration >> 8),
+                                                          4294967295.0));  // stepped stop in a step
         pins.stop_jerk = kind == 1 ? 0 : limits.jerk;
         const __int128 begin = bench->exact();
         const uint64_t underruns = bench->underruns;
-        __int128 before = begin, step = 0, slope = 0, late = 0;              // late: a brake acts one tick after the strobe
-        unsigned brake_at = braked ? 1 + random() % (plan.ticks + 1) : 0, retargets_left = kind > 0 && !slowed ? random() % 4 : 0;
-        unsigned retarget_at = 1 + random() % (plan.ticks + 1), queued = 0, played = 0, override_left = slowed ? 3 : 0;
-        bool missed = false, started = false, end_queued = false, stopped = false, bad = false, over = false, changed = false;
+        __int128 before = begin, step = 0, slope = 0,
+                 late = 0;  // late: a brake acts one tick after the strobe
+        unsigned brake_at = braked ? 1 + random() % (plan.ticks + 1) : 0,
+                 retargets_left = kind > 0 && !slowed ? random() % 4 : 0;
+        unsigned retarget_at = 1 + random() % (plan.ticks + 1), queued = 0, played = 0,
+                 override_left = slowed ? 3 : 0;
+        bool missed = false, started = false, end_queued = false, stopped = false, bad = false,
+             over = false, changed = false;
         int64_t goal = distance;
-        const char *why = "";
+        const char* why = "";
         for (unsigned idle = 0; idle < 400000; idle++) {
             while (!stopped && !end_queued && pins.queue_free && queued < played + 64) {
                 if (retargets_left && queued >= retarget_at) {
-                    int64_t other = random.one_in(2) ? goal + int64_t(random.spread(1, 1 << 20)) * (random.one_in(2) ? 1 : -1)
-                                                     : int64_t(random.spread(1, 1 << 26)) * (random.one_in(2) ? 1 : -1);
+                    int64_t other = random.one_in(2) ? goal + int64_t(random.spread(1, 1 << 20)) *
+                                                                  (random.one_in(2) ? 1 : -1)
+                                                     : int64_t(random.spread(1, 1 << 26)) *
+                                                           (random.one_in(2) ? 1 : -1);
                     retargets_left--, retarget_at += 1 + random() % 200;
                     struct plan made;
                     if (planner_retarget(&made, &plan, 0, &planned, other, nullptr)) {
                         if (made.ticks <= 20000) plan = made, goal = other, retargets++;
-                    } else refused++, missed = true;
+                    } else
+                        refused++, missed = true;
                 }
                 planner_segment piece;
                 bool last;
                 if (!planner_take_up_to(&plan, &piece, &last, 32)) break;
-                pins.segment_velocity = uint64_t(piece.velocity), pins.segment_acceleration = uint64_t(piece.acceleration);
-                pins.segment_jerk = uint32_t(piece.jerk), pins.segment_ticks = piece.ticks, pins.segment_last = last;
+                pins.segment_velocity = uint64_t(piece.velocity),
+                pins.segment_acceleration = uint64_t(piece.acceleration);
+                pins.segment_jerk = uint32_t(piece.jerk), pins.segment_ticks = piece.ticks,
+                pins.segment_last = last;
                 pins.push = 1, bench->clk(), pins.push = 0;
                 for (int n = 1; n < 7; n++) bench->clk();
                 queued += piece.ticks, end_queued = last;
@@ -124,46 +152,65 @@ int main(int count, char **words) {
             if (!started) started = true, pins.start = 1, bench->clk(), pins.start = 0;
             if (!pins.moving) break;
             if (override_left && random.one_in(100))
-                pins.feed_fraction = random() % 65537, pins.pause = random.one_in(4), override_left--, overridden++, changed = true;
-            else if (slowed && random.one_in(200)) pins.feed_fraction = 65536, pins.pause = 0;
+                pins.feed_fraction = random() % 65537, pins.pause = random.one_in(4),
+                override_left--, overridden++, changed = true;
+            else if (slowed && random.one_in(200))
+                pins.feed_fraction = 65536, pins.pause = 0;
             if (brake_at && played == brake_at && !stopped) {
                 stopped = true, brakes++, late = slope < 0 ? -slope : slope;
                 pins.controlled_stop = 1, bench->clk(), pins.controlled_stop = 0;
             }
             bench->tick(), played++, ticks++;
-            __int128 now = bench->exact(), step_now = now - before, slope_now = step_now - step, bend = slope_now - slope;
-            const __int128 roundoff = pins.moving ? ROUNDING : ROUNDING + (1 << 24);          // the end is rounded
+            __int128 now = bench->exact(), step_now = now - before, slope_now = step_now - step,
+                     bend = slope_now - slope;
+            const __int128 roundoff =
+                pins.moving ? ROUNDING : ROUNDING + (1 << 24);  // the end is rounded
             auto size = [](__int128 x) { return x < 0 ? -x : x; };
-            const bool steps = kind == 0;                                     // stepped have a limit of velocity only
-            if (size(step_now) > __int128(limits.velocity) + roundoff + late) over = true, why = "velocity";
-            auto granted = [&](uint64_t limit) { return __int128(limit) + (changed ? limit / 4 : 0) + roundoff; };
-            if (!steps && size(slope_now) > granted(limits.acceleration)) over = true, why = "acceleration";
+            const bool steps = kind == 0;  // stepped have a limit of velocity only
+            if (size(step_now) > __int128(limits.velocity) + roundoff + late)
+                over = true, why = "velocity";
+            auto granted = [&](uint64_t limit) {
+                return __int128(limit) + (changed ? limit / 4 : 0) + roundoff;
+            };
+            if (!steps && size(slope_now) > granted(limits.acceleration))
+                over = true, why = "acceleration";
             if (!steps && kind != 1 && size(bend) > granted(limits.jerk)) over = true, why = "jerk";
             if (over && !bad) {
                 bad = true, above++;
                 if (above <= 5)
-                    std::fprintf(stderr, "seed %llu move %llu: %s at tick %u kind %u slowed %d stopped %d: %g %g %g of %g %g %g\n",
-                                 (unsigned long long)seed, (unsigned long long)moves, why, played, kind, slowed, stopped, double(step_now),
-                                 double(slope_now), double(bend), double(limits.velocity), double(limits.acceleration),
+                    std::fprintf(stderr,
+                                 "seed %llu move %llu: %s at tick %u kind %u slowed %d stopped %d: "
+                                 "%g %g %g of %g %g %g\n",
+                                 (unsigned long long)seed, (unsigned long long)moves, why, played,
+                                 kind, slowed, stopped, double(step_now), double(slope_now),
+                                 double(bend), double(limits.velocity), double(limits.acceleration),
                                  double(limits.jerk));
             }
             before = now, step = step_now, slope = slope_now;
         }
-        missed = missed || pins.moving || bench->underruns != underruns || (!stopped && bench->exact() != begin + (__int128(goal) << 24));
+        missed = missed || pins.moving || bench->underruns != underruns ||
+                 (!stopped && bench->exact() != begin + (__int128(goal) << 24));
         if (missed) {
             landed_wrong++;
             if (landed_wrong <= 5)
-                std::fprintf(stderr, "seed %llu move %llu landed wrong: kind %u slowed %d stopped %d moving %d underruns %llu\n",
-                             (unsigned long long)seed, (unsigned long long)moves, kind, slowed, stopped, pins.moving,
+                std::fprintf(stderr,
+                             "seed %llu move %llu landed wrong: kind %u slowed %d stopped %d "
+                             "moving %d underruns %llu\n",
+                             (unsigned long long)seed, (unsigned long long)moves, kind, slowed,
+                             stopped, pins.moving,
                              (unsigned long long)(bench->underruns - underruns));
             pins.rst = 1, bench->clk(), pins.rst = 0;
         }
         misses += missed || bad;
     }
-    const std::pair<const char *, uint64_t> totals[] = {
-        {"misses", misses}, {"moves", moves}, {"ticks", ticks}, {"retargets", retargets}, {"refused", refused},
-        {"overrides", overridden}, {"brakes", brakes}, {"landed_wrong", landed_wrong}, {"above_a_limit", above}};
-    for (const auto &[name, total] : totals) std::printf("%llu %s ", (unsigned long long)total, name);
+    const std::pair<const char*, uint64_t> totals[] = {
+        {"misses", misses},      {"moves", moves},
+        {"ticks", ticks},        {"retargets", retargets},
+        {"refused", refused},    {"overrides", overridden},
+        {"brakes", brakes},      {"landed_wrong", landed_wrong},
+        {"above_a_limit", above}};
+    for (const auto& [name, total] : totals)
+        std::printf("%llu %s ", (unsigned long long)total, name);
     std::printf("\n");
     return 0;
 }

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// ps2_run -- drive the Verilated ps2_pass between a keyboard and a host that know only the interface's description.
+// ps2_run -- drive the Verilated ps2_pass between a keyboard and a host that know only the
+// interface's description.
 //
-//   ps2_run sequences COUNT SEED             keys of a person, commands, injections, the host cutting frames at random
-//   ps2_run delay COUNT SEED                 keys alone: the longest way through, us beyond the ten bits of our frame
-//   ps2_run wave RECORDING COUNT SEED FILE   a recorded keyboard, then COUNT sequences, on lines written to FILE for another decoder:
-//                                            one byte a clk, clock | data << 1; prints the bytes that it must find
+//   ps2_run sequences COUNT SEED             keys of a person, commands, injections, the host
+//   cutting frames at random ps2_run delay COUNT SEED                 keys alone: the longest way
+//   through, us beyond the ten bits of our frame ps2_run wave RECORDING COUNT SEED FILE   a
+//   recorded keyboard, then COUNT sequences, on lines written to FILE for another decoder:
+//                                            one byte a clk, clock | data << 1; prints the bytes
+//                                            that it must find
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -23,11 +26,12 @@ namespace {
 
 constexpr int CLK_HZ = 400'000;
 constexpr double US = CLK_HZ / 1e6;
-const std::vector<uint8_t> START = {0x14, 0x1D, 0xF0, 0x1D, 0xF0, 0x14};    // S4: left Ctrl + W; our person never types 14, 1D
+const std::vector<uint8_t> START = {
+    0x14, 0x1D, 0xF0, 0x1D, 0xF0, 0x14};  // S4: left Ctrl + W; our person never types 14, 1D
 
 int clks(double us) { return std::max(1, int(us * US + 0.5)); }
 
-struct Random {                          // xorshift64*
+struct Random {  // xorshift64*
     uint64_t state;
     uint64_t operator()() {
         state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
@@ -37,29 +41,36 @@ struct Random {                          // xorshift64*
     double between(double a, double b) { return a + (b - a) * double(below(1 << 20)) / (1 << 20); }
 };
 
-bool parity(uint8_t byte) { return !(__builtin_popcount(byte) & 1); }       // of the frame
-bool bit_of(uint8_t byte, int place) { return place == 0 ? false : place < 9 ? byte >> (place - 1) & 1 : place == 9 ? parity(byte) : true; }
+bool parity(uint8_t byte) { return !(__builtin_popcount(byte) & 1); }  // of the frame
+bool bit_of(uint8_t byte, int place) {
+    return place == 0   ? false
+           : place < 9  ? byte >> (place - 1) & 1
+           : place == 9 ? parity(byte)
+                        : true;
+}
 
 struct Keyboard {
-    double half = 40;                    // us of half a bit
+    double half = 40;  // us of half a bit
     bool clock_low = false, data_low = false;
     std::deque<uint8_t> keys, answers;
     std::vector<uint8_t> commands;
-    int64_t eleventh = 0;                // clk of the last eleventh edge
+    int64_t eleventh = 0;  // clk of the last eleventh edge
     uint64_t aborts = 0;
 
     void step(int64_t now, bool clock, bool data) {
         if (state == FREE) {
             free = clock ? free + 1 : 0;
             if (free <= clks(50)) return;
-            if (!data) begin(HEAR);
-            else if (!answers.empty() || !keys.empty()) byte = answers.empty() ? keys.front() : answers.front(), begin(SAY);
+            if (!data)
+                begin(HEAR);
+            else if (!answers.empty() || !keys.empty())
+                byte = answers.empty() ? keys.front() : answers.front(), begin(SAY);
             return;
         }
         if (--left > 0) return;
         phase++;
         left = clks(phase == 1 ? half : half / 2);
-        if (phase == 1) {                                                   // high is over
+        if (phase == 1) {  // high is over
             if (!clock) return stop();
             clock_low = true;
             if (place == 10) eleventh = now;
@@ -73,13 +84,17 @@ struct Keyboard {
         }
     }
 
-private:
+ private:
     enum State { FREE, SAY, HEAR } state = FREE;
     int free = 0, left = 0, phase = 0, place = 0, bits = 0;
     uint8_t byte = 0, last = 0;
 
-    void begin(State next) { state = next, phase = 0, place = 0, bits = 0, left = clks(half / 2), set_data(); }
-    void set_data() { data_low = state == SAY ? !bit_of(byte, place) : place == 10 && (bits >> 9 & 1); }
+    void begin(State next) {
+        state = next, phase = 0, place = 0, bits = 0, left = clks(half / 2), set_data();
+    }
+    void set_data() {
+        data_low = state == SAY ? !bit_of(byte, place) : place == 10 && (bits >> 9 & 1);
+    }
     void stop() { clock_low = data_low = false, state = FREE, free = 0, aborts++; }
     void finish() {
         clock_low = data_low = false, free = 0;
@@ -92,15 +107,18 @@ private:
         }
         const uint8_t command = uint8_t(bits);
         answers.clear();
-        if ((bits >> 8 & 1) != parity(command) || !(bits >> 9 & 1)) answers = {0xFE};
-        else if (command == 0xFE) answers = {last};
-        else commands.push_back(command), answers = {uint8_t(command == 0xEE ? 0xEE : 0xFA)};
+        if ((bits >> 8 & 1) != parity(command) || !(bits >> 9 & 1))
+            answers = {0xFE};
+        else if (command == 0xFE)
+            answers = {last};
+        else
+            commands.push_back(command), answers = {uint8_t(command == 0xEE ? 0xEE : 0xFA)};
     }
 };
 
 struct Host {
-    double cut = 0;                      // share of bits after which the clock is pulled
-    double rest = 0;                     // us that it is pulled after each byte
+    double cut = 0;   // share of bits after which the clock is pulled
+    double rest = 0;  // us that it is pulled after each byte
     bool clock_low = false, data_low = false;
     std::deque<uint8_t> orders;
     std::vector<uint8_t> heard;
@@ -108,7 +126,7 @@ struct Host {
     uint64_t damaged = 0, unanswered = 0, cuts = 0;
     bool idle() const { return state == LISTEN && places == 0 && orders.empty(); }
 
-    void step(int64_t now, bool clock, bool data, Random &random) {
+    void step(int64_t now, bool clock, bool data, Random& random) {
         const bool fall = before && !clock;
         before = clock;
         switch (state) {
@@ -117,12 +135,17 @@ struct Host {
             if (fall) {
                 still = 0;
                 bits |= int(data) << places++;
-                if (places == 11) eleventh = now, judge();
-                else if (cut > 0 && random.between(0, 1) < cut) {     // not just before the last edge: no device can tell
-                    then(BEFORE_PULL, random.between(1, places < 10 ? 75 : 60)), pull_us = random.between(100, 400), cuts++;
+                if (places == 11)
+                    eleventh = now, judge();
+                else if (cut > 0 && random.between(0, 1) <
+                                        cut) {  // not just before the last edge: no device can tell
+                    then(BEFORE_PULL, random.between(1, places < 10 ? 75 : 60)),
+                        pull_us = random.between(100, 400), cuts++;
                 }
-            } else if (places && still > clks(300)) places = bits = 0;
-            else if (!places && !orders.empty()) clock_low = true, then(REQUEST, 110);
+            } else if (places && still > clks(300))
+                places = bits = 0;
+            else if (!places && !orders.empty())
+                clock_low = true, then(REQUEST, 110);
             break;
         case BEFORE_PULL:
             if (--left <= 0) clock_low = true, then(PULL, pull_us);
@@ -140,7 +163,8 @@ struct Host {
                     break;
                 }
                 data_low = !bit_of(orders.front(), ++places), then(CLOCKED, 15'000);
-            } else if (--left <= 0) unanswered++, data_low = false, orders.pop_front(), then(SETTLE, 60);
+            } else if (--left <= 0)
+                unanswered++, data_low = false, orders.pop_front(), then(SETTLE, 60);
             break;
         case SETTLE:
             if (--left <= 0) state = LISTEN, places = bits = still = 0;
@@ -148,7 +172,7 @@ struct Host {
         }
     }
 
-private:
+ private:
     enum State { LISTEN, BEFORE_PULL, PULL, REQUEST, CLOCKED, SETTLE } state = LISTEN;
     bool before = true;
     int places = 0, bits = 0, left = 0, still = 0;
@@ -159,7 +183,8 @@ private:
         const uint8_t byte = uint8_t(bits >> 1);
         const bool whole = !(bits & 1) && (bits >> 9 & 1) == parity(byte) && (bits >> 10 & 1);
         places = bits = 0;
-        if (!whole) damaged++, orders.push_front(0xFE);
+        if (!whole)
+            damaged++, orders.push_front(0xFE);
         else {
             heard.push_back(byte);
             if (rest > 0) then(BEFORE_PULL, 60), pull_us = rest;
@@ -188,11 +213,13 @@ struct Bench {
     void clk(bool keyboard_clock_low, bool keyboard_data_low, bool live) {
         const bool keyboard_clock = !(pins->keyboard_clock_low || keyboard_clock_low);
         const bool keyboard_data = !(pins->keyboard_data_low || keyboard_data_low);
-        const bool host_clock = !(pins->host_clock_low || host.clock_low), host_data = !(pins->host_data_low || host.data_low);
+        const bool host_clock = !(pins->host_clock_low || host.clock_low),
+                   host_data = !(pins->host_data_low || host.data_low);
         pins->keyboard_clock = keyboard_clock, pins->keyboard_data = keyboard_data;
         pins->host_clock = host_clock, pins->host_data = host_data;
         pins->inject_valid = !injection.empty();
-        pins->inject = injection.empty() ? 0 : injection.front(), pins->inject_last = injection.size() == 1;
+        pins->inject = injection.empty() ? 0 : injection.front(),
+        pins->inject_last = injection.size() == 1;
         pins->eval();
         const bool taken = pins->inject_valid && pins->inject_ready;
         if (writes) samples += char(host_clock | host_data << 1);
@@ -208,26 +235,30 @@ struct Bench {
     }
 };
 
-struct Judge {                           // what the host may hear: keys in order, whole injections between whole sequences, answers
-    std::deque<std::pair<uint8_t, bool>> expected;                          // byte, last of its sequence
+struct Judge {  // what the host may hear: keys in order, whole injections between whole sequences,
+                // answers
+    std::deque<std::pair<uint8_t, bool>> expected;  // byte, last of its sequence
     size_t seen = 0, place = 0;
     uint64_t wrong = 0, bytes = 0, injections = 0, answers = 0;
     bool border = true;
-    void look(const std::vector<uint8_t> &heard) {
+    void look(const std::vector<uint8_t>& heard) {
         for (; seen < heard.size(); seen++) {
             const uint8_t byte = heard[seen];
             bytes++;
-            if (byte == 0xFA || byte == 0xEE) answers++;
+            if (byte == 0xFA || byte == 0xEE)
+                answers++;
             else if (place || (byte == START[0] && border)) {
                 wrong += byte != START[place];
                 if (++place == START.size()) place = 0, injections++;
-            } else if (expected.empty() || expected.front().first != byte) wrong++;
-            else border = expected.front().second, expected.pop_front();
+            } else if (expected.empty() || expected.front().first != byte)
+                wrong++;
+            else
+                border = expected.front().second, expected.pop_front();
         }
     }
 };
 
-void type(Bench &bench, Judge &judge) {
+void type(Bench& bench, Judge& judge) {
     static const uint8_t codes[] = {0x1C, 0x1B, 0x23, 0x2B, 0x34, 0x33, 0x5A, 0x75, 0x83, 0x12};
     const uint8_t code = codes[bench.random.below(10)];
     std::vector<std::vector<uint8_t>> all;
@@ -235,10 +266,12 @@ void type(Bench &bench, Judge &judge) {
     case 0: all = {{code}, {0xF0, code}}; break;
     case 1: all = {{0xE0, code}, {0xE0, 0xF0, code}}; break;
     case 2: all = {{0xE1, 0x12, 0x77, 0xE1, 0xF0, 0x12, 0xF0, 0x77}}; break;
-    case 3: all = std::vector<std::vector<uint8_t>>(size_t(2 + bench.random.below(6)), {code}); break;      // typematic
+    case 3:
+        all = std::vector<std::vector<uint8_t>>(size_t(2 + bench.random.below(6)), {code});
+        break;  // typematic
     default: all = {{0xE0, 0x12}, {0xE0, 0x7C}};
     }
-    for (const auto &sequence : all)
+    for (const auto& sequence : all)
         for (size_t n = 0; n < sequence.size(); n++) {
             bench.keyboard.keys.push_back(sequence[n]);
             judge.expected.emplace_back(sequence[n], n + 1 == sequence.size());
@@ -252,26 +285,31 @@ int sequences(int count, uint64_t seed) {
     uint64_t started = 0, orders = 0;
     static const uint8_t commands[] = {0xED, 0xF3, 0xF4, 0xEE, 0x02, 0x20};
     for (int n = 0; n < count; n++) {
-        bench.keyboard.half = bench.random.between(30, 50), bench.host.cut = bench.random.below(2) ? 0.02 : 0;
+        bench.keyboard.half = bench.random.between(30, 50),
+        bench.host.cut = bench.random.below(2) ? 0.02 : 0;
         type(bench, judge);
-        if (bench.injection.empty() && bench.random.below(3) == 0) bench.injection.assign(START.begin(), START.end()), started++;
+        if (bench.injection.empty() && bench.random.below(3) == 0)
+            bench.injection.assign(START.begin(), START.end()), started++;
         if (bench.host.orders.empty() && bench.random.below(3) == 0) {
             bench.wait(bench.random.between(0, 30'000));
             const uint8_t command = commands[bench.random.below(6)];
             bench.host.orders.push_back(command), ordered.push_back(command), orders++;
         }
         bench.wait(bench.random.between(0, bench.random.below(2) ? 60'000 : 4'000));
-        for (int ms = 0; ms < 200 && judge.answers < orders; ms++)          // a host waits for its answer
+        for (int ms = 0; ms < 200 && judge.answers < orders; ms++)  // a host waits for its answer
             bench.wait(1'000), judge.look(bench.host.heard);
         judge.look(bench.host.heard);
     }
     bench.host.cut = 0;
     bench.wait(1'500'000);
     judge.look(bench.host.heard);
-    uint64_t wrong = judge.wrong + judge.expected.size() + bench.host.damaged + bench.host.unanswered;
-    wrong += started - judge.injections + (ordered != bench.keyboard.commands) + (judge.answers != orders);
-    std::printf("%llu wrong %llu bytes %llu injections %llu commands %llu cuts %.0f ms\n", (unsigned long long)wrong,
-                (unsigned long long)judge.bytes, (unsigned long long)judge.injections, (unsigned long long)orders,
+    uint64_t wrong =
+        judge.wrong + judge.expected.size() + bench.host.damaged + bench.host.unanswered;
+    wrong += started - judge.injections + (ordered != bench.keyboard.commands) +
+             (judge.answers != orders);
+    std::printf("%llu wrong %llu bytes %llu injections %llu commands %llu cuts %.0f ms\n",
+                (unsigned long long)wrong, (unsigned long long)judge.bytes,
+                (unsigned long long)judge.injections, (unsigned long long)orders,
                 (unsigned long long)bench.host.cuts, double(bench.now) * 1e3 / CLK_HZ);
     return 0;
 }
@@ -286,14 +324,15 @@ int delay(int count, uint64_t seed) {
         const size_t before = bench.host.heard.size();
         for (int ms = 0; ms < 20 && bench.host.heard.size() == before; ms++) bench.wait(1'000);
         if (bench.host.heard.size() == before) return std::puts("1e9 us"), 0;
-        longest = std::max(longest, double(bench.host.eleventh - bench.keyboard.eleventh) / US - 10 * 80);
+        longest =
+            std::max(longest, double(bench.host.eleventh - bench.keyboard.eleventh) / US - 10 * 80);
         bench.wait(bench.random.between(0, 3'000));
     }
     std::printf("%.2f us\n", longest);
     return 0;
 }
 
-int wave(const char *recording, int count, uint64_t seed, const char *file) {
+int wave(const char* recording, int count, uint64_t seed, const char* file) {
     Bench bench(seed);
     bench.host.rest = 150, bench.writes = true;
     std::ifstream lines(recording);
@@ -305,7 +344,8 @@ int wave(const char *recording, int count, uint64_t seed, const char *file) {
         int next_clock, next_data;
         if (std::sscanf(line.c_str(), "%lld,%d,%d", &next, &next_clock, &next_data) != 3) continue;
         if (at >= 0)
-            for (int n = clks(std::min(double(next - at) / 24, 5'000.0)); n > 0; n--) bench.clk(!clock, !data, false);
+            for (int n = clks(std::min(double(next - at) / 24, 5'000.0)); n > 0; n--)
+                bench.clk(!clock, !data, false);
         at = next, clock = next_clock, data = next_data;
     }
     bench.wait(20'000);
@@ -313,14 +353,16 @@ int wave(const char *recording, int count, uint64_t seed, const char *file) {
     judge.seen = bench.host.heard.size();
     for (int n = 0; n < count; n++) {
         type(bench, judge);
-        if (bench.injection.empty() && bench.random.below(3) == 0) bench.injection.assign(START.begin(), START.end());
+        if (bench.injection.empty() && bench.random.below(3) == 0)
+            bench.injection.assign(START.begin(), START.end());
         bench.wait(bench.random.between(0, 50'000));
         judge.look(bench.host.heard);
     }
     bench.wait(500'000);
     judge.look(bench.host.heard);
     std::ofstream(file, std::ios::binary) << bench.samples;
-    std::printf("%llu\n", (unsigned long long)(judge.wrong + judge.expected.size() + bench.host.damaged));
+    std::printf("%llu\n",
+                (unsigned long long)(judge.wrong + judge.expected.size() + bench.host.damaged));
     for (uint8_t byte : bench.host.heard) std::printf("%02x ", byte);
     std::puts("");
     return 0;
@@ -328,11 +370,15 @@ int wave(const char *recording, int count, uint64_t seed, const char *file) {
 
 }  // namespace
 
-int main(int count, char **words) {
+int main(int count, char** words) {
     const std::string what = count > 1 ? words[1] : "";
-    if (what == "sequences" && count == 4) return sequences(std::atoi(words[2]), std::strtoull(words[3], nullptr, 10));
-    if (what == "delay" && count == 4) return delay(std::atoi(words[2]), std::strtoull(words[3], nullptr, 10));
-    if (what == "wave" && count == 6) return wave(words[2], std::atoi(words[3]), std::strtoull(words[4], nullptr, 10), words[5]);
-    std::fputs("ps2_run sequences COUNT SEED | delay COUNT SEED | wave RECORDING COUNT SEED FILE\n", stderr);
+    if (what == "sequences" && count == 4)
+        return sequences(std::atoi(words[2]), std::strtoull(words[3], nullptr, 10));
+    if (what == "delay" && count == 4)
+        return delay(std::atoi(words[2]), std::strtoull(words[3], nullptr, 10));
+    if (what == "wave" && count == 6)
+        return wave(words[2], std::atoi(words[3]), std::strtoull(words[4], nullptr, 10), words[5]);
+    std::fputs("ps2_run sequences COUNT SEED | delay COUNT SEED | wave RECORDING COUNT SEED FILE\n",
+               stderr);
     return 2;
 }

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of S4 in the twin: true angles of the table, and outcomes of whole jobs of two nodes, judged by the log of the EDM machine.
+"""Figures of S4 in the twin: true angles of the table, and outcomes of whole jobs of two nodes,
+judged by the log of the EDM machine.
 
 The soak of 20 whole jobs of 36 stations is `make soak K=s4_jobs`.
 """
+
 import math
 import random
 from concurrent.futures import ProcessPoolExecutor
@@ -17,17 +19,28 @@ from twin import START_S, Axis, Node, Twin, TwinTransport, build
 PROCESSES = 2
 JOBS = 20
 STATIONS = 36
-SENSOR = 8                                          # of PERIPHERALS: the angle sensor only
-TROUBLED_STATIONS, TROUBLED_PART = 8, 0.06          # of a turn
-TROUBLED_STATION_S = 3                              # of one, about; the power goes within the job
+SENSOR = 8  # of PERIPHERALS: the angle sensor only
+TROUBLED_STATIONS, TROUBLED_PART = 8, 0.06  # of a turn
+TROUBLED_STATION_S = 3  # of one, about; the power goes within the job
 
 
-def indexed(seed):                      # in a process of its own, as the jobs: a fork would inherit the progress bar's thread
-    """arcsec: the largest true error of a table that goes to the stations of a job, from its rest until a cut would have ended."""
+def indexed(
+    seed,
+):  # in a process of its own, as the jobs: a fork would inherit the progress bar's thread
+    """arcsec: the largest true error of a table that goes to the stations of a job, from its rest
+    until a cut would have ended.
+    """
     source = random.Random(seed)
-    with Twin([Node(1, [Axis("worm_table", s4_job.random_worm(source))])], seed=seed, clk_hz=s4_job.CLK_HZ,
-              firmware=build.firmware("station"), node_parameters={**s4_job.NODE, "PERIPHERALS": SENSOR}) as twin:
-        node = Bus(TwinTransport(twin), random_source=random.Random(seed), poll_s=s4_job.POLL_S).node(1)
+    with Twin(
+        [Node(1, [Axis("worm_table", s4_job.random_worm(source))])],
+        seed=seed,
+        clk_hz=s4_job.CLK_HZ,
+        firmware=build.firmware("station"),
+        node_parameters={**s4_job.NODE, "PERIPHERALS": SENSOR},
+    ) as twin:
+        node = Bus(
+            TwinTransport(twin), random_source=random.Random(seed), poll_s=s4_job.POLL_S
+        ).node(1)
         twin.set_position(0, math.radians(source.uniform(0, s4_job.ABOUT)))
         twin.run(START_S)
         s4_job.set_up_table(node)
@@ -35,7 +48,9 @@ def indexed(seed):                      # in a process of its own, as the jobs: 
         for station in s4_job.random_stations(STATIONS, source):
             IndexingTable(node).turn(station)
             for _ in range(2):
-                errors.append(s4_job.apart(math.degrees(twin.truth(0).position_rad) * 3600, station))
+                errors.append(
+                    s4_job.apart(math.degrees(twin.truth(0).position_rad) * 3600, station)
+                )
                 twin.run(s4_job.CUT_S)
         return max(map(abs, errors))
 
@@ -55,14 +70,21 @@ def troubled_job(seed):
 
 
 def jobs(job, count):
-    s4_job.IndexingMachine().twin.close()           # builds the twin once
+    s4_job.IndexingMachine().twin.close()  # builds the twin once
     made = []
     with bar("jobs") as progress, ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
         for outcome in progress.track(pool.map(job, range(1, count + 1)), total=count):
             made.append(outcome)
-            progress.console.print(f"job {len(made)}: {outcome.words}; {len(outcome.answers)} answers")
-    cuts, failed = sum(len(outcome.cuts) for outcome in made), sum(outcome.failed for outcome in made)
-    console.print(f"{cuts} cuts in {len(made)} jobs, {failed} failed; largest error {max(outcome.worst for outcome in made):.2f} arcsec")
+            progress.console.print(
+                f"job {len(made)}: {outcome.words}; {len(outcome.answers)} answers"
+            )
+    cuts, failed = (
+        sum(len(outcome.cuts) for outcome in made),
+        sum(outcome.failed for outcome in made),
+    )
+    console.print(
+        f"{cuts} cuts in {len(made)} jobs, {failed} failed; largest error {max(outcome.worst for outcome in made):.2f} arcsec"
+    )
     return made
 
 
@@ -73,27 +95,47 @@ def s4_index_arcsec_max(count=JOBS):
         worst = []
         for error in progress.track(pool.map(indexed, range(1, count + 1)), total=count):
             worst.append(error)
-            progress.console.print(f"table {len(worst)}: at most {error:.2f} arcsec at {STATIONS} stations")
+            progress.console.print(
+                f"table {len(worst)}: at most {error:.2f} arcsec at {STATIONS} stations"
+            )
     return max(worst)
 
 
 def s4_jobs_failed(count=JOBS):
-    """Failed: a station uncut, one cut twice, a cut elsewhere or more than the tolerance away, or no end."""
+    """Failed: a station uncut, one cut twice, a cut elsewhere or more than the tolerance away, or
+    no end.
+    """
     return sum(outcome.failed for outcome in jobs(troubled_job, count))
 
 
 FIGURES = {
-    "s4_index_arcsec_max": Figure(s4_index_arcsec_max, "arcsec", f"true angle less wanted, largest at the {STATIONS} stations of {JOBS} "
-                                  "jobs, anywhere in a turn, random worms", "<= 2 (the sensor alone +-1)", lambda v: v <= 2, 2),
-    "s4_jobs_failed": Figure(s4_jobs_failed, "jobs", f"jobs with a station uncut or cut twice, of {JOBS} jobs of {TROUBLED_STATIONS} "
-                             "stations with 1 % of the sensor's frames damaged, garbage between the nodes, a person who types, and a power "
-                             "cut each", "0", lambda v: v == 0, 0),
+    "s4_index_arcsec_max": Figure(
+        s4_index_arcsec_max,
+        "arcsec",
+        f"true angle less wanted, largest at the {STATIONS} stations of {JOBS} "
+        "jobs, anywhere in a turn, random worms",
+        "<= 2 (the sensor alone +-1)",
+        lambda v: v <= 2,
+        2,
+    ),
+    "s4_jobs_failed": Figure(
+        s4_jobs_failed,
+        "jobs",
+        f"jobs with a station uncut or cut twice, of {JOBS} jobs of {TROUBLED_STATIONS} "
+        "stations with 1 % of the sensor's frames damaged, garbage between the nodes, a person who types, and a power "
+        "cut each",
+        "0",
+        lambda v: v == 0,
+        0,
+    ),
 }
 
 
 def whole_jobs():
     outcomes = jobs(calm_job, JOBS)
-    return max(outcome.worst for outcome in outcomes), not any(outcome.failed for outcome in outcomes)
+    return max(outcome.worst for outcome in outcomes), not any(
+        outcome.failed for outcome in outcomes
+    )
 
 
 SOAK = {"s4_jobs": whole_jobs}

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// firmware_fuzz -- coverage-guided fuzzing of the whole firmware on this computer: words of the line, registers and time as they come.
+// firmware_fuzz -- coverage-guided fuzzing of the whole firmware on this computer: words of the
+// line, registers and time as they come.
 //
-//     firmware_fuzz SECONDS SEED      prints `runs edges corpus`; a sanitizer or the time limit ends it with the input on standard error
-//     firmware_fuzz INPUT             plays that input again
+//     firmware_fuzz SECONDS SEED      prints `runs edges corpus`; a sanitizer or the time limit
+//     ends it with the input on standard error firmware_fuzz INPUT             plays that input
+//     again
 //
-// An input is a script: what the line receives, what registers hold, how time goes on. The compiler calls trace_pc at every edge; an
-// input that reaches a new edge, or one a new order of magnitude of times, joins the corpus that the next inputs are made of.
+// An input is a script: what the line receives, what registers hold, how time goes on. The compiler
+// calls trace_pc at every edge; an input that reaches a new edge, or one a new order of magnitude
+// of times, joins the corpus that the next inputs are made of.
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -19,12 +22,12 @@
 #define EDGES 65536u
 #define LONGEST 512u
 #define CORPUS 4096u
-#define MAP_WORDS 2048u                 // the register map, up to 0x2000
+#define MAP_WORDS 2048u  // the register map, up to 0x2000
 #define QUEUE 256u
 #define AXES 2u
 #define CLK 4000000u
-#define SEGMENTS 16u                    // that the queue of a profile player takes
-#define RUN_SECONDS 30                  // of one input: more is a hang
+#define SEGMENTS 16u    // that the queue of a profile player takes
+#define RUN_SECONDS 30  // of one input: more is a hang
 
 void firmware_start(void);
 void firmware_poll(void);
@@ -46,8 +49,7 @@ static struct queue {
 } line_words, peer_bytes;
 
 void __sanitizer_cov_trace_pc(void);
-void __sanitizer_cov_trace_pc(void)
-{
+void __sanitizer_cov_trace_pc(void) {
     uintptr_t here = (uintptr_t)__builtin_return_address(0);
     unsigned edge = (unsigned)((here ^ previous) * 0x9E3779B1u >> 7) % EDGES;
     if (hits[edge] < 255) hits[edge]++;
@@ -56,24 +58,21 @@ void __sanitizer_cov_trace_pc(void)
 
 // ------------------------------------------------------------------ the hardware
 
-static bool is_axis_register(uint32_t offset, uint32_t which)
-{
-    return offset >= AXIS_BASE && offset < AXIS_BASE + AXES * AXIS_STRIDE && (offset - AXIS_BASE) % AXIS_STRIDE == which;
+static bool is_axis_register(uint32_t offset, uint32_t which) {
+    return offset >= AXIS_BASE && offset < AXIS_BASE + AXES * AXIS_STRIDE &&
+           (offset - AXIS_BASE) % AXIS_STRIDE == which;
 }
 
-static void put(struct queue *queue, unsigned word)
-{
+static void put(struct queue* queue, unsigned word) {
     if (queue->put - queue->taken < QUEUE) queue->words[queue->put++ % QUEUE] = (uint16_t)word;
 }
 
-static uint32_t take(struct queue *queue, uint32_t present)
-{
+static uint32_t take(struct queue* queue, uint32_t present) {
     return queue->taken < queue->put ? queue->words[queue->taken++ % QUEUE] | present : 0;
 }
 
 // Anything that a register can hold; what the hardware promises of one holds here too.
-uint32_t register_read(uint32_t offset)
-{
+uint32_t register_read(uint32_t offset) {
     uint32_t held = map[offset / 4 % MAP_WORDS];
     if (is_axis_register(offset, AXIS_STATE) && FIELD_GET(held, AXIS_STATE_QUEUE_FREE) > SEGMENTS)
         held = (held & ~AXIS_STATE_QUEUE_FREE_MASK) | FIELD_PUT(AXIS_STATE_QUEUE_FREE, SEGMENTS);
@@ -83,29 +82,24 @@ uint32_t register_read(uint32_t offset)
     case NODE_BUILD: return AXES | 1u << 4 | 64u << 8;
     case NODE_TIME_STAMP_LOW: return clk += 10;
     case BUS_BASE + BUS_RECEIVE: return take(&line_words, BUS_RECEIVE_PRESENT_MASK);
-    case BUS_BASE + BUS_CRC: return 0;                        // of anything: so every CRC-32 of zeros is right
+    case BUS_BASE + BUS_CRC: return 0;  // of anything: so every CRC-32 of zeros is right
     case PERIPHERALS_BASE + PERIPHERALS_BUILT: return ~0u;
-    case PERIPHERALS_BASE + PERIPHERALS_PEER_RECEIVE: return take(&peer_bytes, PERIPHERALS_PEER_RECEIVE_PRESENT_MASK);
+    case PERIPHERALS_BASE + PERIPHERALS_PEER_RECEIVE:
+        return take(&peer_bytes, PERIPHERALS_PEER_RECEIVE_PRESENT_MASK);
     default: return held;
     }
 }
 
-void register_write(uint32_t offset, uint32_t value)
-{
-    map[offset / 4 % MAP_WORDS] = value;
-}
+void register_write(uint32_t offset, uint32_t value) { map[offset / 4 % MAP_WORDS] = value; }
 
-static void receive(unsigned word)
-{
-    put(&line_words, word);
-}
+static void receive(unsigned word) { put(&line_words, word); }
 
-static void receive_frame(const uint8_t *body, unsigned length)
-{
+static void receive_frame(const uint8_t* body, unsigned length) {
     receive(0x21u | BUS_RECEIVE_COMMAND_MASK);
     receive(length);
     for (unsigned n = 0; n < length; n++) receive(body[n]);
-    for (unsigned n = 0; n < 4; n++) receive(rand() % 256 | (n == 3 && length <= BUS_LONGEST_BODY ? BUS_RECEIVE_GOOD_MASK : 0));
+    for (unsigned n = 0; n < 4; n++)
+        receive(rand() % 256 | (n == 3 && length <= BUS_LONGEST_BODY ? BUS_RECEIVE_GOOD_MASK : 0));
     receive(0x11u | BUS_RECEIVE_COMMAND_MASK);
 }
 
@@ -113,8 +107,7 @@ static void receive_frame(const uint8_t *body, unsigned length)
 
 enum { POLL, WORD, FRAME, PEER, REGISTER, TIME, KINDS };
 
-static void play(const struct input *input)
-{
+static void play(const struct input* input) {
     unsigned at = 0;
 #define NEXT (at < input->length ? input->bytes[at++] : 0u)
     memset(map, 0, sizeof map);
@@ -133,7 +126,8 @@ static void play(const struct input *input)
             break;
         }
         case FRAME: {
-            unsigned length = NEXT % (2u * BUS_LONGEST_BODY);    // the hardware marks none that is too long as good
+            unsigned length =
+                NEXT % (2u * BUS_LONGEST_BODY);  // the hardware marks none that is too long as good
             if (length > input->length - at) length = input->length - at;
             receive_frame(&input->bytes[at], length);
             at += length;
@@ -151,7 +145,7 @@ static void play(const struct input *input)
             map[place] = value;
             break;
         }
-        default:                                                // up to 1.3 s
+        default:  // up to 1.3 s
             clk += NEXT * (CLK / 200u);
             firmware_poll();
             break;
@@ -161,14 +155,14 @@ static void play(const struct input *input)
 #undef NEXT
 }
 
-static void tell(void)                                          // the input that was being played
+static void tell(void)  // the input that was being played
 {
     fprintf(stderr, "input:");
     for (unsigned n = 0; n < trial.length; n++) fprintf(stderr, " %02x", trial.bytes[n]);
     fprintf(stderr, "\n");
 }
 
-static void die(int number)                                     // by a sanitizer, with abort_on_error=1, or by the alarm
+static void die(int number)  // by a sanitizer, with abort_on_error=1, or by the alarm
 {
     if (number == SIGALRM) fprintf(stderr, "an input took longer than %d s\n", RUN_SECONDS);
     tell();
@@ -177,8 +171,7 @@ static void die(int number)                                     // by a sanitize
 
 // ------------------------------------------------------------------ inputs
 
-static uint32_t draw(uint32_t below)
-{
+static uint32_t draw(uint32_t below) {
     random_state = random_state * 6364136223846793005u + 1442695040888963407u;
     return (uint32_t)((random_state >> 33) % below);
 }
@@ -186,8 +179,7 @@ static uint32_t draw(uint32_t below)
 #define OPERATION(name, code, request, ...) {code, request},
 static const uint8_t operations[][2] = {BUS_OPERATIONS(OPERATION)};
 
-static void insert(struct input *input, const uint8_t *bytes, unsigned length)
-{
+static void insert(struct input* input, const uint8_t* bytes, unsigned length) {
     unsigned at = draw(input->length + 1u);
     if (input->length + length > LONGEST) return;
     memmove(&input->bytes[at + length], &input->bytes[at], input->length - at);
@@ -195,24 +187,25 @@ static void insert(struct input *input, const uint8_t *bytes, unsigned length)
     input->length = (uint16_t)(input->length + length);
 }
 
-static unsigned request(uint8_t *body)                          // of the right length; its values are anything
+static unsigned request(uint8_t* body)  // of the right length; its values are anything
 {
-    const uint8_t *operation = operations[draw(sizeof operations / sizeof *operations)];
+    const uint8_t* operation = operations[draw(sizeof operations / sizeof *operations)];
     unsigned length = operation[1];
     body[0] = (uint8_t)draw(256);
     body[1] = operation[0];
-    for (unsigned n = 2; n < length; n++) body[n] = (uint8_t)(draw(3) ? draw(4) - (draw(4) == 0) : draw(256));
+    for (unsigned n = 2; n < length; n++)
+        body[n] = (uint8_t)(draw(3) ? draw(4) - (draw(4) == 0) : draw(256));
     return length;
 }
 
-static void insert_request(struct input *input)
-{
+static void insert_request(struct input* input) {
     uint8_t bytes[2 + BUS_LONGEST_BODY] = {FRAME};
     bytes[1] = (uint8_t)request(&bytes[2]);
     insert(input, bytes, 2u + bytes[1]);
 }
 
-static void insert_peer_frame(struct input *input)              // COBS of a request and its CRC-32, zeros around it
+static void insert_peer_frame(
+    struct input* input)  // COBS of a request and its CRC-32, zeros around it
 {
     uint8_t bytes[4 + BUS_LONGEST_BODY + 5] = {PEER}, content[BUS_LONGEST_BODY + 4] = {0};
     unsigned length = request(content) + 4u, code = 3;
@@ -227,36 +220,43 @@ static void insert_peer_frame(struct input *input)              // COBS of a req
     insert(input, bytes, 5u + length);
 }
 
-static void mutate(struct input *input)
-{
+static void mutate(struct input* input) {
     uint8_t some[8];
     unsigned at = input->length ? draw(input->length) : 0, length;
     for (unsigned n = 0; n < sizeof some; n++) some[n] = (uint8_t)draw(256);
     switch (draw(9)) {
-    case 0: if (input->length) input->bytes[at] ^= (uint8_t)(1u << draw(8)); break;
-    case 1: if (input->length) input->bytes[at] = some[0]; break;
-    case 2: if (input->length) input->bytes[at] = (uint8_t)(draw(2) ? 0xFF : 0x80 >> draw(8)); break;
+    case 0:
+        if (input->length) input->bytes[at] ^= (uint8_t)(1u << draw(8));
+        break;
+    case 1:
+        if (input->length) input->bytes[at] = some[0];
+        break;
+    case 2:
+        if (input->length) input->bytes[at] = (uint8_t)(draw(2) ? 0xFF : 0x80 >> draw(8));
+        break;
     case 3: insert(input, some, 1u + draw(sizeof some)); break;
     case 4:
         length = draw(input->length - at + 1u);
         memmove(&input->bytes[at], &input->bytes[at + length], input->length - at - length);
         input->length = (uint16_t)(input->length - length);
         break;
-    case 5: {                                                   // a piece of another
-        const struct input *other = &corpus[draw(corpus_size)];
+    case 5: {  // a piece of another
+        const struct input* other = &corpus[draw(corpus_size)];
         unsigned from = draw(other->length + 1u);
         length = draw(other->length - from + 1u);
         insert(input, &other->bytes[from], length < 64 ? length : 64);
         break;
     }
-    case 6: some[0] = draw(2) ? TIME : POLL; insert(input, some, 3); break;
+    case 6:
+        some[0] = draw(2) ? TIME : POLL;
+        insert(input, some, 3);
+        break;
     case 7: insert_peer_frame(input); break;
     default: insert_request(input); break;
     }
 }
 
-static bool new_ground(void)
-{
+static bool new_ground(void) {
     bool found = false;
     for (unsigned n = 0; n < EDGES; n++) {
         if (!hits[n]) continue;
@@ -267,15 +267,15 @@ static bool new_ground(void)
     return found;
 }
 
-static void parse(const char *text)                             // bytes in hexadecimal, with spaces or without
+static void parse(const char* text)  // bytes in hexadecimal, with spaces or without
 {
     int taken_here;
-    for (unsigned byte; trial.length < LONGEST && sscanf(text, "%2x%n", &byte, &taken_here) == 1; text += taken_here)
+    for (unsigned byte; trial.length < LONGEST && sscanf(text, "%2x%n", &byte, &taken_here) == 1;
+         text += taken_here)
         trial.bytes[trial.length++] = (uint8_t)byte;
 }
 
-int main(int count, char **words)
-{
+int main(int count, char** words) {
     signal(SIGABRT, die);
     signal(SIGALRM, die);
     if (count == 2) {
@@ -290,7 +290,7 @@ int main(int count, char **words)
     unsigned long runs = 0, edges = 0;
     struct timespec began, now;
     clock_gettime(CLOCK_MONOTONIC, &began);
-    corpus_size = 1;                                            // the empty input
+    corpus_size = 1;  // the empty input
     do {
         trial = corpus[draw(corpus_size)];
         for (unsigned n = 1u + draw(8); n; n--) mutate(&trial);
@@ -302,7 +302,8 @@ int main(int count, char **words)
         runs++;
         if (new_ground()) corpus[corpus_size < CORPUS ? corpus_size++ : draw(CORPUS)] = trial;
         clock_gettime(CLOCK_MONOTONIC, &now);
-    } while ((double)(now.tv_sec - began.tv_sec) + 1e-9 * (double)(now.tv_nsec - began.tv_nsec) < seconds);
+    } while ((double)(now.tv_sec - began.tv_sec) + 1e-9 * (double)(now.tv_nsec - began.tv_nsec) <
+             seconds);
     for (unsigned n = 0; n < EDGES; n++) edges += seen[n] != 0;
     printf("%lu %lu %u\n", runs, edges, corpus_size);
     return 0;

@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Coverage-guided fuzzing of all that the host package reads: bytes of the line and of clients, files, words on the command line.
+"""Coverage-guided fuzzing of all that the host package reads: bytes of the line and of clients,
+files, words on the command line.
 
     python -m fuzz.parser_fuzz SECONDS [SEED]
 
-Whatever a parser is given it answers, or refuses by a MoireError; any other exception, and anything that takes long, is a crash. An input
-that reaches a pair of lines that was not reached before joins the corpus that the next inputs are made of.
+Whatever a parser is given it answers, or refuses by a MoireError; any other exception, and anything
+that takes long, is a crash. An input
+that reaches a pair of lines that was not reached before joins the corpus that the next inputs are
+made of.
 """
+
 import io
 import random
 import signal
@@ -33,9 +37,10 @@ HANG_S = 10
 
 # ------------------------------------------------------------------ what is fuzzed
 
+
 def packets(data):
     reader = cobs.PacketReader()
-    for content in reader.feed(data[:len(data) // 2]) + reader.feed(data[len(data) // 2:]):
+    for content in reader.feed(data[: len(data) // 2]) + reader.feed(data[len(data) // 2 :]):
         cobs.address_of(content, protocol.TO_NODE), cobs.address_of(content, protocol.FROM_NODE)
         if body := cobs.body_of(content):
             protocol.parse_reply(body)
@@ -54,7 +59,9 @@ def words_of(data):
 
 
 def fed(exchange, data):
-    """An exchange that hears these words, with a silence after each that has bit 1 of its second byte."""
+    """An exchange that hears these words, with a silence after each that has bit 1 of its second
+    byte.
+    """
     for n, word in enumerate(words_of(data)):
         if exchange.finished:
             break
@@ -141,7 +148,11 @@ def tuning_record(data):
 
 
 def readings(data):
-    path = Path("/dev/shm/moire_readings.csv") if Path("/dev/shm").is_dir() else Path("build/readings.csv")
+    path = (
+        Path("/dev/shm/moire_readings.csv")
+        if Path("/dev/shm").is_dir()
+        else Path("build/readings.csv")
+    )
     path.write_bytes(data)
     calibration.read_readings(path)
 
@@ -154,23 +165,57 @@ def good_reply():
 
 HEAD = '{"record": "moire bus", "version": 1, "protocol_crc": %d}\n' % recording.PROTOCOL_CRC
 SEEDS = {
-    packets: [cobs.packet(0x51, bytes([7, 2, 3])), cobs.packet(0x21, protocol.request_body("identify", 1))],
-    telnet: [bytes([255, 253, 44, 255, 250, 44, 3, 4, 255, 240, 33]), bytes([255, 250, 44, 1, 0, 0, 37, 128, 255, 240, 255, 255])],
+    packets: [
+        cobs.packet(0x51, bytes([7, 2, 3])),
+        cobs.packet(0x21, protocol.request_body("identify", 1)),
+    ],
+    telnet: [
+        bytes([255, 253, 44, 255, 250, 44, 3, 4, 255, 240, 33]),
+        bytes([255, 250, 44, 1, 0, 0, 37, 128, 255, 240, 255, 255]),
+    ],
     exchange: [good_reply()],
     relay_exchange: [good_reply()],
-    record: [(HEAD + '{"at": 0.5, "send": [289]}\n{"at": 0.6, "receive": [97], "wanted": 1, "timeout_s": 0.1}').encode(),
-             (HEAD + '{"at": 0.5, "baud": 9600}\n{"at": 0.6, "break": true}').encode()],
+    record: [
+        (
+            HEAD
+            + '{"at": 0.5, "send": [289]}\n{"at": 0.6, "receive": [97], "wanted": 1, "timeout_s": 0.1}'
+        ).encode(),
+        (HEAD + '{"at": 0.5, "baud": 9600}\n{"at": 0.6, "break": true}').encode(),
+    ],
     quantities: [b"1.5mm", b"-2e3 nm/s", b"20ms", b"50%"],
-    command: [b"move 1mm --by -- status --json", b"params set kp 0.1", b"compare from 1mm 10um --count 5", b"scope arm --trigger motion"],
+    command: [
+        b"move 1mm --by -- status --json",
+        b"params set kp 0.1",
+        b"compare from 1mm 10um --count 5",
+        b"scope arm --trigger motion",
+    ],
     parameters: [b'{"parameters": {"velocity": "5mm/s", "kp": "0.5", "home_end": "low"}}'],
     tuning_record: [b"command,position\n1,2\n-3,4.5"],
     readings: [b"angle,error\n0,1\n90,-2\n180,0.5\n270,1"],
 }
-WORDS = [b"0", b"-1", b"1e999", b"nan", b"1/0", b'"', b"{}", b"[]", b"null", b"\n", b",", b"--", b"--help", b"\0",
-         b"\xff\xfa\x2c", b"\xff\xf0", *(name.encode() for name in [*OPERATIONS, *PARAMETERS, "mm", "deg", "period"])]
+WORDS = [
+    b"0",
+    b"-1",
+    b"1e999",
+    b"nan",
+    b"1/0",
+    b'"',
+    b"{}",
+    b"[]",
+    b"null",
+    b"\n",
+    b",",
+    b"--",
+    b"--help",
+    b"\0",
+    b"\xff\xfa\x2c",
+    b"\xff\xf0",
+    *(name.encode() for name in [*OPERATIONS, *PARAMETERS, "mm", "deg", "period"]),
+]
 
 
 # ------------------------------------------------------------------ how
+
 
 @dataclass
 class Target:
@@ -179,7 +224,7 @@ class Target:
     seen: set = field(default_factory=set)
     runs: int = 0
     seconds: float = 0.0
-    crashes: dict = field(default_factory=dict)          # where: input
+    crashes: dict = field(default_factory=dict)  # where: input
 
 
 class Pairs:
@@ -211,11 +256,11 @@ def mutated(draw, target):
         elif kind == 3:
             data[at:at] = draw.choice(WORDS)
         elif kind == 4:
-            del data[at:at + draw.randrange(1, 20)]
+            del data[at : at + draw.randrange(1, 20)]
         else:
             other = draw.choice(target.corpus)
             begin = draw.randrange(len(other) + 1)
-            data[at:at] = other[begin:begin + draw.randrange(1, 60)]
+            data[at:at] = other[begin : begin + draw.randrange(1, 60)]
     return bytes(data[:LONGEST])
 
 
@@ -255,7 +300,10 @@ def attempt(target, data):
 
 def fuzz(seconds, seed=1, parsers=tuple(SEEDS), first=False):
     """Targets, after so many seconds over all of them; with `first` the first crash ends it."""
-    draw, targets = random.Random(seed), [Target(parse, list(SEEDS.get(parse, [b""]))) for parse in parsers]
+    draw, targets = (
+        random.Random(seed),
+        [Target(parse, list(SEEDS.get(parse, [b""]))) for parse in parsers],
+    )
     before = signal.signal(signal.SIGALRM, hang)
     end, nowhere = time.monotonic() + seconds, io.StringIO()
     try:
@@ -263,8 +311,10 @@ def fuzz(seconds, seed=1, parsers=tuple(SEEDS), first=False):
             for target in targets:
                 for data in target.corpus:
                     attempt(target, data)
-            while time.monotonic() < end and not (first and any(target.crashes for target in targets)):
-                target = min(targets, key=lambda target: target.seconds)      # each has the same time
+            while time.monotonic() < end and not (
+                first and any(target.crashes for target in targets)
+            ):
+                target = min(targets, key=lambda target: target.seconds)  # each has the same time
                 data = mutated(draw, target)
                 if attempt(target, data):
                     target.corpus.append(data)
@@ -279,8 +329,10 @@ def fuzz(seconds, seed=1, parsers=tuple(SEEDS), first=False):
 def main():
     targets = fuzz(float(sys.argv[1]), int((sys.argv[2:] or ["1"])[0]))
     for target in targets:
-        print(f"{target.parse.__name__:16} {target.runs:8} runs {len(target.corpus):5} inputs kept {len(target.seen):6} pairs of lines "
-              f"{len(target.crashes)} crashes")
+        print(
+            f"{target.parse.__name__:16} {target.runs:8} runs {len(target.corpus):5} inputs kept {len(target.seen):6} pairs of lines "
+            f"{len(target.crashes)} crashes"
+        )
         for where, data in target.crashes.items():
             print(f"    {where}\n    {data!r}")
     return 1 if any(target.crashes for target in targets) else 0

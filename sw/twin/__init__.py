@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The twin: the RTL and firmware of the nodes, closed around a model of the machine. The machines are in parameters/."""
+"""The twin: the RTL and firmware of the nodes, closed around a model of the machine. The machines
+are in parameters/.
+"""
+
 from twin.devices.devices import Devices, DevicesBench, EdmCut, PeerLineBench
 from twin.machines.machine import Machine
 from twin.machines.ring import RotaryRing
@@ -18,5 +21,22 @@ from twin.nodes.twin import (
 
 from .build import BuildError
 
-__all__ = ["START_S", "Axis", "BuildError", "EdmCut", "FrameBench", "BusState", "Machine", "Node", "PeerLineBench", "RotaryRing",
-           "Devices", "DevicesBench", "Twin", "TwinTransport", "WITH_SEGMENTS", "cells_of", "realtime_factor"]
+__all__ = [
+    "START_S",
+    "Axis",
+    "BuildError",
+    "EdmCut",
+    "FrameBench",
+    "BusState",
+    "Machine",
+    "Node",
+    "PeerLineBench",
+    "RotaryRing",
+    "Devices",
+    "DevicesBench",
+    "Twin",
+    "TwinTransport",
+    "WITH_SEGMENTS",
+    "cells_of",
+    "realtime_factor",
+]

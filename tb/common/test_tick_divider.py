@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tick_divider: exact periods at both ends of the range, a period changed under way, and starting anew, and random
+"""tick_divider: exact periods at both ends of the range, a period changed under way, and starting
+anew, and random
 settings against the model."""
+
 import random
 
 import cocotb
@@ -62,7 +64,7 @@ async def a_period_begins_at_restart_wherever_the_one_before_was(dut):
     for before in range(13):
         await clk(dut, 10, rst=1)
         await ticks(dut, 10, before)
-        assert await clk(dut, 10, restart=1) == 0                # not even where a tick was due
+        assert await clk(dut, 10, restart=1) == 0  # not even where a tick was due
         assert await ticks(dut, 10, 20) == [10, 20]
 
 

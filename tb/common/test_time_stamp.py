@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """time_stamp: counts every clk, wraps, and begins again after a reset in mid-flow."""
+
 import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge

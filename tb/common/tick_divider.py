@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/common/tick_divider.sv does, in integers: step(period, restart) is one clk and returns tick after it."""
+"""What rtl/common/tick_divider.sv does, in integers: step(period, restart) is one clk and returns
+tick after it.
+"""
 
 
 class TickDivider:

@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/compensate/harmonic_map.sv does, in integers: clk(...) is one clk, the state is what stands after it.
+"""What rtl/compensate/harmonic_map.sv does, in integers: clk(...) is one clk, the state is what
+stands after it.
 
-term_of(amplitude, phase) makes the words of a term from counts and radians; exact(terms, turn) is the sum that they stand for.
+term_of(amplitude, phase) makes the words of a term from counts and radians; exact(terms, turn) is
+the sum that they stand for.
 """
+
 import math
 
 STEPS = 22
 ROTATIONS = [round(math.atan(2.0**-n) * 2**32 / (2 * math.pi)) for n in range(24)]
 GAIN = math.prod(math.sqrt(1 + 4.0**-n) for n in range(STEPS))
-SETTLE = 35                             # clk of a round beside its terms
+SETTLE = 35  # clk of a round beside its terms
 
 
 def signed(value, bits):
@@ -22,7 +25,10 @@ def term_of(amplitude, phase):
 
 def exact(terms, turn):
     """Counts at an angle in turns, from the words as written; terms by order from 1 up."""
-    return sum(a / 2**16 * GAIN * math.sin(2 * math.pi * (k * turn + phase / 2**32)) for k, (a, phase) in enumerate(terms, 1))
+    return sum(
+        a / 2**16 * GAIN * math.sin(2 * math.pi * (k * turn + phase / 2**32))
+        for k, (a, phase) in enumerate(terms, 1)
+    )
 
 
 def rotated(amplitude, angle, steps):
@@ -67,11 +73,24 @@ class HarmonicMap:
         self.stop()
 
     def stop(self):
-        self.left = None                    # clk of the round
+        self.left = None  # clk of the round
         self.base = self.slope = self.offset = self.since = 0
         self.refreshed = False
 
-    def clk(self, rst=0, enable=0, radians_per_count=0, write=0, term=0, amplitude=0, phase=0, swap=0, angle=0, step=0, position=0):
+    def clk(
+        self,
+        rst=0,
+        enable=0,
+        radians_per_count=0,
+        write=0,
+        term=0,
+        amplitude=0,
+        phase=0,
+        swap=0,
+        angle=0,
+        step=0,
+        position=0,
+    ):
         self.corrected = signed((self.position_q << 16) - self.correction, self.w + 16)
         self.position_q = position
         self.correction = signed(self.base + (self.offset >> 4) + 128 >> 8, 32)
@@ -86,7 +105,11 @@ class HarmonicMap:
             self.total, self.slope = summed(self.terms, self.angle, radians_per_count, self.steps)
         self.left = self.left - 1 if self.left and not ends else None
         if begins:
-            self.left, self.angle, self.terms = round_of(self.k, self.steps), angle, list(self.sets[self.page])
+            self.left, self.angle, self.terms = (
+                round_of(self.k, self.steps),
+                angle,
+                list(self.sets[self.page]),
+            )
         if write:
             self.sets[1 - self.page][term] = (amplitude, phase)
         if swap:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/compensate/segment_correction.sv does, in integers: clk(...) is one clk, the state is what stands after it."""
+"""What rtl/compensate/segment_correction.sv does, in integers: clk(...) is one clk, the state is
+what stands after it.
+"""
+
 from tb.compensate.segment_table import segment_table
 
 
@@ -8,10 +11,12 @@ def wrap(value, bits=48):
 
 
 class SegmentCorrection:
-    """points are those that were written; a table at work has those of the clk in which it was asked."""
+    """points are those that were written; a table at work has those of the clk in which it was
+    asked.
+    """
 
     def __init__(self, index=8):
-        self.index, self.round = index, index + 22              # clk of the table
+        self.index, self.round = index, index + 22  # clk of the table
         self.points = [0] * (1 << index)
         self.moved_by = self.stored = self.read_value = 0
         self.off = True
@@ -23,15 +28,37 @@ class SegmentCorrection:
         self.stop()
 
     def stop(self):
-        self.left = None                                        # clk until the table is done
+        self.left = None  # clk until the table is done
         self.told = self.answered = self.in_force = self.outside = False
         self.error = 0
 
-    def clk(self, rst=0, enable=0, linear=0, origin_written=0, origin=0, segment_length=1, segments=1, write=0, point=0, value=0, read=0,
-            read_point=0, valid=0, position=0, shift=0, shift_periods=0):
+    def clk(
+        self,
+        rst=0,
+        enable=0,
+        linear=0,
+        origin_written=0,
+        origin=0,
+        segment_length=1,
+        segments=1,
+        write=0,
+        point=0,
+        value=0,
+        read=0,
+        read_point=0,
+        valid=0,
+        position=0,
+        shift=0,
+        shift_periods=0,
+    ):
         fresh = self.answer if enable and valid and self.answered else self.error
-        begins, ends = bool(enable and self.told and not self.in_force), bool(not enable and self.in_force)
-        asking = bool(enable and not self.asked and not self.looking and (valid or not self.in_force))
+        begins, ends = (
+            bool(enable and self.told and not self.in_force),
+            bool(not enable and self.in_force),
+        )
+        asking = bool(
+            enable and not self.asked and not self.looking and (valid or not self.in_force)
+        )
         periods = shift_periods << 16 if shift else 0
 
         if valid or self.moved:
@@ -55,8 +82,14 @@ class SegmentCorrection:
         self.off = not enable
         self.told = self.left == 1
         if self.told:
-            corrected, self.beyond = segment_table(self.place, self.points[:segments + 1], self.origin, segment_length, linear,
-                                                   index_bits=self.index)
+            corrected, self.beyond = segment_table(
+                self.place,
+                self.points[: segments + 1],
+                self.origin,
+                segment_length,
+                linear,
+                index_bits=self.index,
+            )
             self.answer = self.place - corrected
         self.left = self.left - 1 if self.left and not self.told else None
         if asking:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/compensate/segment_map.sv does, in integers: clk(...) is one clk, the state is what stands after it."""
+"""What rtl/compensate/segment_map.sv does, in integers: clk(...) is one clk, the state is what
+stands after it.
+"""
+
 from tb.compensate.segment_table import segment_table
 
 
@@ -11,13 +14,23 @@ def signed(value, bits):
 def error_at(points, angle):
     """2^-16 count at an angle in 2^-32 turn; points are those of one turn."""
     errors = [*points, points[0]]
-    return angle - segment_table(angle, errors, 0, -(-2**32 // len(points)), linear=1, index_bits=len(errors).bit_length())[0]
+    return (
+        angle
+        - segment_table(
+            angle,
+            errors,
+            0,
+            -(-(2**32) // len(points)),
+            linear=1,
+            index_bits=len(errors).bit_length(),
+        )[0]
+    )
 
 
 class SegmentMap:
     def __init__(self, segments=36, w=32):
         self.segments, self.w = segments, w
-        self.round = (2 * segments + 1).bit_length() + 23               # clk
+        self.round = (2 * segments + 1).bit_length() + 23  # clk
         self.sets = [[0] * segments, [0] * segments]
         self.position_q = self.corrected = 0
         self.reset()

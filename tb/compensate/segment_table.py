@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/compensate/segment_table.sv does to one position, in integers; SegmentTable.clk(...) is one clk of it."""
+"""What rtl/compensate/segment_table.sv does to one position, in integers; SegmentTable.clk(...) is
+one clk of it.
+"""
 
 
 def segment_table(position, errors, origin, length, linear, enable=1, index_bits=8):
@@ -17,12 +19,20 @@ def segment_table(position, errors, origin, length, linear, enable=1, index_bits
 
 
 class SegmentTable:
-    """done, corrected, outside and error are what stands after a clk. Settings and table stand still while a position is under way."""
+    """done, corrected, outside and error are what stands after a clk. Settings and table stand
+    still while a position is under way.
+    """
 
     LATENCY = 30
 
     def __init__(self):
-        self.left, self.done, self.corrected, self.outside, self.error = None, False, None, None, None
+        self.left, self.done, self.corrected, self.outside, self.error = (
+            None,
+            False,
+            None,
+            None,
+            None,
+        )
 
     def clk(self, rst=0, valid=0, position=0, **settings):
         self.done = self.left == 1 and not rst

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""harmonic_map: a sine by hand, latency and round, accuracy over the turn, staleness at speed, swaps, and any motion against the model."""
+"""harmonic_map: a sine by hand, latency and round, accuracy over the turn, staleness at speed,
+swaps, and any motion against the model.
+"""
+
 import math
 import random
 import re
@@ -11,10 +14,21 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import ROOT, run, start
 from tb.compensate.harmonic_map import HarmonicMap, exact, round_of, term_of
 
-IDLE = dict(enable=0, radians_per_count=0, write=0, term=0, amplitude=0, phase=0, swap=0, angle=0, step=0, position=0)
+IDLE = dict(
+    enable=0,
+    radians_per_count=0,
+    write=0,
+    term=0,
+    amplitude=0,
+    phase=0,
+    swap=0,
+    angle=0,
+    step=0,
+    position=0,
+)
 STROBES = "write", "swap", "step"
 COUNTS = 32768
-ARCSEC = 1_296_000 / COUNTS             # of a count
+ARCSEC = 1_296_000 / COUNTS  # of a count
 
 
 class Map:
@@ -32,7 +46,7 @@ class Map:
         await start(self.dut, **IDLE)
         await FallingEdge(self.dut.clk)
         await self.clk(rst=1)
-        await self.give(())                                 # whatever an earlier test left in the other set
+        await self.give(())  # whatever an earlier test left in the other set
         await self.give(terms)
         return self
 
@@ -45,7 +59,11 @@ class Map:
 
     async def clk(self, count=1, rst=0, **inputs):
         for _ in range(count):
-            self.inputs.update(inputs, position=self.place % 2**32, angle=round(self.place * 2**32 / self.counts) % 2**32)
+            self.inputs.update(
+                inputs,
+                position=self.place % 2**32,
+                angle=round(self.place * 2**32 / self.counts) % 2**32,
+            )
             for name, level in self.inputs.items():
                 getattr(self.dut, name).value = level
             self.dut.rst.value = rst
@@ -76,7 +94,7 @@ class Map:
 
 @cocotb.test()
 async def by_hand(dut):
-    chart = await Map(dut).reset([term_of(3.0, math.pi / 2)])               # 3 cos
+    chart = await Map(dut).reset([term_of(3.0, math.pi / 2)])  # 3 cos
     await chart.rest()
     assert abs(chart.model.correction - 3 * 65536) <= 2
     assert chart.model.corrected == -chart.model.correction
@@ -111,8 +129,21 @@ async def a_round_is_as_long_as_the_header_says(dut):
 
 @cocotb.test()
 async def all_orders_are_right_to_a_hundredth_of_an_arcsecond(dut):
-    chart = await Map(dut).reset([term_of(random.uniform(-3, 3) / k, random.uniform(0, 6.3)) for k in range(1, int(dut.K.value) + 1)])
-    for place in (0, 1, COUNTS // 4, COUNTS // 2, 3 * COUNTS // 4 - 1, COUNTS - 1, *(random.randrange(COUNTS) for _ in range(8))):
+    chart = await Map(dut).reset(
+        [
+            term_of(random.uniform(-3, 3) / k, random.uniform(0, 6.3))
+            for k in range(1, int(dut.K.value) + 1)
+        ]
+    )
+    for place in (
+        0,
+        1,
+        COUNTS // 4,
+        COUNTS // 2,
+        3 * COUNTS // 4 - 1,
+        COUNTS - 1,
+        *(random.randrange(COUNTS) for _ in range(8)),
+    ):
         chart.place = place
         await chart.rest()
         assert abs(chart.error()) * ARCSEC <= 0.01
@@ -121,7 +152,10 @@ async def all_orders_are_right_to_a_hundredth_of_an_arcsecond(dut):
 @cocotb.test()
 async def largest_amplitudes_do_not_overflow(dut):
     for sign in (1, -1):
-        chart = await Map(dut).reset([term_of(sign * 16383.0 / int(dut.K.value), math.pi / 2)] * int(dut.K.value), counts=32_768_000)
+        chart = await Map(dut).reset(
+            [term_of(sign * 16383.0 / int(dut.K.value), math.pi / 2)] * int(dut.K.value),
+            counts=32_768_000,
+        )
         for place in (0, chart.counts // 2):
             chart.place = place
             await chart.rest()
@@ -130,7 +164,7 @@ async def largest_amplitudes_do_not_overflow(dut):
 
 @cocotb.test()
 async def at_speed_it_is_behind_by_no_more_than_its_bound(dut):
-    amplitudes = (3.4, 0.5, 0.2)[:int(dut.K.value)]
+    amplitudes = (3.4, 0.5, 0.2)[: int(dut.K.value)]
     chart = await Map(dut).reset([term_of(amplitude, n) for n, amplitude in enumerate(amplitudes)])
     await chart.rest()
     curve = sum(k * k * a for k, a in enumerate(amplitudes, 1)) * (2 * math.pi / COUNTS) ** 2
@@ -167,7 +201,10 @@ async def a_set_comes_into_force_as_a_whole(dut):
         await chart.give(second if chart.terms[0] == first[0] else first)
         for _ in range(2 * chart.round):
             await chart.clk()
-            assert min(abs(chart.model.correction / 65536 - s) for s in (was, exact(chart.terms, 0))) < 0.001
+            assert (
+                min(abs(chart.model.correction / 65536 - s) for s in (was, exact(chart.terms, 0)))
+                < 0.001
+            )
         assert abs(chart.error()) < 0.001
 
 
@@ -194,7 +231,7 @@ async def reset_in_mid_flow(dut):
         await chart.clk(wait)
         await chart.clk(rst=1)
         await chart.clk(2 * chart.round)
-        assert chart.model.correction == 0                                  # a set must be swapped in anew
+        assert chart.model.correction == 0  # a set must be swapped in anew
         await chart.give([term_of(2.0, 1.0)])
         await chart.rest()
         assert abs(chart.error()) < 0.001
@@ -202,7 +239,9 @@ async def reset_in_mid_flow(dut):
 
 @cocotb.test()
 async def any_motion_matches_the_model(dut):
-    chart = await Map(dut).reset([term_of(random.uniform(-9, 9), random.uniform(0, 6)) for _ in range(int(dut.K.value))])
+    chart = await Map(dut).reset(
+        [term_of(random.uniform(-9, 9), random.uniform(0, 6)) for _ in range(int(dut.K.value))]
+    )
     way = 1
     for _ in range(6000):
         inputs = {}
@@ -210,20 +249,34 @@ async def any_motion_matches_the_model(dut):
         if kind == 0:
             way = random.choice((-1, 0, 1))
         elif kind < 4:
-            inputs.update(write=1, term=random.randrange(chart.k), amplitude=random.randrange(-2**24, 2**24), phase=random.getrandbits(32))
+            inputs.update(
+                write=1,
+                term=random.randrange(chart.k),
+                amplitude=random.randrange(-(2**24), 2**24),
+                phase=random.getrandbits(32),
+            )
         elif kind == 4:
             inputs["swap"] = 1
         elif kind == 5:
             inputs["enable"] = int(random.randrange(4) > 0)
         elif kind == 6:
             chart.place = random.randrange(COUNTS)
-        await chart.clk(step=random.choice((0, way)), rst=int(random.randrange(3000) == 0), **inputs)
+        await chart.clk(
+            step=random.choice((0, way)), rst=int(random.randrange(3000) == 0), **inputs
+        )
 
 
 def test_the_page_of_the_relay_says_how_far_it_lags():
     clk_hz, page = 48e6, (ROOT / "docs" / "relay.md").read_text()
-    curve = sum(k * k * arcsec for k, arcsec in enumerate((105, 40, 12), 1)) * (2 * math.pi / COUNTS) ** 2
-    for name, rate in (("600 rev/min", 10 * COUNTS), ("3 MHz of edges", 3e6), ("24 MHz of edges", 24e6)):
+    curve = (
+        sum(k * k * arcsec for k, arcsec in enumerate((105, 40, 12), 1))
+        * (2 * math.pi / COUNTS) ** 2
+    )
+    for name, rate in (
+        ("600 rev/min", 10 * COUNTS),
+        ("3 MHz of edges", 3e6),
+        ("24 MHz of edges", 24e6),
+    ):
         moved = round_of(16) * rate / clk_hz
         told = re.search(rf"^\| {name}.*\| ([\d.]+)\u2033 \|$", page, re.MULTILINE).group(1)
         assert float(told) == pytest.approx(3 * moved**2 * curve, rel=0.2)

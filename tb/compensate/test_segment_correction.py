@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""segment_correction: by hand in both directions, its steps taken by a target, what it lags at speed, shifts, reading back, and any
+"""segment_correction: by hand in both directions, its steps taken by a target, what it lags at
+speed, shifts, reading back, and any
 motion against the model."""
+
 import random
 
 import cocotb
@@ -10,8 +12,23 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import run, start
 from tb.compensate.segment_correction import SegmentCorrection, wrap
 
-IDLE = dict(enable=0, linear=0, origin_written=0, origin=0, segment_length=1, segments=1, write=0, point=0, value=0, read=0, read_point=0,
-            valid=0, position=0, shift=0, shift_periods=0)
+IDLE = dict(
+    enable=0,
+    linear=0,
+    origin_written=0,
+    origin=0,
+    segment_length=1,
+    segments=1,
+    write=0,
+    point=0,
+    value=0,
+    read=0,
+    read_point=0,
+    valid=0,
+    position=0,
+    shift=0,
+    shift_periods=0,
+)
 STROBES = "origin_written", "write", "read", "valid", "shift"
 SIGNED = "corrected", "moved_by", "error"
 FLAGS = "done", "moved", "in_force", "outside", "known"
@@ -24,7 +41,7 @@ class Scale:
         self.dut, self.inputs = dut, dict(IDLE)
         self.index = int(dut.INDEX.value)
         self.model = SegmentCorrection(self.index)
-        self.place, self.target = 0, 0                      # of the scale, told as position
+        self.place, self.target = 0, 0  # of the scale, told as position
 
     async def reset(self, points, origin=0, length=65536):
         await start(self.dut, **IDLE)
@@ -36,7 +53,9 @@ class Scale:
     async def give(self, points, origin, length):
         for n, value in enumerate(points):
             await self.clk(write=1, point=n, value=value)
-        await self.clk(segments=len(points) - 1, segment_length=length, origin=origin, origin_written=1)
+        await self.clk(
+            segments=len(points) - 1, segment_length=length, origin=origin, origin_written=1
+        )
 
     async def clk(self, count=1, rst=0, **inputs):
         dut, model = self.dut, self.model
@@ -50,13 +69,17 @@ class Scale:
             await RisingEdge(dut.clk)
             await FallingEdge(dut.clk)
             for name in FLAGS:
-                assert bool(getattr(dut, name).value) == getattr(model, name), f"{self.inputs}: {name} is not as the model's"
+                assert bool(getattr(dut, name).value) == getattr(model, name), (
+                    f"{self.inputs}: {name} is not as the model's"
+                )
             names = SIGNED if model.moved else ("corrected", "error")
             for name in (*names, "stored") if model.known else names:
                 got, want = getattr(dut, name).value.to_signed(), getattr(model, name)
                 assert got == want, f"{self.inputs}: {name} is {got}, the model has {want}"
             if self.inputs["shift"]:
-                self.inputs["position"] = wrap(self.inputs["position"] + (self.inputs["shift_periods"] << 16))
+                self.inputs["position"] = wrap(
+                    self.inputs["position"] + (self.inputs["shift_periods"] << 16)
+                )
             for name in STROBES:
                 self.inputs[name] = 0
 
@@ -76,7 +99,15 @@ def any_points(count, reach=(1 << 23) - 1):
 async def the_rectangle_and_the_straight_line_by_hand(dut):
     scale = await Scale(dut).reset([0, 10, 30, -20], origin=500, length=1000)
     await scale.clk(enable=1)
-    for position, error in ((500, 5), (1499, 5), (1500, 20), (2499, 20), (3499, 5), (100, 0), (9999, -20)):
+    for position, error in (
+        (500, 5),
+        (1499, 5),
+        (1500, 20),
+        (2499, 20),
+        (3499, 5),
+        (100, 0),
+        (9999, -20),
+    ):
         assert await scale.at(position) == position - error
     await scale.clk(2, enable=0)
     await scale.clk(enable=1, linear=1)
@@ -87,9 +118,11 @@ async def the_rectangle_and_the_straight_line_by_hand(dut):
 @cocotb.test()
 async def the_sign_is_right_in_both_directions(dut):
     count = (1 << int(dut.INDEX.value)) - 1
-    scale = await Scale(dut).reset([round(65536 * n / 101) for n in range(count + 1)])  # the scale shows 1 % too much
+    scale = await Scale(dut).reset(
+        [round(65536 * n / 101) for n in range(count + 1)]
+    )  # the scale shows 1 % too much
     await scale.clk(enable=1, linear=1)
-    longest = 2 * (scale.model.round + 1 + 8) // 8 + 1                          # steps of the motion below
+    longest = 2 * (scale.model.round + 1 + 8) // 8 + 1  # steps of the motion below
     for way in (1, -1):
         true = 0 if way > 0 else count * 64000
         for step in range(600):
@@ -126,21 +159,23 @@ async def it_comes_into_force_index_plus_23_clk_after_enable(dut):
 
 @cocotb.test()
 async def a_target_that_takes_its_steps_is_never_thrown(dut):
-    scale = await Scale(dut).reset([4_000_000] * 4, origin=-100_000)            # 61 periods, everywhere
+    scale = await Scale(dut).reset([4_000_000] * 4, origin=-100_000)  # 61 periods, everywhere
     position = 0
     for n in range(40):
         enable = n % 2
         for _ in range(random.randrange(3, 90)):
             moving = random.randrange(3) == 0
             position += 11 * moving
-            await scale.clk(valid=int(moving or random.randrange(2)), position=position, enable=enable)
+            await scale.clk(
+                valid=int(moving or random.randrange(2)), position=position, enable=enable
+            )
             scale.target += 11 * moving
             assert scale.target == scale.model.corrected
 
 
 @cocotb.test()
 async def the_error_in_force_is_that_of_a_place_not_longer_ago_than_the_header_says(dut):
-    scale = await Scale(dut).reset([0, 1 << 22], length=1 << 24)                # a quarter of the way
+    scale = await Scale(dut).reset([0, 1 << 22], length=1 << 24)  # a quarter of the way
     apart = 7
     await scale.clk(enable=1, linear=1)
     for way in (300, -300):
@@ -173,7 +208,12 @@ async def a_shift_moves_the_table_with_the_scale(dut):
 async def beyond_the_table_the_error_is_that_of_its_border_and_it_says_so(dut):
     scale = await Scale(dut).reset([100, 200, -300], length=1000)
     await scale.clk(enable=1)
-    for position, error, outside in ((-5, 100, True), (500, 150, False), (1500, -50, False), (2000, -300, True)):
+    for position, error, outside in (
+        (-5, 100, True),
+        (500, 150, False),
+        (1500, -50, False),
+        (2000, -300, True),
+    ):
         assert await scale.at(position) == position - error
         assert scale.model.outside == outside
 
@@ -184,7 +224,9 @@ async def points_are_read_back_at_work_too(dut):
     scale = await Scale(dut).reset(points)
     for enable in (0, 1, 0, 1):
         for n in random.sample(range(len(points)), 4):
-            await scale.clk(random.randrange(1, 40), valid=1, position=random.randrange(1 << 18), enable=enable)
+            await scale.clk(
+                random.randrange(1, 40), valid=1, position=random.randrange(1 << 18), enable=enable
+            )
             await scale.clk(read=1, read_point=n)
             await scale.clk()
             for _ in range(scale.model.round + 3):
@@ -199,7 +241,9 @@ async def reset_in_mid_flow(dut):
         await scale.clk(enable=1, valid=1, position=5000)
         await scale.clk(wait, valid=1, position=5100)
         await scale.clk(rst=1, position=0)
-        assert not (scale.model.in_force or scale.model.done or scale.model.moved or scale.model.known)
+        assert not (
+            scale.model.in_force or scale.model.done or scale.model.moved or scale.model.known
+        )
         await scale.clk(3, enable=0)
         assert scale.model.corrected == 0
 
@@ -210,7 +254,10 @@ async def any_motion_and_any_table_match_the_model(dut):
     most = (1 << scale.index) - 1
     for _ in range(20):
         await scale.clk(2, enable=0)
-        count, length = random.randint(1, most), random.choice((3, 1000, 1 << 16, random.getrandbits(34) + 1))
+        count, length = (
+            random.randint(1, most),
+            random.choice((3, 1000, 1 << 16, random.getrandbits(34) + 1)),
+        )
         await scale.give(any_points(count + 1), random.randrange(-1 << 40, 1 << 40), length)
         position = wrap(scale.model.first + random.randrange(-length, (count + 1) * length))
         scale.inputs["position"] = position

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""segment_map: points by hand, latency and round, the last border, staleness at speed, swaps, and any motion against the model."""
+"""segment_map: points by hand, latency and round, the last border, staleness at speed, swaps, and
+any motion against the model.
+"""
+
 import math
 import random
 
@@ -29,7 +32,7 @@ class Map:
         await start(self.dut, **IDLE)
         await FallingEdge(self.dut.clk)
         await self.clk(rst=1)
-        await self.give([0] * self.segments)                # whatever an earlier test left in the other set
+        await self.give([0] * self.segments)  # whatever an earlier test left in the other set
         await self.give(points)
         return self
 
@@ -76,7 +79,9 @@ async def by_hand(dut):
     chart = await Map(dut).reset(points)
     for n in range(chart.segments - 1):
         assert abs(await chart.at(n * TURN // chart.segments + 1) - points[n]) <= 1
-        assert abs(await chart.at((2 * n + 1) * TURN // (2 * chart.segments)) - points[n] - 500) <= 1
+        assert (
+            abs(await chart.at((2 * n + 1) * TURN // (2 * chart.segments)) - points[n] - 500) <= 1
+        )
     await chart.clk(3, position=77)
     assert chart.model.corrected == (77 << 16) - chart.model.correction
 
@@ -93,7 +98,7 @@ async def the_last_border_is_the_first(dut):
 async def latency_is_3(dut):
     chart = await Map(dut).reset([0] * int(dut.SEGMENTS.value))
     await chart.clk(4, position=5)
-    seen = []                                               # position is one clk younger than step
+    seen = []  # position is one clk younger than step
     await chart.clk(position=6)
     for _ in range(3):
         seen.append(chart.model.corrected >> 16)
@@ -109,7 +114,9 @@ async def a_round_is_as_long_as_the_header_says(dut):
         await chart.clk()
         if chart.model.refreshed:
             times.append(n)
-    assert {b - a for a, b in zip(times, times[1:])} == {math.ceil(math.log2(2 * chart.segments + 2)) + 23}
+    assert {b - a for a, b in zip(times, times[1:])} == {
+        math.ceil(math.log2(2 * chart.segments + 2)) + 23
+    }
 
 
 @cocotb.test()
@@ -126,7 +133,10 @@ async def at_speed_it_is_behind_by_two_rounds_at_most(dut):
             await chart.clk(angle=angle)
             place = angle * count / TURN
             low, high = points[int(place)], [*points, points[0]][int(place) + 1]
-            assert abs(chart.model.correction - low - (high - low) * (place % 1)) <= 2 * chart.round * 65536 / 32768 + 2
+            assert (
+                abs(chart.model.correction - low - (high - low) * (place % 1))
+                <= 2 * chart.round * 65536 / 32768 + 2
+            )
 
 
 @cocotb.test()
@@ -176,7 +186,7 @@ async def reset_in_mid_flow(dut):
         await chart.clk(wait)
         await chart.clk(rst=1)
         await chart.clk(3 * chart.round)
-        assert chart.model.correction == 0                  # a set must be swapped in anew
+        assert chart.model.correction == 0  # a set must be swapped in anew
         await chart.give([9] * chart.segments)
         assert await chart.at(5) == 9
 
@@ -189,9 +199,20 @@ async def any_motion_matches_the_model(dut):
         if random.randrange(3) == 0:
             await chart.put(any_points(chart.segments, random.choice((100, LARGEST))))
         for _ in range(random.randrange(60)):
-            angle = random.choice((angle, (angle + random.choice((-1, 1)) * TURN // 4000) % TURN, random.getrandbits(32)))
-            await chart.clk(angle=angle, position=random.getrandbits(32), swap=int(random.randrange(40) == 0),
-                            enable=int(random.randrange(30) > 0), rst=int(random.randrange(500) == 0))
+            angle = random.choice(
+                (
+                    angle,
+                    (angle + random.choice((-1, 1)) * TURN // 4000) % TURN,
+                    random.getrandbits(32),
+                )
+            )
+            await chart.clk(
+                angle=angle,
+                position=random.getrandbits(32),
+                swap=int(random.randrange(40) == 0),
+                enable=int(random.randrange(30) > 0),
+                rst=int(random.randrange(500) == 0),
+            )
 
 
 @pytest.mark.parametrize("segments", [2, 5, 36, 64])

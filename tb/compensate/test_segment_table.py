@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""segment_table: the printed rectangle by hand, the straight line, bounds, sign in both directions, and any table against the model."""
+"""segment_table: the printed rectangle by hand, the straight line, bounds, sign in both directions,
+and any table against the model.
+"""
+
 import random
 
 import cocotb
@@ -8,7 +11,19 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import run, start
 from tb.compensate.segment_table import SegmentTable
 
-IDLE = dict(enable=1, linear=0, origin=0, segment_length=1, segments=1, write=0, point=0, value=0, read_point=0, valid=0, position=0)
+IDLE = dict(
+    enable=1,
+    linear=0,
+    origin=0,
+    segment_length=1,
+    segments=1,
+    write=0,
+    point=0,
+    value=0,
+    read_point=0,
+    valid=0,
+    position=0,
+)
 FAR = 1 << 47
 
 
@@ -16,7 +31,11 @@ class Table:
     """The design with the model beside it in every clk."""
 
     def __init__(self, dut):
-        self.dut, self.model, self.inputs = dut, SegmentTable(), dict(rst=0, valid=0, position=0, linear=0, enable=1)
+        self.dut, self.model, self.inputs = (
+            dut,
+            SegmentTable(),
+            dict(rst=0, valid=0, position=0, linear=0, enable=1),
+        )
         self.errors, self.origin, self.length = [0, 0], 0, 1
 
     async def reset(self, errors, origin=0, length=1000):
@@ -27,7 +46,11 @@ class Table:
 
     async def give(self, errors, origin, length):
         dut = self.dut
-        dut.origin.value, dut.segment_length.value, dut.segments.value = origin, length, len(errors) - 1
+        dut.origin.value, dut.segment_length.value, dut.segments.value = (
+            origin,
+            length,
+            len(errors) - 1,
+        )
         for n, error in enumerate(errors):
             dut.write.value, dut.point.value, dut.value.value = 1, n, error
             await self.clk()
@@ -45,9 +68,15 @@ class Table:
             await FallingEdge(dut.clk)
             assert int(dut.done.value) == model.done
             if model.done:
-                got = dut.corrected.value.to_signed(), bool(dut.outside.value), dut.error.value.to_signed()
+                got = (
+                    dut.corrected.value.to_signed(),
+                    bool(dut.outside.value),
+                    dut.error.value.to_signed(),
+                )
                 want = model.corrected, model.outside, model.error
-                assert got == want, f"{self.inputs} in {self.length} from {self.origin}: {got}, the model has {want}"
+                assert got == want, (
+                    f"{self.inputs} in {self.length} from {self.origin}: {got}, the model has {want}"
+                )
 
     async def at(self, position, linear=0, enable=1):
         """(corrected, outside); the clk it took in self.clks."""
@@ -69,7 +98,15 @@ async def the_rectangle_as_printed_by_hand(dut):
 @cocotb.test()
 async def the_straight_line_by_hand(dut):
     table = await Table(dut).reset([0, 10, 30, -20], origin=-500)
-    for position, error in ((-500, 0), (0, 5), (500, 10), (1000, 20), (1500, 30), (2000, 5), (2499, -20)):
+    for position, error in (
+        (-500, 0),
+        (0, 5),
+        (500, 10),
+        (1000, 20),
+        (1500, 30),
+        (2000, 5),
+        (2499, -20),
+    ):
         assert await table.at(position, linear=1) == (position - error, False)
 
 
@@ -83,7 +120,7 @@ async def latency_is_30(dut):
 
 @cocotb.test()
 async def the_sign_is_right_in_both_directions(dut):
-    errors = [100 * n for n in range(9)]                    # the scale shows 100 more with each segment
+    errors = [100 * n for n in range(9)]  # the scale shows 100 more with each segment
     table = await Table(dut).reset(errors, length=10_000)
     for linear in (0, 1):
         for true in [*range(0, 79_000, 3950), *range(79_000, 0, -3950)]:
@@ -114,7 +151,7 @@ async def points_are_read_back_while_no_position_is_under_way(dut):
         dut.read_point.value = n
         await table.clk()
         assert dut.read_value.value.to_signed() == points[n]
-        await table.at(random.randrange(255_000), random.getrandbits(1))        # which reads other points
+        await table.at(random.randrange(255_000), random.getrandbits(1))  # which reads other points
         await table.clk(valid=0)
         assert dut.read_value.value.to_signed() == points[n]
 
@@ -122,7 +159,9 @@ async def points_are_read_back_while_no_position_is_under_way(dut):
 @cocotb.test()
 async def largest_errors_and_longest_tables(dut):
     ends = -(1 << 23), (1 << 23) - 1
-    table = await Table(dut).reset([ends[n % 2] for n in range(256)], origin=-FAR // 2, length=(FAR - 1) // 256)
+    table = await Table(dut).reset(
+        [ends[n % 2] for n in range(256)], origin=-FAR // 2, length=(FAR - 1) // 256
+    )
     for n in (0, 1, 127, 254):
         for linear in (0, 1):
             for inside in (0, 1, table.length // 2, table.length - 1):
@@ -133,7 +172,9 @@ async def largest_errors_and_longest_tables(dut):
 async def a_position_that_comes_too_early_is_not_taken(dut):
     table = await Table(dut).reset([3, 4, 5])
     for n in range(200):
-        await table.clk(valid=random.getrandbits(1), position=random.randrange(-100, 2100), enable=int(n < 150))
+        await table.clk(
+            valid=random.getrandbits(1), position=random.randrange(-100, 2100), enable=int(n < 150)
+        )
 
 
 @cocotb.test()
@@ -153,10 +194,21 @@ async def any_table_matches_the_model(dut):
     for _ in range(25):
         count = random.choice((1, 2, 7, 100, 255))
         length = random.choice((1, 3, 1000, random.getrandbits(30) + 1, random.getrandbits(38) + 1))
-        await table.give([random.randrange(-1 << 23, 1 << 23) for _ in range(count + 1)], random.randrange(-1 << 40, 1 << 40), length)
+        await table.give(
+            [random.randrange(-1 << 23, 1 << 23) for _ in range(count + 1)],
+            random.randrange(-1 << 40, 1 << 40),
+            length,
+        )
         for _ in range(12):
-            place = random.choice((random.randrange(count * length), random.randrange(count) * length, -1, count * length,
-                                   random.randrange(-length, (count + 1) * length)))
+            place = random.choice(
+                (
+                    random.randrange(count * length),
+                    random.randrange(count) * length,
+                    -1,
+                    count * length,
+                    random.randrange(-length, (count + 1) * length),
+                )
+            )
             await table.at(table.origin + place, random.getrandbits(1))
             await table.clk(random.choice((0, 0, 3)))
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""turn_angle: a turn by hand, the angle to its bound, start at every quarter, a missing index, and any steps against the model."""
+"""turn_angle: a turn by hand, the angle to its bound, start at every quarter, a missing index, and
+any steps against the model.
+"""
+
 import random
 
 import cocotb
@@ -18,7 +21,9 @@ class Turn:
         self.dut, self.model, self.inputs = dut, TurnAngle(int(dut.W.value)), dict(IDLE)
 
     async def reset(self, counts=0, **inputs):
-        self.inputs.update(counts_per_turn=counts, angle_per_count=round(2**48 / counts) if counts else 0, **inputs)
+        self.inputs.update(
+            counts_per_turn=counts, angle_per_count=round(2**48 / counts) if counts else 0, **inputs
+        )
         await start(self.dut, **IDLE)
         await FallingEdge(self.dut.clk)
         await self.clk(rst=1)
@@ -54,7 +59,11 @@ async def by_hand(dut):
 async def latency_is_1(dut):
     turn = await Turn(dut).reset(counts=8)
     await turn.clk(step=1, index=1)
-    assert int(dut.position.value) == 1 and int(dut.known.value) == 1 and int(dut.referenced.value) == 1
+    assert (
+        int(dut.position.value) == 1
+        and int(dut.known.value) == 1
+        and int(dut.referenced.value) == 1
+    )
     await turn.clk()
     assert int(dut.referenced.value) == 0
 
@@ -109,7 +118,7 @@ async def trembling_over_a_wide_index_misses_nothing(dut):
     await turn.clk(step=1, index=1)
     for _ in range(20):
         await turn.clk(step=-1)
-        await turn.clk(step=1)                              # still high: not found again
+        await turn.clk(step=1)  # still high: not found again
         assert not turn.model.missing
 
 
@@ -140,8 +149,13 @@ async def any_steps_match_the_model(dut):
         for _ in range(2000):
             drift = drift if random.randrange(50) else random.choice((-1, 0, 1))
             step = random.choice((-1, 0, 1, drift, drift))
-            await turn.clk(step=step, index=int(random.randrange(40) == 0), rst=int(random.randrange(500) == 0),
-                           a=random.getrandbits(1), b=random.getrandbits(1))
+            await turn.clk(
+                step=step,
+                index=int(random.randrange(40) == 0),
+                rst=int(random.randrange(500) == 0),
+                a=random.getrandbits(1),
+                b=random.getrandbits(1),
+            )
 
 
 def test_turn_angle():

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/compensate/turn_angle.sv does, in integers: clk(...) is one clk, the state is what stands after it."""
+"""What rtl/compensate/turn_angle.sv does, in integers: clk(...) is one clk, the state is what
+stands after it.
+"""
 
 
 class TurnAngle:
     def __init__(self, w=32):
         self.w = w
         self.position = self.place = self.turned = self.turns = 0
-        self.highest = 0                        # place, as of the clk before
+        self.highest = 0  # place, as of the clk before
         self.moved = self.known = self.referenced = self.missing = False
 
     @property

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/control/biquad_cascade.sv does, in integers: clk(...) is one clk and returns what is on the pins after it."""
+"""What rtl/control/biquad_cascade.sv does, in integers: clk(...) is one clk and returns what is on
+the pins after it.
+"""
 
-FRACTION = 30                           # bits of a coefficient
-STAGE = 36                              # clk per section from x to y
-PAST = 4 * 35 + 1                       # and then to add up its past
+FRACTION = 30  # bits of a coefficient
+STAGE = 36  # clk per section from x to y
+PAST = 4 * 35 + 1  # and then to add up its past
 LOW, HIGH = -1 << 31, (1 << 31) - 1
 
 
@@ -14,10 +16,12 @@ class BiquadCascade:
         self.reset()
 
     def reset(self):
-        self.n = None                   # clk since the sample, None: ready
-        self.streams = [(0, 0)] * (self.sections + 1)              # two past samples of each, the newer one first
+        self.n = None  # clk since the sample, None: ready
+        self.streams = [(0, 0)] * (
+            self.sections + 1
+        )  # two past samples of each, the newer one first
         self.remainders = [0] * self.sections
-        self.samples = 0                # in a row that the sections know
+        self.samples = 0  # in a row that the sections know
         self.filtering = 0
         self.y = 0
 
@@ -25,13 +29,27 @@ class BiquadCascade:
         if not works:
             self.remainders[section] = 0
             return x
-        terms = zip(self.coefficients[section], (x, *self.streams[section], *self.streams[section + 1]))
-        y, self.remainders[section] = divmod(sum(c * s for c, s in terms) + self.remainders[section], 1 << FRACTION)
+        terms = zip(
+            self.coefficients[section], (x, *self.streams[section], *self.streams[section + 1])
+        )
+        y, self.remainders[section] = divmod(
+            sum(c * s for c, s in terms) + self.remainders[section], 1 << FRACTION
+        )
         if not LOW <= y <= HIGH:
             self.remainders[section] = 0
         return max(LOW, min(HIGH, y))
 
-    def clk(self, rst=0, in_use=0, coefficient_write=0, coefficient_address=0, coefficient=0, valid_in=0, track=0, x=0):
+    def clk(
+        self,
+        rst=0,
+        in_use=0,
+        coefficient_write=0,
+        coefficient_address=0,
+        coefficient=0,
+        valid_in=0,
+        track=0,
+        x=0,
+    ):
         """Coefficients must not change in use, nor in_use rise and fall within a sample."""
         if coefficient_write:
             self.coefficients[coefficient_address >> 3][coefficient_address & 7] = coefficient

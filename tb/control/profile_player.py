@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/control/profile_player.sv does, in integers: clk(...) is one clk and returns what is on the pins after it."""
+"""What rtl/control/profile_player.sv does, in integers: clk(...) is one clk and returns what is on
+the pins after it.
+"""
+
 from collections import deque
 
 HALF = 1 << 23
@@ -28,7 +31,9 @@ def clks(count):
 
 
 class Way:
-    """A value on its way to zero: its slope in whole paces, and what that still adds while it falls to zero."""
+    """A value on its way to zero: its slope in whole paces, and what that still adds while it falls
+    to zero.
+    """
 
     def __init__(self):
         self.slope = self.area = self.pace = self.upward = 0
@@ -81,17 +86,44 @@ class ProfilePlayer:
     def stand(self):
         """As at the end of a profile."""
         self.life = self.ticks()
-        self.velocity = self.acceleration = self.jerk = self.left = self.last = self.fraction = self.offset = 0
+        self.velocity = self.acceleration = self.jerk = self.left = self.last = self.fraction = (
+            self.offset
+        ) = 0
         self.step = self.change = self.ready = self.final = self.arrived = self.rate = 0
         self.moving = self.braking = self.target_velocity = self.target_acceleration = 0
         self.ramp, self.controlled_stop = Way(), None
 
     def pins(self):
-        return (wrap(self.exact >> 24, 48), self.target_velocity, self.target_acceleration, self.moving, self.armed,
-                self.depth - len(self.queue), self.underrun)
+        return (
+            wrap(self.exact >> 24, 48),
+            self.target_velocity,
+            self.target_acceleration,
+            self.moving,
+            self.armed,
+            self.depth - len(self.queue),
+            self.underrun,
+        )
 
-    def clk(self, rst=0, tick=0, push=None, start=0, controlled_stop=0, set_target_to_position=0, position=0, shift=None, stop_deceleration=0, stop_jerk=0,
-            slope=0, curve=0, feed_fraction=65536, pause=0, arm=0, start_at=0, now=0):
+    def clk(
+        self,
+        rst=0,
+        tick=0,
+        push=None,
+        start=0,
+        controlled_stop=0,
+        set_target_to_position=0,
+        position=0,
+        shift=None,
+        stop_deceleration=0,
+        stop_jerk=0,
+        slope=0,
+        curve=0,
+        feed_fraction=65536,
+        pause=0,
+        arm=0,
+        start_at=0,
+        now=0,
+    ):
         """push: (velocity, acceleration, jerk, ticks, last) or None. shift: 2^-16 period or None."""
         self.underrun = 0
         if rst or set_target_to_position:
@@ -101,8 +133,18 @@ class ProfilePlayer:
             self.stand()
             self.empty()
             return self.pins()
-        self.tick, self.shifted, self.brake_now, self.stop_deceleration, self.stop_jerk = tick, shift is not None, controlled_stop, stop_deceleration, stop_jerk
-        self.slope, self.curve, self.setting = slope, curve, 0 if pause else min(feed_fraction, 65536) << 16
+        self.tick, self.shifted, self.brake_now, self.stop_deceleration, self.stop_jerk = (
+            tick,
+            shift is not None,
+            controlled_stop,
+            stop_deceleration,
+            stop_jerk,
+        )
+        self.slope, self.curve, self.setting = (
+            slope,
+            curve,
+            0 if pause else min(feed_fraction, 65536) << 16,
+        )
         moving, waiting = self.moving, bool(self.queue)
         room = len(self.queue) < self.depth and not self.braking and not self.writing
         reached = self.armed and wrap(now - start_at, 32) >= 0
@@ -160,11 +202,13 @@ class ProfilePlayer:
             self.rate, self.arrived = self.setting, 0
             ramp.slope = ramp.area = 0
             return
-        yield from clks(3 + (2 + ramp.choose(self.slope, self.curve) - 1 if ramp.slope == 0 else 0) + 1)
+        yield from clks(
+            3 + (2 + ramp.choose(self.slope, self.curve) - 1 if ramp.slope == 0 else 0) + 1
+        )
         distance = self.rate - self.setting
         new = ramp.slope == 0
         what, clk = ramp.decide(distance, self.slope)
-        if new and self.arrived:                        # a rest of one tick before the next ramp
+        if new and self.arrived:  # a rest of one tick before the next ramp
             yield from clks(4 + 2)
             self.arrived = 0
         elif what == "last":
@@ -190,7 +234,10 @@ class ProfilePlayer:
             if self.fraction >= FULL:
                 self.fraction -= FULL
                 base += self.velocity
-                self.velocity, self.acceleration = self.velocity + self.acceleration, self.acceleration + self.jerk
+                self.velocity, self.acceleration = (
+                    self.velocity + self.acceleration,
+                    self.acceleration + self.jerk,
+                )
                 self.left -= 1
                 yield from clks(11)
                 if self.left == 0 and (yield from self.load()):
@@ -257,7 +304,9 @@ class ProfilePlayer:
         yield
 
     def begin_to_brake(self, limit):
-        """A slope of as many whole paces as the acceleration is high: (too fast to stop, "stay" if it must not grow at this step)."""
+        """A slope of as many whole paces as the acceleration is high: (too fast to stop, "stay" if
+        it must not grow at this step).
+        """
         brake = self.brake
         yield from clks(1 + brake.choose(limit, self.stop_jerk) + 1 + 3 + 31)
         brake.upward = int(self.change > 0)
@@ -271,7 +320,9 @@ class ProfilePlayer:
         if brake.slope * (quotient & ~1) >= 1 << 68:
             return True, None
         yield from clks(3)
-        if brake.slope or not rest:                     # of no slope but a rest: from the other side it would be more than a pace
+        if (
+            brake.slope or not rest
+        ):  # of no slope but a rest: from the other side it would be more than a pace
             if not brake.slope:
                 yield
             return False, None

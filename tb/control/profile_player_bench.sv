@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// profile_player_bench -- profile_player with its exact target in sight, and whether its next step is prepared: the top of sw/figures/profile_run.cpp.
+// profile_player_bench -- profile_player with its exact target in sight, and whether its next step
+// is prepared: the top of sw/figures/profile_run.cpp.
 `default_nettype none
 
 module profile_player_bench (
@@ -20,20 +21,51 @@ module profile_player_bench (
     input  wire               segment_last,
     input  wire               start,
     input  wire               controlled_stop,
-    output logic       [71:0] exact,                            // 2^-40 period; while prepared
+    output logic       [71:0] exact,                 // 2^-40 period; while prepared
     output logic              moving,
-    output logic       [4:0]  queue_free,
+    output logic       [ 4:0] queue_free,
     output logic              underrun,
-    output logic              prepared                          // level: a tick is taken
+    output logic              prepared               // level: a tick is taken
 );
     /* verilator lint_off PINCONNECTEMPTY */
-    profile_player u_player (.clk, .rst, .stop_deceleration, .stop_jerk, .slope, .curve, .feed_fraction, .pause, .tick, .push, .segment_velocity, .segment_acceleration, .segment_jerk,
-        .segment_ticks, .segment_last, .start, .arm(1'b0), .start_at(32'd0), .now(32'd0), .controlled_stop, .set_target_to_position(1'b0), .position(48'd0),
-        .shift(1'b0), .shift_by(48'd0), .target(), .target_velocity(), .target_acceleration(), .moving, .armed(), .queue_free, .underrun);
+    profile_player u_player (
+        .clk,
+        .rst,
+        .stop_deceleration,
+        .stop_jerk,
+        .slope,
+        .curve,
+        .feed_fraction,
+        .pause,
+        .tick,
+        .push,
+        .segment_velocity,
+        .segment_acceleration,
+        .segment_jerk,
+        .segment_ticks,
+        .segment_last,
+        .start,
+        .arm                   (1'b0),
+        .start_at              (32'd0),
+        .now                   (32'd0),
+        .controlled_stop,
+        .set_target_to_position(1'b0),
+        .position              (48'd0),
+        .shift                 (1'b0),
+        .shift_by              (48'd0),
+        .target                (),
+        .target_velocity       (),
+        .target_acceleration   (),
+        .moving,
+        .armed                 (),
+        .queue_free,
+        .underrun
+    );
     /* verilator lint_on PINCONNECTEMPTY */
     assign prepared = u_player.job == u_player.WAIT;
 
-    // while it waits, acc is the step and the fraction that the target has below its LSB, and half an LSB at the end
+    // while it waits, acc is the step and the fraction that the target has below its LSB, and half
+    // an LSB at the end
     wire [23:0] fraction = u_player.acc[23:0] - u_player.memory[3][23:0] - {u_player.final_step, 23'd0};
     assign exact = {u_player.target, u_player.ready ? fraction : 24'd0};
 endmodule

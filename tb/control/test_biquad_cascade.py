@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""biquad_cascade: steps by hand, rest without error, the accuracy bound, bypass, both ends, and random filters against the model."""
+"""biquad_cascade: steps by hand, rest without error, the accuracy bound, bypass, both ends, and
+random filters against the model.
+"""
+
 import cmath
 import math
 import random
@@ -12,7 +15,9 @@ from tb.bench import run, start
 from tb.control.biquad_cascade import HIGH, LOW, PAST, STAGE, BiquadCascade
 
 ONE = 1 << 30
-IDLE = dict(in_use=0, coefficient_write=0, coefficient_address=0, coefficient=0, valid_in=0, track=0, x=0)
+IDLE = dict(
+    in_use=0, coefficient_write=0, coefficient_address=0, coefficient=0, valid_in=0, track=0, x=0
+)
 
 
 def settled(b0, b1, b2, a1, a2):
@@ -63,7 +68,9 @@ class Cascade:
 
     async def load(self, section, coefficients):
         for number, value in enumerate(coefficients):
-            await self.clk(coefficient_write=1, coefficient_address=8 * section + number, coefficient=value)
+            await self.clk(
+                coefficient_write=1, coefficient_address=8 * section + number, coefficient=value
+            )
 
     async def sample(self, x, **inputs):
         """Give a sample, return y once the next one may come."""
@@ -85,7 +92,12 @@ async def by_hand(dut):
     await cascade.load(0, (ONE // 2, ONE // 4, ONE // 8, ONE // 2, -ONE // 4))
     await cascade.clk(in_use=1)
     await cascade.settle()
-    assert [await cascade.sample(x) for x in (800, 0, 0, 0)] == [400, 200 + 200, 100 + 200 - 100, 100 - 100]
+    assert [await cascade.sample(x) for x in (800, 0, 0, 0)] == [
+        400,
+        200 + 200,
+        100 + 200 - 100,
+        100 - 100,
+    ]
     assert await cascade.sample(0) == -50
 
 
@@ -95,7 +107,18 @@ async def what_is_cut_off_goes_into_the_next_sample(dut):
     await cascade.load(0, (ONE // 4, 0, 0, 0, 0))
     await cascade.clk(in_use=1)
     await cascade.settle()
-    assert [await cascade.sample(x) for x in [3] * 5 + [-3] * 5] == [0, 1, 1, 1, 0, 0, -1, -1, -1, 0]
+    assert [await cascade.sample(x) for x in [3] * 5 + [-3] * 5] == [
+        0,
+        1,
+        1,
+        1,
+        0,
+        0,
+        -1,
+        -1,
+        -1,
+        0,
+    ]
 
 
 @cocotb.test()
@@ -116,7 +139,9 @@ async def a_sample_each_177_clk_a_section_and_1(dut):
         ready, _, _ = await cascade.clk(valid_in=1, x=7)
         clk = 1
         while not ready:
-            ready, _, y = await cascade.clk(valid_in=random.getrandbits(1), x=9)        # too early: ignored
+            ready, _, y = await cascade.clk(
+                valid_in=random.getrandbits(1), x=9
+            )  # too early: ignored
             clk += 1
         assert clk == 177 * cascade.sections + 1 == (STAGE + PAST) * cascade.sections + 1 and y == 7
 
@@ -142,11 +167,14 @@ async def the_error_is_within_the_stated_bound(dut):
     await cascade.clk(in_use=1)
     await cascade.settle()
     b0, b1, b2, c1, c2 = (value / ONE for value in coefficients)
-    shape, s1, s2 = [], 0.0, 0.0                         # impulse response of (1 - z^-1) / A(z)
+    shape, s1, s2 = [], 0.0, 0.0  # impulse response of (1 - z^-1) / A(z)
     for n in range(2000):
         s1, s2 = (n == 0) - (n == 1) + c1 * s1 + c2 * s2, s1
         shape.append(s1)
-    low, high = -sum(max(0, s) for s in shape), sum(max(0, -s) for s in shape)     # what is cut off counts negative
+    low, high = (
+        -sum(max(0, s) for s in shape),
+        sum(max(0, -s) for s in shape),
+    )  # what is cut off counts negative
     x1 = x2 = y1 = y2 = 0.0
     worst = 0.0
     for _ in range(120):
@@ -167,11 +195,21 @@ async def a_notch_takes_its_frequency_out_and_leaves_others(dut):
     await cascade.settle()
 
     async def gain(frequency):
-        out = [await cascade.sample(round(1e6 * math.sin(2 * math.pi * frequency * n))) for n in range(90)][50:]
-        return abs(sum(y * cmath.exp(-2j * math.pi * frequency * n) for n, y in enumerate(out))) * 2 / len(out) / 1e6
+        out = [
+            await cascade.sample(round(1e6 * math.sin(2 * math.pi * frequency * n)))
+            for n in range(90)
+        ][50:]
+        return (
+            abs(sum(y * cmath.exp(-2j * math.pi * frequency * n) for n, y in enumerate(out)))
+            * 2
+            / len(out)
+            / 1e6
+        )
 
     assert await gain(0.1) < 1e-3
-    assert abs(await gain(0.05) - 0.9525) < 0.002         # |1 - u^2| / |1 - u^2 + j u / Q|, u = tan(pi f) / tan(pi 0.1)
+    assert (
+        abs(await gain(0.05) - 0.9525) < 0.002
+    )  # |1 - u^2| / |1 - u^2 + j u / Q|, u = tan(pi f) / tan(pi 0.1)
 
 
 @cocotb.test()
@@ -193,7 +231,11 @@ async def in_bypass_and_in_a_track_sample_x_passes_and_filtering_goes_on_from_th
 @cocotb.test()
 async def both_ends(dut):
     cascade = await Cascade(dut).reset()
-    for ends in ((LOW, LOW, LOW, LOW, LOW), (HIGH, HIGH, HIGH, HIGH, HIGH), (LOW, HIGH, LOW, HIGH, LOW)):
+    for ends in (
+        (LOW, LOW, LOW, LOW, LOW),
+        (HIGH, HIGH, HIGH, HIGH, HIGH),
+        (LOW, HIGH, LOW, HIGH, LOW),
+    ):
         await cascade.clk(in_use=0)
         for section in range(cascade.sections):
             await cascade.load(section, ends)
@@ -229,7 +271,9 @@ async def any_filters_match_the_model(dut):
         await cascade.sample(word())
         for section in range(cascade.sections):
             if random.getrandbits(1):
-                await cascade.load(section, low_pass(random.uniform(0.001, 0.49), random.uniform(0.3, 9)))
+                await cascade.load(
+                    section, low_pass(random.uniform(0.001, 0.49), random.uniform(0.3, 9))
+                )
             else:
                 await cascade.load(section, [word() for _ in range(5)])
         cascade.inputs["in_use"] = random.getrandbits(cascade.sections)

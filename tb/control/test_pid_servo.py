@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""pid_servo: each term by hand, wind-up, the dead band, the blocked directions, no jump at a change of mode or gain, the filters,
+"""pid_servo: each term by hand, wind-up, the dead band, the blocked directions, no jump at a change
+of mode or gain, the filters,
 both ends, and random ticks against the model."""
+
 import random
 
 import cocotb
@@ -10,12 +12,14 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import needs, run, start
 from tb.control.pid_servo import PidServo
 
-INPUTS = ("closed_loop kp ki kd kv ka output_limit integral_limit dead_band target target_velocity target_acceleration moving "
-          "position velocity open_command block_up block_down filters_in_use").split()
-ONE = 1 << 16                           # of kp, kd, kv
-HALF = 1 << 23                          # of ki
+INPUTS = (
+    "closed_loop kp ki kd kv ka output_limit integral_limit dead_band target target_velocity target_acceleration moving "
+    "position velocity open_command block_up block_down filters_in_use"
+).split()
+ONE = 1 << 16  # of kp, kd, kv
+HALF = 1 << 23  # of ki
 MOST, LIMIT = (1 << 24) - 1, (1 << 15) - 1
-UNITY = 1 << 30                         # of a filter's coefficients
+UNITY = 1 << 30  # of a filter's coefficients
 STROBES = dict(gains_changed=0, coefficient_write=0, coefficient_address=0, coefficient=0)
 
 
@@ -47,7 +51,12 @@ class Servo:
         await FallingEdge(self.dut.clk)
         want = self.model.clk(**strobes, **self.inputs)
         dut = self.dut
-        got = int(dut.valid.value), dut.command.value.to_signed(), dut.error.value.to_signed(), int(dut.saturated.value)
+        got = (
+            int(dut.valid.value),
+            dut.command.value.to_signed(),
+            dut.error.value.to_signed(),
+            int(dut.saturated.value),
+        )
         assert got == want, f"valid, command, error, saturated are {got}, the model has {want}"
         return got
 
@@ -77,28 +86,51 @@ class Servo:
 
     async def filter(self, section, *coefficients):
         for number, value in enumerate(coefficients):
-            await self.clk(coefficient_write=1, coefficient_address=8 * section + number, coefficient=value)
+            await self.clk(
+                coefficient_write=1, coefficient_address=8 * section + number, coefficient=value
+            )
 
 
 @cocotb.test()
 async def each_term_by_hand(dut):
     servo = await Servo(dut).reset()
     needs(servo.terms == 5, "built with fewer terms")
-    none = dict(kp=0, kd=0, kv=0, ka=0, target=0, position=0, target_velocity=0, velocity=0, target_acceleration=0)
-    assert await servo.tick(**none, ) == (0, 0)
+    none = dict(
+        kp=0,
+        kd=0,
+        kv=0,
+        ka=0,
+        target=0,
+        position=0,
+        target_velocity=0,
+        velocity=0,
+        target_acceleration=0,
+    )
+    assert await servo.tick(
+        **none,
+    ) == (0, 0)
     assert await servo.tick(**none | dict(kp=ONE, target=70, position=-30)) == (100, 0)
-    assert await servo.tick(**none | dict(kp=ONE // 2, target=-3)) == (-2, 0)                       # rounded down
+    assert await servo.tick(**none | dict(kp=ONE // 2, target=-3)) == (-2, 0)  # rounded down
     assert await servo.tick(**none | dict(kd=ONE, target_velocity=50, velocity=80)) == (-30, 0)
     assert await servo.tick(**none | dict(kv=2 * ONE, target_velocity=50, velocity=80)) == (100, 0)
     assert await servo.tick(**none | dict(ka=256, target_acceleration=-7)) == (-7, 0)
-    assert await servo.tick(kp=ONE, kd=ONE, kv=ONE, ka=256, target=1, position=0, target_velocity=20, velocity=10,
-                            target_acceleration=300) == (331, 0)
+    assert await servo.tick(
+        kp=ONE,
+        kd=ONE,
+        kv=ONE,
+        ka=256,
+        target=1,
+        position=0,
+        target_velocity=20,
+        velocity=10,
+        target_acceleration=300,
+    ) == (331, 0)
 
 
 @cocotb.test()
 async def the_integral_grows_by_ki_each_tick(dut):
-    servo = await Servo(dut).reset(ki=1 << 22, target=6)           # 6/4 of a count a tick
-    assert [(await servo.tick())[0] for _ in range(6)] == [0, 1, 3, 4, 6, 7]       # see bumpless
+    servo = await Servo(dut).reset(ki=1 << 22, target=6)  # 6/4 of a count a tick
+    assert [(await servo.tick())[0] for _ in range(6)] == [0, 1, 3, 4, 6, 7]  # see bumpless
     assert [(await servo.tick(target=-6))[0] for _ in range(6)] == [6, 4, 3, 1, 0, -2]
 
 
@@ -119,7 +151,7 @@ async def a_tick_each_10_clk_and_25_a_term_and_177_a_filter(dut):
     servo = await Servo(dut).reset()
     period = 10 + 25 * servo.terms + 177 * servo.biquads + (servo.biquads == 0)
     assert (servo.terms, servo.biquads, period) in ((5, 2, 489), (5, 0, 136), (2, 0, 61))
-    for wanted in (period, period - 1):                  # one clk earlier each second tick is ignored
+    for wanted in (period, period - 1):  # one clk earlier each second tick is ignored
         ticks = 0
         for n in range(4 * wanted):
             ticks += (await servo.clk(tick=n % wanted == 0))[0]
@@ -166,16 +198,35 @@ async def both_ends_of_the_command(dut):
 async def ends_of_every_range(dut):
     servo = await Servo(dut).reset()
     low32, high32, low48, high48 = -1 << 31, (1 << 31) - 1, -1 << 47, (1 << 47) - 1
-    for target, position, error in ((high48, low48, high32), (low48, high48, low32), (high32, 0, high32), (low32, 0, low32),
-                                    (1 << 31, 0, high32), (low32 - 1, 0, low32)):
+    for target, position, error in (
+        (high48, low48, high32),
+        (low48, high48, low32),
+        (high32, 0, high32),
+        (low32, 0, low32),
+        (1 << 31, 0, high32),
+        (low32 - 1, 0, low32),
+    ):
         for rate in (low32, high32):
             for gains in (0, 1, MOST):
-                command, saturated = await servo.tick(kp=gains, ki=gains, kd=gains, kv=gains, ka=gains, target=target,
-                                                      position=position, target_velocity=rate, velocity=-1 - rate,
-                                                      target_acceleration=rate, dead_band=random.getrandbits(16))
+                command, saturated = await servo.tick(
+                    kp=gains,
+                    ki=gains,
+                    kd=gains,
+                    kv=gains,
+                    ka=gains,
+                    target=target,
+                    position=position,
+                    target_velocity=rate,
+                    velocity=-1 - rate,
+                    target_acceleration=rate,
+                    dead_band=random.getrandbits(16),
+                )
                 assert dut.error.value.to_signed() == error
                 if gains == MOST and servo.terms == 5:
-                    assert (command, saturated) == (LIMIT if rate > 0 else -LIMIT, 1)       # ka outweighs them all
+                    assert (command, saturated) == (
+                        LIMIT if rate > 0 else -LIMIT,
+                        1,
+                    )  # ka outweighs them all
 
 
 @cocotb.test()
@@ -195,8 +246,8 @@ async def the_integral_does_not_wind_up_while_the_command_stands_at_its_limit(du
     for sign in (1, -1):
         assert await servo.commands(1, target=0) == [0]
         out = [await servo.tick(target=sign * 900) for _ in range(20)]
-        assert out == [(sign * 1000, 1)] * 20           # 900 + 450, which the first tick could not know
-        assert await servo.tick(target=sign * -100) == (sign * 300, 0)      # -100 + 450 - 50
+        assert out == [(sign * 1000, 1)] * 20  # 900 + 450, which the first tick could not know
+        assert await servo.tick(target=sign * -100) == (sign * 300, 0)  # -100 + 450 - 50
         assert await servo.tick(target=sign * 100) == (sign * 550, 0)
         await servo.tick(closed_loop=0)
         servo.set(closed_loop=1)
@@ -225,7 +276,10 @@ async def the_integral_does_not_grow_into_a_blocked_direction(dut):
         servo.set(closed_loop=1, **{block: 0})
 
 
-OFF = ((dict(closed_loop=0), dict(closed_loop=1)), (dict(block_up=1, block_down=1), dict(block_up=0, block_down=0)))
+OFF = (
+    (dict(closed_loop=0), dict(closed_loop=1)),
+    (dict(block_up=1, block_down=1), dict(block_up=0, block_down=0)),
+)
 
 
 @cocotb.test()
@@ -234,16 +288,20 @@ async def the_integral_is_zero_in_open_loop_and_while_the_drive_is_off(dut):
     for off, on in OFF:
         assert await servo.commands(3) == [0, 50, 100]  # it stands for the first tick
         servo.set(**off)
-        await servo.clk()                               # one clk is enough
+        await servo.clk()  # one clk is enough
         servo.set(**on)
-        assert await servo.commands(2, open_command=0) == ([100, 150] if "closed_loop" in off else [0, 50])
+        assert await servo.commands(2, open_command=0) == (
+            [100, 150] if "closed_loop" in off else [0, 50]
+        )
         assert await servo.commands(2, **off) == [0, 0]
         servo.set(**on)
 
 
 @cocotb.test()
 async def a_command_whose_inputs_were_taken_without_power_stands(dut):
-    """The firmware holds the target here and closes the loop; a tick that still saw the old target must not kick the motor."""
+    """The firmware holds the target here and closes the loop; a tick that still saw the old target
+    must not kick the motor.
+    """
     servo = await Servo(dut).reset(kp=ONE, target=1 << 20, position=0)
     for off, on in OFF:
         for wait in (0, 9, 10, 40, servo.model.limit - 1):
@@ -263,7 +321,7 @@ async def a_command_whose_inputs_were_taken_without_power_stands(dut):
 async def closing_the_loop_goes_on_from_the_open_command(dut):
     servo = await Servo(dut).reset(kp=ONE, ki=1 << 22, closed_loop=0, open_command=3000, target=400)
     assert await servo.commands(2) == [3000, 3000]
-    assert await servo.commands(3, closed_loop=1) == [3000, 3100, 3200]            # 400 / 4 a tick
+    assert await servo.commands(3, closed_loop=1) == [3000, 3100, 3200]  # 400 / 4 a tick
     assert (await servo.tick(target=410))[0] == 3200 + 10 + 102
 
 
@@ -291,7 +349,7 @@ async def a_change_of_gains_makes_no_jump(dut):
     assert await servo.commands(3, target_velocity=5) == [before, before + 40, before + 80]
     await servo.gains(kp=0)
     assert await servo.commands(2) == [before + 80, before + 120]
-    await servo.gains(kp=100 * ONE)                     # more than the integral may take
+    await servo.gains(kp=100 * ONE)  # more than the integral may take
     assert await servo.commands(2, integral_limit=1000) == [before + 120, LIMIT]
 
 
@@ -305,18 +363,23 @@ async def a_change_of_gains_within_a_calculation_makes_no_jump(dut):
         for _ in range(wait):
             dut.tick.value = 0
             await RisingEdge(dut.clk)
-            await FallingEdge(dut.clk)                  # the model holds no gains that change now
+            await FallingEdge(dut.clk)  # the model holds no gains that change now
         dut.kp.value, dut.gains_changed.value = ONE * (wait % 2), 1
         out = []
         while len(out) < 2:
             await RisingEdge(dut.clk)
             await FallingEdge(dut.clk)
-            dut.gains_changed.value, dut.tick.value = 0, int(bool(dut.valid.value) and servo.biquads == 0)
+            dut.gains_changed.value, dut.tick.value = (
+                0,
+                int(bool(dut.valid.value) and servo.biquads == 0),
+            )
             if dut.valid.value:
                 out.append(dut.command.value.to_signed())
             elif servo.biquads and len(out) == 1:
                 dut.tick.value = int(dut.g_filters.u_filters.ready.value)
-        assert all(abs(command - before) <= 80 for command in out), f"{out} after {before}, changed {wait} clk after tick"
+        assert all(abs(command - before) <= 80 for command in out), (
+            f"{out} after {before}, changed {wait} clk after tick"
+        )
         dut.tick.value = 0
         servo.set(kp=0)
         await servo.clk(rst=1)
@@ -335,13 +398,16 @@ async def with_ki_0_the_command_follows_the_gains_at_once(dut):
 async def a_filter_acts_on_the_command_and_its_limits_hold(dut):
     servo = await Servo(dut).reset(kp=ONE, target=1000)
     needs(servo.biquads, "built without filters")
-    await servo.filter(0, UNITY // 2, 0, 0, UNITY // 2, 0)                          # y goes half the way each tick
+    await servo.filter(0, UNITY // 2, 0, 0, UNITY // 2, 0)  # y goes half the way each tick
     assert await servo.commands(3, filters_in_use=1) == [1000, 1000, 1000]
     assert await servo.commands(4, target=2000) == [1500, 1750, 1875, 1937]
-    assert await servo.commands(2, target=-1 << 20, output_limit=3000) == [-532, -1766]   # 1937.5 half the way to -3000, and again
+    assert await servo.commands(2, target=-1 << 20, output_limit=3000) == [
+        -532,
+        -1766,
+    ]  # 1937.5 half the way to -3000, and again
     servo.set(filters_in_use=0)
     assert await servo.tick(target=100) == (100, 0)
-    await servo.filter(0, UNITY, UNITY - 1, 0, 0, 0)                                # up to twice the command
+    await servo.filter(0, UNITY, UNITY - 1, 0, 0, 0)  # up to twice the command
     await servo.commands(3, filters_in_use=1)
     assert await servo.tick(target=2000, output_limit=2050) == (2050, 1)
 
@@ -353,7 +419,12 @@ async def the_drive_comes_on_without_a_jump_through_a_filter(dut):
     await servo.filter(0, UNITY // 2, 0, 0, UNITY // 2, 0)
     await servo.commands(3, filters_in_use=1)
     assert await servo.commands(2, closed_loop=0, open_command=500) == [500, 500]
-    assert await servo.commands(4, closed_loop=1) == [500, 700, 1000, 1350]       # half the way to 900, 1300, 1700
+    assert await servo.commands(4, closed_loop=1) == [
+        500,
+        700,
+        1000,
+        1350,
+    ]  # half the way to 900, 1300, 1700
 
 
 @cocotb.test()
@@ -375,7 +446,10 @@ async def reset_in_mid_flow(dut):
         assert await servo.clk(rst=1) == (0, 0, 0, 0)
         for _ in range(3):
             assert (await servo.clk())[0] == 0
-        assert await servo.commands(2) == [0, 50]       # from zero, and the integral takes what the gain asks for
+        assert await servo.commands(2) == [
+            0,
+            50,
+        ]  # from zero, and the integral takes what the gain asks for
 
 
 @cocotb.test()
@@ -390,14 +464,36 @@ async def any_tick_matches_the_model(dut):
                 servo.set(filters_in_use=0)
                 await servo.filter(section, *(random.randrange(-UNITY, UNITY) for _ in range(5)))
                 servo.set(filters_in_use=random.getrandbits(servo.biquads))
-            servo.set(kp=gain(24), ki=gain(24), kd=gain(24), kv=gain(24), ka=gain(24), output_limit=gain(15),
-                      integral_limit=gain(15), dead_band=gain(16), closed_loop=1, block_up=0, block_down=0)
-        servo.set(target=word(48), position=word(48) if n % 3 else servo.inputs["target"] - word(20) >> 1, target_velocity=word(32),
-                  target_acceleration=word(32), velocity=word(32), moving=random.getrandbits(1), open_command=word(16))
+            servo.set(
+                kp=gain(24),
+                ki=gain(24),
+                kd=gain(24),
+                kv=gain(24),
+                ka=gain(24),
+                output_limit=gain(15),
+                integral_limit=gain(15),
+                dead_band=gain(16),
+                closed_loop=1,
+                block_up=0,
+                block_down=0,
+            )
+        servo.set(
+            target=word(48),
+            position=word(48) if n % 3 else servo.inputs["target"] - word(20) >> 1,
+            target_velocity=word(32),
+            target_acceleration=word(32),
+            velocity=word(32),
+            moving=random.getrandbits(1),
+            open_command=word(16),
+        )
         out = await servo.begin()
         while not out[0]:
-            if random.randrange(60) == 0:               # the guard and the firmware act in any clk
-                servo.set(block_up=random.getrandbits(1), block_down=random.getrandbits(1), closed_loop=random.randrange(4) > 0)
+            if random.randrange(60) == 0:  # the guard and the firmware act in any clk
+                servo.set(
+                    block_up=random.getrandbits(1),
+                    block_down=random.getrandbits(1),
+                    closed_loop=random.randrange(4) > 0,
+                )
             out = await servo.clk()
         for _ in range(random.randrange(4)):
             await servo.clk()

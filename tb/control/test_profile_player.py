@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""profile_player: by hand, against the spline of the profile, at the ends of every range, and random events against the model."""
+"""profile_player: by hand, against the spline of the profile, at the ends of every range, and
+random events against the model.
+"""
+
 import random
 from fractions import Fraction
 
@@ -10,14 +13,44 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import run, start
 from tb.control.profile_player import FULL, ProfilePlayer, moved, wrap
 
-PERIOD = 1 << 40                        # of velocity, acceleration and jerk
-LSB = 1 << 24                           # of target, in the same unit
-GAP, BRAKE_GAP, PUSH_GAP = 160, 350, 7                # clk from tick to tick that the header asks for
+PERIOD = 1 << 40  # of velocity, acceleration and jerk
+LSB = 1 << 24  # of target, in the same unit
+GAP, BRAKE_GAP, PUSH_GAP = 160, 350, 7  # clk from tick to tick that the header asks for
 SETTINGS = "slope", "curve", "feed_fraction", "pause", "stop_deceleration", "stop_jerk"
 WORDS = "segment_velocity", "segment_acceleration", "segment_jerk", "segment_ticks", "segment_last"
-EVENTS = "rst", "tick", "start", "controlled_stop", "set_target_to_position", "position", "arm", "start_at", "now"
-IDLE = dict.fromkeys(("tick", "push", "segment_velocity", "segment_acceleration", "segment_jerk", "segment_ticks", "segment_last",
-                      "start", "controlled_stop", "set_target_to_position", "position", "shift", "shift_by", "arm", "start_at", "now", *SETTINGS), 0)
+EVENTS = (
+    "rst",
+    "tick",
+    "start",
+    "controlled_stop",
+    "set_target_to_position",
+    "position",
+    "arm",
+    "start_at",
+    "now",
+)
+IDLE = dict.fromkeys(
+    (
+        "tick",
+        "push",
+        "segment_velocity",
+        "segment_acceleration",
+        "segment_jerk",
+        "segment_ticks",
+        "segment_last",
+        "start",
+        "controlled_stop",
+        "set_target_to_position",
+        "position",
+        "shift",
+        "shift_by",
+        "arm",
+        "start_at",
+        "now",
+        *SETTINGS,
+    ),
+    0,
+)
 
 
 class Player:
@@ -25,9 +58,11 @@ class Player:
 
     def __init__(self, dut):
         self.dut, self.model, self.clk_count = dut, ProfilePlayer(int(dut.DEPTH.value)), 0
-        self.settings = dict(slope=0, curve=0, feed_fraction=65536, pause=0, stop_deceleration=0, stop_jerk=0)
+        self.settings = dict(
+            slope=0, curve=0, feed_fraction=65536, pause=0, stop_deceleration=0, stop_jerk=0
+        )
         self.driven = {}
-        self.stands = -1                                # clk that the words of a segment must still stand
+        self.stands = -1  # clk that the words of a segment must still stand
 
     async def reset(self):
         await start(self.dut, **IDLE)
@@ -39,7 +74,11 @@ class Player:
         """One clk with these events (as ProfilePlayer.clk takes them); returns the pins after it."""
         dut, push, shift = self.dut, events.get("push"), events.get("shift")
         events = self.settings | events
-        pins = dict.fromkeys(EVENTS, 0) | events | dict(push=int(push is not None), shift=int(shift is not None), shift_by=shift or 0)
+        pins = (
+            dict.fromkeys(EVENTS, 0)
+            | events
+            | dict(push=int(push is not None), shift=int(shift is not None), shift_by=shift or 0)
+        )
         for name, value in pins.items():
             if self.driven.get(name) != value:
                 getattr(dut, name).value = value
@@ -49,16 +88,34 @@ class Player:
             for name, word in zip(WORDS, push):
                 getattr(dut, name).value = word
         elif self.stands == 0:
-            dut.segment_velocity.value, dut.segment_ticks.value = random.getrandbits(63), random.getrandbits(24)
+            dut.segment_velocity.value, dut.segment_ticks.value = (
+                random.getrandbits(63),
+                random.getrandbits(24),
+            )
         self.stands -= self.stands >= 0
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
         self.clk_count += 1
         want = self.model.clk(**events)
-        got = (dut.target.value.to_signed(), dut.target_velocity.value.to_signed(), dut.target_acceleration.value.to_signed(),
-               int(dut.moving.value), int(dut.armed.value), int(dut.queue_free.value), int(dut.underrun.value))
+        got = (
+            dut.target.value.to_signed(),
+            dut.target_velocity.value.to_signed(),
+            dut.target_acceleration.value.to_signed(),
+            int(dut.moving.value),
+            int(dut.armed.value),
+            int(dut.queue_free.value),
+            int(dut.underrun.value),
+        )
         assert got == want, f"clk {self.clk_count}, {events}: {got}, the model has {want}"
-        self.target, self.velocity, self.acceleration, self.moving, self.armed, self.free, self.underrun = got
+        (
+            self.target,
+            self.velocity,
+            self.acceleration,
+            self.moving,
+            self.armed,
+            self.free,
+            self.underrun,
+        ) = got
         return got
 
     async def push(self, segment):
@@ -77,7 +134,9 @@ class Player:
     async def tick(self, gap=None, **events):
         """One tick and the clk after it; returns the underrun strobes seen."""
         strobes = (await self.clk(tick=1, **events))[-1]
-        for _ in range((gap or (BRAKE_GAP if self.model.braking and not self.model.brake else GAP)) - 1):
+        for _ in range(
+            (gap or (BRAKE_GAP if self.model.braking and not self.model.brake else GAP)) - 1
+        ):
             strobes += (await self.clk())[-1]
         return strobes
 
@@ -101,18 +160,24 @@ def positions(*segments):
 
 
 def spline(exact, time):
-    """The quadratic B-spline of positions that stand before and after, at a time from 0 to their number less one."""
+    """The quadratic B-spline of positions that stand before and after, at a time from 0 to their
+    number less one.
+    """
     k = int(time)
     f = time - k
     before, here, after = (exact[max(0, min(n, len(exact) - 1))] for n in (k, k + 1, k + 2))
     # between the second and the third control point
-    return Fraction(before + here, 2) + f * (here - before) + f * f * (after - 2 * here + before) / 2
+    return (
+        Fraction(before + here, 2) + f * (here - before) + f * f * (after - 2 * here + before) / 2
+    )
 
 
 @cocotb.test()
 async def by_hand(dut):
     player = await Player(dut).reset()
-    await player.play((PERIOD, 0, 0, 2, 0), (PERIOD, -PERIOD // 2, 0, 2, 1))        # 1, 1, 1, 1/2 period, each step the mean of two
+    await player.play(
+        (PERIOD, 0, 0, 2, 0), (PERIOD, -PERIOD // 2, 0, 2, 1)
+    )  # 1, 1, 1, 1/2 period, each step the mean of two
     assert player.target == 0
     assert [target / 65536 for target in await player.finish()] == [1.5, 2.5, 3.25, 3.5]
     assert (player.velocity, player.acceleration) == (0, 0)
@@ -122,7 +187,7 @@ async def by_hand(dut):
 async def latency_is_2(dut):
     player = await Player(dut).reset()
     await player.play((PERIOD, 0, 0, 2, 1))
-    for _ in range(2):                                  # inside a segment, and its last
+    for _ in range(2):  # inside a segment, and its last
         before, latency = player.target, 1
         await player.clk(tick=1)
         while player.target == before:
@@ -135,7 +200,9 @@ async def latency_is_2(dut):
 
 @cocotb.test()
 async def ticks_may_follow_each_other_in_160_clk(dut):
-    """And in 350 from the first of a controlled_stop: with less the step would not be ready, and the tick be lost."""
+    """And in 350 from the first of a controlled_stop: with less the step would not be ready, and
+    the tick be lost.
+    """
     player = await Player(dut).reset()
     player.settings |= dict(feed_fraction=65535, stop_deceleration=1 << 20, stop_jerk=1 << 25)
     await player.play((PERIOD, 0, 0, 9, 0), (PERIOD, 0, 0, 100, 1))
@@ -153,21 +220,31 @@ async def ticks_may_follow_each_other_in_160_clk(dut):
 @cocotb.test()
 async def n_ticks_move_by_the_closed_form(dut):
     player = await Player(dut).reset()
-    exact = 0                                           # 2^-40 period, the fraction carried through the profile
+    exact = 0  # 2^-40 period, the fraction carried through the profile
     for _ in range(6):
-        segments = [(random.randrange(-1 << 44, 1 << 44), random.randrange(-1 << 36, 1 << 36), random.randrange(-1 << 31, 1 << 31),
-                     random.randrange(1, 20), 0) for _ in range(random.randrange(1, 4))]
+        segments = [
+            (
+                random.randrange(-1 << 44, 1 << 44),
+                random.randrange(-1 << 36, 1 << 36),
+                random.randrange(-1 << 31, 1 << 31),
+                random.randrange(1, 20),
+                0,
+            )
+            for _ in range(random.randrange(1, 4))
+        ]
         segments[-1] = (*segments[-1][:4], 1)
         await player.play(*segments)
         assert len(await player.finish()) == sum(s[3] for s in segments)
         exact += sum(moved(*s[:4]) for s in segments)
-        exact = (exact + LSB // 2) // LSB * LSB         # a half goes up
+        exact = (exact + LSB // 2) // LSB * LSB  # a half goes up
         assert player.target == exact // LSB
 
 
 @cocotb.test()
 async def slower_it_takes_the_same_way_and_lands_on_the_same_bit(dut):
-    """Against the spline in fractions: nothing of the player's own arithmetic but one rounding of each step."""
+    """Against the spline in fractions: nothing of the player's own arithmetic but one rounding of
+    each step.
+    """
     player = await Player(dut).reset()
     jerk = (1 << 30) + 12345
     segments = ((0, 0, jerk, 5, 0), (10 * jerk, 5 * jerk, -jerk, 5, 0), (25 * jerk, 0, 0, 3, 1))
@@ -181,7 +258,7 @@ async def slower_it_takes_the_same_way_and_lands_on_the_same_bit(dut):
         for n, target in enumerate(targets):
             time += rate
             where = Fraction(time, FULL)
-            if where < len(exact) - 2:                  # the velocity of this profile ends in a step
+            if where < len(exact) - 2:  # the velocity of this profile ends in a step
                 assert abs(target + 0.5 - spline(exact, where) / LSB) <= 0.501, n
         assert player.target == (exact[-1] + LSB // 2) // LSB
         assert len(targets) == -(-13 * FULL // rate)
@@ -191,7 +268,11 @@ async def slower_it_takes_the_same_way_and_lands_on_the_same_bit(dut):
 async def slower_every_step_keeps_the_limits_of_the_profile(dut):
     player = await Player(dut).reset()
     jerk = 1 << 30
-    segments = ((0, 0, jerk, 8, 0), (28 * jerk, 8 * jerk, -jerk, 16, 0), (36 * jerk, -8 * jerk, jerk, 8, 1))     # 36 = sum at the middle
+    segments = (
+        (0, 0, jerk, 8, 0),
+        (28 * jerk, 8 * jerk, -jerk, 16, 0),
+        (36 * jerk, -8 * jerk, jerk, 8, 1),
+    )  # 36 = sum at the middle
     exact = positions(*segments)
     steps = [0, 0, 0, *(b - a for a, b in zip(exact, exact[1:])), 0, 0, 0]
     limits = []
@@ -205,7 +286,7 @@ async def slower_every_step_keeps_the_limits_of_the_profile(dut):
         await player.play(*segments)
         seen = [0, 0, 0]
         while player.moving:
-            seen.append(player.model.step)              # the one that this tick makes
+            seen.append(player.model.step)  # the one that this tick makes
             await player.tick()
         seen += [0, 0, 0]
         for power, limit in enumerate(limits, start=1):
@@ -240,7 +321,7 @@ async def the_fraction_goes_on_from_segment_to_segment_and_ends_at_the_nearest_l
     await player.tick()
     assert player.target == 0
     await player.finish()
-    assert player.target == 1                           # 3 * floor(1/3 LSB): just below one, rounded to it
+    assert player.target == 1  # 3 * floor(1/3 LSB): just below one, rounded to it
     await player.play((third, 0, 0, 1, 1))
     await player.finish()
     assert player.target == 1
@@ -276,7 +357,7 @@ async def ends_of_the_range(dut):
     for velocity, shown in ((-1 << 60, -1 << 31), (1 << 60, (1 << 31) - 1)):
         await player.play((velocity, 0, 0, 3, 1))
         await player.tick()
-        assert player.velocity == player.acceleration == shown              # held
+        assert player.velocity == player.acceleration == shown  # held
         await player.finish()
 
 
@@ -310,13 +391,19 @@ async def start_without_a_segment_does_nothing(dut):
     assert await player.tick() == 0
     await player.push((PERIOD, 0, 0, 1, 1))
     await player.tick()
-    assert player.target == 0 and not player.moving     # a queued segment waits for start
+    assert player.target == 0 and not player.moving  # a queued segment waits for start
 
 
 @cocotb.test()
 async def an_armed_player_starts_when_its_time_has_come(dut):
     player = await Player(dut).reset()
-    for start_at in (5, 2, 0x7FFF_FFFF, 0xFFFF_FFFF, 0):        # also across the wrap, and one that is past
+    for start_at in (
+        5,
+        2,
+        0x7FFF_FFFF,
+        0xFFFF_FFFF,
+        0,
+    ):  # also across the wrap, and one that is past
         await player.push((PERIOD, 0, 0, 1, 1))
         time = (start_at - 4 if start_at != 2 else 100) % (1 << 32)
         await player.clk(arm=1, start_at=start_at, now=time)
@@ -334,7 +421,7 @@ async def an_armed_player_starts_when_its_time_has_come(dut):
         await player.clk(**{event: 1}, start_at=1000)
         assert not player.armed
     await player.clk(arm=1, start_at=1000)
-    await player.clk(start_at=1000, now=1000)           # nothing to play: neither now nor later
+    await player.clk(start_at=1000, now=1000)  # nothing to play: neither now nor later
     await player.clk(push=(PERIOD, 0, 0, 1, 1), start_at=1000, now=1001)
     await player.clk(start_at=1000, now=1002)
     assert not player.moving and not player.armed
@@ -343,7 +430,12 @@ async def an_armed_player_starts_when_its_time_has_come(dut):
 @cocotb.test()
 async def segments_of_0_ticks_are_skipped(dut):
     player = await Player(dut).reset()
-    await player.play((5 * PERIOD, 0, 0, 0, 0), (7 * PERIOD, 0, 0, 0, 0), (PERIOD, 0, 0, 2, 0), (9 * PERIOD, 0, 0, 0, 1))
+    await player.play(
+        (5 * PERIOD, 0, 0, 0, 0),
+        (7 * PERIOD, 0, 0, 0, 0),
+        (PERIOD, 0, 0, 2, 0),
+        (9 * PERIOD, 0, 0, 0, 1),
+    )
     assert await player.finish() == [65536 * 3 // 2, 65536 * 2]
     await player.play((PERIOD, 0, 0, 0, 1))
     assert await player.finish() == [65536 * 2]
@@ -352,7 +444,9 @@ async def segments_of_0_ticks_are_skipped(dut):
 @cocotb.test()
 async def an_underrun_strobes_once_and_brakes(dut):
     player = await Player(dut).reset()
-    player.settings |= dict(stop_deceleration=1 << 30, stop_jerk=0)      # a quarter period/tick2, at once
+    player.settings |= dict(
+        stop_deceleration=1 << 30, stop_jerk=0
+    )  # a quarter period/tick2, at once
     await player.play((PERIOD, 0, 0, 4, 0))
     strobes, targets = 0, []
     while player.moving:
@@ -387,10 +481,10 @@ async def stop_from(player, velocity, acceleration, rate, jerk, feed_fraction=65
     assert player.free == int(player.dut.DEPTH.value) and player.moving
     await player.push((PERIOD, 0, 0, 1, 1))
     await player.clk(start=1)
-    assert player.free == int(player.dut.DEPTH.value)                       # not while braking
+    assert player.free == int(player.dut.DEPTH.value)  # not while braking
     first = player.model.change, player.model.step - player.model.change
     while player.moving:
-        steps.append(player.model.step)                                     # the one that this tick makes
+        steps.append(player.model.step)  # the one that this tick makes
         await player.tick()
     assert (player.velocity, player.acceleration) == (0, 0)
     return first, steps
@@ -405,14 +499,21 @@ async def brake_ends_at_rest_within_its_limits_from_anywhere(dut):
         elif n == 1:
             velocity, acceleration, rate, jerk = -PERIOD >> 4, -(1 << 33), 1 << 25, 1 << 30
         elif n == 2:
-            velocity, acceleration, rate, jerk = 1 << 31, -(1 << 34), 1 << 27, 1 << 31         # decelerates too hard: comes back
+            velocity, acceleration, rate, jerk = (
+                1 << 31,
+                -(1 << 34),
+                1 << 27,
+                1 << 31,
+            )  # decelerates too hard: comes back
         else:
             jerk = int(2 ** random.uniform(20, 31.9))
             rate = min((1 << 32) - 1, max(1, int((jerk >> 8) * 2 ** random.uniform(-2, 6))))
             pace = min(jerk, rate << 8)
             velocity = random.choice((1, -1)) * int(pace * 2 ** random.uniform(-2, 9))
             acceleration = random.choice((1, -1, 0)) * int((rate << 8) * random.uniform(0, 2))
-        (before, step), steps = await stop_from(player, velocity, acceleration, rate, jerk, random.choice((65536, 65536, 21845)))
+        (before, step), steps = await stop_from(
+            player, velocity, acceleration, rate, jerk, random.choice((65536, 65536, 21845))
+        )
         pace = min(jerk, rate << 8)
         all_steps = [step - 0, *steps, 0, 0]
         changes = [b - a for a, b in zip(all_steps, all_steps[1:])]
@@ -422,7 +523,12 @@ async def brake_ends_at_rest_within_its_limits_from_anywhere(dut):
             assert abs(new - old) <= pace, f"jerk {abs(new - old)} above {pace} in run {n}"
             assert abs(new) <= max(rate << 8, abs(old)), f"acceleration in run {n}"
         limit = min(rate << 8, 1 << 62)
-        bound = abs(step) / limit + 2 * (limit + top) / pace + (top + 2 * (top * top / pace)) / limit + 8
+        bound = (
+            abs(step) / limit
+            + 2 * (limit + top) / pace
+            + (top + 2 * (top * top / pace)) / limit
+            + 8
+        )
         bound += 2 * (abs(step) / pace) ** 0.5 * 2
         assert len(steps) <= bound, f"{len(steps)} ticks, {bound} in run {n}"
 
@@ -431,12 +537,20 @@ async def brake_ends_at_rest_within_its_limits_from_anywhere(dut):
 async def brake_takes_no_longer_than_the_best_stop_and_three_ticks(dut):
     """From constant velocity: v/A + A/J, or 2 sqrt(v/J) where A is not reached."""
     player = await Player(dut).reset()
-    for velocity, rate, jerk in ((PERIOD >> 4, 1 << 26, 1 << 31), (PERIOD >> 3, 1 << 30, 1 << 31), (1 << 36, 1 << 25, (1 << 32) - 1),
-                                 (-PERIOD >> 5, 1 << 25, 1 << 31)):
+    for velocity, rate, jerk in (
+        (PERIOD >> 4, 1 << 26, 1 << 31),
+        (PERIOD >> 3, 1 << 30, 1 << 31),
+        (1 << 36, 1 << 25, (1 << 32) - 1),
+        (-PERIOD >> 5, 1 << 25, 1 << 31),
+    ):
         _, steps = await stop_from(player, velocity, 0, rate, jerk)
         pace, limit = jerk, rate << 8
         size = abs(velocity)
-        best = size / limit + limit / pace if limit * limit <= size * pace else 2 * (size / pace) ** 0.5
+        best = (
+            size / limit + limit / pace
+            if limit * limit <= size * pace
+            else 2 * (size / pace) ** 0.5
+        )
         assert len(steps) <= best + 5, (len(steps), best)
 
 
@@ -445,7 +559,7 @@ async def brake_at_rate_0_stops_in_one_step(dut):
     player = await Player(dut).reset()
     for velocity in (PERIOD, -PERIOD, 1):
         _, steps = await stop_from(player, velocity, 0, 0, 1 << 30)
-        assert len(steps) == 2 and steps[-1] == 0       # the one that was prepared, and the stop
+        assert len(steps) == 2 and steps[-1] == 0  # the one that was prepared, and the stop
 
 
 @cocotb.test()
@@ -476,18 +590,23 @@ async def brake_at_rest_only_empties_the_queue(dut):
 @cocotb.test()
 async def set_target_to_position_stands_at_the_position_with_an_empty_queue(dut):
     player = await Player(dut).reset()
-    for wait in (*range(8), 30, 60, 90):                # in every phase of a tick
+    for wait in (*range(8), 30, 60, 90):  # in every phase of a tick
         for segment in ((PERIOD + 5, 0, 0, 5, 0), (PERIOD, 0, 0, 1, 1)):
             await player.push(segment)
         await player.clk(start=1, feed_fraction=21845)
-        if wait < 8:                                    # and in the clk that makes a step
+        if wait < 8:  # and in the clk that makes a step
             for n in range(GAP):
                 await player.clk(tick=int(n == 0), feed_fraction=21845)
         await player.clk(tick=1, feed_fraction=21845)
         for _ in range(wait):
             await player.clk(feed_fraction=21845)
         await player.clk(set_target_to_position=1, position=-777)
-        assert (player.target, player.velocity, player.moving, player.free) == (-777, 0, 0, int(dut.DEPTH.value))
+        assert (player.target, player.velocity, player.moving, player.free) == (
+            -777,
+            0,
+            0,
+            int(dut.DEPTH.value),
+        )
 
 
 @cocotb.test()
@@ -533,24 +652,42 @@ async def the_rate_goes_to_its_setting_by_hand(dut):
     await player.play(ENDLESS)
     await rates(player, 3)
     player.settings |= dict(slope=1 << 29, curve=1 << 28, feed_fraction=0)
-    assert [rate * 16 >> 30 for rate in await rates(player, 12)] == [16, 15, 13, 11, 9, 7, 5, 3, 1, 0, 0, 0]
+    assert [rate * 16 >> 30 for rate in await rates(player, 12)] == [
+        16,
+        15,
+        13,
+        11,
+        9,
+        7,
+        5,
+        3,
+        1,
+        0,
+        0,
+        0,
+    ]
 
 
 @cocotb.test()
 async def every_way_of_the_rate_keeps_slope_and_curve_and_ends_at_the_setting(dut):
     player = await Player(dut).reset()
     await player.play(ENDLESS)
-    seen = (await rates(player, 3))[-1:]                # the first step is half of one
+    seen = (await rates(player, 3))[-1:]  # the first step is half of one
     slope, curve = 1 << 29, 1 << 27
     player.settings |= dict(slope=slope, curve=curve)
-    for _ in range(25):                                 # settings that change on the way make no jump
-        player.settings |= dict(feed_fraction=random.choice((0, 1, 65535, 131071, random.randrange(65536))), pause=int(random.randrange(4) == 0))
+    for _ in range(25):  # settings that change on the way make no jump
+        player.settings |= dict(
+            feed_fraction=random.choice((0, 1, 65535, 131071, random.randrange(65536))),
+            pause=int(random.randrange(4) == 0),
+        )
         seen += await rates(player, random.choice((1, 2, 5, 30)))
     seen += await rates(player, 40)
     setting = 0 if player.settings["pause"] else min(player.settings["feed_fraction"], 65536) << 14
     assert seen[-1] == setting
     paces = [b - a for a, b in zip(seen, seen[1:])]
-    assert max(map(abs, paces)) <= slope + 4 >> 2 and all(abs(b - a) <= (curve >> 2) + 2 for a, b in zip(paces, paces[1:]))
+    assert max(map(abs, paces)) <= slope + 4 >> 2 and all(
+        abs(b - a) <= (curve >> 2) + 2 for a, b in zip(paces, paces[1:])
+    )
 
 
 @cocotb.test()
@@ -558,7 +695,7 @@ async def a_setting_that_changes_in_any_clk_makes_no_jump(dut):
     """Beside the model, which takes the settings at once: the rate is judged off the pins alone."""
     player = await Player(dut).reset()
     await player.play(ENDLESS)
-    seen = (await rates(player, 3))[-1:]                # the first step is half of one
+    seen = (await rates(player, 3))[-1:]  # the first step is half of one
     slope, curve = 1 << 29, 1 << 27
     dut.slope.value, dut.curve.value = slope, curve
     for _ in range(60):
@@ -571,7 +708,9 @@ async def a_setting_that_changes_in_any_clk_makes_no_jump(dut):
             await FallingEdge(dut.clk)
         seen.append(dut.target_velocity.value.to_signed())
     paces = [b - a for a, b in zip(seen, seen[1:])]
-    assert max(map(abs, paces)) <= slope + 4 >> 2 and all(abs(b - a) <= (curve >> 2) + 2 for a, b in zip(paces, paces[1:]))
+    assert max(map(abs, paces)) <= slope + 4 >> 2 and all(
+        abs(b - a) <= (curve >> 2) + 2 for a, b in zip(paces, paces[1:])
+    )
 
 
 @cocotb.test()
@@ -587,14 +726,35 @@ async def any_events_match_the_model(dut):
             start_at = (now + random.randrange(-20, 100)) % (1 << 32)
         events = dict(now=now, start_at=start_at)
         if wait <= 0 and chance(3):
-            if wait < -BRAKE_GAP or chance(3):          # the settings stand until the step is prepared
+            if wait < -BRAKE_GAP or chance(3):  # the settings stand until the step is prepared
                 wait = BRAKE_GAP
-                player.settings |= dict(stop_deceleration=setting(32), stop_jerk=setting(32), slope=setting(32), curve=setting(32),
-                                        feed_fraction=random.choice((65536, 65536, 0, setting(17))), pause=int(chance(6)))
-            events["tick"], wait = 1, random.choice((GAP, GAP, BRAKE_GAP)) if chance(4) else BRAKE_GAP
-        if chance(30) and player.stands <= 0:           # the words of the last one are written
-            events["push"] = (word(64), word(64), word(32), random.choice((0, 1, 1, 2, 3, 5)), int(chance(4)))
-        for name, one_in in (("start", 60), ("arm", 300), ("controlled_stop", 1500), ("set_target_to_position", 2500), ("rst", 5000)):
+                player.settings |= dict(
+                    stop_deceleration=setting(32),
+                    stop_jerk=setting(32),
+                    slope=setting(32),
+                    curve=setting(32),
+                    feed_fraction=random.choice((65536, 65536, 0, setting(17))),
+                    pause=int(chance(6)),
+                )
+            events["tick"], wait = (
+                1,
+                random.choice((GAP, GAP, BRAKE_GAP)) if chance(4) else BRAKE_GAP,
+            )
+        if chance(30) and player.stands <= 0:  # the words of the last one are written
+            events["push"] = (
+                word(64),
+                word(64),
+                word(32),
+                random.choice((0, 1, 1, 2, 3, 5)),
+                int(chance(4)),
+            )
+        for name, one_in in (
+            ("start", 60),
+            ("arm", 300),
+            ("controlled_stop", 1500),
+            ("set_target_to_position", 2500),
+            ("rst", 5000),
+        ):
             if chance(one_in):
                 events[name] = 1
         events["position"] = word(48)

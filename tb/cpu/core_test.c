@@ -1,50 +1,70 @@
 /* SPDX-License-Identifier: Apache-2.0
- * What tb/cpu/test_soft_core.py runs on the soft core. It takes two operands from the registers, works on them with every
- * instruction of rv32im that a compiler uses and with each width of memory access, and writes the results to the registers,
- * one after the other. Then it does what the register ORDER says; the orders above 0 should all trap.
+ * What tb/cpu/test_soft_core.py runs on the soft core. It takes two operands from the registers,
+ * works on them with every instruction of rv32im that a compiler uses and with each width of memory
+ * access, and writes the results to the registers, one after the other. Then it does what the
+ * register ORDER says; the orders above 0 should all trap.
  */
 typedef unsigned int u32;
 typedef unsigned short u16;
 typedef unsigned char u8;
 
 #define REGISTERS 0x80000000u
-#define REGISTER(offset) (*(volatile u32 *)(REGISTERS + (offset)))
-#define A         REGISTER(0x000)
-#define B         REGISTER(0x004)
-#define ORDER     REGISTER(0x008)
-#define STACK     REGISTER(0x00C)
-#define STARTS    REGISTER(0x010)
-#define RESULT    REGISTER(0xFFFC)
-#define TWO(mnemonic) do { u32 r; __asm__ volatile(mnemonic " %0, %1, %2" : "=r"(r) : "r"(a), "r"(b)); RESULT = r; } while (0)
+#define REGISTER(offset) (*(volatile u32*)(REGISTERS + (offset)))
+#define A REGISTER(0x000)
+#define B REGISTER(0x004)
+#define ORDER REGISTER(0x008)
+#define STACK REGISTER(0x00C)
+#define STARTS REGISTER(0x010)
+#define RESULT REGISTER(0xFFFC)
+#define TWO(mnemonic)                                                        \
+    do {                                                                     \
+        u32 r;                                                               \
+        __asm__ volatile(mnemonic " %0, %1, %2" : "=r"(r) : "r"(a), "r"(b)); \
+        RESULT = r;                                                          \
+    } while (0)
 
-__asm__(".section .start, \"ax\"\n"
-        ".globl _start\n"
-        "_start:\n"
-        "    lui t0, 0x80000\n"
-        "    sw sp, 12(t0)\n"
-        "    j main\n");
+__asm__(
+    ".section .start, \"ax\"\n"
+    ".globl _start\n"
+    "_start:\n"
+    "    lui t0, 0x80000\n"
+    "    sw sp, 12(t0)\n"
+    "    j main\n");
 
-u32 starts = 0x1000;                    /* memory outlives a reset */
+u32 starts = 0x1000; /* memory outlives a reset */
 volatile u32 here[2];
 
-void main(void)
-{
+void main(void) {
     STARTS = ++starts;
     for (;;) {
         u32 a = A, b = B;
-        TWO("add"); TWO("sub"); TWO("and"); TWO("or"); TWO("xor");
-        TWO("sll"); TWO("srl"); TWO("sra"); TWO("slt"); TWO("sltu");
-        TWO("mul"); TWO("mulh"); TWO("mulhsu"); TWO("mulhu");
-        TWO("div"); TWO("divu"); TWO("rem"); TWO("remu");
+        TWO("add");
+        TWO("sub");
+        TWO("and");
+        TWO("or");
+        TWO("xor");
+        TWO("sll");
+        TWO("srl");
+        TWO("sra");
+        TWO("slt");
+        TWO("sltu");
+        TWO("mul");
+        TWO("mulh");
+        TWO("mulhsu");
+        TWO("mulhu");
+        TWO("div");
+        TWO("divu");
+        TWO("rem");
+        TWO("remu");
 
-        volatile u8 *bytes = (volatile u8 *)here;
-        volatile u16 *halves = (volatile u16 *)here;
+        volatile u8* bytes = (volatile u8*)here;
+        volatile u16* halves = (volatile u16*)here;
         here[0] = a;
         here[1] = b;
         for (int n = 0; n < 8; n++) RESULT = bytes[n];
-        for (int n = 0; n < 8; n++) RESULT = (u32)((volatile signed char *)here)[n];
+        for (int n = 0; n < 8; n++) RESULT = (u32)((volatile signed char*)here)[n];
         for (int n = 0; n < 4; n++) RESULT = halves[n];
-        for (int n = 0; n < 4; n++) RESULT = (u32)((volatile short *)here)[n];
+        for (int n = 0; n < 4; n++) RESULT = (u32)((volatile short*)here)[n];
         for (int n = 0; n < 4; n++) bytes[n] = (u8)(b >> 8 * n);
         for (int n = 0; n < 2; n++) halves[2 + n] = (u16)(a >> 16 * n);
         RESULT = here[0];
@@ -53,16 +73,16 @@ void main(void)
         halves[3] = 0xA55A;
         RESULT = here[0];
         RESULT = here[1];
-        RESULT = ((volatile u8 *)REGISTERS)[1];              /* a byte of a register may be read */
+        RESULT = ((volatile u8*)REGISTERS)[1]; /* a byte of a register may be read */
 
         switch (ORDER) {
         case 0: break;
-        case 1: RESULT = *(volatile u32 *)MEMORY_BYTES; break;
-        case 2: *(volatile u32 *)MEMORY_BYTES = 1; break;
-        case 3: *(volatile u32 *)(REGISTERS + 0x10000) = 1; break;
-        case 4: RESULT = *(volatile u32 *)0xFFFFFFFCu; break;
-        case 5: *(volatile u8 *)REGISTERS = 1; break;
-        case 6: *(volatile u16 *)(REGISTERS + 2) = 1; break;
+        case 1: RESULT = *(volatile u32*)MEMORY_BYTES; break;
+        case 2: *(volatile u32*)MEMORY_BYTES = 1; break;
+        case 3: *(volatile u32*)(REGISTERS + 0x10000) = 1; break;
+        case 4: RESULT = *(volatile u32*)0xFFFFFFFCu; break;
+        case 5: *(volatile u8*)REGISTERS = 1; break;
+        case 6: *(volatile u16*)(REGISTERS + 2) = 1; break;
         case 7: __asm__ volatile("lw t0, 2(%0)" : : "r"(here) : "t0"); break;
         case 8: __asm__ volatile("sh t0, 1(%0)" : : "r"(here)); break;
         case 9: __asm__ volatile(".word 0"); break;

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What tb/cpu/core_test.c must find: the results of rv32im for two operands, in the order in which the program writes them."""
+"""What tb/cpu/core_test.c must find: the results of rv32im for two operands, in the order in which
+the program writes them.
+"""
+
 MASK = (1 << 32) - 1
 
 
@@ -8,7 +11,9 @@ def signed(x, w=32):
 
 
 def divide(a, b, w_signed):
-    """Quotient and remainder as RISC-V has them: towards zero, and defined for a divisor of 0 and for overflow."""
+    """Quotient and remainder as RISC-V has them: towards zero, and defined for a divisor of 0 and
+    for overflow.
+    """
     if w_signed:
         a, b = signed(a), signed(b)
     if b == 0:
@@ -19,12 +24,26 @@ def divide(a, b, w_signed):
 
 def results(a, b):
     sa, sb, n = signed(a), signed(b), b & 31
-    out = [a + b, a - b, a & b, a | b, a ^ b, a << n, a >> n, sa >> n, sa < sb, a < b,
-           a * b, sa * sb >> 32, sa * b >> 32, a * b >> 32]
+    out = [
+        a + b,
+        a - b,
+        a & b,
+        a | b,
+        a ^ b,
+        a << n,
+        a >> n,
+        sa >> n,
+        sa < sb,
+        a < b,
+        a * b,
+        sa * sb >> 32,
+        sa * b >> 32,
+        a * b >> 32,
+    ]
     (div, rem), (divu, remu) = divide(a, b, True), divide(a, b, False)
     out += [div, divu, rem, remu]
     memory = a.to_bytes(4, "little") + b.to_bytes(4, "little")
-    halves = [int.from_bytes(memory[k:k + 2], "little") for k in range(0, 8, 2)]
+    halves = [int.from_bytes(memory[k : k + 2], "little") for k in range(0, 8, 2)]
     out += [*memory, *(signed(x, 8) for x in memory), *halves, *(signed(x, 16) for x in halves)]
     out += [b, a, b & ~0xFF0000 | 0x5A0000, a & 0xFFFF | 0xA55A0000, a >> 8 & 0xFF]
     return [int(x) & MASK for x in out]

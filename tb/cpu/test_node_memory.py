@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""node_memory: what the file says at power-up, single bytes, both ends, random accesses; and block RAM in synthesis."""
+"""node_memory: what the file says at power-up, single bytes, both ends, random accesses; and block
+RAM in synthesis.
+"""
+
 import random
 import re
 import subprocess
@@ -15,7 +18,7 @@ from tb.bench import ROOT, run, source_of
 from tb.cpu.node_memory import NodeMemory
 
 BYTES = 1024
-CONTENTS = [n * 0x9E3779B1 % (1 << 32) for n in range(BYTES // 4)]      # any words, all different
+CONTENTS = [n * 0x9E3779B1 % (1 << 32) for n in range(BYTES // 4)]  # any words, all different
 
 
 def contents_in(path):
@@ -24,7 +27,12 @@ def contents_in(path):
 
 
 async def clk(dut, read, write, address, wdata=0):
-    dut.read.value, dut.write.value, dut.address.value, dut.wdata.value = read, write, address, wdata
+    dut.read.value, dut.write.value, dut.address.value, dut.wdata.value = (
+        read,
+        write,
+        address,
+        wdata,
+    )
     await RisingEdge(dut.clk)
     await FallingEdge(dut.clk)
     return dut.rdata.value
@@ -62,18 +70,30 @@ async def any_access_matches_the_model(dut):
     model.step(1, 0, 0, 0)
     await clk(dut, 1, 0, 0)
     for n in range(3000):
-        word = random.getrandbits(1), random.choice([0, 15, random.getrandbits(4)]), random.randrange(16), random.getrandbits(32)
+        word = (
+            random.getrandbits(1),
+            random.choice([0, 15, random.getrandbits(4)]),
+            random.randrange(16),
+            random.getrandbits(32),
+        )
         assert int(await clk(dut, *word)) == model.step(*word), f"clk {n}"
 
 
 def test_node_memory():
     (ROOT / "build").mkdir(exist_ok=True)
-    run("node_memory", __file__, BYTES=BYTES, FIRMWARE=str(contents_in(ROOT / "build" / "node_memory.hex")))
+    run(
+        "node_memory",
+        __file__,
+        BYTES=BYTES,
+        FIRMWARE=str(contents_in(ROOT / "build" / "node_memory.hex")),
+    )
 
 
 @pytest.mark.skipif(not find_spec("pyosys"), reason="pyosys is not installed")
 def test_32_kib_are_16_block_rams_of_an_ecp5_and_hold_the_file(tmp_path):
-    """In a process of its own: the synthesis library keeps its memory, and one test should not be the next one's load."""
+    """In a process of its own: the synthesis library keeps its memory, and one test should not be
+    the next one's load.
+    """
     file = contents_in(tmp_path / "node_memory.hex")
     script = f"""
 from pyosys import libyosys
@@ -82,7 +102,9 @@ for step in ['read_verilog -sv {source_of("node_memory")}', 'chparam -set FIRMWA
              'synth_ecp5 -top node_memory', 'write_verilog {tmp_path / "netlist.v"}']:
     design.run_pass('tee -q ' + step)
 """
-    subprocess.run([sys.executable, "-c", script], check=True, timeout=120, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        [sys.executable, "-c", script], check=True, timeout=120, stdout=subprocess.DEVNULL
+    )
     netlist = (tmp_path / "netlist.v").read_text()
     assert netlist.count("DP16KD #(") == 16
     assert len(re.findall(r"TRELLIS_FF #\(|TRELLIS_DPR16X4", netlist)) == 0

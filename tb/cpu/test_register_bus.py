@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""register_bus: every block at both ends of its range, nobody's addresses, and random accesses against the model."""
+"""register_bus: every block at both ends of its range, nobody's addresses, and random accesses
+against the model.
+"""
+
 import random
 
 import cocotb
@@ -10,12 +13,18 @@ from cocotb.triggers import FallingEdge
 from tb.bench import run
 from tb.cpu.register_bus import RegisterBus
 
-ALONE = {"node": 0x000, "bus": 0x100, "peripherals": 0x200}                                 # blocks of which there is one
-OF_AXES = {"axis": 0x400, "feedback": 0xC00, "actuator": 0x1400}         # blocks that each axis has, where the first one lies
+ALONE = {"node": 0x000, "bus": 0x100, "peripherals": 0x200}  # blocks of which there is one
+OF_AXES = {
+    "axis": 0x400,
+    "feedback": 0xC00,
+    "actuator": 0x1400,
+}  # blocks that each axis has, where the first one lies
 
 
 async def access(dut, model, select, address):
-    """One clk with this access; selects and answer are compared with the model, the answer is returned."""
+    """One clk with this access; selects and answer are compared with the model, the answer is
+    returned.
+    """
     word = lambda: random.getrandbits(32)
     dut.select.value, dut.address.value = select, address
     await FallingEdge(dut.clk)
@@ -53,18 +62,26 @@ async def begin(dut):
 @cocotb.test()
 async def each_block_answers_at_both_ends_of_its_range(dut):
     model = await begin(dut)
-    bases = [*ALONE.values(), *(first + 0x100 * n for first in OF_AXES.values() for n in range(model.axes))]
+    bases = [
+        *ALONE.values(),
+        *(first + 0x100 * n for first in OF_AXES.values() for n in range(model.axes)),
+    ]
     for block, base in enumerate(bases):
         for address in (base, base + 0xFC):
             value, answers = await check(dut, model, 1, address)
-            alone, several = answers[:len(ALONE)], answers[len(ALONE):]
+            alone, several = answers[: len(ALONE)], answers[len(ALONE) :]
             assert value == [*alone, *(word for words in several for word in words)][block]
 
 
 @cocotb.test()
 async def nobody_answers_elsewhere(dut):
     model = await begin(dut)
-    for address in (0x300, 0x3FC, *(first + 0x100 * model.axes for first in OF_AXES.values()), 0xFFFC):
+    for address in (
+        0x300,
+        0x3FC,
+        *(first + 0x100 * model.axes for first in OF_AXES.values()),
+        0xFFFC,
+    ):
         assert (await check(dut, model, 1, address))[0] == 0
     assert (await check(dut, model, 0, 0))[0] == 0
 
@@ -73,7 +90,12 @@ async def nobody_answers_elsewhere(dut):
 async def any_access_matches_the_model(dut):
     model = await begin(dut)
     for _ in range(500):
-        await check(dut, model, random.getrandbits(1), random.choice([random.getrandbits(13), random.getrandbits(16)]) & ~3)
+        await check(
+            dut,
+            model,
+            random.getrandbits(1),
+            random.choice([random.getrandbits(13), random.getrandbits(16)]) & ~3,
+        )
 
 
 @pytest.mark.parametrize("axes", [1, 3])

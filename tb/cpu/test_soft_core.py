@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""soft_core: a compiled program does every instruction and access width on operands from the register bus, then goes wrong
+"""soft_core: a compiled program does every instruction and access width on operands from the
+register bus, then goes wrong
 in every way it can. The program's results are those of tb/cpu/soft_core.py."""
+
 import random
 import struct
 import subprocess
@@ -16,7 +18,7 @@ from tb.cpu.soft_core import results
 BYTES = 2048
 BUILD = ROOT / "build" / "soft_core"
 OPERANDS = [0, 1, 2, 0xFFFFFFFF, 0x80000000, 0x7FFFFFFF, 0x0000FFFF, 31]
-TRAPS = range(1, 14)                    # ORDER in program.c
+TRAPS = range(1, 14)  # ORDER in program.c
 A_TURN = len(results(0, 0))
 
 
@@ -37,7 +39,11 @@ class Registers:
             if int(dut.write.value):
                 self.written.append((address, int(dut.wdata.value)))
         await RisingEdge(dut.clk)
-        dut.rdata.value = self.words.get(address, 0) if strobe and not int(dut.write.value) else random.getrandbits(32)
+        dut.rdata.value = (
+            self.words.get(address, 0)
+            if strobe and not int(dut.write.value)
+            else random.getrandbits(32)
+        )
         await FallingEdge(dut.clk)
         return int(dut.trap.value)
 
@@ -63,14 +69,21 @@ async def begin(dut):
 @cocotb.test()
 async def every_instruction_and_access_width_has_the_right_result(dut):
     registers = await begin(dut)
-    pairs = [(a, b) for a in OPERANDS[:6] for b in (0, 0xFFFFFFFF)] + [(0x80000000, 31), (0x7FFFFFFF, 0x80000000)]
-    pairs += [(random.getrandbits(32), random.getrandbits(random.choice([5, 16, 32]))) for _ in range(8)]
-    for a, b in pairs:                                  # each is set just after the last result of the one before
+    pairs = [(a, b) for a in OPERANDS[:6] for b in (0, 0xFFFFFFFF)] + [
+        (0x80000000, 31),
+        (0x7FFFFFFF, 0x80000000),
+    ]
+    pairs += [
+        (random.getrandbits(32), random.getrandbits(random.choice([5, 16, 32]))) for _ in range(8)
+    ]
+    for a, b in pairs:  # each is set just after the last result of the one before
         registers.written.clear()
         registers.words[0], registers.words[4] = a, b
         await registers.until(lambda: len(registers.taken(0xFFFC)) >= A_TURN)
         got, want = registers.taken(0xFFFC), results(a, b)
-        assert got == want, f"operands {a:#x}, {b:#x}: results {[n for n, (g, w) in enumerate(zip(got, want)) if g != w]} are wrong"
+        assert got == want, (
+            f"operands {a:#x}, {b:#x}: results {[n for n, (g, w) in enumerate(zip(got, want)) if g != w]} are wrong"
+        )
         assert not int(dut.trap.value)
 
 
@@ -92,8 +105,12 @@ async def every_wrong_access_traps_and_reset_starts_again(dut):
         written, selects = len(registers.written), registers.selects
         for _ in range(200):
             assert await registers.clk(), f"order {order}: the trap stands until reset"
-        assert (len(registers.written), registers.selects) == (written, selects), f"order {order}: the bus is quiet in a trap"
-        assert all(where in (0x0C, 0x10, 0xFFFC) for where, _ in registers.written), f"order {order}: nothing was written elsewhere"
+        assert (len(registers.written), registers.selects) == (written, selects), (
+            f"order {order}: the bus is quiet in a trap"
+        )
+        assert all(where in (0x0C, 0x10, 0xFFFC) for where, _ in registers.written), (
+            f"order {order}: nothing was written elsewhere"
+        )
         registers.words[8] = 0
         registers.written.clear()
         assert not await registers.clk(rst=1)
@@ -111,7 +128,7 @@ async def an_operation_takes_3_clk_a_product_6_a_quotient_40_and_a_register_acce
         before = len(registers.taken(0xFFFC))
         await registers.clk()
         times += [n] * (len(registers.taken(0xFFFC)) - before)
-    took = [b - a - 6 for a, b in zip(times, times[1:])]           # an operation and a write to RESULT
+    took = [b - a - 6 for a, b in zip(times, times[1:])]  # an operation and a write to RESULT
     dut._log.info(f"clk for sub … remu: {took[:17]}")
     assert took[:9] == [3] * 9 and took[9:13] == [6] * 4 and took[13:17] == [40] * 4
 
@@ -128,12 +145,27 @@ async def a_register_access_is_one_strobe(dut):
 
 
 def compiled():
-    """The program as a file for $readmemh, the whole memory long; by the tools of the firmware's own build."""
+    """The program as a file for $readmemh, the whole memory long; by the tools of the firmware's
+    own build.
+    """
     here, command, libraries = Path(__file__).parent, *firmware_build.compiler()
     BUILD.mkdir(parents=True, exist_ok=True)
     elf, words = BUILD / "program.elf", BUILD / "program.hex"
-    subprocess.run([*command, *firmware_build.FLAGS, firmware_build.FAST, f"-DMEMORY_BYTES={BYTES}", f"-Wl,-T,{here / 'program.ld'}", "-o", str(elf),
-                    str(here / "core_test.c"), *libraries], check=True, timeout=300)
+    subprocess.run(
+        [
+            *command,
+            *firmware_build.FLAGS,
+            firmware_build.FAST,
+            f"-DMEMORY_BYTES={BYTES}",
+            f"-Wl,-T,{here / 'program.ld'}",
+            "-o",
+            str(elf),
+            str(here / "core_test.c"),
+            *libraries,
+        ],
+        check=True,
+        timeout=300,
+    )
     content, _ = firmware_build.image(firmware_build.load_segments(elf.read_bytes())[0], BYTES)
     words.write_text("".join(f"{word:08x}\n" for (word,) in struct.iter_unpack("<I", content)))
     return words

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/decode/incremental_encoder.sv does: its three blocks in a row, flags, and the time of the last edge."""
+"""What rtl/decode/incremental_encoder.sv does: its three blocks in a row, flags, and the time of
+the last edge.
+"""
+
 from dataclasses import dataclass, field
 
 from tb.decode.index_latch import IndexLatch, Settings
@@ -20,8 +23,18 @@ class Setup:
 
 class IncrementalEncoder:
     def __init__(self, w=32, check=1):
-        self.filter, self.decoder, self.index = EventFilter(3), QuadratureDecoder(w), IndexLatch(w, check)
-        self.clean, self.own, self.edge_time, self.illegal, self.wrong = [0, 0, 0], [0, 0], None, 0, 0
+        self.filter, self.decoder, self.index = (
+            EventFilter(3),
+            QuadratureDecoder(w),
+            IndexLatch(w, check),
+        )
+        self.clean, self.own, self.edge_time, self.illegal, self.wrong = (
+            [0, 0, 0],
+            [0, 0],
+            None,
+            0,
+            0,
+        )
         self.seen = self.fault = self.revolution = 0
 
     def step(self, setup, a, b, z, now, arm=0, clear_flags=0, rst=0, own_a=0, own_b=0):
@@ -33,19 +46,34 @@ class IncrementalEncoder:
             self.edge_time = now
         ready = decoder.ready
         self.seen = int(self.illegal or (self.seen and not clear_flags))
-        self.fault = int(setup.illegal_enable and (self.illegal or (self.fault and not clear_flags)))
+        self.fault = int(
+            setup.illegal_enable and (self.illegal or (self.fault and not clear_flags))
+        )
         self.revolution = int(self.wrong or (self.revolution and not clear_flags))
         count_before = decoder.count
         levels = [*self.own, self.clean[2]] if setup.own else self.clean
         self.own = [own_a, own_b]
         count, step, self.illegal = decoder.step(later[0], later[1], setup.mode, clear, rst)
-        armed, found, index_count, self.wrong = self.index.step(setup.index, levels, ready, direction, moves if ready else 0,
-                                                                count_before, arm, rst)
-        self.clean, rejected = self.filter.step(setup.skip, setup.required, setup.tolerated, [a, b, z], rst)
+        armed, found, index_count, self.wrong = self.index.step(
+            setup.index, levels, ready, direction, moves if ready else 0, count_before, arm, rst
+        )
+        self.clean, rejected = self.filter.step(
+            setup.skip, setup.required, setup.tolerated, [a, b, z], rst
+        )
         if rst:
             self.seen = self.fault = self.revolution = 0
-        return {"count": count, "step": step, "edge_time": self.edge_time, "index_found": found, "index_armed": armed,
-                "index_count": index_count, "filtered": self.clean[0] | self.clean[1] << 1 | self.clean[2] << 2,
-                "rejected": rejected[0] | rejected[1] << 1 | rejected[2] << 2, "illegal": self.illegal,
-                "illegal_seen": self.seen, "illegal_fault": self.fault, "revolution_wrong": self.wrong,
-                "revolution_fault": self.revolution}
+        return {
+            "count": count,
+            "step": step,
+            "edge_time": self.edge_time,
+            "index_found": found,
+            "index_armed": armed,
+            "index_count": index_count,
+            "filtered": self.clean[0] | self.clean[1] << 1 | self.clean[2] << 2,
+            "rejected": rejected[0] | rejected[1] << 1 | rejected[2] << 2,
+            "illegal": self.illegal,
+            "illegal_seen": self.seen,
+            "illegal_fault": self.fault,
+            "revolution_wrong": self.wrong,
+            "revolution_fault": self.revolution,
+        }

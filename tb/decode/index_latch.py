@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/decode/index_latch.sv does: clear() tells what goes to the decoder in this clk, step() ends the clk."""
+"""What rtl/decode/index_latch.sv does: clear() tells what goes to the decoder in this clk, step()
+ends the clk.
+"""
+
 from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
 class Settings:
     active_low: int = 0
-    gate_mask: int = 0        # bit 0 a, bit 1 b
+    gate_mask: int = 0  # bit 0 a, bit 1 b
     gate: int = 0
     take_up: int = 1
     take_down: int = 1
@@ -42,13 +45,23 @@ class IndexLatch:
         return int(self.met(direction) and self.wanted and settings.clears)
 
     def step(self, settings, levels, ready, direction, stepped, count, arm=0, rst=0, probe=0):
-        """levels (a, b, z); stepped is -1, 0, +1 of the decoder in this clk. Returns (armed, found, index_count, revolution_wrong)."""
+        """levels (a, b, z); stepped is -1, 0, +1 of the decoder in this clk. Returns (armed, found,
+        index_count, revolution_wrong).
+        """
         met = self.met(direction)
         take = int(met and self.wanted)
-        entering = ready and settings.holds(*levels) and not settings.holds(*self.later) and not self.used
+        entering = (
+            ready and settings.holds(*levels) and not settings.holds(*self.later) and not self.used
+        )
         on = settings.each and settings.counts_per_revolution
         per = settings.counts_per_revolution
-        self.wrong = int(bool(self.check and self.judge_turn and (self.turn % (1 << self.w)) not in (0, per, -per % (1 << self.w))))
+        self.wrong = int(
+            bool(
+                self.check
+                and self.judge_turn
+                and (self.turn % (1 << self.w)) not in (0, per, -per % (1 << self.w))
+            )
+        )
         self.judge_turn, self.turn = self.judge, self.wrap(self.index_count - self.reference)
         self.judge = int(bool(take and self.known and on))
         self.known = int(bool(on and (self.known or take)))
@@ -59,7 +72,10 @@ class IndexLatch:
         if take or probe:
             self.index_count = self.wrap(count + stepped)
         self.used = int((self.used or met) and levels[2] != settings.active_low)
-        self.up, self.down = int(entering and settings.take_up), int(entering and settings.take_down)
+        self.up, self.down = (
+            int(entering and settings.take_up),
+            int(entering and settings.take_down),
+        )
         self.wanted = int(settings.each or self.armed)
         self.armed, self.found = int(arm or (self.armed and not take)), take
         self.later = tuple(levels)

@@ -1,21 +1,33 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/decode/quadrature_decoder.sv does: step(a, b, mode, clear, rst) is one clk, and returns what is on the pins after it."""
+"""What rtl/decode/quadrature_decoder.sv does: step(a, b, mode, clear, rst) is one clk, and returns
+what is on the pins after it.
+"""
 
-PLACE = {(0, 0): 0, (1, 0): 1, (1, 1): 2, (0, 1): 3}      # quarter of the period
+PLACE = {(0, 0): 0, (1, 0): 1, (1, 1): 2, (0, 1): 3}  # quarter of the period
 X4, X2, X1, PULSES = range(4)
-BORDERS = {X4: {0, 1, 2, 3}, X2: {0, 2}, X1: {0}}         # quarters behind which a border counts
+BORDERS = {X4: {0, 1, 2, 3}, X2: {0, 2}, X1: {0}}  # quarters behind which a border counts
 
 
 class QuadratureDecoder:
     def __init__(self, w=32, settle=8):
-        self.w, self.settling, self.settle, self.a, self.b, self.count, self.upward = w, settle, 0, 0, 0, 0, 1
+        self.w, self.settling, self.settle, self.a, self.b, self.count, self.upward = (
+            w,
+            settle,
+            0,
+            0,
+            0,
+            0,
+            1,
+        )
 
     @property
     def ready(self):
         return int(self.settle == 0)
 
     def look(self, a, b, mode=X4):
-        """(direction, what count would move by, illegal) with these levels in this clk, ready or not."""
+        """(direction, what count would move by, illegal) with these levels in this clk, ready or
+        not.
+        """
         if mode == PULSES:
             rise, change = a and not self.a, b != self.b
             return 1 - b, 0 if change or not rise else 1 - 2 * b, int(rise and change)

@@ -1,30 +1,57 @@
 // SPDX-License-Identifier: Apache-2.0
-// recorded_encoder -- test top: pairs of recorded levels, each through two deglitchers into a decoder, as in an axis.
+// recorded_encoder -- test top: pairs of recorded levels, each through two deglitchers into a
+// decoder, as in an axis.
 `default_nettype none
 
 module recorded_encoder #(
     parameter int PAIRS = 4
 ) (
-    input  wire                 clk,
-    input  wire                 rst,
-    input  wire  [15:0]         stable,
-    input  wire  [1:0]          mode,       // as in quadrature_decoder
-    input  wire  [PAIRS-1:0]    a,
-    input  wire  [PAIRS-1:0]    b,
-    output wire  [32*PAIRS-1:0] counts,     // pair 0 lowest
+    input wire clk,
+    input wire rst,
+    input wire [15:0] stable,
+    input wire [1:0] mode,  // as in quadrature_decoder
+    input wire [PAIRS-1:0] a,
+    input wire [PAIRS-1:0] b,
+    output wire [32*PAIRS-1:0] counts,  // pair 0 lowest
     output logic [32*PAIRS-1:0] edges,      // counted edges or pulses since reset, both directions added
-    output logic [32*PAIRS-1:0] rejections, // pulses held back on a and on b
-    output logic [PAIRS-1:0]    illegal     // an illegal edge was seen since reset
+    output logic [32*PAIRS-1:0] rejections,  // pulses held back on a and on b
+    output logic [PAIRS-1:0] illegal  // an illegal edge was seen since reset
 );
     for (genvar i = 0; i < PAIRS; i++) begin : g_pair
         wire a_filtered, b_filtered, a_rejected, b_rejected, skipped;
         wire ready, stepping, direction;
         wire signed [1:0] step;
 
-        deglitcher u_deglitcher_a (.clk, .rst, .stable, .level(a[i]), .filtered(a_filtered), .rejected(a_rejected));
-        deglitcher u_deglitcher_b (.clk, .rst, .stable, .level(b[i]), .filtered(b_filtered), .rejected(b_rejected));
-        quadrature_decoder u_decoder (.clk, .rst, .mode, .clear(1'b0), .a(a_filtered), .b(b_filtered), .ready, .stepping,
-                                      .count(counts[32*i +: 32]), .step, .direction, .illegal(skipped));
+        deglitcher u_deglitcher_a (
+            .clk,
+            .rst,
+            .stable,
+            .level   (a[i]),
+            .filtered(a_filtered),
+            .rejected(a_rejected)
+        );
+        deglitcher u_deglitcher_b (
+            .clk,
+            .rst,
+            .stable,
+            .level   (b[i]),
+            .filtered(b_filtered),
+            .rejected(b_rejected)
+        );
+        quadrature_decoder u_decoder (
+            .clk,
+            .rst,
+            .mode,
+            .clear  (1'b0),
+            .a      (a_filtered),
+            .b      (b_filtered),
+            .ready,
+            .stepping,
+            .count  (counts[32*i+:32]),
+            .step,
+            .direction,
+            .illegal(skipped)
+        );
         wire unused = &{1'b0, ready, stepping, direction};
 
         always_ff @(posedge clk) begin

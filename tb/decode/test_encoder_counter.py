@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""encoder_counter: its words by hand, latencies, flags, probe and index, and random pins and accesses against the model."""
+"""encoder_counter: its words by hand, latencies, flags, probe and index, and random pins and
+accesses against the model.
+"""
+
 import random
 
 import cocotb
@@ -9,7 +12,7 @@ from cocotb.triggers import FallingEdge
 from tb.bench import run, start
 from tb.decode.encoder_counter import ARM, FOUND, ILLEGAL, PROBED, EncoderCounter
 
-TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]                 # a leads b: up
+TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]  # a leads b: up
 UP, DOWN, EACH, CLEARS, PROBE, PROBE_LOW = (1 << n for n in range(10, 16))
 
 
@@ -20,7 +23,9 @@ class Bench:
     async def begin(cls, dut, settings=0):
         bench = cls()
         bench.dut, bench.now, bench.z, bench.probe, bench.place = dut, 0, 0, 0, 0
-        bench.model = EncoderCounter(*(int(getattr(dut, name).value) for name in ("FILTER_W", "TOLERATED_W", "SKIP_W")))
+        bench.model = EncoderCounter(
+            *(int(getattr(dut, name).value) for name in ("FILTER_W", "TOLERATED_W", "SKIP_W"))
+        )
         await start(dut, select=0, write=0, word=0, wdata=0, now=0, a=0, b=0, z=0, probe=0)
         await FallingEdge(dut.clk)
         for _ in range(3):
@@ -33,12 +38,22 @@ class Bench:
     async def clk(self, levels=None, rst=0, **access):
         a, b = levels or TURN[self.place % 4]
         self.now = (self.now + 1) % 65536
-        pins = dict(a=a, b=b, z=self.z, probe=self.probe, now=self.now, rst=rst, **dict(select=0, write=0, word=0, wdata=0) | access)
+        pins = dict(
+            a=a,
+            b=b,
+            z=self.z,
+            probe=self.probe,
+            now=self.now,
+            rst=rst,
+            **dict(select=0, write=0, word=0, wdata=0) | access,
+        )
         for name, value in pins.items():
             getattr(self.dut, name).value = value
         await FallingEdge(self.dut.clk)
         want, got = self.model.step(**pins), self.dut.rdata.value
-        assert want is None or int(got) == want, f"word {pins['word']}: read {got}, the model has {want:08x}"
+        assert want is None or int(got) == want, (
+            f"word {pins['word']}: read {got}, the model has {want:08x}"
+        )
         return want
 
     async def wait(self, clk, **more):
@@ -70,8 +85,10 @@ class Bench:
 async def count_and_the_time_of_its_last_edge_are_one_word(dut):
     bench = await Bench.begin(dut)
     await bench.go(range(1, 8), clk=5)
-    moved = bench.now - 4                               # the clk in which the last edge came to the pins
-    assert await bench.read(0) == moved + 3 - 1 << 16 | 7       # 3 clk to count; the time is that of the clk before
+    moved = bench.now - 4  # the clk in which the last edge came to the pins
+    assert (
+        await bench.read(0) == moved + 3 - 1 << 16 | 7
+    )  # 3 clk to count; the time is that of the clk before
     await bench.go(range(6, -4, -1), clk=5)
     assert await bench.count() == 0xFFFD
 
@@ -79,7 +96,7 @@ async def count_and_the_time_of_its_last_edge_are_one_word(dut):
 @cocotb.test()
 async def latency_is_3_clk_from_the_pins_without_filter_and_1_clk_to_rdata(dut):
     bench = await Bench.begin(dut)
-    await bench.go(range(1, 5))                         # the time means nothing before the first step
+    await bench.go(range(1, 5))  # the time means nothing before the first step
     await bench.wait(4)
     bench.place = 5
     assert [await bench.count() for _ in range(4)] == [4, 4, 4, 5]
@@ -89,16 +106,27 @@ async def latency_is_3_clk_from_the_pins_without_filter_and_1_clk_to_rdata(dut):
 async def rdata_is_0_when_nothing_is_read_and_word_3_does_not_exist(dut):
     bench = await Bench.begin(dut, UP | EACH)
     await bench.go(range(1, 4))
-    assert await bench.clk(word=2) == 0 and await bench.read(3) == 0 and await bench.read(2) == UP | EACH
+    assert (
+        await bench.clk(word=2) == 0
+        and await bench.read(3) == 0
+        and await bench.read(2) == UP | EACH
+    )
 
 
 @cocotb.test()
 async def settings_that_are_left_out_read_0(dut):
     bench = await Bench.begin(dut)
-    filter_w, tolerated_w, skip_w = (int(getattr(dut, name).value) for name in ("FILTER_W", "TOLERATED_W", "SKIP_W"))
+    filter_w, tolerated_w, skip_w = (
+        int(getattr(dut, name).value) for name in ("FILTER_W", "TOLERATED_W", "SKIP_W")
+    )
     for value in (0xFFFFFFFF, 0, 0xA5A5A5A5):
         await bench.write(2, value)
-        there = value & 0xFFF0 | value & 2**filter_w - 1 | value & (2**tolerated_w - 1) << 16 | value & (2**skip_w - 1) << 20
+        there = (
+            value & 0xFFF0
+            | value & 2**filter_w - 1
+            | value & (2**tolerated_w - 1) << 16
+            | value & (2**skip_w - 1) << 20
+        )
         assert await bench.read(2) == there
 
 
@@ -111,7 +139,11 @@ async def an_index_clears_and_latches_exactly_on_a_count_edge(dut):
             await bench.go([place], clk=2)
         bench.z = 0
         await bench.wait(6)
-        assert await bench.count() == count and await bench.latched() == 6 and await bench.flags() == FOUND
+        assert (
+            await bench.count() == count
+            and await bench.latched() == 6
+            and await bench.flags() == FOUND
+        )
         await bench.write(1, FOUND)
         assert await bench.flags() == 0 and await bench.latched() == 6
 
@@ -136,7 +168,7 @@ async def once_takes_one_index_for_each_arm(dut):
 async def a_probe_latches_the_count_of_its_own_pins_at_its_wanted_edge(dut):
     for low in (0, 1):
         bench = await Bench.begin(dut, PROBE | low * PROBE_LOW)
-        for place in range(1, 13):                      # one edge a clk: latched is that of the very clk
+        for place in range(1, 13):  # one edge a clk: latched is that of the very clk
             bench.probe = int(4 <= place < 9)
             await bench.go([place])
         await bench.wait(4)
@@ -173,7 +205,7 @@ async def an_illegal_edge_is_not_counted_and_stands_until_told(dut):
     bench = await Bench.begin(dut)
     await bench.go(range(1, 3))
     await bench.wait(4)
-    await bench.go([4], clk=5)                          # from (1, 1) to (0, 0)
+    await bench.go([4], clk=5)  # from (1, 1) to (0, 0)
     assert await bench.count() == 2 and await bench.flags() == ILLEGAL
     await bench.write(1, FOUND | PROBED)
     assert await bench.flags() == ILLEGAL
@@ -185,7 +217,7 @@ async def an_illegal_edge_is_not_counted_and_stands_until_told(dut):
 async def a_flag_that_comes_again_in_the_clk_in_which_it_is_forgotten_stays(dut):
     bench = await Bench.begin(dut)
     await bench.go([2])
-    for _ in range(6):                                  # one of these meets it
+    for _ in range(6):  # one of these meets it
         await bench.write(1, ILLEGAL)
         bench.place += 2
     await bench.wait(4)
@@ -212,23 +244,34 @@ async def reset_in_mid_flow_forgets_all_but_the_pins(dut):
     await bench.go(range(1, 6), clk=2)
     await bench.clk(rst=1)
     await bench.wait(20)
-    assert await bench.count() == 0 and await bench.read(2) == 0 and await bench.flags() == 0 and await bench.latched() == 0
+    assert (
+        await bench.count() == 0
+        and await bench.read(2) == 0
+        and await bench.flags() == 0
+        and await bench.latched() == 0
+    )
 
 
 @cocotb.test()
 async def any_pins_and_accesses_match_the_model_in_every_clk(dut):
     bench, bits = await Bench.begin(dut), random.getrandbits
     for _ in range(100):
-        mask = 0xFFF3FFF3 if random.random() < 0.2 else 0x0011FFF3      # short filters, or any
+        mask = 0xFFF3FFF3 if random.random() < 0.2 else 0x0011FFF3  # short filters, or any
         await bench.write(2, bits(32) & mask)
         way, clk = random.choice([-1, 1]), random.choice([1, 1, 2, 6])
         for n in range(60):
             if n % clk == 0:
                 way = -way if random.random() < 0.1 else way
                 bench.place += way * random.choice([0, 1, 1, 1, 1, 1, 1, 2])
-                bench.z, bench.probe = int(bench.place % 12 in (0, 1)), bench.probe ^ (random.random() < 0.1)
-            told = dict(select=bits(1), write=bits(1), word=1, wdata=bits(8) & bits(8)) if random.random() < 0.2 else \
-                dict(select=bits(1), write=0, word=bits(2), wdata=bits(32))
+                bench.z, bench.probe = (
+                    int(bench.place % 12 in (0, 1)),
+                    bench.probe ^ (random.random() < 0.1),
+                )
+            told = (
+                dict(select=bits(1), write=bits(1), word=1, wdata=bits(8) & bits(8))
+                if random.random() < 0.2
+                else dict(select=bits(1), write=0, word=bits(2), wdata=bits(32))
+            )
             await bench.clk(rst=int(random.random() < 0.002), **told)
 
 

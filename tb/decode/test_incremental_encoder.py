@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""incremental_encoder: latencies, its flags, every index fault known from the field, time stamps, and random pins against the model."""
+"""incremental_encoder: latencies, its flags, every index fault known from the field, time stamps,
+and random pins against the model.
+"""
+
 import random
 
 import cocotb
@@ -10,13 +13,15 @@ from tb.bench import needs, run, start
 from tb.decode.incremental_encoder import IncrementalEncoder, Setup
 from tb.decode.index_latch import Settings
 
-TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]         # a leads b: up
+TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]  # a leads b: up
 EACH = Settings(each=1)
 CLEARS = Settings(each=1, clears=1)
 
 
 class Bench:
-    """Design and model side by side. An encoder with its index where `at_index(place)` holds is moved over them."""
+    """Design and model side by side. An encoder with its index where `at_index(place)` holds is
+    moved over them.
+    """
 
     @classmethod
     async def begin(cls, dut, setup=None, levels=(0, 0, 0), ready=True):
@@ -33,17 +38,37 @@ class Bench:
 
     def put(self, levels, rst=0, arm=0, clear_flags=0, own=(0, 0)):
         dut, setup, index = self.dut, self.setup, self.setup.index
-        values = {"filter_skip": setup.skip, "filter_required": setup.required, "filter_tolerated": setup.tolerated, "mode": setup.mode,
-                  "index_low": index.active_low, "index_gate_mask": index.gate_mask, "index_gate": index.gate, "index_up": index.take_up,
-                  "index_down": index.take_down, "index_each": index.each, "index_clears": index.clears,
-                  "counts_per_revolution": index.counts_per_revolution, "illegal_enable": setup.illegal_enable, "arm_index": arm,
-                  "clear_flags": clear_flags, "now": self.now, "a": levels[0], "b": levels[1], "z": levels[2],
-                  "own": setup.own, "own_a": own[0], "own_b": own[1], "rst": rst}
+        values = {
+            "filter_skip": setup.skip,
+            "filter_required": setup.required,
+            "filter_tolerated": setup.tolerated,
+            "mode": setup.mode,
+            "index_low": index.active_low,
+            "index_gate_mask": index.gate_mask,
+            "index_gate": index.gate,
+            "index_up": index.take_up,
+            "index_down": index.take_down,
+            "index_each": index.each,
+            "index_clears": index.clears,
+            "counts_per_revolution": index.counts_per_revolution,
+            "illegal_enable": setup.illegal_enable,
+            "arm_index": arm,
+            "clear_flags": clear_flags,
+            "now": self.now,
+            "a": levels[0],
+            "b": levels[1],
+            "z": levels[2],
+            "own": setup.own,
+            "own_a": own[0],
+            "own_b": own[1],
+            "rst": rst,
+        }
         for name, value in values.items():
             getattr(dut, name).value = value
 
     async def play(self, rows, rst=0, arm=0, clear_flags=0, own=None):
-        """Levels (a, b, z), one row a clk; the strobes stand in the first of them. `own` are the node's own levels (a, b) in each
+        """Levels (a, b, z), one row a clk; the strobes stand in the first of them. `own` are the
+        node's own levels (a, b) in each
         clk. Returns the pins of each clk by name."""
         out = []
         for clk, levels in enumerate(rows):
@@ -53,9 +78,19 @@ class Bench:
             self.put(levels, rst, **strobes, own=own_now)
             await RisingEdge(self.dut.clk)
             await FallingEdge(self.dut.clk)
-            want = self.model.step(self.setup, *levels, self.now, rst=rst, **strobes, own_a=own_now[0], own_b=own_now[1])
+            want = self.model.step(
+                self.setup,
+                *levels,
+                self.now,
+                rst=rst,
+                **strobes,
+                own_a=own_now[0],
+                own_b=own_now[1],
+            )
             got = {name: self.read(name) for name in want if want[name] is not None}
-            wrong = {name: (value, want[name]) for name, value in got.items() if value != want[name]}
+            wrong = {
+                name: (value, want[name]) for name, value in got.items() if value != want[name]
+            }
             assert not wrong, f"clk {clk}, {self.setup}: (design, model) {wrong}"
             out.append(want | {"now": self.now})
         return out
@@ -66,7 +101,9 @@ class Bench:
 
     async def go(self, places, at_index=lambda place: 0, clk=1, **strobes):
         """Visit these places, clk each, then wait for what is on its way; the pins of each clk."""
-        rows = [(*TURN[place % 4], int(bool(at_index(place)))) for place in places for _ in range(clk)]
+        rows = [
+            (*TURN[place % 4], int(bool(at_index(place)))) for place in places for _ in range(clk)
+        ]
         return await self.play(rows + rows[-1:] * 6, **strobes)
 
 
@@ -102,7 +139,7 @@ async def index_and_count_arrive_together(dut):
 
 @cocotb.test()
 async def an_index_that_coincides_with_a_count_edge_clears_and_latches_exactly(dut):
-    for clk in (1, 2, 5):                                   # riocore acknowledges it and does not clear
+    for clk in (1, 2, 5):  # riocore acknowledges it and does not clear
         bench = await Bench.begin(dut, Setup(index=CLEARS))
         out = await bench.go(there_and_back(0, 9), lambda place: place == 6, clk)
         assert found(out) == [6] and out[-1]["count"] == 3
@@ -123,9 +160,13 @@ async def a_cleared_count_never_shows_the_old_number_at_the_index(dut):
 
 @cocotb.test()
 async def a_wide_index_clears_once(dut):
-    bench = await Bench.begin(dut, Setup(index=CLEARS))     # PandABlocks clears for as long as it stands
+    bench = await Bench.begin(
+        dut, Setup(index=CLEARS)
+    )  # PandABlocks clears for as long as it stands
     out = await bench.go(there_and_back(0, 12, 8), lambda place: 3 <= place <= 11)
-    assert found(out) == [3, 8] and out[-1]["count"] == -3  # the far side is another edge: gate it or take one direction
+    assert (
+        found(out) == [3, 8] and out[-1]["count"] == -3
+    )  # the far side is another edge: gate it or take one direction
 
 
 @cocotb.test()
@@ -137,9 +178,11 @@ async def a_gated_index_wider_than_a_period_is_found_once_a_pass(dut):
 
 @cocotb.test()
 async def a_gated_index_lies_at_the_same_count_in_both_directions(dut):
-    for gate, place in ((0, 8), (1, 9), (3, 6), (2, 7)):    # {b, a}
+    for gate, place in ((0, 8), (1, 9), (3, 6), (2, 7)):  # {b, a}
         bench = await Bench.begin(dut, Setup(index=EACH.but(gate_mask=3, gate=gate)))
-        out = await bench.go(there_and_back(0, 14, 0, 14), lambda at, place=place: abs(at - place) <= 1)
+        out = await bench.go(
+            there_and_back(0, 14, 0, 14), lambda at, place=place: abs(at - place) <= 1
+        )
         assert found(out) == [place] * 3
 
 
@@ -180,7 +223,13 @@ async def arming_inside_an_index_waits_for_the_next(dut):
 async def an_index_that_stands_at_power_up_and_new_settings_make_no_event(dut):
     bench = await Bench.begin(dut, Setup(index=CLEARS), levels=(1, 0, 1), ready=False)
     assert found(await bench.play([(1, 0, 1)] * 30)) == []
-    for index in (EACH.but(active_low=1), EACH, EACH.but(gate_mask=3, gate=3), EACH.but(gate_mask=3, gate=1), EACH):
+    for index in (
+        EACH.but(active_low=1),
+        EACH,
+        EACH.but(gate_mask=3, gate=3),
+        EACH.but(gate_mask=3, gate=1),
+        EACH,
+    ):
         bench.setup = Setup(index=index)
         assert found(await bench.play([(1, 0, 1)] * 8)) == []
 
@@ -188,12 +237,22 @@ async def an_index_that_stands_at_power_up_and_new_settings_make_no_event(dut):
 @cocotb.test()
 async def counts_per_revolution_are_checked_at_any_number(dut):
     needs(int(dut.CHECK.value), "built without the check of revolutions")
-    for per, clears in ((10, 0), (10, 1), (7, 0), (16, 1)):     # not a power of two, not even a whole period
+    for per, clears in (
+        (10, 0),
+        (10, 1),
+        (7, 0),
+        (16, 1),
+    ):  # not a power of two, not even a whole period
         setup = Setup(index=EACH.but(counts_per_revolution=per, clears=clears))
         bench = await Bench.begin(dut, setup)
-        out = await bench.go(there_and_back(0, 3 * per + 2, -per - 2, per + 2), lambda place, per=per: place % per == 3)
+        out = await bench.go(
+            there_and_back(0, 3 * per + 2, -per - 2, per + 2),
+            lambda place, per=per: place % per == 3,
+        )
         assert len(found(out)) > 7 and not any(row["revolution_wrong"] for row in out)
-        out = await bench.go(there_and_back(per + 2, 4 * per), lambda place, per=per: place % per == 4)     # it has slipped
+        out = await bench.go(
+            there_and_back(per + 2, 4 * per), lambda place, per=per: place % per == 4
+        )  # it has slipped
         assert sum(row["revolution_wrong"] for row in out) == 1 and out[-1]["revolution_fault"]
         out = await bench.go([4 * per], clear_flags=1)
         assert not out[-1]["revolution_fault"]
@@ -212,7 +271,7 @@ async def the_check_forgets_when_it_is_switched_off(dut):
 
 @cocotb.test()
 async def an_illegal_edge_is_never_counted_and_stays_readable_until_cleared(dut):
-    bench = await Bench.begin(dut, Setup(illegal_enable=1))     # OnStepX #103 counts an invalid state
+    bench = await Bench.begin(dut, Setup(illegal_enable=1))  # OnStepX #103 counts an invalid state
     out = await bench.play([(1, 1, 0)] * 20)
     assert [row["count"] for row in out] == [0] * 20 and sum(row["illegal"] for row in out) == 1
     assert out[-1]["illegal_seen"] and out[-1]["illegal_fault"]
@@ -222,7 +281,7 @@ async def an_illegal_edge_is_never_counted_and_stays_readable_until_cleared(dut)
 
 @cocotb.test()
 async def a_stale_illegal_edge_fires_nothing_when_it_is_enabled(dut):
-    bench = await Bench.begin(dut)                              # LinuxCNC #2860, #2869
+    bench = await Bench.begin(dut)  # LinuxCNC #2860, #2869
     out = await bench.play([(1, 1, 0)] * 9)
     assert out[-1]["illegal_seen"] and not out[-1]["illegal_fault"]
     bench.setup = Setup(illegal_enable=1)
@@ -258,7 +317,10 @@ async def reset_in_mid_flow_makes_zero_of_where_it_is(dut):
     await bench.go(there_and_back(0, 7), lambda place: place == 3)
     await bench.play([(1, 1, 0)] * 4)
     out = await bench.play([(1, 1, 1)], rst=1)
-    assert not any(out[0][name] for name in ("count", "index_count", "index_found", "illegal_seen", "illegal_fault"))
+    assert not any(
+        out[0][name]
+        for name in ("count", "index_count", "index_found", "illegal_seen", "illegal_fault")
+    )
     assert (await bench.play([(1, 1, 1)] * 20))[-1]["count"] == 0
     assert (await bench.play([(0, 1, 1)] * 4))[-1]["count"] == 1
 
@@ -266,7 +328,9 @@ async def reset_in_mid_flow_makes_zero_of_where_it_is(dut):
 @cocotb.test()
 async def own_steps_of_one_clk_are_all_counted_whatever_the_filter_is_set_to(dut):
     for required, skip in ((0, 0), (255, 0), (3, 200)):
-        bench = await Bench.begin(dut, Setup(skip=skip, required=required, tolerated=2, mode=3, own=1))
+        bench = await Bench.begin(
+            dut, Setup(skip=skip, required=required, tolerated=2, mode=3, own=1)
+        )
         for down, steps, count in ((0, 7, 7), (1, 12, -5)):
             own = [(0, down)] * 2 + [(1, down), (0, down)] * steps + [(0, down)] * 4
             out = await bench.play([(0, 0, 0)] * len(own), own=own)
@@ -284,7 +348,11 @@ async def latency_is_3_clk_from_own_a_to_count(dut):
 async def the_pins_are_filtered_and_not_counted_while_own_steps_are(dut):
     bench = await Bench.begin(dut, Setup(required=3, own=1))
     out = await bench.play([(1, 0, 0)] * 2 + [(0, 0, 0)] * 6 + [(1, 0, 0)] * 8)
-    assert sum(row["rejected"] for row in out) == 1 and out[-1]["filtered"] == 1 and not any(row["count"] for row in out)
+    assert (
+        sum(row["rejected"] for row in out) == 1
+        and out[-1]["filtered"] == 1
+        and not any(row["count"] for row in out)
+    )
 
 
 @cocotb.test()
@@ -293,9 +361,21 @@ async def any_pins_settings_and_strobes_match_the_model(dut):
     bits = random.getrandbits
     top = 1 << int(dut.W.value)
     for _ in range(60):
-        index = Settings(bits(1), bits(2) & bits(2), bits(2), bits(1) | bits(1), bits(1) | bits(1), bits(1), bits(1),
-                         random.choice([0, 5, 8, 12]) % top)
-        skip, required, tolerated = random.choice([0, 0, 1, 3]), random.choice([0, 1, 1, 2, 3]), random.choice([0, 0, 1, 2])
+        index = Settings(
+            bits(1),
+            bits(2) & bits(2),
+            bits(2),
+            bits(1) | bits(1),
+            bits(1) | bits(1),
+            bits(1),
+            bits(1),
+            random.choice([0, 5, 8, 12]) % top,
+        )
+        skip, required, tolerated = (
+            random.choice([0, 0, 1, 3]),
+            random.choice([0, 1, 1, 2, 3]),
+            random.choice([0, 0, 1, 2]),
+        )
         own = random.random() < 0.3
         bench.setup = Setup(skip, required, tolerated, bits(2), bits(1), int(own), index)
         if random.random() < 0.3:
@@ -308,8 +388,13 @@ async def any_pins_settings_and_strobes_match_the_model(dut):
                 place += way
                 rows += [(*TURN[place % 4], int(place % 12 in (0, 1)))] * clk
         for first in range(0, len(rows), 15):
-            await bench.play(rows[first:first + 15], rst=int(random.random() < 0.01), arm=bits(1), clear_flags=bits(1) & bits(1),
-                             own=[(bits(1), bits(1)) for _ in range(15)])
+            await bench.play(
+                rows[first : first + 15],
+                rst=int(random.random() < 0.01),
+                arm=bits(1),
+                clear_flags=bits(1) & bits(1),
+                own=[(bits(1), bits(1)) for _ in range(15)],
+            )
 
 
 @pytest.mark.parametrize("w, time_w, check", [(32, 32, 1), (8, 16, 0)])

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""index_latch alone: its latencies, clear in the clk of the edge, the wrap of the check, and random inputs against the model.
+"""index_latch alone: its latencies, clear in the clk of the edge, the wrap of the check, and random
+inputs against the model.
 
 What it does with a decoder before and behind it stands in test_incremental_encoder.py.
 """
+
 import random
 
 import cocotb
@@ -12,7 +14,16 @@ from cocotb.triggers import FallingEdge, ReadOnly, RisingEdge
 from tb.bench import needs, run, start
 from tb.decode.index_latch import IndexLatch, Settings
 
-PORTS = ["active_low", "gate_mask", "gate", "take_up", "take_down", "each", "clears", "counts_per_revolution"]
+PORTS = [
+    "active_low",
+    "gate_mask",
+    "gate",
+    "take_up",
+    "take_down",
+    "each",
+    "clears",
+    "counts_per_revolution",
+]
 
 
 async def begin(dut, levels=(0, 0, 0)):
@@ -24,8 +35,12 @@ async def begin(dut, levels=(0, 0, 0)):
     return model
 
 
-async def clk(dut, model, settings, levels, direction=1, stepped=0, count=0, ready=1, arm=0, rst=0, probe=0):
-    """One clk of both; returns (clear in this clk, armed, found, index_count, revolution_wrong after it)."""
+async def clk(
+    dut, model, settings, levels, direction=1, stepped=0, count=0, ready=1, arm=0, rst=0, probe=0
+):
+    """One clk of both; returns (clear in this clk, armed, found, index_count, revolution_wrong
+    after it).
+    """
     for name in PORTS:
         getattr(dut, name).value = getattr(settings, name)
     dut.a.value, dut.b.value, dut.z.value = levels
@@ -36,8 +51,16 @@ async def clk(dut, model, settings, levels, direction=1, stepped=0, count=0, rea
     await RisingEdge(dut.clk)
     await FallingEdge(dut.clk)
     want = wanted, *model.step(settings, levels, ready, direction, stepped, count, arm, rst, probe)
-    got = (clear, int(dut.armed.value), int(dut.found.value), dut.index_count.value.to_signed(), int(dut.revolution_wrong.value))
-    assert got == want, f"{settings}: (clear, armed, found, index_count, revolution_wrong) is {got}, the model has {want}"
+    got = (
+        clear,
+        int(dut.armed.value),
+        int(dut.found.value),
+        dut.index_count.value.to_signed(),
+        int(dut.revolution_wrong.value),
+    )
+    assert got == want, (
+        f"{settings}: (clear, armed, found, index_count, revolution_wrong) is {got}, the model has {want}"
+    )
     assert (int(dut.a_later.value), int(dut.b_later.value)) == levels[:2]
     return got
 
@@ -47,7 +70,10 @@ async def found_comes_2_clk_after_z_and_clear_in_the_clk_before(dut):
     model = await begin(dut)
     settings = Settings(each=1, clears=1)
     await clk(dut, model, settings, (0, 0, 0))
-    rows = [await clk(dut, model, settings, (1, 0, 1), stepped=int(n == 1), count=3 * (n == 1)) for n in range(4)]
+    rows = [
+        await clk(dut, model, settings, (1, 0, 1), stepped=int(n == 1), count=3 * (n == 1))
+        for n in range(4)
+    ]
     assert [row[0] for row in rows] == [0, 1, 0, 0]
     assert [row[2] for row in rows] == [0, 1, 0, 0]
     assert rows[1][3] == 4
@@ -57,7 +83,10 @@ async def found_comes_2_clk_after_z_and_clear_in_the_clk_before(dut):
 async def a_wrong_revolution_comes_4_clk_after_z_and_distances_wrap(dut):
     needs(int(dut.CHECK.value), "built without the check of revolutions")
     top = 1 << int(dut.W.value) - 1
-    for second, wrong in ((-top + 4, 0), (-top + 5, 1)):        # from top - 1 on: 5 counts up through the wrap, and 6
+    for second, wrong in (
+        (-top + 4, 0),
+        (-top + 5, 1),
+    ):  # from top - 1 on: 5 counts up through the wrap, and 6
         model = await begin(dut)
         settings = Settings(each=1, counts_per_revolution=5)
         rows = []
@@ -84,14 +113,25 @@ async def reset_in_the_middle_of_an_index_forgets_it(dut):
     await clk(dut, model, settings, (0, 0, 0))
     await clk(dut, model, settings, (0, 0, 1), count=5)
     await clk(dut, model, settings, (0, 0, 1), count=5, rst=1)
-    assert [(await clk(dut, model, settings, (0, 0, 1), count=5))[1:4] for _ in range(4)] == [(0, 0, 0)] * 4
+    assert [(await clk(dut, model, settings, (0, 0, 1), count=5))[1:4] for _ in range(4)] == [
+        (0, 0, 0)
+    ] * 4
 
 
 @cocotb.test()
 async def a_probe_latches_the_count_with_the_step_of_its_clk_and_is_no_index(dut):
     model = await begin(dut)
     for stepped, want in ((0, 5), (1, 6), (-1, 4)):
-        row = await clk(dut, model, Settings(clears=1), (0, 0, 0), direction=int(stepped >= 0), stepped=stepped, count=5, probe=1)
+        row = await clk(
+            dut,
+            model,
+            Settings(clears=1),
+            (0, 0, 0),
+            direction=int(stepped >= 0),
+            stepped=stepped,
+            count=5,
+            probe=1,
+        )
         assert row[:4] == (0, 0, 0, want)
         assert (await clk(dut, model, Settings(), (0, 0, 0), count=3))[3] == want
 
@@ -113,13 +153,33 @@ async def any_inputs_match_the_model(dut):
     model, top = await begin(dut), 1 << int(dut.W.value) - 1
     bits = random.getrandbits
     for _ in range(80):
-        settings = Settings(bits(1), bits(2) & bits(2), bits(2), bits(1), bits(1), bits(1), bits(1), random.choice([0, 1, 5, top]))
+        settings = Settings(
+            bits(1),
+            bits(2) & bits(2),
+            bits(2),
+            bits(1),
+            bits(1),
+            bits(1),
+            bits(1),
+            random.choice([0, 1, 5, top]),
+        )
         change = random.choice([2, 4, 8])
         levels = [bits(1), bits(1), bits(1)]
         for _ in range(25):
             levels = [level ^ (random.randrange(change) == 0) for level in levels]
-            await clk(dut, model, settings, tuple(levels), bits(1), 0, random.choice([0, 5, -1, -top, top - 1]),
-                      int(random.random() < 0.95), int(random.random() < 0.1), int(random.random() < 0.01), bits(1) & bits(1))
+            await clk(
+                dut,
+                model,
+                settings,
+                tuple(levels),
+                bits(1),
+                0,
+                random.choice([0, 5, -1, -top, top - 1]),
+                int(random.random() < 0.95),
+                int(random.random() < 0.1),
+                int(random.random() < 0.01),
+                bits(1) & bits(1),
+            )
         await clk(dut, model, settings, tuple(levels), 1, 1, top - 1)
         await clk(dut, model, settings, tuple(levels), 0, -1, -top)
 

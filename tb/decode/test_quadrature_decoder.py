@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""quadrature_decoder: a known turn in each mode, the jitter of S0, the wrap, the illegal edge, clearing, its start, and random levels
+"""quadrature_decoder: a known turn in each mode, the jitter of S0, the wrap, the illegal edge,
+clearing, its start, and random levels
 against the model."""
+
 import random
 
 import cocotb
@@ -10,7 +12,7 @@ from cocotb.triggers import FallingEdge, ReadOnly, RisingEdge
 from tb.bench import run, start
 from tb.decode.quadrature_decoder import PULSES, X1, X2, X4, QuadratureDecoder
 
-TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]        # a leads b: up
+TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]  # a leads b: up
 
 
 async def begin(dut, a=0, b=0, mode=X4, ready=True):
@@ -25,19 +27,27 @@ async def begin(dut, a=0, b=0, mode=X4, ready=True):
 
 
 async def drive(dut, model, levels, rst=0, clear=0):
-    """Put each (a, b) on the pins for one clk and hold the model beside the design; return (count, step, illegal) of each clk."""
+    """Put each (a, b) on the pins for one clk and hold the model beside the design; return (count,
+    step, illegal) of each clk.
+    """
     out = []
     dut.rst.value, dut.clear.value, dut.mode.value = rst, clear, model.mode
     for clk, (a, b) in enumerate(levels):
         dut.a.value, dut.b.value = a, b
         await ReadOnly()
         direction, moves, _ = model.look(a, b, model.mode)
-        assert (int(dut.direction.value), int(dut.stepping.value), int(dut.ready.value)) == (direction, abs(moves), model.ready)
+        assert (int(dut.direction.value), int(dut.stepping.value), int(dut.ready.value)) == (
+            direction,
+            abs(moves),
+            model.ready,
+        )
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
         want = model.step(a, b, model.mode, clear, rst)
         got = dut.count.value.to_signed(), dut.step.value.to_signed(), int(dut.illegal.value)
-        assert got == want, f"clk {clk}, mode {model.mode}: (count, step, illegal) is {got}, the model has {want}"
+        assert got == want, (
+            f"clk {clk}, mode {model.mode}: (count, step, illegal) is {got}, the model has {want}"
+        )
         out.append(got)
     dut.rst.value, dut.clear.value = 0, 0
     return out
@@ -73,7 +83,7 @@ async def s0_up_is_a_rising_while_b_is_low_and_down_while_b_is_high(dut):
 async def s0_jitter_reversal_over_falling_edge_c_leaves_no_count_too_many(dut):
     model = await begin(dut)
     before, _, _ = (await drive(dut, model, [(1, 0), (1, 1)]))[-1]
-    for _ in range(5):                                  # past C (a falls, b high) and back over it
+    for _ in range(5):  # past C (a falls, b high) and back over it
         out = await drive(dut, model, [(0, 1), (1, 1)])
         assert out == [(before + 1, 1, 0), (before, -1, 0)]
     assert (await drive(dut, model, [(1, 0), (0, 0)]))[-1][0] == 0
@@ -82,7 +92,7 @@ async def s0_jitter_reversal_over_falling_edge_c_leaves_no_count_too_many(dut):
 @cocotb.test()
 async def s0_jitter_reversal_over_rising_edge_b_is_not_half_a_pulse_off(dut):
     model = await begin(dut)
-    for _ in range(5):                                  # past B (a rises, b low) and back over it
+    for _ in range(5):  # past B (a rises, b low) and back over it
         assert await drive(dut, model, [(1, 0), (0, 0)]) == [(1, 1, 0), (0, -1, 0)]
     assert (await drive(dut, model, TURN[1:] + TURN[:1]))[-1][0] == 4
 
@@ -100,9 +110,9 @@ async def x2_counts_the_edges_of_a_and_x1_those_with_b_low(dut):
 @cocotb.test()
 async def s0_jitter_over_any_edge_leaves_no_trace_in_x4_x2_and_x1(dut):
     for mode in (X4, X2, X1):
-        for before in range(4):                         # S0's edge B lies behind quarter 0, its edge C behind quarter 2
+        for before in range(4):  # S0's edge B lies behind quarter 0, its edge C behind quarter 2
             model = await begin(dut, *TURN[before], mode=mode)
-            there, = await turn(dut, model, [before + 1])
+            (there,) = await turn(dut, model, [before + 1])
             for _ in range(3):
                 assert await turn(dut, model, [before, before + 1]) == [0, there]
             assert (await turn(dut, model, [before]))[-1] == 0
@@ -112,14 +122,29 @@ async def s0_jitter_over_any_edge_leaves_no_trace_in_x4_x2_and_x1(dut):
 @cocotb.test()
 async def pulses_count_where_a_rises_by_the_level_of_b(dut):
     model = await begin(dut, mode=PULSES)
-    assert await drive(dut, model, [(1, 0), (0, 0), (1, 0), (0, 0)]) == [(1, 1, 0), (1, 0, 0), (2, 1, 0), (2, 0, 0)]
-    assert await drive(dut, model, [(0, 1), (1, 1), (1, 0), (0, 1)]) == [(2, 0, 0), (1, -1, 0), (1, 0, 0), (1, 0, 0)]
+    assert await drive(dut, model, [(1, 0), (0, 0), (1, 0), (0, 0)]) == [
+        (1, 1, 0),
+        (1, 0, 0),
+        (2, 1, 0),
+        (2, 0, 0),
+    ]
+    assert await drive(dut, model, [(0, 1), (1, 1), (1, 0), (0, 1)]) == [
+        (2, 0, 0),
+        (1, -1, 0),
+        (1, 0, 0),
+        (1, 0, 0),
+    ]
 
 
 @cocotb.test()
 async def a_pulse_whose_direction_changes_with_it_is_illegal_and_not_counted(dut):
     model = await begin(dut, mode=PULSES)
-    assert await drive(dut, model, [(1, 1), (0, 0), (0, 1), (1, 0)]) == [(0, 0, 1), (0, 0, 0), (0, 0, 0), (0, 0, 1)]
+    assert await drive(dut, model, [(1, 1), (0, 0), (0, 1), (1, 0)]) == [
+        (0, 0, 1),
+        (0, 0, 0),
+        (0, 0, 0),
+        (0, 0, 1),
+    ]
 
 
 @cocotb.test()
@@ -150,7 +175,7 @@ async def power_up_at_any_levels_makes_no_count(dut):
 @cocotb.test()
 async def levels_that_arrive_late_after_reset_make_no_count(dut):
     model = await begin(dut, 0, 0, ready=False)
-    late = int(dut.SETTLE.value) - 1                    # what is in front fills meanwhile
+    late = int(dut.SETTLE.value) - 1  # what is in front fills meanwhile
     assert await drive(dut, model, [(0, 0)] * late + [(1, 1)] * 9) == [(0, 0, 0)] * (late + 9)
     assert (await drive(dut, model, [(0, 1)]))[-1] == (1, 1, 0)
 
@@ -159,12 +184,16 @@ async def levels_that_arrive_late_after_reset_make_no_count(dut):
 async def illegal_edges_are_reported_and_never_count(dut):
     model = await begin(dut)
     for a, b in [(0, 0), (1, 1), (0, 0), (1, 1)] * 5:
-        (count, step, _), = await drive(dut, model, [(a, b)])
+        ((count, step, _),) = await drive(dut, model, [(a, b)])
         assert (count, step) == (0, 0)
     assert (await drive(dut, model, [(0, 0)]))[-1] == (0, 0, 1)
     await drive(dut, model, [(1, 0)])
     assert (await drive(dut, model, [(0, 1)]))[-1] == (1, 0, 1)
-    assert (await drive(dut, model, [(0, 0)]))[-1] == (2, 1, 0)        # the new levels are the state from here on
+    assert (await drive(dut, model, [(0, 0)]))[-1] == (
+        2,
+        1,
+        0,
+    )  # the new levels are the state from here on
 
 
 @cocotb.test()
@@ -189,9 +218,11 @@ async def any_levels_match_the_model(dut):
     model = await begin(dut)
     for _ in range(16):
         model.mode = random.choice([X4, X2, X1, PULSES])
-        await drive(dut, model, [(random.getrandbits(1), random.getrandbits(1)) for _ in range(150)])
+        await drive(
+            dut, model, [(random.getrandbits(1), random.getrandbits(1)) for _ in range(150)]
+        )
         place, path = 0, []
-        for _ in range(150):                            # legal edges only, with pauses
+        for _ in range(150):  # legal edges only, with pauses
             place += random.choice([-1, 0, 0, 1])
             path.append(TURN[place % 4])
         await drive(dut, model, path)

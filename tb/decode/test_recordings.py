@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Levels recorded from a real optical mouse sensor (HDNS-2000), and step and direction of a real Smoothieware controller, go through
-deglitcher and decoder, clean and with spikes, and must count what a plain offline decoder counts, at every recorded edge.
+"""Levels recorded from a real optical mouse sensor (HDNS-2000), and step and direction of a real
+Smoothieware controller, go through
+deglitcher and decoder, clean and with spikes, and must count what a plain offline decoder counts,
+at every recorded edge.
 
-A recording is millions of samples, mostly still. One sample is one clk, but a stretch without any edge is cut to STILL clk,
-eight times what the deglitcher waits; the order of the edges and every shorter distance stay as recorded.
+A recording is millions of samples, mostly still. One sample is one clk, but a stretch without any
+edge is cut to STILL clk,
+eight times what the deglitcher waits; the order of the edges and every shorter distance stay as
+recorded.
 """
+
 import csv
 import os
 import random
@@ -19,26 +24,34 @@ from tb.decode.quadrature_decoder import PULSES, X4
 
 CAPTURES = bench.ROOT.parent / "shared" / "captures"
 RECORDINGS = [("hdns2000_fast", X4), ("hdns2000_left_right", X4), ("smoothieware_steps", PULSES)]
-ROWS = 5000         # of a recording, at most
-STABLE = 5          # setting of the deglitchers, clk
-STILL = 40          # longest stretch without an edge, clk
+ROWS = 5000  # of a recording, at most
+STABLE = 5  # setting of the deglitchers, clk
+STILL = 40  # longest stretch without an edge, clk
 NAMES = ["x clean", "y clean", "x with spikes", "y with spikes"]
 
 
 def recording(name):
-    """Rows of (duration in clk, xa, xb, ya, yb); a is step, b is direction where these are recorded."""
+    """Rows of (duration in clk, xa, xb, ya, yb); a is step, b is direction where these are
+    recorded.
+    """
     with open(CAPTURES / f"{name}.csv", newline="") as lines:
-        rows = [tuple(map(int, row)) for row in islice(csv.reader(line for line in lines if line[0].isdigit()), ROWS)]
+        rows = [
+            tuple(map(int, row))
+            for row in islice(csv.reader(line for line in lines if line[0].isdigit()), ROWS)
+        ]
     ends = [row[0] for row in rows[1:]] + [rows[-1][0] + STILL]
     return [(min(end - row[0], STILL), *row[1:]) for row, end in zip(rows, ends)]
 
 
 def offline(levels, mode):
-    """Count after each (a, b) of a list, and how much was counted: edges by the side that leads, or pulses by their direction;
+    """Count after each (a, b) of a list, and how much was counted: edges by the side that leads, or
+    pulses by their direction;
     nothing is filtered."""
     moves = []
     for (a, b), (a_now, b_now) in pairwise(levels):
-        assert (a, b) == (a_now, b_now) or (a == a_now) != (b == b_now), "the recording itself has an illegal edge"
+        assert (a, b) == (a_now, b_now) or (a == a_now) != (b == b_now), (
+            "the recording itself has an illegal edge"
+        )
         if mode == PULSES:
             moves.append((-1 if b_now else +1) if a_now > a else 0)
         elif a != a_now:
@@ -51,21 +64,28 @@ def offline(levels, mode):
 
 
 def spikes(duration):
-    """A pulse too short to pass, somewhere in a stretch: (clk at which it starts, clk at which it ends), clear of both ends."""
+    """A pulse too short to pass, somewhere in a stretch: (clk at which it starts, clk at which it
+    ends), clear of both ends.
+    """
     width = random.randrange(1, STABLE)
     first = random.randrange(1, duration - width)
     return first, first + width
 
 
 async def play(dut, rows):
-    """Play the rows, with spikes on pairs 2 and 3; return what stands on counts at the end of each row, and the spikes sent to x, y."""
+    """Play the rows, with spikes on pairs 2 and 3; return what stands on counts at the end of each
+    row, and the spikes sent to x, y.
+    """
     counts, sent = [], [0, 0]
     for duration, xa, xb, ya, yb in rows:
         clean_a, clean_b = xa | ya << 1, xb | yb << 1
         levels_a, levels_b = clean_a | clean_a << 2, clean_b | clean_b << 2
-        changes = {0: (0, 0), duration: (0, 0)}         # clk of the row -> lines turned over from there on, a and b
+        changes = {
+            0: (0, 0),
+            duration: (0, 0),
+        }  # clk of the row -> lines turned over from there on, a and b
         if duration > 2 * STABLE:
-            for line in range(4):                       # xa, xb, ya, yb
+            for line in range(4):  # xa, xb, ya, yb
                 if random.random() < 0.5:
                     begin, end = spikes(duration)
                     mask = 4 << line // 2
@@ -95,21 +115,27 @@ async def every_count_is_that_of_the_offline_decoder_with_and_without_spikes(dut
     first = rows[0]
     a, b = first[1] | first[3] << 1, first[2] | first[4] << 1
     await bench.start(dut, stable=STABLE, mode=mode, a=a | a << 2, b=b | b << 2)
-    await ClockCycles(dut.clk, STILL, FallingEdge)      # filters and decoders have taken the first levels
+    await ClockCycles(
+        dut.clk, STILL, FallingEdge
+    )  # filters and decoders have taken the first levels
     seen, sent = await play(dut, rows)
     await ClockCycles(dut.clk, 4 * STABLE, FallingEdge)
 
-    expected = [offline([row[at:at + 2] for row in rows], mode) for at in (1, 3)] * 2
+    expected = [offline([row[at : at + 2] for row in rows], mode) for at in (1, 3)] * 2
     for pair, (counts, edges) in enumerate(expected):
         assert edges > 20, "a recording without motion proves nothing"
-        end, total, held = (words(port.value)[pair] for port in (dut.counts, dut.edges, dut.rejections))
+        end, total, held = (
+            words(port.value)[pair] for port in (dut.counts, dut.edges, dut.rejections)
+        )
         assert end == counts[-1] & 0xFFFFFFFF, f"{NAMES[pair]}: {end} counted, {counts[-1]} offline"
         assert total == edges, f"{NAMES[pair]}: {total} edges counted, {edges} offline"
         assert held == ([0, 0] + sent)[pair], f"{NAMES[pair]}: {held} pulses held back"
         for number, (row, value) in enumerate(zip(rows, seen)):
-            if row[0] == STILL:                         # long enough for every edge before to have passed
+            if row[0] == STILL:  # long enough for every edge before to have passed
                 got = words(value)[pair]
-                assert got == counts[number] & 0xFFFFFFFF, f"{NAMES[pair]}, row {number}: {got} counted, {counts[number]} offline"
+                assert got == counts[number] & 0xFFFFFFFF, (
+                    f"{NAMES[pair]}, row {number}: {got} counted, {counts[number]} offline"
+                )
     assert not int(dut.illegal.value)
     assert min(sent) > 200
     dut._log.info("edges x %d, y %d; spikes %d, %d", expected[0][1], expected[1][1], *sent)

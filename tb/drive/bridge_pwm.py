@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/drive/bridge_pwm.sv does, in integers: clk(...) is one clk and returns what is on the pins after it."""
+"""What rtl/drive/bridge_pwm.sv does, in integers: clk(...) is one clk and returns what is on the
+pins after it.
+"""
 
-MULTIPLY = 8            # clk from taking a command to its product
+MULTIPLY = 8  # clk from taking a command to its product
 
 
 class BridgePwm:
@@ -9,9 +11,11 @@ class BridgePwm:
         self.off()
 
     def off(self):
-        self.asked = None                               # [clk left, command, period]
-        self.command = self.period = 0                  # of the next border
-        self.left = self.on_left = self.fraction = 0    # of the period that runs; fraction in 2^-15 clk
+        self.asked = None  # [clk left, command, period]
+        self.command = self.period = 0  # of the next border
+        self.left = self.on_left = self.fraction = (
+            0  # of the period that runs; fraction in 2^-15 clk
+        )
         self.negative = self.powered = False
         return 0, 0
 
@@ -32,4 +36,6 @@ class BridgePwm:
             self.asked[0] -= 1
             if self.asked[0] == 0:
                 (_, self.command, self.period), self.asked = self.asked, None
-        return int(self.powered and not (drives and self.negative)), int(self.powered and (not drives or self.negative))
+        return int(self.powered and not (drives and self.negative)), int(
+            self.powered and (not drives or self.negative)
+        )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/drive/quadrature_encoder.sv does, in integers: clk(...) is one clk; pins() and the state are what stands after it."""
+"""What rtl/drive/quadrature_encoder.sv does, in integers: clk(...) is one clk; pins() and the state
+are what stands after it.
+"""
 
 
 def signed(value, bits):
@@ -10,19 +12,29 @@ def signed(value, bits):
 class QuadratureEncoder:
     def __init__(self, w=32, f=16):
         self.w, self.f = w, f
-        self.position = 0                   # wraps at 2^w
-        self.aim = None                     # (target, half a band) as of the clk before
+        self.position = 0  # wraps at 2^w
+        self.aim = None  # (target, half a band) as of the clk before
         self.left = 0
-        self.place = None                   # counts from the index up
-        self.waiting = None                 # home that is not taken yet
-        self.turn = self.highest = 0        # highest: place, as of the clk before
-        self.far = self.behind = False      # far: behind, of the clk to come
+        self.place = None  # counts from the index up
+        self.waiting = None  # home that is not taken yet
+        self.turn = self.highest = 0  # highest: place, as of the clk before
+        self.far = self.behind = False  # far: behind, of the clk to come
 
     def pins(self):
         b = self.position >> 1 & 1
         return b ^ self.position & 1, b, int(self.place == 0 and self.turn != 0)
 
-    def clk(self, rst=0, minimum_edge_separation=0, hysteresis=0, counts_per_turn=0, load=0, target=0, home=0, home_position=0):
+    def clk(
+        self,
+        rst=0,
+        minimum_edge_separation=0,
+        hysteresis=0,
+        counts_per_turn=0,
+        load=0,
+        target=0,
+        home=0,
+        home_position=0,
+    ):
         self.turn = counts_per_turn
         if rst:
             self.__init__(self.w, self.f)

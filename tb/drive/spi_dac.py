@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/drive/spi_dac.sv does, in integers: clk(...) is one clk and returns what is on the pins after it."""
+"""What rtl/drive/spi_dac.sv does, in integers: clk(...) is one clk and returns what is on the pins
+after it.
+"""
+
 from tb.peripheral.spi_word_sender import SpiWordSender
 
 

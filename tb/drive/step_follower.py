@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/drive/step_follower.sv does, in integers: clk(…) is one clk and returns what stands after it."""
+"""What rtl/drive/step_follower.sv does, in integers: clk(…) is one clk and returns what stands
+after it.
+"""
+
 from tb.drive.step_scaler import StepScaler
 
 
@@ -12,7 +15,9 @@ class StepFollower:
         self.scaler, self.wait, self.rebased, self.pending, self.done = StepScaler(), 0, 1, 1, 0
 
     def clk(self, rst=0, ratio=0, shift=0, enable=0, rebase=0, tick=0, target=0, trim=0):
-        """go, restart and position as they stand after the clk, with the levels of enable and rebase of this clk."""
+        """go, restart and position as they stand after the clk, with the levels of enable and
+        rebase of this clk.
+        """
         take = self.wait == 1
         moved = int(rebase or not enable)
         required = signed(target + (trim << shift), 48)
@@ -25,4 +30,6 @@ class StepFollower:
             self.wait = 8 if tick else max(self.wait - 1, 0)
         self.done = done
         fresh = self.pending or self.rebased or moved
-        return dict(go=int(done and not fresh), restart=int(done and bool(fresh)), position=position)
+        return dict(
+            go=int(done and not fresh), restart=int(done and bool(fresh)), position=position
+        )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/drive/step_generator.sv does, in integers: clk(...) is one clk and returns (step, direction, steps, overrun) after it."""
+"""What rtl/drive/step_generator.sv does, in integers: clk(...) is one clk and returns (step,
+direction, steps, overrun) after it.
+"""
 
 STEP_DIRECTION, QUADRATURE = 0, 1
 
@@ -15,17 +17,17 @@ class StepGenerator:
 
     def reset(self, target=0):
         self.line_clk = 0
-        self.stand = self.settle = 0                            # clk left, beside the last
+        self.stand = self.settle = 0  # clk left, beside the last
         self.pulse = self.upward = self.turning = self.rewired = False
         self.quarter = self.steps = 0
-        self.wiring = (0, 0, 0)                                 # mode, step_low, direction_low as they are in force
+        self.wiring = (0, 0, 0)  # mode, step_low, direction_low as they are in force
         self.pins = (0, 0)
         self.restart(target)
         return self.shown()
 
     def restart(self, target):
         self.line_end = target >> 16 << 16
-        self.left = 0                                           # clk left of the line, beside the last
+        self.left = 0  # clk left of the line, beside the last
         self.slope = self.ahead = 0
         self.waiting = self.strays = self.overrun = False
         self.acted = self.upward
@@ -44,8 +46,22 @@ class StepGenerator:
             pins = self.pulse and self.upward, self.pulse and not self.upward
         return int(pins[0]) ^ step_low, int(pins[1]) ^ direction_low
 
-    def clk(self, rst=0, period=0, high_cycles=0, low_cycles=0, setup_cycles=0, hold_cycles=0, mode=0, step_low=0, direction_low=0, enable=0, load=0,
-            tick=0, target=0):
+    def clk(
+        self,
+        rst=0,
+        period=0,
+        high_cycles=0,
+        low_cycles=0,
+        setup_cycles=0,
+        hold_cycles=0,
+        mode=0,
+        step_low=0,
+        direction_low=0,
+        enable=0,
+        load=0,
+        tick=0,
+        target=0,
+    ):
         if rst:
             return self.reset(target)
         follows_target = enable and not load and self.line_clk > 0
@@ -79,8 +95,16 @@ class StepGenerator:
             self.line_clk = period
 
         # the wire
-        self.stand = (high_cycles if rise else low_cycles) - 1 if rise or fall or self.rewired else self.stand - 1
-        self.settle = (hold_cycles if fall else setup_cycles) - 1 if fall or turns or self.rewired else self.settle - 1
+        self.stand = (
+            (high_cycles if rise else low_cycles) - 1
+            if rise or fall or self.rewired
+            else self.stand - 1
+        )
+        self.settle = (
+            (hold_cycles if fall else setup_cycles) - 1
+            if fall or turns or self.rewired
+            else self.settle - 1
+        )
         self.steps += (1 if upward else -1) * rise
         self.quarter += (1 if upward else -1) * rise
         self.pulse = rise or (self.pulse and not fall)

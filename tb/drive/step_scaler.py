@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/drive/step_scaler.sv does, in integers: clk(...) is one clk and returns (done, steps) after it."""
+"""What rtl/drive/step_scaler.sv does, in integers: clk(...) is one clk and returns (done, steps)
+after it.
+"""
 
 LATENCY = 49
 

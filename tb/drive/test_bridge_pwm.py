@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""bridge_pwm: duty by hand and by count, both ends, off within a clk, and random commands against the model in every cycle."""
+"""bridge_pwm: duty by hand and by count, both ends, off within a clk, and random commands against
+the model in every cycle.
+"""
+
 import random
 
 import cocotb
@@ -10,7 +13,7 @@ from tb.bench import run, start
 from tb.drive.bridge_pwm import BridgePwm
 
 FULL = 1 << 15
-CLK_PS = 10_000                         # as start() makes it
+CLK_PS = 10_000  # as start() makes it
 IDLE = dict(period=0, enable=0, valid=0, command=0)
 
 
@@ -34,7 +37,10 @@ class Bridge:
         self.inputs["valid"] = 0
         await RisingEdge(self.dut.clk)
         await FallingEdge(self.dut.clk)
-        got, want = (int(self.dut.bridge_a.value), int(self.dut.bridge_b.value)), self.model.clk(**once)
+        got, want = (
+            (int(self.dut.bridge_a.value), int(self.dut.bridge_b.value)),
+            self.model.clk(**once),
+        )
         assert got == want, f"{once}: the pins are {got}, the model has {want}"
         return got
 
@@ -62,7 +68,7 @@ async def by_hand(dut):
     assert await bridge.periods(2) == [1, 1, 0, 0] * 2
     await bridge.give(-FULL // 4)
     assert await bridge.periods(2) == [-1, 0, 0, 0] * 2
-    await bridge.give(FULL // 8)                         # half a clk a period: every second period
+    await bridge.give(FULL // 8)  # half a clk a period: every second period
     assert await bridge.periods(4) in (([0] * 4 + [1, 0, 0, 0]) * 2, ([1, 0, 0, 0] + [0] * 4) * 2)
 
 
@@ -92,7 +98,7 @@ async def a_command_each_9_clk_is_taken_and_an_earlier_one_is_replaced(dut):
         await bridge.clk()
     await bridge.clk(valid=1, command=-FULL)
     pins = [await bridge.clk() for _ in range(30)]
-    assert pins == [(0, 1)] * 30                        # the zero never came to the pins
+    assert pins == [(0, 1)] * 30  # the zero never came to the pins
 
 
 @cocotb.test()
@@ -108,7 +114,9 @@ async def over_n_periods_the_time_driven_is_right_to_one_clk(dut):
 
 
 async def two_pulses(dut, pin, clk_between):
-    """Two low pulses on the pin that does not drive, the first one clk long, and so far apart; without a look at every clk."""
+    """Two low pulses on the pin that does not drive, the first one clk long, and so far apart;
+    without a look at every clk.
+    """
     dut.valid.value = 0
     await FallingEdge(pin)
     first = get_sim_time("step")
@@ -139,7 +147,7 @@ async def both_ends_of_the_duty(dut):
     for period in (1, 2, 3, 30):
         bridge.inputs["period"] = period
         await bridge.give(-FULL)
-        assert set(await bridge.periods(20)) == {-1}    # all the time
+        assert set(await bridge.periods(20)) == {-1}  # all the time
         await bridge.give(0)
         assert set(await bridge.periods(20)) == {0}
         await bridge.give(FULL - 1)
@@ -171,7 +179,7 @@ async def off_one_clk_after_enable_falls_and_on_only_by_a_new_command(dut):
         assert await bridge.clk() == pins
         assert await bridge.clk(enable=0) == (0, 0)
         assert {await bridge.clk(enable=1) for _ in range(40)} == {(0, 0)}
-        await bridge.clk(enable=0, valid=1, command=command)                    # a command while off is forgotten
+        await bridge.clk(enable=0, valid=1, command=command)  # a command while off is forgotten
         assert {await bridge.clk(enable=1) for _ in range(40)} == {(0, 0)}
 
 
@@ -192,7 +200,10 @@ async def any_commands_match_the_model(dut):
     for _ in range(12_000):
         inputs = {}
         if random.randrange(12) == 0:
-            inputs.update(valid=1, command=random.choice((0, 1, -1, -FULL, FULL - 1, random.randrange(-FULL, FULL))))
+            inputs.update(
+                valid=1,
+                command=random.choice((0, 1, -1, -FULL, FULL - 1, random.randrange(-FULL, FULL))),
+            )
         if random.randrange(100) == 0:
             inputs["period"] = random.choice((0, 1, 2, 3, 17, 200, random.getrandbits(8)))
         if random.randrange(200) == 0:

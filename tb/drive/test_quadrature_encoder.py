@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""quadrature_encoder: edges by hand, latency, minimum_edge_separation, hysteresis, index, both ends of the range, and any target against the model."""
+"""quadrature_encoder: edges by hand, latency, minimum_edge_separation, hysteresis, index, both ends
+of the range, and any target against the model.
+"""
+
 import random
 
 import cocotb
@@ -9,7 +12,15 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import run, start
 from tb.drive.quadrature_encoder import QuadratureEncoder, signed
 
-IDLE = dict(minimum_edge_separation=1, hysteresis=0, counts_per_turn=0, load=0, target=0, home=0, home_position=0)
+IDLE = dict(
+    minimum_edge_separation=1,
+    hysteresis=0,
+    counts_per_turn=0,
+    load=0,
+    target=0,
+    home=0,
+    home_position=0,
+)
 STROBES = "home", "load"
 
 
@@ -39,7 +50,9 @@ class Encoder:
             await RisingEdge(self.dut.clk)
             await FallingEdge(self.dut.clk)
             got = int(self.dut.a.value), int(self.dut.b.value), int(self.dut.z.value)
-            assert got == self.model.pins(), f"{self.inputs}: pins {got}, the model has {self.model.pins()}"
+            assert got == self.model.pins(), (
+                f"{self.inputs}: pins {got}, the model has {self.model.pins()}"
+            )
             assert int(self.dut.position.value) == self.model.position
             assert bool(self.dut.behind.value) == self.model.behind
             for name in STROBES:
@@ -79,7 +92,14 @@ async def latency_is_2(dut):
 async def a_half_goes_up(dut):
     encoder = await Encoder(dut).reset()
     least = 1 / (1 << encoder.f)
-    for target, settled in ((0.5, 1), (0.5 - least, 0), (-0.5, 0), (-0.5 - least, -1), (1.5, 2), (-1.5, -1)):
+    for target, settled in (
+        (0.5, 1),
+        (0.5 - least, 0),
+        (-0.5, 0),
+        (-0.5 - least, -1),
+        (1.5, 2),
+        (-1.5, -1),
+    ):
         await encoder.at(target)
         await encoder.clk(6)
         assert encoder.position == settled, target
@@ -100,7 +120,10 @@ async def edges_keep_their_spacing_while_a_jump_is_made_up_and_none_is_lost(dut)
                 if encoder.position != was:
                     times.append(n)
             assert encoder.position == jump and len(times) == abs(jump - before)
-            assert all(later - earlier == max(1, minimum_edge_separation) for earlier, later in zip(times, times[1:]))
+            assert all(
+                later - earlier == max(1, minimum_edge_separation)
+                for earlier, later in zip(times, times[1:])
+            )
 
 
 @cocotb.test()
@@ -138,7 +161,7 @@ async def hysteresis_holds_to_its_last_bit_at_both_ends(dut):
 async def z_stands_for_one_count_once_a_turn_in_both_directions(dut):
     encoder = await Encoder(dut).reset(counts_per_turn=10)
     for _ in range(14):
-        assert (await encoder.clk())[2] == 0                    # never before home
+        assert (await encoder.clk())[2] == 0  # never before home
     await encoder.at(0, home=1, home_position=3)
     await encoder.clk(4)
     for goal in (24, -19):
@@ -225,7 +248,9 @@ async def any_target_matches_the_model(dut):
             inputs.update(home=1, home_position=near % (1 << encoder.w))
         elif kind == 105 and n % 3 == 0:
             inputs.update(load=1, home_position=random.getrandbits(encoder.w))
-        await encoder.clk(target=signed(target, width), rst=int(kind == 199 and n % 4 == 0), **inputs)
+        await encoder.clk(
+            target=signed(target, width), rst=int(kind == 199 and n % 4 == 0), **inputs
+        )
 
 
 @pytest.mark.parametrize("w, f", [(32, 16), (8, 4)])

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""spi_dac: frames as a model of the AD5542A takes them, trim, both ends, off at once, refresh, and random commands against the model."""
+"""spi_dac: frames as a model of the AD5542A takes them, trim, both ends, off at once, refresh, and
+random commands against the model.
+"""
+
 import random
 
 import cocotb
@@ -72,15 +75,29 @@ async def codes_by_hand(dut):
     dac = await Dac(dut).reset(enable=1)
     await dac.run(80)
     assert dac.converter.codes == [32768, 32768] or dac.converter.codes == [32768]
-    for command, code in ((1, 32769), (-1, 32767), (0x1234, 0x9234), (FULL - 1, 65535), (-FULL, 0), (0, 32768)):
+    for command, code in (
+        (1, 32769),
+        (-1, 32767),
+        (0x1234, 0x9234),
+        (FULL - 1, 65535),
+        (-FULL, 0),
+        (0, 32768),
+    ):
         assert await dac.give(command) == code
 
 
 @cocotb.test()
 async def trim_is_added_and_held_inside_16_bits(dut):
     dac = await Dac(dut).reset(enable=1)
-    for trim, command, code in ((5, 0, 32773), (-7, 7, 32768), (100, FULL - 50, 65535), (-100, -FULL, 0), (FULL - 1, FULL - 1, 65535),
-                                (-FULL, -FULL, 0), (-FULL, FULL - 1, 32767)):
+    for trim, command, code in (
+        (5, 0, 32773),
+        (-7, 7, 32768),
+        (100, FULL - 50, 65535),
+        (-100, -FULL, 0),
+        (FULL - 1, FULL - 1, 65535),
+        (-FULL, -FULL, 0),
+        (-FULL, FULL - 1, 32767),
+    ):
         assert await dac.give(command, trim=trim) == code
 
 
@@ -118,9 +135,9 @@ async def off_sends_0_v_at_once_after_the_frame_in_hand_and_forgets_the_command(
         dac.converter.codes.clear()
         await dac.run(75, enable=0)
         assert dac.converter.codes[-1] == 32777 and len(dac.converter.codes) <= 2
-        assert await dac.give(5000) == 32777            # while off
+        assert await dac.give(5000) == 32777  # while off
         await dac.run(80, enable=1)
-        assert dac.converter.codes[-1] == 32777         # and on again: until the next command
+        assert dac.converter.codes[-1] == 32777  # and on again: until the next command
         assert await dac.give(1) == 32778
 
 
@@ -148,7 +165,7 @@ async def both_ends_of_half_period(dut):
         await dac.clk(valid=1, command=-FULL)
         pins, high = await dac.clk(), 0
         while not pins[3]:
-            pins = await dac.clk(half_period=3)            # taken with the frame
+            pins = await dac.clk(half_period=3)  # taken with the frame
             high += pins[1]
         assert high == 16 * length and dac.converter.codes[-1] == 0
         await dac.run(4 * 255)
@@ -172,9 +189,15 @@ async def any_commands_match_the_model(dut):
     for _ in range(9000):
         inputs = {}
         if random.randrange(40) == 0:
-            inputs.update(valid=1, command=random.choice((0, -FULL, FULL - 1, random.randrange(-FULL, FULL))))
+            inputs.update(
+                valid=1, command=random.choice((0, -FULL, FULL - 1, random.randrange(-FULL, FULL)))
+            )
         if random.randrange(200) == 0:
-            inputs.update(half_period=random.choice((0, 1, 2, 3)), refresh=random.choice((0, 1, 50, 500)), trim=random.randrange(-FULL, FULL))
+            inputs.update(
+                half_period=random.choice((0, 1, 2, 3)),
+                refresh=random.choice((0, 1, 50, 500)),
+                trim=random.randrange(-FULL, FULL),
+            )
         if random.randrange(150) == 0:
             inputs["enable"] = int(random.randrange(4) > 0)
         await dac.clk(**inputs)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""step_follower: places by hand, when it begins restart, reset in mid-flow, and random inputs against the model in every clk."""
+"""step_follower: places by hand, when it begins restart, reset in mid-flow, and random inputs
+against the model in every clk.
+"""
+
 import random
 
 import cocotb
@@ -9,7 +12,7 @@ from tb.bench import run, start
 from tb.drive.step_follower import StepFollower
 
 IDLE = dict(ratio=0, shift=0, enable=0, rebase=0, tick=0, target=0, trim=0)
-ONE = 1 << 32                           # a step per period
+ONE = 1 << 32  # a step per period
 LATENCY = 57
 
 
@@ -33,14 +36,20 @@ class Follower:
         await FallingEdge(self.dut.clk)
         await ReadOnly()
         want = self.model.clk(rst, **self.inputs)
-        got = dict(go=int(self.dut.go.value), restart=int(self.dut.restart.value), position=self.dut.position.value.to_signed())
+        got = dict(
+            go=int(self.dut.go.value),
+            restart=int(self.dut.restart.value),
+            position=self.dut.position.value.to_signed(),
+        )
         assert got == want, f"{self.inputs}: {got}, the model has {want}"
         self.inputs.update(tick=0, rebase=0)
         await Timer(1, "step")
         return got
 
     async def tick(self, at_clk=None, **inputs):
-        """What a tick leads to, and after how many clk; `inputs` come at clk `at_clk` after the tick."""
+        """What a tick leads to, and after how many clk; `inputs` come at clk `at_clk` after the
+        tick.
+        """
         for clk in range(1, 100):
             now = inputs if clk - 1 == at_clk else {}
             got = await self.clk(tick=clk == 1, **now)
@@ -78,7 +87,9 @@ async def it_begins_anew_after_a_rebase_whenever_it_comes(dut):
             await follower.clk(rebase=1)
         else:
             assert (await follower.tick(at, rebase=1))[0] == "restart"
-        if at is None or at >= 8:                           # the position was taken before: the next one begins restart again
+        if (
+            at is None or at >= 8
+        ):  # the position was taken before: the next one begins restart again
             assert (await follower.tick())[0] == "restart"
         assert (await follower.tick())[0] == "go"
 
@@ -112,10 +123,18 @@ async def any_input_matches_the_model(dut):
     follower, since = await Follower(dut).reset(), 0
     for _ in range(6000):
         since = 0 if since > 56 and random.random() < 0.1 else since + 1
-        follower.inputs.update(ratio=random.randrange(-1 << 47, 1 << 47), target=random.randrange(-1 << 47, 1 << 47),
-                               trim=random.randrange(-1 << 15, 1 << 15), shift=random.randrange(16))
-        await follower.clk(int(random.random() < 0.002), tick=int(since == 0), enable=int(random.random() < 0.995),
-                           rebase=int(random.random() < 0.01))
+        follower.inputs.update(
+            ratio=random.randrange(-1 << 47, 1 << 47),
+            target=random.randrange(-1 << 47, 1 << 47),
+            trim=random.randrange(-1 << 15, 1 << 15),
+            shift=random.randrange(16),
+        )
+        await follower.clk(
+            int(random.random() < 0.002),
+            tick=int(since == 0),
+            enable=int(random.random() < 0.995),
+            rebase=int(random.random() < 0.01),
+        )
 
 
 def test_step_follower():

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""step_generator: edges by hand in every mode, timings on the wire, nothing lost, and random lines against the model in every cycle."""
+"""step_generator: edges by hand in every mode, timings on the wire, nothing lost, and random lines
+against the model in every cycle.
+"""
+
 import csv
 import random
 import shutil
@@ -15,19 +18,38 @@ from tb.drive.step_generator import StepGenerator
 
 PERIOD_W, TIME_W, AHEAD_W = 8, 5, 4
 ONE = 1 << 16
-IDLE = dict(period=20, high_cycles=1, low_cycles=1, setup_cycles=2, hold_cycles=1, mode=0, step_low=0, direction_low=0, enable=0, load=0, tick=0,
-            target=0)
+IDLE = dict(
+    period=20,
+    high_cycles=1,
+    low_cycles=1,
+    setup_cycles=2,
+    hold_cycles=1,
+    mode=0,
+    step_low=0,
+    direction_low=0,
+    enable=0,
+    load=0,
+    tick=0,
+    target=0,
+)
 WAVEFORM = ROOT / "build" / "step_generator.csv"
 RECORDING = ROOT.parent / "shared" / "captures" / "smoothieware_steps.csv"
-SLOWER = 50                          # samples of the recording a clk
-RECORDED = 150                       # steps of it that are played
+SLOWER = 50  # samples of the recording a clk
+RECORDED = 150  # steps of it that are played
 
 
 class Generator:
-    """The design with the model beside it in every cycle; `seen` has (step, direction) of every clk."""
+    """The design with the model beside it in every cycle; `seen` has (step, direction) of every
+    clk.
+    """
 
     def __init__(self, dut):
-        self.dut, self.model, self.inputs, self.seen = dut, StepGenerator(PERIOD_W, AHEAD_W), dict(IDLE), []
+        self.dut, self.model, self.inputs, self.seen = (
+            dut,
+            StepGenerator(PERIOD_W, AHEAD_W),
+            dict(IDLE),
+            [],
+        )
 
     async def reset(self, **inputs):
         self.inputs.update(inputs)
@@ -49,9 +71,13 @@ class Generator:
         await RisingEdge(self.dut.clk)
         await FallingEdge(self.dut.clk)
         got = tuple(int(port.value) for port in (self.dut.step, self.dut.direction)) + (
-            self.dut.steps.value.to_signed(), int(self.dut.overrun.value))
+            self.dut.steps.value.to_signed(),
+            int(self.dut.overrun.value),
+        )
         want = self.model.clk(**once)
-        assert got == want, f"{once}: step, direction, steps, overrun are {got}, the model has {want}"
+        assert got == want, (
+            f"{once}: step, direction, steps, overrun are {got}, the model has {want}"
+        )
         self.seen.append(got[:2])
         return got
 
@@ -71,18 +97,31 @@ class Generator:
 
 def rises(levels, before=0):
     """Clk after the tick in which a level is high and was not."""
-    return [clk for clk, level in enumerate(levels, start=1) if level and not (levels[clk - 2] if clk > 1 else before)]
+    return [
+        clk
+        for clk, level in enumerate(levels, start=1)
+        if level and not (levels[clk - 2] if clk > 1 else before)
+    ]
 
 
 @cocotb.test()
 async def by_hand(dut):
     generator = await Generator(dut).reset(target=0, period=20)
-    await generator.line(1)                                                     # turns upward, one step at its end
+    await generator.line(1)  # turns upward, one step at its end
     pins = await generator.line(5) + await generator.line(5)
-    assert [clk for clk in rises([step for step, _ in pins]) if clk > 2] == [5, 7, 12, 17, 22]     # the first had to turn
+    assert [clk for clk in rises([step for step, _ in pins]) if clk > 2] == [
+        5,
+        7,
+        12,
+        17,
+        22,
+    ]  # the first had to turn
     assert all(direction for _, direction in pins[4:])
     pins = await generator.line(3) + await generator.line(3)
-    assert rises([step for step, _ in pins]) == [6, 13]         # below 5 at 1 clk, but turns first; below 4 at 11 clk
+    assert rises([step for step, _ in pins]) == [
+        6,
+        13,
+    ]  # below 5 at 1 clk, but turns first; below 4 at 11 clk
     assert [direction for _, direction in pins].index(0) == 3
     assert (await generator.clk())[2] == 3
 
@@ -91,7 +130,7 @@ async def by_hand(dut):
 async def the_edge_comes_1_clk_after_the_line_has_passed(dut):
     for target, latency in ((Fraction(1), 20), (Fraction(2), 10), (Fraction(4), 5)):
         generator = await Generator(dut).reset(target=0)
-        await generator.line(Fraction(1, ONE))                                  # now it heads up, or not yet
+        await generator.line(Fraction(1, ONE))  # now it heads up, or not yet
         await generator.clk(load=1, target=0)
         generator.model.upward or await generator.line(1)
         await generator.wait(5)
@@ -109,7 +148,7 @@ async def the_wire_is_at_the_floor_of_the_line_after_every_line(dut):
     for _ in range(60):
         place = Fraction(int((place + Fraction(random.randrange(-9000, 9000), 1000)) * ONE), ONE)
         await generator.line(place)
-        await generator.wait(12)                                # a line's last steps may have to turn first
+        await generator.wait(12)  # a line's last steps may have to turn first
         got = await generator.clk()
         assert got[2] == place // 1 - origin and not got[3]
 
@@ -121,14 +160,29 @@ async def a_step_each_2_clk_at_most_and_the_rest_is_made_up(dut):
     pins = await generator.line(99)
     steps = rises([step for step, _ in pins], before=pins[0][0])
     assert {b - a for a, b in zip(steps, steps[1:])} == {2}
-    await generator.line(157)                                                   # 58 steps in 100 clk: 8 are owed
+    await generator.line(157)  # 58 steps in 100 clk: 8 are owed
     assert (await generator.wait(30))[2:] == (157, 0)
 
 
 @cocotb.test()
 async def timings_are_kept_at_both_ends(dut):
-    for high, low, setup, hold in ((0, 0, 0, 0), (1, 1, 1, 1), (31, 1, 1, 1), (1, 31, 1, 1), (1, 1, 31, 1), (1, 1, 1, 31), (3, 4, 9, 7)):
-        generator = await Generator(dut).reset(target=0, period=120, high_cycles=high, low_cycles=low, setup_cycles=setup, hold_cycles=hold)
+    for high, low, setup, hold in (
+        (0, 0, 0, 0),
+        (1, 1, 1, 1),
+        (31, 1, 1, 1),
+        (1, 31, 1, 1),
+        (1, 1, 31, 1),
+        (1, 1, 1, 31),
+        (3, 4, 9, 7),
+    ):
+        generator = await Generator(dut).reset(
+            target=0,
+            period=120,
+            high_cycles=high,
+            low_cycles=low,
+            setup_cycles=setup,
+            hold_cycles=hold,
+        )
         for target in (3, 1, 4, 4, 0, 0):
             await generator.line(target)
         assert (await generator.wait(300))[2:] == (0, 0)
@@ -147,7 +201,7 @@ async def timings_are_kept_at_both_ends(dut):
                 else:
                     shortest["setup"] = min(shortest["setup"], since_turn)
                 since_edge = 0
-        assert shortest["high"] == max(high, 1)                 # never shorter, and no longer than it must be
+        assert shortest["high"] == max(high, 1)  # never shorter, and no longer than it must be
         assert shortest["low"] >= max(low, 1) and shortest["hold"] >= max(hold, 1)
         assert shortest["setup"] == max(setup, 2)
 
@@ -174,7 +228,10 @@ async def pulses_going_up_are_on_step_and_those_going_down_on_direction(dut):
     generator = await Generator(dut).reset(target=0, mode=2, period=40)
     for target in (5, 5, 2, 2):
         await generator.line(target)
-    assert len(rises([step for step, _ in generator.seen])) == 5 and len(rises([down for _, down in generator.seen])) == 3
+    assert (
+        len(rises([step for step, _ in generator.seen])) == 5
+        and len(rises([down for _, down in generator.seen])) == 3
+    )
 
 
 @cocotb.test()
@@ -182,7 +239,9 @@ async def polarity_turns_the_pins_over(dut):
     for mode in (0, 1, 2):
         seen = []
         for low in (0, 1):
-            generator = await Generator(dut).reset(target=0, mode=mode, step_low=low, direction_low=low, period=30)
+            generator = await Generator(dut).reset(
+                target=0, mode=mode, step_low=low, direction_low=low, period=30
+            )
             for target in (3, 1, 1):
                 await generator.line(target)
             seen.append(generator.seen)
@@ -196,7 +255,7 @@ async def off_finishes_the_pulse_and_on_again_does_not_jump(dut):
     while not generator.seen[-1][0]:
         await generator.clk()
     pins = [await generator.clk(enable=0, target=900 * ONE) for _ in range(60)]
-    assert [pin[0] for pin in pins] == [1] * 5 + [0] * 55                       # the pulse was 6 clk long
+    assert [pin[0] for pin in pins] == [1] * 5 + [0] * 55  # the pulse was 6 clk long
     made = pins[-1][2]
     await generator.clk(enable=1)
     for target in (900, 900, 903, 903):
@@ -209,7 +268,7 @@ async def load_makes_no_step(dut):
     generator = await Generator(dut).reset(target=0, period=40)
     for target in (3, 3):
         await generator.line(target)
-    for target in (-2**31, 2**31 - 1, 7):
+    for target in (-(2**31), 2**31 - 1, 7):
         await generator.clk(load=1, target=target * ONE)
         await generator.line(target)
         assert (await generator.line(target))[-1][0] == 0 and generator.model.steps == 3
@@ -221,20 +280,22 @@ async def load_makes_no_step(dut):
 async def the_shortest_way_over_the_end_of_the_range(dut):
     generator = await Generator(dut).reset(target=(2**31 - 2) * ONE, period=40)
     await generator.line(2**31 - 1)
-    await generator.line(-2**31)
-    await generator.line(-2**31 + 1)
+    await generator.line(-(2**31))
+    await generator.line(-(2**31) + 1)
     assert (await generator.wait(10))[2:] == (3, 0)
 
 
 @cocotb.test()
 async def overrun_when_target_runs_away_and_only_load_or_off_ends_it(dut):
-    for jump in (256, -257, 30000, 2**31 - 1):                                  # 256: 2^PERIOD_W
+    for jump in (256, -257, 30000, 2**31 - 1):  # 256: 2^PERIOD_W
         generator = await Generator(dut).reset(target=0, period=40)
         await generator.line(jump)
         got = await generator.line(jump)
         assert (await generator.clk())[3] and len({step for step, _ in got[4:]}) == 1
         assert not (await generator.clk(load=1))[3]
-    generator = await Generator(dut).reset(target=0, period=200, high_cycles=30)   # 2^(PERIOD_W + AHEAD_W - 2) / 200 = 5.1 steps
+    generator = await Generator(dut).reset(
+        target=0, period=200, high_cycles=30
+    )  # 2^(PERIOD_W + AHEAD_W - 2) / 200 = 5.1 steps
     await generator.line(4)
     assert not (await generator.wait(200))[3]
     await generator.line(40)
@@ -277,18 +338,27 @@ async def any_lines_match_the_model(dut):
         inputs = {}
         if random.randrange(generator.inputs["period"] + 2) == 0:
             if random.randrange(4) == 0:
-                speed = random.choice((0, 1, -1, random.randrange(-ONE, ONE), random.randrange(-20 * ONE, 20 * ONE)))
+                speed = random.choice(
+                    (0, 1, -1, random.randrange(-ONE, ONE), random.randrange(-20 * ONE, 20 * ONE))
+                )
             if random.randrange(300) == 0:
-                speed = random.randrange(-2**47, 2**47)
+                speed = random.randrange(-(2**47), 2**47)
             target = (target + speed + 2**47) % 2**48 - 2**47
             inputs.update(tick=1, target=target)
         for name in ("high_cycles", "low_cycles", "setup_cycles", "hold_cycles"):
             if random.randrange(300) == 0:
                 inputs[name] = random.choice((0, 1, 2, 31, random.randrange(8)))
         if random.randrange(100) == 0:
-            inputs.update(mode=random.randrange(4), step_low=random.getrandbits(1), direction_low=random.getrandbits(1))
+            inputs.update(
+                mode=random.randrange(4),
+                step_low=random.getrandbits(1),
+                direction_low=random.getrandbits(1),
+            )
         if random.randrange(200) == 0:
-            inputs.update(enable=int(random.randrange(3) > 0), period=random.choice((0, 1, 2, 7, 30, 30, 30, 255)))
+            inputs.update(
+                enable=int(random.randrange(3) > 0),
+                period=random.choice((0, 1, 2, 7, 30, 30, 30, 255)),
+            )
         if random.randrange(500) == 0:
             inputs["load"] = 1
         if random.randrange(3000) == 0:
@@ -299,17 +369,23 @@ async def any_lines_match_the_model(dut):
 @cocotb.test()
 async def writes_a_waveform_of_23_steps_up_and_9_down(dut):
     """sigrok judges it below."""
-    generator = await Generator(dut).reset(target=0, period=50, high_cycles=2, low_cycles=3, setup_cycles=4, hold_cycles=3)
+    generator = await Generator(dut).reset(
+        target=0, period=50, high_cycles=2, low_cycles=3, setup_cycles=4, hold_cycles=3
+    )
     for target in (8, 16, 23, 23, 20, 14, 14):
         await generator.line(target)
     WAVEFORM.write_text("".join(f"{step},{direction}\n" for step, direction in generator.seen))
 
 
 def recorded():
-    """Place of a real machine's axis, as its controller stepped it, once a period: its first steps, and back again."""
+    """Place of a real machine's axis, as its controller stepped it, once a period: its first steps,
+    and back again.
+    """
     with open(RECORDING, newline="") as lines:
         rows = [tuple(map(int, row[:2])) for row in csv.reader(lines) if row[0].isdigit()]
-    edges = [sample for (_, before), (sample, step) in zip(rows, rows[1:]) if step > before][:RECORDED]
+    edges = [sample for (_, before), (sample, step) in zip(rows, rows[1:]) if step > before][
+        :RECORDED
+    ]
     period = SLOWER * IDLE["period"]
     times = range(edges[0] - period, edges[-1] + period, period)
     places = [sum(edge <= time for edge in edges) for time in times]
@@ -320,7 +396,9 @@ def recorded():
 async def follows_a_recorded_machine_there_and_back(dut):
     places = recorded()
     assert places[0] == places[-1] == 0 and max(places) == RECORDED
-    generator = await Generator(dut).reset(target=0, high_cycles=2, low_cycles=2, setup_cycles=2, hold_cycles=2)
+    generator = await Generator(dut).reset(
+        target=0, high_cycles=2, low_cycles=2, setup_cycles=2, hold_cycles=2
+    )
     for before, place in zip(places, places[1:]):
         await generator.line(place)
         assert min(before, place) - 1 <= generator.model.steps <= max(before, place)
@@ -337,7 +415,22 @@ def test_sigrok_counts_the_same_steps():
     if not program:
         pytest.skip("no sigrok-cli")
     run("step_generator", __file__, PERIOD_W=PERIOD_W, TIME_W=TIME_W, AHEAD_W=AHEAD_W)
-    told = subprocess.run([program, "-i", WAVEFORM, "-I", "csv:column_formats=2l:samplerate=1000000:header=no", "-P",
-                           "stepper_motor:step=0:dir=1:unit=steps", "-A", "stepper_motor=position"], capture_output=True, text=True)
+    told = subprocess.run(
+        [
+            program,
+            "-i",
+            WAVEFORM,
+            "-I",
+            "csv:column_formats=2l:samplerate=1000000:header=no",
+            "-P",
+            "stepper_motor:step=0:dir=1:unit=steps",
+            "-A",
+            "stepper_motor=position",
+        ],
+        capture_output=True,
+        text=True,
+    )
     places = [int(line.split()[1]) for line in told.stdout.splitlines()]
-    assert places == [*range(1, 24), *range(22, 14, -1)], told.stderr           # it tells a place when the next step comes: 14 is not told
+    assert places == [*range(1, 24), *range(22, 14, -1)], (
+        told.stderr
+    )  # it tells a place when the next step comes: 14 is not told

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""step_permission: all levels at the ends of every range of velocity, and random velocities, against the model."""
+"""step_permission: all levels at the ends of every range of velocity, and random velocities,
+against the model.
+"""
+
 import itertools
 import random
 
@@ -38,7 +41,14 @@ async def without_the_drive_or_with_another_kind_of_it_nothing_is_followed(dut):
 
 @cocotb.test()
 async def all_levels_and_any_velocity_match_the_model(dut):
-    velocities = [-1 << 31, -1, 0, 1, (1 << 31) - 1, *(random.getrandbits(32) - (1 << 31) for _ in range(50))]
+    velocities = [
+        -1 << 31,
+        -1,
+        0,
+        1,
+        (1 << 31) - 1,
+        *(random.getrandbits(32) - (1 << 31) for _ in range(50)),
+    ]
     for levels in itertools.product((0, 1), repeat=len(LEVELS)):
         for velocity in velocities:
             assert await answer(dut, levels, velocity) == permission(*levels, velocity)

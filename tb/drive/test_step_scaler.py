@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """step_scaler: products by hand, both ends, and random positions against the model in every cycle."""
+
 import random
 
 import cocotb
@@ -9,7 +10,7 @@ from tb.bench import run, start
 from tb.drive.step_scaler import LATENCY, StepScaler
 
 IDLE = dict(ratio=0, valid=0, position=0)
-ONE = 1 << 32                           # a step per period
+ONE = 1 << 32  # a step per period
 
 
 class Scaler:
@@ -29,7 +30,10 @@ class Scaler:
             getattr(self.dut, name).value = level
         await RisingEdge(self.dut.clk)
         await FallingEdge(self.dut.clk)
-        got, want = (int(self.dut.done.value), self.dut.steps.value.to_signed()), self.model.clk(**inputs)
+        got, want = (
+            (int(self.dut.done.value), self.dut.steps.value.to_signed()),
+            self.model.clk(**inputs),
+        )
         assert got == want, f"{inputs}: done, steps are {got}, the model has {want}"
         return got
 
@@ -45,8 +49,16 @@ class Scaler:
 @cocotb.test()
 async def by_hand(dut):
     scaler = await Scaler(dut).reset()
-    for position, ratio, steps in ((3 << 16, ONE, 3 << 16), (5 << 16, 5 * ONE // 2, 25 << 15), (-3, ONE // 2, -2), (3, -ONE // 2, -2),
-                                   (1, ONE - 1, 0), (-1, 1, -1), (-7, -ONE, 7), (0, -1, 0)):
+    for position, ratio, steps in (
+        (3 << 16, ONE, 3 << 16),
+        (5 << 16, 5 * ONE // 2, 25 << 15),
+        (-3, ONE // 2, -2),
+        (3, -ONE // 2, -2),
+        (1, ONE - 1, 0),
+        (-1, 1, -1),
+        (-7, -ONE, 7),
+        (0, -1, 0),
+    ):
         assert (await scaler.scale(position, ratio))[0] == steps
 
 
@@ -59,7 +71,7 @@ async def latency_is_49(dut):
 @cocotb.test()
 async def both_ends(dut):
     scaler = await Scaler(dut).reset()
-    ends = (-2**47, 2**47 - 1, -1, 0, 1)
+    ends = (-(2**47), 2**47 - 1, -1, 0, 1)
     for position in ends:
         for ratio in (*ends, ONE, -ONE):
             steps, _ = await scaler.scale(position, ratio)
@@ -91,9 +103,12 @@ async def reset_in_mid_flow(dut):
 async def any_positions_match_the_model(dut):
     scaler = await Scaler(dut).reset()
     for _ in range(8000):
-        await scaler.clk(rst=int(random.randrange(1000) == 0), valid=int(random.randrange(20) == 0),
-                         position=random.randrange(-2**47, 2**47) >> random.randrange(47),
-                         ratio=random.randrange(-2**47, 2**47) >> random.randrange(47))
+        await scaler.clk(
+            rst=int(random.randrange(1000) == 0),
+            valid=int(random.randrange(20) == 0),
+            position=random.randrange(-(2**47), 2**47) >> random.randrange(47),
+            ratio=random.randrange(-(2**47), 2**47) >> random.randrange(47),
+        )
 
 
 def test_step_scaler():

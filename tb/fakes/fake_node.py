@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A node in Python, written from docs/protocol.md and not from the host's code, and a line to it that can be spoilt."""
+"""A node in Python, written from docs/protocol.md and not from the host's code, and a line to it
+that can be spoilt.
+"""
+
 import binascii
 import random
 from functools import reduce
@@ -42,14 +45,14 @@ class FakeAxis:
         self.kind, self.ended, self.end_as = None, "no_motion_yet", "ok"
         self.writes = []
         self.learner = dict(reason=1, converged=0, frozen=1, accepted=0, refused=0, scatter=0)
-        self.learns_in = 4             # moves while it learns; None: never
+        self.learns_in = 4  # moves while it learns; None: never
         self.correction = dict(sin_offset=0, cos_offset=0, gain=65536, quadrature_error=0)
         self.harmonics = {order: (0, 0) for order in range(1, 11)}
         self.waiting = dict(self.harmonics)
         self.signal = dict(faults=0, first=0)
-        self.points = []               # of the segment table
-        self.speeds = []               # of moves, period/s
-        self.full_speed_s = 0.0        # left of a motion that is paused
+        self.points = []  # of the segment table
+        self.speeds = []  # of moves, period/s
+        self.full_speed_s = 0.0  # left of a motion that is paused
 
     def advance(self, now):
         """The motion as it stands at this time."""
@@ -100,21 +103,36 @@ class FakeNode:
         self.axes = [FakeAxis() for _ in range(axes)]
         self.sine = sine
         self.now, self.registers = 0.0, {0: map_crc, 0x400: 7}
-        self.written = []              # (address, value)
-        self.captures = []             # words of captured, captured_time and captured_position, oldest first
+        self.written = []  # (address, value)
+        self.captures = []  # words of captured, captured_time and captured_position, oldest first
         self.expecting, self.payload = None, []
         self.baud = self.next_baud = BAUD
-        self.powered_up = 0.0          # when its time stamp was zero
+        self.powered_up = 0.0  # when its time stamp was zero
         self.last, self.reply = None, bytes([0, 0, 0])
         self.counters = dict.fromkeys(
-            ("frames_good", "frames_bad", "framing_errors", "start_glitches", "overruns", "repeated", "refused", "breaks", "transmit_timeouts",
-             "syncs"), 0
+            (
+                "frames_good",
+                "frames_bad",
+                "framing_errors",
+                "start_glitches",
+                "overruns",
+                "repeated",
+                "refused",
+                "breaks",
+                "transmit_timeouts",
+                "syncs",
+            ),
+            0,
         )
-        self.marked = 0                # mask of the axes that the next mark starts
-        self.scope, self.armed, self.samples = "empty", None, []       # samples: position, error, command, time
-        self.executed = []             # names of the operations, without repetitions
+        self.marked = 0  # mask of the axes that the next mark starts
+        self.scope, self.armed, self.samples = (
+            "empty",
+            None,
+            [],
+        )  # samples: position, error, command, time
+        self.executed = []  # names of the operations, without repetitions
         self.wrong_map = False
-        self.most_segments = 0         # of a table; 0: it was not built
+        self.most_segments = 0  # of a table; 0: it was not built
         self.spoils_points = False
 
     # the bus
@@ -133,7 +151,7 @@ class FakeNode:
                 return []
             if word & 0xFF == 0x10 | self.address:
                 inside = bytes([0x50 | self.address, len(self.reply)]) + self.reply
-                self.baud = self.next_baud         # when it has been sent
+                self.baud = self.next_baud  # when it has been sent
                 return list(inside + binascii.crc32(inside).to_bytes(4, "little"))
             return []
         if self.expecting is None:
@@ -163,7 +181,7 @@ class FakeNode:
             self.counters["repeated"] += 1
             return
         self.last = (inside[1], crc)
-        self.next_baud = self.baud                 # unless this request is another set_baud
+        self.next_baud = self.baud  # unless this request is another set_baud
         self.reply = self.execute(inside[1:])
 
     # the firmware
@@ -176,7 +194,9 @@ class FakeNode:
             self.executed.append(operation.name)
             values, place = {}, 2
             for name, kind in operation.request:
-                values[name] = int.from_bytes(body[place:place + SIZE[kind]], "little", signed=kind.startswith("i"))
+                values[name] = int.from_bytes(
+                    body[place : place + SIZE[kind]], "little", signed=kind.startswith("i")
+                )
                 place += SIZE[kind]
             if place != len(body):
                 cause = "wrong_length"
@@ -191,7 +211,9 @@ class FakeNode:
         if cause != "ok":
             self.counters["refused"] += 1
             return bytes([sequence, code, CAUSE[cause]])
-        return bytes([sequence, code, 0]) + b"".join(bytes_of(fields[name], kind) for name, kind in operation.reply)
+        return bytes([sequence, code, 0]) + b"".join(
+            bytes_of(fields[name], kind) for name, kind in operation.reply
+        )
 
     def do_identify(self, _):
         return "ok", dict(
@@ -236,7 +258,15 @@ class FakeNode:
         return "ok", {}
 
     def ready(self, axis):
-        return "faulted" if axis.faults else "not_enabled" if not axis.enabled else "busy" if axis.kind else "ok"
+        return (
+            "faulted"
+            if axis.faults
+            else "not_enabled"
+            if not axis.enabled
+            else "busy"
+            if axis.kind
+            else "ok"
+        )
 
     def do_home(self, axis):
         if self.ready(axis) != "ok":
@@ -309,7 +339,11 @@ class FakeNode:
         return "ok", {}
 
     def do_get_parameter(self, axis, parameter):
-        return ("ok", {"value": axis.parameters[parameter]}) if parameter in axis.parameters else ("unknown_parameter", {})
+        return (
+            ("ok", {"value": axis.parameters[parameter]})
+            if parameter in axis.parameters
+            else ("unknown_parameter", {})
+        )
 
     def do_set_parameter(self, axis, parameter, value):
         known = next((known for known in PARAMETERS.values() if known.id == parameter), None)
@@ -386,42 +420,59 @@ class FakeNode:
         if self.scope == "waiting" and any(axis.kind == "moving" for axis in self.axes):
             self.scope = "full"
         full = self.scope == "full"
-        return "ok", dict(state=SCOPE_STATE[self.scope], count=len(self.samples) * full, before=self.armed["before"] if full else 0)
+        return "ok", dict(
+            state=SCOPE_STATE[self.scope],
+            count=len(self.samples) * full,
+            before=self.armed["before"] if full else 0,
+        )
 
     def do_read_scope(self, _, first):
         if first >= len(self.samples) or self.scope != "full":
             return "out_of_range", {}
-        padded = self.samples[first:first + 5] + [(0, 0, 0, 0)] * 5
-        return "ok", {f"{name}_{n}": padded[n][place] for n in range(5)
-                      for place, name in enumerate(("position", "error", "command", "time"))}
+        padded = self.samples[first : first + 5] + [(0, 0, 0, 0)] * 5
+        return "ok", {
+            f"{name}_{n}": padded[n][place]
+            for n in range(5)
+            for place, name in enumerate(("position", "error", "command", "time"))
+        }
 
     def do_segments(self, axis):
         use, whole = axis.parameters[90], len(axis.points) > axis.parameters[87]
-        reason = "ok" if not use else "no_segments" if not whole else "ok" if axis.homed else "not_homed"
+        reason = (
+            "ok" if not use else "no_segments" if not whole else "ok" if axis.homed else "not_homed"
+        )
         if not self.most_segments:
             return "not_built", {}
-        return "ok", dict(loaded=len(axis.points), in_force=use if reason == "ok" else 0, reason=CAUSE[reason])
+        return "ok", dict(
+            loaded=len(axis.points), in_force=use if reason == "ok" else 0, reason=CAUSE[reason]
+        )
 
     def do_set_segments(self, axis, border, points, **values):
         if not self.most_segments:
             return "not_built", {}
         if axis.parameters[90]:
             return "segments_in_use", {}
-        if border not in (0, len(axis.points)) or points > 12 or border + points > self.most_segments + 1:
+        if (
+            border not in (0, len(axis.points))
+            or points > 12
+            or border + points > self.most_segments + 1
+        ):
             return "out_of_range", {}
         axis.points = axis.points[:border] + list(values.values())[:points]
         return "ok", {}
 
     def do_get_segments(self, axis, border):
-        points = [point + self.spoils_points for point in axis.points[border:border + 12]]
-        return "ok", {f"point_{n}": point for n, point in enumerate(points + [0] * (12 - len(points)))}
+        points = [point + self.spoils_points for point in axis.points[border : border + 12]]
+        return "ok", {
+            f"point_{n}": point for n, point in enumerate(points + [0] * (12 - len(points)))
+        }
 
     def do_write_register(self, _, address, value):
         if not 0xC00 <= address < 0xD00:
             return "no_such_register", {}
         self.written.append((address, value))
         self.registers[address] = value
-        if address == 0xC10 and value & 1 << 6:        # done with the oldest capture
+        if address == 0xC10 and value & 1 << 6:  # done with the oldest capture
             self.captures.pop(0)
         return "ok", {}
 
@@ -430,25 +481,35 @@ class FakeNode:
             return "ok", {"value": bool(self.captures) | (self.registers.get(address, 0) & 64)}
         if self.captures and 0xC68 <= address < 0xC78:
             return "ok", {"value": self.captures[0][address - 0xC68 >> 2]}
-        if address in (0xCB4, 0xCD4):                  # state and error of the segment table
+        if address in (0xCB4, 0xCD4):  # state and error of the segment table
             return "ok", {"value": self.most_segments if address == 0xCB4 else 0xFFFFE000}
-        if address & 0xFF == 0xA8 and 0xC00 <= address < 0x1400:       # position_source.sine
+        if address & 0xFF == 0xA8 and 0xC00 <= address < 0x1400:  # position_source.sine
             return "ok", {"value": self.sine << 2}
-        if 0x10 <= address < 0x18:                     # time stamp
-            return "ok", {"value": round((self.now - self.powered_up) * CLK_HZ) >> 8 * (address - 0x10) & 0xFFFFFFFF}
-        return ("ok", {"value": self.registers[address]}) if address in self.registers else ("no_such_register", {})
+        if 0x10 <= address < 0x18:  # time stamp
+            return "ok", {
+                "value": round((self.now - self.powered_up) * CLK_HZ) >> 8 * (address - 0x10)
+                & 0xFFFFFFFF
+            }
+        return (
+            ("ok", {"value": self.registers[address]})
+            if address in self.registers
+            else ("no_such_register", {})
+        )
 
 
 class FakeBus(Transport):
-    """All nodes on one pair of wires. `to_node` and `from_node` may change, lose or multiply each word: word -> list of words."""
+    """All nodes on one pair of wires. `to_node` and `from_node` may change, lose or multiply each
+    word: word -> list of words.
+    """
 
     time_is_stopped = True
 
     def __init__(self, *nodes):
         self.nodes, self.arrived, self.clock, self.closed = nodes, [], 0.0, False
         self.to_node = self.from_node = lambda word: [word]
-        self.wired_and = False         # as on the wire: what several nodes send at once is their AND; else one after the other
-        self.at = []                   # (time, action), done when the time comes
+        # as on the wire: what several nodes send at once is their AND; else one after the other
+        self.wired_and = False
+        self.at = []  # (time, action), done when the time comes
         self.baud = BAUD
 
     def pass_time(self, seconds):
@@ -465,7 +526,9 @@ class FakeBus(Transport):
         for word in words:
             self.pass_time(self.character_s)
             for heard in self.to_node(word):
-                answers = [node.hear(heard) if node.baud == self.baud else [] for node in self.nodes]
+                answers = [
+                    node.hear(heard) if node.baud == self.baud else [] for node in self.nodes
+                ]
                 if self.wired_and:
                     answers = [[reduce(and_, several) for several in zip(*answers)]]
                 for answer in chain(*answers):
@@ -497,8 +560,12 @@ class FakeBus(Transport):
 
 def spoil(source: random.Random, share: float):
     """Loses, changes or doubles this share of the words."""
+
     def change(word):
         if source.random() >= share:
             return [word]
-        return source.choice([[], [word ^ 1 << source.randrange(9)], [word, word], [source.randrange(512)]])
+        return source.choice(
+            [[], [word ^ 1 << source.randrange(9)], [word, word], [source.randrange(512)]]
+        )
+
     return change

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The transport of the host package over fake_machine.FakeNode: host and firmware together, without hardware and without the twin."""
+"""The transport of the host package over fake_machine.FakeNode: host and firmware together, without
+hardware and without the twin.
+"""
+
 from moire.bus.transport import Transport
 from twin.compiled.node import DEFINES
 
@@ -13,8 +16,14 @@ class FakeNodeBus(Transport):
     def send(self, words):
         passed = []
         for word, after in zip(words, [*words[1:], 0x100], strict=True):
-            whole = not word >> 8 and after >> 8                # the hardware marks the last word of a right frame
-            passed.append(word & 0xFF | DEFINES["BUS_RECEIVE_COMMAND_MASK"] * (word >> 8) | DEFINES["BUS_RECEIVE_GOOD_MASK"] * whole)
+            whole = (
+                not word >> 8 and after >> 8
+            )  # the hardware marks the last word of a right frame
+            passed.append(
+                word & 0xFF
+                | DEFINES["BUS_RECEIVE_COMMAND_MASK"] * (word >> 8)
+                | DEFINES["BUS_RECEIVE_GOOD_MASK"] * whole
+            )
         self.sent += self.machine.hear(passed)
         self.wait(0.001)
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page of the figures: bars are as long as they should be, in the order of merit, and every peer has a figure beside it."""
+"""The page of the figures: bars are as long as they should be, in the order of merit, and every
+peer has a figure beside it.
+"""
+
 import re
 from xml.etree import ElementTree
 
@@ -39,7 +42,9 @@ def test_values_decades_apart_are_drawn_logarithmic_and_said_so():
     part, logarithmic = scale([1, 1000])
     assert logarithmic and part(1000) == 1 and 0 < part(1) < part(10) < part(100) < 1
     assert part(100) - part(10) == pytest.approx(part(1000) - part(100))
-    assert bars(SMALL, 1.0, Comparison("less", [Peer("far", 1000.0, "")]))[1].endswith("logarithmic")
+    assert bars(SMALL, 1.0, Comparison("less", [Peer("far", 1000.0, "")]))[1].endswith(
+        "logarithmic"
+    )
 
 
 def test_nothing_is_drawn_of_nothing():
@@ -50,11 +55,27 @@ def test_nothing_is_drawn_of_nothing():
 
 
 def test_the_page_has_every_figure_and_pictures_where_there_are_peers():
-    other, failed = Figure(lambda: 0, "", "lonely", "0", lambda v: v == 0, 0), Figure(lambda: 0, "", "broken", "0", lambda v: True)
-    text = page([("small", SMALL, 2.0, 1.0), ("other", other, 1.0, 2.0), ("failed", failed, None, "no <tool>")],
-                {"small": Comparison("less", [Peer("<b>", 2.5, "s")], (1.0, "physics")), "failed": Comparison("less", [Peer("x", 1, "")])})
+    other, failed = (
+        Figure(lambda: 0, "", "lonely", "0", lambda v: v == 0, 0),
+        Figure(lambda: 0, "", "broken", "0", lambda v: True),
+    )
+    text = page(
+        [
+            ("small", SMALL, 2.0, 1.0),
+            ("other", other, 1.0, 2.0),
+            ("failed", failed, None, "no <tool>"),
+        ],
+        {
+            "small": Comparison("less", [Peer("<b>", 2.5, "s")], (1.0, "physics")),
+            "failed": Comparison("less", [Peer("x", 1, "")]),
+        },
+    )
     assert "1 of 3 are" in text and text.count("<svg") == 1 and text.count("<tr>") == 4
-    assert '<td class="good">2.0 nm</td>' in text and '<td class="bad">1 </td>' in text and "failed: no &lt;tool&gt;" in text
+    assert (
+        '<td class="good">2.0 nm</td>' in text
+        and '<td class="bad">1 </td>' in text
+        and "failed: no &lt;tool&gt;" in text
+    )
     assert "&lt;b&gt;" in text and "an &lt;error&gt;" in text and "limit: 1 nm, physics" in text
     assert not re.search(r"<b>|<error>|<tool>", text)
 
@@ -63,4 +84,6 @@ def test_every_comparison_belongs_to_a_figure():
     known, figures = comparisons(), collected("FIGURES")
     assert set(known) <= set(figures)
     for name, comparison in known.items():
-        assert all(0 < len(peer.source) <= 60 and len(peer.name) <= 36 for peer in comparison.peers), f"{name}: too long for a bar"
+        assert all(
+            0 < len(peer.source) <= 60 and len(peer.name) <= 36 for peer in comparison.peers
+        ), f"{name}: too long for a bar"

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The fuzzers find what is planted, and nothing in a short run of the real thing; the figure runs them for longer."""
+"""The fuzzers find what is planted, and nothing in a short run of the real thing; the figure runs
+them for longer.
+"""
+
 import shutil
 
 import pytest
@@ -13,7 +16,16 @@ def test_the_parsers_of_the_host_stand_a_short_fuzz():
     targets = parser_fuzz.fuzz(5)
     assert not any(target.crashes for target in targets), [target.crashes for target in targets]
     assert all(target.runs > 20 and target.seen for target in targets)
-    assert len([target for target in targets if len(target.corpus) > len(parser_fuzz.SEEDS[target.parse])]) > 5, "nothing new was found"
+    assert (
+        len(
+            [
+                target
+                for target in targets
+                if len(target.corpus) > len(parser_fuzz.SEEDS[target.parse])
+            ]
+        )
+        > 5
+    ), "nothing new was found"
 
 
 def planted(data):
@@ -28,8 +40,10 @@ def planted(data):
 
 def test_a_fault_behind_several_right_bytes_is_found_by_coverage(monkeypatch):
     monkeypatch.setattr(parser_fuzz, "PACKAGE", __file__)
-    target, = parser_fuzz.fuzz(120, parsers=(planted,), first=True)
-    assert any(where.startswith("ZeroDivisionError") for where in target.crashes), f"not in {target.runs} runs"
+    (target,) = parser_fuzz.fuzz(120, parsers=(planted,), first=True)
+    assert any(where.startswith("ZeroDivisionError") for where in target.crashes), (
+        f"not in {target.runs} runs"
+    )
 
 
 def test_an_input_that_takes_for_ever_is_a_crash(monkeypatch):
@@ -38,11 +52,14 @@ def test_an_input_that_takes_for_ever_is_a_crash(monkeypatch):
     def endless(data):
         while True:
             pass
-    target, = parser_fuzz.fuzz(0, parsers=(endless,))
+
+    (target,) = parser_fuzz.fuzz(0, parsers=(endless,))
     assert any(where.startswith("Hang") for where in target.crashes)
 
 
-needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="the firmware is fuzzed with the sanitizers of gcc")
+needs_gcc = pytest.mark.skipif(
+    shutil.which("gcc") is None, reason="the firmware is fuzzed with the sanitizers of gcc"
+)
 
 
 @needs_gcc
@@ -57,7 +74,9 @@ def test_a_missing_bound_in_the_firmware_is_found(tmp_path):
     copy = tmp_path / "firmware"
     shutil.copytree(FIRMWARE, copy)
     right = (copy / "bus" / "bus.c").read_text()
-    wrong = right.replace("if (!receiving || received == sizeof request) continue;", "if (!receiving) continue;")
+    wrong = right.replace(
+        "if (!receiving || received == sizeof request) continue;", "if (!receiving) continue;"
+    )
     assert wrong != right
     (copy / "bus" / "bus.c").write_text(wrong)
     said = fuzz_firmware(60, "axis", firmware=copy).said

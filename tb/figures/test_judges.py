@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The judges of s0_bus_wrong and eeprom_torn see what they are there to see: nodes with a planted fault are found out."""
+"""The judges of s0_bus_wrong and eeprom_torn see what they are there to see: nodes with a planted
+fault are found out.
+"""
+
 import zlib
 
 import pytest
@@ -16,18 +19,26 @@ ANSWER = ready_byte(ADDRESS, FROM_NODE)
 
 
 def words(cells):
-    """The words of the cells; None for a character without a stop bit, which a node drops together with its frame."""
+    """The words of the cells; None for a character without a stop bit, which a node drops together
+    with its frame.
+    """
     place = 0
     while place <= len(cells) - CELLS:
         if cells[place]:
             place += 1
             continue
-        yield sum(bit << n for n, bit in enumerate(cells[place + 1:place + 10])) if cells[place + CELLS - 1] else None
+        yield (
+            sum(bit << n for n, bit in enumerate(cells[place + 1 : place + 10]))
+            if cells[place + CELLS - 1]
+            else None
+        )
         place += CELLS
 
 
 class Node:
-    """In the place of FrameBench: takes a frame that `takes` likes, and answers each request with `unknown operation`."""
+    """In the place of FrameBench: takes a frame that `takes` likes, and answers each request with
+    `unknown operation`.
+    """
 
     def __init__(self, takes):
         self.takes, self.payload, self.reply = takes, None, bytes([0, 0, 1])
@@ -62,7 +73,9 @@ def right(payload):
 
 
 def right_but_for_the_sequence_number(payload):
-    """Whether there is a sequence number with which the frame is right: the node does not look at that byte."""
+    """Whether there is a sequence number with which the frame is right: the node does not look at
+    that byte.
+    """
     return any(right(bytes([payload[0], number]) + payload[2:]) for number in range(256))
 
 
@@ -70,15 +83,24 @@ def half_right(payload):
     return crc_of(payload) & 0xFFFF == int.from_bytes(payload[-4:-2], "little")
 
 
-@pytest.mark.parametrize("takes, wrong", [(right, False), (right_but_for_the_sequence_number, True), (half_right, True),
-                                          (lambda payload: True, True)])
+@pytest.mark.parametrize(
+    "takes, wrong",
+    [
+        (right, False),
+        (right_but_for_the_sequence_number, True),
+        (half_right, True),
+        (lambda payload: True, True),
+    ],
+)
 def test_the_bus_judge_counts_frames_that_a_node_accepts_wrongly(takes, wrong):
     assert (s0_bus_wrong(2000, lambda address: Node(takes)) > 0) == wrong
 
 
 def test_nodes_in_this_file_speak_as_the_protocol_says():
     node, body = Node(right), bytes([7, 3, 0])
-    assert node.exchange(cells_of([WRITE, *frame(WRITE & 0xFF, body)])) == [READY] and node.reply == bytes([7, 3, 1])
+    assert node.exchange(cells_of([WRITE, *frame(WRITE & 0xFF, body)])) == [
+        READY
+    ] and node.reply == bytes([7, 3, 1])
     assert figures_s0.node_answer(node)[0].sequence == 7
 
 
@@ -87,7 +109,7 @@ def test_the_eeprom_judge_survives_an_empty_program_and_counts_it(monkeypatch):
 
     def wiped(self):
         power_cut(self)
-        self.eeprom.memory[:] = b"\xFF" * len(self.eeprom.memory)
+        self.eeprom.memory[:] = b"\xff" * len(self.eeprom.memory)
         return True
 
     assert figures_job.torn(cuts=12) == 0

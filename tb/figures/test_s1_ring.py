@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""S1 without its Verilated relay: the ring is the paper's, readings tell its error, and the relay's integers take off what was fitted."""
+"""S1 without its Verilated relay: the ring is the paper's, readings tell its error, and the relay's
+integers take off what was fitted.
+"""
+
 import numpy as np
 import pytest
 
@@ -12,15 +15,21 @@ ANGLES = np.arange(0, 360, 0.5) + 0.17
 def test_a_ring_has_both_numbers_of_the_paper():
     for number in (1, 2, 3):
         ring = s1_ring.paper_ring(number)
-        assert np.abs(s1_ring.error_of(ring, ANGLES)).max() == pytest.approx(s1_ring.PAPER_PEAK, rel=0.002)
-        assert np.abs(s1_ring.error_of(ring, ANGLES, s1_ring.HIGH_ORDERS)).max() == pytest.approx(s1_ring.PAPER_RESIDUAL, rel=0.01)
+        assert np.abs(s1_ring.error_of(ring, ANGLES)).max() == pytest.approx(
+            s1_ring.PAPER_PEAK, rel=0.002
+        )
+        assert np.abs(s1_ring.error_of(ring, ANGLES, s1_ring.HIGH_ORDERS)).max() == pytest.approx(
+            s1_ring.PAPER_RESIDUAL, rel=0.01
+        )
 
 
 def test_readings_are_the_error_at_the_angle_that_the_encoder_shows():
     ring = s1_ring.paper_ring(1, ring_drift=0.0, ring_line_error=0.0)
-    readings = s1_ring.measure(ring, s1_ring.TEN_DEGREES, np.random.default_rng(seed()), scatter=0.0)
+    readings = s1_ring.measure(
+        ring, s1_ring.TEN_DEGREES, np.random.default_rng(seed()), scatter=0.0
+    )
     true = s1_ring.true_angle(ring, s1_ring.TEN_DEGREES)
-    assert np.allclose(readings.error, s1_ring.error_of(ring, true), atol=0.11)         # half a count
+    assert np.allclose(readings.error, s1_ring.error_of(ring, true), atol=0.11)  # half a count
 
 
 def test_what_the_relay_takes_off_is_what_was_fitted():
@@ -36,5 +45,8 @@ def test_our_fit_leaves_less_than_the_papers():
     ring, source = s1_ring.paper_ring(1, ring_drift=0.0), np.random.default_rng(seed())
     readings = s1_ring.measure(ring, s1_ring.TEN_DEGREES, source)
     places = s1_ring.off_grid(source, 90)
-    plain, better = (s1_ring.left_by_model(ring, way(readings), places) for way in (s1_ring.as_in_the_paper, s1_ring.ours))
+    plain, better = (
+        s1_ring.left_by_model(ring, way(readings), places)
+        for way in (s1_ring.as_in_the_paper, s1_ring.ours)
+    )
     assert better < plain < s1_ring.PAPER_AFTER

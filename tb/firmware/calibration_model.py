@@ -1,9 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What sw/firmware/calibration/calibration.c computes, in Python's integers: the sine, the ellipse, the table, the bursts of a pass."""
+"""What sw/firmware/calibration/calibration.c computes, in Python's integers: the sine, the ellipse,
+the table, the bursts of a pass.
+"""
+
 from math import isqrt
 
 ORDERS, POINTS, PHASES, PARTS, PASS, BLOCKS, BINS, LINES = 10, 256, 2048, 16, 39, 256, 128, 128
-(RUNNING, FROZEN, STANDSTILL, PARTIAL_CIRCLE, AMPLITUDE, DISTORTED, TOO_FAST, UNSTEADY, ONE_SPEED, VIBRATION) = range(10)
+(
+    RUNNING,
+    FROZEN,
+    STANDSTILL,
+    PARTIAL_CIRCLE,
+    AMPLITUDE,
+    DISTORTED,
+    TOO_FAST,
+    UNSTEADY,
+    ONE_SPEED,
+    VIBRATION,
+) = range(10)
 UNIT = 1 << 28
 DEGREE = (0, 1, 1, 2, 2, 2)
 
@@ -23,7 +37,10 @@ def circle():
     quarter, sine, cosine = [], 0, 1 << 30
     for _ in range(129):
         quarter.append(sine * 32767 + (1 << 29) >> 30)
-        sine, cosine = (sine * 1073660973 + cosine * 13176464 + (1 << 29) >> 30, cosine * 1073660973 - sine * 13176464 + (1 << 29) >> 30)
+        sine, cosine = (
+            sine * 1073660973 + cosine * 13176464 + (1 << 29) >> 30,
+            cosine * 1073660973 - sine * 13176464 + (1 << 29) >> 30,
+        )
     half = quarter + quarter[127:0:-1]
     return half + [-channel for channel in half]
 
@@ -53,16 +70,28 @@ def cosine_of(phase):
     return cosine_at(point) - turn_of(sine_at(point), phase)
 
 
-IDENTITY = dict(sin_offset=0, cos_offset=0, gain=65536, quadrature_error=0, cosine=(0,) * ORDERS, sine=(0,) * ORDERS)
+IDENTITY = dict(
+    sin_offset=0,
+    cos_offset=0,
+    gain=65536,
+    quadrature_error=0,
+    cosine=(0,) * ORDERS,
+    sine=(0,) * ORDERS,
+)
 
 
 def fits(values):
-    return (32768 <= values["gain"] < 131072 and abs(values["quadrature_error"]) <= 65536 and abs(values["sin_offset"]) <= 16384
-            and abs(values["cos_offset"]) <= 16384
-            and all(abs(quotient(v, 2)) <= 1 << 20 for v in (*values["cosine"], *values["sine"])))
+    return (
+        32768 <= values["gain"] < 131072
+        and abs(values["quadrature_error"]) <= 65536
+        and abs(values["sin_offset"]) <= 16384
+        and abs(values["cos_offset"]) <= 16384
+        and all(abs(quotient(v, 2)) <= 1 << 20 for v in (*values["cosine"], *values["sine"]))
+    )
 
 
 # ---- the ellipse
+
 
 def solve(m, largest=4 * UNIT):
     """The solution of the equations, column 5 the right side, in units of 2^-28, or None."""
@@ -81,7 +110,9 @@ def solve(m, largest=4 * UNIT):
     for i in reversed(range(size)):
         rest = m[i][5] - sum(m[i][j] * solution[j] >> 28 for j in range(i + 1, size))
         coarse = quotient(rest * 16, m[i][i])
-        solution[i] = coarse * (UNIT // 16) + quotient((rest * 16 - coarse * m[i][i]) * (UNIT // 16), m[i][i])
+        solution[i] = coarse * (UNIT // 16) + quotient(
+            (rest * 16 - coarse * m[i][i]) * (UNIT // 16), m[i][i]
+        )
         if abs(solution[i]) > largest:
             return None
     return solution
@@ -108,7 +139,13 @@ def ellipse_fit(samples, values=IDENTITY, low=0, high=65535):
         return PARTIAL_CIRCLE, values
     scale = lambda s, up: s << up if up > 0 else s >> -up
     shift = count.bit_length() - 1
-    m = [[scale(total[i][j], 28 - 12 * (DEGREE[i] + DEGREE[j])) >> shift if j >= i else 0 for j in range(6)] for i in range(5)]
+    m = [
+        [
+            scale(total[i][j], 28 - 12 * (DEGREE[i] + DEGREE[j])) >> shift if j >= i else 0
+            for j in range(6)
+        ]
+        for i in range(5)
+    ]
     mean_square = quotient(m[0][5] * UNIT, m[0][0])
     if outside * 16 > count or mean_square > UNIT + UNIT // 4:
         return AMPLITUDE, values
@@ -129,16 +166,24 @@ def ellipse_fit(samples, values=IDENTITY, low=0, high=65535):
         return DISTORTED, values
     root = isqrt(determinant * UNIT)
     x, y = quotient(q * b + e * c, determinant) >> 1, quotient(p * c + e * b, determinant) >> 1
-    fit = values | dict(cos_offset=clamp(x + (1 << 12) >> 13, 32767), sin_offset=clamp(y + (1 << 12) >> 13, 32767),
-                        gain=quotient(q * 65536 + root // 2, root), quadrature_error=quotient(-e * 65536, root))
+    fit = values | dict(
+        cos_offset=clamp(x + (1 << 12) >> 13, 32767),
+        sin_offset=clamp(y + (1 << 12) >> 13, 32767),
+        gain=quotient(q * 65536 + root // 2, root),
+        quadrature_error=quotient(-e * 65536, root),
+    )
     return (RUNNING, fit) if fits(fit) else (DISTORTED, values)
 
 
 # ---- the harmonics
 
+
 def table_entry(values, point):
-    total = sum(values["cosine"][k] * cosine_at((k + 1) * point * 2) + values["sine"][k] * sine_at((k + 1) * point * 2)
-                for k in range(ORDERS))
+    total = sum(
+        values["cosine"][k] * cosine_at((k + 1) * point * 2)
+        + values["sine"][k] * sine_at((k + 1) * point * 2)
+        for k in range(ORDERS)
+    )
     return clamp(total + (1 << 18) >> 19, 0x1FFFF)
 
 
@@ -150,7 +195,9 @@ def judge(phases, spoiled=False):
     """(reason, travel) of PHASES phases."""
     steps = [(b - a + 32768 & 65535) - 32768 for a, b in zip(phases, phases[1:])]
     size = PHASES // PARTS
-    gone = [sum(steps[max(part * size - 1, 0):(part + 1) * size - 1]) for part in range(PARTS)]     # the first part is one step shorter
+    gone = [
+        sum(steps[max(part * size - 1, 0) : (part + 1) * size - 1]) for part in range(PARTS)
+    ]  # the first part is one step shorter
     travel, slowest, fastest = sum(gone), min(gone), max(gone)
     if spoiled:
         return AMPLITUDE, travel
@@ -211,22 +258,30 @@ def fit(block, vibration=None):
     for n, place in enumerate(block):
         base, window = motion_of(n), window_of(n)
         if vibration is not None:
-            base += tuple(wave * attenuation(vibration >> 12) >> 15 for wave in waves_of(vibration, turn_of_block(n)))
+            base += tuple(
+                wave * attenuation(vibration >> 12) >> 15
+                for wave in waves_of(vibration, turn_of_block(n))
+            )
         for i in range(size):
             weighed = window * base[i] >> 15
-            for j in range(i + 1):                              # of two factors the later one is weighed,
+            for j in range(i + 1):  # of two factors the later one is weighed,
                 m[j][i] += weighed * base[j] >> 10
             m[i][5] += weighed * place
     for i in range(3):
-        for j in range(i, 3):                                   # in the motion alone the earlier one
-            m[i][j] = sum((window_of(n) * motion_of(n)[i] >> 15) * motion_of(n)[j] >> 10 for n in range(BLOCKS))
+        for j in range(i, 3):  # in the motion alone the earlier one
+            m[i][j] = sum(
+                (window_of(n) * motion_of(n)[i] >> 15) * motion_of(n)[j] >> 10
+                for n in range(BLOCKS)
+            )
     for row in m:
         row[5] >>= 19
     return solve(m, 1 << 33)
 
 
 def transform(rest):
-    """(real, imaginary) of the lines of BLOCKS real numbers: even ones real, odd ones imaginary; radix 2 in time, halved at every level."""
+    """(real, imaginary) of the lines of BLOCKS real numbers: even ones real, odd ones imaginary;
+    radix 2 in time, halved at every level.
+    """
     points = BLOCKS // 2
     order = [int(f"{n:07b}"[::-1], 2) for n in range(points)]
     real, imaginary = [rest[2 * n] for n in order], [rest[2 * n + 1] for n in order]
@@ -242,7 +297,12 @@ def transform(rest):
     for n in range(points):
         m, c, s = -n % points, cosine_at(2 * n), sine_at(2 * n)
         x, y = imaginary[n] + imaginary[m], real[m] - real[n]
-        lines.append((real[n] + real[m] + (c * x + s * y >> 15) >> 1, imaginary[n] - imaginary[m] + (c * y - s * x >> 15) >> 1))
+        lines.append(
+            (
+                real[n] + real[m] + (c * x + s * y >> 15) >> 1,
+                imaginary[n] - imaginary[m] + (c * y - s * x >> 15) >> 1,
+            )
+        )
     return lines
 
 
@@ -271,14 +331,23 @@ class Pass:
 
     def __init__(self, values=IDENTITY):
         self.values, self.bursts, self.spectra, self.every, self.line = values, 0, 0, 0, [0] * LINES
-        self.information, self.cosine, self.sine, self.squares = [0] * ORDERS, [0] * ORDERS, [0] * ORDERS, 0
+        self.information, self.cosine, self.sine, self.squares = (
+            [0] * ORDERS,
+            [0] * ORDERS,
+            [0] * ORDERS,
+            0,
+        )
         self.travels = []
 
     def candidate(self):
         channels = {}
         for channel, sums in (("cosine", self.cosine), ("sine", self.sine)):
-            channels[channel] = tuple(clamp(quotient(total * 4096, known), 1 << 21) if self.bursts >= 4 and known >= 256 else before
-                              for total, known, before in zip(sums, self.information, self.values[channel]))
+            channels[channel] = tuple(
+                clamp(quotient(total * 4096, known), 1 << 21)
+                if self.bursts >= 4 and known >= 256
+                else before
+                for total, known, before in zip(sums, self.information, self.values[channel])
+            )
         return self.values | channels
 
     def take(self, phases, every=1):
@@ -286,11 +355,18 @@ class Pass:
         candidate = self.candidate()
         _, travel = judge(phases)
         gone, table = travels(phases), [table_entry(candidate, 2 * n + 1) for n in range(BINS)]
-        block = [sum(gone[8 * n:8 * n + 8]) * 2 - (sum(table[p >> 9] for p in phases[8 * n:8 * n + 8]) >> 3) for n in range(BLOCKS)]
+        block = [
+            sum(gone[8 * n : 8 * n + 8]) * 2
+            - (sum(table[p >> 9] for p in phases[8 * n : 8 * n + 8]) >> 3)
+            for n in range(BLOCKS)
+        ]
         vibration, solution = 0, fit(block)
         if solution is None:
             return False
-        rest = [clamp(p - position_of_motion(solution, motion_of(n)), 32767) * window_of(n) >> 16 for n, p in enumerate(block)]
+        rest = [
+            clamp(p - position_of_motion(solution, motion_of(n)), 32767) * window_of(n) >> 16
+            for n, p in enumerate(block)
+        ]
         lines = transform(rest)
         levels = [quarter_log2(x * x + y * y) for x, y in lines]
         if every != self.every:
@@ -318,7 +394,7 @@ class Pass:
             swinging = swing - position_of_vibration(solution, waves_of(vibration, turn - 32))
             for channel, wave in zip(seen[1:], waves):
                 channel[phases[8 * n] >> 9] += window * wave >> 5
-            for phase, travelled in zip(phases[8 * n:8 * n + 8], gone[8 * n:]):
+            for phase, travelled in zip(phases[8 * n : 8 * n + 8], gone[8 * n :]):
                 rest = clamp(travelled * 16 - table[phase >> 9] - smooth - swing, 32767)
                 seen[0][phase >> 9] += window * rest >> 5
                 smooth += speed
@@ -331,11 +407,20 @@ class Pass:
         for k in range(ORDERS):
             points = [(k + 1) * (4 * n + 2) for n in range(BINS)]
             waves = [cosine_at(p) for p in points], [sine_at(p) for p in points]
-            (x, y), cosine, sine = [[sum(map(int.__mul__, row, wave)) >> shift for wave in waves]
-                                    for row, shift in zip(seen, (25, 27, 27))]
-            near, far = (cosine[0] + sine[1], sine[0] - cosine[1]), (cosine[0] - sine[1], sine[0] + cosine[1])
+            (x, y), cosine, sine = [
+                [sum(map(int.__mul__, row, wave)) >> shift for wave in waves]
+                for row, shift in zip(seen, (25, 27, 27))
+            ]
+            near, far = (
+                (cosine[0] + sine[1], sine[0] - cosine[1]),
+                (cosine[0] - sine[1], sine[0] + cosine[1]),
+            )
             halves = [(step + side * (k + 1) * own) % (1 << 32) >> 1 for side in (-1, 1)]
-            shared = [channel * attenuation(half) >> 15 for half, band in zip(halves, (near, far)) for channel in band]
+            shared = [
+                channel * attenuation(half) >> 15
+                for half, band in zip(halves, (near, far))
+                for channel in band
+            ]
             retained = max(0, 32768 - (sum(channel * channel for channel in shared) >> 15))
             self.information[k] += weight * retained >> 15
             self.cosine[k] += weight * (x + (retained * candidate["cosine"][k] >> 15)) >> 12

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a plan must be: the player's recursion in closed form, and the shortest time that continuous motion could take."""
+"""What a plan must be: the player's recursion in closed form, and the shortest time that continuous
+motion could take.
+"""
+
 from math import comb
 
 TICK_HZ = 4000
@@ -7,7 +10,11 @@ TICK_HZ = 4000
 
 def limits(velocity, acceleration, jerk):
     """From period/s, /s2, /s3 to 2^-40 period per tick, /tick2, /tick3."""
-    return velocity * 2**40 // TICK_HZ, acceleration * 2**40 // TICK_HZ**2, min(jerk * 2**40 // TICK_HZ**3, 2**31 - 1)
+    return (
+        velocity * 2**40 // TICK_HZ,
+        acceleration * 2**40 // TICK_HZ**2,
+        min(jerk * 2**40 // TICK_HZ**3, 2**31 - 1),
+    )
 
 
 def gone(segment, n):
@@ -32,20 +39,28 @@ def steps(plan):
 def peaks(plan):
     """Largest |step| and its largest first and second difference, from and to rest.
 
-    Inside a segment the second difference is constant and the first is monotone, so three steps at either end of each tell all,
+    Inside a segment the second difference is constant and the first is monotone, so three steps at
+    either end of each tell all,
     and those where the first difference changes its sign.
     """
     peak = [0, 0, 0]
-    before = [0, 0]                                             # the two steps before
+    before = [0, 0]  # the two steps before
     rest = (0, 0, 0, 2)
     for segment in [*plan, rest]:
         velocity, acceleration, jerk, ticks = segment
         turns = acceleration * (acceleration + jerk * (ticks - 1)) < 0
         turn = abs(acceleration // jerk) if turns else 0
-        near = sorted({n for middle in (1, turn, ticks - 2) for n in range(middle - 2, middle + 3) if 0 <= n < ticks})
+        near = sorted(
+            {
+                n
+                for middle in (1, turn, ticks - 2)
+                for n in range(middle - 2, middle + 3)
+                if 0 <= n < ticks
+            }
+        )
         last = -1
         for n in near:
-            if n != last + 1:                                   # a gap: start the differences afresh
+            if n != last + 1:  # a gap: start the differences afresh
                 before = [velocity + acceleration * (n - k) + jerk * comb(n - k, 2) for k in (2, 1)]
             step = velocity + acceleration * n + jerk * comb(n, 2)
             values = step, step - before[1], step - 2 * before[1] + before[0]
@@ -55,9 +70,13 @@ def peaks(plan):
 
 
 def shortest(length, velocity, acceleration, jerk):
-    """Ticks of the fastest continuous motion from rest to rest: length in 2^-40 period, limits as above."""
+    """Ticks of the fastest continuous motion from rest to rest: length in 2^-40 period, limits as
+    above.
+    """
     if acceleration**2 <= velocity * jerk:
-        ramp = velocity / acceleration + acceleration / jerk    # full acceleration is reached on the way to full speed
+        ramp = (
+            velocity / acceleration + acceleration / jerk
+        )  # full acceleration is reached on the way to full speed
     else:
         ramp = 2 * (velocity / jerk) ** 0.5
     if length >= velocity * ramp:

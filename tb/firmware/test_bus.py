@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """line.c and parameters.c: what is answered, what is refused and why, what is ignored."""
+
 import random
 import zlib
 
@@ -13,7 +14,9 @@ COMMAND = DEFINES["BUS_RECEIVE_COMMAND_MASK"]
 GOOD = DEFINES["BUS_RECEIVE_GOOD_MASK"]
 OPERATION = {name: operation["code"] for name, operation in TABLE["operation"].items()}
 CODE = {name: code for name, (code, _) in TABLE["cause"].items()}
-WITH_AXIS = [name for name, operation in TABLE["operation"].items() if "axis u8" in operation["request"]]
+WITH_AXIS = [
+    name for name, operation in TABLE["operation"].items() if "axis u8" in operation["request"]
+]
 
 
 def example(operation, **values):
@@ -21,7 +24,9 @@ def example(operation, **values):
     body = bytes([9, OPERATION[operation]])
     for declaration in TABLE["operation"][operation]["request"]:
         name, kind = declaration.split()
-        body += values.get(name, 0 if name == "axis" else 1).to_bytes(int(kind[1:]) // 8, "little", signed=kind[0] == "i")
+        body += values.get(name, 0 if name == "axis" else 1).to_bytes(
+            int(kind[1:]) // 8, "little", signed=kind[0] == "i"
+        )
     return body
 
 
@@ -45,12 +50,16 @@ def test_a_known_exchange_byte_by_byte():
     assert machine.hear([*frame, *crc[:3], crc[3] | GOOD]) == b""
     answer = machine.hear([0x12 | COMMAND])
     body = bytes([7, OPERATION["counters"], 0]) + bytes(40)
-    assert answer == b"\x52" + bytes([43]) + body + zlib.crc32(b"\x52" + bytes([43]) + body).to_bytes(4, "little")
+    assert answer == b"\x52" + bytes([43]) + body + zlib.crc32(
+        b"\x52" + bytes([43]) + body
+    ).to_bytes(4, "little")
 
 
 def test_identify_tells_what_was_built():
     answer = FakeNode(Axis(), Axis(), address=13).ask("identify")
-    assert answer["map_crc"] == DEFINES["MAP_CRC"] and answer["address"] == 13 and answer["axes"] == 2
+    assert (
+        answer["map_crc"] == DEFINES["MAP_CRC"] and answer["address"] == 13 and answer["axes"] == 2
+    )
     assert (answer["clk_hz"], answer["tick_hz"], answer["sample_hz"]) == (CLK_HZ, 4000, 100_000)
     assert answer["protocol_crc"] == zlib.crc32((ROOT / "tables" / "bus.toml").read_bytes())
 
@@ -93,13 +102,15 @@ def test_a_repeated_frame_is_not_acted_on_again():
     body = example("set_parameter", parameter=PARAMETER["kp"]["id"], value=5)
     machine.send(body)
     machine.set(kp=6)
-    machine.send(body)                                      # other frames came between: this is a new one
+    machine.send(body)  # other frames came between: this is a new one
     assert machine.axes[0].word[DEFINES["AXIS_KP"]] == 5
     machine.axes[0].word[DEFINES["AXIS_KP"]] = 99
     for _ in range(3):
         machine.send(body)
         assert machine.reply()[:3] == bytes([9, OPERATION["set_parameter"], 0])
-    assert machine.axes[0].word[DEFINES["AXIS_KP"]] == 99 and machine.ask("counters")["repeated"] == 3
+    assert (
+        machine.axes[0].word[DEFINES["AXIS_KP"]] == 99 and machine.ask("counters")["repeated"] == 3
+    )
 
 
 def test_the_same_sequence_number_with_other_content_is_acted_on():
@@ -117,17 +128,27 @@ def test_frames_that_the_hardware_did_not_mark_good_change_nothing():
     words = machine.frame(example("set_parameter", parameter=PARAMETER["kp"]["id"], value=5))
     machine.hear([word & ~GOOD for word in words])
     assert machine.reply() == before
-    machine.hear(words[:5])                                 # broken off
-    machine.hear([word | GOOD for word in words[5:7]])      # marked good, but shorter than it says: not a frame
-    machine.hear([words[0], *[200] * 200])                  # far longer than any frame
-    assert machine.reply() == before and machine.axes[0].word[DEFINES["AXIS_KP"]] == PARAMETER["kp"]["default"]
+    machine.hear(words[:5])  # broken off
+    machine.hear(
+        [word | GOOD for word in words[5:7]]
+    )  # marked good, but shorter than it says: not a frame
+    machine.hear([words[0], *[200] * 200])  # far longer than any frame
+    assert (
+        machine.reply() == before
+        and machine.axes[0].word[DEFINES["AXIS_KP"]] == PARAMETER["kp"]["default"]
+    )
 
 
 def test_nonsense_on_the_line_never_stops_the_node():
     draw = random.Random(seed())
     machine = FakeNode()
     for _ in range(300):
-        machine.hear([draw.getrandbits(10) if draw.random() < 0.5 else draw.getrandbits(8) for _ in range(draw.randrange(100))])
+        machine.hear(
+            [
+                draw.getrandbits(10) if draw.random() < 0.5 else draw.getrandbits(8)
+                for _ in range(draw.randrange(100))
+            ]
+        )
     assert machine.ask("identify")["version"] == TABLE["version"]
 
 
@@ -140,52 +161,93 @@ def test_refusals_are_counted():
 
 def test_counters_are_those_of_the_line():
     machine = FakeNode()
-    names = "frames_good", "frames_bad", "framing_errors", "start_glitches", "overruns", "breaks", "transmit_timeouts", "syncs"
+    names = (
+        "frames_good",
+        "frames_bad",
+        "framing_errors",
+        "start_glitches",
+        "overruns",
+        "breaks",
+        "transmit_timeouts",
+        "syncs",
+    )
     for n, name in enumerate(names):
         machine.word[DEFINES["BUS_BASE"] + DEFINES["BUS_" + name.upper()]] = 1000 + n
     answer = machine.ask("counters")
     assert [answer[name] for name in names] == [*range(1000, 1008)]
 
 
-# own steps are counted as pulses and direction only; the converter serves the motor or the fine stage
+# own steps are counted as pulses and direction only; the converter serves the motor or the fine
+# stage
 PARTNER = {"step_output": "position_source", "fine_reach": "drive"}
 
 
 def test_every_parameter_takes_both_ends_and_nothing_beyond():
     machine = FakeNode()
     for name, parameter in PARAMETER.items():
-        assert machine.ask("get_parameter", axis=0, parameter=parameter["id"])["value"] == parameter["default"]
+        assert (
+            machine.ask("get_parameter", axis=0, parameter=parameter["id"])["value"]
+            == parameter["default"]
+        )
         if name in PARTNER:
             machine.set(**{PARTNER[name]: 0})
         for value in (parameter["min"], parameter["max"]):
             machine.set(**{name: value})
             assert machine.ask("get_parameter", axis=0, parameter=parameter["id"])["value"] == value
         for value in (parameter["min"] - 1, parameter["max"] + 1):
-            assert machine.request("set_parameter", axis=0, parameter=parameter["id"], value=value)[0] == "out_of_range"
-        assert machine.ask("get_parameter", axis=0, parameter=parameter["id"])["value"] == parameter["max"]
+            assert (
+                machine.request("set_parameter", axis=0, parameter=parameter["id"], value=value)[0]
+                == "out_of_range"
+            )
+        assert (
+            machine.ask("get_parameter", axis=0, parameter=parameter["id"])["value"]
+            == parameter["max"]
+        )
 
 
 @pytest.mark.parametrize("number", [0, len(PARAMETER) + 1, 255])
 def test_a_parameter_that_does_not_exist_is_refused(number):
     machine = FakeNode()
     assert machine.request("get_parameter", axis=0, parameter=number)[0] == "unknown_parameter"
-    assert machine.request("set_parameter", axis=0, parameter=number, value=1)[0] == "unknown_parameter"
+    assert (
+        machine.request("set_parameter", axis=0, parameter=number, value=1)[0]
+        == "unknown_parameter"
+    )
 
 
 def test_start_writes_the_defaults_into_the_registers():
     machine = FakeNode()
     word, actuator, d = machine.axes[0].word, machine.actuators[0], DEFINES
     default = {name: parameter["default"] for name, parameter in PARAMETER.items()}
-    for name in ("kp", "ki", "kd", "kv", "ka", "dead_band", "following_limit", "disagreement_limit", "encoder_fault_mask"):
+    for name in (
+        "kp",
+        "ki",
+        "kd",
+        "kv",
+        "ka",
+        "dead_band",
+        "following_limit",
+        "disagreement_limit",
+        "encoder_fault_mask",
+    ):
         assert word[d["AXIS_" + name.upper()]] == default[name]
     assert word[d["AXIS_SERVO_LIMITS"]] == default["output_limit"] | default["integral_limit"] << 15
-    assert word[d["AXIS_AMPLITUDE_WINDOW"]] == default["amplitude_low"] | default["amplitude_high"] << 16
-    assert word[d["AXIS_SENSING"]] == CLK_HZ // 100_000 | default["outlier_step"] << 16 | default["outlier_hold"] << 24    # 10 us
+    assert (
+        word[d["AXIS_AMPLITUDE_WINDOW"]]
+        == default["amplitude_low"] | default["amplitude_high"] << 16
+    )
+    assert (
+        word[d["AXIS_SENSING"]]
+        == CLK_HZ // 100_000 | default["outlier_step"] << 16 | default["outlier_hold"] << 24
+    )  # 10 us
     assert actuator[d["ACTUATOR_PWM_PERIOD"]] == CLK_HZ // 20_000 and word[d["AXIS_CONTROL"]] == 0
     assert word[d["AXIS_STOP_DECELERATION"]] == 125_000 * 2**40 // 4000**2 >> 8
     assert machine.word[d["BUS_BASE"] + d["BUS_BIT_TIME"]] == round(16 * CLK_HZ / 115_200)
     assert machine.word[d["BUS_BASE"] + d["BUS_WATCHDOG_TIME"]] == default["watchdog_time"]
-    assert machine.word[d["NODE_TICK_PERIOD"]] == CLK_HZ // 4000 and machine.word[d["NODE_SAMPLE_PERIOD"]] == CLK_HZ // 100_000
+    assert (
+        machine.word[d["NODE_TICK_PERIOD"]] == CLK_HZ // 4000
+        and machine.word[d["NODE_SAMPLE_PERIOD"]] == CLK_HZ // 100_000
+    )
 
 
 def test_values_too_large_for_a_register_stop_at_its_end():
@@ -197,22 +259,49 @@ def test_values_too_large_for_a_register_stop_at_its_end():
 def test_the_watchdog_time_is_one_for_all_axes():
     machine = FakeNode(Axis(), Axis())
     machine.set(axis=1, watchdog_time=77)
-    assert machine.ask("get_parameter", axis=0, parameter=PARAMETER["watchdog_time"]["id"])["value"] == 77
+    assert (
+        machine.ask("get_parameter", axis=0, parameter=PARAMETER["watchdog_time"]["id"])["value"]
+        == 77
+    )
 
 
 def test_registers_are_read_by_address_but_never_a_queue():
     machine = FakeNode()
-    assert machine.ask("read_register", address=DEFINES["NODE_MAP_CRC"])["value"] == DEFINES["MAP_CRC"]
+    assert (
+        machine.ask("read_register", address=DEFINES["NODE_MAP_CRC"])["value"] == DEFINES["MAP_CRC"]
+    )
     machine.axes[0].word[DEFINES["AXIS_KI"]] = 0xDEADBEEF
-    assert machine.ask("read_register", address=DEFINES["AXIS_BASE"] + DEFINES["AXIS_KI"])["value"] == 0xDEADBEEF
-    assert machine.ask("read_register", address=DEFINES["PERIPHERALS_BASE"] + DEFINES["PERIPHERALS_BUILT"])["value"] == 0
-    for address in (1, 2, 3, 0x300, 0x3FC, DEFINES["AXIS_BASE"] + DEFINES["AXIS_STRIDE"], 0xFFFC, 0xFFFF,
-                    DEFINES["BUS_BASE"] + DEFINES["BUS_RECEIVE"], DEFINES["PERIPHERALS_BASE"] + DEFINES["PERIPHERALS_I2C_ANSWER"],
-                    DEFINES["PERIPHERALS_BASE"] + DEFINES["PERIPHERALS_PEER_RECEIVE"]):
-        assert machine.request("read_register", address=address)[0] == "no_such_register", hex(address)
+    assert (
+        machine.ask("read_register", address=DEFINES["AXIS_BASE"] + DEFINES["AXIS_KI"])["value"]
+        == 0xDEADBEEF
+    )
+    assert (
+        machine.ask(
+            "read_register", address=DEFINES["PERIPHERALS_BASE"] + DEFINES["PERIPHERALS_BUILT"]
+        )["value"]
+        == 0
+    )
+    for address in (
+        1,
+        2,
+        3,
+        0x300,
+        0x3FC,
+        DEFINES["AXIS_BASE"] + DEFINES["AXIS_STRIDE"],
+        0xFFFC,
+        0xFFFF,
+        DEFINES["BUS_BASE"] + DEFINES["BUS_RECEIVE"],
+        DEFINES["PERIPHERALS_BASE"] + DEFINES["PERIPHERALS_I2C_ANSWER"],
+        DEFINES["PERIPHERALS_BASE"] + DEFINES["PERIPHERALS_PEER_RECEIVE"],
+    ):
+        assert machine.request("read_register", address=address)[0] == "no_such_register", hex(
+            address
+        )
 
 
-@pytest.mark.parametrize("position", [0, 1, -1, PERIOD, -PERIOD - 1, 123_456_789, -2**47, 2**47 - 1])
+@pytest.mark.parametrize(
+    "position", [0, 1, -1, PERIOD, -PERIOD - 1, 123_456_789, -(2**47), 2**47 - 1]
+)
 @pytest.mark.parametrize("divisions", [1, 160, 65536])
 def test_counts_are_the_floor_of_position_times_n(position, divisions):
     machine = FakeNode(Axis(position))
@@ -227,7 +316,7 @@ def test_no_part_of_a_millisecond_is_lost():
     for _ in range(1000):
         machine.clk += 7 * CLK_HZ // 10_000
         machine.poll()
-    machine.clk += 5 * CLK_HZ                               # a long wait
+    machine.clk += 5 * CLK_HZ  # a long wait
     machine.poll()
     assert machine.firmware.clock_ms() - start == 5700
 
@@ -238,7 +327,10 @@ def test_a_followed_position_is_told_afresh_at_each_reading_until_the_next_reque
     for position in (7, -1, 2**47 - 1):
         machine.axes[1].machine = position
         body = machine.reply()
-        assert body[:3] == bytes([machine.sequence, OPERATION["follow"], 0]) and int.from_bytes(body[3:], "little", signed=True) == position
+        assert (
+            body[:3] == bytes([machine.sequence, OPERATION["follow"], 0])
+            and int.from_bytes(body[3:], "little", signed=True) == position
+        )
     machine.ask("position", axis=1)
     before = machine.reply()
     machine.axes[1].machine = 55
@@ -278,7 +370,7 @@ def test_a_break_or_a_silence_of_five_seconds_brings_the_first_baud_rate_back():
         machine.ask("set_baud", baud=9600)
         machine.run(4999)
         assert bit_time(machine) == bit_time_of(9600)
-        machine.reply()                                     # a mere reading is a sign of the master too
+        machine.reply()  # a mere reading is a sign of the master too
         machine.run(4999)
         assert bit_time(machine) == bit_time_of(9600)
         machine.run(3)
@@ -306,5 +398,14 @@ def test_the_encoder_is_shown_as_it_is():
     word[d["AXIS_PHASE"]] = 0xFEDC | 101 << 16
     word[d["AXIS_QUADRATURE_COUNT"]] = -5 & 0xFFFFFFFF
     word[d["AXIS_REJECTED_PULSES"]], word[d["AXIS_REJECTED_SAMPLES"]] = 6, 7
-    assert machine.ask("encoder", axis=0) == {"sin": -100, "cos": -32768, "phase": 0xFEDC, "amplitude": 101, "quadrature_count": -5,
-                                              "rejected_pulses": 6, "rejected_samples": 7, "home_phase": 0, "fault_position": 0}
+    assert machine.ask("encoder", axis=0) == {
+        "sin": -100,
+        "cos": -32768,
+        "phase": 0xFEDC,
+        "amplitude": 101,
+        "quadrature_count": -5,
+        "rejected_pulses": 6,
+        "rejected_samples": 7,
+        "home_phase": 0,
+        "fault_position": 0,
+    }

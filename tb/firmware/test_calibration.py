@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""calibration: equal to its model in every integer, learned from reset, each gate refuses with its reason, values stored and restored."""
+"""calibration: equal to its model in every integer, learned from reset, each gate refuses with its
+reason, values stored and restored.
+"""
+
 import ctypes
 import math
 import random
@@ -29,7 +32,10 @@ def circle(turns, count=1024, size=0.8, gain=1.0, phase=0.0, offset=(0.0, 0.0)):
     """Samples (cos, sin) at equal steps over so many turns, full scale 2^15."""
     places = [math.tau * (0.1 + turns * n / count) for n in range(count)]
     hold = lambda leg: max(-32768, min(32767, round(leg * size * 32768)))
-    return [(hold(math.cos(p) + offset[0]), hold(gain * math.sin(p + phase) + offset[1])) for p in places]
+    return [
+        (hold(math.cos(p) + offset[0]), hold(gain * math.sin(p + phase) + offset[1]))
+        for p in places
+    ]
 
 
 def words(samples):
@@ -43,12 +49,19 @@ def line(periods, count=PHASES_OF_BURST):
 def fit(samples, **window):
     """(reason, values) of the firmware's ellipse."""
     calibration, sums, values = Calibration(), Ellipse(), Values()
-    calibration.amplitude_low, calibration.amplitude_high = window.get("low", 0), window.get("high", 65535)
+    calibration.amplitude_low, calibration.amplitude_high = (
+        window.get("low", 0),
+        window.get("high", 65535),
+    )
     values.gain = 65536
     library().calibration_ellipse_start(ctypes.byref(sums))
     for word in words(samples):
-        library().calibration_ellipse_take(ctypes.byref(sums), ctypes.byref(calibration), ctypes.c_uint32(word))
-    return library().calibration_ellipse_fit(ctypes.byref(sums), ctypes.byref(values)), values.as_dict()
+        library().calibration_ellipse_take(
+            ctypes.byref(sums), ctypes.byref(calibration), ctypes.c_uint32(word)
+        )
+    return library().calibration_ellipse_fit(
+        ctypes.byref(sums), ctypes.byref(values)
+    ), values.as_dict()
 
 
 def fresh(complete=False):
@@ -68,18 +81,34 @@ def learned():
 
 # ---- equal to the model
 
+
 def test_any_samples_give_the_ellipse_of_the_model():
     draw, seen = random.Random(seed()), set()
     for _ in range(150):
-        samples = circle(draw.choice((0, 0.01, 0.3, 1, 1.5, 7.3)), draw.choice((8, 64, 200)), draw.uniform(0.02, 1.3),
-                         draw.choice((0.3, 1, 1.06, 1.9)), draw.uniform(-1, 1), (draw.uniform(-0.3, 0.3), draw.uniform(-0.3, 0.3)))
+        samples = circle(
+            draw.choice((0, 0.01, 0.3, 1, 1.5, 7.3)),
+            draw.choice((8, 64, 200)),
+            draw.uniform(0.02, 1.3),
+            draw.choice((0.3, 1, 1.06, 1.9)),
+            draw.uniform(-1, 1),
+            (draw.uniform(-0.3, 0.3), draw.uniform(-0.3, 0.3)),
+        )
         noise = draw.choice((0, 30, 3000))
-        samples = [tuple(max(-32768, min(32767, leg + draw.randint(-noise, noise))) for leg in sample) for sample in samples]
+        samples = [
+            tuple(max(-32768, min(32767, leg + draw.randint(-noise, noise))) for leg in sample)
+            for sample in samples
+        ]
         window = dict(low=draw.choice((0, 5000)), high=draw.choice((65535, 30000)))
         got, want = fit(samples, **window), model.ellipse_fit(samples, **window)
         assert got == want
         seen.add(got[0])
-    assert seen >= {model.RUNNING, model.STANDSTILL, model.PARTIAL_CIRCLE, model.AMPLITUDE, model.DISTORTED}
+    assert seen >= {
+        model.RUNNING,
+        model.STANDSTILL,
+        model.PARTIAL_CIRCLE,
+        model.AMPLITUDE,
+        model.DISTORTED,
+    }
 
 
 def test_the_corners_of_the_range_give_what_the_model_gives():
@@ -89,13 +118,19 @@ def test_the_corners_of_the_range_give_what_the_model_gives():
 
 
 def test_a_pass_of_any_phases_gives_the_values_of_the_model():
-    """Among them a vibration, a reversal of the motion, a change of the recorder's setting, a burst that is refused between."""
+    """Among them a vibration, a reversal of the motion, a change of the recorder's setting, a burst
+    that is refused between.
+    """
     draw, machine = np.random.default_rng(seed()), fresh(complete=True)
     want = model.Pass(model.IDENTITY)
     line_of_vibration = draw.uniform(3, 120)
     while machine.calibration.accepted + machine.calibration.refused < 2:
         ramp = np.arange(PHASES_OF_BURST) / PHASES_OF_BURST
-        place = draw.uniform() + draw.uniform(10, 22) * ramp * draw.choice([-1, 1]) + draw.uniform(-1, 1) * ramp**2
+        place = (
+            draw.uniform()
+            + draw.uniform(10, 22) * ramp * draw.choice([-1, 1])
+            + draw.uniform(-1, 1) * ramp**2
+        )
         place = place + 0.02 * np.sin(2 * np.pi * (line_of_vibration * ramp + draw.uniform()))
         place = place + 0.01 * np.sin(2 * np.pi * 2 * place) + draw.normal(0, 0.001, len(place))
         phases, every = (np.rint(place * 65536).astype(int) & 65535).tolist(), 1 + (want.bursts > 6)
@@ -105,11 +140,24 @@ def test_a_pass_of_any_phases_gives_the_values_of_the_model():
             assert machine.phases(line(0)) == model.STANDSTILL
         if want.bursts < model.PASS:
             got = machine.calibration.pass_
-            assert (got.bursts, got.spectra, got.every, got.squares) == (want.bursts, want.spectra, want.every, want.squares)
+            assert (got.bursts, got.spectra, got.every, got.squares) == (
+                want.bursts,
+                want.spectra,
+                want.every,
+                want.squares,
+            )
             assert (list(got.line), list(got.information), list(got.cosine), list(got.sine)) == (
-                want.line, want.information, want.cosine, want.sine)
+                want.line,
+                want.information,
+                want.cosine,
+                want.sine,
+            )
             assert (got.slowest, got.fastest) == (min(want.travels), max(want.travels))
-    assert want.bursts == model.PASS and machine.calibration.accepted == 1 and machine.calibration.refused == 1
+    assert (
+        want.bursts == model.PASS
+        and machine.calibration.accepted == 1
+        and machine.calibration.refused == 1
+    )
     assert machine.values == want.candidate() and machine.calibration.scatter == want.scatter()
     assert machine.table == model.table_of(machine.values)
     assert machine.values["sine"][1] == pytest.approx(0.01 * 2**24, rel=0.02)
@@ -127,18 +175,27 @@ def test_any_values_give_the_table_of_the_model_held_to_18_bits():
 
 
 def test_the_sine_is_true_within_its_points():
-    assert all(abs(model.sine_of(n) - 32767 * math.sin(math.tau * n / 65536)) <= 3.5 for n in range(65536))
+    assert all(
+        abs(model.sine_of(n) - 32767 * math.sin(math.tau * n / 65536)) <= 3.5 for n in range(65536)
+    )
 
 
 # ---- what is learned
+
 
 def test_an_ellipse_is_found_to_the_last_bits():
     gain, phase, offset = 1.06, math.radians(4), (0.05, -0.04)
     reason, values = fit(circle(3.3, gain=gain, phase=phase, offset=offset))
     assert reason == model.RUNNING
     size = 0.8 * 32768
-    assert abs(values["cos_offset"] - offset[0] * size) <= 1.5 and abs(values["sin_offset"] - offset[1] * size) <= 1.5
-    assert abs(values["gain"] / 65536 - 1 / (gain * math.cos(phase))) < 1e-4 and abs(values["quadrature_error"] / 65536 + math.tan(phase)) < 1e-4
+    assert (
+        abs(values["cos_offset"] - offset[0] * size) <= 1.5
+        and abs(values["sin_offset"] - offset[1] * size) <= 1.5
+    )
+    assert (
+        abs(values["gain"] / 65536 - 1 / (gain * math.cos(phase))) < 1e-4
+        and abs(values["quadrature_error"] / 65536 + math.tan(phase)) < 1e-4
+    )
 
 
 def test_one_turn_of_64_samples_is_enough_for_the_ellipse():
@@ -148,12 +205,18 @@ def test_one_turn_of_64_samples_is_enough_for_the_ellipse():
 def test_a_harmonic_of_the_phase_is_found_whatever_its_size_in_one_pass():
     draw, machine = np.random.default_rng(3), fresh(complete=True)
     while not machine.calibration.accepted:
-        phase = place = draw.uniform() + draw.uniform(12, 20) * np.arange(PHASES_OF_BURST) / PHASES_OF_BURST
-        for _ in range(30):                                     # the phase at which place = phase - 0.01 sin 3 phase
+        phase = place = (
+            draw.uniform() + draw.uniform(12, 20) * np.arange(PHASES_OF_BURST) / PHASES_OF_BURST
+        )
+        for _ in range(30):  # the phase at which place = phase - 0.01 sin 3 phase
             phase = place + 0.01 * np.sin(6 * np.pi * phase)
         machine.phases((np.rint(phase * 65536).astype(int) & 65535).tolist())
     found = np.array(machine.values["sine"]) / 2**24, np.array(machine.values["cosine"]) / 2**24
-    assert abs(found[0][2] - 0.01) < 3e-5 and np.abs(np.delete(found[0], 2)).max() < 4e-5 and np.abs(found[1]).max() < 2e-5
+    assert (
+        abs(found[0][2] - 0.01) < 3e-5
+        and np.abs(np.delete(found[0], 2)).max() < 4e-5
+        and np.abs(found[1]).max() < 2e-5
+    )
 
 
 @pytest.mark.parametrize("harmonic", [2, 5, -2, -5])
@@ -164,14 +227,19 @@ def test_the_length_of_the_vector_tells_plus_from_minus(harmonic):
     part = lambda real: 2 * np.mean(real * np.exp(-1j * order * turn))
     p, r = part(np.angle(wave * np.exp(-1j * turn))), part(np.abs(wave) - 1)
     plus, minus = (r + 1j * p) / 2, np.conj((r - 1j * p) / 2)
-    assert abs((plus if harmonic > 0 else minus) - size) < 2e-6 and abs(minus if harmonic > 0 else plus) < 2e-6
+    assert (
+        abs((plus if harmonic > 0 else minus) - size) < 2e-6
+        and abs(minus if harmonic > 0 else plus) < 2e-6
+    )
 
 
 def test_one_learner_waits_while_another_is_at_work():
     first, second = fresh(complete=True), fresh(complete=True)
-    assert first.call("open", ctypes.c_uint16(1), False) and not second.call("open", ctypes.c_uint16(1), False)
+    assert first.call("open", ctypes.c_uint16(1), False) and not second.call(
+        "open", ctypes.c_uint16(1), False
+    )
     assert second.calibration.need == PHASES and second.calibration.refused == 0
-    first.call("freeze", True)                                  # leaves its burst
+    first.call("freeze", True)  # leaves its burst
     assert second.phases(line(15)) == model.RUNNING and second.calibration.pass_.bursts == 1
 
 
@@ -183,16 +251,20 @@ def test_the_test_signal_is_learned_from_reset_within_610_fringes():
 
 # ---- the gates
 
-@pytest.mark.parametrize("samples, spoiled, reason", [
-    (circle(0.001), False, model.STANDSTILL),
-    (circle(0.6), False, model.PARTIAL_CIRCLE),
-    (circle(0.87), False, model.PARTIAL_CIRCLE),
-    (circle(3, size=0.1), False, model.AMPLITUDE),
-    (circle(3, size=1.4), False, model.AMPLITUDE),
-    (circle(3), True, model.AMPLITUDE),
-    (circle(3, gain=0.4), False, model.DISTORTED),
-    (circle(3, phase=0.9), False, model.DISTORTED),
-])
+
+@pytest.mark.parametrize(
+    "samples, spoiled, reason",
+    [
+        (circle(0.001), False, model.STANDSTILL),
+        (circle(0.6), False, model.PARTIAL_CIRCLE),
+        (circle(0.87), False, model.PARTIAL_CIRCLE),
+        (circle(3, size=0.1), False, model.AMPLITUDE),
+        (circle(3, size=1.4), False, model.AMPLITUDE),
+        (circle(3), True, model.AMPLITUDE),
+        (circle(3, gain=0.4), False, model.DISTORTED),
+        (circle(3, phase=0.9), False, model.DISTORTED),
+    ],
+)
 def test_the_ellipse_is_refused(samples, spoiled, reason):
     machine = fresh()
     machine.calibration.amplitude_low, machine.calibration.amplitude_high = 8000, 40000
@@ -200,23 +272,44 @@ def test_the_ellipse_is_refused(samples, spoiled, reason):
     for _ in range(2):
         got = machine.burst(words(samples), spoiled)
     assert got == reason
-    assert machine.values == before and machine.calibration.accepted == 0 and machine.calibration.refused >= 1 and machine.calibration.need == SAMPLES
+    assert (
+        machine.values == before
+        and machine.calibration.accepted == 0
+        and machine.calibration.refused >= 1
+        and machine.calibration.need == SAMPLES
+    )
     for _ in range(2):
         machine.burst(words(circle(3)))
-    assert machine.calibration.reason == model.RUNNING and machine.calibration.accepted == 1          # and it comes back by itself
+    assert (
+        machine.calibration.reason == model.RUNNING and machine.calibration.accepted == 1
+    )  # and it comes back by itself
 
 
-@pytest.mark.parametrize("phases, spoiled, reason", [
-    (line(0), False, model.STANDSTILL),
-    (line(0.2), False, model.STANDSTILL),
-    (line(7.9), False, model.PARTIAL_CIRCLE),
-    ([round(3e4 * math.sin(n / 30)) & 65535 for n in range(PHASES_OF_BURST)], False, model.PARTIAL_CIRCLE),
-    (line(15), True, model.AMPLITUDE),
-    (line(300), False, model.TOO_FAST),
-    (line(-300), False, model.TOO_FAST),
-    ([round(65536 * 20 * (n / PHASES_OF_BURST) ** 2) & 65535 for n in range(PHASES_OF_BURST)], False, model.UNSTEADY),
-    (line(30, 1300) + line(-15, PHASES_OF_BURST - 1300), False, model.UNSTEADY),
-])
+@pytest.mark.parametrize(
+    "phases, spoiled, reason",
+    [
+        (line(0), False, model.STANDSTILL),
+        (line(0.2), False, model.STANDSTILL),
+        (line(7.9), False, model.PARTIAL_CIRCLE),
+        (
+            [round(3e4 * math.sin(n / 30)) & 65535 for n in range(PHASES_OF_BURST)],
+            False,
+            model.PARTIAL_CIRCLE,
+        ),
+        (line(15), True, model.AMPLITUDE),
+        (line(300), False, model.TOO_FAST),
+        (line(-300), False, model.TOO_FAST),
+        (
+            [
+                round(65536 * 20 * (n / PHASES_OF_BURST) ** 2) & 65535
+                for n in range(PHASES_OF_BURST)
+            ],
+            False,
+            model.UNSTEADY,
+        ),
+        (line(30, 1300) + line(-15, PHASES_OF_BURST - 1300), False, model.UNSTEADY),
+    ],
+)
 def test_a_burst_of_phases_is_refused(phases, spoiled, reason):
     machine = fresh(complete=True)
     assert machine.phases(phases, spoiled) == reason == model.judge(phases, spoiled)[0]
@@ -228,7 +321,10 @@ def test_a_burst_of_phases_is_refused(phases, spoiled, reason):
 def test_a_vibration_locked_to_the_fringe_at_one_of_two_speeds_is_taken_off(multiple):
     speeds = iter([600, 700] * 100)
     machine, _, _, curve = signals.learn(3, 600 * multiple, speeds=lambda: next(speeds))
-    assert machine.calibration.complete and signals.remaining_nm(machine.values, machine.table, curve) <= 0.1
+    assert (
+        machine.calibration.complete
+        and signals.remaining_nm(machine.values, machine.table, curve) <= 0.1
+    )
 
 
 def test_vibrations_locked_to_the_fringe_at_each_speed_are_refused():
@@ -243,26 +339,41 @@ def test_one_speed_is_refused_since_a_locked_vibration_would_not_show():
     assert machine.calibration.reason == model.ONE_SPEED
     assert not machine.calibration.complete and not any(machine.values["cosine"])
     draw = random.Random(1)
-    machine.call("freeze", True)                                # a pass of the same signal from its start
+    machine.call("freeze", True)  # a pass of the same signal from its start
     machine.call("freeze", False)
     machine.calibration.reason = model.ONE_SPEED
-    for _ in range(model.PASS - 1):                             # what the pass was refused for stands while the next one runs
+    for _ in range(model.PASS - 1):  # what the pass was refused for stands while the next one runs
         assert machine.phases(line(draw.uniform(12, 18))) == model.ONE_SPEED
     assert machine.phases(line(15)) == model.RUNNING and machine.calibration.complete
 
 
 # ---- read, freeze, store, restore
 
+
 def test_what_is_restored_equals_what_was_stored():
     machine, _ = learned()
     stored, table, again = bytes(machine.calibration.values), machine.table, fresh()
-    assert again.call("restore", ctypes.byref(Values.from_buffer_copy(stored))) and again.calibration.need == LOADING
+    assert (
+        again.call("restore", ctypes.byref(Values.from_buffer_copy(stored)))
+        and again.calibration.need == LOADING
+    )
     again.idle()
-    assert bytes(again.calibration.values) == stored and again.table == table and again.calibration.complete and again.calibration.need == PHASES
+    assert (
+        bytes(again.calibration.values) == stored
+        and again.table == table
+        and again.calibration.complete
+        and again.calibration.need == PHASES
+    )
 
 
 def test_values_out_of_range_are_not_restored():
-    for name, value in (("gain", 0), ("gain", 131072), ("quadrature_error", 65537), ("sin_offset", -32768), ("cos_offset", 16385)):
+    for name, value in (
+        ("gain", 0),
+        ("gain", 131072),
+        ("quadrature_error", 65537),
+        ("sin_offset", -32768),
+        ("cos_offset", 16385),
+    ):
         machine, wrong = fresh(), Values(gain=65536)
         setattr(wrong, name, value)
         assert not machine.call("restore", ctypes.byref(wrong)) and machine.values == model.IDENTITY
@@ -288,15 +399,25 @@ def test_frozen_values_stand_and_learning_goes_on_when_thawed():
 def test_restored_values_are_loaded_even_if_frozen():
     machine = fresh()
     machine.call("freeze", True)
-    assert machine.call("restore", ctypes.byref(Values(gain=70000))) and machine.calibration.need == LOADING
+    assert (
+        machine.call("restore", ctypes.byref(Values(gain=70000)))
+        and machine.calibration.need == LOADING
+    )
     loads = machine.loads
-    assert machine.idle() == NOTHING and machine.loads == loads + 1 and machine.values["gain"] == 70000
+    assert (
+        machine.idle() == NOTHING and machine.loads == loads + 1 and machine.values["gain"] == 70000
+    )
 
 
 def test_forgetting_starts_from_nothing():
     machine, _ = learned()
     machine.call("forget")
-    assert machine.idle() == SAMPLES and machine.values == model.IDENTITY and set(machine.table) == {0} and not machine.calibration.complete
+    assert (
+        machine.idle() == SAMPLES
+        and machine.values == model.IDENTITY
+        and set(machine.table) == {0}
+        and not machine.calibration.complete
+    )
 
 
 def test_a_word_that_was_not_asked_for_changes_nothing():

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""axis.c: enabling, moving, stopping, homing and what a fault does, on an axis that lives in fake_machine."""
+"""axis.c: enabling, moving, stopping, homing and what a fault does, on an axis that lives in
+fake_machine.
+"""
+
 import random
 
 import pytest
@@ -14,9 +17,25 @@ RESET = DEFINES["AXIS_STROBES_RESET_FAULTS_MASK"]
 ENABLE = DEFINES["AXIS_CONTROL_ENABLE_MASK"]
 CLOSED_LOOP = DEFINES["AXIS_CONTROL_CLOSED_LOOP_MASK"]
 HOMING = DEFINES["AXIS_CONTROL_HOMING_MASK"]
-STEPS_OF_HOMING = [3, 40, 68, 72, 76, 80, 120, 170, 190, 205]     # ms: approach, catch, creep, depart, settle, zero
-DISTANCE = 100 * PERIOD                                     # from switch to zero
-SHORT = {"travel_low": -50 * PERIOD, "travel_high": 2000 * PERIOD, "home_distance": DISTANCE, "homing_search_speed": 2000}
+STEPS_OF_HOMING = [
+    3,
+    40,
+    68,
+    72,
+    76,
+    80,
+    120,
+    170,
+    190,
+    205,
+]  # ms: approach, catch, creep, depart, settle, zero
+DISTANCE = 100 * PERIOD  # from switch to zero
+SHORT = {
+    "travel_low": -50 * PERIOD,
+    "travel_high": 2000 * PERIOD,
+    "home_distance": DISTANCE,
+    "homing_search_speed": 2000,
+}
 
 
 def enabled(*axes, **parameters):
@@ -35,11 +54,14 @@ def homed(axis=None, **parameters):
 
 
 def finish(machine, ms=20_000):
-    assert machine.run(ms, until=lambda: machine.status()["ended"] != "running"), "the motion does not end"
+    assert machine.run(ms, until=lambda: machine.status()["ended"] != "running"), (
+        "the motion does not end"
+    )
     return machine.status()["ended"]
 
 
 # enable
+
 
 def test_the_drive_is_off_at_start():
     machine = FakeNode()
@@ -54,7 +76,11 @@ def test_enable_holds_here_before_the_loop_is_closed():
     machine = FakeNode(axis)
     axis.player.target, axis.strobes = 0, []
     machine.ask("enable", axis=0, on=1)
-    assert axis.strobes == [(SET_TARGET, 0)] and axis.control == ENABLE | CLOSED_LOOP and axis.target == 12345
+    assert (
+        axis.strobes == [(SET_TARGET, 0)]
+        and axis.control == ENABLE | CLOSED_LOOP
+        and axis.target == 12345
+    )
     status = machine.status()
     assert status["state"] == "holding" and status["flags"] == {"enabled", "settled"}
 
@@ -74,7 +100,9 @@ def test_enable_off_is_always_allowed_and_ends_a_motion():
     machine.run(20)
     machine.ask("enable", axis=0, on=0)
     status = machine.status()
-    assert (status["state"], status["ended"]) == ("off", "stopped") and "enabled" not in status["flags"]
+    assert (status["state"], status["ended"]) == ("off", "stopped") and "enabled" not in status[
+        "flags"
+    ]
     assert not machine.axes[0].player.moving and machine.axes[0].control == 0
     machine.ask("enable", axis=0, on=0)
     assert "homed" in machine.status()["flags"]
@@ -103,6 +131,7 @@ def test_enable_is_refused_if_the_guard_does_not_agree():
 
 # move
 
+
 def test_a_move_ends_exactly_at_its_target():
     machine = homed()
     for target in (500 * PERIOD + 1, 500 * PERIOD, 0, SHORT["travel_low"], SHORT["travel_high"]):
@@ -126,12 +155,17 @@ def test_each_limit_of_the_motion_counts_from_when_it_is_set():
     machine = homed()
     last = machine.ask("move", axis=0, target=100 * PERIOD)["duration_ticks"]
     assert finish(machine) == "ok"
-    for n, (name, value) in enumerate((("jerk", 1_000_000), ("acceleration", 20_000), ("velocity", 700))):
+    for n, (name, value) in enumerate(
+        (("jerk", 1_000_000), ("acceleration", 20_000), ("velocity", 700))
+    ):
         machine.set(**{name: value})
         ticks = machine.ask("move", axis=0, target=100 * PERIOD * (n % 2))["duration_ticks"]
         assert finish(machine) == "ok" and ticks > last
         last = ticks
-    assert machine.axes[0].word[DEFINES["AXIS_STOP_DECELERATION"]] == limits(700, 20_000, 1_000_000)[1] >> 8
+    assert (
+        machine.axes[0].word[DEFINES["AXIS_STOP_DECELERATION"]]
+        == limits(700, 20_000, 1_000_000)[1] >> 8
+    )
 
 
 def test_a_move_to_where_the_axis_is_ends_after_the_settling_time():
@@ -170,22 +204,36 @@ def test_motions_are_refused_in_the_documented_order():
     machine.ask("home", axis=0)
     assert move(beyond) == machine.request("home", axis=0)[0] == "busy"
     assert finish(machine) == "ok"
-    assert move(beyond) == move(SHORT["travel_low"] - 1) == move(-2**63) == move(2**63 - 1) == "out_of_travel"
+    assert (
+        move(beyond)
+        == move(SHORT["travel_low"] - 1)
+        == move(-(2**63))
+        == move(2**63 - 1)
+        == "out_of_travel"
+    )
     assert move(1000 * PERIOD) == "ok"
-    assert machine.request("home", axis=0)[0] == machine.request("prepare", axis=0, target=0)[0] == "busy"
+    assert (
+        machine.request("home", axis=0)[0]
+        == machine.request("prepare", axis=0, target=0)[0]
+        == "busy"
+    )
     assert move(beyond) == "out_of_travel"
 
 
 def test_parameters_are_refused_while_the_axis_moves():
     machine = homed()
     machine.ask("move", axis=0, target=500 * PERIOD)
-    assert machine.request("set_parameter", axis=0, parameter=PARAMETER["kp"]["id"], value=1)[0] == "busy"
+    assert (
+        machine.request("set_parameter", axis=0, parameter=PARAMETER["kp"]["id"], value=1)[0]
+        == "busy"
+    )
     machine.ask("get_parameter", axis=0, parameter=PARAMETER["kp"]["id"])
     finish(machine)
     machine.set(kp=1)
 
 
 # prepared motions, override
+
 
 def begun(machine):
     """The axes that the node was reported to start together."""
@@ -211,10 +259,16 @@ def test_prepared_motions_begin_in_one_write_and_land_exactly():
     machine.run(50)
     for n in (0, 1):
         status = machine.status(n)
-        assert (status["state"], status["ended"], status["position"]) == ("prepared", "running", before[n])
+        assert (status["state"], status["ended"], status["position"]) == (
+            "prepared",
+            "running",
+            before[n],
+        )
     machine.ask("start", axes=3)
     assert begun(machine) == 3
-    assert machine.run(20_000, until=lambda: all(machine.status(n)["ended"] == "ok" for n in (0, 1)))
+    assert machine.run(
+        20_000, until=lambda: all(machine.status(n)["ended"] == "ok" for n in (0, 1))
+    )
     assert tuple(machine.status(n)["target"] for n in (0, 1)) == targets
 
 
@@ -222,7 +276,9 @@ def test_none_begins_if_one_of_them_is_not_prepared():
     machine = two_homed()
     machine.ask("prepare", axis=1, target=9 * PERIOD)
     assert machine.request("start", axes=3)[0] == "not_prepared" and begun(machine) == 0
-    assert machine.request("start", axes=0)[0] == machine.request("start", axes=4)[0] == "out_of_range"
+    assert (
+        machine.request("start", axes=0)[0] == machine.request("start", axes=4)[0] == "out_of_range"
+    )
     assert machine.status(1)["state"] == "prepared"
     machine.ask("start", axes=2)
     assert begun(machine) == 2 and machine.request("start", axes=2)[0] == "not_prepared"
@@ -233,8 +289,20 @@ def sync(machine):
     line = DEFINES["BUS_BASE"]
     machine.word[line + DEFINES["BUS_SYNCS"]] = machine.word.get(line + DEFINES["BUS_SYNCS"], 0) + 1
     for n, axis in enumerate(machine.axes):
-        axis.player.moving |= bool(machine.word[line + DEFINES["BUS_SYNC_AXES"]] >> n & 1 and axis.player.queue)
-    return machine.hear([0x20 | DEFINES["BUS_RECEIVE_COMMAND_MASK"], 1, 7, 0, 0, 0, DEFINES["BUS_RECEIVE_GOOD_MASK"]])
+        axis.player.moving |= bool(
+            machine.word[line + DEFINES["BUS_SYNC_AXES"]] >> n & 1 and axis.player.queue
+        )
+    return machine.hear(
+        [
+            0x20 | DEFINES["BUS_RECEIVE_COMMAND_MASK"],
+            1,
+            7,
+            0,
+            0,
+            0,
+            DEFINES["BUS_RECEIVE_GOOD_MASK"],
+        ]
+    )
 
 
 def test_a_mark_starts_the_axes_that_wait_for_it_and_no_other_and_is_not_answered():
@@ -246,7 +314,10 @@ def test_a_mark_starts_the_axes_that_wait_for_it_and_no_other_and_is_not_answere
     assert [machine.status(n)["state"] for n in (0, 1)] == ["prepared", "prepared"]
     assert sync(machine) == b""
     assert [machine.status(n)["state"] for n in (0, 1)] == ["prepared", "moving"]
-    assert machine.run(20_000, until=lambda: machine.status(1)["ended"] == "ok") and machine.status(1)["target"] == 100 * PERIOD
+    assert (
+        machine.run(20_000, until=lambda: machine.status(1)["ended"] == "ok")
+        and machine.status(1)["target"] == 100 * PERIOD
+    )
     sync(machine)
     machine.run(20)
     assert machine.status(0)["state"] == "prepared"
@@ -255,7 +326,10 @@ def test_a_mark_starts_the_axes_that_wait_for_it_and_no_other_and_is_not_answere
 def test_what_waits_for_a_mark_can_be_taken_back_and_what_is_not_prepared_cannot_wait():
     machine = two_homed()
     machine.ask("prepare", axis=0, target=100 * PERIOD)
-    assert machine.request("start_at_sync", axes=3)[0] == "not_prepared" and machine.request("start_at_sync", axes=4)[0] == "out_of_range"
+    assert (
+        machine.request("start_at_sync", axes=3)[0] == "not_prepared"
+        and machine.request("start_at_sync", axes=4)[0] == "out_of_range"
+    )
     machine.ask("start_at_sync", axes=1)
     machine.ask("start_at_sync", axes=0)
     sync(machine)
@@ -283,16 +357,33 @@ def test_the_override_changes_in_motion_and_nothing_else_does():
     machine = homed()
     machine.ask("move", axis=0, target=500 * PERIOD)
     for share in (65536, 32768, 1, 0):
-        machine.ask("set_parameter", axis=0, parameter=PARAMETER["feed_override"]["id"], value=share)
+        machine.ask(
+            "set_parameter", axis=0, parameter=PARAMETER["feed_override"]["id"], value=share
+        )
         assert machine.axes[0].read(DEFINES["AXIS_FEED_OVERRIDE"]) == share
-    assert machine.request("set_parameter", axis=0, parameter=PARAMETER["feed_override"]["id"], value=65537)[0] == "out_of_range"
-    assert machine.request("set_parameter", axis=0, parameter=PARAMETER["velocity"]["id"], value=100)[0] == "busy"
+    assert (
+        machine.request(
+            "set_parameter", axis=0, parameter=PARAMETER["feed_override"]["id"], value=65537
+        )[0]
+        == "out_of_range"
+    )
+    assert (
+        machine.request("set_parameter", axis=0, parameter=PARAMETER["velocity"]["id"], value=100)[
+            0
+        ]
+        == "busy"
+    )
 
 
-@pytest.mark.parametrize("name, value", [("drive", 1), ("position_source", 1), ("step_output", 1), ("step_invert", 1)])
+@pytest.mark.parametrize(
+    "name, value", [("drive", 1), ("position_source", 1), ("step_output", 1), ("step_invert", 1)]
+)
 def test_what_the_drive_is_changes_only_with_the_drive_off(name, value):
     machine = enabled()
-    assert machine.request("set_parameter", axis=0, parameter=PARAMETER[name]["id"], value=value)[0] == "busy"
+    assert (
+        machine.request("set_parameter", axis=0, parameter=PARAMETER[name]["id"], value=value)[0]
+        == "busy"
+    )
     machine.ask("enable", axis=0, on=0)
     machine.ask("set_parameter", axis=0, parameter=PARAMETER[name]["id"], value=value)
     assert machine.ask("get_parameter", axis=0, parameter=PARAMETER[name]["id"])["value"] == value
@@ -300,9 +391,16 @@ def test_what_the_drive_is_changes_only_with_the_drive_off(name, value):
 
 def test_a_drive_that_was_not_built_is_refused():
     machine = FakeNode()
-    machine.actuators[0][DEFINES["ACTUATOR_DRIVE"]] = 0b0001 << DEFINES["ACTUATOR_DRIVE_BUILT_SHIFT"]
+    machine.actuators[0][DEFINES["ACTUATOR_DRIVE"]] = (
+        0b0001 << DEFINES["ACTUATOR_DRIVE_BUILT_SHIFT"]
+    )
     for name, value in (("drive", 1), ("drive", 2), ("fine_reach", 65536)):
-        assert machine.request("set_parameter", axis=0, parameter=PARAMETER[name]["id"], value=value)[0] == "not_built"
+        assert (
+            machine.request("set_parameter", axis=0, parameter=PARAMETER[name]["id"], value=value)[
+                0
+            ]
+            == "not_built"
+        )
     machine.ask("set_parameter", axis=0, parameter=PARAMETER["drive"]["id"], value=0)
 
 
@@ -310,15 +408,26 @@ SINE = [parameter for parameter in PARAMETER.values() if "needs" in parameter]
 
 
 def test_without_sine_and_cosine_a_parameter_that_needs_them_takes_what_asks_for_nothing():
-    wanted = {p["id"]: next(value for value in (p["min"] + 1, p["min"] + 2) if value != p["default"]) if p["max"] > 1 else 1 for p in SINE}
+    wanted = {
+        p["id"]: next(value for value in (p["min"] + 1, p["min"] + 2) if value != p["default"])
+        if p["max"] > 1
+        else 1
+        for p in SINE
+    }
     machine = FakeNode(sine=False)
     for parameter in SINE:
         asked = {"axis": 0, "parameter": parameter["id"]}
         for value in (0, parameter["default"]):
             machine.ask("set_parameter", **asked, value=value)
             assert machine.ask("get_parameter", **asked)["value"] == value
-        assert machine.request("set_parameter", **asked, value=wanted[parameter["id"]])[0] == "not_built"
-        assert machine.request("set_parameter", **asked, value=parameter["max"] + 1)[0] == "out_of_range"
+        assert (
+            machine.request("set_parameter", **asked, value=wanted[parameter["id"]])[0]
+            == "not_built"
+        )
+        assert (
+            machine.request("set_parameter", **asked, value=parameter["max"] + 1)[0]
+            == "out_of_range"
+        )
         assert machine.ask("get_parameter", **asked)["value"] == parameter["default"]
     machine = FakeNode()
     for number, value in wanted.items():
@@ -326,7 +435,10 @@ def test_without_sine_and_cosine_a_parameter_that_needs_them_takes_what_asks_for
 
 
 def test_without_sine_and_cosine_the_position_is_made_of_counts_from_power_up_on():
-    machine, source = FakeNode(sine=False), {"axis": 0, "parameter": PARAMETER["position_source"]["id"]}
+    machine, source = (
+        FakeNode(sine=False),
+        {"axis": 0, "parameter": PARAMETER["position_source"]["id"]},
+    )
     chosen = DEFINES["FEEDBACK_POSITION_SOURCE_COUNTS_MASK"]
     assert machine.ask("get_parameter", **source)["value"] == 1
     assert machine.feedback_channels[0].word[DEFINES["FEEDBACK_POSITION_SOURCE"]] & chosen
@@ -337,9 +449,17 @@ def test_without_sine_and_cosine_the_position_is_made_of_counts_from_power_up_on
 
 
 def test_without_sine_and_cosine_their_operations_are_not_built_and_the_others_work():
-    operations = (("signal", {}), ("calibration", {"action": 0}), ("get_correction", {}), ("get_harmonic", {"order": 1}),
-                  ("set_harmonic", {"order": 1, "cosine": 0, "sine": 0}),
-                  ("set_correction", {"sin_offset": 0, "cos_offset": 0, "gain": 65536, "quadrature_error": 0, "apply": 1}))
+    operations = (
+        ("signal", {}),
+        ("calibration", {"action": 0}),
+        ("get_correction", {}),
+        ("get_harmonic", {"order": 1}),
+        ("set_harmonic", {"order": 1, "cosine": 0, "sine": 0}),
+        (
+            "set_correction",
+            {"sin_offset": 0, "cos_offset": 0, "gain": 65536, "quadrature_error": 0, "apply": 1},
+        ),
+    )
     machine = FakeNode()
     for operation, fields in operations:
         machine.ask(operation, axis=0, **fields)
@@ -376,13 +496,14 @@ def test_settling_means_the_whole_time_inside_the_window():
     for _ in range(5):
         machine.run(30)
         assert machine.status()["ended"] == "running"
-        axis.machine += PERIOD                              # pushed out
+        axis.machine += PERIOD  # pushed out
         machine.poll()
     machine.run(60)
     assert machine.status()["ended"] == "ok"
 
 
 # stop
+
 
 def test_stop_brakes_and_keeps_the_drive_on():
     machine = homed()
@@ -391,8 +512,10 @@ def test_stop_brakes_and_keeps_the_drive_on():
     before = machine.axes[0].position
     machine.axes[0].strobes = []
     machine.ask("stop", axis=0)
-    assert [strobes for strobes, _ in machine.axes[0].strobes] == [CONTROLLED_STOP] and machine.status()["state"] == "stopping"
-    machine.ask("stop", axis=0)                             # once more changes nothing
+    assert [strobes for strobes, _ in machine.axes[0].strobes] == [
+        CONTROLLED_STOP
+    ] and machine.status()["state"] == "stopping"
+    machine.ask("stop", axis=0)  # once more changes nothing
     assert len(machine.axes[0].strobes) == 1
     assert machine.request("move", axis=0, target=0)[0] == "busy"
     assert finish(machine) == "stopped"
@@ -421,7 +544,10 @@ def test_stop_while_settling_ends_it():
 
 # faults
 
-@pytest.mark.parametrize("fault", [name for name in FAULT if name not in ("limit_low", "limit_high", "following_error")])
+
+@pytest.mark.parametrize(
+    "fault", [name for name in FAULT if name not in ("limit_low", "limit_high", "following_error")]
+)
 def test_a_fault_ends_the_motion_and_is_named(fault):
     machine = homed()
     axis = machine.axes[0]
@@ -430,10 +556,19 @@ def test_a_fault_ends_the_motion_and_is_named(fault):
     axis.causes = FAULT[fault]
     machine.run(2)
     where, status = axis.position, machine.status()
-    assert (status["state"], status["ended"]) == ("faulted", "ended_by_fault") and "enabled" not in status["flags"]
-    assert status["faults"] == status["first_fault"] == FAULT[fault] and not axis.player.moving and axis.control == 0
+    assert (status["state"], status["ended"]) == (
+        "faulted",
+        "ended_by_fault",
+    ) and "enabled" not in status["flags"]
+    assert (
+        status["faults"] == status["first_fault"] == FAULT[fault]
+        and not axis.player.moving
+        and axis.control == 0
+    )
     assert machine.ask("encoder", axis=0)["fault_position"] == where
-    assert ("homed" in status["flags"]) == (fault != "encoder")         # only an encoder fault loses the zero
+    assert ("homed" in status["flags"]) == (
+        fault != "encoder"
+    )  # only an encoder fault loses the zero
     assert machine.request("move", axis=0, target=0)[0] == "faulted"
 
     if fault in ("estop", "drive", "cpu"):
@@ -442,7 +577,9 @@ def test_a_fault_ends_the_motion_and_is_named(fault):
     machine.ask("reset_faults", axis=0)
     assert machine.status()["state"] == "off" and machine.status()["faults"] == 0
     machine.ask("enable", axis=0, on=1)
-    assert machine.request("move", axis=0, target=0)[0] == ("ok" if fault != "encoder" else "not_homed")
+    assert machine.request("move", axis=0, target=0)[0] == (
+        "ok" if fault != "encoder" else "not_homed"
+    )
 
 
 def test_a_fault_while_nothing_moves_leaves_the_outcome_of_the_last_motion():
@@ -456,7 +593,10 @@ def test_an_axis_that_cannot_follow_is_a_fault():
     machine = homed(following_limit=3 * PERIOD)
     machine.axes[0].seized = True
     machine.ask("move", axis=0, target=100 * PERIOD)
-    assert finish(machine) == "ended_by_fault" and machine.status()["faults"] == FAULT["following_error"]
+    assert (
+        finish(machine) == "ended_by_fault"
+        and machine.status()["faults"] == FAULT["following_error"]
+    )
     machine.axes[0].seized = False
     machine.ask("reset_faults", axis=0)
     machine.ask("enable", axis=0, on=1)
@@ -499,13 +639,18 @@ def test_running_into_a_switch_is_a_fault_and_there_is_a_way_off_it():
     machine = homed(Axis(position=50 * PERIOD, low=0, high=300 * PERIOD))
     axis = machine.axes[0]
     machine.ask("move", axis=0, target=1000 * PERIOD)
-    assert finish(machine) == "ended_by_fault" and machine.status()["first_fault"] == FAULT["limit_high"]
+    assert (
+        finish(machine) == "ended_by_fault"
+        and machine.status()["first_fault"] == FAULT["limit_high"]
+    )
     machine.ask("reset_faults", axis=0)
     machine.ask("enable", axis=0, on=1)
     machine.run(10)
     assert axis.pressed_high and axis.control & HOMING and machine.status()["state"] == "holding"
     machine.ask("move", axis=0, target=0)
-    assert finish(machine) == "ok" and not axis.control & HOMING          # off the switch it is a fault again
+    assert (
+        finish(machine) == "ok" and not axis.control & HOMING
+    )  # off the switch it is a fault again
     machine.ask("move", axis=0, target=1000 * PERIOD)
     assert finish(machine) == "ended_by_fault"
 
@@ -516,27 +661,35 @@ def test_faults_of_one_axis_leave_the_other_alone():
         machine.ask("enable", axis=axis, on=1)
     machine.axes[1].causes = FAULT["encoder"]
     machine.run(5)
-    assert machine.status(axis=0)["state"] == "holding" and machine.status(axis=1)["state"] == "faulted"
+    assert (
+        machine.status(axis=0)["state"] == "holding"
+        and machine.status(axis=1)["state"] == "faulted"
+    )
 
 
 # home
+
 
 def place(axis):
     """Where the zero of the node lies, in positions of the machine."""
     return -axis.origin
 
 
-@pytest.mark.parametrize("offset", [0, 1, PERIOD // 2 - 1, PERIOD // 2, PERIOD - 1, 17 * PERIOD + 12345])
+@pytest.mark.parametrize(
+    "offset", [0, 1, PERIOD // 2 - 1, PERIOD // 2, PERIOD - 1, 17 * PERIOD + 12345]
+)
 def test_home_puts_the_zero_at_a_phase_zero_a_distance_from_the_edge(offset):
     machine = homed(Axis(position=50 * PERIOD, low=-10 * PERIOD + offset))
     axis, answer = machine.axes[0], machine.ask("encoder", axis=0)
-    edge = axis.low_at + PERIOD // 2                        # where the switch opens
+    edge = axis.low_at + PERIOD // 2  # where the switch opens
     assert place(axis) % PERIOD == 0
-    asked = place(axis) + answer["home_phase"]              # edge + distance, as the firmware saw it
+    asked = place(axis) + answer["home_phase"]  # edge + distance, as the firmware saw it
     assert abs(answer["home_phase"]) <= PERIOD // 2
-    assert 0 <= asked - edge - DISTANCE < PERIOD // 4       # the creep goes on for at most two polls
+    assert 0 <= asked - edge - DISTANCE < PERIOD // 4  # the creep goes on for at most two polls
     assert axis.position == axis.target == 0 and machine.status()["state"] == "holding"
-    assert machine.status()["flags"] == {"enabled", "homed", "settled"} and not axis.control & HOMING
+    assert (
+        machine.status()["flags"] == {"enabled", "homed", "settled"} and not axis.control & HOMING
+    )
 
 
 def test_home_stops_creeping_when_the_switch_opens():
@@ -560,12 +713,14 @@ def test_the_target_follows_an_axis_that_slides_into_its_switch():
 
 def test_the_longest_search_stays_inside_the_numbers():
     axis = Axis()
-    machine = enabled(axis, travel_low=-2**47, travel_high=2**47 - 1, homing_search_speed=1_000_000)
+    machine = enabled(
+        axis, travel_low=-(2**47), travel_high=2**47 - 1, homing_search_speed=1_000_000
+    )
     machine.ask("home", axis=0)
     while not axis.pushed[-1][4]:
-        axis.player.queue.clear()                           # as if they had been played
+        axis.player.queue.clear()  # as if they had been played
         machine.poll()
-    assert distance(segment[:4] for segment in axis.pushed) == -2**46 << 24
+    assert distance(segment[:4] for segment in axis.pushed) == -(2**46) << 24
 
 
 def test_home_comes_back_to_a_switch_that_threw_the_axis_off():
@@ -575,7 +730,11 @@ def test_home_comes_back_to_a_switch_that_threw_the_axis_off():
     assert machine.run(1000, until=lambda: axis.pressed_low)
     axis.machine = 7 * PERIOD
     assert finish(machine) == "ok"
-    assert 0 <= place(axis) + machine.ask("encoder", axis=0)["home_phase"] - DISTANCE - PERIOD // 2 < PERIOD // 4
+    assert (
+        0
+        <= place(axis) + machine.ask("encoder", axis=0)["home_phase"] - DISTANCE - PERIOD // 2
+        < PERIOD // 4
+    )
 
 
 def test_home_works_at_the_high_end_too():
@@ -588,8 +747,12 @@ def test_home_works_at_the_high_end_too():
 def test_home_from_a_pressed_switch_goes_away_first(depth):
     axis = Axis(position=-depth, low=0)
     machine = homed(axis)
-    assert axis.pushed[0][2] > 0                            # the first jerk leads away
-    assert 0 <= place(axis) + machine.ask("encoder", axis=0)["home_phase"] - DISTANCE - PERIOD // 2 < PERIOD // 4
+    assert axis.pushed[0][2] > 0  # the first jerk leads away
+    assert (
+        0
+        <= place(axis) + machine.ask("encoder", axis=0)["home_phase"] - DISTANCE - PERIOD // 2
+        < PERIOD // 4
+    )
 
 
 def test_home_twice_finds_the_same_zero():
@@ -654,4 +817,8 @@ def test_a_fault_ends_homing(ms):
     axis.causes = FAULT["estop"]
     machine.run(2)
     status = machine.status()
-    assert (status["state"], status["ended"]) == ("faulted", "ended_by_fault") and axis.control == 0 and "homed" not in status["flags"]
+    assert (
+        (status["state"], status["ended"]) == ("faulted", "ended_by_fault")
+        and axis.control == 0
+        and "homed" not in status["flags"]
+    )

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """build.py: what it makes, when it makes it, and how it says that it cannot."""
+
 import os
 import struct
 import subprocess
@@ -14,8 +15,13 @@ MEMORY = 98304
 
 
 def build(out, *options, **environment):
-    return subprocess.run([sys.executable, SOURCE / "build.py", "--out", out, *options], capture_output=True, text=True, check=False,
-                          env={**os.environ, **environment})
+    return subprocess.run(
+        [sys.executable, SOURCE / "build.py", "--out", out, *options],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, **environment},
+    )
 
 
 def functions(elf):
@@ -35,13 +41,20 @@ def test_the_hex_is_the_program_filled_to_the_size_of_the_memory(made):
     lines = (out / "firmware.hex").read_text().split()
     program = (out / "firmware.bin").read_bytes()
     assert len(lines) == MEMORY // 4 and all(len(line) == 8 for line in lines)
-    assert b"".join(struct.pack("<I", int(line, 16)) for line in lines) == program + bytes(MEMORY - len(program))
+    assert b"".join(struct.pack("<I", int(line, 16)) for line in lines) == program + bytes(
+        MEMORY - len(program)
+    )
 
 
 def test_the_report_adds_up(made):
     numbers = [int(word) for word in made[1].replace(",", "").split() if word.isdigit()]
     program, data, stack, used, memory, free = numbers
-    assert memory == MEMORY and program + data + stack == used and used + free == memory and stack == 4096
+    assert (
+        memory == MEMORY
+        and program + data + stack == used
+        and used + free == memory
+        and stack == 4096
+    )
     assert program == (made[0] / "firmware.bin").stat().st_size
 
 
@@ -51,13 +64,21 @@ def test_nothing_is_made_twice(made):
     assert (made[0] / "firmware.elf").stat().st_mtime_ns == before
 
 
-@pytest.mark.parametrize("options, environment, words", [
-    (["--memory", "16384"], {}, "does not fit"),
-    ([], {"CROSS": "no-such-machine-"}, "no-such-machine-gcc was not found"),
-])
+@pytest.mark.parametrize(
+    "options, environment, words",
+    [
+        (["--memory", "16384"], {}, "does not fit"),
+        ([], {"CROSS": "no-such-machine-"}, "no-such-machine-gcc was not found"),
+    ],
+)
 def test_what_cannot_be_made_is_said_in_one_line(tmp_path, options, environment, words):
     run = build(tmp_path, *options, **environment)
-    assert run.returncode == 1 and words in run.stderr and run.stderr.count("\n") == 1 and run.stdout == ""
+    assert (
+        run.returncode == 1
+        and words in run.stderr
+        and run.stderr.count("\n") == 1
+        and run.stdout == ""
+    )
     assert not (tmp_path / "firmware.hex").exists()
 
 
@@ -65,5 +86,10 @@ def test_each_image_is_made_beside_the_others(made, tmp_path):
     run = build(tmp_path, "--image", "station")
     assert run.returncode == 0 and run.stdout.startswith("station: "), run.stderr
     station, axis = functions(tmp_path / "station.elf"), functions(made[0] / "firmware.elf")
-    assert "settings_operation" in station and not {"calibration_axes_work", "calibration_work"} & station
-    assert "settings_operation" not in axis and {"calibration_axes_work", "calibration_work"} <= axis
+    assert (
+        "settings_operation" in station
+        and not {"calibration_axes_work", "calibration_work"} & station
+    )
+    assert (
+        "settings_operation" not in axis and {"calibration_axes_work", "calibration_work"} <= axis
+    )

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""feedback.c: the learner is served burst by burst, what it says reaches the hardware whole, and the host is refused what it may not."""
+"""feedback.c: the learner is served burst by burst, what it says reaches the hardware whole, and
+the host is refused what it may not.
+"""
+
 import math
 
 import pytest
@@ -22,7 +25,9 @@ def speed(periods_per_second):
 
 
 class Signal:
-    """Bursts of a circle beside its middle, with a second harmonic of the phase; two speeds, turn by turn."""
+    """Bursts of a circle beside its middle, with a second harmonic of the phase; two speeds, turn
+    by turn.
+    """
 
     def __init__(self, offset=(1000, -600), error=0.002, periods=(20, 26)):
         self.offset, self.error, self.periods, self.count = offset, error, periods, 0
@@ -32,10 +37,18 @@ class Signal:
         periods = self.periods[self.count % len(self.periods)]
         if phases:
             place = [0.123 * self.count + periods * n / 2048 for n in range(2048)]
-            seen = [round(65536 * (p + self.error * math.sin(2 * math.tau * p))) & 65535 for p in place]
+            seen = [
+                round(65536 * (p + self.error * math.sin(2 * math.tau * p))) & 65535 for p in place
+            ]
             return [later << 16 | earlier for earlier, later in zip(seen[::2], seen[1::2])]
         turn = [math.tau * periods * n / 1024 for n in range(1024)]
-        legs = [(round(25000 * math.cos(t)) + self.offset[1], round(25000 * math.sin(t)) + self.offset[0]) for t in turn]
+        legs = [
+            (
+                round(25000 * math.cos(t)) + self.offset[1],
+                round(25000 * math.sin(t)) + self.offset[0],
+            )
+            for t in turn
+        ]
         return [(cos & 65535) << 16 | sin & 65535 for cos, sin in legs]
 
 
@@ -61,37 +74,76 @@ def correction(machine):
 
 # ---- from power-up
 
+
 def test_at_power_up_nothing_is_corrected_and_nothing_is_learned():
     machine = moving(learning=False)
     grating = machine.feedback_channels[0]
     machine.poll(100)
-    assert grating.correction == IDENTITY and set(grating.points.values()) == {0} and grating.loads == 1 and grating.records == []
-    assert look(machine) == dict(reason="frozen", converged=0, frozen=1, accepted=0, refused=0, scatter=0)
-    assert correction(machine) == IDENTITY and machine.ask("get_harmonic", axis=0, order=10) == dict(cosine=0, sine=0)
+    assert (
+        grating.correction == IDENTITY
+        and set(grating.points.values()) == {0}
+        and grating.loads == 1
+        and grating.records == []
+    )
+    assert look(machine) == dict(
+        reason="frozen", converged=0, frozen=1, accepted=0, refused=0, scatter=0
+    )
+    assert correction(machine) == IDENTITY and machine.ask(
+        "get_harmonic", axis=0, order=10
+    ) == dict(cosine=0, sine=0)
 
 
 def test_the_settings_of_the_user_reach_the_grating():
     machine = FakeNode()
     word = machine.feedback_channels[0].word
-    assert word[DEFINES["FEEDBACK_VELOCITY_QUANTUM"]] == 128 and word[DEFINES["FEEDBACK_SIGNAL_FAULT_MASK"]] == 0
-    assert word[DEFINES["FEEDBACK_EDGE_FILTER"]] == 0 and word[DEFINES["FEEDBACK_DECODER_MODE"]] == 0
-    machine.set(signal_clip_level=100, signal_tolerance=7, signal_jump=8, signal_no_noise_samples=9, signal_span=10, signal_band=11, signal_sign_threshold=12,
-                signal_offset=13, signal_balance=14, signal_quadrature_error=15, signal_fault_mask=32767, velocity_quantum=0, decoder_mode=2)
-    for name, low, high in (("LISSAJOUS", 100, 7), ("JUMP", 8, 9), ("CHANNEL", 10, 11), ("DRIFT", 13, 14),
-                            ("QUADRATURE", 15, 12)):
+    assert (
+        word[DEFINES["FEEDBACK_VELOCITY_QUANTUM"]] == 128
+        and word[DEFINES["FEEDBACK_SIGNAL_FAULT_MASK"]] == 0
+    )
+    assert (
+        word[DEFINES["FEEDBACK_EDGE_FILTER"]] == 0 and word[DEFINES["FEEDBACK_DECODER_MODE"]] == 0
+    )
+    machine.set(
+        signal_clip_level=100,
+        signal_tolerance=7,
+        signal_jump=8,
+        signal_no_noise_samples=9,
+        signal_span=10,
+        signal_band=11,
+        signal_sign_threshold=12,
+        signal_offset=13,
+        signal_balance=14,
+        signal_quadrature_error=15,
+        signal_fault_mask=32767,
+        velocity_quantum=0,
+        decoder_mode=2,
+    )
+    for name, low, high in (
+        ("LISSAJOUS", 100, 7),
+        ("JUMP", 8, 9),
+        ("CHANNEL", 10, 11),
+        ("DRIFT", 13, 14),
+        ("QUADRATURE", 15, 12),
+    ):
         assert word[DEFINES[f"FEEDBACK_{name}_LIMITS"]] == low | high << 16
-    assert word[DEFINES["FEEDBACK_SIGNAL_FAULT_MASK"]] == 32767 and word[DEFINES["FEEDBACK_VELOCITY_QUANTUM"]] == 0
+    assert (
+        word[DEFINES["FEEDBACK_SIGNAL_FAULT_MASK"]] == 32767
+        and word[DEFINES["FEEDBACK_VELOCITY_QUANTUM"]] == 0
+    )
     assert word[DEFINES["FEEDBACK_DECODER_MODE"]] == 2
 
 
 def test_the_deglitcher_counts_samples_that_lie_so_far_apart():
     machine = FakeNode()
-    machine.set(deglitch=10_000, filter_skip=1000, filter_tolerated=3)          # 40 clk of 4 MHz; 4 clk left out: 5 clk a sample
+    machine.set(
+        deglitch=10_000, filter_skip=1000, filter_tolerated=3
+    )  # 40 clk of 4 MHz; 4 clk left out: 5 clk a sample
     assert machine.feedback_channels[0].word[DEFINES["FEEDBACK_EDGE_FILTER"]] == 4 | 3 << 16
     assert machine.axes[0].word[DEFINES["AXIS_SENSING"]] & 0xFFFF == (40 + 4) // 5
 
 
 # ---- the learner
+
 
 def test_it_learns_in_motion_and_what_it_learned_is_loaded_at_once():
     machine = moving()
@@ -101,24 +153,45 @@ def test_it_learns_in_motion_and_what_it_learned_is_loaded_at_once():
         if grating.loads == 3:
             break
     reported, learned = look(machine), correction(machine)
-    assert (reported["reason"], reported["converged"], reported["accepted"], reported["refused"]) == ("calibrating", 1, 2, 0)
-    assert learned["sin_offset"] == pytest.approx(1000, abs=8) and learned["cos_offset"] == pytest.approx(-600, abs=8)
+    assert (
+        reported["reason"],
+        reported["converged"],
+        reported["accepted"],
+        reported["refused"],
+    ) == ("calibrating", 1, 2, 0)
+    assert learned["sin_offset"] == pytest.approx(1000, abs=8) and learned[
+        "cos_offset"
+    ] == pytest.approx(-600, abs=8)
     assert grating.correction == learned
     second = machine.ask("get_harmonic", axis=0, order=2)
     assert second["sine"] == pytest.approx(0.002 * 2**24, rel=0.02) and abs(second["cosine"]) < 1000
-    assert grating.points[32] == pytest.approx(0.002 * 2**20, rel=0.03) and grating.points[96] == pytest.approx(-0.002 * 2**20, rel=0.03)
-    both = DEFINES["FEEDBACK_STROBES_LOAD_CORRECTION_MASK"] | DEFINES["FEEDBACK_STROBES_SWAP_HARMONICS_MASK"]
+    assert grating.points[32] == pytest.approx(0.002 * 2**20, rel=0.03) and grating.points[
+        96
+    ] == pytest.approx(-0.002 * 2**20, rel=0.03)
+    both = (
+        DEFINES["FEEDBACK_STROBES_LOAD_CORRECTION_MASK"]
+        | DEFINES["FEEDBACK_STROBES_SWAP_HARMONICS_MASK"]
+    )
     assert {strobes & both for strobes in grating.strobes} == {0, both}
-    # 2048 phases of 100 kHz at 600 periods a second are 12 periods: every one is kept. 1024 samples: every second
+    # 2048 phases of 100 kHz at 600 periods a second are 12 periods: every one is kept. 1024
+    # samples: every second
     assert grating.records[0] == (False, 2) and set(grating.records[2:]) == {(True, 1)}
 
     look(machine, "freeze")
     records = len(grating.records)
     machine.poll(200)
-    assert look(machine)["reason"] == "frozen" and correction(machine) == learned and len(grating.records) == records
+    assert (
+        look(machine)["reason"] == "frozen"
+        and correction(machine) == learned
+        and len(grating.records) == records
+    )
     look(machine, "clear")
     machine.poll(50)
-    assert grating.correction == IDENTITY and set(grating.points.values()) == {0} and look(machine)["converged"] == 0
+    assert (
+        grating.correction == IDENTITY
+        and set(grating.points.values()) == {0}
+        and look(machine)["converged"] == 0
+    )
 
 
 def test_a_slow_axis_keeps_fewer_samples_and_a_standing_one_none():
@@ -133,7 +206,9 @@ def test_a_slow_axis_keeps_fewer_samples_and_a_standing_one_none():
         machine.axes[0].speed = standing
         look(machine, "calibrate")
         machine.poll(50)
-        assert machine.feedback_channels[0].records == [] and look(machine)["reason"] == "standstill"
+        assert (
+            machine.feedback_channels[0].records == [] and look(machine)["reason"] == "standstill"
+        )
     machine.axes[0].speed = speed(600)
     machine.poll(2)
     assert look(machine)["reason"] == "calibrating"
@@ -174,9 +249,10 @@ def test_a_poll_takes_no_more_words_than_fit_its_time():
     assert grating.taken - before == 32
     plain = machine.read
 
-    def read(offset):           # a word takes 0.4 ms
+    def read(offset):  # a word takes 0.4 ms
         machine.clk += CLK_HZ // 2500 * (offset == address("RECORDER_WORD"))
         return plain(offset)
+
     machine.answers = type(machine.answers[0])(read), machine.answers[1]
     machine.firmware.register_bridge(*machine.answers)
     before = grating.taken
@@ -185,7 +261,7 @@ def test_a_poll_takes_no_more_words_than_fit_its_time():
 
 
 def test_nothing_is_learned_while_an_axis_homes():
-    machine = FakeNode(Axis(low=-10**7), Axis())
+    machine = FakeNode(Axis(low=-(10**7)), Axis())
     machine.feedback_channels[1].burst = Signal()
     machine.axes[1].speed = speed(600)
     machine.poll(100)
@@ -197,6 +273,7 @@ def test_nothing_is_learned_while_an_axis_homes():
 
 
 # ---- values stored and restored
+
 
 def test_values_that_were_stored_come_into_force_together():
     machine = moving(learning=False)
@@ -210,18 +287,31 @@ def test_values_that_were_stored_come_into_force_together():
     assert grating.loads == 2 and grating.correction == VALUES == correction(machine)
     assert machine.ask("get_harmonic", axis=0, order=3) == dict(cosine=5008, sine=-7000)
     assert grating.points[0] == 313 and look(machine)["converged"] == 1
-    machine.ask("set_correction", axis=0, apply=1, **VALUES)               # harmonics are those set since the last time: none
+    machine.ask(
+        "set_correction", axis=0, apply=1, **VALUES
+    )  # harmonics are those set since the last time: none
     machine.poll(50)
-    assert machine.ask("get_harmonic", axis=0, order=3) == dict(cosine=0, sine=0) and set(grating.points.values()) == {0}
+    assert machine.ask("get_harmonic", axis=0, order=3) == dict(cosine=0, sine=0) and set(
+        grating.points.values()
+    ) == {0}
 
 
-@pytest.mark.parametrize("name, values", [
-    ("set_correction", {**VALUES, "gain": 0, "apply": 1}), ("set_correction", {**VALUES, "quadrature_error": 65537, "apply": 1}),
-    ("set_correction", {**VALUES, "cos_offset": -32768, "apply": 0}), ("set_correction", {**VALUES, "apply": 2}),
-    ("set_harmonic", dict(order=0, cosine=0, sine=0)), ("set_harmonic", dict(order=11, cosine=0, sine=0)),
-    ("set_harmonic", dict(order=1, cosine=2**31 - 1, sine=0)), ("set_harmonic", dict(order=1, cosine=0, sine=-2**31)),
-    ("get_harmonic", dict(order=0)), ("get_harmonic", dict(order=11)), ("calibration", dict(action=4)),
-])
+@pytest.mark.parametrize(
+    "name, values",
+    [
+        ("set_correction", {**VALUES, "gain": 0, "apply": 1}),
+        ("set_correction", {**VALUES, "quadrature_error": 65537, "apply": 1}),
+        ("set_correction", {**VALUES, "cos_offset": -32768, "apply": 0}),
+        ("set_correction", {**VALUES, "apply": 2}),
+        ("set_harmonic", dict(order=0, cosine=0, sine=0)),
+        ("set_harmonic", dict(order=11, cosine=0, sine=0)),
+        ("set_harmonic", dict(order=1, cosine=2**31 - 1, sine=0)),
+        ("set_harmonic", dict(order=1, cosine=0, sine=-(2**31))),
+        ("get_harmonic", dict(order=0)),
+        ("get_harmonic", dict(order=11)),
+        ("calibration", dict(action=4)),
+    ],
+)
 def test_values_out_of_range_are_refused_and_change_nothing(name, values):
     machine = moving(learning=False)
     assert machine.request(name, axis=0, **values) == ("out_of_range", {})
@@ -241,10 +331,13 @@ def test_the_learner_and_the_parameter_are_one_switch():
 
 # ---- signal faults and registers
 
+
 def test_signal_faults_are_shown_and_the_first_ones_forgotten_with_the_faults():
     machine = FakeNode()
     grating = machine.feedback_channels[0]
-    grating.word.update({DEFINES["FEEDBACK_SIGNAL_FAULTS"]: 0x4001, DEFINES["FEEDBACK_FIRST_SIGNAL_FAULTS"]: 0x10})
+    grating.word.update(
+        {DEFINES["FEEDBACK_SIGNAL_FAULTS"]: 0x4001, DEFINES["FEEDBACK_FIRST_SIGNAL_FAULTS"]: 0x10}
+    )
     assert machine.ask("signal", axis=0) == dict(faults=0x4001, first=0x10)
     grating.strobes.clear()
     machine.ask("reset_faults", axis=0)
@@ -255,24 +348,57 @@ def test_only_index_capture_and_compare_may_be_written():
     machine = FakeNode(Axis(), Axis())
     for axis in (0, 1):
         machine.ask("write_register", address=address("COMPARE_STEP_LOW", axis), value=0xDEADBEEF)
-        assert machine.feedback_channels[axis].word[DEFINES["FEEDBACK_COMPARE_STEP_LOW"]] == 0xDEADBEEF
-        assert machine.ask("read_register", address=address("COMPARE_STEP_LOW", axis))["value"] == 0xDEADBEEF
-    machine.ask("write_register", address=address("STROBES"), value=DEFINES["FEEDBACK_STROBES_CAPTURE_NEXT_MASK"])
+        assert (
+            machine.feedback_channels[axis].word[DEFINES["FEEDBACK_COMPARE_STEP_LOW"]] == 0xDEADBEEF
+        )
+        assert (
+            machine.ask("read_register", address=address("COMPARE_STEP_LOW", axis))["value"]
+            == 0xDEADBEEF
+        )
+    machine.ask(
+        "write_register",
+        address=address("STROBES"),
+        value=DEFINES["FEEDBACK_STROBES_CAPTURE_NEXT_MASK"],
+    )
     for strobe in ("LOAD_CORRECTION", "SWAP_HARMONICS", "RECORD", "CLEAR_SIGNAL_FAULTS"):
         value = DEFINES[f"FEEDBACK_STROBES_{strobe}_MASK"]
-        assert machine.request("write_register", address=address("STROBES"), value=value)[0] == "out_of_range"
-    allowed = {"STROBES", "INDEX", "COUNTS_PER_REVOLUTION", "INDEX_EVENTS", "CAPTURE_SOURCES", "CAPTURE_STATE", "COMPARE_START_LOW",
-               "COMPARE_START_HIGH", "COMPARE_STEP_LOW", "COMPARE_STEP_HIGH", "COMPARE_COUNT", "COMPARE_PULSE", "COMPARE_GAP",
-               "COMPARE_STATE"}
+        assert (
+            machine.request("write_register", address=address("STROBES"), value=value)[0]
+            == "out_of_range"
+        )
+    allowed = {
+        "STROBES",
+        "INDEX",
+        "COUNTS_PER_REVOLUTION",
+        "INDEX_EVENTS",
+        "CAPTURE_SOURCES",
+        "CAPTURE_STATE",
+        "COMPARE_START_LOW",
+        "COMPARE_START_HIGH",
+        "COMPARE_STEP_LOW",
+        "COMPARE_STEP_HIGH",
+        "COMPARE_COUNT",
+        "COMPARE_PULSE",
+        "COMPARE_GAP",
+        "COMPARE_STATE",
+    }
     places = {address(name, axis) for name in allowed for axis in (0, 1)}
     for place in range(0, 0x1000, 4):
         cause = machine.request("write_register", address=place, value=0)[0]
         assert cause == ("ok" if place in places else "no_such_register"), hex(place)
-    assert machine.request("write_register", address=address("INDEX") + 1, value=0)[0] == "no_such_register"
+    assert (
+        machine.request("write_register", address=address("INDEX") + 1, value=0)[0]
+        == "no_such_register"
+    )
 
 
 def test_the_burst_of_the_learner_is_not_read_by_others():
     machine = FakeNode()
-    assert machine.request("read_register", address=address("RECORDER_WORD"))[0] == "no_such_register"
-    assert machine.request("read_register", address=address("SIGNAL_FAULTS", 1))[0] == "no_such_register"
+    assert (
+        machine.request("read_register", address=address("RECORDER_WORD"))[0] == "no_such_register"
+    )
+    assert (
+        machine.request("read_register", address=address("SIGNAL_FAULTS", 1))[0]
+        == "no_such_register"
+    )
     assert machine.ask("read_register", address=address("CAPTURE_STATE"))["value"] == 0

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""axis.c: the motor hands over to the fine stage and takes over again, on an axis that lives in fake_machine."""
+"""axis.c: the motor hands over to the fine stage and takes over again, on an axis that lives in
+fake_machine.
+"""
+
 import pytest
 
 from tb.firmware.test_firmware_axis import CLOSED_LOOP, ENABLE, finish, homed
@@ -12,7 +15,7 @@ KIND = DEFINES["ACTUATOR_DRIVE"]
 FINE_COMMAND = DEFINES["ACTUATOR_FINE_COMMAND"]
 LIMIT = 3000
 REACH = 1000
-EASE = 8                                # of the motor's command, in a millisecond
+EASE = 8  # of the motor's command, in a millisecond
 FINE_MS = 10
 
 
@@ -33,7 +36,9 @@ class Coarse(Axis):
 
 
 def holding(command=500, **parameters):
-    machine = homed(Coarse(position=50 * PERIOD, low=0), fine_reach=REACH, fine_limit=LIMIT, **parameters)
+    machine = homed(
+        Coarse(position=50 * PERIOD, low=0), fine_reach=REACH, fine_limit=LIMIT, **parameters
+    )
     axis = machine.axes[0]
     axis.stand(REACH + 1)
     machine.run(3)
@@ -73,7 +78,11 @@ def test_the_motor_goes_on_from_its_command_and_is_eased_to_zero(command):
     machine, axis = holding(command)
     axis.stand(0)
     machine.run(FINE_MS + 2)
-    assert axis.loop == FINE and 0 < abs(command) - abs(axis.open_command) <= 4 * EASE and axis.open_command * command > 0
+    assert (
+        axis.loop == FINE
+        and 0 < abs(command) - abs(axis.open_command) <= 4 * EASE
+        and axis.open_command * command > 0
+    )
     before = axis.open_command
     machine.run(10)
     assert abs(abs(before) - abs(axis.open_command) - 10 * EASE) <= EASE
@@ -138,7 +147,10 @@ def test_homing_is_content_with_the_reach():
 
 
 def test_off_and_fault_end_it():
-    for end in (lambda machine, axis: machine.ask("enable", axis=0, on=0), lambda machine, axis: setattr(axis, "causes", FAULT["estop"])):
+    for end in (
+        lambda machine, axis: machine.ask("enable", axis=0, on=0),
+        lambda machine, axis: setattr(axis, "causes", FAULT["estop"]),
+    ):
         machine, axis = holding()
         axis.stand(0)
         machine.run(FINE_MS + 2)
@@ -150,6 +162,16 @@ def test_off_and_fault_end_it():
 
 def test_no_fine_stage_behind_a_converter_that_drives():
     machine = FakeNode(Coarse())
-    for name, value, cause in (("fine_reach", REACH, "ok"), ("drive", 2, "out_of_range"), ("fine_reach", 0, "ok"), ("drive", 2, "ok"),
-                               ("fine_reach", REACH, "out_of_range")):
-        assert machine.request("set_parameter", axis=0, parameter=PARAMETER[name]["id"], value=value)[0] == cause, (name, value)
+    for name, value, cause in (
+        ("fine_reach", REACH, "ok"),
+        ("drive", 2, "out_of_range"),
+        ("fine_reach", 0, "ok"),
+        ("drive", 2, "ok"),
+        ("fine_reach", REACH, "out_of_range"),
+    ):
+        assert (
+            machine.request("set_parameter", axis=0, parameter=PARAMETER[name]["id"], value=value)[
+                0
+            ]
+            == cause
+        ), (name, value)

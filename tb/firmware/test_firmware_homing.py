@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""homing.c: the methods of CiA 402 and of S3 with an index, on an axis that lives in fake_machine. (S0's: test_firmware_axis.)"""
+"""homing.c: the methods of CiA 402 and of S3 with an index, on an axis that lives in fake_machine.
+(S0's: test_firmware_axis.)
+"""
+
 import random
 
 import pytest
@@ -8,9 +11,14 @@ from tb.bench import seed
 from twin.compiled.node import PARAMETER, PERIOD, Axis, FakeNode
 
 QUARTER = PERIOD // 4
-COUNTS = 1                                                  # position_source
-TRAVEL = {"travel_low": -500 * PERIOD, "travel_high": 500 * PERIOD, "home_distance": 300 * PERIOD, "homing_search_speed": 2000,
-          "following_limit": 2**31 - 1}
+COUNTS = 1  # position_source
+TRAVEL = {
+    "travel_low": -500 * PERIOD,
+    "travel_high": 500 * PERIOD,
+    "home_distance": 300 * PERIOD,
+    "homing_search_speed": 2000,
+    "following_limit": 2**31 - 1,
+}
 
 
 def home(axis, method, source=COUNTS, **parameters):
@@ -36,19 +44,27 @@ def rest(machine):
 
 # to an index
 
-@pytest.mark.parametrize(("method", "start"), [(33, 90), (34, -90), (-2, 90), (-2, -90), (-2, 250), (-2, -250), (-2, 1), (-2, -1)])
+
+@pytest.mark.parametrize(
+    ("method", "start"),
+    [(33, 90), (34, -90), (-2, 90), (-2, -90), (-2, 250), (-2, -250), (-2, 1), (-2, -1)],
+)
 @pytest.mark.parametrize("quarters", range(4))
-def test_the_zero_is_the_count_of_the_index_whatever_side_it_was_sought_from(method, start, quarters):
+def test_the_zero_is_the_count_of_the_index_whatever_side_it_was_sought_from(
+    method, start, quarters
+):
     index = 3 * PERIOD + quarters * QUARTER
     ended, machine = home(Axis(position=index + start * PERIOD, index=[index]), method)
     assert ended == "ok" and zero_of(machine) == index
-    assert abs(rest(machine) - index) <= 1638               # and there the axis stands
+    assert abs(rest(machine) - index) <= 1638  # and there the axis stands
 
 
 def test_many_searches_of_s3_give_the_same_count():
     source, zeros = random.Random(seed()), set()
     for _ in range(40):
-        ended, machine = home(Axis(position=source.randrange(-290 * PERIOD, 290 * PERIOD), index=[QUARTER]), -2)
+        ended, machine = home(
+            Axis(position=source.randrange(-290 * PERIOD, 290 * PERIOD), index=[QUARTER]), -2
+        )
         assert ended == "ok"
         zeros.add(zero_of(machine))
     assert zeros == {QUARTER}
@@ -63,10 +79,16 @@ def test_an_interpolated_scale_takes_the_phase_zero_nearest_to_the_index():
 
 def test_the_zero_is_called_home_offset():
     ended, machine = home(Axis(position=-50 * PERIOD, index=[PERIOD]), 34, home_offset=-20)
-    assert ended == "ok" and machine.axes[0].origin == -21 * PERIOD and abs(machine.status()["position"] + 20 * PERIOD) <= 1638
+    assert (
+        ended == "ok"
+        and machine.axes[0].origin == -21 * PERIOD
+        and abs(machine.status()["position"] + 20 * PERIOD) <= 1638
+    )
 
 
-@pytest.mark.parametrize(("method", "start"), [(33, -90), (34, 90), (34, -320), (-2, -650), (-2, 650)])
+@pytest.mark.parametrize(
+    ("method", "start"), [(33, -90), (34, 90), (34, -320), (-2, -650), (-2, 650)]
+)
 def test_no_index_within_the_home_distance_is_told(method, start):
     ended, machine = home(Axis(position=start * PERIOD, index=[0]), method)
     assert ended == "no_index" and machine.axes[0].enabled and machine.axes[0].faults == 0
@@ -75,6 +97,7 @@ def test_no_index_within_the_home_distance_is_told(method, start):
 def test_a_switch_in_the_way_turns_s3_round_and_ends_the_one_sided_methods():
     def axis():
         return Axis(position=50 * PERIOD, low=-80 * PERIOD, high=100 * PERIOD, index=[0])
+
     ended, machine = home(axis(), -2)
     assert ended == "ok" and zero_of(machine) == 0 and machine.axes[0].faults == 0
     ended, machine = home(axis(), 34)
@@ -83,20 +106,31 @@ def test_a_switch_in_the_way_turns_s3_round_and_ends_the_one_sided_methods():
 
 # to a switch
 
-@pytest.mark.parametrize(("method", "low", "high", "sign"), [(17, -70, None, 1), (18, None, 70, -1)])
+
+@pytest.mark.parametrize(
+    ("method", "low", "high", "sign"), [(17, -70, None, 1), (18, None, 70, -1)]
+)
 @pytest.mark.parametrize("start", [0, -90, 90])
 def test_methods_17_and_18_take_the_edge_of_the_switch(method, low, high, sign, start):
-    edges = {name: place * PERIOD for name, place in (("low", low), ("high", high)) if place is not None}
+    edges = {
+        name: place * PERIOD for name, place in (("low", low), ("high", high)) if place is not None
+    }
     ended, machine = home(Axis(position=start * PERIOD, **edges), method)
-    edge = sign * -70 * PERIOD + sign * PERIOD // 2          # where the switch of fake_machine opens
+    edge = sign * -70 * PERIOD + sign * PERIOD // 2  # where the switch of fake_machine opens
     assert ended == "ok" and 0 <= sign * (zero_of(machine) - edge) <= PERIOD
 
 
 @pytest.mark.parametrize(("method", "switch", "sign"), [(1, "low", 1), (2, "high", -1)])
 def test_methods_1_and_2_take_the_first_index_after_the_switch(method, switch, sign):
     marks = [sign * (-69 + n * 20) * PERIOD + QUARTER for n in range(-3, 5)]
-    ended, machine = home(Axis(position=0, index=sorted(marks), **{switch: sign * -70 * PERIOD}), method)
-    assert ended == "ok" and zero_of(machine) == sign * -69 * PERIOD + QUARTER and machine.axes[0].faults == 0
+    ended, machine = home(
+        Axis(position=0, index=sorted(marks), **{switch: sign * -70 * PERIOD}), method
+    )
+    assert (
+        ended == "ok"
+        and zero_of(machine) == sign * -69 * PERIOD + QUARTER
+        and machine.axes[0].faults == 0
+    )
     ended, machine = home(Axis(position=0, **{switch: sign * -70 * PERIOD}), method)
     assert ended == "no_index"
     ended, machine = home(Axis(position=0), method)
@@ -105,17 +139,26 @@ def test_methods_1_and_2_take_the_first_index_after_the_switch(method, switch, s
 
 # here
 
+
 @pytest.mark.parametrize("method", [35, 37])
 def test_methods_35_and_37_take_the_place_where_the_axis_stands(method):
     ended, machine = home(Axis(position=12 * PERIOD + 3 * QUARTER), method)
-    assert ended == "ok" and zero_of(machine) == 12 * PERIOD + 3 * QUARTER and rest(machine) == 12 * PERIOD + 3 * QUARTER
+    assert (
+        ended == "ok"
+        and zero_of(machine) == 12 * PERIOD + 3 * QUARTER
+        and rest(machine) == 12 * PERIOD + 3 * QUARTER
+    )
 
 
 # bad input
+
 
 @pytest.mark.parametrize("method", [0, 3, 16, 19, 32, 36])
 def test_a_method_that_does_not_exist_is_refused(method):
     machine = FakeNode()
     known = PARAMETER["home_method"]
-    assert machine.request("set_parameter", axis=0, parameter=known["id"], value=method)[0] == "out_of_range"
+    assert (
+        machine.request("set_parameter", axis=0, parameter=known["id"], value=method)[0]
+        == "out_of_range"
+    )
     assert machine.ask("get_parameter", axis=0, parameter=known["id"])["value"] == known["default"]

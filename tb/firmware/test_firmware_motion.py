@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""motion.c and what axis.c makes of it: pieces kept short, another target in flight, override, fine stage."""
+"""motion.c and what axis.c makes of it: pieces kept short, another target in flight, override, fine
+stage.
+"""
+
 import random
 
 import pytest
@@ -8,7 +11,12 @@ from tb.bench import seed
 from tb.firmware.plan_model import limits, steps
 from twin.compiled.node import DEFINES, PARAMETER, PERIOD, Axis, FakeNode
 
-TRAVEL = {"travel_low": -5000 * PERIOD, "travel_high": 20_000 * PERIOD, "home_method": 37, "position_source": 1}
+TRAVEL = {
+    "travel_low": -5000 * PERIOD,
+    "travel_high": 20_000 * PERIOD,
+    "home_method": 37,
+    "position_source": 1,
+}
 FINE = DEFINES["AXIS_CONTROL_FINE_MASK"]
 CLOSED_LOOP = DEFINES["AXIS_CONTROL_CLOSED_LOOP_MASK"]
 ENABLE = DEFINES["AXIS_CONTROL_ENABLE_MASK"]
@@ -20,16 +28,21 @@ def homed(axes=1, **parameters):
         machine.set(axis=n, **{**TRAVEL, **parameters})
         machine.ask("enable", axis=n, on=1)
         machine.ask("home", axis=n)
-    assert machine.run(1000, until=lambda: all(machine.status(n)["ended"] == "ok" for n in range(axes)))
+    assert machine.run(
+        1000, until=lambda: all(machine.status(n)["ended"] == "ok" for n in range(axes))
+    )
     return machine
 
 
 def finish(machine, axis=0, ms=20_000):
-    assert machine.run(ms, until=lambda: machine.status(axis)["ended"] != "running"), "the motion does not end"
+    assert machine.run(ms, until=lambda: machine.status(axis)["ended"] != "running"), (
+        "the motion does not end"
+    )
     return machine.status(axis)["ended"]
 
 
 # feeding
+
 
 def test_what_is_queued_lasts_16_ms_and_150_000_clk_and_a_piece():
     machine = homed()
@@ -48,6 +61,7 @@ def test_what_is_queued_lasts_16_ms_and_150_000_clk_and_a_piece():
 
 # another target in flight
 
+
 @pytest.mark.parametrize("second", [9000, 200, 100, -2000, 0, 7000])
 @pytest.mark.parametrize("after_ms", [1, 60, 140, 300])
 def test_a_move_in_motion_goes_on_to_the_new_target(second, after_ms):
@@ -55,7 +69,11 @@ def test_a_move_in_motion_goes_on_to_the_new_target(second, after_ms):
     machine.ask("move", axis=0, target=8000 * PERIOD)
     machine.run(after_ms)
     assert machine.ask("move", axis=0, target=second * PERIOD + 7) == {"duration_ticks": 0}
-    assert finish(machine) == "ok" and machine.axes[0].target == second * PERIOD + 7 and machine.axes[0].faults == 0
+    assert (
+        finish(machine) == "ok"
+        and machine.axes[0].target == second * PERIOD + 7
+        and machine.axes[0].faults == 0
+    )
 
 
 def test_targets_that_change_all_the_time_end_at_the_last_one_taken():
@@ -67,10 +85,14 @@ def test_targets_that_change_all_the_time_end_at_the_last_one_taken():
             machine.run(draw.randrange(1, 200))
             another = draw.randrange(-4000 * PERIOD, 9000 * PERIOD)
             cause = machine.request("move", axis=0, target=another)[0]
-            assert cause in ("ok", "busy")                  # busy: its last piece is queued
+            assert cause in ("ok", "busy")  # busy: its last piece is queued
             taken += cause == "ok"
             target = another if cause == "ok" else target
-        assert finish(machine) == "ok" and machine.axes[0].target == target and machine.axes[0].faults == 0
+        assert (
+            finish(machine) == "ok"
+            and machine.axes[0].target == target
+            and machine.axes[0].faults == 0
+        )
     assert taken > 5
 
 
@@ -79,10 +101,15 @@ def test_a_move_that_settles_gives_way_to_the_next_one():
     machine.ask("move", axis=0, target=PERIOD)
     assert machine.run(2000, until=lambda: machine.status()["state"] == "settling")
     machine.ask("move", axis=0, target=9 * PERIOD)
-    assert machine.status()["state"] == "moving" and finish(machine) == "ok" and machine.axes[0].target == 9 * PERIOD
+    assert (
+        machine.status()["state"] == "moving"
+        and finish(machine) == "ok"
+        and machine.axes[0].target == 9 * PERIOD
+    )
 
 
 # override
+
 
 @pytest.mark.parametrize("jerk", [10**6, 12_500_000, 10**9])
 def test_a_change_of_the_override_adds_no_more_than_a_quarter_of_acceleration_and_jerk(jerk):
@@ -91,17 +118,28 @@ def test_a_change_of_the_override_adds_no_more_than_a_quarter_of_acceleration_an
     machine.set(feed_override=32768)
     word = machine.axes[0].word
     assert word[DEFINES["AXIS_FEED_OVERRIDE"]] == 32768
-    slope, curve = word[DEFINES["AXIS_FEED_OVERRIDE_SLOPE"]] / 2**32 * 4000, word[DEFINES["AXIS_FEED_OVERRIDE_CURVE"]] / 2**32 * 4000**2
+    slope, curve = (
+        word[DEFINES["AXIS_FEED_OVERRIDE_SLOPE"]] / 2**32 * 4000,
+        word[DEFINES["AXIS_FEED_OVERRIDE_CURVE"]] / 2**32 * 4000**2,
+    )
     velocity, acceleration = (PARAMETER[name]["default"] for name in ("velocity", "acceleration"))
-    of_acceleration, of_jerk = velocity * slope / acceleration, (3 * acceleration * slope + velocity * curve) / jerk
+    of_acceleration, of_jerk = (
+        velocity * slope / acceleration,
+        (3 * acceleration * slope + velocity * curve) / jerk,
+    )
     assert max(of_acceleration, of_jerk) <= 0.25 and (of_acceleration > 0.2499 or of_jerk > 0.2499)
 
 
 # profiles
 
+
 def played_steps(axis):
     """The step of each tick, 2^-40 period, of all pieces pushed."""
-    return [step for velocity, acceleration, jerk, ticks, _ in axis.pushed for step in steps([(velocity, acceleration, jerk, ticks)])]
+    return [
+        step
+        for velocity, acceleration, jerk, ticks, _ in axis.pushed
+        for step in steps([(velocity, acceleration, jerk, ticks)])
+    ]
 
 
 def test_a_trapezoid_is_at_full_acceleration_within_three_ticks_and_brakes_without_a_limit_of_jerk():
@@ -110,10 +148,16 @@ def test_a_trapezoid_is_at_full_acceleration_within_three_ticks_and_brakes_witho
     axis.pushed = []
     ticks = machine.ask("move", axis=0, target=700 * PERIOD)["duration_ticks"]
     assert finish(machine) == "ok" and axis.target == 700 * PERIOD
-    velocity, acceleration, _ = limits(*(PARAMETER[name]["default"] for name in ("velocity", "acceleration", "jerk")))
+    velocity, acceleration, _ = limits(
+        *(PARAMETER[name]["default"] for name in ("velocity", "acceleration", "jerk"))
+    )
     every = [0, *played_steps(axis), 0]
     slopes = [b - a for a, b in zip(every, every[1:])]
-    assert max(map(abs, slopes)) <= acceleration and max(every) <= velocity and slopes[4] > 0.99 * acceleration
+    assert (
+        max(map(abs, slopes)) <= acceleration
+        and max(every) <= velocity
+        and slopes[4] > 0.99 * acceleration
+    )
     assert ticks <= (700 << 40) / velocity + velocity / acceleration + 4 + 1e-3 * len(every)
     assert axis.word[DEFINES["AXIS_STOP_JERK"]] == 0
     machine.set(profile=0)
@@ -122,23 +166,41 @@ def test_a_trapezoid_is_at_full_acceleration_within_three_ticks_and_brakes_witho
 
 @pytest.mark.parametrize("border_3, sections", [(32768, (400, 1200)), (21846, (400, 800))])
 def test_stairs_climb_as_in_s4_and_come_down_the_mirror(border_3, sections):
-    """f0 = 50, top 2450, rises of 50, 100, 200 period/s every 20 ms; sections 2 and 3 begin at 1/6 and 1/2, or 1/3, of the climb."""
+    """f0 = 50, top 2450, rises of 50, 100, 200 period/s every 20 ms; sections 2 and 3 begin at 1/6
+    and 1/2, or 1/3, of the climb.
+    """
     rates = {"first": 50, "rise_1": 50, "rise_2": 100, "rise_3": 200}
-    machine = homed(profile=2, velocity=2450, stepped_border_3=border_3, **{f"stepped_{name}": rate * 65536 for name, rate in rates.items()})
+    machine = homed(
+        profile=2,
+        velocity=2450,
+        stepped_border_3=border_3,
+        **{f"stepped_{name}": rate * 65536 for name, rate in rates.items()},
+    )
     axis = machine.axes[0]
     axis.pushed = []
     machine.ask("move", axis=0, target=3000 * PERIOD)
     assert finish(machine) == "ok" and axis.target == 3000 * PERIOD
-    every = played_steps(axis)[1:]                                   # the first is that of rest
-    climb = [round(step * 4000 / 2**40) for step in every[:len(every) // 2:80]]
+    every = played_steps(axis)[1:]  # the first is that of rest
+    climb = [round(step * 4000 / 2**40) for step in every[: len(every) // 2 : 80]]
     wanted = [50]
     while wanted[-1] < 2450:
-        wanted.append(wanted[-1] + (50 if wanted[-1] < 50 + sections[0] else 100 if wanted[-1] < 50 + sections[1] else 200))
+        wanted.append(
+            wanted[-1]
+            + (
+                50
+                if wanted[-1] < 50 + sections[0]
+                else 100
+                if wanted[-1] < 50 + sections[1]
+                else 200
+            )
+        )
     wanted = [step for step in wanted if step <= 2450]
-    assert climb[:len(wanted) - 1] == wanted[:-1]
-    assert all(len(set(every[n:n + 80])) == 1 for n in range(0, 80 * (len(wanted) - 1), 80))
+    assert climb[: len(wanted) - 1] == wanted[:-1]
+    assert all(len(set(every[n : n + 80])) == 1 for n in range(0, 80 * (len(wanted) - 1), 80))
     down = every[::-1]
-    assert [round(step * 4000 / 2**40) for step in down[:80 * (len(wanted) - 1):80]] == wanted[:-1]
+    assert [round(step * 4000 / 2**40) for step in down[: 80 * (len(wanted) - 1) : 80]] == wanted[
+        :-1
+    ]
     assert all(piece[1:3] == (0, 0) for piece in axis.pushed)
 
 
@@ -147,7 +209,10 @@ def test_stairs_go_on_to_where_they_were_going():
     machine.ask("move", axis=0, target=3000 * PERIOD)
     machine.run(100)
     assert machine.request("move", axis=0, target=100 * PERIOD)[0] == "busy"
-    assert machine.request("set_parameter", axis=0, parameter=PARAMETER["profile"]["id"], value=0)[0] == "busy"
+    assert (
+        machine.request("set_parameter", axis=0, parameter=PARAMETER["profile"]["id"], value=0)[0]
+        == "busy"
+    )
     assert finish(machine) == "ok" and machine.axes[0].target == 3000 * PERIOD
 
 
@@ -163,7 +228,10 @@ def test_a_short_way_on_stairs_and_a_low_velocity_keep_their_speed():
         assert max(every) - min(every) <= 1 and max(every) <= min(12.5, velocity) * 2**40 / 4000
 
 
-@pytest.mark.parametrize("wrong", [{"stepped_border_2": 40_000}, {"stepped_rise_1": 1, "stepped_rise_2": 1, "stepped_rise_3": 1}])
+@pytest.mark.parametrize(
+    "wrong",
+    [{"stepped_border_2": 40_000}, {"stepped_rise_1": 1, "stepped_rise_2": 1, "stepped_rise_3": 1}],
+)
 def test_stairs_that_cannot_be_climbed_are_refused_with_their_cause(wrong):
     machine = homed(profile=2, velocity=2450, **wrong)
     assert machine.request("move", axis=0, target=15_000 * PERIOD)[0] == "stepped_profile_invalid"
@@ -174,6 +242,7 @@ def test_stairs_that_cannot_be_climbed_are_refused_with_their_cause(wrong):
 
 # fine stage
 
+
 def test_the_fine_stage_takes_over_within_its_reach_and_rests_in_motion():
     machine = homed(fine_reach=PERIOD // 10)
     axis = machine.axes[0]
@@ -182,7 +251,7 @@ def test_the_fine_stage_takes_over_within_its_reach_and_rests_in_motion():
     machine.ask("move", axis=0, target=500 * PERIOD)
     assert axis.control == ENABLE | CLOSED_LOOP
     assert finish(machine) == "ok" and axis.control == ENABLE | FINE
-    axis.machine += PERIOD // 5                             # inside four times the reach it stays, beyond it lets go
+    axis.machine += PERIOD // 5  # inside four times the reach it stays, beyond it lets go
     axis.seized = True
     machine.run(30)
     assert axis.control == ENABLE | FINE

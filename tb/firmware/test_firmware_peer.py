@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""peer.c: two nodes over a line that adds, loses and damages bytes; the main node's side is that which job.c will call."""
+"""peer.c: two nodes over a line that adds, loses and damages bytes; the main node's side is that
+which job.c will call.
+"""
+
 import ctypes
 import random
 import zlib
@@ -14,22 +17,33 @@ OPERATION = {name: operation["code"] for name, operation in TABLE["operation"].i
 PHASE = {code: name for name, (code, _) in TABLE["peer_phase"].items()}
 SETTING = TABLE["setting"]
 LEGACY, FRAMES = 1, 2
-READY = 1                            # a store_state
+READY = 1  # a store_state
 MAIN, SUB = 0, 1
-ORDER, DONE = b"\xFF\xFF\xAA", b"\xFF\xFF\x55"
+ORDER, DONE = b"\xff\xff\xaa", b"\xff\xff\x55"
 ARCSEC = 100
-AXIS = {"position_source": 2, "velocity": 30000, "acceleration": 500000, "jerk": 50000000, "homing_latch_speed": 300, "following_limit": 2**31 - 1}
+AXIS = {
+    "position_source": 2,
+    "velocity": 30000,
+    "acceleration": 500000,
+    "jerk": 50000000,
+    "homing_latch_speed": 300,
+    "following_limit": 2**31 - 1,
+}
 
 
 class Node(FakeNode):
-    """The firmware has one set of variables: so this is one of the two, the test speaks for the other."""
+    """The firmware has one set of variables: so this is one of the two, the test speaks for the
+    other.
+    """
 
     def __init__(self, mode, role):
         self.random = random.Random(seed())
         self.table = Table(self.random)
         self.sensor, self.port, self.i2c = Sensor(self.random, self.table), PeerPort(), I2c()
         self.reported = {"peer_mode": mode, "peer_role": role}
-        super().__init__(Axis(), image="station", peripherals=FakePeripherals(self.sensor, self.port, self.i2c))
+        super().__init__(
+            Axis(), image="station", peripherals=FakePeripherals(self.sensor, self.port, self.i2c)
+        )
         self.begin()
 
     def begin(self):
@@ -77,6 +91,7 @@ def stations(node, *arcsec):
 
 # ------------------------------------------------------------------ frames, by hand
 
+
 def frame(body):
     data, out = body + zlib.crc32(body).to_bytes(4, "little"), b""
     for part in data.split(b"\0"):
@@ -91,7 +106,7 @@ def bodies(data):
     for part in data.split(b"\0"):
         whole, at = b"", 0
         while at < len(part):
-            whole += (b"\0" if at else b"") + part[at + 1:at + part[at]]
+            whole += (b"\0" if at else b"") + part[at + 1 : at + part[at]]
             at += part[at]
         if len(whole) > 4 and zlib.crc32(whole[:-4]) == int.from_bytes(whole[-4:], "little"):
             found.append(whole[:-4])
@@ -108,6 +123,7 @@ def look(sequence):
 
 # ------------------------------------------------------------------ the sub-node, printed
 
+
 def test_the_order_as_printed_indexes_to_the_next_station_and_is_answered_as_printed():
     node = Node(LEGACY, SUB)
     stations(node, 600, 900, 1500)
@@ -123,8 +139,19 @@ def test_the_order_as_printed_indexes_to_the_next_station_and_is_answered_as_pri
     assert (node.peer()["phase"], node.peer()["ended"]) == ("failed", "no_station")
 
 
-@pytest.mark.parametrize("before", [b"", b"\xFF", b"\xFF\xFF\xFF", b"\xFF\xAA", b"\xFF\xFF\x55", b"\xFF\xFF\x00\xFF", b"\xAA\xAA",
-                                    bytes(range(256))])
+@pytest.mark.parametrize(
+    "before",
+    [
+        b"",
+        b"\xff",
+        b"\xff\xff\xff",
+        b"\xff\xaa",
+        b"\xff\xff\x55",
+        b"\xff\xff\x00\xff",
+        b"\xaa\xaa",
+        bytes(range(256)),
+    ],
+)
 def test_an_order_is_found_after_any_garbage(before):
     node = Node(LEGACY, SUB)
     stations(node, 600)
@@ -134,7 +161,11 @@ def test_an_order_is_found_after_any_garbage(before):
     assert node.peer()["phase"] == "idle"
     node.say(ORDER)
     node.run(20)
-    assert node.peer()["phase"] == "turning" and node.peer()["garbage"] == len(before) and node.peer()["heard"] == 1
+    assert (
+        node.peer()["phase"] == "turning"
+        and node.peer()["garbage"] == len(before)
+        and node.peer()["heard"] == 1
+    )
 
 
 def test_a_node_that_hears_nothing_but_garbage_for_long_still_hears_an_order():
@@ -142,7 +173,9 @@ def test_a_node_that_hears_nothing_but_garbage_for_long_still_hears_an_order():
     stations(node, 600)
     sent = 0
     for _ in range(500):
-        part = bytes(source.choice((0xFF, 0xFF, 0x55, 0x00, source.randrange(256))) for _ in range(20)).replace(ORDER, b"")
+        part = bytes(
+            source.choice((0xFF, 0xFF, 0x55, 0x00, source.randrange(256))) for _ in range(20)
+        ).replace(ORDER, b"")
         sent += len(part)
         node.say(part + b"\0")
         node.run(3)
@@ -158,11 +191,18 @@ def test_an_index_that_fails_is_not_answered_and_the_next_order_goes_there_again
     node.say(ORDER)
     node.run(500)
     node.sensor.dead = True
-    assert node.heard(2000) == b"" and node.peer()["ended"] == "sensor_timed_out" and node.peer()["phase"] == "failed"
+    assert (
+        node.heard(2000) == b""
+        and node.peer()["ended"] == "sensor_timed_out"
+        and node.peer()["phase"] == "failed"
+    )
     node.sensor.dead = False
     node.run(50)
     node.say(ORDER)
-    assert node.run(60_000, until=lambda: node.peer()["phase"] == "turned") and abs(node.table.angle - 3600) <= 2
+    assert (
+        node.run(60_000, until=lambda: node.peer()["phase"] == "turned")
+        and abs(node.table.angle - 3600) <= 2
+    )
 
 
 def test_a_second_order_while_it_indexes_is_nothing():
@@ -180,7 +220,9 @@ def indexed(node, place):
     """An order, and the table is there."""
     node.say(ORDER)
     node.port.other = PeerPort()
-    assert node.run(60_000, until=lambda: node.port.other.received and not node.port.sent), node.peer()
+    assert node.run(60_000, until=lambda: node.port.other.received and not node.port.sent), (
+        node.peer()
+    )
     assert bytes(node.port.other.received) == DONE and abs(node.table.angle - place) <= 2
 
 
@@ -197,14 +239,19 @@ def test_the_next_station_can_be_told_and_is_that_of_before_after_a_power_cut():
 
 
 def test_a_sub_node_goes_on_with_its_list_after_a_power_cut_at_any_moment():
-    """What was answered is not gone to again; what was not is, or was counted and the answer lost: never is one left out unseen."""
+    """What was answered is not gone to again; what was not is, or was counted and the answer lost:
+    never is one left out unseen.
+    """
     node, places = Node(LEGACY, SUB), [300 + 90 * n for n in range(12)]
     stations(node, *places)
     done = 0
     while done < len(places):
         node.say(ORDER)
         node.port.other = PeerPort()
-        node.run(node.random.uniform(0, 9000), until=lambda: node.port.other.received and not node.port.sent)
+        node.run(
+            node.random.uniform(0, 9000),
+            until=lambda: node.port.other.received and not node.port.sent,
+        )
         answered = bytes(node.port.other.received) == DONE
         node.power_cut()
         assert node.peer()["next"] in ((done + 1,) if answered else (done, done + 1))
@@ -221,7 +268,10 @@ def test_an_order_that_comes_while_the_eeprom_is_read_is_done_when_the_list_is_t
     node.tell(**node.reported)
     node.set(**AXIS)
     assert node.peer()["stations"] == 0 and node.peer()["heard"] == 0
-    assert node.run(60_000, until=lambda: node.peer()["phase"] == "turned") and abs(node.table.angle - 300) <= 2
+    assert (
+        node.run(60_000, until=lambda: node.peer()["phase"] == "turned")
+        and abs(node.table.angle - 300) <= 2
+    )
 
 
 def test_done_is_said_only_when_the_count_is_in_the_journal():
@@ -230,7 +280,10 @@ def test_done_is_said_only_when_the_count_is_in_the_journal():
     node.say(ORDER)
     node.run(50)
     node.i2c.bus.devices.clear()
-    assert node.heard(20_000) == b"" and (node.peer()["phase"], node.peer()["ended"]) == ("failed", "eeprom_missing")
+    assert node.heard(20_000) == b"" and (node.peer()["phase"], node.peer()["ended"]) == (
+        "failed",
+        "eeprom_missing",
+    )
     assert abs(node.table.angle - 300) <= 2
 
 
@@ -254,19 +307,25 @@ def test_the_list_does_not_change_while_the_table_turns():
 def test_only_a_sub_node_has_a_next_station():
     node = Node(LEGACY, MAIN)
     stations(node, 600, 1200)
-    assert node.request("peer_next", station=1)[0] == "peer_off" and node.ask("job_stations")["journal"] == 0
+    assert (
+        node.request("peer_next", station=1)[0] == "peer_off"
+        and node.ask("job_stations")["journal"] == 0
+    )
 
 
 # ------------------------------------------------------------------ the main node, printed
+
 
 def test_the_main_node_orders_as_printed_and_waits_for_the_answer():
     node = Node(LEGACY, MAIN)
     assert node.order(3) == "ok" and node.heard() == ORDER
     assert node.peer()["phase"] == "turning" and node.order(4) == "busy"
-    node.say(b"\xFF\x55\xFF\xFF\xFF\x55")
+    node.say(b"\xff\x55\xff\xff\xff\x55")
     node.run(5)
     assert node.peer()["phase"] == "turned" and node.peer()["station"] == 3
-    assert PHASE[node.firmware.peer_state()] == "turned" and CAUSE[node.firmware.peer_cause()] == "ok"
+    assert (
+        PHASE[node.firmware.peer_state()] == "turned" and CAUSE[node.firmware.peer_cause()] == "ok"
+    )
 
 
 def test_an_answer_that_never_comes_is_told_by_time_and_one_that_nobody_waits_for_is_nothing():
@@ -294,14 +353,21 @@ def test_a_stopped_order_is_over_for_the_main_node():
 
 # ------------------------------------------------------------------ the sub-node, frames
 
+
 def test_a_frame_is_done_and_answered_with_the_body_of_the_line():
     node = Node(FRAMES, SUB)
     node.say(frame(turn_to(7, 600)))
     assert bodies(node.heard()) == [bytes([7, OPERATION["turn_to"], 0])]
     node.say(frame(look(8)))
     reply = bodies(node.heard())[0]
-    assert reply[:3] == bytes([8, OPERATION["turn_state"], 0]) and int.from_bytes(reply[7:11], "little") == 60_000
-    assert node.run(60_000, until=lambda: node.ask("turn_state")["phase"] == 0) and abs(node.table.angle - 600) <= 2
+    assert (
+        reply[:3] == bytes([8, OPERATION["turn_state"], 0])
+        and int.from_bytes(reply[7:11], "little") == 60_000
+    )
+    assert (
+        node.run(60_000, until=lambda: node.ask("turn_state")["phase"] == 0)
+        and abs(node.table.angle - 600) <= 2
+    )
 
 
 def test_a_request_that_comes_again_is_answered_again_and_not_acted_on_again():
@@ -319,13 +385,18 @@ def test_a_request_that_comes_again_is_answered_again_and_not_acted_on_again():
     assert node.peer()["repeated"] == 1
     node.say(frame(turn_to(2, 600)))
     node.heard(500)
-    assert len(node.axes[0].pushed) > pushed                    # another one is
+    assert len(node.axes[0].pushed) > pushed  # another one is
 
 
 def test_what_is_refused_is_answered_with_its_cause():
     node = Node(FRAMES, SUB)
-    for sequence, (body, cause) in enumerate([(b"\xC8", "unknown_operation"), (bytes([OPERATION["turn_to"]]), "wrong_length"),
-                                              (turn_to(0, 1296000)[1:], "out_of_range")]):
+    for sequence, (body, cause) in enumerate(
+        [
+            (b"\xc8", "unknown_operation"),
+            (bytes([OPERATION["turn_to"]]), "wrong_length"),
+            (turn_to(0, 1296000)[1:], "out_of_range"),
+        ]
+    ):
         node.say(frame(bytes([sequence]) + body))
         assert [CAUSE[reply[2]] for reply in bodies(node.heard())] == [cause]
 
@@ -347,7 +418,12 @@ def test_damaged_frames_are_counted_and_not_answered_and_the_next_one_is():
         before = node.peer()["heard"]
         node.say(whole + b"\0")
         reported = node.heard(8)
-        assert bodies(reported) == [] and reported == b"" or kind == 2 and node.peer()["heard"] == before + 1     # a zero between frames is none
+        assert (
+            bodies(reported) == []
+            and reported == b""
+            or kind == 2
+            and node.peer()["heard"] == before + 1
+        )  # a zero between frames is none
     node.say(frame(good))
     assert len(bodies(node.heard())) == 1 and node.peer()["garbage"] > 150
 
@@ -363,11 +439,19 @@ def test_a_frame_without_an_end_does_not_hang_the_port():
 
 # ------------------------------------------------------------------ the main node, frames
 
+
 class Answering:
     """The sub-node: answers what the main node asks, if `hears` says so."""
 
     def __init__(self, node):
-        self.node, self.asked, self.phase, self.ended, self.target, self.cause = node, [], 0, "no_motion_yet", 0, "ok"
+        self.node, self.asked, self.phase, self.ended, self.target, self.cause = (
+            node,
+            [],
+            0,
+            "no_motion_yet",
+            0,
+            "ok",
+        )
         self.answers, self.last = True, None
         node.port.other = self.port = PeerPort()
 
@@ -386,7 +470,11 @@ class Answering:
         if body[1] == OPERATION["turn_to"] and body != self.last:
             cause = self.cause
             if cause == "ok":
-                self.phase, self.ended, self.target = 1, "running", int.from_bytes(body[2:6], "little")
+                self.phase, self.ended, self.target = (
+                    1,
+                    "running",
+                    int.from_bytes(body[2:6], "little"),
+                )
         elif body[1] == OPERATION["stop"]:
             self.phase, self.ended = 0, "stopped"
         code = next(number for number, name in CAUSE.items() if name == cause)
@@ -395,7 +483,12 @@ class Answering:
             ended = next(number for number, name in CAUSE.items() if name == self.ended)
             fields = bytes([self.phase, ended, 0, 0]) + self.target.to_bytes(4, "little") + bytes(8)
         if body[1] == OPERATION["status"]:
-            fields = bytes(4) + (3 << 2).to_bytes(2, "little") + (1 << 3).to_bytes(2, "little") + bytes(30)
+            fields = (
+                bytes(4)
+                + (3 << 2).to_bytes(2, "little")
+                + (1 << 3).to_bytes(2, "little")
+                + bytes(30)
+            )
         self.last = body
         return body[:2] + bytes([code]) + fields
 
@@ -417,15 +510,21 @@ def test_the_main_node_looks_orders_and_watches_until_the_table_has_indexed():
     sub = Answering(node)
     assert node.order(5, 600) == "ok"
     sub.run(500)
-    assert sub.operations()[:3] == ["turn_state", "set_parameter", "turn_to"] and set(sub.operations()[3:]) == {"turn_state"}
+    assert sub.operations()[:3] == ["turn_state", "set_parameter", "turn_to"] and set(
+        sub.operations()[3:]
+    ) == {"turn_state"}
     assert len({body[0] for body in sub.asked}) == len(sub.asked) and 5 <= len(sub.asked) <= 14
     assert sub.target == 60_000 and node.peer()["phase"] == "turning"
     sub.phase, sub.ended = 0, "ok"
     sub.run(100)
-    assert (node.peer()["phase"], node.peer()["ended"], node.peer()["station"]) == ("turned", "ok", 5)
+    assert (node.peer()["phase"], node.peer()["ended"], node.peer()["station"]) == (
+        "turned",
+        "ok",
+        5,
+    )
     count = len(sub.asked)
     sub.run(500)
-    assert len(sub.asked) == count                              # then it is quiet
+    assert len(sub.asked) == count  # then it is quiet
 
 
 @pytest.mark.parametrize("ended", ["sensor_timed_out", "stiction", "ended_by_fault"])
@@ -437,7 +536,9 @@ def test_the_cause_of_the_sub_node_is_that_of_the_main_node(ended):
     sub.phase, sub.ended = 0, ended
     sub.run(200)
     assert (node.peer()["phase"], node.peer()["ended"]) == ("failed", ended)
-    assert node.firmware.peer_faults() == (1 << 3 if ended == "ended_by_fault" else 0)         # the first of them
+    assert node.firmware.peer_faults() == (
+        1 << 3 if ended == "ended_by_fault" else 0
+    )  # the first of them
 
 
 def test_the_speed_goes_before_each_order():
@@ -447,7 +548,10 @@ def test_the_speed_goes_before_each_order():
     node.order(0, 600)
     sub.run(200)
     reported = next(body for body in sub.asked if body[1] == OPERATION["set_parameter"])
-    assert reported[2:4] == bytes([0, PARAMETER["feed_override"]["id"]]) and int.from_bytes(reported[4:], "little") == 65536 // 4
+    assert (
+        reported[2:4] == bytes([0, PARAMETER["feed_override"]["id"]])
+        and int.from_bytes(reported[4:], "little") == 65536 // 4
+    )
 
 
 def test_an_order_that_is_refused_has_failed():
@@ -471,7 +575,7 @@ def test_a_silent_sub_node_is_told_after_two_seconds_of_asking(after):
     assert node.peer()["phase"] == "turning"
     sub.run(250)
     assert (node.peer()["phase"], node.peer()["ended"]) == ("silent", "peer_silent")
-    assert len({body[0] for body in sub.asked[-20:]}) == 1      # the same request each time
+    assert len({body[0] for body in sub.asked[-20:]}) == 1  # the same request each time
 
 
 def test_a_sub_node_that_lost_its_power_is_told():
@@ -499,7 +603,10 @@ def test_a_sub_node_that_never_comes_to_rest_is_busy():
     sub = Answering(node)
     sub.cause = "busy"
     node.order(0, 600)
-    assert sub.run(11_000, until=lambda: node.peer()["phase"] == "failed") and node.peer()["ended"] == "busy"
+    assert (
+        sub.run(11_000, until=lambda: node.peer()["phase"] == "failed")
+        and node.peer()["ended"] == "busy"
+    )
 
 
 def test_stop_reaches_the_sub_node():
@@ -509,7 +616,10 @@ def test_stop_reaches_the_sub_node():
     sub.run(200)
     node.firmware.peer_stop()
     sub.run(200)
-    assert sub.operations().count("stop") == 1 and (node.peer()["phase"], node.peer()["ended"]) == ("failed", "stopped")
+    assert sub.operations().count("stop") == 1 and (node.peer()["phase"], node.peer()["ended"]) == (
+        "failed",
+        "stopped",
+    )
 
 
 def test_a_noisy_line_costs_repetitions_and_nothing_else():
@@ -518,20 +628,29 @@ def test_a_noisy_line_costs_repetitions_and_nothing_else():
 
     def spoil(data):
         kept = [byte for byte in data if source.random() > 0.01]
-        return [byte ^ (1 << source.randrange(8)) if source.random() < 0.01 else byte for byte in kept]
+        return [
+            byte ^ (1 << source.randrange(8)) if source.random() < 0.01 else byte for byte in kept
+        ]
 
     node.port.spoil, answer = spoil, node.say
     node.say = lambda data: answer(spoil(data))
     for station in range(10):
         assert node.order(station, 100 + station) == "ok"
         before, place = sub.target, (100 + station) * ARCSEC
-        assert sub.run(3000, until=lambda before=before: sub.target != before) and sub.target == place
+        assert (
+            sub.run(3000, until=lambda before=before: sub.target != before) and sub.target == place
+        )
         sub.phase, sub.ended = 0, "ok"
         assert sub.run(3000, until=lambda: node.peer()["phase"] == "turned")
-    assert node.peer()["garbage"] > 0 and len(set(sub.asked)) < len(sub.asked) and 10 <= sub.operations().count("turn_to") < 30
+    assert (
+        node.peer()["garbage"] > 0
+        and len(set(sub.asked)) < len(sub.asked)
+        and 10 <= sub.operations().count("turn_to") < 30
+    )
 
 
 # ------------------------------------------------------------------ not in use
+
 
 def test_a_node_whose_peer_port_is_not_in_use_orders_nothing_and_obeys_nothing():
     node = Node(0, MAIN)

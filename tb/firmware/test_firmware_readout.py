@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """readout.c: the position of axis 0 in mm on eight digits."""
+
 from fractions import Fraction
 
 import pytest
@@ -21,13 +22,31 @@ class Station(FakeNode):
         return self.display.text()
 
 
-@pytest.mark.parametrize(("periods", "decimals", "text"), [
-    (0, 5, "0.00000"), (0, 0, "0"), (1, 6, "0.000800"), (1, 5, "0.00080"), (-1, 5, "-0.00080"), (-1, 3, "-0.001"), (-1, 2, "0.00"),
-    (156_250, 5, "125.00000"), (-156_250, 4, "-125.0000"),
-    (-12_500, 6, "--------"), (-12_499, 6, "-9.999200"), (15_432, 5, "12.34560"), (15_432, 0, "12"), (124_999_999, 2, "100000.00"),
-    (124_999_999, 3, "99999.999"), (124_999_999, 4, "--------"), (-12_500_000, 3, "--------"), (-12_499_999, 3, "-9999.999")])
+@pytest.mark.parametrize(
+    ("periods", "decimals", "text"),
+    [
+        (0, 5, "0.00000"),
+        (0, 0, "0"),
+        (1, 6, "0.000800"),
+        (1, 5, "0.00080"),
+        (-1, 5, "-0.00080"),
+        (-1, 3, "-0.001"),
+        (-1, 2, "0.00"),
+        (156_250, 5, "125.00000"),
+        (-156_250, 4, "-125.0000"),
+        (-12_500, 6, "--------"),
+        (-12_499, 6, "-9.999200"),
+        (15_432, 5, "12.34560"),
+        (15_432, 0, "12"),
+        (124_999_999, 2, "100000.00"),
+        (124_999_999, 3, "99999.999"),
+        (124_999_999, 4, "--------"),
+        (-12_500_000, 3, "--------"),
+        (-12_499_999, 3, "-9999.999"),
+    ],
+)
 def test_the_position_is_shown_in_mm_with_the_decimals_that_are_set(periods, decimals, text):
-    millimetres = Fraction(periods * 800, 10**6)                # of the default period
+    millimetres = Fraction(periods * 800, 10**6)  # of the default period
     if "--" not in text:
         assert abs(Fraction(text) - millimetres) <= Fraction(1, 2 * 10**decimals)
     assert Station(periods * PERIOD).shown(decimals) == text
@@ -44,7 +63,7 @@ def test_the_display_is_refreshed_ten_times_a_second_with_its_set_up():
     station = Station()
     station.run(1000)
     assert station.display.written == 10 * 13
-    station.display.registers.clear()                           # it lost its power
+    station.display.registers.clear()  # it lost its power
     assert station.shown(2) == "0.00"
 
 

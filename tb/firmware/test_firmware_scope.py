@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""scope.c: what is kept before and after each trigger, at which distance, and the open loop that goes with it."""
+"""scope.c: what is kept before and after each trigger, at which distance, and the open loop that
+goes with it.
+"""
+
 import pytest
 
 from twin.compiled.node import CLK_HZ, DEFINES, FAULT, PERIOD, TABLE, Axis, FakeNode
@@ -24,9 +27,12 @@ def samples(machine):
     assert SCOPE_STATE[reported["state"]] == "full"
     while len(out) < reported["count"]:
         fields = machine.ask("read_scope", first=len(out))
-        out += [{name: fields[f"{name}_{n}"] for name in ("position", "error", "command", "time")} for n in range(5)]
-    assert all(set(sample.values()) == {0} for sample in out[reported["count"]:])
-    return out[:reported["count"]], reported["before"]
+        out += [
+            {name: fields[f"{name}_{n}"] for name in ("position", "error", "command", "time")}
+            for n in range(5)
+        ]
+    assert all(set(sample.values()) == {0} for sample in out[reported["count"] :])
+    return out[: reported["count"]], reported["before"]
 
 
 @pytest.fixture
@@ -51,9 +57,13 @@ def test_a_record_at_once_is_full_and_evenly_spaced(machine, every):
     machine.run(SAMPLES * every // 4 + 5)
     taken, before = samples(machine)
     assert len(taken) == SAMPLES and before == 0
-    assert {sample["time"] for sample in taken[1:]} == {every * TICK_CLK // CLK, every * TICK_CLK // CLK + 1} - \
-        ({every * TICK_CLK // CLK + 1} if every * TICK_CLK % CLK == 0 else set())
-    assert sum(sample["time"] for sample in taken[1:]) * CLK == pytest.approx((SAMPLES - 1) * every * TICK_CLK, abs=CLK)
+    assert {sample["time"] for sample in taken[1:]} == {
+        every * TICK_CLK // CLK,
+        every * TICK_CLK // CLK + 1,
+    } - ({every * TICK_CLK // CLK + 1} if every * TICK_CLK % CLK == 0 else set())
+    assert sum(sample["time"] for sample in taken[1:]) * CLK == pytest.approx(
+        (SAMPLES - 1) * every * TICK_CLK, abs=CLK
+    )
     assert machine.request("read_scope", first=SAMPLES)[0] == "out_of_range"
 
 
@@ -66,7 +76,7 @@ def test_samples_hold_what_the_registers_held(machine):
         machine.run(1)
         held.append((axis.position, axis.error))
     taken, _ = samples(machine)
-    assert [(sample["position"], sample["error"]) for sample in taken[1:]] == held[:SAMPLES - 1]
+    assert [(sample["position"], sample["error"]) for sample in taken[1:]] == held[: SAMPLES - 1]
     assert {sample["command"] for sample in taken} == {-100}
 
 
@@ -127,15 +137,24 @@ def test_only_the_axis_that_was_asked_for_triggers(machine):
     assert state(machine) == "recording"
 
 
-@pytest.mark.parametrize("setting", [
-    dict(trigger=5), dict(before=SAMPLES), dict(every=0), dict(every=201), dict(amplitude=-1),
-    dict(amplitude=100, trigger=TRIGGER["motion"]), dict(amplitude=100, before=1),
-])
+@pytest.mark.parametrize(
+    "setting",
+    [
+        dict(trigger=5),
+        dict(before=SAMPLES),
+        dict(every=0),
+        dict(every=201),
+        dict(amplitude=-1),
+        dict(amplitude=100, trigger=TRIGGER["motion"]),
+        dict(amplitude=100, before=1),
+    ],
+)
 def test_settings_that_make_no_sense_are_refused(machine, setting):
     assert arm(machine, **setting) == "out_of_range" and state(machine) == "empty"
 
 
 # ------------------------------------------------------------------ open loop
+
 
 def excite(machine, **setting):
     return arm(machine, **{"amplitude": 3000, "level": 50 * PERIOD, "every": 8, **setting})
@@ -165,7 +184,11 @@ def test_the_open_loop_is_driven_by_steps_and_their_mirrors_and_then_held(machin
         last = command
     assert len(runs) > 8 and len(set(runs)) > 3 and max(runs) <= 2 * 2 * 16 + 2
     machine.run(10)
-    assert machine.axes[0].control & control and machine.status()["state"] == "holding" and machine.status()["ended"] == "ok"
+    assert (
+        machine.axes[0].control & control
+        and machine.status()["state"] == "holding"
+        and machine.status()["ended"] == "ok"
+    )
     assert len(samples(machine)[0]) == SAMPLES
 
 
@@ -191,13 +214,16 @@ def test_stop_disable_and_fault_end_the_open_loop_and_the_record(machine, way):
     assert reported["ended"] == ("ended_by_fault" if way == "fault" else "stopped")
     before = machine.axes[0].word[DEFINES["AXIS_OPEN_COMMAND"]]
     machine.run(50)
-    assert machine.axes[0].word[DEFINES["AXIS_OPEN_COMMAND"]] == before and 20 < len(samples(machine)[0]) < 40
+    assert (
+        machine.axes[0].word[DEFINES["AXIS_OPEN_COMMAND"]] == before
+        and 20 < len(samples(machine)[0]) < 40
+    )
 
 
 def test_an_axis_that_goes_too_far_is_held(machine):
     excite(machine)
     machine.run(20)
-    machine.axes[0].seized = True             # the machine of this bench knows no open loop
+    machine.axes[0].seized = True  # the machine of this bench knows no open loop
     machine.axes[0].machine += 51 * PERIOD
     machine.run(4)
     assert machine.status()["state"] == "holding" and machine.axes[0].error == 0

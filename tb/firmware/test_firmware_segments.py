@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""segments.c: a table is loaded in order and whole or not used, in force only at rest and with a zero, and it lies where the zero is."""
+"""segments.c: a table is loaded in order and whole or not used, in force only at rest and with a
+zero, and it lies where the zero is.
+"""
+
 import pytest
 
 from twin.compiled.node import CAUSE, PARAMETER, PERIOD, Axis, FakeNode
@@ -10,7 +13,7 @@ LENGTH, FIRST = 1000 * PERIOD, -2000 * PERIOD
 
 def table(machine, points=POINTS, **more):
     for border in range(0, len(points), 12):
-        block = points[border:border + 12]
+        block = points[border : border + 12]
         filled = {f"point_{n}": point for n, point in enumerate([*block, *[0] * 12][:12])}
         machine.ask("set_segments", axis=0, border=border, points=len(block), **filled)
     machine.set(segment_count=len(points) - 1, segment_length=LENGTH, segment_first=FIRST, **more)
@@ -45,9 +48,15 @@ def test_a_table_in_force_is_the_one_that_was_loaded_and_reads_back():
     machine.set(segments=2)
     machine.poll(4)
     grating = machine.feedback_channels[0]
-    assert look(machine) == (30, 2, "ok") and grating.use == dict(linear=True, segments=29, length=LENGTH, origin=FIRST)
+    assert look(machine) == (30, 2, "ok") and grating.use == dict(
+        linear=True, segments=29, length=LENGTH, origin=FIRST
+    )
     assert [grating.segments[n] for n in range(30)] == POINTS
-    back = [machine.ask("get_segments", axis=0, border=border)[f"point_{n}"] for border in (0, 12, 24) for n in range(12)]
+    back = [
+        machine.ask("get_segments", axis=0, border=border)[f"point_{n}"]
+        for border in (0, 12, 24)
+        for n in range(12)
+    ]
     assert back[:30] == POINTS
 
 
@@ -55,13 +64,15 @@ def test_a_table_in_force_is_the_one_that_was_loaded_and_reads_back():
 def test_the_table_counts_from_the_place_that_homing_finds_whatever_it_is_called(offset):
     machine = homed(home_offset=offset)
     table(machine, segments=1)
-    machine.set(home_offset=offset + 5)                 # counts from the next homing on
+    machine.set(home_offset=offset + 5)  # counts from the next homing on
     machine.poll(4)
     assert machine.feedback_channels[0].use["origin"] == FIRST + offset * PERIOD
     machine.ask("home", axis=0)
     assert machine.feedback_channels[0].use is None
     machine.run(300)
-    assert machine.feedback_channels[0].use["origin"] == FIRST + (offset + 5) * PERIOD and look(machine) == (30, 1, "ok")
+    assert machine.feedback_channels[0].use["origin"] == FIRST + (offset + 5) * PERIOD and look(
+        machine
+    ) == (30, 1, "ok")
 
 
 def test_without_a_zero_it_is_not_in_force_and_says_so():
@@ -75,7 +86,7 @@ def test_a_zero_that_is_lost_takes_it_out_of_force():
     machine = homed()
     table(machine, segments=1)
     machine.poll(4)
-    machine.axes[0].causes = 1 << 4                     # encoder
+    machine.axes[0].causes = 1 << 4  # encoder
     machine.poll(4)
     machine.axes[0].causes = 0
     assert look(machine) == (30, 0, "not_homed") and machine.feedback_channels[0].use is None
@@ -129,7 +140,12 @@ def test_points_out_of_order_too_many_or_too_large_are_refused():
     machine = homed()
     assert machine.request("set_segments", **block(border=12))[0] == "out_of_range"
     machine.ask("set_segments", **block(points=12))
-    for wrong in (block(border=11), block(border=13), block(border=12, points=13), block(border=12, point=1 << 23)):
+    for wrong in (
+        block(border=11),
+        block(border=13),
+        block(border=12, points=13),
+        block(border=12, point=1 << 23),
+    ):
         assert machine.request("set_segments", **wrong)[0] == "out_of_range"
     for border in range(12, 252, 12):
         machine.ask("set_segments", **block(point=-(1 << 23) + 1, border=border, points=12))
@@ -142,10 +158,16 @@ def test_a_node_without_a_table_says_so():
     machine = homed()
     machine.feedback_channels[0].most_segments = 0
     assert machine.request("set_segments", **block())[0] == "not_built"
-    assert refused(machine, "segments", 1) == "not_built" and refused(machine, "segments", 0) == "ok"
+    assert (
+        refused(machine, "segments", 1) == "not_built" and refused(machine, "segments", 0) == "ok"
+    )
 
 
 def test_points_have_their_sign():
     machine = homed()
     table(machine, [-1, (1 << 23) - 1, -(1 << 23) + 1])
-    assert [machine.feedback_channels[0].segments[n] for n in range(3)] == [-1, (1 << 23) - 1, -(1 << 23) + 1]
+    assert [machine.feedback_channels[0].segments[n] for n in range(3)] == [
+        -1,
+        (1 << 23) - 1,
+        -(1 << 23) + 1,
+    ]

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""settings.c and the images: what a node of one image answers, and what one of the other does not have."""
+"""settings.c and the images: what a node of one image answers, and what one of the other does not
+have.
+"""
+
 import pytest
 
 from twin.compiled.node import TABLE, FakeNode
@@ -23,7 +26,10 @@ def test_each_setting_begins_at_its_default_and_takes_both_ends_of_its_range(sta
 def test_a_value_beyond_either_end_is_refused_and_changes_nothing(station):
     for setting in SETTING.values():
         for value in (setting["min"] - 1, setting["max"] + 1):
-            assert station.request("set_setting", setting=setting["id"], value=value)[0] == "out_of_range"
+            assert (
+                station.request("set_setting", setting=setting["id"], value=value)[0]
+                == "out_of_range"
+            )
         assert station.ask("get_setting", setting=setting["id"])["value"] == setting["default"]
 
 
@@ -52,4 +58,7 @@ def test_axes_move_in_a_station_as_elsewhere(station):
     station.ask("home", axis=0)
     assert station.run(2000, until=lambda: station.status()["ended"] == "ok")
     station.ask("move", axis=0, target=65536)
-    assert station.run(2000, until=lambda: station.status()["ended"] == "ok") and station.status()["target"] == 65536
+    assert (
+        station.run(2000, until=lambda: station.status()["ended"] == "ok")
+        and station.status()["target"] == 65536
+    )

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""job.c with machine.c: whole jobs between a sub-node and the machine, every failure provoked, and no station ever cut twice."""
+"""job.c with machine.c: whole jobs between a sub-node and the machine, every failure provoked, and
+no station ever cut twice.
+"""
+
 import random
 
 import pytest
@@ -16,10 +19,15 @@ def node(frames=True, angles=ANGLES, panel=False, **options):
     """A main node with a sub-node and a program."""
     station = Station(absent=() if panel else ("keypad", "display"), **options)
     station.sub_node = SubNode(frames=frames)
-    station.setting(peer_mode=FRAMES if frames else PRINTED, job_start_limit=2, job_cut_limit=5, peer_timeout=3000)
+    station.setting(
+        peer_mode=FRAMES if frames else PRINTED,
+        job_start_limit=2,
+        job_cut_limit=5,
+        peer_timeout=3000,
+    )
     station.ready()
     assert station.load(angles) == "ok"
-    station.run(2500 if panel else 0)                       # it is found
+    station.run(2500 if panel else 0)  # it is found
     return station
 
 
@@ -39,7 +47,7 @@ def test_a_job_cuts_every_station_once_and_in_order(frames):
     assert job["state"] == "finished" and job["cause"] == "ok" and cuts(station) == STATIONS
     assert station.sub_node.angles == (ANGLES if frames else [None] * STATIONS)
     assert station.edm.heard == station.edm.START * STATIONS
-    assert station.do("start") == "ok"                      # and again, from the first station on
+    assert station.do("start") == "ok"  # and again, from the first station on
     station.until("finished")
     assert cuts(station) == 2 * STATIONS
 
@@ -64,21 +72,33 @@ def test_every_cut_is_in_the_journal_before_the_keys_are_sent():
     start(station, "turning")
     for n in range(STATIONS):
         station.until("cutting")
-        record = station.eeprom.memory[4096:4096 + 64 * 64]
-        newest = max((record[at:at + 12] for at in range(0, len(record), 64) if record[at:at + 4] != b"\xff" * 4),
-                     key=lambda line: int.from_bytes(line[:4], "little"))
-        assert (newest[8], newest[10]) == (n, 3)            # station, cut begun
+        record = station.eeprom.memory[4096 : 4096 + 64 * 64]
+        newest = max(
+            (
+                record[at : at + 12]
+                for at in range(0, len(record), 64)
+                if record[at : at + 4] != b"\xff" * 4
+            ),
+            key=lambda line: int.from_bytes(line[:4], "little"),
+        )
+        assert (newest[8], newest[10]) == (n, 3)  # station, cut begun
         station.until("ended", "leaving", "turning", "finishing")
 
 
 # a person
+
 
 def test_pause_stands_before_the_next_cut_and_resume_goes_on():
     station = node()
     start(station, "cutting")
     assert station.do("pause") == "ok" and "pausing" in station.job()["flags"]
     job = station.until("paused")
-    assert job["cause"] == "paused_by_operator" and job["station"] == 1 and cuts(station) == 1 and job["answers"] == {"resume", "stop"}
+    assert (
+        job["cause"] == "paused_by_operator"
+        and job["station"] == 1
+        and cuts(station) == 1
+        and job["answers"] == {"resume", "stop"}
+    )
     station.run(3000)
     assert cuts(station) == 1
     assert station.do("resume") == "ok"
@@ -109,11 +129,19 @@ def test_stop_ends_the_job_wherever_it_is(at):
     station.run(3000)
     assert cuts(station) == begun and station.sub_node.there_at is None
     station.power_cut()
-    assert station.ready()["state"] == "idle"               # nothing is left of it
+    assert station.ready()["state"] == "idle"  # nothing is left of it
 
 
-@pytest.mark.parametrize(("action", "cause"), [("resume", "not_now"), ("again", "not_now"), ("next", "not_now"), ("stop", "not_now"),
-                                               ("pause", "not_now")])
+@pytest.mark.parametrize(
+    ("action", "cause"),
+    [
+        ("resume", "not_now"),
+        ("again", "not_now"),
+        ("next", "not_now"),
+        ("stop", "not_now"),
+        ("pause", "not_now"),
+    ],
+)
 def test_answers_that_nobody_waits_for_are_refused(action, cause):
     station = node()
     assert station.do(action) == cause and station.job()["answers"] == {"start"}
@@ -135,12 +163,15 @@ def test_the_keys_pending_while_a_person_types():
     station.edm.types_until = station.clk + ms(25_000)
     start(station, "cutting")
     station.run(15_000)
-    assert cuts(station) == 0 and "keys_pending" in station.job()["flags"] and station.edm.heard == b""
+    assert (
+        cuts(station) == 0 and "keys_pending" in station.job()["flags"] and station.edm.heard == b""
+    )
     station.until("finished")
     assert cuts(station) == STATIONS and station.edm.heard == station.edm.START * STATIONS
 
 
 # the machine
+
 
 def test_a_cut_that_does_not_start_is_asked_about_and_no_key_is_sent_again():
     station = node()
@@ -170,7 +201,7 @@ def test_a_cut_that_does_not_end_is_asked_about_and_may_be_followed():
     station.edm.endless = True
     job = start(station, "unsure")
     assert job["cause"] == "cut_not_ended" and job["answers"] == {"resume", "next", "stop"}
-    assert station.do("again") == "edm_busy"            # it would cut twice
+    assert station.do("again") == "edm_busy"  # it would cut twice
     assert station.do("resume") == "ok"
     station.until("following")
     station.edm.endless = False
@@ -196,13 +227,17 @@ def test_an_alarm_in_the_cut_is_asked_about_with_its_words():
     assert station.run(2000, until=lambda: station.edm.inputs & 1)
     station.edm.alarm()
     job = station.until("unsure")
-    assert job["cause"] == "edm_alarm" and {"alarm"} <= job["flags"] and job["answers"] == {"next", "stop"}
+    assert (
+        job["cause"] == "edm_alarm"
+        and {"alarm"} <= job["flags"]
+        and job["answers"] == {"next", "stop"}
+    )
     assert station.shown()[1:3] == ["the machine reports", "an alarm"]
     assert station.do("again") == "edm_alarm"
     station.edm.alarm(False)
     assert station.do("again") == "ok"
     station.until("finished")
-    assert cuts(station) == STATIONS + 1                    # the person said so
+    assert cuts(station) == STATIONS + 1  # the person said so
 
 
 def test_an_alarm_that_comes_a_little_after_the_end_of_the_cut_counts():
@@ -220,7 +255,11 @@ def test_an_alarm_before_the_cut_pauses():
     start(station, "turning")
     station.edm.alarm()
     job = station.until("paused")
-    assert job["cause"] == "edm_alarm" and station.do("resume") == "edm_alarm" and station.edm.heard == b""
+    assert (
+        job["cause"] == "edm_alarm"
+        and station.do("resume") == "edm_alarm"
+        and station.edm.heard == b""
+    )
     station.edm.alarm(False)
     station.do("resume")
     station.until("finished")
@@ -238,7 +277,11 @@ def test_keys_that_the_machine_does_not_take_are_taken_back_and_never_come_late(
     station = node()
     station.edm.takes_nothing = True
     job = start(station, "unsure")
-    assert job["cause"] == "keys_not_taken" and "keys_pending" not in job["flags"] and job["answers"] == {"again", "next", "stop"}
+    assert (
+        job["cause"] == "keys_not_taken"
+        and "keys_pending" not in job["flags"]
+        and job["answers"] == {"again", "next", "stop"}
+    )
     station.edm.takes_nothing = False
     station.run(5000)
     assert cuts(station) == 0 and station.edm.heard == b""
@@ -253,7 +296,11 @@ def test_a_machine_that_takes_half_the_keys_is_named_and_gets_the_others_once():
     assert station.run(5000, until=lambda: station.edm.injecting)
     station.edm.next_key = station.clk + ms(30_000)
     job = station.until("unsure")
-    assert job["cause"] == "keys_not_taken" and station.do("again") == "edm_busy" and "keys_pending" in job["flags"]
+    assert (
+        job["cause"] == "keys_not_taken"
+        and station.do("again") == "edm_busy"
+        and "keys_pending" in job["flags"]
+    )
     assert station.run(30_000, until=lambda: station.edm.inputs & 1)
     assert station.do("resume") == "ok"
     station.until("finished")
@@ -287,7 +334,10 @@ def test_a_node_without_keyboard_or_status_inputs_does_no_job(missing):
 
 # the sub-node
 
-@pytest.mark.parametrize("cause", ["sensor_timed_out", "not_converged", "sensor_disagrees", "stiction"])
+
+@pytest.mark.parametrize(
+    "cause", ["sensor_timed_out", "not_converged", "sensor_disagrees", "stiction"]
+)
 def test_what_the_sub_node_failed_of_is_told_and_resume_tries_again(cause):
     station = node()
     station.sub_node.fault = cause
@@ -299,27 +349,47 @@ def test_what_the_sub_node_failed_of_is_told_and_resume_tries_again(cause):
     assert cuts(station) == STATIONS
 
 
-@pytest.mark.parametrize(("fault", "words"), [("estop", ["emergency stop", ""]), ("following_error", ["following error too", "large"]),
-                                              ("step_overrun", ["more steps were owed", "than may be"])])
-def test_a_fault_of_the_sub_node_is_said_in_words_and_reset_by_resume_when_its_cause_is_gone(fault, words):
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ("estop", ["emergency stop", ""]),
+        ("following_error", ["following error too", "large"]),
+        ("step_overrun", ["more steps were owed", "than may be"]),
+    ],
+)
+def test_a_fault_of_the_sub_node_is_said_in_words_and_reset_by_resume_when_its_cause_is_gone(
+    fault, words
+):
     station = node(panel=True)
     start(station, "turning")
     station.run(50)
     station.sub_node.latch(fault, "cpu")
     station.sub_node.cause_stands = True
     job = station.until("paused")
-    assert job["cause"] == "ended_by_fault" and job["table_faults"] == {fault} and job["answers"] == {"resume", "stop"}
+    assert (
+        job["cause"] == "ended_by_fault"
+        and job["table_faults"] == {fault}
+        and job["answers"] == {"resume", "stop"}
+    )
     seen = [station.shown()[1:3] for _ in range(12)]
     assert words in seen and ["a fault ended the", "motion"] in seen
     station.run(5000)
-    assert station.sub_node.resets == 0                     # never by itself
+    assert station.sub_node.resets == 0  # never by itself
     station.press("RESUME")
     job = station.until("paused")
-    assert job["cause"] == "fault_persists" and job["table_faults"] == {fault} and station.sub_node.resets == 1
+    assert (
+        job["cause"] == "fault_persists"
+        and job["table_faults"] == {fault}
+        and station.sub_node.resets == 1
+    )
     station.sub_node.cause_stands = False
     station.press("RESUME")
     station.until("finished")
-    assert cuts(station) == STATIONS and station.sub_node.resets == 2 and station.job()["table_faults"] == set()
+    assert (
+        cuts(station) == STATIONS
+        and station.sub_node.resets == 2
+        and station.job()["table_faults"] == set()
+    )
 
 
 def test_a_fault_of_the_sub_node_is_reset_by_resume_only():
@@ -330,7 +400,11 @@ def test_a_fault_of_the_sub_node_is_reset_by_resume_only():
     assert (job["cause"], job["table_faults"], job["station"]) == ("faulted", {"drive"}, 1)
     station.do("stop")
     station.until("idle")
-    assert station.do("start") == "ok" and station.until("paused")["cause"] == "faulted" and station.sub_node.resets == 0
+    assert (
+        station.do("start") == "ok"
+        and station.until("paused")["cause"] == "faulted"
+        and station.sub_node.resets == 0
+    )
     station.do("resume")
     station.until("finished")
     assert station.sub_node.resets == 1 and cuts(station) == 1 + STATIONS
@@ -372,7 +446,11 @@ def test_a_sub_node_that_counts_is_never_sent_on_when_its_place_is_not_known():
     station = node(frames=False)
     station.sub_node.fault = "no_motion_yet"
     assert start(station, "paused")["cause"] == "check_sub_node"
-    assert station.job()["answers"] == {"stop"} and station.do("resume") == "table_position_unknown" and station.sub_node.requests == 1
+    assert (
+        station.job()["answers"] == {"stop"}
+        and station.do("resume") == "table_position_unknown"
+        and station.sub_node.requests == 1
+    )
     station.do("stop")
     station.until("idle")
 
@@ -391,6 +469,7 @@ def test_a_sub_node_that_counts_is_not_told_twice_to_go_to_a_station():
 
 # power
 
+
 def test_after_a_power_cut_in_the_cut_a_person_is_asked():
     station = node()
     station.edm.cut_ms = 4000
@@ -398,8 +477,12 @@ def test_after_a_power_cut_in_the_cut_a_person_is_asked():
     assert station.run(2000, until=lambda: station.edm.inputs & 1)
     station.power_cut()
     job = station.ready()
-    assert (job["state"], job["cause"], job["station"]) == ("unsure", "power_lost", 0) and "again" not in job["answers"]
-    assert station.do("resume") == "ok"                     # it still cuts: follow it
+    assert (job["state"], job["cause"], job["station"]) == (
+        "unsure",
+        "power_lost",
+        0,
+    ) and "again" not in job["answers"]
+    assert station.do("resume") == "ok"  # it still cuts: follow it
     station.until("finished")
     assert cuts(station) == STATIONS
 
@@ -412,9 +495,18 @@ def test_a_cut_that_ended_without_power_is_cut_again_only_if_a_person_says_so(an
     station.power_cut()
     station.run(5000)
     job = station.job()
-    assert job["state"] == "unsure" and job["answers"] == {"again", "next", "stop"} and cuts(station) == 1
+    assert (
+        job["state"] == "unsure"
+        and job["answers"] == {"again", "next", "stop"}
+        and cuts(station) == 1
+    )
     station.run(2500)
-    assert station.shown() == ["is it cut?   001/004", "the power was lost", "during the job", "STOP AGAIN NEXT"]
+    assert station.shown() == [
+        "is it cut?   001/004",
+        "the power was lost",
+        "during the job",
+        "STOP AGAIN NEXT",
+    ]
     station.press(answer.upper())
     station.until("finished")
     assert cuts(station) == STATIONS + (answer == "again")
@@ -426,7 +518,9 @@ def test_a_job_whose_power_went_between_the_cuts_waits_for_resume_and_misses_non
     station.until("turning")
     station.power_cut()
     job = station.ready()
-    assert (job["state"], job["cause"], job["station"]) == ("paused", "power_lost", 1) and job["answers"] == {"resume", "stop"}
+    assert (job["state"], job["cause"], job["station"]) == ("paused", "power_lost", 1) and job[
+        "answers"
+    ] == {"resume", "stop"}
     station.run(3000)
     assert cuts(station) == 1
     station.do("resume")
@@ -448,11 +542,14 @@ def test_power_cuts_at_any_moment_leave_no_station_uncut_and_cut_none_twice():
             station.power_cut()
             station.run(1200)
             station.ready()
-            station.run(1500)                               # a cut that was under way has ended
+            station.run(1500)  # a cut that was under way has ended
             job = station.job()
             if job["state"] == "unsure":
-                begun = bool(station.edm.cuts) and station.sub_node.angles[-1] == ANGLES[job["station"]] and len(
-                    station.edm.cuts) == job["station"] + 1
+                begun = (
+                    bool(station.edm.cuts)
+                    and station.sub_node.angles[-1] == ANGLES[job["station"]]
+                    and len(station.edm.cuts) == job["station"] + 1
+                )
                 assert station.do("next" if begun else "again") == "ok"
             elif job["state"] == "paused":
                 assert station.do("resume") == "ok"
@@ -464,7 +561,7 @@ def test_power_cuts_at_any_moment_leave_no_station_uncut_and_cut_none_twice():
 
 def test_a_job_of_another_program_is_not_resumed():
     station = node(angles=[1, 2])
-    assert station.load(ANGLES) == "ok"                     # over the older copy, the first
+    assert station.load(ANGLES) == "ok"  # over the older copy, the first
     start(station, "cutting")
     station.eeprom.memory[90] ^= 1
     station.power_cut()
@@ -474,12 +571,17 @@ def test_a_job_of_another_program_is_not_resumed():
 
 # the EEPROM in the job
 
+
 def test_no_cut_begins_that_is_not_in_the_journal():
     station = node()
     start(station, "turning")
     station.bus.devices.pop(0x50)
     job = station.until("paused")
-    assert job["cause"] == "eeprom_missing" and station.edm.heard == b"" and station.do("resume") == "eeprom_missing"
+    assert (
+        job["cause"] == "eeprom_missing"
+        and station.edm.heard == b""
+        and station.do("resume") == "eeprom_missing"
+    )
     station.bus.devices[0x50] = station.eeprom
     station.run(4000)
     assert station.do("resume") == "ok"
@@ -495,7 +597,11 @@ def test_another_eeprom_in_the_middle_of_a_job_is_refused():
     station.until("paused")
     station.bus.devices[0x50] = other
     station.run(4000)
-    assert station.do("resume") == "job_changed" and station.job()["answers"] == {"stop"} and cuts(station) == 0
+    assert (
+        station.do("resume") == "job_changed"
+        and station.job()["answers"] == {"stop"}
+        and cuts(station) == 0
+    )
     station.bus.devices.pop(0x50)
     station.power_cut()
     station.bus.devices[0x50] = mine

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""keep.c and store.c: parameters and settings kept in the EEPROM through power cuts, and why they are not in force where they are not."""
+"""keep.c and store.c: parameters and settings kept in the EEPROM through power cuts, and why they
+are not in force where they are not.
+"""
+
 import random
 import zlib
 
@@ -10,7 +13,7 @@ from twin.compiled.node import PARAMETER, TABLE, Axis, FakeNode
 from twin.compiled.station import SETTING, Station
 
 COPIES = (8192, 12288)
-VALUE = 16                                                  # bytes
+VALUE = 16  # bytes
 END = 0x101
 
 
@@ -27,11 +30,17 @@ def restarted(station):
 
 
 def parameters(station, *names):
-    return {name: station.ask("get_parameter", axis=0, parameter=PARAMETER[name]["id"])["value"] for name in names or PARAMETER}
+    return {
+        name: station.ask("get_parameter", axis=0, parameter=PARAMETER[name]["id"])["value"]
+        for name in names or PARAMETER
+    }
 
 
 def settings(station, *names):
-    return {name: station.ask("get_setting", setting=SETTING[name])["value"] for name in names or SETTING}
+    return {
+        name: station.ask("get_setting", setting=SETTING[name])["value"]
+        for name in names or SETTING
+    }
 
 
 def default(table):
@@ -43,29 +52,53 @@ def rewrite(station, change, copy=0):
     at = COPIES[copy]
     memory = bytes(station.eeprom.memory)
     values = []
-    while int.from_bytes((value := memory[at:at + VALUE])[8:12], "little") != END:
+    while int.from_bytes((value := memory[at : at + VALUE])[8:12], "little") != END:
         values.append(bytearray(value))
         at += VALUE
     change(values)
     body = b"".join(values)
     end = zlib.crc32(body).to_bytes(8, "little") + END.to_bytes(8, "little")
-    station.eeprom.memory[COPIES[copy]:COPIES[copy] + len(body) + VALUE] = body + end
+    station.eeprom.memory[COPIES[copy] : COPIES[copy] + len(body) + VALUE] = body + end
 
 
 def test_parameters_and_settings_are_in_force_after_a_power_cut_and_all_others_at_their_defaults():
     station = powered()
     station.set(velocity=777, kp=0, position_source=2, travel_low=-5)
     station.setting(peer_role=1, turn_frames=9)
-    assert station.save_settings() == "ok" and station.saved_settings()["values"] == 6 and station.saved_settings()["generation"] == 1
-    station.set(jerk=4242)                                  # not kept
+    assert (
+        station.save_settings() == "ok"
+        and station.saved_settings()["values"] == 6
+        and station.saved_settings()["generation"] == 1
+    )
+    station.set(jerk=4242)  # not kept
     assert restarted(station) == "ok"
-    assert parameters(station) == {**default(PARAMETER), "velocity": 777, "kp": 0, "position_source": 2, "travel_low": -5}
+    assert parameters(station) == {
+        **default(PARAMETER),
+        "velocity": 777,
+        "kp": 0,
+        "position_source": 2,
+        "travel_low": -5,
+    }
     assert settings(station) == {**default(TABLE["setting"]), "peer_role": 1, "turn_frames": 9}
-    assert station.saved_settings() == {"writing": 0, "cause": "ok", "damaged": 0, "generation": 1, "values": 6}
+    assert station.saved_settings() == {
+        "writing": 0,
+        "cause": "ok",
+        "damaged": 0,
+        "generation": 1,
+        "values": 6,
+    }
 
 
 def test_a_sub_node_listens_to_its_main_node_only_when_its_axis_is_as_it_was():
-    station, kept = powered(), {name: 4242 + n for n, name in enumerate(name for name in PARAMETER if name[:8] in ("filter_1", "filter_2"))}
+    station, kept = (
+        powered(),
+        {
+            name: 4242 + n
+            for n, name in enumerate(
+                name for name in PARAMETER if name[:8] in ("filter_1", "filter_2")
+            )
+        },
+    )
     station.set(**kept)
     station.setting(peer_mode=2, peer_role=1)
     station.save_settings()
@@ -73,10 +106,17 @@ def test_a_sub_node_listens_to_its_main_node_only_when_its_axis_is_as_it_was():
     seen = []
     while not seen or station.saved_settings()["writing"]:
         station.run(0.5)
-        listens, taken = settings(station, "peer_mode")["peer_mode"] == 2, parameters(station, *kept) == kept
+        listens, taken = (
+            settings(station, "peer_mode")["peer_mode"] == 2,
+            parameters(station, *kept) == kept,
+        )
         assert taken or not listens
         seen.append((taken, listens))
-    assert seen[0] == (False, False) and seen[-1] == (True, True) and station.saved_settings()["cause"] == "ok"
+    assert (
+        seen[0] == (False, False)
+        and seen[-1] == (True, True)
+        and station.saved_settings()["cause"] == "ok"
+    )
 
 
 def test_registers_follow_what_is_kept():
@@ -91,9 +131,16 @@ def test_registers_follow_what_is_kept():
 def test_every_value_at_either_end_of_its_range_is_kept():
     station, source = powered(), random.Random(seed())
     for parameter in PARAMETER.values():
-        station.request("set_parameter", axis=0, parameter=parameter["id"], value=parameter[source.choice(("min", "max"))])
+        station.request(
+            "set_parameter",
+            axis=0,
+            parameter=parameter["id"],
+            value=parameter[source.choice(("min", "max"))],
+        )
     for setting in TABLE["setting"].values():
-        station.ask("set_setting", setting=setting["id"], value=setting[source.choice(("min", "max"))])
+        station.ask(
+            "set_setting", setting=setting["id"], value=setting[source.choice(("min", "max"))]
+        )
     station.setting(peer_role=0)
     before = parameters(station), settings(station)
     assert station.save_settings() == "ok" and station.saved_settings()["values"] > 60
@@ -105,7 +152,7 @@ def test_each_keeping_goes_over_the_older_copy():
     for generation in range(1, 5):
         station.set(kp=generation)
         assert station.save_settings() == "ok"
-        found = {int.from_bytes(station.eeprom.memory[at:at + 4], "little") for at in COPIES}
+        found = {int.from_bytes(station.eeprom.memory[at : at + 4], "little") for at in COPIES}
         assert found == {generation, generation - 1 or 0xFFFFFFFF}
         assert restarted(station) == "ok" and parameters(station, "kp") == {"kp": generation}
 
@@ -114,14 +161,22 @@ def test_what_is_forgotten_is_at_its_default_from_the_next_power_up_on():
     station = powered()
     station.set(kp=1)
     station.save_settings()
-    assert station.save_settings("clear") == "nothing_saved" and parameters(station, "kp") == {"kp": 1}
+    assert station.save_settings("clear") == "nothing_saved" and parameters(station, "kp") == {
+        "kp": 1
+    }
     assert restarted(station) == "nothing_saved" and parameters(station) == default(PARAMETER)
     assert station.saved_settings()["generation"] == 2 and station.saved_settings()["damaged"] == 0
 
 
 def test_a_blank_eeprom_keeps_nothing_and_the_panel_does_not_mention_it():
     station = powered()
-    assert station.saved_settings() == {"writing": 0, "cause": "nothing_saved", "damaged": 0, "generation": 0, "values": 0}
+    assert station.saved_settings() == {
+        "writing": 0,
+        "cause": "nothing_saved",
+        "damaged": 0,
+        "generation": 0,
+        "values": 0,
+    }
     station.load([1])
     assert station.job()["cause"] == "ok"
 
@@ -135,11 +190,18 @@ def test_a_damaged_copy_is_told_and_the_other_one_is_in_force(copies):
         station.save_settings()
     for at in COPIES[::-1][:copies]:
         station.eeprom.memory[at + VALUE + 1] ^= 4
-    assert restarted(station) == ("ok" if copies == 1 else "saved_damaged") and station.saved_settings()["damaged"] == 1
+    assert (
+        restarted(station) == ("ok" if copies == 1 else "saved_damaged")
+        and station.saved_settings()["damaged"] == 1
+    )
     assert parameters(station, "kp") == {"kp": 1 if copies == 1 else PARAMETER["kp"]["default"]}
     assert station.job()["cause"] == ("ok" if copies == 1 else "saved_damaged")
     station.set(kp=3)
-    assert station.save_settings() == "ok" and station.saved_settings()["damaged"] == 0 and station.job()["cause"] == "ok"
+    assert (
+        station.save_settings() == "ok"
+        and station.saved_settings()["damaged"] == 0
+        and station.job()["cause"] == "ok"
+    )
     assert restarted(station) == "ok" and parameters(station, "kp") == {"kp": 3}
 
 
@@ -150,7 +212,11 @@ def test_values_of_another_build_are_not_taken_and_the_panel_says_so():
     station.save_settings()
     rewrite(station, lambda values: values[0].__setitem__(4, values[0][4] ^ 1))
     assert restarted(station) == "saved_other_build" and parameters(station) == default(PARAMETER)
-    assert station.run(2500) is False and station.shown()[:3] == ["ready        001/001", "the kept values are", "of another build"]
+    assert station.run(2500) is False and station.shown()[:3] == [
+        "ready        001/001",
+        "the kept values are",
+        "of another build",
+    ]
 
 
 def test_values_of_a_node_with_another_count_of_axes_are_of_another_build():
@@ -171,9 +237,13 @@ def test_a_value_that_is_not_allowed_is_named_and_the_others_are_in_force():
     def spoil(values):
         assert values[1][12] == PARAMETER["velocity"]["id"]
         values[1][:8] = bytes(8)
+
     rewrite(station, spoil)
     assert restarted(station) == "saved_refused"
-    assert parameters(station, "velocity", "kp") == {"velocity": PARAMETER["velocity"]["default"], "kp": 5}
+    assert parameters(station, "velocity", "kp") == {
+        "velocity": PARAMETER["velocity"]["default"],
+        "kp": 5,
+    }
 
 
 @pytest.mark.parametrize("last", ["program", "values"])
@@ -195,13 +265,20 @@ def test_keeping_leaves_program_and_journal_as_they_are():
     station.set(kp=1)
     station.save_settings()
     assert station.eeprom.memory[:8192] == before and station.program() == [1, 2, 3]
-    assert station.save_settings("clear") == "nothing_saved" and station.ask("job_stations")["ended"] == 0
+    assert (
+        station.save_settings("clear") == "nothing_saved"
+        and station.ask("job_stations")["ended"] == 0
+    )
 
 
 def test_without_a_program_keeping_does_not_make_it_look_like_one():
     station = powered()
     station.set(kp=1)
-    assert station.save_settings() == "ok" and station.do("start") == "no_job" and station.job()["cause"] == "no_job"
+    assert (
+        station.save_settings() == "ok"
+        and station.do("start") == "no_job"
+        and station.job()["cause"] == "no_job"
+    )
 
 
 def test_a_missing_eeprom_is_named_and_what_it_keeps_is_taken_at_power_up_only():
@@ -211,10 +288,16 @@ def test_a_missing_eeprom_is_named_and_what_it_keeps_is_taken_at_power_up_only()
     station.bus.devices.pop(0x50)
     station.power_cut()
     station.run(500)
-    assert station.saved_settings()["cause"] == "saved_not_read" and station.request("save_settings", action=0)[0] == "eeprom_missing"
+    assert (
+        station.saved_settings()["cause"] == "saved_not_read"
+        and station.request("save_settings", action=0)[0] == "eeprom_missing"
+    )
     station.bus.devices[0x50] = station.eeprom
     station.ready()
-    assert parameters(station, "kp") == {"kp": PARAMETER["kp"]["default"]} and station.saved_settings()["cause"] == "saved_not_read"
+    assert (
+        parameters(station, "kp") == {"kp": PARAMETER["kp"]["default"]}
+        and station.saved_settings()["cause"] == "saved_not_read"
+    )
     assert restarted(station) == "ok" and parameters(station, "kp") == {"kp": 1}
 
 
@@ -232,7 +315,10 @@ def test_keeping_is_refused_while_the_eeprom_is_written_and_so_is_an_unknown_act
     station = powered()
     assert station.request("save_settings", action=2)[0] == "out_of_range"
     station.ask("save_settings", action=0)
-    assert station.request("save_settings", action=0)[0] == "eeprom_busy" and station.saved_settings()["writing"] == 1
+    assert (
+        station.request("save_settings", action=0)[0] == "eeprom_busy"
+        and station.saved_settings()["writing"] == 1
+    )
 
 
 def test_values_that_change_while_they_are_written_leave_a_whole_copy():
@@ -251,7 +337,12 @@ def test_a_power_cut_at_any_moment_of_keeping_leaves_the_old_values_or_the_new_o
     station.save_settings()
     old, seen = parameters(station), set()
     for _ in range(40):
-        station.set(**{name: source.randrange(1000) for name in source.sample(names, source.randrange(1, len(names)))})
+        station.set(
+            **{
+                name: source.randrange(1000)
+                for name in source.sample(names, source.randrange(1, len(names)))
+            }
+        )
         new = parameters(station)
         station.ask("save_settings", action=0)
         station.run(source.uniform(0, 180))
@@ -265,7 +356,11 @@ def test_a_power_cut_at_any_moment_of_keeping_leaves_the_old_values_or_the_new_o
 
 def test_the_image_of_the_axes_keeps_nothing():
     machine = FakeNode()
-    assert machine.request("save_settings", action=0)[0] == machine.request("saved_settings")[0] == "not_built"
+    assert (
+        machine.request("save_settings", action=0)[0]
+        == machine.request("saved_settings")[0]
+        == "not_built"
+    )
 
 
 def test_a_blank_eeprom_that_comes_late_keeps_nothing():
@@ -274,4 +369,8 @@ def test_a_blank_eeprom_that_comes_late_keeps_nothing():
     assert station.saved_settings()["cause"] == "saved_not_read"
     station.bus.devices[0x50] = station.eeprom
     station.ready()
-    assert station.saved_settings()["cause"] == "nothing_saved" and station.load([1]) == "ok" and station.job()["cause"] == "ok"
+    assert (
+        station.saved_settings()["cause"] == "nothing_saved"
+        and station.load([1]) == "ok"
+        and station.job()["cause"] == "ok"
+    )

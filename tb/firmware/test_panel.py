@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""panel.c with keypad.c and display.c: programs entered by key, everything said in words, and parts that are missing."""
+"""panel.c with keypad.c and display.c: programs entered by key, everything said in words, and parts
+that are missing.
+"""
+
 import pytest
 
 from twin.compiled.station import KEYS, SETTING, TABLE, TURN, Station
@@ -9,7 +12,7 @@ from twin.compiled.station import KEYS, SETTING, TABLE, TURN, Station
 def station():
     made = Station()
     made.ready()
-    made.run(2500)                                          # the panel is found
+    made.run(2500)  # the panel is found
     return made
 
 
@@ -21,7 +24,9 @@ def test_a_node_without_a_program_says_so(station):
 def test_the_display_gets_nothing_too_soon_and_rs_stands_before_e(station):
     station.press("DIVIDE", "6", "ENTER")
     station.run(3000)
-    assert station.display.too_soon == 0 and station.display.rs_moved == 0 and station.display.port & 8
+    assert (
+        station.display.too_soon == 0 and station.display.rs_moved == 0 and station.display.port & 8
+    )
 
 
 def test_a_turn_is_divided_by_its_count(station):
@@ -52,28 +57,41 @@ def test_stations_are_looked_through_with_up_and_down(station):
 
 def test_longest_cut_and_speed_are_settings(station):
     station.press("LIMIT", *"900", "ENTER", "SPEED", *"40", "ENTER")
-    assert [station.ask("get_setting", setting=SETTING[name])["value"] for name in ("job_cut_limit", "job_speed")] == [900, 40]
+    assert [
+        station.ask("get_setting", setting=SETTING[name])["value"]
+        for name in ("job_cut_limit", "job_speed")
+    ] == [900, 40]
 
 
-@pytest.mark.parametrize(("keys", "words"), [
-    (["DIVIDE", "0", "ENTER"], ["a program needs at", "least one station"]),
-    (["DIVIDE", *"361", "ENTER"], ["the EEPROM is full:", "it holds 360"][:1]),
-    (["DIVIDE", *"3.5", "ENTER"], ["the value is outside"]),
-    (["DIVIDE", "ENTER"], ["the value is outside"]),
-    (["LIST", *"360", "ENTER"], ["angles must be below", "360 degrees"]),
-    (["LIST", *"10", "ENTER", *"10", "ENTER"], ["each angle must be", "larger than the last"]),
-    (["LIST", ".", "ENTER"], ["the value is outside"]),
-    (["LIST", *"1.2.3", "ENTER"], ["the value is outside"]),
-    (["LIST", "ENTER"], ["a program needs at", "least one station"]),
-    (["LIST", *"99999999999", "9"], ["the value is outside"]),
-    (["LIMIT", "0", "ENTER"], ["the value is outside"]),
-    (["SPEED", *"101", "ENTER"], ["the value is outside"]),
-])
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        (["DIVIDE", "0", "ENTER"], ["a program needs at", "least one station"]),
+        (["DIVIDE", *"361", "ENTER"], ["the EEPROM is full:", "it holds 360"][:1]),
+        (["DIVIDE", *"3.5", "ENTER"], ["the value is outside"]),
+        (["DIVIDE", "ENTER"], ["the value is outside"]),
+        (["LIST", *"360", "ENTER"], ["angles must be below", "360 degrees"]),
+        (["LIST", *"10", "ENTER", *"10", "ENTER"], ["each angle must be", "larger than the last"]),
+        (["LIST", ".", "ENTER"], ["the value is outside"]),
+        (["LIST", *"1.2.3", "ENTER"], ["the value is outside"]),
+        (["LIST", "ENTER"], ["a program needs at", "least one station"]),
+        (["LIST", *"99999999999", "9"], ["the value is outside"]),
+        (["LIMIT", "0", "ENTER"], ["the value is outside"]),
+        (["SPEED", *"101", "ENTER"], ["the value is outside"]),
+    ],
+)
 def test_what_cannot_be_is_said_in_words(station, keys, words):
     station.press(*keys)
     shown = station.shown()
-    at = next((n for n, line in enumerate(shown) if line == words[0] or words[0].startswith(line) and len(line) > 15), None)
-    assert at is not None and shown[at + 1:at + len(words)] == words[1:], shown
+    at = next(
+        (
+            n
+            for n, line in enumerate(shown)
+            if line == words[0] or words[0].startswith(line) and len(line) > 15
+        ),
+        None,
+    )
+    assert at is not None and shown[at + 1 : at + len(words)] == words[1:], shown
     assert station.program() == []
 
 
@@ -113,13 +131,15 @@ def test_a_node_without_its_panel_works_and_tells_what_is_missing(absent):
     station.ready()
     station.run(2500)
     assert station.load([1, 2]) == "ok"
-    assert not set(absent) & station.job()["flags"] and len({"keypad", "display"} & station.job()["flags"]) == 2 - len(absent)
+    assert not set(absent) & station.job()["flags"] and len(
+        {"keypad", "display"} & station.job()["flags"]
+    ) == 2 - len(absent)
 
 
 def test_a_panel_that_comes_later_is_found_and_what_was_pressed_before_does_not_count():
     station = Station(absent=["keypad", "display"])
     station.ready()
-    station.keypad.registers[0x1D:0x1F] = b"\x1f\x7f"      # set up by the node before a reset
+    station.keypad.registers[0x1D:0x1F] = b"\x1f\x7f"  # set up by the node before a reset
     station.keypad.press("DIVIDE")
     station.bus.devices[0x34], station.bus.devices[0x27] = station.keypad, station.display
     station.run(2500)
@@ -135,7 +155,9 @@ def test_a_display_that_lost_its_power_is_set_up_again_when_it_is_back(station):
     device.power_cut(station.clk)
     station.bus.devices[0x27] = device
     station.run(2500)
-    assert station.shown()[0] == "ready" and device.too_soon <= 1       # only the first byte, which is sent once more than needed
+    assert (
+        station.shown()[0] == "ready" and device.too_soon <= 1
+    )  # only the first byte, which is sent once more than needed
 
 
 def test_every_key_of_the_layout_reaches_its_function():

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """planner: every move lands exactly, keeps its limits and is nearly as short as motion can be."""
+
 import ctypes
 import random
 
@@ -10,11 +11,11 @@ from tb.firmware.plan_model import distance, gone, limits, peaks, shortest, step
 from twin.compiled.firmware import Plan, Segment, SteppedProfile, library
 
 FOREVER, LONGEST = 1 << 40, 0x800000
-S0 = 6000, 125_000, 12_500_000                      # the stage of S0: period/s, /s2, /s3
+S0 = 6000, 125_000, 12_500_000  # the stage of S0: period/s, /s2, /s3
 FEWEST_TICKS = 5
-LONGER_TICKS = 4                                    # a move is at most so many ticks ...
-LONGER = 1.001                                      # ... and this factor longer than the continuous optimum (jerk >= 10 000)
-LONGER_AT_LOW_JERK = 1.03                           # down to 1 period/s3, where one unit of jerk is 6 percent of it
+LONGER_TICKS = 4  # a move is at most so many ticks ...
+LONGER = 1.001  # ... and this factor longer than the continuous optimum (jerk >= 10 000)
+LONGER_AT_LOW_JERK = 1.03  # down to 1 period/s3, where one unit of jerk is 6 percent of it
 
 
 def plan_of(length, rates=S0):
@@ -30,18 +31,25 @@ def plan_of(length, rates=S0):
 def check(length, rates):
     plan, ticks = plan_of(length, rates)
     assert distance(plan) == length << 24, f"{length} at {rates}"
-    assert sum(s[3] for s in plan) == ticks and all(s[3] > 0 for s in plan) and (len(plan) <= 40 or ticks > LONGEST)
+    assert (
+        sum(s[3] for s in plan) == ticks
+        and all(s[3] > 0 for s in plan)
+        and (len(plan) <= 40 or ticks > LONGEST)
+    )
     for peak, limit, name in zip(peaks(plan), limits(*rates), ("velocity", "acceleration", "jerk")):
         assert peak <= limit, f"{name} {peak} above {limit}: {length} at {rates}"
     best = shortest(abs(length) << 24, *limits(*rates))
     factor = LONGER if rates[2] >= 10_000 else LONGER_AT_LOW_JERK
-    assert ticks <= max(FEWEST_TICKS, factor * best + LONGER_TICKS), f"{ticks} ticks, optimum {best}: {length} at {rates}"
+    assert ticks <= max(FEWEST_TICKS, factor * best + LONGER_TICKS), (
+        f"{ticks} ticks, optimum {best}: {length} at {rates}"
+    )
     return ticks, best
 
 
 def random_rates(draw):
     def spread(low, high):
         return int(low * (high / low) ** draw.random())
+
     return spread(1, 1_000_000), spread(1, 100_000_000), spread(1, 2_000_000_000)
 
 
@@ -63,7 +71,9 @@ def test_no_distance_is_no_segment():
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize("length", [1, 2, 3, 65535, 65536, 65537, 125 << 16, 150_000 << 16, (1 << 38) - 1])
+@pytest.mark.parametrize(
+    "length", [1, 2, 3, 65535, 65536, 65537, 125 << 16, 150_000 << 16, (1 << 38) - 1]
+)
 def test_a_move_of_s0_lands_exactly_inside_its_limits(length, sign):
     check(sign * length, S0)
 
@@ -87,11 +97,21 @@ def test_any_move_lands_exactly_inside_its_limits():
         ticks, best = check(length, rates)
         if best > 40:
             worst[kind] = max(worst[kind], (ticks / best, ticks - best))
-    print(f"worst time over optimum: S0 {worst['S0'][0]:.4f}, any limits {worst['any'][0]:.4f} (moves above 40 ticks, seed {seed()})")
+    print(
+        f"worst time over optimum: S0 {worst['S0'][0]:.4f}, any limits {worst['any'][0]:.4f} (moves above 40 ticks, seed {seed()})"
+    )
 
 
-@pytest.mark.parametrize("rates", [(1_000_000, 1_000_000, 1), (1_000_000, 1_000_000, 2), (1_000_000, 1, 1_000_000_000),
-                                   (30, 100_000_000, 2_000_000_000), (100, 300, 1)])
+@pytest.mark.parametrize(
+    "rates",
+    [
+        (1_000_000, 1_000_000, 1),
+        (1_000_000, 1_000_000, 2),
+        (1_000_000, 1, 1_000_000_000),
+        (30, 100_000_000, 2_000_000_000),
+        (100, 300, 1),
+    ],
+)
 def test_limits_of_few_units_are_reached_but_not_passed(rates):
     draw = random.Random(seed())
     highest = [0, 0, 0]
@@ -99,7 +119,9 @@ def test_limits_of_few_units_are_reached_but_not_passed(rates):
         length = int(2 ** (10 + draw.random() * 26))
         check(length, rates)
         highest = [max(pair) for pair in zip(highest, peaks(plan_of(length, rates)[0]))]
-    assert any(high >= limit - 9 - limit // 2**13 for high, limit in zip(highest, limits(*rates)))   # kept free for a retarget
+    assert any(
+        high >= limit - 9 - limit // 2**13 for high, limit in zip(highest, limits(*rates))
+    )  # kept free for a retarget
 
 
 def test_every_step_of_short_moves_is_inside_the_limits():
@@ -118,13 +140,24 @@ def test_every_step_of_short_moves_is_inside_the_limits():
 
 def test_a_plan_taken_in_pieces_is_the_same_motion():
     for length, rates in ((20_000 << 16, (1, 1, 1)), (9 << 16, S0), (1 << 35, (3, 1000, 77))):
-        made, plan, piece, last = library().planner_limits(*rates), Plan(), Segment(), ctypes.c_bool()
+        made, plan, piece, last = (
+            library().planner_limits(*rates),
+            Plan(),
+            Segment(),
+            ctypes.c_bool(),
+        )
         assert library().planner_move(ctypes.byref(plan), ctypes.byref(made), length)
         pieces = []
-        while library().planner_take_up_to(ctypes.byref(plan), ctypes.byref(piece), ctypes.byref(last), LONGEST):
+        while library().planner_take_up_to(
+            ctypes.byref(plan), ctypes.byref(piece), ctypes.byref(last), LONGEST
+        ):
             pieces.append((piece.velocity, piece.acceleration, piece.jerk, piece.ticks))
-            assert piece.ticks <= 0x800000 and last.value == (sum(p[3] for p in pieces) == plan.ticks)
-        assert distance(pieces) == length << 24 and peaks(pieces) == peaks(plan_of(length, rates)[0])
+            assert piece.ticks <= 0x800000 and last.value == (
+                sum(p[3] for p in pieces) == plan.ticks
+            )
+        assert distance(pieces) == length << 24 and peaks(pieces) == peaks(
+            plan_of(length, rates)[0]
+        )
 
 
 def test_a_move_of_days_is_refused():
@@ -144,7 +177,9 @@ def segments_of(plan):
 def taken(plan, ticks, longest=64):
     """Pieces for so many ticks."""
     pieces, piece, last = [], Segment(), ctypes.c_bool()
-    while ticks and library().planner_take_up_to(ctypes.byref(plan), ctypes.byref(piece), ctypes.byref(last), min(longest, ticks)):
+    while ticks and library().planner_take_up_to(
+        ctypes.byref(plan), ctypes.byref(piece), ctypes.byref(last), min(longest, ticks)
+    ):
         pieces.append((piece.velocity, piece.acceleration, piece.jerk, piece.ticks))
         ticks -= piece.ticks
     return pieces
@@ -153,7 +188,9 @@ def taken(plan, ticks, longest=64):
 def retargeted(plan, made, goal, ticks=0):
     """Whether the plan was changed; if not, it holds the cause."""
     new = Plan()
-    done = library().planner_retarget(ctypes.byref(new), ctypes.byref(plan), ticks, ctypes.byref(made), goal, None)
+    done = library().planner_retarget(
+        ctypes.byref(new), ctypes.byref(plan), ticks, ctypes.byref(made), goal, None
+    )
     if done:
         ctypes.pointer(plan)[0] = new
     plan.cause = new.cause
@@ -165,7 +202,9 @@ def test_the_state_after_some_ticks_is_that_of_the_steps():
     for ticks in (0, 1, 7, 100, len(every) - 1, len(every)):
         plan, _ = plan_for(125 << 16, S0)
         pieces = taken(plan, ticks)
-        assert all(piece[3] <= 64 for piece in pieces) and distance(pieces) == plan.at.state.gone == sum(every[:ticks])
+        assert all(piece[3] <= 64 for piece in pieces) and distance(
+            pieces
+        ) == plan.at.state.gone == sum(every[:ticks])
         assert list(steps(segments_of(plan))) == every[ticks:]
 
 
@@ -173,33 +212,52 @@ def test_retargets_land_exactly_inside_the_limits():
     """Up to four in a row, some of them a few ticks apart; none is refused."""
     draw = random.Random(seed())
     for n in range(1500):
-        rates = S0 if n % 3 == 0 else (draw.randrange(100, 50_000), draw.randrange(10_000, 5_000_000), draw.randrange(10**5, 10**9))
+        rates = (
+            S0
+            if n % 3 == 0
+            else (
+                draw.randrange(100, 50_000),
+                draw.randrange(10_000, 5_000_000),
+                draw.randrange(10**5, 10**9),
+            )
+        )
         goal = int(2 ** (10 + draw.random() * 20)) * draw.choice((1, -1))
         plan, made = plan_for(goal, rates)
         played = []
         for _ in range(draw.randrange(1, 5)):
             if plan.ticks - plan.at.tick < 2:
                 break
-            played += taken(plan, draw.randrange(1, min(plan.ticks - plan.at.tick, draw.choice((6, 1 << 30)))))
+            played += taken(
+                plan, draw.randrange(1, min(plan.ticks - plan.at.tick, draw.choice((6, 1 << 30))))
+            )
             goal += draw.choice((1, -1)) * int(2 ** (draw.random() * 30))
             assert retargeted(plan, made, goal)
         whole = played + segments_of(plan)
         assert distance(whole) == goal << 24, (rates, goal)
-        for peak, limit, name in zip(peaks(whole), limits(*rates), ("velocity", "acceleration", "jerk")):
+        for peak, limit, name in zip(
+            peaks(whole), limits(*rates), ("velocity", "acceleration", "jerk")
+        ):
             assert peak <= limit, (name, peak, limit, rates, goal)
 
 
 def test_limits_lowered_in_motion_are_kept_from_then_on():
     plan, made = plan_for(2000 << 16, S0)
-    played = taken(plan, 600)                                        # it cruises
+    played = taken(plan, 600)  # it cruises
     lower = library().planner_limits(*(rate // 2 for rate in S0))
     assert retargeted(plan, lower, 3000 << 16)
     rest = segments_of(plan)
     every = list(steps(rest))
     assert distance(played + rest) == 3000 << 40
-    assert lower.velocity < every[0] <= made.velocity and max(every) <= every[0] + 8 and every[400] <= lower.velocity
+    assert (
+        lower.velocity < every[0] <= made.velocity
+        and max(every) <= every[0] + 8
+        and every[400] <= lower.velocity
+    )
     slopes = [b - a for a, b in zip(every, every[1:])]
-    assert max(map(abs, slopes)) <= lower.acceleration and max(abs(b - a) for a, b in zip(slopes, slopes[1:])) <= lower.jerk
+    assert (
+        max(map(abs, slopes)) <= lower.acceleration
+        and max(abs(b - a) for a, b in zip(slopes, slopes[1:])) <= lower.jerk
+    )
 
 
 def test_a_retarget_may_begin_some_ticks_ahead():
@@ -225,15 +283,23 @@ def test_a_retarget_to_the_same_place_ends_at_the_same_time():
         plan, made = plan_for(125 << 16, S0)
         whole, played = plan.ticks, taken(plan, ticks)
         assert retargeted(plan, made, 125 << 16)
-        assert abs(ticks + plan.ticks - whole) <= 2 and distance(played + segments_of(plan)) == 125 << 40
+        assert (
+            abs(ticks + plan.ticks - whole) <= 2
+            and distance(played + segments_of(plan)) == 125 << 40
+        )
 
 
 def test_an_override_adds_a_quarter_of_acceleration_and_jerk_at_most():
     made, slope, curve = library().planner_limits(*S0), ctypes.c_uint32(), ctypes.c_uint32()
     library().planner_feed_override(ctypes.byref(made), ctypes.byref(slope), ctypes.byref(curve))
     slope, curve = slope.value / 2**32, curve.value / 2**32
-    assert made.velocity * slope <= made.acceleration / 4 and 3 * made.acceleration * slope + made.velocity * curve <= made.jerk / 4
-    assert slope > 0.999 * min(made.acceleration / made.velocity / 4, made.jerk / made.acceleration / 24)
+    assert (
+        made.velocity * slope <= made.acceleration / 4
+        and 3 * made.acceleration * slope + made.velocity * curve <= made.jerk / 4
+    )
+    assert slope > 0.999 * min(
+        made.acceleration / made.velocity / 4, made.jerk / made.acceleration / 24
+    )
 
 
 def test_a_trapezoid_lands_exactly_with_steps_of_acceleration():
@@ -253,10 +319,18 @@ def test_a_trapezoid_lands_exactly_with_steps_of_acceleration():
 
 
 def test_impossible_limits_are_refused_with_their_cause():
-    for values, cause in (((0, 999, 999), 1), ((999, 0, 999), 2), ((999, 999, 0), 3), ((999, 999, 1), 3)):
+    for values, cause in (
+        ((0, 999, 999), 1),
+        ((999, 0, 999), 2),
+        ((999, 999, 0), 3),
+        ((999, 999, 1), 3),
+    ):
         made, plan = library().planner_limits(*S0), Plan()
         made.velocity, made.acceleration, made.jerk = values
-        assert not library().planner_move(ctypes.byref(plan), ctypes.byref(made), 1000) and plan.cause == cause
+        assert (
+            not library().planner_move(ctypes.byref(plan), ctypes.byref(made), 1000)
+            and plan.cause == cause
+        )
         whole, _ = plan_for(1000, S0)
         assert not retargeted(whole, made, 10) and whole.cause == cause
 
@@ -267,23 +341,35 @@ def test_stairs_climb_by_sections_and_come_down_the_mirror(as_printed):
     hertz = 2**40 // 4000
     stairs = SteppedProfile(first=50 * hertz, top=2450 * hertz, ticks=80)
     stairs.rise[:] = 50 * hertz, 100 * hertz, 200 * hertz
-    library().planner_stepped_borders(ctypes.byref(stairs), 65536 // 6 + 1, 65536 // 3 + 1 if as_printed else 65536 // 2)
+    library().planner_stepped_borders(
+        ctypes.byref(stairs), 65536 // 6 + 1, 65536 // 3 + 1 if as_printed else 65536 // 2
+    )
     assert [round(border / hertz) for border in stairs.border] == [450, 850 if as_printed else 1250]
     for pulses in (1, 7, 100, 5000, -20000):
         plan = Plan()
-        assert library().planner_stepped_move(ctypes.byref(plan), ctypes.byref(stairs), pulses << 16)
+        assert library().planner_stepped_move(
+            ctypes.byref(plan), ctypes.byref(stairs), pulses << 16
+        )
         ticks, pieces = plan.ticks, taken(plan, FOREVER, LONGEST)
         assert distance(pieces) == pulses << 40 and sum(piece[3] for piece in pieces) == ticks
         assert all(piece[1:3] == (0, 0) for piece in pieces)
-        assert pieces[0] == (0, 0, 0, 1)                             # the player joins the step after it to this one
+        assert pieces[0] == (0, 0, 0, 1)  # the player joins the step after it to this one
         pieces = pieces[1:]
         levels = [abs(piece[0]) for piece in pieces]
         assert max(levels) <= stairs.top
-    top = levels.index(max(levels))                                  # the longest reaches it
-    climb, fall = [level // hertz for level in levels[:top]], [level // hertz for level in levels[:top:-1]]
+    top = levels.index(max(levels))  # the longest reaches it
+    climb, fall = (
+        [level // hertz for level in levels[:top]],
+        [level // hertz for level in levels[:top:-1]],
+    )
     middle = range(450, 850, 100) if as_printed else range(450, 1250, 100)
     assert climb == [*range(50, 450, 50), *middle, *range(middle.stop, 2450, 200)]
-    assert fall[:len(climb)] == climb and len(fall) <= len(climb) + 1    # the top may be two pieces, one unit apart
-    assert all(piece[3] == stairs.ticks for piece in pieces[:top] + pieces[-len(climb):])
+    assert (
+        fall[: len(climb)] == climb and len(fall) <= len(climb) + 1
+    )  # the top may be two pieces, one unit apart
+    assert all(piece[3] == stairs.ticks for piece in pieces[:top] + pieces[-len(climb) :])
     stairs.border[1] = stairs.border[0] - 1
-    assert not library().planner_stepped_move(ctypes.byref(plan), ctypes.byref(stairs), 1 << 16) and plan.cause == 5
+    assert (
+        not library().planner_stepped_move(ctypes.byref(plan), ctypes.byref(stairs), 1 << 16)
+        and plan.cause == 5
+    )

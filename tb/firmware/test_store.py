@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """store.c: program and journal in the EEPROM, kept through power cuts, and every failure named."""
+
 import random
 
 import pytest
@@ -29,7 +30,7 @@ def test_each_new_program_goes_over_the_older_copy():
     for generation in range(1, 5):
         angles = [generation, 2 * generation + 5]
         assert station.load(angles) == "ok"
-        copies = {int.from_bytes(station.eeprom.memory[at:at + 4], "little") for at in (0, 2048)}
+        copies = {int.from_bytes(station.eeprom.memory[at : at + 4], "little") for at in (0, 2048)}
         assert copies == {generation, generation - 1 or 0xFFFFFFFF}
         assert station.program() == angles
 
@@ -48,15 +49,22 @@ def test_as_many_stations_as_fit_are_kept_and_one_more_is_refused():
     assert station.program() == angles
 
 
-@pytest.mark.parametrize(("angles", "cause"), [
-    ([TURN], "angle_out_of_turn"), ([0xFFFFFFFF], "angle_out_of_turn"), ([5, 5], "angles_not_ascending"), ([5, 4], "angles_not_ascending")])
+@pytest.mark.parametrize(
+    ("angles", "cause"),
+    [
+        ([TURN], "angle_out_of_turn"),
+        ([0xFFFFFFFF], "angle_out_of_turn"),
+        ([5, 5], "angles_not_ascending"),
+        ([5, 4], "angles_not_ascending"),
+    ],
+)
 def test_an_angle_that_cannot_be_is_named_and_not_taken(angles, cause):
     station = powered()
     station.ask("job_begin")
     for n, angle in enumerate(angles[:-1]):
         station.ask("job_add", station=n, angle=angle)
     assert station.request("job_add", station=len(angles) - 1, angle=angles[-1])[0] == cause
-    station.ask("job_add", station=len(angles) - 1, angle=TURN - 1)     # the others are still there
+    station.ask("job_add", station=len(angles) - 1, angle=TURN - 1)  # the others are still there
     station.ask("job_save")
     assert station.saved() == "ok" and station.program() == [*angles[:-1], TURN - 1]
 
@@ -78,12 +86,21 @@ def test_settings_are_kept_with_the_program():
     assert station.load(EVENLY) == "ok"
     station.power_cut()
     station.ready()
-    assert [station.ask("get_setting", setting=SETTING[name])["value"] for name in ("job_cut_limit", "peer_mode")] == [77, 2]
+    assert [
+        station.ask("get_setting", setting=SETTING[name])["value"]
+        for name in ("job_cut_limit", "peer_mode")
+    ] == [77, 2]
 
 
 def test_a_blank_eeprom_has_no_job():
     station = powered()
-    assert station.ask("job_stations") == {"writing": 0, "ended": 43, "generation": 0, "stations": 0, "journal": 0}
+    assert station.ask("job_stations") == {
+        "writing": 0,
+        "ended": 43,
+        "generation": 0,
+        "stations": 0,
+        "journal": 0,
+    }
     assert station.do("start") == "no_job"
 
 
@@ -91,7 +108,7 @@ def test_a_blank_eeprom_has_no_job():
 def test_a_damaged_copy_is_told_and_the_other_one_is_in_force(copies):
     station = powered()
     station.load([1, 2, 3])
-    station.load([4, 5, 6])                                 # over copy 0
+    station.load([4, 5, 6])  # over copy 0
     for at in (90, 2048 + 90)[:copies]:
         station.eeprom.memory[at] ^= 4
     station.power_cut()
@@ -108,8 +125,13 @@ def test_a_missing_eeprom_is_named_and_found_when_it_comes():
     station = Station(absent=["eeprom"])
     station.run(2000)
     job = station.job()
-    assert (job["state"], job["cause"]) == ("loading", "eeprom_missing") and "store" not in job["flags"]
-    assert station.do("start") == "eeprom_missing" and station.request("job_begin")[0] == "eeprom_missing"
+    assert (job["state"], job["cause"]) == ("loading", "eeprom_missing") and "store" not in job[
+        "flags"
+    ]
+    assert (
+        station.do("start") == "eeprom_missing"
+        and station.request("job_begin")[0] == "eeprom_missing"
+    )
     station.bus.devices[0x50] = station.eeprom
     station.ready()
     assert station.load(EVENLY) == "ok"
@@ -177,7 +199,11 @@ def test_writes_are_spread_over_the_pages_of_the_journal():
     for _ in range(130):
         assert station.firmware.journal_write(0, 1) == 0
         station.saved()
-    assert len(pages) == 130 and set(pages) == set(range(64, 128)) and max(map(pages.count, pages)) == 3
+    assert (
+        len(pages) == 130
+        and set(pages) == set(range(64, 128))
+        and max(map(pages.count, pages)) == 3
+    )
     station.power_cut()
     station.ready()
     assert station.ask("job_stations")["journal"] == 130
@@ -186,7 +212,7 @@ def test_writes_are_spread_over_the_pages_of_the_journal():
 def test_a_worn_page_of_the_journal_is_passed_over():
     station = powered()
     station.load([1])
-    station.eeprom.worn[4096 + 64 * 1 + 3] = 0x5A          # where the first line goes
+    station.eeprom.worn[4096 + 64 * 1 + 3] = 0x5A  # where the first line goes
     assert station.firmware.journal_write(0, 1) == 0 and station.saved() == "ok"
     assert station.ask("job_stations")["journal"] == 2
 
@@ -194,7 +220,7 @@ def test_a_worn_page_of_the_journal_is_passed_over():
 def test_lines_behind_worn_pages_that_stay_blank_are_found():
     station = powered()
     station.load([1])
-    for page in (1, 2):                                    # as many as a line passes over
+    for page in (1, 2):  # as many as a line passes over
         station.eeprom.worn.update({4096 + 64 * page + n: 0xFF for n in range(64)})
     for line in (3, 4):
         assert station.firmware.journal_write(0, 1) == 0 and station.saved() == "ok"
@@ -205,7 +231,7 @@ def test_lines_behind_worn_pages_that_stay_blank_are_found():
 
 def test_a_journal_that_was_hardly_written_is_not_read_to_its_end():
     station = powered()
-    for lines in (1, 20):                                  # 6: the job was stopped
+    for lines in (1, 20):  # 6: the job was stopped
         station.load([1])
         for _ in range(lines):
             assert station.firmware.journal_write(0, 6) == 0 and station.saved() == "ok"

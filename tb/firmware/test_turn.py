@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""index.c and sensor.c: a worm table with errors, backlash and stiction is turned to angles of its sensor; each named cause provoked."""
+"""index.c and sensor.c: a worm table with errors, backlash and stiction is turned to angles of its
+sensor; each named cause provoked.
+"""
+
 import random
 
 import pytest
@@ -12,7 +15,14 @@ PHASE = {code: name for name, (code, _) in TABLE["turn_phase"].items()}
 SETTING = TABLE["setting"]
 PER_ARCSEC = 100
 DEGREE = 3600
-AXIS = {"position_source": 2, "velocity": 30000, "acceleration": 500000, "jerk": 50000000, "homing_latch_speed": 300, "following_limit": 2**31 - 1}
+AXIS = {
+    "position_source": 2,
+    "velocity": 30000,
+    "acceleration": 500000,
+    "jerk": 50000000,
+    "homing_latch_speed": 300,
+    "following_limit": 2**31 - 1,
+}
 
 
 class Station(FakeNode):
@@ -51,7 +61,12 @@ class Station(FakeNode):
 
 def test_every_target_is_reached_within_two_arcsec_of_the_truth_from_either_side():
     station, source = Station(), random.Random(seed())
-    for arcsec in [10 * DEGREE, 5 * DEGREE, 5 * DEGREE + 30, *(source.uniform(0, TURN_ARCSEC / 36) for _ in range(4))]:
+    for arcsec in [
+        10 * DEGREE,
+        5 * DEGREE,
+        5 * DEGREE + 30,
+        *(source.uniform(0, TURN_ARCSEC / 36) for _ in range(4)),
+    ]:
         assert station.index(arcsec) == "ok"
         assert abs(station.state()["left"]) <= 50 and abs(station.error(arcsec)) <= 2
 
@@ -75,7 +90,10 @@ def test_the_long_way_ends_below_the_target_and_the_tries_halve_what_is_left():
         station.run(500, until=lambda: station.state()["phase"] != "reading")
         left.append(station.state()["left"])
     assert len(left) == station.state()["tries"] == 7
-    assert all(now == pytest.approx(before / 2, abs=20) for before, now in zip([6000, *left], left, strict=False))
+    assert all(
+        now == pytest.approx(before / 2, abs=20)
+        for before, now in zip([6000, *left], left, strict=False)
+    )
 
 
 def test_the_share_of_a_try_is_a_setting():
@@ -91,24 +109,44 @@ def test_the_share_of_a_try_is_a_setting():
 def test_a_table_that_is_there_already_does_not_move():
     station = Station(angle=DEGREE + 0.1, sensor={"noise": 0, "wave": 0})
     assert station.index(DEGREE) == "ok"
-    assert station.axes[0].pushed == [] and station.state()["tries"] == 0 and station.axes[0].enabled
+    assert (
+        station.axes[0].pushed == [] and station.state()["tries"] == 0 and station.axes[0].enabled
+    )
 
 
-@pytest.mark.parametrize(("way", "begin", "target", "turned"), [
-    (0, 1 * DEGREE, 359 * DEGREE, 358), (1, 1 * DEGREE, 359 * DEGREE, -2), (2, 1 * DEGREE, 359 * DEGREE, 358),
-    (0, 359 * DEGREE, 1 * DEGREE, -358), (1, 359 * DEGREE, 1 * DEGREE, 2), (2, 359 * DEGREE, 1 * DEGREE, 2),
-    (0, TURN_ARCSEC - 1, 1 * DEGREE, 1)])
-def test_the_way_round_is_a_setting_and_the_table_stands_at_zero_a_little_below_it_too(way, begin, target, turned):
-    station = Station(angle=begin, parameters={"velocity": 900_000, "acceleration": 90_000_000, "jerk": 2_000_000_000})
+@pytest.mark.parametrize(
+    ("way", "begin", "target", "turned"),
+    [
+        (0, 1 * DEGREE, 359 * DEGREE, 358),
+        (1, 1 * DEGREE, 359 * DEGREE, -2),
+        (2, 1 * DEGREE, 359 * DEGREE, 358),
+        (0, 359 * DEGREE, 1 * DEGREE, -358),
+        (1, 359 * DEGREE, 1 * DEGREE, 2),
+        (2, 359 * DEGREE, 1 * DEGREE, 2),
+        (0, TURN_ARCSEC - 1, 1 * DEGREE, 1),
+    ],
+)
+def test_the_way_round_is_a_setting_and_the_table_stands_at_zero_a_little_below_it_too(
+    way, begin, target, turned
+):
+    station = Station(
+        angle=begin,
+        parameters={"velocity": 900_000, "acceleration": 90_000_000, "jerk": 2_000_000_000},
+    )
     station.tell(turn_direction=way)
     assert station.index(target) == "ok"
-    assert station.table.angle - begin == pytest.approx(turned * DEGREE, abs=5) and abs(station.error(target)) <= 2
+    assert (
+        station.table.angle - begin == pytest.approx(turned * DEGREE, abs=5)
+        and abs(station.error(target)) <= 2
+    )
 
 
 def test_an_overshoot_backs_off_below_and_comes_again():
     station = Station(worm_error=30)
     station.tell(turn_allowance=0, turn_overshoots=10)
-    assert all(station.index(arcsec) == "ok" for arcsec in (DEGREE, 2 * DEGREE, 3 * DEGREE, 4 * DEGREE))
+    assert all(
+        station.index(arcsec) == "ok" for arcsec in (DEGREE, 2 * DEGREE, 3 * DEGREE, 4 * DEGREE)
+    )
     met = []
     for arcsec in range(5, 10):
         assert station.index(arcsec * DEGREE) == "ok" and abs(station.error(arcsec * DEGREE)) <= 2
@@ -119,7 +157,7 @@ def test_an_overshoot_backs_off_below_and_comes_again():
 def test_overshoots_are_limited():
     station = Station(worm_error=0, wheel_error=0)
     station.tell(turn_allowance=0, turn_overshoots=0, turn_tolerance=1)
-    station.table.angle += 25                                   # an error of the worm that was not there before
+    station.table.angle += 25  # an error of the worm that was not there before
     station.table.offset += 25
     assert "not_converged" in {station.index(arcsec * DEGREE) for arcsec in range(1, 9)}
 
@@ -130,10 +168,13 @@ def test_the_zero_of_the_sensor_is_a_setting():
     assert station.ask("sensor")["angle"] == pytest.approx(100 * PER_ARCSEC, abs=110)
     assert station.index(500) == "ok" and abs(station.error(1400)) <= 2
     station.tell(sensor_zero=1500 * PER_ARCSEC)
-    assert station.ask("sensor")["angle"] == pytest.approx((TURN_ARCSEC - 100) * PER_ARCSEC, abs=210)
+    assert station.ask("sensor")["angle"] == pytest.approx(
+        (TURN_ARCSEC - 100) * PER_ARCSEC, abs=210
+    )
 
 
 # frames that do not come, or come damaged
+
 
 def test_lost_and_damaged_frames_are_counted_and_change_nothing():
     station = Station(sensor={"lost": 0.1, "damaged": 0.2})
@@ -153,6 +194,7 @@ def test_a_reading_takes_only_frames_sent_after_the_table_had_settled():
 
 # each named cause
 
+
 def test_a_sensor_that_never_spoke_is_dead():
     station = Station()
     station.sensor.dead = True
@@ -169,7 +211,10 @@ def test_a_sensor_that_dies_on_the_way_stops_the_table_under_control():
     station.sensor.dead = True
     station.until("idle", 400)
     assert station.state()["ended"] == "sensor_timed_out"
-    assert station.run(1000, until=lambda: station.status()["state"] == "holding") and station.axes[0].faults == 0
+    assert (
+        station.run(1000, until=lambda: station.status()["state"] == "holding")
+        and station.axes[0].faults == 0
+    )
     assert station.table.angle < 2 * DEGREE
 
 
@@ -240,10 +285,14 @@ def test_an_angle_beyond_a_turn_is_refused(hundredths):
 
 def test_a_node_without_a_sensor_says_so():
     machine = FakeNode(image="station")
-    assert machine.request("turn_to", angle=0)[0] == "not_built" and machine.request("sensor")[0] == "not_built"
+    assert (
+        machine.request("turn_to", angle=0)[0] == "not_built"
+        and machine.request("sensor")[0] == "not_built"
+    )
 
 
 # others who drive the axis
+
 
 def test_a_second_index_waits_for_the_first():
     station = Station()

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""SEED of the environment: `random` collects the whole suite, is drawn once for all workers, and the printed number reproduces it."""
+"""SEED of the environment: `random` collects the whole suite, is drawn once for all workers, and
+the printed number reproduces it.
+"""
+
 import os
 import re
 import subprocess
@@ -25,9 +28,16 @@ def test_probe(drawn):
 
 def pytest_of(*arguments, **environment):
     """Output of another pytest run, and its exit code."""
-    inherited = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
-    result = subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments], cwd=bench.ROOT,
-                            env=inherited | environment, capture_output=True, text=True)
+    inherited = {
+        name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")
+    }
+    result = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments],
+        cwd=bench.ROOT,
+        env=inherited | environment,
+        capture_output=True,
+        text=True,
+    )
     return result.stdout + result.stderr, result.returncode
 
 
@@ -39,14 +49,26 @@ def test_the_whole_suite_is_collected_with_a_random_seed():
 
 @pytest.fixture
 def probe(tmp_path):
-    """Runs a probe of four parametrised tests on two workers; returns what the workers saw and what was printed."""
+    """Runs a probe of four parametrised tests on two workers; returns what the workers saw and what
+    was printed.
+    """
     path, log = tmp_path / "test_probe.py", tmp_path / "log"
     path.write_text(PROBE)
 
     def run(seed):
         log.unlink(missing_ok=True)
-        output, code = pytest_of("-p", "conftest", "-n", "2", "--rootdir", str(tmp_path), str(path), SEED=seed, PROBE_LOG=str(log),
-                                 PYTHONPATH=str(bench.ROOT / "tb"))
+        output, code = pytest_of(
+            "-p",
+            "conftest",
+            "-n",
+            "2",
+            "--rootdir",
+            str(tmp_path),
+            str(path),
+            SEED=seed,
+            PROBE_LOG=str(log),
+            PYTHONPATH=str(bench.ROOT / "tb"),
+        )
         assert code == 0, output
         return sorted(log.read_text().splitlines()), output
 
@@ -62,7 +84,9 @@ def test_the_drawn_seed_is_one_for_all_workers_and_reproduces_the_run(probe):
 
 def test_without_a_seed_it_is_1(monkeypatch):
     for value in ("", None):
-        monkeypatch.setenv("SEED", value) if value is not None else monkeypatch.delenv("SEED", raising=False)
+        monkeypatch.setenv("SEED", value) if value is not None else monkeypatch.delenv(
+            "SEED", raising=False
+        )
         assert bench.seed() == 1
 
 

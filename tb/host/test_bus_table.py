@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tables/bus.py: nothing made is stale, the made files say what bus.toml says, and a wrong table is refused."""
+"""tables/bus.py: nothing made is stale, the made files say what bus.toml says, and a wrong table is
+refused.
+"""
+
 import re
 import shutil
 import struct
@@ -20,7 +23,6 @@ TABLE = tomllib.loads(SOURCE.read_text(encoding="utf-8"))
 HEADER = (ROOT / "sw" / "firmware" / "made" / "bus_protocol.h").read_text(encoding="utf-8")
 
 
-
 def test_the_made_files_are_fresh():
     assert generator.main(["--check"]) == 0
 
@@ -31,7 +33,10 @@ def test_a_stale_file_is_found_named_and_made_again(tmp_path, monkeypatch, capsy
     shutil.copy(generator.HEADER, copy)
     with open(copy, "a") as file:
         file.write("// edited\n")
-    host, page = generator.HOST.read_text(encoding="utf-8"), generator.PAGE.read_text(encoding="utf-8")
+    host, page = (
+        generator.HOST.read_text(encoding="utf-8"),
+        generator.PAGE.read_text(encoding="utf-8"),
+    )
     for name, text in (("HOST", host), ("PAGE", page)):
         (tmp_path / name).write_text(text, encoding="utf-8")
         monkeypatch.setattr(generator, name, tmp_path / name)
@@ -43,39 +48,78 @@ def test_a_stale_file_is_found_named_and_made_again(tmp_path, monkeypatch, capsy
 
 def test_the_crc_is_that_of_the_source_whatever_its_line_ends():
     text = SOURCE.read_bytes()
-    assert zlib.crc32(text) == bus_tables.PROTOCOL_CRC == generator.Bus(text.replace(b"\n", b"\r\n")).crc
+    assert (
+        zlib.crc32(text)
+        == bus_tables.PROTOCOL_CRC
+        == generator.Bus(text.replace(b"\n", b"\r\n")).crc
+    )
     assert f"#define PROTOCOL_CRC         0x{bus_tables.PROTOCOL_CRC:08X}u" in HEADER
     assert generator.Bus(text + b"# one remark more\n").crc != bus_tables.PROTOCOL_CRC
 
 
 def test_the_host_has_every_entry_of_the_source():
-    for name, made in (("cause", bus_tables.CAUSES), ("fault", bus_tables.FAULTS), ("encoder_event", bus_tables.ENCODER_EVENTS),
-                       ("state", bus_tables.STATES), ("flag", bus_tables.FLAGS), ("calibration_reason", bus_tables.CALIBRATION_REASONS),
-                       ("signal_fault", bus_tables.SIGNAL_FAULTS), ("calibration_action", bus_tables.CALIBRATION_ACTIONS),
-                       ("scope_trigger", bus_tables.SCOPE_TRIGGERS), ("scope_state", bus_tables.SCOPE_STATES)):
+    for name, made in (
+        ("cause", bus_tables.CAUSES),
+        ("fault", bus_tables.FAULTS),
+        ("encoder_event", bus_tables.ENCODER_EVENTS),
+        ("state", bus_tables.STATES),
+        ("flag", bus_tables.FLAGS),
+        ("calibration_reason", bus_tables.CALIBRATION_REASONS),
+        ("signal_fault", bus_tables.SIGNAL_FAULTS),
+        ("calibration_action", bus_tables.CALIBRATION_ACTIONS),
+        ("scope_trigger", bus_tables.SCOPE_TRIGGERS),
+        ("scope_state", bus_tables.SCOPE_STATES),
+    ):
         assert made == {code: (key, words) for key, (code, words) in TABLE[name].items()}
-    assert list(bus_tables.OPERATIONS) == list(TABLE["operation"]) and list(bus_tables.PARAMETERS) == list(TABLE["parameter"])
+    assert list(bus_tables.OPERATIONS) == list(TABLE["operation"]) and list(
+        bus_tables.PARAMETERS
+    ) == list(TABLE["parameter"])
     for name, source in TABLE["operation"].items():
         made = bus_tables.OPERATIONS[name]
-        assert (made.code, [" ".join(field) for field in made.request], [" ".join(field) for field in made.reply]) == (
-            source["code"], source["request"], source["reply"])
+        assert (
+            made.code,
+            [" ".join(field) for field in made.request],
+            [" ".join(field) for field in made.reply],
+        ) == (source["code"], source["request"], source["reply"])
     assert list(bus_tables.SETTINGS) == list(TABLE["setting"])
     for name, source in {**TABLE["parameter"], **TABLE["setting"]}.items():
         made = {**bus_tables.PARAMETERS, **bus_tables.SETTINGS}[name]
         assert (made.id, made.unit, made.lsb, made.min, made.max, made.default) == (
-            source["id"], source["unit"], Fraction(source["lsb"]), source["min"], source["max"], source["default"])
+            source["id"],
+            source["unit"],
+            Fraction(source["lsb"]),
+            source["min"],
+            source["max"],
+            source["default"],
+        )
 
 
 def test_offsets_and_lengths_in_the_header_are_those_of_a_packed_struct():
-    formats = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i8": "b", "i16": "h", "i32": "i", "i64": "q"}
+    formats = {
+        "u8": "B",
+        "u16": "H",
+        "u32": "I",
+        "u64": "Q",
+        "i8": "b",
+        "i16": "h",
+        "i32": "i",
+        "i64": "q",
+    }
     for name, source in TABLE["operation"].items():
         for way, head in (("request", "BB"), ("reply", "BBB")):
             laid = "<" + head
             for declared in source[way]:
                 field, kind = declared.split()
-                assert f"#define BUS_{name}_{way}_{field} {struct.calcsize(laid)}u ".upper() in HEADER.upper()
+                assert (
+                    f"#define BUS_{name}_{way}_{field} {struct.calcsize(laid)}u ".upper()
+                    in HEADER.upper()
+                )
                 laid += formats[kind]
-            assert re.search(f"#define BUS_{name}_{way}_LENGTH {struct.calcsize(laid)}u$".upper(), HEADER.upper(), re.MULTILINE)
+            assert re.search(
+                f"#define BUS_{name}_{way}_LENGTH {struct.calcsize(laid)}u$".upper(),
+                HEADER.upper(),
+                re.MULTILINE,
+            )
 
 
 def test_a_compiler_reads_the_header_and_gets_the_same_numbers(tmp_path):
@@ -91,14 +135,34 @@ def test_a_compiler_reads_the_header_and_gets_the_same_numbers(tmp_path):
         "int main(void) { BUS_PARAMETERS(P) BUS_SETTINGS(P) BUS_OPERATIONS(O) "
         "return BUS_CAUSE_NO_MOTION_YET - 20 + BUS_FAULT_PROFILE_UNDERRUN - 256; }\n"
     )
-    subprocess.run([compiler, "-Wall", "-Wextra", "-Werror", "-I", ROOT / "sw" / "firmware", "-o", tmp_path / "print", source], check=True)
-    told = subprocess.run([tmp_path / "print"], check=True, capture_output=True, text=True).stdout.splitlines()
-    wanted = [f"{p.name} {p.id} {p.min} {p.max} {p.default}" for table in (bus_tables.PARAMETERS, bus_tables.SETTINGS)
-              for p in table.values()]
+    subprocess.run(
+        [
+            compiler,
+            "-Wall",
+            "-Wextra",
+            "-Werror",
+            "-I",
+            ROOT / "sw" / "firmware",
+            "-o",
+            tmp_path / "print",
+            source,
+        ],
+        check=True,
+    )
+    told = subprocess.run(
+        [tmp_path / "print"], check=True, capture_output=True, text=True
+    ).stdout.splitlines()
+    wanted = [
+        f"{p.name} {p.id} {p.min} {p.max} {p.default}"
+        for table in (bus_tables.PARAMETERS, bus_tables.SETTINGS)
+        for p in table.values()
+    ]
     size = {"8": 1, "16": 2, "32": 4, "64": 8}
-    wanted += [f"{o.name} {o.code} {2 + sum(size[kind[1:]] for _, kind in o.request)} {3 + sum(size[kind[1:]] for _, kind in o.reply)} "
-               f"{int(('axis', 'u8') in o.request)}"
-               for o in bus_tables.OPERATIONS.values()]
+    wanted += [
+        f"{o.name} {o.code} {2 + sum(size[kind[1:]] for _, kind in o.request)} {3 + sum(size[kind[1:]] for _, kind in o.reply)} "
+        f"{int(('axis', 'u8') in o.request)}"
+        for o in bus_tables.OPERATIONS.values()
+    ]
     assert told == wanted
 
 

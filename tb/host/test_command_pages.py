@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tables/commands.py and the pages that people copy from: nothing made is stale, and every command written there is understood."""
+"""tables/commands.py and the pages that people copy from: nothing made is stale, and every command
+written there is understood.
+"""
+
 import re
 import shlex
 from pathlib import Path
@@ -16,7 +19,20 @@ def test_the_made_pages_are_fresh_and_there_is_one_for_each_command():
     assert generator.main(["--check"]) == 0
     names = set(generator.below(command_line.make_parser()))
     assert {path.stem for path in generator.PAGES.glob("*.md")} == names | {"README"}
-    assert names >= {"find", "status", "home", "move", "watch", "scope", "tune", "commission", "params", "fault", "reset", "selftest"}
+    assert names >= {
+        "find",
+        "status",
+        "home",
+        "move",
+        "watch",
+        "scope",
+        "tune",
+        "commission",
+        "params",
+        "fault",
+        "reset",
+        "selftest",
+    }
 
 
 def test_a_stale_page_and_one_of_no_command_are_found_and_put_right(tmp_path, monkeypatch, capsys):
@@ -27,8 +43,16 @@ def test_a_stale_page_and_one_of_no_command_are_found_and_put_right(tmp_path, mo
     capsys.readouterr()
     assert generator.main(["--check"]) == 1
     said = capsys.readouterr().err
-    assert "commands/move.md is stale" in said and "commands/fly.md is stale" in said and said.count("\n") == 2
-    assert generator.main([]) == 0 and generator.main(["--check"]) == 0 and not (tmp_path / "commands" / "fly.md").exists()
+    assert (
+        "commands/move.md is stale" in said
+        and "commands/fly.md is stale" in said
+        and said.count("\n") == 2
+    )
+    assert (
+        generator.main([]) == 0
+        and generator.main(["--check"]) == 0
+        and not (tmp_path / "commands" / "fly.md").exists()
+    )
 
 
 def test_every_argument_of_every_command_is_on_its_page():
@@ -37,13 +61,22 @@ def test_every_argument_of_every_command_is_on_its_page():
         for part in [parser, *generator.below(parser).values()]:
             assert part.description in text
             for action in generator.own(part):
-                assert f"`{generator.name_of(action)}`" in text or f"`[{generator.name_of(action)}]`" in text
+                assert (
+                    f"`{generator.name_of(action)}`" in text
+                    or f"`[{generator.name_of(action)}]`" in text
+                )
 
 
 def written_commands():
-    pages = [ROOT / "README.md", ROOT / "docs" / "tutorial.md", *sorted((ROOT / "docs" / "commands").glob("*.md"))]
+    pages = [
+        ROOT / "README.md",
+        ROOT / "docs" / "tutorial.md",
+        *sorted((ROOT / "docs" / "commands").glob("*.md")),
+    ]
     for path in pages:
-        for line in re.findall(r"^ +(?:build/venv/bin/)?(moire (?!.*--help).*)$", path.read_text(), re.MULTILINE):
+        for line in re.findall(
+            r"^ +(?:build/venv/bin/)?(moire (?!.*--help).*)$", path.read_text(), re.MULTILINE
+        ):
             yield pytest.param(line, id=f"{path.stem}: {line}")
 
 

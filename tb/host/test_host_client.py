@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""client: what a node says in real units and words, every refusal with its values, motions that end well, badly and by Ctrl-C."""
+"""client: what a node says in real units and words, every refusal with its values, motions that end
+well, badly and by Ctrl-C.
+"""
+
 import random
 from dataclasses import replace
 from fractions import Fraction
@@ -42,10 +45,14 @@ def homed_stage():
 
 # ------------------------------------------------------------------ who is there
 
+
 def test_find_tells_every_node_of_any_build():
     fake = FakeBus(FakeNode(3, axes=2), FakeNode(15, map_crc=5))
     found = Bus(fake).find()
-    assert [(node.address, node.axes, node.matches) for node in found] == [(3, 2, True), (15, 1, False)]
+    assert [(node.address, node.axes, node.matches) for node in found] == [
+        (3, 2, True),
+        (15, 1, False),
+    ]
     assert Bus(fake).find([1, 2]) == []
     assert fake.now() < 10
 
@@ -55,9 +62,14 @@ def test_nobody_is_a_clear_exception():
         Bus(FakeBus(FakeNode(1))).axis(4)
 
 
-@pytest.mark.parametrize("crc, value, words", [("map_crc", MAP_CRC, "register map"), ("protocol_crc", PROTOCOL_CRC, "protocol table")])
+@pytest.mark.parametrize(
+    "crc, value, words",
+    [("map_crc", MAP_CRC, "register map"), ("protocol_crc", PROTOCOL_CRC, "protocol table")],
+)
 def test_a_node_of_another_build_is_refused_with_both_numbers(crc, value, words):
-    with pytest.raises(WrongBuild, match=f"{words}.*CRC-32 0000BEEF in the node, {value:08X} in this host") as caught:
+    with pytest.raises(
+        WrongBuild, match=f"{words}.*CRC-32 0000BEEF in the node, {value:08X} in this host"
+    ) as caught:
         Bus(FakeBus(FakeNode(**{crc: 0xBEEF}))).axis()
     assert (caught.value.node, caught.value.host) == (0xBEEF, value)
 
@@ -78,15 +90,27 @@ def test_a_garbled_line_is_told_from_a_silent_one():
 
 # ------------------------------------------------------------------ real units
 
+
 def test_status_is_in_real_units():
     fake, node, axis = stage()
     inside = node.axes[0]
-    inside.enabled, inside.homed, inside.position, inside.target = True, True, 65536 * 1250 + 4096, 65536 * 1250
+    inside.enabled, inside.homed, inside.position, inside.target = (
+        True,
+        True,
+        65536 * 1250 + 4096,
+        65536 * 1250,
+    )
     inside.events = 0b10010
     status = axis.status()
     assert status.position_nm == pytest.approx(1_000_050) and status.target_nm == 1_000_000
     assert status.counts == 1250 * 160 + 10
-    assert status.enabled and status.homed and status.settled and not status.estop and not status.limit_low
+    assert (
+        status.enabled
+        and status.homed
+        and status.settled
+        and not status.estop
+        and not status.limit_low
+    )
     assert (status.state, status.words, status.faults, status.encoder_events) == (
         "holding",
         "holding position",
@@ -96,7 +120,11 @@ def test_status_is_in_real_units():
     inside.go("moving", fake.now(), 1.0, 0)
     status = axis.status()
     # 1.5 periods of 800 nm in a tick of 0.25 ms
-    assert status.velocity_mm_s == pytest.approx(4.8) and status.drive_command == -0.5 and status.in_motion
+    assert (
+        status.velocity_mm_s == pytest.approx(4.8)
+        and status.drive_command == -0.5
+        and status.in_motion
+    )
 
 
 def test_the_period_is_read_from_the_node():
@@ -109,9 +137,18 @@ def test_the_period_is_read_from_the_node():
 def test_encoder_counters_and_registers():
     fake, node, axis = stage()
     encoder = axis.encoder()
-    assert (encoder.sin, encoder.cos, encoder.amplitude, encoder.quadrature_count) == (-100, 27, 103, -4)
-    assert encoder.home_phase_nm == -200 and encoder.home_margin == 0.5 and encoder.fault_position_nm == 800
-    assert axis.node.counters()["frames_good"] == 4                # identify, period, encoder and its own
+    assert (encoder.sin, encoder.cos, encoder.amplitude, encoder.quadrature_count) == (
+        -100,
+        27,
+        103,
+        -4,
+    )
+    assert (
+        encoder.home_phase_nm == -200
+        and encoder.home_margin == 0.5
+        and encoder.fault_position_nm == 800
+    )
+    assert axis.node.counters()["frames_good"] == 4  # identify, period, encoder and its own
     assert axis.node.read_register(0x400) == 7
     with pytest.raises(Refused, match=r"no register at this address \(address 0x0404\)"):
         axis.node.read_register(0x404)
@@ -124,10 +161,21 @@ def test_registers_are_read_by_name_and_wide_ones_low_word_first():
     _, node, axis = stage()
     known = {(field.block, field.register): field for field in FIELDS}
     place = known["axis", "position"].address()
-    node.registers = {place: 0xFFFF0000, place + 4: 0x0000FFFF, known["axis", "control"].address(): 0b101}
+    node.registers = {
+        place: 0xFFFF0000,
+        place + 4: 0x0000FFFF,
+        known["axis", "control"].address(): 0b101,
+    }
     assert axis.node.read_named("axis.position") == {"value": -65536}
-    assert axis.node.read_named("axis.control") == {"enable": 1, "closed_loop": 0, "homing": 1, "fine": 0}
-    with pytest.raises(UnknownName, match="there is no register 'axis.speed': known are node.map_crc"):
+    assert axis.node.read_named("axis.control") == {
+        "enable": 1,
+        "closed_loop": 0,
+        "homing": 1,
+        "fine": 0,
+    }
+    with pytest.raises(
+        UnknownName, match="there is no register 'axis.speed': known are node.map_crc"
+    ):
         axis.node.read_named("axis.speed")
     with pytest.raises(OutOfRange, match="bus.transmit can only be written"):
         axis.node.read_named("bus.transmit")
@@ -135,12 +183,17 @@ def test_registers_are_read_by_name_and_wide_ones_low_word_first():
 
 # ------------------------------------------------------------------ motion
 
+
 def test_home_and_move_go_where_they_should():
     fake, node, axis = stage()
     axis.enable()
     seen = []
     status = axis.home(progress=seen.append)
-    assert status.homed and status.position_nm == 0 and {"homing", "holding"} == {each.state for each in seen}
+    assert (
+        status.homed
+        and status.position_nm == 0
+        and {"homing", "holding"} == {each.state for each in seen}
+    )
     assert axis.move(mm=1.5).position_nm == 1_500_000
     assert axis.move("-200um", by=True).position_nm == 1_300_000
     assert axis.move(50).position_nm == pytest.approx(50, abs=0.01)
@@ -152,14 +205,18 @@ def test_home_and_move_go_where_they_should():
 
 def test_refusals_carry_the_words_of_the_table_and_the_values():
     fake, node, axis = stage()
-    with pytest.raises(Refused, match="node 1 refused 'home': the drive is off: enable it first") as caught:
+    with pytest.raises(
+        Refused, match="node 1 refused 'home': the drive is off: enable it first"
+    ) as caught:
         axis.home()
     assert (caught.value.cause, caught.value.code) == ("not_enabled", 8)
     axis.enable()
     with pytest.raises(Refused, match="home it first"):
         axis.move(mm=1)
     axis.home()
-    with pytest.raises(Refused, match=r"outside the travel \(target 130mm, allowed -800um to 119.6mm\)"):
+    with pytest.raises(
+        Refused, match=r"outside the travel \(target 130mm, allowed -800um to 119.6mm\)"
+    ):
         axis.move(mm=130)
     node.axes[0].go("moving", fake.now(), 10.0, 65536)
     with pytest.raises(Refused, match="stop it or wait"):
@@ -213,7 +270,8 @@ def test_a_motion_that_a_fault_ends_names_the_first_fault():
     fake, node, axis = homed_stage()
     fake.at.append((fake.now() + 0.2, lambda: setattr(node.axes[0], "standing", LIMIT_LOW)))
     with pytest.raises(
-        MotionFailed, match=r"axis 0 of node 1: a fault ended the motion: limit switch at the low end \(at .*, target 10mm\)"
+        MotionFailed,
+        match=r"axis 0 of node 1: a fault ended the motion: limit switch at the low end \(at .*, target 10mm\)",
     ) as caught:
         axis.move(mm=10)
     assert caught.value.cause == "ended_by_fault"
@@ -242,6 +300,7 @@ def test_whatever_interrupts_the_wait_brings_the_axis_to_rest_first(what, motion
     def interrupt(status):
         if status.state in ("homing", "moving"):
             raise what
+
     with pytest.raises(what):
         axis.home(progress=interrupt) if motion == "home" else axis.move(mm=10, progress=interrupt)
     assert node.executed.count("stop") == 1
@@ -258,11 +317,12 @@ def test_ctrl_c_in_the_middle_of_an_exchange_stops_the_axis_too():
             if len(seen) == place + 1:
                 raise KeyboardInterrupt
             return [word]
+
         fake.to_node = interrupt
         with pytest.raises(KeyboardInterrupt):
             axis.move(mm=10)
         assert node.axes[0].kind is None, place
-        assert axis.move(mm=1).position_nm == 1_000_000            # and the bus is in order again
+        assert axis.move(mm=1).position_nm == 1_000_000  # and the bus is in order again
 
 
 def test_an_axis_that_cannot_be_told_to_stop_is_said():
@@ -272,7 +332,10 @@ def test_an_axis_that_cannot_be_told_to_stop_is_said():
         fake.to_node = lambda word: []
         raise KeyboardInterrupt
 
-    with pytest.raises(BusError, match="axis 0 of node 1 could not be told to stop, its watchdog has to: nobody answers"):
+    with pytest.raises(
+        BusError,
+        match="axis 0 of node 1 could not be told to stop, its watchdog has to: nobody answers",
+    ):
         axis.move(mm=10, progress=cut_and_interrupt)
 
 
@@ -287,6 +350,7 @@ def test_waiting_talks_often_enough_for_the_watchdog():
 
 
 # ------------------------------------------------------------------ several axes, override, drive
+
 
 def two_axes():
     """A node with both axes homed."""
@@ -304,7 +368,9 @@ def test_prepared_axes_begin_together_and_end_one_after_the_other():
     node.axis(1).prepare(mm=1)
     assert node.axis(0).status().state == "prepared" and node.axis(0).status().position_nm == 0
     seen = []
-    ended = node.start(0, 1, progress=lambda status: seen.append([axis.kind for axis in fake.nodes[0].axes]))
+    ended = node.start(
+        0, 1, progress=lambda status: seen.append([axis.kind for axis in fake.nodes[0].axes])
+    )
     assert [round(status.position_nm) for status in ended] == [2_000_000, 1_000_000]
     assert seen[0] == ["moving", "moving"] and all(status.ended == "ok" for status in ended)
 
@@ -324,8 +390,16 @@ def test_axes_of_two_nodes_begin_at_one_mark():
     for axis in chosen:
         axis.prepare(mm=1)
     seen = []
-    ended = bus.start(*chosen, progress=lambda status: seen.append([axis.kind for node in fake.nodes for axis in node.axes]))
-    assert seen[0][0] == seen[0][2] == "moving" != seen[0][1] and [round(status.position_nm) for status in ended] == [1_000_000] * 2
+    ended = bus.start(
+        *chosen,
+        progress=lambda status: seen.append(
+            [axis.kind for node in fake.nodes for axis in node.axes]
+        ),
+    )
+    assert (
+        seen[0][0] == seen[0][2] == "moving" != seen[0][1]
+        and [round(status.position_nm) for status in ended] == [1_000_000] * 2
+    )
     assert [node.counters["syncs"] for node in fake.nodes] == [1, 1]
 
 
@@ -381,6 +455,7 @@ def test_a_rate_that_the_port_cannot_do_is_passed_over_and_a_port_that_is_gone_i
         if baud not in able:
             raise PortError("the port COM7 failed")
         set_baud(baud)
+
     fake.nodes[1].baud, fake.set_baud = 9_600, choosy
     assert bus.find_baud()[1] == 9_600
     able.clear()
@@ -399,7 +474,9 @@ def test_nobody_at_any_rate_leaves_the_first_one_and_what_was_garbled_is_said():
 def test_find_tells_two_nodes_with_one_address_that_identify_themselves_alike():
     fake = FakeBus(FakeNode(), FakeNode())
     fake.wired_and = True
-    assert [identity.address for identity in Bus(fake).find()] == [1]       # to the very clk the same: nothing could tell
+    assert [identity.address for identity in Bus(fake).find()] == [
+        1
+    ]  # to the very clk the same: nothing could tell
     fake.nodes[1].powered_up = 0.3
     with pytest.raises(BusGarbled, match="two nodes with the address 1"):
         Bus(fake).find()
@@ -408,7 +485,12 @@ def test_find_tells_two_nodes_with_one_address_that_identify_themselves_alike():
 def test_what_needs_the_own_line_is_refused_through_a_door():
     fake, bus = two_nodes()
     fake.handshake = False
-    for action in (bus.sync, lambda: bus.set_baud(9600, [1]), bus.find_baud, lambda: bus.start(bus.axis(1))):
+    for action in (
+        bus.sync,
+        lambda: bus.set_baud(9600, [1]),
+        bus.find_baud,
+        lambda: bus.start(bus.axis(1)),
+    ):
         with pytest.raises(BusError, match="the nodes' own line"):
             action()
 
@@ -435,6 +517,7 @@ def test_an_interrupted_common_start_stops_all_of_them():
 
     def interrupt(_):
         raise KeyboardInterrupt
+
     with pytest.raises(KeyboardInterrupt):
         node.start(0, 1, progress=interrupt)
     assert [axis.ended for axis in fake.nodes[0].axes] == ["stopped", "stopped"]
@@ -455,7 +538,7 @@ def test_pause_stands_and_resume_goes_on_at_the_override_before():
     assert seconds == pytest.approx(1.05, abs=0.01)
     fake.wait(0.5)
     axis.pause()
-    axis.pause()                                                # twice is once
+    axis.pause()  # twice is once
     stands = axis.status().position_nm
     fake.wait(10)
     assert axis.status().position_nm == stands and axis.status().in_motion and 0 < stands < 4.8e6
@@ -483,6 +566,7 @@ def test_ctrl_c_while_waiting_for_a_motion_stops_it():
 
     def interrupt(_):
         raise KeyboardInterrupt
+
     with pytest.raises(KeyboardInterrupt):
         axis.motion_end(interrupt)
     assert node.axes[0].ended == "stopped"
@@ -499,9 +583,16 @@ def test_home_keeps_the_method_that_was_asked_for():
 
 def test_the_drive_is_told_in_words():
     _, node, axis = homed_stage()
-    node.registers.update({0x1400: 1 | 0b1111 << 2, 0x1420: -7 & 0xFFFFFFFF, 0x143C: -16384 & 0xFFFF})
+    node.registers.update(
+        {0x1400: 1 | 0b1111 << 2, 0x1420: -7 & 0xFFFFFFFF, 0x143C: -16384 & 0xFFFF}
+    )
     drive = axis.drive()
-    assert (drive.kind, drive.built, drive.steps, drive.fine_command) == ("steps", ("bridge", "steps", "dac", "fine"), -7, -0.5)
+    assert (drive.kind, drive.built, drive.steps, drive.fine_command) == (
+        "steps",
+        ("bridge", "steps", "dac", "fine"),
+        -7,
+        -0.5,
+    )
     assert drive.override == 1
 
 
@@ -513,7 +604,11 @@ def test_a_parameter_that_is_a_choice_takes_and_tells_its_words():
         words = CHOICES[name]
         assert len(words) == known.max - known.min + 1 and known.min == 0
         for counts, word in enumerate(words):
-            assert axis.set_parameter(name, word).counts == counts == axis.set_parameter(name, str(counts)).counts
+            assert (
+                axis.set_parameter(name, word).counts
+                == counts
+                == axis.set_parameter(name, str(counts)).counts
+            )
             assert axis.get_parameter(name).written() == word
         with pytest.raises(OutOfRange, match=f"{name} is no 'sideways': allowed are {words[0]}, "):
             axis.set_parameter(name, "sideways")
@@ -522,26 +617,66 @@ def test_a_parameter_that_is_a_choice_takes_and_tells_its_words():
 
 def test_a_tuning_is_written_gain_by_gain_and_filter_by_filter():
     _, node, axis = stage()
-    tuning = Tuning(kp=100, ki=200, kd=300, kv=400, ka=500, filters=((1, 2, 3, 4, 5),), bandwidth_hz=40, phase_margin_degree=50,
-                    gain_margin=3)
+    tuning = Tuning(
+        kp=100,
+        ki=200,
+        kd=300,
+        kv=400,
+        ka=500,
+        filters=((1, 2, 3, 4, 5),),
+        bandwidth_hz=40,
+        phase_margin_degree=50,
+        gain_margin=3,
+    )
     axis.set_tuning(tuning)
     written = {name: node.axes[0].parameters[known.id] for name, known in PARAMETERS.items()}
-    assert [written[name] for name in ("kp", "ki", "kd", "kv", "ka", "filters")] == [100, 200, 300, 400, 500, 1]
-    assert [written[f"filter_1_{name}"] for name in ("b0", "b1", "b2", "a1", "a2")] == [1, 2, 3, 4, 5]
+    assert [written[name] for name in ("kp", "ki", "kd", "kv", "ka", "filters")] == [
+        100,
+        200,
+        300,
+        400,
+        500,
+        1,
+    ]
+    assert [written[f"filter_1_{name}"] for name in ("b0", "b1", "b2", "a1", "a2")] == [
+        1,
+        2,
+        3,
+        4,
+        5,
+    ]
     with pytest.raises(OutOfRange, match="the servo has 2 filters, the tuning 3"):
         axis.set_tuning(replace(tuning, filters=tuning.filters * 3))
 
 
 # ------------------------------------------------------------------ parameters
 
+
 def test_parameters_are_in_real_units():
     fake, node, axis = stage()
     velocity = axis.get_parameter("velocity")
-    assert (velocity.value, velocity.unit, velocity.counts, velocity.range_words) == (Fraction(24, 5), "mm/s", 6000, "800nm/s to 800mm/s")
-    assert axis.get_parameter("acceleration").written() == "100mm/s2" and axis.get_parameter("jerk").written() == "10000mm/s3"
-    assert axis.get_parameter("period").written() == "800nm" and axis.get_parameter("home_distance").written() == "1mm"
-    assert axis.get_parameter("settle_time").written() == "20ms" and axis.get_parameter("deglitch").written() == "10us"
-    assert axis.get_parameter("pwm_frequency").written() == "20kHz" and axis.get_parameter("counts_per_period").written() == "160"
+    assert (velocity.value, velocity.unit, velocity.counts, velocity.range_words) == (
+        Fraction(24, 5),
+        "mm/s",
+        6000,
+        "800nm/s to 800mm/s",
+    )
+    assert (
+        axis.get_parameter("acceleration").written() == "100mm/s2"
+        and axis.get_parameter("jerk").written() == "10000mm/s3"
+    )
+    assert (
+        axis.get_parameter("period").written() == "800nm"
+        and axis.get_parameter("home_distance").written() == "1mm"
+    )
+    assert (
+        axis.get_parameter("settle_time").written() == "20ms"
+        and axis.get_parameter("deglitch").written() == "10us"
+    )
+    assert (
+        axis.get_parameter("pwm_frequency").written() == "20kHz"
+        and axis.get_parameter("counts_per_period").written() == "160"
+    )
     assert axis.get_parameter("settle_window").written(4) == "20nm"
     assert axis.set_parameter("velocity", "5mm/s").value == 5 and node.axes[0].parameters[5] == 6250
     assert axis.set_parameter("velocity", 4).counts == 5000
@@ -575,7 +710,9 @@ def test_wrong_values_say_what_is_allowed():
         axis.set_parameter("counts_per_period", "160.5")
     with pytest.raises(UnitError, match="'5mm' is no speed"):
         axis.set_parameter("velocity", "5mm")
-    with pytest.raises(UnknownName, match="there is no parameter 'speed': known are period, counts_per_period"):
+    with pytest.raises(
+        UnknownName, match="there is no parameter 'speed': known are period, counts_per_period"
+    ):
         axis.get_parameter("speed")
     node.do_set_parameter = lambda *_, **__: ("out_of_range", {})
     with pytest.raises(Refused, match=r"outside what this parameter allows \(velocity 5mm/s\)"):
@@ -588,7 +725,10 @@ def test_saved_parameters_come_back_to_the_last_bit():
     source = random.Random(SEED)
     for _ in range(10):
         fake, node, axis = stage()
-        wanted = {known.id: source.choice([known.min, known.max, source.randint(known.min, known.max)]) for known in PARAMETERS.values()}
+        wanted = {
+            known.id: source.choice([known.min, known.max, source.randint(known.min, known.max)])
+            for known in PARAMETERS.values()
+        }
         node.axes[0].parameters.update(wanted)
         axis.period_nm = axis.read_period()
         saved = axis.save_parameters()
@@ -600,7 +740,11 @@ def test_saved_parameters_come_back_to_the_last_bit():
 
 def test_a_file_with_one_wrong_value_writes_nothing():
     fake, node, axis = stage()
-    for wrong in ({"kp": "0.5", "velocity": "900mm/s"}, {"kp": "0.5", "speed": "1mm/s"}, {"kp": "0.5", "jerk": "x"}):
+    for wrong in (
+        {"kp": "0.5", "velocity": "900mm/s"},
+        {"kp": "0.5", "speed": "1mm/s"},
+        {"kp": "0.5", "jerk": "x"},
+    ):
         with pytest.raises((OutOfRange, UnknownName, UnitError)):
             axis.load_parameters(wrong)
     assert node.axes[0].writes == []

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""cobs: stuffing against the published examples and its own inverse, and a reader that nothing can throw off."""
+"""cobs: stuffing against the published examples and its own inverse, and a reader that nothing can
+throw off.
+"""
+
 import random
 from pathlib import Path
 
@@ -13,11 +16,19 @@ SEED = seed()
 BODY = b"\x07\x03\x00\x01"
 
 
-@pytest.mark.parametrize("plain, stuffed", [                     # Cheshire and Baker, and the edges of a run
-    (b"", "01"), (b"\0", "0101"), (b"\0\0", "010101"), (b"\0\x11\0", "01021101"), (b"\x11\x22\0\x33", "0311220233"),
-    (b"\x11\0\0\0", "0211010101"), (bytes(range(1, 254)), "fe" + bytes(range(1, 254)).hex()),
-    (bytes(range(1, 255)) + b"\xff", "ff" + bytes(range(1, 255)).hex() + "02ff"),
-])
+@pytest.mark.parametrize(
+    "plain, stuffed",
+    [  # Cheshire and Baker, and the edges of a run
+        (b"", "01"),
+        (b"\0", "0101"),
+        (b"\0\0", "010101"),
+        (b"\0\x11\0", "01021101"),
+        (b"\x11\x22\0\x33", "0311220233"),
+        (b"\x11\0\0\0", "0211010101"),
+        (bytes(range(1, 254)), "fe" + bytes(range(1, 254)).hex()),
+        (bytes(range(1, 255)) + b"\xff", "ff" + bytes(range(1, 255)).hex() + "02ff"),
+    ],
+)
 def test_stuffing_is_that_of_the_paper(plain, stuffed):
     assert cobs.stuff(plain).hex() == stuffed and cobs.unstuff(bytes.fromhex(stuffed)) == plain
 
@@ -42,7 +53,9 @@ def test_a_packet_tells_its_body_and_its_node_only_if_it_is_right():
     assert cobs.body_of(content) == BODY
     assert cobs.address_of(content, TO_NODE) == 11 and cobs.address_of(content, FROM_NODE) is None
     assert cobs.address_of(b"\x5b", FROM_NODE) == 11
-    assert [cobs.address_of(wrong, TO_NODE) for wrong in (b"", b"\x20", b"\x1b", b"\x6b")] == [None] * 4
+    assert [cobs.address_of(wrong, TO_NODE) for wrong in (b"", b"\x20", b"\x1b", b"\x6b")] == [
+        None
+    ] * 4
     for bit in range(8 * len(content)):
         spoilt = bytearray(content)
         spoilt[bit // 8] ^= 1 << bit % 8
@@ -53,7 +66,9 @@ def test_a_packet_tells_its_body_and_its_node_only_if_it_is_right():
 def test_a_reader_takes_bytes_one_by_one_as_in_one_piece():
     stream = cobs.packet(0x21, BODY) + cobs.packet(0x22, b"\0" * 64)
     reader = cobs.PacketReader()
-    assert sum((reader.feed(bytes([byte])) for byte in stream), []) == cobs.PacketReader().feed(stream)
+    assert sum((reader.feed(bytes([byte])) for byte in stream), []) == cobs.PacketReader().feed(
+        stream
+    )
     assert reader.dropped == 0
 
 
@@ -62,7 +77,9 @@ def test_the_packet_after_any_noise_is_taken():
     for _ in range(2000):
         reader = cobs.PacketReader()
         noise = source.randbytes(source.randrange(200))
-        assert reader.feed(noise + cobs.packet(0x21, BODY))[-1] == bytes([0x21]) + frame(0x21, BODY), noise.hex()
+        assert reader.feed(noise + cobs.packet(0x21, BODY))[-1] == bytes([0x21]) + frame(
+            0x21, BODY
+        ), noise.hex()
         assert len(reader.held) == 0
 
 

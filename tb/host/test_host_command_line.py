@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""command_line: sequences, exit codes, JSON, files, the shell, and that every error is one sentence that says what is allowed."""
+"""command_line: sequences, exit codes, JSON, files, the shell, and that every error is one sentence
+that says what is allowed.
+"""
+
 import io
 import json
 import sys
@@ -26,6 +29,7 @@ class Call:
         def open_transport(options):
             self.options = options
             return self.bus
+
         arguments = text.split() if isinstance(text, str) else text
         self.code = command_line.main(arguments, open_transport, out, err)
         self.out, self.err = out.getvalue(), err.getvalue()
@@ -37,11 +41,14 @@ class Call:
 
 def sentence(call, code):
     """The one line that was complained."""
-    assert call.code == code and call.err.count("\n") == 1 and call.err.startswith("moire: "), call.err
+    assert call.code == code and call.err.count("\n") == 1 and call.err.startswith("moire: "), (
+        call.err
+    )
     return call.err
 
 
 # ------------------------------------------------------------------ what it does
+
 
 def test_home_move_status_in_one_call_and_the_drive_is_off_at_its_end():
     node = FakeNode()
@@ -67,17 +74,30 @@ def test_drives_are_switched_off_after_an_error_too():
 
 def test_options_of_the_first_command_hold_for_all_and_may_be_given_again():
     nodes = FakeNode(1), FakeNode(2, axes=2)
-    call = Call("--address 2 home --axis 1 -- status -- status --axis 0 -- status --address 1 --axis 0 --json", *nodes)
-    assert [(told["address"], told["axis"]) for told in call.told] == [(2, 1), (2, 1), (2, 0), (1, 0)]
+    call = Call(
+        "--address 2 home --axis 1 -- status -- status --axis 0 -- status --address 1 --axis 0 --json",
+        *nodes,
+    )
+    assert [(told["address"], told["axis"]) for told in call.told] == [
+        (2, 1),
+        (2, 1),
+        (2, 0),
+        (1, 0),
+    ]
     assert nodes[1].axes[1].homed and not nodes[1].axes[0].homed
 
 
 def test_find_lists_the_nodes_and_marks_those_of_another_build():
     call = Call("find 1 3", FakeNode(1), FakeNode(3, map_crc=1, axes=2))
     assert call.code == 0
-    assert call.out.splitlines()[0].startswith("node 1: 1 axis, clock 4 MHz, servo 4 kHz, samples 100 kHz, made from the same sources")
+    assert call.out.splitlines()[0].startswith(
+        "node 1: 1 axis, clock 4 MHz, servo 4 kHz, samples 100 kHz, made from the same sources"
+    )
     assert "node 3: 2 axes" in call.out and "MADE FROM OTHER SOURCES" in call.out
-    assert [node["matches"] for node in Call("find --json", FakeNode(1), FakeNode(3, map_crc=1)).told[0]["nodes"]] == [True, False]
+    assert [
+        node["matches"]
+        for node in Call("find --json", FakeNode(1), FakeNode(3, map_crc=1)).told[0]["nodes"]
+    ] == [True, False]
 
 
 def test_find_tries_the_usual_baud_rates_and_says_which_it_is():
@@ -85,9 +105,13 @@ def test_find_tries_the_usual_baud_rates_and_says_which_it_is():
     node.baud = 1_000_000
     assert "or try all with 'find --any-baud'" in sentence(Call("find", node), 3)
     call = Call("find --any-baud -- status --address 2", node)
-    assert call.code == 0 and "at 1000000 baud: --baud 1000000" in call.out and "drive off" in call.out
+    assert (
+        call.code == 0 and "at 1000000 baud: --baud 1000000" in call.out and "drive off" in call.out
+    )
     assert Call("find --any-baud --json", node).told[0]["baud"] == 1_000_000
-    assert "check power and wiring; no usual baud rate is left" in sentence(Call("find 5 --any-baud", node), 3)
+    assert "check power and wiring; no usual baud rate is left" in sentence(
+        Call("find 5 --any-baud", node), 3
+    )
 
 
 def test_enable_wait_stop_reset_encoder_counters():
@@ -100,7 +124,10 @@ def test_enable_wait_stop_reset_encoder_counters():
 def test_a_node_without_sine_and_cosine_says_so():
     node = FakeNode(sine=False)
     call = Call("status -- encoder", node)
-    assert call.out.count("counts only: built without sine and cosine") == 2 and "converter counts" not in call.out
+    assert (
+        call.out.count("counts only: built without sine and cosine") == 2
+        and "converter counts" not in call.out
+    )
     assert [told["sine"] for told in Call("status -- encoder --json", node).told] == [False, False]
     assert "built without that" in sentence(Call("signal", node), 1)
     call = Call("status -- encoder")
@@ -112,7 +139,10 @@ def test_registers_by_address_and_by_name():
     node.registers = {0x110: 258, 0x400: 5}
     call = Call("register 0x110 272 bus.frames_good axis.control", node)
     assert call.code == 0
-    assert "0x110 = 0x00000102 258\n272 = 0x00000102 258\nbus.frames_good: value = 258\naxis.control: enable = 1" in call.out
+    assert (
+        "0x110 = 0x00000102 258\n272 = 0x00000102 258\nbus.frames_good: value = 258\naxis.control: enable = 1"
+        in call.out
+    )
     assert "axis.position" in Call("register").out
     assert Call("register 0x110 --json", node).told[0]["registers"] == {"0x110": 258}
 
@@ -124,40 +154,71 @@ def test_parameters_are_listed_set_and_read_back():
     rows = call.out.splitlines()
     assert rows[0].split()[:2] == ["velocity", "5mm/s"] and "800nm/s to 800mm/s" in rows[0]
     assert len(rows) == 1 + 2 + len(PARAMETERS)
-    assert Call("params set travel_low -1.5mm", node).code == 0 and node.axes[0].parameters[3] == -1875 * 65536
+    assert (
+        Call("params set travel_low -1.5mm", node).code == 0
+        and node.axes[0].parameters[3] == -1875 * 65536
+    )
     assert Call("params get period --json", node).told[0]["parameters"][0]["value"] == 800
 
 
 def test_parameters_are_saved_and_loaded(tmp_path):
     node, file = FakeNode(), str(tmp_path / "stage.json")
     node.axes[0].parameters[PARAMETERS["settle_window"].id] = 1639
-    assert Call(["params", "save", file], node).out == f"{len(PARAMETERS)} parameters saved in {file}\n"
+    assert (
+        Call(["params", "save", file], node).out
+        == f"{len(PARAMETERS)} parameters saved in {file}\n"
+    )
     assert json.loads(open(file).read())["parameters"]["acceleration"] == "100mm/s2"
     other = FakeNode()
-    assert Call(["params", "load", file], other).code == 0 and other.axes[0].parameters == node.axes[0].parameters
+    assert (
+        Call(["params", "load", file], other).code == 0
+        and other.axes[0].parameters == node.axes[0].parameters
+    )
 
 
 def test_two_axes_begin_together():
     node = FakeNode(axes=2)
     call = Call("home -- home --axis 1 -- prepare 1mm -- prepare 2mm --axis 1 -- start 0 1", node)
     assert call.code == 0, call.err
-    assert "node 1 axis 0: at 1.000000 mm, error 0.0 nm\nnode 1 axis 1: at 2.000000 mm, error 0.0 nm" in call.out
-    assert sentence(Call("home -- prepare 1mm -- start 0 1", FakeNode(axes=2)), 1).endswith("the axis has no motion prepared\n")
+    assert (
+        "node 1 axis 0: at 1.000000 mm, error 0.0 nm\nnode 1 axis 1: at 2.000000 mm, error 0.0 nm"
+        in call.out
+    )
+    assert sentence(Call("home -- prepare 1mm -- start 0 1", FakeNode(axes=2)), 1).endswith(
+        "the axis has no motion prepared\n"
+    )
 
 
 def test_a_motion_is_slowed_paused_resumed_and_awaited():
     node = FakeNode()
-    call = Call("home -- override 50% -- move 1mm --no-wait -- pause -- wait 20s -- resume -- finish -- override", node)
+    call = Call(
+        "home -- override 50% -- move 1mm --no-wait -- pause -- wait 20s -- resume -- finish -- override",
+        node,
+    )
     assert call.code == 0, call.err
     rows = call.out.splitlines()
-    assert rows[1].endswith("50 % of full speed") and "on its way" in rows[2] and rows[3].endswith("paused")
-    assert "moving" in rows[4] and any("at 1.000000 mm, error 0.0 nm" in row for row in rows) and rows[-1].endswith("50 % of full speed")
+    assert (
+        rows[1].endswith("50 % of full speed")
+        and "on its way" in rows[2]
+        and rows[3].endswith("paused")
+    )
+    assert (
+        "moving" in rows[4]
+        and any("at 1.000000 mm, error 0.0 nm" in row for row in rows)
+        and rows[-1].endswith("50 % of full speed")
+    )
 
 
 def test_home_takes_a_method():
     node = FakeNode()
-    assert Call("home --method 35", node).code == 0 and node.axes[0].parameters[PARAMETERS["home_method"].id] == 35
-    assert Call("home --method s3", node).code == 0 and node.axes[0].parameters[PARAMETERS["home_method"].id] == -2
+    assert (
+        Call("home --method 35", node).code == 0
+        and node.axes[0].parameters[PARAMETERS["home_method"].id] == 35
+    )
+    assert (
+        Call("home --method s3", node).code == 0
+        and node.axes[0].parameters[PARAMETERS["home_method"].id] == -2
+    )
 
 
 def test_the_drive_and_choices_in_words():
@@ -165,9 +226,15 @@ def test_the_drive_and_choices_in_words():
     node.registers.update({0x1400: 1 | 0b0111 << 2, 0x1420: 25, 0x143C: 0})
     call = Call("drive -- params set drive steps -- register actuator.steps", node)
     assert call.code == 0, call.err
-    assert "drive     steps; built: bridge, steps, dac\n" in call.out and "25 on the wire" in call.out and "fine" not in call.out
+    assert (
+        "drive     steps; built: bridge, steps, dac\n" in call.out
+        and "25 on the wire" in call.out
+        and "fine" not in call.out
+    )
     assert "bridge, steps, dac" in call.out and node.axes[0].parameters[PARAMETERS["drive"].id] == 1
-    assert "'sideways': allowed are bridge, steps, dac" in sentence(Call("params set drive sideways", node), 2)
+    assert "'sideways': allowed are bridge, steps, dac" in sentence(
+        Call("params set drive sideways", node), 2
+    )
 
 
 def test_tune_reads_a_record_tells_gains_and_writes_them(tmp_path):
@@ -179,18 +246,31 @@ def test_tune_reads_a_record_tells_gains_and_writes_them(tmp_path):
         velocity += 0.05 * (0.2 * command - velocity)
         position += velocity
     record.write_text("\n".join(rows))
-    call = Call(["tune", str(record), "--bandwidth", "40Hz", "--picture", str(picture), "--json"], node)
+    call = Call(
+        ["tune", str(record), "--bandwidth", "40Hz", "--picture", str(picture), "--json"], node
+    )
     assert call.code == 0, call.err
     told = call.told[0]
-    assert told["plant"]["a"] == pytest.approx(0.95, rel=0.01) and not told["written"] and picture.read_bytes().startswith(b"\x89PNG")
+    assert (
+        told["plant"]["a"] == pytest.approx(0.95, rel=0.01)
+        and not told["written"]
+        and picture.read_bytes().startswith(b"\x89PNG")
+    )
     assert node.axes[0].writes == []
     call = Call(["tune", str(record), "--bandwidth", "40Hz", "--tick", "250us", "--write"], node)
     assert call.code == 0 and "written to node 1 axis 0" in call.out
     assert node.axes[0].parameters[PARAMETERS["kp"].id] == round(told["gains"]["kp"] * 65536) > 0
 
 
-@pytest.mark.parametrize("text, said", [("1,2,3\n1,2,3", "is no record"), ("1,x\n2,3", "is no record"), ("", "is no record"),
-                                        ("command,position\n1,2", "too few")])
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        ("1,2,3\n1,2,3", "is no record"),
+        ("1,x\n2,3", "is no record"),
+        ("", "is no record"),
+        ("command,position\n1,2", "too few"),
+    ],
+)
 def test_a_file_that_is_no_record_is_refused(tmp_path, text, said):
     record = tmp_path / "record.csv"
     record.write_text(text)
@@ -199,6 +279,7 @@ def test_a_file_that_is_no_record_is_refused(tmp_path, text, said):
 
 
 # ------------------------------------------------------------------ JSON
+
 
 @pytest.mark.parametrize(
     "text",
@@ -235,7 +316,9 @@ def test_every_command_tells_one_json_object_a_line(text):
     for arguments in (text + " --json", "--json " + text):
         call = Call(arguments, node)
         assert call.code == 0 and call.err == ""
-        assert [told["command"] for told in call.told] == [part.split()[0] for part in text.split(" -- ")]
+        assert [told["command"] for told in call.told] == [
+            part.split()[0] for part in text.split(" -- ")
+        ]
         node.axes[0].enabled = True
 
 
@@ -243,7 +326,11 @@ def test_status_in_json_has_numbers_and_words():
     node = FakeNode()
     node.axes[0].standing = node.axes[0].faults = ESTOP
     told = Call("status --json", node).told[0]
-    assert told["faults"] == ["estop"] and told["fault_words"] == "emergency stop" and told["state"] == "faulted"
+    assert (
+        told["faults"] == ["estop"]
+        and told["fault_words"] == "emergency stop"
+        and told["state"] == "faulted"
+    )
     assert told["position_nm"] == pytest.approx(123456 / 65536 * 800) and told["homed"] is False
 
 
@@ -258,10 +345,15 @@ def test_errors_are_json_too():
         }
     ]
     told = Call("move 1 --json").told[0]
-    assert told["error"] == "UsageError" and told["exit_code"] == 2 and "such as 1.5mm" in told["message"]
+    assert (
+        told["error"] == "UsageError"
+        and told["exit_code"] == 2
+        and "such as 1.5mm" in told["message"]
+    )
 
 
 # ------------------------------------------------------------------ errors and exit codes
+
 
 @pytest.mark.parametrize(
     "text, said",
@@ -316,7 +408,9 @@ def test_nothing_moves_when_a_later_command_is_wrong():
 
 def test_a_refusal_is_exit_code_1():
     assert "home it first" in sentence(Call("move 1mm"), 1)
-    assert "outside the travel (target 1000mm, allowed -800um to 119.6mm)" in sentence_of_last("home -- move 1m", 1)
+    assert "outside the travel (target 1000mm, allowed -800um to 119.6mm)" in sentence_of_last(
+        "home -- move 1m", 1
+    )
     assert "no such axis" not in sentence(Call("status --axis 3"), 1)
 
 
@@ -329,7 +423,9 @@ def test_a_motion_that_ends_badly_is_exit_code_1():
     node.axes[0].end_as = "no_switch"
     assert "no limit switch was found within the travel" in sentence(Call("home", node), 1)
     told = Call("home --json", node).told[-1]
-    assert (told["error"], told["cause"]) == ("MotionFailed", "no_switch") and CAUSE["no_switch"] == 15
+    assert (told["error"], told["cause"]) == ("MotionFailed", "no_switch") and CAUSE[
+        "no_switch"
+    ] == 15
 
 
 def test_silence_and_noise_are_exit_code_3():
@@ -349,23 +445,32 @@ def test_two_nodes_with_one_address_are_exit_code_3():
 def test_ports_are_exit_code_4(monkeypatch):
     monkeypatch.delenv("MOIRE_PORT", raising=False)
     err = io.StringIO()
-    assert command_line.main(["status"], err=err) == 4 and "write --port /dev/ttyUSB0, or --port twin" in err.getvalue()
+    assert (
+        command_line.main(["status"], err=err) == 4
+        and "write --port /dev/ttyUSB0, or --port twin" in err.getvalue()
+    )
     monkeypatch.setenv("MOIRE_PORT", "/dev/no_such_port")
     err = io.StringIO()
-    assert command_line.main(["status"], err=err) == 4 and err.getvalue() == "moire: there is no port /dev/no_such_port\n"
+    assert (
+        command_line.main(["status"], err=err) == 4
+        and err.getvalue() == "moire: there is no port /dev/no_such_port\n"
+    )
 
 
 def test_without_a_checkout_the_port_twin_says_what_to_do(monkeypatch):
     monkeypatch.setattr("moire.cli.twin.entry_points", lambda **_: ())
     err = io.StringIO()
     assert command_line.main(["--port", "twin", "status"], err=err) == 4
-    assert err.getvalue() == ("moire: the simulated machine needs a checkout of Moire: run `make demo` there and use its "
-                              "build/venv/bin/moire\n")
+    assert err.getvalue() == (
+        "moire: the simulated machine needs a checkout of Moire: run `make demo` there and use its "
+        "build/venv/bin/moire\n"
+    )
 
 
 def test_a_twin_that_does_not_build_is_exit_code_4(monkeypatch):
     def broken(_):
         raise BuildError("g++ is missing")
+
     monkeypatch.setitem(machines.MACHINES, "s0", broken)
     err = io.StringIO()
     assert command_line.main(["--port", "twin", "status"], err=err) == 4
@@ -375,8 +480,13 @@ def test_a_twin_that_does_not_build_is_exit_code_4(monkeypatch):
 def test_a_simulated_machine_that_does_not_exist_is_named():
     err = io.StringIO()
     assert command_line.main(["--port", "twin:s9", "status"], err=err) == 2
-    assert err.getvalue() == f"moire: there is no simulated machine 's9': known are {', '.join(MACHINES)}\n"
-    assert "--nodes is for s0: the nodes of s2 have their addresses" in sentence(Call("twin --machine s2 --nodes 1"), 2)
+    assert (
+        err.getvalue()
+        == f"moire: there is no simulated machine 's9': known are {', '.join(MACHINES)}\n"
+    )
+    assert "--nodes is for s0: the nodes of s2 have their addresses" in sentence(
+        Call("twin --machine s2 --nodes 1"), 2
+    )
     assert "invalid choice: 's9'" in sentence(Call("twin --machine s9"), 2)
 
 
@@ -390,11 +500,17 @@ def test_ctrl_c_stops_the_axis_and_is_exit_code_130():
 
     def interrupt():
         raise KeyboardInterrupt
+
     bus.at.append((0.5, interrupt))
     call = Call("home", bus=bus)
     assert "interrupted; what moved was stopped under control" in sentence(call, 130)
     assert node.axes[0].ended == "stopped"
-    assert "stop" in node.executed and node.axes[0].kind is None and not node.axes[0].enabled and bus.closed
+    assert (
+        "stop" in node.executed
+        and node.axes[0].kind is None
+        and not node.axes[0].enabled
+        and bus.closed
+    )
 
 
 def test_ctrl_c_in_another_command_stops_what_moves_too():
@@ -404,9 +520,14 @@ def test_ctrl_c_in_another_command_stops_what_moves_too():
 
     def interrupt():
         raise KeyboardInterrupt
+
     bus.at.append((0.5, interrupt))
     assert Call("move 100mm --no-wait -- watch --json", bus=bus).told[-1]["exit_code"] == 130
-    assert node.executed[-1] == "enable" and "stop" in node.executed and node.axes[0].ended == "stopped"
+    assert (
+        node.executed[-1] == "enable"
+        and "stop" in node.executed
+        and node.axes[0].ended == "stopped"
+    )
     assert node.axes[0].target != 100_000_000 * 65536 // 800
 
 
@@ -430,11 +551,17 @@ def test_help_names_every_command_and_gives_examples(capsys):
 
 # ------------------------------------------------------------------ files and the shell
 
+
 def test_a_file_of_commands_is_carried_out(tmp_path):
     node, file = FakeNode(), tmp_path / "warm up.txt"
     file.write_text("# to the zero\nhome\n\nmove 1mm   # there\nmove -0.5mm --by -- status\n")
     call = Call(["run", str(file), "--json"], node)
-    assert call.code == 0 and [told["command"] for told in call.told] == ["home", "move", "move", "status"]
+    assert call.code == 0 and [told["command"] for told in call.told] == [
+        "home",
+        "move",
+        "move",
+        "status",
+    ]
     assert call.told[-1]["position_nm"] == 500_000 and not node.axes[0].enabled
 
 
@@ -454,7 +581,9 @@ def test_a_file_with_a_wrong_line_moves_nothing(tmp_path, text, said):
     assert node.executed == []
 
 
-@pytest.mark.parametrize("text", ["{", '"x"', "{}", '{"parameters": {"kp": 1}}', '{"parameters": []}'])
+@pytest.mark.parametrize(
+    "text", ["{", '"x"', "{}", '{"parameters": {"kp": 1}}', '{"parameters": []}']
+)
 def test_a_file_without_parameters_is_refused(tmp_path, text):
     node, file = FakeNode(), tmp_path / "wrong.json"
     file.write_text(text)
@@ -467,13 +596,19 @@ def test_the_shell_keeps_the_drive_on_between_commands(monkeypatch):
     monkeypatch.setattr(sys, "stdin", io.StringIO("home\nmove 1mm\nstatus\nquit\nfly\n"))
     call = Call("shell", node)
     assert call.code == 0 and "holding position, zero known" in call.out
-    assert node.executed.count("enable") == 2 and not node.axes[0].enabled           # on once, off once at the end
+    assert (
+        node.executed.count("enable") == 2 and not node.axes[0].enabled
+    )  # on once, off once at the end
 
 
 def test_json_may_be_asked_for_a_single_line(monkeypatch):
     monkeypatch.setattr(sys, "stdin", io.StringIO("enable\nstatus --json\ndisable\n"))
     rows = Call("shell").out.splitlines()
-    assert rows[0].endswith("drive on") and json.loads(rows[1])["state"] == "holding" and rows[2].endswith("drive off")
+    assert (
+        rows[0].endswith("drive on")
+        and json.loads(rows[1])["state"] == "holding"
+        and rows[2].endswith("drive off")
+    )
 
 
 def test_commands_from_a_pipe_end_at_the_first_error(monkeypatch):
@@ -487,6 +622,7 @@ def test_a_person_may_mistype_in_the_shell(monkeypatch):
     class Keyboard(io.StringIO):
         def isatty(self):
             return True
+
     node = FakeNode()
     monkeypatch.setattr(sys, "stdin", Keyboard("fly\nmove --help\nhome\nmove 1\nmove 1mm\n"))
     call = Call("shell", node)
@@ -508,7 +644,9 @@ def test_a_waiting_shell_talks_on_a_line_whose_time_runs(monkeypatch):
                     break
                 threading.Event().wait(0.01)
             yield "quit\n"
+
     import threading
+
     node = FakeNode()
     bus = FakeBus(node)
     bus.time_is_stopped = False
@@ -520,5 +658,6 @@ def test_a_waiting_shell_talks_on_a_line_whose_time_runs(monkeypatch):
 def test_a_port_that_does_not_open_ends_the_shell_at_once(monkeypatch):
     def refuse(_):
         raise PortError("there is no port COM9")
+
     monkeypatch.setattr(sys, "stdin", io.StringIO("status\n"))
     assert command_line.main(["shell"], refuse, io.StringIO(), io.StringIO()) == 4

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Learning, correction, signal faults, capture and compare, through the client and through the command line."""
+"""Learning, correction, signal faults, capture and compare, through the client and through the
+command line.
+"""
+
 import io
 import json
 
@@ -13,7 +16,14 @@ from tb.fakes.fake_node import FakeBus, FakeNode
 from tb.host.test_host_command_line import Call, sentence
 
 VELOCITY = PARAMETERS["velocity"].id
-VALUES = dict(sin_offset=-300, cos_offset=12, gain=66000, quadrature_error=-5, cosine=list(range(10)), sine=[-n for n in range(10)])
+VALUES = dict(
+    sin_offset=-300,
+    cos_offset=12,
+    gain=66000,
+    quadrature_error=-5,
+    cosine=list(range(10)),
+    sine=[-n for n in range(10)],
+)
 
 
 def stage(homed=True):
@@ -27,14 +37,28 @@ def stage(homed=True):
 
 # ---- learning
 
+
 def test_learning_goes_to_and_fro_at_several_speeds_and_ends_frozen_where_it_began():
     _, inside, axis = stage()
     inside.learns_in = 7
     start, seen = inside.position, []
     told = axis.calibrate(seen.append)
     assert (told.settled, told.frozen, told.reason, told.words) == (True, True, "frozen", "frozen")
-    assert told.scatter_nm == pytest.approx(26 / 2**20 * 800) and len(seen) == 8 and inside.position == start
-    assert inside.speeds == [2500, 2500, 1500, 1500, 2000, 2000, 2500, 2500]       # 1250 periods of 800 nm in half a second
+    assert (
+        told.scatter_nm == pytest.approx(26 / 2**20 * 800)
+        and len(seen) == 8
+        and inside.position == start
+    )
+    assert inside.speeds == [
+        2500,
+        2500,
+        1500,
+        1500,
+        2000,
+        2000,
+        2500,
+        2500,
+    ]  # 1250 periods of 800 nm in half a second
     assert inside.parameters[VELOCITY] == PARAMETERS["velocity"].default
 
 
@@ -43,7 +67,11 @@ def test_calibrate_homes_learns_and_saves(tmp_path):
     node.axes[0].correction["gain"] = 65000
     call = Call(["commission", str(file), "--json"], node)
     assert call.code == 0, call.err
-    assert call.told[0]["command"] == "commission" and call.told[0]["settled"] and call.told[0]["frozen"]
+    assert (
+        call.told[0]["command"] == "commission"
+        and call.told[0]["settled"]
+        and call.told[0]["frozen"]
+    )
     assert node.axes[0].homed and json.loads(file.read_text())["correction"]["gain"] == 65000
     before = node.executed.count("home")
     node.axes[0].learns_in = 4
@@ -54,9 +82,15 @@ def test_what_is_not_learned_in_time_is_told_with_its_reason():
     _, inside, axis = stage()
     inside.learns_in = None
     inside.parameters[VELOCITY] = 900
-    with pytest.raises(NotCalibrated, match="learned no correction within 3s: learning \\(0 accepted, 0 refused\\)") as caught:
+    with pytest.raises(
+        NotCalibrated, match="learned no correction within 3s: learning \\(0 accepted, 0 refused\\)"
+    ) as caught:
         axis.calibrate(timeout="3s")
-    assert caught.value.cause == "calibrating" and inside.learner["frozen"] == 1 and inside.parameters[VELOCITY] == 900
+    assert (
+        caught.value.cause == "calibrating"
+        and inside.learner["frozen"] == 1
+        and inside.parameters[VELOCITY] == 900
+    )
     assert max(inside.speeds) == 900
 
 
@@ -72,7 +106,7 @@ def test_learning_needs_a_zero_room_and_a_distance():
     with pytest.raises(OutOfRange, match="no room for 200mm: the travel is -800um to 119.6mm"):
         axis.calibrate(distance="200mm")
     axis.move(mm=119.5)
-    axis.calibrate(distance="0.5mm")                          # to the other side
+    axis.calibrate(distance="0.5mm")  # to the other side
     assert inside.position == axis.to_counts("119.5mm") and "calibration" in node.executed
 
 
@@ -87,13 +121,18 @@ def test_a_fault_while_learning_is_the_error_that_is_told():
 
 def test_the_learner_knows_its_actions():
     _, inside, axis = stage()
-    assert axis.calibration("calibrate").reason == "calibrating" and axis.calibration().frozen is False
+    assert (
+        axis.calibration("calibrate").reason == "calibrating" and axis.calibration().frozen is False
+    )
     assert axis.calibration("freeze").reason == "frozen"
-    with pytest.raises(OutOfRange, match="knows no 'rest': allowed are read, calibrate, freeze, clear"):
+    with pytest.raises(
+        OutOfRange, match="knows no 'rest': allowed are read, calibrate, freeze, clear"
+    ):
         axis.calibration("rest")
 
 
 # ---- correction
+
 
 def test_a_correction_is_read_and_put_back_whole():
     _, inside, axis = stage()
@@ -101,8 +140,17 @@ def test_a_correction_is_read_and_put_back_whole():
     assert axis.correction() == VALUES and inside.harmonics[3] == (2, -2)
 
 
-@pytest.mark.parametrize("wrong", [{}, {**VALUES, "gain": 1.5}, {**VALUES, "gain": True}, {**VALUES, "sine": [0] * 9},
-                                   {**VALUES, "sine": 3}, {**VALUES, "cosine": ["1"] * 10}])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {},
+        {**VALUES, "gain": 1.5},
+        {**VALUES, "gain": True},
+        {**VALUES, "sine": [0] * 9},
+        {**VALUES, "sine": 3},
+        {**VALUES, "cosine": ["1"] * 10},
+    ],
+)
 def test_what_is_no_correction_is_refused_before_anything_is_sent(wrong):
     node, _, axis = stage()
     with pytest.raises(OutOfRange, match="this is no correction"):
@@ -123,21 +171,29 @@ def test_a_correction_out_of_range_changes_nothing():
 
 # ---- signal, capture, compare
 
+
 def test_signal_faults_are_told_by_name_and_in_words():
     _, inside, axis = stage()
     inside.signal = dict(faults=1 << 9 | 1 << 14, first=1 << 9)
     signal = axis.signal()
-    assert signal.faults == ("channel_missing", "lost_count") and signal.first == ("channel_missing",)
+    assert signal.faults == ("channel_missing", "lost_count") and signal.first == (
+        "channel_missing",
+    )
     assert signal.first_words == "the comparators change, a leg never changes sign"
 
 
 def test_captures_are_taken_oldest_first_and_losses_are_told():
     node, _, axis = stage()
-    node.captures = [[0b0001 | 40 << 7, 1000, 65536, 0], [0b1100, 2000, -65536 & 0xFFFFFFFF, 0xFFFF]]
+    node.captures = [
+        [0b0001 | 40 << 7, 1000, 65536, 0],
+        [0b1100, 2000, -65536 & 0xFFFFFFFF, 0xFFFF],
+    ]
     node.registers[0xC64] = 64
     captures, lost = axis.captures()
     assert lost and [(c.sources, c.position_nm, c.time_clk) for c in captures] == [
-        (("index",), 800, 1000), (("software", "probe_0_rising"), -800, 2000)]
+        (("index",), 800, 1000),
+        (("software", "probe_0_rising"), -800, 2000),
+    ]
     assert captures[0].age_s == 1e-5 and node.written[-1] == (0xC64, 64) and node.captures == []
     node.registers[0xC64] = 0
     assert axis.captures() == ([], False)
@@ -164,7 +220,14 @@ def test_compare_is_set_up_whole_and_armed_last():
     assert (words[0xC88], words[0xC8C], words[0xC90], words[0xC94]) == (5, 8, 4000, 2)
     node.registers.update({0xC94: 3, 0xC98: 4})
     assert axis.compare() == type(axis.compare())(armed=True, passed=4, late=True)
-    for wrong in (dict(step=0), dict(step="9999m"), dict(start="9999999m"), dict(pulse="10s"), dict(gap="1ns"), dict(count=-1)):
+    for wrong in (
+        dict(step=0),
+        dict(step="9999m"),
+        dict(start="9999999m"),
+        dict(pulse="10s"),
+        dict(gap="1ns"),
+        dict(count=-1),
+    ):
         with pytest.raises(OutOfRange):
             axis.compare_from(**{"start": 0, "step": "1um", "count": 0, **wrong})
 
@@ -180,17 +243,28 @@ def test_only_words_go_to_registers():
 
 # ---- the command line
 
+
 def test_learn_save_forget_load_in_calls_of_moire(tmp_path):
     node, file = FakeNode(), str(tmp_path / "correction.json")
     call = Call("home -- calibrate --distance 80um --timeout 1min -- correction show", node)
-    assert call.code == 0 and "correction learned in" in call.out and "known to 0.020 nm, frozen" in call.out
+    assert (
+        call.code == 0
+        and "correction learned in" in call.out
+        and "known to 0.020 nm, frozen" in call.out
+    )
     assert "harmonics of the phase, nm: 1: 0.000" in call.out and not node.axes[0].enabled
     node.axes[0].correction["sin_offset"] = 77
     assert Call(["correction", "save", file], node).out == f"correction saved in {file}\n"
     other = FakeNode()
-    assert Call(["correction", "load", file], other).code == 0 and other.axes[0].correction["sin_offset"] == 77
+    assert (
+        Call(["correction", "load", file], other).code == 0
+        and other.axes[0].correction["sin_offset"] == 77
+    )
     for action, frozen in (("calibrate", 0), ("freeze", 1), ("clear", 1)):
-        assert Call(f"correction {action}", node).code == 0 and node.axes[0].learner["frozen"] == frozen
+        assert (
+            Call(f"correction {action}", node).code == 0
+            and node.axes[0].learner["frozen"] == frozen
+        )
     assert "not settled" in Call("correction show", node).out
 
 
@@ -205,8 +279,14 @@ def test_a_person_sees_learning_go_on(monkeypatch):
     class Screen(io.StringIO):
         def isatty(self):
             return True
+
     err = Screen()
-    assert command_line.main(["home", "--", "calibrate"], lambda _: FakeBus(FakeNode()), io.StringIO(), err) == 0
+    assert (
+        command_line.main(
+            ["home", "--", "calibrate"], lambda _: FakeBus(FakeNode()), io.StringIO(), err
+        )
+        == 0
+    )
     assert "learning; not settled (0 accepted, 0 refused)" in err.getvalue()
 
 
@@ -214,10 +294,17 @@ def test_signal_capture_and_compare_in_calls_of_moire():
     node = FakeNode()
     assert "nothing is wrong with the signal\n  first since reset: none" in Call("signal", node).out
     node.axes[0].signal = dict(faults=1, first=3)
-    assert "signal too small\n  first since reset: signal too small, signal too large" in Call("signal", node).out
+    assert (
+        "signal too small\n  first since reset: signal too small, signal too large"
+        in Call("signal", node).out
+    )
     node.captures = [[0b0010, 1000, 65536, 0]]
     call = Call("capture from tick software -- capture now -- capture read -- capture from", node)
-    assert call.code == 0 and "captures from tick, software" in call.out and "captures from nothing" in call.out
+    assert (
+        call.code == 0
+        and "captures from tick, software" in call.out
+        and "captures from nothing" in call.out
+    )
     assert "1 captures\n  0.000800 mm at clk 1000, its sample 0.00 us before: tick" in call.out
     node.registers.update({0xC94: 1, 0xC98: 2})
     assert "under way, 2 points passed" in Call("compare show", node).out
@@ -225,31 +312,57 @@ def test_signal_capture_and_compare_in_calls_of_moire():
     assert call.code == 0 and "pulses from -1mm every 10um, count: 3" in call.out
 
 
-@pytest.mark.parametrize("text", ["signal", "correction show", "correction freeze", "capture from", "capture from tick", "capture now",
-                                  "capture read", "compare from 1mm 1um", "compare show", "compare off", "home -- calibrate"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "signal",
+        "correction show",
+        "correction freeze",
+        "capture from",
+        "capture from tick",
+        "capture now",
+        "capture read",
+        "compare from 1mm 1um",
+        "compare show",
+        "compare off",
+        "home -- calibrate",
+    ],
+)
 def test_each_tells_one_json_object_a_line(text):
     node = FakeNode()
     node.registers.update({0xC94: 0, 0xC98: 0})
     node.captures = [[1, 2, 3, 0]]
     call = Call(text + " --json", node)
     assert call.code == 0 and call.err == ""
-    assert [told["command"] for told in call.told] == [part.split()[0] for part in text.split(" -- ")]
+    assert [told["command"] for told in call.told] == [
+        part.split()[0] for part in text.split(" -- ")
+    ]
 
 
-@pytest.mark.parametrize("text, said", [
-    ("calibrate --distance 1", "has no unit"), ("calibrate --distance 0mm", "not above zero"), ("calibrate --timeout -1s", "not above zero"),
-    ("correction", "required: ACTION"), ("correction load /no/such/file", "cannot be read"),
-    ("capture from probe", "no capture source 'probe'"), ("compare from 1mm", "required: STEP"),
-    ("compare from 1mm 0mm", "the step not zero"),
-    ("compare from 1mm 1um --count 0", "no whole number above 0"), ("compare from 1mm 1um --pulse 9s", "pulse and gap allow"),
-])
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        ("calibrate --distance 1", "has no unit"),
+        ("calibrate --distance 0mm", "not above zero"),
+        ("calibrate --timeout -1s", "not above zero"),
+        ("correction", "required: ACTION"),
+        ("correction load /no/such/file", "cannot be read"),
+        ("capture from probe", "no capture source 'probe'"),
+        ("compare from 1mm", "required: STEP"),
+        ("compare from 1mm 0mm", "the step not zero"),
+        ("compare from 1mm 1um --count 0", "no whole number above 0"),
+        ("compare from 1mm 1um --pulse 9s", "pulse and gap allow"),
+    ],
+)
 def test_wrong_usage_is_one_sentence(text, said):
     node = FakeNode()
     assert said in sentence(Call(text, node), 2)
     assert node.written == []
 
 
-@pytest.mark.parametrize("text", ["[]", "{}", '{"correction": 3}', "{", '{"correction": {"gain": 65536}}'])
+@pytest.mark.parametrize(
+    "text", ["[]", "{}", '{"correction": 3}', "{", '{"correction": {"gain": 65536}}']
+)
 def test_a_file_that_holds_no_correction_is_refused(tmp_path, text):
     node, file = FakeNode(), tmp_path / "wrong.json"
     file.write_text(text)

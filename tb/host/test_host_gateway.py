@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""gateway and the transports that come in by it: the stock pyserial client and our own, against nodes in Python behind the real sockets
+"""gateway and the transports that come in by it: the stock pyserial client and our own, against
+nodes in Python behind the real sockets
 and pseudo terminals of this computer."""
+
 import contextlib
 import io
 import json
@@ -24,9 +26,11 @@ from moire.errors import BusGarbled, MoireError, NoAnswer, PortError
 from tb.bench import seed
 from tb.fakes.fake_node import FakeBus, FakeNode
 
-pytestmark = pytest.mark.filterwarnings("ignore:set(Daemon|Name).. is deprecated:DeprecationWarning")      # in pyserial
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:set(Daemon|Name).. is deprecated:DeprecationWarning"
+)  # in pyserial
 SEED = seed()
-HANG_S = 60                      # what has not come by then never will
+HANG_S = 60  # what has not come by then never will
 
 
 class Served:
@@ -36,8 +40,11 @@ class Served:
         self.far = FakeBus(*(nodes or [FakeNode()]))
         self.gateway = Gateway(self.far)
         host = "127.0.0.1"
-        self.ports = {"rfc2217": f"rfc2217://{host}:{self.gateway.open_rfc2217(host, 0)}",
-                      "tcp": f"socket://{host}:{self.gateway.open_tcp(host, 0)}", "terminal": self.gateway.open_pty()}
+        self.ports = {
+            "rfc2217": f"rfc2217://{host}:{self.gateway.open_rfc2217(host, 0)}",
+            "tcp": f"socket://{host}:{self.gateway.open_tcp(host, 0)}",
+            "terminal": self.gateway.open_pty(),
+        }
         self.ending, self.looked = False, threading.Condition()
         self.thread = threading.Thread(target=self.run)
         self.thread.start()
@@ -69,10 +76,17 @@ def opened(served, entrance, parity="auto"):
     return open_bus(served.ports[entrance], parity=parity)
 
 
-ENTRANCES = [("rfc2217", "mark"), ("rfc2217", "odd"), ("rfc2217", "none"), ("tcp", "auto"), ("terminal", "auto")]
+ENTRANCES = [
+    ("rfc2217", "mark"),
+    ("rfc2217", "odd"),
+    ("rfc2217", "none"),
+    ("tcp", "auto"),
+    ("terminal", "auto"),
+]
 
 
 # ------------------------------------------------------------------ in by every entrance
+
 
 @pytest.mark.parametrize("entrance, parity", ENTRANCES)
 def test_the_same_work_is_done_through_every_entrance(served, entrance, parity):
@@ -82,7 +96,11 @@ def test_the_same_work_is_done_through_every_entrance(served, entrance, parity):
         axis.enable()
         assert axis.status().state == "holding"
         assert axis.set_parameter("velocity", "7mm/s").counts == 8750
-    assert node.executed.count("enable") == 1 and node.axes[0].enabled and node.axes[0].parameters[5] == 8750
+    assert (
+        node.executed.count("enable") == 1
+        and node.axes[0].enabled
+        and node.axes[0].parameters[5] == 8750
+    )
     assert node.counters["frames_bad"] == 0
 
 
@@ -107,13 +125,15 @@ def test_every_byte_arrives_with_the_ninth_bit_it_was_sent_with(served):
 
 def test_a_change_of_parity_over_rfc2217_waits_for_nothing(served, monkeypatch):
     """pyserial's own setter sleeps until the far end has agreed."""
+
     def sleep(seconds):
         raise AssertionError(f"slept {seconds} s")
+
     with opened(served, "rfc2217", "mark") as port:
         axis = Bus(port).axis()
         with monkeypatch.context() as patch:
             patch.setattr(serial.rfc2217, "time", SimpleNamespace(time=time.time, sleep=sleep))
-            for _ in range(20):               # four changes each
+            for _ in range(20):  # four changes each
                 axis.status()
             with pytest.raises(AssertionError, match="slept"):
                 port.port.parity = serial.PARITY_ODD
@@ -126,7 +146,11 @@ def test_the_stock_client_alone_reads_a_position_in_8n1(served):
         while not contents:
             contents = reader.feed(port.read(1))
         body = cobs.body_of(contents[0])
-        assert contents[0][0] == 0x51 and body[:3] == bytes([9, 2, 0]) and int.from_bytes(body[11:19], "little") == 123456
+        assert (
+            contents[0][0] == 0x51
+            and body[:3] == bytes([9, 2, 0])
+            and int.from_bytes(body[11:19], "little") == 123456
+        )
 
 
 @pytest.mark.parametrize("served", [(FakeNode(1), FakeNode(6), FakeNode(15))], indirect=True)
@@ -137,8 +161,10 @@ def test_find_sees_all_nodes_through_packets(served):
 
 def test_clients_at_three_entrances_do_not_disturb_each_other(served):
     with contextlib.ExitStack() as stack:
-        axes = [Bus(stack.enter_context(opened(served, entrance, parity))).axis() for entrance, parity in
-                (("rfc2217", "mark"), ("tcp", "auto"), ("terminal", "auto"))]
+        axes = [
+            Bus(stack.enter_context(opened(served, entrance, parity))).axis()
+            for entrance, parity in (("rfc2217", "mark"), ("tcp", "auto"), ("terminal", "auto"))
+        ]
         failures = []
 
         def work(axis):
@@ -147,6 +173,7 @@ def test_clients_at_three_entrances_do_not_disturb_each_other(served):
                     axis.status()
             except MoireError as error:
                 failures.append(error)
+
         threads = [threading.Thread(target=work, args=[axis]) for axis in axes]
         for thread in threads:
             thread.start()
@@ -162,7 +189,7 @@ def test_noise_at_a_packet_entrance_is_dropped_and_the_next_request_answered(ser
         for _ in range(20):
             port.port.write(source.randbytes(50))
         right = bytes([0x21]) + b"\x03\x01\x02\x00\x00\x00\x00\x00"
-        port.port.write(cobs.sealed(right))              # a packet with a wrong CRC-32
+        port.port.write(cobs.sealed(right))  # a packet with a wrong CRC-32
         assert axis.status().state == "off"
     assert served.gateway.refused >= 1 and served.far.nodes[0].counters["frames_bad"] == 0
 
@@ -178,7 +205,10 @@ def test_a_reply_that_comes_too_late_is_not_taken_for_the_next(served):
 
 def test_nobody_answers_through_packets_either(served):
     with opened(served, "tcp") as port:
-        with pytest.raises(NoAnswer, match="nobody answers at address 5, asked 2 times: check power, wiring, baud rate and address"):
+        with pytest.raises(
+            NoAnswer,
+            match="nobody answers at address 5, asked 2 times: check power, wiring, baud rate and address",
+        ):
             Bus(port, tries=2).node(5)
 
 
@@ -186,10 +216,11 @@ def test_a_client_that_goes_is_forgotten(served):
     for _ in range(3):
         with opened(served, "tcp") as port:
             Bus(port).node()
-    served.wait_until(lambda: len(served.gateway.clients) == 1)       # the terminal stays
+    served.wait_until(lambda: len(served.gateway.clients) == 1)  # the terminal stays
 
 
 # ------------------------------------------------------------------ what can be wrong
+
 
 def complaint(text, code):
     out, err = io.StringIO(), io.StringIO()
@@ -202,26 +233,39 @@ def test_a_server_that_is_not_there_is_one_sentence():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         free = taken.getsockname()[1]
     for scheme in ("rfc2217", "socket"):
-        assert f"nobody listens at {scheme}://127.0.0.1:{free}" in complaint(f"--port {scheme}://127.0.0.1:{free} find", 4)
+        assert f"nobody listens at {scheme}://127.0.0.1:{free}" in complaint(
+            f"--port {scheme}://127.0.0.1:{free} find", 4
+        )
 
 
 def test_a_tcp_port_in_use_is_one_sentence():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         number = taken.getsockname()[1]
-        with pytest.raises(PortError, match=f"the TCP port {number} at 127.0.0.1 does not open: .*already in use; choose another"):
+        with pytest.raises(
+            PortError,
+            match=f"the TCP port {number} at 127.0.0.1 does not open: .*already in use; choose another",
+        ):
             Gateway(FakeBus(FakeNode())).open_tcp("127.0.0.1", number)
 
 
 def test_a_pseudo_terminal_in_use_is_one_sentence(served):
     with opened(served, "terminal"):
-        assert "is in use by another program" in complaint(f"--port {served.ports['terminal']} find", 4)
+        assert "is in use by another program" in complaint(
+            f"--port {served.ports['terminal']} find", 4
+        )
 
 
 def test_no_permission_is_one_sentence(tmp_path, monkeypatch):
     def refused(*_, **__):
-        raise serial.SerialException(13, "could not open port /dev/ttyUSB0: [Errno 13] Permission denied: '/dev/ttyUSB0'")
+        raise serial.SerialException(
+            13, "could not open port /dev/ttyUSB0: [Errno 13] Permission denied: '/dev/ttyUSB0'"
+        )
+
     monkeypatch.setattr(serial, "serial_for_url", refused)
-    assert "no permission to use the port /dev/ttyUSB0: on Linux, join the group dialout" in complaint("--port /dev/ttyUSB0 find", 4)
+    assert (
+        "no permission to use the port /dev/ttyUSB0: on Linux, join the group dialout"
+        in complaint("--port /dev/ttyUSB0 find", 4)
+    )
 
 
 @pytest.mark.parametrize("entrance", ["rfc2217", "tcp", "terminal"])
@@ -229,15 +273,23 @@ def test_a_port_unplugged_in_mid_move_is_one_sentence_that_says_who_stops_the_ax
     served = Served()
     node = served.far.nodes[0]
     node.axes[0].homed = True
-    threading.Thread(target=lambda: (served.wait_until(lambda: "move" in node.executed), served.end())).start()
+    threading.Thread(
+        target=lambda: (served.wait_until(lambda: "move" in node.executed), served.end())
+    ).start()
     said = complaint(f"--port {served.ports[entrance]} move 100mm", 4)
-    assert served.ports[entrance] in said and "axis 0 of node 1 could not be told to stop, its watchdog has to" in said
+    assert (
+        served.ports[entrance] in said
+        and "axis 0 of node 1 could not be told to stop, its watchdog has to" in said
+    )
 
 
 @pytest.mark.parametrize("served", [(FakeNode(1, map_crc=1),)], indirect=True)
 def test_a_node_of_another_build_is_one_sentence(served):
     said = complaint(f"--port {served.ports['tcp']} status", 5)
-    assert "node 1 was made from another register map" in said and "build both from the same sources" in said
+    assert (
+        "node 1 was made from another register map" in said
+        and "build both from the same sources" in said
+    )
 
 
 @pytest.mark.parametrize("served", [(FakeNode(1), FakeNode(1))], indirect=True)
@@ -245,7 +297,9 @@ def test_two_nodes_with_one_address_are_one_sentence(served):
     served.far.nodes[1].axes[0].position += 999
     served.far.wired_and = True
     with opened(served, "rfc2217", "mark") as port:
-        with pytest.raises(BusGarbled, match="wrong CRC-32; as from noise, .* or two nodes with the address 1"):
+        with pytest.raises(
+            BusGarbled, match="wrong CRC-32; as from noise, .* or two nodes with the address 1"
+        ):
             Bus(port).axis().status()
 
 
@@ -260,15 +314,38 @@ def test_ctrl_c_is_the_good_end_of_a_served_twin(monkeypatch):
 
     def interrupt(*_):
         raise KeyboardInterrupt
+
     monkeypatch.setattr(Gateway, "follow_clock", interrupt)
     err = io.StringIO()
-    assert command_line.main(["twin", "--rfc2217", "0", "--tcp", "0"], None, io.StringIO(), err) == 0 and err.getvalue() == ""
+    assert (
+        command_line.main(["twin", "--rfc2217", "0", "--tcp", "0"], None, io.StringIO(), err) == 0
+        and err.getvalue() == ""
+    )
 
 
 def test_the_ports_are_told_as_json(monkeypatch, tmp_path):
     monkeypatch.setattr("moire.cli.twin.make_twin", fake_twin)
     out, link = io.StringIO(), tmp_path / "link"
-    arguments = ["twin", "--nodes", "3", "4", "--rfc2217", "0", "--tcp", "0", "--link", str(link), "--for", "50ms", "--json"]
+    arguments = [
+        "twin",
+        "--nodes",
+        "3",
+        "4",
+        "--rfc2217",
+        "0",
+        "--tcp",
+        "0",
+        "--link",
+        str(link),
+        "--for",
+        "50ms",
+        "--json",
+    ]
     assert command_line.main(arguments, None, out, io.StringIO()) == 0
     told = json.loads(out.getvalue())
-    assert told["machine"] == "s0" and told["nodes"] == [3, 4] and told["rfc2217"].startswith("rfc2217://127.0.0.1:") and not link.exists()
+    assert (
+        told["machine"] == "s0"
+        and told["nodes"] == [3, 4]
+        and told["rfc2217"].startswith("rfc2217://127.0.0.1:")
+        and not link.exists()
+    )

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""calibration.py: harmonics found by hand and in noise, what the readings carry, and every bad table named by its line."""
+"""calibration.py: harmonics found by hand and in noise, what the readings carry, and every bad
+table named by its line.
+"""
+
 import math
 
 import numpy as np
@@ -15,7 +18,10 @@ FINE = np.arange(0, 360, 0.05) + 0.013
 
 def ring(angle, cosine, sine):
     turn = np.radians(angle)
-    return sum(c * np.cos(k * turn) + s * np.sin(k * turn) for k, (c, s) in enumerate(zip(cosine, sine, strict=True), start=1))
+    return sum(
+        c * np.cos(k * turn) + s * np.sin(k * turn)
+        for k, (c, s) in enumerate(zip(cosine, sine, strict=True), start=1)
+    )
 
 
 def readings(error, angle=TEN):
@@ -30,7 +36,9 @@ def written(tmp_path, lines):
 
 def table(angles=TEN, change=None):
     """Lines of a good table; change: {number of a line: text}, None takes the line away."""
-    lines = ["angle_deg,error_arcsec"] + [f"{angle:g},{ring(np.array([angle]), [100, 20], [0, -7])[0]:.4f}" for angle in angles]
+    lines = ["angle_deg,error_arcsec"] + [
+        f"{angle:g},{ring(np.array([angle]), [100, 20], [0, -7])[0]:.4f}" for angle in angles
+    ]
     for number, text in (change or {}).items():
         lines[number - 1] = text
     return [line for line in lines if line is not None]
@@ -39,12 +47,23 @@ def table(angles=TEN, change=None):
 def test_harmonics_without_noise_are_found_exactly():
     cosine, sine = [80, -20, 3, 0, 1.5], [50, 10, 0, -2, 0]
     found = fit(readings(7 + ring(TEN, cosine, sine)), orders=5)
-    assert np.allclose(found.cosine, cosine) and np.allclose(found.sine, sine) and found.constant == pytest.approx(7)
+    assert (
+        np.allclose(found.cosine, cosine)
+        and np.allclose(found.sine, sine)
+        and found.constant == pytest.approx(7)
+    )
     assert found.left < 1e-9 and np.allclose(found.at(FINE), ring(FINE, cosine, sine))
 
 
-@pytest.mark.parametrize(("angles", "orders"), [(TEN, 17), (np.arange(0, 1441, 10.0), 17), (np.arange(0, 361, 1.0), 32),
-                                                (np.arange(0, 361, 60.0), 2)])
+@pytest.mark.parametrize(
+    ("angles", "orders"),
+    [
+        (TEN, 17),
+        (np.arange(0, 1441, 10.0), 17),
+        (np.arange(0, 361, 1.0), 32),
+        (np.arange(0, 361, 60.0), 2),
+    ],
+)
 def test_as_many_orders_are_fitted_as_the_places_carry(angles, orders):
     made = readings(ring(angles, [100], [0]), angles)
     assert fit(made).orders == orders
@@ -53,8 +72,12 @@ def test_as_many_orders_are_fitted_as_the_places_carry(angles, orders):
 
 
 def test_an_order_above_half_the_places_looks_like_its_alias():
-    found = fit(readings(ring(TEN, [0] * 33 + [5], [0] * 34)))                  # order 34 at 36 places
-    assert found.amplitude[1] == pytest.approx(5) and "34 as 2" in found.words() and "35 as 1" in found.words()
+    found = fit(readings(ring(TEN, [0] * 33 + [5], [0] * 34)))  # order 34 at 36 places
+    assert (
+        found.amplitude[1] == pytest.approx(5)
+        and "34 as 2" in found.words()
+        and "35 as 1" in found.words()
+    )
 
 
 def test_noise_is_estimated_and_weighted_away():
@@ -67,17 +90,22 @@ def test_noise_is_estimated_and_weighted_away():
         assert weighted.noise == pytest.approx(2 / math.sqrt(3), rel=0.2)
         assert np.all(weighted.weight[:3] > 0.99) and np.all(weighted.weight[3:] < 0.9)
         truth = ring(FINE, [90, 25, 8], [0, 0, 0])
-        gains.append(np.max(np.abs(truth - plain.at(FINE))) / np.max(np.abs(truth - weighted.at(FINE))))
+        gains.append(
+            np.max(np.abs(truth - plain.at(FINE))) / np.max(np.abs(truth - weighted.at(FINE)))
+        )
     assert np.median(gains) > 1.5
 
 
 def test_one_revolution_says_nothing_of_its_noise_and_takes_what_it_is_told():
-    error = ring(TEN, [90, 25, 8], [0, 0, 0]) + np.random.default_rng(seed()).uniform(-2, 2, len(TEN))
+    error = ring(TEN, [90, 25, 8], [0, 0, 0]) + np.random.default_rng(seed()).uniform(
+        -2, 2, len(TEN)
+    )
     assert fit(readings(error)).noise is None and np.all(fit(readings(error)).weight == 1)
     assert np.all(fit(readings(error), noise=1.15).weight[3:] < 1)
 
 
 # files
+
 
 def test_a_good_table_is_read_with_or_without_heading_and_comments(tmp_path):
     for lines in (table(), table()[1:], ["# laser, 2026-11-21", "", *table()]):
@@ -86,33 +114,45 @@ def test_a_good_table_is_read_with_or_without_heading_and_comments(tmp_path):
 
 
 def test_angles_that_fall_back_begin_the_next_revolution(tmp_path):
-    read = read_readings(written(tmp_path, table(np.concatenate([np.arange(0, 360, 10), np.arange(0, 361, 10)]))))
-    assert np.array_equal(read.angle, np.arange(0, 721, 10)) and read.places == 36 and read.revolutions == 2
+    read = read_readings(
+        written(tmp_path, table(np.concatenate([np.arange(0, 360, 10), np.arange(0, 361, 10)])))
+    )
+    assert (
+        np.array_equal(read.angle, np.arange(0, 721, 10))
+        and read.places == 36
+        and read.revolutions == 2
+    )
 
 
-@pytest.mark.parametrize(("change", "words"), [
-    ({5: "40"}, "line 5: two columns"),
-    ({5: "30,1,2"}, "line 5: two columns"),
-    ({5: "30,abc"}, "line 5: the error is no number: 'abc'"),
-    ({5: "x,1"}, "line 5: the angle is no number: 'x'"),
-    ({5: "30,nan"}, "line 5: the error is nan"),
-    ({5: "30,9999"}, "line 5: an error of 9999 arcsec is absurd"),
-    ({5: "-30,1"}, "line 5: an angle of -30 degrees is outside"),
-    ({5: "20,99"}, "line 5: the angle 20 is there twice, also in line 4"),
-    ({5: "12,99"}, "line 5: the angle 12 comes after 20 in line 4"),
-    ({8: None, 9: None}, "line 8: from 50 to 80 degrees a reading is missing"),
-    ({20: "180,-20"}, "line 20: the error -20 arcsec at 180 degrees is"),
-])
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({5: "40"}, "line 5: two columns"),
+        ({5: "30,1,2"}, "line 5: two columns"),
+        ({5: "30,abc"}, "line 5: the error is no number: 'abc'"),
+        ({5: "x,1"}, "line 5: the angle is no number: 'x'"),
+        ({5: "30,nan"}, "line 5: the error is nan"),
+        ({5: "30,9999"}, "line 5: an error of 9999 arcsec is absurd"),
+        ({5: "-30,1"}, "line 5: an angle of -30 degrees is outside"),
+        ({5: "20,99"}, "line 5: the angle 20 is there twice, also in line 4"),
+        ({5: "12,99"}, "line 5: the angle 12 comes after 20 in line 4"),
+        ({8: None, 9: None}, "line 8: from 50 to 80 degrees a reading is missing"),
+        ({20: "180,-20"}, "line 20: the error -20 arcsec at 180 degrees is"),
+    ],
+)
 def test_what_is_wrong_with_a_table_is_told_with_its_line(tmp_path, change, words):
     with pytest.raises(BadFile, match=words):
         read_readings(written(tmp_path, table(change=change)))
 
 
-@pytest.mark.parametrize(("lines", "words"), [
-    ([], "0 readings are too few"),
-    (["angle,error"], "0 readings are too few"),
-    (table(np.arange(0, 181, 10)), "cover 180 degrees; a whole revolution"),
-])
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ([], "0 readings are too few"),
+        (["angle,error"], "0 readings are too few"),
+        (table(np.arange(0, 181, 10)), "cover 180 degrees; a whole revolution"),
+    ],
+)
 def test_a_table_that_says_too_little_is_refused(tmp_path, lines, words):
     with pytest.raises(BadFile, match=words):
         read_readings(written(tmp_path, lines))

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""job and its commands, against the firmware of a main node with its EEPROM, the machine and a sub-node."""
+"""job and its commands, against the firmware of a main node with its EEPROM, the machine and a
+sub-node.
+"""
+
 import io
 import json
 
@@ -25,7 +28,12 @@ class Workshop:
     def call(self, text):
         """Exit code, what was told, what was complained."""
         out, err = io.StringIO(), io.StringIO()
-        code = command_line.main(["--address", str(ADDRESS), *text.split()], lambda options: FakeNodeBus(self.station), out, err)
+        code = command_line.main(
+            ["--address", str(ADDRESS), *text.split()],
+            lambda options: FakeNodeBus(self.station),
+            out,
+            err,
+        )
         return code, out.getvalue(), err.getvalue()
 
 
@@ -36,22 +44,41 @@ def test_a_program_is_loaded_read_and_cut():
     workshop.job.start()
     states = []
     state = workshop.job.wait(progress=lambda state: states.append(state.state))
-    assert state.state == "finished" and state.words == "all cut, station 3 of 3" and len(workshop.station.edm.cuts) == 3
-    assert {"turning", "cutting"} <= set(states) and workshop.station.sub_node.angles == [0, 540_000, 720_000]
+    assert (
+        state.state == "finished"
+        and state.words == "all cut, station 3 of 3"
+        and len(workshop.station.edm.cuts) == 3
+    )
+    assert {"turning", "cutting"} <= set(states) and workshop.station.sub_node.angles == [
+        0,
+        540_000,
+        720_000,
+    ]
 
 
 def test_a_turn_is_divided_to_the_nearest_count():
     parts = equal_parts(7)
-    assert len(parts) == 7 and parts[0] == 0 and all(abs(part - 1_296_000 * n / 7) <= 0.005 for n, part in enumerate(parts))
+    assert (
+        len(parts) == 7
+        and parts[0] == 0
+        and all(abs(part - 1_296_000 * n / 7) <= 0.005 for n, part in enumerate(parts))
+    )
     for count in (0, -1, 361):
         with pytest.raises(OutOfRange, match="1 to 360 stations"):
             equal_parts(count)
 
 
-@pytest.mark.parametrize(("angles", "words"), [
-    ([], "1 to 360 stations, not 0"), (["0deg"] * 361, "not 361"), (["1deg", "360deg"], "station 2: an angle is 0deg or more"),
-    (["1deg", "1deg"], "station 2 at 1deg does not lie above"), (["-1deg"], "station 1: an angle"),
-    (["2deg", "1deg"], "station 2 at 1deg")])
+@pytest.mark.parametrize(
+    ("angles", "words"),
+    [
+        ([], "1 to 360 stations, not 0"),
+        (["0deg"] * 361, "not 361"),
+        (["1deg", "360deg"], "station 2: an angle is 0deg or more"),
+        (["1deg", "1deg"], "station 2 at 1deg does not lie above"),
+        (["-1deg"], "station 1: an angle"),
+        (["2deg", "1deg"], "station 2 at 1deg"),
+    ],
+)
 def test_a_program_that_cannot_be_is_refused_before_the_first_byte(angles, words):
     workshop = Workshop()
     with pytest.raises(OutOfRange, match=words):
@@ -65,8 +92,16 @@ def test_stations_come_from_a_file_in_degrees_or_with_units(tmp_path):
     assert read_stations(file) == [0, 37_800, 39_600, 39_700]
 
 
-@pytest.mark.parametrize(("text", "words"), [
-    ("", "no stations"), ("angle\n", "no stations"), ("1\nx\n", "line 2"), ("a\nb\n1\n", "line 2"), ("1\n2mm\n", "line 2")])
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "no stations"),
+        ("angle\n", "no stations"),
+        ("1\nx\n", "line 2"),
+        ("a\nb\n1\n", "line 2"),
+        ("1\n2mm\n", "line 2"),
+    ],
+)
 def test_a_bad_line_of_a_file_is_named(tmp_path, text, words):
     file = tmp_path / "former.csv"
     file.write_text(text)
@@ -85,13 +120,25 @@ def test_answers_that_nobody_waits_for_are_refused_in_words():
 
 def test_the_commands_do_a_whole_job(tmp_path):
     workshop, file = Workshop(), tmp_path / "read.csv"
-    assert workshop.call("job load --equal 4")[:2] == (0, "4 stations from 0arcsec to 270deg, kept in the EEPROM\n")
-    assert workshop.call(f"job read {file}")[0] == 0 and file.read_text() == "0.0000000\n90.0000000\n180.0000000\n270.0000000\n"
+    assert workshop.call("job load --equal 4")[:2] == (
+        0,
+        "4 stations from 0arcsec to 270deg, kept in the EEPROM\n",
+    )
+    assert (
+        workshop.call(f"job read {file}")[0] == 0
+        and file.read_text() == "0.0000000\n90.0000000\n180.0000000\n270.0000000\n"
+    )
     assert workshop.call(f"job load {file}")[0] == 0
     code, told, _ = workshop.call("job start --wait")
-    assert code == 0 and told.startswith("all cut, station 4 of 4\n  takes    start\n") and len(workshop.station.edm.cuts) == 4
+    assert (
+        code == 0
+        and told.startswith("all cut, station 4 of 4\n  takes    start\n")
+        and len(workshop.station.edm.cuts) == 4
+    )
     told = json.loads(workshop.call("job status --json")[1])
-    assert told["state"] == "finished" and told["answers"] == ["start"] and told["flags"] == ["eeprom"]
+    assert (
+        told["state"] == "finished" and told["answers"] == ["start"] and told["flags"] == ["eeprom"]
+    )
 
 
 def test_a_question_is_told_and_answered():
@@ -100,7 +147,11 @@ def test_a_question_is_told_and_answered():
     workshop.call("job load --equal 2")
     workshop.station.edm.deaf = True
     code, told, complained = workshop.call("job start --wait")
-    assert code == 1 and "because  the cut did not start in time" in told and "takes    stop, again, next" in told
+    assert (
+        code == 1
+        and "because  the cut did not start in time" in told
+        and "takes    stop, again, next" in told
+    )
     assert complained == "moire: the job waits: the cut did not start in time\n"
     assert workshop.call("job resume")[2].endswith("the job does not wait for that now\n")
     workshop.station.edm.deaf = False
@@ -112,9 +163,14 @@ def test_waiting_asks_the_table_too():
     workshop, operations = Workshop(), []
     workshop.call("job load --equal 2")
     hear = workshop.station.hear
-    workshop.station.hear = lambda words: operations.append(words[2] if len(words) > 2 else None) or hear(words)
+    workshop.station.hear = lambda words: (
+        operations.append(words[2] if len(words) > 2 else None) or hear(words)
+    )
     assert workshop.call("job start --wait")[0] == 0 and OPERATION["status"] not in operations
-    assert workshop.call("job start --wait --table 2")[0] == 0 and operations.count(OPERATION["status"]) > 20
+    assert (
+        workshop.call("job start --wait --table 2")[0] == 0
+        and operations.count(OPERATION["status"]) > 20
+    )
     code, _, complained = workshop.call("job wait --table 3")
     assert code == 3 and "address 3" in complained
 
@@ -125,7 +181,10 @@ def test_pause_resume_and_stop_from_the_command_line():
     assert workshop.call("job start")[0] == workshop.call("job pause")[0] == 0
     assert workshop.call("job wait")[0] == 1
     assert workshop.call("job resume")[0] == 0 and workshop.call("job stop")[0] == 0
-    assert workshop.call("job wait")[0] == 0 and json.loads(workshop.call("job status --json")[1])["state"] == "idle"
+    assert (
+        workshop.call("job wait")[0] == 0
+        and json.loads(workshop.call("job status --json")[1])["state"] == "idle"
+    )
 
 
 def test_a_missing_eeprom_is_said_in_words():

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """keep and its commands, against the firmware of a station with its EEPROM."""
+
 import json
 
 import pytest
@@ -19,7 +20,11 @@ def workshop():
 
 def test_what_is_kept_is_there_after_a_power_cut(workshop):
     workshop.station.set(kp=7)
-    assert (state := workshop.saved.save()).cause == "ok" and state.values == 2 and state.words == "2 values are kept"
+    assert (
+        (state := workshop.saved.save()).cause == "ok"
+        and state.values == 2
+        and state.words == "2 values are kept"
+    )
     workshop.station.power_cut()
     assert workshop.saved.state() == state
     assert workshop.call("params get kp")[1].split()[1].startswith("0.0001")
@@ -32,7 +37,12 @@ def test_the_commands_keep_forget_and_tell(workshop):
     assert workshop.call("params save-to-node") == (0, "1 value is kept\n", "")
     code, out, _ = workshop.call("params saved-in-node --json")
     assert code == 0 and json.loads(out)["cause"] == "ok" and json.loads(out)["values"] == 1
-    assert workshop.call("params restore-defaults -- params saved-in-node")[1].count("the defaults are in force") == 2
+    assert (
+        workshop.call("params restore-defaults -- params saved-in-node")[1].count(
+            "the defaults are in force"
+        )
+        == 2
+    )
 
 
 def test_a_damaged_copy_is_told(workshop):
@@ -46,7 +56,9 @@ def test_a_damaged_copy_is_told(workshop):
 def test_what_cannot_be_kept_is_said_in_words(workshop):
     workshop.saved.state()
     workshop.station.eeprom.worn[8192 + 1] = 0xA5
-    with pytest.raises(MotionFailed, match="node 2 did not save its values: the EEPROM does not keep"):
+    with pytest.raises(
+        MotionFailed, match="node 2 did not save its values: the EEPROM does not keep"
+    ):
         workshop.saved.save()
     workshop.station.bus.devices.pop(0x50)
     workshop.station.power_cut()
@@ -61,5 +73,8 @@ def test_a_fault_of_the_sub_node_stands_beside_the_cause(workshop):
     workshop.station.sub_node.latch("estop")
     workshop.job.start()
     state = workshop.job.wait()
-    assert state.table_faults == ("estop",) and state.cause_words == f"{dict(CAUSES.values())['faulted']} (emergency stop)"
+    assert (
+        state.table_faults == ("estop",)
+        and state.cause_words == f"{dict(CAUSES.values())['faulted']} (emergency stop)"
+    )
     assert "(emergency stop)" in workshop.call("job status")[1]

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""protocol: known bytes, every way in which an exchange can fail, and random noise against the node in fake_node.py."""
+"""protocol: known bytes, every way in which an exchange can fail, and random noise against the node
+in fake_node.py.
+"""
+
 import random
 
 import pytest
@@ -59,7 +62,7 @@ def test_command_bytes_are_those_of_the_8031_stage():
 
 
 def test_negative_positions_are_two_complement_little_endian():
-    assert request_body("move", 1, axis=0, target=-2) == bytes([1, 5, 0, 0xFE]) + b"\xFF" * 7
+    assert request_body("move", 1, axis=0, target=-2) == bytes([1, 5, 0, 0xFE]) + b"\xff" * 7
 
 
 def test_values_that_do_not_fit_are_refused_before_sending():
@@ -71,7 +74,10 @@ def test_values_that_do_not_fit_are_refused_before_sending():
 
 def test_every_body_fits_the_longest():
     for operation in OPERATIONS.values():
-        assert 2 + layout(operation.request).size <= LONGEST_BODY and 3 + layout(operation.reply).size <= LONGEST_BODY
+        assert (
+            2 + layout(operation.request).size <= LONGEST_BODY
+            and 3 + layout(operation.reply).size <= LONGEST_BODY
+        )
     for length in (0, LONGEST_BODY + 1):
         with pytest.raises(OutOfRange):
             frame(0x21, bytes(length))
@@ -98,16 +104,19 @@ def test_silence_is_nobody_answers_after_all_tries():
     assert caught.value.address == 9
 
 
-@pytest.mark.parametrize("words, reason", [
-    ([0x62], "62 came instead of 61"),                              # another node
-    ([0x161], "9th bit"),
-    ([0x61, 0x61], "61 came instead of 51"),
-    ([0x61, 0x51, 0], "length of 0"),
-    ([0x61, 0x51, LONGEST_BODY + 1], "length of 65"),
-    ([0x61] + reply_words()[:-1] + [reply_words()[-1] ^ 1], "wrong CRC-32"),
-    ([0x61, 0x51] + list(frame(0x51, b"\x07\x03")), "wrong length"),
-    ([0x61, 0x51] + list(frame(0x52, b"\x07\x03\x00")), "wrong CRC-32"),
-])
+@pytest.mark.parametrize(
+    "words, reason",
+    [
+        ([0x62], "62 came instead of 61"),  # another node
+        ([0x161], "9th bit"),
+        ([0x61, 0x61], "61 came instead of 51"),
+        ([0x61, 0x51, 0], "length of 0"),
+        ([0x61, 0x51, LONGEST_BODY + 1], "length of 65"),
+        ([0x61] + reply_words()[:-1] + [reply_words()[-1] ^ 1], "wrong CRC-32"),
+        ([0x61, 0x51] + list(frame(0x51, b"\x07\x03")), "wrong length"),
+        ([0x61, 0x51] + list(frame(0x52, b"\x07\x03\x00")), "wrong CRC-32"),
+    ],
+)
 def test_each_garbled_answer_is_named(words, reason):
     exchange = Exchange(1, ENABLE, tries=1)
     exchange.feed(words)
@@ -133,7 +142,9 @@ def test_an_old_reply_repeats_the_same_words_at_once():
     assert exchange.events == ["old reply"] and exchange.words_to_send() == [0x121]
     exchange.feed([0x61])
     assert exchange.words_to_send() == first
-    exchange.feed(reply_words(sequence=7, operation=2, cause=3))         # right number, another operation: old too
+    exchange.feed(
+        reply_words(sequence=7, operation=2, cause=3)
+    )  # right number, another operation: old too
     with pytest.raises(BusGarbled, match="never received the request whole"):
         exchange.result()
 
@@ -142,8 +153,12 @@ def test_after_nonsense_the_line_is_left_quiet_before_the_repetition():
     exchange = Exchange(1, ENABLE)
     exchange.words_to_send()
     exchange.feed([0x55])
-    assert exchange.words_to_send() == [] and exchange.state == State.QUIET and exchange.timeout_s == Timing().quiet
-    exchange.feed([0x61, 0x51, 0x100])                                   # the rest of the nonsense
+    assert (
+        exchange.words_to_send() == []
+        and exchange.state == State.QUIET
+        and exchange.timeout_s == Timing().quiet
+    )
+    exchange.feed([0x61, 0x51, 0x100])  # the rest of the nonsense
     assert exchange.words_to_send() == []
     exchange.silence()
     assert exchange.words_to_send() == [0x121]
@@ -169,6 +184,7 @@ def test_patience_grows_with_what_is_awaited():
 
 # ------------------------------------------------------------------ with a node at the other end
 
+
 def test_a_lost_word_at_any_place_is_repeated_and_acted_on_once():
     for to_node in (True, False):
         for place in range(60):
@@ -178,6 +194,7 @@ def test_a_lost_word_at_any_place_is_repeated_and_acted_on_once():
             def lose(word, place=place, seen=seen):
                 seen.append(word)
                 return [] if len(seen) == place + 1 else [word]
+
             setattr(fake, "to_node" if to_node else "from_node", lose)
             bus = Bus(fake, random_source=random.Random(1))
             bus.request(1, "enable", axis=0, on=1)
@@ -215,14 +232,19 @@ def test_any_noise_ends_in_the_right_reply_or_in_a_line_error():
             before = len(node.axes[0].writes)
             try:
                 bus.request(1, "set_parameter", axis=0, parameter=15, value=value)
-                assert node.axes[0].parameters[15] == value and len(node.axes[0].writes) == before + 1
+                assert (
+                    node.axes[0].parameters[15] == value and len(node.axes[0].writes) == before + 1
+                )
                 done += 1
             except BusError:
                 assert len(node.axes[0].writes) <= before + 1
                 failed += 1
         # when the noise is over the line works again
         fake.to_node = fake.from_node = lambda word: [word]
-        assert bus.request(1, "get_parameter", axis=0, parameter=15)["value"] == node.axes[0].parameters[15]
+        assert (
+            bus.request(1, "get_parameter", axis=0, parameter=15)["value"]
+            == node.axes[0].parameters[15]
+        )
     assert done > 300 and failed > 50
 
 
@@ -254,5 +276,7 @@ def test_a_new_host_with_the_number_of_the_last_one_still_gets_fresh_answers():
     axis = Bus(fake, random_source=Always5()).axis()
     before = axis.status().position_nm
     node.axes[0].position += 65536
-    axis = Bus(fake, random_source=Always5()).axis()        # identify is the repetition, and its answer is the same anyway
+    axis = Bus(
+        fake, random_source=Always5()
+    ).axis()  # identify is the repetition, and its answer is the same anyway
     assert axis.status().position_nm == pytest.approx(before + 800)

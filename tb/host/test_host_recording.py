@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""recording, selftest and the commands that only look: a session is written down whole and given again; what is wrong is found."""
+"""recording, selftest and the commands that only look: a session is written down whole and given
+again; what is wrong is found.
+"""
+
 import json
 
 import pytest
@@ -19,6 +22,7 @@ def recorded(tmp_path, text="home -- move 1mm -- status", node=None):
 
 
 # ------------------------------------------------------------------ record and replay
+
 
 def test_a_session_replays_to_the_same_machine_with_the_same_bytes(tmp_path):
     file, node = recorded(tmp_path), FakeNode()
@@ -41,13 +45,20 @@ def test_other_values_are_told_apart_from_other_outcomes(tmp_path):
 
 
 def test_a_node_that_does_not_answer_differs(tmp_path):
-    assert "nothing came instead of 61" in sentence(Call(f"replay {recorded(tmp_path, 'status')}", FakeNode(2)), 1)
+    assert "nothing came instead of 61" in sentence(
+        Call(f"replay {recorded(tmp_path, 'status')}", FakeNode(2)), 1
+    )
 
 
 def test_a_record_is_told_in_words_without_a_port(tmp_path):
     rows = Call(f"replay --show {recorded(tmp_path)}").out.splitlines()
-    assert rows[0].split()[2:] == ["node", "1:", "identify"] and rows[1].strip().startswith("ok map_crc=")
-    assert any("move axis=0 target=81920000" in row for row in rows) and sum("no right reply" in row for row in rows) == 0
+    assert rows[0].split()[2:] == ["node", "1:", "identify"] and rows[1].strip().startswith(
+        "ok map_crc="
+    )
+    assert (
+        any("move axis=0 target=81920000" in row for row in rows)
+        and sum("no right reply" in row for row in rows) == 0
+    )
 
 
 def test_what_went_wrong_on_the_line_is_in_the_record(tmp_path):
@@ -72,8 +83,15 @@ def test_a_recorder_hides_nothing_of_its_transport():
 
         def send_break(self):
             self.broken = True
+
     bus = recording.Recorder(Deep(), open("/dev/null", "w"))
-    assert (bus.handshake, bus.time_is_stopped, bus.character_s, bus.reaches(3), bus.reaches(4)) == (False, True, 0.125, True, False)
+    assert (
+        bus.handshake,
+        bus.time_is_stopped,
+        bus.character_s,
+        bus.reaches(3),
+        bus.reaches(4),
+    ) == (False, True, 0.125, True, False)
     bus.set_baud(4)
     bus.send_break()
     assert bus.character_s == 0.25 and bus.transport.broken
@@ -87,14 +105,15 @@ def test_a_change_of_the_baud_rate_and_the_break_after_it_are_recorded_and_repla
     assert Call(f"replay {file}", node).code == 0
     assert node.counters["breaks"] == 1 and node.baud == 115200 and node.axes[0].homed
     rows = Call(f"replay --show {file}").out.splitlines()
-    assert [row.split(" s  ")[1] for row in rows if " baud from" in row or row.endswith("break")] == [
-        "1000000 baud from here on", "break", "115200 baud from here on"]
+    assert [
+        row.split(" s  ")[1] for row in rows if " baud from" in row or row.endswith("break")
+    ] == ["1000000 baud from here on", "break", "115200 baud from here on"]
 
 
 def test_a_record_that_broke_off_at_another_baud_rate_leaves_the_nodes_at_the_first_one(tmp_path):
     file = recorded(tmp_path, "baud 1000000 1 -- status")
     rows = file.read_text().splitlines()
-    file.write_text("\n".join(rows[:-2]))                # without the break and what follows it
+    file.write_text("\n".join(rows[:-2]))  # without the break and what follows it
     assert recording.last_baud(recording.read(file.read_text())) == 1_000_000
     call = Call(f"replay {file}")
     assert call.code == 0 and call.bus.nodes[0].baud == call.bus.baud == 115200
@@ -103,20 +122,42 @@ def test_a_record_that_broke_off_at_another_baud_rate_leaves_the_nodes_at_the_fi
 def test_a_record_with_another_baud_rate_is_not_replayed_through_a_door(tmp_path):
     bus = FakeBus(FakeNode())
     bus.handshake = False
-    assert "the nodes' own line" in sentence(Call(f"replay {recorded(tmp_path, 'baud 9600 1')}", bus=bus), 3)
+    assert "the nodes' own line" in sentence(
+        Call(f"replay {recorded(tmp_path, 'baud 9600 1')}", bus=bus), 3
+    )
 
 
-@pytest.mark.parametrize("text", [
-    "", "{}", "no json", '{"record": "moire bus", "version": 2, "protocol_crc": 0}',
-    json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + '\n{"at": 1}',
-    json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + '\n{"at": 1, "send": [512]}',
-    json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + '\n{"at": 1, "receive": [1], "wanted": 1}',
-    *(json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + f'\n{{"at": 1, {call}}}' for call in
-      ('"baud": 0', '"baud": "fast"', '"baud": 1e9', '"baud": true', '"break": 1', '"break": true, "baud": 9600')),
-])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{}",
+        "no json",
+        '{"record": "moire bus", "version": 2, "protocol_crc": 0}',
+        json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + '\n{"at": 1}',
+        json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC})
+        + '\n{"at": 1, "send": [512]}',
+        json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC})
+        + '\n{"at": 1, "receive": [1], "wanted": 1}',
+        *(
+            json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC})
+            + f'\n{{"at": 1, {call}}}'
+            for call in (
+                '"baud": 0',
+                '"baud": "fast"',
+                '"baud": 1e9',
+                '"baud": true',
+                '"break": 1',
+                '"break": true, "baud": 9600',
+            )
+        ),
+    ],
+)
 def test_a_file_that_is_no_record_is_refused(tmp_path, text):
     (tmp_path / "no.jsonl").write_text(text)
-    assert "is no record of a bus: make one with" in sentence(Call(f"replay {tmp_path / 'no.jsonl'}"), 2)
+    assert "is no record of a bus: make one with" in sentence(
+        Call(f"replay {tmp_path / 'no.jsonl'}"), 2
+    )
 
 
 def test_a_record_of_another_protocol_is_refused():
@@ -131,9 +172,17 @@ def test_a_record_that_cannot_be_written_is_one_sentence(tmp_path):
 
 # ------------------------------------------------------------------ look
 
+
 def test_watch_tells_the_state_as_often_as_asked_and_ends_in_time():
     call = Call("watch --every 0.1s --for 0.5s --json")
-    assert [round(told["time_s"], 1) for told in call.told] == [0.0, 0.1, 0.2, 0.3, 0.4, 0.5] and call.told[0]["state"] == "off"
+    assert [round(told["time_s"], 1) for told in call.told] == [
+        0.0,
+        0.1,
+        0.2,
+        0.3,
+        0.4,
+        0.5,
+    ] and call.told[0]["state"] == "off"
     assert "drive off" in Call("watch --for 0s").out
 
 
@@ -149,7 +198,10 @@ def test_fault_tells_cause_place_and_what_to_do():
     node.axes[0].standing = node.axes[0].faults = ESTOP
     node.axes[0].events, node.axes[0].signal = 4, dict(faults=0, first=1)
     out = Call("fault", node).out
-    assert out.startswith("node 1 axis 0: emergency stop\n  first     emergency stop, at 800nm\n") and "signal too small" in out
+    assert (
+        out.startswith("node 1 axis 0: emergency stop\n  first     emergency stop, at 800nm\n")
+        and "signal too small" in out
+    )
     assert "remove the cause, then 'moire reset', then 'moire home'" in out
     assert Call("fault --json", node).told[0]["first_fault"] == ["estop"]
 
@@ -163,9 +215,16 @@ def test_selftest_passes_a_sound_node_without_sine_and_cosine():
     node = FakeNode(sine=False)
     node.axes[0].parameters[PARAMETERS["position_source"].id] = 1
     call = Call("selftest", node)
-    assert call.code == 0 and "passed   axis 0 sensor      no illegal edge; built without sine and cosine\n" in call.out
+    assert (
+        call.code == 0
+        and "passed   axis 0 sensor      no illegal edge; built without sine and cosine\n"
+        in call.out
+    )
     node.axes[0].events = 1
-    assert "FAILED   axis 0 sensor      both quadrature levels changed at once" in Call("selftest", node).out
+    assert (
+        "FAILED   axis 0 sensor      both quadrature levels changed at once"
+        in Call("selftest", node).out
+    )
 
 
 def test_fault_of_a_node_without_sine_and_cosine_tells_what_there_is():
@@ -194,11 +253,16 @@ def spoil_register(node):
     node.registers[0] = 5
 
 
-@pytest.mark.parametrize("spoil, name, said", [
-    (spoil_estop, "axis 0 guard", "emergency stop pressed"), (spoil_limits, "axis 0 sensor", "amplitude 103, allowed 200 to 160"),
-    (spoil_signal, "axis 0 sensor", "signal too large"), (spoil_parameter, "axis 0 parameters", "out of range: pwm_frequency"),
-    (spoil_register, "line", "wrong_values 50"),
-])
+@pytest.mark.parametrize(
+    "spoil, name, said",
+    [
+        (spoil_estop, "axis 0 guard", "emergency stop pressed"),
+        (spoil_limits, "axis 0 sensor", "amplitude 103, allowed 200 to 160"),
+        (spoil_signal, "axis 0 sensor", "signal too large"),
+        (spoil_parameter, "axis 0 parameters", "out of range: pwm_frequency"),
+        (spoil_register, "line", "wrong_values 50"),
+    ],
+)
 def test_selftest_finds_and_names_what_is_wrong(spoil, name, said):
     node = FakeNode()
     spoil(node)
@@ -206,7 +270,9 @@ def test_selftest_finds_and_names_what_is_wrong(spoil, name, said):
     assert f"FAILED   {name}" in call.out and said in call.out
     assert f"node 1 failed 1 of 8 checks: {name}" in sentence(call, 1)
     told = Call("selftest --json", node).told
-    assert told[0]["passed"] is False and [check["name"] for check in told[0]["checks"] if not check["passed"]] == [name]
+    assert told[0]["passed"] is False and [
+        check["name"] for check in told[0]["checks"] if not check["passed"]
+    ] == [name]
     assert told[1]["error"] == "SelfTestFailed"
 
 
@@ -216,6 +282,7 @@ def test_selftest_counts_what_is_wrong_on_the_line():
     def every_hundredth(word):
         count[0] += 1
         return [word ^ 1] if count[0] % 100 == 0 and count[0] > 300 else [word]
+
     bus.to_node = every_hundredth
     call = Call("selftest", bus=bus)
     assert "FAILED   line" in call.out and "frames_bad" in call.out and "repeats" in call.out

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""relay.py against a relay of models (requests, set, flash): sets by hand, a noisy line, power failures, and every refusal."""
+"""relay.py against a relay of models (requests, set, flash): sets by hand, a noisy line, power
+failures, and every refusal.
+"""
+
 import argparse
 import math
 import random
@@ -34,24 +37,52 @@ from tb.serial.frame_check import FrameCheck
 
 K = 4
 SOME = [(3.0, 1.0), (0.5, -2.0)]
-LIMITS = [(dict(counts_per_turn=1608), "counts per turn"), (dict(counts_per_turn=2**25 + 1), "counts per turn"),
-          (dict(minimum_edge_separation=65536), "minimum_edge_separation"), (dict(hysteresis=1.0), "hysteresis"), (dict(filter_samples=256), "filter"),
-          (dict(index_gate_mask=4), "mask"), (dict(index_gate=-1), "gate")]
+LIMITS = [
+    (dict(counts_per_turn=1608), "counts per turn"),
+    (dict(counts_per_turn=2**25 + 1), "counts per turn"),
+    (dict(minimum_edge_separation=65536), "minimum_edge_separation"),
+    (dict(hysteresis=1.0), "hysteresis"),
+    (dict(filter_samples=256), "filter"),
+    (dict(index_gate_mask=4), "mask"),
+    (dict(index_gate=-1), "gate"),
+]
 
 
 class FakeRelay(Transport):
-    """The relay behind its UART, byte by byte. spoil(words) may break what passes, in both directions."""
+    """The relay behind its UART, byte by byte. spoil(words) may break what passes, in both
+    directions.
+    """
 
     def __init__(self, k=K, chip=None, spoil=lambda words: words):
-        self.requests, self.check, self.set, self.chip = RelayRequests(), FrameCheck(), relay_set.RelaySet(k), chip or Flash(1 << 21)
+        self.requests, self.check, self.set, self.chip = (
+            RelayRequests(),
+            FrameCheck(),
+            relay_set.RelaySet(k),
+            chip or Flash(1 << 21),
+        )
         self.k, self.spoil, self.heard, self.passed, self.sent = k, spoil, [], 0.0, 0
         self.booting, self.sclk = 3, 0
 
     def clk(self, **strobes):
         requests, levels = self.requests, 2 * self.set.loaded + 8 * (self.booting > 0)
-        words = dict(levels=levels, source=1, orders=self.k, identity=self.set.identity, position=7, correction=-65536 & 0xFFFFFFFF)
-        requests.clk(answer_ready=1, events=32 * self.set.bad, pass_ready=int(requests.pass_select), **words, **strobes)
-        self.set.clk(start=requests.set_start, valid=requests.set_valid, data=requests.set_data or 0)
+        words = dict(
+            levels=levels,
+            source=1,
+            orders=self.k,
+            identity=self.set.identity,
+            position=7,
+            correction=-65536 & 0xFFFFFFFF,
+        )
+        requests.clk(
+            answer_ready=1,
+            events=32 * self.set.bad,
+            pass_ready=int(requests.pass_select),
+            **words,
+            **strobes,
+        )
+        self.set.clk(
+            start=requests.set_start, valid=requests.set_valid, data=requests.set_data or 0
+        )
         if requests.pass_valid:
             requests.clk(pass_done=1, pass_data=self.byte_of_flash(requests.set_data), **words)
         if not requests.pass_select:
@@ -109,15 +140,26 @@ def noise(source, share):
         if words and source.random() < share:
             how = source.randrange(3)
             if how == 0:
-                return words[:source.randrange(len(words))]
+                return words[: source.randrange(len(words))]
             place = source.randrange(len(words))
-            words[place] = words[place] ^ 1 << source.randrange(8) if how == 1 else source.randrange(512)
+            words[place] = (
+                words[place] ^ 1 << source.randrange(8) if how == 1 else source.randrange(512)
+            )
         return words
+
     return spoil
 
 
 def test_a_set_is_that_of_the_model_of_the_hardware():
-    settings = Settings(40_000, minimum_edge_separation=7, hysteresis=0.125, filter_samples=3, index_low=True, index_gate_mask=2, index_gate=1)
+    settings = Settings(
+        40_000,
+        minimum_edge_separation=7,
+        hysteresis=0.125,
+        filter_samples=3,
+        index_low=True,
+        index_gate_mask=2,
+        index_gate=1,
+    )
     words = [term_of(*term) for term in SOME] + [(0, 0)] * (K - len(SOME))
     assert make_set(SOME, settings, K) == relay_set.image(words, 40_000, 7, 0x2000, 3, 1, 2, 1)
 
@@ -129,9 +171,14 @@ def test_the_terms_of_a_correction_take_off_what_it_describes():
     for index_at in (0.0, 77.0):
         terms = [term_of(*term) for term in terms_of(found, counts, index_at)]
         for degrees in (0, 10, 123.4, 359):
-            wanted = sum(c * math.cos(k * math.radians(degrees + index_at)) + s * math.sin(k * math.radians(degrees + index_at))
-                         for k, (c, s) in enumerate(zip(found.cosine, found.sine, strict=True), 1))
-            assert exact(terms, degrees / 360) * 1_296_000 / counts == pytest.approx(wanted, abs=0.01)
+            wanted = sum(
+                c * math.cos(k * math.radians(degrees + index_at))
+                + s * math.sin(k * math.radians(degrees + index_at))
+                for k, (c, s) in enumerate(zip(found.cosine, found.sine, strict=True), 1)
+            )
+            assert exact(terms, degrees / 360) * 1_296_000 / counts == pytest.approx(
+                wanted, abs=0.01
+            )
 
 
 @pytest.mark.parametrize(("change", "name"), LIMITS)
@@ -165,14 +212,20 @@ def test_status_in_words():
     relay.write(a_set())
     status = relay.status()
     assert status.orders == K and status.correction == -1.0 and status.position == 7
-    assert f"a set is in force; 4 orders, set {identity_of(a_set()):08X}, at power-up from the first copy in flash" in status.words()
+    assert (
+        f"a set is in force; 4 orders, set {identity_of(a_set()):08X}, at power-up from the first copy in flash"
+        in status.words()
+    )
     assert "flag" not in status.words()
 
 
 def test_a_set_for_other_hardware_is_refused_and_the_one_in_force_stays():
     relay = Relay(FakeRelay())
     relay.write(a_set())
-    with pytest.raises(RelayRefused, match=f"refused the set .*{identity_of(a_set()):08X} stays in force: is it one for 4 orders"):
+    with pytest.raises(
+        RelayRefused,
+        match=f"refused the set .*{identity_of(a_set()):08X} stays in force: is it one for 4 orders",
+    ):
         relay.write(make_set(SOME, Settings(32768), K + 1))
     assert relay.status().flags == 32 and "flag: a set was refused" in relay.status().words()
     assert relay.clear(~32 & 0xFF).flags == 32 and relay.clear(32).flags == 0
@@ -184,14 +237,16 @@ def test_a_saved_set_stands_in_both_copies_and_is_not_written_twice():
     relay, whole = Relay(transport), a_set()
     relay.save(whole)
     for address in (FIRST, SECOND):
-        assert transport.chip.memory[address:address + len(whole)] == whole
-    transport.chip.power = 0                                    # nothing more can be written
+        assert transport.chip.memory[address : address + len(whole)] == whole
+    transport.chip.power = 0  # nothing more can be written
     relay.save(whole)
 
 
 def test_power_may_fail_anywhere_while_a_set_is_saved():
     source, old, new = random.Random(seed()), a_set(), a_set([(9.0, 0.5)])
-    for power in [0, 4095, 4096, 4096 + 20, 2 * 4096 + len(new)] + [source.randrange(2 * 4096 + 2 * len(new)) for _ in range(4)]:
+    for power in [0, 4095, 4096, 4096 + 20, 2 * 4096 + len(new)] + [
+        source.randrange(2 * 4096 + 2 * len(new)) for _ in range(4)
+    ]:
         transport = FakeRelay(chip=awake())
         Relay(transport).save(old)
         transport.chip.power = power
@@ -199,7 +254,10 @@ def test_power_may_fail_anywhere_while_a_set_is_saved():
             Relay(transport).save(new)
         except RelayRefused as why:
             assert "does not hold what was written" in str(why)
-        copies = [bytes(transport.chip.memory[address:address + len(old)]) for address in (FIRST, SECOND)]
+        copies = [
+            bytes(transport.chip.memory[address : address + len(old)])
+            for address in (FIRST, SECOND)
+        ]
         assert copies[0] in (old, new) or copies[1] in (old, new)
 
 
@@ -214,7 +272,10 @@ def test_a_noisy_line_leads_to_the_same_set_or_to_an_error():
             done += 1
         except (BusGarbled, NoAnswer):
             continue
-        assert transport.set.identity == identity_of(a_set()) and transport.chip.memory[FIRST:FIRST + len(a_set())] == a_set()
+        assert (
+            transport.set.identity == identity_of(a_set())
+            and transport.chip.memory[FIRST : FIRST + len(a_set())] == a_set()
+        )
     assert done > 5
 
 
@@ -222,26 +283,37 @@ def test_a_repeated_request_is_not_acted_on_again():
     lost = []
 
     def lose_answers(words):
-        if words and not words[0] & NINTH and len(lost) < 6:     # an answer
+        if words and not words[0] & NINTH and len(lost) < 6:  # an answer
             lost.append(words)
             return []
         return words
 
     transport = FakeRelay(spoil=lose_answers)
     Relay(transport, tries=8).write(a_set())
-    assert len(lost) == 6 and transport.set.identity == identity_of(a_set()) and not transport.requests.flags
+    assert (
+        len(lost) == 6
+        and transport.set.identity == identity_of(a_set())
+        and not transport.requests.flags
+    )
 
 
 def test_nobody_answers_and_noise_are_told_apart():
     with pytest.raises(NoAnswer):
         Relay(FakeRelay(spoil=lambda words: []))
     with pytest.raises(BusGarbled, match="wrong CRC-32"):
-        Relay(FakeRelay(spoil=lambda words: words if words[0] & NINTH else [*words[:5], words[5] ^ 1, *words[6:]]))
+        Relay(
+            FakeRelay(
+                spoil=lambda words: (
+                    words if words[0] & NINTH else [*words[:5], words[5] ^ 1, *words[6:]]
+                )
+            )
+        )
     with pytest.raises(OutOfRange, match="2 to 64 bytes"):
         Exchange(bytes(65))
 
 
 # the commands
+
 
 def call(transport, *words):
     """What the command says, as the command line would run it."""
@@ -255,13 +327,17 @@ def call(transport, *words):
     parser = argparse.ArgumentParser()
     command_relay.add_to(parser.add_subparsers(), command)
     options = parser.parse_args(words)
-    session = SimpleNamespace(bus=SimpleNamespace(transport=transport), say=lambda told, text: said.append((told, text)))
+    session = SimpleNamespace(
+        bus=SimpleNamespace(transport=transport), say=lambda told, text: said.append((told, text))
+    )
     options.handler(session, options)
     return said[0]
 
 
 def readings_file(tmp_path, amplitude=80.0):
-    lines = [f"{angle},{amplitude * math.cos(math.radians(angle)):.4f}" for angle in range(0, 361, 10)]
+    lines = [
+        f"{angle},{amplitude * math.cos(math.radians(angle)):.4f}" for angle in range(0, 361, 10)
+    ]
     path = tmp_path / "ring.csv"
     path.write_text("\n".join(lines) + "\n")
     return path
@@ -269,16 +345,37 @@ def readings_file(tmp_path, amplitude=80.0):
 
 def test_calibrate_writes_saves_and_draws(tmp_path):
     transport, table = FakeRelay(chip=awake()), readings_file(tmp_path)
-    told, text = call(transport, "calibrate", str(table), "--counts", "32768", "--picture", str(tmp_path / "ring.png"))
+    told, text = call(
+        transport,
+        "calibrate",
+        str(table),
+        "--counts",
+        "32768",
+        "--picture",
+        str(tmp_path / "ring.png"),
+    )
     whole = make_set(terms_of(fit(read_readings(table), orders=K), 32768), Settings(32768), K)
-    assert told["orders"] == K and told["before"] == pytest.approx(80) and told["left"] < 0.01 and "kept in flash" in text
-    assert transport.set.identity == identity_of(whole) and transport.chip.memory[SECOND:SECOND + len(whole)] == whole
+    assert (
+        told["orders"] == K
+        and told["before"] == pytest.approx(80)
+        and told["left"] < 0.01
+        and "kept in flash" in text
+    )
+    assert (
+        transport.set.identity == identity_of(whole)
+        and transport.chip.memory[SECOND : SECOND + len(whole)] == whole
+    )
     assert (tmp_path / "ring.png").read_bytes()[1:4] == b"PNG"
 
 
 def test_calibrate_dry_and_a_bad_table_write_nothing(tmp_path):
     transport, table = FakeRelay(chip=awake()), readings_file(tmp_path)
-    assert "nothing written" in call(transport, "calibrate", str(table), "--counts", "32768", "--dry", "--orders", "3")[1]
+    assert (
+        "nothing written"
+        in call(transport, "calibrate", str(table), "--counts", "32768", "--dry", "--orders", "3")[
+            1
+        ]
+    )
     table.write_text(table.read_text().replace("20,", "200,", 1))
     with pytest.raises(BadFile, match="line 3"):
         call(transport, "calibrate", str(table), "--counts", "32768")

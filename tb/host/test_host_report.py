@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""report: the page holds every move, every picture is a PNG inside it, texts are escaped, and what is missing is said."""
+"""report: the page holds every move, every picture is a PNG inside it, texts are escaped, and what
+is missing is said.
+"""
+
 import base64
 import html.parser
 import io
@@ -25,18 +28,33 @@ def full_result():
     target = 1e6 * (1 - numpy.cos(math.pi * time_s))
     traces = [
         report.Trace(
-            name, time_s, target * scale, target * scale + 40 * numpy.sin(50 * time_s), target * scale + 45 * numpy.sin(50 * time_s)
+            name,
+            time_s,
+            target * scale,
+            target * scale + 40 * numpy.sin(50 * time_s),
+            target * scale + 45 * numpy.sin(50 * time_s),
         )
         for name, scale in (("X", 1), ("Y", -0.5))
     ]
     angle = numpy.linspace(0, 40, 400)
-    circle = report.Lissajous("X", numpy.round(100 * numpy.sin(angle)), numpy.round(100 * numpy.cos(angle)))
+    circle = report.Lissajous(
+        "X", numpy.round(100 * numpy.sin(angle)), numpy.round(100 * numpy.cos(angle))
+    )
     compared = [
         report.Compared("coarse error", "0.8 \N{MICRO SIGN}m", "16 nm", True),
         report.Compared("<speed>", "5 mm/s", "4 mm/s", False),
         report.Compared("axes", "2", "2"),
     ]
-    return report.Result("S0 <stage> & co", MOVES, traces, [circle], compared, seed=42, facts={"clock": "4 MHz"}, summary="What was done.")
+    return report.Result(
+        "S0 <stage> & co",
+        MOVES,
+        traces,
+        [circle],
+        compared,
+        seed=42,
+        facts={"clock": "4 MHz"},
+        summary="What was done.",
+    )
 
 
 class Page(html.parser.HTMLParser):
@@ -84,32 +102,44 @@ def test_the_page_holds_everything_and_needs_no_other_file(tmp_path):
     assert not re.search(r'(src|href)="(?!data:)', path.read_text(encoding="utf-8"))
     assert len(page.images) == 4
     for source in page.images:
-        image = Image.open(io.BytesIO(base64.b64decode(source.removeprefix("data:image/png;base64,"))))
-        assert image.format == "PNG" and image.width > 400 and len(set(image.convert("RGB").resize((60, 60)).get_flattened_data())) > 3
+        image = Image.open(
+            io.BytesIO(base64.b64decode(source.removeprefix("data:image/png;base64,")))
+        )
+        assert (
+            image.format == "PNG"
+            and image.width > 400
+            and len(set(image.convert("RGB").resize((60, 60)).get_flattened_data())) > 3
+        )
 
 
 def test_a_result_of_moves_alone_has_the_histogram_alone(tmp_path):
-    page = Page(report.write(report.Result("moves", MOVES[:1]), tmp_path).read_text(encoding="utf-8"))
+    page = Page(
+        report.write(report.Result("moves", MOVES[:1]), tmp_path).read_text(encoding="utf-8")
+    )
     assert len(page.images) == 1 and "How it was measured" not in page.texts
 
 
 def test_errors_are_summed_up_by_hand_too():
     errors = report.Errors.of(MOVES)
-    assert (errors.count, errors.largest, errors.mean) == (3, 16.0, pytest.approx(-4 / 3)) and errors.rms == pytest.approx(
-        math.sqrt(400 / 3)
-    )
+    assert (errors.count, errors.largest, errors.mean) == (
+        3,
+        16.0,
+        pytest.approx(-4 / 3),
+    ) and errors.rms == pytest.approx(math.sqrt(400 / 3))
 
 
 def test_an_error_beyond_the_paper_is_marked():
     bad = report.Move("X", 0, 0, 900, 900.0, 1.0)
-    assert 'class="bad">+900.0<' in report.page(report.Result("bad", [bad])) and 'class="bad"' not in report.page(
-        report.Result("good", MOVES)
-    )
+    assert 'class="bad">+900.0<' in report.page(
+        report.Result("bad", [bad])
+    ) and 'class="bad"' not in report.page(report.Result("good", MOVES))
 
 
 @pytest.mark.parametrize("error", [0.0, 0.01, 799.0, 5e6])
 def test_any_size_of_error_is_drawn(error):
-    assert report.histogram([report.Move("X", 0, 0, error, error, 1.0)], 800.0).startswith(b"\x89PNG")
+    assert report.histogram([report.Move("X", 0, 0, error, error, 1.0)], 800.0).startswith(
+        b"\x89PNG"
+    )
 
 
 def test_what_cannot_be_done_is_said(tmp_path):

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""scope: what is asked of the node, and its samples as times, lengths and shares; test_firmware_scope has the node's side."""
+"""scope: what is asked of the node, and its samples as times, lengths and shares;
+test_firmware_scope has the node's side.
+"""
+
 import math
 import random
 
@@ -25,7 +28,9 @@ def low(position):
 def ramp(node, count=12, step=PERIOD // 4):
     """Samples that end where the axis is: 62 or 63 units of 64 clk apart."""
     end = node.axes[0].position
-    node.samples = [(low(end - (count - 1 - n) * step), 3 * n, -16384 + n, 62 + n % 2) for n in range(count)]
+    node.samples = [
+        (low(end - (count - 1 - n) * step), 3 * n, -16384 + n, 62 + n % 2) for n in range(count)
+    ]
 
 
 def test_settings_go_out_in_counts():
@@ -34,10 +39,16 @@ def test_settings_go_out_in_counts():
     assert node.armed == dict(trigger=3, before=7, every=10, level=2 * PERIOD, amplitude=0)
 
 
-@pytest.mark.parametrize("wrong, said", [
-    (dict(trigger="noon"), "no trigger 'noon': there are now, motion, settling, error, fault"), (dict(before=128), "0 to 127"),
-    (dict(before=-1), "0 to 127"), (dict(every="100us"), "250us to 50ms"), (dict(every="51ms"), "250us to 50ms"),
-])
+@pytest.mark.parametrize(
+    "wrong, said",
+    [
+        (dict(trigger="noon"), "no trigger 'noon': there are now, motion, settling, error, fault"),
+        (dict(before=128), "0 to 127"),
+        (dict(before=-1), "0 to 127"),
+        (dict(every="100us"), "250us to 50ms"),
+        (dict(every="51ms"), "250us to 50ms"),
+    ],
+)
 def test_settings_that_make_no_sense_are_not_sent(wrong, said):
     node = FakeNode()
     with pytest.raises(OutOfRange, match=said):
@@ -52,8 +63,13 @@ def test_samples_come_back_in_time_and_length():
     scope.arm("now", before=4)
     record = scope.wait()
     assert record.before == 4 and record.time_s[4] == 0 and len(record.time_s) == 12
-    assert record.time_s[5] - record.time_s[4] == pytest.approx(63 * 64 / 4e6) and record.time_s[0] == pytest.approx(-250 * 64 / 4e6)
-    assert record.position_nm[-1] == pytest.approx(123456 / PERIOD * 800) and record.position_nm[1] - record.position_nm[0] == 200
+    assert record.time_s[5] - record.time_s[4] == pytest.approx(63 * 64 / 4e6) and record.time_s[
+        0
+    ] == pytest.approx(-250 * 64 / 4e6)
+    assert (
+        record.position_nm[-1] == pytest.approx(123456 / PERIOD * 800)
+        and record.position_nm[1] - record.position_nm[0] == 200
+    )
     assert record.error_nm[2] == pytest.approx(6 / PERIOD * 800) and record.command[0] == -0.5
 
 
@@ -64,7 +80,10 @@ def test_positions_are_whole_where_the_low_word_wraps():
     scope = Scope(axis_of(node))
     scope.arm()
     record = scope.read()
-    assert record.position_nm[-1] == (5 * 65536 + 40) * 800 and record.position_nm[0] == (5 * 65536 + 40 - 190) * 800
+    assert (
+        record.position_nm[-1] == (5 * 65536 + 40) * 800
+        and record.position_nm[0] == (5 * 65536 + 40 - 190) * 800
+    )
 
 
 def test_a_trigger_that_does_not_come_and_a_scope_that_is_not_armed_are_one_sentence():
@@ -82,11 +101,34 @@ def test_commands_arm_move_and_read_in_one_call(tmp_path):
     node = FakeNode()
     ramp(node)
     file, picture = tmp_path / "move.csv", tmp_path / "move.png"
-    call = Call(["home", "--", "scope", "arm", "--trigger", "motion", "--", "move", "1mm", "--no-wait", "--", "scope", "read", str(file),
-                 "--picture", str(picture)], node)
+    call = Call(
+        [
+            "home",
+            "--",
+            "scope",
+            "arm",
+            "--trigger",
+            "motion",
+            "--",
+            "move",
+            "1mm",
+            "--no-wait",
+            "--",
+            "scope",
+            "read",
+            str(file),
+            "--picture",
+            str(picture),
+        ],
+        node,
+    )
     assert call.code == 0, call.err
     rows = file.read_text().splitlines()
-    assert rows[0] == "time_s,position_nm,error_nm,command" and len(rows) == 13 and picture.read_bytes().startswith(b"\x89PNG")
+    assert (
+        rows[0] == "time_s,position_nm,error_nm,command"
+        and len(rows) == 13
+        and picture.read_bytes().startswith(b"\x89PNG")
+    )
     told = Call(["scope", "arm", "--", "scope", "read", str(file), "--json"], node).told[1]
     assert told["before"] == 0 and len(told["position_nm"]) == 12
 
@@ -97,8 +139,11 @@ def test_a_scope_without_a_record_is_exit_code_1(tmp_path):
 
 # ------------------------------------------------------------------ open loop
 
+
 def answering(node, time_constant_s=0.008, gain=50_000.0):
-    """Samples of an axis that answers as a first-order velocity, LSB/s by a command, each 2 ms; as identify_samples wants them."""
+    """Samples of an axis that answers as a first-order velocity, LSB/s by a command, each 2 ms; as
+    identify_samples wants them.
+    """
     draw, position, velocity, sign, left = random.Random(1), 0.0, 0.0, 1, 0
     decay, commands, positions = math.exp(-0.002 / time_constant_s), [0], []
     for _ in range(128):
@@ -110,7 +155,10 @@ def answering(node, time_constant_s=0.008, gain=50_000.0):
         wanted = gain * commands[-1] / 1000
         position += wanted * 0.002 + (velocity - wanted) * time_constant_s * (1 - decay)
         velocity = wanted + (velocity - wanted) * decay
-    node.samples = [(position, 0, command, 125 * (n > 0)) for n, (position, command) in enumerate(zip(positions, commands))]
+    node.samples = [
+        (position, 0, command, 125 * (n > 0))
+        for n, (position, command) in enumerate(zip(positions, commands))
+    ]
     node.axes[0].position = node.axes[0].target = positions[-1]
 
 
@@ -123,7 +171,9 @@ def test_the_open_loop_needs_the_drive_and_tells_amplitude_and_reach():
     axis.enable()
     times, commands, positions = lsb(excite(axis, "25%", "2ms", "80um"))
     assert node.armed == dict(trigger=0, before=0, every=8, level=100 * PERIOD, amplitude=8192)
-    assert commands[:-1] == [command for _, _, command, _ in node.samples[1:]] and times[1] == pytest.approx(0.002)
+    assert commands[:-1] == [command for _, _, command, _ in node.samples[1:]] and times[
+        1
+    ] == pytest.approx(0.002)
     assert positions[:2] == [0, node.samples[1][0]]
 
 
@@ -133,6 +183,10 @@ def test_tune_without_a_file_drives_and_proposes():
     call = Call("tune --bandwidth 40Hz --json", node)
     assert call.code == 0, call.err
     plant = call.told[0]["plant"]
-    assert plant["a"] == pytest.approx(math.exp(-0.25 / 8), abs=1e-4) and plant["delay"] == 0 and plant["tick_s"] == 1 / 4000
+    assert (
+        plant["a"] == pytest.approx(math.exp(-0.25 / 8), abs=1e-4)
+        and plant["delay"] == 0
+        and plant["tick_s"] == 1 / 4000
+    )
     assert plant["b"] / (1 - plant["a"]) == pytest.approx(50 / 4000, rel=0.001)
     assert "enable" in node.executed and not node.axes[0].enabled and not call.told[0]["written"]

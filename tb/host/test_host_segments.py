@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""segments: tables as people write them, every wrong row named by its line, written and read back, and the commands."""
+"""segments: tables as people write them, every wrong row named by its line, written and read back,
+and the commands.
+"""
+
 import json
 from fractions import Fraction
 
@@ -30,28 +33,50 @@ def file(tmp_path):
     def write(*lines):
         (tmp_path / "scale.csv").write_text("\n".join(lines))
         return tmp_path / "scale.csv"
+
     return write
 
 
-@pytest.mark.parametrize("lines", [
-    GOOD, ["position, error", "# measured at 20 degrees", *GOOD], ["position / mm, error / nm", *GOOD],
-    ["x (um), deviation [um]", "0,0", "1000,0.1", "2000,-0.05", "3000,0.02"], ["0, 0", "1mm, 0.1um", "2000um, -50nm", "3 mm, 20 nm"],
-    ["position / um, error / pm", "0mm, 0", "1mm, 100000", "2mm, -50000", "3000, 20nm"],
-])
+@pytest.mark.parametrize(
+    "lines",
+    [
+        GOOD,
+        ["position, error", "# measured at 20 degrees", *GOOD],
+        ["position / mm, error / nm", *GOOD],
+        ["x (um), deviation [um]", "0,0", "1000,0.1", "2000,-0.05", "3000,0.02"],
+        ["0, 0", "1mm, 0.1um", "2000um, -50nm", "3 mm, 20 nm"],
+        ["position / um, error / pm", "0mm, 0", "1mm, 100000", "2mm, -50000", "3000, 20nm"],
+    ],
+)
 def test_a_table_is_read_with_its_units(file, lines):
     assert read_table(file(*lines)) == SegmentTable(Fraction(0), Fraction(10**6), (0, 100, -50, 20))
 
 
-@pytest.mark.parametrize("lines, said", [
-    (["0, 0", "1, 100", "3, 20", "4, 30"], "line 3: from 1mm to 3mm a border is missing"),
-    (["0, 0", "1, 100", "1, 100", "2, 3"], "line 3: the position 1mm is there twice, also in line 2"),
-    (["0, 0", "2, 100", "1, 100", "3, 3"], "line 3: the position 1mm comes after 2mm in line 2"),
-    (["0, 0", "1, 100", "2.2, 100", "3.2, 3"], "line 3: 2.2mm is no border of equal segments of 1mm"),
-    (["0, 0", "1, 100", "2, 20um", "3, 3"], "line 3: an error of 20um after 100nm is absurd"),
-    (["0, 0", "1, nan", "2, 2"], "line 2: the error is nan"), (["0, 0", "1, about 5", "2, 2"], "line 2: the error is no length: 'about 5'"),
-    (["0, 0", "1, 5 kg"], "line 2: the error is no length: '5 kg'"), (["0, 0", "1, 2, 3"], "line 2: two columns are wanted"),
-    (["# nothing", "0, 0"], "1 borders are too few"), (["0, 0", "1,"], "line 2: the error is no number"),
-])
+@pytest.mark.parametrize(
+    "lines, said",
+    [
+        (["0, 0", "1, 100", "3, 20", "4, 30"], "line 3: from 1mm to 3mm a border is missing"),
+        (
+            ["0, 0", "1, 100", "1, 100", "2, 3"],
+            "line 3: the position 1mm is there twice, also in line 2",
+        ),
+        (
+            ["0, 0", "2, 100", "1, 100", "3, 3"],
+            "line 3: the position 1mm comes after 2mm in line 2",
+        ),
+        (
+            ["0, 0", "1, 100", "2.2, 100", "3.2, 3"],
+            "line 3: 2.2mm is no border of equal segments of 1mm",
+        ),
+        (["0, 0", "1, 100", "2, 20um", "3, 3"], "line 3: an error of 20um after 100nm is absurd"),
+        (["0, 0", "1, nan", "2, 2"], "line 2: the error is nan"),
+        (["0, 0", "1, about 5", "2, 2"], "line 2: the error is no length: 'about 5'"),
+        (["0, 0", "1, 5 kg"], "line 2: the error is no length: '5 kg'"),
+        (["0, 0", "1, 2, 3"], "line 2: two columns are wanted"),
+        (["# nothing", "0, 0"], "1 borders are too few"),
+        (["0, 0", "1,"], "line 2: the error is no number"),
+    ],
+)
 def test_what_is_wrong_is_told_with_its_line(file, lines, said):
     with pytest.raises(BadFile) as told:
         read_table(file(*lines))
@@ -65,13 +90,30 @@ def test_a_file_that_is_not_there_is_one_sentence(tmp_path):
 
 def test_the_rectangle_has_the_mean_of_its_borders_and_the_line_goes_through_them():
     table = SegmentTable(Fraction(100), Fraction(10), (0, 4, -6))
-    assert [table.at(place) for place in (99, 100, 105, 110, 115, 120, 121)] == [0, 0, 2, 4, -1, -6, -6]
-    assert [table.at(place, "rectangle") for place in (99, 100, 109, 110, 119, 120)] == [0, 2, 2, -1, -1, -6]
+    assert [table.at(place) for place in (99, 100, 105, 110, 115, 120, 121)] == [
+        0,
+        0,
+        2,
+        4,
+        -1,
+        -6,
+        -6,
+    ]
+    assert [table.at(place, "rectangle") for place in (99, 100, 109, 110, 119, 120)] == [
+        0,
+        2,
+        2,
+        -1,
+        -1,
+        -6,
+    ]
 
 
 def test_a_table_is_written_whole_and_comes_into_force():
     node = node_with_table()
-    table = SegmentTable(Fraction(-10**6), Fraction(10**6), tuple(Fraction(n * 50) for n in range(-15, 16)))
+    table = SegmentTable(
+        Fraction(-(10**6)), Fraction(10**6), tuple(Fraction(n * 50) for n in range(-15, 16))
+    )
     told = Segments(axis_of(node)).load(table, "rectangle")
     axis = node.axes[0]
     assert axis.points == [n * 50 * 65536 // 800 for n in range(-15, 16)]
@@ -82,7 +124,7 @@ def test_a_table_is_written_whole_and_comes_into_force():
 
 def test_positions_are_told_from_the_zero_whatever_it_is_called():
     node = node_with_table()
-    node.axes[0].parameters[51] = 250                       # home_offset: 200 um
+    node.axes[0].parameters[51] = 250  # home_offset: 200 um
     table = SegmentTable(Fraction(10**6), Fraction(10**6), (Fraction(0), Fraction(100)))
     segments = Segments(axis_of(node))
     segments.load(table)
@@ -93,11 +135,22 @@ def test_without_a_zero_the_table_waits_and_says_why():
     node = node_with_table()
     node.axes[0].homed = False
     told = Segments(axis_of(node)).load(SegmentTable(Fraction(0), Fraction(10**6), (0, 1)))
-    assert (told.in_force, told.reason) == ("off", "not_homed") and "off: the axis has no zero yet: home it first" in told.words()
+    assert (told.in_force, told.reason) == (
+        "off",
+        "not_homed",
+    ) and "off: the axis has no zero yet: home it first" in told.words()
 
 
-@pytest.mark.parametrize("errors, said", [((0,) * 257, "257 points are too few or too many: this node's segment table takes 2 to 256"),
-                                          ((0, 200_000), "128 periods are the most")])
+@pytest.mark.parametrize(
+    "errors, said",
+    [
+        (
+            (0,) * 257,
+            "257 points are too few or too many: this node's segment table takes 2 to 256",
+        ),
+        ((0, 200_000), "128 periods are the most"),
+    ],
+)
 def test_a_table_that_does_not_fit_leaves_the_old_one_in_force(errors, said):
     node = node_with_table()
     segments = Segments(axis_of(node))
@@ -116,17 +169,37 @@ def test_what_does_not_read_back_is_not_put_in_force():
 
 
 def test_the_file_of_a_table_reads_back_digit_by_digit(tmp_path):
-    table = SegmentTable(Fraction(-10**6), Fraction(10**6), (Fraction(0), Fraction(125, 1024), Fraction(-3)))
+    table = SegmentTable(
+        Fraction(-(10**6)), Fraction(10**6), (Fraction(0), Fraction(125, 1024), Fraction(-3))
+    )
     (tmp_path / "again.csv").write_text(text_of(table))
     assert read_table(tmp_path / "again.csv") == table
 
 
 def test_the_commands_load_tell_use_and_save(file, tmp_path):
     node, saved, png = node_with_table(), str(tmp_path / "saved.csv"), tmp_path / "scale.png"
-    call = Call(["segments", "load", str(file(*GOOD)), "--rectangle", "--picture", str(png), "--", "segments", "status"], node)
+    call = Call(
+        [
+            "segments",
+            "load",
+            str(file(*GOOD)),
+            "--rectangle",
+            "--picture",
+            str(png),
+            "--",
+            "segments",
+            "status",
+        ],
+        node,
+    )
     assert call.code == 0 and call.err == "" and png.read_bytes().startswith(b"\x89PNG")
-    assert "3 segments of 1mm from 0nm on; rectangle; -100nm taken off the position; 4 points loaded" in call.out
-    assert Call("segments use linear -- segments status --json", node).told[-1]["in_force"] == "linear"
+    assert (
+        "3 segments of 1mm from 0nm on; rectangle; -100nm taken off the position; 4 points loaded"
+        in call.out
+    )
+    assert (
+        Call("segments use linear -- segments status --json", node).told[-1]["in_force"] == "linear"
+    )
     assert Call(["segments", "save", saved], node).out == f"3 segments saved in {saved}\n"
     assert read_table(saved).segments == 3
     assert "off; 4 points loaded, at most 256" in Call("segments use off", node).out
@@ -135,7 +208,9 @@ def test_the_commands_load_tell_use_and_save(file, tmp_path):
 
 def test_a_wrong_file_is_one_sentence_and_nothing_is_written(file):
     node = node_with_table()
-    assert "line 2: the position 0nm is there twice" in sentence(Call(["segments", "load", str(file("0, 0", "0, 1", "1, 1"))], node), 2)
+    assert "line 2: the position 0nm is there twice" in sentence(
+        Call(["segments", "load", str(file("0, 0", "0, 1", "1, 1"))], node), 2
+    )
     assert node.axes[0].points == [] and not node.axes[0].writes
 
 
@@ -150,7 +225,10 @@ def test_parameters_are_saved_and_loaded_with_the_table(tmp_path):
     assert "parameters and a segment table saved" in Call(["params", "save", saved], node).out
     call = Call(["params", "load", saved], other)
     assert call.code == 0 and "and a segment table loaded" in call.out
-    assert other.axes[0].points == node.axes[0].points and other.axes[0].parameters == node.axes[0].parameters
+    assert (
+        other.axes[0].points == node.axes[0].points
+        and other.axes[0].parameters == node.axes[0].parameters
+    )
     told = json.loads((tmp_path / "stage.json").read_text())
     (tmp_path / "stage.json").write_text(json.dumps({**told, "segment_points": ["1"]}))
     assert "no list of whole numbers" in sentence(Call(["params", "load", saved], other), 2)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """transport: the parity of each byte, and what a port that does not open says."""
+
 import errno
 import os
 
@@ -19,7 +20,13 @@ class FakePort:
 
     def __init__(self, name="fake", mark=True, node=None, **settings):
         self.settings, self.node, self.sync = settings, node or FakeNode(), mark
-        self.held, self.timeout, self.words, self.answers, self.is_open = "N", 0, [], bytearray(), True
+        self.held, self.timeout, self.words, self.answers, self.is_open = (
+            "N",
+            0,
+            [],
+            bytearray(),
+            True,
+        )
 
     @property
     def parity(self):
@@ -65,10 +72,13 @@ def serial_line(parity="auto", **port):
     def open_port(name, **settings):
         made.append(FakePort(name, **port, **settings))
         return made[0]
+
     return SerialBus("COM7", 1_000_000, parity, open_port), made[0]
 
 
-@pytest.mark.parametrize("mark, parity", [(True, "auto"), (True, "odd"), (False, "auto"), (False, "odd"), (True, "mark")])
+@pytest.mark.parametrize(
+    "mark, parity", [(True, "auto"), (True, "odd"), (False, "auto"), (False, "odd"), (True, "mark")]
+)
 def test_an_exchange_has_the_ninth_bit_on_command_bytes_only(mark, parity):
     line, port = serial_line(parity, mark=mark, node=FakeNode(address=7))
     assert Bus(line).axis(address=7).status().state == "off"
@@ -90,8 +100,14 @@ def test_mark_reaches_all_addresses_and_odd_parity_eight():
     line.send([0x123])
     assert port.words == [0x123]
     line, port = serial_line(mark=False)
-    assert tuple(address for address in range(1, 16) if line.reaches(address)) == ODD_ADDRESSES == (1, 2, 4, 7, 8, 11, 13, 14)
-    with pytest.raises(PortError, match="odd parity reaches only the addresses 1, 2, 4, 7, 8, 11, 13, 14"):
+    assert (
+        tuple(address for address in range(1, 16) if line.reaches(address))
+        == ODD_ADDRESSES
+        == (1, 2, 4, 7, 8, 11, 13, 14)
+    )
+    with pytest.raises(
+        PortError, match="odd parity reaches only the addresses 1, 2, 4, 7, 8, 11, 13, 14"
+    ):
         line.send([0x123])
     assert port.words == []
 
@@ -115,30 +131,47 @@ def test_mark_that_is_demanded_and_missing_is_refused():
     "error, sentence",
     [
         (
-            serial.SerialException(errno.ENOENT, "could not open port COM7: [Errno 2] No such file or directory: 'COM7'"),
+            serial.SerialException(
+                errno.ENOENT,
+                "could not open port COM7: [Errno 2] No such file or directory: 'COM7'",
+            ),
             "there is no port COM7",
         ),
         (FileNotFoundError(errno.ENOENT, "No such file or directory"), "there is no port COM7"),
-        (serial.SerialException(errno.EBUSY, "could not open port"), "the port COM7 is in use by another program"),
         (
-            serial.SerialException(errno.EAGAIN, "Could not exclusively lock port COM7: [Errno 11] Resource temporarily unavailable"),
+            serial.SerialException(errno.EBUSY, "could not open port"),
             "the port COM7 is in use by another program",
         ),
         (
-            serial.SerialException("could not open port 'COM7': PermissionError(13, 'Access is denied.', None, 5)"),
+            serial.SerialException(
+                errno.EAGAIN,
+                "Could not exclusively lock port COM7: [Errno 11] Resource temporarily unavailable",
+            ),
             "the port COM7 is in use by another program",
         ),
         (
-            serial.SerialException(errno.EACCES, "could not open port COM7: [Errno 13] Permission denied: 'COM7'"),
+            serial.SerialException(
+                "could not open port 'COM7': PermissionError(13, 'Access is denied.', None, 5)"
+            ),
+            "the port COM7 is in use by another program",
+        ),
+        (
+            serial.SerialException(
+                errno.EACCES, "could not open port COM7: [Errno 13] Permission denied: 'COM7'"
+            ),
             "no permission to use the port COM7",
         ),
         (ValueError("Not a valid baudrate: -1"), "the port COM7 cannot do 1000000 baud"),
-        (OSError(errno.EIO, "Input/output error"), "the port COM7 does not open: Input/output error"),
+        (
+            OSError(errno.EIO, "Input/output error"),
+            "the port COM7 does not open: Input/output error",
+        ),
     ],
 )
 def test_a_port_that_does_not_open_says_why_in_one_sentence(error, sentence):
     def open_port(*_, **__):
         raise error
+
     with pytest.raises(PortError) as caught:
         SerialBus("COM7", 1_000_000, open_port=open_port)
     assert str(caught.value).startswith(sentence) and "\n" not in str(caught.value)
@@ -154,6 +187,7 @@ def test_a_port_that_vanishes_is_a_port_error():
 
     def gone(_):
         raise serial.SerialException("device reports readiness to read but returned no data")
+
     port.read = gone
     with pytest.raises(PortError, match="the port COM7 failed: device reports readiness"):
         line.receive(1, 0.1)
@@ -161,7 +195,12 @@ def test_a_port_that_vanishes_is_a_port_error():
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no pseudo terminals")
 @pytest.mark.parametrize(
-    "parity, said", [("auto", "sends no parity bit"), ("odd", "sends no parity bit"), ("mark", "no MARK and SPACE parity")]
+    "parity, said",
+    [
+        ("auto", "sends no parity bit"),
+        ("odd", "sends no parity bit"),
+        ("mark", "no MARK and SPACE parity"),
+    ],
 )
 def test_a_port_that_drops_the_parity_bit_is_refused_and_not_trusted(parity, said):
     # what a pseudo terminal does
@@ -202,7 +241,9 @@ class Clock:
 
 
 def test_an_answer_with_gaps_is_read_whole_and_its_end_is_still_seen(monkeypatch):
-    """As from a USB adapter that hands over its bytes every 16 ms: all gaps together are longer than the answer may take."""
+    """As from a USB adapter that hands over its bytes every 16 ms: all gaps together are longer
+    than the answer may take.
+    """
     line, port = serial_line()
     clock, chunks = Clock(), [bytes([n]) * 3 for n in range(5)]
     monkeypatch.setattr(transport, "time", clock)
@@ -214,7 +255,10 @@ def test_an_answer_with_gaps_is_read_whole_and_its_end_is_still_seen(monkeypatch
             clock.sleep(0.001)
         taken, port.answers = bytes(port.answers[:count]), port.answers[count:]
         return taken
+
     port.read = read
     assert line.receive(100, 0.02) == [n for n in range(5) for _ in range(3)]
     assert clock.now == pytest.approx(0.016 * 5 + line.GAP_S, abs=0.005)
-    assert line.receive(1, 0.02) == [] and clock.now == pytest.approx(0.016 * 5 + line.GAP_S + 0.02, abs=0.006)
+    assert line.receive(1, 0.02) == [] and clock.now == pytest.approx(
+        0.016 * 5 + line.GAP_S + 0.02, abs=0.006
+    )

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tune: a plant is found again from its own answer, gains hold the margin they promise, and what cannot be told is refused."""
+"""tune: a plant is found again from its own answer, gains hold the margin they promise, and what
+cannot be told is refused.
+"""
+
 import io
 import math
 
@@ -15,36 +18,54 @@ TICK = 1 / 4000
 
 
 def simulated(plant, command, noise=0.0, friction=0.0, seed=1):
-    """Whole LSB at each tick, as the node would report them; written apart from the code under test."""
+    """Whole LSB at each tick, as the node would report them; written apart from the code under
+    test.
+    """
     draw = numpy.random.default_rng(seed)
     position = velocity = 0.0
     out = []
     for n in range(len(command)):
         out.append(round(position + noise * draw.standard_normal()))
-        velocity = plant.a * velocity + plant.b * (command[n - plant.delay] if n >= plant.delay else 0) - friction
+        velocity = (
+            plant.a * velocity
+            + plant.b * (command[n - plant.delay] if n >= plant.delay else 0)
+            - friction
+        )
         position += velocity
     return tune.Record(command, out, TICK)
 
 
-PLANTS = [tune.Plant(math.exp(-TICK / tau), gain * (1 - math.exp(-TICK / tau)), delay, TICK)
-          for tau, gain, delay in ((0.02, 0.05, 0), (0.005, 0.3, 1), (0.1, 1.0, 3))]
+PLANTS = [
+    tune.Plant(math.exp(-TICK / tau), gain * (1 - math.exp(-TICK / tau)), delay, TICK)
+    for tau, gain, delay in ((0.02, 0.05, 0), (0.005, 0.3, 1), (0.1, 1.0, 3))
+]
 
 
 @pytest.mark.parametrize("plant", PLANTS)
-@pytest.mark.parametrize("kind", [dict(kind="steps"), dict(kind="chirp", tick_s=TICK, low_hz=1, high_hz=800)])
+@pytest.mark.parametrize(
+    "kind", [dict(kind="steps"), dict(kind="chirp", tick_s=TICK, low_hz=1, high_hz=800)]
+)
 def test_a_plant_is_found_again(plant, kind):
-    found = tune.identify(simulated(plant, tune.excitation(3000, 8000, **kind), noise=0.3, friction=0.5))
+    found = tune.identify(
+        simulated(plant, tune.excitation(3000, 8000, **kind), noise=0.3, friction=0.5)
+    )
     assert found.delay == plant.delay
-    assert found.b == pytest.approx(plant.b, rel=0.05) and found.time_constant_s == pytest.approx(plant.time_constant_s, rel=0.15)
+    assert found.b == pytest.approx(plant.b, rel=0.05) and found.time_constant_s == pytest.approx(
+        plant.time_constant_s, rel=0.15
+    )
     assert found.resonance_hz is None
 
 
 def sampled(time_constant_s, gain, delay_s, noise=0.0, seed=1, count=128):
-    """Times, commands and positions of a continuous plant, sampled unevenly; written apart from the code under test, in small steps."""
+    """Times, commands and positions of a continuous plant, sampled unevenly; written apart from the
+    code under test, in small steps.
+    """
     draw, step = numpy.random.default_rng(seed), 5e-6
     lengths = numpy.round((0.002 + 0.0008 * draw.random(count)) / step).astype(int)
     commands = numpy.repeat(numpy.where(draw.random(count // 4 + 1) < 0.5, 6000, -6000), 4)[:count]
-    given = numpy.concatenate([numpy.zeros(round(delay_s / step)), numpy.repeat(commands, lengths)])[:lengths.sum()]
+    given = numpy.concatenate(
+        [numpy.zeros(round(delay_s / step)), numpy.repeat(commands, lengths)]
+    )[: lengths.sum()]
     position = velocity = 0.0
     track = []
     for command in given:
@@ -52,24 +73,40 @@ def sampled(time_constant_s, gain, delay_s, noise=0.0, seed=1, count=128):
         velocity += (gain * command - velocity) * step / time_constant_s
         position += velocity * step
     at = numpy.concatenate([[0], numpy.cumsum(lengths)[:-1]])
-    return at * step, commands, numpy.round(numpy.array(track)[at] + noise * draw.standard_normal(count))
+    return (
+        at * step,
+        commands,
+        numpy.round(numpy.array(track)[at] + noise * draw.standard_normal(count)),
+    )
 
 
-@pytest.mark.parametrize("time_constant_s, gain, delay_s", [(0.008, 50.0, 0.0), (0.008, 5.0, 0.0005), (0.03, 200.0, 0.001)])
+@pytest.mark.parametrize(
+    "time_constant_s, gain, delay_s",
+    [(0.008, 50.0, 0.0), (0.008, 5.0, 0.0005), (0.03, 200.0, 0.001)],
+)
 def test_a_plant_is_found_from_few_uneven_samples(time_constant_s, gain, delay_s):
     plant = tune.identify_samples(*sampled(time_constant_s, gain, delay_s, noise=1.0), TICK)
     assert plant.time_constant_s == pytest.approx(time_constant_s, rel=0.05)
-    assert plant.gain == pytest.approx(gain * TICK, rel=0.05) and plant.delay * TICK == pytest.approx(delay_s, abs=1.01 * TICK)
+    assert plant.gain == pytest.approx(
+        gain * TICK, rel=0.05
+    ) and plant.delay * TICK == pytest.approx(delay_s, abs=1.01 * TICK)
     assert plant.unexplained < 0.05
 
 
-@pytest.mark.parametrize("change, said", [
-    (dict(count=20), "20 samples are too few"), (dict(noise=1e4), "too noisy"), (dict(gain=0.0), "no motion"),
-    (dict(gain=-50.0), "moves the axis down"),
-])
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        (dict(count=20), "20 samples are too few"),
+        (dict(noise=1e4), "too noisy"),
+        (dict(gain=0.0), "no motion"),
+        (dict(gain=-50.0), "moves the axis down"),
+    ],
+)
 def test_samples_that_tell_nothing_are_refused(change, said):
     with pytest.raises(tune.NotTuned, match=said):
-        tune.identify_samples(*sampled(**{**dict(time_constant_s=0.008, gain=50.0, delay_s=0.0), **change}), TICK)
+        tune.identify_samples(
+            *sampled(**{**dict(time_constant_s=0.008, gain=50.0, delay_s=0.0), **change}), TICK
+        )
 
 
 def test_a_gain_by_hand():
@@ -77,7 +114,7 @@ def test_a_gain_by_hand():
     assert plant.gain == pytest.approx(5.0)
     assert plant.time_constant_s == pytest.approx(TICK / 0.10536, rel=1e-4)
     tuning = tune.propose(plant, 40)
-    assert (tuning.kv, tuning.ka) == (round(0.2 * 65536), 2 * 256)      # u = v / 5 + acceleration * 2
+    assert (tuning.kv, tuning.ka) == (round(0.2 * 65536), 2 * 256)  # u = v / 5 + acceleration * 2
 
 
 @pytest.mark.parametrize("plant", PLANTS)
@@ -88,7 +125,10 @@ def test_gains_hold_bandwidth_and_margin(plant, bandwidth_hz, margin):
     assert tuning.phase_margin_degree >= margin - 1.5 and tuning.gain_margin > 1.5
     assert abs(tune.open_loop(plant, tuning, bandwidth_hz)) == pytest.approx(1, rel=0.02)
     target, position = tune.step(plant, tuning, ticks=8000)
-    assert position.max() < 1.6 * target[0] and abs(position[-400:] - target[-1]).max() < 0.02 * target[-1]
+    assert (
+        position.max() < 1.6 * target[0]
+        and abs(position[-400:] - target[-1]).max() < 0.02 * target[-1]
+    )
 
 
 def test_the_servo_itself_comes_to_rest_with_these_gains():
@@ -96,15 +136,28 @@ def test_the_servo_itself_comes_to_rest_with_these_gains():
     plant = PLANTS[1]
     tuning = tune.propose(plant, 60, filters=[tune.notch(700, TICK), tune.low_pass(900, TICK)])
     servo = PidServo()
-    settings = dict(kp=tuning.kp, ki=tuning.ki, kd=tuning.kd, kv=tuning.kv, ka=tuning.ka, closed_loop=1, output_limit=32767,
-                    integral_limit=32767, filters_in_use=3)
+    settings = dict(
+        kp=tuning.kp,
+        ki=tuning.ki,
+        kd=tuning.kd,
+        kv=tuning.kv,
+        ka=tuning.ka,
+        closed_loop=1,
+        output_limit=32767,
+        integral_limit=32767,
+        filters_in_use=3,
+    )
     for section, values in enumerate(tuning.filters):
         for number, value in enumerate(values):
-            servo.clk(coefficient_write=1, coefficient_address=8 * section + number, coefficient=value)
+            servo.clk(
+                coefficient_write=1, coefficient_address=8 * section + number, coefficient=value
+            )
     position, velocity, queue = 0.0, 0.0, [0] * plant.delay
     reached = []
     for n in range(700):
-        inputs = settings | dict(target=2000 if n > 4 else 0, position=round(position), velocity=round(velocity))
+        inputs = settings | dict(
+            target=2000 if n > 4 else 0, position=round(position), velocity=round(velocity)
+        )
         valid, command, *_ = servo.clk(tick=1, **inputs)
         while not (valid and servo.ready):
             done, new, *_ = servo.clk(**inputs)
@@ -144,30 +197,42 @@ def test_filters_pass_a_constant_exactly_in_the_block(make):
     assert abs(y - 1000) <= 1
 
 
-@pytest.mark.parametrize("record, word", [
-    (tune.Record([5] * 100, [0] * 100, TICK), "too few"),
-    (tune.Record([5] * 300, [0] * 299, TICK), "one of each"),
-    (tune.Record([5] * 300, list(range(300)), TICK), "did not change"),
-    (tune.Record([5, -5] * 200, [7] * 400, TICK), "no motion"),
-    (tune.Record([32767, -32768] * 200, [0, 500] * 200, TICK), "full scale"),
-    (tune.Record([5, -5] * 200, [0, math.nan] * 200, TICK), "no numbers"),
-    (simulated(PLANTS[0], tune.excitation(1000, 50), noise=400), "too noisy"),
-    (simulated(tune.Plant(0.95, -0.01, 0, TICK), tune.excitation(1000, 8000)), "swap"),
-])
+@pytest.mark.parametrize(
+    "record, word",
+    [
+        (tune.Record([5] * 100, [0] * 100, TICK), "too few"),
+        (tune.Record([5] * 300, [0] * 299, TICK), "one of each"),
+        (tune.Record([5] * 300, list(range(300)), TICK), "did not change"),
+        (tune.Record([5, -5] * 200, [7] * 400, TICK), "no motion"),
+        (tune.Record([32767, -32768] * 200, [0, 500] * 200, TICK), "full scale"),
+        (tune.Record([5, -5] * 200, [0, math.nan] * 200, TICK), "no numbers"),
+        (simulated(PLANTS[0], tune.excitation(1000, 50), noise=400), "too noisy"),
+        (simulated(tune.Plant(0.95, -0.01, 0, TICK), tune.excitation(1000, 8000)), "swap"),
+    ],
+)
 def test_a_record_that_cannot_tell_is_refused(record, word):
     with pytest.raises(tune.NotTuned, match=word):
         tune.identify(record)
 
 
 def test_what_cannot_be_had_is_refused():
-    for plant, bandwidth, margin, word in ((PLANTS[2], 600, 60, "less bandwidth"), (PLANTS[0], 0, 50, "quarter"),
-                                           (PLANTS[0], 2000, 50, "quarter"), (PLANTS[0], 20, 90, "from 20 to 80"),
-                                           (tune.Plant(0.9, 1e-6, 0, TICK), 50, 50, "too little"),
-                                           (tune.Plant(0.9, 1e4, 0, TICK), 5, 50, "too much")):
+    for plant, bandwidth, margin, word in (
+        (PLANTS[2], 600, 60, "less bandwidth"),
+        (PLANTS[0], 0, 50, "quarter"),
+        (PLANTS[0], 2000, 50, "quarter"),
+        (PLANTS[0], 20, 90, "from 20 to 80"),
+        (tune.Plant(0.9, 1e-6, 0, TICK), 50, 50, "too little"),
+        (tune.Plant(0.9, 1e4, 0, TICK), 5, 50, "too much"),
+    ):
         with pytest.raises(tune.NotTuned, match=word):
             tune.propose(plant, bandwidth, margin)
-    for arguments in (dict(ticks=100, amplitude=5), dict(ticks=1000, amplitude=0), dict(ticks=1000, amplitude=40000),
-                      dict(ticks=1000, amplitude=5, kind="noise"), dict(ticks=1000, amplitude=5, kind="chirp")):
+    for arguments in (
+        dict(ticks=100, amplitude=5),
+        dict(ticks=1000, amplitude=0),
+        dict(ticks=1000, amplitude=40000),
+        dict(ticks=1000, amplitude=5, kind="noise"),
+        dict(ticks=1000, amplitude=5, kind="chirp"),
+    ):
         with pytest.raises(tune.NotTuned):
             tune.excitation(**arguments)
     for frequency in (0, 2000):
@@ -177,7 +242,11 @@ def test_what_cannot_be_had_is_refused():
 
 def test_steps_leave_the_axis_where_it_is_and_a_seed_repeats_them():
     steps = tune.excitation(2000, 700)
-    assert set(steps) == {700, -700} and abs(steps.sum()) <= 32 * 700 and (steps == tune.excitation(2000, 700)).all()
+    assert (
+        set(steps) == {700, -700}
+        and abs(steps.sum()) <= 32 * 700
+        and (steps == tune.excitation(2000, 700)).all()
+    )
     assert (steps != tune.excitation(2000, 700, seed=2)).any()
 
 

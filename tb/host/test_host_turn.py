@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""index, settings and their commands, against the firmware of a station with a table, a sensor and a peer port."""
+"""index, settings and their commands, against the firmware of a station with a table, a sensor and
+a peer port.
+"""
+
 import io
 import json
 import random
@@ -33,23 +36,42 @@ class Panel:
     def call(self, text):
         """Exit code, what was told, what was complained."""
         out, err = io.StringIO(), io.StringIO()
-        code = command_line.main(["--address", str(ADDRESS), *text.split()], lambda options: FakeNodeBus(self.machine), out, err)
+        code = command_line.main(
+            ["--address", str(ADDRESS), *text.split()],
+            lambda options: FakeNodeBus(self.machine),
+            out,
+            err,
+        )
         return code, out.getvalue(), err.getvalue()
 
 
 def test_an_index_ends_at_the_angle_and_tells_what_is_left():
     panel, phases = Panel(), []
     state = panel.table.turn("1deg", progress=lambda state: phases.append(state.phase))
-    assert state.phase == "idle" and state.ended == "ok" and state.target == 3600 and abs(state.left) <= Fraction(1, 2)
-    assert abs(panel.machine.error(3600)) <= 2 and {"reading", "coming_up", "closing_in"} <= set(phases)
+    assert (
+        state.phase == "idle"
+        and state.ended == "ok"
+        and state.target == 3600
+        and abs(state.left) <= Fraction(1, 2)
+    )
+    assert abs(panel.machine.error(3600)) <= 2 and {"reading", "coming_up", "closing_in"} <= set(
+        phases
+    )
     sensor = panel.table.sensor()
-    assert abs(sensor.angle - 3600) < 2 and 0 <= sensor.age_s <= Fraction(12, 1000) and not sensor.dead and sensor.frames > 50
+    assert (
+        abs(sensor.angle - 3600) < 2
+        and 0 <= sensor.age_s <= Fraction(12, 1000)
+        and not sensor.dead
+        and sensor.frames > 50
+    )
 
 
 def test_what_went_wrong_is_said_in_words():
     panel = Panel()
     panel.machine.table.blocked = True
-    with pytest.raises(MotionFailed, match="node 2 is not at 1deg: the table did not follow its steps") as failed:
+    with pytest.raises(
+        MotionFailed, match="node 2 is not at 1deg: the table did not follow its steps"
+    ) as failed:
         panel.table.turn("1deg")
     assert failed.value.cause == "stiction"
 
@@ -60,6 +82,7 @@ def test_whatever_interrupts_the_wait_stops_the_table():
     def impatient(state):
         if state.phase == "coming_up":
             raise KeyboardInterrupt
+
     with pytest.raises(KeyboardInterrupt):
         panel.table.turn("90deg", progress=impatient)
     panel.bus.transport.wait(0.5)
@@ -75,11 +98,25 @@ def test_an_angle_beyond_a_turn_never_reaches_the_line(angle):
 
 def test_settings_are_real_units_and_words():
     panel = Panel()
-    assert panel.settings.get("turn_tolerance").written() == "0.5arcsec" and panel.settings.get("peer_mode").written() == "off"
-    assert panel.settings.set("turn_allowance", "1.5arcmin").value == 90 and panel.settings.get("turn_allowance").counts == 9000
-    assert panel.settings.set("turn_settle", "0.25s").written() == "250ms" and panel.settings.set("peer_mode", "frames").counts == 2
+    assert (
+        panel.settings.get("turn_tolerance").written() == "0.5arcsec"
+        and panel.settings.get("peer_mode").written() == "off"
+    )
+    assert (
+        panel.settings.set("turn_allowance", "1.5arcmin").value == 90
+        and panel.settings.get("turn_allowance").counts == 9000
+    )
+    assert (
+        panel.settings.set("turn_settle", "0.25s").written() == "250ms"
+        and panel.settings.set("peer_mode", "frames").counts == 2
+    )
     assert panel.settings.set("turn_share", 0.7).counts == 70
-    for name, value in (("turn_share", 1), ("turn_tries", 1.5), ("peer_role", "slave"), ("sensor_zero", "360deg")):
+    for name, value in (
+        ("turn_share", 1),
+        ("turn_tries", 1.5),
+        ("peer_role", "slave"),
+        ("sensor_zero", "360deg"),
+    ):
         with pytest.raises(OutOfRange):
             panel.settings.set(name, value)
     with pytest.raises(UnknownName, match="turn_tolerance, turn_allowance"):
@@ -112,7 +149,13 @@ def test_a_node_of_the_other_image_says_that_it_was_built_without():
 def sub_node():
     """That counts its stations, with its EEPROM."""
     source = random.Random(1)
-    panel = Panel(FakeNode(Axis(), image="station", peripherals=FakePeripherals(Sensor(source, Worm(source)), PeerPort(), I2c())))
+    panel = Panel(
+        FakeNode(
+            Axis(),
+            image="station",
+            peripherals=FakePeripherals(Sensor(source, Worm(source)), PeerPort(), I2c()),
+        )
+    )
     panel.settings.load({"peer_role": "sub", "peer_mode": "printed"})
     return panel
 
@@ -131,7 +174,9 @@ def test_a_sub_node_counts_the_stations_of_its_program():
 def test_the_commands_turn_the_table_and_say_where_it_is(tmp_path):
     panel, file = Panel(), tmp_path / "station.json"
     code, out, _ = panel.call("turn to 0.5deg -- turn status")
-    assert code == 0 and "arcsec left" in out and "target 30arcmin" in out and "sensor  alive" in out
+    assert (
+        code == 0 and "arcsec left" in out and "target 30arcmin" in out and "sensor  alive" in out
+    )
     assert abs(panel.machine.error(1800)) <= 2
     code, out, err = panel.call("turn to 400deg")
     assert code == 2 and out == "" and err.count("\n") == 1 and "below 360deg" in err

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """units: known answers, what is refused and how, and random values there and back."""
+
 import random
 from fractions import Fraction
 
@@ -73,7 +74,10 @@ def test_speeds_and_their_kin_are_read():
 
 
 def test_a_wrong_speed_says_what_is_allowed():
-    with pytest.raises(UnitError, match=r"'5mm' is no speed: write a number with pm/s nm/s um/s mm/s cm/s m/s, such as 5mm/s"):
+    with pytest.raises(
+        UnitError,
+        match=r"'5mm' is no speed: write a number with pm/s nm/s um/s mm/s cm/s m/s, such as 5mm/s",
+    ):
         units.parse_speed("5mm")
 
 
@@ -95,13 +99,25 @@ def test_numbers_are_written_as_people_read_them():
 
 
 @pytest.mark.parametrize(
-    "quantity", [units.LENGTH, units.SPEED, units.ACCELERATION, units.JERK, units.TIME, units.FREQUENCY, units.NUMBER], ids=lambda q: q.name
+    "quantity",
+    [
+        units.LENGTH,
+        units.SPEED,
+        units.ACCELERATION,
+        units.JERK,
+        units.TIME,
+        units.FREQUENCY,
+        units.NUMBER,
+    ],
+    ids=lambda q: q.name,
 )
 def test_any_value_comes_back_from_its_exact_text(quantity):
     print("SEED", SEED)
     source = random.Random(SEED)
     for _ in range(500):
-        value = Fraction(source.randrange(-2**48, 2**48), 2 ** source.randrange(40)) * Fraction(10) ** source.randrange(-6, 7)
+        value = Fraction(source.randrange(-(2**48), 2**48), 2 ** source.randrange(40)) * Fraction(
+            10
+        ) ** source.randrange(-6, 7)
         text = units.with_unit(quantity, value)
         assert quantity.parse(text) == value, text
 
@@ -110,7 +126,9 @@ def test_any_text_is_a_value_or_a_clear_refusal():
     print("SEED", SEED)
     source, refusals = random.Random(SEED), []
     for _ in range(3000):
-        text = "".join(source.choice("0123456789.-+eE munp/s ") for _ in range(source.randrange(1, 9)))
+        text = "".join(
+            source.choice("0123456789.-+eE munp/s ") for _ in range(source.randrange(1, 9))
+        )
         try:
             units.parse_length(text)
         except UnitError as refused:
@@ -118,8 +136,17 @@ def test_any_text_is_a_value_or_a_clear_refusal():
     assert 0 < len(refusals) < 3000 and all("such as" in words for words in refusals)
 
 
-@pytest.mark.parametrize("text, share", [("50%", Fraction(1, 2)), ("0%", 0), ("100 %", 1),
-                                         ("0.25", Fraction(1, 4)), (1, 1), (0.5, Fraction(1, 2))])
+@pytest.mark.parametrize(
+    "text, share",
+    [
+        ("50%", Fraction(1, 2)),
+        ("0%", 0),
+        ("100 %", 1),
+        ("0.25", Fraction(1, 4)),
+        (1, 1),
+        (0.5, Fraction(1, 2)),
+    ],
+)
 def test_a_share_is_a_percentage_or_a_part_of_one(text, share):
     assert units.parse_share(text) == share
 

@@ -1,12 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/interlock/drive_interlock.sv does, in integers: clk(...) is one clk and returns what is on the pins after it."""
+"""What rtl/interlock/drive_interlock.sv does, in integers: clk(...) is one clk and returns what is
+on the pins after it.
+"""
 
-(LIMIT_LOW, LIMIT_HIGH, ESTOP, FOLLOWING_ERROR, ENCODER, BUS_WATCHDOG, DRIVE, CPU, PROFILE_UNDERRUN,
- STEP_OVERRUN) = (1 << n for n in range(10))
+(
+    LIMIT_LOW,
+    LIMIT_HIGH,
+    ESTOP,
+    FOLLOWING_ERROR,
+    ENCODER,
+    BUS_WATCHDOG,
+    DRIVE,
+    CPU,
+    PROFILE_UNDERRUN,
+    STEP_OVERRUN,
+) = (1 << n for n in range(10))
 LATCH_ALWAYS = ESTOP | DRIVE | CPU
 
-INPUTS = dict.fromkeys("""enable_request closed_loop homing reset_faults limit_low limit_high estop drive_fault encoder_fault
-    watchdog_expired cpu_trap profile_underrun step_overrun following_limit error_valid error position valid_in command_in""".split(), 0)
+INPUTS = dict.fromkeys(
+    """enable_request closed_loop homing reset_faults limit_low limit_high estop drive_fault encoder_fault
+    watchdog_expired cpu_trap profile_underrun step_overrun following_limit error_valid error position valid_in command_in""".split(),
+    0,
+)
 
 
 class DriveInterlock:
@@ -18,25 +33,47 @@ class DriveInterlock:
         self.faults = self.first_fault = self.fault_position = 0
 
     def causes(self, i):
-        standing = (i["limit_low"] and not i["homing"], i["limit_high"] and not i["homing"], i["estop"], self.too_far,
-                    i["encoder_fault"], i["watchdog_expired"], i["drive_fault"], i["cpu_trap"], i["profile_underrun"], i["step_overrun"])
+        standing = (
+            i["limit_low"] and not i["homing"],
+            i["limit_high"] and not i["homing"],
+            i["estop"],
+            self.too_far,
+            i["encoder_fault"],
+            i["watchdog_expired"],
+            i["drive_fault"],
+            i["cpu_trap"],
+            i["profile_underrun"],
+            i["step_overrun"],
+        )
         return sum(1 << n for n, cause in enumerate(standing) if cause)
 
     def clk(self, rst=0, **inputs):
-        """Missing inputs are 0. causes_now, block_up and block_down are seen with the inputs of this clk, after it."""
+        """Missing inputs are 0. causes_now, block_up and block_down are seen with the inputs of
+        this clk, after it.
+        """
         i = INPUTS | inputs
         if rst:
             self.reset()
         else:
             self.step(i)
-        return dict(valid_out=self.valid_out, command_out=self.command, enabled=self.enabled, faults=self.faults,
-                    causes_now=self.causes(i), first_fault=self.first_fault, fault_position=self.fault_position,
-                    block_up=int(i["limit_high"] or not self.enabled), block_down=int(i["limit_low"] or not self.enabled))
+        return dict(
+            valid_out=self.valid_out,
+            command_out=self.command,
+            enabled=self.enabled,
+            faults=self.faults,
+            causes_now=self.causes(i),
+            first_fault=self.first_fault,
+            fault_position=self.fault_position,
+            block_up=int(i["limit_high"] or not self.enabled),
+            block_down=int(i["limit_low"] or not self.enabled),
+        )
 
     def step(self, i):
         causes = self.causes(i)
         arrived = causes if i["enable_request"] else causes & LATCH_ALWAYS
-        kept = self.faults & causes if i["reset_faults"] and not i["enable_request"] else self.faults
+        kept = (
+            self.faults & causes if i["reset_faults"] and not i["enable_request"] else self.faults
+        )
         if not kept:
             self.first_fault = arrived & -arrived
             if arrived:
@@ -51,6 +88,8 @@ class DriveInterlock:
         self.enabled = int(i["enable_request"] and not self.faults)
 
         asked = i["command_in"] if i["valid_in"] else self.command
-        blocked = not self.enabled or (i["limit_high"] and asked > 0) or (i["limit_low"] and asked < 0)
+        blocked = (
+            not self.enabled or (i["limit_high"] and asked > 0) or (i["limit_low"] and asked < 0)
+        )
         self.valid_out = int(i["valid_in"] or (blocked and self.command != 0))
         self.command = 0 if blocked else asked

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""drive_interlock: every cause, how a fault may and may not go, the limit switches, and random inputs against the model."""
+"""drive_interlock: every cause, how a fault may and may not go, the limit switches, and random
+inputs against the model.
+"""
+
 import random
 
 import cocotb
@@ -21,9 +24,17 @@ from tb.interlock.drive_interlock import (
     DriveInterlock,
 )
 
-CAUSES = dict(limit_low=LIMIT_LOW, limit_high=LIMIT_HIGH, estop=ESTOP, encoder_fault=ENCODER, watchdog_expired=BUS_WATCHDOG,
-              drive_fault=DRIVE, cpu_trap=CPU, profile_underrun=PROFILE_UNDERRUN,
-              step_overrun=STEP_OVERRUN)
+CAUSES = dict(
+    limit_low=LIMIT_LOW,
+    limit_high=LIMIT_HIGH,
+    estop=ESTOP,
+    encoder_fault=ENCODER,
+    watchdog_expired=BUS_WATCHDOG,
+    drive_fault=DRIVE,
+    cpu_trap=CPU,
+    profile_underrun=PROFILE_UNDERRUN,
+    step_overrun=STEP_OVERRUN,
+)
 ALWAYS = ("estop", "drive_fault", "cpu_trap")
 SIGNED = ("command_out", "fault_position")
 HIGH, LOW = (1 << 15) - 1, -1 << 15
@@ -49,8 +60,10 @@ class Guard:
         await RisingEdge(self.dut.clk)
         await ReadOnly()
         want = self.model.clk(rst, **self.inputs)
-        self.out = {name: port.value.to_signed() if name in SIGNED else int(port.value)
-                    for name, port in ((name, getattr(self.dut, name)) for name in want)}
+        self.out = {
+            name: port.value.to_signed() if name in SIGNED else int(port.value)
+            for name, port in ((name, getattr(self.dut, name)) for name in want)
+        }
         assert self.out == want, f"{self.inputs}: the pins are {self.out}, the model has {want}"
         await FallingEdge(self.dut.clk)
         self.inputs.update(reset_faults=0, error_valid=0, valid_in=0, profile_underrun=0)
@@ -74,10 +87,24 @@ async def the_drive_is_off_one_clk_after_any_cause(dut):
         assert await guard.command(1234) == 1234
         position = random.randrange(-1 << 47, 1 << 47)
         out = await guard.clk(**{name: 1}, position=position)
-        assert (out["enabled"], out["faults"], out["first_fault"], out["fault_position"]) == (0, bit, bit, position)
-        assert (out["command_out"], out["valid_out"], out["block_up"], out["block_down"]) == (0, 1, 1, 1)
+        assert (out["enabled"], out["faults"], out["first_fault"], out["fault_position"]) == (
+            0,
+            bit,
+            bit,
+            position,
+        )
+        assert (out["command_out"], out["valid_out"], out["block_up"], out["block_down"]) == (
+            0,
+            1,
+            1,
+            1,
+        )
         out = await guard.clk(**{name: 0}, position=0)
-        assert (out["enabled"], out["faults"], out["fault_position"]) == (0, bit, position)          # latched
+        assert (out["enabled"], out["faults"], out["fault_position"]) == (
+            0,
+            bit,
+            position,
+        )  # latched
 
 
 @cocotb.test()
@@ -86,17 +113,17 @@ async def a_fault_goes_only_by_reset_with_the_request_gone_and_the_cause_gone(du
     for name, bit in CAUSES.items():
         await guard.enable()
         await guard.clk(**{name: 1})
-        strobe = name == "profile_underrun"             # gone by itself
-        assert (await guard.clk(reset_faults=1))["faults"] == bit                                # requested, cause stands
+        strobe = name == "profile_underrun"  # gone by itself
+        assert (await guard.clk(reset_faults=1))["faults"] == bit  # requested, cause stands
         assert (await guard.clk(enable_request=0))["faults"] == bit
         if not strobe:
-            assert (await guard.clk(reset_faults=1))["faults"] == bit                            # cause stands
+            assert (await guard.clk(reset_faults=1))["faults"] == bit  # cause stands
         assert (await guard.clk(enable_request=1, **{name: 0}))["faults"] == bit
-        assert (await guard.clk(reset_faults=1))["faults"] == bit                                # requested
+        assert (await guard.clk(reset_faults=1))["faults"] == bit  # requested
         assert (await guard.clk(enable_request=0))["faults"] == bit
         out = await guard.clk(reset_faults=1)
         assert (out["faults"], out["first_fault"], out["enabled"]) == (0, 0, 0)
-        assert (await guard.clk())["enabled"] == 0                                               # nothing restarts by itself
+        assert (await guard.clk())["enabled"] == 0  # nothing restarts by itself
         assert (await guard.clk(enable_request=1))["enabled"] == 1
 
 
@@ -130,12 +157,16 @@ async def the_first_fault_is_kept_and_of_several_at_once_the_lowest(dut):
     out = await guard.clk(drive_fault=1, encoder_fault=1, position=77)
     assert (out["faults"], out["first_fault"]) == (ENCODER | DRIVE, ENCODER)
     out = await guard.clk(limit_low=1, position=88)
-    assert (out["faults"], out["first_fault"], out["fault_position"]) == (ENCODER | DRIVE | LIMIT_LOW, ENCODER, 77)
+    assert (out["faults"], out["first_fault"], out["fault_position"]) == (
+        ENCODER | DRIVE | LIMIT_LOW,
+        ENCODER,
+        77,
+    )
     await guard.clk(enable_request=0, encoder_fault=0)
-    out = await guard.clk(reset_faults=1)               # the others stand
+    out = await guard.clk(reset_faults=1)  # the others stand
     assert (out["faults"], out["first_fault"]) == (DRIVE | LIMIT_LOW, ENCODER)
     await guard.clk(limit_low=0, drive_fault=0)
-    out = await guard.clk(reset_faults=1, estop=1, position=-5)                                  # a new one in the clk of the reset
+    out = await guard.clk(reset_faults=1, estop=1, position=-5)  # a new one in the clk of the reset
     assert (out["faults"], out["first_fault"], out["fault_position"]) == (ESTOP, ESTOP, -5)
 
 
@@ -143,14 +174,21 @@ async def the_first_fault_is_kept_and_of_several_at_once_the_lowest(dut):
 async def no_command_into_a_pressed_switch_passes(dut):
     guard = await Guard(dut).reset()
     await guard.clk(homing=1)
-    for switch, into, away in (("limit_high", HIGH, LOW), ("limit_high", 1, -1), ("limit_low", LOW, HIGH), ("limit_low", -1, 1)):
+    for switch, into, away in (
+        ("limit_high", HIGH, LOW),
+        ("limit_high", 1, -1),
+        ("limit_low", LOW, HIGH),
+        ("limit_low", -1, 1),
+    ):
         await guard.enable()
         for command in (into, away, 0):
             assert await guard.command(command) == command
         assert await guard.command(into) == into
-        out = await guard.clk(**{switch: 1})            # pressed on the way: zero in one clk, and told
+        out = await guard.clk(**{switch: 1})  # pressed on the way: zero in one clk, and told
         assert (out["command_out"], out["valid_out"], out["enabled"], out["faults"]) == (0, 1, 1, 0)
-        assert (out["block_up"], out["block_down"]) == ((1, 0) if switch == "limit_high" else (0, 1))
+        assert (out["block_up"], out["block_down"]) == (
+            (1, 0) if switch == "limit_high" else (0, 1)
+        )
         assert (await guard.clk())["valid_out"] == 0
         assert await guard.command(into) == 0
         assert await guard.command(away) == away
@@ -158,7 +196,7 @@ async def no_command_into_a_pressed_switch_passes(dut):
         assert out["command_out"] == away
         await guard.command(into)
         await guard.clk(**{switch: 1})
-        assert (await guard.clk(**{switch: 0}))["command_out"] == 0                              # zero until the next command
+        assert (await guard.clk(**{switch: 0}))["command_out"] == 0  # zero until the next command
 
 
 @cocotb.test()
@@ -168,11 +206,11 @@ async def a_limit_switch_is_a_fault_unless_homing(dut):
         await guard.enable()
         out = await guard.clk(homing=1, **{switch: 1})
         assert (out["enabled"], out["faults"], out["causes_now"]) == (1, 0, 0)
-        out = await guard.clk(homing=0)                 # still on the switch
+        out = await guard.clk(homing=0)  # still on the switch
         assert (out["enabled"], out["faults"], out["causes_now"]) == (0, bit, bit)
         await guard.clk(enable_request=0)
         assert (await guard.clk(reset_faults=1))["faults"] == bit
-        await guard.clk(homing=1)                       # the way off a switch
+        await guard.clk(homing=1)  # the way off a switch
         assert (await guard.clk(reset_faults=1))["faults"] == 0
         assert (await guard.clk(enable_request=1))["enabled"] == 1
         await guard.clk(homing=0, **{switch: 0})
@@ -189,15 +227,25 @@ async def measure(guard, error, times=2):
 async def the_following_error_is_checked_against_its_limit(dut):
     guard = await Guard(dut).reset()
     top, bottom = (1 << 31) - 1, -1 << 31
-    for limit, good, bad in ((1, 1, 2), (100, -100, 101), (100, 100, -101), (top, top, bottom), (top - 1, 1 - top, top)):
+    for limit, good, bad in (
+        (1, 1, 2),
+        (100, -100, 101),
+        (100, 100, -101),
+        (top, top, bottom),
+        (top - 1, 1 - top, top),
+    ):
         await guard.enable()
         await guard.clk(closed_loop=1, following_limit=limit)
         assert await measure(guard, good, 5) == 0
         assert await measure(guard, bad, 1) == FOLLOWING_ERROR
-    for setting in (dict(following_limit=0), dict(following_limit=1, closed_loop=0), dict(closed_loop=1, following_limit=1 << 31)):
+    for setting in (
+        dict(following_limit=0),
+        dict(following_limit=1, closed_loop=0),
+        dict(closed_loop=1, following_limit=1 << 31),
+    ):
         await guard.enable()
         await guard.clk(**setting)
-        assert await measure(guard, bottom, 5) == 0     # off; open loop; as large as it gets
+        assert await measure(guard, bottom, 5) == 0  # off; open loop; as large as it gets
 
 
 @cocotb.test()
@@ -206,9 +254,11 @@ async def an_error_measured_before_the_drive_was_on_does_not_count(dut):
     await guard.clk(closed_loop=1, following_limit=10)
     await measure(guard, 5000, 3)
     await guard.enable()
-    assert await measure(guard, 5000, 1) == 0           # may have been taken before
+    assert await measure(guard, 5000, 1) == 0  # may have been taken before
     assert await measure(guard, 5000, 1) == FOLLOWING_ERROR
-    assert (await guard.clk())["causes_now"] == 0       # the drive is off: nothing stands in the way of a reset
+    assert (await guard.clk())[
+        "causes_now"
+    ] == 0  # the drive is off: nothing stands in the way of a reset
 
 
 @cocotb.test()
@@ -242,11 +292,21 @@ async def reset_in_mid_flow(dut):
     await guard.command(999)
     await guard.clk(estop=1, position=5)
     out = await guard.clk(rst=1, estop=0, enable_request=0)
-    assert not any(out[name] for name in ("enabled", "faults", "first_fault", "fault_position", "command_out", "valid_out"))
+    assert not any(
+        out[name]
+        for name in (
+            "enabled",
+            "faults",
+            "first_fault",
+            "fault_position",
+            "command_out",
+            "valid_out",
+        )
+    )
     await guard.enable()
     out = await guard.clk(rst=1)
     assert out["enabled"] == 0
-    assert (await guard.clk())["enabled"] == 1          # the request still stands and no fault was latched
+    assert (await guard.clk())["enabled"] == 1  # the request still stands and no fault was latched
 
 
 @cocotb.test()
@@ -254,9 +314,15 @@ async def any_inputs_match_the_model(dut):
     guard = await Guard(dut).reset()
     rare = lambda one_in: int(random.randrange(one_in) == 0)
     for _ in range(12_000):
-        inputs = dict(reset_faults=rare(8), valid_in=rare(3), command_in=random.choice((HIGH, LOW, 0, random.randrange(LOW, HIGH))),
-                      error_valid=rare(4), error=random.choice((0, -3, random.randrange(-1 << 31, 1 << 31))),
-                      position=random.randrange(-1 << 47, 1 << 47), profile_underrun=rare(150))
+        inputs = dict(
+            reset_faults=rare(8),
+            valid_in=rare(3),
+            command_in=random.choice((HIGH, LOW, 0, random.randrange(LOW, HIGH))),
+            error_valid=rare(4),
+            error=random.choice((0, -3, random.randrange(-1 << 31, 1 << 31))),
+            position=random.randrange(-1 << 47, 1 << 47),
+            profile_underrun=rare(150),
+        )
         for name in (*CAUSES, "enable_request", "closed_loop", "homing"):
             if name != "profile_underrun" and rare(40):
                 inputs[name] = rare(5) if name in CAUSES else random.getrandbits(1)

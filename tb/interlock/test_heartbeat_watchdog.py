@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""heartbeat_watchdog: to the clk, both ends of the time, what clears it, and random events against the model."""
+"""heartbeat_watchdog: to the clk, both ends of the time, what clears it, and random events against
+the model.
+"""
+
 import random
 
 import cocotb
@@ -9,14 +12,18 @@ from cocotb.triggers import FallingEdge, RisingEdge, Timer
 from tb.bench import needs, run, start
 from tb.interlock.heartbeat_watchdog import HeartbeatWatchdog
 
-CLK_NS = 10                             # as start() makes it
+CLK_NS = 10  # as start() makes it
 
 
 class Watchdog:
     """The design with the model beside it in every cycle."""
 
     def __init__(self, dut):
-        self.dut, self.model, self.clk_ms = dut, HeartbeatWatchdog(int(dut.CLK_HZ.value)), int(dut.CLK_HZ.value) // 1000
+        self.dut, self.model, self.clk_ms = (
+            dut,
+            HeartbeatWatchdog(int(dut.CLK_HZ.value)),
+            int(dut.CLK_HZ.value) // 1000,
+        )
         self.inputs = dict(time_ms=0, kick=0, armed=0)
 
     async def reset(self, **inputs):
@@ -77,7 +84,7 @@ async def a_new_time_counts_at_once(dut):
     for _ in range(10 * watchdog.clk_ms):
         assert not await watchdog.clk()
     assert await watchdog.clk(time_ms=5)
-    assert await watchdog.clk(time_ms=1000)             # stays until a frame comes
+    assert await watchdog.clk(time_ms=1000)  # stays until a frame comes
     assert not await watchdog.clk(kick=1)
 
 
@@ -100,7 +107,7 @@ async def time_0_is_for_ever_and_65535_ms_is_the_longest(dut):
     await Timer(5 * CLK_NS, "ns")
     await FallingEdge(dut.clk)
     assert not dut.expired.value
-    dut.time_ms.value = 65535                           # a time that has passed already
+    dut.time_ms.value = 65535  # a time that has passed already
     await RisingEdge(dut.clk)
     await FallingEdge(dut.clk)
     assert dut.expired.value
@@ -120,8 +127,12 @@ async def reset_in_mid_flow(dut):
 async def any_events_match_the_model(dut):
     watchdog = await Watchdog(dut).reset()
     for _ in range(6000):
-        await watchdog.clk(rst=random.randrange(500) == 0, kick=int(random.randrange(40) == 0),
-                           armed=int(random.randrange(60) > 0), time_ms=random.choice((0, 1, 2, 3, 8)))
+        await watchdog.clk(
+            rst=random.randrange(500) == 0,
+            kick=int(random.randrange(40) == 0),
+            armed=int(random.randrange(60) > 0),
+            time_ms=random.choice((0, 1, 2, 3, 8)),
+        )
 
 
 @pytest.mark.parametrize("clk_hz", [1000, 3000])

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/interpolate/arctan_iterative.sv does, in integers: sample() is one sample, ArctanIterative.step() one clk."""
+"""What rtl/interpolate/arctan_iterative.sv does, in integers: sample() is one sample,
+ArctanIterative.step() one clk.
+"""
+
 from functools import cache
 
 from tables import arctan_rotation
@@ -14,7 +17,9 @@ def angles(w):
     """Of each digit, from 1 on."""
     turns, digits, _, guard = arctan_rotation.ITERATIVE[w]
     first = arctan_rotation.entry(turns, 1, 0, 1, guard) - (1 << guard - 1)
-    return [None, first] + [arctan_rotation.entry(turns, digit, 0, 1, guard) for digit in range(2, digits + 1)]
+    return [None, first] + [
+        arctan_rotation.entry(turns, digit, 0, 1, guard) for digit in range(2, digits + 1)
+    ]
 
 
 def sample(w, sin, cos):
@@ -25,7 +30,7 @@ def sample(w, sin, cos):
     steep = abs(sin) > abs(cos)
     y, x = sorted((abs(sin), abs(cos)))
     turned = steep ^ (sin < 0) ^ (cos < 0)
-    longer, shorter = x << f, (y << f) - 1                                  # shorter is less by 1 than it is
+    longer, shorter = x << f, (y << f) - 1  # shorter is less by 1 than it is
     angle = ((sin < 0 if steep else cos < 0) << 15 | steep << 14) << guard | 1 << guard - 1
     for digit in range(1, digits + 1):
         negative = shorter < 0 and digit > 1

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/interpolate/arctan_pipelined.sv does, in integers: sample() is one sample, ArctanPipelined.step() one clk."""
+"""What rtl/interpolate/arctan_pipelined.sv does, in integers: sample() is one sample,
+ArctanPipelined.step() one clk.
+"""
+
 from collections import deque
 from functools import cache
 
@@ -19,8 +22,14 @@ def moved(value, places):
 def sums(w):
     """(first, count, entries) of each sum of angles."""
     turns, digits, _, guard = arctan_rotation.PIPELINED[w]
-    return [(first, count, [arctan_rotation.entry(turns, first, n, count, guard) for n in range(1 << count)])
-            for first, count in arctan_rotation.groups(digits)]
+    return [
+        (
+            first,
+            count,
+            [arctan_rotation.entry(turns, first, n, count, guard) for n in range(1 << count)],
+        )
+        for first, count in arctan_rotation.groups(digits)
+    ]
 
 
 def sample(w, sin, cos):
@@ -31,10 +40,18 @@ def sample(w, sin, cos):
     steep = 2 * abs(sin) - (sin < 0) > 2 * abs(cos) - (cos < 0)
     y, x = sorted((abs(sin), abs(cos)))
     found = [steep ^ (sin < 0) ^ (cos < 0)]
-    longer, shorter, x_bits, y_bits = 2 * x + y, 2 * y - x - 1, 1, 0        # bits behind the point; shorter is less by 1 than it is
+    longer, shorter, x_bits, y_bits = (
+        2 * x + y,
+        2 * y - x - 1,
+        1,
+        0,
+    )  # bits behind the point; shorter is less by 1 than it is
     for digit in range(2, digits):
         negative = shorter < 0
-        rest, one = ~shorter if negative else shorter, int(not negative)    # rest + one is the shorter leg without its sign
+        rest, one = (
+            ~shorter if negative else shorter,
+            int(not negative),
+        )  # rest + one is the shorter leg without its sign
         found.append(found[-1] ^ negative)
         new_y_bits = min(head - digit - 1, max(y_bits - 1, x_bits))
         up = new_y_bits - y_bits + 1
@@ -43,14 +60,20 @@ def sample(w, sin, cos):
         if digit <= turns:
             new_x_bits = min(head - digit - 2, max(x_bits, y_bits + 2 * digit - 1))
             down = y_bits + 2 * digit - 1 - new_x_bits
-            longer = moved(longer, new_x_bits - x_bits) + (rest >> down) + (rest >> down - 1 & 1 if down else one)
+            longer = (
+                moved(longer, new_x_bits - x_bits)
+                + (rest >> down)
+                + (rest >> down - 1 & 1 if down else one)
+            )
             x_bits = new_x_bits
         shorter, y_bits = doubled - taken - less, new_y_bits
     found.append(found[-1] ^ (shorter < 0))
 
     angle = ((sin < 0 if steep else cos < 0) << 15 | steep << 14) << guard
     for first, count, entries in sums(w):
-        angle += entries[sum(negative << j for j, negative in enumerate(found[first - 1:first - 1 + count]))]
+        angle += entries[
+            sum(negative << j for j, negative in enumerate(found[first - 1 : first - 1 + count]))
+        ]
     halves = longer >> x_bits - 1
     size = halves - ((halves >> 3) + (halves >> 6) + (halves >> 11)) >> 1
     return (angle >> guard) % (1 << 16), size

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/interpolate/arctan_table.sv does, in integers: phase_of() is one sample, ArctanTable.step() one clk."""
-
+"""What rtl/interpolate/arctan_table.sv does, in integers: phase_of() is one sample,
+ArctanTable.step() one clk.
+"""
 
 from tables import arctan
 
@@ -10,7 +11,9 @@ LATENCY = 23
 def phase_of(sin, cos):
     smaller, larger = sorted((abs(sin), abs(cos)))
     index, along = divmod((smaller << arctan.RATIO) // max(larger, 1), 1 << arctan.FRACTION)
-    phase = ((arctan.BASE[index] << arctan.FRACTION) + arctan.SLOPE[index] * along) >> arctan.GUARD + arctan.FRACTION
+    phase = (
+        (arctan.BASE[index] << arctan.FRACTION) + arctan.SLOPE[index] * along
+    ) >> arctan.GUARD + arctan.FRACTION
     if abs(sin) > abs(cos):
         phase = (1 << 14) - phase
     if cos < 0:

@@ -3,16 +3,39 @@
 
 
 class CalibrationRecorder:
-    """step() returns (word, full, invalid) as they are after the clk; word is None until that place has been written."""
+    """step() returns (word, full, invalid) as they are after the clk; word is None until that place
+    has been written.
+    """
 
     def __init__(self, w=8, depth=1024):
         self.w, self.depth, self.burst = w, depth, [None] * depth
         self.begin()
 
     def begin(self, recording=False):
-        self.recording, self.full, self.invalid, self.kept, self.next, self.left, self.earlier = recording, 0, 0, 0, 0, 0, None
+        self.recording, self.full, self.invalid, self.kept, self.next, self.left, self.earlier = (
+            recording,
+            0,
+            0,
+            0,
+            0,
+            0,
+            None,
+        )
 
-    def step(self, start=0, phases=0, decimation=1, sampled=0, sin=0, cos=0, phase_valid=0, phase=0, disturbed=0, read=0, rst=0):
+    def step(
+        self,
+        start=0,
+        phases=0,
+        decimation=1,
+        sampled=0,
+        sin=0,
+        cos=0,
+        phase_valid=0,
+        phase=0,
+        disturbed=0,
+        read=0,
+        rst=0,
+    ):
         word, was_full = self.burst[self.next], self.full
         if self.recording:
             self.invalid |= disturbed
@@ -24,7 +47,11 @@ class CalibrationRecorder:
                     if phases and self.earlier is None:
                         self.earlier = phase
                     else:
-                        high, low = (phase, self.earlier) if phases else (cos << shift & 0xFFFF, sin << shift & 0xFFFF)
+                        high, low = (
+                            (phase, self.earlier)
+                            if phases
+                            else (cos << shift & 0xFFFF, sin << shift & 0xFFFF)
+                        )
                         self.burst[self.kept] = high << 16 | low
                         self.kept, self.earlier = self.kept + 1, None
                     if self.kept == self.depth:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/interpolate/harmonic_correction.sv does: corrected(phase, table) is a phase, HarmonicCorrection.step one clk."""
+"""What rtl/interpolate/harmonic_correction.sv does: corrected(phase, table) is a phase,
+HarmonicCorrection.step one clk.
+"""
 
 LATENCY = 4
 POINTS = 256
@@ -26,7 +28,11 @@ class HarmonicCorrection:
         """`write` is None or (point, value)."""
         self.page ^= swap
         self.swapped |= bool(swap)
-        self.flow.append((corrected(phase, self.tables[self.page]) if enable and self.swapped else phase) if valid else None)
+        self.flow.append(
+            (corrected(phase, self.tables[self.page]) if enable and self.swapped else phase)
+            if valid
+            else None
+        )
         if write:
             self.tables[self.page ^ 1][write[0]] = write[1]
         if rst:

@@ -1,22 +1,29 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the tests of the arctans share: the true phase, the pairs on which rounding is decided, and the plan as the RTL has it."""
+"""What the tests of the arctans share: the true phase, the pairs on which rounding is decided, and
+the plan as the RTL has it.
+"""
+
 import math
 import re
 from itertools import product
 
 import numpy as np
 
-LSB = 65536 / math.tau                                  # a radian
+LSB = 65536 / math.tau  # a radian
 
 
 def error(phase, sin, cos):
-    """LSB from the true phase. A double is out by 1e-11 LSB here; no tie of 8, 9 or 10 bits is nearer than 2e-5."""
+    """LSB from the true phase. A double is out by 1e-11 LSB here; no tie of 8, 9 or 10 bits is
+    nearer than 2e-5.
+    """
     away = phase - math.atan2(sin, cos) * LSB
     return away - round(away / 65536) * 65536
 
 
 def close_calls(w, allowed):
-    """All pairs whose true phase is nearer to a tie than an arctan may be wrong there: allowed(radius) is its bound less one half."""
+    """All pairs whose true phase is nearer to a tie than an arctan may be wrong there:
+    allowed(radius) is its bound less one half.
+    """
     leg = np.arange(-1 << w - 1, 1 << w - 1)
     sin, cos = (a.ravel() for a in np.meshgrid(leg, leg))
     true, radius = np.arctan2(sin, cos) * LSB, np.hypot(sin, cos)
@@ -25,8 +32,13 @@ def close_calls(w, allowed):
 
 
 def turned(smaller, larger, octant, largest):
-    """The pair in another octant: legs exchanged and negated as the bits say; `largest` has only a negative."""
-    first, second = (-leg if leg == largest or octant >> bit & 1 else leg for bit, leg in enumerate((smaller, larger)))
+    """The pair in another octant: legs exchanged and negated as the bits say; `largest` has only a
+    negative.
+    """
+    first, second = (
+        -leg if leg == largest or octant >> bit & 1 else leg
+        for bit, leg in enumerate((smaller, larger))
+    )
     return (second, first) if octant & 4 else (first, second)
 
 

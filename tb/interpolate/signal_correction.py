@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/interpolate/signal_correction.sv does: corrected(sin, cos, ...) is a sample, SignalCorrection.step one clk."""
+"""What rtl/interpolate/signal_correction.sv does: corrected(sin, cos, ...) is a sample,
+SignalCorrection.step one clk.
+"""
+
 from typing import NamedTuple
 
 LATENCY = 3
 
 
 class Settings(NamedTuple):
-    sin_offset: int = 0         # full scale 2^15
+    sin_offset: int = 0  # full scale 2^15
     cos_offset: int = 0
-    gain: int = 1 << 16         # 1.0 = 2^16
+    gain: int = 1 << 16  # 1.0 = 2^16
     quadrature_error: int = 0
 
 
@@ -18,8 +21,13 @@ def held(channel):
 
 def corrected(sin, cos, settings, w=8):
     """(sin_out, cos_out) of a sample of w bits."""
-    sin_channel, cos_channel = (sin << 16 - w) - settings.sin_offset, (cos << 16 - w) - settings.cos_offset
-    return held(sin_channel * settings.gain + cos_channel * settings.quadrature_error + 65536 >> 17), held(cos_channel + 1 >> 1)
+    sin_channel, cos_channel = (
+        (sin << 16 - w) - settings.sin_offset,
+        (cos << 16 - w) - settings.cos_offset,
+    )
+    return held(
+        sin_channel * settings.gain + cos_channel * settings.quadrature_error + 65536 >> 17
+    ), held(cos_channel + 1 >> 1)
 
 
 class SignalCorrection:
@@ -37,7 +45,8 @@ class SignalCorrection:
         if rst:
             self.reset()
             return 0, 0, 0
-        # an offset acts on the sample of its clk; the factors multiply one clk later, so they too act from that sample on
+        # an offset acts on the sample of its clk; the factors multiply one clk later, so they too
+        # act from that sample on
         self.settings = load or self.settings
         self.flow.append(corrected(sin, cos, self.settings, self.w) if valid else None)
         ready = self.flow.pop(0)

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""arctan_iterative: by hand, its latency, samples that come too soon, every clk against the model; the model against math.atan2.
+"""arctan_iterative: by hand, its latency, samples that come too soon, every clk against the model;
+the model against math.atan2.
 
-All 8-bit pairs: the model for every pair; the RTL against it for all of them under SIM=verilator, under Icarus for every fourth
-pair of one octant, turned into the octant whose turn it is. For 9 and 10 bits every pair that the bound leaves open.
+All 8-bit pairs: the model for every pair; the RTL against it for all of them under SIM=verilator,
+under Icarus for every fourth
+pair of one octant, turned into the octant whose turn it is. For 9 and 10 bits every pair that the
+bound leaves open.
 """
+
 import math
 import random
 from itertools import product
@@ -45,17 +49,23 @@ async def ask(dut, sin, cos):
 async def the_octant_borders_are_exact(dut):
     full = 1 << await begin(dut) - 1
     for size in (full // 4, full // 2, full - 1):
-        for eighth, (sin, cos) in enumerate([(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)]):
+        for eighth, (sin, cos) in enumerate(
+            [(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)]
+        ):
             assert (await ask(dut, sin * size, cos * size))[0] == eighth * 8192
 
 
 @cocotb.test()
 async def by_hand(dut):
     unit = 1 << await begin(dut) - 8
-    for sin, cos, phase in ((48, 64, 6712), (64, 48, 16384 - 6712), (-48, 64, 65536 - 6712)):           # atan 0.75; 3, 4, 5
+    for sin, cos, phase in (
+        (48, 64, 6712),
+        (64, 48, 16384 - 6712),
+        (-48, 64, 65536 - 6712),
+    ):  # atan 0.75; 3, 4, 5
         got, size = await ask(dut, sin * unit, cos * unit)
         assert got == phase and abs(size - 80 * unit) <= arctan_rotation.amplitude_bound(80 * unit)
-    assert (await ask(dut, -unit, -100 * unit))[0] == 32768 + 104                                       # atan 0.01
+    assert (await ask(dut, -unit, -100 * unit))[0] == 32768 + 104  # atan 0.01
     assert await ask(dut, 0, 0) == (0, 0)
 
 
@@ -86,7 +96,11 @@ async def any_input_matches_the_model_in_every_clk(dut):
     model = ArctanIterative(w)
     for clk in range(3000):
         rst, size = int(random.random() < 0.005), 1 << random.choice((w - 1, w - 1, 3))
-        valid, sin, cos = random.choice((0, 0, 1)), random.randrange(-size, size), random.randrange(-size, size)
+        valid, sin, cos = (
+            random.choice((0, 0, 1)),
+            random.randrange(-size, size),
+            random.randrange(-size, size),
+        )
         dut.rst.value, dut.valid.value, dut.sin.value, dut.cos.value = rst, valid, sin, cos
         await FallingEdge(dut.clk)
         want = model.step(valid, sin, cos)
@@ -99,7 +113,7 @@ async def any_input_matches_the_model_in_every_clk(dut):
 async def all_pairs_of_8_bits_match_the_model(dut):
     needs(await begin(dut) == 8, "wider samples are drawn at random")
     whole = not cocotb.SIM_NAME.startswith("Icarus")
-    for sin, cos in pairs_of_8_bits(whole)[::1 if whole else 5]:
+    for sin, cos in pairs_of_8_bits(whole)[:: 1 if whole else 5]:
         assert await ask(dut, sin, cos) == sample(8, sin, cos), (sin, cos)
 
 
@@ -107,8 +121,10 @@ def test_every_sample_of_8_bits_is_correctly_rounded():
     pairs = [pair for pair in product(range(-128, 128), repeat=2) if pair != (0, 0)]
     answers = [sample(8, *pair) for pair in pairs]
     assert max(abs(error(phase, *pair)) for (phase, _), pair in zip(answers, pairs)) < 0.5
-    assert all(abs(size - math.hypot(*pair)) <= arctan_rotation.amplitude_bound(math.hypot(*pair))
-               for (_, size), pair in zip(answers, pairs))
+    assert all(
+        abs(size - math.hypot(*pair)) <= arctan_rotation.amplitude_bound(math.hypot(*pair))
+        for (_, size), pair in zip(answers, pairs)
+    )
 
 
 @pytest.mark.parametrize("w", [9, 10])
@@ -123,7 +139,10 @@ def test_any_wider_sample_is_within_the_bounds():
     for w in range(11, 17):
         full = 1 << w - 1
         for _ in range(3000):
-            sin, cos = draw.randrange(-full, full), draw.randrange(-full, full) or 1          # (0, 0) has no phase
+            sin, cos = (
+                draw.randrange(-full, full),
+                draw.randrange(-full, full) or 1,
+            )  # (0, 0) has no phase
             radius = math.hypot(sin, cos)
             phase, size = sample(w, sin, cos)
             assert abs(error(phase, sin, cos)) <= arctan_rotation.bound(PLAN[w], w, radius, True)
@@ -133,10 +152,16 @@ def test_any_wider_sample_is_within_the_bounds():
 def test_the_module_has_the_plan_and_the_bounds_of_the_table():
     text = source_of("arctan_iterative").read_text()
     for w in range(8, 17):
-        assert tuple(localparam(text, name, w) for name in ("TURNS", "DIGITS", "F", "GUARD")) == PLAN[w]
+        assert (
+            tuple(localparam(text, name, w) for name in ("TURNS", "DIGITS", "F", "GUARD"))
+            == PLAN[w]
+        )
     widest = max(arctan_rotation.quarter_bound(PLAN, w) for w in range(11, 17))
     assert f"within {widest:.3f} LSB" in text and widest < 0.52
-    assert "within 1.5 counts and 0.00015 of itself" in text and arctan_rotation.amplitude_bound(10000) == 3
+    assert (
+        "within 1.5 counts and 0.00015 of itself" in text
+        and arctan_rotation.amplitude_bound(10000) == 3
+    )
 
 
 @pytest.mark.parametrize("w", [8, 10, 12, 16])

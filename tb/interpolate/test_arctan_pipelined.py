@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""arctan_pipelined: by hand, its latency, one sample a clk, every clk against the model; the model against math.atan2.
+"""arctan_pipelined: by hand, its latency, one sample a clk, every clk against the model; the model
+against math.atan2.
 
-All 8-bit pairs: the model for every pair, the RTL against it for all of them under SIM=verilator, under Icarus for one octant of
-pairs, each turned into the octant whose turn it is. For 9 and 10 bits the model is held against every pair that its bound leaves open.
+All 8-bit pairs: the model for every pair, the RTL against it for all of them under SIM=verilator,
+under Icarus for one octant of
+pairs, each turned into the octant whose turn it is. For 9 and 10 bits the model is held against
+every pair that its bound leaves open.
 """
+
 import math
 import random
 from itertools import product
@@ -56,7 +60,9 @@ async def the_octant_borders_are_exact(dut):
     full = 1 << w - 1
     eighths = [(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)]
     sizes = [full // 4, full // 2, full - 1] + [1, 3] * (w < 11)
-    answers = await ask(dut, model, [(sin * size, cos * size) for size in sizes for sin, cos in eighths])
+    answers = await ask(
+        dut, model, [(sin * size, cos * size) for size in sizes for sin, cos in eighths]
+    )
     assert [phase for phase, _ in answers] == [eighth * 8192 for eighth in range(8)] * len(sizes)
 
 
@@ -64,9 +70,26 @@ async def the_octant_borders_are_exact(dut):
 async def by_hand(dut):
     w, model = await begin(dut)
     unit = 1 << w - 8
-    answers = await ask(dut, model, [(s * unit, c * unit) for s, c in ((48, 64), (64, 48), (-48, 64), (1, 100), (-1, -100), (0, 0))])
-    assert [phase for phase, _ in answers] == [6712, 16384 - 6712, 65536 - 6712, 104, 32768 + 104, 0]   # atan 0.75, 0.01
-    assert all(abs(size - 80 * unit) <= arctan_rotation.amplitude_bound(80 * unit) for _, size in answers[:3])      # 3, 4, 5
+    answers = await ask(
+        dut,
+        model,
+        [
+            (s * unit, c * unit)
+            for s, c in ((48, 64), (64, 48), (-48, 64), (1, 100), (-1, -100), (0, 0))
+        ],
+    )
+    assert [phase for phase, _ in answers] == [
+        6712,
+        16384 - 6712,
+        65536 - 6712,
+        104,
+        32768 + 104,
+        0,
+    ]  # atan 0.75, 0.01
+    assert all(
+        abs(size - 80 * unit) <= arctan_rotation.amplitude_bound(80 * unit)
+        for _, size in answers[:3]
+    )  # 3, 4, 5
     assert answers[-1] == (0, 0)
 
 
@@ -114,7 +137,13 @@ async def any_input_matches_the_model_in_every_clk(dut):
     for _ in range(30):
         often, size = random.choice((1, 1, 2, 5)), 1 << random.choice((w - 1, w - 1, w - 2, 3))
         for _ in range(60):
-            await clk(dut, model, None if random.randrange(often) else (random.randrange(-size, size), random.randrange(-size, size)))
+            await clk(
+                dut,
+                model,
+                None
+                if random.randrange(often)
+                else (random.randrange(-size, size), random.randrange(-size, size)),
+            )
 
 
 @cocotb.test()
@@ -129,8 +158,10 @@ def test_every_sample_of_8_bits_is_correctly_rounded():
     answers = [sample(8, *pair) for pair in pairs]
     assert len(pairs) == 65535
     assert max(abs(error(phase, *pair)) for (phase, _), pair in zip(answers, pairs)) < 0.5
-    assert all(abs(size - math.hypot(*pair)) <= arctan_rotation.amplitude_bound(math.hypot(*pair))
-               for (_, size), pair in zip(answers, pairs))
+    assert all(
+        abs(size - math.hypot(*pair)) <= arctan_rotation.amplitude_bound(math.hypot(*pair))
+        for (_, size), pair in zip(answers, pairs)
+    )
 
 
 @pytest.mark.parametrize("w", [9, 10])
@@ -145,7 +176,10 @@ def test_any_wider_sample_is_within_the_bounds():
     for w in range(11, 17):
         full = 1 << w - 1
         for _ in range(3000):
-            sin, cos = draw.randrange(-full, full), draw.randrange(-full, full) or 1          # (0, 0) has no phase
+            sin, cos = (
+                draw.randrange(-full, full),
+                draw.randrange(-full, full) or 1,
+            )  # (0, 0) has no phase
             radius = math.hypot(sin, cos)
             phase, size = sample(w, sin, cos)
             assert abs(error(phase, sin, cos)) <= arctan_rotation.bound(PLAN[w], w, radius)
@@ -155,10 +189,16 @@ def test_any_wider_sample_is_within_the_bounds():
 def test_the_module_has_the_plan_and_the_bounds_of_the_table():
     text = source_of("arctan_pipelined").read_text()
     for w in range(8, 17):
-        assert tuple(localparam(text, name, w) for name in ("TURNS", "DIGITS", "HEAD", "GUARD")) == PLAN[w]
+        assert (
+            tuple(localparam(text, name, w) for name in ("TURNS", "DIGITS", "HEAD", "GUARD"))
+            == PLAN[w]
+        )
     widest = max(arctan_rotation.quarter_bound(PLAN, w) for w in range(11, 17))
     assert f"within {widest:.3f} LSB" in text and widest < 0.55
-    assert "within 1.5 counts and 0.00015 of itself" in text and arctan_rotation.amplitude_bound(10000) == 3
+    assert (
+        "within 1.5 counts and 0.00015 of itself" in text
+        and arctan_rotation.amplitude_bound(10000) == 3
+    )
 
 
 @pytest.mark.parametrize("w, steps", [(8, 1), (8, 2), (10, 3), (12, 1), (16, 2)])

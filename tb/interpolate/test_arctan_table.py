@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""arctan_table: by hand, all 8-bit pairs against math.atan2 within the bound of the table's maker, every clk against the model.
+"""arctan_table: by hand, all 8-bit pairs against math.atan2 within the bound of the table's maker,
+every clk against the model.
 
-The model is held against atan2 for all 65 535 pairs. The RTL is held against the model for all pairs under SIM=verilator;
+The model is held against atan2 for all 65 535 pairs. The RTL is held against the model for all
+pairs under SIM=verilator;
 under Icarus for all 8 385 pairs of one octant, each turned into the octant whose turn it is.
 """
+
 import math
 import random
 import subprocess
@@ -47,16 +50,18 @@ async def the_octant_borders_are_exact(dut):
     await begin(dut)
     full, half = (1 << int(dut.W.value) - 1) - 1, 1 << int(dut.W.value) - 2
     for size in (1, 3, half, full):
-        for eighth, (sin, cos) in enumerate([(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)]):
+        for eighth, (sin, cos) in enumerate(
+            [(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)]
+        ):
             assert await ask(dut, sin * size, cos * size) == eighth * 8192
 
 
 @cocotb.test()
 async def by_hand(dut):
     await begin(dut)
-    assert await ask(dut, 3, 4) == 6712              # atan 0.75 = 36.8699 deg = 6711.96 of 65 536
+    assert await ask(dut, 3, 4) == 6712  # atan 0.75 = 36.8699 deg = 6711.96 of 65 536
     assert await ask(dut, 4, 3) == 16384 - 6712
-    assert await ask(dut, 1, 100) == 104             # 0.572939 deg = 104.30
+    assert await ask(dut, 1, 100) == 104  # 0.572939 deg = 104.30
     assert await ask(dut, -1, 100) == 65536 - 104
     assert await ask(dut, 0, 0) == 0
 
@@ -89,7 +94,11 @@ async def any_input_matches_the_model_in_every_clk(dut):
     w, model, rst = int(dut.W.value), ArctanTable(), 0
     for clk in range(4000):
         rst = int(random.random() < 0.005)
-        valid, sin, cos = random.choice((0, 0, 1)), random.randrange(-1 << w - 1, 1 << w - 1), random.randrange(-1 << w - 1, 1 << w - 1)
+        valid, sin, cos = (
+            random.choice((0, 0, 1)),
+            random.randrange(-1 << w - 1, 1 << w - 1),
+            random.randrange(-1 << w - 1, 1 << w - 1),
+        )
         dut.rst.value, dut.valid.value, dut.sin.value, dut.cos.value = rst, valid, sin, cos
         await FallingEdge(dut.clk)
         want = model.step(valid, sin, cos)
@@ -107,14 +116,22 @@ async def pairs_match_the_model(dut):
             octant = [(smaller, larger) for larger in range(129) for smaller in range(larger + 1)]
             pairs = [turned(*pair, number % 8) for number, pair in enumerate(octant)]
     else:
-        pairs = [(random.randrange(-1 << 15, 1 << 15), random.randrange(-1 << 15, 1 << 15)) for _ in range(1000)]
+        pairs = [
+            (random.randrange(-1 << 15, 1 << 15), random.randrange(-1 << 15, 1 << 15))
+            for _ in range(1000)
+        ]
     for sin, cos in pairs:
         assert await ask(dut, sin, cos) == phase_of(sin, cos), (sin, cos)
 
 
 def turned(smaller, larger, octant):
-    """The pair in another octant: legs exchanged and negated as the bits say; 128 has only a negative."""
-    first, second = (-leg if leg == 128 or octant >> bit & 1 else leg for bit, leg in enumerate((smaller, larger)))
+    """The pair in another octant: legs exchanged and negated as the bits say; 128 has only a
+    negative.
+    """
+    first, second = (
+        -leg if leg == 128 or octant >> bit & 1 else leg
+        for bit, leg in enumerate((smaller, larger))
+    )
     return (second, first) if octant & 4 else (first, second)
 
 
@@ -122,14 +139,20 @@ def test_all_pairs_are_within_the_bound_of_the_table():
     errors = [error(s, c) for s, c in product(range(-128, 128), repeat=2) if s or c]
     assert len(errors) == 65535
     assert max(map(abs, errors)) <= arctan.BOUND <= 4
-    assert max(map(abs, errors)) > 0.9 * arctan.BOUND               # the bound is near: nothing was given away
+    assert max(map(abs, errors)) > 0.9 * arctan.BOUND  # the bound is near: nothing was given away
 
 
 def test_any_wider_pair_is_within_the_bound():
     draw = random.Random(1)
     for w in range(9, 17):
         full = 1 << w - 1
-        assert max(abs(error(draw.randrange(-full, full), draw.randrange(-full, full) or 1)) for _ in range(20_000)) <= arctan.BOUND
+        assert (
+            max(
+                abs(error(draw.randrange(-full, full), draw.randrange(-full, full) or 1))
+                for _ in range(20_000)
+            )
+            <= arctan.BOUND
+        )
     edge = [32767, -32768, 32766, 1, 2, 255, 256, 257]
     assert max(abs(error(s, c)) for s, c in product(edge, repeat=2)) <= arctan.BOUND
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""calibration_recorder: a burst by hand, thinning, what spoils it, its reading, and random use against the model in decimation clk."""
+"""calibration_recorder: a burst by hand, thinning, what spoils it, its reading, and random use
+against the model in decimation clk.
+"""
+
 import random
 
 import cocotb
@@ -9,7 +12,18 @@ from cocotb.triggers import FallingEdge
 from tb.bench import run, start
 from tb.interpolate.calibration_recorder import CalibrationRecorder
 
-IDLE = dict(start=0, phases=0, decimation=1, sampled=0, sin=0, cos=0, phase_valid=0, phase=0, disturbed=0, read=0)
+IDLE = dict(
+    start=0,
+    phases=0,
+    decimation=1,
+    sampled=0,
+    sin=0,
+    cos=0,
+    phase_valid=0,
+    phase=0,
+    disturbed=0,
+    read=0,
+)
 
 
 async def begin(dut):
@@ -47,10 +61,14 @@ async def a_burst_of_samples_is_read_back_left_aligned(dut):
     await clk(dut, model, start=1)
     for n in range(depth):
         assert not (await clk(dut, model, sampled=0))[1]
-        assert (await clk(dut, model, sampled=1, sin=-n % 100, cos=-(n % 100)))[1] == (n == depth - 1)
-    await clk(dut, model, sampled=1, sin=1, cos=1)                          # one too many
-    want = [((-(n % 100) << shift) & 65535) << 16 | (-n % 100 << shift) & 65535 for n in range(depth)]
-    assert await words(dut, model) == want == await words(dut, model)       # reading goes round
+        assert (await clk(dut, model, sampled=1, sin=-n % 100, cos=-(n % 100)))[1] == (
+            n == depth - 1
+        )
+    await clk(dut, model, sampled=1, sin=1, cos=1)  # one too many
+    want = [
+        ((-(n % 100) << shift) & 65535) << 16 | (-n % 100 << shift) & 65535 for n in range(depth)
+    ]
+    assert await words(dut, model) == want == await words(dut, model)  # reading goes round
 
 
 @cocotb.test()
@@ -73,7 +91,9 @@ async def only_every_so_many_are_kept_and_0_is_1(dut):
             n += 1
         step = max(decimation, 1)
         assert n == (2 * depth - 1) * step + 1
-        assert (await words(dut, model))[:3] == [(2 * k + 1) * step << 16 | 2 * k * step for k in range(3)]
+        assert (await words(dut, model))[:3] == [
+            (2 * k + 1) * step << 16 | 2 * k * step for k in range(3)
+        ]
 
 
 @cocotb.test()
@@ -108,9 +128,20 @@ async def any_use_matches_the_model_in_every_clk(dut):
         phases, decimation = random.getrandbits(1), random.choice((0, 1, 1, 2, 3))
         await clk(dut, model, start=1, phases=phases, decimation=decimation)
         for _ in range(random.choice((10, 100))):
-            await clk(dut, model, phases=phases, decimation=decimation, sampled=random.getrandbits(1), phase_valid=random.getrandbits(1),
-                      sin=random.randrange(-full, full), cos=random.randrange(-full, full), phase=random.getrandbits(16),
-                      disturbed=int(random.random() < 0.01), read=random.getrandbits(1), rst=int(random.random() < 0.002))
+            await clk(
+                dut,
+                model,
+                phases=phases,
+                decimation=decimation,
+                sampled=random.getrandbits(1),
+                phase_valid=random.getrandbits(1),
+                sin=random.randrange(-full, full),
+                cos=random.randrange(-full, full),
+                phase=random.getrandbits(16),
+                disturbed=int(random.random() < 0.01),
+                read=random.getrandbits(1),
+                rst=int(random.random() < 0.002),
+            )
 
 
 @pytest.mark.parametrize("w, depth", [(8, 8), (16, 32)])

@@ -1,16 +1,41 @@
 # SPDX-License-Identifier: Apache-2.0
-"""grating as a whole: the latency of its header, from the converter's pins on. What its blocks do is tested block by block; how they
+"""grating as a whole: the latency of its header, from the converter's pins on. What its blocks do
+is tested block by block; how they
 work together in motion, in tb/system."""
+
 import cocotb
 import pytest
 from cocotb.triggers import FallingEdge
 
 from tb.bench import run, start
 
-LATENCY = 22                                            # clk from a converter word to its position; 1 more with a segment table
-SETTINGS = dict(deglitch=0, outlier_step=0, outlier_hold=0, amplitude_low=0, amplitude_high=65535, disagreement_limit=0)
-INPUTS = dict(tick=0, sample_tick=0, sync=0, now=0, select=0, write=0, word=0, wdata=0, shift=0, shift_periods=0, a=0, b=0, z=0, probe=0,
-              adc_sin=1, adc_cos=1)
+LATENCY = 22  # clk from a converter word to its position; 1 more with a segment table
+SETTINGS = dict(
+    deglitch=0,
+    outlier_step=0,
+    outlier_hold=0,
+    amplitude_low=0,
+    amplitude_high=65535,
+    disagreement_limit=0,
+)
+INPUTS = dict(
+    tick=0,
+    sample_tick=0,
+    sync=0,
+    now=0,
+    select=0,
+    write=0,
+    word=0,
+    wdata=0,
+    shift=0,
+    shift_periods=0,
+    a=0,
+    b=0,
+    z=0,
+    probe=0,
+    adc_sin=1,
+    adc_cos=1,
+)
 
 
 async def converted(dut):
@@ -30,13 +55,15 @@ async def latency_is_22_clk_from_a_converter_word_to_position_and_1_more_with_a_
     latency = LATENCY + bool(int(dut.SEGMENTS.value))
     await start(dut, **SETTINGS, **INPUTS)
     await FallingEdge(dut.clk)
-    for adc_cos, eighths in ((1, 1), (0, 3), (1, 1)):   # sin stands at its upper end
+    for adc_cos, eighths in ((1, 1), (0, 3), (1, 1)):  # sin stands at its upper end
         dut.adc_cos.value = adc_cos
         await converted(dut)
         for clk in range(1, latency + 4):
             await FallingEdge(dut.clk)
             assert int(dut.position_valid.value) == (clk == latency)
-        assert abs(dut.position.value.to_signed() - eighths * 8192) < 50        # the ends of 8 bits are 127 and -128
+        assert (
+            abs(dut.position.value.to_signed() - eighths * 8192) < 50
+        )  # the ends of 8 bits are 127 and -128
         assert int(dut.phase.value) == dut.position.value.to_unsigned() % 65536
 
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fringe_tracker: steps by hand, speeds up to a period a sample, bad samples, and every clk against the model."""
+"""fringe_tracker: steps by hand, speeds up to a period a sample, bad samples, and every clk against
+the model.
+"""
+
 import random
 
 import cocotb
@@ -47,7 +50,14 @@ async def latency_is_1(dut):
 @cocotb.test()
 async def by_hand(dut):
     await begin(dut)
-    assert await feed(dut, [65000, 65000, 65500, 500, 500, 65000]) == [(0, 0), (0, 0), (500, 0), (536, 0), (0, 0), (-1036, 0)]
+    assert await feed(dut, [65000, 65000, 65500, 500, 500, 65000]) == [
+        (0, 0),
+        (0, 0),
+        (500, 0),
+        (536, 0),
+        (0, 0),
+        (-1036, 0),
+    ]
 
 
 @cocotb.test()
@@ -88,7 +98,7 @@ async def a_speed_of_a_period_a_sample_is_an_overspeed(dut):
     for direction in (1, -1):
         await again(dut)
         steps = [n * 16000 for n in range(5)] + [65000, 66000]
-        where = [direction * sum(steps[:n + 1]) for n in range(len(steps))]
+        where = [direction * sum(steps[: n + 1]) for n in range(len(steps))]
         assert [o for _, o in await feed(dut, where)] == [0] * 6 + [1]
 
 
@@ -123,7 +133,11 @@ async def any_input_matches_the_model_in_every_clk(dut):
     model, phase, speed = FringeTracker(), 0, 0
     for clk in range(20_000):
         rst, valid = int(random.random() < 0.003), random.getrandbits(1)
-        speed = max(-70_000, min(70_000, speed + random.randrange(-3000, 3000))) if random.random() > 0.01 else -speed
+        speed = (
+            max(-70_000, min(70_000, speed + random.randrange(-3000, 3000)))
+            if random.random() > 0.01
+            else -speed
+        )
         phase += speed
         if random.random() < 0.02:
             phase = random.getrandbits(16)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""harmonic_correction: by hand, the ends of table and phase, its two tables, and random use against the model in every clk."""
+"""harmonic_correction: by hand, the ends of table and phase, its two tables, and random use against
+the model in every clk.
+"""
+
 import math
 import random
 
@@ -16,19 +19,28 @@ async def begin(dut):
     await start(dut, **IDLE)
     await FallingEdge(dut.clk)
     model = HarmonicCorrection()
-    for _ in range(2):                                  # both tables known to both
+    for _ in range(2):  # both tables known to both
         await load(dut, model, [0] * POINTS)
     await clk(dut, model, rst=1)
     return model
 
 
 async def clk(dut, model, valid=0, phase=0, enable=1, write=None, swap=0, rst=0):
-    dut.valid.value, dut.phase.value, dut.enable.value, dut.swap.value, dut.rst.value = valid, phase, enable, swap, rst
+    dut.valid.value, dut.phase.value, dut.enable.value, dut.swap.value, dut.rst.value = (
+        valid,
+        phase,
+        enable,
+        swap,
+        rst,
+    )
     dut.write.value = int(write is not None)
     if write:
         dut.point.value, dut.value.value = write
     await FallingEdge(dut.clk)
-    got, want = (int(dut.done.value), dut.phase_out.value.to_unsigned()), model.step(valid, phase, enable, write, swap, rst)
+    got, want = (
+        (int(dut.done.value), dut.phase_out.value.to_unsigned()),
+        model.step(valid, phase, enable, write, swap, rst),
+    )
     assert got == want, f"got {got}, the model has {want}"
     return got
 
@@ -59,7 +71,7 @@ async def latency_is_4_and_phases_may_come_every_clk(dut):
 async def by_hand(dut):
     model = await begin(dut)
     table = [0] * POINTS
-    table[3], table[4] = 160, -320                      # 10 and -20 LSB of phase
+    table[3], table[4] = 160, -320  # 10 and -20 LSB of phase
     await load(dut, model, table)
     assert await ask(dut, model, 3 * 256) == 3 * 256 - 10
     assert await ask(dut, model, 3 * 256 + 128) == 3 * 256 + 128 + 5
@@ -104,17 +116,35 @@ async def reset_in_mid_flow_drops_the_phase_and_the_correction(dut):
 async def any_input_matches_the_model_in_every_clk(dut):
     model = await begin(dut)
     for _ in range(4000):
-        write = (random.randrange(POINTS), random.randrange(-1 << 17, 1 << 17)) if random.getrandbits(1) else None
-        await clk(dut, model, random.getrandbits(1), random.choice((0, 65535, random.getrandbits(16))), int(random.random() < 0.9), write,
-                  int(random.random() < 0.05), int(random.random() < 0.003))
+        write = (
+            (random.randrange(POINTS), random.randrange(-1 << 17, 1 << 17))
+            if random.getrandbits(1)
+            else None
+        )
+        await clk(
+            dut,
+            model,
+            random.getrandbits(1),
+            random.choice((0, 65535, random.getrandbits(16))),
+            int(random.random() < 0.9),
+            write,
+            int(random.random() < 0.05),
+            int(random.random() < 0.003),
+        )
 
 
 def test_the_chords_leave_no_more_of_a_sine_than_the_header_says():
     for order, share in ((2, 0.0003), (9, 0.0062)):
         size = 100_000
         table = [round(size * math.sin(math.tau * order * n / POINTS)) for n in range(POINTS)]
-        worst = max(abs((phase - corrected(phase, table) + 32768 & 65535) - 32768 - size / 16 * math.sin(math.tau * order * phase / 65536))
-                    for phase in range(0, 65536, 7))
+        worst = max(
+            abs(
+                (phase - corrected(phase, table) + 32768 & 65535)
+                - 32768
+                - size / 16 * math.sin(math.tau * order * phase / 65536)
+            )
+            for phase in range(0, 65536, 7)
+        )
         assert worst <= size / 16 * share + 0.55
 
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""signal_correction: by hand, both ends of every range, its load, and random samples against the model in every clk."""
+"""signal_correction: by hand, both ends of every range, its load, and random samples against the
+model in every clk.
+"""
+
 import math
 import random
 from itertools import product
@@ -22,7 +25,13 @@ async def begin(dut):
 
 async def clk(dut, model, valid=0, sin=0, cos=0, load=None, rst=0):
     """One clk of design and model; returns (done, sin_out, cos_out)."""
-    dut.rst.value, dut.valid.value, dut.sin.value, dut.cos.value, dut.load.value = rst, valid, sin, cos, int(load is not None)
+    dut.rst.value, dut.valid.value, dut.sin.value, dut.cos.value, dut.load.value = (
+        rst,
+        valid,
+        sin,
+        cos,
+        int(load is not None),
+    )
     if load:
         for name, value in load._asdict().items():
             getattr(dut, name).value = value
@@ -44,7 +53,9 @@ async def ask(dut, model, sin, cos):
 
 def anything(w, draw):
     full = 1 << w - 1
-    return draw.choice((-full, full - 1, 0, draw.randrange(-full, full))), draw.choice((-full, full - 1, 0, draw.randrange(-full, full)))
+    return draw.choice((-full, full - 1, 0, draw.randrange(-full, full))), draw.choice(
+        (-full, full - 1, 0, draw.randrange(-full, full))
+    )
 
 
 @cocotb.test()
@@ -57,7 +68,7 @@ async def latency_is_3_and_samples_may_come_every_clk(dut):
 @cocotb.test()
 async def by_hand(dut):
     model, scale = await begin(dut), 1 << 16 - int(dut.W.value)
-    assert await ask(dut, model, 100, -50) == (50 * scale, -25 * scale)     # half the size
+    assert await ask(dut, model, 100, -50) == (50 * scale, -25 * scale)  # half the size
     await clk(dut, model, load=Settings(256, -512, 65536 * 3 // 2, -32768))
     u, v = 40 * scale + 512, 60 * scale - 256
     assert await ask(dut, model, 60, 40) == ((3 * v - u + 2) // 4, (u + 1) // 2)
@@ -67,7 +78,10 @@ async def by_hand(dut):
 async def what_is_too_large_is_held(dut):
     model, full = await begin(dut), 1 << int(dut.W.value) - 1
     await clk(dut, model, load=Settings(-32768, -32768, 131071, 65535))
-    assert await ask(dut, model, full - 1, full - 1) == (32767, min(32767, 32768 - (1 << 16 - int(dut.W.value)) // 2))
+    assert await ask(dut, model, full - 1, full - 1) == (
+        32767,
+        min(32767, 32768 - (1 << 16 - int(dut.W.value)) // 2),
+    )
     await clk(dut, model, load=Settings(32767, 32767, 131071, 65535))
     assert (await ask(dut, model, -full, -full)) == (-32768, -32767)
 
@@ -108,20 +122,48 @@ async def reset_in_mid_flow_drops_samples_and_settings(dut):
 async def any_input_matches_the_model_in_every_clk(dut):
     model, w = await begin(dut), int(dut.W.value)
     for _ in range(3000):
-        load = Settings(random.randrange(-32768, 32768), random.randrange(-32768, 32768), random.randrange(131072),
-                        random.randrange(-65536, 65536)) if random.random() < 0.1 else None
-        await clk(dut, model, random.getrandbits(1), *anything(w, random), load, int(random.random() < 0.005))
+        load = (
+            Settings(
+                random.randrange(-32768, 32768),
+                random.randrange(-32768, 32768),
+                random.randrange(131072),
+                random.randrange(-65536, 65536),
+            )
+            if random.random() < 0.1
+            else None
+        )
+        await clk(
+            dut,
+            model,
+            random.getrandbits(1),
+            *anything(w, random),
+            load,
+            int(random.random() < 0.005),
+        )
 
 
 def test_the_ellipse_of_its_own_settings_becomes_a_circle():
-    """An ellipse with offset, gain and phase error, and the settings that follow from them by Heydemann's formulas."""
+    """An ellipse with offset, gain and phase error, and the settings that follow from them by
+    Heydemann's formulas.
+    """
     gain, phase, ox, oy, size = 1.06, math.radians(4), 0.05, -0.04, 26000
-    settings = Settings(round(oy * size), round(ox * size), round(65536 / (gain * math.cos(phase))), round(-65536 * math.tan(phase)))
+    settings = Settings(
+        round(oy * size),
+        round(ox * size),
+        round(65536 / (gain * math.cos(phase))),
+        round(-65536 * math.tan(phase)),
+    )
     for n in range(1000):
         turn = n / 1000 * math.tau
-        sin, cos = round(size * (gain * math.sin(turn + phase) + oy)), round(size * (math.cos(turn) + ox))
+        sin, cos = (
+            round(size * (gain * math.sin(turn + phase) + oy)),
+            round(size * (math.cos(turn) + ox)),
+        )
         out = corrected(sin, cos, settings, 16)
-        assert abs(out[0] - size / 2 * math.sin(turn)) < 2.5 and abs(out[1] - size / 2 * math.cos(turn)) < 1.5
+        assert (
+            abs(out[0] - size / 2 * math.sin(turn)) < 2.5
+            and abs(out[1] - size / 2 * math.cos(turn)) < 1.5
+        )
 
 
 @pytest.mark.parametrize("w", [8, 12, 16])

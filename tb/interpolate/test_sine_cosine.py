@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From converter words to position: the chain of feedback_channel.sv, nothing learned yet, driven with what a grating gives.
+"""From converter words to position: the chain of feedback_channel.sv, nothing learned yet, driven
+with what a grating gives.
 
-Every disturbance has a bound on the position error from theory, and every motion is held against it: the RTL on short
+Every disturbance has a bound on the position error from theory, and every motion is held against
+it: the RTL on short
 motions, the models on long ones. One period is 0.8 um, as in S0.
 """
+
 import math
 from pathlib import Path
 
@@ -18,13 +21,29 @@ from tb.interpolate.fringe_tracker import FringeTracker
 from tb.position.unwrap import Unwrap
 
 PERIOD_NM = 800
-LATENCY = 22                                            # clk from a converter word to its position
-ARCTAN = arctan_rotation.quarter_bound(arctan_rotation.PIPELINED, 16)       # LSB of phase; a corrected leg is half of 16 bits large
-SETTINGS = dict(outlier_step=0, outlier_hold=0, load=0, sin_offset=0, cos_offset=0, gain=1 << 16, quadrature_error=0, enable=0, write=0, point=0, value=0,
-                swap=0, shift=0, shift_periods=0)
-AMPLITUDE = 0.84                                       # of full scale: room for what is added
+LATENCY = 22  # clk from a converter word to its position
+ARCTAN = arctan_rotation.quarter_bound(
+    arctan_rotation.PIPELINED, 16
+)  # LSB of phase; a corrected leg is half of 16 bits large
+SETTINGS = dict(
+    outlier_step=0,
+    outlier_hold=0,
+    load=0,
+    sin_offset=0,
+    cos_offset=0,
+    gain=1 << 16,
+    quadrature_error=0,
+    enable=0,
+    write=0,
+    point=0,
+    value=0,
+    swap=0,
+    shift=0,
+    shift_periods=0,
+)
+AMPLITUDE = 0.84  # of full scale: room for what is added
 CLEAN = dict(offset=0.0, gain=0.0, phase=0.0, noise=0.0)
-DISTURBED = {                                           # offset, gain: of the amplitude; phase: degrees; noise: of full scale
+DISTURBED = {  # offset, gain: of the amplitude; phase: degrees; noise: of full scale
     "clean": CLEAN,
     "offset": CLEAN | dict(offset=0.01),
     "gain": CLEAN | dict(gain=0.01),
@@ -56,12 +75,19 @@ def phase_bound(degrees):
 
 
 def bound(w, offset, gain, phase, noise):
-    """LSB of position. The disturbances act one after the other, so their bounds add; each shortens the vector for the next."""
+    """LSB of position. The disturbances act one after the other, so their bounds add; each shortens
+    the vector for the next.
+    """
     full = 1 << w - 1
     length = AMPLITUDE * full * math.sqrt(1 - math.sin(math.radians(abs(phase)))) * min(1, 1 + gain)
     turn = phase_bound(phase) + gain_bound(gain)
-    halved = math.sqrt(2) if w == 16 else 0             # an odd word loses its last bit in the correction
-    for added in (AMPLITUDE * full * abs(offset), math.sqrt(2) * noise * full, math.sqrt(0.5), halved):     # from the third on: rounding
+    halved = math.sqrt(2) if w == 16 else 0  # an odd word loses its last bit in the correction
+    for added in (
+        AMPLITUDE * full * abs(offset),
+        math.sqrt(2) * noise * full,
+        math.sqrt(0.5),
+        halved,
+    ):  # from the third on: rounding
         turn += offset_bound(added, length)
         length -= added
     return turn / math.tau * 65536 + ARCTAN
@@ -71,7 +97,9 @@ def samples(where, w, draw, offset, gain, phase, noise):
     """Converter words at the places `where`, in periods."""
     full = 1 << w - 1
     angle, half = math.tau * np.asarray(where), math.radians(phase) / 2
-    sin = AMPLITUDE * full * ((1 + gain) * np.sin(angle + half) + offset) + noise * full * draw.uniform(-1, 1, len(angle))
+    sin = AMPLITUDE * full * (
+        (1 + gain) * np.sin(angle + half) + offset
+    ) + noise * full * draw.uniform(-1, 1, len(angle))
     cos = AMPLITUDE * full * np.cos(angle - half) + noise * full * draw.uniform(-1, 1, len(angle))
     words = [np.rint(leg).astype(int) for leg in (sin, cos)]
     assert all(-full <= leg.min() and leg.max() < full for leg in words)
@@ -79,7 +107,9 @@ def samples(where, w, draw, offset, gain, phase, noise):
 
 
 def top_acceleration(error):
-    """Largest change of speed, in periods a sample, if every phase may be wrong by `error` LSB: four of them meet."""
+    """Largest change of speed, in periods a sample, if every phase may be wrong by `error` LSB:
+    four of them meet.
+    """
     return (16384 - 4 * error - 1) / 65536
 
 
@@ -141,7 +171,9 @@ async def follow(dut, sin, cos):
     dut.valid.value, dut.sin.value, dut.cos.value = 1, sin, cos
     await FallingEdge(dut.clk)
     dut.valid.value = 0
-    await ClockCycles(dut.clk, LATENCY, FallingEdge)                # the first clk brought it into the bench's register
+    await ClockCycles(
+        dut.clk, LATENCY, FallingEdge
+    )  # the first clk brought it into the bench's register
     assert dut.done.value == 1
     return dut.position.value.to_signed()
 
@@ -150,7 +182,7 @@ async def follow(dut, sin, cos):
 async def latency_is_22_clk_from_converter_word_to_position(dut):
     await begin(dut)
     dut.valid.value, dut.sin.value, dut.cos.value = 1, 50, 0
-    for clk in range(LATENCY + 4):                      # after clk 0 the word stands in the bench's register
+    for clk in range(LATENCY + 4):  # after clk 0 the word stands in the bench's register
         await FallingEdge(dut.clk)
         dut.valid.value = 0
         assert int(dut.done.value) == (clk == LATENCY)
@@ -161,13 +193,23 @@ async def latency_is_22_clk_from_converter_word_to_position(dut):
 async def a_learned_correction_and_harmonics_act_within_the_same_latency(dut):
     await begin(dut)
     w = int(dut.W.value)
-    dut.load.value, dut.sin_offset.value, dut.gain.value, dut.enable.value = 1, 10 << 16 - w, 1 << 15, 1
+    dut.load.value, dut.sin_offset.value, dut.gain.value, dut.enable.value = (
+        1,
+        10 << 16 - w,
+        1 << 15,
+        1,
+    )
     for point in range(256):
-        dut.write.value, dut.point.value, dut.value.value, dut.swap.value = 1, point, 160, int(point == 255)
+        dut.write.value, dut.point.value, dut.value.value, dut.swap.value = (
+            1,
+            point,
+            160,
+            int(point == 255),
+        )
         await FallingEdge(dut.clk)
         dut.load.value = 0
     dut.write.value, dut.swap.value = 0, 0
-    await FallingEdge(dut.clk)                          # sin (90 - 10) / 2 = 40 = cos: an eighth, less 160 / 2^20 period
+    await FallingEdge(dut.clk)  # sin (90 - 10) / 2 = 40 = cos: an eighth, less 160 / 2^20 period
     assert await follow(dut, 90, 40) == 8192 - 10
 
 
@@ -218,10 +260,14 @@ async def the_centre_of_every_count_reads_exactly(dut):
     w, draw = int(dut.W.value), np.random.default_rng(seed())
     for subdivision in (1, 7, 160):
         await again(dut)
-        steps = max(subdivision, 16)                    # a sample a count, or enough for the tracker
-        where = (np.concatenate([np.arange(steps), np.arange(steps)[::-1], -1 - np.arange(steps)]) + 0.5) / steps
+        steps = max(subdivision, 16)  # a sample a count, or enough for the tracker
+        where = (
+            np.concatenate([np.arange(steps), np.arange(steps)[::-1], -1 - np.arange(steps)]) + 0.5
+        ) / steps
         for place, (sin, cos) in zip(where, samples(where, w, draw, **CLEAN)):
-            assert counts(await follow(dut, sin, cos), subdivision) == math.floor(place * subdivision)
+            assert counts(await follow(dut, sin, cos), subdivision) == math.floor(
+                place * subdivision
+            )
 
 
 @cocotb.test()
@@ -251,8 +297,10 @@ def test_the_bounds_are_those_of_theory():
 
 def test_eight_bits_cost_no_more_than_0_683_nm():
     angle = np.linspace(0, math.tau, 200_000, endpoint=False)
-    away = [phase_of(8, round(127 * s), round(127 * c)) - a / math.tau * 65536
-            for s, c, a in zip(np.sin(angle).tolist(), np.cos(angle).tolist(), angle.tolist())]
+    away = [
+        phase_of(8, round(127 * s), round(127 * c)) - a / math.tau * 65536
+        for s, c, a in zip(np.sin(angle).tolist(), np.cos(angle).tolist(), angle.tolist())
+    ]
     worst = max(abs((e + 32768) % 65536 - 32768) for e in away) / 65536 * PERIOD_NM
     assert 0.6 < worst <= 0.683
     assert worst <= nm(offset_bound(math.sqrt(0.5), 127)) + ARCTAN / 65536 * PERIOD_NM
@@ -278,10 +326,16 @@ def test_the_read_out_is_the_floor_of_the_place(subdivision):
     away = bound(w, **CLEAN) / 65536
     for place, (sin, cos) in zip(where, samples(where, w, draw, **CLEAN)):
         read = counts(chain.follow(sin, cos)[0], subdivision)
-        assert math.floor((place - away) * subdivision) <= read <= math.floor((place + away) * subdivision)
+        assert (
+            math.floor((place - away) * subdivision)
+            <= read
+            <= math.floor((place + away) * subdivision)
+        )
 
 
 @pytest.mark.parametrize("w", [8, 12])
 def test_sine_cosine(w, monkeypatch):
-    monkeypatch.setattr("tb.bench.source_of", lambda top: Path(__file__).with_name(f"{top}.sv"))    # a bench top is no part of rtl/
+    monkeypatch.setattr(
+        "tb.bench.source_of", lambda top: Path(__file__).with_name(f"{top}.sv")
+    )  # a bench top is no part of rtl/
     run("interpolator_bench", __file__, W=w)

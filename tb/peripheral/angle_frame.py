@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/peripheral/angle_frame.sv does, in integers: step(...) is one clk and returns the pins after it."""
+"""What rtl/peripheral/angle_frame.sv does, in integers: step(...) is one clk and returns the pins
+after it.
+"""
+
 LONGEST = 0xFFFF_FFFF
 
 
@@ -33,9 +36,20 @@ class AngleFrame:
         return min(value + by, self.top)
 
     def pins(self, stale_after):
-        """(valid, angle, number, age, stale, crc_errors, broken, missed); angle and number are None before the first frame."""
+        """(valid, angle, number, age, stale, crc_errors, broken, missed); angle and number are None
+        before the first frame.
+        """
         stale = int(not self.known or bool(stale_after) and self.age > stale_after)
-        return self.valid, self.angle, self.number, self.age, stale, self.crc_errors, self.broken, self.missed
+        return (
+            self.valid,
+            self.angle,
+            self.number,
+            self.age,
+            stale,
+            self.crc_errors,
+            self.broken,
+            self.missed,
+        )
 
     def step(self, gap, stale_after, byte=None, framing_error=0, clear=0, rst=0):
         whole, silent = len(self.bytes) == 8, self.silent
@@ -45,15 +59,22 @@ class AngleFrame:
         self.silent = 0 if byte is not None else min(silent + 1, 0xFFFFFF)
         self.elapsed = 1 if first else min(elapsed + 1, LONGEST)
         if whole and frame(self.bytes[1], int.from_bytes(self.bytes[2:6], "little")) == self.bytes:
-            self.missed = self.count(self.missed, (self.bytes[1] - self.number - 1) % 256) if self.known else self.missed
+            self.missed = (
+                self.count(self.missed, (self.bytes[1] - self.number - 1) % 256)
+                if self.known
+                else self.missed
+            )
             self.valid, self.known, self.number = 1, 1, self.bytes[1]
-            self.angle, self.age = int.from_bytes(self.bytes[2:6], "little"), min(elapsed + 1, LONGEST)
+            self.angle, self.age = (
+                int.from_bytes(self.bytes[2:6], "little"),
+                min(elapsed + 1, LONGEST),
+            )
         elif whole:
             self.crc_errors = self.count(self.crc_errors)
         if inside and (framing_error or byte is None and silent >= gap):
             self.broken, self.bytes = self.count(self.broken), b""
         elif whole or not self.bytes:
-            self.bytes = b"\xA5" if first else b""
+            self.bytes = b"\xa5" if first else b""
         elif byte is not None:
             self.bytes += bytes([byte])
         if clear:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A Microchip 24AA128 on its lines: 16 KiB, pages of 64 bytes, busy (no acknowledge) while it writes.
+"""A Microchip 24AA128 on its lines: 16 KiB, pages of 64 bytes, busy (no acknowledge) while it
+writes.
 
 step(scl, sda) is one clk and returns (scl_low, sda_low)."""
 
@@ -9,7 +10,7 @@ SIZE, PAGE = 16384, 64
 class Eeprom:
     def __init__(self, address=0x50, write_clk=2000, stretch=0):
         self.address, self.write_clk, self.stretch = address, write_clk, stretch
-        self.memory = bytearray(b"\xFF" * SIZE)
+        self.memory = bytearray(b"\xff" * SIZE)
         self.state, self.sda_low, self.scl_low, self.busy, self.last = "idle", 0, 0, 0, (1, 1)
         self.bits, self.place, self.page, self.writes, self.pointer = [], 0, {}, 0, 0
 
@@ -29,7 +30,9 @@ class Eeprom:
         return int(self.scl_low > 0), self.sda_low
 
     def stop(self):
-        if self.state == "data" and self.page and not self.bits[1:]:       # at the border of a byte; the stop's own edge came before
+        if (
+            self.state == "data" and self.page and not self.bits[1:]
+        ):  # at the border of a byte; the stop's own edge came before
             for place, byte in self.page.items():
                 self.memory[place] = byte
             self.busy, self.writes = self.write_clk, self.writes + 1
@@ -41,7 +44,7 @@ class Eeprom:
             self.sda_low = int(self.take(sum(b << 7 - n for n, b in enumerate(self.bits))))
             self.scl_low = self.stretch
         elif self.state == "read" and len(self.bits) == 9 and self.bits[8]:
-            self.state = "idle"                                            # not acknowledged: enough
+            self.state = "idle"  # not acknowledged: enough
         if len(self.bits) == 9:
             self.bits = []
             if self.state == "answer":

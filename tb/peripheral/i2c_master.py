@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/peripheral/i2c_master.sv does, in integers: step(...) is one clk and returns the pins after it."""
+"""What rtl/peripheral/i2c_master.sv does, in integers: step(...) is one clk and returns the pins
+after it.
+"""
 
 START, STOP, WRITE, READ, RECOVER = range(5)
 OK, NOT_ACKNOWLEDGED, LOST, NO_BUS = range(4)
@@ -7,7 +9,10 @@ OK, NOT_ACKNOWLEDGED, LOST, NO_BUS = range(4)
 
 class I2cMaster:
     def __init__(self, clk_hz, bus_hz, stretch_us):
-        self.low, self.high = -(-clk_hz // 10 * 11 // (2 * bus_hz)), -(-clk_hz // 10 * 9 // (2 * bus_hz))
+        self.low, self.high = (
+            -(-clk_hz // 10 * 11 // (2 * bus_hz)),
+            -(-clk_hz // 10 * 9 // (2 * bus_hz)),
+        )
         self.stretch = clk_hz // 1000 * stretch_us // 1000
         self.elapsed = 0
         self.kind, self.bits, self.read = None, [], []
@@ -15,7 +20,14 @@ class I2cMaster:
         self.reset()
 
     def reset(self):
-        self.state, self.free, self.owned, self.scl_low, self.sda_low, self.done = "idle", 0, 0, 0, 0, 0
+        self.state, self.free, self.owned, self.scl_low, self.sda_low, self.done = (
+            "idle",
+            0,
+            0,
+            0,
+            0,
+            0,
+        )
 
     def go(self, state):
         self.state, self.elapsed = state, 0
@@ -29,7 +41,15 @@ class I2cMaster:
     def pins(self):
         """(command_ready, done, result, read_data, owned, scl_low, sda_low); result with done only."""
         result = self.result if self.done else None
-        return int(self.state == "idle"), self.done, result, self.read_data, self.owned, self.scl_low, self.sda_low
+        return (
+            int(self.state == "idle"),
+            self.done,
+            result,
+            self.read_data,
+            self.owned,
+            self.scl_low,
+            self.sda_low,
+        )
 
     def step(self, scl, sda, command=None, data=0, acknowledge=0, rst=0):
         free, elapsed = self.free, self.elapsed
@@ -40,7 +60,11 @@ class I2cMaster:
             if command is not None:
                 command = min(command, RECOVER)
                 self.kind, self.read, self.result = command, [], OK
-                self.bits = [*(data >> n & 1 for n in range(7, -1, -1)), 1] if command == WRITE else [1] * 8 + [1 - acknowledge]
+                self.bits = (
+                    [*(data >> n & 1 for n in range(7, -1, -1)), 1]
+                    if command == WRITE
+                    else [1] * 8 + [1 - acknowledge]
+                )
                 if command == START and not self.owned:
                     self.go("free")
                 elif command != RECOVER and not self.owned:
@@ -52,7 +76,11 @@ class I2cMaster:
             self.end(NO_BUS, let_go=True)
         elif self.state == "pulled":
             if elapsed == self.low // 4:
-                self.sda_low = 1 - self.bits[len(self.read)] if self.kind in (WRITE, READ) else int(self.kind == STOP)
+                self.sda_low = (
+                    1 - self.bits[len(self.read)]
+                    if self.kind in (WRITE, READ)
+                    else int(self.kind == STOP)
+                )
             if elapsed == self.low - 1:
                 self.scl_low = 0
                 self.go("free" if self.kind == START else "rise")

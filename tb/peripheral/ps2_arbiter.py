@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/peripheral/ps2_arbiter.sv does, in integers. wires(...) is what stands on the outputs for these inputs; step(...) is one clk.
+"""What rtl/peripheral/ps2_arbiter.sv does, in integers. wires(...) is what stands on the outputs
+for these inputs; step(...) is one clk.
 
 The inputs are one tuple of Inputs, a byte is (value, damaged) or None."""
+
 from typing import NamedTuple, Optional
 
 EXCHANGE, LONGEST, RESEND = 20, 1000, 0xFE
@@ -10,7 +12,7 @@ ANSWERS = {0xFF: 2, 0xF2: 3}
 
 class Inputs(NamedTuple):
     idle_ms: int = 0
-    inject: Optional[tuple] = None          # (value, last)
+    inject: Optional[tuple] = None  # (value, last)
     keyboard: Optional[tuple] = None
     keyboard_busy: int = 0
     keyboard_held: int = 0
@@ -29,13 +31,22 @@ class Ps2Arbiter:
         self.reset()
 
     def reset(self):
-        self.part = self.quiet = self.left = self.awaited = self.ordered = self.stood = self.injecting = self.own = self.again = 0
+        self.part = self.quiet = self.left = self.awaited = self.ordered = self.stood = (
+            self.injecting
+        ) = self.own = self.again = 0
 
     def conditions(self, i):
         resend = int(i.host == (RESEND, 0) and self.own)
         active = bool(i.host or self.ordered or i.keyboard or i.keyboard_busy)
         is_open = active or self.awaited or self.quiet < EXCHANGE
-        may = bool(i.inject and not self.injecting and not self.left and not is_open and self.quiet >= i.idle_ms and not self.again)
+        may = bool(
+            i.inject
+            and not self.injecting
+            and not self.left
+            and not is_open
+            and self.quiet >= i.idle_ms
+            and not self.again
+        )
         return resend, active, is_open, may
 
     def arrived(self, i):
@@ -43,13 +54,29 @@ class Ps2Arbiter:
         return i.keyboard[0] if i.keyboard and not self.stood and not i.keyboard[1] else None
 
     def wires(self, i):
-        """(keyboard_hold, command, host_ready, send, keyboard_ready, inject_ready, injecting, typed); a byte is None without its valid."""
+        """(keyboard_hold, command, host_ready, send, keyboard_ready, inject_ready, injecting,
+        typed); a byte is None without its valid.
+        """
         resend, _, is_open, may = self.conditions(i)
-        send = ((self.injected, 0) if self.again else i.keyboard if i.keyboard else
-                (i.inject[0], 0) if self.injecting and i.inject and not is_open else None)
-        return (int(not self.awaited if self.injecting else may), i.host if i.host and not resend else None, int(resend or i.command_ready),
-                send, int(i.send_ready and not self.again), int(i.send_ready and not self.again and not i.keyboard), self.injecting,
-                int(self.arrived(i) is not None and not self.awaited))
+        send = (
+            (self.injected, 0)
+            if self.again
+            else i.keyboard
+            if i.keyboard
+            else (i.inject[0], 0)
+            if self.injecting and i.inject and not is_open
+            else None
+        )
+        return (
+            int(not self.awaited if self.injecting else may),
+            i.host if i.host and not resend else None,
+            int(resend or i.command_ready),
+            send,
+            int(i.send_ready and not self.again),
+            int(i.send_ready and not self.again and not i.keyboard),
+            self.injecting,
+            int(self.arrived(i) is not None and not self.awaited),
+        )
 
     def step(self, i, rst=0):
         resend, active, _, may = self.conditions(i)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/peripheral/ps2_inject_queue.sv does: outputs(injecting) are those in a clk, step(…) is the clk."""
+"""What rtl/peripheral/ps2_inject_queue.sv does: outputs(injecting) are those in a clk, step(…) is
+the clk.
+"""
+
 from tb.serial.sync_fifo import SyncFifo
 
 

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A PS/2 keyboard and a PS/2 host as the interface's description has them, each the judge of the other side.
+"""A PS/2 keyboard and a PS/2 host as the interface's description has them, each the judge of the
+other side.
 
-Both are stepped once a clk with the levels of their lines, and pull them by clock_low and data_low."""
+Both are stepped once a clk with the levels of their lines, and pull them by clock_low and
+data_low."""
+
 import random
 
 from tb.peripheral.ps2_host import frame
@@ -24,7 +27,9 @@ class Party:
 
 
 class Keyboard(Party):
-    """Sends what is put into `outbox`, answers commands; `half` is its half bit in us. A share of its frames can be damaged."""
+    """Sends what is put into `outbox`, answers commands; `half` is its half bit in us. A share of
+    its frames can be damaged.
+    """
 
     def __init__(self, clk_hz, half=40, damage=0.0):
         super().__init__(clk_hz)
@@ -46,7 +51,9 @@ class Keyboard(Party):
             yield
 
     def pulse(self):
-        """One clock pulse, from the middle of high to the middle of high; False if the host holds the clock."""
+        """One clock pulse, from the middle of high to the middle of high; False if the host holds
+        the clock.
+        """
         yield from self.wait(self.half / 2)
         if not self.clock:
             return False
@@ -83,17 +90,27 @@ class Keyboard(Party):
             self.answers = [self.last]
         else:
             self.commands.append(byte)
-            self.answers = {0xEE: [0xEE], 0xFF: [0xFA, 0xAA], 0xF2: [0xFA, 0xAB, 0x83]}.get(byte, [0xFA])
+            self.answers = {0xEE: [0xEE], 0xFF: [0xFA, 0xAA], 0xF2: [0xFA, 0xAB, 0x83]}.get(
+                byte, [0xFA]
+            )
 
 
 class Host(Party):
-    """Keeps in `heard` what it hears, sends what is put into `orders`, asks for damaged bytes again. cut: the share of bits after which
+    """Keeps in `heard` what it hears, sends what is put into `orders`, asks for damaged bytes
+    again. cut: the share of bits after which
     it pulls the clock; rest: it does so after each byte."""
 
     def __init__(self, clk_hz, cut=0.0, rest=0):
         super().__init__(clk_hz)
         self.cut, self.rest = cut, rest
-        self.heard, self.at, self.orders, self.damaged, self.unanswered, self.now = [], [], [], 0, 0, 0
+        self.heard, self.at, self.orders, self.damaged, self.unanswered, self.now = (
+            [],
+            [],
+            [],
+            0,
+            0,
+            0,
+        )
 
     def live(self):
         bits, before, still = [], 1, 0
@@ -106,7 +123,9 @@ class Host(Party):
                     yield from self.judge(bits)
                     bits = []
                 elif random.random() < self.cut:
-                    yield from self.wait(random.uniform(1, 75 if len(bits) < 10 else 60))      # no device can tell a cut at its last edge
+                    yield from self.wait(
+                        random.uniform(1, 75 if len(bits) < 10 else 60)
+                    )  # no device can tell a cut at its last edge
                     yield from self.pull(random.uniform(100, 400))
                     bits = []
                 before = self.clock

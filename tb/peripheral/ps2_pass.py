@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/peripheral/ps2_pass.sv does: the models of its parts, wired as the parts are. step(...) is one clk and returns the pulls after it,
+"""What rtl/peripheral/ps2_pass.sv does: the models of its parts, wired as the parts are. step(...)
+is one clk and returns the pulls after it,
 (keyboard clock, keyboard data, host clock, host data)."""
+
 from tb.common.synchroniser import Synchroniser
 from tb.peripheral.ps2_arbiter import Inputs, Ps2Arbiter
 from tb.peripheral.ps2_device import Ps2Device
@@ -14,14 +16,28 @@ class Ps2Pass:
         self.deglitchers = [Deglitcher() for _ in range(4)]
         self.stable = clk_hz // 1_000_000
         self.levels, self.lines = [1] * 4, [1] * 4
-        self.host, self.device, self.arbiter = Ps2Host(clk_hz), Ps2Device(clk_hz), Ps2Arbiter(clk_hz)
+        self.host, self.device, self.arbiter = (
+            Ps2Host(clk_hz),
+            Ps2Device(clk_hz),
+            Ps2Arbiter(clk_hz),
+        )
 
     def inputs(self, idle_ms, inject):
         """What the arbiter sees, and its answers."""
         _, valid, byte, damaged, sent, unsent, _, busy, _, _ = self.host.pins()
         send_ready, host_valid, order, order_damaged, *_ = self.device.pins(self.lines[2])
-        seen = Inputs(idle_ms, inject, (byte, damaged) if valid else None, busy, 0, self.host.rested(), sent, unsent, send_ready,
-                      (order, order_damaged) if host_valid else None)
+        seen = Inputs(
+            idle_ms,
+            inject,
+            (byte, damaged) if valid else None,
+            busy,
+            0,
+            self.host.rested(),
+            sent,
+            unsent,
+            send_ready,
+            (order, order_damaged) if host_valid else None,
+        )
         command = self.arbiter.wires(seen)[1]
         return seen._replace(keyboard_held=int(self.host.rested() and command is None))
 
@@ -36,6 +52,8 @@ class Ps2Pass:
         self.host.step(*self.lines[:2], hold, keyboard_ready, *(command or (None, 0)), rst)
         self.device.step(*self.lines[2:], *(send or (None, 0)), host_ready, rst)
         self.arbiter.step(seen, rst)
-        self.lines = [d.step(self.stable, level, rst)[0] for d, level in zip(self.deglitchers, self.levels)]
+        self.lines = [
+            d.step(self.stable, level, rst)[0] for d, level in zip(self.deglitchers, self.levels)
+        ]
         self.levels = [s.step(level, rst) for s, level in zip(self.synchronisers, lines)]
         return *self.host.pins()[-2:], *self.device.pins(1)[-2:]

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/peripheral/spi_word_sender.sv does, in integers: step(...) is one clk and returns (ready, cs_n, sclk, sdi, sent) after it."""
+"""What rtl/peripheral/spi_word_sender.sv does, in integers: step(...) is one clk and returns
+(ready, cs_n, sclk, sdi, sent) after it.
+"""
 
-BITS, RAISE, HALVES = 16, 33, 36            # half periods of sclk in a word: before cs_n rises; in all
+BITS, RAISE, HALVES = 16, 33, 36  # half periods of sclk in a word: before cs_n rises; in all
 
 
 class SpiWordSender:
     def __init__(self):
-        self.word, self.age = 0, None       # age: clk since the word was taken, None: ready
+        self.word, self.age = 0, None  # age: clk since the word was taken, None: ready
 
     def step(self, valid, word, half_period, rst=0):
         if rst:
@@ -24,4 +26,10 @@ class SpiWordSender:
             return 1, 1, 0, self.word & 1, 0
         half, rest = divmod(self.age, self.length)
         sdi = self.word >> BITS - 1 - min(half // 2, BITS - 1) & 1
-        return 0, int(half >= RAISE), int(half % 2 and half < RAISE), sdi, int(half == RAISE and rest == 0)
+        return (
+            0,
+            int(half >= RAISE),
+            int(half % 2 and half < RAISE),
+            sdi,
+            int(half == RAISE and rest == 0),
+        )

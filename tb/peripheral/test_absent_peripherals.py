@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""links: what was not built is idle, whatever is written and whatever comes at the pins; the build register tells."""
+"""links: what was not built is idle, whatever is written and whatever comes at the pins; the build
+register tells.
+"""
+
 import random
 
 import cocotb
@@ -9,12 +12,33 @@ from cocotb.triggers import FallingEdge
 from moire.made.registers import BY_NAME
 from tb import bench
 
-INPUTS = "i2c_scl", "i2c_sda", "keyboard_clock", "keyboard_data", "edm_clock", "edm_data", "peer_rx", "sensor_rx", "edm_status"
-IDLE = [dict(i2c_scl_low=0, i2c_sda_low=0),                                # by the bits of PERIPHERALS
-        dict(keyboard_clock_low=0, keyboard_data_low=0, edm_clock_low=0, edm_data_low=0),
-        dict(peer_tx=1), {}, dict(display_cs_n=1, display_sclk=0, display_data=0), {}]
-BUILT, BIT_TIME, TRANSMIT = (BY_NAME["peripherals", register, field].offset // 4 for register, field in
-                             (("built", "i2c"), ("peer_bit_time", "value"), ("peer_transmit", "value")))
+INPUTS = (
+    "i2c_scl",
+    "i2c_sda",
+    "keyboard_clock",
+    "keyboard_data",
+    "edm_clock",
+    "edm_data",
+    "peer_rx",
+    "sensor_rx",
+    "edm_status",
+)
+IDLE = [
+    dict(i2c_scl_low=0, i2c_sda_low=0),  # by the bits of PERIPHERALS
+    dict(keyboard_clock_low=0, keyboard_data_low=0, edm_clock_low=0, edm_data_low=0),
+    dict(peer_tx=1),
+    {},
+    dict(display_cs_n=1, display_sclk=0, display_data=0),
+    {},
+]
+BUILT, BIT_TIME, TRANSMIT = (
+    BY_NAME["peripherals", register, field].offset // 4
+    for register, field in (
+        ("built", "i2c"),
+        ("peer_bit_time", "value"),
+        ("peer_transmit", "value"),
+    )
+)
 
 
 @cocotb.test()
@@ -24,7 +48,10 @@ async def absent_links_are_idle(dut):
     await FallingEdge(dut.clk)
     await FallingEdge(dut.clk)
     awake = set()
-    for word, value in ((BIT_TIME, 2 << 4), (TRANSMIT, 0)):                 # soon, since what the writes below set may take longer
+    for word, value in (
+        (BIT_TIME, 2 << 4),
+        (TRANSMIT, 0),
+    ):  # soon, since what the writes below set may take longer
         dut.select.value, dut.write.value, dut.word.value, dut.wdata.value = 1, 1, word, value
         await FallingEdge(dut.clk)
     for n in range(6000):
@@ -39,7 +66,9 @@ async def absent_links_are_idle(dut):
             for name, level in idle.items():
                 if int(getattr(dut, name).value) != level:
                     awake.add(bit)
-    assert awake == {bit for bit, outputs in enumerate(IDLE) if built >> bit & 1 and outputs}, "what was built, and only that, moves"
+    assert awake == {bit for bit, outputs in enumerate(IDLE) if built >> bit & 1 and outputs}, (
+        "what was built, and only that, moves"
+    )
     dut.write.value, dut.word.value = 0, BUILT
     await FallingEdge(dut.clk)
     assert int(dut.rdata.value) == built

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""i2c_master: the waveform by hand, its times, a 24AA128, stretching, a lost and a stuck bus, sigrok, random against the model."""
+"""i2c_master: the waveform by hand, its times, a 24AA128, stretching, a lost and a stuck bus,
+sigrok, random against the model.
+"""
+
 import random
 import re
 import shutil
@@ -34,11 +37,17 @@ class Bus:
     def __init__(self, dut, device=None):
         self.dut, self.device = dut, device
         self.bus_hz = int(dut.BUS_HZ.value)
-        self.model, self.samples, self.foreign = I2cMaster(CLK_HZ, self.bus_hz, STRETCH_US), bytearray(), (0, 0)
+        self.model, self.samples, self.foreign = (
+            I2cMaster(CLK_HZ, self.bus_hz, STRETCH_US),
+            bytearray(),
+            (0, 0),
+        )
         self.pulls, self.device_pulls = (0, 0), (0, 0)
 
     async def begin(self):
-        await bench.start(self.dut, scl=1, sda=1, command_valid=0, command=0, write_data=0, acknowledge=0)
+        await bench.start(
+            self.dut, scl=1, sda=1, command_valid=0, command=0, write_data=0, acknowledge=0
+        )
         self.dut.rst.value = 1
         await FallingEdge(self.dut.clk)
         await FallingEdge(self.dut.clk)
@@ -47,7 +56,9 @@ class Bus:
 
     async def clk(self, command=None, data=0, acknowledge=0, rst=0):
         d = self.dut
-        scl, sda = (int(not any(pulls)) for pulls in zip(self.pulls, self.device_pulls, self.foreign))
+        scl, sda = (
+            int(not any(pulls)) for pulls in zip(self.pulls, self.device_pulls, self.foreign)
+        )
         d.scl.value, d.sda.value, d.rst.value = scl, sda, rst
         d.command_valid.value, d.command.value = command is not None, command or 0
         d.write_data.value, d.acknowledge.value = data, acknowledge
@@ -55,8 +66,15 @@ class Bus:
         await FallingEdge(d.clk)
         want = self.model.step(scl, sda, command, data, acknowledge, rst)
         done = int(d.done.value)
-        got = (int(d.command_ready.value), done, int(d.result.value) if done else None,
-               int(d.read_data.value) if want[3] is not None else None, int(d.owned.value), int(d.scl_low.value), int(d.sda_low.value))
+        got = (
+            int(d.command_ready.value),
+            done,
+            int(d.result.value) if done else None,
+            int(d.read_data.value) if want[3] is not None else None,
+            int(d.owned.value),
+            int(d.scl_low.value),
+            int(d.sda_low.value),
+        )
         assert got == want, f"{got} where the model has {want}"
         self.pulls = got[5:]
         self.device_pulls = self.device.step(scl, sda) if self.device else (0, 0)
@@ -94,8 +112,14 @@ class Bus:
             tries += 1
 
     async def read(self, place, length):
-        assert [await self.do(START), await self.do(WRITE, 0xA0), await self.do(WRITE, place >> 8), await self.do(WRITE, place & 255),
-                await self.do(START), await self.do(WRITE, 0xA1)] == [OK] * 6
+        assert [
+            await self.do(START),
+            await self.do(WRITE, 0xA0),
+            await self.do(WRITE, place >> 8),
+            await self.do(WRITE, place & 255),
+            await self.do(START),
+            await self.do(WRITE, 0xA1),
+        ] == [OK] * 6
         data = []
         for n in range(length):
             assert await self.do(READ, acknowledge=int(n < length - 1)) == OK
@@ -118,20 +142,31 @@ def edges(samples):
 @cocotb.test()
 async def one_byte_by_hand(dut):
     bus = await Bus(dut).begin()
-    assert [await bus.do(START), await bus.do(WRITE, 0xA1), await bus.do(STOP)] == [OK, NOT_ACKNOWLEDGED, OK]
-    assert edges(bus.samples) == "S" + "10100001" + "1" + "0" + "P"         # the clock rises once more, with data low, for the stop
+    assert [await bus.do(START), await bus.do(WRITE, 0xA1), await bus.do(STOP)] == [
+        OK,
+        NOT_ACKNOWLEDGED,
+        OK,
+    ]
+    assert (
+        edges(bus.samples) == "S" + "10100001" + "1" + "0" + "P"
+    )  # the clock rises once more, with data low, for the stop
 
 
 @cocotb.test()
 async def the_times_of_the_bus_are_kept(dut):
-    """UM10204, table 10, in us: low, high, set-up and hold of a start, set-up of a stop, free before a start, set-up of data."""
+    """UM10204, table 10, in us: low, high, set-up and hold of a start, set-up of a stop, free
+    before a start, set-up of data.
+    """
     bus = await Bus(dut, Eeprom()).begin()
-    await bus.write(0, b"\x5A\xC3")
+    await bus.write(0, b"\x5a\xc3")
     await bus.poll()
-    least = dict(low=4.7, high=4.0, su_sta=4.7, hd_sta=4.0, su_sto=4.0, buf=4.7, su_dat=.25) if bus.bus_hz <= 100_000 else \
-        dict(low=1.3, high=.6, su_sta=.6, hd_sta=.6, su_sto=.6, buf=1.3, su_dat=.1)
+    least = (
+        dict(low=4.7, high=4.0, su_sta=4.7, hd_sta=4.0, su_sto=4.0, buf=4.7, su_dat=0.25)
+        if bus.bus_hz <= 100_000
+        else dict(low=1.3, high=0.6, su_sta=0.6, hd_sta=0.6, su_sto=0.6, buf=1.3, su_dat=0.1)
+    )
     least = {name: us * CLK_HZ / 1e6 for name, us in least.items()}
-    rose = fell = moved = begun = ended = -10**6
+    rose = fell = moved = begun = ended = -(10**6)
     for now, (before, after) in enumerate(zip(bus.samples, bus.samples[1:])):
         if (before ^ after) & 2:
             if before & after & 1:
@@ -155,12 +190,18 @@ async def an_eeprom_takes_a_page_and_is_polled_until_it_is_written(dut):
     device = Eeprom(write_clk=CLK_HZ // 1000)
     bus = await Bus(dut, device).begin()
     data = bytes(random.getrandbits(8) for _ in range(10))
-    await bus.write(0x0FC0 + 58, data)                                     # runs over the end of its page, as the real one
+    await bus.write(0x0FC0 + 58, data)  # runs over the end of its page, as the real one
     assert device.writes == 1 and await bus.poll() > 0
-    assert device.memory[0x0FC0 + 58:0x1000] == data[:6] and device.memory[0x0FC0:0x0FC4] == data[6:]
+    assert (
+        device.memory[0x0FC0 + 58 : 0x1000] == data[:6] and device.memory[0x0FC0:0x0FC4] == data[6:]
+    )
     assert await bus.read(0x0FC0 + 58, 6) == data[:6]
-    assert await bus.read(0x3FFF, 2) == b"\xFF\xFF"
-    assert await bus.do(START) == OK and await bus.do(WRITE, 0xA2) == NOT_ACKNOWLEDGED and await bus.do(STOP) == OK   # nobody there
+    assert await bus.read(0x3FFF, 2) == b"\xff\xff"
+    assert (
+        await bus.do(START) == OK
+        and await bus.do(WRITE, 0xA2) == NOT_ACKNOWLEDGED
+        and await bus.do(STOP) == OK
+    )  # nobody there
 
 
 @cocotb.test()
@@ -189,7 +230,7 @@ async def another_master_takes_the_bus(dut):
     while not (got := await bus.clk())[1]:
         pass
     assert got[2] == LOST and bus.pulls == (0, 0) and not got[4]
-    assert await bus.do(START) == NO_BUS                                   # and holds it
+    assert await bus.do(START) == NO_BUS  # and holds it
     bus.foreign = (0, 0)
     assert await bus.do(START) == OK
 
@@ -229,10 +270,14 @@ async def any_commands_on_any_wires_match_the_model(dut):
     for device in (None, Eeprom(), Eeprom(stretch=60)):
         bus = await Bus(dut, device).begin()
         for _ in range(60):
-            bus.foreign = (random.random() < .03, random.random() < .1)
-            await bus.clk(random.choice([START, STOP, WRITE, WRITE, READ, RECOVER, 7]), random.choice([0xA0, 0xA1, random.getrandbits(8)]),
-                          random.randrange(2), int(random.random() < .02))
-            await bus.quiet(random.randrange(900 if random.random() < .5 else 30))
+            bus.foreign = (random.random() < 0.03, random.random() < 0.1)
+            await bus.clk(
+                random.choice([START, STOP, WRITE, WRITE, READ, RECOVER, 7]),
+                random.choice([0xA0, 0xA1, random.getrandbits(8)]),
+                random.randrange(2),
+                int(random.random() < 0.02),
+            )
+            await bus.quiet(random.randrange(900 if random.random() < 0.5 else 30))
 
 
 @cocotb.test(skip=not shutil.which("sigrok-cli"))
@@ -245,18 +290,46 @@ async def sigrok_reads_the_same_bytes_and_the_eeprom_operations(dut):
     Path("bus.bin").write_bytes(bus.samples)
 
     def sigrok(decoders, words):
-        out = subprocess.run(["sigrok-cli", "-i", "bus.bin", "-I", f"binary:numchannels=2:samplerate={CLK_HZ}", "-P", decoders,
-                              "-A", words], capture_output=True, text=True, check=True, timeout=60)
+        out = subprocess.run(
+            [
+                "sigrok-cli",
+                "-i",
+                "bus.bin",
+                "-I",
+                f"binary:numchannels=2:samplerate={CLK_HZ}",
+                "-P",
+                decoders,
+                "-A",
+                words,
+            ],
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=60,
+        )
         return out.stdout
 
     wire = sigrok("i2c:scl=0:sda=1", "i2c=data-write:data-read:warnings")
-    assert [int(b, 16) for b in re.findall(r"Data write: (\w\w)", wire)] == [0x12, 0x34, *data, 0x12, 0x34]
-    assert bytes(int(b, 16) for b in re.findall(r"Data read: (\w\w)", wire)) == data and "warning" not in wire.lower()
+    assert [int(b, 16) for b in re.findall(r"Data write: (\w\w)", wire)] == [
+        0x12,
+        0x34,
+        *data,
+        0x12,
+        0x34,
+    ]
+    assert (
+        bytes(int(b, 16) for b in re.findall(r"Data read: (\w\w)", wire)) == data
+        and "warning" not in wire.lower()
+    )
     # the 24AA64 is its nearest: the same commands, half the size and page
-    operations = sigrok("i2c:scl=0:sda=1,eeprom24xx:chip=microchip_24aa64", "eeprom24xx=page-write:seq-random-read")
+    operations = sigrok(
+        "i2c:scl=0:sda=1,eeprom24xx:chip=microchip_24aa64", "eeprom24xx=page-write:seq-random-read"
+    )
     words = data.hex(" ").upper()
-    assert re.findall(r"eeprom24xx-1: (.*)", operations) == [f"Page write (addr=1234, 5 bytes): {words}",
-                                                             f"Sequential random read (addr=1234, 5 bytes): {words}"]
+    assert re.findall(r"eeprom24xx-1: (.*)", operations) == [
+        f"Page write (addr=1234, 5 bytes): {words}",
+        f"Sequential random read (addr=1234, 5 bytes): {words}",
+    ]
 
 
 @pytest.mark.parametrize("bus_hz", [100_000, 400_000])

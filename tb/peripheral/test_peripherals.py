@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""links: each link end to end, from its registers to what stands at its pins: an EEPROM, a keyboard and its machine, a peer, an angle
+"""links: each link end to end, from its registers to what stands at its pins: an EEPROM, a keyboard
+and its machine, a peer, an angle
 sensor, a numeric display, two lamps."""
+
 import random
 
 import cocotb
@@ -16,8 +18,8 @@ from tb.peripheral.test_i2c_master import edges
 
 CLK_HZ = 1_000_000
 MS = CLK_HZ // 1000
-BIT = 16                                                                   # clk, of both serial ports
-CUT = [0x14, 0x1D, 0xF0, 0x1D, 0xF0, 0x14]                                 # S4: left Ctrl + W
+BIT = 16  # clk, of both serial ports
+CUT = [0x14, 0x1D, 0xF0, 0x1D, 0xF0, 0x14]  # S4: left Ctrl + W
 REGISTERS = {}
 for field in FIELDS:
     if field.block == "peripherals":
@@ -32,7 +34,11 @@ class SerialBus:
 
     def send(self, data, stop=1):
         for byte in data:
-            self.levels += [level for bit in (0, *(byte >> n & 1 for n in range(8)), stop) for level in [bit] * BIT]
+            self.levels += [
+                level
+                for bit in (0, *(byte >> n & 1 for n in range(8)), stop)
+                for level in [bit] * BIT
+            ]
 
     def level(self):
         return self.levels.pop(0) if self.levels else 1
@@ -54,14 +60,39 @@ class Links:
     """The block with everything around it, one clk at a time; registers by their names."""
 
     def __init__(self, dut):
-        self.dut, self.eeprom, self.keyboard, self.machine = dut, Eeprom(write_clk=5 * MS), Keyboard(CLK_HZ), Host(CLK_HZ)
-        self.stuck, self.wires = (0, 0), bytearray()                       # I2C: lines that something holds low, samples of both
-        self.peer, self.sensor, self.lamps, self.display, self.shown = SerialBus(), SerialBus(), 0, (1, 0), []
+        self.dut, self.eeprom, self.keyboard, self.machine = (
+            dut,
+            Eeprom(write_clk=5 * MS),
+            Keyboard(CLK_HZ),
+            Host(CLK_HZ),
+        )
+        self.stuck, self.wires = (
+            (0, 0),
+            bytearray(),
+        )  # I2C: lines that something holds low, samples of both
+        self.peer, self.sensor, self.lamps, self.display, self.shown = (
+            SerialBus(),
+            SerialBus(),
+            0,
+            (1, 0),
+            [],
+        )
         self.bits = []
 
     async def begin(self):
-        ones = "i2c_scl", "i2c_sda", "keyboard_clock", "keyboard_data", "edm_clock", "edm_data", "peer_rx", "sensor_rx"
-        await bench.start(self.dut, select=0, write=0, word=0, wdata=0, edm_status=0, **dict.fromkeys(ones, 1))
+        ones = (
+            "i2c_scl",
+            "i2c_sda",
+            "keyboard_clock",
+            "keyboard_data",
+            "edm_clock",
+            "edm_data",
+            "peer_rx",
+            "sensor_rx",
+        )
+        await bench.start(
+            self.dut, select=0, write=0, word=0, wdata=0, edm_status=0, **dict.fromkeys(ones, 1)
+        )
         self.dut.rst.value = 1
         await self.clk(3)
         self.dut.rst.value = 0
@@ -78,15 +109,33 @@ class Links:
     def around(self):
         d, k, m, e = self.dut, self.keyboard, self.machine, self.eeprom
         pulls = int(d.i2c_scl_low.value), int(d.i2c_sda_low.value)
-        lines = [int(not (own or device or stuck)) for own, device, stuck in zip(pulls, (e.scl_low > 0, e.sda_low), self.stuck)]
+        lines = [
+            int(not (own or device or stuck))
+            for own, device, stuck in zip(pulls, (e.scl_low > 0, e.sda_low), self.stuck)
+        ]
         e.step(*lines)
         self.wires.append(lines[0] | lines[1] << 1)
-        k.step(1 - (int(d.keyboard_clock_low.value) | k.clock_low), 1 - (int(d.keyboard_data_low.value) | k.data_low))
-        m.step(1 - (int(d.edm_clock_low.value) | m.clock_low), 1 - (int(d.edm_data_low.value) | m.data_low))
+        k.step(
+            1 - (int(d.keyboard_clock_low.value) | k.clock_low),
+            1 - (int(d.keyboard_data_low.value) | k.data_low),
+        )
+        m.step(
+            1 - (int(d.edm_clock_low.value) | m.clock_low),
+            1 - (int(d.edm_data_low.value) | m.data_low),
+        )
         self.peer.hear(int(d.peer_tx.value))
         self.look(int(d.display_cs_n.value), int(d.display_sclk.value))
-        inputs = dict(i2c_scl=lines[0], i2c_sda=lines[1], keyboard_clock=k.clock, keyboard_data=k.data, edm_clock=m.clock,
-                      edm_data=m.data, peer_rx=self.peer.level(), sensor_rx=self.sensor.level(), edm_status=self.lamps)
+        inputs = dict(
+            i2c_scl=lines[0],
+            i2c_sda=lines[1],
+            keyboard_clock=k.clock,
+            keyboard_data=k.data,
+            edm_clock=m.clock,
+            edm_data=m.data,
+            peer_rx=self.peer.level(),
+            sensor_rx=self.sensor.level(),
+            edm_status=self.lamps,
+        )
         for name, level in inputs.items():
             if int(getattr(d, name).value) != level:
                 getattr(d, name).value = level
@@ -105,11 +154,15 @@ class Links:
         d.select.value, d.write.value, d.word.value, d.wdata.value = 1, write, offset // 4, wdata
         await self.clk()
         d.select.value = 0
-        return int(d.rdata.value.resolve("zeros"))                         # what never came has no value
+        return int(d.rdata.value.resolve("zeros"))  # what never came has no value
 
     async def write(self, register, **values):
         fields = REGISTERS[register]
-        await self.access(1, next(iter(fields.values())).offset, sum(value << fields[name].low for name, value in values.items()))
+        await self.access(
+            1,
+            next(iter(fields.values())).offset,
+            sum(value << fields[name].low for name, value in values.items()),
+        )
 
     async def read(self, register):
         """The fields of a register by name; the value alone, if there is only one."""
@@ -131,7 +184,11 @@ class Links:
     async def i2c(self, *commands):
         """Queue (command, data or acknowledge) and wait for their results: [(result, data)]."""
         for command, value in commands:
-            await self.write("i2c", command=command, **({"acknowledge": value} if command == READ else {"data": value}))
+            await self.write(
+                "i2c",
+                command=command,
+                **({"acknowledge": value} if command == READ else {"data": value}),
+            )
         while (await self.read("i2c_state"))["busy"]:
             await self.clk(50)
         answers = []
@@ -154,15 +211,19 @@ async def a_page_goes_into_the_eeprom_with_one_queue_of_commands_and_comes_back(
     head = [(START, 0), (WRITE, 0xA0), (WRITE, 0x12), (WRITE, 0x40)]
     assert (await links.read("i2c_state"))["free"] == 128
     answers = await links.i2c(*head, *((WRITE, byte) for byte in data), (STOP, 0))
-    assert [result for result, _ in answers] == [OK] * 69 and links.eeprom.memory[0x1240:0x1280] == bytes(data)
+    assert [result for result, _ in answers] == [OK] * 69 and links.eeprom.memory[
+        0x1240:0x1280
+    ] == bytes(data)
     tries = 0
     while (await links.i2c((START, 0), (WRITE, 0xA0), (STOP, 0)))[1][0] == NOT_ACKNOWLEDGED:
         tries += 1
-    assert tries > 0                                                       # it writes for 5 ms
-    answers = await links.i2c(*head, (START, 0), (WRITE, 0xA1), *((READ, int(n < 63)) for n in range(64)), (STOP, 0))
+    assert tries > 0  # it writes for 5 ms
+    answers = await links.i2c(
+        *head, (START, 0), (WRITE, 0xA1), *((READ, int(n < 63)) for n in range(64)), (STOP, 0)
+    )
     assert {result for result, _ in answers} == {OK} and [byte for _, byte in answers[6:70]] == data
     assert await links.read("i2c_state") == dict(free=128, busy=0, owned=0, scl=1, sda=1)
-    assert edges(links.wires).count("S") == edges(links.wires).count("P") + 1                   # a repeated start
+    assert edges(links.wires).count("S") == edges(links.wires).count("P") + 1  # a repeated start
 
 
 @cocotb.test()
@@ -193,7 +254,9 @@ async def a_person_types_and_a_cut_is_started_after_it(dut):
     assert links.machine.heard == [0x1C, 0xF0, 0x1C, *CUT]
     assert await links.read("ps2_state") == dict(free=32, injecting=0, busy=0)
     assert await links.read("ps2_typed") == 3
-    assert not any((await links.read("ps2_errors")).values()) and await links.read("ps2_glitches") == 0
+    assert (
+        not any((await links.read("ps2_errors")).values()) and await links.read("ps2_glitches") == 0
+    )
 
 
 @cocotb.test()
@@ -209,7 +272,9 @@ async def keys_are_taken_back_but_for_the_sequence_that_is_under_way(dut):
     assert (await links.read("ps2_state"))["free"] <= 32 - 3 * len(CUT) + 3
     await links.until(lambda: len(links.machine.heard) == len(CUT))
     await links.clk(60 * MS)
-    assert links.machine.heard == CUT and await links.read("ps2_state") == dict(free=32, injecting=0, busy=0)
+    assert links.machine.heard == CUT and await links.read("ps2_state") == dict(
+        free=32, injecting=0, busy=0
+    )
 
 
 @cocotb.test()
@@ -219,7 +284,9 @@ async def errors_of_the_keyboard_are_counted_and_cleared(dut):
     await links.begin()
     links.keyboard.outbox = [0x1C]
     await links.until(lambda: links.machine.damaged == 2)
-    assert (await links.read("ps2_errors"))["keyboard_damaged"] >= 2 and await links.read("ps2_typed") == 0
+    assert (await links.read("ps2_errors"))["keyboard_damaged"] >= 2 and await links.read(
+        "ps2_typed"
+    ) == 0
     links.keyboard.damage = 0.0
     await links.until(lambda: links.machine.heard == [0x1C])
     await links.write("ps2_errors")
@@ -236,7 +303,9 @@ async def bytes_pass_to_and_from_the_peer(dut):
     links.peer.send(back)
     await links.until(lambda: len(links.peer.heard) == 64)
     await links.clk(2 * BIT)
-    assert bytes(links.peer.heard) == there and await links.read("peer_state") == dict(transmit_free=64, sending=0)
+    assert bytes(links.peer.heard) == there and await links.read("peer_state") == dict(
+        transmit_free=64, sending=0
+    )
     heard = []
     while (word := await links.read("peer_receive"))["present"]:
         heard.append(word["data"])
@@ -272,13 +341,17 @@ async def an_angle_its_age_and_its_number_are_read(dut):
     assert await links.read("sensor_state") == dict(sequence_number=7, stale=0)
     reading = await links.read("sensor_reading")
     assert reading & 0xFFFFFFFF == 0x89ABCDEF
-    assert 70 * BIT <= reading >> 32 <= 70 * BIT + 4 * BIT                  # seven characters since the first had come
+    assert (
+        70 * BIT <= reading >> 32 <= 70 * BIT + 4 * BIT
+    )  # seven characters since the first had come
     links.sensor.send(frame(8, 1))
     low = await links.access(0, REGISTERS["sensor_reading"]["value"].offset)
     await links.until(lambda: not links.sensor.levels)
     await links.clk(5)
     high = await links.access(0, REGISTERS["sensor_reading"]["value"].offset + 4)
-    assert low == 0x89ABCDEF and reading >> 32 <= high <= (reading >> 32) + 20, "the age is that of the angle read"
+    assert low == 0x89ABCDEF and reading >> 32 <= high <= (reading >> 32) + 20, (
+        "the age is that of the angle read"
+    )
     links.sensor.send(frame(11, 2))
     links.sensor.send(frame(12, 3)[:7] + b"\x00")
     await links.until(lambda: not links.sensor.levels)

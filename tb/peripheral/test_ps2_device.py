@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ps2_device: bytes and commands by hand, a host that cuts at every bit, bad commands, and random lines against the model."""
+"""ps2_device: bytes and commands by hand, a host that cuts at every bit, bad commands, and random
+lines against the model.
+"""
+
 import random
 
 import cocotb
@@ -23,7 +26,9 @@ class Side:
         self.now, self.edges, self.done, self.commands, self.aborted = 0, [], 0, [], 0
 
     async def begin(self):
-        await bench.start(self.dut, clock=1, data=1, send_valid=0, send=0, send_damaged=0, received_ready=1)
+        await bench.start(
+            self.dut, clock=1, data=1, send_valid=0, send=0, send_damaged=0, received_ready=1
+        )
         self.dut.rst.value = 1
         await FallingEdge(self.dut.clk)
         await FallingEdge(self.dut.clk)
@@ -34,7 +39,11 @@ class Side:
     async def clk(self, pull_clock=0, pull_data=0, send=None, damaged=0, ready=1, rst=0, n=1):
         """n clk; edges holds (clk, data) of each falling edge of the wire that is not the host's."""
         d, pins = self.dut, None
-        d.send_valid.value, d.send.value, d.send_damaged.value = send is not None, send or 0, damaged
+        d.send_valid.value, d.send.value, d.send_damaged.value = (
+            send is not None,
+            send or 0,
+            damaged,
+        )
         d.received_ready.value, d.rst.value = ready, rst
         for _ in range(n):
             clock, data = 1 - (self.clock_low | pull_clock), 1 - (self.data_low | pull_data)
@@ -113,7 +122,11 @@ async def a_host_that_cuts_after_any_bit_gets_the_byte_again_whole(dut):
             await side.clk(send=0xA5, n=late)
             done, aborted = side.done, side.aborted
             await side.clk(pull_clock=1, send=0xA5, n=round(120 * US))
-            assert side.done == done and side.aborted == aborted + 1 and (side.clock_low, side.data_low) == (0, 0), (cut, late)
+            assert (
+                side.done == done
+                and side.aborted == aborted + 1
+                and (side.clock_low, side.data_low) == (0, 0)
+            ), (cut, late)
             side.edges.clear()
             await side.until_sent(0xA5)
             assert [bit for _, bit in side.edges] == frame(0xA5), (cut, late)
@@ -134,12 +147,14 @@ async def after_the_eleventh_edge_the_byte_is_sent_whatever_the_host_does(dut):
 @cocotb.test()
 async def a_command_by_hand_is_acknowledged(dut):
     side = await Side(dut).begin()
-    assert await side.command([1, 0, 1, 1, 0, 1, 1, 1, 1, 1]) == 0          # ED and its parity bit, stop; data low at the eleventh edge
+    assert (
+        await side.command([1, 0, 1, 1, 0, 1, 1, 1, 1, 1]) == 0
+    )  # ED and its parity bit, stop; data low at the eleventh edge
     assert side.commands == [(0xED, 0)]
     assert await side.command(frame(0xF4, 1)[1:]) == 0
     assert side.commands.pop() == (0xF4, 1)
     assert await side.command([*frame(0xF4)[1:10], 0]) is not None
-    assert side.commands.pop() == (0xF4, 1)                                # no stop bit
+    assert side.commands.pop() == (0xF4, 1)  # no stop bit
 
 
 @cocotb.test()
@@ -163,8 +178,10 @@ async def a_command_goes_before_a_byte_and_waits_while_another_stands(dut):
     await side.clk(pull_data=1, n=round(100 * US), send=0x12)
     assert side.edges and side.model.state == "receive"
     await side.clk(pull_clock=1, n=round(120 * US))
-    while not side.model.valid:                                            # a byte that is not taken
-        await side.clk(pull_data=int(not (side.model.state == "receive" and side.model.place >= 9)), ready=0)
+    while not side.model.valid:  # a byte that is not taken
+        await side.clk(
+            pull_data=int(not (side.model.state == "receive" and side.model.place >= 9)), ready=0
+        )
     side.edges.clear()
     await side.clk(pull_data=1, n=round(1000 * US), ready=0)
     assert len(side.edges) <= 1
@@ -188,14 +205,27 @@ async def reset_lets_go_of_both_lines(dut):
 async def any_lines_match_the_model(dut):
     side = await Side(dut).begin()
     for _ in range(150):
-        more = dict(send=random.choice([None, random.getrandbits(8)]), damaged=random.randrange(2), ready=random.random() < .7)
+        more = dict(
+            send=random.choice([None, random.getrandbits(8)]),
+            damaged=random.randrange(2),
+            ready=random.random() < 0.7,
+        )
         kind = random.randrange(3)
         if kind == 0:
             await side.clk(n=random.randrange(500), **more)
         elif kind == 1:
-            await side.command(frame(random.getrandbits(8), random.randrange(2))[1:], random.choice([None, random.randrange(1, 11)]))
+            await side.command(
+                frame(random.getrandbits(8), random.randrange(2))[1:],
+                random.choice([None, random.randrange(1, 11)]),
+            )
         else:
-            await side.clk(random.randrange(2), random.randrange(2), n=random.randrange(1, 60), rst=random.random() < .1, **more)
+            await side.clk(
+                random.randrange(2),
+                random.randrange(2),
+                n=random.randrange(1, 60),
+                rst=random.random() < 0.1,
+                **more,
+            )
 
 
 def test_ps2_device():

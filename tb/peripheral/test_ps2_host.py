@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ps2_host: bytes and commands by hand, damage, time-outs, holding, a recorded keyboard, and random lines against the model."""
+"""ps2_host: bytes and commands by hand, damage, time-outs, holding, a recorded keyboard, and random
+lines against the model.
+"""
+
 import csv
 import random
 
@@ -14,17 +17,51 @@ CLK_HZ = 400_000
 US = CLK_HZ / 1e6
 BIT = round(80 * US)
 RECORDING = bench.ROOT.parent / "shared" / "captures" / "ps2_keyboard_asdfgh.csv"
-TYPED = [0x1C, 0xF0, 0x1C, 0x1B, 0xF0, 0x1B, 0x23, 0xF0, 0x23, 0x2B, 0xF0, 0x2B, 0x34, 0xF0, 0x34, 0x33, 0xF0, 0x33]
+TYPED = [
+    0x1C,
+    0xF0,
+    0x1C,
+    0x1B,
+    0xF0,
+    0x1B,
+    0x23,
+    0xF0,
+    0x23,
+    0x2B,
+    0xF0,
+    0x2B,
+    0x34,
+    0xF0,
+    0x34,
+    0x33,
+    0xF0,
+    0x33,
+]
 
 
 class Side:
     """The design and its model, clk by clk."""
 
     def __init__(self, dut):
-        self.dut, self.model, self.bytes, self.results, self.pulls = dut, Ps2Host(CLK_HZ), [], [], []
+        self.dut, self.model, self.bytes, self.results, self.pulls = (
+            dut,
+            Ps2Host(CLK_HZ),
+            [],
+            [],
+            [],
+        )
 
     async def begin(self):
-        await bench.start(self.dut, hold=0, clock=1, data=1, command_valid=0, command=0, command_damaged=0, received_ready=1)
+        await bench.start(
+            self.dut,
+            hold=0,
+            clock=1,
+            data=1,
+            command_valid=0,
+            command=0,
+            command_damaged=0,
+            received_ready=1,
+        )
         self.dut.rst.value = 1
         await FallingEdge(self.dut.clk)
         await FallingEdge(self.dut.clk)
@@ -35,13 +72,25 @@ class Side:
     async def clk(self, clock=1, data=1, hold=0, ready=1, command=None, damaged=0, rst=0, n=1):
         """n clk with these inputs; returns the pins of the last."""
         d = self.dut
-        d.clock.value, d.data.value, d.hold.value, d.received_ready.value, d.rst.value = clock, data, hold, ready, rst
-        d.command_valid.value, d.command.value, d.command_damaged.value = command is not None, command or 0, damaged
+        d.clock.value, d.data.value, d.hold.value, d.received_ready.value, d.rst.value = (
+            clock,
+            data,
+            hold,
+            ready,
+            rst,
+        )
+        d.command_valid.value, d.command.value, d.command_damaged.value = (
+            command is not None,
+            command or 0,
+            damaged,
+        )
         for _ in range(n):
             await Timer(1, "ns")
             pins = [int(p.value) for p in (d.command_ready, d.received_valid)]
             pins += [int(p.value) if pins[1] else None for p in (d.received, d.received_damaged)]
-            pins += [int(p.value) for p in (d.sent, d.unsent, d.held, d.busy, d.clock_low, d.data_low)]
+            pins += [
+                int(p.value) for p in (d.sent, d.unsent, d.held, d.busy, d.clock_low, d.data_low)
+            ]
             want = self.model.pins(command is not None)
             assert tuple(pins) == want, f"{pins} where the model has {want}"
             if pins[1] and ready:
@@ -73,7 +122,7 @@ class Side:
 @cocotb.test()
 async def one_byte_by_hand(dut):
     side = await Side(dut).begin()
-    await side.type([0, 0, 0, 1, 1, 1, 0, 0, 0, 0, 1])                     # 1C: three ones, so the parity bit is 0
+    await side.type([0, 0, 0, 1, 1, 1, 0, 0, 0, 0, 1])  # 1C: three ones, so the parity bit is 0
     assert side.bytes == [(0x1C, 0)]
 
 
@@ -98,7 +147,7 @@ async def a_byte_stands_2_clk_after_the_eleventh_edge_and_holds_the_keyboard_unt
         await side.clk(data=bit, clock=0, n=BIT // 2)
     await side.clk(n=BIT // 2, ready=0)
     assert (await side.clk(clock=0, ready=0))[1] == 0
-    assert (await side.clk(clock=0, ready=0))[1] == 1                      # the edge was seen in the clk before
+    assert (await side.clk(clock=0, ready=0))[1] == 1  # the edge was seen in the clk before
     for _ in range(3):
         assert (await side.clk(n=200, ready=0))[8] == 1
     assert side.bytes == []
@@ -113,7 +162,7 @@ async def the_clock_is_pulled_for_100_us_at_least(dut):
     await side.clk(hold=1)
     await side.clk(n=100)
     assert sum(clock for clock, _ in side.pulls) >= 100 * US
-    assert (await side.clk(hold=1, n=100))[6] == 1                          # held
+    assert (await side.clk(hold=1, n=100))[6] == 1  # held
 
 
 @cocotb.test()
@@ -122,8 +171,20 @@ async def a_command_by_hand(dut):
     while not (await side.clk(command=0xED))[0]:
         pass
     await side.clk(n=round(40 * US))
-    assert side.pulls[-1] == (0, 1)                                        # data low, clock let go
-    assert await side.obey() == [1, 0, 1, 1, 0, 1, 1, 1, 1, 1, 1]           # ED: six ones, so the parity bit is 1; stop; acknowledge
+    assert side.pulls[-1] == (0, 1)  # data low, clock let go
+    assert await side.obey() == [
+        1,
+        0,
+        1,
+        1,
+        0,
+        1,
+        1,
+        1,
+        1,
+        1,
+        1,
+    ]  # ED: six ones, so the parity bit is 1; stop; acknowledge
     await side.clk(n=4)
     assert side.results == ["sent"]
 
@@ -134,7 +195,7 @@ async def what_is_not_acknowledged_or_not_clocked_is_unsent(dut):
     while not (await side.clk(command=0xFF, damaged=1))[0]:
         pass
     await side.clk(n=round(40 * US))
-    assert (await side.obey(acknowledge=1))[8] == 0                        # wrong parity on purpose
+    assert (await side.obey(acknowledge=1))[8] == 0  # wrong parity on purpose
     await side.clk(n=40)
     assert side.results == ["unsent"]
     while not (await side.clk(command=0xF4))[0]:
@@ -157,7 +218,7 @@ async def a_frame_that_stops_is_damaged_and_the_next_is_whole(dut):
         await side.clk(n=round(200 * US))
         assert side.bytes == [(0, 1), (0x1B, 0)], length
         side.bytes.clear()
-    await side.type([1, 1, 1])                                             # an edge with data high begins nothing
+    await side.type([1, 1, 1])  # an edge with data high begins nothing
     await side.clk(n=round(500 * US))
     assert side.bytes == []
 
@@ -178,13 +239,17 @@ async def reset_lets_go_of_both_lines(dut):
 
 @cocotb.test(skip=not RECORDING.exists())
 async def a_recorded_keyboard_is_read(dut):
-    """The keys a s d f g h of a real keyboard; its pauses are cut to 1 ms, its host's own pulling after each byte stays in."""
+    """The keys a s d f g h of a real keyboard; its pauses are cut to 1 ms, its host's own pulling
+    after each byte stays in.
+    """
     side = await Side(dut).begin()
     with open(RECORDING, newline="") as lines:
-        rows = [tuple(map(int, row)) for row in csv.reader(line for line in lines if line[0].isdigit())]
+        rows = [
+            tuple(map(int, row)) for row in csv.reader(line for line in lines if line[0].isdigit())
+        ]
     for (at, clock, data), (end, _, _) in zip(rows, [*rows[1:], (rows[-1][0] + 24_000, 1, 1)]):
-        length = min((end - at) / 24, 1000)                                 # us
-        if length > 2:                                                     # what the deglitcher takes away
+        length = min((end - at) / 24, 1000)  # us
+        if length > 2:  # what the deglitcher takes away
             await side.clk(clock, data, n=round(length * US))
     assert side.bytes == [(byte, 0) for byte in TYPED]
 
@@ -194,12 +259,21 @@ async def any_lines_match_the_model(dut):
     side = await Side(dut).begin()
     for _ in range(60):
         kind = random.randrange(4)
-        more = dict(hold=random.random() < .2, ready=random.random() < .8, command=random.choice([None, None, random.getrandbits(8)]))
+        more = dict(
+            hold=random.random() < 0.2,
+            ready=random.random() < 0.8,
+            command=random.choice([None, None, random.getrandbits(8)]),
+        )
         if kind == 0:
-            await side.type(frame(random.getrandbits(8), random.randrange(2))[:random.choice([11, 11, 5])], **more)
+            await side.type(
+                frame(random.getrandbits(8), random.randrange(2))[: random.choice([11, 11, 5])],
+                **more,
+            )
         elif kind == 1:
             for _ in range(60):
-                await side.clk(random.getrandbits(1), random.getrandbits(1), n=random.randrange(1, 12), **more)
+                await side.clk(
+                    random.getrandbits(1), random.getrandbits(1), n=random.randrange(1, 12), **more
+                )
         elif kind == 2:
             await side.clk(n=random.randrange(600), **more)
         else:

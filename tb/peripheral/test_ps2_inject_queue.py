@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ps2_inject_queue: order, what a drop takes back and what it leaves, and random traffic with a reader as ps2_arbiter is one."""
+"""ps2_inject_queue: order, what a drop takes back and what it leaves, and random traffic with a
+reader as ps2_arbiter is one.
+"""
+
 import random
 
 import cocotb
@@ -13,21 +16,37 @@ CUT = [(0x14, 0), (0x1D, 0), (0xF0, 0), (0x1D, 0), (0xF0, 0), (0x14, 1)]
 
 
 class Queue:
-    """With a reader: `begins` lets it begin a sequence that stands, `reads` take a code of the one that is under way."""
+    """With a reader: `begins` lets it begin a sequence that stands, `reads` take a code of the one
+    that is under way.
+    """
 
     def __init__(self, dut):
-        self.dut, self.model, self.injecting, self.sent = dut, Ps2InjectQueue(int(dut.DEPTH.value)), 0, []
-        self.input = getattr(dut, "in")               # a keyword of Python
+        self.dut, self.model, self.injecting, self.sent = (
+            dut,
+            Ps2InjectQueue(int(dut.DEPTH.value)),
+            0,
+            [],
+        )
+        self.input = getattr(dut, "in")  # a keyword of Python
 
     async def clk(self, push=None, drop=0, begins=0, reads=0, rst=0):
         """Returns (valid, free) of this clk."""
         dut = self.dut
-        dut.push.value, dut.drop.value, dut.rst.value, dut.injecting.value = push is not None, drop, rst, self.injecting
+        dut.push.value, dut.drop.value, dut.rst.value, dut.injecting.value = (
+            push is not None,
+            drop,
+            rst,
+            self.injecting,
+        )
         self.input.value, dut.in_last.value = push or (0, 0)
         dut.ready.value = 0
         await Timer(1, "ns")
         valid = int(dut.valid.value)
-        got = valid, (int(dut.out.value), int(dut.last.value)) if valid else None, int(dut.free.value)
+        got = (
+            valid,
+            (int(dut.out.value), int(dut.last.value)) if valid else None,
+            int(dut.free.value),
+        )
         want = self.model.outputs(self.injecting)
         assert got == want, f"(valid, code, free) is {got}, the model has {want}"
         ready = int(bool(reads and valid and self.injecting))
@@ -110,7 +129,7 @@ async def what_comes_after_a_drop_stays(dut):
     queue = await begin(dut)
     await queue.put(CUT * 3)
     await queue.clk(begins=1)
-    await queue.clk(later[0], drop=1)                 # even in its clk
+    await queue.clk(later[0], drop=1)  # even in its clk
     await queue.clk(later[1])
     assert await queue.read_all() == CUT + later
     await queue.put(CUT * 2)
@@ -143,11 +162,25 @@ async def reset_in_the_middle_of_a_drop_empties_it(dut):
 async def any_traffic_matches_the_model(dut):
     queue = await begin(dut)
     for _ in range(60):
-        fill, drain, starts, drops = random.random(), random.random(), random.random(), random.random() * 0.1
+        fill, drain, starts, drops = (
+            random.random(),
+            random.random(),
+            random.random(),
+            random.random() * 0.1,
+        )
         for _ in range(100):
-            push = (random.getrandbits(8), int(random.random() < 0.3)) if random.random() < fill else None
-            await queue.clk(push, int(random.random() < drops), int(random.random() < starts), int(random.random() < drain),
-                            int(random.random() < 0.001))
+            push = (
+                (random.getrandbits(8), int(random.random() < 0.3))
+                if random.random() < fill
+                else None
+            )
+            await queue.clk(
+                push,
+                int(random.random() < drops),
+                int(random.random() < starts),
+                int(random.random() < drain),
+                int(random.random() < 0.001),
+            )
 
 
 @pytest.mark.parametrize("depth", [32])

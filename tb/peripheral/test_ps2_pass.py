@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ps2_pass between a keyboard and a host that break every rule they may: typing, cuts, commands, damage, injections; equal to the model."""
+"""ps2_pass between a keyboard and a host that break every rule they may: typing, cuts, commands,
+damage, injections; equal to the model.
+"""
+
 import csv
 import random
 import re
@@ -17,7 +20,7 @@ from tb.peripheral.test_ps2_host import RECORDING, TYPED
 
 CLK_HZ = 400_000
 MS = CLK_HZ // 1000
-START = [0x14, 0x1D, 0xF0, 0x1D, 0xF0, 0x14]                               # S4: left Ctrl + W, the start of a cut
+START = [0x14, 0x1D, 0xF0, 0x1D, 0xF0, 0x14]  # S4: left Ctrl + W, the start of a cut
 
 
 class Wires:
@@ -28,11 +31,22 @@ class Wires:
         self.keyboard, self.host = keyboard or Keyboard(CLK_HZ), host or Host(CLK_HZ)
         self.idle_ms, self.inject, self.pulls = 20, [], (0, 0, 0, 0)
         self.typed = 0
-        self.samples, self.edges, self.lines = bytearray(), {"keyboard": [], "host": []}, (1, 1, 1, 1)
+        self.samples, self.edges, self.lines = (
+            bytearray(),
+            {"keyboard": [], "host": []},
+            (1, 1, 1, 1),
+        )
 
     async def begin(self):
         names = "keyboard_clock", "keyboard_data", "host_clock", "host_data"
-        await bench.start(self.dut, idle_ms=self.idle_ms, inject_valid=0, inject=0, inject_last=0, **dict.fromkeys(names, 1))
+        await bench.start(
+            self.dut,
+            idle_ms=self.idle_ms,
+            inject_valid=0,
+            inject=0,
+            inject_last=0,
+            **dict.fromkeys(names, 1),
+        )
         self.dut.rst.value = 1
         await FallingEdge(self.dut.clk)
         await FallingEdge(self.dut.clk)
@@ -46,19 +60,43 @@ class Wires:
         for _ in range(clks or 4000 * MS):
             if until and until():
                 return
-            lines = (1 - (self.pulls[0] | k.clock_low), 1 - (self.pulls[1] | k.data_low),
-                     1 - (self.pulls[2] | h.clock_low), 1 - (self.pulls[3] | h.data_low))
+            lines = (
+                1 - (self.pulls[0] | k.clock_low),
+                1 - (self.pulls[1] | k.data_low),
+                1 - (self.pulls[2] | h.clock_low),
+                1 - (self.pulls[3] | h.data_low),
+            )
             inject = (self.inject[0], int(len(self.inject) == 1)) if self.inject else None
             if (lines, inject) != last:
-                d.keyboard_clock.value, d.keyboard_data.value, d.host_clock.value, d.host_data.value = lines
-                d.inject_valid.value, d.inject.value, d.inject_last.value = inject is not None, *(inject or (0, 0))
+                (
+                    d.keyboard_clock.value,
+                    d.keyboard_data.value,
+                    d.host_clock.value,
+                    d.host_data.value,
+                ) = lines
+                d.inject_valid.value, d.inject.value, d.inject_last.value = (
+                    inject is not None,
+                    *(inject or (0, 0)),
+                )
                 last = lines, inject
             k.step(*lines[:2])
             h.step(*lines[2:])
-            taken = self.model.arbiter.wires(self.model.inputs(self.idle_ms, inject))[5] if inject else 0
+            taken = (
+                self.model.arbiter.wires(self.model.inputs(self.idle_ms, inject))[5]
+                if inject
+                else 0
+            )
             want = self.model.step(lines, self.idle_ms, inject)
             await FallingEdge(d.clk)
-            pulls = tuple(int(p.value) for p in (d.keyboard_clock_low, d.keyboard_data_low, d.host_clock_low, d.host_data_low))
+            pulls = tuple(
+                int(p.value)
+                for p in (
+                    d.keyboard_clock_low,
+                    d.keyboard_data_low,
+                    d.host_clock_low,
+                    d.host_data_low,
+                )
+            )
             assert pulls == want, f"pulls {pulls} where the model has {want}"
             typed = int(d.typed.value)
             assert typed == self.model.typed()
@@ -75,15 +113,36 @@ class Wires:
 
 
 def without(heard, sequence):
-    """What is left when the one place of the sequence is cut out; None if it is not in one piece there."""
-    places = [n for n in range(len(heard) - len(sequence) + 1) if heard[n:n + len(sequence)] == sequence]
-    return heard[:places[0]] + heard[places[0] + len(sequence):] if places else None
+    """What is left when the one place of the sequence is cut out; None if it is not in one piece
+    there.
+    """
+    places = [
+        n for n in range(len(heard) - len(sequence) + 1) if heard[n : n + len(sequence)] == sequence
+    ]
+    return heard[: places[0]] + heard[places[0] + len(sequence) :] if places else None
 
 
 @cocotb.test()
 async def what_is_typed_arrives_untouched_within_200_us(dut):
     wires = await Wires(dut).begin()
-    keys = [0x1C, 0xF0, 0x1C, 0xE0, 0x75, 0xE0, 0xF0, 0x75, 0xE1, 0x14, 0x77, 0xE1, 0xF0, 0x14, 0xF0, 0x77]
+    keys = [
+        0x1C,
+        0xF0,
+        0x1C,
+        0xE0,
+        0x75,
+        0xE0,
+        0xF0,
+        0x75,
+        0xE1,
+        0x14,
+        0x77,
+        0xE1,
+        0xF0,
+        0x14,
+        0xF0,
+        0x77,
+    ]
     for key in keys:
         wires.edges = {"keyboard": [], "host": []}
         wires.keyboard.outbox = [key]
@@ -112,7 +171,7 @@ async def the_start_of_a_cut_enters_in_one_piece_while_a_person_types(dut):
     keys = [0x1C, 0xF0, 0x1C] * 3
     wires.keyboard.outbox = keys[:4]
     wires.inject = list(START)
-    await wires.run(until=lambda: len(wires.inject) < 5)                   # the person goes on while it is under way
+    await wires.run(until=lambda: len(wires.inject) < 5)  # the person goes on while it is under way
     wires.keyboard.outbox += keys[4:]
     await wires.run(until=lambda: len(wires.host.heard) == len(keys) + len(START))
     await wires.run(10 * MS)
@@ -121,7 +180,7 @@ async def the_start_of_a_cut_enters_in_one_piece_while_a_person_types(dut):
 
 @cocotb.test()
 async def a_host_that_cuts_and_orders_at_will_loses_nothing(dut):
-    wires = await Wires(dut, Keyboard(CLK_HZ, half=31), Host(CLK_HZ, cut=.03)).begin()
+    wires = await Wires(dut, Keyboard(CLK_HZ, half=31), Host(CLK_HZ, cut=0.03)).begin()
     keys, orders = [], []
     for turn in range(4):
         more = [random.choice([0x1C, 0xF0, 0x5A, 0xE0, 0x15]) for _ in range(4)] + [0x1C]
@@ -134,13 +193,13 @@ async def a_host_that_cuts_and_orders_at_will_loses_nothing(dut):
         await wires.run(30 * MS)
     await wires.run(until=lambda: not wires.inject and not wires.keyboard.outbox)
     await wires.run(20 * MS)
-    heard = [byte for byte in wires.host.heard if byte != 0xFA]            # the answers come where they come
+    heard = [byte for byte in wires.host.heard if byte != 0xFA]  # the answers come where they come
     assert without(heard, START) == keys and wires.keyboard.commands == orders
 
 
 @cocotb.test()
 async def damaged_bytes_are_asked_for_again_by_their_receiver(dut):
-    wires = await Wires(dut, Keyboard(CLK_HZ, damage=.3)).begin()
+    wires = await Wires(dut, Keyboard(CLK_HZ, damage=0.3)).begin()
     keys = [0x1C, 0x1B, 0x23, 0x2B, 0x34]
     for key in keys:
         heard = len(wires.host.heard)
@@ -157,7 +216,15 @@ async def reset_in_mid_frame_lets_go_of_all_lines(dut):
     await wires.run(until=lambda: wires.pulls[2])
     dut.rst.value = 1
     await FallingEdge(dut.clk)
-    assert not any(int(p.value) for p in (dut.keyboard_clock_low, dut.keyboard_data_low, dut.host_clock_low, dut.host_data_low))
+    assert not any(
+        int(p.value)
+        for p in (
+            dut.keyboard_clock_low,
+            dut.keyboard_data_low,
+            dut.host_clock_low,
+            dut.host_data_low,
+        )
+    )
 
 
 class Recording(Party):
@@ -165,7 +232,10 @@ class Recording(Party):
 
     def live(self):
         with open(RECORDING, newline="") as lines:
-            rows = [tuple(map(int, row)) for row in csv.reader(line for line in lines if line[0].isdigit())]
+            rows = [
+                tuple(map(int, row))
+                for row in csv.reader(line for line in lines if line[0].isdigit())
+            ]
         for (at, clock, data), (end, _, _) in zip(rows, rows[1:]):
             self.clock_low, self.data_low = 1 - clock, 1 - data
             yield from self.wait(min((end - at) / 24, 5000))
@@ -176,7 +246,9 @@ class Recording(Party):
 
 @cocotb.test(skip=not RECORDING.exists() or not shutil.which("sigrok-cli"))
 async def a_recorded_keyboard_passes_and_sigrok_reads_it_with_the_injection_after_it(dut):
-    """sigrok takes the clock of a pulling host for the twelfth bit of a byte: this host pulls once after each, as the recorded one."""
+    """sigrok takes the clock of a pulling host for the twelfth bit of a byte: this host pulls once
+    after each, as the recorded one.
+    """
     wires = await Wires(dut, keyboard=Recording(CLK_HZ), host=Host(CLK_HZ, rest=150)).begin()
     await wires.run(until=lambda: len(wires.host.heard) == len(TYPED))
     wires.inject = list(START)
@@ -184,9 +256,26 @@ async def a_recorded_keyboard_passes_and_sigrok_reads_it_with_the_injection_afte
     await wires.run(2 * MS)
     assert wires.host.heard == TYPED + START
     Path("pass.bin").write_bytes(wires.samples)
-    out = subprocess.run(["sigrok-cli", "-i", "pass.bin", "-I", f"binary:numchannels=2:samplerate={CLK_HZ}", "-P", "ps2:clk=0:data=1",
-                          "-A", "ps2=word:parity-err"], capture_output=True, text=True, check=True, timeout=60)
-    assert [int(word, 16) for word in re.findall(r"Data: (\w\w)", out.stdout)] == TYPED + START and "err" not in out.stdout
+    out = subprocess.run(
+        [
+            "sigrok-cli",
+            "-i",
+            "pass.bin",
+            "-I",
+            f"binary:numchannels=2:samplerate={CLK_HZ}",
+            "-P",
+            "ps2:clk=0:data=1",
+            "-A",
+            "ps2=word:parity-err",
+        ],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    )
+    assert [
+        int(word, 16) for word in re.findall(r"Data: (\w\w)", out.stdout)
+    ] == TYPED + START and "err" not in out.stdout
 
 
 def test_ps2_pass():

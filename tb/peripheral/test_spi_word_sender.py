@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""spi_word_sender: a word by hand, its times, the device's view of the wires, reset in mid-word, and random words against the model."""
+"""spi_word_sender: a word by hand, its times, the device's view of the wires, reset in mid-word,
+and random words against the model.
+"""
+
 import random
 
 import cocotb
@@ -15,7 +18,9 @@ class Wires:
     def __init__(self, dut):
         self.dut, self.model, self.half_period = dut, SpiWordSender(), 1
         self.bits, self.taken, self.last, self.now = [], [], (1, 0), 0
-        self.fell = self.rose = self.risen = None           # clk of the last edges of cs_n, of sclk's last rise
+        self.fell = self.rose = self.risen = (
+            None  # clk of the last edges of cs_n, of sclk's last rise
+        )
 
     async def begin(self):
         await bench.start(self.dut, half_period=1, valid=0, word=0)
@@ -24,7 +29,12 @@ class Wires:
 
     async def clk(self, word=None, rst=0):
         d = self.dut
-        d.half_period.value, d.valid.value, d.word.value, d.rst.value = self.half_period, word is not None, word or 0, rst
+        d.half_period.value, d.valid.value, d.word.value, d.rst.value = (
+            self.half_period,
+            word is not None,
+            word or 0,
+            rst,
+        )
         await FallingEdge(d.clk)
         want = self.model.step(word is not None, word or 0, self.half_period, rst)
         got = tuple(int(p.value) for p in (d.ready, d.cs_n, d.sclk, d.sdi, d.sent))
@@ -43,7 +53,9 @@ class Wires:
         assert sent == (rises and len(self.bits) == 16)
         if rises:
             self.rose = self.now
-            self.taken.append(sum(b << 15 - n for n, b in enumerate(self.bits)) if len(self.bits) == 16 else None)
+            self.taken.append(
+                sum(b << 15 - n for n, b in enumerate(self.bits)) if len(self.bits) == 16 else None
+            )
 
     async def send(self, word):
         await self.clk(word)
@@ -54,8 +66,10 @@ class Wires:
 @cocotb.test()
 async def one_word_by_hand(dut):
     wires = await Wires(dut).begin()
-    await wires.send(0x0C01)                                               # MAX7219: out of shutdown
-    assert wires.bits == [0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1] and wires.taken == [0x0C01]
+    await wires.send(0x0C01)  # MAX7219: out of shutdown
+    assert wires.bits == [0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1] and wires.taken == [
+        0x0C01
+    ]
 
 
 @cocotb.test()
@@ -64,7 +78,7 @@ async def cs_n_rises_33_half_periods_after_it_fell_and_the_next_word_36_and_a_cl
     for half_period in (0, 1, 2, 3, 255):
         wires.half_period, half = half_period, max(half_period, 1)
         await wires.clk(0xFFFF)
-        wires.half_period = 7                                                 # taken with a word
+        wires.half_period = 7  # taken with a word
         fell = wires.fell
         assert fell == wires.now
         while not (await wires.clk(0x8001))[0]:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/position/count_phase_check.sv does, in integers: step() is one clk and returns the disagreement."""
+"""What rtl/position/count_phase_check.sv does, in integers: step() is one clk and returns the
+disagreement.
+"""
 
 
 def wrapped(difference):
@@ -8,7 +10,9 @@ def wrapped(difference):
 
 
 class CountPhaseCheck:
-    """Two stages behind the inputs: `between` of the position before, then its `difference` from the constant."""
+    """Two stages behind the inputs: `between` of the position before, then its `difference` from
+    the constant.
+    """
 
     def __init__(self):
         self.constant, self.between, self.difference, self.disagreement = None, None, None, 0

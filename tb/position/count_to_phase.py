@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/position/count_to_phase.sv does, in integers: clk(…) is one clk and returns what stands after it."""
+"""What rtl/position/count_to_phase.sv does, in integers: clk(…) is one clk and returns what stands
+after it.
+"""
 
 QUARTER = 1 << 14
 
@@ -11,4 +13,6 @@ class CountToPhase:
     def clk(self, rst=0, tick=0, count_step=0, align=0, align_counts=0):
         counts = count_step + (align_counts if align else 0)
         self.phase = 0 if rst else (self.phase + counts * QUARTER) % 65536
-        return dict(valid=int(not rst and (tick or counts != 0)), step=counts * QUARTER, phase=self.phase)
+        return dict(
+            valid=int(not rst and (tick or counts != 0)), step=counts * QUARTER, phase=self.phase
+        )

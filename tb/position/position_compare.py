@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/position/position_compare.sv does, in integers: step() is one clk and returns armed, pulse, late, passed."""
+"""What rtl/position/position_compare.sv does, in integers: step() is one clk and returns armed,
+pulse, late, passed.
+"""
 
 
 def wrapped(value):
@@ -8,18 +10,30 @@ def wrapped(value):
 
 class PositionCompare:
     def __init__(self):
-        self.origin, self.here = 0, None                # here: of the position one clk ago, if it was new
+        self.origin, self.here = 0, None  # here: of the position one clk ago, if it was new
         self.armed = self.ready = False
         self.reach = self.point = self.stride = self.passed = self.count = 0
-        self.pulse = self.resting = self.timer = 0      # timer: clk left of pulse or gap, with this one
+        self.pulse = self.resting = self.timer = 0  # timer: clk left of pulse or gap, with this one
         self.waited = False
 
     def past(self, place, mark):
         """How far place has come beyond mark in the direction of the points."""
         return wrapped(mark - place if self.stride < 0 else place - mark)
 
-    def step(self, start=0, step=0, count=0, pulse_length=1, gap_length=1, arm=0, disarm=0, valid=0, position=0, shift=0,
-             shift_periods=0):
+    def step(
+        self,
+        start=0,
+        step=0,
+        count=0,
+        pulse_length=1,
+        gap_length=1,
+        arm=0,
+        disarm=0,
+        valid=0,
+        position=0,
+        shift=0,
+        shift_periods=0,
+    ):
         due = self.armed and self.ready and self.past(self.reach, self.point) >= 0
         busy = self.pulse or self.resting and self.timer > 1
         begins = due and not busy and not arm and not disarm

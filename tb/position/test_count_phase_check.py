@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""count_phase_check: a true scale agrees, a lost fringe shows, shifts hide nothing, and every clk against the model."""
+"""count_phase_check: a true scale agrees, a lost fringe shows, shifts hide nothing, and every clk
+against the model.
+"""
+
 import random
 
 import cocotb
@@ -9,8 +12,8 @@ from tb.bench import run, start
 from tb.position.count_phase_check import CountPhaseCheck
 
 IDLE = dict(limit=0, valid=0, position=0, count=0, shift=0, shift_periods=0)
-LIMIT = 32768                                           # as in tables/bus.toml: as far from the quarter period between two counts
-                                                        # as from the 3/4 period that a lost fringe leaves at worst
+LIMIT = 32768  # as in tables/bus.toml: as far from the quarter period between two counts
+# as from the 3/4 period that a lost fringe leaves at worst
 
 
 async def begin(dut):
@@ -26,7 +29,12 @@ async def again(dut):
 
 
 async def clock(dut, position, count, valid=1, limit=LIMIT, shift=0, shift_periods=0):
-    dut.position.value, dut.count.value, dut.valid.value, dut.limit.value = position, count, valid, limit
+    dut.position.value, dut.count.value, dut.valid.value, dut.limit.value = (
+        position,
+        count,
+        valid,
+        limit,
+    )
     dut.shift.value, dut.shift_periods.value = shift, shift_periods
     await FallingEdge(dut.clk)
     return int(dut.disagreement.value)
@@ -65,13 +73,15 @@ async def the_limit_itself_still_agrees(dut):
 @cocotb.test()
 async def a_scale_in_motion_with_a_late_count_agrees(dut):
     await begin(dut)
-    position, speed, lag = 12345, 0, 3                  # the count is that of the position three samples before
+    position, speed, lag = 12345, 0, 3  # the count is that of the position three samples before
     past = [position] * (lag + 1)
     for _ in range(3000):
         speed = max(-4096, min(4096, speed + random.randrange(-300, 301)))
         position += speed
         past = past[1:] + [position]
-        assert not await clock(dut, position, past[0] >> 14)     # 1/4 + 3 * 4096 / 65536 period is below the limit
+        assert not await clock(
+            dut, position, past[0] >> 14
+        )  # 1/4 + 3 * 4096 / 65536 period is below the limit
 
 
 @cocotb.test()
@@ -88,7 +98,7 @@ async def one_lost_fringe_shows_in_both_directions(dut):
 @cocotb.test()
 async def a_lost_fringe_shows_at_the_next_position_wherever_the_constant_was_learned(dut):
     await begin(dut)
-    for learned in (0, 1, 8000, 16383):                 # place within a count
+    for learned in (0, 1, 8000, 16383):  # place within a count
         for place in (0, 16383):
             for lost in (65536, -65536):
                 await again(dut)
@@ -140,11 +150,15 @@ async def any_input_matches_the_model_in_every_clk(dut):
     model, position, count = CountPhaseCheck(), 0, 0
     for clk in range(20_000):
         rst, valid, shift = (int(random.random() < share) for share in (0.002, 0.5, 0.05))
-        moved = random.choice((0, 0, 0, 1, -1, random.randrange(-1 << 30, 1 << 30) if random.random() < 0.02 else 1))
+        moved = random.choice(
+            (0, 0, 0, 1, -1, random.randrange(-1 << 30, 1 << 30) if random.random() < 0.02 else 1)
+        )
         position, count = position + (moved << 14) + random.randrange(-3, 4), count + moved
         limit = random.choice((LIMIT, LIMIT, LIMIT, 20, 1 << 19, 0 if random.random() < 0.1 else 5))
         periods = random.choice((0, 1, -5, random.randrange(-1 << 31, 1 << 31)))
-        position, count = ((v + (1 << n - 1)) % (1 << n) - (1 << n - 1) for v, n in ((position, 48), (count, 32)))
+        position, count = (
+            (v + (1 << n - 1)) % (1 << n) - (1 << n - 1) for v, n in ((position, 48), (count, 32))
+        )
         dut.rst.value = rst
         got = await clock(dut, position, count, valid, limit, shift, periods)
         want = model.step(limit, valid, position, count, shift, periods)

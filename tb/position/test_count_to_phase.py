@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""count_to_phase: by hand, every count with every alignment, reset in mid-flow, and every clk against the model."""
+"""count_to_phase: by hand, every count with every alignment, reset in mid-flow, and every clk
+against the model.
+"""
+
 import random
 
 import cocotb
@@ -27,7 +30,11 @@ class Counts:
         for name, value in [*now.items(), ("rst", rst)]:
             getattr(self.dut, name).value = value
         await FallingEdge(self.dut.clk)
-        got = dict(valid=int(self.dut.valid.value), step=self.dut.step.value.to_signed(), phase=int(self.dut.phase.value))
+        got = dict(
+            valid=int(self.dut.valid.value),
+            step=self.dut.step.value.to_signed(),
+            phase=int(self.dut.phase.value),
+        )
         want = self.model.clk(rst, **now)
         assert got == want, f"{now}: {got}, the model has {want}"
         return got["valid"], got["step"], got["phase"]
@@ -57,8 +64,12 @@ async def a_reset_in_mid_flow_begins_at_phase_zero(dut):
 async def every_clk_matches_the_model_and_the_steps_add_up_to_the_phase(dut):
     counts, total = await Counts(dut).begin(), 0
     for _ in range(3000):
-        _, step, phase = await counts.clk(tick=random.random() < 0.2, count_step=random.choice((-1, 0, 0, 1)),
-                                          align=random.random() < 0.1, align_counts=random.randint(-2, 2))
+        _, step, phase = await counts.clk(
+            tick=random.random() < 0.2,
+            count_step=random.choice((-1, 0, 0, 1)),
+            align=random.random() < 0.1,
+            align_counts=random.randint(-2, 2),
+        )
         total += step
         assert total % 65536 == phase
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""position_capture: every source, order, age, both ends of the queue, and every clk against the model."""
+"""position_capture: every source, order, age, both ends of the queue, and every clk against the
+model.
+"""
+
 import random
 
 import cocotb
@@ -17,7 +20,9 @@ from tb.position.position_capture import (
     rising,
 )
 
-INPUTS = dict(enabled=0, index=0, tick=0, software=0, probe=0, now=0, valid=0, position=0, pop=0, clear=0)
+INPUTS = dict(
+    enabled=0, index=0, tick=0, software=0, probe=0, now=0, valid=0, position=0, pop=0, clear=0
+)
 
 
 class Capture:
@@ -36,9 +41,20 @@ class Capture:
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
         present = int(dut.present.value)
-        entry = (int(dut.captured_sources.value), int(dut.captured_age.value), int(dut.captured_time.value),
-                 dut.captured_position.value.to_signed()) if present else None
-        got, want = (present, entry, int(dut.free.value), int(dut.overrun.value)), self.model.step(rst=rst, **values)
+        entry = (
+            (
+                int(dut.captured_sources.value),
+                int(dut.captured_age.value),
+                int(dut.captured_time.value),
+                dut.captured_position.value.to_signed(),
+            )
+            if present
+            else None
+        )
+        got, want = (
+            (present, entry, int(dut.free.value), int(dut.overrun.value)),
+            self.model.step(rst=rst, **values),
+        )
         assert got == want, f"{got}, the model has {want}"
         return got
 
@@ -71,10 +87,18 @@ async def each_source_makes_an_entry_with_its_own_bit(dut):
     await capture.clk(valid=1, position=-70_000)
     events = [(INDEX, dict(index=1)), (TICK, dict(tick=1)), (SOFTWARE, dict(software=1))]
     for n in range(capture.probes):
-        events += [(rising(n, capture.probes), dict(probe=1 << n)), (falling(n, capture.probes), dict(probe=0))]
+        events += [
+            (rising(n, capture.probes), dict(probe=1 << n)),
+            (falling(n, capture.probes), dict(probe=0)),
+        ]
     for age, (_, inputs) in enumerate(events, 1):
         assert (await capture.clk(position=-70_000 - age, **inputs))[3] == int(age > capture.depth)
-    assert await capture.read() == [(bit, age, age + 2, -70_000 - age) for age, (bit, _) in enumerate(events, 1)][:capture.depth]
+    assert (
+        await capture.read()
+        == [(bit, age, age + 2, -70_000 - age) for age, (bit, _) in enumerate(events, 1)][
+            : capture.depth
+        ]
+    )
 
 
 @cocotb.test()
@@ -82,8 +106,10 @@ async def events_of_one_clk_make_one_entry(dut):
     capture = await begin(dut)
     await capture.clk()
     await capture.clk(probe=1, index=1, tick=1, software=1, valid=1, position=9)
-    (sources, age, _, position), = await capture.read()
-    assert sources & 7 == INDEX | TICK | SOFTWARE and sources & rising(0) and (age, position) == (0, 9)
+    ((sources, age, _, position),) = await capture.read()
+    assert (
+        sources & 7 == INDEX | TICK | SOFTWARE and sources & rising(0) and (age, position) == (0, 9)
+    )
 
 
 @cocotb.test()
@@ -91,7 +117,9 @@ async def only_enabled_sources_capture(dut):
     capture = await begin(dut)
     for bit in range(2 * capture.probes + 3):
         for probe in (capture.all, 0):
-            await capture.clk(enabled=1 << bit, index=1, tick=1, software=1, probe=probe % (1 << capture.probes))
+            await capture.clk(
+                enabled=1 << bit, index=1, tick=1, software=1, probe=probe % (1 << capture.probes)
+            )
         found = await capture.read()
         assert {entry[0] for entry in found} == {1 << bit} and len(found) == (2 if bit < 3 else 1)
     await capture.clk(enabled=0, index=1, tick=1, software=1, probe=1)
@@ -125,7 +153,7 @@ async def a_full_queue_tells_what_it_drops_and_keeps_the_rest(dut):
         assert (await capture.clk(index=1, position=n))[2:] == (capture.depth - 1 - n, 0)
     for _ in range(3):
         assert (await capture.clk(tick=1, position=-1))[3] == 1
-    assert (await capture.clk(index=1, position=-1, pop=1))[3] == 1         # full when it came
+    assert (await capture.clk(index=1, position=-1, pop=1))[3] == 1  # full when it came
     assert (await capture.clk(index=1, position=77))[3] == 0
     assert [entry[3] for entry in await capture.read()] == [*range(1, capture.depth), 77]
 
@@ -164,10 +192,17 @@ async def any_events_match_the_model_in_every_clk(dut):
     for clk in range(8000):
         busy = (0.05, 0.5, 0.9)[clk // 500 % 3]
         probe ^= random.getrandbits(capture.probes) if random.random() < busy else 0
-        await capture.clk(enabled=random.getrandbits(2 * capture.probes + 3), probe=probe, position=random.randrange(-1 << 47, 1 << 47),
-                          now=random.getrandbits(len(dut.now)), valid=int(random.random() < 0.1), pop=int(random.random() < 0.4),
-                          clear=int(random.random() < 0.004), rst=int(random.random() < 0.002),
-                          **{source: int(random.random() < busy / 2) for source in ("index", "tick", "software")})
+        await capture.clk(
+            enabled=random.getrandbits(2 * capture.probes + 3),
+            probe=probe,
+            position=random.randrange(-1 << 47, 1 << 47),
+            now=random.getrandbits(len(dut.now)),
+            valid=int(random.random() < 0.1),
+            pop=int(random.random() < 0.4),
+            clear=int(random.random() < 0.004),
+            rst=int(random.random() < 0.002),
+            **{source: int(random.random() < busy / 2) for source in ("index", "tick", "software")},
+        )
 
 
 @pytest.mark.parametrize("probes, time_w, depth", [(2, 32, 16), (1, 64, 4)])

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""position_compare: a pulse a point in both directions, jitter, jumps, both ends of the settings, and every clk against the model."""
+"""position_compare: a pulse a point in both directions, jitter, jumps, both ends of the settings,
+and every clk against the model.
+"""
+
 import random
 
 import cocotb
@@ -8,13 +11,32 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import run, start
 from tb.position.position_compare import PositionCompare, wrapped
 
-INPUTS = dict(start=0, step=0, count=0, pulse_length=1, gap_length=1, arm=0, disarm=0, valid=0, position=0, shift=0, shift_periods=0)
+INPUTS = dict(
+    start=0,
+    step=0,
+    count=0,
+    pulse_length=1,
+    gap_length=1,
+    arm=0,
+    disarm=0,
+    valid=0,
+    position=0,
+    shift=0,
+    shift_periods=0,
+)
 PERIOD = 1 << 16
 
 
 class Compare:
     def __init__(self, dut):
-        self.dut, self.model, self.settings, self.pulse, self.pulses, self.late = dut, PositionCompare(), {}, 0, 0, 0
+        self.dut, self.model, self.settings, self.pulse, self.pulses, self.late = (
+            dut,
+            PositionCompare(),
+            {},
+            0,
+            0,
+            0,
+        )
 
     async def clk(self, rst=0, **inputs):
         """One clk with the model beside it; (armed, pulse, late, passed)."""
@@ -24,11 +46,23 @@ class Compare:
             getattr(dut, name).value = value
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
-        got, want = (int(dut.armed.value), int(dut.pulse.value), int(dut.late.value), int(dut.passed.value)), self.model.step(**values)
+        got, want = (
+            (
+                int(dut.armed.value),
+                int(dut.pulse.value),
+                int(dut.late.value),
+                int(dut.passed.value),
+            ),
+            self.model.step(**values),
+        )
         if rst:
             self.model, want = PositionCompare(), (0, 0, 0, 0)
         assert got == want, f"(armed, pulse, late, passed) is {got}, the model has {want}"
-        self.pulses, self.pulse, self.late = self.pulses + (got[1] > self.pulse), got[1], self.late + got[2]
+        self.pulses, self.pulse, self.late = (
+            self.pulses + (got[1] > self.pulse),
+            got[1],
+            self.late + got[2],
+        )
         return got
 
     async def arm(self, **settings):
@@ -60,7 +94,7 @@ async def latency_is_3(dut):
     await compare.ride([0])
     await compare.rest(5)
     await compare.clk(valid=1, position=100)
-    assert await compare.rest(2) == [0, 1]                                  # the third clk edge after valid raises it
+    assert await compare.rest(2) == [0, 1]  # the third clk edge after valid raises it
 
 
 @cocotb.test()
@@ -117,7 +151,7 @@ async def a_jump_over_many_points_makes_all_their_pulses_in_a_row(dut):
     await compare.ride([199])
     assert await compare.rest(70) == [0] + [1, 1, 1, 0, 0] * 10 + [0] * 19  # 100, 110 … 190
     assert (compare.pulses, compare.late) == (10, 9)
-    await compare.ride([200, 50, 400, 60], 1)                               # what was reached counts, also if it is left at once
+    await compare.ride([200, 50, 400, 60], 1)  # what was reached counts, also if it is left at once
     await compare.rest(200)
     assert compare.pulses == 31
 
@@ -207,7 +241,11 @@ async def points_and_position_may_wrap(dut):
 async def pulses_are_the_points_passed_at_any_speed(dut):
     compare = await begin(dut)
     for _ in range(25):
-        sign, step, first = random.choice((1, -1)), random.choice((1, 7, 1000, 5 * PERIOD)), random.randrange(-1000, 1000)
+        sign, step, first = (
+            random.choice((1, -1)),
+            random.choice((1, 7, 1000, 5 * PERIOD)),
+            random.randrange(-1000, 1000),
+        )
         await compare.arm(start=first, step=sign * step)
         place, farthest = first - sign, first - sign
         for _ in range(60):
@@ -225,14 +263,25 @@ async def any_input_matches_the_model_in_every_clk(dut):
     compare, position = await begin(dut), 0
     for clk in range(12_000):
         if clk % 400 == 0:
-            compare.settings = dict(start=position + random.randrange(-300, 300), step=random.randrange(-50, 50),
-                                    count=random.choice((0, 0, 1, 3, 20)), pulse_length=random.choice((0, 1, 4)),
-                                    gap_length=random.choice((0, 1, 3)))
+            compare.settings = dict(
+                start=position + random.randrange(-300, 300),
+                step=random.randrange(-50, 50),
+                count=random.choice((0, 0, 1, 3, 20)),
+                pulse_length=random.choice((0, 1, 4)),
+                gap_length=random.choice((0, 1, 3)),
+            )
         arm, shift, rst = (int(random.random() < share) for share in (0.01, 0.01, 0.002))
         position = wrapped(position + random.randrange(-20, 22))
         periods = random.choice((1, -3, random.randrange(-1 << 31, 1 << 31)))
-        await compare.clk(rst, arm=arm, disarm=int(random.random() < 0.002), valid=int(random.random() < 0.6), position=position,
-                          shift=shift and not rst, shift_periods=periods)
+        await compare.clk(
+            rst,
+            arm=arm,
+            disarm=int(random.random() < 0.002),
+            valid=int(random.random() < 0.6),
+            position=position,
+            shift=shift and not rst,
+            shift_periods=periods,
+        )
         if shift and not rst:
             position = wrapped(position + (periods << 16))
             compare.settings["start"] = wrapped(compare.settings["start"] + (periods << 16))

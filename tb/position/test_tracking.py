@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fringe_tracker, unwrap and count_phase_check in a row: full resolution without lag up to a quarter period a sample, and whatever makes
+"""fringe_tracker, unwrap and count_phase_check in a row: full resolution without lag up to a
+quarter period a sample, and whatever makes
 the position wrong is told within two samples, or the position is right again."""
+
 import random
 from pathlib import Path
 
@@ -13,13 +15,15 @@ from tb.position.count_phase_check import CountPhaseCheck
 from tb.position.unwrap import Unwrap
 
 PERIOD, QUARTER = 1 << 16, 1 << 14
-LIMIT = PERIOD // 2                                     # the quarter period between two counts, and as much for comparators and lag
-PACE = 6                                                # clk from sample to sample, as close as the check can tell them apart
-LATENCY = 5                                             # clk from phase to disagreement
+LIMIT = PERIOD // 2  # the quarter period between two counts, and as much for comparators and lag
+PACE = 6  # clk from sample to sample, as close as the check can tell them apart
+LATENCY = 5  # clk from phase to disagreement
 
 
 class Scale:
-    """The bench with the models beside it; sample() puts the scale at a place and returns (position, alarm of this sample)."""
+    """The bench with the models beside it; sample() puts the scale at a place and returns
+    (position, alarm of this sample).
+    """
 
     def __init__(self, dut):
         self.dut = dut
@@ -34,7 +38,11 @@ class Scale:
     async def sample(self, place, phase=None, count=None):
         dut = self.dut
         phase = place % PERIOD if phase is None else phase
-        dut.phase.value, dut.count.value, overspeed = phase, place // QUARTER if count is None else count, 0
+        dut.phase.value, dut.count.value, overspeed = (
+            phase,
+            place // QUARTER if count is None else count,
+            0,
+        )
         for clk in range(PACE):
             dut.valid.value = int(clk == 0)
             await FallingEdge(dut.clk)
@@ -42,7 +50,9 @@ class Scale:
         step, strayed = self.tracker.follow(phase)
         position = self.unwrap.step(1, step, phase, 0, 0)[1]
         for clk in range(4):
-            disagreement = self.coarse.step(LIMIT, int(clk == 0), position, int(dut.count.value.to_signed()), 0, 0)
+            disagreement = self.coarse.step(
+                LIMIT, int(clk == 0), position, int(dut.count.value.to_signed()), 0, 0
+            )
         got = dut.position.value.to_signed(), overspeed, int(dut.disagreement.value)
         assert got == (position, strayed, disagreement)
         return got[0], bool(overspeed or got[2])
@@ -71,7 +81,7 @@ async def every_bit_comes_through_without_lag_up_to_a_quarter_period_a_sample(du
     for speed in (1, -1, 77, -4095, 10_007, QUARTER - 1, 1 - QUARTER):
         await scale.begin()
         first = random.getrandbits(16)
-        for n in range(40):                             # from standstill to full speed at once, and on
+        for n in range(40):  # from standstill to full speed at once, and on
             place = first + n * speed
             assert await scale.sample(place) == (place, False)
 
@@ -112,7 +122,9 @@ async def any_jump_that_makes_the_position_wrong_is_told_within_two_samples(dut)
             position, alarm = await scale.sample(place)
             assert not alarm
         wrong = position - place
-        place += random.choice((QUARTER, -QUARTER, PERIOD, random.randrange(-8 * PERIOD, 8 * PERIOD)))
+        place += random.choice(
+            (QUARTER, -QUARTER, PERIOD, random.randrange(-8 * PERIOD, 8 * PERIOD))
+        )
         told = []
         for _ in range(2):
             place += speed
@@ -135,10 +147,15 @@ async def a_speed_above_the_limit_is_told_within_two_samples(dut):
 @cocotb.test()
 async def a_phase_that_stands_while_the_count_goes_on_is_told_within_two_samples(dut):
     scale = await begin(dut)
-    for speed in (QUARTER, PERIOD // 2, -QUARTER, -PERIOD):         # a converter that hangs: slower, it takes 3/4 period of way
+    for speed in (
+        QUARTER,
+        PERIOD // 2,
+        -QUARTER,
+        -PERIOD,
+    ):  # a converter that hangs: slower, it takes 3/4 period of way
         await scale.begin()
         place = 20_000
-        while abs(place - 20_000) < 3 * PERIOD:                     # up to speed in steps that are followed
+        while abs(place - 20_000) < 3 * PERIOD:  # up to speed in steps that are followed
             pace = min(abs(speed), abs(place - 20_000) // 4 + QUARTER // 2)
             place += pace if speed > 0 else -pace
             _, alarm = await scale.sample(place)
@@ -153,7 +170,7 @@ async def a_phase_that_stands_while_the_count_goes_on_is_told_within_two_samples
 @cocotb.test()
 async def a_count_that_stands_or_loses_is_told_when_it_is_half_a_period_off(dut):
     scale = await begin(dut)
-    for lost in (3, -3, 4, 100):                                    # counts; with a quarter period between counts, 3 are always seen
+    for lost in (3, -3, 4, 100):  # counts; with a quarter period between counts, 3 are always seen
         await scale.begin()
         for n in range(4):
             assert not (await scale.sample(1000 + 99 * n))[1]
@@ -161,5 +178,7 @@ async def a_count_that_stands_or_loses_is_told_when_it_is_half_a_period_off(dut)
 
 
 def test_tracking(monkeypatch):
-    monkeypatch.setattr("tb.bench.source_of", lambda top: Path(__file__).with_name(f"{top}.sv"))    # a bench top is no part of rtl/
+    monkeypatch.setattr(
+        "tb.bench.source_of", lambda top: Path(__file__).with_name(f"{top}.sv")
+    )  # a bench top is no part of rtl/
     run("tracking_bench", __file__)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""unwrap: by hand, the ends of the range, shifts with and without a step, and every clk against the model."""
+"""unwrap: by hand, the ends of the range, shifts with and without a step, and every clk against the
+model.
+"""
+
 import random
 
 import cocotb
@@ -35,7 +38,7 @@ async def latency_is_1(dut):
 @cocotb.test()
 async def by_hand(dut):
     await begin(dut)
-    assert await clock(dut, 1, 12345, 60000) == (1, 60000)              # the first step is not looked at
+    assert await clock(dut, 1, 12345, 60000) == (1, 60000)  # the first step is not looked at
     assert await clock(dut, 1, 10000, 4464) == (1, 70000)
     assert await clock(dut, 1, -65536, 4464) == (1, 4464)
     assert await clock(dut, 1, -4465, 65535) == (1, -1)
@@ -45,7 +48,7 @@ async def by_hand(dut):
 @cocotb.test()
 async def a_shift_moves_whole_periods_with_or_without_a_step(dut):
     await begin(dut)
-    assert await clock(dut, shift=1, shift_periods=3) == (0, 3 << 16)    # before the first phase
+    assert await clock(dut, shift=1, shift_periods=3) == (0, 3 << 16)  # before the first phase
     assert await clock(dut, 1, 0, 100) == (1, (3 << 16) + 100)
     assert await clock(dut, shift=1, shift_periods=-5) == (0, (-2 << 16) + 100)
     assert await clock(dut, 1, -101, 65535, 1, 2) == (1, -1)
@@ -67,11 +70,23 @@ async def any_input_matches_the_model_in_every_clk(dut):
     await begin(dut)
     model = Unwrap()
     for clk in range(10_000):
-        rst, valid, shift = int(random.random() < 0.003), random.getrandbits(1), int(random.random() < 0.1)
-        step, periods = random.randrange(-65536, 65536), random.choice((random.randrange(-9, 9), random.randrange(-1 << 31, 1 << 31)))
-        phase = (model.position + step) % 65536 if random.random() < 0.99 else random.getrandbits(16)
+        rst, valid, shift = (
+            int(random.random() < 0.003),
+            random.getrandbits(1),
+            int(random.random() < 0.1),
+        )
+        step, periods = (
+            random.randrange(-65536, 65536),
+            random.choice((random.randrange(-9, 9), random.randrange(-1 << 31, 1 << 31))),
+        )
+        phase = (
+            (model.position + step) % 65536 if random.random() < 0.99 else random.getrandbits(16)
+        )
         dut.rst.value = rst
-        got, want = await clock(dut, valid, step, phase, shift, periods), model.step(valid, step, phase, shift, periods)
+        got, want = (
+            await clock(dut, valid, step, phase, shift, periods),
+            model.step(valid, step, phase, shift, periods),
+        )
         if rst:
             model, want = Unwrap(), (0, 0)
         assert got == want, f"clk {clk}"

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""velocity_estimator: by hand, both ends, shifts, the sweep of speeds, resolution, and every clk against the model."""
+"""velocity_estimator: by hand, both ends, shifts, the sweep of speeds, resolution, and every clk
+against the model.
+"""
+
 import math
 import random
 
@@ -10,7 +13,7 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import run, start
 from tb.position.velocity_estimator import VelocityEstimator
 
-X4 = 1 << 14                                            # quantum of a plain scale
+X4 = 1 << 14  # quantum of a plain scale
 IDLE = dict(quantum=X4, tick=0, position=0, shift=0, shift_periods=0)
 LATENCY = 5
 
@@ -28,7 +31,12 @@ async def again(dut):
 
 
 async def clock(dut, position, tick=0, shift=0, shift_periods=0, quantum=0):
-    dut.tick.value, dut.position.value, dut.shift.value, dut.shift_periods.value = tick, position, shift, shift_periods
+    dut.tick.value, dut.position.value, dut.shift.value, dut.shift_periods.value = (
+        tick,
+        position,
+        shift,
+        shift_periods,
+    )
     dut.quantum.value = quantum
     await FallingEdge(dut.clk)
     return dut.velocity.value.to_signed()
@@ -70,7 +78,7 @@ async def a_tick_in_every_clk_is_the_way_of_a_clk(dut):
     await begin(dut)
     where = [n * n for n in range(20)]
     seen = [await clock(dut, p, 1) for p in where]
-    assert seen[LATENCY:] == [b - a for a, b in zip(where, where[1:])][:20 - LATENCY]
+    assert seen[LATENCY:] == [b - a for a, b in zip(where, where[1:])][: 20 - LATENCY]
 
 
 @cocotb.test()
@@ -78,9 +86,9 @@ async def a_shift_leaves_no_trace(dut):
     await begin(dut)
     await ticks(dut, [1000])
     assert await ticks(dut, [1010]) == 10
-    await clock(dut, 1015, 0, 1, -7)                            # between ticks
+    await clock(dut, 1015, 0, 1, -7)  # between ticks
     assert await ticks(dut, [1020 - (7 << 16)]) == 10
-    await clock(dut, 1030 - (7 << 16), 1, 1, 100_000)           # in the clk of a tick: still the old origin
+    await clock(dut, 1030 - (7 << 16), 1, 1, 100_000)  # in the clk of a tick: still the old origin
     here = 1030 + (99_993 << 16)
     assert [await clock(dut, here) for _ in range(LATENCY)][-1] == 10
     assert await ticks(dut, [here + 10]) == 10
@@ -90,7 +98,14 @@ async def a_shift_leaves_no_trace(dut):
 async def the_velocity_stops_at_both_ends(dut):
     await begin(dut)
     end = 1 << 31
-    for far, want in ((end - 1, end - 1), (end, end - 1), (2 * end - 1, end - 1), (-end, -end), (-end - 1, -end), (1 - 2 * end, -end)):
+    for far, want in (
+        (end - 1, end - 1),
+        (end, end - 1),
+        (2 * end - 1, end - 1),
+        (-end, -end),
+        (-end - 1, -end),
+        (1 - 2 * end, -end),
+    ):
         assert await ticks(dut, [0, far]) == want
         await ticks(dut, [0])
 
@@ -110,8 +125,10 @@ async def by_hand_one_edge_in_five_ticks(dut):
         velocity = await clock(dut, clk // 500 * X4, clk % period == 0, quantum=X4)
         if clk > 1500 and clk % period == 99:
             seen.append((velocity, dut.fine.value.to_signed()))
-    (velocity, fine), = set(seen)
-    assert velocity == round(X4 / 5) and abs(fine / 256 - X4 / 5) < X4 * 2**-19     # 3276.8: fine tells what is cut off
+    ((velocity, fine),) = set(seen)
+    assert (
+        velocity == round(X4 / 5) and abs(fine / 256 - X4 / 5) < X4 * 2**-19
+    )  # 3276.8: fine tells what is cut off
 
 
 @cocotb.test()
@@ -119,7 +136,7 @@ async def an_edge_that_trembles_has_no_velocity(dut):
     await begin(dut)
     seen = []
     for clk in range(3000):
-        position = X4 * (7 + (clk // 13 + clk // 101) % 2)              # to and fro over one edge of the scale
+        position = X4 * (7 + (clk // 13 + clk // 101) % 2)  # to and fro over one edge of the scale
         seen.append(await clock(dut, position, clk % 97 == 0, quantum=X4))
     assert set(seen[300:]) == {0}
     assert max(map(abs, seen)) <= X4
@@ -136,7 +153,7 @@ async def after_a_stop_the_velocity_dies_away_as_one_over_the_time_and_ends(dut)
         if clk % 100 == 50:
             seen.append(velocity)
     assert seen[10] == 2 * X4
-    for n, velocity in enumerate(seen[17:], 2):                         # n ticks and more since the last edge
+    for n, velocity in enumerate(seen[17:], 2):  # n ticks and more since the last edge
         assert velocity <= X4 // (n - 1)
         assert velocity > X4 // (n + 2) or n * 100 > longest - 200
     assert (seen[-1] == 0) == (longest < 2000)
@@ -147,9 +164,9 @@ async def the_step_it_rests_on_is_24_to_50_clk_old(dut):
     await begin(dut)
     for age in (23, 24, 49, 50):
         taken = set()
-        for late in range(0, 24, 5):                                    # against the divisions, one every 24 clk
+        for late in range(0, 24, 5):  # against the divisions, one every 24 clk
             await again(dut)
-            for clk in range(820 + late):                               # two edges, the second `age` before the tick
+            for clk in range(820 + late):  # two edges, the second `age` before the tick
                 position = X4 * ((clk >= 100) + (clk >= 800 + late - age))
                 velocity = await clock(dut, position, clk in (400 + late, 800 + late), quantum=X4)
             taken.add(velocity > 0)
@@ -157,7 +174,9 @@ async def the_step_it_rests_on_is_24_to_50_clk_old(dut):
 
 
 def ride(speed, period, count, quantum=X4, backwards=False):
-    """(speed, velocity / quantum) at each tick of the model on a scale with this speed(clk), in quanta a tick."""
+    """(speed, velocity / quantum) at each tick of the model on a scale with this speed(clk), in
+    quanta a tick.
+    """
     model, where, out = VelocityEstimator(), 0.5, []
     for clk in range(period * count):
         where += (-speed(clk) if backwards else speed(clk)) / period
@@ -171,23 +190,31 @@ def ride(speed, period, count, quantum=X4, backwards=False):
 def test_at_constant_speed_the_error_is_below_2_clk_of_a_tick(backwards):
     period = 500
     for speed in (0.04, 0.37, 0.77, 0.99, 1, 1.01, 1.99, 2, 2.5, 7.3, 50.1):
-        for true, got in ride(lambda clk, speed=speed: speed, period, int(10 + 3 / speed), backwards=backwards)[int(4 + 2 / speed):]:
+        for true, got in ride(
+            lambda clk, speed=speed: speed, period, int(10 + 3 / speed), backwards=backwards
+        )[int(4 + 2 / speed) :]:
             assert abs(got - true) <= 2 / period * true + 2**-17
 
 
 @pytest.mark.parametrize("backwards", [False, True])
 def test_no_speed_has_a_step_where_time_stamps_and_differences_meet(backwards):
     count, period, slow, fast = 200, 400, 0.1, 10
-    growth = math.log(fast / slow) / count                              # of the speed, a tick
-    seen = ride(lambda clk: slow * math.exp(growth * clk / period), period, count, backwards=backwards)[30:]
+    growth = math.log(fast / slow) / count  # of the speed, a tick
+    seen = ride(
+        lambda clk: slow * math.exp(growth * clk / period), period, count, backwards=backwards
+    )[30:]
     for (_, before), (true, now) in zip(seen, seen[1:]):
         assert -4 / period * true <= now - before
-        assert now - before <= (growth * (2 + 1 / true) + 4 / period) * true    # what the speed gains from edge to edge
+        assert (
+            now - before <= (growth * (2 + 1 / true) + 4 / period) * true
+        )  # what the speed gains from edge to edge
 
 
 def test_a_fraction_of_a_unit_a_tick_is_told():
     for speed in (0.15, 1.4):
-        for true, got in ride(lambda clk, speed=speed: speed, 500, int(10 + 4 / speed), quantum=1)[int(5 + 3 / speed):]:
+        for true, got in ride(lambda clk, speed=speed: speed, 500, int(10 + 4 / speed), quantum=1)[
+            int(5 + 3 / speed) :
+        ]:
             assert abs(got - true) <= 2 / 500 * true + 1 / 256
 
 
@@ -196,10 +223,12 @@ async def a_ramp_across_the_joint_matches_the_model(dut):
     await begin(dut)
     model, period, where = VelocityEstimator(int(dut.TIME_W.value)), 150, 0.5
     for clk in range(9_000):
-        where += (clk / 9_000) ** 2 * 4 / period                       # up to four cells a tick
+        where += (clk / 9_000) ** 2 * 4 / period  # up to four cells a tick
         position, tick = int(where) * X4, int(clk % period == 0)
         got = await clock(dut, position, tick, quantum=X4)
-        assert (got, dut.fine.value.to_signed()) == model.step(X4, tick, position, 0, 0), f"clk {clk}"
+        assert (got, dut.fine.value.to_signed()) == model.step(X4, tick, position, 0, 0), (
+            f"clk {clk}"
+        )
 
 
 @cocotb.test()
@@ -210,12 +239,22 @@ async def any_input_matches_the_model_in_every_clk(dut):
     await again(dut)
     for clk in range(12_000):
         if clk % 500 == 0:
-            lively, pace = random.choice((0, 0.003, 0.05, 0.5, 1)), random.choice((0.0, 0.004, 0.02, 0.3))
+            lively, pace = (
+                random.choice((0, 0.003, 0.05, 0.5, 1)),
+                random.choice((0.0, 0.004, 0.02, 0.3)),
+            )
             quantum = random.choice((0, 1, 128, X4, 65535))
         rst, tick, shift = (int(random.random() < share) for share in (0.001, pace, 0.02))
         if random.random() < lively:
-            position += random.choice((quantum, -quantum, 3 * quantum, random.randrange(-99, 99),
-                                       random.randrange(-1 << 34, 1 << 34) if random.random() < 0.02 else 0))
+            position += random.choice(
+                (
+                    quantum,
+                    -quantum,
+                    3 * quantum,
+                    random.randrange(-99, 99),
+                    random.randrange(-1 << 34, 1 << 34) if random.random() < 0.02 else 0,
+                )
+            )
         position = (position + (1 << 47)) % (1 << 48) - (1 << 47)
         periods = random.randrange(-1 << 31, 1 << 31)
         dut.rst.value = rst

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""zero_crossing: every pass and its direction, none from a shift or a wrap, and every clk against the model."""
+"""zero_crossing: every pass and its direction, none from a shift or a wrap, and every clk against
+the model.
+"""
+
 import random
 
 import cocotb
@@ -30,7 +33,9 @@ async def clock(dut, position, valid=1, shift=0):
 
 
 async def ride(dut, positions):
-    return "".join("u" if up else "d" if down else "." for up, down in [await clock(dut, p) for p in positions])
+    return "".join(
+        "u" if up else "d" if down else "." for up, down in [await clock(dut, p) for p in positions]
+    )
 
 
 @cocotb.test()
@@ -64,7 +69,7 @@ async def a_shift_is_no_crossing(dut):
     assert await clock(dut, 6, 0, 1) == (0, 0)
     assert await clock(dut, 6 - 131072, 0) == (0, 0)
     assert await ride(dut, [7 - 131072, -1, 0]) == "..u"
-    assert await clock(dut, -1, 1, 1) == (0, 1)             # the clk of the strobe still has the old origin
+    assert await clock(dut, -1, 1, 1) == (0, 1)  # the clk of the strobe still has the old origin
     assert await ride(dut, [131071, 131072, -1]) == "..d"
 
 

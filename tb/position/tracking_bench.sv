@@ -1,26 +1,56 @@
 // SPDX-License-Identifier: Apache-2.0
-// tracking_bench -- phase and comparator count of one scale to position and its two alarms, the way axis.sv strings the blocks together.
+// tracking_bench -- phase and comparator count of one scale to position and its two alarms, the way
+// axis.sv strings the blocks together.
 `default_nettype none
 
 module tracking_bench (
-    input  wire                  clk,
-    input  wire                  rst,
-    input  wire        [19:0]    limit,         // 2^-16 period
-    input  wire                  valid,         // strobe: phase is new
-    input  wire        [15:0]    phase,
-    input  wire signed [31:0]    count,         // 1/4 period
-    output logic                 done,          // strobe: position is that of a new phase
-    output logic signed [47:0]   position,      // Q32.16 periods
-    output logic                 overspeed,     // strobe
-    output logic                 disagreement
+    input  wire                clk,
+    input  wire                rst,
+    input  wire         [19:0] limit,        // 2^-16 period
+    input  wire                valid,        // strobe: phase is new
+    input  wire         [15:0] phase,
+    input  wire signed  [31:0] count,        // 1/4 period
+    output logic               done,         // strobe: position is that of a new phase
+    output logic signed [47:0] position,     // Q32.16 periods
+    output logic               overspeed,    // strobe
+    output logic               disagreement
 );
     wire               stepped;
     wire signed [16:0] step;
     wire        [15:0] tracked_phase;
 
-    fringe_tracker u_tracker (.clk, .rst, .valid, .phase, .done(stepped), .step, .phase_out(tracked_phase), .overspeed);
-    unwrap u_position (.clk, .rst, .valid(stepped), .step, .phase(tracked_phase), .shift(1'b0), .shift_periods(32'sd0), .done, .position);
-    count_phase_check u_count_phase_check (.clk, .rst, .limit, .valid(done), .position, .count, .shift(1'b0), .shift_periods(32'sd0), .disagreement);
+    fringe_tracker u_tracker (
+        .clk,
+        .rst,
+        .valid,
+        .phase,
+        .done     (stepped),
+        .step,
+        .phase_out(tracked_phase),
+        .overspeed
+    );
+    unwrap u_position (
+        .clk,
+        .rst,
+        .valid        (stepped),
+        .step,
+        .phase        (tracked_phase),
+        .shift        (1'b0),
+        .shift_periods(32'sd0),
+        .done,
+        .position
+    );
+    count_phase_check u_count_phase_check (
+        .clk,
+        .rst,
+        .limit,
+        .valid        (done),
+        .position,
+        .count,
+        .shift        (1'b0),
+        .shift_periods(32'sd0),
+        .disagreement
+    );
 endmodule
 
 `default_nettype wire

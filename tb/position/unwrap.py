@@ -9,7 +9,9 @@ class Unwrap:
     def step(self, valid, step, phase, shift, shift_periods):
         if valid:
             self.position += step if self.started else 0
-            self.position += phase - self.position % 65536      # nothing where the step leads to the phase
+            self.position += (
+                phase - self.position % 65536
+            )  # nothing where the step leads to the phase
             self.started = True
         if shift:
             self.position += shift_periods << 16

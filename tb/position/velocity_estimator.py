@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/position/velocity_estimator.sv does, in integers: step() is one clk and returns velocity, fine."""
-K = 20                                                  # bits of tick / time between two steps
-BUSY = K + 3                                            # clk from the choice of a division to its last
-P = 33                                                  # bits of a place
+"""What rtl/position/velocity_estimator.sv does, in integers: step() is one clk and returns
+velocity, fine.
+"""
+
+K = 20  # bits of tick / time between two steps
+BUSY = K + 3  # clk from the choice of a division to its last
+P = 33  # bits of a place
 
 
 def wrapped(value, bits):
@@ -14,9 +17,13 @@ def between(value, low, high):
 
 
 def quotient(way, period, span):
-    """2^-24 period/tick: way * period / span, the quotient of the times cut off behind K bits; at most twice the way."""
+    """2^-24 period/tick: way * period / span, the quotient of the times cut off behind K bits; at
+    most twice the way.
+    """
     divisor = max(2 * span, period)
-    ratio = (period << K) // divisor if divisor else (1 << K + 1) - 1       # the divider's answer to a division by 0
+    ratio = (
+        (period << K) // divisor if divisor else (1 << K + 1) - 1
+    )  # the divider's answer to a division by 0
     return wrapped((way * ratio) >> K - 9, P + 10)
 
 
@@ -26,13 +33,19 @@ class VelocityEstimator:
         self.velocity = self.fine = self.speed = 0
         self.origin = self.now = self.quiet = self.since_tick = self.period = self.age = 0
         self.here = self.here_q = self.last = None
-        self.stepped = None                             # the place just stepped from is known: True upwards, False downwards
-        self.ticks = [None] * 5                         # what each tick still carries, the youngest first
-        self.latest = self.run = self.base = None       # (place, time) of steps
+        self.stepped = None  # the place just stepped from is known: True upwards, False downwards
+        self.ticks = [None] * 5  # what each tick still carries, the youngest first
+        self.latest = self.run = self.base = None  # (place, time) of steps
         self.fresh, self.busy, self.task = False, 0, None
 
     def step(self, quantum, tick, position, shift, shift_periods):
-        before, here, here_q, stepped, quiet = self.ticks, self.here, self.here_q, self.stepped, self.quiet
+        before, here, here_q, stepped, quiet = (
+            self.ticks,
+            self.here,
+            self.here_q,
+            self.stepped,
+            self.quiet,
+        )
         run, speed, now, base = self.run, self.speed, self.now, self.base
         # the tick on its way to the velocity
         self.ticks = [True if tick else None, None, None, None, None]
@@ -59,11 +72,11 @@ class VelocityEstimator:
                     self.speed = found
                 elif quiet == self.longest:
                     self.speed = 0
-                elif 2 * span <= period:                # half a tick and less says nothing about a limit
+                elif 2 * span <= period:  # half a tick and less says nothing about a limit
                     pass
                 elif speed < found if speed < 0 else speed > found:
                     self.speed = found
-            elif self.busy == BUSY - 1:                 # the length of the tick is taken with the times
+            elif self.busy == BUSY - 1:  # the length of the tick is taken with the times
                 way, span, _, bounding = self.task
                 self.task = way, span, self.period, bounding
         elif self.latest is not None:

@@ -8,7 +8,13 @@ class ZeroCrossing:
 
     def step(self, valid, position, shift):
         below, wrap = position < 0, not -1 << 46 <= position < 1 << 46
-        crossed = valid and self.below is not None and not self.shifted and not wrap and below != self.below
+        crossed = (
+            valid
+            and self.below is not None
+            and not self.shifted
+            and not wrap
+            and below != self.below
+        )
         if valid or self.shifted and self.below is not None:
             self.below = below
         self.shifted = bool(shift)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What any rtl/registers/*_registers.sv does, in integers: step(...) is one clk and returns every output after it, by port name."""
+"""What any rtl/registers/*_registers.sv does, in integers: step(...) is one clk and returns every
+output after it, by port name.
+"""
 
 WORD = (1 << 32) - 1
 
@@ -11,7 +13,8 @@ def extend(value, width, signed, to):
 
 
 class RegisterBlock:
-    """`block` is a block of tables/registers.py, `constant` the CRC-32 that word 0 of the map shows. A setting that needs a
+    """`block` is a block of tables/registers.py, `constant` the CRC-32 that word 0 of the map
+    shows. A setting that needs a
     parameter named in `without` has no bits."""
 
     def __init__(self, block, constant, without=()):
@@ -19,12 +22,20 @@ class RegisterBlock:
         self.reset()
 
     def reset(self):
-        self.value = {r.port(f): 0 if f.needs in self.without else f.reset & ((1 << f.width) - 1)
-                      for r, f in self.block.fields if f.kind in ("setting", "counter", "sticky")}
-        self.pulse = {r.port(f): 0 for r, f in self.block.fields if f.kind == "pulse"} | \
-                     {f"{r.name}_written": 0 for r in self.block.registers if r.on_write}
-        self.upper = {r.name: 0 for r in self.block.registers if r.wide}          # latched by a read of the low word
-        self.lower = {r.name: 0 for r in self.block.registers if r.wide}          # waits for a write of the high word
+        self.value = {
+            r.port(f): 0 if f.needs in self.without else f.reset & ((1 << f.width) - 1)
+            for r, f in self.block.fields
+            if f.kind in ("setting", "counter", "sticky")
+        }
+        self.pulse = {r.port(f): 0 for r, f in self.block.fields if f.kind == "pulse"} | {
+            f"{r.name}_written": 0 for r in self.block.registers if r.on_write
+        }
+        self.upper = {
+            r.name: 0 for r in self.block.registers if r.wide
+        }  # latched by a read of the low word
+        self.lower = {
+            r.name: 0 for r in self.block.registers if r.wide
+        }  # waits for a write of the high word
         self.rdata = 0
 
     def shown(self, register, inputs):
@@ -34,17 +45,28 @@ class RegisterBlock:
             port = register.port(f)
             source = {"constant": {port: self.constant}, "input": inputs}.get(f.kind, self.value)
             if "r" in f.access:
-                whole |= extend(source[port], f.width, f.signed and len(register.fields) == 1, size - f.low) << f.low
+                whole |= (
+                    extend(
+                        source[port], f.width, f.signed and len(register.fields) == 1, size - f.low
+                    )
+                    << f.low
+                )
         return whole
 
     def step(self, select, write, word, wdata, inputs, rst=0):
-        read = {f"{r.name}_read": int(select and not write and word == r.word) for r in self.block.registers if r.on_read}
+        read = {
+            f"{r.name}_read": int(select and not write and word == r.word)
+            for r in self.block.registers
+            if r.on_read
+        }
         if rst:
             self.reset()
         else:
             self.get(word, inputs) if select and not write else setattr(self, "rdata", 0)
             self.put(word if select and write else None, wdata, inputs)
-        outputs = {r.port(f): self.value[r.port(f)] for r, f in self.block.fields if f.kind == "setting"}
+        outputs = {
+            r.port(f): self.value[r.port(f)] for r, f in self.block.fields if f.kind == "setting"
+        }
         return {"rdata": self.rdata, **outputs, **self.pulse, **read}
 
     def get(self, word, inputs):
@@ -67,10 +89,18 @@ class RegisterBlock:
                 if f.kind == "pulse":
                     self.pulse[port] = int(hit and bits)
                 elif f.kind == "counter":
-                    self.value[port] = min((0 if hit else self.value[port]) + inputs[port], (1 << f.width) - 1)
+                    self.value[port] = min(
+                        (0 if hit else self.value[port]) + inputs[port], (1 << f.width) - 1
+                    )
                 elif f.kind == "sticky":
-                    self.value[port] = int(inputs[port] or (self.value[port] and not (hit and bits)))
+                    self.value[port] = int(
+                        inputs[port] or (self.value[port] and not (hit and bits))
+                    )
                 elif f.kind == "setting" and commit and f.needs not in self.without:
-                    self.value[port] = (wdata << 32 | self.lower[r.name]) & ((1 << f.width) - 1) if r.wide else bits
+                    self.value[port] = (
+                        (wdata << 32 | self.lower[r.name]) & ((1 << f.width) - 1)
+                        if r.wide
+                        else bits
+                    )
             if r.wide and hit:
                 self.lower[r.name] = wdata

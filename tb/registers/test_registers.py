@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every register of every made block: access, first value, neighbours, words of 64 bits, strobes, counters, sticky bits; and
+"""Every register of every made block: access, first value, neighbours, words of 64 bits, strobes,
+counters, sticky bits; and
 what the other made files say about the same map."""
+
 import random
 import re
 import zlib
@@ -21,10 +23,16 @@ class Bus:
     def __init__(self, dut):
         self.dut = dut
         self.block = next(b for b in tables.read() if f"{b.name}_registers" == dut._name)
-        without = [parameter for parameter in self.block.parameters if not int(getattr(dut, parameter).value)]
+        without = [
+            parameter
+            for parameter in self.block.parameters
+            if not int(getattr(dut, parameter).value)
+        ]
         self.model = RegisterBlock(self.block, tables.crc(), without)
         self.there = {f: f.needs not in without for _, f in self.block.fields}
-        self.inputs = {r.port(f): 0 for r, f in self.block.fields if f.kind in ("input", "counter", "sticky")}
+        self.inputs = {
+            r.port(f): 0 for r, f in self.block.fields if f.kind in ("input", "counter", "sticky")
+        }
         self.width = {r.port(f): f.width if f.kind == "input" else 1 for r, f in self.block.fields}
 
     async def begin(self):
@@ -37,7 +45,14 @@ class Bus:
     async def clk(self, select=0, write=0, word=0, wdata=0, rst=0, **inputs):
         """Inputs named here stand for this clk only."""
         now = self.inputs | inputs
-        for name, level in [*now.items(), ("select", select), ("write", write), ("word", word), ("wdata", wdata), ("rst", rst)]:
+        for name, level in [
+            *now.items(),
+            ("select", select),
+            ("write", write),
+            ("word", word),
+            ("wdata", wdata),
+            ("rst", rst),
+        ]:
             port = getattr(self.dut, name)
             if int(port.value) != level:
                 port.value = level
@@ -45,8 +60,12 @@ class Bus:
         await FallingEdge(self.dut.clk)
         want = self.model.step(select, write, word, wdata, now, rst)
         got = {name: int(getattr(self.dut, name).value) for name in want}
-        wrong = [f"{n} is {got[n]:#x}, the model has {want[n]:#x}" for n in want if got[n] != want[n]]
-        assert not wrong, f"word {word:#x} {'write' if write else 'read' if select else 'idle'}: {'; '.join(wrong)}"
+        wrong = [
+            f"{n} is {got[n]:#x}, the model has {want[n]:#x}" for n in want if got[n] != want[n]
+        ]
+        assert not wrong, (
+            f"word {word:#x} {'write' if write else 'read' if select else 'idle'}: {'; '.join(wrong)}"
+        )
         return got
 
     async def read(self, word, **inputs):
@@ -74,7 +93,11 @@ async def reset_gives_the_first_values(dut):
     bus = await Bus(dut).begin()
     for _ in range(2):
         for r in bus.block.registers:
-            first = sum(f.reset << f.low for f in r.fields if f.kind == "setting" and "r" in f.access and bus.there[f])
+            first = sum(
+                f.reset << f.low
+                for f in r.fields
+                if f.kind == "setting" and "r" in f.access and bus.there[f]
+            )
             if all(f.kind == "setting" for f in r.fields):
                 assert await bus.read(r.word) == first & WORD
                 assert not r.wide or await bus.read(r.word + 1) == first >> 32
@@ -111,9 +134,17 @@ async def every_input_reads_back_at_both_ends_of_its_range(dut):
 @cocotb.test()
 async def a_word_without_a_register_reads_zero(dut):
     bus = await Bus(dut).begin()
-    bus.inputs = {name: (1 << bus.width[name]) - 1 for name in bus.inputs if name not in [r.port(f) for r, f in bus.of("counter")]} | \
-                 {r.port(f): 0 for r, f in bus.of("counter")}
-    known = {word for r in bus.block.registers for word in range(r.word, r.word + 1 + r.wide) if any("r" in f.access for f in r.fields)}
+    bus.inputs = {
+        name: (1 << bus.width[name]) - 1
+        for name in bus.inputs
+        if name not in [r.port(f) for r, f in bus.of("counter")]
+    } | {r.port(f): 0 for r, f in bus.of("counter")}
+    known = {
+        word
+        for r in bus.block.registers
+        for word in range(r.word, r.word + 1 + r.wide)
+        if any("r" in f.access for f in r.fields)
+    }
     for word in sorted(set(range(64)) - known):
         await bus.write(word, WORD)
         assert await bus.read(word) == 0
@@ -128,7 +159,7 @@ async def a_wide_value_is_read_and_written_whole(dut):
         if f.kind == "input":
             bus.inputs[port] = 0xFFFF_FFFF
             assert await bus.read(r.word) == WORD
-            bus.inputs[port] = 0x1_0000_0000                       # the carry comes between the two reads
+            bus.inputs[port] = 0x1_0000_0000  # the carry comes between the two reads
             assert await bus.read(r.word + 1) == 0
         else:
             assert (await bus.write(r.word, 0x89AB_CDEF))[port] == f.reset & ones
@@ -144,12 +175,17 @@ async def strobes_last_one_clk(dut):
         assert (await bus.write(r.word, WORD ^ 1 << f.low))[r.port(f)] == 0
     for r in (r for r in bus.block.registers if r.on_write):
         out = await bus.write(r.word + r.wide, 5 << min(f.low for f in r.fields))
-        assert out[f"{r.name}_written"] == 1 and out[r.port(r.fields[0])] == (5 << 32 * r.wide) * bus.there[r.fields[0]]
+        assert (
+            out[f"{r.name}_written"] == 1
+            and out[r.port(r.fields[0])] == (5 << 32 * r.wide) * bus.there[r.fields[0]]
+        )
         assert (await bus.clk())[f"{r.name}_written"] == 0
     for r in (r for r in bus.block.registers if r.on_read):
         dut.select.value, dut.write.value, dut.word.value = 1, 0, r.word
         await cocotb.triggers.Timer(1, "ns")
-        assert getattr(dut, f"{r.name}_read").value == 1, "the strobe goes with the read, not after it"
+        assert getattr(dut, f"{r.name}_read").value == 1, (
+            "the strobe goes with the read, not after it"
+        )
         await bus.clk()
 
 
@@ -192,8 +228,14 @@ async def any_access_matches_the_model(dut):
     used = [word for r in bus.block.registers for word in range(r.word, r.word + 1 + r.wide)]
     for n in range(1500):
         word = random.choice(used) if random.random() < 0.9 else random.randrange(64)
-        await bus.clk(random.random() < 0.8, random.getrandbits(1), word, random.getrandbits(32), random.random() < 0.005,
-                      **(bus.noise() if n % 3 == 0 else {}))
+        await bus.clk(
+            random.random() < 0.8,
+            random.getrandbits(1),
+            word,
+            random.getrandbits(32),
+            random.random() < 0.005,
+            **(bus.noise() if n % 3 == 0 else {}),
+        )
 
 
 @cocotb.test()
@@ -216,28 +258,51 @@ def test_registers_without_sine(block):
 
 def test_all_made_files_carry_the_crc_of_the_source():
     source = (ROOT / "tables" / "registers.rdl").read_bytes().replace(b"\r\n", b"\n")
-    made = {"rtl/registers/node_registers.sv": r"6'h00: rdata <= 32'h(\w{8});", "sw/firmware/made/registers.h": r"MAP_CRC 0x(\w{8})u",
-            "sw/host/moire/made/registers.py": r"MAP_CRC = 0x(\w{8})", "docs/registers.md": r"CRC-32 `0x(\w{8})`"}
+    made = {
+        "rtl/registers/node_registers.sv": r"6'h00: rdata <= 32'h(\w{8});",
+        "sw/firmware/made/registers.h": r"MAP_CRC 0x(\w{8})u",
+        "sw/host/moire/made/registers.py": r"MAP_CRC = 0x(\w{8})",
+        "docs/registers.md": r"CRC-32 `0x(\w{8})`",
+    }
     for name, place in made.items():
-        assert re.search(place, (ROOT / name).read_text(), re.IGNORECASE).group(1).upper() == f"{zlib.crc32(source):08X}", name
+        assert (
+            re.search(place, (ROOT / name).read_text(), re.IGNORECASE).group(1).upper()
+            == f"{zlib.crc32(source):08X}"
+        ), name
 
 
 @pytest.mark.parametrize("axes", [1, 2, 4, 8])
 def test_host_and_firmware_find_every_register_at_every_axis_count(axes):
-    header = dict(re.findall(r"#define (\w+) +(0x[0-9a-fA-F]+)u", (ROOT / "sw" / "firmware" / "made" / "registers.h").read_text()))
+    header = dict(
+        re.findall(
+            r"#define (\w+) +(0x[0-9a-fA-F]+)u",
+            (ROOT / "sw" / "firmware" / "made" / "registers.h").read_text(),
+        )
+    )
     taken = {}
     for block in tables.read(axes):
         assert block.count == (axes if block.name in ("axis", "feedback", "actuator") else 1)
         for n in range(block.count):
             for r in block.registers:
                 address = block.base + n * block.stride + r.offset
-                base, stride, offset = (int(header.get(f"{block.name}_{x}".upper(), "0"), 16) for x in ("BASE", "STRIDE", r.name))
+                base, stride, offset = (
+                    int(header.get(f"{block.name}_{x}".upper(), "0"), 16)
+                    for x in ("BASE", "STRIDE", r.name)
+                )
                 assert base + n * stride + offset == address
                 for f in r.fields:
                     entry = host.BY_NAME[block.name, r.name, f.name]
-                    assert (entry.address(n), entry.low, entry.width, entry.signed) == (address, f.low, f.width, f.signed)
+                    assert (entry.address(n), entry.low, entry.width, entry.signed) == (
+                        address,
+                        f.low,
+                        f.width,
+                        f.signed,
+                    )
                 for word in range(address, address + (8 if r.wide else 4), 4):
-                    assert taken.setdefault(word, (block.name, n, r.name)) == (block.name, n, r.name) and word < 1 << 16
+                    assert (
+                        taken.setdefault(word, (block.name, n, r.name)) == (block.name, n, r.name)
+                        and word < 1 << 16
+                    )
 
 
 def test_host_reads_a_field_out_of_a_word():

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A serial flash chip as its data sheet tells: commands 03 read, AB wake, 06 write enable, 02 program, 20 erase a sector, 05 status.
+"""A serial flash chip as its data sheet tells: commands 03 read, AB wake, 06 write enable, 02
+program, 20 erase a sector, 05 status.
 
-pins(chip_n, sclk, sdo) is called whenever they may have changed and returns sdi. Asleep it answers nothing, as after an iCE40 has
-configured itself. Programming only clears bits; a power failure may stop it after any byte: see `power`."""
+pins(chip_n, sclk, sdo) is called whenever they may have changed and returns sdi. Asleep it answers
+nothing, as after an iCE40 has
+configured itself. Programming only clears bits; a power failure may stop it after any byte: see
+`power`."""
 
 SECTOR = 4096
 
@@ -11,7 +14,7 @@ class Flash:
     def __init__(self, size=1 << 21):
         self.memory = bytearray(b"\xff" * size)
         self.asleep, self.writable = True, False
-        self.power = None                       # bytes that may still be programmed before power fails; None: no failure
+        self.power = None  # bytes that may still be programmed before power fails; None: no failure
         self.chip_n = 1
         self.sclk = 0
         self.sdi = 1
@@ -57,8 +60,13 @@ class Flash:
             self.change({begin + n: 0xFF for n in range(SECTOR)})
         elif self.writable and command == b"\x02":
             page = self.address() // 256 * 256
-            self.change({page + (self.address() + n) % 256: byte & self.memory[page + (self.address() + n) % 256]
-                         for n, byte in enumerate(self.heard[4:])})
+            self.change(
+                {
+                    page + (self.address() + n) % 256: byte
+                    & self.memory[page + (self.address() + n) % 256]
+                    for n, byte in enumerate(self.heard[4:])
+                }
+            )
 
     def change(self, bytes_at):
         self.writable = False

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/relay/relay_requests.sv does, in integers: clk(...) is one clk, the state is what stands after it. zlib makes the CRC-32."""
+"""What rtl/relay/relay_requests.sv does, in integers: clk(...) is one clk, the state is what stands
+after it. zlib makes the CRC-32.
+"""
+
 import zlib
 
 CLEAR, BEGIN_SET, SET, FLASH = 1, 2, 3, 4
@@ -13,7 +16,11 @@ class RelayRequests:
         self.reset()
 
     def reset(self):
-        self.state, self.taken, self.heard = "listen", None, False      # taken: bytes after the command byte
+        self.state, self.taken, self.heard = (
+            "listen",
+            None,
+            False,
+        )  # taken: bytes after the command byte
         self.flags = 0
         self.set_start = self.set_valid = self.pass_select = self.pass_valid = False
 
@@ -28,8 +35,25 @@ class RelayRequests:
             return self.row[self.at]
         return zlib.crc32(bytes(self.row)) >> 8 * (self.at - len(self.row)) & 0xFF
 
-    def clk(self, rst=0, valid=0, data=0, command=0, good=0, events=0, levels=0, source=0, orders=0, identity=0, position=0, correction=0,
-            pass_ready=0, pass_done=0, pass_data=0, answer_ready=0):
+    def clk(
+        self,
+        rst=0,
+        valid=0,
+        data=0,
+        command=0,
+        good=0,
+        events=0,
+        levels=0,
+        source=0,
+        orders=0,
+        identity=0,
+        position=0,
+        correction=0,
+        pass_ready=0,
+        pass_done=0,
+        pass_data=0,
+        answer_ready=0,
+    ):
         if rst:
             self.reset()
             return
@@ -41,7 +65,7 @@ class RelayRequests:
             elif valid and self.taken is not None:
                 self.taken += bytes([data])
             if good and self.taken is not None:
-                self.body, self.taken = list(self.taken[1:1 + self.taken[0]]), None
+                self.body, self.taken = list(self.taken[1 : 1 + self.taken[0]]), None
                 self.state, self.at = "read", 0
         elif self.state == "read":
             self.state = "act"
@@ -56,7 +80,12 @@ class RelayRequests:
         elif answer_ready:
             if self.at == 0 and self.kind != FLASH:
                 words = (identity, position, correction)
-                self.row[4:] = flags, levels, orders << 2 | source, *(word >> n & 0xFF for word in words for n in (0, 8, 16, 24))
+                self.row[4:] = (
+                    flags,
+                    levels,
+                    orders << 2 | source,
+                    *(word >> n & 0xFF for word in words for n in (0, 8, 16, 24)),
+                )
             self.at += 1
             self.state = "fetch" if self.at < len(self.row) + 4 else "listen"
 
@@ -89,4 +118,8 @@ class RelayRequests:
             self.state = "listen"
         else:
             self.state, self.at = "fetch", 0
-            self.row = [REPLY, len(self.body), *self.body] if self.kind == FLASH else [REPLY, 17, *self.body[:2], *[0] * 15]
+            self.row = (
+                [REPLY, len(self.body), *self.body]
+                if self.kind == FLASH
+                else [REPLY, 17, *self.body[:2], *[0] * 15]
+            )

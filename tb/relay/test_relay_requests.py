@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""relay_requests: each request by hand, the same one again, what is broken or comes too early, and any strobes against the model."""
+"""relay_requests: each request by hand, the same one again, what is broken or comes too early, and
+any strobes against the model.
+"""
+
 import random
 
 import cocotb
@@ -10,17 +13,40 @@ from tb.relay.relay_requests import BEGIN_SET, CLEAR, FLASH, SET, RelayRequests
 from tb.serial.frame_check import FrameCheck, frame
 
 STATUS = 0
-INPUTS = "valid", "data", "command", "good", "events", "levels", "source", "orders", "identity", "position", "correction", "pass_ready", \
-    "pass_done", "pass_data", "answer_ready"
+INPUTS = (
+    "valid",
+    "data",
+    "command",
+    "good",
+    "events",
+    "levels",
+    "source",
+    "orders",
+    "identity",
+    "position",
+    "correction",
+    "pass_ready",
+    "pass_done",
+    "pass_data",
+    "answer_ready",
+)
 IDLE = dict.fromkeys(INPUTS, 0)
 
 
 class Requests:
-    """The design with the model beside it in every clk, frames before it, a chip and a slow line behind it."""
+    """The design with the model beside it in every clk, frames before it, a chip and a slow line
+    behind it.
+    """
 
     def __init__(self, dut):
         self.dut, self.model, self.last = dut, RelayRequests(), {}
-        self.said, self.set, self.chip, self.answers, self.waits = bytearray(), [], bytearray(), 3, None
+        self.said, self.set, self.chip, self.answers, self.waits = (
+            bytearray(),
+            [],
+            bytearray(),
+            3,
+            None,
+        )
 
     async def reset(self):
         await start(self.dut, **IDLE)
@@ -30,7 +56,12 @@ class Requests:
 
     async def clk(self, **inputs):
         dut, model = self.dut, self.model
-        values = {**IDLE, "rst": 0, "answer_ready": int(random.randrange(self.answers) == 0), **inputs}
+        values = {
+            **IDLE,
+            "rst": 0,
+            "answer_ready": int(random.randrange(self.answers) == 0),
+            **inputs,
+        }
         if "pass_ready" not in inputs:
             values["pass_ready"] = int(model.pass_select and self.waits is None)
         if self.waits == 0:
@@ -45,7 +76,14 @@ class Requests:
         model.clk(**values)
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
-        for name in ("flags", "set_start", "set_valid", "pass_select", "pass_valid", "answer_valid"):
+        for name in (
+            "flags",
+            "set_start",
+            "set_valid",
+            "pass_select",
+            "pass_valid",
+            "answer_valid",
+        ):
             got, want = int(getattr(dut, name).value), int(getattr(model, name))
             assert got == want, f"{values}: {name} is {got}, the model has {want} in {model.state}"
         if model.answer_valid:
@@ -88,8 +126,19 @@ class Requests:
 async def status_by_hand(dut):
     host = await Requests(dut).reset()
     await host.clk(events=0x05)
-    told = await host.ask(9, STATUS, levels=0x0B, source=2, orders=32, identity=0x11223344, position=0x55667788, correction=-2 & 0xFFFFFFFF)
-    assert told == bytes([9, 0, 5, 0x0B, 130, 0x44, 0x33, 0x22, 0x11, 0x88, 0x77, 0x66, 0x55, 0xFE, 0xFF, 0xFF, 0xFF])
+    told = await host.ask(
+        9,
+        STATUS,
+        levels=0x0B,
+        source=2,
+        orders=32,
+        identity=0x11223344,
+        position=0x55667788,
+        correction=-2 & 0xFFFFFFFF,
+    )
+    assert told == bytes(
+        [9, 0, 5, 0x0B, 130, 0x44, 0x33, 0x22, 0x11, 0x88, 0x77, 0x66, 0x55, 0xFE, 0xFF, 0xFF, 0xFF]
+    )
 
 
 @cocotb.test()
@@ -157,7 +206,9 @@ async def flash_bytes_go_out_and_back_and_wait_until_the_chip_is_free(dut):
         await host.clk()
     assert host.chip[3:] == b"\x03"
     longest = bytes(range(62))
-    assert await host.ask(8, FLASH, *longest) == bytes([8, FLASH]) + bytes(byte ^ 0xFF for byte in longest)
+    assert await host.ask(8, FLASH, *longest) == bytes([8, FLASH]) + bytes(
+        byte ^ 0xFF for byte in longest
+    )
 
 
 @cocotb.test()
@@ -218,12 +269,26 @@ async def any_strobes_match_the_model(dut):
     host = await Requests(dut).reset()
     for _ in range(120):
         host.answers = random.choice((1, 2, 9))
-        body = [random.randrange(4), random.choice((0, 1, 2, 3, 4, 9)), *random.randbytes(random.randrange(12))]
-        levels = dict(events=random.choice((0, 0, random.getrandbits(8))), levels=random.getrandbits(8), source=random.randrange(3),
-                      orders=random.getrandbits(6), identity=random.getrandbits(32), position=random.getrandbits(32),
-                      correction=random.getrandbits(32))
+        body = [
+            random.randrange(4),
+            random.choice((0, 1, 2, 3, 4, 9)),
+            *random.randbytes(random.randrange(12)),
+        ]
+        levels = dict(
+            events=random.choice((0, 0, random.getrandbits(8))),
+            levels=random.getrandbits(8),
+            source=random.randrange(3),
+            orders=random.getrandbits(6),
+            identity=random.getrandbits(32),
+            position=random.getrandbits(32),
+            correction=random.getrandbits(32),
+        )
         words = frame(random.choice((0x21, 0x21, 0x11)), body)
-        await host.hear(words[:random.choice((len(words), len(words), random.randrange(1, len(words))))], random.randrange(2), **levels)
+        await host.hear(
+            words[: random.choice((len(words), len(words), random.randrange(1, len(words))))],
+            random.randrange(2),
+            **levels,
+        )
         for _ in range(random.choice((0, 5, 400))):
             await host.clk(**levels)
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""relay_set: a whole set by hand, every broken bit refused, and rows cut anywhere against the model in every cycle."""
+"""relay_set: a whole set by hand, every broken bit refused, and rows cut anywhere against the model
+in every cycle.
+"""
+
 import random
 import zlib
 
@@ -10,8 +13,17 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import needs, run, start
 from tb.relay.relay_set import RelaySet, image
 
-SETTINGS = "counts_per_turn", "angle_per_count", "minimum_edge_separation", "radians_per_count", "hysteresis", "filter_required", "index_gate", \
-    "index_gate_mask", "index_low"
+SETTINGS = (
+    "counts_per_turn",
+    "angle_per_count",
+    "minimum_edge_separation",
+    "radians_per_count",
+    "hysteresis",
+    "filter_required",
+    "index_gate",
+    "index_gate_mask",
+    "index_low",
+)
 WIDTHS = 32, 48, 16, 32, 16, 8, 2, 2, 1
 
 
@@ -37,9 +49,23 @@ class Bytes:
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
         model = self.model
-        got = [int(x.value) for x in (dut.good, dut.swap, dut.bad, dut.loaded, dut.identity, dut.write)]
-        want = [int(x) for x in (model.good, model.good, model.bad, model.loaded, model.identity, model.write is not None)]
-        assert got == want, f"{inputs}: good, swap, bad, loaded, identity, write are {got}, the model has {want}"
+        got = [
+            int(x.value) for x in (dut.good, dut.swap, dut.bad, dut.loaded, dut.identity, dut.write)
+        ]
+        want = [
+            int(x)
+            for x in (
+                model.good,
+                model.good,
+                model.bad,
+                model.loaded,
+                model.identity,
+                model.write is not None,
+            )
+        ]
+        assert got == want, (
+            f"{inputs}: good, swap, bad, loaded, identity, write are {got}, the model has {want}"
+        )
         if model.write:
             got = tuple(int(x.value) for x in (dut.term, dut.amplitude, dut.phase))
             assert got == model.write
@@ -65,7 +91,10 @@ class Bytes:
 def any_terms(row):
     k = row.k
     if row.segments:
-        return [(random.randrange(-2**23, 2**23) % 2**32, random.randrange(-2**23, 2**23) % 2**32) for _ in range(k)]
+        return [
+            (random.randrange(-(2**23), 2**23) % 2**32, random.randrange(-(2**23), 2**23) % 2**32)
+            for _ in range(k)
+        ]
     reach = 2**29 // k
     return [(random.randrange(1 - reach, reach) % 2**32, random.getrandbits(32)) for _ in range(k)]
 
@@ -74,12 +103,34 @@ def any_terms(row):
 async def by_hand(dut):
     row = await Bytes(dut).reset()
     terms = any_terms(row)
-    whole = image(terms, 1 << 15, minimum_edge_separation=3, hysteresis=0x1234, filter_required=4, index_low=1, gate_mask=3, gate=2, segments=row.segments)
+    whole = image(
+        terms,
+        1 << 15,
+        minimum_edge_separation=3,
+        hysteresis=0x1234,
+        filter_required=4,
+        index_low=1,
+        gate_mask=3,
+        gate=2,
+        segments=row.segments,
+    )
     assert await row.send(whole) == 1
     assert row.written == [(n, a, p) for n, (a, p) in enumerate(terms)]
-    assert int(dut.counts_per_turn.value) == 32768 and int(dut.angle_per_count.value) == 1 << 33 and int(dut.minimum_edge_separation.value) == 3
-    assert int(dut.hysteresis.value) == 0x1234 and int(dut.filter_required.value) == 4 and int(dut.radians_per_count.value) == 210828714
-    assert (int(dut.index_low.value), int(dut.index_gate_mask.value), int(dut.index_gate.value)) == (1, 3, 2)
+    assert (
+        int(dut.counts_per_turn.value) == 32768
+        and int(dut.angle_per_count.value) == 1 << 33
+        and int(dut.minimum_edge_separation.value) == 3
+    )
+    assert (
+        int(dut.hysteresis.value) == 0x1234
+        and int(dut.filter_required.value) == 4
+        and int(dut.radians_per_count.value) == 210828714
+    )
+    assert (
+        int(dut.index_low.value),
+        int(dut.index_gate_mask.value),
+        int(dut.index_gate.value),
+    ) == (1, 3, 2)
 
 
 @cocotb.test()
@@ -117,7 +168,14 @@ async def a_set_for_another_number_of_orders_is_refused(dut):
 @cocotb.test()
 async def counts_per_turn_outside_their_range_are_refused(dut):
     row = await Bytes(dut).reset()
-    for counts, verdict in ((1609, 1), (1608, -1), (2**25, 1), (2**25 + 1, -1), (0, -1), (2**32 - 1, -1)):
+    for counts, verdict in (
+        (1609, 1),
+        (1608, -1),
+        (2**25, 1),
+        (2**25 + 1, -1),
+        (0, -1),
+        (2**32 - 1, -1),
+    ):
         assert await row.send(image(any_terms(row), counts, segments=row.segments)) == verdict
 
 
@@ -142,11 +200,23 @@ async def amplitudes_that_may_overflow_the_map_are_refused(dut):
 async def points_of_128_counts_are_refused(dut):
     row = await Bytes(dut).reset()
     needs(row.segments, "a map of harmonics has no points")
-    for value, verdict in ((2**23 - 1, 1), (2**23, -1), (-2**23, 1), (-2**23 - 1, -1), (2**31 - 1, -1), (-2**31, -1)):
+    for value, verdict in (
+        (2**23 - 1, 1),
+        (2**23, -1),
+        (-(2**23), 1),
+        (-(2**23) - 1, -1),
+        (2**31 - 1, -1),
+        (-(2**31), -1),
+    ):
         for place in (0, 2 * row.k - 1):
             words = [0] * (2 * row.k)
             words[place] = value
-            assert await row.send(image(list(zip(words[::2], words[1::2])), 32768, segments=row.segments)) == verdict
+            assert (
+                await row.send(
+                    image(list(zip(words[::2], words[1::2])), 32768, segments=row.segments)
+                )
+                == verdict
+            )
 
 
 @cocotb.test()
@@ -162,7 +232,7 @@ async def a_row_cut_short_changes_nothing_and_the_next_is_whole(dut):
     row = await Bytes(dut).reset()
     for _ in range(20):
         whole = image(any_terms(row), random.getrandbits(25) | 4096, segments=row.segments)
-        assert await row.send(whole[:random.randrange(len(whole))]) == 0
+        assert await row.send(whole[: random.randrange(len(whole))]) == 0
         assert await row.send(whole) == 1
         assert await row.send(b"") == 0
 
@@ -173,10 +243,10 @@ async def reset_in_mid_flow(dut):
     whole = image(any_terms(row), 7777, segments=row.segments)
     for _ in range(10):
         await row.send(whole)
-        await row.send(whole[:random.randrange(len(whole))])
+        await row.send(whole[: random.randrange(len(whole))])
         await row.clk(rst=1)
         for byte in whole:
-            await row.clk(valid=1, data=byte)                   # without a start nothing is taken
+            await row.clk(valid=1, data=byte)  # without a start nothing is taken
         assert not row.model.loaded and int(dut.counts_per_turn.value) == 0
 
 
@@ -185,13 +255,29 @@ async def any_strobes_match_the_model(dut):
     row = await Bytes(dut).reset()
     left = []
     for _ in range(3000):
-        left = left or list(image(any_terms(row), random.getrandbits(random.choice((25, 32))) | 4096, segments=row.segments))
+        left = left or list(
+            image(
+                any_terms(row),
+                random.getrandbits(random.choice((25, 32))) | 4096,
+                segments=row.segments,
+            )
+        )
         send = random.randrange(5) > 0
         begin = row.model.row is None and random.randrange(8) == 0 or random.randrange(1500) == 0
         if begin:
-            left = list(image(any_terms(row), random.getrandbits(random.choice((25, 32))) | 4096, segments=row.segments))
-        await row.clk(start=int(begin), valid=int(send), data=left.pop(0) if send and row.model.row is not None and not begin else 7,
-                      rst=int(random.randrange(3000) == 0))
+            left = list(
+                image(
+                    any_terms(row),
+                    random.getrandbits(random.choice((25, 32))) | 4096,
+                    segments=row.segments,
+                )
+            )
+        await row.clk(
+            start=int(begin),
+            valid=int(send),
+            data=left.pop(0) if send and row.model.row is not None and not begin else 7,
+            rst=int(random.randrange(3000) == 0),
+        )
 
 
 @pytest.mark.parametrize("k, segments", [(1, 0), (16, 0), (32, 0), (1, 2), (18, 36), (32, 64)])

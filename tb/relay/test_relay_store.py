@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""relay_store with a chip: both copies, each broken, the time of a copy, bytes passed through, and reset while it reads."""
+"""relay_store with a chip: both copies, each broken, the time of a copy, bytes passed through, and
+reset while it reads.
+"""
+
 import random
 
 import cocotb
@@ -12,11 +15,16 @@ LENGTH, FIRST, SECOND = 20, 4096, 8192
 
 
 class Store:
-    """The design with a chip on its pins, two clk away as behind a synchroniser, and a set that says good or bad."""
+    """The design with a chip on its pins, two clk away as behind a synchroniser, and a set that
+    says good or bad.
+    """
 
     def __init__(self, dut, first, second):
         self.dut, self.chip, self.copies, self.line = dut, Flash(1 << 14), [], [1, 1]
-        self.chip.memory[FIRST:FIRST + LENGTH], self.chip.memory[SECOND:SECOND + LENGTH] = first, second
+        self.chip.memory[FIRST : FIRST + LENGTH], self.chip.memory[SECOND : SECOND + LENGTH] = (
+            first,
+            second,
+        )
         self.judge = lambda copy: copy[0] == 1
         self.passed = []
 
@@ -32,12 +40,19 @@ class Store:
             self.waits = -1
         elif self.copies and len(self.copies[-1]) == LENGTH:
             self.waits -= 1
-        dut.good.value, dut.bad.value, dut.rst.value = int(verdict is True), int(verdict is False), rst
+        dut.good.value, dut.bad.value, dut.rst.value = (
+            int(verdict is True),
+            int(verdict is False),
+            rst,
+        )
         for name, level in inputs.items():
             getattr(dut, name).value = level
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
-        self.line = [*self.line[1:], self.chip.pins(int(dut.chip_n.value), int(dut.sclk.value), int(dut.sdo.value))]
+        self.line = [
+            *self.line[1:],
+            self.chip.pins(int(dut.chip_n.value), int(dut.sclk.value), int(dut.sdo.value)),
+        ]
         dut.sdi.value = self.line[0]
         if dut.start.value:
             self.copies.append(b"")
@@ -89,10 +104,11 @@ async def the_first_whole_copy_is_taken(dut):
 
 @cocotb.test()
 async def a_copy_takes_the_time_that_the_header_says(dut):
-    """A byte takes 66 clk: one to begin it, 8 bits of 8 clk, one to hand it on. Before a copy come a pause of 2048 clk and the four
+    """A byte takes 66 clk: one to begin it, 8 bits of 8 clk, one to hand it on. Before a copy come
+    a pause of 2048 clk and the four
     bytes of the command and its address; before the first one the byte that wakes the chip."""
     store = await Store(dut, some(0), some(1)).reset()
-    whole = []                                              # clk from reset, or from the verdict, to the last byte of each copy
+    whole = []  # clk from reset, or from the verdict, to the last byte of each copy
     for bytes_before in (5, 4):
         clks = 0
         while not (dut.valid.value and len(store.copies[-1]) == LENGTH):
@@ -102,7 +118,10 @@ async def a_copy_takes_the_time_that_the_header_says(dut):
         assert clks == 2048 + 66 * (LENGTH + bytes_before), whole
         while not (dut.bad.value or dut.good.value):
             await store.clk()
-    assert store.copies == [bytes(store.chip.memory[at:at + LENGTH]) for at in (FIRST, SECOND)] and int(dut.source.value) == 2
+    assert (
+        store.copies == [bytes(store.chip.memory[at : at + LENGTH]) for at in (FIRST, SECOND)]
+        and int(dut.source.value) == 2
+    )
 
 
 @cocotb.test()

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/channel_monitor.sv does, in integers, for many signals side by side: sample() is one sample of each of them."""
+"""What rtl/sense/channel_monitor.sv does, in integers, for many signals side by side: sample() is
+one sample of each of them.
+"""
+
 import numpy as np
 
 NEVER = 65535
@@ -9,27 +12,60 @@ class ChannelMonitor:
     def __init__(self, lanes=1):
         zeros = lambda: np.zeros(lanes, np.int64)
         self.started = False
-        self.last, self.home, self.other_home, self.stood, self.same, self.channel_stuck, self.recent = (zeros() for _ in range(7))
-        self.sign, self.sign_before, self.side, self.changes, self.turns = (zeros() for _ in range(5))
+        (
+            self.last,
+            self.home,
+            self.other_home,
+            self.stood,
+            self.same,
+            self.channel_stuck,
+            self.recent,
+        ) = (zeros() for _ in range(7))
+        self.sign, self.sign_before, self.side, self.changes, self.turns = (
+            zeros() for _ in range(5)
+        )
         self.level, self.edge_other = zeros(), zeros()
 
-    def sample(self, channel, other, level, other_level, clip_level, band, span, no_noise_samples, sign_threshold):
+    def sample(
+        self,
+        channel,
+        other,
+        level,
+        other_level,
+        clip_level,
+        band,
+        span,
+        no_noise_samples,
+        sign_threshold,
+    ):
         """clipped, channel_stuck, no_noise, comparator_mismatch, comparator_stuck, channel_missing"""
         size = abs(channel)
         clipped = (clip_level != NEVER) & (size > clip_level)
 
         homely = self.started & (abs(channel - self.home) <= band)
         far = (span != NEVER) & (abs(other - self.other_home) > span)
-        self.channel_stuck = homely & (self.channel_stuck | (self.stood >= 2) & far & (self.recent > 0))
+        self.channel_stuck = homely & (
+            self.channel_stuck | (self.stood >= 2) & far & (self.recent > 0)
+        )
         self.recent = np.where(homely, np.where(far, 3, np.maximum(self.recent - 1, 0)), 0)
         self.stood = np.where(homely, np.minimum(self.stood + 1, 3), 0)
-        self.home, self.other_home = np.where(homely, self.home, channel), np.where(homely, self.other_home, other)
+        self.home, self.other_home = (
+            np.where(homely, self.home, channel),
+            np.where(homely, self.other_home, other),
+        )
 
-        self.same = np.where((channel == self.last) & self.started, np.minimum(self.same + 1, 65535), 0)
+        self.same = np.where(
+            (channel == self.last) & self.started, np.minimum(self.same + 1, 65535), 0
+        )
         no_noise = (no_noise_samples != 0) & (self.same >= no_noise_samples)
 
         sign = np.where(size > sign_threshold, np.sign(channel), 0)
-        comparator_mismatch = (sign != 0) & (sign == self.sign) & (sign == self.sign_before) & (self.level != (channel > 0))
+        comparator_mismatch = (
+            (sign != 0)
+            & (sign == self.sign)
+            & (sign == self.sign_before)
+            & (self.level != (channel > 0))
+        )
         crossing = (sign != 0) & (self.side != 0) & (sign != self.side)
         toggled = (level != self.level) & self.started
         self.changes = np.where(toggled, 0, np.minimum(self.changes + crossing, 3))
@@ -37,5 +73,18 @@ class ChannelMonitor:
         self.turns = np.where(crossing, 0, np.where(toggled, turned, self.turns))
         self.edge_other = np.where(toggled, other_level, self.edge_other)
         self.side = np.where(sign != 0, sign, self.side)
-        self.sign, self.sign_before, self.level, self.last, self.started = sign, self.sign, level, channel, True
-        return clipped, self.channel_stuck, no_noise, comparator_mismatch, self.changes == 3, (self.turns == 3) & (self.side != 0)
+        self.sign, self.sign_before, self.level, self.last, self.started = (
+            sign,
+            self.sign,
+            level,
+            channel,
+            True,
+        )
+        return (
+            clipped,
+            self.channel_stuck,
+            no_noise,
+            comparator_mismatch,
+            self.changes == 3,
+            (self.turns == 3) & (self.side != 0),
+        )

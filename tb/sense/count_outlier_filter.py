@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/count_outlier_filter.sv does to the counts since reset: follow(enable, count) returns what comes out."""
+"""What rtl/sense/count_outlier_filter.sv does to the counts since reset: follow(enable, count)
+returns what comes out.
+"""
 
 
 class CountOutlierFilter:
@@ -15,5 +17,5 @@ class CountOutlierFilter:
         else:
             difference = self.wrapped(count - self.out)
             if abs(difference) > 1:
-                self.out = self.wrapped(self.out + (difference >> 1))       # (Dn + Dn-1) / 2
+                self.out = self.wrapped(self.out + (difference >> 1))  # (Dn + Dn-1) / 2
         return self.out

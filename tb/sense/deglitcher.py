@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/deglitcher.sv does: step(stable_cycles, level, rst) is one clk, and returns what is on the pins after it."""
+"""What rtl/sense/deglitcher.sv does: step(stable_cycles, level, rst) is one clk, and returns what
+is on the pins after it.
+"""
 
 
 class Deglitcher:

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/dual_adc_reader.sv does: step(start, sdata_a, sdata_b, rst) is one clk, and returns what is on the pins after it."""
+"""What rtl/sense/dual_adc_reader.sv does: step(start, sdata_a, sdata_b, rst) is one clk, and
+returns what is on the pins after it.
+"""
 
 
 class DualAdcReader:
     def __init__(self, w=8, leading=2, frame=14):
         self.w, self.leading, self.frame = w, leading, frame
-        self.clk = None                     # clk since cs_n fell, None between frames
+        self.clk = None  # clk since cs_n fell, None between frames
         self.words, self.sample = [0, 0], (0, 0)
 
     def step(self, start, sdata_a, sdata_b, rst=0):

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/event_filter.sv does: step(skip, required, tolerated, levels, rst) is one clk, and returns the pins after it."""
+"""What rtl/sense/event_filter.sv does: step(skip, required, tolerated, levels, rst) is one clk, and
+returns the pins after it.
+"""
 
 
 class Level:
-    """One level. A disturbance has `seen` samples of the new level, and `against` it since the first of them."""
+    """One level. A disturbance has `seen` samples of the new level, and `against` it since the
+    first of them.
+    """
 
     def __init__(self):
         self.filtered, self.seen, self.against = 0, 0, 0
@@ -29,7 +33,12 @@ class Level:
 
 class EventFilter:
     def __init__(self, levels=1, settle=4):
-        self.levels, self.settling, self.settle, self.left = [Level() for _ in range(levels)], settle, 0, 0
+        self.levels, self.settling, self.settle, self.left = (
+            [Level() for _ in range(levels)],
+            settle,
+            0,
+            0,
+        )
         self.last = 0
 
     def step(self, skip, required, tolerated, levels, rst=0):
@@ -40,7 +49,9 @@ class EventFilter:
                 own.filtered = level
                 own.forget()
         elif self.left == 0:
-            rejected = [own.sample(self.last, tolerated, level) for own, level in zip(self.levels, levels)]
+            rejected = [
+                own.sample(self.last, tolerated, level) for own, level in zip(self.levels, levels)
+            ]
         self.last = max(required, 1) - 1
         self.left = 0 if rst else skip if self.left == 0 else self.left - 1
         self.settle = self.settling if rst else max(self.settle - 1, 0)

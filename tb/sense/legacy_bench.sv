@@ -1,64 +1,183 @@
 // SPDX-License-Identifier: Apache-2.0
-// legacy_bench -- the same samples through S0's path as its paper printed it, and through the path of feedback_channel.sv.
+// legacy_bench -- the same samples through S0's path as its paper printed it, and through the path
+// of feedback_channel.sv.
 `default_nettype none
 
 module legacy_bench #(
-    parameter int W           = 8,              // bits of a sample
-    parameter int SUBDIVISION = 160             // counts of a period, as printed
+    parameter int W           = 8,   // bits of a sample
+    parameter int SUBDIVISION = 160  // counts of a period, as printed
 ) (
-    input  wire                  clk,
-    input  wire                  rst,
-    input  wire                  valid,         // strobe: sin and cos are a new sample; 30 clk apart at least
-    input  wire signed [W-1:0]   sin,           // full scale = 2^(W-1)
-    input  wire signed [W-1:0]   cos,
-    input  wire        [7:0]     largest_move,  // limit filter 1; 0: out of use
-    input  wire                  limit_counts,  // limit filter 2
-    input  wire                  load,          // of the learned values
-    input  wire signed [15:0]    sin_offset,
-    input  wire signed [15:0]    cos_offset,
-    input  wire        [16:0]    gain,
-    input  wire signed [16:0]    quadrature_error,
-    input  wire                  write,
-    input  wire        [7:0]     point,
-    input  wire signed [17:0]    value,
-    input  wire                  swap,
-    output logic                 printed_done,  // strobe
-    output logic signed [31:0]   printed_count, // 1 / SUBDIVISION period
-    output logic                 done,          // strobe
-    output logic signed [47:0]   position       // Q32.16 periods
+    input wire clk,
+    input wire rst,
+    input wire valid,  // strobe: sin and cos are a new sample; 30 clk apart at least
+    input wire signed [W-1:0] sin,  // full scale = 2^(W-1)
+    input wire signed [W-1:0] cos,
+    input wire [7:0] largest_move,  // limit filter 1; 0: out of use
+    input wire limit_counts,  // limit filter 2
+    input wire load,  // of the learned values
+    input wire signed [15:0] sin_offset,
+    input wire signed [15:0] cos_offset,
+    input wire [16:0] gain,
+    input wire signed [16:0] quadrature_error,
+    input wire write,
+    input wire [7:0] point,
+    input wire signed [17:0] value,
+    input wire swap,
+    output logic printed_done,  // strobe
+    output logic signed [31:0] printed_count,  // 1 / SUBDIVISION period
+    output logic done,  // strobe
+    output logic signed [47:0] position  // Q32.16 periods
 );
-    wire                held, rejected, centred, found, stepped, placed, overspeed;
+    wire held, rejected, centred, found, stepped, placed, overspeed;
     wire signed [W-1:0] sin_held, cos_held, sin_centred, cos_centred, sin_drift, cos_drift;
-    wire         [15:0] phase, tracked;
-    wire signed  [16:0] step;
-    wire signed  [47:0] place;
-    wire signed  [55:0] counts = 56'(place) * SUBDIVISION;
+    wire [15:0] phase, tracked;
+    wire signed [16:0] step;
+    wire signed [47:0] place;
+    wire signed [55:0] counts = 56'(place) * SUBDIVISION;
 
-    outlier_filter #(.W(W)) u_limiter (.clk, .rst, .step(largest_move), .hold(8'd255), .valid, .sin, .cos, .done(held),
-                                      .sin_out(sin_held), .cos_out(cos_held), .rejected);
-    peak_offset_tracker #(.W(W)) u_offset (.clk, .rst, .enable(1'b1), .valid(held), .sin(sin_held), .cos(cos_held), .done(centred),
-                                            .sin_out(sin_centred), .cos_out(cos_centred), .sin_offset(sin_drift),
-                                            .cos_offset(cos_drift));
-    arctan_table #(.W(W)) u_arctan (.clk, .rst, .valid(centred), .sin(sin_centred), .cos(cos_centred), .done(found), .phase);
-    fringe_tracker u_tracker (.clk, .rst, .valid(found), .phase, .done(stepped), .step, .phase_out(tracked), .overspeed);
-    unwrap u_place (.clk, .rst, .valid(stepped), .step, .phase(tracked), .shift(1'b0), .shift_periods(32'sd0), .done(placed), .position(place));
-    count_outlier_filter #(.W(32)) u_counts (.clk, .rst, .enable(limit_counts), .valid(placed), .count(counts[47:16]), .done(printed_done),
-                                      .count_out(printed_count));
+    outlier_filter #(
+        .W(W)
+    ) u_limiter (
+        .clk,
+        .rst,
+        .step   (largest_move),
+        .hold   (8'd255),
+        .valid,
+        .sin,
+        .cos,
+        .done   (held),
+        .sin_out(sin_held),
+        .cos_out(cos_held),
+        .rejected
+    );
+    peak_offset_tracker #(
+        .W(W)
+    ) u_offset (
+        .clk,
+        .rst,
+        .enable    (1'b1),
+        .valid     (held),
+        .sin       (sin_held),
+        .cos       (cos_held),
+        .done      (centred),
+        .sin_out   (sin_centred),
+        .cos_out   (cos_centred),
+        .sin_offset(sin_drift),
+        .cos_offset(cos_drift)
+    );
+    arctan_table #(
+        .W(W)
+    ) u_arctan (
+        .clk,
+        .rst,
+        .valid(centred),
+        .sin  (sin_centred),
+        .cos  (cos_centred),
+        .done (found),
+        .phase
+    );
+    fringe_tracker u_tracker (
+        .clk,
+        .rst,
+        .valid    (found),
+        .phase,
+        .done     (stepped),
+        .step,
+        .phase_out(tracked),
+        .overspeed
+    );
+    unwrap u_place (
+        .clk,
+        .rst,
+        .valid        (stepped),
+        .step,
+        .phase        (tracked),
+        .shift        (1'b0),
+        .shift_periods(32'sd0),
+        .done         (placed),
+        .position     (place)
+    );
+    count_outlier_filter #(
+        .W(32)
+    ) u_counts (
+        .clk,
+        .rst,
+        .enable   (limit_counts),
+        .valid    (placed),
+        .count    (counts[47:16]),
+        .done     (printed_done),
+        .count_out(printed_count)
+    );
 
-    wire                corrected, turned, straight, moved, too_fast;
-    wire signed  [15:0] sin_corrected, cos_corrected;
-    wire         [15:0] plain_phase, true_phase, followed, amplitude;
-    wire signed  [16:0] move;
+    wire corrected, turned, straight, moved, too_fast;
+    wire signed [15:0] sin_corrected, cos_corrected;
+    wire [15:0] plain_phase, true_phase, followed, amplitude;
+    wire signed [16:0] move;
 
-    signal_correction #(.W(W)) u_correction (.clk, .rst, .load, .sin_offset, .cos_offset, .gain, .quadrature_error, .valid, .sin, .cos,
-                                             .done(corrected), .sin_out(sin_corrected), .cos_out(cos_corrected));
-    arctan_pipelined #(.W(16), .STEPS(2)) u_angle (.clk, .rst, .valid(corrected), .sin(sin_corrected), .cos(cos_corrected),
-                                                   .done(turned), .phase(plain_phase), .amplitude);
-    harmonic_correction u_harmonics (.clk, .rst, .enable(1'b1), .write, .point, .value, .swap, .valid(turned), .phase(plain_phase),
-                                     .done(straight), .phase_out(true_phase));
-    fringe_tracker u_follower (.clk, .rst, .valid(straight), .phase(true_phase), .done(moved), .step(move), .phase_out(followed),
-                               .overspeed(too_fast));
-    unwrap u_position (.clk, .rst, .valid(moved), .step(move), .phase(followed), .shift(1'b0), .shift_periods(32'sd0), .done, .position);
+    signal_correction #(
+        .W(W)
+    ) u_correction (
+        .clk,
+        .rst,
+        .load,
+        .sin_offset,
+        .cos_offset,
+        .gain,
+        .quadrature_error,
+        .valid,
+        .sin,
+        .cos,
+        .done   (corrected),
+        .sin_out(sin_corrected),
+        .cos_out(cos_corrected)
+    );
+    arctan_pipelined #(
+        .W    (16),
+        .STEPS(2)
+    ) u_angle (
+        .clk,
+        .rst,
+        .valid(corrected),
+        .sin  (sin_corrected),
+        .cos  (cos_corrected),
+        .done (turned),
+        .phase(plain_phase),
+        .amplitude
+    );
+    harmonic_correction u_harmonics (
+        .clk,
+        .rst,
+        .enable   (1'b1),
+        .write,
+        .point,
+        .value,
+        .swap,
+        .valid    (turned),
+        .phase    (plain_phase),
+        .done     (straight),
+        .phase_out(true_phase)
+    );
+    fringe_tracker u_follower (
+        .clk,
+        .rst,
+        .valid    (straight),
+        .phase    (true_phase),
+        .done     (moved),
+        .step     (move),
+        .phase_out(followed),
+        .overspeed(too_fast)
+    );
+    unwrap u_position (
+        .clk,
+        .rst,
+        .valid        (moved),
+        .step         (move),
+        .phase        (followed),
+        .shift        (1'b0),
+        .shift_periods(32'sd0),
+        .done,
+        .position
+    );
 
     wire unused = &{1'b0, rejected, sin_drift, cos_drift, overspeed, counts[55:48], counts[15:0], amplitude, too_fast};
 endmodule

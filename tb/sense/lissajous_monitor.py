@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/lissajous_monitor.sv does, in integers, for many signals side by side: sample() is one sample of each of them."""
+"""What rtl/sense/lissajous_monitor.sv does, in integers, for many signals side by side: sample() is
+one sample of each of them.
+"""
+
 import numpy as np
 
 NEVER = 65535
@@ -7,26 +10,41 @@ NEVER = 65535
 
 class LissajousMonitor:
     def __init__(self, lanes=1):
-        self.lengths = np.zeros((2, 4, lanes), np.int64)        # of the axes, of the diagonals
+        self.lengths = np.zeros((2, 4, lanes), np.int64)  # of the axes, of the diagonals
         self.known = np.zeros((2, 4, lanes), bool)
         self.sector, self.side, self.middle = (np.zeros((2, lanes), np.int64) for _ in range(3))
         self.met = np.zeros((2, lanes), bool)
         self.lane, self.started = np.arange(lanes), False
 
-    def sample(self, length, axis, quadrant, tilt, tolerance, offset_limit, balance_limit, quadrature_limit):
-        """ready after this sample; off_circle, offset_drift, unbalanced, not_in_quadrature: judged by what was ready before it"""
+    def sample(
+        self, length, axis, quadrant, tilt, tolerance, offset_limit, balance_limit, quadrature_limit
+    ):
+        """ready after this sample; off_circle, offset_drift, unbalanced, not_in_quadrature: judged
+        by what was ready before it
+        """
         ready = self.known.all(axis=(0, 1))
-        at_axis, at_diagonal = self.lengths[0, axis, self.lane], self.lengths[1, quadrant, self.lane]
+        at_axis, at_diagonal = (
+            self.lengths[0, axis, self.lane],
+            self.lengths[1, quadrant, self.lane],
+        )
         expected = at_axis + ((at_diagonal - at_axis) * tilt >> 2)
         off_circle = ready & (tolerance != NEVER) & (abs(length - expected) > tolerance)
         east, north, west, south = (self.lengths[:, n] for n in range(4))
         offset = np.maximum(abs(east - west), abs(north - south)).max(axis=0)
         oval = abs(east + west - north - south)
-        drift, unbalanced, skewed = (ready & (limit != NEVER) & (size > 2 * limit)
-                                     for size, limit in [(offset, offset_limit), (oval[0], balance_limit), (oval[1], quadrature_limit)])
+        drift, unbalanced, skewed = (
+            ready & (limit != NEVER) & (size > 2 * limit)
+            for size, limit in [
+                (offset, offset_limit),
+                (oval[0], balance_limit),
+                (oval[1], quadrature_limit),
+            ]
+        )
         for kind, sector, close in [(0, axis, tilt == 0), (1, quadrant, tilt == 4)]:
             onward = (sector - self.sector[kind]) % 4 if self.started else np.full(sector.shape, 2)
-            crossed, = np.nonzero((onward % 2 == 1) & (self.side[kind] == onward) & self.met[kind])
+            (crossed,) = np.nonzero(
+                (onward % 2 == 1) & (self.side[kind] == onward) & self.met[kind]
+            )
             if crossed.size:
                 place = kind, self.sector[kind, crossed], crossed
                 before, middle = self.lengths[place], self.middle[kind, crossed]
@@ -34,7 +52,9 @@ class LissajousMonitor:
                 self.known[place] = True
             self.met[kind] = close | self.met[kind] & (onward == 0)
             self.middle[kind] = np.where(close, length, self.middle[kind])
-            self.side[kind] = np.where(onward == 0, self.side[kind], np.where(onward == 2, 0, onward))
+            self.side[kind] = np.where(
+                onward == 0, self.side[kind], np.where(onward == 2, 0, onward)
+            )
             self.sector[kind] = sector
         self.started = True
         return self.known.all(axis=(0, 1)), off_circle, drift, unbalanced, skewed

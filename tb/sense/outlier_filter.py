@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/outlier_filter.sv does to the samples since reset: sample(sin, cos, step, hold) returns what passes."""
+"""What rtl/sense/outlier_filter.sv does to the samples since reset: sample(sin, cos, step, hold)
+returns what passes.
+"""
 
 
 class OutlierFilter:

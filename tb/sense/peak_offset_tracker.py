@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/peak_offset_tracker.sv does to the samples since reset: sample(sin, cos, enable) returns what comes out."""
+"""What rtl/sense/peak_offset_tracker.sv does to the samples since reset: sample(sin, cos, enable)
+returns what comes out.
+"""
 
 
 class Channel:
@@ -28,5 +30,8 @@ class PeakOffsetTracker:
     def sample(self, sin, cos, enable):
         """(sin_out, cos_out, sin_offset, cos_offset)"""
         offsets = [channel.offset(s + self.zero) for channel, s in zip(self.channels, (sin, cos))]
-        out = [max(-self.zero, min(self.zero - 1, s - offset if enable else s)) for s, offset in zip((sin, cos), offsets)]
+        out = [
+            max(-self.zero, min(self.zero - 1, s - offset if enable else s))
+            for s, offset in zip((sin, cos), offsets)
+        ]
         return *out, *offsets

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/signal_monitor.sv does, in integers, for many signals side by side: sample() is one sample of each of them."""
+"""What rtl/sense/signal_monitor.sv does, in integers, for many signals side by side: sample() is
+one sample of each of them.
+"""
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,14 +12,30 @@ from tb.sense.lissajous_monitor import LissajousMonitor
 from tb.sense.vector_length import vector_length
 
 NEVER = 65535
-FAULTS = ("too_low", "too_high", "clipped", "off_circle", "jump", "channel_stuck", "no_noise", "comparator_mismatch", "comparator_stuck", "channel_missing",
-          "offset_drift", "unbalanced", "not_in_quadrature", "phase_jump", "lost_count")
-COUNTS = 16         # samples for which a bad one counts
+FAULTS = (
+    "too_low",
+    "too_high",
+    "clipped",
+    "off_circle",
+    "jump",
+    "channel_stuck",
+    "no_noise",
+    "comparator_mismatch",
+    "comparator_stuck",
+    "channel_missing",
+    "offset_drift",
+    "unbalanced",
+    "not_in_quadrature",
+    "phase_jump",
+    "lost_count",
+)
+COUNTS = 16  # samples for which a bad one counts
 
 
 @dataclass
 class Settings:
     """As after reset of the settings: nothing is judged."""
+
     low: int = 0
     high: int = NEVER
     clip_level: int = NEVER
@@ -32,10 +51,24 @@ class Settings:
 
     @classmethod
     def advised(cls, amplitude, width=8, no_noise_samples=0):
-        """The settings that docs/signal_faults.md advises for a signal of this amplitude with at most 0.5 LSB rms of noise."""
+        """The settings that docs/signal_faults.md advises for a signal of this amplitude with at
+        most 0.5 LSB rms of noise.
+        """
         part = lambda percent: round(amplitude * percent / 100)
-        return cls(low=part(70), high=part(130), clip_level=2 ** (width - 1) - 2, tolerance=part(9), jump=part(13), band=3, span=part(80),
-                   no_noise_samples=no_noise_samples, sign_threshold=part(20), offset_limit=part(12), balance_limit=part(16), quadrature_limit=part(16))
+        return cls(
+            low=part(70),
+            high=part(130),
+            clip_level=2 ** (width - 1) - 2,
+            tolerance=part(9),
+            jump=part(13),
+            band=3,
+            span=part(80),
+            no_noise_samples=no_noise_samples,
+            sign_threshold=part(20),
+            offset_limit=part(12),
+            balance_limit=part(16),
+            quadrature_limit=part(16),
+        )
 
 
 class Twice:
@@ -52,29 +85,72 @@ class Twice:
 
 class SignalMonitor:
     def __init__(self, lanes=1):
-        self.cos, self.sin, self.circle = ChannelMonitor(lanes), ChannelMonitor(lanes), LissajousMonitor(lanes)
-        self.twice = {name: Twice(lanes) for name in ("too_low", "too_high", "clipped", "off_circle", "comparator_mismatch")}
+        self.cos, self.sin, self.circle = (
+            ChannelMonitor(lanes),
+            ChannelMonitor(lanes),
+            LissajousMonitor(lanes),
+        )
+        self.twice = {
+            name: Twice(lanes)
+            for name in ("too_low", "too_high", "clipped", "off_circle", "comparator_mismatch")
+        }
         self.last_sin, self.last_cos, self.step = (np.zeros(lanes, np.int64) for _ in range(3))
         self.seen, self.amplitude, self.ready = 0, np.zeros(lanes, np.int64), np.zeros(lanes, bool)
 
     def sample(self, sin, cos, a, b, settings):
-        """The faults 0 … 12 of this sample as bits; sin, cos, a, b: integer arrays, one element a lane."""
+        """The faults 0 … 12 of this sample as bits; sin, cos, a, b: integer arrays, one element a
+        lane.
+        """
         s = settings
         way = np.maximum(abs(sin - self.last_sin), abs(cos - self.last_cos))
         jumped = (self.seen >= 2) & (s.jump != NEVER) & (way > 2 * self.step + s.jump)
         self.last_sin, self.last_cos, self.step, self.seen = sin, cos, way, self.seen + 1
 
-        channels = zip(self.cos.sample(cos, sin, a, b, s.clip_level, s.band, s.span, s.no_noise_samples, s.sign_threshold),
-                   self.sin.sample(sin, cos, b, a, s.clip_level, s.band, s.span, s.no_noise_samples, s.sign_threshold))
-        clipped, channel_stuck, no_noise, comparator_mismatch, comparator_stuck, channel_missing = (x | y for x, y in channels)
+        channels = zip(
+            self.cos.sample(
+                cos, sin, a, b, s.clip_level, s.band, s.span, s.no_noise_samples, s.sign_threshold
+            ),
+            self.sin.sample(
+                sin, cos, b, a, s.clip_level, s.band, s.span, s.no_noise_samples, s.sign_threshold
+            ),
+        )
+        clipped, channel_stuck, no_noise, comparator_mismatch, comparator_stuck, channel_missing = (
+            x | y for x, y in channels
+        )
 
         self.amplitude, axis, quadrant, tilt = vector_length(sin, cos)
         self.ready, off_circle, drift, unbalanced, skewed = self.circle.sample(
-            self.amplitude, axis, quadrant, tilt, s.tolerance, s.offset_limit, s.balance_limit, s.quadrature_limit)
+            self.amplitude,
+            axis,
+            quadrant,
+            tilt,
+            s.tolerance,
+            s.offset_limit,
+            s.balance_limit,
+            s.quadrature_limit,
+        )
 
-        twice = {name: self.twice[name].sample(bad) for name, bad in [
-            ("too_low", self.amplitude < s.low), ("too_high", (s.high != NEVER) & (self.amplitude > s.high)),
-            ("clipped", clipped), ("off_circle", off_circle), ("comparator_mismatch", comparator_mismatch)]}
-        flags = dict(twice, jump=jumped, channel_stuck=channel_stuck, no_noise=no_noise, comparator_stuck=comparator_stuck, channel_missing=channel_missing,
-                     offset_drift=drift, unbalanced=unbalanced, not_in_quadrature=skewed)
-        return sum(np.asarray(flags[name], np.int64) << n for n, name in enumerate(FAULTS) if name in flags)
+        twice = {
+            name: self.twice[name].sample(bad)
+            for name, bad in [
+                ("too_low", self.amplitude < s.low),
+                ("too_high", (s.high != NEVER) & (self.amplitude > s.high)),
+                ("clipped", clipped),
+                ("off_circle", off_circle),
+                ("comparator_mismatch", comparator_mismatch),
+            ]
+        }
+        flags = dict(
+            twice,
+            jump=jumped,
+            channel_stuck=channel_stuck,
+            no_noise=no_noise,
+            comparator_stuck=comparator_stuck,
+            channel_missing=channel_missing,
+            offset_drift=drift,
+            unbalanced=unbalanced,
+            not_in_quadrature=skewed,
+        )
+        return sum(
+            np.asarray(flags[name], np.int64) << n for n, name in enumerate(FAULTS) if name in flags
+        )

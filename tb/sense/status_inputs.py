@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/status_inputs.sv does, in integers: step(...) is one clk and returns the pins after it, lists of level, rose, fell."""
+"""What rtl/sense/status_inputs.sv does, in integers: step(...) is one clk and returns the pins
+after it, lists of level, rose, fell.
+"""
+
 from tb.common.synchroniser import Synchroniser
 
-SETTLE = 4                                  # clk after reset in which the level follows
+SETTLE = 4  # clk after reset in which the level follows
 
 
 class StatusInputs:
     def __init__(self, clk_hz, w=2):
-        self.ms, self.w, self.age = clk_hz // 1000, w, 0       # age: clk since reset
+        self.ms, self.w, self.age = clk_hz // 1000, w, 0  # age: clk since reset
         self.synchronisers = [Synchroniser() for _ in range(w)]
         self.now, self.level, self.stood = [0] * w, [0] * w, [0] * w
 
@@ -17,11 +20,21 @@ class StatusInputs:
         if not told:
             self.level, self.stood = list(self.now), [0] * self.w
         else:
-            ripe = [now != level and end and stood >= time_ms for now, level, stood in zip(self.now, self.level, self.stood)]
-            self.stood = [stood + end if now != level and not passes else 0
-                          for now, level, stood, passes in zip(self.now, self.level, self.stood, ripe)]
-            self.level = [now if passes else level for now, level, passes in zip(self.now, self.level, ripe)]
+            ripe = [
+                now != level and end and stood >= time_ms
+                for now, level, stood in zip(self.now, self.level, self.stood)
+            ]
+            self.stood = [
+                stood + end if now != level and not passes else 0
+                for now, level, stood, passes in zip(self.now, self.level, self.stood, ripe)
+            ]
+            self.level = [
+                now if passes else level for now, level, passes in zip(self.now, self.level, ripe)
+            ]
         self.age = 0 if rst else self.age + 1
         self.now = [s.step(level, rst) for s, level in zip(self.synchronisers, inputs)]
-        return (self.level, [int(told and level > old) for level, old in zip(self.level, before)],
-                [int(told and level < old) for level, old in zip(self.level, before)])
+        return (
+            self.level,
+            [int(told and level > old) for level, old in zip(self.level, before)],
+            [int(told and level < old) for level, old in zip(self.level, before)],
+        )

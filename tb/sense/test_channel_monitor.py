@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""channel_monitor: each verdict at its limit and one short of it, both ends of every range, and the model sample by sample."""
+"""channel_monitor: each verdict at its limit and one short of it, both ends of every range, and the
+model sample by sample.
+"""
+
 import random
 
 import cocotb
@@ -10,8 +13,21 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import run, start
 from tb.sense.channel_monitor import NEVER, ChannelMonitor
 
-OFF = {"clip_level": NEVER, "band": 0, "span": NEVER, "no_noise_samples": 0, "sign_threshold": NEVER}
-OUTPUTS = ("clipped", "channel_stuck", "no_noise", "comparator_mismatch", "comparator_stuck", "channel_missing")
+OFF = {
+    "clip_level": NEVER,
+    "band": 0,
+    "span": NEVER,
+    "no_noise_samples": 0,
+    "sign_threshold": NEVER,
+}
+OUTPUTS = (
+    "clipped",
+    "channel_stuck",
+    "no_noise",
+    "comparator_mismatch",
+    "comparator_stuck",
+    "channel_missing",
+)
 
 
 async def begin(dut, **settings):
@@ -23,15 +39,34 @@ async def begin(dut, **settings):
 
 
 async def sample(dut, model, channel, other=0, level=0, other_level=0, gap=0):
-    """One sample, 1 clk later its flags as the model has them; then some clk without one. Returns the names that stand."""
-    dut.valid.value, dut.channel.value, dut.other.value, dut.level.value, dut.other_level.value = 1, channel, other, level, other_level
-    want = tuple(int(x[0]) for x in model.sample(*(np.array([x]) for x in (channel, other, level, other_level)), **model.settings))
+    """One sample, 1 clk later its flags as the model has them; then some clk without one. Returns
+    the names that stand.
+    """
+    dut.valid.value, dut.channel.value, dut.other.value, dut.level.value, dut.other_level.value = (
+        1,
+        channel,
+        other,
+        level,
+        other_level,
+    )
+    want = tuple(
+        int(x[0])
+        for x in model.sample(
+            *(np.array([x]) for x in (channel, other, level, other_level)), **model.settings
+        )
+    )
     for n in range(1 + gap):
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
-        dut.valid.value, dut.channel.value, dut.level.value = 0, random.getrandbits(6), random.getrandbits(1)
+        dut.valid.value, dut.channel.value, dut.level.value = (
+            0,
+            random.getrandbits(6),
+            random.getrandbits(1),
+        )
         got = tuple(int(getattr(dut, name).value) for name in OUTPUTS)
-        assert got == want, f"clk {n} after channel {channel}, other {other}, levels {level}{other_level}: {OUTPUTS} are {got}, not {want}"
+        assert got == want, (
+            f"clk {n} after channel {channel}, other {other}, levels {level}{other_level}: {OUTPUTS} are {got}, not {want}"
+        )
     return [name for name, stands in zip(OUTPUTS, want) if stands]
 
 
@@ -50,14 +85,40 @@ async def a_code_beyond_the_rail_is_told_at_once_latency_is_1(dut):
 @cocotb.test()
 async def a_channel_that_stands_while_the_other_moves_is_frozen_from_the_fourth_sample(dut):
     model = await begin(dut, band=2, span=50)
-    told = await rows(dut, model, (10, 0), (12, 60), (8, 60), (10, 60), (10, 0), (13, 0), (13, 50), (13, -50), (13, 51), (13, 51))
-    assert told == [[], [], [], ["channel_stuck"], ["channel_stuck"], [], [], [], [], ["channel_stuck"]]
+    told = await rows(
+        dut,
+        model,
+        (10, 0),
+        (12, 60),
+        (8, 60),
+        (10, 60),
+        (10, 0),
+        (13, 0),
+        (13, 50),
+        (13, -50),
+        (13, 51),
+        (13, 51),
+    )
+    assert told == [
+        [],
+        [],
+        [],
+        ["channel_stuck"],
+        ["channel_stuck"],
+        [],
+        [],
+        [],
+        [],
+        ["channel_stuck"],
+    ]
 
 
 @cocotb.test()
 async def the_other_channel_must_be_far_away_twice_within_four_samples(dut):
     model = await begin(dut, band=2, span=50)
-    told = await rows(dut, model, *[(10, 0)] * 5, (10, 60), *[(10, 0)] * 3, (10, 60), *[(10, 0)] * 2, (10, 60))
+    told = await rows(
+        dut, model, *[(10, 0)] * 5, (10, 60), *[(10, 0)] * 3, (10, 60), *[(10, 0)] * 2, (10, 60)
+    )
     assert told == [[]] * 12 + [["channel_stuck"]]
 
 
@@ -88,18 +149,48 @@ async def a_comparator_a_sample_early_or_late_is_good(dut):
     channels = [95, 59, 0, -59, -95, -95, -59, 0, 59, 95] * 4
     for shift in (-1, 0, 1):
         model = await begin(dut, sign_threshold=20)
-        levels = [int(channel > 0 or (channel == 0 and before < 0)) for channel, before in zip(channels, channels[-1:] + channels)]
+        levels = [
+            int(channel > 0 or (channel == 0 and before < 0))
+            for channel, before in zip(channels, channels[-1:] + channels)
+        ]
         levels = levels[-shift:] + levels[:-shift]
         others = [int(1 <= (n - shift) % 10 <= 5) for n in range(len(channels))]
-        assert not any(await rows(dut, model, *[(channel, 0, a, b) for channel, a, b in zip(channels, levels, others)]))
+        assert not any(
+            await rows(
+                dut, model, *[(channel, 0, a, b) for channel, a, b in zip(channels, levels, others)]
+            )
+        )
 
 
 @cocotb.test()
 async def three_sure_samples_against_the_comparator_are_opposed(dut):
     model = await begin(dut, sign_threshold=20)
-    told = await rows(dut, model, (21, 0, 0), (21, 0, 0), (21, 0, 0), (20, 0, 0), (21, 0, 0), (21, 0, 1), (21, 0, 0), (-21, 0, 0),
-                      (-21, 0, 1), (-21, 0, 1))
-    assert told == [[], [], ["comparator_mismatch"], [], [], [], [], [], [], ["comparator_mismatch"]]
+    told = await rows(
+        dut,
+        model,
+        (21, 0, 0),
+        (21, 0, 0),
+        (21, 0, 0),
+        (20, 0, 0),
+        (21, 0, 0),
+        (21, 0, 1),
+        (21, 0, 0),
+        (-21, 0, 0),
+        (-21, 0, 1),
+        (-21, 0, 1),
+    )
+    assert told == [
+        [],
+        [],
+        ["comparator_mismatch"],
+        [],
+        [],
+        [],
+        [],
+        [],
+        [],
+        ["comparator_mismatch"],
+    ]
 
 
 @cocotb.test()
@@ -112,8 +203,10 @@ async def a_comparator_that_stands_through_three_changes_of_sign_is_stuck(dut):
 @cocotb.test()
 async def comparators_that_go_on_without_the_channel_tell_it_missing(dut):
     model = await begin(dut, sign_threshold=20)
-    turn = [(0, 1), (1, 1), (1, 0), (0, 0)]                        # (other level, level), a quarter period each
-    told = await rows(dut, model, (50, 0, 1, 0), *[(50, 0, level, other) for other, level in turn * 3])
+    turn = [(0, 1), (1, 1), (1, 0), (0, 0)]  # (other level, level), a quarter period each
+    told = await rows(
+        dut, model, (50, 0, 1, 0), *[(50, 0, level, other) for other, level in turn * 3]
+    )
     assert "channel_missing" in told[-1] and "channel_missing" not in sum(told[:7], [])
     assert "channel_missing" not in (await rows(dut, model, (-50, 0, 0, 0)))[0]
 
@@ -121,7 +214,14 @@ async def comparators_that_go_on_without_the_channel_tell_it_missing(dut):
 @cocotb.test()
 async def a_comparator_that_chatters_about_zero_tells_nothing(dut):
     model = await begin(dut, sign_threshold=20)
-    assert not any(await rows(dut, model, (50, 0, 1, 1), *[(random.randrange(-20, 21), 90, n % 2, 1) for n in range(60)]))
+    assert not any(
+        await rows(
+            dut,
+            model,
+            (50, 0, 1, 1),
+            *[(random.randrange(-20, 21), 90, n % 2, 1) for n in range(60)],
+        )
+    )
 
 
 @cocotb.test()
@@ -138,16 +238,31 @@ async def reset_forgets_all(dut):
 async def any_samples_match_the_model(dut):
     top = (1 << int(dut.W.value) - 1) - 1
     for _ in range(12):
-        model = await begin(dut, clip_level=random.choice([top - 1, top, 0, NEVER]), band=random.choice([0, 2, 255]),
-                            span=random.choice([0, top // 2, top, NEVER]), no_noise_samples=random.choice([0, 1, 4, 65535]),
-                            sign_threshold=random.choice([0, top // 5, top, NEVER]))
-        angle, speed, size = 0.0, random.choice([0.01, 0.1, 0.7, 1.5]), random.choice([2, top // 2, top, 2 * top])
+        model = await begin(
+            dut,
+            clip_level=random.choice([top - 1, top, 0, NEVER]),
+            band=random.choice([0, 2, 255]),
+            span=random.choice([0, top // 2, top, NEVER]),
+            no_noise_samples=random.choice([0, 1, 4, 65535]),
+            sign_threshold=random.choice([0, top // 5, top, NEVER]),
+        )
+        angle, speed, size = (
+            0.0,
+            random.choice([0.01, 0.1, 0.7, 1.5]),
+            random.choice([2, top // 2, top, 2 * top]),
+        )
         channels, levels = [0, 0], [0, 0]
         for _ in range(150):
             angle += speed * random.choice([1, 1, 1, 1, 1, -1])
             if random.random() < 0.9:
-                channels = [round(min(top, max(-top - 1, size * f(angle) + random.gauss(0, 0.7)))) for f in (np.cos, np.sin)]
-            levels = [int(channel > 0) if random.random() < 0.8 else level for channel, level in zip(channels, levels)]
+                channels = [
+                    round(min(top, max(-top - 1, size * f(angle) + random.gauss(0, 0.7))))
+                    for f in (np.cos, np.sin)
+                ]
+            levels = [
+                int(channel > 0) if random.random() < 0.8 else level
+                for channel, level in zip(channels, levels)
+            ]
             await sample(dut, model, *channels, *levels, gap=random.choice([0, 0, 0, 1]))
 
 

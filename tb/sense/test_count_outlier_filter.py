@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""count_outlier_filter: the three lines of S0's equation, its lag and its rest, both ends of the range, and every clk against the model."""
+"""count_outlier_filter: the three lines of S0's equation, its lag and its rest, both ends of the
+range, and every clk against the model.
+"""
+
 import random
 
 import cocotb
@@ -44,10 +47,10 @@ async def latency_is_1(dut):
 @cocotb.test()
 async def by_hand_the_three_lines_of_the_equation(dut):
     await begin(dut)
-    assert await feed(dut, [100, 100]) == [100, 100]                        # difference 0: it stays
-    assert await feed(dut, [101, 99, 101]) == [100, 100, 100]               # difference 1: the count before
-    assert await feed(dut, [102, 104, 110]) == [101, 102, 106]              # more: the mean of both
-    assert await feed(dut, [103, 100, 97]) == [104, 102, 99]                # rounded down
+    assert await feed(dut, [100, 100]) == [100, 100]  # difference 0: it stays
+    assert await feed(dut, [101, 99, 101]) == [100, 100, 100]  # difference 1: the count before
+    assert await feed(dut, [102, 104, 110]) == [101, 102, 106]  # more: the mean of both
+    assert await feed(dut, [103, 100, 97]) == [104, 102, 99]  # rounded down
 
 
 @cocotb.test()
@@ -55,7 +58,7 @@ async def out_of_use_every_count_passes(dut):
     await begin(dut)
     counts = [0, 1, 5, 90, -90, 7]
     assert await feed(dut, counts, enable=0) == counts
-    assert await feed(dut, [8, 17]) == [7, 12]                              # and it goes on from there
+    assert await feed(dut, [8, 17]) == [7, 12]  # and it goes on from there
 
 
 @cocotb.test()
@@ -88,7 +91,13 @@ async def at_rest_it_may_stay_one_count_off_for_ever(dut):
 async def the_ends_of_the_range_wrap(dut):
     await begin(dut)
     top = (1 << int(dut.W.value) - 1) - 1
-    assert await feed(dut, [top - 1, top, -top - 1, -top + 2, top - 3]) == [top - 1, top - 1, top, -top, top - 1]
+    assert await feed(dut, [top - 1, top, -top - 1, -top + 2, top - 3]) == [
+        top - 1,
+        top - 1,
+        top,
+        -top,
+        top - 1,
+    ]
 
 
 @cocotb.test()
@@ -97,8 +106,17 @@ async def any_counts_match_the_model(dut):
     w = int(dut.W.value)
     model, count, last = CountOutlierFilter(w), 0, None
     for clk in range(6000):
-        rst, valid, enable = int(random.random() < 0.005), random.getrandbits(1), int(random.random() < 0.95)
-        count = model.wrapped(count + random.choice((0, 1, -1, random.randrange(-9, 10), random.randrange(-1 << w - 1, 1 << w - 1))))
+        rst, valid, enable = (
+            int(random.random() < 0.005),
+            random.getrandbits(1),
+            int(random.random() < 0.95),
+        )
+        count = model.wrapped(
+            count
+            + random.choice(
+                (0, 1, -1, random.randrange(-9, 10), random.randrange(-1 << w - 1, 1 << w - 1))
+            )
+        )
         dut.rst.value = rst
         done, out = await clock(dut, count, valid, enable)
         if valid:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""deglitcher: pulses just too short and just long enough, both ends of the setting, its start, and random levels against the model."""
+"""deglitcher: pulses just too short and just long enough, both ends of the setting, its start, and
+random levels against the model.
+"""
+
 import random
 
 import cocotb
@@ -19,14 +22,21 @@ async def begin(dut, level=0, stable_cycles=0):
 
 
 async def drive(dut, model, stable_cycles, levels, rst=0):
-    """Put each level on the pin for one clk and hold the model beside the design; return (filtered, rejected) of each clk."""
+    """Put each level on the pin for one clk and hold the model beside the design; return (filtered,
+    rejected) of each clk.
+    """
     dut.stable_cycles.value, dut.rst.value, out = stable_cycles, rst, []
     for clk, level in enumerate(levels):
         dut.level.value = level
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
-        got, want = (int(dut.filtered.value), int(dut.rejected.value)), model.step(stable_cycles, level, rst)
-        assert got == want, f"clk {clk}, stable_cycles {stable_cycles}: (filtered, rejected) is {got}, the model has {want}"
+        got, want = (
+            (int(dut.filtered.value), int(dut.rejected.value)),
+            model.step(stable_cycles, level, rst),
+        )
+        assert got == want, (
+            f"clk {clk}, stable_cycles {stable_cycles}: (filtered, rejected) is {got}, the model has {want}"
+        )
         out.append(got)
     dut.rst.value = 0
     return out
@@ -109,7 +119,11 @@ async def any_levels_match_the_model(dut):
     model = await begin(dut)
     for _ in range(300):
         stable_cycles, pulse = random.choice([0, 1, 2, 3, 5, 8, 15]), random.choice([2, 4, 16])
-        levels = [bit for _ in range(40 // pulse) for bit in [random.getrandbits(1)] * random.randint(1, pulse)]
+        levels = [
+            bit
+            for _ in range(40 // pulse)
+            for bit in [random.getrandbits(1)] * random.randint(1, pulse)
+        ]
         await drive(dut, model, stable_cycles, levels)
         if random.random() < 0.05:
             await drive(dut, model, stable_cycles, levels[:2], rst=1)

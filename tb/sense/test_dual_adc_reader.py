@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""dual_adc_reader: against a converter that times its bits as the data sheet says, known codes, its timing, and the model in every clk."""
+"""dual_adc_reader: against a converter that times its bits as the data sheet says, known codes, its
+timing, and the model in every clk.
+"""
+
 import random
 
 import cocotb
@@ -11,21 +14,32 @@ from tb.sense.dual_adc_reader import DualAdcReader
 
 
 class Converter:
-    """Two converters: sampled when cs_n falls, one bit a falling edge of sclk, its line wrong until half an sclk later."""
+    """Two converters: sampled when cs_n falls, one bit a falling edge of sclk, its line wrong until
+    half an sclk later.
+    """
 
     def __init__(self, leading, bits):
-        self.leading, self.bits, self.codes, self.cs_n, self.sclk, self.edges = leading, bits, (0, 0), 1, 1, 0
+        self.leading, self.bits, self.codes, self.cs_n, self.sclk, self.edges = (
+            leading,
+            bits,
+            (0, 0),
+            1,
+            1,
+            0,
+        )
 
     def lines(self, codes, cs_n, sclk):
-        """Levels of sdata_a, sdata_b while cs_n and sclk stand like this; codes is what the inputs would give now."""
+        """Levels of sdata_a, sdata_b while cs_n and sclk stand like this; codes is what the inputs
+        would give now.
+        """
         if self.cs_n and not cs_n:
             self.codes, self.edges = codes, 0
         elif self.sclk and not sclk:
             self.edges += 1
-        early = sclk == 0                               # the first half after the falling edge: not there yet
+        early = sclk == 0  # the first half after the falling edge: not there yet
         self.cs_n, self.sclk = cs_n, sclk
         if cs_n:
-            return random.getrandbits(1), random.getrandbits(1)         # high impedance
+            return random.getrandbits(1), random.getrandbits(1)  # high impedance
         place = self.bits - 1 - (self.edges - self.leading)
         levels = [code >> place & 1 if 0 <= place < self.bits else 0 for code in self.codes]
         return tuple(1 - level if early else level for level in levels)
@@ -56,18 +70,22 @@ async def begin(dut):
     await start(dut, start=0, sdata_a=0, sdata_b=0)
     w, leading, frame = sizes(dut)
     model = DualAdcReader(w, leading, frame)
-    model.known = False                                 # sin and cos mean nothing before the first sample
+    model.known = False  # sin and cos mean nothing before the first sample
     model.step(0, 0, 0, 1)
     return model, Converter(leading, frame - leading)
 
 
 async def convert(dut, model, converter, codes):
-    """One conversion: (sin, cos), clk to valid, clk until cs_n is high again, falling edges of sclk."""
+    """One conversion: (sin, cos), clk to valid, clk until cs_n is high again, falling edges of
+    sclk.
+    """
     sample, latency, falls, was, n, lines = None, None, 0, 1, 0, (0, 0)
     while True:
         n += 1
         cs_n, sclk, valid, now = await clk(dut, model, int(n == 1), lines)
-        lines = converter.lines(codes if n == 1 else (random.getrandbits(8), random.getrandbits(8)), cs_n, sclk)
+        lines = converter.lines(
+            codes if n == 1 else (random.getrandbits(8), random.getrandbits(8)), cs_n, sclk
+        )
         falls, was = falls + (was and not sclk), sclk
         if valid:
             assert latency is None, "one valid a conversion"
@@ -80,12 +98,16 @@ async def convert(dut, model, converter, codes):
 async def known_codes_by_hand(dut):
     model, converter = await begin(dut)
     w, leading, frame = sizes(dut)
-    bits = frame - leading                              # of this converter
-    one = 1 << bits - w                                 # what one step of sin is worth to it
+    bits = frame - leading  # of this converter
+    one = 1 << bits - w  # what one step of sin is worth to it
     half, top = 1 << bits - 1, (1 << bits) - 1
     low, high = -(1 << w - 1), (1 << w - 1) - 1
-    for codes, want in {(0, top): (low, high), (top, 0): (high, low), (half, half - 1): (0, -1),
-                        (half + 5 * one, half - 5 * one): (5, -5)}.items():
+    for codes, want in {
+        (0, top): (low, high),
+        (top, 0): (high, low),
+        (half, half - 1): (0, -1),
+        (half + 5 * one, half - 5 * one): (5, -5),
+    }.items():
         assert (await convert(dut, model, converter, codes))[0] == want
 
 
@@ -93,10 +115,10 @@ async def known_codes_by_hand(dut):
 async def latency_is_two_clk_a_bit_and_rate_is_as_stated(dut):
     model, converter = await begin(dut)
     w, leading, frame = sizes(dut)
-    for _ in range(3):                                  # back to back: start with the clk in which cs_n was seen high
+    for _ in range(3):  # back to back: start with the clk in which cs_n was seen high
         _, latency, length, falls = await convert(dut, model, converter, (1, 2))
         assert (latency, length, falls) == (2 * (leading + w), 2 * frame + 1, frame)
-    assert 2 * frame + 1 <= 40                          # 100 kS/s at 4 MHz
+    assert 2 * frame + 1 <= 40  # 100 kS/s at 4 MHz
 
 
 @cocotb.test()

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""event_filter: N samples in a row and N of M, the sampling divider, the bypass, both ends, random levels against the model."""
+"""event_filter: N samples in a row and N of M, the sampling divider, the bypass, both ends, random
+levels against the model.
+"""
+
 import random
 
 import cocotb
@@ -12,7 +15,9 @@ from tb.sense.event_filter import EventFilter
 
 
 class Bench:
-    """Design and model side by side; play() gives the same levels to every line and returns (filtered, rejected) of line 0."""
+    """Design and model side by side; play() gives the same levels to every line and returns
+    (filtered, rejected) of line 0.
+    """
 
     @classmethod
     async def begin(cls, dut, level=0, skip=0, required=0, tolerated=0, settled=True):
@@ -20,7 +25,13 @@ class Bench:
         bench.dut, bench.lines = dut, int(dut.LEVELS.value)
         bench.model = EventFilter(bench.lines, int(dut.SETTLE.value))
         bench.settings = skip, required, tolerated
-        await start(dut, level=bench.word([level] * bench.lines), skip=skip, required=required, tolerated=tolerated)
+        await start(
+            dut,
+            level=bench.word([level] * bench.lines),
+            skip=skip,
+            required=required,
+            tolerated=tolerated,
+        )
         bench.model.step(skip, required, tolerated, [level] * bench.lines, 1)
         if settled:
             await bench.play([level] * int(dut.SETTLE.value))
@@ -44,8 +55,13 @@ class Bench:
             await RisingEdge(dut.clk)
             await FallingEdge(dut.clk)
             filtered, rejected = self.model.step(*self.settings, levels, rst)
-            got, want = (int(dut.filtered.value), int(dut.rejected.value)), (self.word(filtered), self.word(rejected))
-            assert got == want, f"clk {clk}, (skip, required, tolerated) {self.settings}: (filtered, rejected) is {got}, the model has {want}"
+            got, want = (
+                (int(dut.filtered.value), int(dut.rejected.value)),
+                (self.word(filtered), self.word(rejected)),
+            )
+            assert got == want, (
+                f"clk {clk}, (skip, required, tolerated) {self.settings}: (filtered, rejected) is {got}, the model has {want}"
+            )
             out.append((filtered[0], rejected[0]))
         dut.rst.value = 0
         return out
@@ -139,7 +155,9 @@ async def lines_do_not_disturb_each_other(dut):
     bench = await Bench.begin(dut)
     await bench.set(0, 3, 0)
     for line in range(bench.lines):
-        await bench.rows([[int(n == line) for n in range(bench.lines)]] * 3 + [[0] * bench.lines] * 3)
+        await bench.rows(
+            [[int(n == line) for n in range(bench.lines)]] * 3 + [[0] * bench.lines] * 3
+        )
         await bench.rows([[random.getrandbits(1) for _ in range(bench.lines)] for _ in range(200)])
         await bench.play([0] * 10)
 
@@ -157,9 +175,17 @@ async def reset_in_the_middle_of_a_pulse_forgets_it(dut):
 async def any_levels_and_any_change_of_settings_match_the_model(dut):
     bench = await Bench.begin(dut)
     for _ in range(150):
-        await bench.set(random.choice([0, 0, 1, 2, 5]), random.choice([0, 1, 2, 3, 5, 7]), random.choice([0, 0, 1, 2, 3]))
+        await bench.set(
+            random.choice([0, 0, 1, 2, 5]),
+            random.choice([0, 1, 2, 3, 5, 7]),
+            random.choice([0, 0, 1, 2, 3]),
+        )
         pulse = random.choice([1, 2, 4, 12])
-        rows = [[random.getrandbits(1) for _ in range(bench.lines)] for _ in range(40 // pulse) for _ in range(1)]
+        rows = [
+            [random.getrandbits(1) for _ in range(bench.lines)]
+            for _ in range(40 // pulse)
+            for _ in range(1)
+        ]
         await bench.rows([row for row in rows for _ in range(random.randint(1, pulse))])
         if random.random() < 0.05:
             await bench.rows(rows[:2], rst=1)

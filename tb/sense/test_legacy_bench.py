@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""legacy_bench: both of its paths, sample by sample, against their models in a row; what the comparison of sw/figures/legacy.py rests on."""
+"""legacy_bench: both of its paths, sample by sample, against their models in a row; what the
+comparison of sw/figures/legacy.py rests on.
+"""
+
 import math
 import random
 
@@ -15,9 +18,27 @@ from tb.sense.count_outlier_filter import CountOutlierFilter
 from tb.sense.outlier_filter import OutlierFilter
 from tb.sense.peak_offset_tracker import PeakOffsetTracker
 
-APART, LARGEST_MOVE, SUBDIVISION = 30, 40, 160          # clk from sample to sample; counts; counts of a period
-IDLE = dict(valid=0, sin=0, cos=0, largest_move=LARGEST_MOVE, limit_counts=1, load=0, sin_offset=0, cos_offset=0, gain=0, quadrature_error=0,
-            write=0, point=0, value=0, swap=0)
+APART, LARGEST_MOVE, SUBDIVISION = (
+    30,
+    40,
+    160,
+)  # clk from sample to sample; counts; counts of a period
+IDLE = dict(
+    valid=0,
+    sin=0,
+    cos=0,
+    largest_move=LARGEST_MOVE,
+    limit_counts=1,
+    load=0,
+    sin_offset=0,
+    cos_offset=0,
+    gain=0,
+    quadrature_error=0,
+    write=0,
+    point=0,
+    value=0,
+    swap=0,
+)
 
 
 class Follower:
@@ -70,17 +91,22 @@ async def both_paths_are_their_models_in_a_row(dut):
     printed, ours, where, place = Follower(), Follower(), random.random(), []
     for n in range(600):
         where += 0.06 if n < 400 else -0.06
-        sin, cos = (round(100 * channel(math.tau * where) + 3 + random.gauss(0, 0.7)) for channel in (math.sin, math.cos))
+        sin, cos = (
+            round(100 * channel(math.tau * where) + 3 + random.gauss(0, 0.7))
+            for channel in (math.sin, math.cos)
+        )
         if random.random() < 0.02:
-            sin = random.randrange(-128, 128)           # a spike
+            sin = random.randrange(-128, 128)  # a spike
         held = spikes.sample(sin, cos, LARGEST_MOVE, 255)[:2]
         centred = offset.sample(*held, 1)[:2]
-        count = counts.follow(1, printed.follow(arctan_table.phase_of(*centred)) * SUBDIVISION >> 16)
+        count = counts.follow(
+            1, printed.follow(arctan_table.phase_of(*centred)) * SUBDIVISION >> 16
+        )
         phase = sample(16, *signal_correction.corrected(sin, cos, values, 8))[0]
         position = ours.follow(harmonic_correction.corrected(phase, table))
         assert await send(dut, sin, cos) == ([count], [position]), f"sample {n}: {sin}, {cos}"
         place.append(position / 65536 - where)
-    assert max(place) - min(place) < 1.2                # ours has stayed on its fringe
+    assert max(place) - min(place) < 1.2  # ours has stayed on its fringe
 
 
 def test_printed_bench():

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""lissajous_monitor: what teaches it and what does not, each verdict at its limit, and the model sample by sample."""
+"""lissajous_monitor: what teaches it and what does not, each verdict at its limit, and the model
+sample by sample.
+"""
+
 import random
 
 import cocotb
@@ -13,36 +16,57 @@ from tb.sense.lissajous_monitor import NEVER, LissajousMonitor
 LATENCY = 5
 LIMITS = ("tolerance", "offset_limit", "balance_limit", "quadrature_limit")
 OUTPUTS = ("ready", "off_circle", "offset_drift", "unbalanced", "not_in_quadrature")
-TURN = [((k + 1) // 2 % 4, k // 2, 4 * (k % 2)) for k in range(8)]      # (axis, quadrant, tilt) each 45 degrees
+TURN = [
+    ((k + 1) // 2 % 4, k // 2, 4 * (k % 2)) for k in range(8)
+]  # (axis, quadrant, tilt) each 45 degrees
 
 
 async def begin(dut, **limits):
-    await start(dut, valid=0, length=0, axis=0, quadrant=0, tilt=0, **{name: limits.get(name, NEVER) for name in LIMITS})
+    await start(
+        dut,
+        valid=0,
+        length=0,
+        axis=0,
+        quadrant=0,
+        tilt=0,
+        **{name: limits.get(name, NEVER) for name in LIMITS},
+    )
     model = LissajousMonitor()
     model.limits, model.stands = [limits.get(name, NEVER) for name in LIMITS], (0,) * len(OUTPUTS)
     return model
 
 
 async def sample(dut, model, length, place, gap=0):
-    """One sample, 1 clk later its verdict as the model has it; then some clk without one. Returns the verdict."""
+    """One sample, 1 clk later its verdict as the model has it; then some clk without one. Returns
+    the verdict.
+    """
     axis, quadrant, tilt = place
     dut.valid.value, dut.length.value = 1, length
     dut.axis.value, dut.quadrant.value, dut.tilt.value = axis, quadrant, tilt
-    want = tuple(int(x[0]) for x in model.sample(*(np.array([x]) for x in (length, axis, quadrant, tilt)), *model.limits))
+    want = tuple(
+        int(x[0])
+        for x in model.sample(
+            *(np.array([x]) for x in (length, axis, quadrant, tilt)), *model.limits
+        )
+    )
     for n in range(LATENCY + gap):
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
         dut.valid.value, dut.length.value = 0, random.getrandbits(8)
         got = tuple(int(getattr(dut, name).value) for name in OUTPUTS)
         stands = want if n >= LATENCY - 1 else (want[0], *model.stands[1:])
-        assert got == stands, f"clk {n} after {length} at {place}: {OUTPUTS} are {got}, the model has {stands}"
+        assert got == stands, (
+            f"clk {n} after {length} at {place}: {OUTPUTS} are {got}, the model has {stands}"
+        )
         assert int(dut.done.value) == (n == LATENCY - 1)
     model.stands = want
     return want
 
 
 async def turn(dut, model, lengths, times=1, back=False):
-    """Whole turns in steps of 45 degrees; lengths of the eight directions from +cos on. Returns the last verdict."""
+    """Whole turns in steps of 45 degrees; lengths of the eight directions from +cos on. Returns the
+    last verdict.
+    """
     for _ in range(times):
         for k in reversed(range(8)) if back else range(8):
             verdict = await sample(dut, model, lengths[k], TURN[k], gap=random.choice([0, 0, 2]))
@@ -77,18 +101,36 @@ async def a_sample_far_from_the_middle_teaches_nothing(dut):
 
 @cocotb.test()
 async def off_circle_stands_beyond_the_tolerance_only_and_between_the_directions_too(dut):
-    for place, expected in [(TURN[0], 100), (TURN[1], 120), ((0, 0, 2), 110), ((1, 0, 1), 105), ((2, 1, 3), 115)]:
+    for place, expected in [
+        (TURN[0], 100),
+        (TURN[1], 120),
+        ((0, 0, 2), 110),
+        ((1, 0, 1), 105),
+        ((2, 1, 3), 115),
+    ]:
         model = await begin(dut, tolerance=5)
         await turn(dut, model, [100, 120] * 4, times=3)
-        assert [(await sample(dut, model, expected + d, place))[1] for d in (-6, -5, 0, 5, 6)] == [1, 0, 0, 0, 1]
+        assert [(await sample(dut, model, expected + d, place))[1] for d in (-6, -5, 0, 5, 6)] == [
+            1,
+            0,
+            0,
+            0,
+            1,
+        ]
 
 
 @cocotb.test()
 async def offset_balance_and_square_stand_beyond_their_limits_only(dut):
     for name, output, good, bad in [
-            ("offset_limit", 2, [120, 110, 100, 90, 80, 90, 100, 110], [121, 110, 100, 90, 80, 90, 100, 110]),
-            ("balance_limit", 3, [110, 100, 90, 100] * 2, [111, 100, 90, 100, 110, 100, 90, 100]),
-            ("quadrature_limit", 4, [100, 110, 100, 90] * 2, [100, 111, 100, 90, 100, 110, 100, 90])]:
+        (
+            "offset_limit",
+            2,
+            [120, 110, 100, 90, 80, 90, 100, 110],
+            [121, 110, 100, 90, 80, 90, 100, 110],
+        ),
+        ("balance_limit", 3, [110, 100, 90, 100] * 2, [111, 100, 90, 100, 110, 100, 90, 100]),
+        ("quadrature_limit", 4, [100, 110, 100, 90] * 2, [100, 111, 100, 90, 100, 110, 100, 90]),
+    ]:
         for lengths, expected in [(good, 0), (bad, 1)]:
             model = await begin(dut, **{name: 20})
             verdict = await turn(dut, model, lengths, times=4)
@@ -122,11 +164,22 @@ async def reset_forgets_the_circle(dut):
 async def any_walk_matches_the_model(dut):
     top = (1 << int(dut.R.value)) - 1
     for _ in range(8):
-        model = await begin(dut, **{name: random.choice([0, top // 10, top // 5, top, NEVER]) for name in LIMITS})
-        middle, play, k, way = random.randrange(top // 2, top), random.choice([2, 20]), random.randrange(32), 1
+        model = await begin(
+            dut, **{name: random.choice([0, top // 10, top // 5, top, NEVER]) for name in LIMITS}
+        )
+        middle, play, k, way = (
+            random.randrange(top // 2, top),
+            random.choice([2, 20]),
+            random.randrange(32),
+            1,
+        )
         for _ in range(250):
             way = random.choice([-1, 1]) if random.random() < 0.05 else way
-            k = (k + way * random.choice([0, 1, 1, 1, 2, 4])) % 32 if random.random() < 0.99 else random.randrange(32)
+            k = (
+                (k + way * random.choice([0, 1, 1, 1, 2, 4])) % 32
+                if random.random() < 0.99
+                else random.randrange(32)
+            )
             place = (k + 4) // 8 % 4, k // 8, abs((k + 4) % 8 - 4)
             length = min(top, max(0, middle + random.randrange(-play, play + 1)))
             await sample(dut, model, length, place, gap=random.choice([0, 0, 0, 1]))
@@ -135,19 +188,29 @@ async def any_walk_matches_the_model(dut):
 def test_the_circle_between_its_directions_is_expected_within_5_percent():
     """The header's claim: 5 % offsets, 6 % gain, 4 degrees, the harmonics of the test signal."""
     from tb.sense.vector_length import vector_length
+
     source = np.random.default_rng(1)
     lanes, steps, worst = 300, 400, 0.0
     monitor = LissajousMonitor(lanes)
     offset = source.uniform(-0.05, 0.05, (2, lanes))
     gain, skew = 1 + source.uniform(-0.06, 0.06, lanes), np.radians(source.uniform(-4, 4, lanes))
-    harmonics = [(k, size * np.exp(2j * np.pi * source.random(lanes))) for k, size in [(3, 0.01), (-3, 0.006), (2, 0.004), (-5, 0.003)]]
+    harmonics = [
+        (k, size * np.exp(2j * np.pi * source.random(lanes)))
+        for k, size in [(3, 0.01), (-3, 0.006), (2, 0.004), (-5, 0.003)]
+    ]
     for n in range(3 * steps):
         z = np.exp(2j * np.pi * n / steps + 2j * np.pi * np.arange(lanes) / lanes)
-        v = z + sum(size * z ** k for k, size in harmonics)
-        sin, cos = gain * (v.imag * np.cos(skew) + v.real * np.sin(skew)) + offset[0], v.real + offset[1]
+        v = z + sum(size * z**k for k, size in harmonics)
+        sin, cos = (
+            gain * (v.imag * np.cos(skew) + v.real * np.sin(skew)) + offset[0],
+            v.real + offset[1],
+        )
         length, axis, quadrant, tilt = vector_length(np.rint(20000 * sin), np.rint(20000 * cos))
         if n >= 2 * steps:
-            east, corner = monitor.lengths[0, axis, monitor.lane], monitor.lengths[1, quadrant, monitor.lane]
+            east, corner = (
+                monitor.lengths[0, axis, monitor.lane],
+                monitor.lengths[1, quadrant, monitor.lane],
+            )
             worst = max(worst, abs(length - east - (corner - east) * tilt / 4).max() / 20000)
         monitor.sample(length, axis, quadrant, tilt, NEVER, NEVER, NEVER, NEVER)
     assert monitor.known.all()

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""outlier_filter: a spike by hand, both ends of both settings, S0's filter as printed, and random samples with gaps against the model."""
+"""outlier_filter: a spike by hand, both ends of both settings, S0's filter as printed, and random
+samples with gaps against the model.
+"""
+
 import random
 
 import cocotb
@@ -16,11 +19,17 @@ async def begin(dut):
 
 
 async def stream(dut, model, samples, step, hold, gaps=False):
-    """Send the samples, each checked against the model 1 clk later; return (sin_out, cos_out, rejected) of each."""
+    """Send the samples, each checked against the model 1 clk later; return (sin_out, cos_out,
+    rejected) of each.
+    """
     dut.step.value, dut.hold.value, out = step, hold, []
     for sin, cos in samples:
         while gaps and random.getrandbits(1):
-            dut.valid.value, dut.sin.value, dut.cos.value = 0, random.getrandbits(7), random.getrandbits(7)
+            dut.valid.value, dut.sin.value, dut.cos.value = (
+                0,
+                random.getrandbits(7),
+                random.getrandbits(7),
+            )
             await RisingEdge(dut.clk)
             await FallingEdge(dut.clk)
             assert not int(dut.done.value) and not int(dut.rejected.value)
@@ -31,15 +40,19 @@ async def stream(dut, model, samples, step, hold, gaps=False):
         assert int(dut.done.value)
         got = dut.sin_out.value.to_signed(), dut.cos_out.value.to_signed(), int(dut.rejected.value)
         want = model.sample(sin, cos, step, hold)
-        assert got == want, f"sample {len(out)}: (sin_out, cos_out, rejected) is {got}, the model has {want}"
+        assert got == want, (
+            f"sample {len(out)}: (sin_out, cos_out, rejected) is {got}, the model has {want}"
+        )
         out.append(got)
     return out
 
 
 @cocotb.test()
 async def latency_is_1_and_a_spike_is_held_back_on_its_own_channel(dut):
-    model = await begin(dut)                            # stream() sees done 1 clk after valid
-    out = await stream(dut, model, [(0, 100), (5, 99), (90, 98), (10, 97), (15, -100), (20, 95)], 10, 3)
+    model = await begin(dut)  # stream() sees done 1 clk after valid
+    out = await stream(
+        dut, model, [(0, 100), (5, 99), (90, 98), (10, 97), (15, -100), (20, 95)], 10, 3
+    )
     assert out == [(0, 100, 0), (5, 99, 0), (5, 98, 1), (10, 97, 0), (15, 97, 1), (20, 95, 0)]
 
 
@@ -62,7 +75,9 @@ async def step_0_takes_everything(dut):
 async def the_whole_range_in_one_step_is_seen_as_a_jump(dut):
     model = await begin(dut)
     low, high = -(1 << int(dut.W.value) - 1), (1 << int(dut.W.value) - 1) - 1
-    out = await stream(dut, model, [(low, high), (high, low), (low, high)], 255 if low < -128 else 254, 255)
+    out = await stream(
+        dut, model, [(low, high), (high, low), (low, high)], 255 if low < -128 else 254, 255
+    )
     assert out == [(low, high, 0), (low, high, 1), (low, high, 0)]
 
 
@@ -85,7 +100,9 @@ async def hold_255_is_s0_as_printed_and_never_lets_go(dut):
 @cocotb.test()
 async def a_good_sample_starts_the_patience_afresh(dut):
     model = await begin(dut)
-    out = await stream(dut, model, [(0, 0), (99, 0), (99, 0), (1, 0), (99, 0), (99, 0), (99, 0)], 10, 2)
+    out = await stream(
+        dut, model, [(0, 0), (99, 0), (99, 0), (1, 0), (99, 0), (99, 0), (99, 0)], 10, 2
+    )
     assert [sin for sin, _, _ in out] == [0, 0, 0, 1, 1, 1, 99]
 
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""peak_offset_tracker: by hand as S0 printed it, what it can and what it cannot, and every sample against the model."""
+"""peak_offset_tracker: by hand as S0 printed it, what it can and what it cannot, and every sample
+against the model.
+"""
+
 import math
 import random
 
@@ -17,17 +20,35 @@ class Remover:
         self.model, self.top, self.expected = PeakOffsetTracker(self.w), (1 << self.w - 1) - 1, []
 
     async def clk(self, sin=0, cos=0, valid=1, enable=1, rst=0):
-        """One clk with the model beside it; (sin_out, cos_out, sin_offset, cos_offset) with done, else None."""
+        """One clk with the model beside it; (sin_out, cos_out, sin_offset, cos_offset) with done,
+        else None.
+        """
         dut = self.dut
-        dut.sin.value, dut.cos.value, dut.valid.value, dut.enable.value, dut.rst.value = sin, cos, valid, enable, rst
+        dut.sin.value, dut.cos.value, dut.valid.value, dut.enable.value, dut.rst.value = (
+            sin,
+            cos,
+            valid,
+            enable,
+            rst,
+        )
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
         self.expected = [*self.expected, (sin, cos) if valid else None][-2:]
-        want = self.model.sample(*self.expected[0], enable) if len(self.expected) == 2 and self.expected[0] else None
+        want = (
+            self.model.sample(*self.expected[0], enable)
+            if len(self.expected) == 2 and self.expected[0]
+            else None
+        )
         if rst:
             self.model, self.expected, want = PeakOffsetTracker(self.w), [], None
-        got = tuple(getattr(dut, name).value.to_signed() for name in ("sin_out", "cos_out", "sin_offset", "cos_offset")) \
-            if int(dut.done.value) else None
+        got = (
+            tuple(
+                getattr(dut, name).value.to_signed()
+                for name in ("sin_out", "cos_out", "sin_offset", "cos_offset")
+            )
+            if int(dut.done.value)
+            else None
+        )
         assert got == want, f"{got}, the model has {want}"
         return got
 
@@ -46,8 +67,13 @@ async def begin(dut):
 def circle(top, turns, amplitude=0.8, sin_offset=0, cos_offset=0, per_turn=100, noise=0):
     """Samples of a scale in motion, with offsets in LSB."""
     angles = [math.tau * n / per_turn for n in range(int(turns * per_turn))]
-    return [(round(amplitude * top * math.sin(a) + sin_offset + random.uniform(-noise, noise)),
-             round(amplitude * top * math.cos(a) + cos_offset + random.uniform(-noise, noise))) for a in angles]
+    return [
+        (
+            round(amplitude * top * math.sin(a) + sin_offset + random.uniform(-noise, noise)),
+            round(amplitude * top * math.cos(a) + cos_offset + random.uniform(-noise, noise)),
+        )
+        for a in angles
+    ]
 
 
 @cocotb.test()
@@ -61,7 +87,9 @@ async def latency_is_2(dut):
 async def by_hand_as_printed(dut):
     remover = await begin(dut)
     needs(remover.w == 8, "the paper has 8 bits")
-    sin = [s - 128 for s in (100, 90, 60, 80, 200, 230, 210)]               # Pmin 60, Pmax 230: |255 - 290| / 2 = 17
+    sin = [
+        s - 128 for s in (100, 90, 60, 80, 200, 230, 210)
+    ]  # Pmin 60, Pmax 230: |255 - 290| / 2 = 17
     out = await remover.feed([(s, -100 + n) for n, s in enumerate(sin)])
     assert [o[2] for o in out] == [0] * 6 + [17] and out[-1][0] == 210 - 128 - 17
 
@@ -89,7 +117,9 @@ async def an_offset_is_gone_after_one_fringe_and_a_quarter(dut):
 async def noise_makes_turning_points_that_are_none(dut):
     remover = await begin(dut)
     out = await remover.feed(circle(remover.top, 6, noise=0.03 * remover.top))
-    assert max(abs(o[2]) for o in out) > 0.3 * remover.top                  # without any offset: the limit of the method
+    assert (
+        max(abs(o[2]) for o in out) > 0.3 * remover.top
+    )  # without any offset: the limit of the method
 
 
 @cocotb.test()
@@ -104,7 +134,9 @@ async def out_of_use_samples_pass_and_the_offset_is_still_known(dut):
 async def a_corrected_sample_stops_at_full_scale(dut):
     remover = await begin(dut)
     top = remover.top
-    out = await remover.feed(zip((-10, -5, -20, -top - 1, -top, top), (5, 10, top, top - 1, 0, -top - 1)))
+    out = await remover.feed(
+        zip((-10, -5, -20, -top - 1, -top, top), (5, 10, top, top - 1, 0, -top - 1))
+    )
     assert out[-1][:2] == (top, -top - 1)
     assert out[-1][2] < -top // 3 and out[-1][3] > top // 3
 
@@ -122,8 +154,13 @@ async def any_samples_match_the_model_in_every_clk(dut):
     remover = await begin(dut)
     for clk in range(6000):
         span = remover.top if clk // 300 % 2 else 3
-        await remover.clk(random.randrange(-span - 1, span + 1), random.randrange(-span - 1, span + 1), valid=int(random.random() < 0.7),
-                          enable=int(clk // 40 % 5 > 0), rst=int(random.random() < 0.003))
+        await remover.clk(
+            random.randrange(-span - 1, span + 1),
+            random.randrange(-span - 1, span + 1),
+            valid=int(random.random() < 0.7),
+            enable=int(clk // 40 % 5 > 0),
+            rst=int(random.random() < 0.003),
+        )
 
 
 @pytest.mark.parametrize("w", [8, 12])

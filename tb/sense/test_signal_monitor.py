@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""signal_monitor: each fault by its name and in its time, what must not alarm, and the model in every clk."""
+"""signal_monitor: each fault by its name and in its time, what must not alarm, and the model in
+every clk.
+"""
+
 import random
 from dataclasses import asdict
 
@@ -11,7 +14,7 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import run, start
 from tb.sense.signal_monitor import FAULTS, Settings, SignalMonitor
 
-CLKS = dict(enumerate([10, 10, 2, 14, 5, 2, 2, 2, 2, 2, 14, 14, 14]))      # from valid to each fault
+CLKS = dict(enumerate([10, 10, 2, 14, 5, 2, 2, 2, 2, 2, 14, 14, 14]))  # from valid to each fault
 LATEST = max(CLKS.values())
 ALL = (1 << 13) - 1
 
@@ -21,7 +24,9 @@ def names(bits):
 
 
 class Watch:
-    """The design beside its model; `seen` are all the faults since it was made, `rose` when each rose first."""
+    """The design beside its model; `seen` are all the faults since it was made, `rose` when each
+    rose first.
+    """
 
     def __init__(self, dut, settings):
         self.dut, self.settings, self.model = dut, settings, SignalMonitor()
@@ -47,16 +52,22 @@ class Watch:
         self.rose |= {name: self.clks for name in names(self.now & ~self.seen)}
         self.seen |= self.now
         got = int(dut.faults.value), int(dut.first.value)
-        assert got == (self.now, self.first), f"clk {self.clks}: {names(got[0])}, first {names(got[1])}, the model has " \
-                                              f"{names(self.now)}, first {names(self.first)}"
+        assert got == (self.now, self.first), (
+            f"clk {self.clks}: {names(got[0])}, first {names(got[1])}, the model has "
+            f"{names(self.now)}, first {names(self.first)}"
+        )
 
     async def sample(self, cos, sin, a=None, b=None, gap=0):
         cos, sin = (round(min(self.full - 1, max(-self.full, channel))) for channel in (cos, sin))
-        await self.clk((sin, cos, int(cos > 0) if a is None else a, int(sin > 0) if b is None else b))
+        await self.clk(
+            (sin, cos, int(cos > 0) if a is None else a, int(sin > 0) if b is None else b)
+        )
         for _ in range(gap):
             await self.clk()
 
-    async def turn(self, size, fringes=1.0, begin=0.0, steps=60, gap=0, distort=lambda cos, sin: (cos, sin)):
+    async def turn(
+        self, size, fringes=1.0, begin=0.0, steps=60, gap=0, distort=lambda cos, sin: (cos, sin)
+    ):
         for n in range(round(abs(fringes) * steps)):
             angle = 2 * np.pi * (begin + np.sign(fringes) * n / steps)
             await self.sample(*distort(size * np.cos(angle), size * np.sin(angle)), gap=gap)
@@ -68,7 +79,18 @@ class Watch:
 
 async def begin(dut, settings=None):
     settings = settings or Settings()
-    await start(dut, valid=0, sin=0, cos=0, a=0, b=0, phase_jump=0, lost_count=0, clear=0, **asdict(settings))
+    await start(
+        dut,
+        valid=0,
+        sin=0,
+        cos=0,
+        a=0,
+        b=0,
+        phase_jump=0,
+        lost_count=0,
+        clear=0,
+        **asdict(settings),
+    )
     return Watch(dut, settings)
 
 
@@ -95,7 +117,9 @@ async def latency_is_2_5_10_and_14(dut):
         await watch.turn(90, 2.25, steps=80)
         await watch.rest()
         assert not watch.seen
-        decides = watch.clks + (name != "jump")          # the first sample of a jump, the second one of the others
+        decides = watch.clks + (
+            name != "jump"
+        )  # the first sample of a jump, the second one of the others
         await watch.sample(0, 126)
         await watch.sample(0, 126)
         await watch.rest()
@@ -118,7 +142,11 @@ async def amplitude_comes_9_clk_after_its_sample(dut):
 async def with_everything_switched_off_nothing_alarms(dut):
     watch = await begin(dut)
     for _ in range(300):
-        await watch.sample(*(random.uniform(-1.5, 1.5) * watch.full for _ in range(2)), a=random.getrandbits(1), b=random.getrandbits(1))
+        await watch.sample(
+            *(random.uniform(-1.5, 1.5) * watch.full for _ in range(2)),
+            a=random.getrandbits(1),
+            b=random.getrandbits(1),
+        )
     assert not watch.seen
 
 
@@ -130,7 +158,9 @@ async def a_good_signal_without_noise_raises_nothing_moving_or_at_rest(dut):
     for place in (0, 3, 10):
         await watch.turn(size, -place / 16, steps=90)
         for _ in range(30):
-            await watch.sample(size * np.cos(place / 16 * 2 * np.pi), -size * np.sin(place / 16 * 2 * np.pi))
+            await watch.sample(
+                size * np.cos(place / 16 * 2 * np.pi), -size * np.sin(place / 16 * 2 * np.pi)
+            )
         await watch.turn(size, place / 16, begin=-place / 16, steps=90)
     assert not watch.seen & ~(1 << FAULTS.index("jump"))
 
@@ -147,10 +177,15 @@ async def a_single_spike_is_only_a_jump(dut):
 @cocotb.test()
 async def each_fault_of_a_moving_signal_has_its_name(dut):
     for name, distort in [
-            ("too_low", lambda cos, sin: (0.65 * cos, 0.65 * sin)), ("too_high", lambda cos, sin: (1.35 * cos, 0.9 * sin)),
-            ("clipped", lambda cos, sin: (1.5 * cos, sin)), ("off_circle", lambda cos, sin: (cos, 0.75 * sin)),
-            ("channel_stuck", lambda cos, sin: (cos, 5)), ("offset_drift", lambda cos, sin: (cos, sin + 0.117 * 2 ** (int(dut.W.value) - 1))),
-            ("unbalanced", lambda cos, sin: (1.1 * cos, 0.9 * sin)), ("not_in_quadrature", lambda cos, sin: (cos, sin + 0.2 * cos))]:
+        ("too_low", lambda cos, sin: (0.65 * cos, 0.65 * sin)),
+        ("too_high", lambda cos, sin: (1.35 * cos, 0.9 * sin)),
+        ("clipped", lambda cos, sin: (1.5 * cos, sin)),
+        ("off_circle", lambda cos, sin: (cos, 0.75 * sin)),
+        ("channel_stuck", lambda cos, sin: (cos, 5)),
+        ("offset_drift", lambda cos, sin: (cos, sin + 0.117 * 2 ** (int(dut.W.value) - 1))),
+        ("unbalanced", lambda cos, sin: (1.1 * cos, 0.9 * sin)),
+        ("not_in_quadrature", lambda cos, sin: (cos, sin + 0.2 * cos)),
+    ]:
         watch, size = await ready(dut)
         await watch.turn(size, 4.0, distort=distort)
         await watch.rest()
@@ -159,7 +194,10 @@ async def each_fault_of_a_moving_signal_has_its_name(dut):
 
 @cocotb.test()
 async def each_fault_of_a_comparator_or_channel_has_its_name(dut):
-    for name, a in [("comparator_mismatch", lambda n: n // 30 % 2), ("comparator_stuck", lambda n: 1)]:
+    for name, a in [
+        ("comparator_mismatch", lambda n: n // 30 % 2),
+        ("comparator_stuck", lambda n: 1),
+    ]:
         watch, size = await ready(dut)
         for n in range(120):
             angle = 2 * np.pi * n / 60
@@ -180,7 +218,7 @@ async def each_fault_of_a_comparator_or_channel_has_its_name(dut):
 
 @cocotb.test()
 async def a_channel_that_opens_at_rest_is_found_at_the_second_sample(dut):
-    for place in (0.08, 0.1, 0.2, 0.4):                 # fringe; the sine goes to zero
+    for place in (0.08, 0.1, 0.2, 0.4):  # fringe; the sine goes to zero
         watch, size = await ready(dut)
         await watch.turn(size, place, steps=400)
         angle = 2 * np.pi * place
@@ -195,7 +233,7 @@ async def a_channel_that_opens_at_rest_is_found_at_the_second_sample(dut):
 
 @cocotb.test()
 async def a_signal_lost_in_both_channels_is_told_at_the_second_sample_moving_or_at_rest(dut):
-    for steps in (4.1, 60, None):                       # samples a fringe; None: at rest
+    for steps in (4.1, 60, None):  # samples a fringe; None: at rest
         for place in (0.125, 0.77):
             watch, size = await ready(dut)
             await watch.turn(size, place, steps=200)
@@ -217,7 +255,10 @@ async def the_first_fault_persists_until_it_is_cleared(dut):
     for _ in range(3):
         await watch.sample(0, 50)
     await watch.rest()
-    assert names(int(dut.first.value)) == ["clipped"] and names(int(dut.faults.value)) == ["too_high", "clipped"]
+    assert names(int(dut.first.value)) == ["clipped"] and names(int(dut.faults.value)) == [
+        "too_high",
+        "clipped",
+    ]
     await watch.clk(clear=1)
     assert names(int(dut.first.value)) == ["too_high", "clipped"]
     for _ in range(17):
@@ -244,30 +285,57 @@ async def any_signal_in_any_settings_matches_the_model_in_every_clk(dut):
     for _ in range(8):
         top = (1 << int(dut.W.value) - 1) - 1
         level = lambda top=top: random.choice([0, top // 10, top // 4, top, 65535])
-        settings = random.choice([advised(dut, no_noise_samples=random.choice([0, 3])), Settings(level(), level(), level(), level(), level(),
-                                  random.choice([0, 3, 255]), level(), random.choice([0, 5]), level(), level(), level(), level())])
+        settings = random.choice(
+            [
+                advised(dut, no_noise_samples=random.choice([0, 3])),
+                Settings(
+                    level(),
+                    level(),
+                    level(),
+                    level(),
+                    level(),
+                    random.choice([0, 3, 255]),
+                    level(),
+                    random.choice([0, 5]),
+                    level(),
+                    level(),
+                    level(),
+                    level(),
+                ),
+            ]
+        )
         watch, angle, speed, channel = await begin(dut, settings), 0.0, 0.05, 0.0
         for n in range(160):
             if n % 40 == 0:
-                speed, shrink = random.choice([0, 0.02, 0.3, 1.5, -0.8]), random.choice([1, 1, 0.3, 1.4])
+                speed, shrink = (
+                    random.choice([0, 0.02, 0.3, 1.5, -0.8]),
+                    random.choice([1, 1, 0.3, 1.4]),
+                )
                 channel = random.choice([1, 1, 1, 0, -1])
             angle += speed
             size = 0.8 * top * shrink + random.gauss(0, 0.5)
             upset = {"a": random.getrandbits(1)} if random.random() < 0.05 else {}
             await watch.sample(size * np.cos(angle), channel * size * np.sin(angle), **upset)
             for _ in range(random.choice([0, 0, 0, 1, 5])):
-                await watch.clk(phase_jump=int(random.random() < 0.02), lost_count=int(random.random() < 0.02),
-                                clear=int(random.random() < 0.05))
+                await watch.clk(
+                    phase_jump=int(random.random() < 0.02),
+                    lost_count=int(random.random() < 0.02),
+                    clear=int(random.random() < 0.05),
+                )
 
 
 def test_the_campaigns_tracker_is_that_of_the_house():
     from figures.faults import LOST, Tracker
     from tb.interpolate.fringe_tracker import FringeTracker
     from tb.position.count_phase_check import CountPhaseCheck
+
     source = np.random.default_rng(1)
     lanes = 20
     many, position = Tracker(lanes), [0] * lanes
-    each, checks = [FringeTracker() for _ in range(lanes)], [CountPhaseCheck() for _ in range(lanes)]
+    each, checks = (
+        [FringeTracker() for _ in range(lanes)],
+        [CountPhaseCheck() for _ in range(lanes)],
+    )
     phase, count = np.zeros(lanes, np.int64), np.zeros(lanes, np.int64)
     speed = source.integers(-16000, 16000, lanes)
     for _ in range(300):

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""status_inputs: bounce, both ends of the filter's time, what stands at reset, and random levels against the model."""
+"""status_inputs: bounce, both ends of the filter's time, what stands at reset, and random levels
+against the model.
+"""
+
 import random
 
 import cocotb
@@ -21,7 +24,7 @@ class Contacts:
     def __init__(self, dut):
         self.dut, self.w = dut, int(dut.W.value)
         self.model, self.time_ms = StatusInputs(CLK_HZ, self.w), 3
-        self.told = []                      # (input, "rose" or "fell")
+        self.told = []  # (input, "rose" or "fell")
 
     async def begin(self, *levels):
         await bench.start(self.dut, time_ms=self.time_ms, inputs=word(levels))
@@ -38,8 +41,15 @@ class Contacts:
             await FallingEdge(d.clk)
             level, rose, fell = self.model.step(self.time_ms, levels, rst)
             got = int(d.level.value), int(d.rose.value), int(d.fell.value)
-            assert got == (word(level), word(rose), word(fell)), f"{got} where the model has {level, rose, fell}"
-            self.told += [(i, name) for name, strobes in (("rose", rose), ("fell", fell)) for i, s in enumerate(strobes) if s]
+            assert got == (word(level), word(rose), word(fell)), (
+                f"{got} where the model has {level, rose, fell}"
+            )
+            self.told += [
+                (i, name)
+                for name, strobes in (("rose", rose), ("fell", fell))
+                for i, s in enumerate(strobes)
+                if s
+            ]
             there = clk + 1 if there is None and tuple(level) == levels else there
         return there
 
@@ -108,7 +118,9 @@ async def any_levels_match_the_model(dut):
     for _ in range(600):
         contacts.time_ms = random.choice([0, 1, 2, 5, contacts.time_ms, contacts.time_ms])
         levels = [random.getrandbits(1) for _ in range(contacts.w)]
-        await contacts.clk(*levels, n=random.choice([1, 3, MS, 6 * MS]), rst=int(random.random() < .01))
+        await contacts.clk(
+            *levels, n=random.choice([1, 3, MS, 6 * MS]), rst=int(random.random() < 0.01)
+        )
     assert {name for _, name in contacts.told} == {"rose", "fell"}
 
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""vector_length: known vectors, the stated bound over every 8-bit pair, the sectors, and the model clk by clk."""
+"""vector_length: known vectors, the stated bound over every 8-bit pair, the sectors, and the model
+clk by clk.
+"""
+
 import random
 
 import cocotb
@@ -41,7 +44,15 @@ async def drive(dut, samples):
 async def known_vectors_by_hand_latency_is_8(dut):
     await start(dut, valid=0, sin=0, cos=0)
     got = await drive(dut, [(0, 100), (100, 0), (0, -100), (-100, 0), (60, 80), (-60, -80), (0, 0)])
-    assert got == [(100, 0, 0, 0), (100, 1, 0, 0), (100, 2, 1, 0), (100, 3, 3, 0), (100, 0, 0, 3), (100, 2, 2, 3), (0, 0, 0, 0)]
+    assert got == [
+        (100, 0, 0, 0),
+        (100, 1, 0, 0),
+        (100, 2, 1, 0),
+        (100, 3, 3, 0),
+        (100, 0, 0, 3),
+        (100, 2, 2, 3),
+        (0, 0, 0, 0),
+    ]
 
 
 @cocotb.test()
@@ -66,7 +77,9 @@ async def any_samples_with_any_gaps_match_the_model(dut):
     await start(dut, valid=0, sin=0, cos=0)
     w = int(dut.W.value)
     draw = lambda: random.randrange(-(1 << w - 1), 1 << w - 1) >> random.randrange(w)
-    await drive(dut, [random.choice([None, (draw(), draw()), (draw(), draw())]) for _ in range(1500)])
+    await drive(
+        dut, [random.choice([None, (draw(), draw()), (draw(), draw())]) for _ in range(1500)]
+    )
 
 
 def test_every_pair_of_8_bits_is_within_the_stated_bound():
@@ -83,7 +96,9 @@ def test_any_pair_of_16_bits_is_within_the_stated_bound():
 
 def test_a_turn_passes_the_sectors_in_order():
     turn = np.radians(np.arange(0, 360, 0.25) + 0.1)
-    _, axis, quadrant, tilt = vector_length(np.rint(20000 * np.sin(turn)), np.rint(20000 * np.cos(turn)))
+    _, axis, quadrant, tilt = vector_length(
+        np.rint(20000 * np.sin(turn)), np.rint(20000 * np.cos(turn))
+    )
     assert (axis == np.floor(np.degrees(turn) / 90 + 0.5) % 4).all()
     assert (quadrant == np.floor(np.degrees(turn) / 90)).all()
     away = abs((np.degrees(turn) + 45) % 90 - 45)

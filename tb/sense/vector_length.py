@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rtl/sense/vector_length.sv makes of samples, in integers; of one or of arrays of them."""
+
 import numpy as np
 
-F = 4               # fraction bits
+F = 4  # fraction bits
 
 
 def vector_length(sin, cos):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/serial/address_filter.sv does, in integers: step(…) is one clk and returns (valid, data, command) after it."""
+"""What rtl/serial/address_filter.sv does, in integers: step(…) is one clk and returns (valid, data,
+command) after it.
+"""
 
 
 class AddressFilter:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/serial/break_detector.sv does, in integers: step(rx, rst) is one clk and returns found after it."""
+"""What rtl/serial/break_detector.sv does, in integers: step(rx, rst) is one clk and returns found
+after it.
+"""
 
 
 class BreakDetector:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/serial/crc32_stream.sv does: step(start, valid, data) is one clk and returns crc after it. zlib is the judge."""
+"""What rtl/serial/crc32_stream.sv does: step(start, valid, data) is one clk and returns crc after
+it. zlib is the judge.
+"""
+
 import zlib
 
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/serial/sync_fifo.sv does: step(push, word, pop) is one clk and returns (present, out, free, overrun) after it."""
+"""What rtl/serial/sync_fifo.sv does: step(push, word, pop) is one clk and returns (present, out,
+free, overrun) after it.
+"""
+
 from collections import deque
 
 
@@ -15,7 +18,14 @@ class SyncFifo:
         full = len(self.words) == self.depth
         if pop and self.present:
             self.words.popleft()
-        self.present = int(len(self.words) > 0)               # a word pushed in this clk is not at the output yet
+        self.present = int(
+            len(self.words) > 0
+        )  # a word pushed in this clk is not at the output yet
         if push and not full:
             self.words.append(word)
-        return self.present, self.words[0] if self.present else None, self.depth - len(self.words), int(bool(push and full))
+        return (
+            self.present,
+            self.words[0] if self.present else None,
+            self.depth - len(self.words),
+            int(bool(push and full)),
+        )

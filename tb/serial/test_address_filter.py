@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""address_filter: every word with the 9th bit at every address, the gate by hand, and random words against the model."""
+"""address_filter: every word with the 9th bit at every address, the gate by hand, and random words
+against the model.
+"""
+
 import random
 
 import cocotb
@@ -24,11 +27,11 @@ async def begin(dut, address):
 @cocotb.test()
 async def latency_is_1_and_the_gate_opens_and_shuts(dut):
     await begin(dut, 5)
-    assert (await clk(dut, 1, 0x42))[0] == 0                          # not called yet
+    assert (await clk(dut, 1, 0x42))[0] == 0  # not called yet
     assert await clk(dut, 1, 0x25, 1) == (1, 0x25, 1)
     assert await clk(dut, 1, 0x42) == (1, 0x42, 0)
     assert (await clk(dut, 0, 0x42))[0] == 0
-    assert (await clk(dut, 1, 0x26, 1))[0] == 0                       # node 6 is called
+    assert (await clk(dut, 1, 0x26, 1))[0] == 0  # node 6 is called
     assert (await clk(dut, 1, 0x42))[0] == 0
     assert await clk(dut, 1, 0x15, 1) == (1, 0x15, 1)
 
@@ -40,7 +43,9 @@ async def just_two_of_all_commands_and_the_one_for_all_open_the_gate_of_a_node(d
         passed = []
         for data in range(256):
             command = (await clk(dut, 1, data, 1))[0]
-            assert (await clk(dut, 1, ~data & 255))[0] == command     # the word after it passes or not with it
+            assert (await clk(dut, 1, ~data & 255))[
+                0
+            ] == command  # the word after it passes or not with it
             passed += [data] * command
         assert passed == sorted({0x10 | address, 0x20 | address, 0x20})
 
@@ -59,11 +64,19 @@ async def any_word_matches_the_model(dut):
         await begin(dut, address)
         model = AddressFilter()
         for n in range(1500):
-            likely = random.choice([0x10, 0x20, 0x30, 0x00]) | random.choice([address, 0, random.getrandbits(4)])
-            word = random.getrandbits(1), random.choice([likely, random.getrandbits(8)]), int(random.random() < 0.3)
+            likely = random.choice([0x10, 0x20, 0x30, 0x00]) | random.choice(
+                [address, 0, random.getrandbits(4)]
+            )
+            word = (
+                random.getrandbits(1),
+                random.choice([likely, random.getrandbits(8)]),
+                int(random.random() < 0.3),
+            )
             rst = int(random.random() < 0.01)
             got, want = await clk(dut, *word, rst), model.step(address, *word, rst)
-            assert got[0] == want[0] and (not got[0] or got == want), f"clk {n}: (valid, data, command) is {got}, the model has {want}"
+            assert got[0] == want[0] and (not got[0] or got == want), (
+                f"clk {n}: (valid, data, command) is {got}, the model has {want}"
+            )
 
 
 def test_address_filter():

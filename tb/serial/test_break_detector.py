@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """break_detector: to the clk, characters that are none, once a break, and noise against the model."""
+
 import random
 
 import cocotb
@@ -42,7 +43,9 @@ async def a_break_is_found_to_the_clk_and_once(dut):
 async def a_low_that_is_a_clk_shorter_is_none(dut):
     detector = await Detector(dut).begin()
     for _ in range(5):
-        assert not any([await detector.clk(0) for _ in range(LONGEST - 1)] + [await detector.clk(1)])
+        assert not any(
+            [await detector.clk(0) for _ in range(LONGEST - 1)] + [await detector.clk(1)]
+        )
 
 
 @cocotb.test()

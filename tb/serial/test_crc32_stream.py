@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""crc32_stream: the check value of the catalogue, start in every position, and random bytes against zlib in every clk."""
+"""crc32_stream: the check value of the catalogue, start in every position, and random bytes against
+zlib in every clk.
+"""
+
 import random
 import zlib
 
@@ -28,8 +31,8 @@ async def start_begins_anew_alone_or_with_the_first_byte(dut):
     await start(dut, start=0, valid=0, data=0)
     await clk(dut, valid=1, data=0x55)
     assert await clk(dut, start=1) == 0
-    assert await clk(dut, valid=1, data=0xA5) == zlib.crc32(b"\xA5")
-    assert await clk(dut, start=1, valid=1, data=0x5A) == zlib.crc32(b"\x5A")
+    assert await clk(dut, valid=1, data=0xA5) == zlib.crc32(b"\xa5")
+    assert await clk(dut, start=1, valid=1, data=0x5A) == zlib.crc32(b"\x5a")
     assert await clk(dut, rst=1, valid=1, data=0x5A) == 0
 
 
@@ -40,7 +43,12 @@ async def every_byte_in_every_clk_is_as_zlib_has_it(dut):
     for data in range(256):
         assert await clk(dut, 1, 1, data) == model.step(1, 1, data), f"byte {data:#04x}"
     for n in range(3000):
-        word = int(random.random() < 0.02), random.getrandbits(1), random.getrandbits(8), int(random.random() < 0.01)
+        word = (
+            int(random.random() < 0.02),
+            random.getrandbits(1),
+            random.getrandbits(8),
+            int(random.random() < 0.01),
+        )
         assert await clk(dut, *word) == model.step(*word), f"clk {n}"
 
 

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""frame_check behind the address filter: whole frames, every flip of one or two bits, interruptions, lengths, and noise.
+"""frame_check behind the address filter: whole frames, every flip of one or two bits,
+interruptions, lengths, and noise.
 
 The filter is its model, which test_address_filter holds equal to the design in every clk."""
+
 import random
 import zlib
 from itertools import combinations
@@ -18,30 +20,60 @@ ERROR = "framing error"
 
 
 class Line:
-    """The words of the line through the filter into the design, with the model beside it in every clk."""
+    """The words of the line through the filter into the design, with the model beside it in every
+    clk.
+    """
 
     def __init__(self, dut):
-        self.dut, self.filter, self.model, self.clks, self.last = dut, AddressFilter(), FrameCheck(), 0, None
+        self.dut, self.filter, self.model, self.clks, self.last = (
+            dut,
+            AddressFilter(),
+            FrameCheck(),
+            0,
+            None,
+        )
 
     async def clk(self, valid=0, data=0, command=0, framing_error=0, rst=0):
         dut, inputs = self.dut, (valid, data, command, framing_error, rst)
         if inputs != self.last:
             self.last = inputs
-            (dut.valid_in.value, dut.data_in.value, dut.command_in.value, dut.framing_error.value, dut.rst.value) = inputs
+            (
+                dut.valid_in.value,
+                dut.data_in.value,
+                dut.command_in.value,
+                dut.framing_error.value,
+                dut.rst.value,
+            ) = inputs
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
         self.clks += 1
-        got = tuple(int(x.value) for x in (dut.valid, dut.data, dut.command, dut.good, dut.frame_good, dut.frame_bad, dut.sync))
+        got = tuple(
+            int(x.value)
+            for x in (
+                dut.valid,
+                dut.data,
+                dut.command,
+                dut.good,
+                dut.frame_good,
+                dut.frame_bad,
+                dut.sync,
+            )
+        )
         want = self.model.step(*inputs)
-        assert got[0] == want[0] and got[3:] == want[3:] and (not got[0] or got == want), \
+        assert got[0] == want[0] and got[3:] == want[3:] and (not got[0] or got == want), (
             f"clk {self.clks}: (valid, data, command, good, frame_good, frame_bad, sync) is {got}, the model has {want}"
+        )
         return got
 
     async def hear(self, words):
         """Returns the words that passed, and how many frames were good and bad."""
         passed, good, bad = [], 0, 0
         for word in words:
-            out = await (self.clk(framing_error=1) if word == ERROR else self.clk(*self.filter.step(NODE, 1, *word)))
+            out = await (
+                self.clk(framing_error=1)
+                if word == ERROR
+                else self.clk(*self.filter.step(NODE, 1, *word))
+            )
             passed += [out[1:4]] * out[0]
             good, bad = good + out[4], bad + out[5]
         return passed, good, bad
@@ -66,7 +98,10 @@ async def just_a_good_frame_for_all_nodes_is_a_mark(dut):
 
 def marked(words, good=1):
     """What a frame looks like when it has passed: good on its last word."""
-    return [(data, command, int(good and n == len(words) - 1)) for n, (data, command) in enumerate(words)]
+    return [
+        (data, command, int(good and n == len(words) - 1))
+        for n, (data, command) in enumerate(words)
+    ]
 
 
 @cocotb.test()
@@ -122,17 +157,27 @@ async def no_flip_of_one_or_two_bits_is_ever_good_and_the_next_frame_is(dut):
         bent = [word[0] | word[1] << 8 for word in words]
         for n, bit in flip:
             bent[n] ^= 1 << bit
-        assert (await line.hear([(b & 255, b >> 8) for b in bent]))[1] == 0, f"flipped (word, bit): {flip}"
+        assert (await line.hear([(b & 255, b >> 8) for b in bent]))[1] == 0, (
+            f"flipped (word, bit): {flip}"
+        )
         if len(flip) == 1 or k % 10 == 0:
-            assert (await line.hear(words))[1] == 1, f"the frame after the flipped (word, bit): {flip}"
+            assert (await line.hear(words))[1] == 1, (
+                f"the frame after the flipped (word, bit): {flip}"
+            )
 
 
 def with_remainder_off(words, bit):
-    """The words with a CRC that leaves a remainder with just this bit wrong. The remainder is linear in the flips of the four CRC
+    """The words with a CRC that leaves a remainder with just this bit wrong. The remainder is
+    linear in the flips of the four CRC
     bytes, so those flips are found by elimination."""
     data = bytes(word[0] for word in words)
-    remainder = lambda flips: zlib.crc32(data[:-4] + (int.from_bytes(data[-4:], "little") ^ flips).to_bytes(4, "little"))
-    base, rows = remainder(0), {}                           # rows: {highest bit of a change of the remainder: (change, flips)}
+    remainder = lambda flips: zlib.crc32(
+        data[:-4] + (int.from_bytes(data[-4:], "little") ^ flips).to_bytes(4, "little")
+    )
+    base, rows = (
+        remainder(0),
+        {},
+    )  # rows: {highest bit of a change of the remainder: (change, flips)}
     for n in range(32):
         change, flips = remainder(1 << n) ^ base, 1 << n
         while change.bit_length() in rows:
@@ -144,7 +189,9 @@ def with_remainder_off(words, bit):
         row = rows[change.bit_length()]
         change, flips = change ^ row[0], flips ^ row[1]
     assert remainder(flips) ^ base == 1 << bit
-    return words[:-4] + [(byte, 0) for byte in (int.from_bytes(data[-4:], "little") ^ flips).to_bytes(4, "little")]
+    return words[:-4] + [
+        (byte, 0) for byte in (int.from_bytes(data[-4:], "little") ^ flips).to_bytes(4, "little")
+    ]
 
 
 @cocotb.test()
@@ -162,10 +209,14 @@ async def an_interrupted_payload_is_bad_once_and_the_next_frame_is_good(dut):
     words = frame(0x25, [1, 2, 3, 4])
     for n in range(1, len(words)):
         assert await line.hear(words[:n]) == (marked(words[:n], 0), 0, 0)
-        assert await line.hear(words) == (marked(words), 1, 1)                    # by a command byte
-        assert (await line.hear([*words[:n], ERROR]))[1:] == (0, 1)               # by a lost character
-        assert await line.hear(words[n:]) == ([], 0, 0)                           # its rest is dropped
-        assert await line.hear([*words[:n], (0x15, 1)]) == (marked([*words[:n], (0x15, 1)], 0), 0, 1)
+        assert await line.hear(words) == (marked(words), 1, 1)  # by a command byte
+        assert (await line.hear([*words[:n], ERROR]))[1:] == (0, 1)  # by a lost character
+        assert await line.hear(words[n:]) == ([], 0, 0)  # its rest is dropped
+        assert await line.hear([*words[:n], (0x15, 1)]) == (
+            marked([*words[:n], (0x15, 1)], 0),
+            0,
+            1,
+        )
         assert await line.hear(words) == (marked(words), 1, 0)
 
 
@@ -189,7 +240,11 @@ async def frames_for_other_nodes_leave_no_trace(dut):
     line = await begin(dut)
     for address in range(1, 16):
         if address != NODE:
-            assert await line.hear([*frame(0x20 | address, [1, 2, 3]), (0x10 | address, 1)]) == ([], 0, 0)
+            assert await line.hear([*frame(0x20 | address, [1, 2, 3]), (0x10 | address, 1)]) == (
+                [],
+                0,
+                0,
+            )
     assert (await line.hear(frame(0x25, [1, 2, 3])))[1:] == (1, 0)
 
 
@@ -207,12 +262,20 @@ async def reset_in_mid_payload_forgets_it(dut):
 async def any_word_matches_the_model(dut):
     line = await begin(dut)
     for _ in range(150):
-        words = frame(random.choice([0x25, 0x25, 0x15, 0x24]), random.randbytes(random.choice([1, 2, 5, 64])))
+        words = frame(
+            random.choice([0x25, 0x25, 0x15, 0x24]), random.randbytes(random.choice([1, 2, 5, 64]))
+        )
         if random.getrandbits(1):
             words[random.randrange(len(words))] = (random.getrandbits(8), random.getrandbits(1))
-        for word in words[:random.choice([len(words), random.randrange(len(words) + 1)])]:
+        for word in words[: random.choice([len(words), random.randrange(len(words) + 1)])]:
             while random.random() < 0.1:
-                await line.clk(0, random.getrandbits(8), random.getrandbits(1), int(random.random() < 0.1), int(random.random() < 0.02))
+                await line.clk(
+                    0,
+                    random.getrandbits(8),
+                    random.getrandbits(1),
+                    int(random.random() < 0.1),
+                    int(random.random() < 0.02),
+                )
             await line.clk(*line.filter.step(NODE, 1, *word), int(random.random() < 0.01))
 
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""line: a frame in and a reply out through the register block, when the driver is on, who is cut off, what is counted."""
+"""line: a frame in and a reply out through the register block, when the driver is on, who is cut
+off, what is counted.
+"""
+
 import random
 
 import cocotb
@@ -11,7 +14,7 @@ from tb.serial.frame_check import frame
 from tb.serial.uart_rx import character
 
 CLK_HZ = 1_000_000
-BIT = 8                                                # clk
+BIT = 8  # clk
 ADDRESS = 5
 TIMEOUT_BITS = 1024
 REGISTERS = {}
@@ -22,10 +25,12 @@ for field in FIELDS:
 
 class Line:
     def __init__(self, dut):
-        self.dut, self.trace = dut, []                 # (driver_enable, tx) after each clk
+        self.dut, self.trace = dut, []  # (driver_enable, tx) after each clk
 
     async def begin(self):
-        await start(self.dut, address=ADDRESS, select=0, write=0, word=0, wdata=0, armed=0, rs485_rx=1)
+        await start(
+            self.dut, address=ADDRESS, select=0, write=0, word=0, wdata=0, armed=0, rs485_rx=1
+        )
         await self.clk()
         await self.clk()
         await self.write("bit_time", 16 * BIT)
@@ -48,8 +53,11 @@ class Line:
         await self.access(1, register, value)
 
     async def read(self, register):
-        word = (await self.access(0, register)).replace("X", "0")            # of an empty queue
-        got = {name: int(word, 2) >> f.low & (1 << f.width) - 1 for name, f in REGISTERS[register].items()}
+        word = (await self.access(0, register)).replace("X", "0")  # of an empty queue
+        got = {
+            name: int(word, 2) >> f.low & (1 << f.width) - 1
+            for name, f in REGISTERS[register].items()
+        }
         return got["value"] if list(got) == ["value"] else got
 
     async def levels(self, levels):
@@ -80,7 +88,9 @@ async def a_frame_comes_in_marked_good(dut):
     words = frame(0x20 | ADDRESS, b"\x01\x02\x03")
     await line.words(words)
     await line.levels([1] * 4)
-    assert await line.taken() == [(data, ninth, int(n == len(words) - 1)) for n, (data, ninth) in enumerate(words)]
+    assert await line.taken() == [
+        (data, ninth, int(n == len(words) - 1)) for n, (data, ninth) in enumerate(words)
+    ]
     assert await line.read("frames_good") == 1 and await line.read("frames_bad") == 0
 
 
@@ -115,12 +125,14 @@ async def what_a_node_says_itself_it_does_not_hear(dut):
 @cocotb.test()
 async def a_node_that_talks_for_too_long_is_cut_off_and_counted_and_may_speak_again_later(dut):
     line = await Line(dut).begin()
-    for _ in range(120):                               # 1320 bits
+    for _ in range(120):  # 1320 bits
         await line.write("transmit", 0x00)
     line.trace.clear()
     await line.levels([1] * 1500)
     driven = [place for place, (on, _) in enumerate(line.trace) if on]
-    assert TIMEOUT_BITS * BIT - 200 < len(driven) <= TIMEOUT_BITS * BIT and all(tx for on, tx in line.trace if not on)
+    assert TIMEOUT_BITS * BIT - 200 < len(driven) <= TIMEOUT_BITS * BIT and all(
+        tx for on, tx in line.trace if not on
+    )
     assert await line.read("transmit_timeouts") == 1
     line.trace.clear()
     await line.write("transmit", 0x55)
@@ -131,7 +143,7 @@ async def a_node_that_talks_for_too_long_is_cut_off_and_counted_and_may_speak_ag
 @cocotb.test()
 async def the_longest_reply_is_not_cut_off(dut):
     line = await Line(dut).begin()
-    for _ in range(70):                                # ready byte, length, 64 bytes, CRC-32
+    for _ in range(70):  # ready byte, length, 64 bytes, CRC-32
         await line.write("transmit", 0x00)
     await line.until_silent()
     assert await line.read("transmit_timeouts") == 0
@@ -144,7 +156,11 @@ async def a_break_is_counted_and_the_next_frame_is_good(dut):
     for _ in range(2 * CLK_HZ // 1000 + 10):
         await line.clk(0)
     await line.levels([1] * 12)
-    assert await line.read("breaks") == 1 and await line.read("framing_errors") == 1 and await line.read("frames_bad") == 1
+    assert (
+        await line.read("breaks") == 1
+        and await line.read("framing_errors") == 1
+        and await line.read("frames_bad") == 1
+    )
     await line.words(frame(0x20 | ADDRESS, b"\x02"))
     await line.levels([1] * 4)
     assert await line.read("frames_good") == 1

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""sync_fifo: order, both ends of its range, the latency, overruns, and random traffic against the model."""
+"""sync_fifo: order, both ends of its range, the latency, overruns, and random traffic against the
+model.
+"""
+
 import random
 
 import cocotb
@@ -14,7 +17,7 @@ class Queue:
     def __init__(self, dut):
         self.dut, self.w, self.depth = dut, int(dut.W.value), int(dut.DEPTH.value)
         self.model = SyncFifo(self.depth)
-        self.input = getattr(dut, "in")               # a keyword of Python
+        self.input = getattr(dut, "in")  # a keyword of Python
 
     async def clk(self, push=0, word=0, pop=0, rst=0):
         dut = self.dut
@@ -22,7 +25,12 @@ class Queue:
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
         present = int(dut.present.value)
-        got = present, int(dut.out.value) if present else None, int(dut.free.value), int(dut.overrun.value)
+        got = (
+            present,
+            int(dut.out.value) if present else None,
+            int(dut.free.value),
+            int(dut.overrun.value),
+        )
         want = self.model.step(push, word, pop, rst)
         assert got == want, f"(present, out, free, overrun) is {got}, the model has {want}"
         return got
@@ -60,9 +68,11 @@ async def a_word_too_many_is_dropped_and_reported_and_the_others_stay(dut):
     for n in range(queue.depth):
         assert (await queue.clk(push=1, word=n % 4))[2:] == (queue.depth - 1 - n, 0)
     assert (await queue.clk(push=1, word=3))[2:] == (0, 1)
-    assert (await queue.clk(push=1, word=3, pop=1))[2:] == (1, 1)     # full when it came
+    assert (await queue.clk(push=1, word=3, pop=1))[2:] == (1, 1)  # full when it came
     assert (await queue.clk())[2:] == (1, 0)
-    assert [(await queue.clk(pop=1))[1] for _ in range(queue.depth - 1)] == [n % 4 for n in range(2, queue.depth)] + [None]
+    assert [(await queue.clk(pop=1))[1] for _ in range(queue.depth - 1)] == [
+        n % 4 for n in range(2, queue.depth)
+    ] + [None]
 
 
 @cocotb.test()
@@ -80,7 +90,10 @@ async def one_push_and_one_pop_a_clk(dut):
     await queue.clk(push=1, word=0)
     await queue.clk(push=1, word=1)
     for n in range(2, 3 * queue.depth):
-        assert (await queue.clk(push=1, word=n % (1 << queue.w), pop=1))[:2] == (1, (n - 1) % (1 << queue.w))
+        assert (await queue.clk(push=1, word=n % (1 << queue.w), pop=1))[:2] == (
+            1,
+            (n - 1) % (1 << queue.w),
+        )
 
 
 @cocotb.test()
@@ -99,7 +112,12 @@ async def any_traffic_matches_the_model(dut):
         fill, drain = random.random(), random.random()
         for _ in range(100):
             rst = int(random.random() < 0.001)
-            await queue.clk(int(random.random() < fill), random.getrandbits(queue.w), int(random.random() < drain), rst)
+            await queue.clk(
+                int(random.random() < fill),
+                random.getrandbits(queue.w),
+                int(random.random() < drain),
+                rst,
+            )
 
 
 @pytest.mark.parametrize("w, depth", [(3, 4), (11, 64)])

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""transmit_timeout: to the clk, at both ends of the bit time, how long it lasts, and noise against the model."""
+"""transmit_timeout: to the clk, at both ends of the bit time, how long it lasts, and noise against
+the model.
+"""
+
 import random
 
 import cocotb
@@ -21,7 +24,11 @@ class Bench:
         return self
 
     async def clk(self, requested, bit_time, rst=0):
-        self.dut.requested.value, self.dut.bit_time.value, self.dut.rst.value = requested, bit_time, rst
+        self.dut.requested.value, self.dut.bit_time.value, self.dut.rst.value = (
+            requested,
+            bit_time,
+            rst,
+        )
         await FallingEdge(self.dut.clk)
         got = int(self.dut.driver_enable.value), int(self.dut.expired.value)
         assert got == self.model.step(requested, bit_time, rst)
@@ -33,8 +40,13 @@ async def it_cuts_off_after_its_bit_times_to_the_clk_and_once(dut):
     timeout = await Bench(dut).begin()
     for bit_time, clk in ((0, 8), (127, 8), (128, 8), (160, 10)):
         seen = [await timeout.clk(1, bit_time) for _ in range(2 * timeout.bits * clk)]
-        assert [on for on, _ in seen].index(0) == timeout.bits * clk and seen.index((0, 1)) == timeout.bits * clk
-        assert sum(on for on, _ in seen) == timeout.bits * clk and sum(expired for _, expired in seen) == 1
+        assert [on for on, _ in seen].index(0) == timeout.bits * clk and seen.index(
+            (0, 1)
+        ) == timeout.bits * clk
+        assert (
+            sum(on for on, _ in seen) == timeout.bits * clk
+            and sum(expired for _, expired in seen) == 1
+        )
         assert await timeout.clk(0, bit_time) == (0, 0)
         assert await timeout.clk(1, bit_time) == (1, 0)
         await timeout.clk(0, bit_time)

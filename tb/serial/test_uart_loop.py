@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""uart_tx and uart_rx without the 9th bit (8N1): by hand, every byte, sigrok, noise against both models."""
+"""uart_tx and uart_rx without the 9th bit (8N1): by hand, every byte, sigrok, noise against both
+models.
+"""
+
 import random
 import re
 import shutil
@@ -32,12 +35,20 @@ class Loop:
         """One clk; rx None: the transmitter's own wire. Returns whether the byte was taken."""
         d, taken = self.dut, data is not None and self.sender.ready()
         rx = int(d.tx.value) if rx is None else rx
-        d.bit_time.value, d.valid.value, d.data.value, d.rx.value = bit_time, data is not None, data or 0, rx
+        d.bit_time.value, d.valid.value, d.data.value, d.rx.value = (
+            bit_time,
+            data is not None,
+            data or 0,
+            rx,
+        )
         await FallingEdge(d.clk)
         got = int(d.ready.value), int(d.tx.value), int(d.driver_enable.value)
         assert got == self.sender.step(data is not None, data or 0, 0, bit_time)
         valid, byte, ninth, *flags = self.listener.step(rx, bit_time)
-        assert [int(p.value) for p in (d.received, d.framing_error, d.start_glitch, d.busy)] == [valid, *flags]
+        assert [int(p.value) for p in (d.received, d.framing_error, d.start_glitch, d.busy)] == [
+            valid,
+            *flags,
+        ]
         if valid:
             assert (int(d.character.value), int(d.ninth.value)) == (byte, ninth) == (byte, 0)
             self.heard.append(byte)
@@ -85,7 +96,10 @@ async def bit_times_may_differ_by_4_percent(dut):
     for percent in (96, 104):
         loop = await Loop(dut).begin()
         sent = [0x00, 0xFF, 0x80, 0x01]
-        for level in line([1, *(b for byte in sent for b in character(byte, None)), 1, 1], Fraction(16 * percent, 100)):
+        for level in line(
+            [1, *(b for byte in sent for b in character(byte, None)), 1, 1],
+            Fraction(16 * percent, 100),
+        ):
             await loop.clk(256, rx=level)
         assert loop.heard == sent
 
@@ -106,10 +120,26 @@ async def sigrok_reads_8n1(dut):
     sent = [0xA5, 0x00, 0xFF, *(random.getrandbits(8) for _ in range(20))]
     await loop.send(sent, 555)
     Path("loop.bin").write_bytes(loop.wave)
-    out = subprocess.run(["sigrok-cli", "-i", "loop.bin", "-I", "binary:numchannels=1:samplerate=4000000",
-                          "-P", "uart:rx=0:baudrate=115200", "-A", "uart=rx-data:rx-warnings"],
-                         capture_output=True, text=True, check=True, timeout=60)
-    assert re.findall(r"^uart-1: (.*)$", out.stdout, re.MULTILINE) == [f"{byte:02X}" for byte in sent]
+    out = subprocess.run(
+        [
+            "sigrok-cli",
+            "-i",
+            "loop.bin",
+            "-I",
+            "binary:numchannels=1:samplerate=4000000",
+            "-P",
+            "uart:rx=0:baudrate=115200",
+            "-A",
+            "uart=rx-data:rx-warnings",
+        ],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    )
+    assert re.findall(r"^uart-1: (.*)$", out.stdout, re.MULTILINE) == [
+        f"{byte:02X}" for byte in sent
+    ]
 
 
 def test_character_loop():

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""uart_rx: characters by hand, the tolerance of the bit time both ways, glitches, breaks, and noise against the model."""
+"""uart_rx: characters by hand, the tolerance of the bit time both ways, glitches, breaks, and noise
+against the model.
+"""
+
 import random
 from fractions import Fraction
 
@@ -9,11 +12,13 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import run, start
 from tb.serial.uart_rx import UartRx, character, line
 
-BIT_TIMES = [128, 133, 256, 256 + 15, 555]      # 1/16 clk: 8 clk, …, 115 200 baud at 4 MHz
+BIT_TIMES = [128, 133, 256, 256 + 15, 555]  # 1/16 clk: 8 clk, …, 115 200 baud at 4 MHz
 
 
 async def listen(dut, levels, bit_time, model=None):
-    """Put the levels on rx, one a clk; with the model beside the design. Returns characters, framing errors, glitches."""
+    """Put the levels on rx, one a clk; with the model beside the design. Returns characters,
+    framing errors, glitches.
+    """
     got, errors, glitches = [], 0, 0
     dut.bit_time.value = bit_time
     last = None
@@ -22,14 +27,21 @@ async def listen(dut, levels, bit_time, model=None):
             dut.rx.value = last = level
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
-        flags = int(dut.valid.value), int(dut.framing_error.value), int(dut.start_glitch.value), int(dut.busy.value)
+        flags = (
+            int(dut.valid.value),
+            int(dut.framing_error.value),
+            int(dut.start_glitch.value),
+            int(dut.busy.value),
+        )
         if flags[0]:
             got.append((int(dut.data.value), int(dut.ninth.value)))
         errors, glitches = errors + flags[1], glitches + flags[2]
         if model:
             valid, data, ninth, *rest = model.step(level, bit_time)
             want = valid, *rest
-            assert flags == want, f"clk {n}: (valid, framing_error, start_glitch, busy) is {flags}, the model has {want}"
+            assert flags == want, (
+                f"clk {n}: (valid, framing_error, start_glitch, busy) is {flags}, the model has {want}"
+            )
             if valid:
                 assert got[-1] == (data, ninth), f"clk {n}"
     return got, errors, glitches
@@ -55,8 +67,17 @@ def bits_of(characters):
 @cocotb.test()
 async def one_character_by_hand(dut):
     await quiet(dut)
-    start_bit, data, ninth, stop = [0], [0, 1, 0, 0, 1, 0, 0, 0], [1], [1]          # 0x12: a command for node 2
-    assert await listen(dut, line([1, *start_bit, *data, *ninth, *stop, 1], 16), 256) == ([(0x12, 1)], 0, 0)
+    start_bit, data, ninth, stop = (
+        [0],
+        [0, 1, 0, 0, 1, 0, 0, 0],
+        [1],
+        [1],
+    )  # 0x12: a command for node 2
+    assert await listen(dut, line([1, *start_bit, *data, *ninth, *stop, 1], 16), 256) == (
+        [(0x12, 1)],
+        0,
+        0,
+    )
 
 
 @cocotb.test()
@@ -88,27 +109,41 @@ async def bit_times_may_differ_by_4_percent_from_16_clk_up(dut):
             for _ in range(2):
                 sent = some(4)
                 bits = [*bits_of(sent), 1]
-                levels = line(bits, Fraction(bit_time, 16) * (100 + percent) / 100, Fraction(random.randrange(100), 100))
+                levels = line(
+                    bits,
+                    Fraction(bit_time, 16) * (100 + percent) / 100,
+                    Fraction(random.randrange(100), 100),
+                )
                 assert await listen(dut, levels, bit_time) == (sent, 0, 0), (bit_time, percent)
 
 
 @cocotb.test()
 async def the_tolerance_ends_above_4_percent_either_way(dut):
-    """Measured on the model, which is equal in every bit: the widest mismatch at which nothing was ever misread."""
+    """Measured on the model, which is equal in every bit: the widest mismatch at which nothing was
+    ever misread.
+    """
 
     def clean(bit_time, permille):
         for trial in range(12):
             model, sent = UartRx(), [(0x00, 0), (0xFF, 1), (0x80, 0)] if trial < 8 else some(3)
-            levels = line([1, *bits_of(sent), 1, 1], Fraction(bit_time, 16) * (1000 + permille) / 1000, Fraction(trial % 8, 8))
+            levels = line(
+                [1, *bits_of(sent), 1, 1],
+                Fraction(bit_time, 16) * (1000 + permille) / 1000,
+                Fraction(trial % 8, 8),
+            )
             out = [model.step(level, bit_time) for level in levels]
             if [o[1:3] for o in out if o[0]] != sent:
                 return False
         return True
 
     await quiet(dut)
-    for bit_time in (256, 256 + 8, 555):                    # 16, 16.5 and 34.7 clk a bit
-        slow, fast = (next(p for p in range(38, 99, 2) if not clean(bit_time, sign * p)) for sign in (1, -1))
-        dut._log.info(f"bit_time {bit_time / 16} clk: first error at +{slow / 10} % and -{fast / 10} % of the sender's bit")
+    for bit_time in (256, 256 + 8, 555):  # 16, 16.5 and 34.7 clk a bit
+        slow, fast = (
+            next(p for p in range(38, 99, 2) if not clean(bit_time, sign * p)) for sign in (1, -1)
+        )
+        dut._log.info(
+            f"bit_time {bit_time / 16} clk: first error at +{slow / 10} % and -{fast / 10} % of the sender's bit"
+        )
         assert 40 < slow <= 56 and 40 < fast <= 56
 
 
@@ -125,7 +160,9 @@ async def a_glitch_in_place_of_a_start_bit_is_reported_and_nothing_else(dut):
 
 @cocotb.test()
 async def one_wrong_sample_of_three_changes_nothing(dut):
-    """A spike of one clk at any place of a character, up to the samples of its stop bit, is outvoted."""
+    """A spike of one clk at any place of a character, up to the samples of its stop bit, is
+    outvoted.
+    """
     for bit_time, pace in ((128, 1), (256, 3)):
         await quiet(dut, bit_time)
         sent = [(0x96, 1)]
@@ -175,7 +212,7 @@ async def the_longest_bit_is_timed_as_any_other(dut):
     await quiet(dut)
     longest = (1 << 20) - 1
     model = UartRx()
-    levels = [1] * 4 + [0] * (longest // 32 - longest // 256 - 8)      # half a start bit
+    levels = [1] * 4 + [0] * (longest // 32 - longest // 256 - 8)  # half a start bit
     await quiet(dut, longest)
     dut.rx.value = 0
     for _ in range(40):
@@ -193,7 +230,10 @@ async def noise_matches_the_model(dut):
         for _ in range(4):
             model.step(1, bit_time)
         while len(levels) < 4000:
-            kind, bit_clk = random.randrange(4), Fraction(bit_time, 16) * random.randrange(930, 1070) / 1000
+            kind, bit_clk = (
+                random.randrange(4),
+                Fraction(bit_time, 16) * random.randrange(930, 1070) / 1000,
+            )
             if kind < 2:
                 levels += line(bits_of(some(2)), bit_clk)
             elif kind == 2:

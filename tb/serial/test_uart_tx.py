@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""uart_tx: the waveform by hand, exact bit edges, the line driver, gaps, our receiver and sigrok as listeners."""
+"""uart_tx: the waveform by hand, exact bit edges, the line driver, gaps, our receiver and sigrok as
+listeners.
+"""
+
 import random
 import re
 import shutil
@@ -13,7 +16,7 @@ from tb.bench import run, start
 from tb.serial.uart_rx import UartRx, character
 from tb.serial.uart_tx import UartTx
 
-BIT_TIMES = [128, 133, 256, 271, 555]           # 1/16 clk: 8 clk, …, 115 200 baud at 4 MHz
+BIT_TIMES = [128, 133, 256, 271, 555]  # 1/16 clk: 8 clk, …, 115 200 baud at 4 MHz
 
 
 async def begin(dut, bit_time):
@@ -25,7 +28,9 @@ async def begin(dut, bit_time):
 
 
 async def send(dut, queue, bit_time, clks=None, model=None, gaps=False):
-    """Offer the characters; (tx, driver_enable) of every clk until the line is free again, or for `clks`."""
+    """Offer the characters; (tx, driver_enable) of every clk until the line is free again, or for
+    `clks`.
+    """
     queue, waves, last, wait, taken = list(queue), [], None, 0, 0
     dut.bit_time.value = bit_time
     while len(waves) != clks and (clks or queue or not waves or waves[-1][1]):
@@ -44,7 +49,9 @@ async def send(dut, queue, bit_time, clks=None, model=None, gaps=False):
         assert int(dut.busy.value) == enable
         if model:
             got, want = (ready, tx, enable), model.step(*offer, bit_time)
-            assert got == want, f"clk {len(waves)}: (ready, tx, driver_enable) is {got}, the model has {want}"
+            assert got == want, (
+                f"clk {len(waves)}: (ready, tx, driver_enable) is {got}, the model has {want}"
+            )
     return waves
 
 
@@ -52,7 +59,11 @@ def lengths(levels):
     """Runs of equal levels as (level, clk)."""
     runs = []
     for level in levels:
-        runs = [*runs[:-1], (level, runs[-1][1] + 1)] if runs and runs[-1][0] == level else [*runs, (level, 1)]
+        runs = (
+            [*runs[:-1], (level, runs[-1][1] + 1)]
+            if runs and runs[-1][0] == level
+            else [*runs, (level, 1)]
+        )
     return runs
 
 
@@ -60,8 +71,10 @@ def lengths(levels):
 async def one_character_by_hand(dut):
     await begin(dut, 256)
     waves = await send(dut, [(0x12, 1)], 256)
-    bits = [1] + [0] + [0, 1, 0, 0, 1, 0, 0, 0] + [1] + [1]          # lead, start, 0x12 LSB first, 9th, stop
-    assert [tx for tx, enable in waves if enable][:16 * 12] == [b for b in bits for _ in range(16)]
+    bits = (
+        [1] + [0] + [0, 1, 0, 0, 1, 0, 0, 0] + [1] + [1]
+    )  # lead, start, 0x12 LSB first, 9th, stop
+    assert [tx for tx, enable in waves if enable][: 16 * 12] == [b for b in bits for _ in range(16)]
 
 
 @cocotb.test()
@@ -90,10 +103,18 @@ async def characters_follow_without_a_gap_and_edges_never_drift(dut):
         waves = [tx for tx, enable in await send(dut, sent, bit_time) if enable]
         levels = [b for c in sent for b in character(*c)]
         lead = waves.index(0)
-        # the start bit began at a time between lead and lead + 15/16 clk; every later edge must agree with one such time
-        assert any(all(waves[lead + (n * bit_time + part) // 16] == level for n, level in enumerate(levels)) and
-                   all(waves[lead + ((n + 1) * bit_time + part) // 16 - 1] == level for n, level in enumerate(levels))
-                   for part in range(16))
+        # the start bit began at a time between lead and lead + 15/16 clk; every later edge must
+        # agree with one such time
+        assert any(
+            all(
+                waves[lead + (n * bit_time + part) // 16] == level for n, level in enumerate(levels)
+            )
+            and all(
+                waves[lead + ((n + 1) * bit_time + part) // 16 - 1] == level
+                for n, level in enumerate(levels)
+            )
+            for part in range(16)
+        )
 
 
 @cocotb.test()
@@ -120,14 +141,16 @@ async def reset_lets_go_of_the_line(dut):
     assert (int(dut.tx.value), int(dut.driver_enable.value)) == (1, 0)
     dut.rst.value = 0
     waves = await send(dut, [(0x5A, 0)], 256)
-    assert waves[0] == (1, 1) and [tx for tx, _ in waves[1 + 16::16]][:11] == character(0x5A, 0)
+    assert waves[0] == (1, 1) and [tx for tx, _ in waves[1 + 16 :: 16]][:11] == character(0x5A, 0)
 
 
 @cocotb.test()
 async def less_than_8_clk_a_bit_counts_as_8_and_the_longest_bit_is_whole(dut):
     for bit_time in (0, 127):
         await begin(dut, bit_time)
-        assert lengths(tx for tx, _ in await send(dut, [(0x55, 0)], bit_time))[1:9] == [(n & 1, 8) for n in range(8)]
+        assert lengths(tx for tx, _ in await send(dut, [(0x55, 0)], bit_time))[1:9] == [
+            (n & 1, 8) for n in range(8)
+        ]
     await begin(dut, (1 << 20) - 1)
     assert set(await send(dut, [(0, 0)], (1 << 20) - 1, clks=300)) == {(1, 1)}
 
@@ -154,23 +177,43 @@ def sigrok(waves, baud, options):
     with open("transmitter.bin", "wb") as f:
         f.write(bytes(waves))
     rate = 4_000_000
-    out = subprocess.run(["sigrok-cli", "-i", "transmitter.bin", "-I", f"binary:numchannels=1:samplerate={rate}",
-                          "-P", f"uart:rx=0:baudrate={baud}:{options}", "-A", "uart=rx-data:rx-parity-err:rx-warnings"],
-                         capture_output=True, text=True, check=True, timeout=60)
+    out = subprocess.run(
+        [
+            "sigrok-cli",
+            "-i",
+            "transmitter.bin",
+            "-I",
+            f"binary:numchannels=1:samplerate={rate}",
+            "-P",
+            f"uart:rx=0:baudrate={baud}:{options}",
+            "-A",
+            "uart=rx-data:rx-parity-err:rx-warnings",
+        ],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    )
     return re.findall(r"^uart-1: (.*)$", out.stdout, re.MULTILINE)
 
 
 @cocotb.test(skip=not shutil.which("sigrok-cli"))
 async def sigrok_reads_nine_bits_and_the_ninth_as_odd_parity(dut):
-    """115 200 baud at 4 MHz. Command bytes of S0 are made so that odd parity is 1: a PC without 9-bit mode can send them."""
+    """115 200 baud at 4 MHz. Command bytes of S0 are made so that odd parity is 1: a PC without
+    9-bit mode can send them.
+    """
     await begin(dut, 555)
-    sent = [(0x00, 0), (0xFF, 1), (0x55, 1), (0xAA, 0)] + [(random.getrandbits(8), random.getrandbits(1)) for _ in range(20)]
+    sent = [(0x00, 0), (0xFF, 1), (0x55, 1), (0xAA, 0)] + [
+        (random.getrandbits(8), random.getrandbits(1)) for _ in range(20)
+    ]
     heard = sigrok([tx for tx, _ in await send(dut, sent, 555)], 115200, "data_bits=9:parity=none")
     assert heard == [f"{ninth << 8 | data:03X}" for data, ninth in sent]
     commands = [d54 << 4 | address for d54 in (1, 2) for address in (1, 2, 4, 7, 8, 11, 13, 14)]
     waves = [tx for tx, _ in await send(dut, [(c, 1) for c in commands], 555)]
     assert sigrok(waves, 115200, "data_bits=8:parity=odd") == [f"{c:02X}" for c in commands]
-    waves = [tx for tx, _ in await send(dut, [(0x13, 1)], 555)]                  # 3 has an even number of ones: no odd parity
+    waves = [
+        tx for tx, _ in await send(dut, [(0x13, 1)], 555)
+    ]  # 3 has an even number of ones: no odd parity
     assert "13" in (heard := sigrok(waves, 115200, "data_bits=8:parity=odd")) and len(heard) == 2
 
 

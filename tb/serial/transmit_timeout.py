@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/serial/transmit_timeout.sv does, in integers: step(requested, bit_time, rst) is one clk and returns (driver_enable, expired) after it,
+"""What rtl/serial/transmit_timeout.sv does, in integers: step(requested, bit_time, rst) is one clk
+and returns (driver_enable, expired) after it,
 requested unchanged."""
 
 

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rtl/serial/uart_rx.sv does, in integers, and the line it listens to.
 
-UartRx.step(rx, bit_time) is one clk and returns (valid, data, ninth, framing_error, start_glitch, busy) after it."""
+UartRx.step(rx, bit_time) is one clk and returns (valid, data, ninth, framing_error, start_glitch,
+busy) after it."""
+
 from fractions import Fraction
 
 
 class UartRx:
     def __init__(self, ninth=1):
-        self.last = 9 + ninth                       # place of the stop bit
+        self.last = 9 + ninth  # place of the stop bit
         self.state, self.left, self.bits, self.samples = "release", 0, [], []
         self.data = self.ninth = None
 
@@ -27,13 +29,21 @@ class UartRx:
         else:
             self.samples.append(rx)
             self.left += (spread if len(self.samples) < 3 else whole - 2 * spread) - 16
-            if len(self.samples) == 3 or len(self.bits) == self.last and self.samples in ([0, 0], [1, 1]):
+            if (
+                len(self.samples) == 3
+                or len(self.bits) == self.last
+                and self.samples in ([0, 0], [1, 1])
+            ):
                 level, self.samples = int(sum(self.samples) >= 2), []
                 self.bits.append(level)
                 if len(self.bits) == 1 and level:
                     start_glitch, self.state = 1, "idle"
                 elif len(self.bits) == self.last + 1:
-                    valid, framing_error, self.state = level, 1 - level, "idle" if level else "release"
+                    valid, framing_error, self.state = (
+                        level,
+                        1 - level,
+                        "idle" if level else "release",
+                    )
                     self.data = sum(b << n for n, b in enumerate(self.bits[1:9]))
                     self.ninth = self.bits[9] if self.last == 10 else 0
         if rst:
@@ -48,7 +58,9 @@ def character(data, ninth, stop=1):
 
 
 def line(bits, bit_clk, phase=0):
-    """Levels at each clk of `bits`, each `bit_clk` clk long (a fraction will do), the first edge at clk `phase` in [0, 1)."""
+    """Levels at each clk of `bits`, each `bit_clk` clk long (a fraction will do), the first edge at
+    clk `phase` in [0, 1).
+    """
     bit_clk, phase = Fraction(bit_clk), Fraction(phase)
     levels, n = [], 0
     for k, bit in enumerate(bits):

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rtl/serial/uart_tx.sv does, in integers.
 
-step(valid, data, ninth, bit_time) is one clk and returns (ready, tx, driver_enable) after it; `ready` is also the answer to
-the `valid` of the next clk. Times are exact sixteenths of a clk: an edge stands at the clk at or before its time."""
+step(valid, data, ninth, bit_time) is one clk and returns (ready, tx, driver_enable) after it;
+`ready` is also the answer to
+the `valid` of the next clk. Times are exact sixteenths of a clk: an edge stands at the clk at or
+before its time."""
 
 
 class UartTx:
@@ -12,7 +14,14 @@ class UartTx:
 
     def ready(self):
         ends = self.left < 16
-        return int(self.state == "lead" and ends or self.state == "send" and ends and len(self.bits) == 1 or self.state == "trail")
+        return int(
+            self.state == "lead"
+            and ends
+            or self.state == "send"
+            and ends
+            and len(self.bits) == 1
+            or self.state == "trail"
+        )
 
     def step(self, valid, data, ninth, bit_time, rst=0):
         whole, ends = max(bit_time, 128), self.left < 16

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The boards of constraints/: each port of its top has one pin of its own, and the top fits the node as it is."""
+"""The boards of constraints/: each port of its top has one pin of its own, and the top fits the
+node as it is.
+"""
+
 import re
 import subprocess
 import sys
@@ -15,8 +18,14 @@ BOARDS = sorted(path.parent for path in (ROOT / "constraints").glob("*/board.mk"
 
 def ports(top):
     """Names of the pads: a vector has one for each bit."""
-    declared = re.findall(r"(?:input\s+wire|output\s+logic)\s+(?:\[(\d+):0\])?\s*(\w+)", top.read_text())
-    return [name if high == "" else f"{name}[{n}]" for high, name in declared for n in range(int(high or 0) + 1)]
+    declared = re.findall(
+        r"(?:input\s+wire|output\s+logic)\s+(?:\[(\d+):0\])?\s*(\w+)", top.read_text()
+    )
+    return [
+        name if high == "" else f"{name}[{n}]"
+        for high, name in declared
+        for n in range(int(high or 0) + 1)
+    ]
 
 
 @pytest.mark.parametrize("board", BOARDS, ids=lambda board: board.name)
@@ -31,8 +40,16 @@ def test_each_port_has_a_pin_of_its_own(board):
 @pytest.mark.parametrize("board", BOARDS, ids=lambda board: board.name)
 def test_the_top_fits_the_node(board):
     core = Path(find_spec("pythondata_cpu_picorv32").submodule_search_locations[0]) / "verilog"
-    rooms = " ".join(f"-libdir {room}" for room in sorted({path.parent for path in (ROOT / "rtl").rglob("*.sv")}) + [core])
+    rooms = " ".join(
+        f"-libdir {room}"
+        for room in sorted({path.parent for path in (ROOT / "rtl").rglob("*.sv")}) + [core]
+    )
     passes = f"read_verilog -lib +/ecp5/cells_bb.v; read_verilog -sv {board / 'top.sv'}; hierarchy -check -top top {rooms}"
-    done = subprocess.run([sys.executable, ROOT / "tools" / "yosys.py", passes], cwd=ROOT, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, ROOT / "tools" / "yosys.py", passes],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stdout[-400:]
     assert not re.search(r"not connected|Resizing cell port top", done.stdout)

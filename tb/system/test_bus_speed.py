@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two nodes as they ship on one bus: another baud rate and the way back, positions that are followed, marks for both at once."""
+"""Two nodes as they ship on one bus: another baud rate and the way back, positions that are
+followed, marks for both at once.
+"""
+
 import random
 
 import pytest
@@ -10,9 +13,9 @@ from moire.errors import NoAnswer
 from tb.bench import seed
 from twin import START_S, Twin, TwinTransport
 
-BAUD = 300_000                     # an eighth of the clk of the twin, the highest that it can do
+BAUD = 300_000  # an eighth of the clk of the twin, the highest that it can do
 CLK_HZ = 2_400_000
-NOISE = 1000                       # of a position of 8-bit samples, 2^-16 period
+NOISE = 1000  # of a position of 8-bit samples, 2^-16 period
 
 
 @pytest.fixture
@@ -28,7 +31,9 @@ def test_both_nodes_take_another_baud_rate_and_a_break_brings_the_first_one_back
     bus.set_baud(BAUD, [1, 2])
     began = bus.transport.now()
     bus.request(1, "counters")
-    assert bus.transport.now() - began < 59 * 11 / 115_200        # its characters alone, at the first rate
+    assert (
+        bus.transport.now() - began < 59 * 11 / 115_200
+    )  # its characters alone, at the first rate
     bus.transport.set_baud(115_200)
     with pytest.raises(NoAnswer):
         bus.identify(1, tries=1)
@@ -47,7 +52,12 @@ def test_a_followed_position_is_that_of_the_moment(bus):
         words = bus.transport.receive(17, 0.1)
         assert words[0] == 0x40 | command_byte(1, FROM_NODE)
         now = parse_reply(bytes(words[2:-4])).fields["position"]
-        assert abs(now - told) > 8 * NOISE > 0 == abs(now - axis.request("position")["position"]) // NOISE
+        assert (
+            abs(now - told)
+            > 8 * NOISE
+            > 0
+            == abs(now - axis.request("position")["position"]) // NOISE
+        )
         told = axis.request("follow")["position"]
 
 
@@ -59,6 +69,8 @@ def test_a_mark_is_captured_by_both_nodes_in_the_same_microsecond(bus):
         bus.transport.wait(0.003)
     taken = [bus.axis(address).captures() for address in (1, 2)]
     assert [(len(captures), lost) for captures, lost in taken] == [(3, False), (3, False)]
-    for first, second in zip(taken[0][0], taken[1][0], strict=True):      # reset ends for both in the same clk
+    for first, second in zip(
+        taken[0][0], taken[1][0], strict=True
+    ):  # reset ends for both in the same clk
         assert abs(first.time_clk - second.time_clk) / CLK_HZ < 1e-6
     assert all(bus.node(n).counters()["marks"] == 3 for n in (1, 2))

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Prepared moves of two nodes begin at one mark: judged by the machines, clk by clk, with nodes that did not power up together."""
+"""Prepared moves of two nodes begin at one mark: judged by the machines, clk by clk, with nodes
+that did not power up together.
+"""
+
 import random
 
 import pytest
@@ -15,18 +18,33 @@ from twin.nodes.twin import ALL_PERIPHERALS
 
 ADDRESSES = (1, 2)
 SCALE = SCALES["Z"]
-SETTINGS = {**SCALE.settings(), "position_source": 2, "period": "1um", "steps_per_period": 4, "step_trim": 0, "ki": 0, "home_method": 35,
-            "acceleration": "5m/s2", "jerk": "500m/s3"}
+SETTINGS = {
+    **SCALE.settings(),
+    "position_source": 2,
+    "period": "1um",
+    "steps_per_period": 4,
+    "step_trim": 0,
+    "ki": 0,
+    "home_method": 35,
+    "acceleration": "5m/s2",
+    "jerk": "500m/s3",
+}
 MOVE = "200um"
-LONGEST_S = 0.05                   # until a table has moved
+LONGEST_S = 0.05  # until a table has moved
 MOVED_M = 1e-9
 
 
 @pytest.fixture(scope="module")
 def axes():
-    """Of two nodes that stand at zero; the second lost its power for a moment, so its ticks come at other moments."""
-    with Twin([Node(address, [SCALE.machine()]) for address in ADDRESSES], clk_hz=CLK_HZ, seed=seed() % 1000,
-              node_parameters={"PERIPHERALS": ALL_PERIPHERALS, **NODE}) as twin:
+    """Of two nodes that stand at zero; the second lost its power for a moment, so its ticks come at
+    other moments.
+    """
+    with Twin(
+        [Node(address, [SCALE.machine()]) for address in ADDRESSES],
+        clk_hz=CLK_HZ,
+        seed=seed() % 1000,
+        node_parameters={"PERIPHERALS": ALL_PERIPHERALS, **NODE},
+    ) as twin:
         bus = Bus(TwinTransport(twin), random_source=random.Random(seed()))
         twin.run(START_S)
         twin.power_cut(1)
@@ -53,7 +71,9 @@ def prepared(axes):
 
 
 def began(twin):
-    """When each table was first seen to have moved, and each driver to have taken a step: seconds, clk by clk."""
+    """When each table was first seen to have moved, and each driver to have taken a step: seconds,
+    clk by clk.
+    """
     first = [twin.truth(n) for n in range(2)]
     moved, stepped = {}, {}
     while len(moved) + len(stepped) < 4 and twin.time() - first[0].time_s < LONGEST_S:
@@ -70,7 +90,7 @@ def began(twin):
 def test_two_tables_on_two_nodes_begin_to_move_within_a_microsecond(prepared):
     bus, twin = prepared[0].node.bus, prepared[0].transport.twin
     ticks = [bus.node(address).read_named("node.time_stamp")["value"] for address in ADDRESSES]
-    assert ticks[0] - ticks[1] > START_S * CLK_HZ                    # the nodes have not begun together
+    assert ticks[0] - ticks[1] > START_S * CLK_HZ  # the nodes have not begun together
     for axis in prepared:
         bus.request(axis.node.address, "start_at_sync", axes=1)
     bus.transport.send(sync_words(1))
@@ -98,13 +118,17 @@ def test_a_node_that_missed_the_mark_is_reported_and_does_not_move(prepared):
                 twin_bus.send(words)
 
     twin_bus, bus.transport = bus.transport, Deaf()
-    with pytest.raises(BusError, match="the node did not hear the mark at which its motion should begin") as caught:
+    with pytest.raises(
+        BusError, match="the node did not hear the mark at which its motion should begin"
+    ) as caught:
         bus.start(*prepared)
     bus.transport = twin_bus
     assert caught.value.address == 2
-    assert twin.truth(1).steps == steps[1] and twin.truth(0).steps != steps[0]      # the first had begun, and was stopped
+    assert (
+        twin.truth(1).steps == steps[1] and twin.truth(0).steps != steps[0]
+    )  # the first had begun, and was stopped
     heard, missed = (axis.status() for axis in prepared)
     assert heard.ended == "stopped" and not heard.in_motion and missed.state != "prepared"
     bus.sync()
     twin.run(0.02)
-    assert twin.truth(1).steps == steps[1]                           # a later mark does not begin it
+    assert twin.truth(1).steps == steps[1]  # a later mark does not begin it

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""grating with its position from counts of A/B/Z, built with sine and cosine and without: exact at an edge every clk, at the index,
+"""grating with its position from counts of A/B/Z, built with sine and cosine and without: exact at
+an edge every clk, at the index,
 through align, and of the axis' own steps."""
+
 import random
 
 import cocotb
@@ -10,12 +12,37 @@ from cocotb.triggers import FallingEdge
 from moire.made.registers import FIELDS
 from tb.bench import needs, run, seed, start
 
-TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]                 # a leads b: up
+TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]  # a leads b: up
 QUARTER = 1 << 14
-LATENCY = 5                                             # clk from the pins to position: filter 1, decoder 2, position 2; table 1
-SETTINGS = dict(deglitch=0, outlier_step=0, outlier_hold=0, amplitude_low=0, amplitude_high=65535, disagreement_limit=0)
-INPUTS = dict(tick=0, sample_tick=0, sync=0, now=0, select=0, write=0, word=0, wdata=0, shift=0, shift_periods=0, a=0, b=0, z=0, probe=0,
-              own_step=0, own_direction=0, adc_sin=1, adc_cos=1)
+LATENCY = 5  # clk from the pins to position: filter 1, decoder 2, position 2; table 1
+SETTINGS = dict(
+    deglitch=0,
+    outlier_step=0,
+    outlier_hold=0,
+    amplitude_low=0,
+    amplitude_high=65535,
+    disagreement_limit=0,
+)
+INPUTS = dict(
+    tick=0,
+    sample_tick=0,
+    sync=0,
+    now=0,
+    select=0,
+    write=0,
+    word=0,
+    wdata=0,
+    shift=0,
+    shift_periods=0,
+    a=0,
+    b=0,
+    z=0,
+    probe=0,
+    own_step=0,
+    own_direction=0,
+    adc_sin=1,
+    adc_cos=1,
+)
 
 
 def latency(dut):
@@ -29,14 +56,16 @@ def register(name):
 
 
 class Bench:
-    """A scale in front of the design; at reset it stands at `place`, in counts, which the design calls 0."""
+    """A scale in front of the design; at reset it stands at `place`, in counts, which the design
+    calls 0.
+    """
 
     @classmethod
     async def begin(cls, dut, place=0, mode=0, steps=0):
         bench = cls()
         bench.dut, bench.place, bench.latency = dut, place, latency(dut)
         await start(dut, **SETTINGS, **{**INPUTS, **dict(zip("ab", TURN[place % 4]))})
-        for _ in range(12):                             # filter and decoder only take their levels after reset
+        for _ in range(12):  # filter and decoder only take their levels after reset
             await FallingEdge(dut.clk)
         await bench.write("decoder_mode", value=mode)
         await bench.write("position_source", counts=1, steps=steps)
@@ -47,7 +76,9 @@ class Bench:
     def put(self, name, **fields):
         word, low = register(name)
         self.dut.word.value = word
-        self.dut.wdata.value = sum(value << low[field] for field, value in fields.items()) & 0xFFFFFFFF
+        self.dut.wdata.value = (
+            sum(value << low[field] for field, value in fields.items()) & 0xFFFFFFFF
+        )
         self.dut.select.value = self.dut.write.value = 1
 
     async def write(self, name, **fields):
@@ -58,7 +89,12 @@ class Bench:
     async def wide(self, name, value):
         word = register(name)[0]
         for more, half in enumerate((value & 0xFFFFFFFF, value >> 32 & 0xFFFFFFFF)):
-            self.dut.word.value, self.dut.wdata.value, self.dut.select.value, self.dut.write.value = word + more, half, 1, 1
+            (
+                self.dut.word.value,
+                self.dut.wdata.value,
+                self.dut.select.value,
+                self.dut.write.value,
+            ) = word + more, half, 1, 1
             await FallingEdge(self.dut.clk)
         self.dut.select.value = self.dut.write.value = 0
 
@@ -91,7 +127,9 @@ class Bench:
         return self.dut.position.value.to_signed()
 
     async def go(self, steps, at_index=lambda place: False, clk=1):
-        """Each step takes so many clk; then what is on its way arrives. Returns the positions after each clk."""
+        """Each step takes so many clk; then what is on its way arrives. Returns the positions after
+        each clk.
+        """
         positions = []
         for step in steps:
             self.place += step
@@ -108,7 +146,10 @@ class Bench:
         """All captures, oldest first."""
         taken = []
         while await self.read("capture_state") & 1:
-            low, high = await self.read("captured_position"), await self.read("captured_position", 1)
+            low, high = (
+                await self.read("captured_position"),
+                await self.read("captured_position", 1),
+            )
             taken.append((high << 32 | low) - (1 << 64 if high >> 31 else 0))
             await self.write("strobes", capture_next=1)
             await FallingEdge(self.dut.clk)
@@ -125,13 +166,19 @@ async def position_is_exact_at_an_edge_every_clk(dut):
         place += step
         way.append(place * QUARTER)
     got = await bench.go(steps)
-    assert got[bench.latency - 1:bench.latency - 1 + len(way)] == way
-    assert bench.position() == place * QUARTER == bench.dut.quadrature_count.value.to_signed() * QUARTER
+    assert got[bench.latency - 1 : bench.latency - 1 + len(way)] == way
+    assert (
+        bench.position()
+        == place * QUARTER
+        == bench.dut.quadrature_count.value.to_signed() * QUARTER
+    )
 
 
 @cocotb.test()
 async def the_index_is_captured_at_its_count_in_both_directions_at_any_speed(dut):
-    for start_place in range(4):                        # so that the index begins with any edge of A or B, in the same clk
+    for start_place in range(
+        4
+    ):  # so that the index begins with any edge of A or B, in the same clk
         for clk in (1, 2, 3, 7):
             bench = await Bench.begin(dut, start_place)
             await bench.write("index", up=1, down=1, each=1)
@@ -145,7 +192,9 @@ async def the_index_is_captured_at_its_count_in_both_directions_at_any_speed(dut
 async def a_wide_index_is_captured_at_the_same_count_when_gated_by_a_and_b(dut):
     for gated, want in ((0, [8, 10, 8]), (3, [9, 9, 9])):
         bench = await Bench.begin(dut)
-        await bench.write("index", up=1, down=1, each=1, gate_mask=gated, gate=0b01)      # place 9: a = 1, b = 0
+        await bench.write(
+            "index", up=1, down=1, each=1, gate_mask=gated, gate=0b01
+        )  # place 9: a = 1, b = 0
         await bench.write("capture_sources", value=1)
         for direction in (1, -1, 1):
             await bench.go([direction] * 18, lambda place: 8 <= place <= 10, 2)
@@ -166,7 +215,9 @@ async def an_armed_index_is_captured_once(dut):
 @cocotb.test()
 async def align_moves_position_by_whole_counts_also_together_with_an_edge(dut):
     for counts in (-2, -1, 1, 2):
-        for wait in range(latency(dut) + 2):                 # the strobe meets every clk of an edge's way, and none
+        for wait in range(
+            latency(dut) + 2
+        ):  # the strobe meets every clk of an edge's way, and none
             bench = await Bench.begin(dut)
             await bench.go([1] * 6)
             bench.place += 1
@@ -196,13 +247,15 @@ async def shift_moves_the_origin_by_whole_periods_also_together_with_an_edge(dut
 
 
 @cocotb.test()
-async def own_steps_come_back_as_counts_up_while_the_direction_is_high_whatever_the_edge_filter_is_set_to(dut):
+async def own_steps_come_back_as_counts_up_while_the_direction_is_high_whatever_the_edge_filter_is_set_to(
+    dut,
+):
     bench = await Bench.begin(dut, mode=3, steps=1)
     dut.deglitch.value = 1000
     place = 0
     for direction in (1, 0, 0, 1):
         dut.own_direction.value = direction
-        await FallingEdge(dut.clk)                      # set-up
+        await FallingEdge(dut.clk)  # set-up
         for _ in range(5):
             for level in (1, 0):
                 dut.own_step.value = level
@@ -212,7 +265,7 @@ async def own_steps_come_back_as_counts_up_while_the_direction_is_high_whatever_
         assert bench.position() == place * QUARTER
 
 
-PULSE_TOO_SHORT = 5                                     # of encoder_events
+PULSE_TOO_SHORT = 5  # of encoder_events
 
 
 async def pulses(dut, pulse, gap, number=20):
@@ -229,9 +282,14 @@ async def pulses(dut, pulse, gap, number=20):
 @cocotb.test()
 async def pulses_and_gaps_too_short_for_the_edge_filter_are_told_each(dut):
     bench = await Bench.begin(dut, mode=3)
-    grbl = 244                                          # clk of 25 MHz: its pulses are high for 9.76 us
-    for needed, pulse, gap, counted, told in ((10, 10, 10, 20, 0), (10, 9, 30, 0, 20), (10, 30, 9, 1, 19),
-                                              (250, grbl, 756, 0, 20), (125, grbl, 756, 20, 0)):
+    grbl = 244  # clk of 25 MHz: its pulses are high for 9.76 us
+    for needed, pulse, gap, counted, told in (
+        (10, 10, 10, 20, 0),
+        (10, 9, 30, 0, 20),
+        (10, 30, 9, 1, 19),
+        (250, grbl, 756, 0, 20),
+        (125, grbl, 756, 20, 0),
+    ):
         dut.deglitch.value = needed
         before = bench.position()
         assert await pulses(dut, pulse, gap) == told
@@ -263,9 +321,11 @@ async def reset_in_mid_flow_drops_the_edge(dut):
 
 
 @cocotb.test()
-async def with_a_segment_table_positions_captures_and_compare_points_are_on_the_corrected_scale(dut):
+async def with_a_segment_table_positions_captures_and_compare_points_are_on_the_corrected_scale(
+    dut,
+):
     needs(int(dut.SEGMENTS.value), "built without a segment table")
-    bench, errors = await Bench.begin(dut), [0, 900, -1500, 700]       # of three segments of 8 counts
+    bench, errors = await Bench.begin(dut), [0, 900, -1500, 700]  # of three segments of 8 counts
     for border, error in enumerate(errors):
         await bench.write("segment_point", value=error & 0xFFFFFF, border=border)
         await bench.write("segment_read", border=border)
@@ -281,8 +341,8 @@ async def with_a_segment_table_positions_captures_and_compare_points_are_on_the_
             moved.append(dut.moved_by.value.to_signed())
         await FallingEdge(dut.clk)
     assert moved == [-450] and bench.position() == 12 * QUARTER - 450
-    assert await bench.read("segment_state") == 0x5FF   # known, in force, 255
-    for step in (1, -1):                                # sign right in both directions
+    assert await bench.read("segment_state") == 0x5FF  # known, in force, 255
+    for step in (1, -1):  # sign right in both directions
         for _ in range(12 if step > 0 else 30):
             await bench.go([step])
             await bench.rest()
@@ -297,7 +357,10 @@ async def with_a_segment_table_positions_captures_and_compare_points_are_on_the_
     await bench.wide("compare_start", 16 * QUARTER - 900)
     await bench.wide("compare_step", 4 * QUARTER)
     await bench.write("compare_count", value=1)
-    for pulses, step in ((0, -1), (1, 1)):              # armed one count below, it fires where the corrected scale says so
+    for pulses, step in (
+        (0, -1),
+        (1, 1),
+    ):  # armed one count below, it fires where the corrected scale says so
         await bench.go([step])
         await bench.rest()
         await bench.write("strobes", capture_now=1, compare_arm=1 - pulses)
@@ -337,15 +400,29 @@ async def the_register_tells_whether_sine_and_cosine_were_built(dut):
 async def without_sine_and_cosine_the_converter_rests_and_all_that_comes_of_it_is_zero(dut):
     needs(not int(dut.SINE.value), "built with sine and cosine")
     bench, source = await Bench.begin(dut), random.Random(seed())
-    settings = ("correction_offset", "correction_gain", "correction_quadrature_error", "recorder", "signal_fault_mask", "lissajous_limits", "jump_limits",
-                "channel_limits", "drift_limits", "quadrature_limits", "harmonic_point", "harmonic_enable")
+    settings = (
+        "correction_offset",
+        "correction_gain",
+        "correction_quadrature_error",
+        "recorder",
+        "signal_fault_mask",
+        "lissajous_limits",
+        "jump_limits",
+        "channel_limits",
+        "drift_limits",
+        "quadrature_limits",
+        "harmonic_point",
+        "harmonic_enable",
+    )
     await bench.write("position_source", counts=0)
     for name in settings:
         dut.word.value, dut.wdata.value = register(name)[0], 0xFFFFFFFF
         dut.select.value = dut.write.value = 1
         await FallingEdge(dut.clk)
     dut.select.value = dut.write.value = 0
-    await bench.write("strobes", load_correction=1, swap_harmonics=1, record=1, clear_signal_faults=1)
+    await bench.write(
+        "strobes", load_correction=1, swap_harmonics=1, record=1, clear_signal_faults=1
+    )
     dut.amplitude_low.value, dut.outlier_step.value, dut.disagreement_limit.value = 65535, 1, 1
     place = 0
     for _ in range(2000):
@@ -357,11 +434,27 @@ async def without_sine_and_cosine_the_converter_rests_and_all_that_comes_of_it_i
             pin.value = source.getrandbits(1)
         await FallingEdge(dut.clk)
         assert (int(dut.adc_cs_n.value), int(dut.adc_sclk.value)) == (1, 1)
-        for idle in (dut.sin, dut.cos, dut.sample_rejected, dut.phase, dut.amplitude, dut.signal_fault, dut.events):
+        for idle in (
+            dut.sin,
+            dut.cos,
+            dut.sample_rejected,
+            dut.phase,
+            dut.amplitude,
+            dut.signal_fault,
+            dut.events,
+        ):
             assert int(idle.value) == 0
     await bench.go([])
-    assert bench.position() == place * QUARTER, "counts make the position even where phases were chosen"
-    for name in (*settings, "recorder_state", "recorder_word", "signal_faults", "first_signal_faults"):
+    assert bench.position() == place * QUARTER, (
+        "counts make the position even where phases were chosen"
+    )
+    for name in (
+        *settings,
+        "recorder_state",
+        "recorder_word",
+        "signal_faults",
+        "first_signal_faults",
+    ):
         assert await bench.read(name) == 0, name
 
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`moire twin` as a program of its own, and clients in this one: what a client can do on hardware it can do here, with the same bytes."""
+"""`moire twin` as a program of its own, and clients in this one: what a client can do on hardware
+it can do here, with the same bytes.
+"""
+
 import io
 import json
 import os
@@ -20,15 +23,30 @@ from moire.errors import BusGarbled, NoAnswer
 from twin import START_S, Twin, TwinTransport
 
 ROOT = Path(__file__).resolve().parents[2]
-pytestmark = pytest.mark.filterwarnings("ignore:set(Daemon|Name).. is deprecated:DeprecationWarning")      # in pyserial
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:set(Daemon|Name).. is deprecated:DeprecationWarning"
+)  # in pyserial
 
 
 @contextmanager
 def served(*arguments):
     """`moire twin` as a program, while it runs: where it is served."""
-    command = [sys.executable, "-m", "moire.cli.command_line", "twin", *arguments, "--rfc2217", "0", "--tcp", "0", "--json"]
+    command = [
+        sys.executable,
+        "-m",
+        "moire.cli.command_line",
+        "twin",
+        *arguments,
+        "--rfc2217",
+        "0",
+        "--tcp",
+        "0",
+        "--json",
+    ]
     path = os.pathsep.join(map(str, (ROOT / "sw", ROOT / "sw" / "host")))
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": path}) as process:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": path}
+    ) as process:
         yield json.loads(process.stdout.readline())
         process.terminate()
 
@@ -45,7 +63,10 @@ def moire(*arguments, code=0):
     return [json.loads(row) for row in out.getvalue().splitlines()]
 
 
-@pytest.mark.parametrize("entrance, parity", [("rfc2217", "mark"), ("rfc2217", "none"), ("tcp", "auto"), ("terminal", "auto")])
+@pytest.mark.parametrize(
+    "entrance, parity",
+    [("rfc2217", "mark"), ("rfc2217", "none"), ("tcp", "auto"), ("terminal", "auto")],
+)
 def test_every_entrance_leads_to_the_node(ports, entrance, parity):
     told = moire("--port", ports[entrance], "--parity", parity, "selftest", "--", "status")
     assert told[0]["passed"] and told[1]["state"] == "off"
@@ -55,7 +76,9 @@ def test_homes_and_moves_over_the_network_and_another_client_sees_it(ports):
     told = moire("--port", ports["tcp"], "home", "--", "move", "150um")
     assert told[-1]["command"] == "move" and abs(told[-1]["error_nm"]) < 50
     seen = moire("--port", ports["rfc2217"], "status")[0]
-    assert seen["homed"] and abs(seen["position_nm"] - 150_000) < 50_000     # the drive is off: wound-up springs have relaxed
+    assert (
+        seen["homed"] and abs(seen["position_nm"] - 150_000) < 50_000
+    )  # the drive is off: wound-up springs have relaxed
 
 
 def test_a_client_at_another_rate_hears_nobody_and_spoils_nothing(ports):
@@ -78,12 +101,31 @@ def test_two_nodes_with_one_address_are_told_apart_from_silence(apart_s):
 
 def test_a_recorded_session_replays_on_the_twin_to_the_last_bit(tmp_path):
     file = str(tmp_path / "session.jsonl")
-    moire("--port", "twin", "--record", file, "baud", "300000", "1", "2", "--", "enable", "--", "wait", "50ms", "--", "status")
+    moire(
+        "--port",
+        "twin",
+        "--record",
+        file,
+        "baud",
+        "300000",
+        "1",
+        "2",
+        "--",
+        "enable",
+        "--",
+        "wait",
+        "50ms",
+        "--",
+        "status",
+    )
     told = moire("--port", "twin", "replay", file)[0]
     assert told["same"] > 10 and told["other_values"] == told["different"] == 0
     rows = moire("replay", file, "--show")[0]["said"]
     assert [row.split("s  ")[1] for row in rows if "break" in row or "baud from" in row] == [
-        "300000 baud from here on", "break", "115200 baud from here on"]
+        "300000 baud from here on",
+        "break",
+        "115200 baud from here on",
+    ]
 
 
 def test_the_scope_sees_what_the_machine_does_and_the_plant_is_found():
@@ -102,13 +144,23 @@ def test_the_scope_sees_what_the_machine_does_and_the_plant_is_found():
         assert record.before == 10 and seen[-1] - seen[0] == pytest.approx(100_000, abs=50)
         # the record has no absolute time: it is the true way, some shift away
         after = times >= 0
-        worst = min(abs(numpy.interp(times[after] + shift, trace["time_s"], trace["position_m"] * 1e9) - seen[after]).max()
-                    for shift in trace["time_s"][0] + numpy.arange(0, 0.1, 1e-5))
-        assert worst < 0.1e-3 * 4.8e6                  # a time is right to 0.1 ms, at the top speed
+        worst = min(
+            abs(
+                numpy.interp(times[after] + shift, trace["time_s"], trace["position_m"] * 1e9)
+                - seen[after]
+            ).max()
+            for shift in trace["time_s"][0] + numpy.arange(0, 0.1, 1e-5)
+        )
+        assert worst < 0.1e-3 * 4.8e6  # a time is right to 0.1 ms, at the top speed
         assert max(record.command) > 0.05
 
         plant = identify_samples(*lsb(excite(axis, "40%")), 1 / axis.node.identity.tick_hz)
         assert plant.unexplained < 0.1
-        by_hand = axis.get_parameter("kv").value, axis.get_parameter("ka").value      # feed-forward that fits this stage
-        assert 1 / plant.gain == pytest.approx(float(by_hand[0]), rel=0.2) and 1 / plant.b == pytest.approx(float(by_hand[1]), rel=0.2)
+        by_hand = (
+            axis.get_parameter("kv").value,
+            axis.get_parameter("ka").value,
+        )  # feed-forward that fits this stage
+        assert 1 / plant.gain == pytest.approx(
+            float(by_hand[0]), rel=0.2
+        ) and 1 / plant.b == pytest.approx(float(by_hand[1]), rel=0.2)
         assert axis.status().state == "holding"

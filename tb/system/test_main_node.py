@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""S4 as it ships, image `station` in two nodes on the RTL: a job with its table, sensor, EEPROM, panel and machine, and a power cut."""
+"""S4 as it ships, image `station` in two nodes on the RTL: a job with its table, sensor, EEPROM,
+panel and machine, and a power cut.
+"""
+
 import math
 import random
 
@@ -12,19 +15,51 @@ from twin import Twin, TwinTransport, build
 from twin.devices.devices import Devices
 from twin.nodes.twin import Axis, Node
 
-MAIN, SUB = 0, 1                 # places
+MAIN, SUB = 0, 1  # places
 NODE = {"DRIVES": 2, "FILTERS": 0, "SINE": 0}
-AXIS = {"period": "1um", "drive": "steps", "position_source": "own_steps", "steps_per_period": 4, "counts_per_period": 4,
-        "disagreement_limit": 0, "encoder_fault_mask": 0, "kp": 0, "ki": 0, "kd": 0, "kv": 0, "ka": 0,
-        "following_limit": "10mm", "velocity": "20mm/s", "acceleration": "100mm/s2", "jerk": "1000mm/s3", "homing_latch_speed": "0.2mm/s",
-        "settle_window": "1um", "settle_time": "5ms", "watchdog_time": "60s"}
-AROUND = Devices(eeprom=True, keypad=True, display=True, keyboard=True, edm=True, table=SUB, parameters={"edm_cut_time": 0.3})
+AXIS = {
+    "period": "1um",
+    "drive": "steps",
+    "position_source": "own_steps",
+    "steps_per_period": 4,
+    "counts_per_period": 4,
+    "disagreement_limit": 0,
+    "encoder_fault_mask": 0,
+    "kp": 0,
+    "ki": 0,
+    "kd": 0,
+    "kv": 0,
+    "ka": 0,
+    "following_limit": "10mm",
+    "velocity": "20mm/s",
+    "acceleration": "100mm/s2",
+    "jerk": "1000mm/s3",
+    "homing_latch_speed": "0.2mm/s",
+    "settle_window": "1um",
+    "settle_time": "5ms",
+    "watchdog_time": "60s",
+}
+AROUND = Devices(
+    eeprom=True,
+    keypad=True,
+    display=True,
+    keyboard=True,
+    edm=True,
+    table=SUB,
+    parameters={"edm_cut_time": 0.3},
+)
 
 
 def test_a_job_is_cut_at_its_angles_through_a_power_cut_and_no_station_twice():
     nodes = [Node(1, [Axis("unconnected")], AROUND), Node(2, [Axis("worm_table")])]
-    with Twin(nodes, seed=seed() % 1000, node_parameters=NODE, firmware=build.firmware("station"), peers=(MAIN, SUB),
-              peer_baud=115200) as twin:
+    with Twin(
+        nodes,
+        seed=seed() % 1000,
+        node_parameters=NODE,
+        firmware=build.firmware("station"),
+        peers=(MAIN, SUB),
+        peer_baud=115200,
+    ) as twin:
         bus = Bus(TwinTransport(twin), random_source=random.Random(seed()), poll_s=0.1)
         bus.transport.wait(0.1)
         for name, value in AXIS.items():
@@ -32,11 +67,15 @@ def test_a_job_is_cut_at_its_angles_through_a_power_cut_and_no_station_twice():
         for address, role in ((1, "main"), (2, "sub")):
             Settings(bus.node(address)).set("peer_role", role)
             Settings(bus.node(address)).set("peer_mode", "frames")
-        job, around, here = Job(bus.node(1)), twin.around[MAIN], IndexingTable(bus.node(2)).sensor().angle
+        job, around, here = (
+            Job(bus.node(1)),
+            twin.around[MAIN],
+            IndexingTable(bus.node(2)).sensor().angle,
+        )
         first = round(here) + 200 if here < TURN - 500 else 100
         angles = [first, first + 150]
         assert job.load(angles).angles == tuple(angles)
-        around.type([0x1C, 0xF0, 0x1C])                     # a person types: the keys wait
+        around.type([0x1C, 0xF0, 0x1C])  # a person types: the keys wait
         job.start()
         while not around.cuts:
             bus.transport.wait(0.1)
@@ -46,10 +85,18 @@ def test_a_job_is_cut_at_its_angles_through_a_power_cut_and_no_station_twice():
         twin.power_on(MAIN)
         bus.transport.wait(0.2)
         asked = job.wait()
-        assert (asked.state, asked.cause, asked.station) == ("unsure", "power_lost", 0) and len(around.cuts) == 1
-        bus.transport.wait(1.5)                            # the panel is found
+        assert (asked.state, asked.cause, asked.station) == ("unsure", "power_lost", 0) and len(
+            around.cuts
+        ) == 1
+        bus.transport.wait(1.5)  # the panel is found
         assert around.lines[1].rstrip() == "the power was lost" and around.cuts[0].whole
         job.do("next")
         assert job.wait().state == "finished"
-        assert all(abs(math.degrees(cut.angle_start_rad) * 3600 - angle) <= 2 for cut, angle in zip(around.cuts, angles, strict=True))
-        assert all(abs(math.degrees(cut.angle_end_rad - cut.angle_start_rad)) * 3600 < 0.1 and cut.whole for cut in around.cuts)
+        assert all(
+            abs(math.degrees(cut.angle_start_rad) * 3600 - angle) <= 2
+            for cut, angle in zip(around.cuts, angles, strict=True)
+        )
+        assert all(
+            abs(math.degrees(cut.angle_end_rad - cut.angle_start_rad)) * 3600 < 0.1 and cut.whole
+            for cut in around.cuts
+        )

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""relay, pins to pins: it passes, corrects, flags, takes sets over the line and from flash, and loses no count."""
+"""relay, pins to pins: it passes, corrects, flags, takes sets over the line and from flash, and
+loses no count.
+"""
+
 import math
 import random
 
@@ -38,7 +41,7 @@ class Relay:
 
     def __init__(self, dut, chip=None):
         self.dut, self.chip = dut, chip or Flash(1 << 14)
-        self.place = 0                          # of the ring, counts from its index; the index is one count wide
+        self.place = 0  # of the ring, counts from its index; the index is one count wide
         self.counted, self.levels, self.edges = 0, None, []
         self.clks, self.index_at = 0, []
         self.with_index = True
@@ -67,7 +70,9 @@ class Relay:
             await RisingEdge(dut.clk)
             await FallingEdge(dut.clk)
             self.clks += 1
-            dut.flash_sdi.value = self.chip.pins(int(dut.flash_chip_n.value), int(dut.flash_sclk.value), int(dut.flash_sdo.value))
+            dut.flash_sdi.value = self.chip.pins(
+                int(dut.flash_chip_n.value), int(dut.flash_sclk.value), int(dut.flash_sdo.value)
+            )
             a, b = int(dut.relay_a.value), int(dut.relay_b.value)
             if self.levels is not None and (a, b) != self.levels:
                 assert (a != self.levels[0]) != (b != self.levels[1]), "two edges in one clk"
@@ -145,12 +150,15 @@ class Relay:
     async def give(self, whole):
         """A set, piece by piece; what the last answer tells."""
         for n in range(0, len(whole), PIECE):
-            told = await self.ask(SET if n else BEGIN_SET, bytes(whole[n:n + PIECE]))
+            told = await self.ask(SET if n else BEGIN_SET, bytes(whole[n : n + PIECE]))
         return Status.of(told)
 
     async def save(self, whole, address):
         """One copy, into an erased sector."""
-        for command, at, more in ((0x20, address, b""), *((0x02, address + n, whole[n:n + 32]) for n in range(0, len(whole), 32))):
+        for command, at, more in (
+            (0x20, address, b""),
+            *((0x02, address + n, whole[n : n + 32]) for n in range(0, len(whole), 32)),
+        ):
             await self.ask(FLASH, b"\x06")
             await self.ask(FLASH, bytes([command]) + at.to_bytes(3, "big") + more)
 
@@ -179,7 +187,11 @@ async def until_the_index_it_passes_and_says_so_then_it_corrects(dut):
         await relay.clk(400)
         assert abs(relay.counted - wanted(relay.place, terms)) <= 0.76, (relay.place, relay.counted)
     status = await relay.status()
-    assert status.levels == KNOWN | LOADED | CORRECTING and status.flags == 0 and status.position == relay.place - COUNTS + 60
+    assert (
+        status.levels == KNOWN | LOADED | CORRECTING
+        and status.flags == 0
+        and status.position == relay.place - COUNTS + 60
+    )
 
 
 @cocotb.test()
@@ -210,7 +222,9 @@ async def a_missing_index_and_illegal_edges_are_flagged_until_they_are_cleared(d
     relay.with_index = False
     await relay.go(COUNTS + 10)
     assert int(dut.fault.value) and (await relay.status()).flags == MISSING
-    assert (await relay.clear(~MISSING & 0xFF)).flags == MISSING and (await relay.clear(MISSING)).flags == 0
+    assert (await relay.clear(~MISSING & 0xFF)).flags == MISSING and (
+        await relay.clear(MISSING)
+    ).flags == 0
     relay.place += 2
     relay.show()
     await relay.clk(30)
@@ -251,7 +265,7 @@ async def a_set_whose_pieces_are_asked_for_twice_is_taken_all_the_same(dut):
     whole = image(some_terms(), COUNTS)
     for n in range(0, len(whole), 20):
         for repeat in (False, True, True):
-            told = await relay.ask(SET if n else BEGIN_SET, whole[n:n + 20], repeat=repeat)
+            told = await relay.ask(SET if n else BEGIN_SET, whole[n : n + 20], repeat=repeat)
     assert Status.of(told).identity == identity_of(whole) and Status.of(told).flags == 0
 
 
@@ -290,14 +304,17 @@ async def a_broken_request_has_no_answer_and_the_next_one_has(dut):
 async def a_saved_set_comes_back_at_power_up_whenever_power_failed(dut):
     old, new = (image(some_terms(size), COUNTS) for size in (1.0, 2.0))
     chip = Flash(1 << 14)
-    for second, power, source in ((old, 4096 + 10, 1), (new, 4096 + 30, 2)):       # it failed in the second copy, in the first
+    for second, power, source in (
+        (old, 4096 + 10, 1),
+        (new, 4096 + 30, 2),
+    ):  # it failed in the second copy, in the first
         for address in (FIRST, SECOND):
-            chip.memory[address:address + len(old)] = old
+            chip.memory[address : address + len(old)] = old
         chip.power, chip.asleep = None, True
         relay = await Relay(dut, chip).power_up()
         await relay.booted()
         if second is new:
-            chip.memory[SECOND:SECOND + len(new)] = new             # the second copy stands already
+            chip.memory[SECOND : SECOND + len(new)] = new  # the second copy stands already
         chip.power = power
         await relay.save(new, SECOND if second is old else FIRST)
         chip.power, chip.asleep = None, True
@@ -324,7 +341,7 @@ async def reset_in_mid_flow(dut):
     await relay.go(30)
     await relay.tell(Exchange(bytes([1, BEGIN_SET, 1, 2])).words_to_send()[:4])
     dut.rst.value = 1
-    for n in range(24):                                     # the pins find the levels of the ring again
+    for n in range(24):  # the pins find the levels of the ring again
         dut.rst.value, relay.levels = int(n < 3), None
         await relay.clk()
     assert not int(dut.correcting.value) and not int(dut.fault.value)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""relay with a table of segments instead of harmonics, pins to pins: it corrects by it in both directions, and takes no other set."""
+"""relay with a table of segments instead of harmonics, pins to pins: it corrects by it in both
+directions, and takes no other set.
+"""
+
 import cocotb
 
 from moire.bus.relay import identity_of
@@ -18,7 +21,7 @@ from tb.system.test_relay import (
 )
 
 SEGMENTS = 5
-POINTS = 0.0, 3.5, -2.0, 6.25, 1.0                  # counts at the borders
+POINTS = 0.0, 3.5, -2.0, 6.25, 1.0  # counts at the borders
 
 
 def whole_of(points):
@@ -45,7 +48,11 @@ async def it_corrects_by_the_table_in_both_directions(dut):
         await relay.clk(100)
         assert abs(relay.counted - wanted(relay.place)) <= 0.76, (relay.place, relay.counted)
     status = await relay.status()
-    assert status.levels == KNOWN | LOADED | CORRECTING and status.orders == 0 and not status.flags & ~16
+    assert (
+        status.levels == KNOWN | LOADED | CORRECTING
+        and status.orders == 0
+        and not status.flags & ~16
+    )
 
 
 @cocotb.test()
@@ -67,7 +74,7 @@ async def a_set_of_harmonics_is_refused(dut):
 async def a_saved_table_comes_back_at_power_up(dut):
     relay = Relay(dut)
     whole = whole_of(POINTS)
-    relay.chip.memory[SECOND:SECOND + len(whole)] = whole
+    relay.chip.memory[SECOND : SECOND + len(whole)] = whole
     await relay.power_up()
     await relay.booted()
     status = await relay.status()

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The correction on its way from the learner to the position: the firmware's learner on this computer learns the interferometer, the
-node is told the values over the line, and its positions are held against the true place of the table."""
+"""The correction on its way from the learner to the position: the firmware's learner on this
+computer learns the interferometer, the
+node is told the values over the line, and its positions are held against the true place of the
+table."""
+
 import random
 
 import numpy as np
@@ -11,9 +14,9 @@ from moire.bus.client import CORRECTION, Bus
 from twin import START_S, Twin, TwinTransport
 from twin.parameters import tables as parameters
 
-PLACES = 16                          # of a period
-LOOKS = 8                            # at each: the noise of one is 0.7 nm
-LOADING_S = 0.6                      # until the node has computed the table and taken it over
+PLACES = 16  # of a period
+LOOKS = 8  # at each: the noise of one is 0.7 nm
+LOADING_S = 0.6  # until the node has computed the table and taken it over
 
 
 @pytest.fixture(scope="module")
@@ -26,13 +29,24 @@ def machine_and_axis():
 
 @pytest.fixture(scope="module")
 def learned():
-    machine, *_ = figures_calibration.learn(1, 0, 0, curve=figures_calibration.curve_of_twin(), amplitude=parameters.values()["signal_amplitude"])
+    machine, *_ = figures_calibration.learn(
+        1,
+        0,
+        0,
+        curve=figures_calibration.curve_of_twin(),
+        amplitude=parameters.values()["signal_amplitude"],
+    )
     assert machine.learner.settled
-    return {**machine.values, "cosine": list(machine.values["cosine"]), "sine": list(machine.values["sine"])}
+    return {
+        **machine.values,
+        "cosine": list(machine.values["cosine"]),
+        "sine": list(machine.values["sine"]),
+    }
 
 
 def left_nm(machine, axis, correction):
-    """Largest difference of the node's position from the true one over a period with this correction, the mean taken off. The table
+    """Largest difference of the node's position from the true one over a period with this
+    correction, the mean taken off. The table
     stands at each place."""
     axis.set_correction(correction)
     axis.node.bus.transport.wait(LOADING_S)
@@ -40,7 +54,9 @@ def left_nm(machine, axis, correction):
     for n in range(PLACES):
         machine.set_position(n * 0.8e-6 / PLACES)
         axis.node.bus.transport.wait(0.001)
-        away.append(np.mean([axis.status().position_nm - machine.state.position_nm for _ in range(LOOKS)]))
+        away.append(
+            np.mean([axis.status().position_nm - machine.state.position_nm for _ in range(LOOKS)])
+        )
     return np.abs(np.array(away) - np.mean(away)).max()
 
 
@@ -50,4 +66,6 @@ def test_harmonics_that_were_learned_come_off_every_position(machine_and_axis, l
     uncorrected = left_nm(machine, axis, {**dict.fromkeys(CORRECTION, 0), "gain": 65536, **flat})
     ellipse = left_nm(machine, axis, {**learned, **flat})
     harmonics = left_nm(machine, axis, learned)
-    assert uncorrected > 6 and ellipse > 3 and harmonics < 1, f"{uncorrected:.2f}, {ellipse:.2f}, {harmonics:.2f} nm"
+    assert uncorrected > 6 and ellipse > 3 and harmonics < 1, (
+        f"{uncorrected:.2f}, {ellipse:.2f}, {harmonics:.2f} nm"
+    )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""S0 with its fine stage: RTL and firmware of a node, the stage with a piezo on its table, the host package."""
+"""S0 with its fine stage: RTL and firmware of a node, the stage with a piezo on its table, the host
+package.
+"""
 
 import numpy as np
 import pytest
@@ -11,8 +13,8 @@ from tb.bench import seed
 SEED = seed()
 X = "X"
 BOUND_NM = 5.0
-ZERO_VOLT = 32768                    # code of the converter
-NEWTON = 20.0                        # pushes the table against the screw, and does not turn it
+ZERO_VOLT = 32768  # code of the converter
+NEWTON = 20.0  # pushes the table against the screw, and does not turn it
 DRIFT_NM = 1200.0
 
 
@@ -91,7 +93,7 @@ def drift(stage, first_nm, last_nm):
 
 
 def test_beyond_its_range_the_motor_takes_over_and_hands_back(stage):
-    axis, limit = stage.axes[X], 4000                    # 0.6 um
+    axis, limit = stage.axes[X], 4000  # 0.6 um
     axis.write_parameter("fine_limit", limit)
     stage.machine(X).trace(10_000)
     try:

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""S0's segment table in the node: a scale that is long by 20 ppm, bends every 1.5 mm and wanders is measured against the true place at
+"""S0's segment table in the node: a scale that is long by 20 ppm, bends every 1.5 mm and wanders is
+measured against the true place at
 equal distances, the table is loaded, and what is left of the error is what theory says.
 
-Between borders h apart straight lines leave at most h^2 / 8 times the curvature of the error, and a step of the walk there; the
+Between borders h apart straight lines leave at most h^2 / 8 times the curvature of the error, and a
+step of the walk there; the
 rectangle leaves half of what the error changes from border to border besides.
 """
+
 import math
 import random
 
@@ -17,15 +20,20 @@ from twin import START_S, WITH_SEGMENTS, Twin, TwinTransport
 
 CYCLIC, PITCH, WALK = 150e-9, 1.5e-3, 10e-9
 SCALE = dict(scale_linear=20e-6, scale_cyclic=CYCLIC, scale_pitch=PITCH, scale_walk=WALK)
-IDEAL = dict(signal_offset_sin=0, signal_offset_cos=0, signal_gain_cos=1, signal_phase_error=0)     # other tests have the learner
+IDEAL = dict(
+    signal_offset_sin=0, signal_offset_cos=0, signal_gain_cos=1, signal_phase_error=0
+)  # other tests have the learner
 SEGMENTS, LENGTH_NM = 10, 200_000
-NOISE_NM = 6                        # of a position that is read, and of the two borders beside it
+NOISE_NM = 6  # of a position that is read, and of the two borders beside it
 CURVED_NM = LENGTH_NM**2 / 8 * CYCLIC * 1e9 * (2 * math.pi / PITCH / 1e9) ** 2
 
 
 class Stage:
     def __init__(self, twin):
-        self.machine, self.axis = twin.machine(), Bus(TwinTransport(twin), random_source=random.Random(1)).axis(1)
+        self.machine, self.axis = (
+            twin.machine(),
+            Bus(TwinTransport(twin), random_source=random.Random(1)).axis(1),
+        )
         self.axis.node.bus.transport.wait(START_S)
         self.segments = Segments(self.axis)
         self.axis.enable()
@@ -52,7 +60,9 @@ def stage():
 
 @pytest.fixture(scope="module")
 def table(stage):
-    return SegmentTable(0, LENGTH_NM, tuple(stage.error_nm(n * LENGTH_NM) for n in range(SEGMENTS + 1)))
+    return SegmentTable(
+        0, LENGTH_NM, tuple(stage.error_nm(n * LENGTH_NM) for n in range(SEGMENTS + 1))
+    )
 
 
 def targets(way):
@@ -84,10 +94,14 @@ def test_the_rectangle_leaves_half_a_step_more_in_both_directions(stage, table, 
         low = table.errors[int(target // LENGTH_NM)]
         high = table.errors[int(target // LENGTH_NM) + 1]
         share = target / LENGTH_NM % 1 - 0.5
-        assert abs(left - (high - low) * share) <= CURVED_NM + NOISE_NM, f"{left:.1f} nm at {target} nm"
+        assert abs(left - (high - low) * share) <= CURVED_NM + NOISE_NM, (
+            f"{left:.1f} nm at {target} nm"
+        )
 
 
-def test_coming_into_force_the_stage_stays_and_its_position_is_told_on_the_other_scale(stage, table):
+def test_coming_into_force_the_stage_stays_and_its_position_is_told_on_the_other_scale(
+    stage, table
+):
     stage.segments.load(table, "linear")
     stage.segments.use("off")
     error = stage.error_nm(3.5 * LENGTH_NM)
@@ -106,7 +120,10 @@ def test_a_homing_begins_without_the_table_and_finds_the_same_zero(stage, table)
     stage.error_nm(0.5 * LENGTH_NM)
     stage.axis.home()
     assert stage.segments.use("linear").in_force == "linear"
-    assert abs(stage.error_nm()) < NOISE_NM and abs(stage.error_nm(2.5 * LENGTH_NM)) < CURVED_NM + NOISE_NM
+    assert (
+        abs(stage.error_nm()) < NOISE_NM
+        and abs(stage.error_nm(2.5 * LENGTH_NM)) < CURVED_NM + NOISE_NM
+    )
 
 
 def test_a_table_in_use_is_refused_a_change_and_a_moving_axis_too(stage, table):

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The S0 stage as shipped: RTL and firmware of both nodes, the machine around them, the host package at the end of the line."""
+"""The S0 stage as shipped: RTL and firmware of both nodes, the machine around them, the host
+package at the end of the line.
+"""
+
 import random
 
 import pytest
@@ -12,7 +15,7 @@ from tb.bench import seed
 
 SEED = seed()
 AXIS = {name: number for number, name in enumerate(ADDRESSES)}
-BOUND_NM = 50.0                      # of the true position after a move
+BOUND_NM = 50.0  # of the true position after a move
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +31,9 @@ def homed():
 
 @pytest.fixture
 def stage(homed):
-    """The homed stage with both drives on, holding. The test may leave any fault behind that a reset clears."""
+    """The homed stage with both drives on, holding. The test may leave any fault behind that a
+    reset clears.
+    """
     for axis in homed.axes.values():
         if axis.status().faults:
             axis.reset()
@@ -37,7 +42,9 @@ def stage(homed):
 
 
 def rest(stage, name):
-    """True position, told position and target: what a refused command must not change. Looks long enough to see a motion begin."""
+    """True position, told position and target: what a refused command must not change. Looks long
+    enough to see a motion begin.
+    """
     stage.dwell(0.05)
     status = stage.axes[name].status()
     return stage.true_nm(name), status.target_nm
@@ -52,6 +59,7 @@ def refused(cause, call, *arguments, **named):
 
 # ------------------------------------------------------------------ the main way
 
+
 def test_power_up_finds_both_nodes_with_drives_off_and_no_zero():
     stage = Stage.power_up(SEED + 1)
     identities = stage.find()
@@ -59,8 +67,16 @@ def test_power_up_finds_both_nodes_with_drives_off_and_no_zero():
     assert all(identity.matches for identity in identities)
     for name, axis in stage.axes.items():
         status = axis.status()
-        assert (status.state, status.ended, status.enabled, status.homed, status.faults) == ("off", "never", False, False, ())
-        assert stage.true_nm(name, from_zero=False) != pytest.approx(status.position_nm, abs=1000), "the place at power-up is unknown"
+        assert (status.state, status.ended, status.enabled, status.homed, status.faults) == (
+            "off",
+            "never",
+            False,
+            False,
+            (),
+        )
+        assert stage.true_nm(name, from_zero=False) != pytest.approx(
+            status.position_nm, abs=1000
+        ), "the place at power-up is unknown"
         refused("not_enabled", axis.move, 0)
         axis.enable()
         refused("not_homed", axis.move, 0)
@@ -71,25 +87,47 @@ def test_homing_takes_the_zero_at_a_phase_zero(homed):
     for name, axis in homed.axes.items():
         status, encoder = axis.status(), axis.encoder()
         assert status.homed and status.state == "holding"
-        before, position_nm, after = homed.true_nm(name, False), float(axis.status().position_nm), homed.true_nm(name, False)
-        from_phase_zero = ((before + after) / 2 - position_nm + PERIOD_NM / 2) % PERIOD_NM - PERIOD_NM / 2
-        print(f"{name}: the zero is {from_phase_zero:.2f} nm from a phase zero of the interferometer")
-        assert abs(from_phase_zero) < 20, "the zero is a phase zero, but for the error of a signal that is not learned and of one reading"
+        before, position_nm, after = (
+            homed.true_nm(name, False),
+            float(axis.status().position_nm),
+            homed.true_nm(name, False),
+        )
+        from_phase_zero = (
+            (before + after) / 2 - position_nm + PERIOD_NM / 2
+        ) % PERIOD_NM - PERIOD_NM / 2
+        print(
+            f"{name}: the zero is {from_phase_zero:.2f} nm from a phase zero of the interferometer"
+        )
+        assert abs(from_phase_zero) < 20, (
+            "the zero is a phase zero, but for the error of a signal that is not learned and of one reading"
+        )
         assert abs(homed.true_nm(name)) < BOUND_NM
-        apart = (encoder.phase * PERIOD_NM - status.position_nm + PERIOD_NM / 2) % PERIOD_NM - PERIOD_NM / 2
+        apart = (
+            encoder.phase * PERIOD_NM - status.position_nm + PERIOD_NM / 2
+        ) % PERIOD_NM - PERIOD_NM / 2
         assert abs(apart) < 10, "the position's fraction is the phase"
-        assert encoder.home_margin > 0.2, f"the switch stands too near the middle between two phase zeros: {encoder.home_phase_nm} nm"
+        assert encoder.home_margin > 0.2, (
+            f"the switch stands too near the middle between two phase zeros: {encoder.home_phase_nm} nm"
+        )
 
 
 def test_five_moves_reach_their_targets(stage):
-    for name, target_nm in (("X", 0.3e6), ("Y", 0.2e6), ("X", 0.3e6 + 100), ("Y", -0.05e6), ("X", 1234.5)):
+    for name, target_nm in (
+        ("X", 0.3e6),
+        ("Y", 0.2e6),
+        ("X", 0.3e6 + 100),
+        ("Y", -0.05e6),
+        ("X", 1234.5),
+    ):
         move = stage.move(name, target_nm)
         assert abs(move.error_nm) <= BOUND_NM, move
         assert abs(move.reached_nm - target_nm) <= BOUND_NM, move
 
 
 def test_targets_that_change_in_flight_leave_the_queue_filled(stage):
-    """The soft core goes on feeding while it plans: the profile never runs out, and the axis ends at the last target."""
+    """The soft core goes on feeding while it plans: the profile never runs out, and the axis ends
+    at the last target.
+    """
     axis, transport = stage.axes["X"], stage.bus.transport
     targets, longest = (3e6, 3.000_01e6, 1e6, 2.5e6, -0.02e6), 0.0
     for target_nm in targets:
@@ -99,7 +137,11 @@ def test_targets_that_change_in_flight_leave_the_queue_filled(stage):
         stage.dwell(0.02)
     axis.wait(stage.record_while_moving("X"))
     status = axis.status()
-    assert not status.faults and abs(status.target_nm - targets[-1]) < 1 and abs(stage.true_nm("X") - targets[-1]) <= BOUND_NM
+    assert (
+        not status.faults
+        and abs(status.target_nm - targets[-1]) < 1
+        and abs(stage.true_nm("X") - targets[-1]) <= BOUND_NM
+    )
     print(f"answered within {longest * axis.node.identity.clk_hz / 1e3:.0f} 000 clk")
     assert longest * axis.node.identity.clk_hz < 900_000
 
@@ -129,13 +171,18 @@ def test_stop_in_mid_move_keeps_the_axis_under_control(stage):
 
 # ------------------------------------------------------------------ sensing
 
+
 def sub_division_errors(stage, name, count=12, looks=8):
-    """True position less that of the encoder, in nm, at places spread over a period; the mean of some looks, since a stage that is held
+    """True position less that of the encoder, in nm, at places spread over a period; the mean of
+    some looks, since a stage that is held
     moves by a nanometre or two between the one and the other."""
     errors = []
     for n in range(count):
         stage.move(name, 1000 * n + PERIOD_NM * n / count)
-        errors.append(sum(stage.true_nm(name) - stage.axes[name].status().position_nm for _ in range(looks)) / looks)
+        errors.append(
+            sum(stage.true_nm(name) - stage.axes[name].status().position_nm for _ in range(looks))
+            / looks
+        )
     return errors
 
 
@@ -151,7 +198,9 @@ def test_the_learner_takes_the_ellipse_off_in_motion(stage):
     assert learner.accepted == 1 and learner.refused == 0, learner
     after = sub_division_errors(stage, "Y")
     spread = [max(errors) - min(errors) for errors in (before, after)]
-    assert spread[1] < spread[0] / 3 and spread[1] < 2.5, f"from {spread[0]:.1f} to {spread[1]:.1f} nm"
+    assert spread[1] < spread[0] / 3 and spread[1] < 2.5, (
+        f"from {spread[0]:.1f} to {spread[1]:.1f} nm"
+    )
     assert not axis.signal().faults
 
 
@@ -163,13 +212,18 @@ def test_positions_are_captured_on_demand(stage):
     captures, overrun = axis.captures()
     axis.capture_from()
     assert len(captures) == 3 and not overrun
-    assert all(abs(capture.position_nm - axis.status().position_nm) < BOUND_NM for capture in captures)
+    assert all(
+        abs(capture.position_nm - axis.status().position_nm) < BOUND_NM for capture in captures
+    )
 
 
 # ------------------------------------------------------------------ faults
 
+
 def fault_during_move(stage, name, provoke, distance_nm=0.5e6):
-    """Begin a move, provoke a fault in its middle; returns the status soon after and the true place of the axis then."""
+    """Begin a move, provoke a fault in its middle; returns the status soon after and the true place
+    of the axis then.
+    """
     axis = stage.axes[name]
     here = axis.status().position_nm
     axis.request("move", target=axis.to_counts(here + distance_nm))
@@ -204,14 +258,18 @@ def test_limit_switch_stops_the_drive_and_lets_the_axis_leave(stage):
     axis.set_parameter("travel_low", "-1.3mm")
     with pytest.raises(MotionFailed) as caught:
         stage.move("X", -1.2e6)
-    assert caught.value.cause == "ended_by_fault" and "limit switch at the low end" in str(caught.value)
+    assert caught.value.cause == "ended_by_fault" and "limit switch at the low end" in str(
+        caught.value
+    )
     status = assert_stopped_by(stage, "X", "limit_low")
     assert status.limit_low
     assert_position_survived(stage, "X")
     axis.reset()
     axis.enable()
     place = stage.true_nm("X")
-    axis.request("move", target=axis.to_counts(-1.29e6))          # further in: the guard lets no command pass
+    axis.request(
+        "move", target=axis.to_counts(-1.29e6)
+    )  # further in: the guard lets no command pass
     stage.dwell(0.3)
     assert place - 100 < stage.true_nm("X") < place + 5000
     axis.disable()
@@ -275,7 +333,9 @@ def test_jammed_motor_is_a_following_error(stage):
 
 
 def test_drive_fault_pin_takes_the_drive(stage):
-    axis = fault_during_move(stage, "X", lambda: stage.twin.inject("drive_fault", AXIS["X"]), distance_nm=-0.2e6)
+    axis = fault_during_move(
+        stage, "X", lambda: stage.twin.inject("drive_fault", AXIS["X"]), distance_nm=-0.2e6
+    )
     stage.dwell(0.01)
     assert_stopped_by(stage, "X", "drive")
     refused("fault_persists", axis.reset)
@@ -285,6 +345,7 @@ def test_drive_fault_pin_takes_the_drive(stage):
 
 
 # ------------------------------------------------------------------ the line
+
 
 def test_nonsense_on_the_line_moves_nothing_and_the_next_command_works(stage):
     axis = stage.axes["X"]
@@ -302,8 +363,11 @@ def test_nonsense_on_the_line_moves_nothing_and_the_next_command_works(stage):
 
 
 def send_frame(stage, address, body, crc_flip=0, length=None):
-    """A write frame by hand; returns the words that came back to the command byte and to the payload."""
+    """A write frame by hand; returns the words that came back to the command byte and to the
+    payload.
+    """
     import zlib
+
     command = 0x20 | address
     payload = bytes([len(body) if length is None else length]) + body
     crc = (zlib.crc32(bytes([command]) + payload) ^ crc_flip).to_bytes(4, "little")
@@ -326,8 +390,11 @@ def test_bad_crc_is_not_obeyed_and_counted(stage):
 
 
 def test_a_frame_under_another_nodes_address_is_not_obeyed(stage):
-    """Two flips turn address 1 into 2: the CRC-32 covers the command byte, so the wrong node refuses the frame."""
+    """Two flips turn address 1 into 2: the CRC-32 covers the command byte, so the wrong node
+    refuses the frame.
+    """
     import zlib
+
     body = request_body("move", 78, axis=0, target=stage.axes["X"].to_counts(0.5e6))
     payload = bytes([len(body)]) + body
     crc = zlib.crc32(bytes([0x20 | ADDRESSES["X"]]) + payload).to_bytes(4, "little")
@@ -346,7 +413,9 @@ def test_a_repeated_request_is_answered_again_and_not_acted_on_again(stage):
     axis = stage.axes["X"]
     stage.move("X", 0)
     counted = axis.node.counters()["repeated"]
-    body = request_body("set_parameter", 99, axis=0, parameter=client.PARAMETERS["settle_time"].id, value=21)
+    body = request_body(
+        "set_parameter", 99, axis=0, parameter=client.PARAMETERS["settle_time"].id, value=21
+    )
     for _ in range(3):
         ready, _ = send_frame(stage, ADDRESSES["X"], body)
         transport = stage.bus.transport
@@ -358,9 +427,14 @@ def test_a_repeated_request_is_answered_again_and_not_acted_on_again(stage):
 
 # ------------------------------------------------------------------ bad input
 
+
 def test_unknown_command_and_wrong_length_are_refused_in_words(stage, monkeypatch):
     before = rest(stage, "X")
-    bodies = {bytes([41, 200]): "does not know this command", bytes([42, 5, 0, 1]): "wrong length", bytes([43]): "wrong length"}
+    bodies = {
+        bytes([41, 200]): "does not know this command",
+        bytes([42, 5, 0, 1]): "wrong length",
+        bytes([43]): "wrong length",
+    }
     for body, words in bodies.items():
         send_frame(stage, ADDRESSES["X"], body)
         transport = stage.bus.transport
@@ -390,7 +464,13 @@ def test_parameter_out_of_range_is_refused_by_host_and_node(stage):
     kept = axis.get_parameter("kp").counts
     with pytest.raises(client.OutOfRange, match="kp allows"):
         axis.set_parameter("kp", 1000)
-    refused("out_of_range", axis.request, "set_parameter", parameter=client.PARAMETERS["kp"].id, value=-1)
+    refused(
+        "out_of_range",
+        axis.request,
+        "set_parameter",
+        parameter=client.PARAMETERS["kp"].id,
+        value=-1,
+    )
     refused("unknown_parameter", axis.request, "get_parameter", parameter=250)
     assert axis.get_parameter("kp").counts == kept
 
@@ -415,7 +495,9 @@ def test_a_node_of_another_build_is_refused(stage, monkeypatch):
 
 
 def test_a_line_with_much_noise_still_brings_every_command_through_or_says_so(stage):
-    """Spikes on the line: replies are repeated, nothing wrong is obeyed; what does not come through is an exception."""
+    """Spikes on the line: replies are repeated, nothing wrong is obeyed; what does not come through
+    is an exception.
+    """
     axis = stage.axes["X"]
     target = axis.status().target_nm
     stage.twin.bus_spikes(200)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""S2 as shipped: three stepper axes with scales in one node; and its counters in front of pulses from C++."""
+"""S2 as shipped: three stepper axes with scales in one node; and its counters in front of pulses
+from C++.
+"""
 
 import pytest
 
@@ -8,7 +10,7 @@ from figures import s2s3 as figures_s2s3
 from tb.bench import seed
 
 SEED = seed()
-NEAR = 4                                                        # counts within which a move settles
+NEAR = 4  # counts within which a move settles
 
 
 @pytest.fixture(scope="module")
@@ -26,24 +28,32 @@ def middle_counts(scale):
 def test_homing_takes_the_index_and_the_origin_lies_in_the_middle(stage):
     for name, scale in SCALES.items():
         of_scale, of_node, _ = stage.both(name)
-        assert of_scale - of_node == middle_counts(scale)       # the index lies in count 0 of the machine
+        assert of_scale - of_node == middle_counts(
+            scale
+        )  # the index lies in count 0 of the machine
         assert stage.axes[name].status().homed
 
 
 def test_as_many_counts_as_pulses_on_both_sides_of_the_origin(stage):
-    made = [*stage.move("up", {name: 5.0 for name in SCALES}), *stage.move("down", {name: -2000.0 for name in SCALES}),
-            *stage.move("slow", {name: -1950.0 for name in SCALES}, 0.5)]
+    made = [
+        *stage.move("up", {name: 5.0 for name in SCALES}),
+        *stage.move("down", {name: -2000.0 for name in SCALES}),
+        *stage.move("slow", {name: -1950.0 for name in SCALES}, 0.5),
+    ]
     assert [move.wrong for move in made] == [0] * 9
     assert [move.counts < 0 for move in made] == [False] * 3 + [True] * 6
     for move in made:
         count_um = float(SCALES[move.axis].count_um)
         assert abs(move.counts * count_um - move.target_um) <= NEAR * count_um
-        assert abs(move.apart_um) < 2 * count_um                # the table itself, by the model
-    assert all(stage.twin.truth(n).lost_steps == 0 and stage.twin.truth(n).step_timing_errors == 0 for n in range(3))
+        assert abs(move.apart_um) < 2 * count_um  # the table itself, by the model
+    assert all(
+        stage.twin.truth(n).lost_steps == 0 and stage.twin.truth(n).step_timing_errors == 0
+        for n in range(3)
+    )
 
 
 def test_two_places_that_read_the_same_on_16_bits_are_told_apart(stage):
-    reach = SCALES["Z"].word_mm * 500                           # um: half a 16-bit counter
+    reach = SCALES["Z"].word_mm * 500  # um: half a 16-bit counter
     below, above = (stage.move("", {"Z": place})[0] for place in (-reach, reach))
     turn = (above.counts - below.counts) - WORD
     assert abs(turn) <= 2 * NEAR and abs(above.counts % WORD - below.counts % WORD) <= 2 * NEAR
@@ -61,8 +71,17 @@ def test_a_place_at_the_border_of_31_bits_is_counted_over(stage):
 def test_without_a_scale_its_own_steps_are_the_position(stage):
     axis, number = stage.axes["Y"], stage.number("Y")
     axis.disable()
-    for name, value in {"position_source": 2, "period": "5um", "steps_per_period": 4, "ki": 0, "home_method": 35, "home_offset": 0,
-                        "travel_low": "-10mm", "travel_high": "10mm", "deglitch": "10us"}.items():     # longer than a step is high
+    for name, value in {
+        "position_source": 2,
+        "period": "5um",
+        "steps_per_period": 4,
+        "ki": 0,
+        "home_method": 35,
+        "home_offset": 0,
+        "travel_low": "-10mm",
+        "travel_high": "10mm",
+        "deglitch": "10us",
+    }.items():  # longer than a step is high
         axis.set_parameter(name, value)
     axis.enable()
     axis.home()
@@ -74,6 +93,7 @@ def test_without_a_scale_its_own_steps_are_the_position(stage):
 
 # ------------------------------------------------------------------ pulses from C++
 
+
 def test_pulses_at_random_ways_and_speeds_are_all_counted_through_every_overflow():
     axes = figures_s2s3.counted(SEED, 200_000)
     assert len(axes) == 3
@@ -84,5 +104,5 @@ def test_pulses_at_random_ways_and_speeds_are_all_counted_through_every_overflow
 
 def test_pulses_closer_than_the_edge_filter_passes_are_missed_and_told():
     bypassed, *filtered = figures_s2s3.counted(SEED, 20_000, "too_fast")
-    assert bypassed["wrong"] == 0                               # an edge every clk is as fast as pins can be
+    assert bypassed["wrong"] == 0  # an edge every clk is as fast as pins can be
     assert all(told["wrong"] > 100 for told in filtered)

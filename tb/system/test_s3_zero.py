@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""S3 as shipped: a linear motor behind its converter, RTL and firmware, and every way to find its zero."""
+"""S3 as shipped: a linear motor behind its converter, RTL and firmware, and every way to find its
+zero.
+"""
+
 import random
 
 import pytest
@@ -9,14 +12,18 @@ from moire.errors import MotionFailed
 from tb.bench import seed
 
 SEED = seed()
-AT_MARK = {"switch_low": -1.5e-3, "switch_high": 1.5e-3}       # switches near enough for a short test
-LOW, HIGH = -1500, 1500                                         # counts at which they open
+AT_MARK = {"switch_low": -1.5e-3, "switch_high": 1.5e-3}  # switches near enough for a short test
+LOW, HIGH = -1500, 1500  # counts at which they open
 
 
 @pytest.fixture(scope="module")
 def motor():
     print(f"SEED={SEED}")
-    return s3_zero.Motor(SEED, settings={"home_distance": "2.5mm", "travel_low": "-1mm", "travel_high": "1mm"}, **AT_MARK)
+    return s3_zero.Motor(
+        SEED,
+        settings={"home_distance": "2.5mm", "travel_low": "-1mm", "travel_high": "1mm"},
+        **AT_MARK,
+    )
 
 
 def home(motor, method, start_m=None):
@@ -37,10 +44,13 @@ def test_searches_from_both_sides_of_the_mark_and_from_on_it_find_the_same_count
     for side in (-1, 1) * 4 + (0,):
         motor.carry(side * source.uniform(0.02e-3, 1e-3))
         made.append(motor.search())
-    made += [motor.search() for _ in range(3)]                  # from where the one before ended: on the mark
+    made += [motor.search() for _ in range(3)]  # from where the one before ended: on the mark
     assert {search.zero_counts for search in made} == {0}
     assert {search.start_um > 0 for search in made} == {True, False}
-    assert {len(search.ways.split(", ")) for search in made} >= {2, 4}      # met at once, and only on the other side
+    assert {len(search.ways.split(", ")) for search in made} >= {
+        2,
+        4,
+    }  # met at once, and only on the other side
     assert all(abs(search.remaining_um) < 2 for search in made)
 
 
@@ -50,7 +60,7 @@ def test_s3_method(motor, start_m):
 
 
 def test_method_33_and_34_take_the_edge_that_they_meet_first(motor):
-    assert home(motor, 34, -0.3e-3) == 0                        # the mark lies over the counts 0 and 1
+    assert home(motor, 34, -0.3e-3) == 0  # the mark lies over the counts 0 and 1
     assert home(motor, 33, 0.3e-3) == 1
 
 
@@ -63,7 +73,9 @@ def test_methods_1_and_2_take_the_first_mark_behind_the_switch(motor, method, st
 def test_methods_17_and_18_take_the_place_where_the_switch_opens(motor, method, edge):
     motor.axis.set_parameter("homing_latch_speed", "1mm/s")
     place = home(motor, method, edge * 0.7e-6)
-    late = motor.axis.get_parameter("homing_latch_speed").value * 1000 * 2 / 1000       # um in the two ms until the firmware looks
+    late = (
+        motor.axis.get_parameter("homing_latch_speed").value * 1000 * 2 / 1000
+    )  # um in the two ms until the firmware looks
     assert abs(place - edge) <= 2 + late
 
 
@@ -71,7 +83,7 @@ def test_methods_17_and_18_take_the_place_where_the_switch_opens(motor, method, 
 def test_methods_35_and_37_call_this_place_zero(motor, method):
     motor.carry(0.4e-3)
     here = motor.twin.truth().scale_counts
-    assert abs(home(motor, method) - here) <= 1                 # the drive comes on there
+    assert abs(home(motor, method) - here) <= 1  # the drive comes on there
     assert motor.axis.status().position_nm == pytest.approx(0, abs=2000)
 
 
@@ -85,7 +97,7 @@ def test_a_search_without_a_mark_in_reach_ends_with_its_cause_and_the_axis_under
     assert status.state == "holding" and status.enabled and not status.homed and not status.faults
     before = motor.position_um
     motor.axis.dwell(0.1)
-    assert abs(motor.position_um - before) < 2                     # it stands
+    assert abs(motor.position_um - before) < 2  # it stands
 
 
 def test_a_mark_that_is_stuck_is_no_zero(motor):

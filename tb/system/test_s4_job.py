@@ -1,16 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """S4's unattended job as experiments.s4_job runs it: small ones, and how it judges them."""
+
 import math
 import random
 
 import pytest
 
-from experiments.s4_job import MAIN, SUB, TOLERANCE, Cut, IndexingMachine, Outcome, Trouble, apart, random_stations, random_worm
+from experiments.s4_job import (
+    MAIN,
+    SUB,
+    TOLERANCE,
+    Cut,
+    IndexingMachine,
+    Outcome,
+    Trouble,
+    apart,
+    random_stations,
+    random_worm,
+)
 from moire.bus.job import JobState
 from tb.bench import seed
 
 SEED = seed()
-NEAR_BY = 0.004                      # of a turn: stations 0.7 degree apart
+NEAR_BY = 0.004  # of a turn: stations 0.7 degree apart
 
 
 def test_amid_trouble_and_through_a_power_cut_of_both_nodes_each_station_is_cut_once():
@@ -27,7 +39,7 @@ def test_amid_trouble_and_through_a_power_cut_of_both_nodes_each_station_is_cut_
 def test_a_list_entered_on_the_panel_is_cut_by_the_bytes_as_printed_after_a_power_cut_of_the_sub_node():
     with IndexingMachine(SEED, "printed") as machine:
         machine.enter(["0.25", "1"])
-        machine.power_cut((SUB,))                               # it comes back with its values and the list
+        machine.power_cut((SUB,))  # it comes back with its values and the list
         outcome = machine.run()
         peer = machine.table.peer()
     assert not outcome.failed and not outcome.answers and outcome.stations == [900, 3600]
@@ -37,19 +49,28 @@ def test_a_list_entered_on_the_panel_is_cut_by_the_bytes_as_printed_after_a_powe
 
 # ------------------------------------------------------------------ how it is judged
 
+
 def outcome_of(*cuts, stations=(0.0, 3600.0), state="finished"):
-    made = [Cut(station, stations[station] if station is not None else 0.0, 0.0, error, 0.0, whole) for station, error, whole in cuts]
-    return Outcome(list(stations), made, JobState(state, "ok", len(stations), len(stations), (), ()), 1.0)
+    made = [
+        Cut(station, stations[station] if station is not None else 0.0, 0.0, error, 0.0, whole)
+        for station, error, whole in cuts
+    ]
+    return Outcome(
+        list(stations), made, JobState(state, "ok", len(stations), len(stations), (), ()), 1.0
+    )
 
 
-@pytest.mark.parametrize("outcome, uncut, twice, strays", [
-    (outcome_of((0, 0.1, True), (1, -0.4, True)), [], [], 0),
-    (outcome_of((0, 0.1, True)), [1], [], 0),
-    (outcome_of((0, 0.1, True), (1, 0.1, False)), [1], [], 0),
-    (outcome_of((0, 0.1, True), (0, 0.1, True), (1, 0.1, True)), [], [0], 0),
-    (outcome_of((0, 0.1, False), (0, 0.1, True), (1, 0.1, True)), [], [0], 0),
-    (outcome_of((0, 0.1, True), (1, 0.1, True), (None, 900.0, True)), [], [], 1),
-])
+@pytest.mark.parametrize(
+    "outcome, uncut, twice, strays",
+    [
+        (outcome_of((0, 0.1, True), (1, -0.4, True)), [], [], 0),
+        (outcome_of((0, 0.1, True)), [1], [], 0),
+        (outcome_of((0, 0.1, True), (1, 0.1, False)), [1], [], 0),
+        (outcome_of((0, 0.1, True), (0, 0.1, True), (1, 0.1, True)), [], [0], 0),
+        (outcome_of((0, 0.1, False), (0, 0.1, True), (1, 0.1, True)), [], [0], 0),
+        (outcome_of((0, 0.1, True), (1, 0.1, True), (None, 900.0, True)), [], [], 1),
+    ],
+)
 def test_a_job_is_whole_when_each_station_was_cut_once(outcome, uncut, twice, strays):
     assert (outcome.uncut, outcome.twice, len(outcome.outside_tolerance)) == (uncut, twice, strays)
     assert outcome.whole == (not uncut and not twice and not strays)
@@ -68,4 +89,9 @@ def test_angles_are_apart_the_short_way_round():
 
 def test_random_stations_ascend_within_a_turn():
     stations = random_stations(36, random.Random(SEED))
-    assert len(stations) == 36 and stations == sorted(stations) and 0 <= stations[0] and stations[-1] < 1296000
+    assert (
+        len(stations) == 36
+        and stations == sorted(stations)
+        and 0 <= stations[0]
+        and stations[-1] < 1296000
+    )

@@ -1,27 +1,51 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`moire twin --machine` as a program of its own: a client finds and moves the machine of each experiment."""
+"""`moire twin --machine` as a program of its own: a client finds and moves the machine of each
+experiment.
+"""
+
 import pytest
 
 from experiments.machines import MACHINES
 from moire.cli import twin as command_twin
 from tb.system.test_gateway import moire, served
 
-pytestmark = pytest.mark.filterwarnings("ignore:set(Daemon|Name).. is deprecated:DeprecationWarning")      # in pyserial
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:set(Daemon|Name).. is deprecated:DeprecationWarning"
+)  # in pyserial
 
 
 def test_the_machines_that_are_told_are_those_that_are_made():
     assert list(command_twin.MACHINES) == list(MACHINES)
 
 
-@pytest.mark.parametrize(("machine", "entrance", "axes", "place", "way", "near_nm"), [
-    ("s0_fine", "tcp", {1: 1}, (), "100um", 3),
-    ("s2", "rfc2217", {1: 3}, ("--axis", "2"), "200um", 1000),
-    ("s3", "tcp", {1: 1}, (), "100um", 1000),
-    ("s4", "terminal", {1: 1, 2: 1}, ("--address", "2"), "200um", 1000)])
+@pytest.mark.parametrize(
+    ("machine", "entrance", "axes", "place", "way", "near_nm"),
+    [
+        ("s0_fine", "tcp", {1: 1}, (), "100um", 3),
+        ("s2", "rfc2217", {1: 3}, ("--axis", "2"), "200um", 1000),
+        ("s3", "tcp", {1: 1}, (), "100um", 1000),
+        ("s4", "terminal", {1: 1, 2: 1}, ("--address", "2"), "200um", 1000),
+    ],
+)
 def test_every_machine_is_found_and_moved_by_a_client(machine, entrance, axes, place, way, near_nm):
     with served("--machine", machine) as ports:
         assert ports["machine"] == machine and ports["nodes"] == list(axes)
-        found, _, moved = moire("--port", ports[entrance], "find", *map(str, axes), "--", "home", "--method", "35", *place,
-                                "--", "move", way, *place)
-        assert {node["address"]: node["axes"] for node in found["nodes"]} == axes and all(node["matches"] for node in found["nodes"])
+        found, _, moved = moire(
+            "--port",
+            ports[entrance],
+            "find",
+            *map(str, axes),
+            "--",
+            "home",
+            "--method",
+            "35",
+            *place,
+            "--",
+            "move",
+            way,
+            *place,
+        )
+        assert {node["address"]: node["axes"] for node in found["nodes"]} == axes and all(
+            node["matches"] for node in found["nodes"]
+        )
         assert abs(moved["error_nm"]) < near_nm and moved["target_nm"] > 99_000

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A sub-node of S4 as it ships, image `station` on the RTL: its worm table in the twin goes to angles of its sensor."""
+"""A sub-node of S4 as it ships, image `station` on the RTL: its worm table in the twin goes to
+angles of its sensor.
+"""
+
 import io
 import math
 import random
@@ -20,21 +23,50 @@ from twin import Devices, Twin, TwinTransport, build
 from twin.nodes.twin import Axis, Node
 
 RECIPE = Path(__file__).resolve().parents[2] / "docs" / "indexing.md"
-SUB, MAIN = 0, 1                 # places
+SUB, MAIN = 0, 1  # places
 ESTOP = next(bit for bit, (name, _) in FAULTS.items() if name == "estop")
 NODE = {"DRIVES": 2, "FILTERS": 0, "SINE": 0}
-AXIS = {"period": "1um", "drive": "steps", "position_source": "own_steps", "steps_per_period": 4, "counts_per_period": 4,
-        "disagreement_limit": 0, "encoder_fault_mask": 0, "kp": 0, "ki": 0, "kd": 0, "kv": 0, "ka": 0,
-        "following_limit": "10mm", "velocity": "20mm/s", "acceleration": "100mm/s2", "jerk": "1000mm/s3", "homing_latch_speed": "0.2mm/s",
-        "settle_window": "1um", "settle_time": "5ms", "watchdog_time": "60s"}
-QUICK = {"turn_allowance": "40arcsec", "turn_take_up": "40arcsec", "turn_share": "0.7", "turn_settle": "50ms"}
+AXIS = {
+    "period": "1um",
+    "drive": "steps",
+    "position_source": "own_steps",
+    "steps_per_period": 4,
+    "counts_per_period": 4,
+    "disagreement_limit": 0,
+    "encoder_fault_mask": 0,
+    "kp": 0,
+    "ki": 0,
+    "kd": 0,
+    "kv": 0,
+    "ka": 0,
+    "following_limit": "10mm",
+    "velocity": "20mm/s",
+    "acceleration": "100mm/s2",
+    "jerk": "1000mm/s3",
+    "homing_latch_speed": "0.2mm/s",
+    "settle_window": "1um",
+    "settle_time": "5ms",
+    "watchdog_time": "60s",
+}
+QUICK = {
+    "turn_allowance": "40arcsec",
+    "turn_take_up": "40arcsec",
+    "turn_share": "0.7",
+    "turn_settle": "50ms",
+}
 
 
 class Station:
     def __init__(self):
         table = Axis("worm_table", {"sensor_dropped": 0.005, "sensor_corrupt": 0.005})
-        self.twin = Twin([Node(1, [table], Devices(eeprom=True)), Node(2, [])], seed=seed() % 1000, node_parameters=NODE,
-                         firmware=build.firmware("station"), peers=(SUB, MAIN), peer_baud=115200)
+        self.twin = Twin(
+            [Node(1, [table], Devices(eeprom=True)), Node(2, [])],
+            seed=seed() % 1000,
+            node_parameters=NODE,
+            firmware=build.firmware("station"),
+            peers=(SUB, MAIN),
+            peer_baud=115200,
+        )
         bus = Bus(TwinTransport(self.twin), random_source=random.Random(seed()), poll_s=0.1)
         bus.transport.wait(0.1)
         node, axis = bus.node(1), bus.axis(1)
@@ -42,7 +74,10 @@ class Station:
             axis.set_parameter(name, value)
         self.settings, self.table, self.job = Settings(node), IndexingTable(node), Job(node)
         self.settings.load(QUICK)
-        self.to_sub, self.from_sub = self.twin.peer_lines[MAIN, SUB], self.twin.peer_lines[SUB, MAIN]
+        self.to_sub, self.from_sub = (
+            self.twin.peer_lines[MAIN, SUB],
+            self.twin.peer_lines[SUB, MAIN],
+        )
 
     def beside(self, arcsec):
         """An angle so far from where the table stands."""
@@ -79,8 +114,14 @@ def test_a_frame_from_the_peer_turns_the_table_amid_garbage(station):
     station.settings.set("peer_mode", "frames")
     target = station.beside(200)
     station.to_sub.garbage(20)
-    assert any(station.ask(turn_to(7, target)) == [bytes([7, OPERATION["turn_to"], 0])] for _ in range(10))
-    assert any(reply[:3] == bytes([8 + n, OPERATION["turn_state"], 0]) for n in range(10) for reply in station.ask(look(8 + n)))
+    assert any(
+        station.ask(turn_to(7, target)) == [bytes([7, OPERATION["turn_to"], 0])] for _ in range(10)
+    )
+    assert any(
+        reply[:3] == bytes([8 + n, OPERATION["turn_state"], 0])
+        for n in range(10)
+        for reply in station.ask(look(8 + n))
+    )
     station.to_sub.garbage(0)
     assert station.table.wait().ended == "ok" and abs(station.error(target)) <= 2
     assert station.table.peer().garbage > 0
@@ -113,11 +154,13 @@ def test_the_bytes_as_printed_turn_the_table_to_its_next_station(station):
     target = station.beside(200)
     station.job.load([target])
     station.from_sub.take_heard()
-    station.to_sub.put(b"\xFF\xFF\xAA")
+    station.to_sub.put(b"\xff\xff\xaa")
     station.twin.run(0.1)
     assert station.table.peer().phase == "turning" and station.table.wait().ended == "ok"
     station.twin.run(0.01)
-    assert bytes(station.from_sub.take_heard()) == b"\xFF\xFF\x55" and abs(station.error(target)) <= 2
+    assert (
+        bytes(station.from_sub.take_heard()) == b"\xff\xff\x55" and abs(station.error(target)) <= 2
+    )
 
 
 class Kept(TwinTransport):
@@ -132,13 +175,21 @@ def test_the_recipe_of_indexing_md_turns_the_table_as_it_is_printed():
     target = 3600 * 12.5
     assert len(commands) == 3 and commands[-1].endswith("turn to 12.5deg")
     nodes = [Node(1, []), Node(2, [Axis("worm_table")], Devices(eeprom=True))]
-    with Twin(nodes, seed=seed() % 1000, node_parameters=NODE, firmware=build.firmware("station"), clk_hz=1_840_000) as twin:
-        twin.set_position(1, math.radians(12.3))                   # near, so that the way is short
+    with Twin(
+        nodes,
+        seed=seed() % 1000,
+        node_parameters=NODE,
+        firmware=build.firmware("station"),
+        clk_hz=1_840_000,
+    ) as twin:
+        twin.set_position(1, math.radians(12.3))  # near, so that the way is short
         twin.run(0.1)
         before = twin.truth(1)
         for command in commands:
             out, err = io.StringIO(), io.StringIO()
-            assert command_line.main(command.split(), lambda options: Kept(twin), out, err) == 0, err.getvalue()
+            assert command_line.main(command.split(), lambda options: Kept(twin), out, err) == 0, (
+                err.getvalue()
+            )
         told = twin.truth(1)
         assert told.steps - before.steps > 3000 and told.lost_steps == 0
         assert abs(math.degrees(told.position_rad) * 3600 - target) <= 2

@@ -1,37 +1,82 @@
 // SPDX-License-Identifier: Apache-2.0
-// three_axes_bench -- the axes of S2 without their soft core: three scales at the pins, registers on the bus.
+// three_axes_bench -- the axes of S2 without their soft core: three scales at the pins, registers
+// on the bus.
 `default_nettype none
 
 module three_axes_bench (
-    input  wire                  clk,
-    input  wire                  rst,
-    input  wire                  tick,
-    input  wire                  sample_tick,
-    input  wire        [2:0]     select,            // strobe: access to the block of axis n
-    input  wire        [2:0]     feedback_select,    // to that of its grating
-    input  wire                  write,
-    input  wire        [5:0]     word,
-    input  wire        [31:0]    wdata,
-    output logic       [31:0]    rdata,
-    input  wire        [2:0]     a,
-    input  wire        [2:0]     b
+    input  wire         clk,
+    input  wire         rst,
+    input  wire         tick,
+    input  wire         sample_tick,
+    input  wire  [ 2:0] select,           // strobe: access to the block of axis n
+    input  wire  [ 2:0] feedback_select,  // to that of its grating
+    input  wire         write,
+    input  wire  [ 5:0] word,
+    input  wire  [31:0] wdata,
+    output logic [31:0] rdata,
+    input  wire  [ 2:0] a,
+    input  wire  [ 2:0] b
 );
     wire [31:0] now_high, now;
-    wire [31:0] answer [0:2];
-    wire [31:0] grating_answer [0:2];
+    wire [31:0] answer        [0:2];
+    wire [31:0] grating_answer[0:2];
 
-    time_stamp u_time (.clk, .rst, .now({now_high, now}));
+    time_stamp u_time (
+        .clk,
+        .rst,
+        .now({now_high, now})
+    );
 
     for (genvar n = 0; n < 3; n++) begin : g_axis
         wire [31:0] actuator_rdata;
         wire        adc_cs_n, adc_sclk, bridge_a, bridge_b, step, direction, dac_cs_n, dac_sclk, dac_sdi, drive_enable, compare_pulse;
 
-        axis #(.DRIVES(2), .FILTERS(0), .SINE(0)) u_axis (.clk, .rst, .tick, .tick_period(24'd15000), .sample_tick, .start(1'b0), .sync(1'b0), .estop(1'b0),
-            .watchdog_expired(1'b0), .cpu_stopped(1'b0), .select(select[n]), .write, .word, .wdata, .rdata(answer[n]),
-            .feedback_select(feedback_select[n]), .feedback_rdata(grating_answer[n]), .actuator_select(1'b0), .actuator_rdata, .now,
-            .encoder_a(a[n]), .encoder_b(b[n]), .encoder_z(1'b0), .probe(2'b00), .adc_sin(1'b0), .adc_cos(1'b0), .limit_low_open(1'b0),
-            .limit_high_open(1'b0), .drive_fault_n(1'b1), .adc_cs_n, .adc_sclk, .bridge_a, .bridge_b, .step, .direction, .dac_cs_n,
-            .dac_sclk, .dac_sdi, .drive_enable, .compare_pulse);
+        axis #(
+            .DRIVES (2),
+            .FILTERS(0),
+            .SINE   (0)
+        ) u_axis (
+            .clk,
+            .rst,
+            .tick,
+            .tick_period     (24'd15000),
+            .sample_tick,
+            .start           (1'b0),
+            .sync            (1'b0),
+            .estop           (1'b0),
+            .watchdog_expired(1'b0),
+            .cpu_stopped     (1'b0),
+            .select          (select[n]),
+            .write,
+            .word,
+            .wdata,
+            .rdata           (answer[n]),
+            .feedback_select (feedback_select[n]),
+            .feedback_rdata  (grating_answer[n]),
+            .actuator_select (1'b0),
+            .actuator_rdata,
+            .now,
+            .encoder_a       (a[n]),
+            .encoder_b       (b[n]),
+            .encoder_z       (1'b0),
+            .probe           (2'b00),
+            .adc_sin         (1'b0),
+            .adc_cos         (1'b0),
+            .limit_low_open  (1'b0),
+            .limit_high_open (1'b0),
+            .drive_fault_n   (1'b1),
+            .adc_cs_n,
+            .adc_sclk,
+            .bridge_a,
+            .bridge_b,
+            .step,
+            .direction,
+            .dac_cs_n,
+            .dac_sclk,
+            .dac_sdi,
+            .drive_enable,
+            .compare_pulse
+        );
 
         wire unused = &{1'b0, actuator_rdata, adc_cs_n, adc_sclk, bridge_a, bridge_b, step, direction, dac_cs_n, dac_sclk, dac_sdi,
                         drive_enable, compare_pulse};

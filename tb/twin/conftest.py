@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each test of the twin begins from the same random numbers."""
+
 import random
 
 import pytest

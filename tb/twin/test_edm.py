@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The PS/2 keyboard and the wire-EDM machine of S4 with its PC: on one cable, and each against the party that judges the RTL."""
+"""The PS/2 keyboard and the wire-EDM machine of S4 with its PC: on one cable, and each against the
+party that judges the RTL.
+"""
+
 import math
 import random
 import re
@@ -18,7 +21,9 @@ CUT_S = 0.1
 
 
 def room(seed=1, clk_hz=CLK_HZ, **values):
-    return DevicesBench(Devices(keyboard=True, edm=True, parameters={"edm_cut_time": CUT_S, **values}), seed, clk_hz)
+    return DevicesBench(
+        Devices(keyboard=True, edm=True, parameters={"edm_cut_time": CUT_S, **values}), seed, clk_hz
+    )
 
 
 def heard(bench):
@@ -33,7 +38,11 @@ def test_what_is_typed_arrives():
     bench.cable(0.04)
     assert heard(bench) == keys[:3] and bench.state.keyboard_waiting == 4
     bench.cable(0.04)
-    assert heard(bench) == keys[3:] and bench.state.keyboard_sent == 7 and bench.state.computer_damaged == 0
+    assert (
+        heard(bench) == keys[3:]
+        and bench.state.keyboard_sent == 7
+        and bench.state.computer_damaged == 0
+    )
 
 
 def test_the_clock_keeps_the_rule():
@@ -43,12 +52,12 @@ def test_the_clock_keeps_the_rule():
     clock, data = levels["edm_clock"].astype(int), levels["edm_data"].astype(int)
     falls, rises = (numpy.flatnonzero(numpy.diff(clock) == step) for step in (-1, 1))
     assert len(falls) == len(rises) == 22
-    low, high = (rises - falls) / 2, (falls[1:] - rises[:-1]) / 2           # us
+    low, high = (rises - falls) / 2, (falls[1:] - rises[:-1]) / 2  # us
     assert 30 <= low.min() and low.max() <= 50
     within = numpy.arange(21) != 10
     assert 30 <= high[within].min() and high[within].max() <= 50 and high[10] >= 50
     changes = numpy.flatnonzero(numpy.diff(data))
-    for change in changes:                                    # data is still for 5 us before and after each falling edge
+    for change in changes:  # data is still for 5 us before and after each falling edge
         assert abs(falls - change).min() >= 10
 
 
@@ -56,13 +65,23 @@ def test_commands_are_answered_and_obeyed():
     bench = room()
     bench.order([0xED, 0x05, 0xEE, 0xF3, 0x20])
     bench.cable(0.06)
-    assert bench.take_commands() == bytes([0xED, 0x05, 0xEE, 0xF3, 0x20]) and heard(bench) == [0xFA, 0xFA, 0xEE, 0xFA, 0xFA]
-    assert bench.state.keyboard_lights == 5 and bench.state.computer_waiting == 0 and bench.state.computer_unanswered == 0
+    assert bench.take_commands() == bytes([0xED, 0x05, 0xEE, 0xF3, 0x20]) and heard(bench) == [
+        0xFA,
+        0xFA,
+        0xEE,
+        0xFA,
+        0xFA,
+    ]
+    assert (
+        bench.state.keyboard_lights == 5
+        and bench.state.computer_waiting == 0
+        and bench.state.computer_unanswered == 0
+    )
     bench.order([0xF5])
     bench.cable(0.02)
     bench.type([0x1C])
     bench.cable(0.02)
-    assert heard(bench) == [0xFA]                              # it types nothing until it is enabled
+    assert heard(bench) == [0xFA]  # it types nothing until it is enabled
     bench.order([0xF4])
     bench.cable(0.02)
     bench.type([0x1C])
@@ -81,7 +100,11 @@ def test_a_keyboard_that_is_not_there_answers_nothing():
         bench.order([0xED, 0x01])
         bench.type(START)
         bench.cable(0.5)
-        assert heard(bench) == [] and bench.state.computer_unanswered == 2 and bench.state.computer_waiting == 0
+        assert (
+            heard(bench) == []
+            and bench.state.computer_unanswered == 2
+            and bench.state.computer_waiting == 0
+        )
     bench.type(START)
     bench.cable(0.1)
     assert heard(bench) == START
@@ -93,13 +116,19 @@ def test_nothing_is_lost_when_the_pc_holds_the_keyboard():
     bench.type(keys)
     bench.cable(1.5)
     state = bench.state
-    assert heard(bench) == keys and state.computer_inhibits > 150 and state.keyboard_aborts > 20 and state.computer_damaged == 0
+    assert (
+        heard(bench) == keys
+        and state.computer_inhibits > 150
+        and state.keyboard_aborts > 20
+        and state.computer_damaged == 0
+    )
     bench.order([0xED, 0x02])
     bench.cable(0.2)
     assert state.computer_unanswered == 0 and bench.state.keyboard_lights == 2
 
 
 # each against the other side as tb/peripheral has it
+
 
 def pulls(bench, party, side):
     """A clk with the party at one of the ports."""
@@ -111,15 +140,23 @@ def pulls(bench, party, side):
 def test_the_keyboard_serves_a_host_that_cuts_and_orders_at_will():
     bench, host = room(), Host(CLK_HZ, cut=0.02)
     keys = [random.randrange(1, 0x84) for _ in range(60)]
-    orders = {30_000: 0xEE, 50_000: 0xED, 70_000: 0x07}       # clk
+    orders = {30_000: 0xEE, 50_000: 0xED, 70_000: 0x07}  # clk
     bench.type(keys)
     for n in range(250 * CLK_HZ // 1000):
         if n in orders:
             host.orders = [orders[n]]
         pulls(bench, host, "keyboard")
     answers = [byte for byte in host.heard if byte in (0xEE, 0xFA)]
-    assert [byte for byte in host.heard if byte not in (0xEE, 0xFA)] == keys and host.damaged == 0 and host.unanswered == 0
-    assert answers == [0xEE, 0xFA, 0xFA] and bench.state.keyboard_lights == 7 and bench.state.keyboard_aborts > 5
+    assert (
+        [byte for byte in host.heard if byte not in (0xEE, 0xFA)] == keys
+        and host.damaged == 0
+        and host.unanswered == 0
+    )
+    assert (
+        answers == [0xEE, 0xFA, 0xFA]
+        and bench.state.keyboard_lights == 7
+        and bench.state.keyboard_aborts > 5
+    )
 
 
 def test_the_pc_asks_for_damaged_bytes_again_and_gets_its_answers():
@@ -131,11 +168,16 @@ def test_the_pc_asks_for_damaged_bytes_again_and_gets_its_answers():
         pulls(bench, keyboard, "machine")
     state = bench.state
     assert [byte for byte in heard(bench) if byte not in (0xEE, 0xFA)] == keys
-    assert state.computer_damaged > 3 and state.computer_unanswered == 0 and state.computer_waiting == 0
+    assert (
+        state.computer_damaged > 3
+        and state.computer_unanswered == 0
+        and state.computer_waiting == 0
+    )
     assert list(dict.fromkeys(keyboard.commands)) == [0xED, 0x02, 0xEE]
 
 
 # the machine
+
 
 def cut_once(bench, seconds=0.06 + 1.5e-3 * len(START)):
     bench.type(START)
@@ -145,21 +187,36 @@ def cut_once(bench, seconds=0.06 + 1.5e-3 * len(START)):
 def test_left_control_and_w_make_a_cut():
     bench = room()
     cut_once(bench)
-    assert bench.state.edm_cutting and bench.cuts[0].end_s is None and bench.level("machine_cutting")
+    assert (
+        bench.state.edm_cutting and bench.cuts[0].end_s is None and bench.level("machine_cutting")
+    )
     bench.cable(CUT_S)
     (cut,) = bench.cuts
-    assert cut.whole and cut.end_s - cut.start_s == pytest.approx(CUT_S, abs=1e-5) and math.isnan(cut.angle_start_rad)
-    assert not bench.state.edm_cutting and not bench.level("machine_cutting") and bench.state.edm_starts == 1
+    assert (
+        cut.whole
+        and cut.end_s - cut.start_s == pytest.approx(CUT_S, abs=1e-5)
+        and math.isnan(cut.angle_start_rad)
+    )
+    assert (
+        not bench.state.edm_cutting
+        and not bench.level("machine_cutting")
+        and bench.state.edm_starts == 1
+    )
     assert 0.05 < cut.start_s - bench.take_heard()[-1][0] < 0.0501
 
 
 def test_other_keys_make_none():
     bench = room()
-    for keys in ([0x14, 0x1C, 0xF0, 0x1C, 0xF0, 0x14], START[:5], [0x1D, 0xF0, 0x1D], [0x14, 0x1D, 0xF0, 0x1C, 0x1D, 0xF0, 0x14]):
+    for keys in (
+        [0x14, 0x1C, 0xF0, 0x1C, 0xF0, 0x14],
+        START[:5],
+        [0x1D, 0xF0, 0x1D],
+        [0x14, 0x1D, 0xF0, 0x1C, 0x1D, 0xF0, 0x14],
+    ):
         bench.type(keys)
         bench.cable(0.1)
     assert bench.cuts == [] and bench.state.edm_starts == 0
-    bench.type([0x14, *START])                                 # control came once too often
+    bench.type([0x14, *START])  # control came once too often
     bench.cable(0.1)
     assert len(bench.cuts) == 1
 
@@ -188,7 +245,11 @@ def test_an_alarm_ends_a_cut_and_holds_the_next_back():
     cut_once(bench)
     with bench.fault("edm_alarm"):
         bench.cable(0.01)
-        assert bench.level("edm_alarm") and not bench.level("machine_cutting") and not bench.cuts[0].whole
+        assert (
+            bench.level("edm_alarm")
+            and not bench.level("machine_cutting")
+            and not bench.cuts[0].whole
+        )
         cut_once(bench)
         assert len(bench.cuts) == 1 and bench.state.edm_ignored == 1
     bench.cable(0.01)
@@ -212,11 +273,13 @@ def test_a_machine_may_never_end_and_may_be_deaf():
 def test_the_state_bounces_and_settles():
     bench = room(clk_hz=1_000_000)
     bench.type(START)
-    levels = numpy.concatenate([bench.cable(0.02)["machine_cutting"], bench.cable(0.2)["machine_cutting"]]).astype(int)
+    levels = numpy.concatenate(
+        [bench.cable(0.02)["machine_cutting"], bench.cable(0.2)["machine_cutting"]]
+    ).astype(int)
     edges = numpy.flatnonzero(numpy.diff(levels))
     split = numpy.flatnonzero(numpy.diff(edges) > 50_000)
     assert len(split) == 1 and len(edges) > 4
-    for bounces in (edges[:split[0] + 1], edges[split[0] + 1:]):
+    for bounces in (edges[: split[0] + 1], edges[split[0] + 1 :]):
         assert len(bounces) % 2 == 1 and bounces[-1] - bounces[0] <= 2000
 
 
@@ -234,6 +297,23 @@ def test_sigrok_reads_the_same_from_the_cable(tmp_path):
     levels = bench.cable(0.1)
     file = tmp_path / "wave.bin"
     file.write_bytes((levels["edm_clock"] | levels["edm_data"] << 1).tobytes())
-    out = subprocess.run(["sigrok-cli", "-i", file, "-I", f"binary:numchannels=2:samplerate={CLK_HZ}", "-P", "ps2:clk=0:data=1",
-                          "-A", "ps2=word:parity-err"], capture_output=True, text=True, check=True, timeout=60)
-    assert [int(word, 16) for word in re.findall(r"Data: (\w\w)", out.stdout)] == keys and "err" not in out.stdout
+    out = subprocess.run(
+        [
+            "sigrok-cli",
+            "-i",
+            file,
+            "-I",
+            f"binary:numchannels=2:samplerate={CLK_HZ}",
+            "-P",
+            "ps2:clk=0:data=1",
+            "-A",
+            "ps2=word:parity-err",
+        ],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    )
+    assert [
+        int(word, 16) for word in re.findall(r"Data: (\w\w)", out.stdout)
+    ] == keys and "err" not in out.stdout

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The linear motor of S3, driven by frames to its converter, against what can be worked out by hand."""
+"""The linear motor of S3, driven by frames to its converter, against what can be worked out by
+hand.
+"""
+
 import math
 
 import numpy
@@ -9,7 +12,7 @@ from twin import Machine
 from twin.parameters import tables as parameters
 
 FREE = dict(guide_coulomb=1e-9, guide_static=1e-9, guide_viscous=0, guide_presliding_damping=0)
-AMPERE = 0.3 * 10 / 32768        # a count of the converter
+AMPERE = 0.3 * 10 / 32768  # a count of the converter
 
 
 def motor(clk_hz=1_000_000, **values):
@@ -32,7 +35,10 @@ def test_a_current_holds_it_where_flexure_and_cable_balance():
 def test_the_amplifier_follows_with_its_bandwidth_and_ends_when_disabled():
     machine = motor()
     machine.inject("motor_jam")
-    for start, code, enable, end in ((0.0, 42768, 1, 10000 * AMPERE), (10000 * AMPERE, 42768, 0, 0.0)):
+    for start, code, enable, end in (
+        (0.0, 42768, 1, 10000 * AMPERE),
+        (10000 * AMPERE, 42768, 0, 0.0),
+    ):
         machine.dac(code)
         machine.pins(drive_enable=enable)
         machine.run(1 / (2 * math.pi * 500))
@@ -56,7 +62,9 @@ def test_it_accelerates_as_force_over_mass():
     machine.dac(32768 + 5000)
     machine.run(0.01)
     seconds = machine.state.time_s - start.time_s
-    assert machine.state.velocity_m_s == pytest.approx(12 * 5000 * AMPERE / 1.2 * (seconds - 30e-6), rel=5e-3)
+    assert machine.state.velocity_m_s == pytest.approx(
+        12 * 5000 * AMPERE / 1.2 * (seconds - 30e-6), rel=5e-3
+    )
 
 
 def test_it_swings_on_flexure_and_cable_without_losing_energy():
@@ -70,7 +78,9 @@ def test_it_swings_on_flexure_and_cable_without_losing_energy():
     energy = 140 * x**2 / 2 + 1.2 * v**2 / 2
     assert numpy.abs(energy / energy[0] - 1).max() < 1e-3
     rises = trace["time_s"][1:][(x[:-1] < 0) & (x[1:] >= 0)]
-    assert (len(rises) - 1) / (rises[-1] - rises[0]) == pytest.approx(math.sqrt(140 / 1.2) / (2 * math.pi), rel=1e-3)
+    assert (len(rises) - 1) / (rises[-1] - rises[0]) == pytest.approx(
+        math.sqrt(140 / 1.2) / (2 * math.pi), rel=1e-3
+    )
 
 
 def test_it_rests_anywhere_within_a_millimetre_and_stays_there():
@@ -80,9 +90,15 @@ def test_it_rests_anywhere_within_a_millimetre_and_stays_there():
         places.append(machine.state.position_m)
         machine.run(1.0)
         assert machine.state.position_m == pytest.approx(places[-1], abs=1e-8)
-    assert all(-1e-3 <= place <= 1e-3 for place in places) and len(set(places)) == 20 and min(places) < 0 < max(places)
+    assert (
+        all(-1e-3 <= place <= 1e-3 for place in places)
+        and len(set(places)) == 20
+        and min(places) < 0 < max(places)
+    )
     p = parameters.values(machine="linear_motor")
-    assert p["flexure_stiffness"] * 1e-3 + p["cable_stiffness"] * 4e-3 < 0.7 * p["guide_coulomb"]     # elastic, so it never creeps
+    assert (
+        p["flexure_stiffness"] * 1e-3 + p["cable_stiffness"] * 4e-3 < 0.7 * p["guide_coulomb"]
+    )  # elastic, so it never creeps
 
 
 def test_friction_holds_it_below_break_away():
@@ -96,19 +112,23 @@ def test_friction_holds_it_below_break_away():
 
 
 def test_the_mark_is_a_count_wide_and_scatters_as_stated():
-    machine = motor(**{**FREE, "guide_viscous": 300.0}, flexure_stiffness=0, cable_stiffness=0, clk_hz=1_000_000)
+    machine = motor(
+        **{**FREE, "guide_viscous": 300.0}, flexure_stiffness=0, cable_stiffness=0, clk_hz=1_000_000
+    )
     lows, highs = [], []
     for sign in (1, -1) * 4:
         machine.set_position(-sign * 5e-6)
-        machine.dac(32768 + sign * round(300 * 1e-3 / 12 / AMPERE))        # 1 mm/s
+        machine.dac(32768 + sign * round(300 * 1e-3 / 12 / AMPERE))  # 1 mm/s
         machine.trace(100_000)
         machine.run(0.015)
         trace = machine.take_trace()
         inside = trace["position_m"][trace["z"] > 0]
         lows.append(inside.min())
         highs.append(inside.max())
-    slack = 0.05e-6 + 0.011e-6                                # scatter, and a trace step
-    assert all(abs(low - 0.25e-6) <= slack for low in lows) and all(abs(high - 1.25e-6) <= slack for high in highs)
+    slack = 0.05e-6 + 0.011e-6  # scatter, and a trace step
+    assert all(abs(low - 0.25e-6) <= slack for low in lows) and all(
+        abs(high - 1.25e-6) <= slack for high in highs
+    )
     assert max(lows) - min(lows) > 0.02e-6
 
 
@@ -117,13 +137,15 @@ def test_the_scale_counts_every_micrometre_both_ways():
     machine.set_position(0.5e-6)
     start, total = machine.state.scale_counts, 0
     for sign in (1, -1):
-        machine.dac(32768 + sign * round(30 * 50e-3 / 12 / AMPERE))        # 50 mm/s
+        machine.dac(32768 + sign * round(30 * 50e-3 / 12 / AMPERE))  # 50 mm/s
         levels = machine.watch(0.06)
         a, b = levels["encoder_a"].astype(int), levels["encoder_b"].astype(int)
         steps = (numpy.diff(b << 1 | (a ^ b)) + 1) % 4 - 1
         assert abs(steps).max() == 1
         total += steps.sum()
-    assert abs(total - (machine.state.scale_counts - start)) <= 2          # an edge may lie between two watches
+    assert (
+        abs(total - (machine.state.scale_counts - start)) <= 2
+    )  # an edge may lie between two watches
     machine.set_position(-3e-3)
     machine.run(1e-4)
     assert machine.state.scale_counts in (-3001, -3000)
@@ -140,7 +162,9 @@ def test_stops_and_switches():
     machine.set_position(0.0)
     machine.run(1e-3)
     assert not machine.state.limit_low and not machine.state.limit_high
-    assert machine.level("sensor_rx") and not machine.level("drive_fault")     # no sensor: its line idles
+    assert machine.level("sensor_rx") and not machine.level(
+        "drive_fault"
+    )  # no sensor: its line idles
     with machine.fault("drive_fault"):
         assert machine.level("drive_fault")
     for level in (False, True):

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The panel of S4: EEPROM, key-pad and character display on one I2C bus, numeric display; driven by an I2C master made of pins."""
+"""The panel of S4: EEPROM, key-pad and character display on one I2C bus, numeric display; driven by
+an I2C master made of pins.
+"""
+
 import random
 import re
 import shutil
@@ -16,7 +19,9 @@ PANEL = Devices(eeprom=True, keypad=True, display=True)
 
 
 class Master:
-    """I2C by pins; a quarter of a bit is the unit. `recorded`: levels of scl and sda, a quarter each."""
+    """I2C by pins; a quarter of a bit is the unit. `recorded`: levels of scl and sda, a quarter
+    each.
+    """
 
     def __init__(self, bench):
         self.bench, self.quarter, self.recorded = bench, bench.clk_hz // BUS_HZ // 4, None
@@ -98,10 +103,11 @@ def place(address):
 
 # EEPROM
 
+
 def test_what_is_written_is_read_after_the_write_time(panel, master):
     data = [random.randrange(256) for _ in range(64)]
     assert master.send(EEPROM, [*place(0x1240), *data])
-    assert not master.send(EEPROM)                             # busy
+    assert not master.send(EEPROM)  # busy
     panel.run(4.5e-3)
     assert not master.send(EEPROM)
     panel.run(0.5e-3)
@@ -112,8 +118,10 @@ def test_what_is_written_is_read_after_the_write_time(panel, master):
 def test_a_write_rolls_over_in_its_page(panel, master):
     assert master.send(EEPROM, [*place(0x007E), 1, 2, 3, 4])
     panel.run(5e-3)
-    assert panel.eeprom[0x40:0x42] == bytes([3, 4]) and panel.eeprom[0x7E:0x82] == bytes([1, 2, 0xFF, 0xFF])
-    assert master.send(EEPROM, [*place(0x0000), *range(70)])   # the last 6 over the first
+    assert panel.eeprom[0x40:0x42] == bytes([3, 4]) and panel.eeprom[0x7E:0x82] == bytes(
+        [1, 2, 0xFF, 0xFF]
+    )
+    assert master.send(EEPROM, [*place(0x0000), *range(70)])  # the last 6 over the first
     panel.run(5e-3)
     assert panel.eeprom[:0x40] == bytes([64, 65, 66, 67, 68, 69, *range(6, 64)])
 
@@ -122,23 +130,23 @@ def test_reading_goes_on_over_pages_and_the_end(panel, master):
     panel.write_eeprom(0x3FFE, [5, 6])
     panel.write_eeprom(0, [7, 8])
     assert master.fetch(EEPROM, 4, place(0x3FFE)) == [5, 6, 7, 8]
-    assert master.fetch(EEPROM, 1) == [0xFF]                   # from where it stands
-    assert master.fetch(EEPROM, 2, place(0xC000)) == [7, 8]    # the two highest bits do not matter
+    assert master.fetch(EEPROM, 1) == [0xFF]  # from where it stands
+    assert master.fetch(EEPROM, 2, place(0xC000)) == [7, 8]  # the two highest bits do not matter
 
 
 def test_without_a_stop_after_a_whole_byte_nothing_is_written(panel, master):
     master.start()
     for byte in (EEPROM << 1, 0, 0, 0x55):
         assert master.write(byte)
-    assert master.fetch(EEPROM, 1, place(0)) == [0xFF]         # a start instead
+    assert master.fetch(EEPROM, 1, place(0)) == [0xFF]  # a start instead
     master.start()
     for byte in (EEPROM << 1, 0, 0, 0x55):
         assert master.write(byte)
     for level in (0, 1, 0):
         master.bit(level)
-    master.stop()                                              # in the middle of a byte
-    assert panel.state.eeprom_writes == 0 and panel.eeprom == b"\xFF" * 16384
-    assert master.send(EEPROM, place(5)) and panel.state.eeprom_writes == 0         # an address alone
+    master.stop()  # in the middle of a byte
+    assert panel.state.eeprom_writes == 0 and panel.eeprom == b"\xff" * 16384
+    assert master.send(EEPROM, place(5)) and panel.state.eeprom_writes == 0  # an address alone
 
 
 def test_a_power_cut_while_it_writes_tears_the_page_and_no_other(panel, master):
@@ -151,10 +159,14 @@ def test_a_power_cut_while_it_writes_tears_the_page_and_no_other(panel, master):
         panel.power_cut()
         panel.run(1e-3)
         panel.power_on()
-        assert panel.eeprom[:0x80] == b"\xFF" * 0x80 and panel.eeprom[0xC0:] == b"\xFF" * (16384 - 0xC0)
+        assert panel.eeprom[:0x80] == b"\xff" * 0x80 and panel.eeprom[0xC0:] == b"\xff" * (
+            16384 - 0xC0
+        )
         for byte, was, wanted in zip(panel.eeprom[0x80:0xC0], old, new + old[32:]):
             counts["old" if byte == was else "new" if byte == wanted else "neither"] += 1
-        assert master.fetch(EEPROM, 64, place(0x80)) == list(panel.eeprom[0x80:0xC0])     # ready, and sure of what it has
+        assert master.fetch(EEPROM, 64, place(0x80)) == list(
+            panel.eeprom[0x80:0xC0]
+        )  # ready, and sure of what it has
     assert panel.state.eeprom_torn == 20 and min(counts.values()) > 150, counts
 
 
@@ -188,13 +200,17 @@ def test_every_key_has_its_event(panel, master):
         panel.release(key)
         code = 10 * (key // 7) + key % 7 + 1
         assert read(master, COUNT) == 2
-        assert [read(master, EVENT), read(master, EVENT), read(master, EVENT)] == [0x80 | code, code, 0]
+        assert [read(master, EVENT), read(master, EVENT), read(master, EVENT)] == [
+            0x80 | code,
+            code,
+            0,
+        ]
 
 
 def test_events_wait_in_order_and_the_flag_stays_until_all_are_read(panel, master):
     set_up(master)
     panel.press(0), panel.press(15), panel.release(0)
-    panel.press(15)                                            # it is down: no event
+    panel.press(15)  # it is down: no event
     assert read(master, INT_STAT) == 1 and read(master, COUNT) == 3
     assert master.send(KEYPAD, [INT_STAT, 1]) and read(master, INT_STAT) == 1
     assert [read(master, EVENT) for _ in range(3)] == [0x81, 0x80 | 22, 0x01]
@@ -280,6 +296,7 @@ class Screen:
             value = self.master.fetch(DISPLAY, 1)[0] >> 4
             self.master.send(DISPLAY, [0xF0 | RW | LIGHT])
             return value
+
         return half() << 4 | half()
 
 
@@ -291,13 +308,22 @@ def screen(master):
 
 
 def test_four_lines_are_shown(panel, screen):
-    texts = ["Station 12 of 36    ", "  target 120.00000°", "  angle  119.99987 >", "cutting             "]
+    texts = [
+        "Station 12 of 36    ",
+        "  target 120.00000°",
+        "  angle  119.99987 >",
+        "cutting             ",
+    ]
     for line, text in zip((0x00, 0x40, 0x14, 0x54), texts):
         screen.command(0x80 | line)
         for character in text:
             screen.text(chr(0xDF) if character == "°" else character)
-    assert panel.lines == [text.ljust(20) for text in texts] and panel.state.display_too_soon == 0 and panel.state.back_light
-    screen.command(0x08)                                       # off, and on again
+    assert (
+        panel.lines == [text.ljust(20) for text in texts]
+        and panel.state.display_too_soon == 0
+        and panel.state.back_light
+    )
+    screen.command(0x08)  # off, and on again
     assert panel.lines == [" " * 20] * 4
     screen.command(0x0C)
     assert panel.lines[3] == texts[3]
@@ -313,7 +339,7 @@ def test_the_first_line_goes_on_in_the_third(panel, screen):
 
 
 def test_what_comes_too_soon_is_lost_and_counted(panel, screen):
-    screen.byte(0x01)                                          # 1.52 ms
+    screen.byte(0x01)  # 1.52 ms
     screen.text("A")
     panel.run(2e-3)
     screen.text("B")
@@ -352,8 +378,13 @@ def show(panel, register, value, record=None):
         if record is not None:
             for name, level in levels.items():
                 record["levels"][name] = level
-            record["rows"].append(sum(record["levels"].get(name, 1) << n for n, name in
-                                      enumerate(("display_sclk", "display_data", "display_cs_n"))))
+            record["rows"].append(
+                sum(
+                    record["levels"].get(name, 1) << n
+                    for n, name in enumerate(("display_sclk", "display_data", "display_cs_n"))
+                )
+            )
+
     pins(display_cs_n=0, display_sclk=0)
     for n in range(15, -1, -1):
         pins(display_data=(register << 8 | value) >> n & 1)
@@ -377,7 +408,7 @@ def test_digits_are_decoded_or_drawn(panel):
     assert panel.digits == " " * 8
     panel.power_cut()
     show(panel, 12, 1)
-    assert panel.digits == " " * 8                             # only the first digit, drawn, and nothing in it
+    assert panel.digits == " " * 8  # only the first digit, drawn, and nothing in it
 
 
 def test_a_word_cut_short_is_counted(panel):
@@ -390,15 +421,24 @@ def test_a_word_cut_short_is_counted(panel):
 
 # the bus
 
+
 def test_devices_that_are_absent_or_dead_do_not_answer(panel, master):
-    assert [address for address in range(0x08, 0x78) if master.send(address)] == [DISPLAY, KEYPAD, EEPROM]
-    for fault, address in (("eeprom_dead", EEPROM), ("keypad_dead", KEYPAD), ("display_dead", DISPLAY)):
+    assert [address for address in range(0x08, 0x78) if master.send(address)] == [
+        DISPLAY,
+        KEYPAD,
+        EEPROM,
+    ]
+    for fault, address in (
+        ("eeprom_dead", EEPROM),
+        ("keypad_dead", KEYPAD),
+        ("display_dead", DISPLAY),
+    ):
         with panel.fault(fault):
             assert not master.send(address)
         assert master.send(address)
     other = DevicesBench(Devices(keypad=True))
     assert not Master(other).send(EEPROM) and Master(other).send(KEYPAD)
-    other.clear("eeprom_dead")                                 # what is not there does not come back
+    other.clear("eeprom_dead")  # what is not there does not come back
     assert not Master(other).send(EEPROM)
 
 
@@ -412,9 +452,13 @@ def test_a_shorted_line_is_low(panel):
 
 
 def test_what_does_not_exist_is_refused(panel):
-    for call, error in ((lambda: panel.press(34), IndexError), (lambda: panel.write_eeprom(16383, [1, 2]), IndexError),
-                        (lambda: panel.inject("fire"), KeyError), (lambda: panel.set(weight=1), KeyError),
-                        (lambda: DevicesBench(Devices(parameters={"weight": 1})), KeyError)):
+    for call, error in (
+        (lambda: panel.press(34), IndexError),
+        (lambda: panel.write_eeprom(16383, [1, 2]), IndexError),
+        (lambda: panel.inject("fire"), KeyError),
+        (lambda: panel.set(weight=1), KeyError),
+        (lambda: DevicesBench(Devices(parameters={"weight": 1})), KeyError),
+    ):
         with pytest.raises(error):
             call()
 
@@ -422,12 +466,26 @@ def test_what_does_not_exist_is_refused(panel):
 def decoded(levels, rate, names, folder, *arguments):
     file = folder / "wave.bin"
     file.write_bytes(numpy.asarray(levels, dtype=numpy.uint8).tobytes())
-    out = subprocess.run(["sigrok-cli", "-i", file, "-I", f"binary:numchannels={names}:samplerate={rate}", *arguments],
-                         capture_output=True, text=True, check=True, timeout=60)
+    out = subprocess.run(
+        [
+            "sigrok-cli",
+            "-i",
+            file,
+            "-I",
+            f"binary:numchannels={names}:samplerate={rate}",
+            *arguments,
+        ],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    )
     return out.stdout
 
 
-needs_sigrok = pytest.mark.skipif(not shutil.which("sigrok-cli"), reason="sigrok-cli is not installed")
+needs_sigrok = pytest.mark.skipif(
+    not shutil.which("sigrok-cli"), reason="sigrok-cli is not installed"
+)
 
 
 @needs_sigrok
@@ -437,10 +495,20 @@ def test_sigrok_reads_the_same_from_the_bus(panel, master, tmp_path):
     assert master.send(EEPROM, [*place(0x0123), *data])
     panel.run(5e-3)
     assert master.fetch(EEPROM, 4, place(0x0123)) == data
-    out = decoded(master.recorded, 4 * BUS_HZ, 2, tmp_path, "-P", "i2c:scl=0:sda=1,eeprom24xx:chip=microchip_24lc64", "-A",
-                  "eeprom24xx=ops")
+    out = decoded(
+        master.recorded,
+        4 * BUS_HZ,
+        2,
+        tmp_path,
+        "-P",
+        "i2c:scl=0:sda=1,eeprom24xx:chip=microchip_24lc64",
+        "-A",
+        "eeprom24xx=ops",
+    )
     assert re.findall(r"(write|read) \(addr=(\w+), 4 bytes\): ([\w ]+)", out) == [
-        ("write", "0123", "DE AD BE EF"), ("read", "0123", "DE AD BE EF")]
+        ("write", "0123", "DE AD BE EF"),
+        ("read", "0123", "DE AD BE EF"),
+    ]
 
 
 @needs_sigrok
@@ -448,6 +516,19 @@ def test_sigrok_reads_the_same_from_the_numeric_display(panel, tmp_path):
     record = {"levels": {}, "rows": []}
     for register, value in ((9, 0xFF), (11, 7), (12, 1), (1, 5), (2, 0x83)):
         show(panel, register, value, record)
-    out = decoded(record["rows"], 1_000_000, 3, tmp_path, "-P", "spi:clk=0:mosi=1:cs=2,max7219", "-A", "max7219=register:digit")
-    assert re.findall(r"Shutdown: (\w+)|Digit (\d): (\w+)", out) == [("off", "", ""), ("", "1", "05"), ("", "2", "83")]
+    out = decoded(
+        record["rows"],
+        1_000_000,
+        3,
+        tmp_path,
+        "-P",
+        "spi:clk=0:mosi=1:cs=2,max7219",
+        "-A",
+        "max7219=register:digit",
+    )
+    assert re.findall(r"Shutdown: (\w+)|Digit (\d): (\w+)", out) == [
+        ("off", "", ""),
+        ("", "1", "05"),
+        ("", "2", "83"),
+    ]
     assert panel.digits.endswith("3.5")

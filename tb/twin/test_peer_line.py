@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The serial line between two nodes: what is sent arrives, with garbage among it if asked."""
+
 import random
 
 import numpy
 
 from twin import PeerLineBench
 
-BIT = 104                        # clk; 9615 baud at 1 MHz
+BIT = 104  # clk; 9615 baud at 1 MHz
 
 
 def levels_of(data, gap=3):
@@ -55,10 +56,15 @@ def test_garbage_comes_as_often_as_asked_and_ends():
     line = PeerLineBench()
     line.garbage(10)
     for _ in range(20):
-        line.pass_levels(numpy.ones(500_000))                 # 10 s
+        line.pass_levels(numpy.ones(500_000))  # 10 s
     count = line.garbage_bytes
     heard = line.take_heard()
-    assert 150 < count < 350 and len(heard) + line.framing_errors <= count and len(heard) > 0.9 * count and len(set(heard)) > 50
+    assert (
+        150 < count < 350
+        and len(heard) + line.framing_errors <= count
+        and len(heard) > 0.9 * count
+        and len(set(heard)) > 50
+    )
     line.garbage(0)
     line.pass_levels(idle(50))
     line.take_heard()

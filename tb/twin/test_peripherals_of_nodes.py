@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The links of nodes in the twin, pin by pin: the RTL between a program that hands its registers out and what stands around it."""
+"""The links of nodes in the twin, pin by pin: the RTL between a program that hands its registers
+out and what stands around it.
+"""
+
 import math
 import struct
 from pathlib import Path
@@ -12,7 +15,7 @@ from moire.made.registers import BY_NAME
 from twin import Axis, Devices, Node, Twin, TwinTransport
 
 ARC_SECOND = math.pi / 180 / 3600
-CUT_S, WRITE_S = 0.3, 0.05       # the bridge is slow
+CUT_S, WRITE_S = 0.3, 0.05  # the bridge is slow
 BRIDGE_BAUD = 115200
 START = [0x14, 0x1D, 0xF0, 0x1D, 0xF0, 0x14]
 EEPROM, KEYPAD, DISPLAY = 0x50, 0x34, 0x27
@@ -25,11 +28,26 @@ def program(tmp_path_factory):
     command, libraries = firmware_build.compiler()
     script, elf = folder / "link.ld", folder / "bridge.elf"
     script.write_text(f"MEMORY_BYTES = {memory};\n" + firmware_build.LINK.read_text())
-    sources = [Path(__file__).with_name("peripherals_bridge.c"), firmware_build.HERE / "core" / "start.S"]
-    firmware_build.run([*command, *firmware_build.FLAGS, firmware_build.SMALL, f"-I{firmware_build.HERE}", *map(str, sources), "-Wl,--gc-sections",
-               f"-Wl,-T,{script}", "-o", str(elf), *libraries])
+    sources = [
+        Path(__file__).with_name("peripherals_bridge.c"),
+        firmware_build.HERE / "core" / "start.S",
+    ]
+    firmware_build.run(
+        [
+            *command,
+            *firmware_build.FLAGS,
+            firmware_build.SMALL,
+            f"-I{firmware_build.HERE}",
+            *map(str, sources),
+            "-Wl,--gc-sections",
+            f"-Wl,-T,{script}",
+            "-o",
+            str(elf),
+            *libraries,
+        ]
+    )
     content, used = firmware_build.image(firmware_build.load_segments(elf.read_bytes())[0], memory)
-    return [word for (word,) in struct.iter_unpack("<I", content[:(used + 3) // 4 * 4])]
+    return [word for (word,) in struct.iter_unpack("<I", content[: (used + 3) // 4 * 4])]
 
 
 class Bridge:
@@ -37,7 +55,7 @@ class Bridge:
 
     def __init__(self, twin):
         self.twin, self.to, self.back = twin, twin.peer_line(1, 0), twin.peer_line(0, 1)
-        self.twin.run(2e-3)                                    # the program starts
+        self.twin.run(2e-3)  # the program starts
 
     def _wait(self, count):
         self.twin.run(count * 10 / BRIDGE_BAUD + 1e-4)
@@ -67,7 +85,9 @@ class Bridge:
             self.write("i2c", command=command, data=data, acknowledge=acknowledge)
         while self.read("i2c_state", "busy"):
             self.twin.run(1e-4)
-        answers = [self.word(BY_NAME["peripherals", "i2c_answer", "data"].offset // 4) for _ in commands]
+        answers = [
+            self.word(BY_NAME["peripherals", "i2c_answer", "data"].offset // 4) for _ in commands
+        ]
         assert all(answer >> 10 & 1 for answer in answers)
         return [(answer >> 8 & 3, answer & 0xFF) for answer in answers]
 
@@ -76,17 +96,35 @@ class Bridge:
         return all(result == 0 for result, _ in answers)
 
     def fetch(self, address, count, *at):
-        answers = self.i2c((0, 0, 0), *((2, byte, 0) for byte in (address << 1, *at)), (0, 0, 0), (2, address << 1 | 1, 0),
-                           *((3, 0, n + 1 < count) for n in range(count)), (1, 0, 0))
+        answers = self.i2c(
+            (0, 0, 0),
+            *((2, byte, 0) for byte in (address << 1, *at)),
+            (0, 0, 0),
+            (2, address << 1 | 1, 0),
+            *((3, 0, n + 1 < count) for n in range(count)),
+            (1, 0, 0),
+        )
         assert all(result == 0 for result, _ in answers)
-        return [data for _, data in answers[-1 - count:-1]]
+        return [data for _, data in answers[-1 - count : -1]]
 
 
 @pytest.fixture
 def twin(program):
-    around = Devices(eeprom=True, keypad=True, display=True, keyboard=True, edm=True, table=0,
-                          parameters={"edm_cut_time": CUT_S, "eeprom_write_time": WRITE_S})
-    with Twin([Node(1, [Axis("worm_table")], around), Node(2, [])], firmware=program, peers=(0, 1), peer_baud=BRIDGE_BAUD) as made:
+    around = Devices(
+        eeprom=True,
+        keypad=True,
+        display=True,
+        keyboard=True,
+        edm=True,
+        table=0,
+        parameters={"edm_cut_time": CUT_S, "eeprom_write_time": WRITE_S},
+    )
+    with Twin(
+        [Node(1, [Axis("worm_table")], around), Node(2, [])],
+        firmware=program,
+        peers=(0, 1),
+        peer_baud=BRIDGE_BAUD,
+    ) as made:
         yield made
 
 
@@ -97,13 +135,28 @@ def links(twin):
 
 def test_the_panel_is_reached_by_the_bus(twin, links):
     panel = twin.devices(0)
-    assert links.send(EEPROM, 0x01, 0x20, 1, 2, 3) and not links.send(EEPROM)          # it writes
+    assert links.send(EEPROM, 0x01, 0x20, 1, 2, 3) and not links.send(EEPROM)  # it writes
     twin.run(WRITE_S)
-    assert links.fetch(EEPROM, 3, 0x01, 0x20) == [1, 2, 3] and panel.eeprom[0x120:0x123] == bytes([1, 2, 3])
+    assert links.fetch(EEPROM, 3, 0x01, 0x20) == [1, 2, 3] and panel.eeprom[0x120:0x123] == bytes(
+        [1, 2, 3]
+    )
     assert links.send(KEYPAD, 0x1D, 0x1F) and links.send(KEYPAD, 0x1E, 0x7F)
     panel.press(8)
     assert links.fetch(KEYPAD, 1, 0x04) == [0x80 | 12]
-    for nibble, register in ((3, 0), (3, 0), (3, 0), (2, 0), (2, 0), (8, 0), (0, 0), (0xC, 0), (4, 1), (8, 1), (6, 1), (9, 1)):
+    for nibble, register in (
+        (3, 0),
+        (3, 0),
+        (3, 0),
+        (2, 0),
+        (2, 0),
+        (8, 0),
+        (0, 0),
+        (0xC, 0),
+        (4, 1),
+        (8, 1),
+        (6, 1),
+        (9, 1),
+    ):
         links.send(DISPLAY, nibble << 4 | 12 | register, nibble << 4 | 8 | register)
         twin.run(5e-3)
     assert panel.lines[0] == "Hi" + " " * 18
@@ -126,7 +179,11 @@ def test_keys_pass_both_ways_and_a_cut_is_injected(twin, links):
     around.type([0x1C, 0xF0, 0x1C])
     around.order([0xED, 0x04])
     twin.run(0.1)
-    assert [byte for _, byte in around.take_heard() if byte != 0xFA] == [0x1C, 0xF0, 0x1C] and around.state.keyboard_lights == 4
+    assert [byte for _, byte in around.take_heard() if byte != 0xFA] == [
+        0x1C,
+        0xF0,
+        0x1C,
+    ] and around.state.keyboard_lights == 4
     assert links.read("ps2_typed") == 3
     links.write("ps2_idle", value=20)
     for n, code in enumerate(START):
@@ -138,7 +195,9 @@ def test_keys_pass_both_ways_and_a_cut_is_injected(twin, links):
     assert links.read("edm_status", "inputs") == 1 and links.read("edm_status", "rose_0")
     twin.run(CUT_S)
     (cut,) = around.cuts
-    assert cut.whole and cut.angle_start_rad == pytest.approx(twin.truth(0).position_rad, abs=ARC_SECOND)
+    assert cut.whole and cut.angle_start_rad == pytest.approx(
+        twin.truth(0).position_rad, abs=ARC_SECOND
+    )
     assert links.read("edm_status", "inputs") == 0 and links.read("edm_status", "fell_0")
     with around.fault("edm_alarm"):
         twin.run(0.05)
@@ -150,8 +209,15 @@ def test_the_sensor_of_the_first_axis_is_read(twin, links):
     links.write("sensor_gap", value=2_000)
     twin.run(0.1)
     assert links.read("sensor_frames") >= 9 and links.read("sensor_state", "stale") == 0
-    angle = links.word(BY_NAME["peripherals", "sensor_reading", "value"].offset // 4) / 2**32 * 2 * math.pi
-    assert (angle - twin.truth(0).position_rad % (2 * math.pi)) / ARC_SECOND == pytest.approx(0, abs=1.0)
+    angle = (
+        links.word(BY_NAME["peripherals", "sensor_reading", "value"].offset // 4)
+        / 2**32
+        * 2
+        * math.pi
+    )
+    assert (angle - twin.truth(0).position_rad % (2 * math.pi)) / ARC_SECOND == pytest.approx(
+        0, abs=1.0
+    )
 
 
 def test_a_power_cut_stops_the_program_and_tears_the_page_it_wrote(twin, links):
@@ -164,11 +230,20 @@ def test_a_power_cut_stops_the_program_and_tears_the_page_it_wrote(twin, links):
     twin.power_cut(0)
     torn = around.eeprom
     twin.run(0.05)
-    assert links.back.take_heard() == b"" and around.state.edm_cutting and around.state.eeprom_torn == 1
-    assert torn[:64] not in (bytes([0x22] * 8 + [0x11] * 56), bytes([0x11] * 64)) and torn[64:128] == bytes([0x11] * 64)
+    assert (
+        links.back.take_heard() == b""
+        and around.state.edm_cutting
+        and around.state.eeprom_torn == 1
+    )
+    assert torn[:64] not in (bytes([0x22] * 8 + [0x11] * 56), bytes([0x11] * 64)) and torn[
+        64:128
+    ] == bytes([0x11] * 64)
     around.type([0x1C])
     twin.run(0.05)
-    assert not [byte for _, byte in around.take_heard() if byte == 0x1C] and around.state.keyboard_sent == 7
+    assert (
+        not [byte for _, byte in around.take_heard() if byte == 0x1C]
+        and around.state.keyboard_sent == 7
+    )
     twin.power_on(0)
     twin.run(2e-3)
     assert links.read("sensor_gap") != 2_000 and around.eeprom == torn
@@ -192,10 +267,14 @@ def test_a_node_without_power_is_silent_its_drive_off_and_it_starts_afresh():
         assert twin.receive_words() == [] and not other.status().faults
         twin.inject("estop", 0)
         twin.power_on(0)
-        twin.power_on(0)                                       # has no effect
+        twin.power_on(0)  # has no effect
         twin.run(0.1)
         status = axis.status()
-        assert status.estop and not twin.truth(0).enabled and twin.truth(0).position_m == pytest.approx(before, abs=1e-6)
+        assert (
+            status.estop
+            and not twin.truth(0).enabled
+            and twin.truth(0).position_m == pytest.approx(before, abs=1e-6)
+        )
         twin.clear("estop", 0)
         twin.power_cut(1)
         twin.run(0.01)

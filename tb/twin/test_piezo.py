@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The fine stage on the table, driven by frames to its converter, against what can be worked out by hand."""
+"""The fine stage on the table, driven by frames to its converter, against what can be worked out by
+hand.
+"""
+
 import math
 
 import numpy
@@ -30,7 +33,9 @@ def test_the_full_loop_is_the_range_and_its_middle_is_as_wide_as_stated():
     up, high = go(stage, 32768), go(stage, 65535)
     assert high - low == pytest.approx(10e-6, rel=1e-4)
     assert down - up == pytest.approx(0.12 * 10e-6, rel=1e-3)
-    assert go(stage, 32768) == pytest.approx(down, abs=1e-12) and go(stage, 0) == pytest.approx(low, abs=1e-12)   # the loop closes
+    assert go(stage, 32768) == pytest.approx(down, abs=1e-12) and go(stage, 0) == pytest.approx(
+        low, abs=1e-12
+    )  # the loop closes
 
 
 def test_a_small_loop_is_narrow_and_hardly_moves_the_branch():
@@ -38,7 +43,10 @@ def test_a_small_loop_is_narrow_and_hardly_moves_the_branch():
     stage = fine_stage(**STILL)
     go(stage, 50000)
     places = [go(stage, 50000 - n) for n in (0, 2000, 4000, 2000, 0)]
-    assert places[0] - places[1] == pytest.approx(places[1] - places[2], rel=1e-6) and places[1] < places[0]
+    assert (
+        places[0] - places[1] == pytest.approx(places[1] - places[2], rel=1e-6)
+        and places[1] < places[0]
+    )
     assert places[3:] == pytest.approx(places[1::-1], abs=1e-13)
 
 
@@ -61,8 +69,12 @@ def test_the_amplifier_slews():
     go(stage, 65535, 0.02)
     trace = stage.take_trace()
     full = trace["piezo_m"][-1]
-    took = [trace["time_s"][numpy.argmax(trace["piezo_m"] > share * full)] for share in (0.25, 0.75)]
-    assert 0.4 * 10e-3 < took[1] - took[0] < 0.6 * 10e-3      # 10 ms from the middle to the end, bent a little by the hysteresis
+    took = [
+        trace["time_s"][numpy.argmax(trace["piezo_m"] > share * full)] for share in (0.25, 0.75)
+    ]
+    assert (
+        0.4 * 10e-3 < took[1] - took[0] < 0.6 * 10e-3
+    )  # 10 ms from the middle to the end, bent a little by the hysteresis
 
 
 def test_its_mode_rings_with_its_frequency_and_damping():
@@ -73,7 +85,11 @@ def test_its_mode_rings_with_its_frequency_and_damping():
     time = trace["time_s"]
     go(stage, 36000, 0.3)
     swing = trace["piezo_m"] - stage.state.piezo_m
-    rises = [time[n] + swing[n] / (swing[n] - swing[n + 1]) * 1e-5 for n in range(len(time) - 1) if swing[n] < 0 <= swing[n + 1]]
+    rises = [
+        time[n] + swing[n] / (swing[n] - swing[n + 1]) * 1e-5
+        for n in range(len(time) - 1)
+        if swing[n] < 0 <= swing[n + 1]
+    ]
     assert 8 / (rises[9] - rises[1]) == pytest.approx(500 * math.sqrt(1 - 0.02**2), rel=2e-3)
     peaks = [swing[(time >= a) & (time < b)].max() for a, b in zip(rises, rises[1:])]
     assert math.log(peaks[1] / peaks[6]) / 5 == pytest.approx(2 * math.pi * 0.02, rel=0.05)
@@ -108,7 +124,7 @@ def test_frames_are_16_bits_loaded_at_the_end_and_others_are_counted():
     assert stage.state.dac_bad_frames == 0
     stage.pins(dac_cs_n=0)
     stage.run(1e-5)
-    assert stage.state.dac_code == 65535                      # not before the frame ends
+    assert stage.state.dac_code == 65535  # not before the frame ends
     stage.pins(dac_cs_n=1)
     stage.run(1e-5)
     stage.dac(0x12345, bits=17)

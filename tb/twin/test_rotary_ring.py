@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ring of S1: its errors, its drift, its edges."""
+
 import numpy
 import pytest
 
@@ -12,7 +13,9 @@ ANGLES = numpy.arange(36_000) / 36_000 * TURN
 
 def error(ring):
     """arcsec over a turn, without what changes with time"""
-    return (ring.measured(ANGLES) - ring.measured(ANGLES[0]) + ring.measured(0.0) - ANGLES) / ARC_SECOND
+    return (
+        ring.measured(ANGLES) - ring.measured(ANGLES[0]) + ring.measured(0.0) - ANGLES
+    ) / ARC_SECOND
 
 
 def test_the_peak_is_that_of_the_paper_for_every_ring():
@@ -24,9 +27,15 @@ def test_the_peak_is_that_of_the_paper_for_every_ring():
 def test_the_error_is_the_sum_of_its_orders():
     ring = RotaryRing(3, ring_drift=0, ring_line_error=0)
     amplitude, phase = ring.orders()
-    expected = sum(amplitude[k] * numpy.sin(k * ANGLES + phase[k]) for k in range(1, 17)) / ARC_SECOND
+    expected = (
+        sum(amplitude[k] * numpy.sin(k * ANGLES + phase[k]) for k in range(1, 17)) / ARC_SECOND
+    )
     assert abs(error(ring) - expected).max() < 1e-6
-    assert amplitude[0] == 0 and not amplitude[17:].any() and amplitude[1] > amplitude[2] > amplitude[3] > amplitude[4]
+    assert (
+        amplitude[0] == 0
+        and not amplitude[17:].any()
+        and amplitude[1] > amplitude[2] > amplitude[3] > amplitude[4]
+    )
 
 
 def test_three_orders_leave_what_the_paper_found():
@@ -41,7 +50,9 @@ def test_three_orders_leave_what_the_paper_found():
 def test_the_drift_stays_within_two_arcseconds_and_is_slow():
     time = numpy.arange(0, 3600, 0.2)
     for seed in range(5):
-        drift = (RotaryRing(seed).measured(0.0, time) - RotaryRing(seed, ring_drift=0).measured(0.0)) / ARC_SECOND
+        drift = (
+            RotaryRing(seed).measured(0.0, time) - RotaryRing(seed, ring_drift=0).measured(0.0)
+        ) / ARC_SECOND
         assert 1.5 < abs(drift).max() <= 2.0 and abs(numpy.diff(drift)).max() < 0.05
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The axis of S2, by pulses at its pins: where they carry it, when it loses them, and its scale."""
+
 import math
 
 import numpy
@@ -8,8 +9,17 @@ import pytest
 from twin import Machine
 
 PULSE_M = 5e-3 / 2000
-FREE = dict(motor_coulomb=1e-9, motor_static=1e-9, motor_viscous=0, motor_presliding_damping=0, table_coulomb=1e-9, table_static=1e-9,
-            table_viscous=0, table_presliding_damping=0, screw_backlash=0)
+FREE = dict(
+    motor_coulomb=1e-9,
+    motor_static=1e-9,
+    motor_viscous=0,
+    motor_presliding_damping=0,
+    table_coulomb=1e-9,
+    table_static=1e-9,
+    table_viscous=0,
+    table_presliding_damping=0,
+    screw_backlash=0,
+)
 
 
 def stepper(clk_hz=1_000_000, place=20e-3, **values):
@@ -36,18 +46,26 @@ def test_pulses_carry_the_table_their_way():
         machine.run(0.3)
         start += sign * count * PULSE_M
         assert machine.state.position_m == pytest.approx(start, abs=2e-9)
-    assert machine.state.steps == 99 and machine.state.lost_steps == 0 and machine.state.step_timing_errors == 0
+    assert (
+        machine.state.steps == 99
+        and machine.state.lost_steps == 0
+        and machine.state.step_timing_errors == 0
+    )
 
 
 def test_friction_and_backlash_leave_it_short_of_the_pulses_and_the_scale_sees_it():
-    machine = stepper(stepper_microsteps=100)                 # smooth and slow, so that the table does not coast through the backlash
+    machine = stepper(
+        stepper_microsteps=100
+    )  # smooth and slow, so that the table does not coast through the backlash
     machine.steps(1000, 1000)
     machine.run(0.2)
     forward = machine.state.field_m - machine.state.position_m
     machine.steps(-1000, 1000)
     machine.run(0.2)
     lead = 5e-3 / (2 * math.pi)
-    wound_up = (0.033 + 9 * lead) / (50 * 1.2) * lead + 9 / 3e7 + 1e-6      # rotor on its field, screw, presliding
+    wound_up = (
+        (0.033 + 9 * lead) / (50 * 1.2) * lead + 9 / 3e7 + 1e-6
+    )  # rotor on its field, screw, presliding
     lost_motion = forward - (machine.state.field_m - machine.state.position_m)
     assert 5e-6 <= lost_motion < 5e-6 + 2 * wound_up
     assert machine.state.scale_counts == pytest.approx(machine.state.position_m / 0.5e-6, abs=1.1)
@@ -61,11 +79,13 @@ def test_the_rotor_rings_on_its_field():
     trace = machine.take_trace()
     speed, time = trace["motor_rad_s"], trace["time_s"]
     rises = time[1:][(speed[:-1] < 0) & (speed[1:] >= 0)]
-    assert (len(rises) - 1) / (rises[-1] - rises[0]) == pytest.approx(math.sqrt(50 * 1.2 / 4e-5) / (2 * math.pi), rel=5e-3)
+    assert (len(rises) - 1) / (rises[-1] - rises[0]) == pytest.approx(
+        math.sqrt(50 * 1.2 / 4e-5) / (2 * math.pi), rel=5e-3
+    )
 
 
 def test_a_load_above_the_computed_pull_out_loses_steps_by_four_full_steps():
-    pull_out = 1.2 * 2 * math.pi / 5e-3                       # N at the table
+    pull_out = 1.2 * 2 * math.pi / 5e-3  # N at the table
     for share, slips in ((0.97, False), (1.03, True)):
         machine = stepper(**FREE, travel_low_stop=-1.0, travel_high_stop=1.0)
         for n in range(1, 101):
@@ -78,8 +98,10 @@ def test_a_load_above_the_computed_pull_out_loses_steps_by_four_full_steps():
 
 def test_the_torque_falls_with_speed():
     """At twice the corner speed 1 / sqrt(5) of the torque is left."""
-    for torque, holds in ((0.4, True), (0.65, False)):        # Nm, of 1.2 / sqrt(5) = 0.54
-        machine = stepper(**{**FREE, "motor_viscous": torque / 120}, travel_high_stop=9.0)            # 120 rad/s = 38200 pulses a second
+    for torque, holds in ((0.4, True), (0.65, False)):  # Nm, of 1.2 / sqrt(5) = 0.54
+        machine = stepper(
+            **{**FREE, "motor_viscous": torque / 120}, travel_high_stop=9.0
+        )  # 120 rad/s = 38200 pulses a second
         ramp(machine, 38_200)
         machine.steps(8000, 38_200)
         assert (machine.state.lost_steps == 0) == holds, machine.state
@@ -119,7 +141,7 @@ def test_pulses_too_short_for_the_driver_are_counted():
     assert machine.state.step_timing_errors == 11
     machine.pins(step=1)
     machine.run(0.5e-6)
-    machine.pins(direction=1)                                 # too early behind the edge
+    machine.pins(direction=1)  # too early behind the edge
     machine.run(1e-5)
     assert machine.state.step_timing_errors == 12
 
@@ -143,7 +165,9 @@ def test_the_scale_gives_an_edge_a_count_and_never_two_at_once():
             moved = numpy.concatenate([moved, (quarters(machine.watch(0.5e-3)) + 1) % 4 - 1])
             assert abs(moved).max() <= 1
             total += moved.sum()
-        assert abs(total - (machine.state.scale_counts - before)) <= 1       # an edge may lie between two watches
+        assert (
+            abs(total - (machine.state.scale_counts - before)) <= 1
+        )  # an edge may lie between two watches
         assert abs(total) > 150
 
 
@@ -155,11 +179,17 @@ def test_the_index_lies_in_its_place_one_count_wide_from_both_sides():
         machine.run(0.05)
         trace = machine.take_trace()
         inside = trace["position_m"][trace["z"] > 0]
-        assert len(inside) and 75e-3 - 2e-9 <= inside.min() and inside.max() <= 75e-3 + 0.5e-6 + 2e-9
+        assert (
+            len(inside) and 75e-3 - 2e-9 <= inside.min() and inside.max() <= 75e-3 + 0.5e-6 + 2e-9
+        )
 
 
 def test_the_switches_open_at_the_ends():
-    for place, low, high in ((-2.5e-3, True, False), (70e-3, False, False), (152.5e-3, False, True)):
+    for place, low, high in (
+        (-2.5e-3, True, False),
+        (70e-3, False, False),
+        (152.5e-3, False, True),
+    ):
         machine = stepper(place=place)
         assert (machine.state.limit_low, machine.state.limit_high) == (low, high)
         assert (machine.level("limit_low_open"), machine.level("limit_high_open")) == (low, high)
@@ -169,6 +199,8 @@ def test_the_switches_open_at_the_ends():
         assert machine.state.limit_low
     with machine.fault("encoder_cut"):
         machine.run(1e-5)
-        assert machine.level("encoder_a") and machine.level("encoder_b") and machine.level("encoder_z")
+        assert (
+            machine.level("encoder_a") and machine.level("encoder_b") and machine.level("encoder_z")
+        )
     with pytest.raises(KeyError, match="no fault sensor_cut of a machine stepper_stage"):
         machine.inject("sensor_cut")

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The twin as an instrument: its bus, its faults, its clock, and that the same seed gives the same run."""
+"""The twin as an instrument: its bus, its faults, its clock, and that the same seed gives the same
+run.
+"""
+
 import zlib
 
 import numpy
@@ -7,7 +10,7 @@ import pytest
 
 from twin import START_S, Axis, BuildError, FrameBench, Node, Twin, TwinTransport, build, cells_of
 
-ASK = {1: 0x111, 2: 0x112}       # "slave, send data": 00 01 address, 9th bit 1
+ASK = {1: 0x111, 2: 0x112}  # "slave, send data": 00 01 address, 9th bit 1
 
 
 def empty_reply(address):
@@ -41,7 +44,9 @@ def test_the_transport_returns_as_soon_as_the_words_are_there(twin):
     before = transport.now()
     assert transport.receive(9, 1.0) == empty_reply(1)
     assert transport.now() - before > 9 * transport.character_s
-    assert transport.now() - twin.bus().last_driven_s < transport.character_s        # not long after the last word
+    assert (
+        transport.now() - twin.bus().last_driven_s < transport.character_s
+    )  # not long after the last word
     before = transport.now()
     assert transport.receive(1, 0.003) == []
     assert transport.now() - before == pytest.approx(0.003)
@@ -70,12 +75,12 @@ def test_a_flipped_bit_of_the_command_gives_silence(twin):
 
 
 def test_a_flipped_bit_of_the_reply_reaches_the_host_as_such(twin):
-    twin.flip_reply_cells([11 * 4 + 1 + 6])                    # bit 6 of the fifth word
+    twin.flip_reply_cells([11 * 4 + 1 + 6])  # bit 6 of the fifth word
     expected = empty_reply(1)
     expected[4] ^= 1 << 6
     assert ask(twin) == expected
     before = twin.bus().framing_errors
-    twin.flip_reply_cells([10])                                # the first stop bit: a PC's port gives the word all the same
+    twin.flip_reply_cells([10])  # the first stop bit: a PC's port gives the word all the same
     assert ask(twin) == empty_reply(1) and twin.bus().framing_errors == before + 1
     assert ask(twin) == empty_reply(1)
 
@@ -112,7 +117,9 @@ def test_after_nonsense_and_spikes_the_nodes_answer_again(twin):
     twin.bus_spikes(5000)
     edges = twin.bus().edges
     twin.run(0.02)
-    assert 100 < twin.bus().edges - edges < 320               # 100 spikes of two edges, and answers to chance commands
+    assert (
+        100 < twin.bus().edges - edges < 320
+    )  # 100 spikes of two edges, and answers to chance commands
     twin.bus_spikes(0)
     twin.run(0.01)
     twin.receive_words()
@@ -125,7 +132,12 @@ def record(seed, **arguments):
         twin.run(START_S)
         twin.push(0, 30.0)
         words = ask(twin)
-        return words, twin.take_trace(0)["position_m"].tolist(), [twin.truth(n) for n in (0, 1)], twin.bus().edges
+        return (
+            words,
+            twin.take_trace(0)["position_m"].tolist(),
+            [twin.truth(n) for n in (0, 1)],
+            twin.bus().edges,
+        )
 
 
 def test_the_same_seed_gives_the_same_run():
@@ -137,8 +149,12 @@ def test_the_same_seed_gives_the_same_run():
 def test_the_axes_have_places_of_their_own(twin):
     places = [twin.true_position_nm(n) for n in (0, 1)]
     assert places[0] != places[1] and all(-0.8e6 <= place <= 2e6 for place in places)
-    with Twin(nodes=(1, 2), plant_of={1: {"travel_start_lowest": 0.05, "travel_start_highest": 0.05}}) as other:
-        assert other.true_position_nm(1) == pytest.approx(50e6) and other.true_position_nm(0) < 2.1e6
+    with Twin(
+        nodes=(1, 2), plant_of={1: {"travel_start_lowest": 0.05, "travel_start_highest": 0.05}}
+    ) as other:
+        assert (
+            other.true_position_nm(1) == pytest.approx(50e6) and other.true_position_nm(0) < 2.1e6
+        )
 
 
 def test_a_trace_holds_what_was_true(twin):
@@ -173,7 +189,10 @@ def test_each_fault_is_seen_by_the_node(twin):
 def test_parameters_are_set_and_read_by_name(twin):
     assert twin.machine(1).get("screw_backlash") == 1e-6
     twin.set_plant(1, screw_backlash=2e-6)
-    assert twin.machine(1).get("screw_backlash") == 2e-6 and twin.machine(0).get("screw_backlash") == 1e-6
+    assert (
+        twin.machine(1).get("screw_backlash") == 2e-6
+        and twin.machine(0).get("screw_backlash") == 1e-6
+    )
     with pytest.raises(KeyError, match="no parameter time_step to change"):
         twin.set_plant(1, time_step=1e-6)
 
@@ -181,12 +200,24 @@ def test_parameters_are_set_and_read_by_name(twin):
 def test_a_node_drives_any_machine():
     from moire.bus.client import Bus
 
-    with Twin([Node(1, [Axis("linear_motor", {"travel_start_lowest": 0.5e-3})]), Node(2, [Axis("stepper_stage")])], seed=1) as twin:
+    with Twin(
+        [
+            Node(1, [Axis("linear_motor", {"travel_start_lowest": 0.5e-3})]),
+            Node(2, [Axis("stepper_stage")]),
+        ],
+        seed=1,
+    ) as twin:
         twin.run(START_S)
-        assert 0.5e-3 <= twin.truth(0).position_m <= 1e-3 and 5e-3 <= twin.truth(1).position_m <= 20e-3
+        assert (
+            0.5e-3 <= twin.truth(0).position_m <= 1e-3 and 5e-3 <= twin.truth(1).position_m <= 20e-3
+        )
         bus = Bus(TwinTransport(twin))
         motor, stepper = bus.axis(1), bus.axis(2)
-        for place, low, high in ((-7.5e-3, True, False), (0.0, False, False), (7.5e-3, False, True)):
+        for place, low, high in (
+            (-7.5e-3, True, False),
+            (0.0, False, False),
+            (7.5e-3, False, True),
+        ):
             twin.set_position(0, place)
             twin.run(0.001)
             status = motor.status()
@@ -203,8 +234,13 @@ def test_a_node_drives_any_machine():
 
 def test_axes_of_one_node_have_machines_of_their_own():
     with Twin([Node(1, [Axis("stage"), Axis("worm_table")]), Node(2)], seed=1) as twin:
-        twin.run(0.25)                                         # a second axis takes the firmware longer to start
-        assert [machine.kind for machine in twin.machines] == ["stage", "worm_table", "stage", "unconnected"]
+        twin.run(0.25)  # a second axis takes the firmware longer to start
+        assert [machine.kind for machine in twin.machines] == [
+            "stage",
+            "worm_table",
+            "stage",
+            "unconnected",
+        ]
         assert twin.truth(1).sensor_frames == 25 and twin.truth(3).time_s == twin.time()
         assert ask(twin, 1) == empty_reply(1) and ask(twin, 2) == empty_reply(2)
         twin.push(0, 30.0)
@@ -235,7 +271,9 @@ def test_what_does_not_exist_is_refused(twin):
 
 def test_a_missing_compiler_is_one_line(monkeypatch):
     monkeypatch.setenv("CXX", "no-such-compiler")
-    with pytest.raises(BuildError, match=r"^g\+\+ is missing, the twin needs it: apt install g\+\+"):
+    with pytest.raises(
+        BuildError, match=r"^g\+\+ is missing, the twin needs it: apt install g\+\+"
+    ):
         build.machine_library()
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rotary table of S4: its pulses, its worm, its sensor."""
+
 import math
 
 import numpy
@@ -8,7 +9,7 @@ import pytest
 from twin import Machine
 
 ARC_SECOND = math.pi / 180 / 3600
-TURN = 40_000                    # pulses of a turn of the worm: 2 degree
+TURN = 40_000  # pulses of a turn of the worm: 2 degree
 
 
 def table(clk_hz=400_000, **values):
@@ -33,7 +34,11 @@ def test_a_turn_of_the_worm_is_two_degrees_whatever_its_error():
     first = go(machine, 2000)
     for turn in (1, 2):
         assert (go(machine, TURN) - first) / ARC_SECOND == pytest.approx(turn * 7200, abs=0.1)
-    assert machine.state.steps == 2 * TURN + 2000 and machine.state.lost_steps == 0 and machine.state.step_timing_errors == 0
+    assert (
+        machine.state.steps == 2 * TURN + 2000
+        and machine.state.lost_steps == 0
+        and machine.state.step_timing_errors == 0
+    )
 
 
 def test_the_worm_has_its_periodic_errors():
@@ -44,7 +49,11 @@ def test_the_worm_has_its_periodic_errors():
         errors.append(machine.state.position_rad / ARC_SECOND - 0.18 * machine.state.steps)
         go(machine, TURN // parts)
     spectrum = numpy.abs(numpy.fft.fft(errors)) * 2 / parts
-    assert spectrum[1] == pytest.approx(8, abs=0.1) and spectrum[2] == pytest.approx(2, abs=0.1) and max(spectrum[3:8]) < 0.1
+    assert (
+        spectrum[1] == pytest.approx(8, abs=0.1)
+        and spectrum[2] == pytest.approx(2, abs=0.1)
+        and max(spectrum[3:8]) < 0.1
+    )
 
 
 def test_the_way_back_loses_the_backlash():
@@ -52,9 +61,12 @@ def test_the_way_back_loses_the_backlash():
     up = go(machine, 2000)
     down = go(machine, -1000)
     lost = (down - up) / ARC_SECOND + 1000 * 0.18
-    # rotor on its field and presliding of the motor do not matter at 1:180; the mesh winds up by 3.3 Nm either way, the guides by 4 arcsec
+    # rotor on its field and presliding of the motor do not matter at 1:180; the mesh winds up by
+    # 3.3 Nm either way, the guides by 4 arcsec
     assert 20 < lost < 20 + 2 * 3.4 + 2 * 1
-    assert (go(machine, 1000) - up) / ARC_SECOND == pytest.approx(0, abs=0.1)     # approached from one side it is the same place
+    assert (go(machine, 1000) - up) / ARC_SECOND == pytest.approx(
+        0, abs=0.1
+    )  # approached from one side it is the same place
 
 
 def frames(levels, bit):
@@ -89,9 +101,13 @@ def angle_of(frame):
 
 
 def readings(machine, seconds):
-    """[(clk of the first start bit, sequence, angle in rad)] of the frames whose check is right, and the count of the others."""
+    """[(clk of the first start bit, sequence, angle in rad)] of the frames whose check is right,
+    and the count of the others.
+    """
     data = frames(machine.watch(seconds)["sensor_rx"], machine.clk_hz / 115200)
-    found = [(data[n][0], bytes(byte for _, byte in data[n:n + 8])) for n in range(0, len(data) - 7, 8)]
+    found = [
+        (data[n][0], bytes(byte for _, byte in data[n : n + 8])) for n in range(0, len(data) - 7, 8)
+    ]
     values = [(at, frame[1], angle_of(frame)) for at, frame in found if right(frame)]
     return values, len(found) - len(values)
 
@@ -112,12 +128,14 @@ def test_the_sensor_sends_the_angle_to_its_arcsecond():
 
 
 def test_the_angle_is_as_old_as_the_latency():
-    machine = Machine("worm_table", clk_hz=1_000_000, sensor_latency=5e-3, sensor_error=0, sensor_noise=0)
+    machine = Machine(
+        "worm_table", clk_hz=1_000_000, sensor_latency=5e-3, sensor_error=0, sensor_noise=0
+    )
     machine.pins(drive_enable=1)
     machine.trace(100_000)
     machine.steps(1000, 4000)
     began, levels = machine.state.time_s, []
-    for _ in range(2000):                                     # pulses while the line is watched
+    for _ in range(2000):  # pulses while the line is watched
         machine.pins(step=1, direction=1)
         levels.append(machine.watch(20e-6)["sensor_rx"])
         machine.pins(step=0)
@@ -125,11 +143,13 @@ def test_the_angle_is_as_old_as_the_latency():
     data = frames(numpy.concatenate(levels), 1e6 / 115200)
     trace = machine.take_trace()
     bytes_on_line = bytes(byte for _, byte in data)
-    starts = [n for n in range(len(data) - 7) if right(bytes_on_line[n:n + 8])]
+    starts = [n for n in range(len(data) - 7) if right(bytes_on_line[n : n + 8])]
     assert len(starts) > 10
     for n in starts:
-        angle = angle_of(bytes_on_line[n:n + 8])
-        then = numpy.interp(began + data[n][0] * 1e-6 - 5e-3, trace["time_s"], trace["position_rad"])
+        angle = angle_of(bytes_on_line[n : n + 8])
+        then = numpy.interp(
+            began + data[n][0] * 1e-6 - 5e-3, trace["time_s"], trace["position_rad"]
+        )
         assert (angle - then) / ARC_SECOND == pytest.approx(0, abs=0.05)
 
 
@@ -137,8 +157,15 @@ def test_frames_are_dropped_and_damaged_as_often_as_asked():
     machine = Machine("worm_table", clk_hz=1_000_000, sensor_dropped=0.1, sensor_corrupt=0.2)
     values, bad = readings(machine, 3.0)
     state = machine.state
-    assert state.sensor_frames == 300 and 15 <= state.sensor_dropped <= 50 and 35 <= state.sensor_corrupt <= 85
-    assert bad == state.sensor_corrupt and len(values) == 300 - state.sensor_dropped - state.sensor_corrupt
+    assert (
+        state.sensor_frames == 300
+        and 15 <= state.sensor_dropped <= 50
+        and 35 <= state.sensor_corrupt <= 85
+    )
+    assert (
+        bad == state.sensor_corrupt
+        and len(values) == 300 - state.sensor_dropped - state.sensor_corrupt
+    )
 
 
 def test_faults_of_the_sensor():

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // axis -- what an axis is doing.
 //
-// The switches: while homing, and from `enable` or `reset_faults` on a pressed switch until it is released (leaving), a
-// switch only blocks the way into it. At any other time it is a fault.
+// The switches: while homing, and from `enable` or `reset_faults` on a pressed switch until it is
+// released (leaving), a switch only blocks the way into it. At any other time it is a fault.
 #include "axis/axis.h"
 
 #include "core/clock.h"
@@ -12,50 +12,46 @@
 #include "axis/motion.h"
 #include "axis/parameters.h"
 
-#define FINE_BUILT 8u            // bit of actuator.drive.built
-#define FINE_HYSTERESIS 4       // the fine stage lets go at so many times its reach
-#define FINE_MS 10u             // the axis is within its reach for so long before it takes over
-#define EASE 8                  // of the motor's command, in a millisecond, while the fine stage holds
+#define FINE_BUILT 8u      // bit of actuator.drive.built
+#define FINE_HYSTERESIS 4  // the fine stage lets go at so many times its reach
+#define FINE_MS 10u        // the axis is within its reach for so long before it takes over
+#define EASE 8             // of the motor's command, in a millisecond, while the fine stage holds
 
 enum drive { BRIDGE, STEPS, DAC_OUTPUT };
 
 static struct axis {
-    uint8_t state;              // bus_state
-    uint8_t ended;              // bus_cause
+    uint8_t state;  // bus_state
+    uint8_t ended;  // bus_cause
     bool homed;
-    uint8_t command_count;             // off, home, move, prepare, stop since start; wraps
-    bool homing;                // a switch only blocks, until this motion has ended
-    bool leaving;               // a switch only blocks, until it is released
-    bool fine;                  // the fine stage holds the position
-    bool near;                  // the error has been within its reach since near_ms
+    uint8_t command_count;  // off, home, move, prepare, stop since start; wraps
+    bool homing;            // a switch only blocks, until this motion has ended
+    bool leaving;           // a switch only blocks, until it is released
+    bool fine;              // the fine stage holds the position
+    bool near;              // the error has been within its reach since near_ms
     uint32_t near_ms;
-    uint32_t eased_ms;          // the motor's command was eased up to here
+    uint32_t eased_ms;  // the motor's command was eased up to here
 } axes[HARDWARE_AXES];
 
-static bool is_busy(const struct axis *a)
-{
-    return a->ended == BUS_CAUSE_RUNNING;
-}
+static bool is_busy(const struct axis* a) { return a->ended == BUS_CAUSE_RUNNING; }
 
-static bool pressed(uint32_t state)
-{
+static bool pressed(uint32_t state) {
     return state & (AXIS_STATE_LIMIT_LOW_MASK | AXIS_STATE_LIMIT_HIGH_MASK);
 }
 
-static void write_control(unsigned n, bool on)
-{
-    const struct axis *a = &axes[n];
+static void write_control(unsigned n, bool on) {
+    const struct axis* a = &axes[n];
     uint32_t only_blocks = a->homing || a->leaving ? AXIS_CONTROL_HOMING_MASK : 0;
-    uint32_t loop = a->state == BUS_STATE_EXCITED ? 0 : a->fine ? AXIS_CONTROL_FINE_MASK : AXIS_CONTROL_CLOSED_LOOP_MASK;
+    uint32_t loop = a->state == BUS_STATE_EXCITED ? 0
+                    : a->fine                     ? AXIS_CONTROL_FINE_MASK
+                                                  : AXIS_CONTROL_CLOSED_LOOP_MASK;
     axis_write(n, AXIS_CONTROL, only_blocks | (on ? AXIS_CONTROL_ENABLE_MASK | loop : 0));
 }
 
-// With a fine stage the motor brings the axis within its reach and rests; out of reach, or at the end of the fine stage's range,
-// the motor takes over again, and keeps the axis until the fine stage is back in its middle. Both ways the motor's command goes on
-// from where it stands.
-static void hand_over(unsigned n, bool fine)
-{
-    struct axis *a = &axes[n];
+// With a fine stage the motor brings the axis within its reach and rests; out of reach, or at the
+// end of the fine stage's range, the motor takes over again, and keeps the axis until the fine
+// stage is back in its middle. Both ways the motor's command goes on from where it stands.
+static void hand_over(unsigned n, bool fine) {
+    struct axis* a = &axes[n];
     a->near = fine;
     if (a->fine == fine) return;
     a->fine = fine;
@@ -64,22 +60,26 @@ static void hand_over(unsigned n, bool fine)
     write_control(n, true);
 }
 
-// A motor that rests springs back by what it was wound up: its command goes down slowly enough for the fine stage to follow, until
-// friction alone holds. A stepper stays where its command has put it.
-static void ease(unsigned n)
-{
-    struct axis *a = &axes[n];
+// A motor that rests springs back by what it was wound up: its command goes down slowly enough for
+// the fine stage to follow, until friction alone holds. A stepper stays where its command has put
+// it.
+static void ease(unsigned n) {
+    struct axis* a = &axes[n];
     uint32_t now = clock_ms();
-    int32_t command = (int16_t)axis_read(n, AXIS_OPEN_COMMAND), most = EASE * (int32_t)(now - a->eased_ms);
+    int32_t command = (int16_t)axis_read(n, AXIS_OPEN_COMMAND),
+            most = EASE * (int32_t)(now - a->eased_ms);
     a->eased_ms = now;
     if (parameters_get(n, BUS_PARAMETER_DRIVE) == STEPS) return;
-    axis_write(n, AXIS_OPEN_COMMAND, (uint32_t)(command > most ? command - most : command < -most ? command + most : 0));
+    axis_write(n, AXIS_OPEN_COMMAND,
+               (uint32_t)(command > most    ? command - most
+                          : command < -most ? command + most
+                                            : 0));
 }
 
-static void hold(unsigned n)
-{
-    struct axis *a = &axes[n];
-    int64_t reach = parameters_get(n, BUS_PARAMETER_FINE_REACH), limit = parameters_get(n, BUS_PARAMETER_FINE_LIMIT);
+static void hold(unsigned n) {
+    struct axis* a = &axes[n];
+    int64_t reach = parameters_get(n, BUS_PARAMETER_FINE_REACH),
+            limit = parameters_get(n, BUS_PARAMETER_FINE_LIMIT);
     int16_t command = (int16_t)actuator_read(n, ACTUATOR_FINE_COMMAND);
     bool able = limit && (a->fine ? command < limit && command > -limit : command == 0);
     bool near = reach && able && motion_inside(n, a->fine ? FINE_HYSTERESIS * reach : reach);
@@ -89,9 +89,8 @@ static void hold(unsigned n)
     if (a->fine) ease(n);
 }
 
-static void finish(unsigned n, uint8_t cause)
-{
-    struct axis *a = &axes[n];
+static void finish(unsigned n, uint8_t cause) {
+    struct axis* a = &axes[n];
     a->ended = cause;
     a->state = BUS_STATE_HOLDING;
     a->homing = false;
@@ -99,9 +98,8 @@ static void finish(unsigned n, uint8_t cause)
     write_control(n, true);
 }
 
-static void fault(unsigned n, uint32_t faults)
-{
-    struct axis *a = &axes[n];
+static void fault(unsigned n, uint32_t faults) {
+    struct axis* a = &axes[n];
     if (faults & BUS_FAULT_ENCODER) a->homed = false;
     if (a->state == BUS_STATE_FAULTED) return;
     a->state = BUS_STATE_FAULTED;
@@ -111,16 +109,15 @@ static void fault(unsigned n, uint32_t faults)
     motion_set_target_to_position(n);
 }
 
-void axis_poll(unsigned n)
-{
-    struct axis *a = &axes[n];
+void axis_poll(unsigned n) {
+    struct axis* a = &axes[n];
     uint32_t faults = axis_read(n, AXIS_FAULTS), state;
     uint8_t outcome;
 
     if (faults) fault(n, faults);
     if (a->state == BUS_STATE_OFF || a->state == BUS_STATE_FAULTED) return;
     motion_feed(n);
-    state = axis_read(n, AXIS_STATE);                       // what homing looks at comes right before it looks
+    state = axis_read(n, AXIS_STATE);  // what homing looks at comes right before it looks
     if (a->leaving && !pressed(state)) {
         a->leaving = false;
         write_control(n, true);
@@ -151,18 +148,17 @@ void axis_poll(unsigned n)
     }
 }
 
-void axis_start(unsigned n)
-{
+void axis_start(unsigned n) {
     axes[n] = (struct axis){.state = BUS_STATE_OFF, .ended = BUS_CAUSE_NO_MOTION_YET};
     axis_write(n, AXIS_CONTROL, 0);
     parameters_start(n);
     axis_write(n, AXIS_ENCODER_EVENTS, AXIS_ENCODER_FAULT_MASK_MASK);
-    axis_write(n, AXIS_STROBES, AXIS_STROBES_SET_TARGET_TO_POSITION_MASK | AXIS_STROBES_RESET_FAULTS_MASK);
+    axis_write(n, AXIS_STROBES,
+               AXIS_STROBES_SET_TARGET_TO_POSITION_MASK | AXIS_STROBES_RESET_FAULTS_MASK);
 }
 
-uint8_t axis_enable(unsigned n, bool on)
-{
-    struct axis *a = &axes[n];
+uint8_t axis_enable(unsigned n, bool on) {
+    struct axis* a = &axes[n];
     a->command_count += !on;
     axis_poll(n);
     if (!on) {
@@ -179,14 +175,13 @@ uint8_t axis_enable(unsigned n, bool on)
     motion_set_target_to_position(n);
     a->state = BUS_STATE_HOLDING;
     write_control(n, true);
-    axis_poll(n);                                           // whether the guard agrees
+    axis_poll(n);  // whether the guard agrees
     return a->state == BUS_STATE_FAULTED ? BUS_CAUSE_FAULTED : BUS_CAUSE_OK;
 }
 
 // What every motion asks first.
-static uint8_t check_ready(unsigned n)
-{
-    const struct axis *a = &axes[n];
+static uint8_t check_ready(unsigned n) {
+    const struct axis* a = &axes[n];
     axis_poll(n);
     if (a->state == BUS_STATE_FAULTED) return BUS_CAUSE_FAULTED;
     if (a->state == BUS_STATE_OFF) return BUS_CAUSE_NOT_ENABLED;
@@ -194,15 +189,15 @@ static uint8_t check_ready(unsigned n)
     return BUS_CAUSE_OK;
 }
 
-uint8_t axis_home(unsigned n)
-{
-    struct axis *a = &axes[n];
+uint8_t axis_home(unsigned n) {
+    struct axis* a = &axes[n];
     a->command_count++;
     uint8_t cause = check_ready(n);
     if (cause != BUS_CAUSE_OK) return cause;
 
     hand_over(n, false);
-    feedback_write(n, FEEDBACK_SEGMENT_USE, 0);               // homing looks for phases; the target takes the step with it
+    feedback_write(n, FEEDBACK_SEGMENT_USE,
+                   0);  // homing looks for phases; the target takes the step with it
     cause = homing_begin(n);
     if (cause != BUS_CAUSE_OK) return cause;
     a->homed = false;
@@ -213,23 +208,24 @@ uint8_t axis_home(unsigned n)
     return BUS_CAUSE_OK;
 }
 
-// What every motion to a position asks first. One that only settles is over as soon as another is wanted.
-static uint8_t check_move(unsigned n, int64_t target)
-{
-    struct axis *a = &axes[n];
+// What every motion to a position asks first. One that only settles is over as soon as another is
+// wanted.
+static uint8_t check_move(unsigned n, int64_t target) {
+    struct axis* a = &axes[n];
     a->command_count++;
     uint8_t cause = check_ready(n);
-    if (cause != BUS_CAUSE_OK && !(cause == BUS_CAUSE_BUSY && (a->state == BUS_STATE_SETTLING || a->state == BUS_STATE_MOVING)))
+    if (cause != BUS_CAUSE_OK && !(cause == BUS_CAUSE_BUSY && (a->state == BUS_STATE_SETTLING ||
+                                                               a->state == BUS_STATE_MOVING)))
         return cause;
     if (!a->homed) return BUS_CAUSE_NOT_HOMED;
-    if (target < parameters_get(n, BUS_PARAMETER_TRAVEL_LOW) || target > parameters_get(n, BUS_PARAMETER_TRAVEL_HIGH))
+    if (target < parameters_get(n, BUS_PARAMETER_TRAVEL_LOW) ||
+        target > parameters_get(n, BUS_PARAMETER_TRAVEL_HIGH))
         return BUS_CAUSE_OUT_OF_TRAVEL;
     return BUS_CAUSE_OK;
 }
 
-uint8_t axis_prepare(unsigned n, int64_t target, uint32_t *duration_ticks)
-{
-    struct axis *a = &axes[n];
+uint8_t axis_prepare(unsigned n, int64_t target, uint32_t* duration_ticks) {
+    struct axis* a = &axes[n];
     uint8_t cause = check_move(n, target);
     if (cause != BUS_CAUSE_OK) return cause;
     if (a->state == BUS_STATE_MOVING) return BUS_CAUSE_BUSY;
@@ -241,28 +237,24 @@ uint8_t axis_prepare(unsigned n, int64_t target, uint32_t *duration_ticks)
     return BUS_CAUSE_OK;
 }
 
-static void begin_motion(unsigned n)
-{
+static void begin_motion(unsigned n) {
     hand_over(n, false);
     axes[n].state = BUS_STATE_MOVING;
 }
 
-uint8_t axis_may_start(unsigned count, uint32_t mask)
-{
+uint8_t axis_may_start(unsigned count, uint32_t mask) {
     if (mask == 0 || mask >> count) return BUS_CAUSE_OUT_OF_RANGE;
     for (unsigned n = 0; n < count; n++)
         if (mask >> n & 1u && axes[n].state != BUS_STATE_PREPARED) return BUS_CAUSE_NOT_PREPARED;
     return BUS_CAUSE_OK;
 }
 
-void axis_started(unsigned count, uint32_t mask)
-{
+void axis_started(unsigned count, uint32_t mask) {
     for (unsigned n = 0; n < count; n++)
         if (mask >> n & 1u && axes[n].state == BUS_STATE_PREPARED) begin_motion(n);
 }
 
-uint8_t axis_start_prepared(unsigned count, uint32_t mask)
-{
+uint8_t axis_start_prepared(unsigned count, uint32_t mask) {
     uint8_t cause = axis_may_start(count, mask);
     if (cause != BUS_CAUSE_OK) return cause;
     axis_started(count, mask);
@@ -270,8 +262,7 @@ uint8_t axis_start_prepared(unsigned count, uint32_t mask)
     return BUS_CAUSE_OK;
 }
 
-uint8_t axis_move(unsigned n, int64_t target, uint32_t *duration_ticks)
-{
+uint8_t axis_move(unsigned n, int64_t target, uint32_t* duration_ticks) {
     uint8_t cause;
     axis_poll(n);
     if (axes[n].state == BUS_STATE_MOVING) {
@@ -287,8 +278,7 @@ uint8_t axis_move(unsigned n, int64_t target, uint32_t *duration_ticks)
     return BUS_CAUSE_OK;
 }
 
-uint8_t axis_go(unsigned n, int64_t distance, uint8_t velocity_id)
-{
+uint8_t axis_go(unsigned n, int64_t distance, uint8_t velocity_id) {
     uint8_t cause = check_ready(n);
     if (cause != BUS_CAUSE_OK) return cause;
     cause = motion_prepare(n, distance, velocity_id);
@@ -299,9 +289,8 @@ uint8_t axis_go(unsigned n, int64_t distance, uint8_t velocity_id)
     return BUS_CAUSE_OK;
 }
 
-uint8_t axis_stop(unsigned n)
-{
-    struct axis *a = &axes[n];
+uint8_t axis_stop(unsigned n) {
+    struct axis* a = &axes[n];
     a->command_count++;
     axis_poll(n);
     if (!is_busy(a) || a->state == BUS_STATE_STOPPING) return BUS_CAUSE_OK;
@@ -309,15 +298,15 @@ uint8_t axis_stop(unsigned n)
         motion_controlled_stop(n);
         a->state = BUS_STATE_STOPPING;
     } else {
-        if (a->state == BUS_STATE_PREPARED || a->state == BUS_STATE_EXCITED) motion_set_target_to_position(n);
+        if (a->state == BUS_STATE_PREPARED || a->state == BUS_STATE_EXCITED)
+            motion_set_target_to_position(n);
         finish(n, BUS_CAUSE_STOPPED);
     }
     return BUS_CAUSE_OK;
 }
 
-uint8_t axis_excite(unsigned n, bool on)
-{
-    struct axis *a = &axes[n];
+uint8_t axis_excite(unsigned n, bool on) {
+    struct axis* a = &axes[n];
     if (!on) {
         if (a->state != BUS_STATE_EXCITED) return BUS_CAUSE_OK;
         motion_set_target_to_position(n);
@@ -334,11 +323,11 @@ uint8_t axis_excite(unsigned n, bool on)
     return BUS_CAUSE_OK;
 }
 
-uint8_t axis_reset_faults(unsigned n)
-{
-    struct axis *a = &axes[n];
+uint8_t axis_reset_faults(unsigned n) {
+    struct axis* a = &axes[n];
     axis_poll(n);
-    if (axis_read(n, AXIS_FAULTS) & BUS_FAULT_ENCODER) axis_write(n, AXIS_SHIFT_ORIGIN, 0);    // position and count agree from here on
+    if (axis_read(n, AXIS_FAULTS) & BUS_FAULT_ENCODER)
+        axis_write(n, AXIS_SHIFT_ORIGIN, 0);  // position and count agree from here on
     axis_write(n, AXIS_ENCODER_EVENTS, AXIS_ENCODER_FAULT_MASK_MASK);
     if (a->state != BUS_STATE_FAULTED) return BUS_CAUSE_OK;
     a->leaving = pressed(axis_read(n, AXIS_STATE));
@@ -350,39 +339,50 @@ uint8_t axis_reset_faults(unsigned n)
 }
 
 // What may change in motion, and what only with the drive off.
-static uint8_t check_parameter(unsigned n, uint8_t id, int64_t value)
-{
-    const struct axis *a = &axes[n];
+static uint8_t check_parameter(unsigned n, uint8_t id, int64_t value) {
+    const struct axis* a = &axes[n];
     bool on = a->state != BUS_STATE_OFF && a->state != BUS_STATE_FAULTED;
     if (id == BUS_PARAMETER_FEED_OVERRIDE) return BUS_CAUSE_OK;
     if (is_busy(a)) return BUS_CAUSE_BUSY;
     switch (id) {
     case BUS_PARAMETER_DRIVE:
-        if (!(FIELD_GET(actuator_read(n, ACTUATOR_DRIVE), ACTUATOR_DRIVE_BUILT) >> value & 1)) return BUS_CAUSE_NOT_BUILT;
-        if (value == DAC_OUTPUT && parameters_get(n, BUS_PARAMETER_FINE_REACH)) return BUS_CAUSE_OUT_OF_RANGE;
+        if (!(FIELD_GET(actuator_read(n, ACTUATOR_DRIVE), ACTUATOR_DRIVE_BUILT) >> value & 1))
+            return BUS_CAUSE_NOT_BUILT;
+        if (value == DAC_OUTPUT && parameters_get(n, BUS_PARAMETER_FINE_REACH))
+            return BUS_CAUSE_OUT_OF_RANGE;
         return on ? BUS_CAUSE_BUSY : BUS_CAUSE_OK;
-    case BUS_PARAMETER_POSITION_SOURCE:                    // own steps are counted as pulses and direction
-        if (value == OWN_STEPS && parameters_get(n, BUS_PARAMETER_STEP_OUTPUT)) return BUS_CAUSE_OUT_OF_RANGE;
+    case BUS_PARAMETER_POSITION_SOURCE:  // own steps are counted as pulses and direction
+        if (value == OWN_STEPS && parameters_get(n, BUS_PARAMETER_STEP_OUTPUT))
+            return BUS_CAUSE_OUT_OF_RANGE;
         return on ? BUS_CAUSE_BUSY : BUS_CAUSE_OK;
     case BUS_PARAMETER_STEP_OUTPUT:
-        if (value && parameters_get(n, BUS_PARAMETER_POSITION_SOURCE) == OWN_STEPS) return BUS_CAUSE_OUT_OF_RANGE;
+        if (value && parameters_get(n, BUS_PARAMETER_POSITION_SOURCE) == OWN_STEPS)
+            return BUS_CAUSE_OUT_OF_RANGE;
         return on ? BUS_CAUSE_BUSY : BUS_CAUSE_OK;
     case BUS_PARAMETER_STEP_INVERT: return on ? BUS_CAUSE_BUSY : BUS_CAUSE_OK;
     case BUS_PARAMETER_SEGMENTS:
-        return value && !FIELD_GET(feedback_read(n, FEEDBACK_SEGMENT_STATE), FEEDBACK_SEGMENT_STATE_BUILT) ? BUS_CAUSE_NOT_BUILT : BUS_CAUSE_OK;
+        return value && !FIELD_GET(feedback_read(n, FEEDBACK_SEGMENT_STATE),
+                                   FEEDBACK_SEGMENT_STATE_BUILT)
+                   ? BUS_CAUSE_NOT_BUILT
+                   : BUS_CAUSE_OK;
     case BUS_PARAMETER_SEGMENT_COUNT:
     case BUS_PARAMETER_SEGMENT_LENGTH:
     case BUS_PARAMETER_SEGMENT_FIRST:
-        return parameters_get(n, BUS_PARAMETER_SEGMENTS) && value != parameters_get(n, id) ? BUS_CAUSE_SEGMENTS_IN_USE : BUS_CAUSE_OK;
+        return parameters_get(n, BUS_PARAMETER_SEGMENTS) && value != parameters_get(n, id)
+                   ? BUS_CAUSE_SEGMENTS_IN_USE
+                   : BUS_CAUSE_OK;
     case BUS_PARAMETER_FINE_REACH:
-        if (value && !(FIELD_GET(actuator_read(n, ACTUATOR_DRIVE), ACTUATOR_DRIVE_BUILT) & FINE_BUILT)) return BUS_CAUSE_NOT_BUILT;
-        return value && parameters_get(n, BUS_PARAMETER_DRIVE) == DAC_OUTPUT ? BUS_CAUSE_OUT_OF_RANGE : BUS_CAUSE_OK;
+        if (value &&
+            !(FIELD_GET(actuator_read(n, ACTUATOR_DRIVE), ACTUATOR_DRIVE_BUILT) & FINE_BUILT))
+            return BUS_CAUSE_NOT_BUILT;
+        return value && parameters_get(n, BUS_PARAMETER_DRIVE) == DAC_OUTPUT
+                   ? BUS_CAUSE_OUT_OF_RANGE
+                   : BUS_CAUSE_OK;
     default: return BUS_CAUSE_OK;
     }
 }
 
-uint8_t axis_set_parameter(unsigned n, uint8_t id, int64_t value)
-{
+uint8_t axis_set_parameter(unsigned n, uint8_t id, int64_t value) {
     uint8_t cause = parameters_check(n, id, value);
     if (cause != BUS_CAUSE_OK) return cause;
     axis_poll(n);
@@ -391,35 +391,24 @@ uint8_t axis_set_parameter(unsigned n, uint8_t id, int64_t value)
     return cause;
 }
 
-uint8_t axis_state(unsigned n)
-{
-    return axes[n].state;
-}
+uint8_t axis_state(unsigned n) { return axes[n].state; }
 
-uint8_t axis_command_count(unsigned n)
-{
-    return axes[n].command_count;
-}
+uint8_t axis_command_count(unsigned n) { return axes[n].command_count; }
 
-uint8_t axis_ended(unsigned n)
-{
-    return axes[n].ended;
-}
+uint8_t axis_ended(unsigned n) { return axes[n].ended; }
 
-bool axis_homed(unsigned n)
-{
-    return axes[n].homed;
-}
+bool axis_homed(unsigned n) { return axes[n].homed; }
 
-uint8_t axis_flags(unsigned n)
-{
-    const struct axis *a = &axes[n];
+uint8_t axis_flags(unsigned n) {
+    const struct axis* a = &axes[n];
     uint32_t state = axis_read(n, AXIS_STATE);
     bool on = state & AXIS_STATE_ENABLED_MASK;
     return (uint8_t)((on ? BUS_FLAG_ENABLED : 0) | (a->homed ? BUS_FLAG_HOMED : 0) |
                      (state & AXIS_STATE_LIMIT_LOW_MASK ? BUS_FLAG_LIMIT_LOW : 0) |
                      (state & AXIS_STATE_LIMIT_HIGH_MASK ? BUS_FLAG_LIMIT_HIGH : 0) |
                      (state & AXIS_STATE_ESTOP_MASK ? BUS_FLAG_ESTOP : 0) |
-                     (on && motion_inside(n, parameters_get(n, BUS_PARAMETER_SETTLE_WINDOW)) ? BUS_FLAG_SETTLED : 0) |
+                     (on && motion_inside(n, parameters_get(n, BUS_PARAMETER_SETTLE_WINDOW))
+                          ? BUS_FLAG_SETTLED
+                          : 0) |
                      (state & AXIS_STATE_SATURATED_MASK ? BUS_FLAG_SATURATED : 0));
 }

@@ -9,8 +9,9 @@
 //  -1     S0: home_distance away from the place where the switch at home_end opens
 //  -2     S3: index within home_distance on either side, always met going up
 //
-// A position between two phase zeros is never zero: with an interpolated scale the nearest phase zero is taken, with a counted
-// one the count itself. All but 17, 18, 35 and 37 end at the zero. Where it is called is home_offset.
+// A position between two phase zeros is never zero: with an interpolated scale the nearest phase
+// zero is taken, with a counted one the count itself. All but 17, 18, 35 and 37 end at the zero.
+// Where it is called is home_offset.
 #include "axis/homing.h"
 
 #include "core/clock.h"
@@ -21,82 +22,86 @@
 
 #define S0_METHOD (-1)
 #define S3_METHOD (-2)
-#define STANDSTILL_MS 4u             // an axis that was caught by a switch at_standstill when in this time
-#define STANDSTILL_DISTANCE 8192     // it moved less than an eighth of a period
-#define CLEAR_DISTANCE 65536    // a search that met the index sooner may have begun on it
+#define STANDSTILL_MS 4u  // an axis that was caught by a switch at_standstill when in this time
+#define STANDSTILL_DISTANCE 8192  // it moved less than an eighth of a period
+#define CLEAR_DISTANCE 65536      // a search that met the index sooner may have begun on it
 #define LONGEST_SEARCH (1LL << 46)
-#define CAPTURE_INDEX 1u        // bit of capture_sources
+#define CAPTURE_INDEX 1u  // bit of capture_sources
 
-enum home_step { APPROACH, CATCH, LEAVE, RELEASE, DEPART, SEEK, SEEK_CAUGHT, MET, RETURN, FIRST_SETTLE, ZERO, SECOND_SETTLE };
+enum home_step {
+    APPROACH,
+    CATCH,
+    LEAVE,
+    RELEASE,
+    DEPART,
+    SEEK,
+    SEEK_CAUGHT,
+    MET,
+    RETURN,
+    FIRST_SETTLE,
+    ZERO,
+    SECOND_SETTLE
+};
 
 static struct homing {
-    uint8_t step;               // home_step
-    bool up;                    // direction of the search
-    bool second;                // S3: the first side had no index
+    uint8_t step;  // home_step
+    bool up;       // direction of the search
+    bool second;   // S3: the first side had no index
     uint32_t sampled_ms;
-    int64_t sampled;               // position then
-    int64_t zero_position;              // where the zero is to be
-    int32_t zero;               // what it was called, in periods
+    int64_t sampled;        // position then
+    int64_t zero_position;  // where the zero is to be
+    int32_t zero;           // what it was called, in periods
     int32_t phase;
 } homings[HARDWARE_AXES];
 
-static int64_t method_of(unsigned n)
-{
-    return parameters_get(n, BUS_PARAMETER_HOME_METHOD);
+static int64_t method_of(unsigned n) { return parameters_get(n, BUS_PARAMETER_HOME_METHOD); }
+
+static int64_t distance_of(unsigned n) { return parameters_get(n, BUS_PARAMETER_HOME_DISTANCE); }
+
+bool homing_method_exists(int64_t method) {
+    return method == 1 || method == 2 || method == 17 || method == 18 || method == 33 ||
+           method == 34 || method == 35 || method == 37 || method == S0_METHOD ||
+           method == S3_METHOD;
 }
 
-static int64_t distance_of(unsigned n)
-{
-    return parameters_get(n, BUS_PARAMETER_HOME_DISTANCE);
-}
-
-bool homing_method_exists(int64_t method)
-{
-    return method == 1 || method == 2 || method == 17 || method == 18 || method == 33 || method == 34 || method == 35 || method == 37 ||
-           method == S0_METHOD || method == S3_METHOD;
-}
-
-static bool at_high_end(unsigned n)
-{
+static bool at_high_end(unsigned n) {
     int64_t method = method_of(n);
-    return method == S0_METHOD ? parameters_get(n, BUS_PARAMETER_HOME_END) : method == 2 || method == 18;
+    return method == S0_METHOD ? parameters_get(n, BUS_PARAMETER_HOME_END)
+                               : method == 2 || method == 18;
 }
 
-static bool home_pressed(unsigned n, uint32_t state)
-{
+static bool home_pressed(unsigned n, uint32_t state) {
     return state & (at_high_end(n) ? AXIS_STATE_LIMIT_HIGH_MASK : AXIS_STATE_LIMIT_LOW_MASK);
 }
 
-static int64_t towards_switch(unsigned n, int64_t distance)
-{
+static int64_t towards_switch(unsigned n, int64_t distance) {
     return at_high_end(n) ? distance : -distance;
 }
 
-static uint8_t go(unsigned n, enum home_step step)
-{
+static uint8_t go(unsigned n, enum home_step step) {
     homings[n].step = step;
     motion_settle_begin(n);
     return BUS_CAUSE_RUNNING;
 }
 
-// Homing is the motor's work: with a fine stage it brings the axis within the reach of that, and no nearer.
-static int64_t settle_window(unsigned n)
-{
-    int64_t window = parameters_get(n, BUS_PARAMETER_SETTLE_WINDOW), reach = parameters_get(n, BUS_PARAMETER_FINE_REACH);
+// Homing is the motor's work: with a fine stage it brings the axis within the reach of that, and no
+// nearer.
+static int64_t settle_window(unsigned n) {
+    int64_t window = parameters_get(n, BUS_PARAMETER_SETTLE_WINDOW),
+            reach = parameters_get(n, BUS_PARAMETER_FINE_REACH);
     return reach > window ? reach : window;
 }
 
 // Each step that drives begins here; what the planner refuses ends the homing.
-static uint8_t drive(unsigned n, enum home_step step, int64_t distance, uint8_t velocity_id)
-{
+static uint8_t drive(unsigned n, enum home_step step, int64_t distance, uint8_t velocity_id) {
     uint8_t cause = motion_play(n, distance, velocity_id);
     return cause == BUS_CAUSE_OK ? go(n, step) : cause;
 }
 
-// A switch stops the axis and the guard lets it go no farther: the target follows it until it at_standstill.
-static uint8_t follow_switch_stop(unsigned n, enum home_step step)
-{
-    struct homing *h = &homings[n];
+// A switch stops the axis and the guard lets it go no farther: the target follows it until it
+// at_standstill.
+static uint8_t follow_switch_stop(unsigned n, enum home_step step) {
+    struct homing* h = &homings[n];
     motion_set_target_to_position(n);
     h->sampled = axis_read_position(n, AXIS_POSITION);
     h->sampled_ms = clock_ms();
@@ -104,51 +109,49 @@ static uint8_t follow_switch_stop(unsigned n, enum home_step step)
 }
 
 // running, ok when it at_standstill, not_settled.
-static uint8_t at_standstill(unsigned n)
-{
-    struct homing *h = &homings[n];
+static uint8_t at_standstill(unsigned n) {
+    struct homing* h = &homings[n];
     motion_set_target_to_position(n);
     if (motion_overdue(n)) return BUS_CAUSE_NOT_SETTLED;
     if (clock_ms() - h->sampled_ms < STANDSTILL_MS) return BUS_CAUSE_RUNNING;
     int64_t position = axis_read_position(n, AXIS_POSITION), moved = position - h->sampled;
     h->sampled = position;
     h->sampled_ms = clock_ms();
-    return moved < STANDSTILL_DISTANCE && moved > -STANDSTILL_DISTANCE ? BUS_CAUSE_OK : BUS_CAUSE_RUNNING;
+    return moved < STANDSTILL_DISTANCE && moved > -STANDSTILL_DISTANCE ? BUS_CAUSE_OK
+                                                                       : BUS_CAUSE_RUNNING;
 }
 
 // Which way the index is taken; what else the register holds is the user's.
-static void take_index(unsigned n, uint32_t directions)
-{
-    uint32_t other = feedback_read(n, FEEDBACK_INDEX) & ~(FEEDBACK_INDEX_UP_MASK | FEEDBACK_INDEX_DOWN_MASK);
+static void take_index(unsigned n, uint32_t directions) {
+    uint32_t other =
+        feedback_read(n, FEEDBACK_INDEX) & ~(FEEDBACK_INDEX_UP_MASK | FEEDBACK_INDEX_DOWN_MASK);
     feedback_write(n, FEEDBACK_INDEX, other | directions);
 }
 
-// Only the way of the search counts: an axis that rests on the edge of its mark may go back over it before it sets off.
-static void arm(unsigned n, bool up)
-{
+// Only the way of the search counts: an axis that rests on the edge of its mark may go back over it
+// before it sets off.
+static void arm(unsigned n, bool up) {
     homings[n].up = up;
     take_index(n, up ? FEEDBACK_INDEX_UP_MASK : FEEDBACK_INDEX_DOWN_MASK);
     feedback_write(n, FEEDBACK_CAPTURE_SOURCES, CAPTURE_INDEX);
-    feedback_write(n, FEEDBACK_STROBES, FEEDBACK_STROBES_CAPTURE_CLEAR_MASK | FEEDBACK_STROBES_ARM_INDEX_MASK);
+    feedback_write(n, FEEDBACK_STROBES,
+                   FEEDBACK_STROBES_CAPTURE_CLEAR_MASK | FEEDBACK_STROBES_ARM_INDEX_MASK);
 }
 
-static uint8_t seek(unsigned n, bool up, int64_t distance)
-{
+static uint8_t seek(unsigned n, bool up, int64_t distance) {
     homings[n].sampled = axis_read_position(n, AXIS_POSITION);
     arm(n, up);
     return drive(n, SEEK, up ? distance : -distance, BUS_PARAMETER_HOMING_SEARCH_SPEED);
 }
 
-static void disarm(unsigned n)
-{
+static void disarm(unsigned n) {
     feedback_write(n, FEEDBACK_CAPTURE_SOURCES, 0);
     feedback_write(n, FEEDBACK_STROBES, FEEDBACK_STROBES_CAPTURE_CLEAR_MASK);
     take_index(n, FEEDBACK_INDEX_UP_MASK | FEEDBACK_INDEX_DOWN_MASK);
 }
 
-static uint8_t not_met(unsigned n)
-{
-    struct homing *h = &homings[n];
+static uint8_t not_met(unsigned n) {
+    struct homing* h = &homings[n];
     disarm(n);
     if (method_of(n) != S3_METHOD || h->second) return BUS_CAUSE_NO_INDEX;
     h->second = true;
@@ -156,13 +159,12 @@ static uint8_t not_met(unsigned n)
 }
 
 // The axis at_standstill. Its origin moves so that `zero_position` is called home_offset.
-static void zero(unsigned n)
-{
-    struct homing *h = &homings[n];
+static void zero(unsigned n) {
+    struct homing* h = &homings[n];
     int32_t periods = (int32_t)((h->zero_position + 32768) >> 16), quarters = 0;
     if (parameters_get(n, BUS_PARAMETER_POSITION_SOURCE) != 0) {
         int32_t counts = (int32_t)((h->zero_position + 8192) >> 14);
-        quarters = counts - 4 * periods;                                    // -2 .. 2
+        quarters = counts - 4 * periods;  // -2 .. 2
     }
     h->phase = (int32_t)(h->zero_position - (int64_t)periods * 65536 - quarters * 16384);
     if (quarters) feedback_write(n, FEEDBACK_ALIGN, (uint32_t)-quarters);
@@ -171,11 +173,11 @@ static void zero(unsigned n)
     if (quarters) motion_set_target_to_position(n);
 }
 
-uint8_t homing_begin(unsigned n)
-{
-    struct homing *h = &homings[n];
+uint8_t homing_begin(unsigned n) {
+    struct homing* h = &homings[n];
     int64_t method = method_of(n), search = distance_of(n);
-    int64_t low = parameters_get(n, BUS_PARAMETER_TRAVEL_LOW), high = parameters_get(n, BUS_PARAMETER_TRAVEL_HIGH);
+    int64_t low = parameters_get(n, BUS_PARAMETER_TRAVEL_LOW),
+            high = parameters_get(n, BUS_PARAMETER_TRAVEL_HIGH);
     uint8_t begun;
     h->second = false;
     switch (method) {
@@ -191,17 +193,18 @@ uint8_t homing_begin(unsigned n)
     default:
         if (high > low) search += high - low;
         if (search > LONGEST_SEARCH) search = LONGEST_SEARCH;
-        begun = home_pressed(n, axis_read(n, AXIS_STATE)) ? follow_switch_stop(n, CATCH)
-                                                          : drive(n, APPROACH, towards_switch(n, search), BUS_PARAMETER_HOMING_SEARCH_SPEED);
+        begun =
+            home_pressed(n, axis_read(n, AXIS_STATE))
+                ? follow_switch_stop(n, CATCH)
+                : drive(n, APPROACH, towards_switch(n, search), BUS_PARAMETER_HOMING_SEARCH_SPEED);
         break;
     }
     return begun == BUS_CAUSE_RUNNING ? BUS_CAUSE_OK : begun;
 }
 
-static uint8_t opened(unsigned n)
-{
-    struct homing *h = &homings[n];
-    if (method_of(n) == 1 || method_of(n) == 2) {                           // on as before, now with an eye on the index
+static uint8_t opened(unsigned n) {
+    struct homing* h = &homings[n];
+    if (method_of(n) == 1 || method_of(n) == 2) {  // on as before, now with an eye on the index
         arm(n, !at_high_end(n));
         return go(n, SEEK);
     }
@@ -210,30 +213,29 @@ static uint8_t opened(unsigned n)
     return go(n, RELEASE);
 }
 
-static uint8_t released(unsigned n)
-{
-    struct homing *h = &homings[n];
+static uint8_t released(unsigned n) {
+    struct homing* h = &homings[n];
     if (method_of(n) != S0_METHOD) return go(n, FIRST_SETTLE);
     h->zero_position -= towards_switch(n, distance_of(n));
-    return drive(n, DEPART, h->zero_position - axis_read_position(n, AXIS_TARGET), BUS_PARAMETER_HOMING_SEARCH_SPEED);
+    return drive(n, DEPART, h->zero_position - axis_read_position(n, AXIS_TARGET),
+                 BUS_PARAMETER_HOMING_SEARCH_SPEED);
 }
 
-static uint8_t seek_poll(unsigned n, uint32_t state)
-{
-    struct homing *h = &homings[n];
+static uint8_t seek_poll(unsigned n, uint32_t state) {
+    struct homing* h = &homings[n];
     if (FIELD_GET(feedback_read(n, FEEDBACK_CAPTURE_STATE), FEEDBACK_CAPTURE_STATE_PRESENT)) {
         h->zero_position = (int64_t)(feedback_read_wide(n, FEEDBACK_CAPTURED_POSITION) << 16) >> 16;
         disarm(n);
         motion_controlled_stop(n);
         return go(n, MET);
     }
-    if (state & (h->up ? AXIS_STATE_LIMIT_HIGH_MASK : AXIS_STATE_LIMIT_LOW_MASK)) return follow_switch_stop(n, SEEK_CAUGHT);
+    if (state & (h->up ? AXIS_STATE_LIMIT_HIGH_MASK : AXIS_STATE_LIMIT_LOW_MASK))
+        return follow_switch_stop(n, SEEK_CAUGHT);
     return motion_played(n) ? not_met(n) : BUS_CAUSE_RUNNING;
 }
 
-uint8_t homing_poll(unsigned n, uint32_t state)
-{
-    struct homing *h = &homings[n];
+uint8_t homing_poll(unsigned n, uint32_t state) {
+    struct homing* h = &homings[n];
     int64_t distance = distance_of(n), target = axis_read_position(n, AXIS_TARGET);
     uint8_t caught;
 
@@ -244,8 +246,10 @@ uint8_t homing_poll(unsigned n, uint32_t state)
     case CATCH:
         caught = at_standstill(n);
         if (caught != BUS_CAUSE_OK) return caught;
-        if (home_pressed(n, state)) return drive(n, LEAVE, -towards_switch(n, distance), BUS_PARAMETER_HOMING_LATCH_SPEED);
-        return drive(n, APPROACH, towards_switch(n, distance), BUS_PARAMETER_HOMING_LATCH_SPEED);     // bounced off
+        if (home_pressed(n, state))
+            return drive(n, LEAVE, -towards_switch(n, distance), BUS_PARAMETER_HOMING_LATCH_SPEED);
+        return drive(n, APPROACH, towards_switch(n, distance),
+                     BUS_PARAMETER_HOMING_LATCH_SPEED);  // bounced off
     case LEAVE:
         if (!home_pressed(n, state)) return opened(n);
         return motion_played(n) ? BUS_CAUSE_SWITCH_STUCK : BUS_CAUSE_RUNNING;
@@ -257,27 +261,25 @@ uint8_t homing_poll(unsigned n, uint32_t state)
         return caught == BUS_CAUSE_OK ? not_met(n) : caught;
     case MET:
         if (!motion_played(n)) return BUS_CAUSE_RUNNING;
-        if (method_of(n) != S3_METHOD || (h->up && h->zero_position - h->sampled >= CLEAR_DISTANCE)) return go(n, FIRST_SETTLE);
-        return drive(n, RETURN, h->zero_position - distance / 8 - target, BUS_PARAMETER_HOMING_SEARCH_SPEED);
+        if (method_of(n) != S3_METHOD || (h->up && h->zero_position - h->sampled >= CLEAR_DISTANCE))
+            return go(n, FIRST_SETTLE);
+        return drive(n, RETURN, h->zero_position - distance / 8 - target,
+                     BUS_PARAMETER_HOMING_SEARCH_SPEED);
     case RETURN: return motion_played(n) ? seek(n, true, distance / 4) : BUS_CAUSE_RUNNING;
     case FIRST_SETTLE:
         caught = motion_settle(n, settle_window(n));
         if (caught != BUS_CAUSE_OK) return caught;
         zero(n);
         if (method_of(n) == 17 || method_of(n) == 18) return BUS_CAUSE_OK;
-        return drive(n, ZERO, parameters_get(n, BUS_PARAMETER_HOME_OFFSET) * 65536 - axis_read_position(n, AXIS_TARGET),
+        return drive(n, ZERO,
+                     parameters_get(n, BUS_PARAMETER_HOME_OFFSET) * 65536 -
+                         axis_read_position(n, AXIS_TARGET),
                      BUS_PARAMETER_HOMING_LATCH_SPEED);
     case ZERO: return motion_played(n) ? go(n, SECOND_SETTLE) : BUS_CAUSE_RUNNING;
     default: return motion_settle(n, settle_window(n));
     }
 }
 
-int32_t homing_phase(unsigned n)
-{
-    return homings[n].phase;
-}
+int32_t homing_phase(unsigned n) { return homings[n].phase; }
 
-int32_t homing_zero(unsigned n)
-{
-    return homings[n].zero;
-}
+int32_t homing_zero(unsigned n) { return homings[n].zero; }

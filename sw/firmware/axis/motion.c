@@ -8,67 +8,61 @@
 #include "axis/parameters.h"
 #include "planner/planner.h"
 
-#define PIECE_TICKS 128u        // 32 ms
+#define PIECE_TICKS 128u  // 32 ms
 #define QUEUE 16u
-#define QUEUED_MS 16u           // What is queued cannot be taken back when the target changes, so it is kept short: this, and what
-#define BUSY_KILOCYCLES 150u          // the firmware may be busy with before it looks here again. Pieces are short too where a move begins:
-                                // it is time that counts.
-static const uint16_t plan_kilocycles[] = {300, 800};     // what another target is given to be planned, and half of what is queued
+#define QUEUED_MS \
+    16u  // What is queued cannot be taken back when the target changes, so it is kept short: this,
+         // and what
+#define BUSY_KILOCYCLES \
+    150u  // the firmware may be busy with before it looks here again. Pieces are short too where a
+          // move begins:
+          // it is time that counts.
+static const uint16_t plan_kilocycles[] = {
+    300, 800};  // what another target is given to be planned, and half of what is queued
 
 static struct motion {
     struct plan plan;
-    int64_t from;               // target when the plan began
-    uint8_t queued[QUEUE];      // ticks of the pieces queued last
-    uint8_t pieces;             // queued so far
-    bool inside;                // the error has been inside the window since inside_ms
+    int64_t from;           // target when the plan began
+    uint8_t queued[QUEUE];  // ticks of the pieces queued last
+    uint8_t pieces;         // queued so far
+    bool inside;            // the error has been inside the window since inside_ms
     uint32_t inside_ms;
-    uint32_t since_ms;          // start of settling
+    uint32_t since_ms;  // start of settling
 } motions[HARDWARE_AXES];
 
-static struct {                 // a way to another target, which follows when the old one has been fed so far
+static struct {  // a way to another target, which follows when the old one has been fed so far
     struct plan plan;
     unsigned axis;
-    uint32_t join;              // tick of the old plan; 0: there is none
-    bool ready;                 // it is planned
+    uint32_t join;  // tick of the old plan; 0: there is none
+    bool ready;     // it is planned
 } next;
 
-static bool joins(unsigned n)
-{
-    return next.join && next.axis == n;
-}
+static bool joins(unsigned n) { return next.join && next.axis == n; }
 
-static void discard_plan(unsigned n)
-{
+static void discard_plan(unsigned n) {
     motions[n].plan.next = motions[n].plan.count;
     if (joins(n)) next.join = 0;
 }
 
-void motion_set_target_to_position(unsigned n)
-{
+void motion_set_target_to_position(unsigned n) {
     discard_plan(n);
     axis_write(n, AXIS_STROBES, AXIS_STROBES_SET_TARGET_TO_POSITION_MASK);
 }
 
-void motion_controlled_stop(unsigned n)
-{
+void motion_controlled_stop(unsigned n) {
     discard_plan(n);
     axis_write(n, AXIS_STROBES, AXIS_STROBES_CONTROLLED_STOP_MASK);
 }
 
-static uint32_t ticks_of(uint32_t kilocycles)
-{
+static uint32_t ticks_of(uint32_t kilocycles) {
     return PLANNER_TICK_HZ * kilocycles / (node_read(NODE_CLK_HZ) / 1000u);
 }
 
-static bool at_join(unsigned n)
-{
-    return joins(n) && motions[n].plan.at.tick == next.join;
-}
+static bool at_join(unsigned n) { return joins(n) && motions[n].plan.at.tick == next.join; }
 
 // One piece into the queue, which has room for it. Its ticks; 0: nothing is left.
-static uint32_t push(unsigned n)
-{
-    struct motion *m = &motions[n];
+static uint32_t push(unsigned n) {
+    struct motion* m = &motions[n];
     struct planner_segment piece;
     bool last;
     uint32_t longest = PIECE_TICKS;
@@ -86,27 +80,26 @@ static uint32_t push(unsigned n)
     return piece.ticks;
 }
 
-void motion_feed(unsigned n)
-{
-    struct motion *m = &motions[n];
+void motion_feed(unsigned n) {
+    struct motion* m = &motions[n];
     if (m->plan.next >= m->plan.count) return;
     uint32_t pieces = QUEUE - FIELD_GET(axis_read(n, AXIS_STATE), AXIS_STATE_QUEUE_FREE), ticks = 0;
     uint32_t most = PLANNER_TICK_HZ / 1000u * QUEUED_MS + ticks_of(BUSY_KILOCYCLES);
-    for (uint32_t piece_back = 1; piece_back <= pieces; piece_back++) ticks += m->queued[(m->pieces - piece_back) % QUEUE];
+    for (uint32_t piece_back = 1; piece_back <= pieces; piece_back++)
+        ticks += m->queued[(m->pieces - piece_back) % QUEUE];
     for (uint32_t more = 1; more && pieces < QUEUE; pieces++) {
         if (!joins(n) && ticks >= most) break;
-        if (at_join(n) && !next.ready && ticks >= most / 2) break;           // wait for the new way as long as that may be
+        if (at_join(n) && !next.ready && ticks >= most / 2)
+            break;  // wait for the new way as long as that may be
         ticks += more = push(n);
     }
 }
 
-static void feed_all(void)
-{
+static void feed_all(void) {
     for (unsigned n = 0; n < HARDWARE_AXES; n++) motion_feed(n);
 }
 
-static uint8_t refusal(const struct plan *plan)
-{
+static uint8_t refusal(const struct plan* plan) {
     switch (plan->cause) {
     case PLANNER_TOO_LONG: return BUS_CAUSE_TOO_LONG;
     case PLANNER_BORDERS:
@@ -116,9 +109,8 @@ static uint8_t refusal(const struct plan *plan)
     }
 }
 
-uint8_t motion_prepare(unsigned n, int64_t distance, uint8_t velocity_id)
-{
-    struct plan *plan = &motions[n].plan;
+uint8_t motion_prepare(unsigned n, int64_t distance, uint8_t velocity_id) {
+    struct plan* plan = &motions[n].plan;
     bool planned;
     motions[n].from = axis_read_position(n, AXIS_TARGET);
     if (parameters_get(n, BUS_PARAMETER_PROFILE) == STEPPED) {
@@ -133,10 +125,10 @@ uint8_t motion_prepare(unsigned n, int64_t distance, uint8_t velocity_id)
     return BUS_CAUSE_OK;
 }
 
-// The new way begins so far ahead that the old one can be fed while it is planned. Where that took too long, once more with more.
-uint8_t motion_retarget(unsigned n, int64_t target, uint8_t velocity_id)
-{
-    const struct plan *old = &motions[n].plan;
+// The new way begins so far ahead that the old one can be fed while it is planned. Where that took
+// too long, once more with more.
+uint8_t motion_retarget(unsigned n, int64_t target, uint8_t velocity_id) {
+    const struct plan* old = &motions[n].plan;
     const struct planner_limits limits = parameters_limits(n, velocity_id);
     if (next.join) return BUS_CAUSE_BUSY;
     for (unsigned trial = 0; trial < sizeof plan_kilocycles / sizeof plan_kilocycles[0]; trial++) {
@@ -145,11 +137,12 @@ uint8_t motion_retarget(unsigned n, int64_t target, uint8_t velocity_id)
         next.axis = n;
         next.join = join;
         next.ready = false;
-        if (!planner_retarget(&next.plan, old, ticks, &limits, target - motions[n].from, feed_all)) {
+        if (!planner_retarget(&next.plan, old, ticks, &limits, target - motions[n].from,
+                              feed_all)) {
             next.join = 0;
             return refusal(&next.plan);
         }
-        if (next.join == 0) continue;                                        // the old one had to be fed beyond
+        if (next.join == 0) continue;  // the old one had to be fed beyond
         next.ready = true;
         motion_feed(n);
         return BUS_CAUSE_OK;
@@ -157,53 +150,43 @@ uint8_t motion_retarget(unsigned n, int64_t target, uint8_t velocity_id)
     return BUS_CAUSE_BUSY;
 }
 
-void motion_start(unsigned n)
-{
-    axis_write(n, AXIS_STROBES, AXIS_STROBES_START_MASK);
-}
+void motion_start(unsigned n) { axis_write(n, AXIS_STROBES, AXIS_STROBES_START_MASK); }
 
-uint8_t motion_play(unsigned n, int64_t distance, uint8_t velocity_id)
-{
+uint8_t motion_play(unsigned n, int64_t distance, uint8_t velocity_id) {
     uint8_t cause = motion_prepare(n, distance, velocity_id);
     if (cause == BUS_CAUSE_OK) motion_start(n);
     return cause;
 }
 
-bool motion_played(unsigned n)
-{
-    const struct plan *plan = &motions[n].plan;
+bool motion_played(unsigned n) {
+    const struct plan* plan = &motions[n].plan;
     return plan->next >= plan->count && !(axis_read(n, AXIS_STATE) & AXIS_STATE_MOVING_MASK);
 }
 
-uint32_t motion_ticks(unsigned n)
-{
-    return motions[n].plan.ticks;
-}
+uint32_t motion_ticks(unsigned n) { return motions[n].plan.ticks; }
 
-bool motion_inside(unsigned n, int64_t window)
-{
+bool motion_inside(unsigned n, int64_t window) {
     int64_t error = (int32_t)axis_read(n, AXIS_FOLLOWING_ERROR);
     return error <= window && error >= -window;
 }
 
-void motion_settle_begin(unsigned n)
-{
+void motion_settle_begin(unsigned n) {
     motions[n].inside = false;
     motions[n].since_ms = clock_ms();
 }
 
-bool motion_overdue(unsigned n)
-{
-    return clock_ms() - motions[n].since_ms >= (uint32_t)parameters_get(n, BUS_PARAMETER_SETTLE_TIMEOUT);
+bool motion_overdue(unsigned n) {
+    return clock_ms() - motions[n].since_ms >=
+           (uint32_t)parameters_get(n, BUS_PARAMETER_SETTLE_TIMEOUT);
 }
 
-uint8_t motion_settle(unsigned n, int64_t window)
-{
-    struct motion *m = &motions[n];
+uint8_t motion_settle(unsigned n, int64_t window) {
+    struct motion* m = &motions[n];
     uint32_t now = clock_ms();
     bool inside = motion_inside(n, window);
     if (inside && !m->inside) m->inside_ms = now;
     m->inside = inside;
-    if (inside && now - m->inside_ms >= (uint32_t)parameters_get(n, BUS_PARAMETER_SETTLE_TIME)) return BUS_CAUSE_OK;
+    if (inside && now - m->inside_ms >= (uint32_t)parameters_get(n, BUS_PARAMETER_SETTLE_TIME))
+        return BUS_CAUSE_OK;
     return motion_overdue(n) ? BUS_CAUSE_NOT_SETTLED : BUS_CAUSE_RUNNING;
 }

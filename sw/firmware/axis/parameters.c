@@ -6,129 +6,146 @@
 #include "axis/homing.h"
 #include "made/bus_protocol.h"
 
-#define PULSES_AND_DIRECTION 3u         // a mode of the decoder
+#define PULSES_AND_DIRECTION 3u  // a mode of the decoder
 #define STEP_CYCLES_MASK ACTUATOR_STEP_PULSE_HIGH_MASK
-#define COEFFICIENTS 5u                 // of a filter
+#define COEFFICIENTS 5u  // of a filter
 
 #define LIMITS(name, id, low, high, value) [id] = {low, high, value},
 
-static const struct { int64_t low, high, value; } table[BUS_PARAMETER_COUNT + 1] = {BUS_PARAMETERS(LIMITS)};
+static const struct {
+    int64_t low, high, value;
+} table[BUS_PARAMETER_COUNT + 1] = {BUS_PARAMETERS(LIMITS)};
 
 static const uint8_t sine_parameters[] = {BUS_PARAMETERS_OF_SINE};
 
 static int64_t parameters[HARDWARE_AXES][BUS_PARAMETER_COUNT + 1];
-static struct planner_limits limits[HARDWARE_AXES];     // velocity: that of a move
+static struct planner_limits limits[HARDWARE_AXES];  // velocity: that of a move
 
-static uint32_t saturate(uint64_t value, uint32_t mask)
-{
+static uint32_t saturate(uint64_t value, uint32_t mask) {
     return value > mask ? mask : (uint32_t)value;
 }
 
-void parameters_set_baud(uint32_t baud)
-{
-    bus_write(BUS_BIT_TIME, saturate((16 * (uint64_t)node_read(NODE_CLK_HZ) + baud / 2) / baud, BUS_BIT_TIME_MASK));
+void parameters_set_baud(uint32_t baud) {
+    bus_write(BUS_BIT_TIME, saturate((16 * (uint64_t)node_read(NODE_CLK_HZ) + baud / 2) / baud,
+                                     BUS_BIT_TIME_MASK));
 }
 
-void parameters_start_node(void)
-{
+void parameters_start_node(void) {
     uint32_t clk_hz = node_read(NODE_CLK_HZ);
     parameters_set_baud(BAUD);
-    node_write(NODE_SAMPLE_PERIOD, saturate(clk_hz / SAMPLE_HZ < SAMPLE_CYCLES ? SAMPLE_CYCLES : clk_hz / SAMPLE_HZ, NODE_SAMPLE_PERIOD_MASK));
+    node_write(NODE_SAMPLE_PERIOD,
+               saturate(clk_hz / SAMPLE_HZ < SAMPLE_CYCLES ? SAMPLE_CYCLES : clk_hz / SAMPLE_HZ,
+                        NODE_SAMPLE_PERIOD_MASK));
     node_write(NODE_TICK_PERIOD, saturate(clk_hz / PLANNER_TICK_HZ, NODE_TICK_PERIOD_MASK));
 }
 
-uint32_t parameters_sample_hz(void)
-{
+uint32_t parameters_sample_hz(void) {
     return node_read(NODE_CLK_HZ) / node_read(NODE_SAMPLE_PERIOD);
 }
 
-static void apply_motion(unsigned axis)
-{
-    const int64_t *p = parameters[axis];
+static void apply_motion(unsigned axis) {
+    const int64_t* p = parameters[axis];
     uint32_t slope, curve;
-    limits[axis] = planner_limits((uint32_t)p[BUS_PARAMETER_VELOCITY], (uint32_t)p[BUS_PARAMETER_ACCELERATION],
-                                  (uint32_t)p[BUS_PARAMETER_JERK]);
+    limits[axis] =
+        planner_limits((uint32_t)p[BUS_PARAMETER_VELOCITY], (uint32_t)p[BUS_PARAMETER_ACCELERATION],
+                       (uint32_t)p[BUS_PARAMETER_JERK]);
     if (p[BUS_PARAMETER_PROFILE] == TRAPEZOID) limits[axis].jerk = PLANNER_ANY_JERK;
     planner_feed_override(&limits[axis], &slope, &curve);
-    axis_write(axis, AXIS_STOP_DECELERATION, saturate(limits[axis].acceleration >> 8, AXIS_STOP_DECELERATION_MASK));
+    axis_write(axis, AXIS_STOP_DECELERATION,
+               saturate(limits[axis].acceleration >> 8, AXIS_STOP_DECELERATION_MASK));
     axis_write(axis, AXIS_STOP_JERK, limits[axis].jerk == PLANNER_ANY_JERK ? 0 : limits[axis].jerk);
     axis_write(axis, AXIS_FEED_OVERRIDE_SLOPE, slope);
     axis_write(axis, AXIS_FEED_OVERRIDE_CURVE, curve);
 }
 
-static uint64_t cycles_of(int64_t nanoseconds)
-{
+static uint64_t cycles_of(int64_t nanoseconds) {
     return (uint64_t)nanoseconds * node_read(NODE_CLK_HZ) / 1000000000u;
 }
 
 // The deglitcher counts the samples that it takes: of all clk, or with some left out between two.
-static void apply_sensing(unsigned axis)
-{
-    const int64_t *p = parameters[axis];
+static void apply_sensing(unsigned axis) {
+    const int64_t* p = parameters[axis];
     uint32_t skip = saturate(cycles_of(p[BUS_PARAMETER_FILTER_SKIP]), 0xFFFF);
     uint64_t samples = (cycles_of(p[BUS_PARAMETER_DEGLITCH]) + skip) / (skip + 1u);
-    feedback_write(axis, FEEDBACK_EDGE_FILTER, FIELD_PUT(FEEDBACK_EDGE_FILTER_SKIP, skip) |
-                                             FIELD_PUT(FEEDBACK_EDGE_FILTER_TOLERATED, p[BUS_PARAMETER_FILTER_TOLERATED]));
-    axis_write(axis, AXIS_SENSING, FIELD_PUT(AXIS_SENSING_DEGLITCH, saturate(samples, 0xFFFF)) |
-                                   FIELD_PUT(AXIS_SENSING_OUTLIER_STEP, p[BUS_PARAMETER_OUTLIER_STEP]) |
-                                   FIELD_PUT(AXIS_SENSING_OUTLIER_HOLD, p[BUS_PARAMETER_OUTLIER_HOLD]));
+    feedback_write(
+        axis, FEEDBACK_EDGE_FILTER,
+        FIELD_PUT(FEEDBACK_EDGE_FILTER_SKIP, skip) |
+            FIELD_PUT(FEEDBACK_EDGE_FILTER_TOLERATED, p[BUS_PARAMETER_FILTER_TOLERATED]));
+    axis_write(axis, AXIS_SENSING,
+               FIELD_PUT(AXIS_SENSING_DEGLITCH, saturate(samples, 0xFFFF)) |
+                   FIELD_PUT(AXIS_SENSING_OUTLIER_STEP, p[BUS_PARAMETER_OUTLIER_STEP]) |
+                   FIELD_PUT(AXIS_SENSING_OUTLIER_HOLD, p[BUS_PARAMETER_OUTLIER_HOLD]));
 }
 
-static void apply_source(unsigned axis)
-{
+static void apply_source(unsigned axis) {
     int64_t source = parameters[axis][BUS_PARAMETER_POSITION_SOURCE];
-    feedback_write(axis, FEEDBACK_POSITION_SOURCE, FIELD_PUT(FEEDBACK_POSITION_SOURCE_COUNTS, source != PHASES) |
-                                                 FIELD_PUT(FEEDBACK_POSITION_SOURCE_STEPS, source == OWN_STEPS));
-    feedback_write(axis, FEEDBACK_DECODER_MODE, source == OWN_STEPS ? PULSES_AND_DIRECTION : (uint32_t)parameters[axis][BUS_PARAMETER_DECODER_MODE]);
+    feedback_write(axis, FEEDBACK_POSITION_SOURCE,
+                   FIELD_PUT(FEEDBACK_POSITION_SOURCE_COUNTS, source != PHASES) |
+                       FIELD_PUT(FEEDBACK_POSITION_SOURCE_STEPS, source == OWN_STEPS));
+    feedback_write(axis, FEEDBACK_DECODER_MODE,
+                   source == OWN_STEPS ? PULSES_AND_DIRECTION
+                                       : (uint32_t)parameters[axis][BUS_PARAMETER_DECODER_MODE]);
 }
 
-static void apply_signal(unsigned axis)
-{
-    const int64_t *p = parameters[axis];
-    feedback_write(axis, FEEDBACK_LISSAJOUS_LIMITS, FIELD_PUT(FEEDBACK_LISSAJOUS_LIMITS_CLIP_LEVEL, p[BUS_PARAMETER_SIGNAL_CLIP_LEVEL]) |
-                                               FIELD_PUT(FEEDBACK_LISSAJOUS_LIMITS_TOLERANCE, p[BUS_PARAMETER_SIGNAL_TOLERANCE]));
-    feedback_write(axis, FEEDBACK_JUMP_LIMITS, FIELD_PUT(FEEDBACK_JUMP_LIMITS_JUMP, p[BUS_PARAMETER_SIGNAL_JUMP]) |
-                                             FIELD_PUT(FEEDBACK_JUMP_LIMITS_NO_NOISE_SAMPLES, p[BUS_PARAMETER_SIGNAL_NO_NOISE_SAMPLES]));
-    feedback_write(axis, FEEDBACK_CHANNEL_LIMITS, FIELD_PUT(FEEDBACK_CHANNEL_LIMITS_SPAN, p[BUS_PARAMETER_SIGNAL_SPAN]) |
-                                            FIELD_PUT(FEEDBACK_CHANNEL_LIMITS_BAND, p[BUS_PARAMETER_SIGNAL_BAND]));
-    feedback_write(axis, FEEDBACK_DRIFT_LIMITS, FIELD_PUT(FEEDBACK_DRIFT_LIMITS_OFFSET, p[BUS_PARAMETER_SIGNAL_OFFSET]) |
-                                              FIELD_PUT(FEEDBACK_DRIFT_LIMITS_BALANCE, p[BUS_PARAMETER_SIGNAL_BALANCE]));
-    feedback_write(axis, FEEDBACK_QUADRATURE_LIMITS, FIELD_PUT(FEEDBACK_QUADRATURE_LIMITS_QUADRATURE_ERROR, p[BUS_PARAMETER_SIGNAL_QUADRATURE_ERROR]) |
-                                               FIELD_PUT(FEEDBACK_QUADRATURE_LIMITS_SIGN_THRESHOLD, p[BUS_PARAMETER_SIGNAL_SIGN_THRESHOLD]));
+static void apply_signal(unsigned axis) {
+    const int64_t* p = parameters[axis];
+    feedback_write(
+        axis, FEEDBACK_LISSAJOUS_LIMITS,
+        FIELD_PUT(FEEDBACK_LISSAJOUS_LIMITS_CLIP_LEVEL, p[BUS_PARAMETER_SIGNAL_CLIP_LEVEL]) |
+            FIELD_PUT(FEEDBACK_LISSAJOUS_LIMITS_TOLERANCE, p[BUS_PARAMETER_SIGNAL_TOLERANCE]));
+    feedback_write(axis, FEEDBACK_JUMP_LIMITS,
+                   FIELD_PUT(FEEDBACK_JUMP_LIMITS_JUMP, p[BUS_PARAMETER_SIGNAL_JUMP]) |
+                       FIELD_PUT(FEEDBACK_JUMP_LIMITS_NO_NOISE_SAMPLES,
+                                 p[BUS_PARAMETER_SIGNAL_NO_NOISE_SAMPLES]));
+    feedback_write(axis, FEEDBACK_CHANNEL_LIMITS,
+                   FIELD_PUT(FEEDBACK_CHANNEL_LIMITS_SPAN, p[BUS_PARAMETER_SIGNAL_SPAN]) |
+                       FIELD_PUT(FEEDBACK_CHANNEL_LIMITS_BAND, p[BUS_PARAMETER_SIGNAL_BAND]));
+    feedback_write(axis, FEEDBACK_DRIFT_LIMITS,
+                   FIELD_PUT(FEEDBACK_DRIFT_LIMITS_OFFSET, p[BUS_PARAMETER_SIGNAL_OFFSET]) |
+                       FIELD_PUT(FEEDBACK_DRIFT_LIMITS_BALANCE, p[BUS_PARAMETER_SIGNAL_BALANCE]));
+    feedback_write(axis, FEEDBACK_QUADRATURE_LIMITS,
+                   FIELD_PUT(FEEDBACK_QUADRATURE_LIMITS_QUADRATURE_ERROR,
+                             p[BUS_PARAMETER_SIGNAL_QUADRATURE_ERROR]) |
+                       FIELD_PUT(FEEDBACK_QUADRATURE_LIMITS_SIGN_THRESHOLD,
+                                 p[BUS_PARAMETER_SIGNAL_SIGN_THRESHOLD]));
 }
 
-static uint32_t step_cycles(unsigned axis, uint8_t id)
-{
+static uint32_t step_cycles(unsigned axis, uint8_t id) {
     return saturate(cycles_of(parameters[axis][id]) + 1u, STEP_CYCLES_MASK);
 }
 
-static void apply_steps(unsigned axis)
-{
-    const int64_t *p = parameters[axis];
-    actuator_write(axis, ACTUATOR_STEP_PULSE, FIELD_PUT(ACTUATOR_STEP_PULSE_HIGH, step_cycles(axis, BUS_PARAMETER_STEP_HIGH)) |
-                                              FIELD_PUT(ACTUATOR_STEP_PULSE_LOW, step_cycles(axis, BUS_PARAMETER_STEP_LOW)));
-    actuator_write(axis, ACTUATOR_STEP_DIRECTION, FIELD_PUT(ACTUATOR_STEP_DIRECTION_SETUP, step_cycles(axis, BUS_PARAMETER_STEP_SETUP)) |
-                                                  FIELD_PUT(ACTUATOR_STEP_DIRECTION_HOLD, step_cycles(axis, BUS_PARAMETER_STEP_HOLD)));
-    actuator_write(axis, ACTUATOR_STEP_OUTPUT, FIELD_PUT(ACTUATOR_STEP_OUTPUT_MODE, p[BUS_PARAMETER_STEP_OUTPUT]) |
-                                               FIELD_PUT(ACTUATOR_STEP_OUTPUT_STEP_LOW, p[BUS_PARAMETER_STEP_INVERT]) |
-                                               FIELD_PUT(ACTUATOR_STEP_OUTPUT_DIRECTION_LOW, p[BUS_PARAMETER_STEP_INVERT] >> 1) |
-                                               FIELD_PUT(ACTUATOR_STEP_OUTPUT_TRIM, p[BUS_PARAMETER_STEP_TRIM]));
+static void apply_steps(unsigned axis) {
+    const int64_t* p = parameters[axis];
+    actuator_write(
+        axis, ACTUATOR_STEP_PULSE,
+        FIELD_PUT(ACTUATOR_STEP_PULSE_HIGH, step_cycles(axis, BUS_PARAMETER_STEP_HIGH)) |
+            FIELD_PUT(ACTUATOR_STEP_PULSE_LOW, step_cycles(axis, BUS_PARAMETER_STEP_LOW)));
+    actuator_write(
+        axis, ACTUATOR_STEP_DIRECTION,
+        FIELD_PUT(ACTUATOR_STEP_DIRECTION_SETUP, step_cycles(axis, BUS_PARAMETER_STEP_SETUP)) |
+            FIELD_PUT(ACTUATOR_STEP_DIRECTION_HOLD, step_cycles(axis, BUS_PARAMETER_STEP_HOLD)));
+    actuator_write(
+        axis, ACTUATOR_STEP_OUTPUT,
+        FIELD_PUT(ACTUATOR_STEP_OUTPUT_MODE, p[BUS_PARAMETER_STEP_OUTPUT]) |
+            FIELD_PUT(ACTUATOR_STEP_OUTPUT_STEP_LOW, p[BUS_PARAMETER_STEP_INVERT]) |
+            FIELD_PUT(ACTUATOR_STEP_OUTPUT_DIRECTION_LOW, p[BUS_PARAMETER_STEP_INVERT] >> 1) |
+            FIELD_PUT(ACTUATOR_STEP_OUTPUT_TRIM, p[BUS_PARAMETER_STEP_TRIM]));
     actuator_write_wide(axis, ACTUATOR_STEP_RATIO, (uint64_t)p[BUS_PARAMETER_STEPS_PER_PERIOD]);
 }
 
-static void apply_dac(unsigned axis)
-{
-    const int64_t *p = parameters[axis];
-    uint64_t halves = 2u * (uint64_t)p[BUS_PARAMETER_DAC_CLOCK], half_period = (node_read(NODE_CLK_HZ) + halves - 1u) / halves;
-    actuator_write(axis, ACTUATOR_DAC, FIELD_PUT(ACTUATOR_DAC_HALF_PERIOD, saturate(half_period, 0xFF)) |
-                                             FIELD_PUT(ACTUATOR_DAC_REFRESH, 0xFFFF));
+static void apply_dac(unsigned axis) {
+    const int64_t* p = parameters[axis];
+    uint64_t halves = 2u * (uint64_t)p[BUS_PARAMETER_DAC_CLOCK],
+             half_period = (node_read(NODE_CLK_HZ) + halves - 1u) / halves;
+    actuator_write(axis, ACTUATOR_DAC,
+                   FIELD_PUT(ACTUATOR_DAC_HALF_PERIOD, saturate(half_period, 0xFF)) |
+                       FIELD_PUT(ACTUATOR_DAC_REFRESH, 0xFFFF));
     actuator_write(axis, ACTUATOR_DAC_TRIM, (uint32_t)p[BUS_PARAMETER_DAC_TRIM]);
 }
 
 // A filter takes coefficients only while it is out of use.
-static void apply_filters(unsigned axis)
-{
-    const int64_t *p = parameters[axis];
+static void apply_filters(unsigned axis) {
+    const int64_t* p = parameters[axis];
     for (uint32_t n = 0; n < 2 * COEFFICIENTS; n++) {
         uint32_t address = n / COEFFICIENTS * 8 + n % COEFFICIENTS;
         axis_write(axis, AXIS_FILTERS, FIELD_PUT(AXIS_FILTERS_ADDRESS, address));
@@ -138,9 +155,8 @@ static void apply_filters(unsigned axis)
 }
 
 // The registers that follow from this parameter.
-static void apply(unsigned axis, uint8_t id)
-{
-    const int64_t *p = parameters[axis];
+static void apply(unsigned axis, uint8_t id) {
+    const int64_t* p = parameters[axis];
     uint32_t value = (uint32_t)p[id];
     switch (id) {
     case BUS_PARAMETER_VELOCITY:
@@ -154,8 +170,9 @@ static void apply(unsigned axis, uint8_t id)
     case BUS_PARAMETER_KA: axis_write(axis, AXIS_KA, value); break;
     case BUS_PARAMETER_OUTPUT_LIMIT:
     case BUS_PARAMETER_INTEGRAL_LIMIT:
-        axis_write(axis, AXIS_SERVO_LIMITS, FIELD_PUT(AXIS_SERVO_LIMITS_OUTPUT, p[BUS_PARAMETER_OUTPUT_LIMIT]) |
-                                            FIELD_PUT(AXIS_SERVO_LIMITS_INTEGRAL, p[BUS_PARAMETER_INTEGRAL_LIMIT]));
+        axis_write(axis, AXIS_SERVO_LIMITS,
+                   FIELD_PUT(AXIS_SERVO_LIMITS_OUTPUT, p[BUS_PARAMETER_OUTPUT_LIMIT]) |
+                       FIELD_PUT(AXIS_SERVO_LIMITS_INTEGRAL, p[BUS_PARAMETER_INTEGRAL_LIMIT]));
         break;
     case BUS_PARAMETER_DEAD_BAND: axis_write(axis, AXIS_DEAD_BAND, value); break;
     case BUS_PARAMETER_FOLLOWING_LIMIT: axis_write(axis, AXIS_FOLLOWING_LIMIT, value); break;
@@ -166,17 +183,25 @@ static void apply(unsigned axis, uint8_t id)
     case BUS_PARAMETER_FILTER_TOLERATED: apply_sensing(axis); break;
     case BUS_PARAMETER_AMPLITUDE_LOW:
     case BUS_PARAMETER_AMPLITUDE_HIGH:
-        axis_write(axis, AXIS_AMPLITUDE_WINDOW, FIELD_PUT(AXIS_AMPLITUDE_WINDOW_LOW, p[BUS_PARAMETER_AMPLITUDE_LOW]) |
-                                                FIELD_PUT(AXIS_AMPLITUDE_WINDOW_HIGH, p[BUS_PARAMETER_AMPLITUDE_HIGH]));
+        axis_write(axis, AXIS_AMPLITUDE_WINDOW,
+                   FIELD_PUT(AXIS_AMPLITUDE_WINDOW_LOW, p[BUS_PARAMETER_AMPLITUDE_LOW]) |
+                       FIELD_PUT(AXIS_AMPLITUDE_WINDOW_HIGH, p[BUS_PARAMETER_AMPLITUDE_HIGH]));
         break;
     case BUS_PARAMETER_DISAGREEMENT_LIMIT: axis_write(axis, AXIS_DISAGREEMENT_LIMIT, value); break;
     case BUS_PARAMETER_ENCODER_FAULT_MASK: axis_write(axis, AXIS_ENCODER_FAULT_MASK, value); break;
-    case BUS_PARAMETER_PWM_FREQUENCY: actuator_write(axis, ACTUATOR_PWM_PERIOD, saturate(node_read(NODE_CLK_HZ) / value, ACTUATOR_PWM_PERIOD_MASK)); break;
+    case BUS_PARAMETER_PWM_FREQUENCY:
+        actuator_write(axis, ACTUATOR_PWM_PERIOD,
+                       saturate(node_read(NODE_CLK_HZ) / value, ACTUATOR_PWM_PERIOD_MASK));
+        break;
     case BUS_PARAMETER_WATCHDOG_TIME: bus_write(BUS_WATCHDOG_TIME, value); break;
     case BUS_PARAMETER_POSITION_SOURCE:
     case BUS_PARAMETER_DECODER_MODE: apply_source(axis); break;
-    case BUS_PARAMETER_VELOCITY_QUANTUM: feedback_write(axis, FEEDBACK_VELOCITY_QUANTUM, value); break;
-    case BUS_PARAMETER_SIGNAL_FAULT_MASK: feedback_write(axis, FEEDBACK_SIGNAL_FAULT_MASK, value); break;
+    case BUS_PARAMETER_VELOCITY_QUANTUM:
+        feedback_write(axis, FEEDBACK_VELOCITY_QUANTUM, value);
+        break;
+    case BUS_PARAMETER_SIGNAL_FAULT_MASK:
+        feedback_write(axis, FEEDBACK_SIGNAL_FAULT_MASK, value);
+        break;
     case BUS_PARAMETER_SIGNAL_CLIP_LEVEL:
     case BUS_PARAMETER_SIGNAL_TOLERANCE:
     case BUS_PARAMETER_SIGNAL_JUMP:
@@ -187,7 +212,9 @@ static void apply(unsigned axis, uint8_t id)
     case BUS_PARAMETER_SIGNAL_OFFSET:
     case BUS_PARAMETER_SIGNAL_BALANCE:
     case BUS_PARAMETER_SIGNAL_QUADRATURE_ERROR: apply_signal(axis); break;
-    case BUS_PARAMETER_DRIVE: actuator_write(axis, ACTUATOR_DRIVE, FIELD_PUT(ACTUATOR_DRIVE_KIND, value)); break;
+    case BUS_PARAMETER_DRIVE:
+        actuator_write(axis, ACTUATOR_DRIVE, FIELD_PUT(ACTUATOR_DRIVE_KIND, value));
+        break;
     case BUS_PARAMETER_STEPS_PER_PERIOD:
     case BUS_PARAMETER_STEP_HIGH:
     case BUS_PARAMETER_STEP_LOW:
@@ -203,20 +230,19 @@ static void apply(unsigned axis, uint8_t id)
     case BUS_PARAMETER_FINE_LIMIT: actuator_write(axis, ACTUATOR_FINE_LIMIT, value); break;
     case BUS_PARAMETER_FEED_OVERRIDE: axis_write(axis, AXIS_FEED_OVERRIDE, value); break;
     default:
-        if (id >= BUS_PARAMETER_FILTERS && id < BUS_PARAMETER_FILTER_1_B0 + 2 * COEFFICIENTS) apply_filters(axis);
+        if (id >= BUS_PARAMETER_FILTERS && id < BUS_PARAMETER_FILTER_1_B0 + 2 * COEFFICIENTS)
+            apply_filters(axis);
         break;
     }
 }
 
-void parameters_start(unsigned axis)
-{
+void parameters_start(unsigned axis) {
     for (uint8_t id = 1; id <= BUS_PARAMETER_COUNT; id++) parameters[axis][id] = table[id].value;
     if (!hardware_has_sine(axis)) parameters[axis][BUS_PARAMETER_POSITION_SOURCE] = COUNTS;
     for (uint8_t id = 1; id <= BUS_PARAMETER_COUNT; id++) apply(axis, id);
 }
 
-static bool needs_sine(uint8_t id, int64_t value)
-{
+static bool needs_sine(uint8_t id, int64_t value) {
     if (id == BUS_PARAMETER_POSITION_SOURCE) return value == PHASES;
     if (value == 0 || value == table[id].value) return false;
     for (unsigned n = 0; n < sizeof sine_parameters; n++)
@@ -224,46 +250,43 @@ static bool needs_sine(uint8_t id, int64_t value)
     return false;
 }
 
-uint8_t parameters_check(unsigned axis, uint8_t id, int64_t value)
-{
+uint8_t parameters_check(unsigned axis, uint8_t id, int64_t value) {
     if (id < 1 || id > BUS_PARAMETER_COUNT) return BUS_CAUSE_UNKNOWN_PARAMETER;
-    if (id == BUS_PARAMETER_HOME_METHOD && !homing_method_exists(value)) return BUS_CAUSE_OUT_OF_RANGE;
+    if (id == BUS_PARAMETER_HOME_METHOD && !homing_method_exists(value))
+        return BUS_CAUSE_OUT_OF_RANGE;
     if (value < table[id].low || value > table[id].high) return BUS_CAUSE_OUT_OF_RANGE;
     return needs_sine(id, value) && !hardware_has_sine(axis) ? BUS_CAUSE_NOT_BUILT : BUS_CAUSE_OK;
 }
 
-void parameters_set(unsigned axis, uint8_t id, int64_t value)
-{
+void parameters_set(unsigned axis, uint8_t id, int64_t value) {
     parameters[axis][id] = value;
-    if (id == BUS_PARAMETER_WATCHDOG_TIME)                             // there is one line for all axes
+    if (id == BUS_PARAMETER_WATCHDOG_TIME)  // there is one line for all axes
         for (unsigned other = 0; other < HARDWARE_AXES; other++) parameters[other][id] = value;
     apply(axis, id);
 }
 
-int64_t parameters_default(uint8_t id)
-{
-    return table[id].value;
-}
+int64_t parameters_default(uint8_t id) { return table[id].value; }
 
-int64_t parameters_get(unsigned axis, uint8_t id)
-{
-    return parameters[axis][id];
-}
+int64_t parameters_get(unsigned axis, uint8_t id) { return parameters[axis][id]; }
 
-struct planner_limits parameters_limits(unsigned axis, uint8_t velocity_id)
-{
+struct planner_limits parameters_limits(unsigned axis, uint8_t velocity_id) {
     struct planner_limits made = limits[axis];
-    if (velocity_id != BUS_PARAMETER_VELOCITY) made.velocity = planner_velocity((uint64_t)parameters[axis][velocity_id] << 16);
+    if (velocity_id != BUS_PARAMETER_VELOCITY)
+        made.velocity = planner_velocity((uint64_t)parameters[axis][velocity_id] << 16);
     return made;
 }
 
 // A velocity below the first stair is that of all of them.
-struct planner_stepped_profile parameters_stepped_profile(unsigned axis, uint8_t velocity_id)
-{
-    const int64_t *p = parameters[axis];
-    uint64_t top = planner_velocity((uint64_t)p[velocity_id] << 16), first = planner_velocity((uint64_t)p[BUS_PARAMETER_STEPPED_FIRST]);
-    struct planner_stepped_profile made = {.first = first < top ? first : top, .top = top, .ticks = (uint32_t)p[BUS_PARAMETER_STEPPED_TIME]};
-    for (unsigned n = 0; n < 3; n++) made.rise[n] = planner_velocity((uint64_t)p[BUS_PARAMETER_STEPPED_RISE_1 + n]);
-    planner_stepped_borders(&made, (uint32_t)p[BUS_PARAMETER_STEPPED_BORDER_2], (uint32_t)p[BUS_PARAMETER_STEPPED_BORDER_3]);
+struct planner_stepped_profile parameters_stepped_profile(unsigned axis, uint8_t velocity_id) {
+    const int64_t* p = parameters[axis];
+    uint64_t top = planner_velocity((uint64_t)p[velocity_id] << 16),
+             first = planner_velocity((uint64_t)p[BUS_PARAMETER_STEPPED_FIRST]);
+    struct planner_stepped_profile made = {.first = first < top ? first : top,
+                                           .top = top,
+                                           .ticks = (uint32_t)p[BUS_PARAMETER_STEPPED_TIME]};
+    for (unsigned n = 0; n < 3; n++)
+        made.rise[n] = planner_velocity((uint64_t)p[BUS_PARAMETER_STEPPED_RISE_1 + n]);
+    planner_stepped_borders(&made, (uint32_t)p[BUS_PARAMETER_STEPPED_BORDER_2],
+                            (uint32_t)p[BUS_PARAMETER_STEPPED_BORDER_3]);
     return made;
 }

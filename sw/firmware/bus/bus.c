@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // line -- frames in, requests done, replies out.
 //
-// The hardware passes only words of frames for this node and syncs the last word of a right one; a frame that it does not
-// mark is forgotten when the next command byte comes. Causes are looked for in this order: wrong_map, unknown_operation,
-// wrong_length, no_such_axis, out_of_range of a value, then what the axis says (faulted, not_enabled, busy, not_homed,
-// out_of_travel).
+// The hardware passes only words of frames for this node and syncs the last word of a right one; a
+// frame that it does not mark is forgotten when the next command byte comes. Causes are looked for
+// in this order: wrong_map, unknown_operation, wrong_length, no_such_axis, out_of_range of a value,
+// then what the axis says (faulted, not_enabled, busy, not_homed, out_of_travel).
 #include "bus/bus.h"
 
 #include "axis/axis.h"
@@ -23,62 +23,57 @@
 #define DIRECTION_FROM_NODE 0x10u
 #define READY 0x40u
 #define CRC_BYTES 4u
-#define CAUSE (BUS_REPLY_HEAD - 1u)    // of a reply body
-#define WORDS_PER_POLL 8u                 // then the axes have their turn
+#define CAUSE (BUS_REPLY_HEAD - 1u)  // of a reply body
+#define WORDS_PER_POLL 8u            // then the axes have their turn
 #define LOWEST_BAUD 9600u
 #define HIGHEST_BAUD 3000000u
-#define SHORTEST_BIT_CYCLES 8u             // that receiver and transmitter can do
-#define BAUD_TIMEOUT_MS 5000u          // of a master at another baud rate than the first
+#define SHORTEST_BIT_CYCLES 8u  // that receiver and transmitter can do
+#define BAUD_TIMEOUT_MS 5000u   // of a master at another baud rate than the first
 #define NO_AXIS 0xFFu
 
 #define OPERATION_SHAPE(name, code, request, reply, of_axis) [code] = {request, reply, of_axis},
-static const struct { uint8_t request, reply; bool of_axis; } shapes[] = {BUS_OPERATIONS(OPERATION_SHAPE)};
+static const struct {
+    uint8_t request, reply;
+    bool of_axis;
+} shapes[] = {BUS_OPERATIONS(OPERATION_SHAPE)};
 
 static unsigned axes;
 static bool wrong_map;
 static bool receiving;
-static uint8_t received;                                        // bytes in request
-static uint8_t request[1 + BUS_LONGEST_BODY + CRC_BYTES];      // length, body, CRC-32
+static uint8_t received;                                   // bytes in request
+static uint8_t request[1 + BUS_LONGEST_BODY + CRC_BYTES];  // length, body, CRC-32
 static uint8_t reply[1 + BUS_LONGEST_BODY + CRC_BYTES];
-static const uint8_t *current_request;                                    // bodies of what is being done
-static uint8_t *current_reply;
-static bool answered;                                           // there was a request, with this CRC-32:
+static const uint8_t* current_request;  // bodies of what is being done
+static uint8_t* current_reply;
+static bool answered;  // there was a request, with this CRC-32:
 static uint32_t answered_crc;
 static uint32_t repeated, refused;
-static uint8_t followed;                                        // whose position each reply tells afresh
-static uint32_t baud, next_baud;                                // next: 0, or what comes after this reply
-static uint32_t sync_axes, syncs;                             // those that the next mark starts, and the syncs before
-static bool reply_sent;                                         // it is in the queue at least
-static uint32_t last_command_ms, breaks;                              // when the master called last, and the breaks before this baud rate
+static uint8_t followed;           // whose position each reply tells afresh
+static uint32_t baud, next_baud;   // next: 0, or what comes after this reply
+static uint32_t sync_axes, syncs;  // those that the next mark starts, and the syncs before
+static bool reply_sent;            // it is in the queue at least
+static uint32_t last_command_ms,
+    breaks;  // when the master called last, and the breaks before this baud rate
 
-static uint64_t get(const uint8_t *from, unsigned bytes)
-{
+static uint64_t get(const uint8_t* from, unsigned bytes) {
     uint64_t value = 0;
     while (bytes--) value = value << 8 | from[bytes];
     return value;
 }
 
-static void put(uint32_t at, uint64_t value, unsigned bytes)
-{
-    uint8_t *to = &current_reply[at];
+static void put(uint32_t at, uint64_t value, unsigned bytes) {
+    uint8_t* to = &current_reply[at];
     while (bytes--) {
         *to++ = (uint8_t)value;
         value >>= 8;
     }
 }
 
-uint64_t bus_request_field(uint32_t at, unsigned bytes)
-{
-    return get(&current_request[at], bytes);
-}
+uint64_t bus_request_field(uint32_t at, unsigned bytes) { return get(&current_request[at], bytes); }
 
-void bus_reply_field(uint32_t at, uint64_t value, unsigned bytes)
-{
-    put(at, value, bytes);
-}
+void bus_reply_field(uint32_t at, uint64_t value, unsigned bytes) { put(at, value, bytes); }
 
-static uint8_t identify(void)
-{
+static uint8_t identify(void) {
     put(BUS_IDENTIFY_REPLY_MAP_CRC, node_read(NODE_MAP_CRC), 4);
     put(BUS_IDENTIFY_REPLY_PROTOCOL_CRC, PROTOCOL_CRC, 4);
     put(BUS_IDENTIFY_REPLY_VERSION, BUS_VERSION, 2);
@@ -90,8 +85,7 @@ static uint8_t identify(void)
     return BUS_CAUSE_OK;
 }
 
-static uint8_t status(unsigned axis)
-{
+static uint8_t status(unsigned axis) {
     int64_t position = axis_read_position(axis, AXIS_POSITION);
     axis_poll(axis);
     put(BUS_STATUS_REPLY_STATE, axis_state(axis), 1);
@@ -104,19 +98,20 @@ static uint8_t status(unsigned axis)
     put(BUS_STATUS_REPLY_TARGET, (uint64_t)axis_read_position(axis, AXIS_TARGET), 8);
     put(BUS_STATUS_REPLY_VELOCITY, axis_read(axis, AXIS_VELOCITY), 4);
     put(BUS_STATUS_REPLY_COMMAND, axis_read(axis, AXIS_COMMAND), 2);
-    put(BUS_STATUS_REPLY_COUNTS, (uint64_t)((position * parameters_get(axis, BUS_PARAMETER_COUNTS_PER_PERIOD)) >> 16), 8);
+    put(BUS_STATUS_REPLY_COUNTS,
+        (uint64_t)((position * parameters_get(axis, BUS_PARAMETER_COUNTS_PER_PERIOD)) >> 16), 8);
     return BUS_CAUSE_OK;
 }
 
-static uint8_t enable(unsigned axis)
-{
+static uint8_t enable(unsigned axis) {
     uint8_t on = current_request[BUS_ENABLE_REQUEST_ON];
     return on > 1 ? BUS_CAUSE_OUT_OF_RANGE : axis_enable(axis, on);
 }
 
-typedef uint8_t motion_request(unsigned n, int64_t target, uint32_t *duration_ticks);
+typedef uint8_t motion_request(unsigned n, int64_t target, uint32_t* duration_ticks);
 
-static uint8_t motion(unsigned axis, motion_request *begin)     // move and prepare have the same bodies
+static uint8_t motion(unsigned axis,
+                      motion_request* begin)  // move and prepare have the same bodies
 {
     uint32_t ticks = 0;
     uint8_t cause = begin(axis, (int64_t)get(&current_request[BUS_MOVE_REQUEST_TARGET], 8), &ticks);
@@ -124,22 +119,20 @@ static uint8_t motion(unsigned axis, motion_request *begin)     // move and prep
     return cause;
 }
 
-static uint8_t get_parameter(unsigned axis)
-{
+static uint8_t get_parameter(unsigned axis) {
     uint8_t id = current_request[BUS_GET_PARAMETER_REQUEST_PARAMETER];
-    if (parameters_check(axis, id, 0) == BUS_CAUSE_UNKNOWN_PARAMETER) return BUS_CAUSE_UNKNOWN_PARAMETER;
+    if (parameters_check(axis, id, 0) == BUS_CAUSE_UNKNOWN_PARAMETER)
+        return BUS_CAUSE_UNKNOWN_PARAMETER;
     put(BUS_GET_PARAMETER_REPLY_VALUE, (uint64_t)parameters_get(axis, id), 8);
     return BUS_CAUSE_OK;
 }
 
-static uint8_t set_parameter(unsigned axis)
-{
+static uint8_t set_parameter(unsigned axis) {
     return axis_set_parameter(axis, current_request[BUS_SET_PARAMETER_REQUEST_PARAMETER],
                               (int64_t)get(&current_request[BUS_SET_PARAMETER_REQUEST_VALUE], 8));
 }
 
-static uint8_t counters(void)
-{
+static uint8_t counters(void) {
     put(BUS_COUNTERS_REPLY_FRAMES_GOOD, bus_read(BUS_FRAMES_GOOD), 4);
     put(BUS_COUNTERS_REPLY_FRAMES_BAD, bus_read(BUS_FRAMES_BAD), 4);
     put(BUS_COUNTERS_REPLY_FRAMING_ERRORS, bus_read(BUS_FRAMING_ERRORS), 4);
@@ -153,8 +146,7 @@ static uint8_t counters(void)
     return BUS_CAUSE_OK;
 }
 
-static uint8_t encoder(unsigned axis)
-{
+static uint8_t encoder(unsigned axis) {
     uint32_t sample = axis_read(axis, AXIS_SAMPLE), phase = axis_read(axis, AXIS_PHASE);
     put(BUS_ENCODER_REPLY_SIN, FIELD_GET(sample, AXIS_SAMPLE_SIN), 2);
     put(BUS_ENCODER_REPLY_COS, FIELD_GET(sample, AXIS_SAMPLE_COS), 2);
@@ -164,72 +156,74 @@ static uint8_t encoder(unsigned axis)
     put(BUS_ENCODER_REPLY_REJECTED_PULSES, axis_read(axis, AXIS_REJECTED_PULSES), 4);
     put(BUS_ENCODER_REPLY_REJECTED_SAMPLES, axis_read(axis, AXIS_REJECTED_SAMPLES), 4);
     put(BUS_ENCODER_REPLY_HOME_PHASE, (uint32_t)homing_phase(axis), 4);
-    put(BUS_ENCODER_REPLY_FAULT_POSITION, (uint64_t)axis_read_position(axis, AXIS_FAULT_POSITION), 8);
+    put(BUS_ENCODER_REPLY_FAULT_POSITION, (uint64_t)axis_read_position(axis, AXIS_FAULT_POSITION),
+        8);
     return BUS_CAUSE_OK;
 }
 
-static bool of_axis(uint32_t block, uint32_t base)              // the blocks of an axis have the same stride
+static bool of_axis(uint32_t block, uint32_t base)  // the blocks of an axis have the same stride
 {
     return block >= base && block < base + axes * AXIS_STRIDE;
 }
 
 // Reading these would take something away from the firmware.
-static bool has_read_effect(uint32_t address)
-{
-    return address == BUS_BASE + BUS_RECEIVE || address == PERIPHERALS_BASE + PERIPHERALS_I2C_ANSWER || address == PERIPHERALS_BASE + PERIPHERALS_PEER_RECEIVE;
+static bool has_read_effect(uint32_t address) {
+    return address == BUS_BASE + BUS_RECEIVE ||
+           address == PERIPHERALS_BASE + PERIPHERALS_I2C_ANSWER ||
+           address == PERIPHERALS_BASE + PERIPHERALS_PEER_RECEIVE;
 }
 
 // A block has 64 words; those without a register read 0.
-static uint8_t read_register(void)
-{
-    uint32_t address = (uint32_t)get(&current_request[BUS_READ_REGISTER_REQUEST_ADDRESS], 2), block = address & ~0xFFu;
-    bool exists = block == NODE_BASE || block == BUS_BASE || block == PERIPHERALS_BASE || of_axis(block, AXIS_BASE) ||
-                  of_axis(block, FEEDBACK_BASE) || of_axis(block, ACTUATOR_BASE);
+static uint8_t read_register(void) {
+    uint32_t address = (uint32_t)get(&current_request[BUS_READ_REGISTER_REQUEST_ADDRESS], 2),
+             block = address & ~0xFFu;
+    bool exists = block == NODE_BASE || block == BUS_BASE || block == PERIPHERALS_BASE ||
+                  of_axis(block, AXIS_BASE) || of_axis(block, FEEDBACK_BASE) ||
+                  of_axis(block, ACTUATOR_BASE);
     if (!exists || address % 4 || has_read_effect(address)) return BUS_CAUSE_NO_SUCH_REGISTER;
-    if (of_axis(block, FEEDBACK_BASE) && !feedback_may_read(address - block)) return BUS_CAUSE_NO_SUCH_REGISTER;
+    if (of_axis(block, FEEDBACK_BASE) && !feedback_may_read(address - block))
+        return BUS_CAUSE_NO_SUCH_REGISTER;
     put(BUS_READ_REGISTER_REPLY_VALUE, register_read(address), 4);
     return BUS_CAUSE_OK;
 }
 
-static uint8_t write_register(void)
-{
-    uint32_t address = (uint32_t)get(&current_request[BUS_WRITE_REGISTER_REQUEST_ADDRESS], 2), block = address & ~0xFFu;
+static uint8_t write_register(void) {
+    uint32_t address = (uint32_t)get(&current_request[BUS_WRITE_REGISTER_REQUEST_ADDRESS], 2),
+             block = address & ~0xFFu;
     if (!of_axis(block, FEEDBACK_BASE)) return BUS_CAUSE_NO_SUCH_REGISTER;
-    return feedback_write_register(address - block, (block - FEEDBACK_BASE) / FEEDBACK_STRIDE,
-                                  (uint32_t)get(&current_request[BUS_WRITE_REGISTER_REQUEST_VALUE], 4));
+    return feedback_write_register(
+        address - block, (block - FEEDBACK_BASE) / FEEDBACK_STRIDE,
+        (uint32_t)get(&current_request[BUS_WRITE_REGISTER_REQUEST_VALUE], 4));
 }
 
-static uint8_t reset_faults(unsigned axis)
-{
+static uint8_t reset_faults(unsigned axis) {
     feedback_clear_signal_faults(axis);
     return axis_reset_faults(axis);
 }
 
-static uint8_t signal(unsigned axis)
-{
+static uint8_t signal(unsigned axis) {
     if (!hardware_has_sine(axis)) return BUS_CAUSE_NOT_BUILT;
     put(BUS_SIGNAL_REPLY_FAULTS, feedback_read(axis, FEEDBACK_SIGNAL_FAULTS), 2);
     put(BUS_SIGNAL_REPLY_FIRST, feedback_read(axis, FEEDBACK_FIRST_SIGNAL_FAULTS), 2);
     return BUS_CAUSE_OK;
 }
 
-static uint8_t position(unsigned axis)
-{
+static uint8_t position(unsigned axis) {
     put(BUS_POSITION_REPLY_POSITION, (uint64_t)axis_read_position(axis, AXIS_POSITION), 8);
     return BUS_CAUSE_OK;
 }
 
-static uint8_t set_baud(void)
-{
+static uint8_t set_baud(void) {
     uint32_t requested = (uint32_t)get(&current_request[BUS_SET_BAUD_REQUEST_BAUD], 4);
-    if (requested < LOWEST_BAUD || requested > HIGHEST_BAUD || requested > node_read(NODE_CLK_HZ) / SHORTEST_BIT_CYCLES) return BUS_CAUSE_OUT_OF_RANGE;
+    if (requested < LOWEST_BAUD || requested > HIGHEST_BAUD ||
+        requested > node_read(NODE_CLK_HZ) / SHORTEST_BIT_CYCLES)
+        return BUS_CAUSE_OUT_OF_RANGE;
     next_baud = requested;
     return BUS_CAUSE_OK;
 }
 
 // The hardware starts them; the firmware learns it from the count of syncs.
-static uint8_t start_at_sync(uint32_t mask)
-{
+static uint8_t start_at_sync(uint32_t mask) {
     uint8_t cause = mask ? axis_may_start(axes, mask) : BUS_CAUSE_OK;
     if (cause != BUS_CAUSE_OK) return cause;
     syncs = bus_read(BUS_SYNCS);
@@ -238,28 +232,26 @@ static uint8_t start_at_sync(uint32_t mask)
     return BUS_CAUSE_OK;
 }
 
-static void poll_sync(void)
-{
+static void poll_sync(void) {
     if (!sync_axes || bus_read(BUS_SYNCS) == syncs) return;
     bus_write(BUS_SYNC_AXES, 0);
     axis_started(axes, sync_axes);
     sync_axes = 0;
 }
 
-static uint8_t image_operation(uint8_t operation)
-{
+static uint8_t image_operation(uint8_t operation) {
     uint8_t cause = BUS_CAUSE_NOT_BUILT;
     for (unsigned part = 0; part < image_part_count && cause == BUS_CAUSE_NOT_BUILT; part++)
         if (image_parts[part].operation) cause = image_parts[part].operation(operation);
     return cause;
 }
 
-static uint8_t execute(uint8_t operation, uint8_t length)
-{
-    unsigned axis = current_request[BUS_REQUEST_HEAD];                   // of those operations that have one
+static uint8_t execute(uint8_t operation, uint8_t length) {
+    unsigned axis = current_request[BUS_REQUEST_HEAD];  // of those operations that have one
     if (wrong_map && operation != BUS_OPERATION_IDENTIFY) return BUS_CAUSE_WRONG_MAP;
     if (length < BUS_REQUEST_HEAD) return BUS_CAUSE_WRONG_LENGTH;
-    if (operation >= sizeof shapes / sizeof *shapes || shapes[operation].request == 0) return BUS_CAUSE_UNKNOWN_OPERATION;
+    if (operation >= sizeof shapes / sizeof *shapes || shapes[operation].request == 0)
+        return BUS_CAUSE_UNKNOWN_OPERATION;
     if (length != shapes[operation].request) return BUS_CAUSE_WRONG_LENGTH;
     if (shapes[operation].of_axis && axis >= axes) return BUS_CAUSE_NO_SUCH_AXIS;
 
@@ -268,8 +260,10 @@ static uint8_t execute(uint8_t operation, uint8_t length)
     case BUS_OPERATION_COUNTERS: return counters();
     case BUS_OPERATION_READ_REGISTER: return read_register();
     case BUS_OPERATION_WRITE_REGISTER: return write_register();
-    case BUS_OPERATION_START: return axis_start_prepared(axes, current_request[BUS_START_REQUEST_AXES]);
-    case BUS_OPERATION_START_AT_SYNC: return start_at_sync(current_request[BUS_START_AT_SYNC_REQUEST_AXES]);
+    case BUS_OPERATION_START:
+        return axis_start_prepared(axes, current_request[BUS_START_REQUEST_AXES]);
+    case BUS_OPERATION_START_AT_SYNC:
+        return start_at_sync(current_request[BUS_START_AT_SYNC_REQUEST_AXES]);
     case BUS_OPERATION_STATUS: return status(axis);
     case BUS_OPERATION_ENABLE: return enable(axis);
     case BUS_OPERATION_HOME: return axis_home(axis);
@@ -282,30 +276,28 @@ static uint8_t execute(uint8_t operation, uint8_t length)
     case BUS_OPERATION_ENCODER: return encoder(axis);
     case BUS_OPERATION_SIGNAL: return signal(axis);
     case BUS_OPERATION_POSITION:
-    case BUS_OPERATION_FOLLOW: return position(axis);          // the same bodies
+    case BUS_OPERATION_FOLLOW: return position(axis);  // the same bodies
     case BUS_OPERATION_SET_BAUD: return set_baud();
     default: return image_operation(operation);
     }
 }
 
-static uint8_t own_address(void)
-{
+static uint8_t own_address(void) {
     return (uint8_t)FIELD_GET(node_read(NODE_BUILD), NODE_BUILD_ADDRESS);
 }
 
-static uint32_t crc_of(const uint8_t *bytes, uint32_t count)    // of what went before, and of these
+static uint32_t crc_of(const uint8_t* bytes, uint32_t count)  // of what went before, and of these
 {
     while (count--) bus_write(BUS_CRC_BYTE, *bytes++);
     return bus_read(BUS_CRC);
 }
 
-uint32_t bus_crc(const uint8_t *bytes, uint32_t count)
-{
+uint32_t bus_crc(const uint8_t* bytes, uint32_t count) {
     bus_write(BUS_CRC_START, BUS_CRC_START_START_MASK);
     return crc_of(bytes, count);
 }
 
-static void seal(void)                                          // length and CRC-32 around the body
+static void seal(void)  // length and CRC-32 around the body
 {
     uint8_t command = READY | DIRECTION_FROM_NODE | own_address();
     uint32_t length = reply[0], crc;
@@ -314,8 +306,7 @@ static void seal(void)                                          // length and CR
     for (uint32_t n = 0; n < CRC_BYTES; n++) reply[1 + length + n] = (uint8_t)(crc >> 8 * n);
 }
 
-uint8_t bus_execute(const uint8_t *request_body, uint8_t length, uint8_t *reply_body)
-{
+uint8_t bus_execute(const uint8_t* request_body, uint8_t length, uint8_t* reply_body) {
     current_request = request_body;
     current_reply = reply_body;
     current_reply[0] = current_request[0];
@@ -324,8 +315,7 @@ uint8_t bus_execute(const uint8_t *request_body, uint8_t length, uint8_t *reply_
     return current_reply[CAUSE] == BUS_CAUSE_OK ? shapes[current_reply[1]].reply : BUS_REPLY_HEAD;
 }
 
-static void frame(void)
-{
+static void frame(void) {
     uint8_t length = request[0];
     uint32_t crc = (uint32_t)get(&request[1 + length], CRC_BYTES);
     if (answered && crc == answered_crc && request[1] == reply[1]) {
@@ -335,30 +325,29 @@ static void frame(void)
     next_baud = 0;
     reply[0] = bus_execute(&request[1], length, &reply[1]);
     if (reply[1 + CAUSE] != BUS_CAUSE_OK) refused++;
-    followed = reply[2] == BUS_OPERATION_FOLLOW && reply[1 + CAUSE] == BUS_CAUSE_OK ? request[1 + BUS_REQUEST_HEAD] : NO_AXIS;
+    followed = reply[2] == BUS_OPERATION_FOLLOW && reply[1 + CAUSE] == BUS_CAUSE_OK
+                   ? request[1 + BUS_REQUEST_HEAD]
+                   : NO_AXIS;
     reply_sent = false;
     answered = true;
     answered_crc = crc;
     seal();
 }
 
-static void send(uint8_t data)
-{
-    bus_write(BUS_TRANSMIT, data);
-}
+static void send(uint8_t data) { bus_write(BUS_TRANSMIT, data); }
 
-static void command_byte(uint8_t data)
-{
+static void command_byte(uint8_t data) {
     uint32_t bytes = 1;
     last_command_ms = clock_ms();
     receiving = false;
-    if ((data & ADDRESS_MASK) == 0) return;                     // a mark for all nodes: the hardware took it
+    if ((data & ADDRESS_MASK) == 0) return;  // a mark for all nodes: the hardware took it
     receiving = (data & DIRECTION_MASK) == DIRECTION_TO_NODE;
     received = 0;
     if (!receiving) bytes += 1 + reply[0] + CRC_BYTES;
-    if (FIELD_GET(bus_read(BUS_STATE), BUS_STATE_TRANSMIT_FREE) < bytes) return;    // silence, rather than half an current_reply
+    if (FIELD_GET(bus_read(BUS_STATE), BUS_STATE_TRANSMIT_FREE) < bytes)
+        return;  // silence, rather than half an current_reply
     send(READY | (data & 0x3F));
-    if (!receiving && followed != NO_AXIS) {                    // while the ready byte is under way
+    if (!receiving && followed != NO_AXIS) {  // while the ready byte is under way
         current_reply = &reply[1];
         position(followed);
         seal();
@@ -367,8 +356,7 @@ static void command_byte(uint8_t data)
     for (uint32_t n = 0; n + 1 < bytes; n++) send(reply[n]);
 }
 
-void bus_start(unsigned served_axes)
-{
+void bus_start(unsigned served_axes) {
     axes = served_axes;
     wrong_map = !hardware_map_fits();
     receiving = answered = reply_sent = false;
@@ -384,8 +372,7 @@ void bus_start(unsigned served_axes)
     seal();
 }
 
-static void switch_baud(uint32_t requested)
-{
+static void switch_baud(uint32_t requested) {
     parameters_set_baud(requested);
     baud = requested;
     next_baud = 0;
@@ -393,14 +380,15 @@ static void switch_baud(uint32_t requested)
     breaks = bus_read(BUS_BREAKS);
 }
 
-static void update_baud(void)
-{
-    if (next_baud && reply_sent && !FIELD_GET(bus_read(BUS_STATE), BUS_STATE_SENDING)) switch_baud(next_baud);
-    else if (baud != BAUD && (clock_ms() - last_command_ms > BAUD_TIMEOUT_MS || bus_read(BUS_BREAKS) != breaks)) switch_baud(BAUD);
+static void update_baud(void) {
+    if (next_baud && reply_sent && !FIELD_GET(bus_read(BUS_STATE), BUS_STATE_SENDING))
+        switch_baud(next_baud);
+    else if (baud != BAUD &&
+             (clock_ms() - last_command_ms > BAUD_TIMEOUT_MS || bus_read(BUS_BREAKS) != breaks))
+        switch_baud(BAUD);
 }
 
-void bus_poll(void)
-{
+void bus_poll(void) {
     update_baud();
     poll_sync();
     for (uint32_t words = 0; words < WORDS_PER_POLL; words++) {

@@ -8,12 +8,14 @@
 void bus_start(unsigned axes);
 void bus_poll(void);
 
-// Do a request body that came another way; returns the length of the reply body, at most BUS_LONGEST_BODY.
-uint8_t bus_execute(const uint8_t *request, uint8_t length, uint8_t *reply);
+// Do a request body that came another way; returns the length of the reply body, at most
+// BUS_LONGEST_BODY.
+uint8_t bus_execute(const uint8_t* request, uint8_t length, uint8_t* reply);
 
-uint32_t bus_crc(const uint8_t *bytes, uint32_t count);        // CRC-32
+uint32_t bus_crc(const uint8_t* bytes, uint32_t count);  // CRC-32
 
-// For the parts of an image: a field of the request that is being done, and one of its reply; little endian, `at` as in bus_protocol.h.
+// For the parts of an image: a field of the request that is being done, and one of its reply;
+// little endian, `at` as in bus_protocol.h.
 uint64_t bus_request_field(uint32_t at, unsigned bytes);
 void bus_reply_field(uint32_t at, uint64_t value, unsigned bytes);
 

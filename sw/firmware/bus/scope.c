@@ -8,21 +8,22 @@
 #include "made/bus_protocol.h"
 #include "planner/planner.h"
 
-#define SAMPLES 128u                    // a power of two
-#define LONGEST_EVERY 200u              // ticks: 50 ms, so that a time fits its 16 bits up to a clk of 80 MHz
-#define HOLDS 16u                       // of the open loop: a command stays for 1 to so many samples, then its mirror as long
+#define SAMPLES 128u        // a power of two
+#define LONGEST_EVERY 200u  // ticks: 50 ms, so that a time fits its 16 bits up to a clk of 80 MHz
+#define HOLDS \
+    16u  // of the open loop: a command stays for 1 to so many samples, then its mirror as long
 
 struct setting {
     uint8_t axis;
-    uint8_t trigger;                        // bus_scope_trigger
-    uint8_t before;                         // samples kept from before the trigger
-    uint16_t every;                         // ticks from sample to sample, at least
-    uint32_t level;                         // of the error; with an amplitude: how far the axis may go. LSB of position
-    int16_t amplitude;                      // of the open loop, 0: none
+    uint8_t trigger;    // bus_scope_trigger
+    uint8_t before;     // samples kept from before the trigger
+    uint16_t every;     // ticks from sample to sample, at least
+    uint32_t level;     // of the error; with an amplitude: how far the axis may go. LSB of position
+    int16_t amplitude;  // of the open loop, 0: none
 };
 
-struct sample {                             // as on the line
-    int32_t position;                       // low word
+struct sample {        // as on the line
+    int32_t position;  // low word
     int32_t error;
     int16_t command;
     uint16_t time;
@@ -31,33 +32,32 @@ struct sample {                             // as on the line
 static struct scope {
     struct setting setting;
     struct sample samples[SAMPLES];
-    uint32_t every, due, last;              // clk
+    uint32_t every, due, last;  // clk
     uint32_t random;
-    int32_t from;                           // position when it was armed
+    int32_t from;  // position when it was armed
     uint8_t state;
-    uint8_t next, taken, left;              // place of the next sample, samples there, samples still wanted
+    uint8_t next, taken, left;  // place of the next sample, samples there, samples still wanted
     uint8_t before;
-    uint8_t hold, holds;                    // samples still to go with this command, and its length
+    uint8_t hold, holds;  // samples still to go with this command, and its length
     bool mirrored;
 } scope;
 
-void scope_start(unsigned axes)
-{
+void scope_start(unsigned axes) {
     (void)axes;
     scope.state = BUS_SCOPE_STATE_EMPTY;
 }
 
-static void end(void)
-{
+static void end(void) {
     scope.state = BUS_SCOPE_STATE_FULL;
     if (scope.setting.amplitude) axis_excite(scope.setting.axis, false);
 }
 
-static uint8_t arm(const struct setting *setting)
-{
-    bool right = setting->trigger <= BUS_SCOPE_TRIGGER_FAULT && setting->before < SAMPLES && setting->every >= 1 &&
-                 setting->every <= LONGEST_EVERY && setting->amplitude >= 0 &&
-                 (setting->amplitude == 0 || (setting->trigger == BUS_SCOPE_TRIGGER_NOW && setting->before == 0));
+static uint8_t arm(const struct setting* setting) {
+    bool right = setting->trigger <= BUS_SCOPE_TRIGGER_FAULT && setting->before < SAMPLES &&
+                 setting->every >= 1 && setting->every <= LONGEST_EVERY &&
+                 setting->amplitude >= 0 &&
+                 (setting->amplitude == 0 ||
+                  (setting->trigger == BUS_SCOPE_TRIGGER_NOW && setting->before == 0));
     if (!right) return BUS_CAUSE_OUT_OF_RANGE;
     if (scope.state == BUS_SCOPE_STATE_RECORDING && scope.setting.amplitude) return BUS_CAUSE_BUSY;
     uint8_t cause = setting->amplitude ? axis_excite(setting->axis, true) : BUS_CAUSE_OK;
@@ -74,21 +74,20 @@ static uint8_t arm(const struct setting *setting)
     return BUS_CAUSE_OK;
 }
 
-static bool triggered(unsigned n, int32_t error)
-{
+static bool triggered(unsigned n, int32_t error) {
     uint8_t state = axis_state(n);
     switch (scope.setting.trigger) {
     case BUS_SCOPE_TRIGGER_MOTION: return state == BUS_STATE_MOVING || state == BUS_STATE_HOMING;
     case BUS_SCOPE_TRIGGER_SETTLING: return state == BUS_STATE_SETTLING;
-    case BUS_SCOPE_TRIGGER_ERROR: return (error < 0 ? 0u - (uint32_t)error : (uint32_t)error) >= scope.setting.level;
+    case BUS_SCOPE_TRIGGER_ERROR:
+        return (error < 0 ? 0u - (uint32_t)error : (uint32_t)error) >= scope.setting.level;
     case BUS_SCOPE_TRIGGER_FAULT: return state == BUS_STATE_FAULTED;
     default: return true;
     }
 }
 
-static void take(unsigned n)
-{
-    struct sample *s = &scope.samples[scope.next];
+static void take(unsigned n) {
+    struct sample* s = &scope.samples[scope.next];
     uint32_t now = node_read(NODE_TIME_STAMP_LOW);
     s->position = (int32_t)axis_read(n, AXIS_POSITION);
     s->error = (int32_t)axis_read(n, AXIS_FOLLOWING_ERROR);
@@ -100,7 +99,8 @@ static void take(unsigned n)
     if (scope.state == BUS_SCOPE_STATE_RECORDING) {
         scope.left--;
     } else if (triggered(n, s->error)) {
-        scope.before = scope.taken - 1u < scope.setting.before ? (uint8_t)(scope.taken - 1u) : scope.setting.before;
+        scope.before = scope.taken - 1u < scope.setting.before ? (uint8_t)(scope.taken - 1u)
+                                                               : scope.setting.before;
         scope.taken = (uint8_t)(scope.before + 1u);
         scope.left = (uint8_t)(SAMPLES - scope.taken);
         scope.state = BUS_SCOPE_STATE_RECORDING;
@@ -108,8 +108,7 @@ static void take(unsigned n)
 }
 
 // Steps of random length, each followed by its mirror, so that the axis comes back.
-static void excite(unsigned n)
-{
+static void excite(unsigned n) {
     if (scope.hold == 0) {
         scope.mirrored = !scope.mirrored;
         if (!scope.mirrored) {
@@ -122,20 +121,22 @@ static void excite(unsigned n)
     }
     scope.hold--;
     bool up = (scope.random >> 16 & 1u) != scope.mirrored;
-    axis_write(n, AXIS_OPEN_COMMAND, (uint32_t)(up ? scope.setting.amplitude : -scope.setting.amplitude));
+    axis_write(n, AXIS_OPEN_COMMAND,
+               (uint32_t)(up ? scope.setting.amplitude : -scope.setting.amplitude));
 }
 
-void scope_work(void)
-{
+void scope_work(void) {
     unsigned n = scope.setting.axis;
     if (scope.state != BUS_SCOPE_STATE_WAITING && scope.state != BUS_SCOPE_STATE_RECORDING) return;
     uint32_t now = node_read(NODE_TIME_STAMP_LOW);
     if ((int32_t)(now - scope.due) < 0) return;
     scope.due += scope.every;
-    if ((int32_t)(now - scope.due) >= 0) scope.due = now + scope.every;     // too late for one: they are not made up for
+    if ((int32_t)(now - scope.due) >= 0)
+        scope.due = now + scope.every;  // too late for one: they are not made up for
     take(n);
     if (scope.setting.amplitude) {
-        uint32_t gone = (uint32_t)scope.samples[(scope.next + SAMPLES - 1u) % SAMPLES].position - (uint32_t)scope.from;
+        uint32_t gone = (uint32_t)scope.samples[(scope.next + SAMPLES - 1u) % SAMPLES].position -
+                        (uint32_t)scope.from;
         if ((int32_t)gone < 0) gone = 0u - gone;
         if (axis_state(n) != BUS_STATE_EXCITED || gone > scope.setting.level)
             scope.left = 0;
@@ -145,41 +146,44 @@ void scope_work(void)
     if (scope.left == 0) end();
 }
 
-static uint8_t byte_of(uint32_t first, uint32_t n)               // of the samples from this one on, 0 behind the last; the oldest is 0
+static uint8_t byte_of(
+    uint32_t first,
+    uint32_t n)  // of the samples from this one on, 0 behind the last; the oldest is 0
 {
     uint32_t number = first + n / sizeof(struct sample);
-    const struct sample *sample = &scope.samples[(scope.next + SAMPLES - scope.taken + number) % SAMPLES];
-    return number < scope.taken ? ((const uint8_t *)sample)[n % sizeof *sample] : 0;
+    const struct sample* sample =
+        &scope.samples[(scope.next + SAMPLES - scope.taken + number) % SAMPLES];
+    return number < scope.taken ? ((const uint8_t*)sample)[n % sizeof *sample] : 0;
 }
 
-static uint8_t read_samples(uint8_t first)
-{
+static uint8_t read_samples(uint8_t first) {
     if (scope.state != BUS_SCOPE_STATE_FULL || first >= scope.taken) return BUS_CAUSE_OUT_OF_RANGE;
     for (uint32_t n = 0; n < BUS_READ_SCOPE_REPLY_LENGTH - BUS_READ_SCOPE_REPLY_POSITION_0; n++)
         bus_reply_field(BUS_READ_SCOPE_REPLY_POSITION_0 + n, byte_of(first, n), 1);
     return BUS_CAUSE_OK;
 }
 
-static uint8_t report(void)
-{
+static uint8_t report(void) {
     bus_reply_field(BUS_SCOPE_REPLY_STATE, scope.state, 1);
-    bus_reply_field(BUS_SCOPE_REPLY_COUNT, scope.state == BUS_SCOPE_STATE_FULL ? scope.taken : 0, 1);
+    bus_reply_field(BUS_SCOPE_REPLY_COUNT, scope.state == BUS_SCOPE_STATE_FULL ? scope.taken : 0,
+                    1);
     bus_reply_field(BUS_SCOPE_REPLY_BEFORE, scope.before, 1);
     return BUS_CAUSE_OK;
 }
 
-uint8_t scope_operation(uint8_t operation)
-{
+uint8_t scope_operation(uint8_t operation) {
     switch (operation) {
     case BUS_OPERATION_SCOPE: return report();
-    case BUS_OPERATION_READ_SCOPE: return read_samples((uint8_t)bus_request_field(BUS_READ_SCOPE_REQUEST_FIRST, 1));
+    case BUS_OPERATION_READ_SCOPE:
+        return read_samples((uint8_t)bus_request_field(BUS_READ_SCOPE_REQUEST_FIRST, 1));
     case BUS_OPERATION_ARM_SCOPE:
-        return arm(&(struct setting){.axis = (uint8_t)bus_request_field(BUS_ARM_SCOPE_REQUEST_AXIS, 1),
-                                     .trigger = (uint8_t)bus_request_field(BUS_ARM_SCOPE_REQUEST_TRIGGER, 1),
-                                     .before = (uint8_t)bus_request_field(BUS_ARM_SCOPE_REQUEST_BEFORE, 1),
-                                     .every = (uint16_t)bus_request_field(BUS_ARM_SCOPE_REQUEST_EVERY, 2),
-                                     .level = (uint32_t)bus_request_field(BUS_ARM_SCOPE_REQUEST_LEVEL, 4),
-                                     .amplitude = (int16_t)bus_request_field(BUS_ARM_SCOPE_REQUEST_AMPLITUDE, 2)});
+        return arm(&(struct setting){
+            .axis = (uint8_t)bus_request_field(BUS_ARM_SCOPE_REQUEST_AXIS, 1),
+            .trigger = (uint8_t)bus_request_field(BUS_ARM_SCOPE_REQUEST_TRIGGER, 1),
+            .before = (uint8_t)bus_request_field(BUS_ARM_SCOPE_REQUEST_BEFORE, 1),
+            .every = (uint16_t)bus_request_field(BUS_ARM_SCOPE_REQUEST_EVERY, 2),
+            .level = (uint32_t)bus_request_field(BUS_ARM_SCOPE_REQUEST_LEVEL, 4),
+            .amplitude = (int16_t)bus_request_field(BUS_ARM_SCOPE_REQUEST_AMPLITUDE, 2)});
     default: return BUS_CAUSE_NOT_BUILT;
     }
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// scope -- records position, error and command of one axis, from before a trigger on. With an amplitude it drives the axis in open
-// loop meanwhile, to see how it answers. There is one for all axes. Times are in SCOPE_CYCLES clk since the sample before.
+// scope -- records position, error and command of one axis, from before a trigger on. With an
+// amplitude it drives the axis in open loop meanwhile, to see how it answers. There is one for all
+// axes. Times are in SCOPE_CYCLES clk since the sample before.
 #ifndef MOIRE_SCOPE_H
 #define MOIRE_SCOPE_H
 
@@ -10,6 +11,6 @@
 
 void scope_start(unsigned axes);
 void scope_work(void);
-uint8_t scope_operation(uint8_t operation);                     // a bus_cause
+uint8_t scope_operation(uint8_t operation);  // a bus_cause
 
 #endif

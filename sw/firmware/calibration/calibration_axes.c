@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// correction -- the calibrations of all axes as a part of an image: their turns and what the line asks of them.
+// correction -- the calibrations of all axes as a part of an image: their turns and what the line
+// asks of them.
 #include "calibration/calibration_axes.h"
 
 #include "axis/axis.h"
@@ -9,28 +10,26 @@
 #include "made/bus_protocol.h"
 
 static unsigned axes;
-static unsigned turn;                           // axis that was served last
+static unsigned turn;  // axis that was served last
 
-void calibration_axes_start(unsigned served_axes)
-{
+void calibration_axes_start(unsigned served_axes) {
     axes = served_axes;
     turn = 0;
     for (unsigned n = 0; n < axes; n++) calibration_runner_start(n);
 }
 
-void calibration_axes_work(void)
-{
+void calibration_axes_work(void) {
     if (axes == 0) return;
     for (unsigned n = 0; n < axes; n++)
-        if (axis_state(n) == BUS_STATE_HOMING) return;         // it has to see its switch in time
+        if (axis_state(n) == BUS_STATE_HOMING) return;  // it has to see its switch in time
     turn = turn + 1 < axes ? turn + 1 : 0;
     calibration_runner_poll(turn);
 }
 
-static uint8_t calibration(unsigned axis)
-{
-    const struct calibration *calibration = calibration_runner_state(axis);
-    uint8_t cause = calibration_runner_do(axis, (uint8_t)bus_request_field(BUS_CALIBRATION_REQUEST_ACTION, 1));
+static uint8_t calibration(unsigned axis) {
+    const struct calibration* calibration = calibration_runner_state(axis);
+    uint8_t cause =
+        calibration_runner_do(axis, (uint8_t)bus_request_field(BUS_CALIBRATION_REQUEST_ACTION, 1));
     bus_reply_field(BUS_CALIBRATION_REPLY_REASON, calibration_runner_reason(axis), 1);
     bus_reply_field(BUS_CALIBRATION_REPLY_CONVERGED, calibration->complete, 1);
     bus_reply_field(BUS_CALIBRATION_REPLY_FROZEN, calibration->frozen, 1);
@@ -40,19 +39,18 @@ static uint8_t calibration(unsigned axis)
     return cause;
 }
 
-static uint8_t get_correction(unsigned axis)
-{
-    const struct calibration_values *values = &calibration_runner_state(axis)->values;
+static uint8_t get_correction(unsigned axis) {
+    const struct calibration_values* values = &calibration_runner_state(axis)->values;
     bus_reply_field(BUS_GET_CORRECTION_REPLY_SIN_OFFSET, (uint64_t)values->sin_offset, 2);
     bus_reply_field(BUS_GET_CORRECTION_REPLY_COS_OFFSET, (uint64_t)values->cos_offset, 2);
     bus_reply_field(BUS_GET_CORRECTION_REPLY_GAIN, (uint64_t)values->gain, 4);
-    bus_reply_field(BUS_GET_CORRECTION_REPLY_QUADRATURE_ERROR, (uint64_t)values->quadrature_error, 4);
+    bus_reply_field(BUS_GET_CORRECTION_REPLY_QUADRATURE_ERROR, (uint64_t)values->quadrature_error,
+                    4);
     return BUS_CAUSE_OK;
 }
 
-static uint8_t get_harmonic(unsigned axis)
-{
-    const struct calibration_values *values = &calibration_runner_state(axis)->values;
+static uint8_t get_harmonic(unsigned axis) {
+    const struct calibration_values* values = &calibration_runner_state(axis)->values;
     uint8_t order = (uint8_t)bus_request_field(BUS_GET_HARMONIC_REQUEST_ORDER, 1);
     if (order < 1 || order > CALIBRATION_ORDERS) return BUS_CAUSE_OUT_OF_RANGE;
     bus_reply_field(BUS_GET_HARMONIC_REPLY_COSINE, (uint64_t)values->cosine[order - 1], 4);
@@ -60,25 +58,26 @@ static uint8_t get_harmonic(unsigned axis)
     return BUS_CAUSE_OK;
 }
 
-static uint8_t set_correction(unsigned axis)
-{
+static uint8_t set_correction(unsigned axis) {
     uint8_t apply = (uint8_t)bus_request_field(BUS_SET_CORRECTION_REQUEST_APPLY, 1);
-    struct calibration_values values = {.sin_offset = (int16_t)bus_request_field(BUS_SET_CORRECTION_REQUEST_SIN_OFFSET, 2),
-                                    .cos_offset = (int16_t)bus_request_field(BUS_SET_CORRECTION_REQUEST_COS_OFFSET, 2),
-                                    .gain = (int32_t)bus_request_field(BUS_SET_CORRECTION_REQUEST_GAIN, 4),
-                                    .quadrature_error = (int32_t)bus_request_field(BUS_SET_CORRECTION_REQUEST_QUADRATURE_ERROR, 4)};
-    return apply > 1 ? BUS_CAUSE_OUT_OF_RANGE : calibration_runner_set_correction(axis, &values, apply);
+    struct calibration_values values = {
+        .sin_offset = (int16_t)bus_request_field(BUS_SET_CORRECTION_REQUEST_SIN_OFFSET, 2),
+        .cos_offset = (int16_t)bus_request_field(BUS_SET_CORRECTION_REQUEST_COS_OFFSET, 2),
+        .gain = (int32_t)bus_request_field(BUS_SET_CORRECTION_REQUEST_GAIN, 4),
+        .quadrature_error =
+            (int32_t)bus_request_field(BUS_SET_CORRECTION_REQUEST_QUADRATURE_ERROR, 4)};
+    return apply > 1 ? BUS_CAUSE_OUT_OF_RANGE
+                     : calibration_runner_set_correction(axis, &values, apply);
 }
 
-static uint8_t set_harmonic(unsigned axis)
-{
-    return calibration_runner_set_harmonic(axis, (uint8_t)bus_request_field(BUS_SET_HARMONIC_REQUEST_ORDER, 1),
-                                (int32_t)bus_request_field(BUS_SET_HARMONIC_REQUEST_COSINE, 4),
-                                (int32_t)bus_request_field(BUS_SET_HARMONIC_REQUEST_SINE, 4));
+static uint8_t set_harmonic(unsigned axis) {
+    return calibration_runner_set_harmonic(
+        axis, (uint8_t)bus_request_field(BUS_SET_HARMONIC_REQUEST_ORDER, 1),
+        (int32_t)bus_request_field(BUS_SET_HARMONIC_REQUEST_COSINE, 4),
+        (int32_t)bus_request_field(BUS_SET_HARMONIC_REQUEST_SINE, 4));
 }
 
-uint8_t calibration_axes_operation(uint8_t operation)
-{
+uint8_t calibration_axes_operation(uint8_t operation) {
     unsigned axis = (unsigned)bus_request_field(BUS_REQUEST_HEAD, 1);
     if (axis < axes && !hardware_has_sine(axis)) return BUS_CAUSE_NOT_BUILT;
     switch (operation) {

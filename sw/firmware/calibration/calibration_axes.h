@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// correction -- the learners of all axes as a part of an image: their turns and what the line asks of them.
+// correction -- the learners of all axes as a part of an image: their turns and what the line asks
+// of them.
 #ifndef MOIRE_CALIBRATION_AXES_H
 #define MOIRE_CALIBRATION_AXES_H
 

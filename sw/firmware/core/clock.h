@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 void clock_start(void);
-void clock_poll(void);                  // at least once in 2^32 clk
-uint32_t clock_ms(void);                // wraps
+void clock_poll(void);    // at least once in 2^32 clk
+uint32_t clock_ms(void);  // wraps
 
 #endif

@@ -3,19 +3,17 @@
 #if defined(__riscv) && !defined(__clang__)
 #include <stddef.h>
 
-void *memset(void *to, int value, size_t bytes);
-void *memcpy(void *restrict to, const void *restrict from, size_t bytes);
+void* memset(void* to, int value, size_t bytes);
+void* memcpy(void* restrict to, const void* restrict from, size_t bytes);
 
-void *memset(void *to, int value, size_t bytes)
-{
-    for (unsigned char *byte = to; bytes--; byte++) *byte = (unsigned char)value;
+void* memset(void* to, int value, size_t bytes) {
+    for (unsigned char* byte = to; bytes--; byte++) *byte = (unsigned char)value;
     return to;
 }
 
-void *memcpy(void *restrict to, const void *restrict from, size_t bytes)
-{
-    const unsigned char *source = from;
-    for (unsigned char *byte = to; bytes--; byte++) *byte = *source++;
+void* memcpy(void* restrict to, const void* restrict from, size_t bytes) {
+    const unsigned char* source = from;
+    for (unsigned char* byte = to; bytes--; byte++) *byte = *source++;
     return to;
 }
 #endif

@@ -16,7 +16,8 @@
 #include "station/settings.h"
 #include "station/storage/store.h"
 
-_Static_assert(BUS_SETTING_COUNT + HARDWARE_AXES * BUS_PARAMETER_COUNT <= VALUE_STORE_MAX, "the EEPROM keeps all values");
+_Static_assert(BUS_SETTING_COUNT + HARDWARE_AXES * BUS_PARAMETER_COUNT <= VALUE_STORE_MAX,
+               "the EEPROM keeps all values");
 
 const struct image_part image_parts[] = {
     {settings_start, 0, settings_operation},

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// main -- start, then poll for ever: line, clock, axes, and the parts of the image. There are no interrupts; nothing waits.
+// main -- start, then poll for ever: line, clock, axes, and the parts of the image. There are no
+// interrupts; nothing waits.
 #include "axis/axis.h"
 #include "core/clock.h"
 #include "core/hardware.h"
@@ -7,10 +8,9 @@
 #include "bus/bus.h"
 #include "axis/parameters.h"
 
-static unsigned axes;                   // those that may be touched: none if the register maps differ
+static unsigned axes;  // those that may be touched: none if the register maps differ
 
-void firmware_start(void)
-{
+void firmware_start(void) {
     unsigned built = FIELD_GET(node_read(NODE_BUILD), NODE_BUILD_AXES);
     if (built > HARDWARE_AXES) built = HARDWARE_AXES;
     axes = hardware_map_fits() ? built : 0;
@@ -22,8 +22,7 @@ void firmware_start(void)
     bus_start(built);
 }
 
-void firmware_poll(void)
-{
+void firmware_poll(void) {
     node_write(NODE_HEARTBEAT, NODE_HEARTBEAT_KICK_MASK);
     bus_poll();
     clock_poll();
@@ -39,8 +38,7 @@ void firmware_poll(void)
     }
 }
 
-int main(void)
-{
+int main(void) {
     firmware_start();
     while (hardware_stack_intact()) firmware_poll();
     hardware_halt();

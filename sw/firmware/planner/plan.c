@@ -6,8 +6,7 @@
 
 #include "core/arithmetic.h"
 
-void plan_clear(struct plan *plan)
-{
+void plan_clear(struct plan* plan) {
     plan->ticks = 0;
     plan->count = plan->next = 0;
     plan->cause = PLANNER_OK;
@@ -15,17 +14,17 @@ void plan_clear(struct plan *plan)
     plan->at = (struct planner_progress){.tick = 0};
 }
 
-bool plan_refuse(struct plan *plan, enum planner_cause cause)
-{
+bool plan_refuse(struct plan* plan, enum planner_cause cause) {
     plan->cause = (uint8_t)cause;
     return false;
 }
 
-void plan_add(struct plan *plan, uint32_t tick, struct planner_event event)
-{
+void plan_add(struct plan* plan, uint32_t tick, struct planner_event event) {
     uint32_t at = plan->count;
-    struct planner_event *const list = plan->event;
-    while (at && (list[at - 1].tick > tick || (list[at - 1].tick == tick && list[at - 1].slot > event.slot))) at--;
+    struct planner_event* const list = plan->event;
+    while (at && (list[at - 1].tick > tick ||
+                  (list[at - 1].tick == tick && list[at - 1].slot > event.slot)))
+        at--;
     if (at && list[at - 1].tick == tick && list[at - 1].slot == event.slot) {
         list[at - 1].velocity = (int8_t)(list[at - 1].velocity + event.velocity);
         list[at - 1].acceleration = (int8_t)(list[at - 1].acceleration + event.acceleration);
@@ -37,49 +36,52 @@ void plan_add(struct plan *plan, uint32_t tick, struct planner_event event)
     }
 }
 
-void plan_advance(struct planner_progress *at, uint32_t ticks)
-{
-    struct planner_state *s = &at->state;
+void plan_advance(struct planner_progress* at, uint32_t ticks) {
+    struct planner_state* s = &at->state;
     int64_t jerk = at->jerk + at->landing;
-    s->gone += (uint64_t)s->velocity * ticks + (uint64_t)s->acceleration * pairs(ticks) + (uint64_t)jerk * triples(ticks);
+    s->gone += (uint64_t)s->velocity * ticks + (uint64_t)s->acceleration * pairs(ticks) +
+               (uint64_t)jerk * triples(ticks);
     s->velocity += (int64_t)((uint64_t)s->acceleration * ticks + (uint64_t)jerk * pairs(ticks));
     s->acceleration += jerk * ticks;
     at->tick += ticks;
 }
 
 // What begins at the instant of this slot, which may be a copy of the plan's own.
-static void plan_settle(const struct plan *plan, struct planner_progress *at, uint8_t *next)
-{
+static void plan_settle(const struct plan* plan, struct planner_progress* at, uint8_t* next) {
     if (plan->stepped) {
-        const struct planner_segment *section = &plan->section[*next];
-        at->state.velocity = *next < plan->count ? section->velocity + section->acceleration * (at->tick / section->ticks) : 0;
+        const struct planner_segment* section = &plan->section[*next];
+        at->state.velocity =
+            *next < plan->count
+                ? section->velocity + section->acceleration * (at->tick / section->ticks)
+                : 0;
         return;
     }
-    for (const struct planner_event *event = &plan->event[*next]; *next < plan->count && event->tick == at->tick; event++, ++*next) {
+    for (const struct planner_event* event = &plan->event[*next];
+         *next < plan->count && event->tick == at->tick; event++, ++*next) {
         at->state.velocity += event->velocity;
         at->state.acceleration += event->acceleration;
         *(event->slot == PLANNER_LANDING ? &at->landing : &at->jerk) += event->jerk;
     }
 }
 
-bool plan_walk(const struct plan *plan, struct planner_progress *at, uint8_t *next, struct planner_segment *piece, bool *last,
-               uint32_t longest)
-{
+bool plan_walk(const struct plan* plan, struct planner_progress* at, uint8_t* next,
+               struct planner_segment* piece, bool* last, uint32_t longest) {
     if (*next >= plan->count) return false;
     plan_settle(plan, at, next);
     uint32_t end = plan->ticks, until;
     if (plan->stepped) {
-        const struct planner_segment *section = &plan->section[*next];
+        const struct planner_segment* section = &plan->section[*next];
         end = section->ticks * ((uint32_t)section->jerk + 1);
         until = section->ticks - at->tick % section->ticks;
     } else {
         until = plan->event[*next].tick - at->tick;
     }
     const int64_t jerk = at->jerk + at->landing;
-    const bool fits = (int32_t)jerk == jerk;                                 // of a single tick it tells nothing
+    const bool fits = (int32_t)jerk == jerk;  // of a single tick it tells nothing
     if (until > longest) until = longest;
     if (!fits) until = 1;
-    *piece = (struct planner_segment){at->state.velocity, at->state.acceleration, fits ? (int32_t)jerk : 0, until};
+    *piece = (struct planner_segment){at->state.velocity, at->state.acceleration,
+                                      fits ? (int32_t)jerk : 0, until};
     plan_advance(at, until);
     if (at->tick == end) {
         *next = plan->stepped ? (uint8_t)(*next + 1) : plan->count;
@@ -89,7 +91,7 @@ bool plan_walk(const struct plan *plan, struct planner_progress *at, uint8_t *ne
     return true;
 }
 
-bool planner_take_up_to(struct plan *plan, struct planner_segment *piece, bool *last, uint32_t longest)
-{
+bool planner_take_up_to(struct plan* plan, struct planner_segment* piece, bool* last,
+                        uint32_t longest) {
     return plan_walk(plan, &plan->at, &plan->next, piece, last, longest);
 }

@@ -5,19 +5,25 @@
 
 #include <stdint.h>
 
-enum i2c_client { I2C_STORE, I2C_KEYPAD, I2C_DISPLAY, I2C_CLIENTS };     // who asks; each has one transfer at a time
+enum i2c_client {
+    I2C_STORE,
+    I2C_KEYPAD,
+    I2C_DISPLAY,
+    I2C_CLIENTS
+};  // who asks; each has one transfer at a time
 enum i2c_outcome { I2C_OK, I2C_ABSENT, I2C_FAILED, I2C_BUSY };
 
 struct i2c_transfer {
-    uint8_t address;                    // 7 bits
-    uint8_t write_count, read_count;    // bytes written first, then bytes read; both may be 0
-    const uint8_t *write;               // all stays as it is until the transfer has ended
-    uint8_t *read;
+    uint8_t address;                  // 7 bits
+    uint8_t write_count, read_count;  // bytes written first, then bytes read; both may be 0
+    const uint8_t* write;             // all stays as it is until the transfer has ended
+    uint8_t* read;
 };
 
 void i2c_start(unsigned axes);
 void i2c_work(void);
-void i2c_begin(enum i2c_client client, const struct i2c_transfer *transfer);
-enum i2c_outcome i2c_outcome(enum i2c_client client);      // of the last transfer. absent: nobody acknowledged the address
+void i2c_begin(enum i2c_client client, const struct i2c_transfer* transfer);
+enum i2c_outcome i2c_outcome(
+    enum i2c_client client);  // of the last transfer. absent: nobody acknowledged the address
 
 #endif

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Everything that can go wrong, each in one sentence that a person can act on, each with the exit code of the command line."""
+"""Everything that can go wrong, each in one sentence that a person can act on, each with the exit
+code of the command line.
+"""
 
 
 class MoireError(Exception):
@@ -59,15 +61,21 @@ class NoAnswer(BusError):
     """Not one word came back."""
 
     def __init__(self, address: int, tries: int = 1):
-        super().__init__(address, f"nobody answers at address {address}, asked {times(tries)}: check power, wiring, baud rate and address")
+        super().__init__(
+            address,
+            f"nobody answers at address {address}, asked {times(tries)}: check power, wiring, baud rate and address",
+        )
 
 
 class BusGarbled(BusError):
     """Words came back, but no right reply."""
 
     def __init__(self, address: int, reason: str, tries: int = 1):
-        super().__init__(address, f"the line to address {address} is garbled, tried {times(tries)}: {reason}; as from noise, a wrong baud "
-                                  f"rate, two masters or two nodes with the address {address}")
+        super().__init__(
+            address,
+            f"the line to address {address} is garbled, tried {times(tries)}: {reason}; as from noise, a wrong baud "
+            f"rate, two masters or two nodes with the address {address}",
+        )
         self.reason = reason
 
 
@@ -77,8 +85,10 @@ class WrongBuild(MoireError):
     exit_code = 5
 
     def __init__(self, address: int, what: str, node: int, host: int):
-        super().__init__(f"node {address} was made from another {what}: CRC-32 {node:08X} in the node, {host:08X} in this host package; "
-                         "build both from the same sources")
+        super().__init__(
+            f"node {address} was made from another {what}: CRC-32 {node:08X} in the node, {host:08X} in this host package; "
+            "build both from the same sources"
+        )
         self.address, self.what, self.node, self.host = address, what, node, host
 
 

@@ -1,12 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lengths, speeds and times as people write them ("1.5mm", "5mm/s", "20ms") and as exact fractions."""
+
 import re
 from fractions import Fraction
 
 from .errors import UnitError
 
 SPELLINGS = str.maketrans(
-    {"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "\N{SUPERSCRIPT TWO}": "2", "\N{SUPERSCRIPT THREE}": "3"})
+    {
+        "\N{MICRO SIGN}": "u",
+        "\N{GREEK SMALL LETTER MU}": "u",
+        "\N{SUPERSCRIPT TWO}": "2",
+        "\N{SUPERSCRIPT THREE}": "3",
+    }
+)
 
 LENGTHS = {
     "pm": Fraction(1, 1000),
@@ -16,7 +23,13 @@ LENGTHS = {
     "cm": Fraction(10**7),
     "m": Fraction(10**9),
 }
-TIMES = {"ns": Fraction(1, 10**9), "us": Fraction(1, 10**6), "ms": Fraction(1, 1000), "s": Fraction(1), "min": Fraction(60)}
+TIMES = {
+    "ns": Fraction(1, 10**9),
+    "us": Fraction(1, 10**6),
+    "ms": Fraction(1, 1000),
+    "s": Fraction(1),
+    "min": Fraction(60),
+}
 ANGLES = {"arcsec": Fraction(1), "arcmin": Fraction(60), "deg": Fraction(3600)}
 FREQUENCIES = {"Hz": Fraction(1), "kHz": Fraction(1000), "MHz": Fraction(10**6)}
 
@@ -44,7 +57,10 @@ class Quantity:
             except (TypeError, ValueError, OverflowError):
                 raise UnitError(f"{text!r} is no {self.name}: write {self.allowed()}") from None
         plain = text.strip().translate(SPELLINGS)
-        found = re.fullmatch(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?)\s*([A-Za-z]*(?:/[A-Za-z]+\^?[0-9]?)?)", plain)
+        found = re.fullmatch(
+            r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?)\s*([A-Za-z]*(?:/[A-Za-z]+\^?[0-9]?)?)",
+            plain,
+        )
         if found is None:
             raise UnitError(f"'{text}' is no {self.name}: write {self.allowed()}")
         number, unit = Fraction(found[1]), found[2].replace("^", "")
@@ -90,7 +106,11 @@ def parse_time(text) -> Fraction:
 def parse_share(text) -> Fraction:
     """Of the whole: "50%" or 0.5."""
     plain = text.strip() if isinstance(text, str) else text
-    share = NUMBER.parse(plain[:-1]) / 100 if isinstance(plain, str) and plain.endswith("%") else NUMBER.parse(plain)
+    share = (
+        NUMBER.parse(plain[:-1]) / 100
+        if isinstance(plain, str) and plain.endswith("%")
+        else NUMBER.parse(plain)
+    )
     if not 0 <= share <= 1:
         raise UnitError(f"'{text}' is no share of full speed: write 0% to 100%, or 0 to 1")
     return share
@@ -125,13 +145,23 @@ def rounded(value, digits: int) -> str:
 
 
 def with_unit(quantity: Quantity, value, digits: int | None = None) -> str:
-    """The value (in the base unit) with the largest unit that leaves a digit before the point; exact unless digits are given."""
+    """The value (in the base unit) with the largest unit that leaves a digit before the point;
+    exact unless digits are given.
+    """
     value = Fraction(value)
     unit, worth = quantity.base, Fraction(1)
-    candidates = [item for item in quantity.worth.items() if not item[0].startswith(("cm", "min")) and not re.match(r"m(/|$)", item[0])]
+    candidates = [
+        item
+        for item in quantity.worth.items()
+        if not item[0].startswith(("cm", "min")) and not re.match(r"m(/|$)", item[0])
+    ]
     if value and candidates:
         fitting = [item for item in candidates if abs(value) >= item[1]]
-        unit, worth = max(fitting, key=lambda item: item[1]) if fitting else min(candidates, key=lambda item: item[1])
+        unit, worth = (
+            max(fitting, key=lambda item: item[1])
+            if fitting
+            else min(candidates, key=lambda item: item[1])
+        )
     number = decimal(value / worth) if digits is None else rounded(value / worth, digits)
     return number + unit
 

@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A node without hardware: the registers as the firmware sees them, behind them a line, a clock and simple axes.
+"""A node without hardware: the registers as the firmware sees them, behind them a line, a clock and
+simple axes.
 
-The player adds up the segments as they were pushed, with no B-spline between their steps, no override and no limit of jerk: a brake
-takes stop_deceleration off the velocity each tick, and a profile starts at full speed. What rtl/control/profile_player.sv does beyond this
-is tested with its own model and with the RTL in tb/system. The position follows the target by half the way each tick, a drive that is
-off stands, and a limit switch lets it slide a little into the blocked way. Faults latch as drive_interlock does it.
+The player adds up the segments as they were pushed, with no B-spline between their steps, no
+override and no limit of jerk: a brake
+takes stop_deceleration off the velocity each tick, and a profile starts at full speed. What
+rtl/control/profile_player.sv does beyond this
+is tested with its own model and with the RTL in tb/system. The position follows the target by half
+the way each tick, a drive that is
+off stands, and a limit switch lets it slide a little into the blocked way. Faults latch as
+drive_interlock does it.
 """
+
 import re
 import tomllib
 import zlib
@@ -13,8 +19,14 @@ from collections import deque
 
 from twin.compiled.firmware import READ, ROOT, SOURCE, WRITE, library
 
-DEFINES = {name: int(value.rstrip("u"), 0)
-           for name, value in re.findall(r"^#define (\w+)\s+(0x[0-9a-fA-F]+u?|\d+u?)\b", (SOURCE / "made" / "registers.h").read_text(), re.M)}
+DEFINES = {
+    name: int(value.rstrip("u"), 0)
+    for name, value in re.findall(
+        r"^#define (\w+)\s+(0x[0-9a-fA-F]+u?|\d+u?)\b",
+        (SOURCE / "made" / "registers.h").read_text(),
+        re.M,
+    )
+}
 TABLE = tomllib.loads((ROOT / "tables" / "bus.toml").read_text())
 CAUSE = {code: name for name, (code, _) in TABLE["cause"].items()}
 STATE = {code: name for name, (code, _) in TABLE["state"].items()}
@@ -23,8 +35,8 @@ FLAG = {name: 1 << bit for name, (bit, _) in TABLE["flag"].items()}
 PARAMETER = TABLE["parameter"]
 CLK_HZ = 4_000_000
 PERIOD = 65536
-SLIDE = 30 * PERIOD                                     # into a pressed switch
-BACKLASH = PERIOD // 2                                  # a switch opens so far from where it closed
+SLIDE = 30 * PERIOD  # into a pressed switch
+BACKLASH = PERIOD // 2  # a switch opens so far from where it closed
 ALWAYS_LATCHED = FAULT["estop"] | FAULT["drive"] | FAULT["cpu"]
 
 
@@ -37,7 +49,7 @@ def fields(declarations, data):
     for declaration in declarations:
         name, kind = declaration.split()
         size = int(kind[1:]) // 8
-        values[name] = int.from_bytes(data[at:at + size], "little", signed=kind[0] == "i")
+        values[name] = int.from_bytes(data[at : at + size], "little", signed=kind[0] == "i")
         at += size
     assert at == len(data)
     return values
@@ -45,7 +57,9 @@ def fields(declarations, data):
 
 class Player:
     def __init__(self):
-        self.target = self.velocity = self.acceleration = self.jerk = self.left = self.last = 0     # target: 2^-40 period
+        self.target = self.velocity = self.acceleration = self.jerk = self.left = self.last = (
+            0  # target: 2^-40 period
+        )
         self.queue, self.moving, self.braking, self.stop_deceleration = deque(), False, False, 0
 
     def hold(self, position):
@@ -68,7 +82,9 @@ class Player:
         underrun = False
         if not self.braking and self.left == 0:
             if self.queue:
-                self.velocity, self.acceleration, self.jerk, self.left, self.last = self.queue.popleft()
+                self.velocity, self.acceleration, self.jerk, self.left, self.last = (
+                    self.queue.popleft()
+                )
             else:
                 underrun = self.braking = True
         self.target += self.velocity
@@ -77,7 +93,11 @@ class Player:
             stop = rate == 0 or abs(self.velocity) <= rate
             self.velocity -= self.velocity if stop else rate if self.velocity > 0 else -rate
         else:
-            self.velocity, self.acceleration, self.left = self.velocity + self.acceleration, self.acceleration + self.jerk, self.left - 1
+            self.velocity, self.acceleration, self.left = (
+                self.velocity + self.acceleration,
+                self.acceleration + self.jerk,
+                self.left - 1,
+            )
             stop = self.last and self.left == 0
         if stop:
             self.target = self.target + (1 << 23) >> 24 << 24
@@ -87,9 +107,11 @@ class Player:
 
 class Axis:
     def __init__(self, position=0, low=None, high=None, index=()):
-        """Positions of the switches and of each index are those of the machine: the origin of the node does not move them."""
+        """Positions of the switches and of each index are those of the machine: the origin of the
+        node does not move them.
+        """
         self.word = {}
-        self.machine, self.origin = position, 0                         # position = machine + origin
+        self.machine, self.origin = position, 0  # position = machine + origin
         self.low_at, self.high_at = low, high
         self.pressed_low = low is not None and position <= low
         self.pressed_high = high is not None and position >= high
@@ -97,11 +119,11 @@ class Axis:
         self.player = Player()
         self.player.target = position << 24
         self.faults = self.first_fault = self.fault_position = 0
-        self.causes = 0                                                 # those that the test sets
+        self.causes = 0  # those that the test sets
         self.enabled = self.seized = False
-        self.speed, self.passed = 0, None                               # passed: position of the index met in the last tick
+        self.speed, self.passed = 0, None  # passed: position of the index met in the last tick
         self.index = index
-        self.strobes = []                                               # (strobes, control) in order
+        self.strobes = []  # (strobes, control) in order
         self.pushed = []
 
     @property
@@ -123,7 +145,9 @@ class Axis:
     def interlock(self, strobe_cause=0):
         causes = self.causes | strobe_cause
         if not self.control & DEFINES["AXIS_CONTROL_HOMING_MASK"]:
-            causes |= FAULT["limit_low"] * self.pressed_low | FAULT["limit_high"] * self.pressed_high
+            causes |= (
+                FAULT["limit_low"] * self.pressed_low | FAULT["limit_high"] * self.pressed_high
+            )
         limit = self.word.get(DEFINES["AXIS_FOLLOWING_LIMIT"], 0)
         if self.enabled and limit and abs(self.error) > limit:
             causes |= FAULT["following_error"]
@@ -145,11 +169,23 @@ class Axis:
         underrun = self.player.tick()
         old = self.machine
         if self.enabled and not self.seized:
-            step = self.error - self.error // 2 if self.error > 0 else -(-self.error - -self.error // 2)
+            step = (
+                self.error - self.error // 2
+                if self.error > 0
+                else -(-self.error - -self.error // 2)
+            )
             limit = self.low_at - SLIDE if self.low_at is not None else None
-            self.machine = self.machine + step if limit is None else max(self.machine + step, min(limit, self.machine))
+            self.machine = (
+                self.machine + step
+                if limit is None
+                else max(self.machine + step, min(limit, self.machine))
+            )
         self.speed = self.machine - old
-        met = [place for place in self.index if min(old, self.machine) < place <= max(old, self.machine)]
+        met = [
+            place
+            for place in self.index
+            if min(old, self.machine) < place <= max(old, self.machine)
+        ]
         self.passed = met[0 if self.speed > 0 else -1] + self.origin if met else None
         if self.low_at is not None:
             if self.machine <= self.low_at:
@@ -165,19 +201,32 @@ class Axis:
 
     def read(self, offset):
         d = DEFINES
-        wide = {d["AXIS_POSITION"]: self.position, d["AXIS_TARGET"]: self.target, d["AXIS_FAULT_POSITION"]: self.fault_position}
+        wide = {
+            d["AXIS_POSITION"]: self.position,
+            d["AXIS_TARGET"]: self.target,
+            d["AXIS_FAULT_POSITION"]: self.fault_position,
+        }
         if offset in wide:
             self.latch = wide[offset] >> 32 & 0xFFFF
             return wide[offset] & 0xFFFFFFFF
         if offset - 4 in wide:
             return self.latch
         if offset == d["AXIS_STATE"]:
-            return (d["AXIS_STATE_ENABLED_MASK"] * self.enabled | d["AXIS_STATE_LIMIT_LOW_MASK"] * self.pressed_low |
-                    d["AXIS_STATE_LIMIT_HIGH_MASK"] * self.pressed_high | d["AXIS_STATE_MOVING_MASK"] * self.player.moving |
-                    d["AXIS_STATE_ESTOP_MASK"] * bool(self.causes & FAULT["estop"]) |
-                    16 - len(self.player.queue) << d["AXIS_STATE_QUEUE_FREE_SHIFT"])
-        special = {d["AXIS_FAULTS"]: self.faults, d["AXIS_CAUSES_NOW"]: self.interlock(), d["AXIS_FIRST_FAULT"]: self.first_fault,
-                   d["AXIS_FOLLOWING_ERROR"]: max(-2**31, min(2**31 - 1, self.error)), d["AXIS_VELOCITY"]: self.speed}
+            return (
+                d["AXIS_STATE_ENABLED_MASK"] * self.enabled
+                | d["AXIS_STATE_LIMIT_LOW_MASK"] * self.pressed_low
+                | d["AXIS_STATE_LIMIT_HIGH_MASK"] * self.pressed_high
+                | d["AXIS_STATE_MOVING_MASK"] * self.player.moving
+                | d["AXIS_STATE_ESTOP_MASK"] * bool(self.causes & FAULT["estop"])
+                | 16 - len(self.player.queue) << d["AXIS_STATE_QUEUE_FREE_SHIFT"]
+            )
+        special = {
+            d["AXIS_FAULTS"]: self.faults,
+            d["AXIS_CAUSES_NOW"]: self.interlock(),
+            d["AXIS_FIRST_FAULT"]: self.first_fault,
+            d["AXIS_FOLLOWING_ERROR"]: max(-(2**31), min(2**31 - 1, self.error)),
+            d["AXIS_VELOCITY"]: self.speed,
+        }
         return special.get(offset, self.word.get(offset, 0)) & 0xFFFFFFFF
 
     def write(self, offset, value):
@@ -205,15 +254,28 @@ class Axis:
             self.interlock()
         if offset == d["AXIS_SEGMENT_TICKS"]:
             assert len(self.player.queue) < 16, "a segment was lost: the queue was full"
-            velocity, acceleration = (signed(self.word[d[f"AXIS_SEGMENT_{name}_HIGH"]] << 32 | self.word[d[f"AXIS_SEGMENT_{name}_LOW"]], 64)
-                                      for name in ("VELOCITY", "ACCELERATION"))
-            segment = velocity, acceleration, signed(self.word[d["AXIS_SEGMENT_JERK"]], 32), value & 0xFFFFFF, value >> 24 & 1
+            velocity, acceleration = (
+                signed(
+                    self.word[d[f"AXIS_SEGMENT_{name}_HIGH"]] << 32
+                    | self.word[d[f"AXIS_SEGMENT_{name}_LOW"]],
+                    64,
+                )
+                for name in ("VELOCITY", "ACCELERATION")
+            )
+            segment = (
+                velocity,
+                acceleration,
+                signed(self.word[d["AXIS_SEGMENT_JERK"]], 32),
+                value & 0xFFFFFF,
+                value >> 24 & 1,
+            )
             self.player.queue.append(segment)
             self.pushed.append(segment)
 
 
 class FakeFeedbackChannel:
-    """The registers of a grating; `burst(phases, every)` gives the 1024 words of a burst, which is full after `delay` looks.
+    """The registers of a grating; `burst(phases, every)` gives the 1024 words of a burst, which is
+    full after `delay` looks.
     Without `sine` nothing of sine and cosine is built."""
 
     def __init__(self, sine=True):
@@ -221,10 +283,15 @@ class FakeFeedbackChannel:
         self.word, self.strobes, self.records = {}, [], []
         self.burst, self.spoiled, self.delay = None, False, 0
         self.waiting, self.words, self.taken, self.full = 0, [], 0, False
-        self.points, self.written = {}, {}                              # table in force, table being written
+        self.points, self.written = {}, {}  # table in force, table being written
         self.correction, self.loads = None, 0
         self.armed, self.captured, self.latch = False, None, 0
-        self.most_segments, self.segments, self.use, self.uses = 255, {}, None, []         # use: None, or the settings in force
+        self.most_segments, self.segments, self.use, self.uses = (
+            255,
+            {},
+            None,
+            [],
+        )  # use: None, or the settings in force
 
     def index(self, position):
         if self.armed and self.word.get(DEFINES["FEEDBACK_CAPTURE_SOURCES"], 0) & 1:
@@ -248,8 +315,11 @@ class FakeFeedbackChannel:
         if offset == d["FEEDBACK_CAPTURED_POSITION"] + 4:
             return self.latch
         if offset == d["FEEDBACK_SEGMENT_STATE"]:
-            return (self.most_segments | d["FEEDBACK_SEGMENT_STATE_IN_FORCE_MASK"] * (self.use is not None) |
-                    d["FEEDBACK_SEGMENT_STATE_KNOWN_MASK"])
+            return (
+                self.most_segments
+                | d["FEEDBACK_SEGMENT_STATE_IN_FORCE_MASK"] * (self.use is not None)
+                | d["FEEDBACK_SEGMENT_STATE_KNOWN_MASK"]
+            )
         if offset == d["FEEDBACK_SEGMENT_STORED"]:
             return self.segments.get(self.word[d["FEEDBACK_SEGMENT_READ"]], 0) & 0xFFFFFFFF
         if offset == d["FEEDBACK_POSITION_SOURCE"]:
@@ -257,11 +327,23 @@ class FakeFeedbackChannel:
         return self.word.get(offset, 0)
 
     def wide(self, name, bits):
-        return signed(self.word[DEFINES[f"{name}_HIGH"]] << 32 & (1 << bits) - 1 | self.word[DEFINES[f"{name}_LOW"]], bits)
+        return signed(
+            self.word[DEFINES[f"{name}_HIGH"]] << 32 & (1 << bits) - 1
+            | self.word[DEFINES[f"{name}_LOW"]],
+            bits,
+        )
 
     def use_segments(self, value):
-        self.use = dict(linear=bool(value & 2), segments=value >> 2, length=self.wide("FEEDBACK_SEGMENT_LENGTH", 48),
-                        origin=self.wide("FEEDBACK_SEGMENT_ORIGIN", 48)) if value & 1 else None
+        self.use = (
+            dict(
+                linear=bool(value & 2),
+                segments=value >> 2,
+                length=self.wide("FEEDBACK_SEGMENT_LENGTH", 48),
+                origin=self.wide("FEEDBACK_SEGMENT_ORIGIN", 48),
+            )
+            if value & 1
+            else None
+        )
         self.uses.append(self.use and self.use["linear"])
 
     def write(self, offset, value):
@@ -285,9 +367,14 @@ class FakeFeedbackChannel:
                 self.words = self.burst(*self.records[-1]) if self.burst else []
             if value & d["FEEDBACK_STROBES_LOAD_CORRECTION_MASK"]:
                 offsets = self.word[d["FEEDBACK_CORRECTION_OFFSET"]]
-                self.correction = dict(sin_offset=signed(offsets & 0xFFFF, 16), cos_offset=signed(offsets >> 16, 16),
-                                       gain=self.word[d["FEEDBACK_CORRECTION_GAIN"]],
-                                       quadrature_error=signed(self.word[d["FEEDBACK_CORRECTION_QUADRATURE_ERROR"]], 17))
+                self.correction = dict(
+                    sin_offset=signed(offsets & 0xFFFF, 16),
+                    cos_offset=signed(offsets >> 16, 16),
+                    gain=self.word[d["FEEDBACK_CORRECTION_GAIN"]],
+                    quadrature_error=signed(
+                        self.word[d["FEEDBACK_CORRECTION_QUADRATURE_ERROR"]], 17
+                    ),
+                )
             if value & d["FEEDBACK_STROBES_SWAP_HARMONICS_MASK"]:
                 assert len(self.written) == 256, "a table was taken that was not written whole"
                 self.points, self.written, self.loads = self.written, {}, self.loads + 1
@@ -296,15 +383,33 @@ class FakeFeedbackChannel:
 class FakeNode:
     """The node under the firmware; request() speaks to it as the master does."""
 
-    def __init__(self, *axes, map_crc=DEFINES["MAP_CRC"], address=2, image="axis", peripherals=None, sine=True):
-        self.axes, self.address, self.map_crc, self.clk = list(axes) or [Axis()], address, map_crc, 0
+    def __init__(
+        self,
+        *axes,
+        map_crc=DEFINES["MAP_CRC"],
+        address=2,
+        image="axis",
+        peripherals=None,
+        sine=True,
+    ):
+        self.axes, self.address, self.map_crc, self.clk = (
+            list(axes) or [Axis()],
+            address,
+            map_crc,
+            0,
+        )
         self.feedback_channels = [FakeFeedbackChannel(sine=sine) for _ in self.axes]
         # words by their offset; all drives are built
-        self.actuators = [{DEFINES["ACTUATOR_DRIVE"]: DEFINES["ACTUATOR_DRIVE_BUILT_MASK"]} for _ in self.axes]
+        self.actuators = [
+            {DEFINES["ACTUATOR_DRIVE"]: DEFINES["ACTUATOR_DRIVE_BUILT_MASK"]} for _ in self.axes
+        ]
         self.peripherals = peripherals
         self.received, self.sent, self.word, self.crc_bytes = deque(), [], {}, b""
         self.sequence = 0
-        self.answers = READ(self.read), WRITE(self.write)               # kept alive as long as the firmware may call
+        self.answers = (
+            READ(self.read),
+            WRITE(self.write),
+        )  # kept alive as long as the firmware may call
         self.firmware = library(image)
         self.firmware.register_bridge(*self.answers)
         self.firmware.firmware_start()
@@ -312,9 +417,13 @@ class FakeNode:
     def read(self, offset):
         d = DEFINES
         if offset >= d["ACTUATOR_BASE"]:
-            return self.actuators[(offset - d["ACTUATOR_BASE"]) // d["ACTUATOR_STRIDE"]].get(offset % d["ACTUATOR_STRIDE"], 0)
+            return self.actuators[(offset - d["ACTUATOR_BASE"]) // d["ACTUATOR_STRIDE"]].get(
+                offset % d["ACTUATOR_STRIDE"], 0
+            )
         if offset >= d["FEEDBACK_BASE"]:
-            return self.feedback_channels[(offset - d["FEEDBACK_BASE"]) // d["FEEDBACK_STRIDE"]].read(offset % d["FEEDBACK_STRIDE"])
+            return self.feedback_channels[
+                (offset - d["FEEDBACK_BASE"]) // d["FEEDBACK_STRIDE"]
+            ].read(offset % d["FEEDBACK_STRIDE"])
         if offset >= d["AXIS_BASE"]:
             axis = (offset - d["AXIS_BASE"]) // d["AXIS_STRIDE"]
             return self.axes[axis].read(offset % d["AXIS_STRIDE"])
@@ -323,28 +432,42 @@ class FakeNode:
         if offset >= d["BUS_BASE"]:
             offset -= d["BUS_BASE"]
             if offset == d["BUS_RECEIVE"]:
-                return self.received.popleft() | d["BUS_RECEIVE_PRESENT_MASK"] if self.received else 0
+                return (
+                    self.received.popleft() | d["BUS_RECEIVE_PRESENT_MASK"] if self.received else 0
+                )
             if offset == d["BUS_STATE"]:
                 return 128
             if offset == d["BUS_CRC"]:
                 return zlib.crc32(self.crc_bytes)
             return self.word.get(d["BUS_BASE"] + offset, 0)
         build = len(self.axes) | self.address << 4 | 64 << 8
-        return {d["NODE_MAP_CRC"]: self.map_crc, d["NODE_CLK_HZ"]: CLK_HZ, d["NODE_BUILD"]: build,
-                d["NODE_TIME_STAMP"]: self.clk & 0xFFFFFFFF}.get(offset, self.word.get(offset, 0))
+        return {
+            d["NODE_MAP_CRC"]: self.map_crc,
+            d["NODE_CLK_HZ"]: CLK_HZ,
+            d["NODE_BUILD"]: build,
+            d["NODE_TIME_STAMP"]: self.clk & 0xFFFFFFFF,
+        }.get(offset, self.word.get(offset, 0))
 
     def write(self, offset, value):
         d = DEFINES
         if offset >= d["ACTUATOR_BASE"]:
-            built = d["ACTUATOR_DRIVE_BUILT_MASK"] if offset % d["ACTUATOR_STRIDE"] == d["ACTUATOR_DRIVE"] else 0
-            self.actuators[(offset - d["ACTUATOR_BASE"]) // d["ACTUATOR_STRIDE"]][offset % d["ACTUATOR_STRIDE"]] = value | built
+            built = (
+                d["ACTUATOR_DRIVE_BUILT_MASK"]
+                if offset % d["ACTUATOR_STRIDE"] == d["ACTUATOR_DRIVE"]
+                else 0
+            )
+            self.actuators[(offset - d["ACTUATOR_BASE"]) // d["ACTUATOR_STRIDE"]][
+                offset % d["ACTUATOR_STRIDE"]
+            ] = value | built
         elif offset >= d["FEEDBACK_BASE"]:
             axis = (offset - d["FEEDBACK_BASE"]) // d["FEEDBACK_STRIDE"]
             self.feedback_channels[axis].write(offset % d["FEEDBACK_STRIDE"], value)
             if offset % d["FEEDBACK_STRIDE"] == d["FEEDBACK_ALIGN"]:
                 self.axes[axis].origin += signed(value & 7, 3) * (PERIOD // 4)
         elif offset >= d["AXIS_BASE"]:
-            self.axes[(offset - d["AXIS_BASE"]) // d["AXIS_STRIDE"]].write(offset % d["AXIS_STRIDE"], value)
+            self.axes[(offset - d["AXIS_BASE"]) // d["AXIS_STRIDE"]].write(
+                offset % d["AXIS_STRIDE"], value
+            )
         elif offset >= d["PERIPHERALS_BASE"]:
             if self.peripherals:
                 self.peripherals.write(offset - d["PERIPHERALS_BASE"], value)
@@ -384,7 +507,7 @@ class FakeNode:
         """Put words on the line and return what the node sends."""
         self.sent.clear()
         for n in range(0, len(words), 8):
-            self.received.extend(words[n:n + 8])
+            self.received.extend(words[n : n + 8])
             self.poll()
         return bytes(self.sent)
 
@@ -433,8 +556,12 @@ class FakeNode:
 
     def status(self, axis=0):
         answer = self.ask("status", axis=axis)
-        return {**answer, "state": STATE[answer["state"]], "ended": CAUSE[answer["ended"]],
-                "flags": {name for name, bit in FLAG.items() if answer["flags"] & bit}}
+        return {
+            **answer,
+            "state": STATE[answer["state"]],
+            "ended": CAUSE[answer["ended"]],
+            "flags": {name for name, bit in FLAG.items() if answer["flags"] & bit},
+        }
 
     def set(self, axis=0, **values):
         for name, value in values.items():

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What stands around a station: the link registers as the firmware sees them, behind each link a part.
+"""What stands around a station: the link registers as the firmware sees them, behind each link a
+part.
 
-A part has `built` (its bit of peripherals.built), `read(offset)` (None: not its register), `write(offset, value)` and `millisecond(machine)`.
+A part has `built` (its bit of peripherals.built), `read(offset)` (None: not its register),
+`write(offset, value)` and `millisecond(machine)`.
 """
+
 import math
 from collections import deque
 
@@ -32,19 +35,39 @@ class FakePeripherals:
 
 
 class Table:
-    """Axis 0 turns it by a worm: 0.18 arcsec a step, with the worm's error, backlash and stiction. Angles in arcsec, endless."""
+    """Axis 0 turns it by a worm: 0.18 arcsec a step, with the worm's error, backlash and stiction.
+    Angles in arcsec, endless.
+    """
 
-    def __init__(self, random_source, angle=0.0, backlash=20.0, worm_error=8.0, wheel_error=15.0, stick=1.0, sign=1):
+    def __init__(
+        self,
+        random_source,
+        angle=0.0,
+        backlash=20.0,
+        worm_error=8.0,
+        wheel_error=15.0,
+        stick=1.0,
+        sign=1,
+    ):
         self.phases = [random_source.uniform(0, 2 * math.pi) for _ in range(2)]
-        self.backlash, self.worm_error, self.wheel_error, self.stick, self.sign = backlash, worm_error, wheel_error, stick, sign
+        self.backlash, self.worm_error, self.wheel_error, self.stick, self.sign = (
+            backlash,
+            worm_error,
+            wheel_error,
+            stick,
+            sign,
+        )
         self.blocked = False
         self.nut = 0.0
         self.angle = angle
         self.offset = angle - self.of_nut(0.0)
 
     def of_nut(self, nut):
-        return nut + self.worm_error * math.sin(2 * math.pi * nut / 7200 + self.phases[0]) + \
-            self.wheel_error * math.sin(2 * math.pi * nut / TURN_ARCSEC + self.phases[1])
+        return (
+            nut
+            + self.worm_error * math.sin(2 * math.pi * nut / 7200 + self.phases[0])
+            + self.wheel_error * math.sin(2 * math.pi * nut / TURN_ARCSEC + self.phases[1])
+        )
 
     def millisecond(self, machine):
         worm = self.sign * machine.axes[0].machine / PERIOD * 4 * 0.18
@@ -55,19 +78,32 @@ class Table:
 
 
 class Sensor:
-    """Frames of the table's angle, one each 10 ms, of 2 ms ago, with S4's 1 arcsec; some are lost or damaged on their way."""
+    """Frames of the table's angle, one each 10 ms, of 2 ms ago, with S4's 1 arcsec; some are lost
+    or damaged on their way.
+    """
 
     built = "SENSOR"
 
     def __init__(self, random_source, table, lost=0.0, damaged=0.0, noise=0.4, wave=0.6):
-        self.random, self.table, self.lost, self.damaged, self.noise, self.wave = random_source, table, lost, damaged, noise, wave
+        self.random, self.table, self.lost, self.damaged, self.noise, self.wave = (
+            random_source,
+            table,
+            lost,
+            damaged,
+            noise,
+            wave,
+        )
         self.ms, self.before = 0, deque([table.angle] * 3, maxlen=3)
         self.word, self.sent_clk, self.clk, self.latched = 0, 0, 0, 0
         self.frames, self.missed, self.wrong = 0, 0, 0
         self.dead = self.stuck = False
 
     def reading(self, angle):
-        return angle + self.wave * math.sin(72 * 2 * math.pi * angle / TURN_ARCSEC) + self.random.uniform(-self.noise, self.noise)
+        return (
+            angle
+            + self.wave * math.sin(72 * 2 * math.pi * angle / TURN_ARCSEC)
+            + self.random.uniform(-self.noise, self.noise)
+        )
 
     def millisecond(self, machine):
         self.table.millisecond(machine)
@@ -89,12 +125,19 @@ class Sensor:
         if offset == d["PERIPHERALS_SENSOR_READING_LOW"]:
             self.latched = self.clk - self.sent_clk
             return self.word
-        return {d["PERIPHERALS_SENSOR_FRAMES"]: self.frames, d["PERIPHERALS_SENSOR_READING_HIGH"]: self.latched,
-                d["PERIPHERALS_SENSOR_ERRORS"]: min(self.wrong, 255) << d["PERIPHERALS_SENSOR_ERRORS_CRC_SHIFT"] |
-                min(self.missed, 255) << d["PERIPHERALS_SENSOR_ERRORS_MISSED_SHIFT"]}.get(offset)
+        return {
+            d["PERIPHERALS_SENSOR_FRAMES"]: self.frames,
+            d["PERIPHERALS_SENSOR_READING_HIGH"]: self.latched,
+            d["PERIPHERALS_SENSOR_ERRORS"]: min(self.wrong, 255)
+            << d["PERIPHERALS_SENSOR_ERRORS_CRC_SHIFT"]
+            | min(self.missed, 255) << d["PERIPHERALS_SENSOR_ERRORS_MISSED_SHIFT"],
+        }.get(offset)
 
     def write(self, offset, value):
-        if offset == DEFINES["PERIPHERALS_SENSOR_ERRORS"] and value & DEFINES["PERIPHERALS_SENSOR_ERRORS_CLEAR_MASK"]:
+        if (
+            offset == DEFINES["PERIPHERALS_SENSOR_ERRORS"]
+            and value & DEFINES["PERIPHERALS_SENSOR_ERRORS_CLEAR_MASK"]
+        ):
             self.missed = self.wrong = 0
 
 
@@ -102,7 +145,7 @@ class PeerPort:
     """Bytes to and from another node; `spoil(bytes)` may change what this one sends."""
 
     built = "PEER"
-    CHARACTERS = 11                                             # a millisecond
+    CHARACTERS = 11  # a millisecond
 
     def __init__(self):
         self.received, self.sent, self.other, self.spoil = deque(), deque(), None, list
@@ -116,7 +159,11 @@ class PeerPort:
 
     def read(self, offset):
         if offset == DEFINES["PERIPHERALS_PEER_RECEIVE"]:
-            return self.received.popleft() | DEFINES["PERIPHERALS_PEER_RECEIVE_PRESENT_MASK"] if self.received else 0
+            return (
+                self.received.popleft() | DEFINES["PERIPHERALS_PEER_RECEIVE_PRESENT_MASK"]
+                if self.received
+                else 0
+            )
         return 64 - len(self.sent) if offset == DEFINES["PERIPHERALS_PEER_STATE"] else None
 
     def write(self, offset, value):
@@ -162,8 +209,12 @@ class NumericDisplay:
 
     def text(self):
         r = self.registers
-        assert r[0x9] == 0xFF and r[0xB] == 7 and r[0xC] == 1 and r[0xF] == 0, "the display is not set up"
-        return "".join(self.SIGNS[r[digit] & 15] + "." * (r[digit] >> 7) for digit in range(8, 0, -1)).strip()
+        assert r[0x9] == 0xFF and r[0xB] == 7 and r[0xC] == 1 and r[0xF] == 0, (
+            "the display is not set up"
+        )
+        return "".join(
+            self.SIGNS[r[digit] & 15] + "." * (r[digit] >> 7) for digit in range(8, 0, -1)
+        ).strip()
 
     def millisecond(self, machine):
         pass

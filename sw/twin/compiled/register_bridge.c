@@ -7,18 +7,11 @@
 static uint32_t (*read_function)(uint32_t);
 static void (*write_function)(uint32_t, uint32_t);
 
-void register_bridge(uint32_t (*read)(uint32_t), void (*write)(uint32_t, uint32_t))
-{
+void register_bridge(uint32_t (*read)(uint32_t), void (*write)(uint32_t, uint32_t)) {
     read_function = read;
     write_function = write;
 }
 
-uint32_t register_read(uint32_t offset)
-{
-    return read_function(offset);
-}
+uint32_t register_read(uint32_t offset) { return read_function(offset); }
 
-void register_write(uint32_t offset, uint32_t value)
-{
-    write_function(offset, value);
-}
+void register_write(uint32_t offset, uint32_t value) { write_function(offset, value); }

@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A main node of S4 without hardware: what stands around it, byte by byte, behind the registers of its peripherals.
+"""A main node of S4 without hardware: what stands around it, byte by byte, behind the registers of
+its peripherals.
 
-On the I2C bus an EEPROM 24AA128, a key-pad controller TCA8418 and a character display HD44780 behind a PCF8574; on PS/2 the wire-EDM
-machine and a person at its keyboard; on the peer port a sub-node. Time is the node's: i2c commands take as long as the bus does.
+On the I2C bus an EEPROM 24AA128, a key-pad controller TCA8418 and a character display HD44780
+behind a PCF8574; on PS/2 the wire-EDM
+machine and a person at its keyboard; on the peer port a sub-node. Time is the node's: i2c commands
+take as long as the bus does.
 """
+
 import random
 import zlib
 from collections import deque
 
 from twin.compiled.node import CLK_HZ, DEFINES, TABLE, Axis, FakeNode
 
-BYTE_CLK, EDGE_CLK = CLK_HZ * 9 // 100_000, CLK_HZ // 100_000           # at 100 kHz
+BYTE_CLK, EDGE_CLK = CLK_HZ * 9 // 100_000, CLK_HZ // 100_000  # at 100 kHz
 STATE = {code: name for name, (code, _) in TABLE["job_state"].items()}
 CAUSE = {code: name for name, (code, _) in TABLE["cause"].items()}
 ACTION = {name: code for name, (code, _) in TABLE["job_action"].items()}
@@ -18,8 +22,33 @@ FLAG = {name: 1 << bit for name, (bit, _) in TABLE["job_flag"].items()}
 SETTING = {name: setting["id"] for name, setting in TABLE["setting"].items()}
 OPERATION = {name: operation["code"] for name, operation in TABLE["operation"].items()}
 OK, NOT_ACKNOWLEDGED, NO_BUS = 0, 1, 3
-KEYS = ["7", "8", "9", "START", "PAUSE", "RESUME", "STOP", "4", "5", "6", "AGAIN", "NEXT", "UP", "DOWN", "1", "2", "3", "DIVIDE", "LIST",
-        "LIMIT", "SPEED", "0", ".", "ENTER", "CLEAR"]
+KEYS = [
+    "7",
+    "8",
+    "9",
+    "START",
+    "PAUSE",
+    "RESUME",
+    "STOP",
+    "4",
+    "5",
+    "6",
+    "AGAIN",
+    "NEXT",
+    "UP",
+    "DOWN",
+    "1",
+    "2",
+    "3",
+    "DIVIDE",
+    "LIST",
+    "LIMIT",
+    "SPEED",
+    "0",
+    ".",
+    "ENTER",
+    "CLEAR",
+]
 TURN = 129_600_000
 
 
@@ -44,13 +73,15 @@ class Device:
 
 
 class Eeprom(Device):
-    """Microchip 24AA128. A power cut while a page is written leaves each of its bytes as it was, as it should be, or as anything."""
+    """Microchip 24AA128. A power cut while a page is written leaves each of its bytes as it was, as
+    it should be, or as anything.
+    """
 
     BYTES, PAGE, WRITE = 16384, 64, ms(5)
 
     def __init__(self):
-        self.memory = bytearray(b"\xFF" * self.BYTES)
-        self.worn = {}                                                  # bytes that keep a value of their own
+        self.memory = bytearray(b"\xff" * self.BYTES)
+        self.worn = {}  # bytes that keep a value of their own
         self.busy_until, self.came, self.pointer, self.page, self.writes = 0, [], 0, None, 0
 
     def begun(self, now, reads):
@@ -70,7 +101,7 @@ class Eeprom(Device):
     def stopped(self, now):
         if len(self.came) > 2:
             start = self.pointer // self.PAGE * self.PAGE
-            self.page = start, bytes(self.memory[start:start + self.PAGE])
+            self.page = start, bytes(self.memory[start : start + self.PAGE])
             for n, byte in enumerate(self.came[2:]):
                 self.memory[start + (self.pointer + n) % self.PAGE] = byte
             for place, byte in self.worn.items():
@@ -82,7 +113,9 @@ class Eeprom(Device):
         if now < self.busy_until:
             start, before = self.page
             for n, old in enumerate(before):
-                self.memory[start + n] = source.choice((old, self.memory[start + n], source.randrange(256)))
+                self.memory[start + n] = source.choice(
+                    (old, self.memory[start + n], source.randrange(256))
+                )
         torn, self.busy_until, self.came = now < self.busy_until, 0, []
         return torn
 
@@ -131,13 +164,20 @@ class Display(Device):
         self.power_cut(0)
 
     def power_cut(self, now):
-        self.port, self.four_bits, self.half, self.memory, self.address, self.on = 0xFF, False, None, {}, 0, False
+        self.port, self.four_bits, self.half, self.memory, self.address, self.on = (
+            0xFF,
+            False,
+            None,
+            {},
+            0,
+            False,
+        )
         self.busy_until, self.too_soon, self.rs_moved = now + ms(15), 0, 0
 
     def written(self, now, byte):
-        if self.port & ~byte & 4 and not self.port & 2:                 # E falls, RW is low
+        if self.port & ~byte & 4 and not self.port & 2:  # E falls, RW is low
             self.strobe(now, self.port & 1, self.port >> 4)
-        self.rs_moved += bool((self.port ^ byte) & 1 and byte & 4)      # RS must stand before E rises
+        self.rs_moved += bool((self.port ^ byte) & 1 and byte & 4)  # RS must stand before E rises
         self.port = byte
         return True
 
@@ -166,7 +206,10 @@ class Display(Device):
             self.memory, self.address = {}, 0
 
     def lines(self):
-        return ["".join(self.memory.get(start + n, " ") for n in range(20)) if self.on else "" for start in (0x00, 0x40, 0x14, 0x54)]
+        return [
+            "".join(self.memory.get(start + n, " ") for n in range(20)) if self.on else ""
+            for start in (0x00, 0x40, 0x14, 0x54)
+        ]
 
 
 class I2cBus:
@@ -177,7 +220,7 @@ class I2cBus:
         self.power_cut()
 
     def power_cut(self):
-        self.waiting, self.answers, self.end = deque(), deque(), 0      # (time when it ends, command)
+        self.waiting, self.answers, self.end = deque(), deque(), 0  # (time when it ends, command)
         self.device, self.mode = None, "idle"
 
     def command(self, now, word):
@@ -214,11 +257,17 @@ class I2cBus:
 
     def take(self, now):
         self.work(now)
-        return self.answers.popleft() | DEFINES["PERIPHERALS_I2C_ANSWER_PRESENT_MASK"] if self.answers else 0
+        return (
+            self.answers.popleft() | DEFINES["PERIPHERALS_I2C_ANSWER_PRESENT_MASK"]
+            if self.answers
+            else 0
+        )
 
     def state(self, now):
         self.work(now)
-        return 128 - len(self.waiting) | DEFINES["PERIPHERALS_I2C_STATE_BUSY_MASK"] * bool(self.waiting)
+        return 128 - len(self.waiting) | DEFINES["PERIPHERALS_I2C_STATE_BUSY_MASK"] * bool(
+            self.waiting
+        )
 
 
 class Edm:
@@ -228,7 +277,7 @@ class Edm:
     IDLE, KEY = ms(300), ms(1)
 
     def __init__(self):
-        self.heard, self.cuts = b"", []                                 # cuts: when they began
+        self.heard, self.cuts = b"", []  # cuts: when they began
         self.cut_ms, self.reaction_ms = 400, 50
         self.deaf = self.endless = self.takes_nothing = False
         self.types_until = self.quiet_since = self.typed = 0
@@ -236,12 +285,14 @@ class Edm:
         self.inputs = 0
         self.power_cut()
 
-    def power_cut(self):                                                # of the node
+    def power_cut(self):  # of the node
         self.queue, self.injecting, self.edges, self.next_key = deque(), False, 0, 0
 
     def take_back(self):
         """What is queued; a sequence that is under way is finished."""
-        under_way = next(n for n, (_, last) in enumerate(self.queue, 1) if last) if self.injecting else 0
+        under_way = (
+            next(n for n, (_, last) in enumerate(self.queue, 1) if last) if self.injecting else 0
+        )
         self.queue = deque(list(self.queue)[:under_way])
 
     def set(self, inputs):
@@ -259,7 +310,11 @@ class Edm:
         free = now - self.quiet_since > self.IDLE and not self.takes_nothing
         if self.queue and (free or self.injecting) and now >= self.next_key:
             byte, last = self.queue.popleft()
-            self.injecting, self.next_key, self.heard = not last, now + self.KEY, self.heard + bytes([byte])
+            self.injecting, self.next_key, self.heard = (
+                not last,
+                now + self.KEY,
+                self.heard + bytes([byte]),
+            )
             if self.heard.endswith(self.START) and not self.deaf and not self.inputs:
                 self.start_at = now + ms(self.reaction_ms)
         if self.start_at is not None and now >= self.start_at:
@@ -272,21 +327,38 @@ class Edm:
 
 
 class Station(FakeNode):
-    """The node, powered up. `absent` names what is not there: eeprom, keypad, display. `built`: a mask of the peripherals."""
+    """The node, powered up. `absent` names what is not there: eeprom, keypad, display. `built`: a
+    mask of the peripherals.
+    """
 
     CLK_HZ, POLL_CLK = CLK_HZ, CLK_HZ // 2000
 
     def __init__(self, absent=(), built=63, seed=0):
         self.source = random.Random(seed)
-        self.eeprom, self.keypad, self.display, self.edm, self.bus = Eeprom(), Keypad(), Display(), Edm(), I2cBus()
+        self.eeprom, self.keypad, self.display, self.edm, self.bus = (
+            Eeprom(),
+            Keypad(),
+            Display(),
+            Edm(),
+            I2cBus(),
+        )
         self.sub_node = None
         self.built, self.peer_received = built, deque()
-        self.bus.devices = {address: device for name, address, device in (("eeprom", 0x50, self.eeprom), ("keypad", 0x34, self.keypad),
-                                                                         ("display", 0x27, self.display)) if name not in absent}
+        self.bus.devices = {
+            address: device
+            for name, address, device in (
+                ("eeprom", 0x50, self.eeprom),
+                ("keypad", 0x34, self.keypad),
+                ("display", 0x27, self.display),
+            )
+            if name not in absent
+        }
         super().__init__(Axis(), image="station")
 
     def power_cut(self):
-        """Of the node and what it feeds, just now; it has power again at once. Whether a page of the EEPROM was being written."""
+        """Of the node and what it feeds, just now; it has power again at once. Whether a page of
+        the EEPROM was being written.
+        """
         self.bus.work(self.clk)
         torn = self.eeprom.power_cut(self.clk, self.source)
         self.keypad.power_cut()
@@ -308,13 +380,20 @@ class Station(FakeNode):
         if at == d["PERIPHERALS_I2C_STATE"]:
             return self.bus.state(self.clk)
         if at == d["PERIPHERALS_PS2_STATE"]:
-            return 32 - len(self.edm.queue) | d["PERIPHERALS_PS2_STATE_INJECTING_MASK"] * self.edm.injecting
+            return (
+                32 - len(self.edm.queue)
+                | d["PERIPHERALS_PS2_STATE_INJECTING_MASK"] * self.edm.injecting
+            )
         if at == d["PERIPHERALS_PS2_TYPED"]:
             return self.edm.typed
         if at == d["PERIPHERALS_EDM_STATUS"]:
             return self.edm.inputs | self.edm.edges
         if at == d["PERIPHERALS_PEER_RECEIVE"]:
-            return self.peer_received.popleft() | d["PERIPHERALS_PEER_RECEIVE_PRESENT_MASK"] if self.peer_received else 0
+            return (
+                self.peer_received.popleft() | d["PERIPHERALS_PEER_RECEIVE_PRESENT_MASK"]
+                if self.peer_received
+                else 0
+            )
         if at == d["PERIPHERALS_PEER_STATE"]:
             return 64
         return self.word.get(offset, 0)
@@ -353,10 +432,18 @@ class Station(FakeNode):
 
     def job(self):
         reported = self.ask("job")
-        return {**reported, "state": STATE[reported["state"]], "cause": CAUSE[reported["cause"]],
-                "answers": {name for name, code in ACTION.items() if reported["answers"] >> code & 1},
-                "flags": {name for name, bit in FLAG.items() if reported["flags"] & bit},
-                "table_faults": {name for name, (bit, _) in TABLE["fault"].items() if reported["table_faults"] >> bit & 1}}
+        return {
+            **reported,
+            "state": STATE[reported["state"]],
+            "cause": CAUSE[reported["cause"]],
+            "answers": {name for name, code in ACTION.items() if reported["answers"] >> code & 1},
+            "flags": {name for name, bit in FLAG.items() if reported["flags"] & bit},
+            "table_faults": {
+                name
+                for name, (bit, _) in TABLE["fault"].items()
+                if reported["table_faults"] >> bit & 1
+            },
+        }
 
     def do(self, action):
         return self.request("job_do", action=ACTION[action])[0]
@@ -389,7 +476,9 @@ class Station(FakeNode):
     def save_settings(self, action="save"):
         """How that ended."""
         cause, _ = self.request("save_settings", action=TABLE["save_action"][action][0])
-        assert cause == "ok" and self.run(60_000, until=lambda: self.firmware.store_state() != 2), cause
+        assert cause == "ok" and self.run(60_000, until=lambda: self.firmware.store_state() != 2), (
+            cause
+        )
         return self.saved_settings()["cause"]
 
     def saved_settings(self):
@@ -398,7 +487,10 @@ class Station(FakeNode):
 
     def program(self):
         """The angles that are in force."""
-        return [self.ask("job_angle", station=n)["angle"] for n in range(self.ask("job_stations")["stations"])]
+        return [
+            self.ask("job_angle", station=n)["angle"]
+            for n in range(self.ask("job_stations")["stations"])
+        ]
 
     def press(self, *keys):
         for key in keys:
@@ -411,15 +503,28 @@ class Station(FakeNode):
 
 
 class SubNode:
-    """A node that indexes, on the peer port: in `move_ms` it is there. `frames` or as printed; faults from outside."""
+    """A node that indexes, on the peer port: in `move_ms` it is there. `frames` or as printed;
+    faults from outside.
+    """
 
     def __init__(self, frames=True, move_ms=200):
         self.frames, self.move_ms = frames, move_ms
         self.angles, self.came, self.to_send, self.heads = [], bytearray(), deque(), 0
-        self.target, self.there_at, self.ended, self.fault, self.dead, self.requests = 0, None, CAUSE_CODE["no_motion_yet"], None, False, 0
+        self.target, self.there_at, self.ended, self.fault, self.dead, self.requests = (
+            0,
+            None,
+            CAUSE_CODE["no_motion_yet"],
+            None,
+            False,
+            0,
+        )
         self.last_request = self.last_reply = None
-        self.speeds = []                                                # override that came before each order
-        self.faults, self.cause_stands, self.resets = (), False, 0      # latched ones, the first one first
+        self.speeds = []  # override that came before each order
+        self.faults, self.cause_stands, self.resets = (
+            (),
+            False,
+            0,
+        )  # latched ones, the first one first
 
     def hear(self, now, byte):
         if self.dead:
@@ -442,7 +547,11 @@ class SubNode:
                 self.send(self.last_reply)
 
     def begin(self, now, angle):
-        self.target, self.there_at, self.ended = angle, now + ms(self.move_ms), CAUSE_CODE["running"]
+        self.target, self.there_at, self.ended = (
+            angle,
+            now + ms(self.move_ms),
+            CAUSE_CODE["running"],
+        )
         self.requests += 1
 
     def do(self, now, body):
@@ -459,8 +568,13 @@ class SubNode:
         elif operation == OPERATION["stop"]:
             self.there_at, self.ended = None, CAUSE_CODE["stopped"]
         latched = [1 << TABLE["fault"][name][0] for name in self.faults]
-        values = {"phase": self.there_at is not None, "ended": self.ended, "target": self.target, "faults": sum(latched),
-                  "first_fault": latched[0] if latched else 0}
+        values = {
+            "phase": self.there_at is not None,
+            "ended": self.ended,
+            "target": self.target,
+            "faults": sum(latched),
+            "first_fault": latched[0] if latched else 0,
+        }
         reply = bytes([body[0], operation, CAUSE_CODE[cause]])
         if operation in (OPERATION["turn_state"], OPERATION["status"]):
             name = next(name for name, code in OPERATION.items() if code == operation)
@@ -485,7 +599,7 @@ class SubNode:
             if self.fault is None:
                 self.angles.append(self.target)
                 if not self.frames:
-                    self.to_send.extend(b"\xFF\xFF\x55")
+                    self.to_send.extend(b"\xff\xff\x55")
         sent = bytes(self.to_send) if not self.dead else b""
         self.to_send.clear()
         return sent
@@ -501,6 +615,6 @@ def cobs(data):
 def uncobs(data):
     parts, at = [], 0
     while at < len(data):
-        parts.append(data[at + 1:at + data[at]])
+        parts.append(data[at + 1 : at + data[at]])
         at += data[at]
     return b"\0".join(parts)

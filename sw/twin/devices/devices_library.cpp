@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// C interface to what stands around a node: to that of a node of the twin, and to one without a node, whose pins are driven from here.
+// C interface to what stands around a node: to that of a node of the twin, and to one without a
+// node, whose pins are driven from here.
 #include <algorithm>
 
 #include "nodes/peer_line.h"
@@ -9,11 +10,11 @@ using namespace twin;
 
 namespace {
 
-class DevicesBench {                                     // without a node
-public:
+class DevicesBench {  // without a node
+ public:
     DevicesBench(const DevicesParameters& parameters, unsigned fitted, uint64_t seed, double clk_hz)
         : devices(parameters, fitted, seed, 1, clk_hz) {}
-    void run(uint64_t clk) {                                  // pins as they are, straight from one event to the next
+    void run(uint64_t clk) {  // pins as they are, straight from one event to the next
         const uint64_t end = now + clk;
         if (clk) devices.clk(++now, drive);
         while (now < end) {
@@ -22,11 +23,12 @@ public:
         }
     }
 
-    void cable() {                                            // a clk with the keyboard straight at the machine's port, no node between
+    void cable() {  // a clk with the keyboard straight at the machine's port, no node between
         const Ps2Keyboard& keyboard = devices.keyboard;
         const Ps2Computer& computer = devices.computer;
-        drive = PERIPHERAL_DRIVE_IDLE | KEYBOARD_CLOCK_LOW * computer.clock_low | KEYBOARD_DATA_LOW * computer.data_low |
-                EDM_CLOCK_LOW * keyboard.clock_low | EDM_DATA_LOW * keyboard.data_low;
+        drive = PERIPHERAL_DRIVE_IDLE | KEYBOARD_CLOCK_LOW * computer.clock_low |
+                KEYBOARD_DATA_LOW * computer.data_low | EDM_CLOCK_LOW * keyboard.clock_low |
+                EDM_DATA_LOW * keyboard.data_low;
         devices.clk(++now, drive);
     }
 
@@ -63,7 +65,9 @@ void devices_type(Devices* s, const uint8_t* bytes, int count, uint64_t at) {
     s->keyboard.type(bytes, count, at);
     s->wake();
 }
-int devices_commands(Devices* s, uint8_t* out, int most) { return take(s->keyboard.commands, out, most); }
+int devices_commands(Devices* s, uint8_t* out, int most) {
+    return take(s->keyboard.commands, out, most);
+}
 void devices_order(Devices* s, const uint8_t* bytes, int count) {
     s->computer.order(bytes, count);
     s->wake();
@@ -79,7 +83,8 @@ int devices_heard(Devices* s, uint8_t* bytes, uint64_t* at, int most) {
     return count;
 }
 int devices_cuts(Devices* s) { return int(s->edm.cuts.size()); }
-void devices_cut(Devices* s, int n, uint64_t* clk, double* angle, int* whole) {     // start and end; end ~0: it goes on
+void devices_cut(Devices* s, int n, uint64_t* clk, double* angle,
+                 int* whole) {  // start and end; end ~0: it goes on
     const EdmCut& cut = s->edm.cuts[size_t(n)];
     clk[0] = cut.start;
     clk[1] = cut.end;
@@ -88,7 +93,8 @@ void devices_cut(Devices* s, int n, uint64_t* clk, double* angle, int* whole) { 
     *whole = cut.whole;
 }
 
-void* devices_bench_new(const DevicesParameters* parameters, unsigned fitted, uint64_t seed, double clk_hz) {
+void* devices_bench_new(const DevicesParameters* parameters, unsigned fitted, uint64_t seed,
+                        double clk_hz) {
     return new DevicesBench(*parameters, fitted, seed, clk_hz);
 }
 void devices_bench_delete(DevicesBench* bench) { delete bench; }
@@ -99,7 +105,8 @@ void devices_bench_pins(DevicesBench* bench, unsigned values, unsigned which) {
     bench->drive = (bench->drive & ~which) | (values & which);
 }
 void devices_bench_run(DevicesBench* bench, uint64_t clk) { bench->run(clk); }
-void devices_bench_watch(DevicesBench* bench, uint64_t clk, uint16_t* levels) {     // the same, with the levels after each clk
+void devices_bench_watch(DevicesBench* bench, uint64_t clk,
+                         uint16_t* levels) {  // the same, with the levels after each clk
     for (uint64_t n = 0; n < clk; n++) {
         bench->run(1);
         levels[n] = uint16_t(bench->devices.levels());
@@ -117,16 +124,21 @@ void devices_bench_power_cut(DevicesBench* bench) {
 }
 void devices_bench_power_on(DevicesBench* bench) { bench->devices.power_on(bench->now); }
 
-void* peer_line_new(uint64_t seed, double clk_hz, double baud) { return new PeerLine(seed, 1, clk_hz, baud); }
+void* peer_line_new(uint64_t seed, double clk_hz, double baud) {
+    return new PeerLine(seed, 1, clk_hz, baud);
+}
 void peer_line_delete(PeerLine* line) { delete line; }
-void peer_line_levels(PeerLine* line, uint64_t from, uint64_t clk, const uint8_t* tx, uint8_t* rx) {   // n clk, the first is `from`
+void peer_line_levels(PeerLine* line, uint64_t from, uint64_t clk, const uint8_t* tx,
+                      uint8_t* rx) {  // n clk, the first is `from`
     for (uint64_t n = 0; n < clk; n++) rx[n] = line->step(from + n, tx[n]);
 }
-void peer_line_put(PeerLine* line, const uint8_t* bytes, int count, uint64_t now) { line->put(bytes, count, now); }
+void peer_line_put(PeerLine* line, const uint8_t* bytes, int count, uint64_t now) {
+    line->put(bytes, count, now);
+}
 void peer_line_garbage(PeerLine* line, double rate, uint64_t now) { line->garbage(rate, now); }
 void peer_line_cut(PeerLine* line, int cut) { line->cut = cut; }
 int peer_line_heard(PeerLine* line, uint8_t* out, int most) { return take(line->heard, out, most); }
-void peer_line_counts(PeerLine* line, uint64_t* out) {        // framing errors, bytes of garbage
+void peer_line_counts(PeerLine* line, uint64_t* out) {  // framing errors, bytes of garbage
     out[0] = line->framing_errors;
     out[1] = line->garbage_bytes;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The wire-EDM machine of S4, as far as an indexing table sees it: keys of its keyboard start a cut, two opto-couplers tell its state.
+// The wire-EDM machine of S4, as far as an indexing table sees it: keys of its keyboard start a
+// cut, two opto-couplers tell its state.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -10,8 +11,8 @@
 
 namespace twin {
 
-class OptoCoupler {                                           // bounces for a while after each change
-public:
+class OptoCoupler {  // bounces for a while after each change
+ public:
     static constexpr uint64_t NEVER = ~uint64_t(0);
 
     bool level() const { return level_; }
@@ -22,14 +23,17 @@ public:
         settles_ = now + bounce;
         next_ = now;
     }
-    uint64_t step(uint64_t now, RandomSource& random) {       // returns when to be called again
+    uint64_t step(uint64_t now, RandomSource& random) {  // returns when to be called again
         if (now < next_) return next_;
         level_ = now >= settles_ ? on_ : !level_;
-        next_ = now >= settles_ ? NEVER : std::min(settles_, now + 1 + uint64_t(random.uniform(0, 0.4) * double(settles_ - now)));
+        next_ = now >= settles_
+                    ? NEVER
+                    : std::min(settles_,
+                               now + 1 + uint64_t(random.uniform(0, 0.4) * double(settles_ - now)));
         return next_;
     }
 
-private:
+ private:
     bool level_ = false, on_ = false;
     uint64_t settles_ = 0, next_ = NEVER;
 };
@@ -37,15 +41,16 @@ private:
 struct EdmCut {
     static constexpr uint64_t GOES_ON = ~uint64_t(0);
     uint64_t start, end = GOES_ON;
-    double angle_start, angle_end = NAN;                      // of the table, true
-    bool whole = false;                                       // no alarm ended it
+    double angle_start, angle_end = NAN;  // of the table, true
+    bool whole = false;                   // no alarm ended it
 };
 
 class Edm {
-public:
+ public:
     static constexpr uint64_t NEVER = ~uint64_t(0);
     static constexpr int KEYS = 6;
-    static constexpr uint8_t START[KEYS] = {0x14, 0x1D, 0xF0, 0x1D, 0xF0, 0x14};     // left control and W, pressed and let go
+    static constexpr uint8_t START[KEYS] = {0x14, 0x1D, 0xF0, 0x1D,
+                                            0xF0, 0x14};  // left control and W, pressed and let go
 
     Edm(uint64_t seed, uint64_t stream) : random_(seed, stream) {}
     template <class P>
@@ -65,7 +70,7 @@ public:
             start_at_ = now + reaction_;
     }
     template <class Angle>
-    uint64_t step(uint64_t now, Angle angle) {                // returns when to be called again
+    uint64_t step(uint64_t now, Angle angle) {  // returns when to be called again
         if (alarm != alarming.on()) {
             alarming.set(now, alarm, bounce_);
             if (alarm) {
@@ -84,15 +89,16 @@ public:
         const bool ends = cutting.on() && !endless;
         const uint64_t end_at = ends ? cuts.back().start + cut_time_ : NEVER;
         if (now >= end_at) end(now, angle(), true);
-        return std::min({start_at_, now >= end_at ? NEVER : end_at, cutting.step(now, random_), alarming.step(now, random_)});
+        return std::min({start_at_, now >= end_at ? NEVER : end_at, cutting.step(now, random_),
+                         alarming.step(now, random_)});
     }
 
     std::vector<EdmCut> cuts;
     OptoCoupler cutting, alarming;
-    bool alarm = false, endless = false, deaf = false;        // faults
-    uint64_t starts = 0, ignored = 0;                         // start sequences; of them while cutting, in alarm or deaf
+    bool alarm = false, endless = false, deaf = false;  // faults
+    uint64_t starts = 0, ignored = 0;  // start sequences; of them while cutting, in alarm or deaf
 
-private:
+ private:
     void end(uint64_t now, double angle, bool whole) {
         EdmCut& cut = cuts.back();
         cut.end = now;

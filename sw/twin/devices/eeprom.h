@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Microchip 24AA128: 16 KiB in pages of 64 bytes. A write rolls over within its page and begins with the stop; until it has ended
-// the device does not acknowledge. The whole page is written again, so a power cut meanwhile may leave each of its bytes as it
-// was, as it should be, or as neither.
+// Microchip 24AA128: 16 KiB in pages of 64 bytes. A write rolls over within its page and begins
+// with the stop; until it has ended the device does not acknowledge. The whole page is written
+// again, so a power cut meanwhile may leave each of its bytes as it was, as it should be, or as
+// neither.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -12,10 +13,12 @@
 namespace twin {
 
 class Eeprom : public I2cDevice {
-public:
+ public:
     static constexpr unsigned ADDRESS = 0x50, BYTES = 16384, PAGE = 64;
 
-    Eeprom(uint64_t seed, uint64_t stream) : I2cDevice(ADDRESS), random_(seed, stream) { memory.fill(0xFF); }
+    Eeprom(uint64_t seed, uint64_t stream) : I2cDevice(ADDRESS), random_(seed, stream) {
+        memory.fill(0xFF);
+    }
     void power_cut(uint64_t now) {
         if (now < busy_until_)
             for (unsigned n = 0; n < PAGE; n++) {
@@ -30,9 +33,9 @@ public:
 
     std::array<uint8_t, BYTES> memory;
     uint64_t write_clk = 0;
-    uint64_t writes = 0, torn = 0;                            // pages
+    uint64_t writes = 0, torn = 0;  // pages
 
-protected:
+ protected:
     bool addressed(uint64_t now, bool) override {
         came_ = 0;
         return now >= busy_until_;
@@ -63,11 +66,11 @@ protected:
         writes++;
     }
 
-private:
+ private:
     RandomSource random_;
     unsigned pointer_ = 0, page_ = 0;
-    int came_ = 0;                                            // bytes since the address; 3: data
-    std::array<int, PAGE> new_{};                             // -1: not written
+    int came_ = 0;                 // bytes since the address; 3: data
+    std::array<int, PAGE> new_{};  // -1: not written
     std::array<uint8_t, PAGE> before_{};
     uint64_t busy_until_ = 0;
 };

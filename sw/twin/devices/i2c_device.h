@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// A device on an I2C bus, as NXP's UM10204 has it: bits, acknowledges, start and stop. What the bytes mean is the device's own.
+// A device on an I2C bus, as NXP's UM10204 has it: bits, acknowledges, start and stop. What the
+// bytes mean is the device's own.
 #pragma once
 #include <cstdint>
 
 namespace twin {
 
 class I2cDevice {
-public:
+ public:
     explicit I2cDevice(unsigned address) : address_(address) {}
     virtual ~I2cDevice() = default;
 
-    void lines(uint64_t now, bool scl, bool sda) {            // the levels, whenever one of them has changed
+    void lines(uint64_t now, bool scl, bool sda) {  // the levels, whenever one of them has changed
         if (scl != scl_)
             scl ? rise(sda) : fall(now);
         else if (scl && sda != sda_)
@@ -19,21 +20,22 @@ public:
         sda_ = sda;
     }
     bool sda_low() const { return sda_low_ && !dead; }
-    void let_go() {                                           // without power, or just given it
+    void let_go() {  // without power, or just given it
         mode_ = IDLE;
         sda_low_ = false;
         scl_ = sda_ = true;
     }
 
-    bool dead = false;                                        // fault: does nothing, as if it were not there
+    bool dead = false;  // fault: does nothing, as if it were not there
 
-protected:
-    virtual bool addressed(uint64_t now, bool reads) = 0;     // returns the acknowledge
+ protected:
+    virtual bool addressed(uint64_t now, bool reads) = 0;  // returns the acknowledge
     virtual bool written(uint64_t now, uint8_t byte) = 0;
-    virtual uint8_t read(uint64_t now) = 0;                   // the next byte
-    virtual void ended(uint64_t, bool /*stopped*/) {}         // by a stop after a whole byte written, or anything else
+    virtual uint8_t read(uint64_t now) = 0;  // the next byte
+    virtual void ended(uint64_t, bool /*stopped*/) {
+    }  // by a stop after a whole byte written, or anything else
 
-private:
+ private:
     enum Mode { IDLE, ADDRESS, WRITTEN, READ };
 
     void start(uint64_t now) {
@@ -43,7 +45,7 @@ private:
         sda_low_ = false;
     }
     void stop(uint64_t now) {
-        if (mode_ == WRITTEN) ended(now, count_ == 1);        // the clock of the stop itself was counted
+        if (mode_ == WRITTEN) ended(now, count_ == 1);  // the clock of the stop itself was counted
         mode_ = IDLE;
         sda_low_ = false;
     }
@@ -60,7 +62,8 @@ private:
         if (mode_ == IDLE || dead) return;
         if (count_ == 8 && mode_ != READ) {
             reads_ = byte_ & 1;
-            sda_low_ = mode_ == WRITTEN ? written(now, byte_) : byte_ >> 1 == address_ && addressed(now, reads_);
+            sda_low_ = mode_ == WRITTEN ? written(now, byte_)
+                                        : byte_ >> 1 == address_ && addressed(now, reads_);
             if (!sda_low_) mode_ = IDLE;
         } else if (count_ == 9) {
             count_ = 0;
@@ -75,7 +78,7 @@ private:
 
     unsigned address_;
     Mode mode_ = IDLE;
-    int count_ = 0;                                           // rising edges of this byte
+    int count_ = 0;  // rising edges of this byte
     uint8_t byte_ = 0, sent_ = 0;
     bool scl_ = true, sda_ = true, sda_low_ = false, reads_ = false, acknowledged_ = false;
 };

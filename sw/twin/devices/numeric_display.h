@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numeric display of eight digits on a MAX7219 (Maxim): words of 16 bits, the highest first, each bit taken with the rising edge of
-// sclk and the word with that of cs_n. Bits 11..8 are the register, 7..0 its contents.
+// Numeric display of eight digits on a MAX7219 (Maxim): words of 16 bits, the highest first, each
+// bit taken with the rising edge of sclk and the word with that of cs_n. Bits 11..8 are the
+// register, 7..0 its contents.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -8,7 +9,7 @@
 namespace twin {
 
 class NumericDisplay {
-public:
+ public:
     static constexpr int DIGITS = 8;
 
     void power_cut() {
@@ -16,7 +17,7 @@ public:
         word_ = 0;
         bits_ = 0;
     }
-    void pins(bool cs_n, bool sclk, bool data) {              // whenever one of them has changed
+    void pins(bool cs_n, bool sclk, bool data) {  // whenever one of them has changed
         if (sclk && !sclk_ && !cs_n) {
             word_ = uint16_t(word_ << 1 | data);
             bits_++;
@@ -31,19 +32,23 @@ public:
         cs_n_ = cs_n;
         sclk_ = sclk;
     }
-    void segments(uint8_t* out) const {                       // of each digit from the left: point, A..G from bit 7 down
+    void segments(uint8_t* out) const {  // of each digit from the left: point, A..G from bit 7 down
         for (unsigned n = DIGITS; n--;) {
             const uint8_t code = registers_[DIGIT_0 + n];
-            const uint8_t lit = registers_[DECODE] >> n & 1 ? (code & 0x80) | CODE_B[code & 15] : code;
-            *out++ = registers_[TEST] & 1 ? 0xFF : (registers_[ON] & 1) && n <= (registers_[SCAN_LIMIT] & 7u) ? lit : 0;
+            const uint8_t lit =
+                registers_[DECODE] >> n & 1 ? (code & 0x80) | CODE_B[code & 15] : code;
+            *out++ = registers_[TEST] & 1                                         ? 0xFF
+                     : (registers_[ON] & 1) && n <= (registers_[SCAN_LIMIT] & 7u) ? lit
+                                                                                  : 0;
         }
     }
 
-    uint64_t cut_short = 0;                                   // words of less than 16 bits
+    uint64_t cut_short = 0;  // words of less than 16 bits
 
-private:
+ private:
     enum Register { DIGIT_0 = 1, DECODE = 9, SCAN_LIMIT = 11, ON = 12, TEST = 15 };
-    static constexpr uint8_t CODE_B[16] = {0x7E, 0x30, 0x6D, 0x79, 0x33, 0x5B, 0x5F, 0x70, 0x7F, 0x7B, 0x01, 0x4F, 0x37, 0x0E, 0x67, 0x00};
+    static constexpr uint8_t CODE_B[16] = {0x7E, 0x30, 0x6D, 0x79, 0x33, 0x5B, 0x5F, 0x70,
+                                           0x7F, 0x7B, 0x01, 0x4F, 0x37, 0x0E, 0x67, 0x00};
 
     std::array<uint8_t, 16> registers_{};
     uint16_t word_ = 0;

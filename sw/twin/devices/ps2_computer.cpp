@@ -16,7 +16,7 @@ uint64_t Ps2Computer::step(uint64_t now, bool clock, bool data) {
 }
 
 void Ps2Computer::fell(uint64_t now, bool data) {
-    if (mode_ == SENDS) {                                     // the device clocks: 8 data bits, parity, stop, acknowledge
+    if (mode_ == SENDS) {  // the device clocks: 8 data bits, parity, stop, acknowledge
         at_ = now + us(FRAME);
         if (bit_ < 10) {
             data_low = !(frame_ >> ++bit_ & 1);
@@ -30,7 +30,7 @@ void Ps2Computer::fell(uint64_t now, bool data) {
         at_ = now + us(FRAME);
         if (++bit_ < 11) return;
         pause_ = now + us(PAUSE);
-        processes_at_ = now + us(LAST);                       // once the last clock is over
+        processes_at_ = now + us(LAST);  // once the last clock is over
         const uint8_t byte = uint8_t(frame_ >> 1);
         again_ = frame_ != ps2_frame(byte);
         damaged += again_;
@@ -50,7 +50,7 @@ void Ps2Computer::take(uint64_t now, uint8_t byte) {
     } else if (byte == 0xFE) {
         failed(now);
     } else {
-        keys.push_back(byte);                                 // it was under way
+        keys.push_back(byte);  // it was under way
     }
 }
 
@@ -63,7 +63,7 @@ void Ps2Computer::timers(uint64_t now) {
     } else if (mode_ == ASKS && due) {
         mode_ = SENDS;
         bit_ = 0;
-        data_low = true;                                      // the start bit
+        data_low = true;  // the start bit
         clock_low = false;
         at_ = now + us(FIRST);
     } else if (mode_ == SENDS && due) {
@@ -71,7 +71,7 @@ void Ps2Computer::timers(uint64_t now) {
         data_low = false;
         failed(now);
     } else if (mode_ == LISTENS && due) {
-        if (bit_) {                                           // a frame that never ended
+        if (bit_) {  // a frame that never ended
             listen(now);
             damaged++;
         } else {
@@ -81,11 +81,11 @@ void Ps2Computer::timers(uint64_t now) {
     if (mode_ != LISTENS) return;
     if (now >= processes_at_) {
         processes_at_ = NEVER;
-        if (again_) return ask(now, 0xFE);                    // before another byte comes
+        if (again_) return ask(now, 0xFE);  // before another byte comes
         if (processing_ > 0) return hold(now, us(processing_ * 1e6));
     }
     if (now >= inhibit_at_) {
-        if (bit_ == 10) {                                     // no device can tell a cut at its last edge
+        if (bit_ == 10) {  // no device can tell a cut at its last edge
             inhibit_at_ = now + us(HOLD);
             return;
         }
@@ -105,7 +105,7 @@ void Ps2Computer::hold(uint64_t now, uint64_t clk) {
     at_ = now + clk;
 }
 
-void Ps2Computer::listen(uint64_t now) {                      // for a new byte
+void Ps2Computer::listen(uint64_t now) {  // for a new byte
     mode_ = LISTENS;
     bit_ = 0;
     at_ = awaits_ || again_ ? now + us(ANSWER) : NEVER;
@@ -119,7 +119,7 @@ void Ps2Computer::ask(uint64_t now, uint8_t byte) {
     at_ = now + us(HOLD);
 }
 
-void Ps2Computer::failed(uint64_t now) {                      // the order will be sent again, but not for ever
+void Ps2Computer::failed(uint64_t now) {  // the order will be sent again, but not for ever
     if (awaits_ && ++tries_ >= TRIES) {
         unanswered++;
         orders_.pop_front();

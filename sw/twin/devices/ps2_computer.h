@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The host side of a PS/2 line, the PC of a machine: takes scan codes, asks for damaged ones again (FE), sends commands with their
-// arguments and waits for the answers. It holds the keyboard after each byte, as an 8042 does, and at random times.
+// The host side of a PS/2 line, the PC of a machine: takes scan codes, asks for damaged ones again
+// (FE), sends commands with their arguments and waits for the answers. It holds the keyboard after
+// each byte, as an 8042 does, and at random times.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -12,7 +13,7 @@
 namespace twin {
 
 class Ps2Computer {
-public:
+ public:
     static constexpr uint64_t NEVER = ~uint64_t(0);
     struct Heard {
         uint64_t at;
@@ -24,26 +25,34 @@ public:
         clk_hz_ = clk_hz;
         processing_ = processing_s;
         inhibits_ = inhibits_per_s;
-        if (inhibits_ <= 0) inhibit_at_ = NEVER;
-        else if (inhibit_at_ == NEVER) inhibit_at_ = 0;
+        if (inhibits_ <= 0)
+            inhibit_at_ = NEVER;
+        else if (inhibit_at_ == NEVER)
+            inhibit_at_ = 0;
     }
-    void order(const uint8_t* bytes, int count) { orders_.insert(orders_.end(), bytes, bytes + count); }
+    void order(const uint8_t* bytes, int count) {
+        orders_.insert(orders_.end(), bytes, bytes + count);
+    }
     size_t waiting() const { return orders_.size(); }
-    // the levels of the lines at clk `now`, whenever they have changed or it has asked for; returns when to be called again
+    // the levels of the lines at clk `now`, whenever they have changed or it has asked for; returns
+    // when to be called again
     uint64_t step(uint64_t now, bool clock, bool data);
 
-    bool clock_low = false, data_low = false;                 // pulls
-    std::vector<Heard> heard;                                 // every good byte
-    std::vector<uint8_t> keys;                                // of them those that are no answers, until taken
+    bool clock_low = false, data_low = false;  // pulls
+    std::vector<Heard> heard;                  // every good byte
+    std::vector<uint8_t> keys;                 // of them those that are no answers, until taken
     uint64_t damaged = 0, unanswered = 0, inhibits = 0;
 
-private:
-    static constexpr double HOLD = 110, LAST = 60, FRAME = 2000, FIRST = 15'000, ANSWER = 100'000, PAUSE = 1000;   // us
+ private:
+    static constexpr double HOLD = 110, LAST = 60, FRAME = 2000, FIRST = 15'000, ANSWER = 100'000,
+                            PAUSE = 1000;  // us
     static constexpr int TRIES = 3;
     enum Mode { LISTENS, INHIBITS, ASKS, SENDS };
 
     uint64_t us(double n) const { return uint64_t(n * clk_hz_ / 1e6 + 0.5) + 1; }
-    bool may_order() const { return mode_ == LISTENS && bit_ == 0 && !awaits_ && !again_ && !orders_.empty(); }
+    bool may_order() const {
+        return mode_ == LISTENS && bit_ == 0 && !awaits_ && !again_ && !orders_.empty();
+    }
     void fell(uint64_t now, bool data);
     void take(uint64_t now, uint8_t byte);
     void timers(uint64_t now);
@@ -58,7 +67,8 @@ private:
     Mode mode_ = LISTENS;
     int bit_ = 0, tries_ = 0;
     unsigned frame_ = 0;
-    bool clock_ = true, awaits_ = false, again_ = false;      // the answer to an order, a damaged byte once more
+    bool clock_ = true, awaits_ = false,
+         again_ = false;  // the answer to an order, a damaged byte once more
     uint64_t at_ = NEVER, inhibit_at_ = NEVER, processes_at_ = NEVER, pause_ = 0;
     std::deque<uint8_t> orders_;
 };

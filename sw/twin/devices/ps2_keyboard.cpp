@@ -22,7 +22,8 @@ uint64_t Ps2Keyboard::step(uint64_t now, bool clock, bool data) {
     switch (phase_) {
     case BEFORE:
     case AFTER:
-        if (held && (phase_ == BEFORE || bit_ < 10)) {        // once the last bit has its clock, the byte is the host's
+        if (held && (phase_ == BEFORE ||
+                     bit_ < 10)) {  // once the last bit has its clock, the byte is the host's
             aborts++;
             return stop();
         }
@@ -37,7 +38,8 @@ uint64_t Ps2Keyboard::step(uint64_t now, bool clock, bool data) {
         phase_ = AFTER;
         return at_ = now + us(HALF / 2);
     }
-    if (mode_ == RECEIVES) frame_ |= unsigned(data) << bit_;  // the host has set it while the clock was low
+    if (mode_ == RECEIVES)
+        frame_ |= unsigned(data) << bit_;  // the host has set it while the clock was low
     if (++bit_ < 11) {
         set_bit();
         phase_ = BEFORE;
@@ -85,7 +87,7 @@ void Ps2Keyboard::set_bit() {
     if (mode_ == SENDS)
         data_low = !(frame_ >> bit_ & 1);
     else
-        data_low = bit_ == 10 && (frame_ >> 9 & 1);           // the acknowledge of a stop bit
+        data_low = bit_ == 10 && (frame_ >> 9 & 1);  // the acknowledge of a stop bit
 }
 
 uint64_t Ps2Keyboard::stop() {
@@ -103,21 +105,21 @@ void Ps2Keyboard::command(uint64_t now, uint8_t byte, bool good) {
     }
     if (byte == 0xFE) return answer(now, {last_});
     commands.push_back(byte);
-    if (awaits_ && byte < 0x80) {                             // an argument
+    if (awaits_ && byte < 0x80) {  // an argument
         if (awaits_ == 0xED) lights = byte & 7;
         awaits_ = 0;
         return answer(now, {0xFA});
     }
     awaits_ = 0;
     switch (byte) {
-    case 0xED: case 0xF0: case 0xF3:
-        awaits_ = byte;
-        return answer(now, {0xFA});
-    case 0xEE:
-        return answer(now, {0xEE});
-    case 0xF2:
-        return answer(now, {0xFA, 0xAB, 0x83});
-    case 0xF4: case 0xF5: case 0xF6:
+    case 0xED:
+    case 0xF0:
+    case 0xF3: awaits_ = byte; return answer(now, {0xFA});
+    case 0xEE: return answer(now, {0xEE});
+    case 0xF2: return answer(now, {0xFA, 0xAB, 0x83});
+    case 0xF4:
+    case 0xF5:
+    case 0xF6:
         enabled_ = byte != 0xF5;
         if (!enabled_) typed_.clear();
         return answer(now, {0xFA});
@@ -128,8 +130,7 @@ void Ps2Keyboard::command(uint64_t now, uint8_t byte, bool good) {
         lights = 0;
         enabled_ = true;
         return;
-    default:
-        return answer(now, {0xFE});
+    default: return answer(now, {0xFE});
     }
 }
 

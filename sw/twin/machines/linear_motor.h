@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The linear motor of S3: voice coil on a current amplifier that a bipolar converter sets, mover on guides with a flexure and a
-// cable, linear scale with a reference mark, end stops and limit switches.
+// The linear motor of S3: voice coil on a current amplifier that a bipolar converter sets, mover on
+// guides with a flexure and a cable, linear scale with a reference mark, end stops and limit
+// switches.
 //
-//   m dv/dt = constant * current - flexure x - cable (x - place) - friction + stops + force from outside
+//   m dv/dt = constant * current - flexure x - cable (x - place) - friction + stops + force from
+//   outside
 #pragma once
 #include "parts/dac_input.h"
 #include "parts/friction.h"
@@ -14,30 +16,37 @@
 namespace twin {
 
 class LinearMotor : public Machine {
-public:
-    LinearMotor(const LinearMotorParameters& parameters, uint64_t seed, uint64_t stream, double clk_hz);
+ public:
+    LinearMotor(const LinearMotorParameters& parameters, uint64_t seed, uint64_t stream,
+                double clk_hz);
 
-    const char* faults() const override { return "limit_low limit_high drive_fault motor_jam encoder_cut a_stuck b_stuck z_stuck"; }
+    const char* faults() const override {
+        return "limit_low limit_high drive_fault motor_jam encoder_cut a_stuck b_stuck z_stuck";
+    }
     void set_position(double where) override;
     void push(double newton) override { pushed_ = newton; }
     const char* state_names() const override {
-        return "time_s position_m velocity_m_s current_a friction_n limit_low? limit_high? a? b? z? enabled? scale_counts# dac_code# "
+        return "time_s position_m velocity_m_s current_a friction_n limit_low? limit_high? a? b? "
+               "z? enabled? scale_counts# dac_code# "
                "dac_frames# dac_bad_frames#";
     }
     void state(uint64_t now, double* out) const override;
 
-protected:
+ protected:
     unsigned pins() const override {
-        return scale_.levels() | switches_.low_pressed * LIMIT_LOW_OPEN | switches_.high_pressed * LIMIT_HIGH_OPEN | SENSOR_RX;
+        return scale_.levels() | switches_.low_pressed * LIMIT_LOW_OPEN |
+               switches_.high_pressed * LIMIT_HIGH_OPEN | SENSOR_RX;
     }
-    void drive_changed(uint64_t, unsigned before, unsigned after) override { dac_.drive_changed(before, after); }
+    void drive_changed(uint64_t, unsigned before, unsigned after) override {
+        dac_.drive_changed(before, after);
+    }
     void move(uint64_t now) override;
     uint64_t sense(uint64_t now) override;
     double* parameter(const char* name) override { return find_parameter(p_, name); }
     void configure() override;
     bool own_fault(const char* name, bool on) override;
 
-private:
+ private:
     double position(uint64_t now) const final { return position_ + velocity_ * since(now); }
 
     LinearMotorParameters p_;

@@ -15,23 +15,29 @@ struct WireFault {
     Level level;
 };
 constexpr WireFault WIRE_FAULTS[] = {
-    {"limit_low", LIMIT_LOW_OPEN, HIGH}, {"limit_high", LIMIT_HIGH_OPEN, HIGH}, {"drive_fault", DRIVE_FAULT, HIGH},
-    {"a_stuck", ENCODER_A, GIVEN},       {"b_stuck", ENCODER_B, GIVEN},         {"z_stuck", ENCODER_Z, GIVEN},
-    {"encoder_cut", ENCODER_A | ENCODER_B | ENCODER_Z, HIGH},                   // receivers fail safe high
+    {"limit_low", LIMIT_LOW_OPEN, HIGH},
+    {"limit_high", LIMIT_HIGH_OPEN, HIGH},
+    {"drive_fault", DRIVE_FAULT, HIGH},
+    {"a_stuck", ENCODER_A, GIVEN},
+    {"b_stuck", ENCODER_B, GIVEN},
+    {"z_stuck", ENCODER_Z, GIVEN},
+    {"encoder_cut", ENCODER_A | ENCODER_B | ENCODER_Z, HIGH},  // receivers fail safe high
     {"sensor_cut", SENSOR_RX, HIGH},
 };
 
 bool among(const char* names, const char* name) {
     const size_t length = std::strlen(name);
     for (const char* at = names; (at = std::strstr(at, name)); at += length)
-        if (length && (at == names || at[-1] == ' ') && (at[length] == 0 || at[length] == ' ')) return true;
+        if (length && (at == names || at[-1] == ' ') && (at[length] == 0 || at[length] == ' '))
+            return true;
     return false;
 }
 
 }  // namespace
 
 Machine::Machine(double clk_hz, double time_step)
-    : clk_hz_(clk_hz), step_clk_(std::max<uint64_t>(1, uint64_t(std::llround(time_step * clk_hz)))),
+    : clk_hz_(clk_hz),
+      step_clk_(std::max<uint64_t>(1, uint64_t(std::llround(time_step * clk_hz)))),
       wire_faults_(std::size(WIRE_FAULTS)) {}
 
 void Machine::advance(uint64_t now, unsigned drive) {
@@ -55,7 +61,8 @@ void Machine::advance(uint64_t now, unsigned drive) {
 
 bool Machine::set(const char* name, double value) {
     double* place = parameter(name);
-    if (!place || !std::strcmp(name, "time_step")) return false;   // the time step is fixed at the start
+    if (!place || !std::strcmp(name, "time_step"))
+        return false;  // the time step is fixed at the start
     *place = value;
     configure();
     return true;
@@ -82,7 +89,7 @@ bool Machine::fault(const char* name, bool on, bool level) {
         forced_ |= pins;
         forced_high_ |= high;
     }
-    event_at_ = 0;                                            // the node sees it with the next clk
+    event_at_ = 0;  // the node sees it with the next clk
     return known;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A machine as one axis of a node sees it: pins in, pins out, advanced clk by clk. A machine that nothing happens to costs one
-// comparison a clk: it is called when a pin that drives it changes, and when it asked to be called.
+// A machine as one axis of a node sees it: pins in, pins out, advanced clk by clk. A machine that
+// nothing happens to costs one comparison a clk: it is called when a pin that drives it changes,
+// and when it asked to be called.
 #pragma once
 #include <cmath>
 #include <cstdint>
@@ -11,7 +12,7 @@ namespace twin {
 
 constexpr uint64_t NEVER = ~uint64_t(0);
 
-enum Drive : unsigned {                                       // pins that the node drives
+enum Drive : unsigned {  // pins that the node drives
     ADC_CS_N = 1 << 0,
     ADC_SCLK = 1 << 1,
     BRIDGE_A = 1 << 2,
@@ -24,7 +25,7 @@ enum Drive : unsigned {                                       // pins that the n
     DAC_SDI = 1 << 9,
 };
 
-enum Sense : unsigned {                                       // pins that the machine drives
+enum Sense : unsigned {  // pins that the machine drives
     ENCODER_A = 1 << 0,
     ENCODER_B = 1 << 1,
     ENCODER_Z = 1 << 2,
@@ -33,13 +34,13 @@ enum Sense : unsigned {                                       // pins that the m
     LIMIT_LOW_OPEN = 1 << 5,
     LIMIT_HIGH_OPEN = 1 << 6,
     DRIVE_FAULT = 1 << 7,
-    SENSOR_RX = 1 << 8,                                       // serial frames of an absolute sensor; 1: idle, or no sensor
+    SENSOR_RX = 1 << 8,  // serial frames of an absolute sensor; 1: idle, or no sensor
 };
 constexpr unsigned SENSE_PINS = 9;
 constexpr unsigned DRIVE_IDLE = ADC_CS_N | ADC_SCLK | DAC_CS_N;
 
 class Machine {
-public:
+ public:
     Machine(double clk_hz, double time_step);
     virtual ~Machine() = default;
 
@@ -50,40 +51,47 @@ public:
         return true;
     }
     uint64_t event_at() const { return event_at_; }
-    unsigned levels() const { return (pins() & ~forced_) | forced_high_; }   // Sense
+    unsigned levels() const { return (pins() & ~forced_) | forced_high_; }  // Sense
 
-    bool set(const char* name, double value);                 // false: there is no such parameter
+    bool set(const char* name, double value);  // false: there is no such parameter
     bool get(const char* name, double& value);
-    bool fault(const char* name, bool on, bool level);        // false: there is no such fault
-    virtual const char* faults() const = 0;                   // their names
-    virtual void set_position(double position) = 0;                  // carry it there by hand: at rest, nothing wound up
-    virtual void push(double force) = 0;                      // from outside, from now on
-    virtual double position(uint64_t) const { return NAN; }   // m or rad, true; NAN: it has none to tell
+    bool fault(const char* name, bool on, bool level);  // false: there is no such fault
+    virtual const char* faults() const = 0;             // their names
+    virtual void set_position(
+        double position) = 0;             // carry it there by hand: at rest, nothing wound up
+    virtual void push(double force) = 0;  // from outside, from now on
+    virtual double position(uint64_t) const {
+        return NAN;
+    }  // m or rad, true; NAN: it has none to tell
 
-    // names of the values of state(), the first time_s; a last ? marks a truth value, # a whole number
+    // names of the values of state(), the first time_s; a last ? marks a truth value, # a whole
+    // number
     virtual const char* state_names() const = 0;
     virtual void state(uint64_t now, double* out) const = 0;
     int state_count() const { return state_count_; }
-    void trace(uint64_t every_clk);                           // record states from now on, 0 ends it
-    std::vector<double> rows;                                 // what was recorded
+    void trace(uint64_t every_clk);  // record states from now on, 0 ends it
+    std::vector<double> rows;        // what was recorded
 
-protected:
-    virtual unsigned pins() const = 0;                        // Sense, without faults of the wires
+ protected:
+    virtual unsigned pins() const = 0;  // Sense, without faults of the wires
     virtual void drive_changed(uint64_t, unsigned /*before*/, unsigned /*after*/) {}
-    virtual void move(uint64_t now) = 0;                      // by one time step, that ends now
-    virtual uint64_t sense(uint64_t now) = 0;                 // look at the machine; returns the clk to look again at the latest
-    virtual double* parameter(const char* name) = 0;          // nullptr: there is none
-    virtual void configure() = 0;                             // take over changed parameters, keep the state
+    virtual void move(uint64_t now) = 0;  // by one time step, that ends now
+    virtual uint64_t sense(
+        uint64_t now) = 0;  // look at the machine; returns the clk to look again at the latest
+    virtual double* parameter(const char* name) = 0;  // nullptr: there is none
+    virtual void configure() = 0;  // take over changed parameters, keep the state
     virtual bool own_fault(const char*, bool) { return false; }
 
     double clk_hz() const { return clk_hz_; }
     double time_step() const { return double(step_clk_) / clk_hz_; }
     uint64_t step_clk() const { return step_clk_; }
     unsigned drive() const { return drive_; }
-    double since(uint64_t now) const { return double(now - last_step_) / clk_hz_; }   // s, from the last time step
+    double since(uint64_t now) const {
+        return double(now - last_step_) / clk_hz_;
+    }  // s, from the last time step
     bool flag(unsigned level) const { return levels() & level; }
 
-private:
+ private:
     void advance(uint64_t now, unsigned drive);
 
     double clk_hz_;
@@ -96,7 +104,8 @@ private:
 };
 
 // `kind` is the name of a parameter table; nullptr: there is no such machine
-std::unique_ptr<Machine> make_machine(const char* kind, const double* parameters, uint64_t seed, uint64_t stream, double clk_hz);
+std::unique_ptr<Machine> make_machine(const char* kind, const double* parameters, uint64_t seed,
+                                      uint64_t stream, double clk_hz);
 int machine_parameter_count(const char* kind);
 
 }  // namespace twin

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The machines: what can be done with that of an axis, and one without a node, whose pins are driven from here."""
+"""The machines: what can be done with that of an axis, and one without a node, whose pins are
+driven from here.
+"""
+
 import ctypes
 from contextlib import contextmanager
 from dataclasses import make_dataclass
@@ -10,26 +13,78 @@ import numpy
 from twin import build
 from twin.parameters import tables as parameters
 
-HANDLE, REAL, WHOLE, LONG, TEXT = ctypes.c_void_p, ctypes.c_double, ctypes.c_int, ctypes.c_uint64, ctypes.c_char_p
+HANDLE, REAL, WHOLE, LONG, TEXT = (
+    ctypes.c_void_p,
+    ctypes.c_double,
+    ctypes.c_int,
+    ctypes.c_uint64,
+    ctypes.c_char_p,
+)
 FUNCTIONS = {
-    "machine_parameters": (WHOLE, [TEXT]), "machine_state_names": (TEXT, [HANDLE]), "machine_faults": (TEXT, [HANDLE]),
-    "machine_state": (None, [HANDLE, LONG, HANDLE]), "machine_set": (WHOLE, [HANDLE, TEXT, REAL]),
-    "machine_get": (WHOLE, [HANDLE, TEXT, HANDLE]), "machine_fault": (WHOLE, [HANDLE, TEXT, WHOLE, WHOLE]),
-    "machine_set_position": (None, [HANDLE, REAL]), "machine_push": (None, [HANDLE, REAL]), "machine_trace": (None, [HANDLE, LONG]),
-    "machine_trace_size": (WHOLE, [HANDLE]), "machine_trace_take": (None, [HANDLE, HANDLE])}
+    "machine_parameters": (WHOLE, [TEXT]),
+    "machine_state_names": (TEXT, [HANDLE]),
+    "machine_faults": (TEXT, [HANDLE]),
+    "machine_state": (None, [HANDLE, LONG, HANDLE]),
+    "machine_set": (WHOLE, [HANDLE, TEXT, REAL]),
+    "machine_get": (WHOLE, [HANDLE, TEXT, HANDLE]),
+    "machine_fault": (WHOLE, [HANDLE, TEXT, WHOLE, WHOLE]),
+    "machine_set_position": (None, [HANDLE, REAL]),
+    "machine_push": (None, [HANDLE, REAL]),
+    "machine_trace": (None, [HANDLE, LONG]),
+    "machine_trace_size": (WHOLE, [HANDLE]),
+    "machine_trace_take": (None, [HANDLE, HANDLE]),
+}
 BENCH_FUNCTIONS = {
-    "bench_new": (HANDLE, [TEXT, LONG, REAL, HANDLE]), "bench_delete": (None, [HANDLE]), "bench_machine": (HANDLE, [HANDLE]),
-    "bench_now": (LONG, [HANDLE]), "bench_levels": (ctypes.c_uint, [HANDLE]), "bench_pins": (None, [HANDLE, ctypes.c_uint, ctypes.c_uint]),
-    "bench_run": (None, [HANDLE, LONG]), "bench_watch": (None, [HANDLE, LONG, HANDLE]),
+    "bench_new": (HANDLE, [TEXT, LONG, REAL, HANDLE]),
+    "bench_delete": (None, [HANDLE]),
+    "bench_machine": (HANDLE, [HANDLE]),
+    "bench_now": (LONG, [HANDLE]),
+    "bench_levels": (ctypes.c_uint, [HANDLE]),
+    "bench_pins": (None, [HANDLE, ctypes.c_uint, ctypes.c_uint]),
+    "bench_run": (None, [HANDLE, LONG]),
+    "bench_watch": (None, [HANDLE, LONG, HANDLE]),
     "bench_bridge": (None, [HANDLE, LONG, ctypes.c_uint32, ctypes.c_int32, WHOLE]),
-    "bench_steps": (None, [HANDLE, ctypes.c_int64, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32]),
-    "bench_frame": (None, [HANDLE, ctypes.c_uint32, WHOLE])}
+    "bench_steps": (
+        None,
+        [HANDLE, ctypes.c_int64, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32],
+    ),
+    "bench_frame": (None, [HANDLE, ctypes.c_uint32, WHOLE]),
+}
 
 # pins, in the order of machine.h
-DRIVE = {name: 1 << n for n, name in enumerate(("adc_cs_n", "adc_sclk", "bridge_a", "bridge_b", "drive_enable", "step", "direction",
-                                               "dac_cs_n", "dac_sclk", "dac_sdi"))}
-SENSE = {name: 1 << n for n, name in enumerate(("encoder_a", "encoder_b", "encoder_z", "adc_sin", "adc_cos", "limit_low_open",
-                                               "limit_high_open", "drive_fault", "sensor_rx"))}
+DRIVE = {
+    name: 1 << n
+    for n, name in enumerate(
+        (
+            "adc_cs_n",
+            "adc_sclk",
+            "bridge_a",
+            "bridge_b",
+            "drive_enable",
+            "step",
+            "direction",
+            "dac_cs_n",
+            "dac_sclk",
+            "dac_sdi",
+        )
+    )
+}
+SENSE = {
+    name: 1 << n
+    for n, name in enumerate(
+        (
+            "encoder_a",
+            "encoder_b",
+            "encoder_z",
+            "adc_sin",
+            "adc_cos",
+            "limit_low_open",
+            "limit_high_open",
+            "drive_fault",
+            "sensor_rx",
+        )
+    )
+}
 DAC_ZERO, DAC_BITS = 32768, 16
 
 
@@ -49,7 +104,9 @@ def pack(kind, overrides, library):
 
 
 class State:
-    """A machine as it truly is at a time: time_s and the values that machine.h's state_names lists for it."""
+    """A machine as it truly is at a time: time_s and the values that machine.h's state_names lists
+    for it.
+    """
 
     @property
     def position_nm(self):
@@ -68,7 +125,13 @@ class MachineHandle:
     """The machine of an axis, by its address in the library."""
 
     def __init__(self, library, handle, kind, clk_hz, now):
-        self.library, self.handle, self.kind, self.clk_hz, self.now = library, handle, kind, clk_hz, now
+        self.library, self.handle, self.kind, self.clk_hz, self.now = (
+            library,
+            handle,
+            kind,
+            clk_hz,
+            now,
+        )
         self.names = library.machine_state_names(handle).decode()
         self.faults = library.machine_faults(handle).decode().split()
 
@@ -80,7 +143,9 @@ class MachineHandle:
         return kind(*(make(value) for make, value in zip(makers, out)))
 
     def _unknown(self, name):
-        return KeyError(f"the machine {self.kind} has no parameter {name} to change while it runs; see {parameters.source(self.kind).name}")
+        return KeyError(
+            f"the machine {self.kind} has no parameter {name} to change while it runs; see {parameters.source(self.kind).name}"
+        )
 
     def set(self, **values):
         """Change parameters of the running machine; its time step is fixed."""
@@ -119,11 +184,17 @@ class MachineHandle:
 
     def _fault(self, fault, on, level):
         if not self.library.machine_fault(self.handle, fault.encode(), on, level):
-            raise KeyError(f"there is no fault {fault} of a machine {self.kind}: there are {', '.join(self.faults)}")
+            raise KeyError(
+                f"there is no fault {fault} of a machine {self.kind}: there are {', '.join(self.faults)}"
+            )
 
     def trace(self, rate_hz=10_000):
-        """Record states from now on; the rate is rounded to whole time steps of the machine; 0 ends it."""
-        self.library.machine_trace(self.handle, max(1, round(self.clk_hz / rate_hz)) if rate_hz else 0)
+        """Record states from now on; the rate is rounded to whole time steps of the machine; 0 ends
+        it.
+        """
+        self.library.machine_trace(
+            self.handle, max(1, round(self.clk_hz / rate_hz)) if rate_hz else 0
+        )
 
     def take_trace(self):
         """{name: array} of what was recorded since the last take."""
@@ -136,7 +207,7 @@ class MachineHandle:
 class Machine(MachineHandle):
     """A machine without a node. Time passes in run, watch, bridge, steps and dac."""
 
-    PERIOD = 200                 # clk of the PWM: 20 kHz
+    PERIOD = 200  # clk of the PWM: 20 kHz
 
     def __init__(self, kind, seed=1, clk_hz=4_000_000, **values):
         self.bench = None
@@ -144,7 +215,13 @@ class Machine(MachineHandle):
         declare(library, {**FUNCTIONS, **BENCH_FUNCTIONS})
         packed = pack(kind, values, library)
         self.bench = library.bench_new(kind.encode(), seed, clk_hz, ctypes.addressof(packed))
-        super().__init__(library, library.bench_machine(self.bench), kind, clk_hz, partial(library.bench_now, self.bench))
+        super().__init__(
+            library,
+            library.bench_machine(self.bench),
+            kind,
+            clk_hz,
+            partial(library.bench_now, self.bench),
+        )
 
     def __del__(self):
         if self.bench:
@@ -157,7 +234,9 @@ class Machine(MachineHandle):
     def pins(self, **levels):
         """Set pins that the node would drive; they hold from the next clk on."""
         which = sum(DRIVE[name] for name in levels)
-        self.library.bench_pins(self.bench, sum(DRIVE[name] for name, level in levels.items() if level), which)
+        self.library.bench_pins(
+            self.bench, sum(DRIVE[name] for name, level in levels.items() if level), which
+        )
 
     def run(self, seconds):
         self.library.bench_run(self.bench, self.clk(seconds))
@@ -172,12 +251,18 @@ class Machine(MachineHandle):
         return bool(self.library.bench_levels(self.bench) & SENSE[pin])
 
     def bridge(self, seconds, duty=0.0, brakes=True):
-        """Run with the drive enabled; duty -1..1 of the supply, the rest of the PWM period braking or coasting."""
-        self.library.bench_bridge(self.bench, self.clk(seconds), self.PERIOD, round(duty * self.PERIOD), brakes)
+        """Run with the drive enabled; duty -1..1 of the supply, the rest of the PWM period braking
+        or coasting.
+        """
+        self.library.bench_bridge(
+            self.bench, self.clk(seconds), self.PERIOD, round(duty * self.PERIOD), brakes
+        )
 
     def steps(self, count, rate_hz, high_s=2e-6, setup_s=2e-6):
         """`count` pulses of step, negative: down."""
-        self.library.bench_steps(self.bench, count, self.clk(1 / rate_hz), self.clk(high_s), self.clk(setup_s))
+        self.library.bench_steps(
+            self.bench, count, self.clk(1 / rate_hz), self.clk(high_s), self.clk(setup_s)
+        )
 
     def dac(self, code, bits=DAC_BITS):
         """One frame to the converter."""

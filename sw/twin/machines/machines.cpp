@@ -11,8 +11,8 @@ namespace twin {
 
 namespace {
 
-class Unconnected : public Machine {                          // nothing at the pins
-public:
+class Unconnected : public Machine {  // nothing at the pins
+ public:
     Unconnected(const UnconnectedParameters& parameters, uint64_t, uint64_t, double clk_hz)
         : Machine(clk_hz, parameters.time_step), p_(parameters) {}
     const char* faults() const override { return ""; }
@@ -21,14 +21,14 @@ public:
     const char* state_names() const override { return "time_s"; }
     void state(uint64_t now, double* out) const override { *out = double(now) / clk_hz(); }
 
-protected:
+ protected:
     unsigned pins() const override { return SENSOR_RX; }
     void move(uint64_t) override {}
     uint64_t sense(uint64_t) override { return NEVER; }
     double* parameter(const char* name) override { return find_parameter(p_, name); }
     void configure() override {}
 
-private:
+ private:
     UnconnectedParameters p_;
 };
 
@@ -60,7 +60,8 @@ const Kind* find(const char* name) {
 
 }  // namespace
 
-std::unique_ptr<Machine> make_machine(const char* kind, const double* parameters, uint64_t seed, uint64_t stream, double clk_hz) {
+std::unique_ptr<Machine> make_machine(const char* kind, const double* parameters, uint64_t seed,
+                                      uint64_t stream, double clk_hz) {
     const Kind* found = find(kind);
     return found ? found->make(parameters, seed, stream, clk_hz) : nullptr;
 }

@@ -5,7 +5,8 @@
 
 namespace twin {
 
-Plant::Plant(const StageParameters& parameters, uint64_t seed, uint64_t stream) : p(parameters), random_(seed, stream) {
+Plant::Plant(const StageParameters& parameters, uint64_t seed, uint64_t stream)
+    : p(parameters), random_(seed, stream) {
     configure();
     set_position(random_.uniform(p.travel_start_lowest, p.travel_start_highest));
 }
@@ -22,10 +23,12 @@ void Plant::set_position(double position) {
 }
 
 void Plant::conduct(double emf, double seconds, double& charge) {
-    const double end = emf / p.motor_resistance, x = seconds * p.motor_resistance / p.motor_inductance;
+    const double end = emf / p.motor_resistance,
+                 x = seconds * p.motor_resistance / p.motor_inductance;
     const double left = std::exp(-x), before = current;
     current = end + (before - end) * left;
-    charge += end * seconds + (before - current) * p.motor_inductance / p.motor_resistance;   // exact integral
+    charge += end * seconds +
+              (before - current) * p.motor_inductance / p.motor_resistance;  // exact integral
 }
 
 void Plant::step(const BridgeTime& bridge, double dt) {
@@ -37,10 +40,14 @@ void Plant::step(const BridgeTime& bridge, double dt) {
     if (bridge.forward) conduct(p.supply_voltage - back, share(bridge.forward), charge);
     if (bridge.reverse) conduct(-p.supply_voltage - back, share(bridge.reverse), charge);
     if (bridge.brake) conduct(-back, share(bridge.brake), charge);
-    if (bridge.coast && current != 0) {                       // the diodes feed the current back into the supply until it ends
-        const double sign = current > 0 ? 1 : -1, against = -sign * (p.supply_voltage + 2 * p.supply_diode_drop) - back;
-        const double end = against / p.motor_resistance, tau = p.motor_inductance / p.motor_resistance;
-        const double seconds = share(bridge.coast), ends = sign * end < 0 ? tau * std::log1p(-current / end) : seconds;
+    if (bridge.coast &&
+        current != 0) {  // the diodes feed the current back into the supply until it ends
+        const double sign = current > 0 ? 1 : -1,
+                     against = -sign * (p.supply_voltage + 2 * p.supply_diode_drop) - back;
+        const double end = against / p.motor_resistance,
+                     tau = p.motor_inductance / p.motor_resistance;
+        const double seconds = share(bridge.coast),
+                     ends = sign * end < 0 ? tau * std::log1p(-current / end) : seconds;
         if (ends < seconds) {
             charge += end * ends + current * tau;
             current = 0;

@@ -33,28 +33,33 @@ double RotaryRing::peak() const {
     double most = 0;
     for (int n = 0; n < POINTS; n++) {
         double sum = 0;
-        for (int k = 1; k <= ORDERS; k++) sum += amplitude[size_t(k)] * std::sin(TURN * k * n / POINTS + phase[size_t(k)]);
+        for (int k = 1; k <= ORDERS; k++)
+            sum += amplitude[size_t(k)] * std::sin(TURN * k * n / POINTS + phase[size_t(k)]);
         most = std::fmax(most, std::fabs(sum));
     }
     return most;
 }
 
 double RotaryRing::error(double angle) const {
-    double s, c, sum = p_.ring_line_error * ARC_SECOND * std::sin(p_.ring_lines * angle + line_phase_);
+    double s, c,
+        sum = p_.ring_line_error * ARC_SECOND * std::sin(p_.ring_lines * angle + line_phase_);
     sincos(angle, &s, &c);
-    double sine = 0, cosine = 1;                              // of k angle, one rotation an order
+    double sine = 0, cosine = 1;  // of k angle, one rotation an order
     for (int k = 1; k <= std::min(ORDERS, int(p_.ring_highest_order)); k++) {
         const double next = sine * c + cosine * s;
         cosine = cosine * c - sine * s;
         sine = next;
-        sum += amplitude[size_t(k)] * (sine * std::cos(phase[size_t(k)]) + cosine * std::sin(phase[size_t(k)]));
+        sum += amplitude[size_t(k)] *
+               (sine * std::cos(phase[size_t(k)]) + cosine * std::sin(phase[size_t(k)]));
     }
     return sum;
 }
 
 double RotaryRing::drift(double seconds) const {
     double sum = 0;
-    for (int n = 0; n < SLOW; n++) sum += DRIFT_SHARE[n] * std::sin(TURN * seconds / DRIFT_PERIOD_S[n] + drift_phase_[size_t(n)]);
+    for (int n = 0; n < SLOW; n++)
+        sum +=
+            DRIFT_SHARE[n] * std::sin(TURN * seconds / DRIFT_PERIOD_S[n] + drift_phase_[size_t(n)]);
     return p_.ring_drift * ARC_SECOND * sum;
 }
 
@@ -65,7 +70,8 @@ int64_t RotaryRing::counts(double measured) const {
 unsigned RotaryRing::levels(double measured) const {
     const int64_t count = counts(measured), turn = int64_t(4 * p_.ring_lines * p_.ring_subdivision);
     const unsigned quarter = unsigned(count) & 3;
-    const bool z = ((count - int64_t(p_.ring_index_count)) % turn + turn) % turn < int64_t(p_.ring_index_width);
+    const bool z = ((count - int64_t(p_.ring_index_count)) % turn + turn) % turn <
+                   int64_t(p_.ring_index_width);
     return ((quarter ^ quarter >> 1) & 1) | quarter >> 1 << 1 | unsigned(z) << 2;
 }
 

@@ -7,7 +7,10 @@
 namespace twin {
 
 Stage::Stage(const StageParameters& parameters, uint64_t seed, uint64_t stream, double clk_hz)
-    : Machine(clk_hz, parameters.time_step), p_(parameters), plant(p_, seed, stream), interferometer(p_, seed, stream + 1, clk_hz) {
+    : Machine(clk_hz, parameters.time_step),
+      p_(parameters),
+      plant(p_, seed, stream),
+      interferometer(p_, seed, stream + 1, clk_hz) {
     piezo.configure(p_);
 }
 
@@ -18,7 +21,7 @@ void Stage::configure() {
 }
 
 void Stage::drive_changed(uint64_t now, unsigned before, unsigned after) {
-    spend(now - 1, before);                                   // clk `now` itself is the first of the new state
+    spend(now - 1, before);  // clk `now` itself is the first of the new state
     const unsigned falling = before & ~after;
     if (falling & ADC_CS_N)
         interferometer.chip_select(position(now));
@@ -38,7 +41,8 @@ void Stage::move(uint64_t now) {
 uint64_t Stage::sense(uint64_t now) {
     const uint64_t spike = look(now, position(now));
     const bool moves = std::fabs(velocity()) * time_step() > 1e-9;
-    return moves ? std::min(spike, now + std::max<uint64_t>(1, step_clk() / LEVELS_PER_STEP)) : spike;
+    return moves ? std::min(spike, now + std::max<uint64_t>(1, step_clk() / LEVELS_PER_STEP))
+                 : spike;
 }
 
 bool Stage::own_fault(const char* name, bool on) {
@@ -50,11 +54,13 @@ bool Stage::own_fault(const char* name, bool on) {
 
 void Stage::state(uint64_t now, double* out) const {
     const Drivetrain& mechanics = plant.drivetrain;
-    for (const double value : {double(now) / clk_hz(), position(now), velocity(), mechanics.nut(), mechanics.speed, plant.current,
-                               plant.voltage, mechanics.force(), double(flag(LIMIT_LOW_OPEN)), double(flag(LIMIT_HIGH_OPEN)),
-                               double(flag(ENCODER_A)), double(flag(ENCODER_B)), double((drive() & DRIVE_ENABLE) != 0),
-                               double(interferometer.code_sin), double(interferometer.code_cos), piezo.position, double(dac.code),
-                               double(dac.bad_frames)})
+    for (const double value :
+         {double(now) / clk_hz(), position(now), velocity(), mechanics.nut(), mechanics.speed,
+          plant.current, plant.voltage, mechanics.force(), double(flag(LIMIT_LOW_OPEN)),
+          double(flag(LIMIT_HIGH_OPEN)), double(flag(ENCODER_A)), double(flag(ENCODER_B)),
+          double((drive() & DRIVE_ENABLE) != 0), double(interferometer.code_sin),
+          double(interferometer.code_cos), piezo.position, double(dac.code),
+          double(dac.bad_frames)})
         *out++ = value;
 }
 

@@ -12,16 +12,20 @@
 namespace twin {
 
 class Stage : public Machine {
-public:
+ public:
     Stage(const StageParameters& parameters, uint64_t seed, uint64_t stream, double clk_hz);
 
-    const char* faults() const override { return "limit_low limit_high drive_fault motor_jam encoder_cut a_stuck b_stuck converter_stuck"; }
+    const char* faults() const override {
+        return "limit_low limit_high drive_fault motor_jam encoder_cut a_stuck b_stuck "
+               "converter_stuck";
+    }
     void set_position(double where) override { plant.set_position(where); }
     void push(double newton) override { pushed_ = newton; }
-    // position and velocity of what is measured: the table, with the piezo on it; nut: from the motor's angle; screw: on the table;
-    // codes: last conversion, straight binary
+    // position and velocity of what is measured: the table, with the piezo on it; nut: from the
+    // motor's angle; screw: on the table; codes: last conversion, straight binary
     const char* state_names() const override {
-        return "time_s position_m velocity_m_s nut_m motor_rad_s current_a voltage_v screw_n limit_low? limit_high? a? b? enabled? "
+        return "time_s position_m velocity_m_s nut_m motor_rad_s current_a voltage_v screw_n "
+               "limit_low? limit_high? a? b? enabled? "
                "code_sin# code_cos# piezo_m dac_code# dac_bad_frames#";
     }
     void state(uint64_t now, double* out) const override;
@@ -31,10 +35,11 @@ public:
     double velocity() const { return plant.drivetrain.velocity + piezo.velocity; }
     uint64_t look(uint64_t now, double position) { return interferometer.advance(now, position); }
 
-protected:
+ protected:
     unsigned pins() const override {
-        return interferometer.a * ENCODER_A | interferometer.b * ENCODER_B | interferometer.sdata_sin() * ADC_SIN |
-               interferometer.sdata_cos() * ADC_COS | plant.switches.low_pressed * LIMIT_LOW_OPEN |
+        return interferometer.a * ENCODER_A | interferometer.b * ENCODER_B |
+               interferometer.sdata_sin() * ADC_SIN | interferometer.sdata_cos() * ADC_COS |
+               plant.switches.low_pressed * LIMIT_LOW_OPEN |
                plant.switches.high_pressed * LIMIT_HIGH_OPEN | SENSOR_RX;
     }
     void drive_changed(uint64_t now, unsigned before, unsigned after) override;
@@ -44,26 +49,28 @@ protected:
     void configure() override;
     bool own_fault(const char* name, bool on) override;
 
-private:
-    static constexpr uint64_t LEVELS_PER_STEP = 4;            // while the table moves
+ private:
+    static constexpr uint64_t LEVELS_PER_STEP = 4;  // while the table moves
 
-    void spend(uint64_t until, unsigned drive) {              // the clk up to here went to this state of the bridge
-        spent_[drive & DRIVE_ENABLE ? (drive & BRIDGE_A ? 1 : 0) | (drive & BRIDGE_B ? 2 : 0) : 0] += uint32_t(until - spent_until_);
+    void spend(uint64_t until,
+               unsigned drive) {  // the clk up to here went to this state of the bridge
+        spent_[drive & DRIVE_ENABLE ? (drive & BRIDGE_A ? 1 : 0) | (drive & BRIDGE_B ? 2 : 0)
+                                    : 0] += uint32_t(until - spent_until_);
         spent_until_ = until;
     }
 
     StageParameters p_;
 
-public:
+ public:
     Plant plant;
     Interferometer interferometer;
     DacInput dac;
     Piezo piezo;
 
-private:
+ private:
     double pushed_ = 0;
     uint64_t spent_until_ = 0;
-    std::array<uint32_t, 4> spent_{};                         // clk in: coast, forward, reverse, brake
+    std::array<uint32_t, 4> spent_{};  // clk in: coast, forward, reverse, brake
 };
 
 }  // namespace twin

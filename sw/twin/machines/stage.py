@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The stage without a node, with what only it has: for tests of the plant against theory, and for tuning."""
+"""The stage without a node, with what only it has: for tests of the plant against theory, and for
+tuning.
+"""
+
 import ctypes
 
 import numpy
@@ -8,9 +11,13 @@ from twin.machines.machine import HANDLE, REAL, WHOLE, Machine, declare
 from twin.parameters import tables as parameters
 
 FUNCTIONS = {
-    "stage_hold": (None, [HANDLE, WHOLE, WHOLE]), "stage_analogue": (None, [HANDLE, REAL, HANDLE]),
-    "stage_convert": (None, [HANDLE, REAL, HANDLE]), "stage_frame": (None, [HANDLE, REAL, WHOLE, HANDLE]),
-    "stage_levels": (None, [HANDLE, ctypes.c_uint64, REAL, REAL, HANDLE]), "friction_slide": (REAL, [REAL] * 8 + [WHOLE])}
+    "stage_hold": (None, [HANDLE, WHOLE, WHOLE]),
+    "stage_analogue": (None, [HANDLE, REAL, HANDLE]),
+    "stage_convert": (None, [HANDLE, REAL, HANDLE]),
+    "stage_frame": (None, [HANDLE, REAL, WHOLE, HANDLE]),
+    "stage_levels": (None, [HANDLE, ctypes.c_uint64, REAL, REAL, HANDLE]),
+    "friction_slide": (REAL, [REAL] * 8 + [WHOLE]),
+}
 
 
 class Stage(Machine):
@@ -46,7 +53,18 @@ class Stage(Machine):
         self.library.stage_levels(self.bench, len(out), from_m, speed_m_s, out.ctypes.data)
         return out & 1, out >> 1
 
-    def friction(self, coulomb, breakaway, stribeck, viscous, presliding, damping, speed, steps=20000):
+    def friction(
+        self, coulomb, breakaway, stribeck, viscous, presliding, damping, speed, steps=20000
+    ):
         """Friction force of a body that slides evenly."""
-        return self.library.friction_slide(coulomb, breakaway, stribeck, viscous, presliding, damping, speed,
-                                           self.plant["time_step"], steps)
+        return self.library.friction_slide(
+            coulomb,
+            breakaway,
+            stribeck,
+            viscous,
+            presliding,
+            damping,
+            speed,
+            self.plant["time_step"],
+            steps,
+        )

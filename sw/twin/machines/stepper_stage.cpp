@@ -5,7 +5,8 @@
 
 namespace twin {
 
-StepperStage::StepperStage(const StepperStageParameters& parameters, uint64_t seed, uint64_t stream, double clk_hz)
+StepperStage::StepperStage(const StepperStageParameters& parameters, uint64_t seed, uint64_t stream,
+                           double clk_hz)
     : Machine(clk_hz, parameters.time_step), p_(parameters), random_(seed, stream) {
     configure();
     set_position(random_.uniform(p_.travel_start_lowest, p_.travel_start_highest));
@@ -27,7 +28,8 @@ void StepperStage::set_position(double where) {
 
 void StepperStage::move(uint64_t) {
     const double dt = time_step();
-    drivetrain_.step(motor_.torque(drivetrain_.angle, drivetrain_.speed, drive() & DRIVE_ENABLE, dt), dt);
+    drivetrain_.step(
+        motor_.torque(drivetrain_.angle, drivetrain_.speed, drive() & DRIVE_ENABLE, dt), dt);
     switches_.move(drivetrain_.position, random_);
 }
 
@@ -43,11 +45,13 @@ bool StepperStage::own_fault(const char* name, bool on) {
 }
 
 void StepperStage::state(uint64_t now, double* out) const {
-    for (const double value : {double(now) / clk_hz(), position(now), drivetrain_.velocity, drivetrain_.nut(),
-                               motor_.field() * p_.screw_lead / (2 * M_PI), drivetrain_.speed, drivetrain_.force(),
-                               double(flag(LIMIT_LOW_OPEN)), double(flag(LIMIT_HIGH_OPEN)), double(flag(ENCODER_A)), double(flag(ENCODER_B)),
-                               double(flag(ENCODER_Z)), double((drive() & DRIVE_ENABLE) != 0), double(scale_.counts()), double(motor_.steps),
-                               double(motor_.lost(drivetrain_.angle)), double(motor_.timing_errors)})
+    for (const double value :
+         {double(now) / clk_hz(), position(now), drivetrain_.velocity, drivetrain_.nut(),
+          motor_.field() * p_.screw_lead / (2 * M_PI), drivetrain_.speed, drivetrain_.force(),
+          double(flag(LIMIT_LOW_OPEN)), double(flag(LIMIT_HIGH_OPEN)), double(flag(ENCODER_A)),
+          double(flag(ENCODER_B)), double(flag(ENCODER_Z)), double((drive() & DRIVE_ENABLE) != 0),
+          double(scale_.counts()), double(motor_.steps), double(motor_.lost(drivetrain_.angle)),
+          double(motor_.timing_errors)})
         *out++ = value;
 }
 

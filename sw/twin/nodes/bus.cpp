@@ -5,10 +5,11 @@ namespace twin {
 
 void HostUart::add(bool level, uint64_t duration) {
     cells_.push_back({uint8_t(level), duration});
-    if (transmit_at_ == NEVER) transmit_at_ = 0;              // at the next clk
+    if (transmit_at_ == NEVER) transmit_at_ = 0;  // at the next clk
 }
 
-void HostUart::send_words(const uint16_t* words, int count, const uint32_t* flips, int flip_count, int gap_cells) {
+void HostUart::send_words(const uint16_t* words, int count, const uint32_t* flips, int flip_count,
+                          int gap_cells) {
     std::vector<uint8_t> levels;
     for (int n = 0; n < count; n++) {
         levels.push_back(0);
@@ -27,7 +28,7 @@ void HostUart::send_levels(const uint8_t* levels, int count, double cell_clk) {
 }
 
 void HostUart::transmit(uint64_t now) {
-    if (cells_.empty()) {                                     // the last cell has ended
+    if (cells_.empty()) {  // the last cell has ended
         driving_ = false;
         level_ = true;
         transmit_at_ = NEVER;
@@ -54,7 +55,7 @@ void HostUart::begin(uint64_t now) {
 }
 
 void HostUart::receive(bool level) {
-    if (bit_ == 0 && level) {                                 // not a start bit
+    if (bit_ == 0 && level) {  // not a start bit
         start_glitches++;
         receiving_ = false;
         return;
@@ -113,7 +114,8 @@ void Bus::draw_spike(uint64_t now) {
         return;
     }
     spike_start_ = now + 1 + uint64_t(random_.exponential(clk_hz_ / spike_rate_));
-    spike_end_ = spike_start_ + uint64_t(random_.uniform(spike_shortest_, spike_longest_) * clk_hz_);
+    spike_end_ =
+        spike_start_ + uint64_t(random_.uniform(spike_shortest_, spike_longest_) * clk_hz_);
 }
 
 }  // namespace twin

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The line: RS-485 with bias (idles 1), shared by the host and the nodes, each with a driver enable; receivers are off while
-// their own driver is on. The host's end is a UART of 9-bit characters: start, 8 data LSB first, 9th bit, stop.
+// The line: RS-485 with bias (idles 1), shared by the host and the nodes, each with a driver
+// enable; receivers are off while their own driver is on. The host's end is a UART of 9-bit
+// characters: start, 8 data LSB first, 9th bit, stop.
 #pragma once
 #include <cstdint>
 #include <deque>
@@ -10,17 +11,19 @@
 
 namespace twin {
 
-enum class Cut { none, idle, broken };                        // what a cut end receives: ones or zeros
+enum class Cut { none, idle, broken };  // what a cut end receives: ones or zeros
 
 class HostUart {
-public:
-    static constexpr int CELLS = 12 - 1;                      // bits of a character on the line
+ public:
+    static constexpr int CELLS = 12 - 1;  // bits of a character on the line
 
     void set_bit_time(double clk) { bit_time_ = uint64_t(clk * FRACTION + 0.5); }
-    void send_words(const uint16_t* words, int count, const uint32_t* flips, int flip_count, int gap_cells);
-    void send_levels(const uint8_t* levels, int count, double cell_clk);   // anything at all, cell by cell
+    void send_words(const uint16_t* words, int count, const uint32_t* flips, int flip_count,
+                    int gap_cells);
+    void send_levels(const uint8_t* levels, int count,
+                     double cell_clk);  // anything at all, cell by cell
 
-    void step(uint64_t now, bool level) {                     // once a clk, with the level its receiver sees
+    void step(uint64_t now, bool level) {  // once a clk, with the level its receiver sees
         if (now >= transmit_at_) transmit(now);
         if (receiving_) {
             if (now >= receive_at_) receive(level);
@@ -30,17 +33,18 @@ public:
         was_high_ = level;
     }
     bool drives() const { return driving_; }
-    bool level() const { return level_; }                     // of the driver
+    bool level() const { return level_; }  // of the driver
 
-    std::deque<uint16_t> received;                            // as a PC's port gives them: without a stop bit too, but no break
+    std::deque<uint16_t>
+        received;  // as a PC's port gives them: without a stop bit too, but no break
     uint32_t framing_errors = 0, start_glitches = 0;
-    uint64_t first_cell = 0, last_cell = 0;                   // clk at which the last burst began and ended
+    uint64_t first_cell = 0, last_cell = 0;  // clk at which the last burst began and ended
 
-private:
+ private:
     static constexpr uint64_t FRACTION = 1 << 16, NEVER = ~uint64_t(0);
     struct Cell {
         uint8_t level;
-        uint64_t duration;                                    // clk * FRACTION
+        uint64_t duration;  // clk * FRACTION
     };
     void add(bool level, uint64_t duration);
     void transmit(uint64_t now);
@@ -58,8 +62,11 @@ private:
 };
 
 class Bus {
-public:
-    Bus(uint64_t seed, double clk_hz, double bit_clk) : clk_hz_(clk_hz), bit_clk_(bit_clk), random_(seed, 0x11E) { host.set_bit_time(bit_clk); }
+ public:
+    Bus(uint64_t seed, double clk_hz, double bit_clk)
+        : clk_hz_(clk_hz), bit_clk_(bit_clk), random_(seed, 0x11E) {
+        host.set_bit_time(bit_clk);
+    }
 
     // once a clk: nodes_driving and nodes_level are bit masks over the nodes
     void step(uint64_t now, uint32_t nodes_driving, uint32_t nodes_level) {
@@ -86,11 +93,13 @@ public:
         if (reply_flips_armed_) at_host ^= reply_flip(now, at_host);
         host.step(now, at_host);
     }
-    bool heard_by(int node, bool own_driver) const {          // what a node's receiver puts out
-        return own_driver || (cut_mask_ >> node & 1 ? broken_mask_ >> node & 1 ? false : true : at_nodes);
+    bool heard_by(int node, bool own_driver) const {  // what a node's receiver puts out
+        return own_driver ||
+               (cut_mask_ >> node & 1 ? broken_mask_ >> node & 1 ? false : true : at_nodes);
     }
     void cut_node(int node, Cut cut);
-    void flip_reply(const uint32_t* cells, int count);        // of the next reply, counted from its first start bit
+    void flip_reply(const uint32_t* cells,
+                    int count);  // of the next reply, counted from its first start bit
     void spikes(double rate, double shortest, double longest, uint64_t now);
 
     HostUart host;
@@ -99,7 +108,7 @@ public:
     uint32_t collisions = 0;
     uint64_t edges = 0, last_driven = 0;
 
-private:
+ private:
     static constexpr uint64_t NEVER = ~uint64_t(0);
     void draw_spike(uint64_t now);
     bool reply_flip(uint64_t now, bool at_host);

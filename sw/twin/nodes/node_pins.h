@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Between the pins of a Verilated node and those of what is around it: vectors over its axes, one word a machine, and its links.
+// Between the pins of a Verilated node and those of what is around it: vectors over its axes, one
+// word a machine, and its links.
 #pragma once
 #include <cstdint>
 
@@ -9,16 +10,17 @@
 namespace twin {
 
 template <class Pins>
-unsigned drive_of(const Pins& pins, int n) {                  // Drive of axis n
-    return (pins.adc_cs_n >> n & 1) * ADC_CS_N | (pins.adc_sclk >> n & 1) * ADC_SCLK | (pins.bridge_a >> n & 1) * BRIDGE_A |
-           (pins.bridge_b >> n & 1) * BRIDGE_B | (pins.drive_enable >> n & 1) * DRIVE_ENABLE | (pins.step >> n & 1) * STEP |
-           (pins.direction >> n & 1) * DIRECTION | (pins.dac_cs_n >> n & 1) * DAC_CS_N | (pins.dac_sclk >> n & 1) * DAC_SCLK |
-           (pins.dac_sdi >> n & 1) * DAC_SDI;
+unsigned drive_of(const Pins& pins, int n) {  // Drive of axis n
+    return (pins.adc_cs_n >> n & 1) * ADC_CS_N | (pins.adc_sclk >> n & 1) * ADC_SCLK |
+           (pins.bridge_a >> n & 1) * BRIDGE_A | (pins.bridge_b >> n & 1) * BRIDGE_B |
+           (pins.drive_enable >> n & 1) * DRIVE_ENABLE | (pins.step >> n & 1) * STEP |
+           (pins.direction >> n & 1) * DIRECTION | (pins.dac_cs_n >> n & 1) * DAC_CS_N |
+           (pins.dac_sclk >> n & 1) * DAC_SCLK | (pins.dac_sdi >> n & 1) * DAC_SDI;
 }
 
 class SensePins {
-public:
-    void add(int n, unsigned levels) {                        // Sense of axis n
+ public:
+    void add(int n, unsigned levels) {  // Sense of axis n
         for (unsigned bit = 0; bit < SENSE_PINS; bit++) vectors_[bit] |= (levels >> bit & 1) << n;
     }
     template <class Pins>
@@ -31,25 +33,26 @@ public:
         pins.limit_low_open = of(LIMIT_LOW_OPEN);
         pins.limit_high_open = of(LIMIT_HIGH_OPEN);
         pins.drive_fault_n = ~of(DRIVE_FAULT) & all;
-        pins.sensor_rx = of(SENSOR_RX) & 1;                   // the node has one, that of its first axis
+        pins.sensor_rx = of(SENSOR_RX) & 1;  // the node has one, that of its first axis
     }
 
-private:
+ private:
     uint32_t of(Sense pin) const { return vectors_[unsigned(__builtin_ctz(pin))]; }
 
     uint32_t vectors_[SENSE_PINS] = {};
 };
 
 template <class Pins>
-unsigned peripheral_drive_of(const Pins& pins) {                    // PeripheralDrive
-    return pins.i2c_scl_low * I2C_SCL_LOW | pins.i2c_sda_low * I2C_SDA_LOW | pins.keyboard_clock_low * KEYBOARD_CLOCK_LOW |
+unsigned peripheral_drive_of(const Pins& pins) {  // PeripheralDrive
+    return pins.i2c_scl_low * I2C_SCL_LOW | pins.i2c_sda_low * I2C_SDA_LOW |
+           pins.keyboard_clock_low * KEYBOARD_CLOCK_LOW |
            pins.keyboard_data_low * KEYBOARD_DATA_LOW | pins.edm_clock_low * EDM_CLOCK_LOW |
-           pins.edm_data_low * EDM_DATA_LOW | pins.display_cs_n * DISPLAY_CS_N | pins.display_sclk * DISPLAY_SCLK |
-           pins.display_data * DISPLAY_DATA;
+           pins.edm_data_low * EDM_DATA_LOW | pins.display_cs_n * DISPLAY_CS_N |
+           pins.display_sclk * DISPLAY_SCLK | pins.display_data * DISPLAY_DATA;
 }
 
 template <class Pins>
-void set_peripheral_pins(Pins& pins, unsigned levels) {             // PeripheralSense
+void set_peripheral_pins(Pins& pins, unsigned levels) {  // PeripheralSense
     pins.i2c_scl = (levels & I2C_SCL) != 0;
     pins.i2c_sda = (levels & I2C_SDA) != 0;
     pins.keyboard_clock = (levels & KEYBOARD_CLOCK) != 0;

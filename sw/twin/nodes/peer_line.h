@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// One direction of the serial line between two nodes, idle high, characters of 8 bits without parity: what the sender puts on it,
-// pulled down by what disturbs it, random bytes at random times among it, and a log of what arrives.
+// One direction of the serial line between two nodes, idle high, characters of 8 bits without
+// parity: what the sender puts on it, pulled down by what disturbs it, random bytes at random times
+// among it, and a log of what arrives.
 #pragma once
 #include <algorithm>
 #include <cstdint>
@@ -12,13 +13,14 @@
 namespace twin {
 
 class PeerLine {
-public:
+ public:
     static constexpr uint64_t NEVER = ~uint64_t(0);
     static constexpr int CELLS = 10;
 
-    PeerLine(uint64_t seed, uint64_t stream, double clk_hz, double baud) : random_(seed, stream), clk_hz_(clk_hz), bit_(clk_hz / baud) {}
+    PeerLine(uint64_t seed, uint64_t stream, double clk_hz, double baud)
+        : random_(seed, stream), clk_hz_(clk_hz), bit_(clk_hz / baud) {}
 
-    bool step(uint64_t now, bool tx) {                        // once a clk; the level at the receiver
+    bool step(uint64_t now, bool tx) {  // once a clk; the level at the receiver
         if (now >= disturb_at_) disturb(now);
         const bool level = (tx && disturbance_) || cut;
         if (now >= sample_at_)
@@ -38,12 +40,12 @@ public:
         draw(now);
     }
 
-    bool cut = false;                                         // fault: the receiver hears an idle line
-    std::vector<uint8_t> heard;                               // what a receiver makes of it, until taken
+    bool cut = false;            // fault: the receiver hears an idle line
+    std::vector<uint8_t> heard;  // what a receiver makes of it, until taken
     uint64_t framing_errors = 0, garbage_bytes = 0;
 
-private:
-    static constexpr unsigned MOST = 4;                       // bytes of garbage in a row
+ private:
+    static constexpr unsigned MOST = 4;  // bytes of garbage in a row
 
     bool disturbs() const { return !pending_.empty() || cell_ > 0; }
     void start(uint64_t now) {
@@ -52,16 +54,18 @@ private:
         disturb_at_ = now;
     }
     void draw(uint64_t now) {
-        next_garbage_ = rate_ > 0 ? now + 1 + uint64_t(random_.exponential(clk_hz_ / rate_)) : NEVER;
+        next_garbage_ =
+            rate_ > 0 ? now + 1 + uint64_t(random_.exponential(clk_hz_ / rate_)) : NEVER;
         if (!disturbs()) disturb_at_ = next_garbage_;
     }
-    void disturb(uint64_t now) {                              // a new cell, or a new burst
+    void disturb(uint64_t now) {  // a new cell, or a new burst
         if (!disturbs()) {
             if (now < next_garbage_) {
                 disturb_at_ = next_garbage_;
                 return;
             }
-            for (uint64_t n = 1 + random_.bits() % MOST; n; n--) pending_.push_back(uint8_t(random_.bits() % 3 ? random_.bits() : 0xFF));
+            for (uint64_t n = 1 + random_.bits() % MOST; n; n--)
+                pending_.push_back(uint8_t(random_.bits() % 3 ? random_.bits() : 0xFF));
             garbage_bytes += pending_.size();
             start(now);
         }
@@ -82,7 +86,7 @@ private:
         sample_at_ = now + uint64_t(bit_ / 2);
     }
     void sample(bool level) {
-        if (place_ == 0 && level) {                           // no start bit
+        if (place_ == 0 && level) {  // no start bit
             sample_at_ = NEVER;
             return;
         }

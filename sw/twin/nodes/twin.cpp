@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nodes (the RTL, Verilated), each with a machine at each axis, on one line with a host; and their C interface.
+// Nodes (the RTL, Verilated), each with a machine at each axis, on one line with a host; and their
+// C interface.
 //
-// All nodes share clk. A clk is: every node takes its pins and sees the rising edge, then the machine and the line take the
-// node's outputs and set the pins for the next edge. One translation unit with the Verilated code, so that all of it inlines.
+// All nodes share clk. A clk is: every node takes its pins and sees the rising edge, then the
+// machine and the line take the node's outputs and set the pins for the next edge. One translation
+// unit with the Verilated code, so that all of it inlines.
 #include <algorithm>
 #include <deque>
 #include <memory>
@@ -12,7 +14,7 @@
 #include "machines/machine.h"
 #include "nodes/node_pins.h"
 #include "nodes/peer_line.h"
-#include "verilated_node.h"                                   // made by build.py: the Verilated sources, CLK_HZ, AXES, REARM_CLK
+#include "verilated_node.h"  // made by build.py: the Verilated sources, CLK_HZ, AXES, REARM_CLK
 
 namespace twin {
 
@@ -21,14 +23,16 @@ constexpr uint32_t ALL_AXES = (1u << AXES) - 1;
 
 using Firmware = std::vector<uint32_t>;
 
-class Core {                                                  // a Verilated node and its clk
-public:
-    Core(unsigned address, const Firmware& firmware) : context_(new VerilatedContext), model_(new Vnode(context_.get())), pins(*model_->rootp) {
+class Core {  // a Verilated node and its clk
+ public:
+    Core(unsigned address, const Firmware& firmware)
+        : context_(new VerilatedContext), model_(new Vnode(context_.get())), pins(*model_->rootp) {
         pins.clk = 0;
         pins.address = address;
         pins.rs485_rx = 1;
         pins.estop_open = 0;
-        pins.encoder_a = pins.encoder_b = pins.encoder_z = pins.probe = pins.adc_sin = pins.adc_cos = 0;
+        pins.encoder_a = pins.encoder_b = pins.encoder_z = pins.probe = pins.adc_sin =
+            pins.adc_cos = 0;
         pins.limit_low_open = pins.limit_high_open = 0;
         pins.drive_fault_n = ALL_AXES;
         pins.sensor_rx = pins.peer_rx = 1;
@@ -43,8 +47,8 @@ public:
     void clk() {
         pins.clk = 1;
 #ifdef REARM_CLK
-        REARM_CLK(pins);                                      // as if the falling edge had been evaluated: nothing depends on it,
-        Vnode___024root___eval(&pins);                        // and nothing prints or finishes, which eval() looks after
+        REARM_CLK(pins);  // as if the falling edge had been evaluated: nothing depends on it,
+        Vnode___024root___eval(&pins);  // and nothing prints or finishes, which eval() looks after
 #else
         model_->eval();
         pins.clk = 0;
@@ -52,20 +56,22 @@ public:
 #endif
     }
 
-private:
+ private:
     std::unique_ptr<VerilatedContext> context_;
     std::unique_ptr<Vnode> model_;
 
-public:
+ public:
     Vnode___024root& pins;
 };
 
 class Node {
-public:
-    Node(unsigned address, const Firmware& firmware, const char* const* kinds, const double* const* parameters, uint64_t seed)
+ public:
+    Node(unsigned address, const Firmware& firmware, const char* const* kinds,
+         const double* const* parameters, uint64_t seed)
         : address_(address), firmware_(firmware), core_(std::in_place, address, firmware) {
         for (int n = 0; n < AXES; n++)
-            machines.push_back(make_machine(kinds[n], parameters[n], seed, uint64_t(address) << 16 | unsigned(n) << 8, CLK_HZ));
+            machines.push_back(make_machine(kinds[n], parameters[n], seed,
+                                            uint64_t(address) << 16 | unsigned(n) << 8, CLK_HZ));
     }
     void step(uint64_t now, bool rs485_rx) {
         bool changed = false;
@@ -73,12 +79,14 @@ public:
             auto& pins = core_->pins;
             pins.rs485_rx = rs485_rx;
             core_->clk();
-            for (int n = 0; n < AXES; n++) changed |= machines[size_t(n)]->clk(now, drive_of(pins, n));
+            for (int n = 0; n < AXES; n++)
+                changed |= machines[size_t(n)]->clk(now, drive_of(pins, n));
             if (changed) sense();
-            if (devices && devices->clk(now, peripheral_drive_of(pins))) set_peripheral_pins(pins, devices->levels());
+            if (devices && devices->clk(now, peripheral_drive_of(pins)))
+                set_peripheral_pins(pins, devices->levels());
             line_drives = pins.rs485_driver_enable;
             line_level = pins.rs485_tx;
-        } else {                                              // nothing is driven, the machines go on
+        } else {  // nothing is driven, the machines go on
             for (auto& machine : machines) machine->clk(now, DRIVE_IDLE);
             if (devices) devices->clk(now, PERIPHERAL_DRIVE_IDLE);
         }
@@ -91,7 +99,7 @@ public:
         estop_ = pressed;
         if (core_) core_->pins.estop_open = pressed;
     }
-    void power(uint64_t now, bool on) {                       // on again, it starts from its image as it did at first
+    void power(uint64_t now, bool on) {  // on again, it starts from its image as it did at first
         if (on == core_.has_value()) return;
         if (on) {
             core_.emplace(address_, firmware_);
@@ -111,9 +119,10 @@ public:
 
     std::vector<std::unique_ptr<Machine>> machines;
     std::unique_ptr<Devices> devices;
-    bool line_drives = false, line_level = true;              // its driver and what that is told, after this clk
+    bool line_drives = false,
+         line_level = true;  // its driver and what that is told, after this clk
 
-private:
+ private:
     void sense() {
         SensePins levels;
         for (int n = 0; n < AXES; n++) levels.add(n, machines[size_t(n)]->levels());
@@ -122,7 +131,7 @@ private:
 
     unsigned address_;
     const Firmware& firmware_;
-    std::optional<Core> core_;                                // without power there is none
+    std::optional<Core> core_;  // without power there is none
     bool estop_ = false;
 };
 
@@ -132,12 +141,13 @@ struct PeerDirection {
 };
 
 class Twin {
-public:
-    Twin(uint64_t seed, int count, const uint8_t* addresses, const Firmware& firmware, const char* const* kinds,
-         const double* const* parameters, double bit_clk)
+ public:
+    Twin(uint64_t seed, int count, const uint8_t* addresses, const Firmware& firmware,
+         const char* const* kinds, const double* const* parameters, double bit_clk)
         : bus(seed, CLK_HZ, bit_clk), firmware_(firmware) {
         for (int n = 0; n < count; n++)
-            nodes.emplace_back(new Node(addresses[n], firmware_, kinds + n * AXES, parameters + n * AXES, seed));
+            nodes.emplace_back(
+                new Node(addresses[n], firmware_, kinds + n * AXES, parameters + n * AXES, seed));
     }
     void step() {
         now++;
@@ -148,39 +158,46 @@ public:
             levels |= uint32_t(nodes[n]->line_level) << n;
         }
         bus.step(now, driving, levels);
-        for (auto& peer : peers) nodes[size_t(peer.to)]->hear_peer(peer.line.step(now, nodes[size_t(peer.from)]->peer_tx()));
+        for (auto& peer : peers)
+            nodes[size_t(peer.to)]->hear_peer(
+                peer.line.step(now, nodes[size_t(peer.from)]->peer_tx()));
     }
 
     uint64_t now = 0;
     Bus bus;
     std::vector<std::unique_ptr<Node>> nodes;
-    std::deque<PeerDirection> peers;                          // at fixed addresses
+    std::deque<PeerDirection> peers;  // at fixed addresses
 
-private:
+ private:
     const Firmware firmware_;
 };
 
-// One node without a machine, fed with the levels of a line as they are: for campaigns of many damaged frames.
+// One node without a machine, fed with the levels of a line as they are: for campaigns of many
+// damaged frames.
 class FrameBench {
-public:
-    static constexpr uint64_t START_CLK = 2'000'000;          // the firmware starts; the learner's first work holds its answers up
-    FrameBench(unsigned address, const Firmware& firmware, double bit_clk) : core_(address, firmware), bit_clk_(bit_clk) {
+ public:
+    static constexpr uint64_t START_CLK =
+        2'000'000;  // the firmware starts; the learner's first work holds its answers up
+    FrameBench(unsigned address, const Firmware& firmware, double bit_clk)
+        : core_(address, firmware), bit_clk_(bit_clk) {
         host_.set_bit_time(bit_clk);
         idle(START_CLK);
     }
     void idle(uint64_t clk) {
         while (clk--) step(true);
     }
-    // Levels, one a cell; then waits until `enough` words are there and the driver is off again, or the line was quiet for
-    // quiet_cells, or most_cells have passed. Returns the count of words.
-    int exchange(const uint8_t* levels, int count, int enough, int quiet_cells, int most_cells, uint16_t* words, int most_words) {
+    // Levels, one a cell; then waits until `enough` words are there and the driver is off again, or
+    // the line was quiet for quiet_cells, or most_cells have passed. Returns the count of words.
+    int exchange(const uint8_t* levels, int count, int enough, int quiet_cells, int most_cells,
+                 uint16_t* words, int most_words) {
         host_.received.clear();
         double end = double(now_);
         for (int n = 0; n < count; n++) {
             end += bit_clk_;
             while (double(now_) < end) step(levels[n]);
         }
-        const uint64_t quiet = uint64_t(quiet_cells * bit_clk_), stop = now_ + uint64_t(most_cells * bit_clk_);
+        const uint64_t quiet = uint64_t(quiet_cells * bit_clk_),
+                       stop = now_ + uint64_t(most_cells * bit_clk_);
         for (uint64_t silent = 0; silent < quiet && now_ < stop;) {
             step(true);
             silent = core_.pins.rs485_driver_enable ? 0 : silent + 1;
@@ -192,7 +209,7 @@ public:
     }
     uint64_t now() const { return now_; }
 
-private:
+ private:
     void step(bool level) {
         now_++;
         core_.pins.rs485_rx = level | core_.pins.rs485_driver_enable;
@@ -211,7 +228,9 @@ private:
 using namespace twin;
 
 namespace {
-Machine& machine_of(Twin* t, int axis) { return *t->nodes[size_t(axis / AXES)]->machines[size_t(axis % AXES)]; }
+Machine& machine_of(Twin* t, int axis) {
+    return *t->nodes[size_t(axis / AXES)]->machines[size_t(axis % AXES)];
+}
 Firmware image(const uint32_t* words, int count) { return {words, words + count}; }
 }  // namespace
 
@@ -220,8 +239,9 @@ extern "C" {
 
 int twin_axes() { return AXES; }
 int twin_memory_words() { return MEMORY_WORDS; }
-void* twin_new(uint64_t seed, int nodes, const uint8_t* addresses, const uint32_t* firmware, int words, const char* const* kinds,
-               const double* const* parameters, double bit_clk) {
+void* twin_new(uint64_t seed, int nodes, const uint8_t* addresses, const uint32_t* firmware,
+               int words, const char* const* kinds, const double* const* parameters,
+               double bit_clk) {
     return new Twin(seed, nodes, addresses, image(firmware, words), kinds, parameters, bit_clk);
 }
 void twin_delete(Twin* t) { delete t; }
@@ -235,10 +255,13 @@ int twin_run_until_words(Twin* t, int words, uint64_t clk) {
     while (received.size() < size_t(words) && clk--) t->step();
     return int(received.size());
 }
-void twin_send_words(Twin* t, const uint16_t* words, int count, const uint32_t* flips, int flip_count, int gap_cells) {
+void twin_send_words(Twin* t, const uint16_t* words, int count, const uint32_t* flips,
+                     int flip_count, int gap_cells) {
     t->bus.host.send_words(words, count, flips, flip_count, gap_cells);
 }
-void twin_send_levels(Twin* t, const uint8_t* levels, int count, double cell_clk) { t->bus.host.send_levels(levels, count, cell_clk); }
+void twin_send_levels(Twin* t, const uint8_t* levels, int count, double cell_clk) {
+    t->bus.host.send_levels(levels, count, cell_clk);
+}
 int twin_receive_words(Twin* t, uint16_t* out, int most) {
     auto& received = t->bus.host.received;
     const int count = int(std::min<size_t>(received.size(), size_t(most)));
@@ -248,30 +271,42 @@ int twin_receive_words(Twin* t, uint16_t* out, int most) {
 }
 void twin_host_bit_time(Twin* t, double clk) { t->bus.host.set_bit_time(clk); }
 void twin_flip_reply(Twin* t, const uint32_t* cells, int count) { t->bus.flip_reply(cells, count); }
-void twin_bus_spikes(Twin* t, double rate, double shortest, double longest) { t->bus.spikes(rate, shortest, longest, t->now); }
-void twin_cut(Twin* t, int node, int cut) {                   // node -1: the host
+void twin_bus_spikes(Twin* t, double rate, double shortest, double longest) {
+    t->bus.spikes(rate, shortest, longest, t->now);
+}
+void twin_cut(Twin* t, int node, int cut) {  // node -1: the host
     if (node < 0)
         t->bus.host_cut = Cut(cut);
     else
         t->bus.cut_node(node, Cut(cut));
 }
-// level, host drives, nodes that drive, collisions, framing errors, start glitches, edges, clk of last drive, words waiting
+// level, host drives, nodes that drive, collisions, framing errors, start glitches, edges, clk of
+// last drive, words waiting
 void twin_bus_state(Twin* t, uint64_t* out) {
     uint64_t driving = 0;
     for (size_t n = 0; n < t->nodes.size(); n++) driving |= uint64_t(t->nodes[n]->line_drives) << n;
     const Bus& bus = t->bus;
-    const uint64_t state[] = {bus.at_nodes, bus.host.drives(), driving, bus.collisions, bus.host.framing_errors,
-                              bus.host.start_glitches, bus.edges, bus.last_driven, bus.host.received.size()};
+    const uint64_t state[] = {bus.at_nodes,   bus.host.drives(),       driving,
+                              bus.collisions, bus.host.framing_errors, bus.host.start_glitches,
+                              bus.edges,      bus.last_driven,         bus.host.received.size()};
     std::copy(std::begin(state), std::end(state), out);
 }
-void twin_estop(Twin* t, int node, int pressed) { t->nodes[size_t(node)]->press_estop(pressed != 0); }
+void twin_estop(Twin* t, int node, int pressed) {
+    t->nodes[size_t(node)]->press_estop(pressed != 0);
+}
 // The machine of an axis; machine_library.cpp has what can be done with it.
 void* twin_machine(Twin* t, int axis) { return &machine_of(t, axis); }
-// What stands around a node; devices_library.cpp has what can be done with it. The angle at each cut is that of a worm table.
-void* twin_attach_devices(Twin* t, int node, const DevicesParameters* parameters, unsigned fitted, uint64_t seed, int table) {
+// What stands around a node; devices_library.cpp has what can be done with it. The angle at each
+// cut is that of a worm table.
+void* twin_attach_devices(Twin* t, int node, const DevicesParameters* parameters, unsigned fitted,
+                          uint64_t seed, int table) {
     auto& around = t->nodes[size_t(node)]->devices;
-    around = std::make_unique<Devices>(*parameters, fitted, seed, 0x5EED00u + unsigned(node) * 16, CLK_HZ);
-    if (table >= 0) around->table_angle = [t, &machine = machine_of(t, table)] { return machine.position(t->now); };
+    around = std::make_unique<Devices>(*parameters, fitted, seed, 0x5EED00u + unsigned(node) * 16,
+                                       CLK_HZ);
+    if (table >= 0)
+        around->table_angle = [t, &machine = machine_of(t, table)] {
+            return machine.position(t->now);
+        };
     return around.get();
 }
 // The serial line between two nodes, one direction; peer_line_* have what can be done with it.
@@ -287,8 +322,8 @@ void* frame_bench_new(unsigned address, const uint32_t* firmware, int words, dou
 void frame_bench_delete(FrameBench* bench) { delete bench; }
 void frame_bench_idle(FrameBench* bench, uint64_t clk) { bench->idle(clk); }
 uint64_t frame_bench_now(FrameBench* bench) { return bench->now(); }
-int frame_bench_exchange(FrameBench* bench, const uint8_t* levels, int count, int enough, int quiet_cells, int most_cells, uint16_t* words,
-                         int most) {
+int frame_bench_exchange(FrameBench* bench, const uint8_t* levels, int count, int enough,
+                         int quiet_cells, int most_cells, uint16_t* words, int most) {
     return bench->exchange(levels, count, enough, quiet_cells, most_cells, words, most);
 }
 

@@ -1,14 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The machine without hardware: nodes as they ship (RTL and firmware), a machine at each axis, a line with a host at its end.
+"""The machine without hardware: nodes as they ship (RTL and firmware), a machine at each axis, a
+line with a host at its end.
 
-Time is simulated: it passes in run, run_until_words and nowhere else, and the same seed gives the same run to the last bit.
+Time is simulated: it passes in run, run_until_words and nowhere else, and the same seed gives the
+same run to the last bit.
 An axis is counted through all nodes: axis = place of the node * axes a node + axis of the node.
 
-    Twin(nodes=(1, 2))                                       two nodes of one axis each, each on a stage of S0
-    Twin([Node(1, [Axis("stepper_stage", {"scale_count": 1e-7})] * 3)])      one node with three axes of S2
-    Twin([Node(1, [], Devices(eeprom=True, keypad=True, display=True, keyboard=True, edm=True, table=1)),
-          Node(2, [Axis("worm_table")])], peers=(0, 1))                      S4: two nodes, a serial line between them
+    Twin(nodes=(1, 2))                                       two nodes of one axis each, each on a
+                                                             stage of S0
+    Twin([Node(1, [Axis("stepper_stage", {"scale_count": 1e-7})] * 3)])      one node with three
+    axes of S2
+    Twin([Node(1, [], Devices(eeprom=True, keypad=True, display=True, keyboard=True, edm=True,
+    table=1)),
+          Node(2, [Axis("worm_table")])], peers=(0, 1))               S4: two nodes, a serial line
+                                                                      between them
 """
+
 import ctypes
 import time
 from contextlib import contextmanager
@@ -25,30 +32,46 @@ from twin.machines.machine import FUNCTIONS as MACHINE_FUNCTIONS
 from twin.machines.machine import HANDLE, LONG, REAL, WHOLE, MachineHandle, declare, pack
 
 CLK_HZ = 2_400_000
-START_S = 0.15                   # until the soft core of a node with one axis listens
-NODE = {"DRIVES": 1, "FILTERS": 0}     # what the stage of S0 needs of rtl/node.sv
-WITH_SEGMENTS = {**NODE, "SEGMENTS": 255}      # and with its segment table, which takes a fifteenth of the speed
+START_S = 0.15  # until the soft core of a node with one axis listens
+NODE = {"DRIVES": 1, "FILTERS": 0}  # what the stage of S0 needs of rtl/node.sv
+WITH_SEGMENTS = {
+    **NODE,
+    "SEGMENTS": 255,
+}  # and with its segment table, which takes a fifteenth of the speed
 BAUD = 115200
-BREAK_S = 0.003                  # the line low; nodes want 2 ms
-TURNAROUND_CELLS = 2             # the host hears a word half a cell before its end; the node's driver lets go half a cell after it
-CELLS = 11                       # of a character: start, eight data, 9th, stop
-PEER_BAUD = 9600                 # between nodes
-ALL_PERIPHERALS = 63                   # of rtl/peripherals.sv
+BREAK_S = 0.003  # the line low; nodes want 2 ms
+# the host hears a word half a cell before its end; the node's driver lets go half a cell after it
+TURNAROUND_CELLS = 2
+CELLS = 11  # of a character: start, eight data, 9th, stop
+PEER_BAUD = 9600  # between nodes
+ALL_PERIPHERALS = 63  # of rtl/peripherals.sv
 CUTS = {"none": 0, "idle": 1, "break": 2}
 
 FUNCTIONS = {
-    "twin_axes": (WHOLE, []), "twin_memory_words": (WHOLE, []),
-    "twin_new": (HANDLE, [LONG, WHOLE, HANDLE, HANDLE, WHOLE, HANDLE, HANDLE, REAL]), "twin_delete": (None, [HANDLE]),
-    "twin_now": (LONG, [HANDLE]), "twin_run": (None, [HANDLE, LONG]), "twin_run_until_words": (WHOLE, [HANDLE, WHOLE, LONG]),
-    "twin_send_words": (None, [HANDLE, HANDLE, WHOLE, HANDLE, WHOLE, WHOLE]), "twin_send_levels": (None, [HANDLE, HANDLE, WHOLE, REAL]),
-    "twin_receive_words": (WHOLE, [HANDLE, HANDLE, WHOLE]), "twin_host_bit_time": (None, [HANDLE, REAL]),
-    "twin_flip_reply": (None, [HANDLE, HANDLE, WHOLE]), "twin_bus_spikes": (None, [HANDLE, REAL, REAL, REAL]),
-    "twin_cut": (None, [HANDLE, WHOLE, WHOLE]), "twin_bus_state": (None, [HANDLE, HANDLE]),
-    "twin_estop": (None, [HANDLE, WHOLE, WHOLE]), "twin_machine": (HANDLE, [HANDLE, WHOLE]),
+    "twin_axes": (WHOLE, []),
+    "twin_memory_words": (WHOLE, []),
+    "twin_new": (HANDLE, [LONG, WHOLE, HANDLE, HANDLE, WHOLE, HANDLE, HANDLE, REAL]),
+    "twin_delete": (None, [HANDLE]),
+    "twin_now": (LONG, [HANDLE]),
+    "twin_run": (None, [HANDLE, LONG]),
+    "twin_run_until_words": (WHOLE, [HANDLE, WHOLE, LONG]),
+    "twin_send_words": (None, [HANDLE, HANDLE, WHOLE, HANDLE, WHOLE, WHOLE]),
+    "twin_send_levels": (None, [HANDLE, HANDLE, WHOLE, REAL]),
+    "twin_receive_words": (WHOLE, [HANDLE, HANDLE, WHOLE]),
+    "twin_host_bit_time": (None, [HANDLE, REAL]),
+    "twin_flip_reply": (None, [HANDLE, HANDLE, WHOLE]),
+    "twin_bus_spikes": (None, [HANDLE, REAL, REAL, REAL]),
+    "twin_cut": (None, [HANDLE, WHOLE, WHOLE]),
+    "twin_bus_state": (None, [HANDLE, HANDLE]),
+    "twin_estop": (None, [HANDLE, WHOLE, WHOLE]),
+    "twin_machine": (HANDLE, [HANDLE, WHOLE]),
     "twin_attach_devices": (HANDLE, [HANDLE, WHOLE, HANDLE, ctypes.c_uint, LONG, WHOLE]),
-    "twin_join_peers": (HANDLE, [HANDLE, WHOLE, WHOLE, LONG, REAL]), "twin_power": (None, [HANDLE, WHOLE, WHOLE]),
-    "frame_bench_new": (HANDLE, [WHOLE, HANDLE, WHOLE, REAL]), "frame_bench_delete": (None, [HANDLE]),
-    "frame_bench_idle": (None, [HANDLE, LONG]), "frame_bench_now": (LONG, [HANDLE]),
+    "twin_join_peers": (HANDLE, [HANDLE, WHOLE, WHOLE, LONG, REAL]),
+    "twin_power": (None, [HANDLE, WHOLE, WHOLE]),
+    "frame_bench_new": (HANDLE, [WHOLE, HANDLE, WHOLE, REAL]),
+    "frame_bench_delete": (None, [HANDLE]),
+    "frame_bench_idle": (None, [HANDLE, LONG]),
+    "frame_bench_now": (LONG, [HANDLE]),
     "frame_bench_exchange": (WHOLE, [HANDLE, HANDLE, WHOLE, WHOLE, WHOLE, WHOLE, HANDLE, WHOLE]),
 }
 
@@ -56,13 +79,17 @@ FUNCTIONS = {
 @dataclass(frozen=True)
 class Axis:
     """A machine by the name of its parameters_<machine>.toml, with what differs from that table."""
+
     machine: str = "stage"
     parameters: dict = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Node:
-    """A node by its address on the line, with a machine at each of its axes, and what stands around it besides."""
+    """A node by its address on the line, with a machine at each of its axes, and what stands around
+    it besides.
+    """
+
     address: int
     axes: list = field(default_factory=lambda: [Axis()])
     devices: Devices | None = None
@@ -70,11 +97,11 @@ class Node:
 
 @dataclass(frozen=True)
 class BusState:
-    level: bool                  # as the nodes hear it
+    level: bool  # as the nodes hear it
     host_drives: bool
-    nodes_drive: int             # bit mask over the nodes
-    collisions: int              # times that two drove at once
-    framing_errors: int          # of the host's receiver
+    nodes_drive: int  # bit mask over the nodes
+    collisions: int  # times that two drove at once
+    framing_errors: int  # of the host's receiver
     start_glitches: int
     edges: int
     last_driven_s: float
@@ -94,46 +121,106 @@ def array(values, dtype):
 def memory_image(found, words):
     image = array(words, numpy.uint32)
     if len(image) > found.twin_memory_words():
-        raise build.BuildError(f"the firmware has {len(image)} words, the node's memory {found.twin_memory_words()}")
+        raise build.BuildError(
+            f"the firmware has {len(image)} words, the node's memory {found.twin_memory_words()}"
+        )
     return image
 
 
 class Twin:
-    """`nodes` are Nodes, or addresses of nodes with `axes` stages each. All nodes are of one build: one with fewer axes than
-    another has unconnected ones behind them. `plant` overrides parameters of all machines, `plant_of` {axis: {…}} those of one;
-    `firmware` is a list of words or None for the one in sw/firmware; `host_baud_error` 0.02 makes the host 2 % fast;
-    `node_parameters` {"W": 12} are parameters of rtl/node.sv, {"DRIVES": 15} builds all that an axis can drive, WITH_SEGMENTS
-    a segment table. Nodes have all links (PERIPHERALS = 63) if one of them has devices or peers; `peers` are two places of nodes, joined by
+    """`nodes` are Nodes, or addresses of nodes with `axes` stages each. All nodes are of one build:
+    one with fewer axes than
+    another has unconnected ones behind them. `plant` overrides parameters of all machines,
+    `plant_of` {axis: {…}} those of one;
+    `firmware` is a list of words or None for the one in sw/firmware; `host_baud_error` 0.02 makes
+    the host 2 % fast;
+    `node_parameters` {"W": 12} are parameters of rtl/node.sv, {"DRIVES": 15} builds all that an
+    axis can drive, WITH_SEGMENTS
+    a segment table. Nodes have all links (PERIPHERALS = 63) if one of them has devices or peers;
+    `peers` are two places of nodes, joined by
     a serial line."""
 
-    def __init__(self, nodes=(1, 2), seed=1, clk_hz=CLK_HZ, baud=BAUD, host_baud_error=0.0, axes=1, plant=None, plant_of=None,
-                 firmware=None, node_parameters=NODE, peers=None, peer_baud=PEER_BAUD):
+    def __init__(
+        self,
+        nodes=(1, 2),
+        seed=1,
+        clk_hz=CLK_HZ,
+        baud=BAUD,
+        host_baud_error=0.0,
+        axes=1,
+        plant=None,
+        plant_of=None,
+        firmware=None,
+        node_parameters=NODE,
+        peers=None,
+        peer_baud=PEER_BAUD,
+    ):
         self.handle = None
         nodes = [node if isinstance(node, Node) else Node(node, [Axis()] * axes) for node in nodes]
-        self.addresses, self.node_axes = tuple(node.address for node in nodes), max(len(node.axes) for node in nodes)
+        self.addresses, self.node_axes = (
+            tuple(node.address for node in nodes),
+            max(len(node.axes) for node in nodes),
+        )
         self.axes = self.node_axes * len(nodes)
         if any(n not in range(self.axes) for n in plant_of or {}):
             raise IndexError(f"plant_of names an axis that is not there: there are {self.axes}")
         if peers or any(node.devices for node in nodes):
             node_parameters = {"PERIPHERALS": ALL_PERIPHERALS, **node_parameters}
-        fitted = [axis for node in nodes for axis in [*node.axes, *[Axis("unconnected")] * (self.node_axes - len(node.axes))]]
-        self.library, self.clk_hz, self.baud = library(clk_hz, self.node_axes, node_parameters), clk_hz, baud
-        packed = [pack(axis.machine, {**(plant or {}), **axis.parameters, **(plant_of or {}).get(n, {})}, self.library)
-                  for n, axis in enumerate(fitted)]
+        fitted = [
+            axis
+            for node in nodes
+            for axis in [*node.axes, *[Axis("unconnected")] * (self.node_axes - len(node.axes))]
+        ]
+        self.library, self.clk_hz, self.baud = (
+            library(clk_hz, self.node_axes, node_parameters),
+            clk_hz,
+            baud,
+        )
+        packed = [
+            pack(
+                axis.machine,
+                {**(plant or {}), **axis.parameters, **(plant_of or {}).get(n, {})},
+                self.library,
+            )
+            for n, axis in enumerate(fitted)
+        ]
         image = memory_image(self.library, build.firmware() if firmware is None else firmware)
         addresses = array(self.addresses, numpy.uint8)
         kinds = (ctypes.c_char_p * self.axes)(*(axis.machine.encode() for axis in fitted))
         tables = (ctypes.c_void_p * self.axes)(*(ctypes.addressof(table) for table in packed))
-        self.handle = self.library.twin_new(seed, len(addresses), addresses.ctypes.data, image.ctypes.data, len(image), kinds, tables,
-                                            clk_hz / baud)
+        self.handle = self.library.twin_new(
+            seed,
+            len(addresses),
+            addresses.ctypes.data,
+            image.ctypes.data,
+            len(image),
+            kinds,
+            tables,
+            clk_hz / baud,
+        )
         now = partial(self.library.twin_now, self.handle)
-        self.machines = [MachineHandle(self.library, self.library.twin_machine(self.handle, n), axis.machine, clk_hz, now)
-                         for n, axis in enumerate(fitted)]
-        self.around = [self._attach_devices(n, node.devices or Devices(), seed, now) for n, node in enumerate(nodes)
-                       if node_parameters.get("PERIPHERALS")]
-        pairs = [(self.check_node(peers[0]), self.check_node(peers[1])), (peers[1], peers[0])] if peers else []
-        self.peer_lines = {pair: PeerLineHandle(self.library, self.library.twin_join_peers(self.handle, *pair, seed, peer_baud), now)
-                           for pair in pairs}
+        self.machines = [
+            MachineHandle(
+                self.library, self.library.twin_machine(self.handle, n), axis.machine, clk_hz, now
+            )
+            for n, axis in enumerate(fitted)
+        ]
+        self.around = [
+            self._attach_devices(n, node.devices or Devices(), seed, now)
+            for n, node in enumerate(nodes)
+            if node_parameters.get("PERIPHERALS")
+        ]
+        pairs = (
+            [(self.check_node(peers[0]), self.check_node(peers[1])), (peers[1], peers[0])]
+            if peers
+            else []
+        )
+        self.peer_lines = {
+            pair: PeerLineHandle(
+                self.library, self.library.twin_join_peers(self.handle, *pair, seed, peer_baud), now
+            )
+            for pair in pairs
+        }
         if host_baud_error:
             self.set_host_baud(baud * (1 + host_baud_error))
 
@@ -153,10 +240,18 @@ class Twin:
 
     def _attach_devices(self, node, around, seed, now):
         if around.table is not None and around.table not in range(self.axes):
-            raise IndexError(f"there is no axis {around.table} to be the table: there are {self.axes}")
+            raise IndexError(
+                f"there is no axis {around.table} to be the table: there are {self.axes}"
+            )
         packed = pack_devices(around.parameters, self.library)
-        handle = self.library.twin_attach_devices(self.handle, node, ctypes.addressof(packed), around.fitted, seed,
-                                            -1 if around.table is None else around.table)
+        handle = self.library.twin_attach_devices(
+            self.handle,
+            node,
+            ctypes.addressof(packed),
+            around.fitted,
+            seed,
+            -1 if around.table is None else around.table,
+        )
         return DevicesHandle(self.library, handle, self.clk_hz, now)
 
     # time
@@ -170,39 +265,52 @@ class Twin:
 
     def run_until_words(self, count, timeout_s):
         """Run until the host has `count` words waiting, at most timeout_s; returns how many wait."""
-        return self.library.twin_run_until_words(self.handle, count, max(0, round(timeout_s * self.clk_hz)))
+        return self.library.twin_run_until_words(
+            self.handle, count, max(0, round(timeout_s * self.clk_hz))
+        )
 
     # line
 
     def send_words(self, words, flip_cells=(), gap_cells=0):
-        """Put words (0…511) behind what the host is sending. flip_cells: bit cells to turn over, counted from the first start
+        """Put words (0…511) behind what the host is sending. flip_cells: bit cells to turn over,
+        counted from the first start
         bit, 11 a word (and gap_cells more between two)."""
         words, flips = array(words, numpy.uint16), array(flip_cells, numpy.uint32)
-        self.library.twin_send_words(self.handle, words.ctypes.data, len(words), flips.ctypes.data, len(flips), gap_cells)
+        self.library.twin_send_words(
+            self.handle, words.ctypes.data, len(words), flips.ctypes.data, len(flips), gap_cells
+        )
 
     def send_levels(self, levels, cell_s=0.0):
-        """The host's driver as it is told, cell by cell (0: of one bit time): breaks, nonsense, half characters."""
+        """The host's driver as it is told, cell by cell (0: of one bit time): breaks, nonsense,
+        half characters.
+        """
         levels = array(levels, numpy.uint8)
-        self.library.twin_send_levels(self.handle, levels.ctypes.data, len(levels), cell_s * self.clk_hz)
+        self.library.twin_send_levels(
+            self.handle, levels.ctypes.data, len(levels), cell_s * self.clk_hz
+        )
 
     def send_nonsense(self, cells, seed=1):
         """Random levels, each of 0.1 to 3 bit times."""
         random = numpy.random.default_rng(seed)
         fine = 10
         runs = random.integers(1, 3 * fine, size=cells)
-        levels = numpy.repeat(numpy.arange(cells) & 1, runs)[:cells * fine]
+        levels = numpy.repeat(numpy.arange(cells) & 1, runs)[: cells * fine]
         self.send_levels(levels, 1 / self.baud / fine)
 
     def receive_words(self, most=4096):
-        """Words that the host has received and not yet taken, as from a port of a PC: without a stop bit too, but no break."""
+        """Words that the host has received and not yet taken, as from a port of a PC: without a
+        stop bit too, but no break.
+        """
         out = numpy.empty(most, dtype=numpy.uint16)
-        return out[:self.library.twin_receive_words(self.handle, out.ctypes.data, most)].tolist()
+        return out[: self.library.twin_receive_words(self.handle, out.ctypes.data, most)].tolist()
 
     def set_host_baud(self, baud):
         self.library.twin_host_bit_time(self.handle, self.clk_hz / baud)
 
     def flip_reply_cells(self, cells):
-        """Turn over bit cells of what the host hears next, counted from the first start bit of the next reply."""
+        """Turn over bit cells of what the host hears next, counted from the first start bit of the
+        next reply.
+        """
         cells = array(cells, numpy.uint32)
         self.library.twin_flip_reply(self.handle, cells.ctypes.data, len(cells))
 
@@ -220,12 +328,19 @@ class Twin:
         before = self.bus()
         self.run(seconds)
         after = self.bus()
-        return after.edges == before.edges and after.level and not after.host_drives and not after.nodes_drive
+        return (
+            after.edges == before.edges
+            and after.level
+            and not after.host_drives
+            and not after.nodes_drive
+        )
 
     # machines
 
     def machine(self, axis=0):
-        """The machine of an axis: its state, parameters, faults and traces; see machine.MachineHandle."""
+        """The machine of an axis: its state, parameters, faults and traces; see
+        machine.MachineHandle.
+        """
         if axis not in range(self.axes):
             raise IndexError(f"there is no axis {axis}: there are {self.axes}")
         return self.machines[axis]
@@ -271,17 +386,20 @@ class Twin:
     # power
 
     def power_cut(self, node=0):
-        """A node loses its power, and with it its panel, its drives' enable and its memory; the machines keep their state, the
+        """A node loses its power, and with it its panel, its drives' enable and its memory; the
+        machines keep their state, the
         EEPROM what was written to its end."""
         self.library.twin_power(self.handle, self.check_node(node), False)
 
     def power_on(self, node=0):
         self.library.twin_power(self.handle, self.check_node(node), True)
 
-    # faults: estop of a node, line_cut of a node or of "host"; all others are those of the machine of an axis
+    # faults: estop of a node, line_cut of a node or of "host"; all others are those of the machine
+    # of an axis
 
     def inject(self, fault, where=0, level=False):
-        """`where` is the axis, for estop and line_cut the node; `level` is that of a stuck pin, and of a cut line: true
+        """`where` is the axis, for estop and line_cut the node; `level` is that of a stuck pin, and
+        of a cut line: true
         if the cut end hears ones, false for a break."""
         self._fault(fault, where, True, level)
 
@@ -301,7 +419,9 @@ class Twin:
             self.library.twin_estop(self.handle, self.check_node(where), on)
         elif fault == "line_cut":
             node = -1 if where == "host" else self.check_node(where)
-            self.library.twin_cut(self.handle, node, CUTS["none" if not on else "idle" if level else "break"])
+            self.library.twin_cut(
+                self.handle, node, CUTS["none" if not on else "idle" if level else "break"]
+            )
         elif on:
             self.machine(where).inject(fault, level)
         else:
@@ -310,7 +430,9 @@ class Twin:
     # traces
 
     def trace(self, axis=0, rate_hz=10_000):
-        """Record from now on; the rate is rounded to whole time steps of the machine (100 kHz at most); 0 ends it."""
+        """Record from now on; the rate is rounded to whole time steps of the machine (100 kHz at
+        most); 0 ends it.
+        """
         self.machine(axis).trace(rate_hz)
 
     def take_trace(self, axis=0):
@@ -372,16 +494,20 @@ def cells_of(words, gap_cells=0):
 
 
 class FrameBench:
-    """One node without a machine at a low clk (16 clk a bit: the firmware keeps its baud): for 10^5 damaged frames.
+    """One node without a machine at a low clk (16 clk a bit: the firmware keeps its baud): for 10^5
+    damaged frames.
     One made with another clk_hz (whole kHz) is another build.
 
-    exchange(levels) puts bit cells on the line as they are and returns the words that the node answered."""
+    exchange(levels) puts bit cells on the line as they are and returns the words that the node
+    answered."""
 
     def __init__(self, address=1, clk_hz=1_840_000, baud=BAUD, firmware=None):
         self.handle = None
         self.library, self.clk_hz = library(clk_hz, 1, NODE), clk_hz
         image = memory_image(self.library, build.firmware() if firmware is None else firmware)
-        self.handle = self.library.frame_bench_new(address, image.ctypes.data, len(image), clk_hz / baud)
+        self.handle = self.library.frame_bench_new(
+            address, image.ctypes.data, len(image), clk_hz / baud
+        )
         self.words = numpy.empty(256, dtype=numpy.uint16)
 
     def __del__(self):
@@ -390,11 +516,21 @@ class FrameBench:
         self.handle = None
 
     def exchange(self, levels, enough=256, quiet_cells=100, most_cells=2000):
-        """Returns when `enough` words are there, or the line was quiet for quiet_cells after the last level or the answer; at
-        the latest after most_cells. A node takes up to 60 cells to answer a request, at a low clk."""
+        """Returns when `enough` words are there, or the line was quiet for quiet_cells after the
+        last level or the answer; at
+        the latest after most_cells. A node takes up to 60 cells to answer a request, at a low
+        clk."""
         levels = array(levels, numpy.uint8)
-        count = self.library.frame_bench_exchange(self.handle, levels.ctypes.data, len(levels), enough, quiet_cells, most_cells,
-                                                  self.words.ctypes.data, len(self.words))
+        count = self.library.frame_bench_exchange(
+            self.handle,
+            levels.ctypes.data,
+            len(levels),
+            enough,
+            quiet_cells,
+            most_cells,
+            self.words.ctypes.data,
+            len(self.words),
+        )
         return self.words[:count].tolist()
 
     def idle(self, cells, baud=BAUD):
@@ -405,9 +541,11 @@ class FrameBench:
 
 
 def realtime_factor(simulated_s=0.1, tries=5, nodes=(1, 2), **arguments):
-    """Simulated seconds per second of one processor, nodes and machines running; the best of the tries."""
+    """Simulated seconds per second of one processor, nodes and machines running; the best of the
+    tries.
+    """
     with Twin(nodes=nodes, **arguments) as twin:
-        twin.run(0.1)                                         # the firmware starts
+        twin.run(0.1)  # the firmware starts
         took = []
         for _ in range(tries):
             start = time.process_time()

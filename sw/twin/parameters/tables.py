@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parameters of the machines: <machine>.toml as dictionaries, and as the C++ structures that build.py puts beside
+"""The parameters of the machines: <machine>.toml as dictionaries, and as the C++ structures that
+build.py puts beside
 the libraries."""
+
 import tomllib
 from functools import cache
 from pathlib import Path
@@ -20,7 +22,11 @@ def load(machine="stage"):
     """{name: entry}, name = section_key, entry = value, unit, why."""
     with open(source(machine), "rb") as file:
         sections = tomllib.load(file)
-    return {f"{section}_{key}": entry for section, entries in sections.items() for key, entry in entries.items()}
+    return {
+        f"{section}_{key}": entry
+        for section, entries in sections.items()
+        for key, entry in entries.items()
+    }
 
 
 def values(overrides=None, machine="stage"):
@@ -28,15 +34,21 @@ def values(overrides=None, machine="stage"):
     result = {name: float(entry["value"]) for name, entry in load(machine).items()}
     for name, value in (overrides or {}).items():
         if name not in result:
-            raise KeyError(f"the machine {machine} has no parameter {name}; see {source(machine).name}")
+            raise KeyError(
+                f"the machine {machine} has no parameter {name}; see {source(machine).name}"
+            )
         result[name] = float(value)
     return result
 
 
 def structure(machine):
     name = "".join(word.capitalize() for word in machine.split("_")) + "Parameters"
-    fields = "\n".join(f"    double {field};    // {entry['unit']}" for field, entry in load(machine).items())
-    table = "\n".join(f'    if (!std::strcmp(name, "{field}")) return &p.{field};' for field in load(machine))
+    fields = "\n".join(
+        f"    double {field};    // {entry['unit']}" for field, entry in load(machine).items()
+    )
+    table = "\n".join(
+        f'    if (!std::strcmp(name, "{field}")) return &p.{field};' for field in load(machine)
+    )
     return f"""struct {name} {{
 {fields}
 }};

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Absolute angle sensor (time grating, S4) that sends frames by itself over a serial line, 8 data bits, no parity, one stop bit:
+// Absolute angle sensor (time grating, S4) that sends frames by itself over a serial line, 8 data
+// bits, no parity, one stop bit:
 //
-//   A5 · sequence · angle (4 bytes, low first, 2^32 a turn) · CRC-16 of the six bytes before (low first; 0x1021, starts at 0xFFFF)
+//   A5 · sequence · angle (4 bytes, low first, 2^32 a turn) · CRC-16 of the six bytes before (low
+//   first; 0x1021, starts at 0xFFFF)
 //
-// The angle is that of `latency` before the first start bit. A share of the frames is left out, another has one byte damaged;
-// their sequence numbers are counted all the same.
+// The angle is that of `latency` before the first start bit. A share of the frames is left out,
+// another has one byte damaged; their sequence numbers are counted all the same.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -17,10 +19,11 @@
 namespace twin {
 
 class AngleSensor {
-public:
+ public:
     static constexpr int BYTES = 8, CELLS = 10;
 
-    AngleSensor(uint64_t seed, uint64_t stream) : random_(seed, stream), phase_(2 * M_PI * random_.uniform()) {}
+    AngleSensor(uint64_t seed, uint64_t stream)
+        : random_(seed, stream), phase_(2 * M_PI * random_.uniform()) {}
 
     template <class P>
     void configure(const P& p, double clk_hz) {
@@ -33,17 +36,20 @@ public:
         dropped_share_ = p.sensor_dropped;
         corrupt_share_ = p.sensor_corrupt;
     }
-    double reading(double angle) {                            // rad
-        return angle + ARC_SECOND * (error_ * std::sin(waves_ * angle + phase_) + noise_ * random_.uniform(-1, 1));
+    double reading(double angle) {  // rad
+        return angle + ARC_SECOND * (error_ * std::sin(waves_ * angle + phase_) +
+                                     noise_ * random_.uniform(-1, 1));
     }
     // the line at clk `now`; returns the clk of what comes next
     uint64_t advance(uint64_t now, double angle) {
         if (now >= sample_at_) {
             sample(angle);
             frame_at_ = now + latency_;
-            sample_at_ = now + std::max<uint64_t>(period_, latency_ + uint64_t(BYTES * CELLS * bit_) + 1);
+            sample_at_ =
+                now + std::max<uint64_t>(period_, latency_ + uint64_t(BYTES * CELLS * bit_) + 1);
         }
-        if (!sends_ || now < frame_at_) return sends_ ? std::min(sample_at_, frame_at_) : sample_at_;
+        if (!sends_ || now < frame_at_)
+            return sends_ ? std::min(sample_at_, frame_at_) : sample_at_;
         const int cell = int(double(now - frame_at_) / bit_);
         if (cell >= BYTES * CELLS) {
             rx = true;
@@ -51,15 +57,17 @@ public:
             return sample_at_;
         }
         const int bit = cell % CELLS;
-        rx = bit == 0 ? false : bit == CELLS - 1 ? true : bytes_[size_t(cell / CELLS)] >> (bit - 1) & 1;
+        rx = bit == 0           ? false
+             : bit == CELLS - 1 ? true
+                                : bytes_[size_t(cell / CELLS)] >> (bit - 1) & 1;
         return frame_at_ + uint64_t(std::ceil((cell + 1) * bit_));
     }
 
     bool rx = true;
-    bool stuck = false;                                       // fault: sends the same angle for ever
-    uint64_t frames = 0, dropped = 0, corrupt = 0;            // frames: all, with those
+    bool stuck = false;                             // fault: sends the same angle for ever
+    uint64_t frames = 0, dropped = 0, corrupt = 0;  // frames: all, with those
 
-private:
+ private:
     static constexpr double ARC_SECOND = M_PI / 180 / 3600;
 
     void sample(double angle) {
@@ -67,11 +75,17 @@ private:
             const double turns = reading(angle) / (2 * M_PI);
             word_ = uint32_t(int64_t(std::floor((turns - std::floor(turns)) * 0x1p32 + 0.5)));
         }
-        bytes_ = {0xA5, uint8_t(frames++), uint8_t(word_), uint8_t(word_ >> 8), uint8_t(word_ >> 16), uint8_t(word_ >> 24)};
+        bytes_ = {0xA5,
+                  uint8_t(frames++),
+                  uint8_t(word_),
+                  uint8_t(word_ >> 8),
+                  uint8_t(word_ >> 16),
+                  uint8_t(word_ >> 24)};
         uint16_t crc = 0xFFFF;
         for (int n = 0; n < BYTES - 2; n++) {
             crc ^= uint16_t(bytes_[size_t(n)] << 8);
-            for (int bit = 0; bit < 8; bit++) crc = uint16_t(crc << 1 ^ (crc & 0x8000 ? 0x1021 : 0));
+            for (int bit = 0; bit < 8; bit++)
+                crc = uint16_t(crc << 1 ^ (crc & 0x8000 ? 0x1021 : 0));
         }
         bytes_[BYTES - 2] = uint8_t(crc);
         bytes_[BYTES - 1] = uint8_t(crc >> 8);
@@ -85,7 +99,8 @@ private:
     }
 
     RandomSource random_;
-    double phase_, bit_ = 1, error_ = 0, noise_ = 0, waves_ = 0, dropped_share_ = 0, corrupt_share_ = 0;
+    double phase_, bit_ = 1, error_ = 0, noise_ = 0, waves_ = 0, dropped_share_ = 0,
+                   corrupt_share_ = 0;
     uint64_t period_ = 1, latency_ = 0, sample_at_ = 0, frame_at_ = 0;
     std::array<uint8_t, BYTES> bytes_{};
     uint32_t word_ = 0;

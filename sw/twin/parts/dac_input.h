@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The 16-bit bipolar converter that a node drives: data in at rising sclk while cs_n is low, MSB first; rising cs_n loads the last
-// 16 bits. Offset binary: 32768 = 0 V. AD5542A class.
+// The 16-bit bipolar converter that a node drives: data in at rising sclk while cs_n is low, MSB
+// first; rising cs_n loads the last 16 bits. Offset binary: 32768 = 0 V. AD5542A class.
 #pragma once
 #include <cstdint>
 
@@ -9,7 +9,7 @@
 namespace twin {
 
 class DacInput {
-public:
+ public:
     static constexpr unsigned BITS = 16, ZERO = 1u << (BITS - 1);
 
     void drive_changed(unsigned before, unsigned after) {
@@ -25,12 +25,12 @@ public:
             bad_frames += clocks_ != BITS;
         }
     }
-    double share() const { return (double(code) - ZERO) / ZERO; }   // of the reference, -1..1
+    double share() const { return (double(code) - ZERO) / ZERO; }  // of the reference, -1..1
 
-    unsigned code = ZERO;                                     // held by its reset until the first frame
-    uint64_t frames = 0, bad_frames = 0;                      // bad: not of 16 clk
+    unsigned code = ZERO;                 // held by its reset until the first frame
+    uint64_t frames = 0, bad_frames = 0;  // bad: not of 16 clk
 
-private:
+ private:
     uint16_t shift_ = ZERO;
     unsigned clocks_ = 0;
 };

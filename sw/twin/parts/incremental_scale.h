@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Incremental scale: A/B, one edge a count, A leads on the way up; and its index or reference mark Z.
+// Incremental scale: A/B, one edge a count, A leads on the way up; and its index or reference mark
+// Z.
 #pragma once
 #include <cmath>
 #include <cstdint>
@@ -10,7 +11,7 @@
 namespace twin {
 
 class IncrementalScale {
-public:
+ public:
     template <class P>
     void configure(const P& p) {
         count_ = p.scale_count;
@@ -30,10 +31,12 @@ public:
     }
     unsigned levels() const {
         const unsigned quarter = unsigned(counts_) & 3;
-        return ((quarter ^ quarter >> 1) & 1) * ENCODER_A | (quarter >> 1) * ENCODER_B | z_ * ENCODER_Z;
+        return ((quarter ^ quarter >> 1) & 1) * ENCODER_A | (quarter >> 1) * ENCODER_B |
+               z_ * ENCODER_Z;
     }
-    double way_to_change(double position, double velocity) const {   // along the motion, m
-        double way = velocity > 0 ? double(counts_ + 1) * count_ - position : position - double(counts_) * count_ + hysteresis_;
+    double way_to_change(double position, double velocity) const {  // along the motion, m
+        double way = velocity > 0 ? double(counts_ + 1) * count_ - position
+                                  : position - double(counts_) * count_ + hysteresis_;
         for (const double edge : {index_ + rise_, index_ + width_ + rise_}) {
             const double ahead = velocity > 0 ? edge - position : position - edge;
             if (ahead > 0 && ahead < way) way = ahead;
@@ -42,12 +45,13 @@ public:
     }
     // the clk at which a body that moves on like this changes a level
     uint64_t next_change(uint64_t now, double position, double velocity, double clk_hz) const {
-        const double clk = velocity ? way_to_change(position, velocity) / std::fabs(velocity) * clk_hz : 1e18;
+        const double clk =
+            velocity ? way_to_change(position, velocity) / std::fabs(velocity) * clk_hz : 1e18;
         return clk < 1e15 ? now + 1 + uint64_t(clk) : NEVER;
     }
-    int64_t counts() const { return counts_; }                // floor of position / count, but for the hysteresis
+    int64_t counts() const { return counts_; }  // floor of position / count, but for the hysteresis
 
-private:
+ private:
     double count_ = 1, hysteresis_ = 0, index_ = 0, width_ = 0, scatter_ = 0, rise_ = 0;
     int64_t counts_ = 0;
     bool z_ = false;

@@ -8,8 +8,14 @@ namespace twin {
 
 constexpr int LEADING_ZEROS = 2;
 
-Interferometer::Interferometer(const StageParameters& parameters, uint64_t seed, uint64_t stream, double clk_hz)
-    : p(parameters), seed_(seed), stream_(stream), clk_hz_(clk_hz), random_(seed, stream), spikes_a_{RandomSource(seed, stream + 1), 0, 0},
+Interferometer::Interferometer(const StageParameters& parameters, uint64_t seed, uint64_t stream,
+                               double clk_hz)
+    : p(parameters),
+      seed_(seed),
+      stream_(stream),
+      clk_hz_(clk_hz),
+      random_(seed, stream),
+      spikes_a_{RandomSource(seed, stream + 1), 0, 0},
       spikes_b_{RandomSource(seed, stream + 2), 0, 0} {
     configure();
     code_sin = code_cos = 1u << (int(p.signal_bits) - 1);
@@ -18,10 +24,12 @@ Interferometer::Interferometer(const StageParameters& parameters, uint64_t seed,
 void Interferometer::configure() {
     sin_of_error_ = std::sin(p.signal_phase_error * M_PI / 180);
     cos_of_error_ = std::cos(p.signal_phase_error * M_PI / 180);
-    const double plus[] = {p.harmonic_plus_2, p.harmonic_plus_3, p.harmonic_plus_4, p.harmonic_plus_5,
-                           p.harmonic_plus_6, p.harmonic_plus_7, p.harmonic_plus_8};
-    const double minus[] = {p.harmonic_minus_2, p.harmonic_minus_3, p.harmonic_minus_4, p.harmonic_minus_5,
-                            p.harmonic_minus_6, p.harmonic_minus_7, p.harmonic_minus_8};
+    const double plus[] = {p.harmonic_plus_2, p.harmonic_plus_3, p.harmonic_plus_4,
+                           p.harmonic_plus_5, p.harmonic_plus_6, p.harmonic_plus_7,
+                           p.harmonic_plus_8};
+    const double minus[] = {p.harmonic_minus_2, p.harmonic_minus_3, p.harmonic_minus_4,
+                            p.harmonic_minus_5, p.harmonic_minus_6, p.harmonic_minus_7,
+                            p.harmonic_minus_8};
     highest_ = 0;
     for (int k = 2; k <= HIGHEST; k++) {
         plus_[k] = plus[k - 2];
@@ -39,8 +47,10 @@ void Interferometer::draw(Spikes& spikes, uint64_t after) {
         spikes.start = spikes.end = ~uint64_t(0);
         return;
     }
-    spikes.start = after + 1 + uint64_t(spikes.random.exponential(clk_hz_ / p.comparator_spike_rate));
-    const double length = spikes.random.uniform(p.comparator_spike_shortest, p.comparator_spike_longest) * clk_hz_;
+    spikes.start =
+        after + 1 + uint64_t(spikes.random.exponential(clk_hz_ / p.comparator_spike_rate));
+    const double length =
+        spikes.random.uniform(p.comparator_spike_shortest, p.comparator_spike_longest) * clk_hz_;
     spikes.end = spikes.start + (length < 1 ? 1 : uint64_t(length));
 }
 
@@ -49,7 +59,9 @@ void Interferometer::analogue(double position, double& sine, double& cosine) con
         sine = cosine = 0;
         return;
     }
-    const double turns = (position + scale_error_.at(position) - p.grating_offset) / p.grating_period, phase = 2 * M_PI * (turns - std::floor(turns));
+    const double turns =
+                     (position + scale_error_.at(position) - p.grating_offset) / p.grating_period,
+                 phase = 2 * M_PI * (turns - std::floor(turns));
     double s, c;
     sincos(phase, &s, &c);
     const std::complex<double> first(c, s);
@@ -60,7 +72,8 @@ void Interferometer::analogue(double position, double& sine, double& cosine) con
         s += (plus_[k] - minus_[k]) * power.imag();
     }
     sine = p.signal_amplitude * (s + p.signal_offset_sin);
-    cosine = p.signal_amplitude * (p.signal_gain_cos * (c * cos_of_error_ - s * sin_of_error_) + p.signal_offset_cos);
+    cosine = p.signal_amplitude *
+             (p.signal_gain_cos * (c * cos_of_error_ - s * sin_of_error_) + p.signal_offset_cos);
 }
 
 uint64_t Interferometer::advance(uint64_t now, double position) {

@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Grating interferometer of one axis, from the place of the table to the pins of the node: sine and cosine through two
-// converters that sample together, and the comparators' quadrature levels with their spikes.
+// Grating interferometer of one axis, from the place of the table to the pins of the node: sine and
+// cosine through two converters that sample together, and the comparators' quadrature levels with
+// their spikes.
 //
-//   phase  = 2 pi (position + scale error - grating_offset) / period          sine = sin(phase)    cosine = cos(phase), with their errors:
-//            harmonics +-2 ... +-8 are added to exp(i phase) first, then gain, phase and offset bend it
+//   phase  = 2 pi (position + scale error - grating_offset) / period          sine = sin(phase)
+//   cosine = cos(phase), with their errors:
+//            harmonics +-2 ... +-8 are added to exp(i phase) first, then gain, phase and offset
+//            bend it
 //   levels   A = cosine > 0, B = sine > 0: at a rising edge of A, B = 0 means forward (S0)
-//   frame    AD7356 class: sampled at the falling edge of cs_n, which also puts out the first leading zero; each falling edge of
-//            sclk puts out the next bit: second leading zero, then the word, MSB first, straight binary, then zeros
+//   frame    AD7356 class: sampled at the falling edge of cs_n, which also puts out the first
+//   leading zero; each falling edge of
+//            sclk puts out the next bit: second leading zero, then the word, MSB first, straight
+//            binary, then zeros
 #pragma once
 #include <cstdint>
 
@@ -17,31 +22,35 @@
 namespace twin {
 
 class Interferometer {
-public:
-    Interferometer(const StageParameters& parameters, uint64_t seed, uint64_t stream, double clk_hz);
+ public:
+    Interferometer(const StageParameters& parameters, uint64_t seed, uint64_t stream,
+                   double clk_hz);
 
-    uint64_t advance(uint64_t now, double position);          // levels at clk `now`; returns the clk of the next change of a spike
-    void sample(double position);                             // conversion of both channels
-    void chip_select(double position) {                       // falling edge of cs_n
+    uint64_t advance(
+        uint64_t now,
+        double position);  // levels at clk `now`; returns the clk of the next change of a spike
+    void sample(double position);        // conversion of both channels
+    void chip_select(double position) {  // falling edge of cs_n
         sample(position);
         shift_sin_ = code_sin << first_bit_;
         shift_cos_ = code_cos << first_bit_;
     }
-    void next_bit() {                                         // falling edge of sclk
+    void next_bit() {  // falling edge of sclk
         shift_sin_ <<= 1;
         shift_cos_ <<= 1;
     }
     unsigned sdata_sin() const { return shift_sin_ >> 31; }
     unsigned sdata_cos() const { return shift_cos_ >> 31; }
-    void analogue(double position, double& sine, double& cosine) const;   // of full scale, without noise
+    void analogue(double position, double& sine,
+                  double& cosine) const;  // of full scale, without noise
 
-    void configure();                                         // take over changed parameters
+    void configure();  // take over changed parameters
 
-    bool a = false, b = false;                                // levels of the comparators
-    uint32_t code_sin = 0, code_cos = 0;                      // last conversion, straight binary
-    bool cut = false, converter_stuck = false;                // faults: no light, no conversion
+    bool a = false, b = false;                  // levels of the comparators
+    uint32_t code_sin = 0, code_cos = 0;        // last conversion, straight binary
+    bool cut = false, converter_stuck = false;  // faults: no light, no conversion
 
-private:
+ private:
     struct Spikes {
         RandomSource random;
         uint64_t start, end;
@@ -52,11 +61,11 @@ private:
     const StageParameters& p;
     static constexpr int HIGHEST = 8;
     double plus_[HIGHEST + 1] = {}, minus_[HIGHEST + 1] = {};  // harmonics
-    int highest_ = 0;                                         // of them that is not zero
+    int highest_ = 0;                                          // of them that is not zero
     uint64_t seed_, stream_;
     ScaleError scale_error_;
     double clk_hz_, sin_of_error_ = 0, cos_of_error_ = 1;
-    int first_bit_ = 0;                                       // of the word, in the 32 bits that are shifted out
+    int first_bit_ = 0;  // of the word, in the 32 bits that are shifted out
     RandomSource random_;
     Spikes spikes_a_, spikes_b_;
     bool clean_a_ = false, clean_b_ = false;

@@ -6,7 +6,7 @@
 namespace twin {
 
 class LimitSwitches {
-public:
+ public:
     template <class P>
     void configure(const P& p) {
         low_ = p.switch_low;
@@ -33,12 +33,16 @@ public:
 
     bool low_pressed = false, high_pressed = false;
 
-private:
-    double next_low(RandomSource& random) const { return low_ + random.uniform(-scatter_, scatter_) - (low_pressed ? 0 : hysteresis_); }
-    double next_high(RandomSource& random) const { return high_ + random.uniform(-scatter_, scatter_) + (high_pressed ? 0 : hysteresis_); }
+ private:
+    double next_low(RandomSource& random) const {
+        return low_ + random.uniform(-scatter_, scatter_) - (low_pressed ? 0 : hysteresis_);
+    }
+    double next_high(RandomSource& random) const {
+        return high_ + random.uniform(-scatter_, scatter_) + (high_pressed ? 0 : hysteresis_);
+    }
 
     double low_ = 0, high_ = 0, hysteresis_ = 0, scatter_ = 0;
-    double low_edge_ = 0, high_edge_ = 0;                     // where each changes next
+    double low_edge_ = 0, high_edge_ = 0;  // where each changes next
 };
 
 }  // namespace twin

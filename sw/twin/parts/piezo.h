@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fine stage: amplifier with a slew limit, piezo with hysteresis and creep, a flexure with its first mode, a mass on it.
+// Fine stage: amplifier with a slew limit, piezo with hysteresis and creep, a flexure with its
+// first mode, a mass on it.
 //
-//   hysteresis  Prandtl-Ishlinskii: y = w0 u + w sum play(u, r_i); the weights follow from the range, which the full loop reaches, and
+//   hysteresis  Prandtl-Ishlinskii: y = w0 u + w sum play(u, r_i); the weights follow from the
+//   range, which the full loop reaches, and
 //               the width of that loop at its middle
-//   creep       log-like: relaxations two a decade from 10 ms to 1000 s, together `creep` of the way a decade
-//   mode        x'' + 2 d w x' + w^2 x = w^2 y
+//   creep       log-like: relaxations two a decade from 10 ms to 1000 s, together `creep` of the
+//   way a decade mode        x'' + 2 d w x' + w^2 x = w^2 y
 #pragma once
 #include <array>
 #include <cmath>
@@ -14,7 +16,7 @@
 namespace twin {
 
 class Piezo {
-public:
+ public:
     template <class P>
     void configure(const P& p) {
         range_ = p.piezo_range;
@@ -23,7 +25,7 @@ public:
         natural_ = 2 * M_PI * p.piezo_mode;
         damping_ = p.piezo_mode_damping;
         mass_ = p.piezo_mass;
-        double width = 0, way = 0;                            // of the full loop, for a weight of 1
+        double width = 0, way = 0;  // of the full loop, for a weight of 1
         for (int i = 0; i < PLAYS; i++) {
             width += 2 * std::fmin(radius(i), 1 - radius(i));
             way += 2 * (1 - radius(i));
@@ -31,7 +33,7 @@ public:
         weight_ = p.piezo_hysteresis * range_ / width;
         direct_ = (range_ - weight_ * way) / 2;
     }
-    void step(double wanted, double dt) {                     // wanted: -1..1 of the amplifier's swing
+    void step(double wanted, double dt) {  // wanted: -1..1 of the amplifier's swing
         const double most = slew_ * dt;
         drive += std::fmax(-most, std::fmin(most, wanted - drive));
         double way = direct_ * drive;
@@ -45,22 +47,24 @@ public:
             crept += state;
             tau *= RATIO;
         }
-        const double acceleration = natural_ * natural_ * (way + crept - position) - 2 * damping_ * natural_ * velocity;
+        const double acceleration =
+            natural_ * natural_ * (way + crept - position) - 2 * damping_ * natural_ * velocity;
         velocity += dt * acceleration;
         position += dt * velocity;
         reaction = -mass_ * acceleration;
     }
 
-    double drive = 0;                                         // of the amplifier's swing
-    double position = 0, velocity = 0;                        // of the platform on the table, m, m/s
-    double reaction = 0;                                      // on the table, N
+    double drive = 0;                   // of the amplifier's swing
+    double position = 0, velocity = 0;  // of the platform on the table, m, m/s
+    double reaction = 0;                // on the table, N
 
-private:
+ private:
     static constexpr int PLAYS = 10, PER_DECADE = 2, RELAXATIONS = 11;
-    static constexpr double SHORTEST = 0.01, RATIO = 3.1622776601683795;   // s; two a decade
+    static constexpr double SHORTEST = 0.01, RATIO = 3.1622776601683795;  // s; two a decade
     static constexpr double radius(int i) { return (i + 1) / double(PLAYS + 1); }
 
-    double range_ = 0, slew_ = 0, creep_ = 0, natural_ = 0, damping_ = 0, mass_ = 0, weight_ = 0, direct_ = 0;
+    double range_ = 0, slew_ = 0, creep_ = 0, natural_ = 0, damping_ = 0, mass_ = 0, weight_ = 0,
+           direct_ = 0;
     std::array<double, PLAYS> play_{};
     std::array<double, RELAXATIONS> crept_{};
 };

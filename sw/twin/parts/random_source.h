@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Random numbers that depend on the seed and the name of the stream only: xoshiro256++ seeded by splitmix64.
+// Random numbers that depend on the seed and the name of the stream only: xoshiro256++ seeded by
+// splitmix64.
 #pragma once
 #include <cmath>
 #include <cstdint>
@@ -7,7 +8,7 @@
 namespace twin {
 
 class RandomSource {
-public:
+ public:
     explicit RandomSource(uint64_t seed = 0, uint64_t stream = 0) {
         uint64_t x = seed * 0x9E3779B97F4A7C15u ^ stream;
         for (auto& word : state_) {
@@ -18,7 +19,8 @@ public:
         }
     }
     uint64_t bits() {
-        const uint64_t sum = state_[0] + state_[3], result = (sum << 23 | sum >> 41) + state_[0], t = state_[1] << 17;
+        const uint64_t sum = state_[0] + state_[3], result = (sum << 23 | sum >> 41) + state_[0],
+                       t = state_[1] << 17;
         state_[2] ^= state_[0];
         state_[3] ^= state_[1];
         state_[1] ^= state_[2];
@@ -27,10 +29,10 @@ public:
         state_[3] = state_[3] << 45 | state_[3] >> 19;
         return result;
     }
-    double uniform() { return double(bits() >> 11) * 0x1p-53; }                         // [0, 1)
+    double uniform() { return double(bits() >> 11) * 0x1p-53; }  // [0, 1)
     double uniform(double low, double high) { return low + (high - low) * uniform(); }
     double exponential(double mean) { return -mean * std::log1p(-uniform()); }
-    double normal() {                                                                   // Marsaglia's polar method
+    double normal() {  // Marsaglia's polar method
         if (spare_valid_) {
             spare_valid_ = false;
             return spare_;
@@ -47,7 +49,7 @@ public:
         return u * scale;
     }
 
-private:
+ private:
     uint64_t state_[4];
     double spare_ = 0;
     bool spare_valid_ = false;

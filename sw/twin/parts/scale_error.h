@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Error of a scale along its travel: what it shows at a place, less that place.
 //
-//   error = linear x + cyclic sin(2 pi x / pitch) + a random walk: independent normal steps every WALK_STEP, straight lines between
+//   error = linear x + cyclic sin(2 pi x / pitch) + a random walk: independent normal steps every
+//   WALK_STEP, straight lines between
 //           them, 0 at x = 0 in each part
 #pragma once
 #include <array>
@@ -14,23 +15,26 @@
 namespace twin {
 
 class ScaleError {
-public:
+ public:
     void configure(const StageParameters& p, uint64_t seed, uint64_t stream) {
         linear_ = p.scale_linear;
         cyclic_ = p.scale_cyclic;
         turns_ = 2 * M_PI / p.scale_pitch;
         there_ = linear_ != 0 || cyclic_ != 0 || p.scale_walk != 0;
-        RandomSource random(~seed, stream);                   // a stream of its own: what else is random stays as it was
+        RandomSource random(~seed,
+                            stream);  // a stream of its own: what else is random stays as it was
         double sum = 0;
         for (double& place : walk_) place = sum += p.scale_walk * random.normal();
         const double zero = walk_at(0);
         for (double& place : walk_) place -= zero;
     }
-    double at(double x) const { return there_ ? linear_ * x + cyclic_ * std::sin(turns_ * x) + walk_at(x) : 0; }
+    double at(double x) const {
+        return there_ ? linear_ * x + cyclic_ * std::sin(turns_ * x) + walk_at(x) : 0;
+    }
 
-private:
+ private:
     static constexpr double WALK_STEP = 1e-3, WALK_FROM = -4e-3;
-    static constexpr int PLACES = 132;                        // 4 mm farther than the travel of S0 on either side
+    static constexpr int PLACES = 132;  // 4 mm farther than the travel of S0 on either side
 
     double walk_at(double x) const {
         const double place = std::fmin(std::fmax((x - WALK_FROM) / WALK_STEP, 0), PLACES - 1.001);

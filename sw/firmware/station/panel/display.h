@@ -12,6 +12,6 @@
 void display_start(unsigned axes);
 void display_work(void);
 bool display_present(void);
-void display_show(unsigned line, const char *text);        // no more than its columns; the rest is blank
+void display_show(unsigned line, const char* text);  // no more than its columns; the rest is blank
 
 #endif

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // keypad -- 34 keys on a key-pad controller TCA8418: 5 rows of 7, the last one short.
 //
-// The controller debounces, and keeps up to ten events; reading its event register takes the oldest one. It is set up whenever its
-// registers are not as they were left: it was missing, or lost its power. What was pressed before the node started does not count.
+// The controller debounces, and keeps up to ten events; reading its event register takes the oldest
+// one. It is set up whenever its registers are not as they were left: it was missing, or lost its
+// power. What was pressed before the node started does not count.
 #include "station/panel/keypad.h"
 
 #include "core/clock.h"
@@ -11,13 +12,13 @@
 #define DEVICE 0x34u
 #define CONFIGURATION 0x01u
 #define EVENT 0x04u
-#define ROWS 0x1Du                      // which lines of the controller belong to keys
-#define NEWEST_EVENTS 0x20u             // of the configuration: when full, the oldest event goes
+#define ROWS 0x1Du           // which lines of the controller belong to keys
+#define NEWEST_EVENTS 0x20u  // of the configuration: when full, the oldest event goes
 #define ROW_LINES 0x1Fu
 #define COLUMN_LINES 0x7Fu
 #define COLUMNS 7u
 #define PRESSED 0x80u
-#define CODES_PER_ROW 10u                 // of the controller, which begin with 1
+#define CODES_PER_ROW 10u  // of the controller, which begin with 1
 #define POLL_MS 20u
 #define CHECK_MS 1000u
 #define QUEUE 8u
@@ -30,26 +31,29 @@ static uint32_t last_ms, checked_ms;
 static uint8_t keys[QUEUE], first, count;
 static struct i2c_transfer transfer;
 
-static void transfer_begin(uint8_t at, uint8_t data, bool writes)
-{
+static void transfer_begin(uint8_t at, uint8_t data, bool writes) {
     out[0] = at;
     out[1] = data;
-    transfer = (struct i2c_transfer){.address = DEVICE, .write = out, .write_count = writes ? 2 : 1, .read = &value, .read_count = !writes};
+    transfer = (struct i2c_transfer){.address = DEVICE,
+                                     .write = out,
+                                     .write_count = writes ? 2 : 1,
+                                     .read = &value,
+                                     .read_count = !writes};
     i2c_begin(I2C_KEYPAD, &transfer);
     under_way = true;
     last_ms = clock_ms();
 }
 
-static void pressed(void)
-{
-    unsigned code = (value & ~PRESSED) - 1u, row = code / CODES_PER_ROW, column = code % CODES_PER_ROW, key = row * COLUMNS + column;
+static void pressed(void) {
+    unsigned code = (value & ~PRESSED) - 1u, row = code / CODES_PER_ROW,
+             column = code % CODES_PER_ROW, key = row * COLUMNS + column;
     fresh = fresh || value == 0;
-    if (!fresh || !(value & PRESSED) || column >= COLUMNS || key >= KEYPAD_KEYS || count == QUEUE) return;
+    if (!fresh || !(value & PRESSED) || column >= COLUMNS || key >= KEYPAD_KEYS || count == QUEUE)
+        return;
     keys[(first + count++) % QUEUE] = (uint8_t)key;
 }
 
-static void ended(enum i2c_outcome outcome)
-{
+static void ended(enum i2c_outcome outcome) {
     present = outcome == I2C_OK;
     if (!present) {
         step = CHECK;
@@ -68,8 +72,7 @@ static void ended(enum i2c_outcome outcome)
     }
 }
 
-void keypad_start(unsigned axes)
-{
+void keypad_start(unsigned axes) {
     (void)axes;
     step = CHECK;
     present = under_way = fresh = false;
@@ -77,8 +80,7 @@ void keypad_start(unsigned axes)
     last_ms = clock_ms();
 }
 
-void keypad_work(void)
-{
+void keypad_work(void) {
     enum i2c_outcome outcome = i2c_outcome(I2C_KEYPAD);
     if (outcome == I2C_BUSY) return;
     if (under_way) ended(outcome);
@@ -96,13 +98,9 @@ void keypad_work(void)
     }
 }
 
-bool keypad_present(void)
-{
-    return present;
-}
+bool keypad_present(void) { return present; }
 
-uint8_t keypad_take(void)
-{
+uint8_t keypad_take(void) {
     if (count == 0) return KEYPAD_NONE;
     uint8_t key = keys[first];
     first = (uint8_t)((first + 1u) % QUEUE);

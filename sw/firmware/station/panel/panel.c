@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// panel -- key-pad and character display: what the job does, in words, and its program and answers by key. Either may be missing.
+// panel -- key-pad and character display: what the job does, in words, and its program and answers
+// by key. Either may be missing.
 //
 //      7  8  9  START   PAUSE  RESUME  STOP
 //      4  5  6  AGAIN   NEXT   UP      DOWN       up, down: browse through the stored stations
-//      1  2  3  DIVIDE  LIST   LIMIT   SPEED      divide: so many equal parts of a turn; list: angle by angle
-//      0  .     ENTER   CLEAR
+//      1  2  3  DIVIDE  LIST   LIMIT   SPEED      divide: so many equal parts of a turn; list:
+//      angle by angle 0  .     ENTER   CLEAR
 //
-// An empty entry ends a list. Limit is the longest cut, speed that of the table in percent of full. The keys that are left have no function.
+// An empty entry ends a list. Limit is the longest cut, speed that of the table in percent of full.
+// The keys that are left have no function.
 #include "station/panel/panel.h"
 
 #include <stddef.h>
@@ -23,59 +25,81 @@
 
 #define NOTICE_MS 3000u
 #define REFRESH_MS 100u
-#define ENTRY 11u                       // characters
-#define DEGREE 360000u                  // in 0.01 arcsec
-#define TURN_MS 2048u                   // cause and fault are shown in turn, each so long
-#define DECIMALS 5u                     // of a shown angle
+#define ENTRY 11u       // characters
+#define DEGREE 360000u  // in 0.01 arcsec
+#define TURN_MS 2048u   // cause and fault are shown in turn, each so long
+#define DECIMALS 5u     // of a shown angle
 
-enum mode { SHOW, DIVIDE, LIST, LIMIT, SPEED, LAST_ENTRY = SPEED, DIVIDING, SAVING };      // what is shown and asked for
-enum key { NONE, UP = 128, DOWN, TO_DIVIDE, TO_LIST, TO_LIMIT, TO_SPEED, ENTER, CLEAR, ACTION };     // others: the character; ACTION and up: a job_action
+enum mode {
+    SHOW,
+    DIVIDE,
+    LIST,
+    LIMIT,
+    SPEED,
+    LAST_ENTRY = SPEED,
+    DIVIDING,
+    SAVING
+};  // what is shown and asked for
+enum key {
+    NONE,
+    UP = 128,
+    DOWN,
+    TO_DIVIDE,
+    TO_LIST,
+    TO_LIMIT,
+    TO_SPEED,
+    ENTER,
+    CLEAR,
+    ACTION
+};  // others: the character; ACTION and up: a job_action
 
 #define OF(action) (ACTION + BUS_JOB_ACTION_##action)
 static const uint8_t layout[KEYPAD_KEYS] = {
-    '7', '8', '9', OF(START),  OF(PAUSE), OF(RESUME), OF(STOP),
-    '4', '5', '6', OF(AGAIN),  OF(NEXT),  UP,         DOWN,
-    '1', '2', '3', TO_DIVIDE,  TO_LIST,   TO_LIMIT,   TO_SPEED,
-    '0', '.',      ENTER,      CLEAR,
+    '7',     '8',       '9',      OF(START), OF(PAUSE), OF(RESUME), OF(STOP), '4', '5',
+    '6',     OF(AGAIN), OF(NEXT), UP,        DOWN,      '1',        '2',      '3', TO_DIVIDE,
+    TO_LIST, TO_LIMIT,  TO_SPEED, '0',       '.',       ENTER,      CLEAR,
 };
 
-static const char *const titles[] = {"", "stations in a turn", "angle, degrees", "longest cut, s", "table speed, percent", "writing", "writing"};
-static const char *const action_keys[] = {"START", "PAUSE", "RESUME", "STOP", "AGAIN", "NEXT"};
+static const char* const titles[] = {"",
+                                     "stations in a turn",
+                                     "angle, degrees",
+                                     "longest cut, s",
+                                     "table speed, percent",
+                                     "writing",
+                                     "writing"};
+static const char* const action_keys[] = {"START", "PAUSE", "RESUME", "STOP", "AGAIN", "NEXT"};
 
 #define WORDS(code, words) [code] = words,
-static const char *const cause_words[] = {BUS_CAUSE_WORDS(WORDS)};
-static const char *const fault_words[] = {BUS_FAULT_WORDS(WORDS)};
-static const char *const state_words[] = {BUS_JOB_STATE_WORDS(WORDS)};
+static const char* const cause_words[] = {BUS_CAUSE_WORDS(WORDS)};
+static const char* const fault_words[] = {BUS_FAULT_WORDS(WORDS)};
+static const char* const state_words[] = {BUS_JOB_STATE_WORDS(WORDS)};
 
-static uint8_t mode, notice;            // notice: a cause, shown for a while
+static uint8_t mode, notice;  // notice: a cause, shown for a while
 static char entry[ENTRY + 1];
 static uint8_t entered;
-static uint16_t browsed, parts;       // parts: of the turn that is being divided
+static uint16_t browsed, parts;  // parts: of the turn that is being divided
 static uint32_t noticed_ms, shown_ms;
-static uint8_t line;                    // that is composed next
-static bool composed;                   // it waits to be shown
+static uint8_t line;   // that is composed next
+static bool composed;  // it waits to be shown
 static char text[DISPLAY_COLUMNS + 1];
-static const char *remaining_words;                // words that are still to be said
+static const char* remaining_words;  // words that are still to be said
 
 // ---- text
 
-static unsigned put(char *row, unsigned at, const char *text)
-{
+static unsigned put(char* row, unsigned at, const char* text) {
     while (*text && at < DISPLAY_COLUMNS) row[at++] = *text++;
     return at;
 }
 
 // A number with at least so many digits, the last one left of `end`.
-static void put_number(char *row, unsigned end, uint32_t number, unsigned digits)
-{
+static void put_number(char* row, unsigned end, uint32_t number, unsigned digits) {
     for (unsigned n = 0; n < digits || number; n++) {
         row[--end] = (char)('0' + number % 10u);
         number /= 10u;
     }
 }
 
-static void put_angle(char *row, unsigned end, uint32_t angle)
-{
+static void put_angle(char* row, unsigned end, uint32_t angle) {
     uint32_t part = (uint32_t)((uint64_t)(angle % DEGREE) * 100000u / DEGREE);
     put_number(row, end, part, DECIMALS);
     row[end - DECIMALS - 1] = '.';
@@ -83,8 +107,7 @@ static void put_angle(char *row, unsigned end, uint32_t angle)
 }
 
 // As many words as fit; returns the remaining_words, a null pointer after the last one.
-static const char *put_words(char *row, const char *text)
-{
+static const char* put_words(char* row, const char* text) {
     unsigned column = 0;
     for (;;) {
         unsigned length = 0;
@@ -98,24 +121,22 @@ static const char *put_words(char *row, const char *text)
     }
 }
 
-static uint8_t shown_cause(void)
-{
+static uint8_t shown_cause(void) {
     if (notice != BUS_CAUSE_OK && clock_ms() - noticed_ms > NOTICE_MS) notice = BUS_CAUSE_OK;
     return notice != BUS_CAUSE_OK ? notice : mode == SHOW ? job_cause() : BUS_CAUSE_OK;
 }
 
 // Why it waits; a fault of the sub-node in its own words too.
-static const char *words_of(uint8_t shown)
-{
+static const char* words_of(uint8_t shown) {
     unsigned faults = peer_faults(), fault = 0;
     if (shown == BUS_CAUSE_OK) return NULL;
-    if (!faults || shown != job_cause() || clock_ms() % (2u * TURN_MS) < TURN_MS) return cause_words[shown];
+    if (!faults || shown != job_cause() || clock_ms() % (2u * TURN_MS) < TURN_MS)
+        return cause_words[shown];
     while (!(faults >> fault & 1u)) fault++;
     return fault_words[fault];
 }
 
-static void put_station(char *row, unsigned station)
-{
+static void put_station(char* row, unsigned station) {
     unsigned stations = station_list_count();
     if (stations == 0) return;
     put_number(row, DISPLAY_COLUMNS, stations, 3);
@@ -123,8 +144,7 @@ static void put_station(char *row, unsigned station)
     put_number(row, DISPLAY_COLUMNS - 4, station < stations ? station + 1u : stations, 3);
 }
 
-static void put_hints(char *row)
-{
+static void put_hints(char* row) {
     uint8_t answers = job_answers();
     unsigned at = 0;
     for (unsigned action = 0; action < sizeof action_keys / sizeof *action_keys; action++) {
@@ -134,8 +154,7 @@ static void put_hints(char *row)
     }
 }
 
-static void put_title(char *row)
-{
+static void put_title(char* row) {
     bool looks = browsed < station_list_count();
     if (mode == SHOW) {
         put(row, 0, looks ? "station" : state_words[job_state()]);
@@ -146,21 +165,19 @@ static void put_title(char *row)
     }
 }
 
-static void put_station_angle(char *row)
-{
-    unsigned stations = station_list_count(), station = browsed < stations ? browsed : job_station();
+static void put_station_angle(char* row) {
+    unsigned stations = station_list_count(),
+             station = browsed < stations ? browsed : job_station();
     if (station < stations) put_angle(row, DISPLAY_COLUMNS, station_list_angle(station));
 }
 
-static void put_entry(char *row)
-{
+static void put_entry(char* row) {
     unsigned at = put(row, 0, entry);
     if (mode <= LAST_ENTRY) put(row, at, "_");
 }
 
 // One line at a time, from the first to the last; what is said goes on over several lines.
-static void compose(unsigned n)
-{
+static void compose(unsigned n) {
     for (unsigned column = 0; column < DISPLAY_COLUMNS; column++) text[column] = ' ';
     if (n == 0) {
         remaining_words = words_of(shown_cause());
@@ -177,27 +194,23 @@ static void compose(unsigned n)
 
 // ---- keys
 
-static void show_notice(uint8_t cause)
-{
+static void show_notice(uint8_t cause) {
     notice = cause;
     noticed_ms = clock_ms();
 }
 
-static void clear_entry(void)
-{
+static void clear_entry(void) {
     entered = 0;
     entry[0] = 0;
 }
 
-static void go(enum mode to)
-{
+static void go(enum mode to) {
     mode = (uint8_t)to;
     clear_entry();
 }
 
 // The entry in parts of 1 / scale; false if it is none, or out of every range.
-static bool value_of_entry(uint32_t scale, uint32_t *value)
-{
+static bool value_of_entry(uint32_t scale, uint32_t* value) {
     uint64_t number = 0, decimals = 1;
     bool point = false;
     for (unsigned n = 0; n < entered; n++) {
@@ -214,33 +227,32 @@ static bool value_of_entry(uint32_t scale, uint32_t *value)
     return entered > point && number <= INT32_MAX;
 }
 
-static void save(void)
-{
+static void save(void) {
     uint8_t cause = job_save_list();
     show_notice(cause);
     go(cause == BUS_CAUSE_OK ? SAVING : SHOW);
 }
 
-static void begin(enum mode to)         // of a new program
+static void begin(enum mode to)  // of a new program
 {
     uint8_t cause = job_begin_list();
     show_notice(cause);
     if (cause == BUS_CAUSE_OK) go(to);
 }
 
-static void entered_list(void)
-{
+static void entered_list(void) {
     uint32_t angle;
     if (entered == 0) return save();
     show_notice(value_of_entry(DEGREE, &angle) ? station_list_add(angle) : BUS_CAUSE_OUT_OF_RANGE);
     clear_entry();
 }
 
-static void entered_parts(void)
-{
+static void entered_parts(void) {
     uint32_t count;
-    uint8_t cause = !value_of_entry(1, &count) ? BUS_CAUSE_OUT_OF_RANGE : count == 0 ? BUS_CAUSE_NO_STATIONS :
-                    count > STATION_LIST_MAX ? BUS_CAUSE_TOO_MANY_STATIONS : BUS_CAUSE_OK;
+    uint8_t cause = !value_of_entry(1, &count) ? BUS_CAUSE_OUT_OF_RANGE
+                    : count == 0               ? BUS_CAUSE_NO_STATIONS
+                    : count > STATION_LIST_MAX ? BUS_CAUSE_TOO_MANY_STATIONS
+                                               : BUS_CAUSE_OK;
     clear_entry();
     show_notice(cause);
     if (cause != BUS_CAUSE_OK) return;
@@ -248,17 +260,18 @@ static void entered_parts(void)
     go(DIVIDING);
 }
 
-static void entered_setting(uint8_t setting)
-{
+static void entered_setting(uint8_t setting) {
     uint32_t value;
-    uint8_t cause = value_of_entry(1, &value) ? settings_set(setting, value) : BUS_CAUSE_OUT_OF_RANGE;
+    uint8_t cause =
+        value_of_entry(1, &value) ? settings_set(setting, value) : BUS_CAUSE_OUT_OF_RANGE;
     show_notice(cause);
-    if (cause == BUS_CAUSE_OK) go(SHOW);
-    else clear_entry();
+    if (cause == BUS_CAUSE_OK)
+        go(SHOW);
+    else
+        clear_entry();
 }
 
-static void enter_key(void)
-{
+static void enter_key(void) {
     switch (mode) {
     case DIVIDE: return entered_parts();
     case LIST: return entered_list();
@@ -268,8 +281,7 @@ static void enter_key(void)
     }
 }
 
-static void character_key(char character)
-{
+static void character_key(char character) {
     if (mode < DIVIDE || mode > LAST_ENTRY) return show_notice(BUS_CAUSE_KEY_WITHOUT_FUNCTION);
     if (entered == ENTRY) return show_notice(BUS_CAUSE_OUT_OF_RANGE);
     show_notice(BUS_CAUSE_OK);
@@ -277,24 +289,26 @@ static void character_key(char character)
     entry[entered] = 0;
 }
 
-static void clear_key(void)             // first what was entered, then out
+static void clear_key(void)  // first what was entered, then out
 {
     show_notice(BUS_CAUSE_OK);
     browsed = STATION_LIST_MAX;
-    if (entered) clear_entry();
-    else go(SHOW);
+    if (entered)
+        clear_entry();
+    else
+        go(SHOW);
 }
 
-static void browse(bool up)
-{
+static void browse(bool up) {
     uint16_t stations = station_list_count();
     if (mode != SHOW || stations == 0) return show_notice(BUS_CAUSE_KEY_WITHOUT_FUNCTION);
-    if (browsed >= stations) browsed = job_station() < stations ? job_station() : 0;
-    else browsed = (uint16_t)((browsed + (up ? 1u : stations - 1u)) % stations);
+    if (browsed >= stations)
+        browsed = job_station() < stations ? job_station() : 0;
+    else
+        browsed = (uint16_t)((browsed + (up ? 1u : stations - 1u)) % stations);
 }
 
-static void key_pressed(uint8_t key)
-{
+static void key_pressed(uint8_t key) {
     if (mode > LAST_ENTRY) return show_notice(BUS_CAUSE_EEPROM_BUSY);
     if (key >= ACTION) {
         go(SHOW);
@@ -317,25 +331,23 @@ static void key_pressed(uint8_t key)
 
 // ---- work
 
-static void divide_on(void)
-{
+static void divide_on(void) {
     uint32_t n = station_list_added();
     if (n == parts) return save();
-    uint8_t cause = station_list_add((uint32_t)(((uint64_t)n * STATION_LIST_TURN + parts / 2u) / parts));
+    uint8_t cause =
+        station_list_add((uint32_t)(((uint64_t)n * STATION_LIST_TURN + parts / 2u) / parts));
     if (cause == BUS_CAUSE_OK) return;
     show_notice(cause);
     go(SHOW);
 }
 
-static void saved(void)
-{
+static void saved(void) {
     if (store_state() == STORE_WRITING) return;
     show_notice(store_cause());
     go(SHOW);
 }
 
-void panel_start(unsigned axes)
-{
+void panel_start(unsigned axes) {
     keypad_start(axes);
     display_start(axes);
     browsed = STATION_LIST_MAX;
@@ -346,17 +358,19 @@ void panel_start(unsigned axes)
     go(SHOW);
 }
 
-static bool refreshed(void)             // a line at a time
+static bool refreshed(void)  // a line at a time
 {
-    if (composed) display_show(line++, text);
-    else if (line < DISPLAY_LINES) compose(line);
-    else return false;
+    if (composed)
+        display_show(line++, text);
+    else if (line < DISPLAY_LINES)
+        compose(line);
+    else
+        return false;
     composed = !composed;
     return true;
 }
 
-void panel_work(void)
-{
+void panel_work(void) {
     uint8_t key = keypad_take();
     if (key != KEYPAD_NONE) return key_pressed(layout[key]);
     if (mode == DIVIDING) return divide_on();
@@ -370,12 +384,6 @@ void panel_work(void)
     display_work();
 }
 
-bool panel_has_keypad(void)
-{
-    return keypad_present();
-}
+bool panel_has_keypad(void) { return keypad_present(); }
 
-bool panel_has_display(void)
-{
-    return display_present();
-}
+bool panel_has_display(void) { return display_present(); }

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // peer -- 115200 baud, 8N1. Two modes:
 //
-//   legacy   S4's bytes: FF FF AA "cutting done, index to the next station", FF FF 55 "indexing done". Found amid any other bytes.
-//             The sub-node has a program of stations and counts them, in its EEPROM: where it is to go next is known after a power cut
-//             too. Nothing is ever said twice, so what is lost is told by time.
-//   frames    00 · COBS of body and its CRC-32 · 00. The bodies are those of the line: the main node asks, the sub-node does what the
-//             line does. What is not answered is asked again; a request that comes again is answered again and not acted on again.
-//             Where a fault of the sub-node is the cause, it is asked which; it is reset only where a person wants it.
+//   legacy   S4's bytes: FF FF AA "cutting done, index to the next station", FF FF 55 "indexing
+//   done". Found amid any other bytes.
+//             The sub-node has a program of stations and counts them, in its EEPROM: where it is to
+//             go next is known after a power cut too. Nothing is ever said twice, so what is lost
+//             is told by time.
+//   frames    00 · COBS of body and its CRC-32 · 00. The bodies are those of the line: the main
+//   node asks, the sub-node does what the
+//             line does. What is not answered is asked again; a request that comes again is
+//             answered again and not acted on again. Where a fault of the sub-node is the cause, it
+//             is asked which; it is reset only where a person wants it.
 #include "station/table/peer.h"
 
 #include "core/clock.h"
@@ -21,40 +25,50 @@
 #define BAUD 115200u
 #define BYTES_PER_POLL 16u
 #define CRC_BYTES 4u
-#define LONGEST_PART (1u + BUS_LONGEST_BODY + CRC_BYTES)       // between the zeros of a frame
-#define ANSWER_MS 100u                  // then a request is sent again
-#define MOST_SENDINGS 20u                    // then the sub-node is silent
-#define PAUSE_MS 50u                    // between two looks at an index
-#define BEGIN_MS 10000u                 // for a sub-node that is still at work to stop
+#define LONGEST_PART (1u + BUS_LONGEST_BODY + CRC_BYTES)  // between the zeros of a frame
+#define ANSWER_MS 100u                                    // then a request is sent again
+#define MOST_SENDINGS 20u                                 // then the sub-node is silent
+#define PAUSE_MS 50u                                      // between two looks at an index
+#define BEGIN_MS 10000u  // for a sub-node that is still at work to stop
 
 enum mode { NOT_IN_USE, LEGACY, FRAMES };
 enum role { MAIN, SUB };
-enum legacy { HEAD = 0xFF, DONE = 0x55, NEXT = 0xAA };         // twice the head, then one of the others
-enum step { RESTING, POLLING, CLEARING, RESETTING, SETTING_SPEED, ORDERING, WATCHING, STOPPING, ASKING_FAULT };    // that was asked last
+enum legacy { HEAD = 0xFF, DONE = 0x55, NEXT = 0xAA };  // twice the head, then one of the others
+enum step {
+    RESTING,
+    POLLING,
+    CLEARING,
+    RESETTING,
+    SETTING_SPEED,
+    ORDERING,
+    WATCHING,
+    STOPPING,
+    ASKING_FAULT
+};  // that was asked last
 
 static struct peer {
-    uint8_t phase;                      // bus_peer_phase
-    uint8_t ended;                      // bus_cause
+    uint8_t phase;  // bus_peer_phase
+    uint8_t ended;  // bus_cause
     uint16_t station;
     uint32_t angle;
-    uint32_t since_ms;                  // the index was asked for
+    uint32_t since_ms;  // the index was asked for
     uint32_t heard, garbage, repeated;
-    uint16_t faults;                    // of the sub-node
-    uint8_t failure;                    // cause, while it is asked for them
-    bool resets;                        // a person wants them reset
-    bool noting;                        // a sub-node in mode legacy writes its count
+    uint16_t faults;  // of the sub-node
+    uint8_t failure;  // cause, while it is asked for them
+    bool resets;      // a person wants them reset
+    bool noting;      // a sub-node in mode legacy writes its count
 } peer;
 
-static struct requests {                // of a main node, frames
+static struct requests {  // of a main node, frames
     uint8_t step;
-    uint8_t body[BUS_SET_PARAMETER_REQUEST_LENGTH];            // the longest one
+    uint8_t body[BUS_SET_PARAMETER_REQUEST_LENGTH];  // the longest one
     uint8_t length;
     uint8_t sendings;
-    bool answered;                      // the next poll_status waits for PAUSE_MS
+    bool answered;  // the next poll_status waits for PAUSE_MS
     uint32_t sent_ms;
 } requests;
 
-static struct replies {                 // of a sub-node, frames
+static struct replies {  // of a sub-node, frames
     bool any;
     uint32_t request_crc;
     uint8_t body[BUS_LONGEST_BODY];
@@ -62,23 +76,16 @@ static struct replies {                 // of a sub-node, frames
 } replies;
 
 static struct incoming {
-    uint8_t heads;                      // of a legacy order, two at most
-    uint8_t bytes[LONGEST_PART];        // of a frame
-    uint32_t count;                     // more than there is room for: it is too long
+    uint8_t heads;                // of a legacy order, two at most
+    uint8_t bytes[LONGEST_PART];  // of a frame
+    uint32_t count;               // more than there is room for: it is too long
 } incoming;
 
-static uint8_t mode(void)
-{
-    return (uint8_t)settings_get(BUS_SETTING_PEER_MODE);
-}
+static uint8_t mode(void) { return (uint8_t)settings_get(BUS_SETTING_PEER_MODE); }
 
-static uint8_t role(void)
-{
-    return (uint8_t)settings_get(BUS_SETTING_PEER_ROLE);
-}
+static uint8_t role(void) { return (uint8_t)settings_get(BUS_SETTING_PEER_ROLE); }
 
-static void end(uint8_t phase, uint8_t cause)
-{
+static void end(uint8_t phase, uint8_t cause) {
     peer.phase = phase;
     peer.ended = cause;
     peer.resets = peer.noting = false;
@@ -87,21 +94,20 @@ static void end(uint8_t phase, uint8_t cause)
 
 // legacy
 
-static void say(uint8_t what)
-{
+static void say(uint8_t what) {
     const uint8_t bytes[] = {HEAD, HEAD, what};
-    for (uint32_t n = 0; n < sizeof bytes; n++) peripherals_write(PERIPHERALS_PEER_TRANSMIT, bytes[n]);
+    for (uint32_t n = 0; n < sizeof bytes; n++)
+        peripherals_write(PERIPHERALS_PEER_TRANSMIT, bytes[n]);
 }
 
 // Of this sub-node: what was indexed last is in the journal.
-static uint16_t next_station(void)
-{
-    const struct journal_record *record = journal_last();
-    return record->step == JOURNAL_NEXT && record->list == station_list_identity() ? record->station : 0;
+static uint16_t next_station(void) {
+    const struct journal_record* record = journal_last();
+    return record->step == JOURNAL_NEXT && record->list == station_list_identity() ? record->station
+                                                                                   : 0;
 }
 
-static void next_ordered(void)
-{
+static void next_ordered(void) {
     uint8_t cause = BUS_CAUSE_NO_STATION;
     if (peer.phase == BUS_PEER_PHASE_TURNING) return;
     peer.station = next_station();
@@ -109,15 +115,20 @@ static void next_ordered(void)
         peer.angle = station_list_angle(peer.station);
         cause = turn_to(peer.angle);
     }
-    end(cause == BUS_CAUSE_OK ? BUS_PEER_PHASE_TURNING : BUS_PEER_PHASE_FAILED, cause == BUS_CAUSE_OK ? BUS_CAUSE_RUNNING : cause);
+    end(cause == BUS_CAUSE_OK ? BUS_PEER_PHASE_TURNING : BUS_PEER_PHASE_FAILED,
+        cause == BUS_CAUSE_OK ? BUS_CAUSE_RUNNING : cause);
 }
 
 // The count is in the journal before the main node hears of it.
-static void turn_watched(void)         // by a sub-node
+static void turn_watched(void)  // by a sub-node
 {
     uint8_t ended = turn_ended();
-    if (peer.phase != BUS_PEER_PHASE_TURNING || ended == BUS_CAUSE_RUNNING || store_state() == STORE_WRITING) return;
-    if (ended == BUS_CAUSE_OK) ended = peer.noting ? store_cause() : journal_write((uint16_t)(peer.station + 1u), JOURNAL_NEXT);
+    if (peer.phase != BUS_PEER_PHASE_TURNING || ended == BUS_CAUSE_RUNNING ||
+        store_state() == STORE_WRITING)
+        return;
+    if (ended == BUS_CAUSE_OK)
+        ended = peer.noting ? store_cause()
+                            : journal_write((uint16_t)(peer.station + 1u), JOURNAL_NEXT);
     if (ended != BUS_CAUSE_OK) return end(BUS_PEER_PHASE_FAILED, ended);
     if (!peer.noting) {
         peer.noting = true;
@@ -127,8 +138,7 @@ static void turn_watched(void)         // by a sub-node
     say(DONE);
 }
 
-static void legacy_byte(uint8_t byte)
-{
+static void legacy_byte(uint8_t byte) {
     if (byte == HEAD) {
         if (incoming.heads == 2) peer.garbage++;
         if (incoming.heads < 2) incoming.heads++;
@@ -145,21 +155,22 @@ static void legacy_byte(uint8_t byte)
         end(BUS_PEER_PHASE_TURNED, BUS_CAUSE_OK);
 }
 
-static void legacy_work(void)
-{
+static void legacy_work(void) {
     if (role() == SUB)
         turn_watched();
-    else if (peer.phase == BUS_PEER_PHASE_TURNING && clock_ms() - peer.since_ms > (uint32_t)settings_get(BUS_SETTING_PEER_TIMEOUT))
+    else if (peer.phase == BUS_PEER_PHASE_TURNING &&
+             clock_ms() - peer.since_ms > (uint32_t)settings_get(BUS_SETTING_PEER_TIMEOUT))
         end(BUS_PEER_PHASE_SILENT, BUS_CAUSE_CHECK_SUB_NODE);
 }
 
 // frames
 
-static void send_frame(const uint8_t *body, uint32_t length)
-{
+static void send_frame(const uint8_t* body, uint32_t length) {
     uint8_t part[LONGEST_PART];
     uint32_t crc = bus_crc(body, length), whole = length + CRC_BYTES, code = 0;
-    if (FIELD_GET(peripherals_read(PERIPHERALS_PEER_STATE), PERIPHERALS_PEER_STATE_TRANSMIT_FREE) < whole + 3u) return;      // silence, rather than half of it
+    if (FIELD_GET(peripherals_read(PERIPHERALS_PEER_STATE), PERIPHERALS_PEER_STATE_TRANSMIT_FREE) <
+        whole + 3u)
+        return;  // silence, rather than half of it
     for (uint32_t n = 0; n < whole; n++) {
         uint8_t byte = (uint8_t)(n < length ? body[n] : crc >> 8 * (n - length));
         part[n + 1] = byte;
@@ -173,9 +184,9 @@ static void send_frame(const uint8_t *body, uint32_t length)
     peripherals_write(PERIPHERALS_PEER_TRANSMIT, 0);
 }
 
-// In place, from the second byte on; the length of body and CRC-32, 0 if the codes do not lead to the end.
-static uint32_t decode(uint8_t *part, uint32_t count)
-{
+// In place, from the second byte on; the length of body and CRC-32, 0 if the codes do not lead to
+// the end.
+static uint32_t decode(uint8_t* part, uint32_t count) {
     uint32_t at = 0;
     while (at < count && part[at]) {
         uint32_t code = part[at];
@@ -185,67 +196,58 @@ static uint32_t decode(uint8_t *part, uint32_t count)
     return at == count ? count - 1 : 0;
 }
 
-static void repeat_request(void)
-{
+static void repeat_request(void) {
     requests.sendings++;
     requests.sent_ms = clock_ms();
     send_frame(requests.body, requests.length);
 }
 
-static void ask(uint8_t step, uint8_t operation, uint64_t fields, uint8_t field_bytes)
-{
+static void ask(uint8_t step, uint8_t operation, uint64_t fields, uint8_t field_bytes) {
     requests.step = step;
-    requests.body[0]++;                                                     // sequence
+    requests.body[0]++;  // sequence
     requests.body[1] = operation;
-    for (uint32_t n = 0; n < field_bytes; n++, fields >>= 8) requests.body[BUS_REQUEST_HEAD + n] = (uint8_t)fields;
+    for (uint32_t n = 0; n < field_bytes; n++, fields >>= 8)
+        requests.body[BUS_REQUEST_HEAD + n] = (uint8_t)fields;
     requests.length = BUS_REQUEST_HEAD + field_bytes;
     requests.sendings = 0;
     requests.answered = false;
     repeat_request();
 }
 
-static void set_speed(void)
-{
+static void set_speed(void) {
     uint64_t override = 65536u * (uint32_t)settings_get(BUS_SETTING_JOB_SPEED) / 100u;
-    ask(SETTING_SPEED, BUS_OPERATION_SET_PARAMETER, override << 16 | BUS_PARAMETER_FEED_OVERRIDE << 8,
-        BUS_SET_PARAMETER_REQUEST_LENGTH - BUS_REQUEST_HEAD);             // of axis 0
+    ask(SETTING_SPEED, BUS_OPERATION_SET_PARAMETER,
+        override << 16 | BUS_PARAMETER_FEED_OVERRIDE << 8,
+        BUS_SET_PARAMETER_REQUEST_LENGTH - BUS_REQUEST_HEAD);  // of axis 0
 }
 
-// Looking before an order also makes the order differ from the last request, should this node have begun its sequence anew.
-static void poll_status(uint8_t step)
-{
-    ask(step, BUS_OPERATION_TURN_STATE, 0, 0);
-}
+// Looking before an order also makes the order differ from the last request, should this node have
+// begun its sequence anew.
+static void poll_status(uint8_t step) { ask(step, BUS_OPERATION_TURN_STATE, 0, 0); }
 
-static void stop(uint8_t step)
-{
-    ask(step, BUS_OPERATION_STOP, 0, 1);
-}
+static void stop(uint8_t step) { ask(step, BUS_OPERATION_STOP, 0, 1); }
 
 // An order has failed. Where a fault is the cause, it is asked which.
-static void fail(uint8_t cause)
-{
-    if (cause != BUS_CAUSE_FAULTED && cause != BUS_CAUSE_ENDED_BY_FAULT && cause != BUS_CAUSE_FAULT_PERSISTS)
+static void fail(uint8_t cause) {
+    if (cause != BUS_CAUSE_FAULTED && cause != BUS_CAUSE_ENDED_BY_FAULT &&
+        cause != BUS_CAUSE_FAULT_PERSISTS)
         return end(BUS_PEER_PHASE_FAILED, cause);
     peer.failure = cause;
     ask(ASKING_FAULT, BUS_OPERATION_STATUS, 0, 1);
 }
 
-static uint32_t field_of(const uint8_t *reply, uint32_t at, uint32_t bytes)
-{
+static uint32_t field_of(const uint8_t* reply, uint32_t at, uint32_t bytes) {
     uint32_t value = 0;
     while (bytes--) value = value << 8 | reply[at + bytes];
     return value;
 }
 
-static void reset_fault(void)
-{
+static void reset_fault(void) {
     peer.resets = false;
     ask(RESETTING, BUS_OPERATION_RESET_FAULTS, 0, 1);
 }
 
-static void report_faults(const uint8_t *reply, uint8_t cause)
-{
+static void report_faults(const uint8_t* reply, uint8_t cause) {
     if (cause == BUS_CAUSE_OK) {
         uint32_t first = field_of(reply, BUS_STATUS_REPLY_FIRST_FAULT, 2);
         peer.faults = (uint16_t)(first ? first : field_of(reply, BUS_STATUS_REPLY_FAULTS, 2));
@@ -253,10 +255,10 @@ static void report_faults(const uint8_t *reply, uint8_t cause)
     end(BUS_PEER_PHASE_FAILED, peer.failure);
 }
 
-static void watched(const uint8_t *reply)
-{
+static void watched(const uint8_t* reply) {
     uint8_t ended = reply[BUS_TURN_STATE_REPLY_ENDED];
-    if (ended == BUS_CAUSE_NO_MOTION_YET || field_of(reply, BUS_TURN_STATE_REPLY_TARGET, 4) != peer.angle)
+    if (ended == BUS_CAUSE_NO_MOTION_YET ||
+        field_of(reply, BUS_TURN_STATE_REPLY_TARGET, 4) != peer.angle)
         fail(BUS_CAUSE_PEER_RESTARTED);
     else if (ended == BUS_CAUSE_OK)
         end(BUS_PEER_PHASE_TURNED, BUS_CAUSE_OK);
@@ -264,13 +266,13 @@ static void watched(const uint8_t *reply)
         fail(ended);
 }
 
-static void reply_heard(const uint8_t *reply, uint32_t length)
-{
-    bool ours = requests.step != RESTING && !requests.answered && length >= BUS_REPLY_HEAD && reply[0] == requests.body[0] &&
-                reply[1] == requests.body[1];
+static void reply_heard(const uint8_t* reply, uint32_t length) {
+    bool ours = requests.step != RESTING && !requests.answered && length >= BUS_REPLY_HEAD &&
+                reply[0] == requests.body[0] && reply[1] == requests.body[1];
     uint8_t cause = ours ? reply[2] : BUS_CAUSE_OK;
-    uint32_t wanted = reply[1] == BUS_OPERATION_TURN_STATE ? BUS_TURN_STATE_REPLY_LENGTH :
-                      reply[1] == BUS_OPERATION_STATUS ? BUS_STATUS_REPLY_LENGTH : BUS_REPLY_HEAD;
+    uint32_t wanted = reply[1] == BUS_OPERATION_TURN_STATE ? BUS_TURN_STATE_REPLY_LENGTH
+                      : reply[1] == BUS_OPERATION_STATUS   ? BUS_STATUS_REPLY_LENGTH
+                                                           : BUS_REPLY_HEAD;
     if (!ours || (cause == BUS_CAUSE_OK && length != wanted)) {
         peer.garbage++;
         return;
@@ -278,7 +280,8 @@ static void reply_heard(const uint8_t *reply, uint32_t length)
     peer.heard++;
     requests.answered = true;
     requests.sent_ms = clock_ms();
-    if (requests.step == POLLING && cause == BUS_CAUSE_OK && reply[BUS_TURN_STATE_REPLY_PHASE] != BUS_TURN_PHASE_IDLE)
+    if (requests.step == POLLING && cause == BUS_CAUSE_OK &&
+        reply[BUS_TURN_STATE_REPLY_PHASE] != BUS_TURN_PHASE_IDLE)
         cause = BUS_CAUSE_BUSY;
     if (cause == BUS_CAUSE_BUSY && clock_ms() - peer.since_ms < BEGIN_MS)
         stop(CLEARING);
@@ -296,8 +299,7 @@ static void reply_heard(const uint8_t *reply, uint32_t length)
         watched(reply);
 }
 
-static void request_heard(const uint8_t *request, uint32_t length, uint32_t crc)
-{
+static void request_heard(const uint8_t* request, uint32_t length, uint32_t crc) {
     peer.heard++;
     if (replies.any && replies.request_crc == crc && replies.body[0] == request[0]) {
         peer.repeated++;
@@ -309,10 +311,9 @@ static void request_heard(const uint8_t *request, uint32_t length, uint32_t crc)
     send_frame(replies.body, replies.length);
 }
 
-static void frame_ended(void)
-{
+static void frame_ended(void) {
     uint32_t count = incoming.count, whole, length, crc = 0;
-    uint8_t *body = &incoming.bytes[1];
+    uint8_t* body = &incoming.bytes[1];
     incoming.count = 0;
     if (count == 0) return;
     whole = count > LONGEST_PART ? 0 : decode(incoming.bytes, count);
@@ -327,8 +328,7 @@ static void frame_ended(void)
         reply_heard(body, length);
 }
 
-static void frame_byte(uint8_t byte)
-{
+static void frame_byte(uint8_t byte) {
     if (byte == 0) {
         frame_ended();
         return;
@@ -337,9 +337,10 @@ static void frame_byte(uint8_t byte)
     if (incoming.count <= LONGEST_PART) incoming.count++;
 }
 
-static void frames_work(void)
-{
-    if (requests.step == RESTING || clock_ms() - requests.sent_ms < (requests.answered ? PAUSE_MS : ANSWER_MS)) return;
+static void frames_work(void) {
+    if (requests.step == RESTING ||
+        clock_ms() - requests.sent_ms < (requests.answered ? PAUSE_MS : ANSWER_MS))
+        return;
     if (!requests.answered && requests.sendings == MOST_SENDINGS)
         end(BUS_PEER_PHASE_SILENT, BUS_CAUSE_PEER_SILENT);
     else if (!requests.answered)
@@ -348,8 +349,7 @@ static void frames_work(void)
         poll_status(requests.step == CLEARING ? POLLING : WATCHING);
 }
 
-void peer_start(unsigned axes)
-{
+void peer_start(unsigned axes) {
     uint64_t sixteenths = 16 * (uint64_t)node_read(NODE_CLK_HZ);
     (void)axes;
     peer = (struct peer){.phase = BUS_PEER_PHASE_IDLE, .ended = BUS_CAUSE_NO_MOTION_YET};
@@ -360,10 +360,10 @@ void peer_start(unsigned axes)
     peripherals_write(PERIPHERALS_PEER_BIT_TIME, (uint32_t)((sixteenths + BAUD / 2) / BAUD));
 }
 
-void peer_work(void)
-{
+void peer_work(void) {
     uint8_t used = mode();
-    if (used == NOT_IN_USE || (used == LEGACY && store_state() == STORE_LOADING)) return;     // what comes waits in its queue
+    if (used == NOT_IN_USE || (used == LEGACY && store_state() == STORE_LOADING))
+        return;  // what comes waits in its queue
     for (uint32_t n = 0; n < BYTES_PER_POLL; n++) {
         uint32_t received = peripherals_read(PERIPHERALS_PEER_RECEIVE);
         if (!(received & PERIPHERALS_PEER_RECEIVE_PRESENT_MASK)) break;
@@ -379,9 +379,9 @@ void peer_work(void)
         frames_work();
 }
 
-uint8_t peer_turn_to(uint16_t station, uint32_t angle)
-{
-    if (!(peripherals_read(PERIPHERALS_BUILT) & PERIPHERALS_BUILT_PEER_MASK)) return BUS_CAUSE_NOT_BUILT;
+uint8_t peer_turn_to(uint16_t station, uint32_t angle) {
+    if (!(peripherals_read(PERIPHERALS_BUILT) & PERIPHERALS_BUILT_PEER_MASK))
+        return BUS_CAUSE_NOT_BUILT;
     if (mode() == NOT_IN_USE || role() != MAIN) return BUS_CAUSE_PEER_OFF;
     if (peer.phase == BUS_PEER_PHASE_TURNING) return BUS_CAUSE_BUSY;
     peer.phase = BUS_PEER_PHASE_TURNING;
@@ -397,8 +397,7 @@ uint8_t peer_turn_to(uint16_t station, uint32_t angle)
     return BUS_CAUSE_OK;
 }
 
-uint8_t peer_stop(void)
-{
+uint8_t peer_stop(void) {
     if (peer.phase != BUS_PEER_PHASE_TURNING || role() != MAIN) return BUS_CAUSE_OK;
     if (mode() == FRAMES)
         stop(STOPPING);
@@ -407,28 +406,15 @@ uint8_t peer_stop(void)
     return BUS_CAUSE_OK;
 }
 
-uint8_t peer_state(void)
-{
-    return peer.phase;
-}
+uint8_t peer_state(void) { return peer.phase; }
 
-uint8_t peer_cause(void)
-{
-    return peer.ended;
-}
+uint8_t peer_cause(void) { return peer.ended; }
 
-uint16_t peer_faults(void)
-{
-    return peer.faults;
-}
+uint16_t peer_faults(void) { return peer.faults; }
 
-void peer_reset_fault(void)
-{
-    peer.resets = peer.faults != 0;
-}
+void peer_reset_fault(void) { peer.resets = peer.faults != 0; }
 
-static uint8_t take_next(void)
-{
+static uint8_t take_next(void) {
     uint16_t station = (uint16_t)bus_request_field(BUS_PEER_NEXT_REQUEST_STATION, 2);
     if (role() != SUB) return BUS_CAUSE_PEER_OFF;
     if (station >= station_list_count()) return BUS_CAUSE_NO_STATION;
@@ -436,8 +422,7 @@ static uint8_t take_next(void)
     return journal_write(station, JOURNAL_NEXT);
 }
 
-uint8_t peer_operation(uint8_t operation)
-{
+uint8_t peer_operation(uint8_t operation) {
     switch (operation) {
     case BUS_OPERATION_PEER_NEXT: return take_next();
     case BUS_OPERATION_PEER: break;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// sensor -- each good frame once, its age known, as long as it is asked for more often than frames come.
+// sensor -- each good frame once, its age known, as long as it is asked for more often than frames
+// come.
 #include "station/table/sensor.h"
 
 #include "core/clock.h"
@@ -9,30 +10,28 @@
 #include "station/settings.h"
 
 #define BAUD 115200u
-#define GAP_CHARACTERS 3u                       // longest pause within a frame
+#define GAP_CHARACTERS 3u  // longest pause within a frame
 #define CHARACTER_BITS 10u
 
 static uint32_t cycles_per_ms;
-static uint32_t frames;                         // good ones
-static uint32_t fresh_ms;                       // when the last of them was sent; at first, when the wait for it began
-static uint32_t word;                           // its angle, 2^-32 turn
+static uint32_t frames;    // good ones
+static uint32_t fresh_ms;  // when the last of them was sent; at first, when the wait for it began
+static uint32_t word;      // its angle, 2^-32 turn
 static uint32_t changes;
 static uint32_t wrong_crc, broken, missed;
 
 static struct measurement {
     uint32_t since_ms;
-    uint32_t first;                             // 2^-32 turn
-    int64_t sum;                                // of what the others differ
+    uint32_t first;  // 2^-32 turn
+    int64_t sum;     // of what the others differ
     uint32_t required, got;
 } measurement;
 
-bool sensor_built(void)
-{
+bool sensor_built(void) {
     return peripherals_read(PERIPHERALS_BUILT) & PERIPHERALS_BUILT_SENSOR_MASK;
 }
 
-void sensor_start(unsigned axes)
-{
+void sensor_start(unsigned axes) {
     uint32_t clk_hz = node_read(NODE_CLK_HZ);
     (void)axes;
     cycles_per_ms = clk_hz / 1000u;
@@ -40,12 +39,13 @@ void sensor_start(unsigned axes)
     fresh_ms = clock_ms();
     word = changes = wrong_crc = broken = missed = 0;
     measurement = (struct measurement){0};
-    peripherals_write(PERIPHERALS_SENSOR_BIT_TIME, (uint32_t)((16 * (uint64_t)clk_hz + BAUD / 2) / BAUD));
+    peripherals_write(PERIPHERALS_SENSOR_BIT_TIME,
+                      (uint32_t)((16 * (uint64_t)clk_hz + BAUD / 2) / BAUD));
     peripherals_write(PERIPHERALS_SENSOR_GAP, clk_hz / BAUD * CHARACTER_BITS * GAP_CHARACTERS);
     peripherals_write(PERIPHERALS_SENSOR_ERRORS, PERIPHERALS_SENSOR_ERRORS_CLEAR_MASK);
 }
 
-static void count_errors(void)                  // before they reach their end
+static void count_errors(void)  // before they reach their end
 {
     uint32_t errors = peripherals_read(PERIPHERALS_SENSOR_ERRORS);
     if (errors == 0) return;
@@ -55,17 +55,15 @@ static void count_errors(void)                  // before they reach their end
     missed += FIELD_GET(errors, PERIPHERALS_SENSOR_ERRORS_MISSED);
 }
 
-static void measure(void)
-{
-    struct measurement *m = &measurement;
+static void measure(void) {
+    struct measurement* m = &measurement;
     if (m->got == m->required || (int32_t)(fresh_ms - m->since_ms) <= 0) return;
     if (m->got == 0) m->first = word;
     m->sum += (int32_t)(word - m->first);
     m->got++;
 }
 
-void sensor_work(void)
-{
+void sensor_work(void) {
     uint32_t now = peripherals_read(PERIPHERALS_SENSOR_FRAMES);
     if (now == frames) return;
     uint64_t reading = peripherals_read_wide(PERIPHERALS_SENSOR_READING);
@@ -77,45 +75,37 @@ void sensor_work(void)
     measure();
 }
 
-bool sensor_timed_out(void)
-{
+bool sensor_timed_out(void) {
     return clock_ms() - fresh_ms > (uint32_t)settings_get(BUS_SETTING_SENSOR_TIMEOUT);
 }
 
-uint32_t sensor_changes(void)
-{
-    return changes;
-}
+uint32_t sensor_changes(void) { return changes; }
 
-void sensor_measure(uint32_t required)
-{
+void sensor_measure(uint32_t required) {
     measurement = (struct measurement){.since_ms = clock_ms(), .required = required};
 }
 
-bool sensor_measured(void)
-{
-    return measurement.got == measurement.required;
-}
+bool sensor_measured(void) { return measurement.got == measurement.required; }
 
 // From 2^-32 turn, above sensor_zero.
-static uint32_t angle_of(uint32_t turn)
-{
-    uint32_t angle = (uint32_t)(((uint64_t)turn * SENSOR_TURN + (1u << 31)) >> 32), zero = (uint32_t)settings_get(BUS_SETTING_SENSOR_ZERO);
+static uint32_t angle_of(uint32_t turn) {
+    uint32_t angle = (uint32_t)(((uint64_t)turn * SENSOR_TURN + (1u << 31)) >> 32),
+             zero = (uint32_t)settings_get(BUS_SETTING_SENSOR_ZERO);
     angle += angle < zero ? SENSOR_TURN - zero : 0u - zero;
     return angle == SENSOR_TURN ? 0 : angle;
 }
 
-uint32_t sensor_mean(void)
-{
-    return angle_of(measurement.first + (uint32_t)(int32_t)(measurement.sum / (int32_t)measurement.required));
+uint32_t sensor_mean(void) {
+    return angle_of(measurement.first +
+                    (uint32_t)(int32_t)(measurement.sum / (int32_t)measurement.required));
 }
 
-uint8_t sensor_operation(uint8_t operation)
-{
+uint8_t sensor_operation(uint8_t operation) {
     if (operation != BUS_OPERATION_SENSOR || !sensor_built()) return BUS_CAUSE_NOT_BUILT;
     count_errors();
     bus_reply_field(BUS_SENSOR_REPLY_ANGLE, angle_of(word), 4);
-    bus_reply_field(BUS_SENSOR_REPLY_AGE, peripherals_read_wide(PERIPHERALS_SENSOR_READING) >> 32, 4);
+    bus_reply_field(BUS_SENSOR_REPLY_AGE, peripherals_read_wide(PERIPHERALS_SENSOR_READING) >> 32,
+                    4);
     bus_reply_field(BUS_SENSOR_REPLY_TIMED_OUT, sensor_timed_out(), 1);
     bus_reply_field(BUS_SENSOR_REPLY_FRAMES, frames, 4);
     bus_reply_field(BUS_SENSOR_REPLY_WRONG_CRC, wrong_crc, 4);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// sensor -- the absolute angle of the table, from the frames of a time-grating sensor. Angles in 0.01 arcsec.
+// sensor -- the absolute angle of the table, from the frames of a time-grating sensor. Angles in
+// 0.01 arcsec.
 #ifndef MOIRE_SENSOR_H
 #define MOIRE_SENSOR_H
 
@@ -13,8 +14,8 @@ void sensor_work(void);
 uint8_t sensor_operation(uint8_t operation);
 
 bool sensor_built(void);
-bool sensor_timed_out(void);                         // no good frame for sensor_timeout
-uint32_t sensor_changes(void);                  // frames with another angle than the one before; wraps
+bool sensor_timed_out(void);    // no good frame for sensor_timeout
+uint32_t sensor_changes(void);  // frames with another angle than the one before; wraps
 
 // The mean of so many frames that were sent from now on.
 void sensor_measure(uint32_t frames);

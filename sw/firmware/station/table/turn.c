@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // index -- turn the table of axis 0 to an absolute angle of its sensor (S4).
 //
-//   reading ─► going_below ─► coming_up ─► reading ─► closing_in ─► reading …      ended: no more than turn_tolerance is left
-//                   ▲ below the target by turn_allowance │                        each closing_in goes turn_share of what is left
-//                   └─────────── above the target ◄───────┘
+//   reading ─► going_below ─► coming_up ─► reading ─► closing_in ─► reading …      ended: no more
+//   than turn_tolerance is left
+//                   ▲ below the target by turn_allowance │                        each closing_in
+//                   goes turn_share of what is left └─────────── above the target ◄───────┘
 //
-// The worm always pushes the table up: a distance up that is shorter than turn_take_up begins farther below. The long directions are at the
-// speed of a move of the axis, closing_in at its homing_latch_speed. What the steps say is held against the sensor at each reading.
+// The worm always pushes the table up: a distance up that is shorter than turn_take_up begins
+// farther below. The long directions are at the speed of a move of the axis, closing_in at its
+// homing_latch_speed. What the steps say is held against the sensor at each reading.
 #include "station/table/turn.h"
 
 #include "axis/axis.h"
@@ -19,83 +21,71 @@
 
 #define AXIS 0u
 #define TURN ((int64_t)SENSOR_TURN)
-#define ABOUT_ZERO (TURN / 360)         // so far below angle 0 the table stands at angle 0
-#define FOLLOWED 4                      // a table that sticks goes less than a quarter of its steps
+#define ABOUT_ZERO (TURN / 360)  // so far below angle 0 the table stands at angle 0
+#define FOLLOWED 4               // a table that sticks goes less than a quarter of its steps
 
 enum direction_choice { DIRECT, SHORTER, ALWAYS_UP };
 
-struct position {                          // of the table, at rest
-    uint32_t angle;                     // by the sensor
-    int64_t steps;                      // by the steps, 2^-16 period
-    uint32_t changes;                   // of the sensor until then
+struct position {      // of the table, at rest
+    uint32_t angle;    // by the sensor
+    int64_t steps;     // by the steps, 2^-16 period
+    uint32_t changes;  // of the sensor until then
 };
 
 static struct turn {
-    uint8_t phase;                      // bus_turn_phase
-    uint8_t ended;                      // bus_cause
+    uint8_t phase;  // bus_turn_phase
+    uint8_t ended;  // bus_cause
     uint8_t tries, overshoots;
-    uint8_t command_count;                     // of the axis; when they change somebody else drives it
-    bool begun;                         // the first reading has been taken
-    bool measuring;                     // the table has settled
-    bool closing;                       // from `near` on
+    uint8_t command_count;  // of the axis; when they change somebody else drives it
+    bool begun;             // the first reading has been taken
+    bool measuring;         // the table has settled
+    bool closing;           // from `near` on
     uint32_t target;
-    uint32_t since_ms;                  // the table rests
-    int64_t up;                         // distance that follows going_below
-    struct position first, near, now;      // where it began, where closing in began, where it is
+    uint32_t since_ms;                 // the table rests
+    int64_t up;                        // distance that follows going_below
+    struct position first, near, now;  // where it began, where closing in began, where it is
 } turn;
 
-static int64_t setting(uint8_t id)
-{
-    return settings_get(id);
-}
+static int64_t setting(uint8_t id) { return settings_get(id); }
 
 // The shorter distance round, from -TURN/2 up to below TURN/2.
-static int64_t wrap_distance(int64_t distance)
-{
+static int64_t wrap_distance(int64_t distance) {
     while (distance >= TURN / 2) distance -= TURN;
     while (distance < -TURN / 2) distance += TURN;
     return distance;
 }
 
-static int64_t apart(uint32_t to, uint32_t from)
-{
-    return wrap_distance((int64_t)to - from);
-}
+static int64_t apart(uint32_t to, uint32_t from) { return wrap_distance((int64_t)to - from); }
 
-static int64_t size(int64_t distance)
-{
-    return distance < 0 ? -distance : distance;
-}
+static int64_t size(int64_t distance) { return distance < 0 ? -distance : distance; }
 
-static int64_t steps_of(int64_t distance)
-{
+static int64_t steps_of(int64_t distance) {
     int64_t part = size(distance) * setting(BUS_SETTING_PERIODS_PER_TURN), whole = part / TURN;
     int64_t steps = (whole << 16) + ((part - whole * TURN) << 16) / TURN;
     return distance < 0 ? -steps : steps;
 }
 
-static int64_t distance_of(int64_t steps)
-{
-    int64_t periods = size(steps) >> 16, part = size(steps) & 0xFFFF, per_turn = setting(BUS_SETTING_PERIODS_PER_TURN);
-    int64_t turns = periods / per_turn, distance = turns * TURN + ((periods - turns * per_turn) * TURN + (part * TURN >> 16)) / per_turn;
+static int64_t distance_of(int64_t steps) {
+    int64_t periods = size(steps) >> 16, part = size(steps) & 0xFFFF,
+            per_turn = setting(BUS_SETTING_PERIODS_PER_TURN);
+    int64_t turns = periods / per_turn,
+            distance = turns * TURN +
+                       ((periods - turns * per_turn) * TURN + (part * TURN >> 16)) / per_turn;
     return steps < 0 ? -distance : distance;
 }
 
-static void finish(uint8_t cause)
-{
+static void finish(uint8_t cause) {
     turn.phase = BUS_TURN_PHASE_IDLE;
     turn.ended = cause;
 }
 
-static void read_angle(void)
-{
+static void read_angle(void) {
     turn.phase = BUS_TURN_PHASE_READING;
     turn.measuring = false;
     turn.since_ms = clock_ms();
 }
 
-static void go(uint8_t phase, int64_t distance, uint8_t velocity_id)
-{
+static void go(uint8_t phase, int64_t distance, uint8_t velocity_id) {
     uint8_t cause = axis_go(AXIS, steps_of(distance), velocity_id);
     if (cause == BUS_CAUSE_OK)
         turn.phase = phase;
@@ -103,14 +93,10 @@ static void go(uint8_t phase, int64_t distance, uint8_t velocity_id)
         finish(cause);
 }
 
-static void come_up(void)
-{
-    go(BUS_TURN_PHASE_COMING_UP, turn.up, BUS_PARAMETER_VELOCITY);
-}
+static void come_up(void) { go(BUS_TURN_PHASE_COMING_UP, turn.up, BUS_PARAMETER_VELOCITY); }
 
 // To below the target, so far away, with the worm pushing up.
-static void approach(int64_t distance)
-{
+static void approach(int64_t distance) {
     int64_t take_up = setting(BUS_SETTING_TURN_TAKE_UP), down;
     turn.closing = false;
     turn.up = distance - setting(BUS_SETTING_TURN_ALLOWANCE);
@@ -123,8 +109,7 @@ static void approach(int64_t distance)
     go(BUS_TURN_PHASE_GOING_BELOW, -down, BUS_PARAMETER_VELOCITY);
 }
 
-static int64_t distance_up(void)
-{
+static int64_t distance_up(void) {
     int64_t from = turn.now.angle, to = turn.target, distance = to - from;
     switch (setting(BUS_SETTING_TURN_DIRECTION)) {
     case DIRECT: return from > TURN - ABOUT_ZERO ? distance + TURN : distance;
@@ -134,9 +119,9 @@ static int64_t distance_up(void)
 }
 
 // Why the tries bring nothing.
-static uint8_t why_not(void)
-{
-    int64_t distance = distance_of(turn.now.steps - turn.near.steps), turned = apart(turn.now.angle, turn.near.angle);
+static uint8_t why_not(void) {
+    int64_t distance = distance_of(turn.now.steps - turn.near.steps),
+            turned = apart(turn.now.angle, turn.near.angle);
     if (turn.now.changes == turn.near.changes) return BUS_CAUSE_SENSOR_STUCK;
     if (distance < FOLLOWED * setting(BUS_SETTING_TURN_TOLERANCE)) return BUS_CAUSE_NOT_CONVERGED;
     if (turned * FOLLOWED <= -distance) return BUS_CAUSE_WRONG_SIGN;
@@ -144,9 +129,9 @@ static uint8_t why_not(void)
 }
 
 // ok, or what is wrong when the table is not where its steps have brought it.
-static uint8_t compare(void)
-{
-    int64_t limit = setting(BUS_SETTING_TURN_DISAGREEMENT), distance = distance_of(turn.now.steps - turn.first.steps);
+static uint8_t compare(void) {
+    int64_t limit = setting(BUS_SETTING_TURN_DISAGREEMENT),
+            distance = distance_of(turn.now.steps - turn.first.steps);
     int64_t turned = apart(turn.now.angle, turn.first.angle);
     if (size(wrap_distance(turned - distance)) <= limit) return BUS_CAUSE_OK;
     uint8_t cause = turn.closing ? why_not() : BUS_CAUSE_NOT_CONVERGED;
@@ -157,11 +142,11 @@ static uint8_t compare(void)
     return BUS_CAUSE_SENSOR_DISAGREES;
 }
 
-static void decide(void)
-{
+static void decide(void) {
     int64_t tolerance = setting(BUS_SETTING_TURN_TOLERANCE), left;
     uint8_t cause = BUS_CAUSE_OK;
-    turn.now = (struct position){sensor_mean(), axis_read_position(AXIS, AXIS_TARGET), sensor_changes()};
+    turn.now =
+        (struct position){sensor_mean(), axis_read_position(AXIS, AXIS_TARGET), sensor_changes()};
     left = apart(turn.target, turn.now.angle);
     if (!turn.begun)
         turn.first = turn.now;
@@ -190,10 +175,10 @@ static void decide(void)
     }
 }
 
-static void reading(void)
-{
+static void reading(void) {
     if (axis_state(AXIS) != BUS_STATE_HOLDING) {
-        finish(axis_state(AXIS) == BUS_STATE_FAULTED ? BUS_CAUSE_ENDED_BY_FAULT : BUS_CAUSE_STOPPED);
+        finish(axis_state(AXIS) == BUS_STATE_FAULTED ? BUS_CAUSE_ENDED_BY_FAULT
+                                                     : BUS_CAUSE_STOPPED);
     } else if (!turn.measuring) {
         if (clock_ms() - turn.since_ms < (uint32_t)setting(BUS_SETTING_TURN_SETTLE)) return;
         sensor_measure((uint32_t)setting(BUS_SETTING_TURN_FRAMES));
@@ -203,18 +188,17 @@ static void reading(void)
     }
 }
 
-void turn_start(unsigned axes)
-{
+void turn_start(unsigned axes) {
     (void)axes;
     turn = (struct turn){.phase = BUS_TURN_PHASE_IDLE, .ended = BUS_CAUSE_NO_MOTION_YET};
 }
 
-void turn_work(void)
-{
+void turn_work(void) {
     uint8_t ended;
     if (turn.phase == BUS_TURN_PHASE_IDLE) return;
     if (turn.command_count != axis_command_count(AXIS)) {
-        finish(axis_state(AXIS) == BUS_STATE_FAULTED ? BUS_CAUSE_ENDED_BY_FAULT : BUS_CAUSE_STOPPED);
+        finish(axis_state(AXIS) == BUS_STATE_FAULTED ? BUS_CAUSE_ENDED_BY_FAULT
+                                                     : BUS_CAUSE_STOPPED);
         return;
     }
     if (sensor_timed_out()) {
@@ -236,8 +220,7 @@ void turn_work(void)
         read_angle();
 }
 
-uint8_t turn_to(uint32_t angle)
-{
+uint8_t turn_to(uint32_t angle) {
     uint8_t cause;
     if (!sensor_built()) return BUS_CAUSE_NOT_BUILT;
     if (angle >= SENSOR_TURN) return BUS_CAUSE_OUT_OF_RANGE;
@@ -246,19 +229,17 @@ uint8_t turn_to(uint32_t angle)
     if (cause != BUS_CAUSE_OK) return cause;
     if (axis_ended(AXIS) == BUS_CAUSE_RUNNING) return BUS_CAUSE_BUSY;
     if (sensor_timed_out()) return BUS_CAUSE_SENSOR_TIMED_OUT;
-    turn = (struct turn){.ended = BUS_CAUSE_RUNNING, .target = angle, .command_count = axis_command_count(AXIS)};
+    turn = (struct turn){
+        .ended = BUS_CAUSE_RUNNING, .target = angle, .command_count = axis_command_count(AXIS)};
     read_angle();
     return BUS_CAUSE_OK;
 }
 
-uint8_t turn_ended(void)
-{
-    return turn.ended;
-}
+uint8_t turn_ended(void) { return turn.ended; }
 
-uint8_t turn_operation(uint8_t operation)
-{
-    if (operation == BUS_OPERATION_TURN_TO) return turn_to((uint32_t)bus_request_field(BUS_TURN_TO_REQUEST_ANGLE, 4));
+uint8_t turn_operation(uint8_t operation) {
+    if (operation == BUS_OPERATION_TURN_TO)
+        return turn_to((uint32_t)bus_request_field(BUS_TURN_TO_REQUEST_ANGLE, 4));
     if (operation != BUS_OPERATION_TURN_STATE) return BUS_CAUSE_NOT_BUILT;
     bus_reply_field(BUS_TURN_STATE_REPLY_PHASE, turn.phase, 1);
     bus_reply_field(BUS_TURN_STATE_REPLY_ENDED, turn.ended, 1);

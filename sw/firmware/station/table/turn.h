@@ -9,7 +9,7 @@ void turn_start(unsigned axes);
 void turn_work(void);
 uint8_t turn_operation(uint8_t operation);
 
-uint8_t turn_to(uint32_t angle);       // a bus_cause at once: ok if it has begun
-uint8_t turn_ended(void);              // running, or how it ended
+uint8_t turn_to(uint32_t angle);  // a bus_cause at once: ok if it has begun
+uint8_t turn_ended(void);         // running, or how it ended
 
 #endif

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """One page of what an experiment measured: moves, pictures, and the paper's numbers beside ours.
 
-    report.write(report.Result(title="S0", moves=moves, traces=traces, lissajous=[...], compared=[...], seed=1), "build/report")
+    report.write(report.Result(title="S0", moves=moves, traces=traces, lissajous=[...],
+    compared=[...], seed=1), "build/report")
 
 The page is one file: the pictures are inside it. Errors are true position minus target, in nm.
 """
+
 import base64
 import html
 import io
@@ -14,7 +16,7 @@ from pathlib import Path
 
 from moire.errors import BadFile, MoireError
 
-PAPER_ERROR_NM = 800.0             # S0, its Fig. 6: below one pulse equivalent
+PAPER_ERROR_NM = 800.0  # S0, its Fig. 6: below one pulse equivalent
 COLOURS = ("#1f5fa8", "#c2571a", "#2c7a4b", "#7a3b8f")
 DOTS_PER_INCH = 110
 
@@ -23,9 +25,9 @@ DOTS_PER_INCH = 110
 class Move:
     axis: str
     target_nm: float
-    reached_nm: float              # by the encoder
+    reached_nm: float  # by the encoder
     true_nm: float
-    error_nm: float                # true - target
+    error_nm: float  # true - target
     time_s: float
 
 
@@ -36,8 +38,8 @@ class Trace:
     axis: str
     time_s: object
     target_nm: object
-    position_nm: object            # by the encoder
-    true_nm: object = None         # of the model, at the same times; None where it is not known at them
+    position_nm: object  # by the encoder
+    true_nm: object = None  # of the model, at the same times; None where it is not known at them
 
 
 @dataclass(frozen=True)
@@ -65,10 +67,12 @@ class Result:
     lissajous: list = field(default_factory=list)
     compared: list = field(default_factory=list)
     seed: int | None = None
-    facts: dict = field(default_factory=dict)          # whatever else a reader should know: name -> words
+    facts: dict = field(default_factory=dict)  # whatever else a reader should know: name -> words
     summary: str = ""
     paper_error_nm: float = PAPER_ERROR_NM
-    drawn: dict = field(default_factory=dict)          # more pictures, of this experiment only: name -> (caption, PNG)
+    drawn: dict = field(
+        default_factory=dict
+    )  # more pictures, of this experiment only: name -> (caption, PNG)
 
 
 @dataclass(frozen=True)
@@ -91,11 +95,14 @@ class Errors:
 
 # ------------------------------------------------------------------ pictures
 
+
 def drawing(width=9.0, height=3.4, **panels):
     try:
         from matplotlib.figure import Figure
     except ImportError:
-        raise MoireError("the package matplotlib is missing, a report needs it: pip install matplotlib") from None
+        raise MoireError(
+            "the package matplotlib is missing, a report needs it: pip install matplotlib"
+        ) from None
     figure = Figure(figsize=(width, height), dpi=DOTS_PER_INCH, layout="constrained")
     axes = figure.subplots(squeeze=False, **panels).ravel()
     for panel in axes:
@@ -114,7 +121,13 @@ def png(figure) -> bytes:
 
 def legend(figure, panel):
     """Above the panels, where it hides nothing."""
-    figure.legend(*panel.get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False, fontsize="small")
+    figure.legend(
+        *panel.get_legend_handles_labels(),
+        loc="outside upper center",
+        ncols=4,
+        frameon=False,
+        fontsize="small",
+    )
 
 
 def colour(number):
@@ -123,20 +136,41 @@ def colour(number):
 
 def length_unit(largest_nm):
     """(nm in one unit, name) that suits a scale up to this."""
-    return next(((worth, name) for worth, name in ((1e6, "mm"), (1e3, "\N{MICRO SIGN}m")) if largest_nm >= worth), (1.0, "nm"))
+    return next(
+        (
+            (worth, name)
+            for worth, name in ((1e6, "mm"), (1e3, "\N{MICRO SIGN}m"))
+            if largest_nm >= worth
+        ),
+        (1.0, "nm"),
+    )
 
 
 def largest(arrays):
-    return max((abs(float(value)) for array in arrays for value in (min(array), max(array))), default=0.0)
+    return max(
+        (abs(float(value)) for array in arrays for value in (min(array), max(array))), default=0.0
+    )
 
 
 def trajectories(traces) -> bytes:
     worth, unit = length_unit(largest([trace.position_nm for trace in traces]))
     figure, (panel,) = drawing()
     for number, trace in enumerate(traces):
-        panel.plot(trace.time_s, [value / worth for value in trace.target_nm], color="#555555", linewidth=0.9, linestyle="--",
-                   label="target" if number == 0 else None)
-        panel.plot(trace.time_s, [value / worth for value in trace.position_nm], color=colour(number), linewidth=1.4, label=trace.axis)
+        panel.plot(
+            trace.time_s,
+            [value / worth for value in trace.target_nm],
+            color="#555555",
+            linewidth=0.9,
+            linestyle="--",
+            label="target" if number == 0 else None,
+        )
+        panel.plot(
+            trace.time_s,
+            [value / worth for value in trace.position_nm],
+            color=colour(number),
+            linewidth=1.4,
+            label=trace.axis,
+        )
     panel.set_xlabel("time / s")
     panel.set_ylabel(f"position / {unit}")
     legend(figure, panel)
@@ -144,16 +178,33 @@ def trajectories(traces) -> bytes:
 
 
 def following_errors(traces) -> bytes:
-    errors = [[target - position for target, position in zip(trace.target_nm, trace.position_nm)] for trace in traces]
-    hidden = [[] if trace.true_nm is None else [target - true for target, true in zip(trace.target_nm, trace.true_nm)] for trace in traces]
+    errors = [
+        [target - position for target, position in zip(trace.target_nm, trace.position_nm)]
+        for trace in traces
+    ]
+    hidden = [
+        []
+        if trace.true_nm is None
+        else [target - true for target, true in zip(trace.target_nm, trace.true_nm)]
+        for trace in traces
+    ]
     worth, unit = length_unit(largest(errors + [error for error in hidden if error]))
     figure, panels = drawing(height=2.2 * len(traces) + 0.6, nrows=len(traces), sharex=True)
     for number, (panel, trace) in enumerate(zip(panels, traces)):
         if hidden[number]:
-            panel.plot(trace.time_s, [value / worth for value in hidden[number]], color="#999999", linewidth=0.9,
-                       label="of the true position")
+            panel.plot(
+                trace.time_s,
+                [value / worth for value in hidden[number]],
+                color="#999999",
+                linewidth=0.9,
+                label="of the true position",
+            )
         panel.plot(
-            trace.time_s, [value / worth for value in errors[number]], color=colour(number), linewidth=0.9, label="seen by the encoder"
+            trace.time_s,
+            [value / worth for value in errors[number]],
+            color=colour(number),
+            linewidth=0.9,
+            label="seen by the encoder",
         )
         panel.set_ylabel(f"{trace.axis}: error / {unit}")
     panels[-1].set_xlabel("time / s")
@@ -164,11 +215,20 @@ def following_errors(traces) -> bytes:
 def circles(several) -> bytes:
     figure, panels = drawing(width=min(4.5 * len(several), 9.0), height=4.3, ncols=len(several))
     for number, (panel, signal) in enumerate(zip(panels, several)):
-        radius = math.sqrt(sum(float(s) ** 2 + float(c) ** 2 for s, c in zip(signal.sin, signal.cos)) / max(1, len(signal.sin)))
+        radius = math.sqrt(
+            sum(float(s) ** 2 + float(c) ** 2 for s, c in zip(signal.sin, signal.cos))
+            / max(1, len(signal.sin))
+        )
         turns = [math.tau * step / 180 for step in range(181)]
-        panel.plot([radius * math.cos(turn) for turn in turns], [radius * math.sin(turn) for turn in turns], color="#999999",
-                   linewidth=0.8)
-        panel.plot(signal.cos, signal.sin, linestyle="", marker=".", markersize=2.5, color=colour(number))
+        panel.plot(
+            [radius * math.cos(turn) for turn in turns],
+            [radius * math.sin(turn) for turn in turns],
+            color="#999999",
+            linewidth=0.8,
+        )
+        panel.plot(
+            signal.cos, signal.sin, linestyle="", marker=".", markersize=2.5, color=colour(number)
+        )
         panel.set_aspect("equal")
         panel.set_xlabel(f"{signal.axis}: cosine / converter counts")
         panel.set_ylabel("sine / converter counts")
@@ -185,14 +245,26 @@ def histogram(moves, paper_error_nm) -> bytes:
     for panel, reach in ((whole, max(1.25 * paper_error_nm, 1.05 * widest)), (fine, 1.05 * widest)):
         worth, unit = length_unit(reach / 2) if panel is fine else (1e3, "\N{MICRO SIGN}m")
         edges = [reach / worth * (step / 20 - 1) for step in range(41)]
-        panel.hist([[error / worth for error in group] for group in errors], bins=edges, stacked=True, label=names,
-                   color=[colour(number) for number in range(len(names))])
+        panel.hist(
+            [[error / worth for error in group] for group in errors],
+            bins=edges,
+            stacked=True,
+            label=names,
+            color=[colour(number) for number in range(len(names))],
+        )
         panel.set_xlabel(f"true position \N{MINUS SIGN} target / {unit}")
         panel.set_ylabel("moves")
         if paper_error_nm <= reach:
             for side in (-1, 1):
-                panel.axvline(side * paper_error_nm / worth, color="#b00020", linewidth=1.2, linestyle="--",
-                              label=f"paper: \N{PLUS-MINUS SIGN}{paper_error_nm / 1e3:g} \N{MICRO SIGN}m" if side > 0 else None)
+                panel.axvline(
+                    side * paper_error_nm / worth,
+                    color="#b00020",
+                    linewidth=1.2,
+                    linestyle="--",
+                    label=f"paper: \N{PLUS-MINUS SIGN}{paper_error_nm / 1e3:g} \N{MICRO SIGN}m"
+                    if side > 0
+                    else None,
+                )
     legend(figure, whole)
     whole.locator_params(axis="x", nbins=5)
     whole.set_title("on the scale of the paper's Fig. 6", fontsize="medium")
@@ -204,11 +276,20 @@ def pictures(result: Result) -> dict:
     """name -> (caption, PNG)."""
     drawn = dict(result.drawn)
     if result.traces:
-        drawn["trajectories"] = ("Trajectories: target and position by the encoder", trajectories(result.traces))
-        drawn["following_error"] = ("Following error: target minus position", following_errors(result.traces))
+        drawn["trajectories"] = (
+            "Trajectories: target and position by the encoder",
+            trajectories(result.traces),
+        )
+        drawn["following_error"] = (
+            "Following error: target minus position",
+            following_errors(result.traces),
+        )
     if result.lissajous:
         drawn["lissajous"] = ("Sine against cosine, as sampled", circles(result.lissajous))
-    drawn["histogram"] = (f"Final errors of {len(result.moves)} moves", histogram(result.moves, result.paper_error_nm))
+    drawn["histogram"] = (
+        f"Final errors of {len(result.moves)} moves",
+        histogram(result.moves, result.paper_error_nm),
+    )
     return drawn
 
 
@@ -242,19 +323,27 @@ tbody tr:last-child td { border-bottom: 0; }
 
 
 def cell(text, tag="td", kind=""):
-    return f'<{tag}{f" class={chr(34)}{kind}{chr(34)}" if kind else ""}>{html.escape(str(text))}</{tag}>'
+    return f"<{tag}{f' class={chr(34)}{kind}{chr(34)}' if kind else ''}>{html.escape(str(text))}</{tag}>"
 
 
 def table(head, rows, text_columns=1, tall=False) -> str:
     """Rows of texts, or of (text, class)."""
+
     def line(cells, tag):
         made = []
         for number, text in enumerate(cells):
             text, kind = text if isinstance(text, tuple) else (text, "")
-            made.append(cell(text, tag, " ".join(filter(None, ("text" if number < text_columns else "", kind)))))
+            made.append(
+                cell(
+                    text,
+                    tag,
+                    " ".join(filter(None, ("text" if number < text_columns else "", kind))),
+                )
+            )
         return "<tr>" + "".join(made) + "</tr>"
+
     body = "\n".join(line(row, "td") for row in rows)
-    return f'<section{" class=tall" if tall else ""}><table><thead>{line(head, "th")}</thead><tbody>\n{body}\n</tbody></table></section>'
+    return f"<section{' class=tall' if tall else ''}><table><thead>{line(head, 'th')}</thead><tbody>\n{body}\n</tbody></table></section>"
 
 
 def verdict(better):
@@ -264,8 +353,15 @@ def verdict(better):
 def move_rows(result: Result):
     for number, move in enumerate(result.moves, 1):
         kind = "bad" if abs(move.error_nm) > result.paper_error_nm else ""
-        yield (move.axis, number, f"{move.target_nm / 1e6:.6f}", f"{move.reached_nm / 1e6:.6f}", f"{move.true_nm / 1e6:.6f}",
-               (f"{move.error_nm:+.1f}", kind), f"{move.time_s:.3f}")
+        yield (
+            move.axis,
+            number,
+            f"{move.target_nm / 1e6:.6f}",
+            f"{move.reached_nm / 1e6:.6f}",
+            f"{move.true_nm / 1e6:.6f}",
+            (f"{move.error_nm:+.1f}", kind),
+            f"{move.time_s:.3f}",
+        )
 
 
 def page(result: Result) -> str:
@@ -276,29 +372,50 @@ def page(result: Result) -> str:
         (f"{errors.largest:.1f} nm", "largest error"),
         (f"{errors.rms:.1f} nm", "rms error"),
         (f"{errors.mean:+.1f} nm", "mean error"),
-        (f"{share:.2g} %" if share < 100 else f"{share:.0f} %", "largest error, of the paper's bound"),
+        (
+            f"{share:.2g} %" if share < 100 else f"{share:.0f} %",
+            "largest error, of the paper's bound",
+        ),
     ]
-    tiles = "".join(f"<div><b>{html.escape(value)}</b><span>{html.escape(name)}</span></div>" for value, name in numbers)
+    tiles = "".join(
+        f"<div><b>{html.escape(value)}</b><span>{html.escape(name)}</span></div>"
+        for value, name in numbers
+    )
     parts = [f"<h1>{html.escape(result.title)}</h1>", f'<div class="numbers">{tiles}</div>']
     if result.summary:
         parts.insert(1, f'<p class="summary">{html.escape(result.summary)}</p>')
     if result.compared:
-        rows = [(entry.what, entry.paper, entry.ours, verdict(entry.better)) for entry in result.compared]
+        rows = [
+            (entry.what, entry.paper, entry.ours, verdict(entry.better))
+            for entry in result.compared
+        ]
         parts += ["<h2>Against the paper</h2>", table(("", "paper", "here", ""), rows)]
     parts.append("<h2>Pictures</h2>")
     for name, (caption, image) in pictures(result).items():
         source = "data:image/png;base64," + base64.b64encode(image).decode()
         words = html.escape(caption)
-        parts.append(f'<figure id="{name}"><img alt="{words}" src="{source}"><figcaption>{words}</figcaption></figure>')
+        parts.append(
+            f'<figure id="{name}"><img alt="{words}" src="{source}"><figcaption>{words}</figcaption></figure>'
+        )
     head = ("axis", "move", "target / mm", "encoder / mm", "true / mm", "error / nm", "time / s")
     parts += ["<h2>Moves</h2>", table(head, move_rows(result), tall=True)]
     facts = {**({"seed": result.seed} if result.seed is not None else {}), **result.facts}
     if facts:
         parts += ["<h2>How it was measured</h2>", table(("", ""), facts.items(), text_columns=2)]
     title = html.escape(result.title)
-    return "\n".join(['<!DOCTYPE html>', '<html lang="en"><head><meta charset="utf-8">',
-                      '<meta name="viewport" content="width=device-width, initial-scale=1">',
-                      f"<title>{title}</title>", f"<style>\n{STYLE}</style></head>", "<body><main>", *parts, "</main></body></html>", ""])
+    return "\n".join(
+        [
+            "<!DOCTYPE html>",
+            '<html lang="en"><head><meta charset="utf-8">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            f"<title>{title}</title>",
+            f"<style>\n{STYLE}</style></head>",
+            "<body><main>",
+            *parts,
+            "</main></body></html>",
+            "",
+        ]
+    )
 
 
 def write(result: Result, folder="build/report") -> Path:

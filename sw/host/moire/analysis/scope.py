@@ -6,8 +6,10 @@
     axis.move(mm=1.5)
     Path("move.csv").write_text(scope.wait().csv())
 
-With an amplitude the axis is driven in open loop meanwhile; moire.tune makes gains of such a record.
+With an amplitude the axis is driven in open loop meanwhile; moire.tune makes gains of such a
+record.
 """
+
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -17,9 +19,9 @@ from moire.errors import MoireError, OutOfRange
 from moire.made.bus_tables import OPERATIONS, SCOPE_STATES, SCOPE_TRIGGERS
 
 TRIGGERS = {name: code for code, (name, _) in SCOPE_TRIGGERS.items()}
-SAMPLES = 128                # of a record; the firmware keeps so many
-LONGEST_TICKS = 200          # from sample to sample
-TIME_CLK = 64                # of `time` on the line
+SAMPLES = 128  # of a record; the firmware keeps so many
+LONGEST_TICKS = 200  # from sample to sample
+TIME_CLK = 64  # of `time` on the line
 AT_ONCE = sum(field.startswith("time_") for field, _ in OPERATIONS["read_scope"].reply)
 
 
@@ -31,17 +33,21 @@ class NoRecord(MoireError):
 class Record:
     """One value a sample in each list; time 0 is the trigger."""
 
-    before: int                # samples from before the trigger
+    before: int  # samples from before the trigger
     time_s: list
     position_nm: list
     error_nm: list
-    command: list              # of full scale, -1…1; that in force when the sample was taken
+    command: list  # of full scale, -1…1; that in force when the sample was taken
     period_nm: float
 
     def csv(self) -> str:
         rows = ["time_s,position_nm,error_nm,command"]
-        rows += [f"{time:.6f},{position:.3f},{error:.3f},{command:.6f}" for time, position, error, command in
-                 zip(self.time_s, self.position_nm, self.error_nm, self.command)]
+        rows += [
+            f"{time:.6f},{position:.3f},{error:.3f},{command:.6f}"
+            for time, position, error, command in zip(
+                self.time_s, self.position_nm, self.error_nm, self.command
+            )
+        ]
         return "\n".join(rows) + "\n"
 
     def picture(self) -> bytes:
@@ -49,16 +55,30 @@ class Record:
         from moire.analysis import report
 
         figure, panels = report.drawing(height=6.0, nrows=3, sharex=True)
-        lengths = [[position - self.position_nm[self.before] for position in self.position_nm], self.error_nm]
+        lengths = [
+            [position - self.position_nm[self.before] for position in self.position_nm],
+            self.error_nm,
+        ]
         for number, (panel, values, name) in enumerate(zip(panels, lengths, ("position", "error"))):
             worth, unit = report.length_unit(report.largest([values]))
-            panel.plot([time * 1e3 for time in self.time_s], [value / worth for value in values], color=report.colour(number),
-                       linewidth=1.2)
+            panel.plot(
+                [time * 1e3 for time in self.time_s],
+                [value / worth for value in values],
+                color=report.colour(number),
+                linewidth=1.2,
+            )
             panel.set_ylabel(f"{name} / {unit}")
-        panels[2].plot([time * 1e3 for time in self.time_s], [100 * command for command in self.command], color=report.colour(2),
-                       linewidth=1.2, drawstyle="steps-pre")
+        panels[2].plot(
+            [time * 1e3 for time in self.time_s],
+            [100 * command for command in self.command],
+            color=report.colour(2),
+            linewidth=1.2,
+            drawstyle="steps-pre",
+        )
         panels[2].set_ylabel("command / %")
-        panels[2].set_xlabel(f"time / ms; position from {units.format_length(self.position_nm[self.before])}")
+        panels[2].set_xlabel(
+            f"time / ms; position from {units.format_length(self.position_nm[self.before])}"
+        )
         for panel in panels:
             panel.axvline(0, color="#555555", linewidth=0.8, linestyle="--")
         return report.png(figure)
@@ -69,20 +89,31 @@ class Scope:
         self.axis, self.node = axis, axis.node
 
     def arm(self, trigger: str = "now", before: int = 0, every="1ms", level="0nm", amplitude=0):
-        """Begins afresh. `every` is rounded to servo ticks; `level` is the error that triggers, or, with an amplitude of the open loop
+        """Begins afresh. `every` is rounded to servo ticks; `level` is the error that triggers, or,
+        with an amplitude of the open loop
         (of full scale), how far the axis may go."""
         if trigger not in TRIGGERS:
-            raise OutOfRange(f"the scope has no trigger '{trigger}': there are {', '.join(TRIGGERS)}")
+            raise OutOfRange(
+                f"the scope has no trigger '{trigger}': there are {', '.join(TRIGGERS)}"
+            )
         if not 0 <= before < SAMPLES:
             raise OutOfRange(f"{before} samples before the trigger do not fit: 0 to {SAMPLES - 1}")
         tick_hz = self.node.identity.tick_hz
         ticks, counts = round(units.parse_time(every) * tick_hz), self.axis.to_counts(level)
         if not 1 <= ticks <= LONGEST_TICKS:
-            raise OutOfRange(f"samples come every {units.format_time(Fraction(1, tick_hz))} to "
-                             f"{units.format_time(Fraction(LONGEST_TICKS, tick_hz))}")
+            raise OutOfRange(
+                f"samples come every {units.format_time(Fraction(1, tick_hz))} to "
+                f"{units.format_time(Fraction(LONGEST_TICKS, tick_hz))}"
+            )
         share = units.parse_share(amplitude)
-        self.axis.request("arm_scope", trigger=TRIGGERS[trigger], before=before, every=ticks, level=min(max(counts, 0), (1 << 32) - 1),
-                          amplitude=min(round(share * FULL_SCALE), FULL_SCALE - 1))
+        self.axis.request(
+            "arm_scope",
+            trigger=TRIGGERS[trigger],
+            before=before,
+            every=ticks,
+            level=min(max(counts, 0), (1 << 32) - 1),
+            amplitude=min(round(share * FULL_SCALE), FULL_SCALE - 1),
+        )
 
     def state(self) -> str:
         return named(SCOPE_STATES, self.node.request("scope")["state"], "state")
@@ -95,8 +126,10 @@ class Scope:
             if state == "empty":
                 raise NoRecord(f"the scope of node {self.node.address} has no record: arm it first")
             if transport.now() > end:
-                raise NoRecord(f"the scope of node {self.node.address} has no record after {units.format_time(patience)}: "
-                               f"{dict(SCOPE_STATES.values())[state]}")
+                raise NoRecord(
+                    f"the scope of node {self.node.address} has no record after {units.format_time(patience)}: "
+                    f"{dict(SCOPE_STATES.values())[state]}"
+                )
             transport.wait(self.node.bus.poll_s)
         return self.read()
 
@@ -105,18 +138,28 @@ class Scope:
         rows = []
         while len(rows) < told["count"]:
             fields = self.node.request("read_scope", first=len(rows))
-            rows += [[fields[f"{name}_{n}"] for name in ("time", "position", "error", "command")] for n in range(AT_ONCE)]
-        times, positions, errors, commands = zip(*rows[:told["count"]])
+            rows += [
+                [fields[f"{name}_{n}"] for name in ("time", "position", "error", "command")]
+                for n in range(AT_ONCE)
+            ]
+        times, positions, errors, commands = zip(*rows[: told["count"]])
         unit_s, clk, time_s = TIME_CLK / self.node.identity.clk_hz, 0, []
         for time in times:
             clk += time
             time_s.append(clk * unit_s)
-        return Record(told["before"], [time - time_s[told["before"]] for time in time_s],
-                      [self.axis.to_nm(position) for position in self.unwrapped(positions)], [self.axis.to_nm(error) for error in errors],
-                      [command / FULL_SCALE for command in commands], float(self.axis.period_nm))
+        return Record(
+            told["before"],
+            [time - time_s[told["before"]] for time in time_s],
+            [self.axis.to_nm(position) for position in self.unwrapped(positions)],
+            [self.axis.to_nm(error) for error in errors],
+            [command / FULL_SCALE for command in commands],
+            float(self.axis.period_nm),
+        )
 
     def unwrapped(self, low_words) -> list:
-        """Whole positions: the last is within half a range of the present one, and each of its neighbour."""
+        """Whole positions: the last is within half a range of the present one, and each of its
+        neighbour.
+        """
         near, out = self.node.request("position", axis=self.axis.number)["position"], []
         for low in reversed(low_words):
             near += (low - near + (1 << 31)) % (1 << 32) - (1 << 31)
@@ -125,15 +168,21 @@ class Scope:
 
 
 def excite(axis: Axis, amplitude="20%", every="2ms", reach="1mm") -> Record:
-    """A record of how the axis answers in open loop; it must be enabled and at rest, and ends held where it is."""
+    """A record of how the axis answers in open loop; it must be enabled and at rest, and ends held
+    where it is.
+    """
     scope = Scope(axis)
     scope.arm("now", every=every, level=reach, amplitude=amplitude)
     return axis.stopping_on_error(scope.wait)
 
 
 def lsb(record: Record) -> tuple:
-    """(times in s, commands of full scale 2^15 given at them, positions in 2^-16 period), as moire.tune takes them: the command of a
+    """(times in s, commands of full scale 2^15 given at them, positions in 2^-16 period), as
+    moire.tune takes them: the command of a
     sample is the one that stood until then."""
     commands = [*record.command[1:], 0.0]
-    return (record.time_s, [command * FULL_SCALE for command in commands],
-            [position * COUNTS / record.period_nm for position in record.position_nm])
+    return (
+        record.time_s,
+        [command * FULL_SCALE for command in commands],
+        [position * COUNTS / record.period_nm for position in record.position_nm],
+    )

@@ -8,8 +8,10 @@
         print(axis.move(mm=1.5).position_nm)
         axis.disable()
 
-A drive stays on only while somebody talks on the line: the node's watchdog switches it off after `watchdog_time`.
+A drive stays on only while somebody talks on the line: the node's watchdog switches it off after
+`watchdog_time`.
 """
+
 import random
 import re
 from dataclasses import dataclass, field
@@ -45,22 +47,48 @@ from moire.made.bus_tables import (
 )
 from moire.made.registers import FIELDS, MAP_CRC
 
-COUNTS = 65536               # of the wire, in one signal period
-FULL_SCALE = 32768           # of the command
-SYNC_S = 0.002               # after it, firmware too knows what the mark began
-BAUD_CHANGE_S = 0.005        # a node changes when the reply is out, and no more than this later
-RATES = (BAUD, 1_000_000, 500_000, 250_000, 3_000_000, 2_000_000, 921_600, 460_800, 230_400, 57_600, 38_400, 19_200, 9_600)
-POLL_S = 0.05                # between two looks at a motion, where a Bus is not told otherwise
+COUNTS = 65536  # of the wire, in one signal period
+FULL_SCALE = 32768  # of the command
+SYNC_S = 0.002  # after it, firmware too knows what the mark began
+BAUD_CHANGE_S = 0.005  # a node changes when the reply is out, and no more than this later
+RATES = (
+    BAUD,
+    1_000_000,
+    500_000,
+    250_000,
+    3_000_000,
+    2_000_000,
+    921_600,
+    460_800,
+    230_400,
+    57_600,
+    38_400,
+    19_200,
+    9_600,
+)
+POLL_S = 0.05  # between two looks at a motion, where a Bus is not told otherwise
 
-HARMONICS = 10               # orders of phase error that are corrected
-SCATTER = 1 << 20            # of learner.scatter, in one signal period
+HARMONICS = 10  # orders of phase error that are corrected
+SCATTER = 1 << 20  # of learner.scatter, in one signal period
 CORRECTION = ("sin_offset", "cos_offset", "gain", "quadrature_error")
-CALIBRATION_SPEEDS = (Fraction(1), Fraction(3, 5), Fraction(4, 5))        # shares of the top speed; the learner wants several
-CALIBRATION_SAMPLES = 20        # for one period at the top speed of learning; it wants eight
-CALIBRATION_STROKE_S = 0.5         # for one way at the top speed: most of it is then at an even speed
-CAPTURE_SOURCES = ("index", "tick", "software", "probe_0_rising", "probe_1_rising", "probe_0_falling", "probe_1_falling")
+CALIBRATION_SPEEDS = (
+    Fraction(1),
+    Fraction(3, 5),
+    Fraction(4, 5),
+)  # shares of the top speed; the learner wants several
+CALIBRATION_SAMPLES = 20  # for one period at the top speed of learning; it wants eight
+CALIBRATION_STROKE_S = 0.5  # for one way at the top speed: most of it is then at an even speed
+CAPTURE_SOURCES = (
+    "index",
+    "tick",
+    "software",
+    "probe_0_rising",
+    "probe_1_rising",
+    "probe_0_falling",
+    "probe_1_falling",
+)
 
-FILTERS = 2                  # of the servo
+FILTERS = 2  # of the servo
 FILTER = ("b0", "b1", "b2", "a1", "a2")
 
 # words for the values of a parameter or setting that is a choice, from 0 on
@@ -78,11 +106,12 @@ CHOICES = {
     "peer_mode": ("off", "printed", "frames"),
     "peer_role": ("main", "sub"),
 }
-HOME_METHODS = {"s0": -1, "s3": -2}      # beside the numbers of CiA 402
+HOME_METHODS = {"s0": -1, "s3": -2}  # beside the numbers of CiA 402
 
 CAUSE_CODES = {name: code for code, (name, _) in CAUSES.items()}
 
-# unit in bus.toml: what people write; its worth there, the period taken as one nm; whether a period is in it
+# unit in bus.toml: what people write; its worth there, the period taken as one nm; whether a period
+# is in it
 KINDS = {
     "pm": (units.LENGTH, Fraction(1, 1000), False),
     "period": (units.LENGTH, Fraction(1), True),
@@ -98,7 +127,11 @@ KINDS = {
 
 def bits(table: dict, value: int) -> tuple:
     """Names of the bits that are set; a bit without a name is named by its number."""
-    return tuple(table[bit][0] if bit in table else f"bit {bit}" for bit in range(value.bit_length()) if value >> bit & 1)
+    return tuple(
+        table[bit][0] if bit in table else f"bit {bit}"
+        for bit in range(value.bit_length())
+        if value >> bit & 1
+    )
 
 
 def words(table: dict, names) -> str:
@@ -111,6 +144,7 @@ def named(table: dict, code: int, what: str) -> str:
 
 
 # ------------------------------------------------------------------ what the node tells
+
 
 @dataclass(frozen=True)
 class Identity:
@@ -126,7 +160,9 @@ class Identity:
     def check(self):
         """Raises WrongBuild unless node and host were made from the same tables."""
         if self.protocol_crc != PROTOCOL_CRC:
-            raise WrongBuild(self.address, "protocol table (bus.toml)", self.protocol_crc, PROTOCOL_CRC)
+            raise WrongBuild(
+                self.address, "protocol table (bus.toml)", self.protocol_crc, PROTOCOL_CRC
+            )
         if self.map_crc != MAP_CRC:
             raise WrongBuild(self.address, "register map (registers.rdl)", self.map_crc, MAP_CRC)
 
@@ -138,7 +174,7 @@ class Identity:
 @dataclass(frozen=True)
 class Status:
     state: str
-    ended: str                     # cause of the last motion
+    ended: str  # cause of the last motion
     enabled: bool
     homed: bool
     limit_low: bool
@@ -152,8 +188,8 @@ class Status:
     position_nm: float
     target_nm: float
     velocity_mm_s: float
-    drive_command: float           # of full scale, -1…1
-    counts: int                    # position in counts of the read-out
+    drive_command: float  # of full scale, -1…1
+    counts: int  # position in counts of the read-out
 
     @property
     def words(self) -> str:
@@ -184,34 +220,34 @@ class Status:
 class Encoder:
     sin: int
     cos: int
-    phase: float                   # of a period
-    amplitude: int                 # converter counts
+    phase: float  # of a period
+    amplitude: int  # converter counts
     quadrature_count: int
     rejected_pulses: int
     rejected_samples: int
-    home_phase_nm: float           # from where homing arrived to the phase zero that it took
-    home_margin: float             # 1: arrived right on the phase zero, 0: midway between two
+    home_phase_nm: float  # from where homing arrived to the phase zero that it took
+    home_margin: float  # 1: arrived right on the phase zero, 0: midway between two
     fault_position_nm: float
 
 
 @dataclass(frozen=True)
 class Drive:
-    kind: str                      # what the command goes to: bridge, steps or converter
-    built: tuple                   # what this node could drive, "fine" for the fine stage
-    command: float                 # of full scale, -1…1
-    steps: int                     # on the wire since reset
-    fine_command: float            # of full scale, -1…1
-    override: Fraction             # how fast profiles are played, of full speed; 0: paused
+    kind: str  # what the command goes to: bridge, steps or converter
+    built: tuple  # what this node could drive, "fine" for the fine stage
+    command: float  # of full scale, -1…1
+    steps: int  # on the wire since reset
+    fine_command: float  # of full scale, -1…1
+    override: Fraction  # how fast profiles are played, of full speed; 0: paused
 
 
 @dataclass(frozen=True)
 class CalibrationState:
-    reason: str                    # "learning", or why nothing is learned just now
-    settled: bool                  # offset, gain, phase and harmonics are all known
+    reason: str  # "learning", or why nothing is learned just now
+    settled: bool  # offset, gain, phase and harmonics are all known
     frozen: bool
-    accepted: int                  # times that something was learned since power-up
-    refused: int                   # bursts and passes of bursts that were not good enough
-    scatter_nm: float              # standard error of what was learned last
+    accepted: int  # times that something was learned since power-up
+    refused: int  # bursts and passes of bursts that were not good enough
+    scatter_nm: float  # standard error of what was learned last
 
     @property
     def words(self) -> str:
@@ -220,8 +256,8 @@ class CalibrationState:
 
 @dataclass(frozen=True)
 class Signal:
-    faults: tuple                  # that stand now
-    first: tuple                   # that came first since reset()
+    faults: tuple  # that stand now
+    first: tuple  # that came first since reset()
 
     @property
     def fault_words(self) -> str:
@@ -234,25 +270,25 @@ class Signal:
 
 @dataclass(frozen=True)
 class Capture:
-    sources: tuple                 # names of CAPTURE_SOURCES; several if they came at once
-    position_nm: float             # of the last sample before the event
-    time_clk: int                  # of the event, wraps at 2^32
-    age_s: float                   # of that sample
+    sources: tuple  # names of CAPTURE_SOURCES; several if they came at once
+    position_nm: float  # of the last sample before the event
+    time_clk: int  # of the event, wraps at 2^32
+    age_s: float  # of that sample
 
 
 @dataclass(frozen=True)
 class Compare:
     armed: bool
-    passed: int                    # points since arm
-    late: bool                     # a pulse had to wait for the one before it
+    passed: int  # points since arm
+    late: bool  # a pulse had to wait for the one before it
 
 
 @dataclass(frozen=True)
 class ParameterValue:
     name: str
     id: int
-    counts: int                    # as on the line
-    value: Fraction                # in `unit`
+    counts: int  # as on the line
+    value: Fraction  # in `unit`
     unit: str
     minimum: Fraction
     maximum: Fraction
@@ -269,7 +305,9 @@ class ParameterValue:
     def range_words(self) -> str:
         if self.name in CHOICES:
             return ", ".join(CHOICES[self.name])
-        return " to ".join(units.with_unit(self.quantity, end, 6) for end in (self.minimum, self.maximum))
+        return " to ".join(
+            units.with_unit(self.quantity, end, 6) for end in (self.minimum, self.maximum)
+        )
 
 
 @dataclass
@@ -285,31 +323,47 @@ class Statistics:
 
 # ------------------------------------------------------------------ line
 
+
 class Bus:
     """The nodes on one transport. `random_source` gives the first sequence number for each node."""
 
     FIND_ANSWER_S = 0.05
     FIND_TRIES = 2
 
-    def __init__(self, transport: Transport, tries: int = 5, answer_s: float = 0.1, random_source: random.Random | None = None,
-                 poll_s: float = POLL_S):
+    def __init__(
+        self,
+        transport: Transport,
+        tries: int = 5,
+        answer_s: float = 0.1,
+        random_source: random.Random | None = None,
+        poll_s: float = POLL_S,
+    ):
         self.transport, self.tries, self.answer_s, self.poll_s = transport, tries, answer_s, poll_s
         self.random = random_source or random.SystemRandom()
         self.sequences, self.nodes = {}, {}
         self.statistics = Statistics()
-        self.in_order = True           # false while words of a broken exchange may still be on the way
-        self.syncs = 0                 # of this host
-        self.baud_changed = False      # by this host, from the one after power-up
+        self.in_order = True  # false while words of a broken exchange may still be on the way
+        self.syncs = 0  # of this host
+        self.baud_changed = False  # by this host, from the one after power-up
 
     def exchange(self, address: int, operation: str, /, tries=None, answer_s=None, **fields):
         """One request, repeated where needed; returns the reply whatever its cause."""
-        # after the first, the number differs from that of every frame the node can remember: a request cannot be taken for an old one
-        sequence = (self.sequences[address] + 1) % 256 if address in self.sequences else self.random.randrange(256)
+        # after the first, the number differs from that of every frame the node can remember: a
+        # request cannot be taken for an old one
+        sequence = (
+            (self.sequences[address] + 1) % 256
+            if address in self.sequences
+            else self.random.randrange(256)
+        )
         self.sequences[address] = sequence
         character_s = self.transport.character_s
-        timing = Timing(character_s, answer=answer_s or self.answer_s, quiet=max(0.01, 3 * character_s))
+        timing = Timing(
+            character_s, answer=answer_s or self.answer_s, quiet=max(0.01, 3 * character_s)
+        )
         body = request_body(operation, sequence, **fields)
-        return self.run_exchange(Exchange(address, body, tries or self.tries, timing, self.transport.handshake)).result()
+        return self.run_exchange(
+            Exchange(address, body, tries or self.tries, timing, self.transport.handshake)
+        ).result()
 
     def run_exchange(self, exchange: Exchange) -> Exchange:
         """Until it is finished, well or not."""
@@ -349,13 +403,17 @@ class Bus:
         if reply.cause == 0:
             return reply.fields
         cause = named(CAUSES, reply.cause, "cause")
-        raise Refused(cause, reply.cause, f"node {address} refused '{operation}': {words(CAUSES, [cause])}")
+        raise Refused(
+            cause, reply.cause, f"node {address} refused '{operation}': {words(CAUSES, [cause])}"
+        )
 
     def identify(self, address: int, **patience) -> Identity:
         reply = self.exchange(address, "identify", **patience)
         if reply.cause:
             cause = named(CAUSES, reply.cause, "cause")
-            raise Refused(cause, reply.cause, f"node {address} refused 'identify': {words(CAUSES, [cause])}")
+            raise Refused(
+                cause, reply.cause, f"node {address} refused 'identify': {words(CAUSES, [cause])}"
+            )
         return Identity(**{**reply.fields, "address": address})
 
     def find(self, addresses=ADDRESSES) -> list:
@@ -365,25 +423,35 @@ class Bus:
             if not self.transport.reaches(address):
                 continue
             try:
-                found.append(self.identify(address, tries=self.FIND_TRIES, answer_s=self.FIND_ANSWER_S))
+                found.append(
+                    self.identify(address, tries=self.FIND_TRIES, answer_s=self.FIND_ANSWER_S)
+                )
             except NoAnswer:
                 continue
-            if found[-1].matches:      # two nodes with one address may identify themselves as one; their times differ
-                self.request(address, "read_register", address=register_fields("node.time_stamp")[0].address(0))
+            if (
+                found[-1].matches
+            ):  # two nodes with one address may identify themselves as one; their times differ
+                self.request(
+                    address,
+                    "read_register",
+                    address=register_fields("node.time_stamp")[0].address(0),
+                )
         return found
 
     def find_baud(self, addresses=ADDRESSES, rates=RATES) -> tuple:
-        """As find(), at the first of these baud rates at which somebody answers, and that rate, which then stays; with an empty list where
-        nobody does. A node that was not called for 5 s has gone back to the first rate, so that is asked at the end too."""
+        """As find(), at the first of these baud rates at which somebody answers, and that rate,
+        which then stays; with an empty list where
+        nobody does. A node that was not called for 5 s has gone back to the first rate, so that is
+        asked at the end too."""
         self.require_direct_bus()
-        garbled = None                 # at a wrong rate it is somebody else's words
+        garbled = None  # at a wrong rate it is somebody else's words
         for rate in (*rates, BAUD):
             found = []
             try:
                 self.transport.set_baud(rate)
                 found = self.find(addresses)
             except PortError:
-                if rate == BAUD:       # which every port can do
+                if rate == BAUD:  # which every port can do
                     raise
             except BusGarbled as error:
                 garbled = garbled or error
@@ -395,10 +463,13 @@ class Bus:
 
     def require_direct_bus(self):
         if not self.transport.handshake:
-            raise BusError(0, "this needs the nodes' own line: it cannot be asked for through a gateway to it")
+            raise BusError(
+                0, "this needs the nodes' own line: it cannot be asked for through a gateway to it"
+            )
 
     def sync(self):
-        """The same moment at all nodes, to within a microsecond: an axis that captures from "software" keeps its position, a motion
+        """The same moment at all nodes, to within a microsecond: an axis that captures from
+        "software" keeps its position, a motion
         that waits for a mark begins. Nobody answers; the nodes count marks."""
         self.require_direct_bus()
         self.syncs += 1
@@ -406,7 +477,8 @@ class Bus:
         self.transport.wait(SYNC_S)
 
     def start(self, *axes: "Axis", progress=None) -> list:
-        """Begin the prepared motions of these axes, of several nodes, within a microsecond, or none of them; returns their Status when
+        """Begin the prepared motions of these axes, of several nodes, within a microsecond, or none
+        of them; returns their Status when
         all have ended. Whatever interrupts the wait stops all of them under control first."""
         if not axes:
             raise OutOfRange("which axes shall start?")
@@ -421,7 +493,10 @@ class Bus:
             self.sync()
             for axis in axes:
                 if axis.status().state == "prepared":
-                    raise BusError(axis.node.address, "the node did not hear the mark at which its motion should begin")
+                    raise BusError(
+                        axis.node.address,
+                        "the node did not hear the mark at which its motion should begin",
+                    )
             return [axis.wait(progress) for axis in axes]
         except BaseException:
             for address in masks:
@@ -431,7 +506,8 @@ class Bus:
             raise
 
     def set_baud(self, baud: int, addresses):
-        """This host and these nodes, all that anyone speaks to, at another baud rate. A node goes back to the first one after a break,
+        """This host and these nodes, all that anyone speaks to, at another baud rate. A node goes
+        back to the first one after a break,
         and by itself when nobody called it for 5 s; all do when one of them does not follow."""
         self.require_direct_bus()
         try:
@@ -465,6 +541,7 @@ class Bus:
 
 # ------------------------------------------------------------------ node
 
+
 class Node:
     """One controller on the line. Made by Bus.node()."""
 
@@ -480,16 +557,22 @@ class Node:
     def axis(self, number: int = 0) -> "Axis":
         if not 0 <= number < self.identity.axes:
             code = CAUSE_CODES["no_such_axis"]
-            known = "only axis 0" if self.identity.axes == 1 else f"axes 0 to {self.identity.axes - 1}"
-            raise Refused("no_such_axis", code, f"node {self.address} has no axis {number}: it has {known}")
+            known = (
+                "only axis 0" if self.identity.axes == 1 else f"axes 0 to {self.identity.axes - 1}"
+            )
+            raise Refused(
+                "no_such_axis", code, f"node {self.address} has no axis {number}: it has {known}"
+            )
         if number not in self.axes:
             self.axes[number] = Axis(self, number)
         return self.axes[number]
 
     def start(self, *axes: int, progress=None) -> list:
-        """Begin the prepared motions of these axes in the very same tick, or none of them; returns their Status when all have ended.
+        """Begin the prepared motions of these axes in the very same tick, or none of them; returns
+        their Status when all have ended.
 
-        `progress` is called with a Status from time to time. Whatever interrupts the wait stops all of them under control first.
+        `progress` is called with a Status from time to time. Whatever interrupts the wait stops all
+        of them under control first.
         """
         if not axes:
             raise OutOfRange("which axes shall start? Give their numbers")
@@ -509,7 +592,9 @@ class Node:
     def read_register(self, address: int) -> int:
         """One 32-bit word of the register map."""
         if address % 4 or not 0 <= address < 65536:
-            raise OutOfRange(f"{address:#x} is no register address: allowed are multiples of 4 from 0 to 0xfffc")
+            raise OutOfRange(
+                f"{address:#x} is no register address: allowed are multiples of 4 from 0 to 0xfffc"
+            )
         try:
             return self.request("read_register", address=address)["value"]
         except Refused as refused:
@@ -518,7 +603,9 @@ class Node:
     def write_register(self, address: int, value: int):
         """Only index, capture and compare of the grating blocks may be written."""
         if address % 4 or not 0 <= address < 65536 or not 0 <= value < 1 << 32:
-            raise OutOfRange(f"{value:#x} cannot go to {address:#x}: allowed are 32-bit words, and multiples of 4 from 0 to 0xfffc")
+            raise OutOfRange(
+                f"{value:#x} cannot go to {address:#x}: allowed are 32-bit words, and multiples of 4 from 0 to 0xfffc"
+            )
         try:
             self.request("write_register", address=address, value=value)
         except Refused as refused:
@@ -526,8 +613,13 @@ class Node:
 
     def write_named(self, name: str, axis: int = 0, **counts):
         """A whole register by its fields, those not given 0; a wide one low word first."""
-        fields = {known.field: known for known in FIELDS if f"{known.block}.{known.register}" == name}
-        word = sum((count & (1 << fields[field].width) - 1) << fields[field].low for field, count in counts.items())
+        fields = {
+            known.field: known for known in FIELDS if f"{known.block}.{known.register}" == name
+        }
+        word = sum(
+            (count & (1 << fields[field].width) - 1) << fields[field].low
+            for field, count in counts.items()
+        )
         known = next(iter(fields.values()))
         self.write_register(known.address(axis), word & 0xFFFFFFFF)
         if known.width > 32:
@@ -536,9 +628,12 @@ class Node:
     def read_named(self, name: str, axis: int = 0) -> dict:
         """Counts of the fields of a register, by name: "axis.position", "bus.frames_good"."""
         fields = register_fields(name)
-        address, wide = fields[0].address(axis), max(field.low + field.width for field in fields) > 32
+        address, wide = (
+            fields[0].address(axis),
+            max(field.low + field.width for field in fields) > 32,
+        )
         word = self.read_register(address)
-        if wide:        # reading the low word latched the high one
+        if wide:  # reading the low word latched the high one
             word |= self.read_register(address + 4) << 32
         return {field.field: field.value(word) for field in fields}
 
@@ -547,7 +642,9 @@ def register_fields(name: str) -> list:
     fields = [known for known in FIELDS if f"{known.block}.{known.register}" == name]
     if not fields:
         several = ", ".join(dict.fromkeys(f"{known.block}.{known.register}" for known in FIELDS))
-        raise UnknownName(f"there is no register '{name}': known are {several}, or an address such as 0x400")
+        raise UnknownName(
+            f"there is no register '{name}': known are {several}, or an address such as 0x400"
+        )
     if not any("r" in known.access for known in fields):
         raise OutOfRange(f"the register {name} can only be written")
     return fields
@@ -560,16 +657,19 @@ def with_more(error, more: str):
 
 # ------------------------------------------------------------------ axis
 
+
 class Axis:
     """One axis of a node. Made by Bus.axis() or Node.axis()."""
 
     def __init__(self, node: Node, number: int):
         self.node, self.number = node, number
         self.period_nm = self.read_period()
-        self.resumed_at = None         # override that resume() brings back
+        self.resumed_at = None  # override that resume() brings back
 
     def read_period(self) -> Fraction:
-        return Fraction(self.request("get_parameter", parameter=PARAMETERS["period"].id)["value"], 1000)
+        return Fraction(
+            self.request("get_parameter", parameter=PARAMETERS["period"].id)["value"], 1000
+        )
 
     @property
     def transport(self) -> Transport:
@@ -595,21 +695,33 @@ class Axis:
         told = self.request("status")
         flags = bits(FLAGS, told["flags"])
         return Status(
-            state=named(STATES, told["state"], "state"), ended=named(CAUSES, told["ended"], "cause"),
+            state=named(STATES, told["state"], "state"),
+            ended=named(CAUSES, told["ended"], "cause"),
             **{name: name in flags for name, _ in FLAGS.values()},
-            faults=bits(FAULTS, told["faults"]), first_fault=bits(FAULTS, told["first_fault"]),
+            faults=bits(FAULTS, told["faults"]),
+            first_fault=bits(FAULTS, told["first_fault"]),
             encoder_events=bits(ENCODER_EVENTS, told["encoder_events"]),
-            position_nm=self.to_nm(told["position"]), target_nm=self.to_nm(told["target"]),
+            position_nm=self.to_nm(told["position"]),
+            target_nm=self.to_nm(told["target"]),
             velocity_mm_s=self.to_nm(told["velocity"]) * self.node.identity.tick_hz / 1e6,
-            drive_command=told["command"] / FULL_SCALE, counts=told["counts"])
+            drive_command=told["command"] / FULL_SCALE,
+            counts=told["counts"],
+        )
 
     def encoder(self) -> Encoder:
         told = self.request("encoder")
         return Encoder(
-            sin=told["sin"], cos=told["cos"], phase=told["phase"] / COUNTS, amplitude=told["amplitude"],
-            quadrature_count=told["quadrature_count"], rejected_pulses=told["rejected_pulses"], rejected_samples=told["rejected_samples"],
-            home_phase_nm=self.to_nm(told["home_phase"]), home_margin=1 - abs(told["home_phase"]) / (COUNTS / 2),
-            fault_position_nm=self.to_nm(told["fault_position"]))
+            sin=told["sin"],
+            cos=told["cos"],
+            phase=told["phase"] / COUNTS,
+            amplitude=told["amplitude"],
+            quadrature_count=told["quadrature_count"],
+            rejected_pulses=told["rejected_pulses"],
+            rejected_samples=told["rejected_samples"],
+            home_phase_nm=self.to_nm(told["home_phase"]),
+            home_margin=1 - abs(told["home_phase"]) / (COUNTS / 2),
+            fault_position_nm=self.to_nm(told["fault_position"]),
+        )
 
     # motion
 
@@ -628,25 +740,41 @@ class Axis:
         self.request("stop")
 
     def home(self, progress=None, method=None) -> Status:
-        """Find the zero; returns when it is reached. `progress` is called with a Status from time to time.
+        """Find the zero; returns when it is reached. `progress` is called with a Status from time
+        to time.
 
-        `method` is a number of CiA 402, "s0" or "s3"; the parameter home_method keeps it. Without one that parameter holds.
+        `method` is a number of CiA 402, "s0" or "s3"; the parameter home_method keeps it. Without
+        one that parameter holds.
         """
         if method is not None:
             self.set_parameter("home_method", method)
         return self.motion("home", progress)
 
     def move(self, nm=None, *, mm=None, by: bool = False, progress=None) -> Status:
-        """To a position, or by a distance; returns when settled. The target is a number, or a text such as "1.5mm"."""
-        return self.to_target("move", nm, mm, by, lambda **fields: self.motion("move", progress, **fields))
+        """To a position, or by a distance; returns when settled. The target is a number, or a text
+        such as "1.5mm".
+        """
+        return self.to_target(
+            "move", nm, mm, by, lambda **fields: self.motion("move", progress, **fields)
+        )
 
     def begin_move(self, nm=None, *, mm=None, by: bool = False) -> float:
-        """As move(), but returns at once, with the seconds that the motion takes at full speed. See wait(), pause() and stop()."""
-        return self.seconds(self.to_target("move", nm, mm, by, lambda **fields: self.request("move", **fields)))
+        """As move(), but returns at once, with the seconds that the motion takes at full speed. See
+        wait(), pause() and stop().
+        """
+        return self.seconds(
+            self.to_target("move", nm, mm, by, lambda **fields: self.request("move", **fields))
+        )
 
     def prepare(self, nm=None, *, mm=None, by: bool = False) -> float:
-        """Plan a move and let it wait for Node.start(), which begins those of several axes together. Returns its seconds."""
-        return self.seconds(self.to_target("prepare", nm, mm, by, lambda **fields: self.request("prepare", **fields)))
+        """Plan a move and let it wait for Node.start(), which begins those of several axes
+        together. Returns its seconds.
+        """
+        return self.seconds(
+            self.to_target(
+                "prepare", nm, mm, by, lambda **fields: self.request("prepare", **fields)
+            )
+        )
 
     def seconds(self, told: dict) -> float:
         return told["duration_ticks"] / self.node.identity.tick_hz
@@ -661,12 +789,18 @@ class Axis:
             return go(target=self.to_counts(target_nm))
         except Refused as refused:
             if refused.cause == "out_of_travel":
-                low, high = (self.get_parameter(name).written(9) for name in ("travel_low", "travel_high"))
-                raise with_more(refused, f"target {units.format_length(target_nm)}, allowed {low} to {high}") from None
+                low, high = (
+                    self.get_parameter(name).written(9) for name in ("travel_low", "travel_high")
+                )
+                raise with_more(
+                    refused, f"target {units.format_length(target_nm)}, allowed {low} to {high}"
+                ) from None
             raise
 
     def override(self, share=None) -> Fraction:
-        """How fast profiles are played, of full speed; given a share ("50%" or 0.5) it changes, in motion too."""
+        """How fast profiles are played, of full speed; given a share ("50%" or 0.5) it changes, in
+        motion too.
+        """
         if share is not None:
             self.resumed_at = None
             return self.set_parameter("feed_override", units.parse_share(share)).value
@@ -680,22 +814,37 @@ class Axis:
             self.resumed_at = before
 
     def resume(self) -> Fraction:
-        """Go on, with the override that was in force before pause(); at full speed if this program did not pause it."""
+        """Go on, with the override that was in force before pause(); at full speed if this program
+        did not pause it.
+        """
         return self.override(self.resumed_at or 1)
 
     def drive(self) -> Drive:
         """What drives the axis, and what it is told just now."""
-        told = {name: self.node.read_named(f"actuator.{name}", self.number) for name in ("drive", "steps", "fine_command")}
+        told = {
+            name: self.node.read_named(f"actuator.{name}", self.number)
+            for name in ("drive", "steps", "fine_command")
+        }
         kinds = CHOICES["drive"]
-        built = tuple(name for bit, name in enumerate((*kinds, "fine")) if told["drive"]["built"] >> bit & 1)
-        return Drive(kind=kinds[told["drive"]["kind"]], built=built, command=self.status().drive_command, steps=told["steps"]["value"],
-                     fine_command=told["fine_command"]["value"] / FULL_SCALE, override=self.override())
+        built = tuple(
+            name for bit, name in enumerate((*kinds, "fine")) if told["drive"]["built"] >> bit & 1
+        )
+        return Drive(
+            kind=kinds[told["drive"]["kind"]],
+            built=built,
+            command=self.status().drive_command,
+            steps=told["steps"]["value"],
+            fine_command=told["fine_command"]["value"] / FULL_SCALE,
+            override=self.override(),
+        )
 
     def motion(self, operation: str, progress, **fields) -> Status:
         """Whatever interrupts the wait, Ctrl-C too, stops the axis under control first."""
+
         def carry_out():
             self.request(operation, **fields)
             return self.wait(progress)
+
         return self.stopping_on_error(carry_out)
 
     def stopping_on_error(self, work):
@@ -708,7 +857,9 @@ class Axis:
             raise
 
     def motion_end(self, progress=None) -> Status:
-        """Until the motion under way has ended; whatever interrupts the wait stops the axis under control first."""
+        """Until the motion under way has ended; whatever interrupts the wait stops the axis under
+        control first.
+        """
         return self.stopping_on_error(lambda: self.wait(progress))
 
     def wait(self, progress=None) -> Status:
@@ -734,9 +885,11 @@ class Axis:
             while self.status().in_motion:
                 self.transport.wait(self.node.bus.poll_s)
         except Refused:
-            pass        # the drive is off
+            pass  # the drive is off
         except (BusError, PortError) as error:
-            error.args = (f"axis {self.number} of node {self.node.address} could not be told to stop, its watchdog has to: {error}",)
+            error.args = (
+                f"axis {self.number} of node {self.node.address} could not be told to stop, its watchdog has to: {error}",
+            )
             raise error from None
 
     def stop_if_enabled(self):
@@ -765,7 +918,9 @@ class Axis:
         return value_of(known, counts, one_count(known, period_nm or self.period_nm))
 
     def get_parameter(self, name: str) -> ParameterValue:
-        return self.parameter_value(name, self.request("get_parameter", parameter=parameter(name).id)["value"])
+        return self.parameter_value(
+            name, self.request("get_parameter", parameter=parameter(name).id)["value"]
+        )
 
     def parameter_counts(self, name: str, value, period_nm=None) -> int:
         """What the wire carries for a value in real units; OutOfRange says what is allowed."""
@@ -773,14 +928,18 @@ class Axis:
         return counts_of(known, value, one_count(known, period_nm or self.period_nm))
 
     def set_parameter(self, name: str, value) -> ParameterValue:
-        """`value` is a number in the unit of get_parameter(), or a text with a unit. Returns what was set: the nearest count."""
+        """`value` is a number in the unit of get_parameter(), or a text with a unit. Returns what
+        was set: the nearest count.
+        """
         return self.write_parameter(name, self.parameter_counts(name, value))
 
     def write_parameter(self, name: str, counts: int) -> ParameterValue:
         try:
             self.request("set_parameter", parameter=parameter(name).id, value=counts)
         except Refused as refused:
-            raise with_more(refused, f"{name} {self.parameter_value(name, counts).written(6)}") from None
+            raise with_more(
+                refused, f"{name} {self.parameter_value(name, counts).written(6)}"
+            ) from None
         if name == "period":
             self.period_nm = self.read_period()
         return self.parameter_value(name, counts)
@@ -794,18 +953,30 @@ class Axis:
         return {name: value.written() for name, value in self.parameters().items()}
 
     def load_parameters(self, texts: dict) -> dict:
-        """Some or all, as saved. Every one is checked before the first is written; the period goes first, since lengths hang on it."""
-        return {name: self.write_parameter(name, value) for name, value in self.check_parameters(texts).items()}
+        """Some or all, as saved. Every one is checked before the first is written; the period goes
+        first, since lengths hang on it.
+        """
+        return {
+            name: self.write_parameter(name, value)
+            for name, value in self.check_parameters(texts).items()
+        }
 
     def check_parameters(self, texts: dict) -> dict:
-        """Counts of some or all, as saved, the period first; OutOfRange or UnknownName if they cannot be loaded."""
+        """Counts of some or all, as saved, the period first; OutOfRange or UnknownName if they
+        cannot be loaded.
+        """
         period_nm = self.period_nm
         if "period" in texts:
             period_nm = Fraction(self.parameter_counts("period", texts["period"]), 1000)
-        return {name: self.parameter_counts(name, texts[name], period_nm) for name in sorted(texts, key=lambda name: name != "period")}
+        return {
+            name: self.parameter_counts(name, texts[name], period_nm)
+            for name in sorted(texts, key=lambda name: name != "period")
+        }
 
     def set_tuning(self, tuning):
-        """Gains and filters of moire.tune, written as they are; filters that it has none of are out of use."""
+        """Gains and filters of moire.tune, written as they are; filters that it has none of are out
+        of use.
+        """
         if len(tuning.filters) > FILTERS:
             raise OutOfRange(f"the servo has {FILTERS} filters, the tuning {len(tuning.filters)}")
         self.write_parameter("filters", 0)
@@ -824,16 +995,25 @@ class Axis:
         if action not in actions:
             raise OutOfRange(f"the learner knows no '{action}': allowed are {', '.join(actions)}")
         told = self.request("calibration", action=actions[action])
-        return CalibrationState(reason=named(CALIBRATION_REASONS, told["reason"], "reason"), settled=bool(told["converged"]), frozen=bool(told["frozen"]),
-                       accepted=told["accepted"], refused=told["refused"],
-                       scatter_nm=float(told["scatter"] * self.period_nm / SCATTER))
+        return CalibrationState(
+            reason=named(CALIBRATION_REASONS, told["reason"], "reason"),
+            settled=bool(told["converged"]),
+            frozen=bool(told["frozen"]),
+            accepted=told["accepted"],
+            refused=told["refused"],
+            scatter_nm=float(told["scatter"] * self.period_nm / SCATTER),
+        )
 
     def calibrate(self, progress=None, distance="1mm", timeout="120s") -> CalibrationState:
-        """Learns the correction afresh: to and fro over a distance at several speeds until it is settled, then freezes it.
+        """Learns the correction afresh: to and fro over a distance at several speeds until it is
+        settled, then freezes it.
 
-        The axis must be enabled and homed. It goes from where it is, to the side where there is room, and comes back; the farther,
-        the faster, and fringes must come faster than the table can follow or ring. `progress` is called with a Learner after each
-        way. NotCalibrated says why it was not settled in time. The parameter `velocity` is set as it was.
+        The axis must be enabled and homed. It goes from where it is, to the side where there is
+        room, and comes back; the farther,
+        the faster, and fringes must come faster than the table can follow or ring. `progress` is
+        called with a Learner after each
+        way. NotCalibrated says why it was not settled in time. The parameter `velocity` is set as
+        it was.
         """
         stretch, patience = units.parse_length(distance), units.parse_time(timeout)
         if stretch <= 0 or patience <= 0:
@@ -842,8 +1022,10 @@ class Axis:
         home = Fraction(self.status().target_nm)
         away = home + stretch if home + stretch <= high else home - stretch
         if away < low:
-            raise OutOfRange(f"there is no room for {units.format_length(stretch)}: the travel is {units.format_length(low)} to "
-                             f"{units.format_length(high)}")
+            raise OutOfRange(
+                f"there is no room for {units.format_length(stretch)}: the travel is {units.format_length(low)} to "
+                f"{units.format_length(high)}"
+            )
         velocity = self.get_parameter("velocity")
         even = stretch / self.period_nm / Fraction(CALIBRATION_STROKE_S)
         fastest = min(velocity.counts, self.node.identity.sample_hz // CALIBRATION_SAMPLES, even)
@@ -852,7 +1034,12 @@ class Axis:
         end, ways = self.transport.now() + float(patience), 0
         try:
             while True:
-                self.write_parameter("velocity", max(1, round(fastest * CALIBRATION_SPEEDS[ways // 2 % len(CALIBRATION_SPEEDS)])))
+                self.write_parameter(
+                    "velocity",
+                    max(
+                        1, round(fastest * CALIBRATION_SPEEDS[ways // 2 % len(CALIBRATION_SPEEDS)])
+                    ),
+                )
                 self.move(home if ways % 2 else away)
                 ways += 1
                 told = self.calibration()
@@ -862,7 +1049,10 @@ class Axis:
                     return self.calibration("freeze")
                 if self.transport.now() > end:
                     sentence = f"axis {self.number} of node {self.node.address} learned no correction within {units.format_time(patience)}"
-                    raise NotCalibrated(told.reason, f"{sentence}: {told.words} ({told.accepted} accepted, {told.refused} refused)")
+                    raise NotCalibrated(
+                        told.reason,
+                        f"{sentence}: {told.words} ({told.accepted} accepted, {told.refused} refused)",
+                    )
         finally:
             self.end_calibration(velocity)
 
@@ -871,22 +1061,29 @@ class Axis:
             self.calibration("freeze")
             self.write_parameter("velocity", velocity.counts)
         except MoireError:
-            pass        # the line is silent or the axis still moves; what ended the learning is told
+            pass  # the line is silent or the axis still moves; what ended the learning is told
 
     def correction(self) -> dict:
         """What is in force, in counts, ready for a JSON file."""
         told = self.request("get_correction")
         harmonics = [self.request("get_harmonic", order=order) for order in range(1, HARMONICS + 1)]
-        return {**told, "cosine": [harmonic["cosine"] for harmonic in harmonics], "sine": [harmonic["sine"] for harmonic in harmonics]}
+        return {
+            **told,
+            "cosine": [harmonic["cosine"] for harmonic in harmonics],
+            "sine": [harmonic["sine"] for harmonic in harmonics],
+        }
 
     def set_correction(self, values: dict):
         """As from correction(); comes into force at once and whole, or not at all."""
         legs = values.get("cosine"), values.get("sine")
         right = all(whole(values.get(name)) for name in CORRECTION) and all(
-            isinstance(leg, list) and len(leg) == HARMONICS and all(map(whole, leg)) for leg in legs)
+            isinstance(leg, list) and len(leg) == HARMONICS and all(map(whole, leg)) for leg in legs
+        )
         if not right:
-            raise OutOfRange(f"this is no correction: it has the whole numbers {', '.join(CORRECTION)} and the lists cosine and sine of "
-                             f"{HARMONICS} whole numbers each")
+            raise OutOfRange(
+                f"this is no correction: it has the whole numbers {', '.join(CORRECTION)} and the lists cosine and sine of "
+                f"{HARMONICS} whole numbers each"
+            )
         for order, (cosine, sine) in enumerate(zip(*legs), 1):
             self.request("set_harmonic", order=order, cosine=cosine, sine=sine)
         self.request("set_correction", **{name: values[name] for name in CORRECTION}, apply=1)
@@ -894,7 +1091,9 @@ class Axis:
     # signal
 
     def has_sine(self) -> bool:
-        """Whether sine and cosine were built; without, the position is made of counts, and what needs them is refused."""
+        """Whether sine and cosine were built; without, the position is made of counts, and what
+        needs them is refused.
+        """
         return bool(self.feedback("position_source")["sine"])
 
     def signal(self) -> Signal:
@@ -911,8 +1110,15 @@ class Axis:
         self.node.write_named(f"feedback.{register}", self.number, **counts)
 
     def capture_from(self, *sources: str):
-        """From which sources positions are captured from here on; none: no more. What waits is kept."""
-        self.write_feedback("capture_sources", value=sum(1 << CAPTURE_SOURCES.index(capture_source(source)) for source in set(sources)))
+        """From which sources positions are captured from here on; none: no more. What waits is
+        kept.
+        """
+        self.write_feedback(
+            "capture_sources",
+            value=sum(
+                1 << CAPTURE_SOURCES.index(capture_source(source)) for source in set(sources)
+            ),
+        )
         if "index" in sources:
             self.write_feedback("strobes", arm_index=1)
 
@@ -921,13 +1127,21 @@ class Axis:
         self.write_feedback("strobes", capture_now=1)
 
     def captures(self, most: int = 16) -> tuple:
-        """Takes the captures that wait, oldest first; and whether some were lost since the last time."""
+        """Takes the captures that wait, oldest first; and whether some were lost since the last
+        time.
+        """
         taken, sources = [], dict(enumerate((name, name) for name in CAPTURE_SOURCES))
         overrun = bool(self.feedback("capture_state")["overrun"])
         while len(taken) < most and self.feedback("capture_state")["present"]:
             told, clk_hz = self.feedback("captured"), self.node.identity.clk_hz
-            taken.append(Capture(bits(sources, told["sources"]), self.to_nm(self.feedback("captured_position")["value"]),
-                                 self.feedback("captured_time")["value"], told["age"] / clk_hz))
+            taken.append(
+                Capture(
+                    bits(sources, told["sources"]),
+                    self.to_nm(self.feedback("captured_position")["value"]),
+                    self.feedback("captured_time")["value"],
+                    told["age"] / clk_hz,
+                )
+            )
             self.write_feedback("strobes", capture_next=1)
         if overrun:
             self.write_feedback("capture_state", overrun=1)
@@ -935,18 +1149,32 @@ class Axis:
 
     def compare(self) -> Compare:
         state = self.feedback("compare_state")
-        return Compare(bool(state["armed"]), self.feedback("compare_passed")["value"], bool(state["late"]))
+        return Compare(
+            bool(state["armed"]), self.feedback("compare_passed")["value"], bool(state["late"])
+        )
 
     def compare_from(self, start, step, count: int = 0, pulse="1us", gap="1us"):
-        """Pulses at start, start + step, …: so many, or without end for 0. A step below zero is for motion downwards."""
+        """Pulses at start, start + step, …: so many, or without end for 0. A step below zero is for
+        motion downwards.
+        """
         places = {"compare_start": self.to_counts(start), "compare_step": self.to_counts(step)}
         clk_hz = self.node.identity.clk_hz
-        times = {"compare_pulse": round(units.parse_time(pulse) * clk_hz), "compare_gap": round(units.parse_time(gap) * clk_hz)}
-        if not all(-(1 << 47) <= place < 1 << 47 for place in places.values()) or places["compare_step"] == 0:
-            raise OutOfRange("start and step must be lengths inside the range of positions, the step not zero")
+        times = {
+            "compare_pulse": round(units.parse_time(pulse) * clk_hz),
+            "compare_gap": round(units.parse_time(gap) * clk_hz),
+        }
+        if (
+            not all(-(1 << 47) <= place < 1 << 47 for place in places.values())
+            or places["compare_step"] == 0
+        ):
+            raise OutOfRange(
+                "start and step must be lengths inside the range of positions, the step not zero"
+            )
         if not all(1 <= clk < 1 << 24 for clk in times.values()) or not 0 <= count < 1 << 32:
             shortest, longest = (units.format_time(Fraction(clk, clk_hz)) for clk in (1, 2**24 - 1))
-            raise OutOfRange(f"pulse and gap allow {shortest} to {longest}, the count 0 to 2^32 - 1")
+            raise OutOfRange(
+                f"pulse and gap allow {shortest} to {longest}, the count 0 to 2^32 - 1"
+            )
         self.compare_off()
         for name, value in {**places, "compare_count": count, **times}.items():
             self.write_feedback(name, value=value)
@@ -963,7 +1191,9 @@ def whole(value) -> bool:
 
 def capture_source(name: str) -> str:
     if name not in CAPTURE_SOURCES:
-        raise UnknownName(f"there is no capture source '{name}': known are {', '.join(CAPTURE_SOURCES)}")
+        raise UnknownName(
+            f"there is no capture source '{name}': known are {', '.join(CAPTURE_SOURCES)}"
+        )
     return name
 
 
@@ -994,8 +1224,18 @@ def one_count(known, period_nm: Fraction) -> Fraction:
 def value_of(known, counts: int, one: Fraction) -> ParameterValue:
     """Of a parameter or a setting, one count of which is worth so much."""
     quantity = KINDS[known.unit][0]
-    return ParameterValue(known.name, known.id, counts, counts * one, quantity.base, known.min * one, known.max * one,
-                          known.default * one, known.text, quantity)
+    return ParameterValue(
+        known.name,
+        known.id,
+        counts,
+        counts * one,
+        quantity.base,
+        known.min * one,
+        known.max * one,
+        known.default * one,
+        known.text,
+        quantity,
+    )
 
 
 def counts_of(known, value, one: Fraction) -> int:
@@ -1007,8 +1247,9 @@ def counts_of(known, value, one: Fraction) -> int:
     counts = round(wanted / one)
     if not known.min <= counts <= known.max:
         allowed = value_of(known, known.default, one).range_words
-        raise OutOfRange(f"{known.name} allows {allowed}, not {units.with_unit(quantity, wanted, 6)}")
+        raise OutOfRange(
+            f"{known.name} allows {allowed}, not {units.with_unit(quantity, wanted, 6)}"
+        )
     if known.lsb == 1 and not known.unit and wanted != counts:
         raise OutOfRange(f"{known.name} takes whole numbers, not {units.decimal(wanted)}")
     return counts
-

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Packets for lines of plain 8N1 bytes: consistent overhead byte stuffing (COBS), and what Moire puts into one.
+"""Packets for lines of plain 8N1 bytes: consistent overhead byte stuffing (COBS), and what Moire
+puts into one.
 
-A packet holds the bytes of one way of an exchange as they stand on the 9-bit line, without the handshake: the first byte (command
-byte, or ready byte of the reply), length, body, CRC-32. Stuffed, it has no zero; a zero ends it. docs/protocol.md says more.
+A packet holds the bytes of one way of an exchange as they stand on the 9-bit line, without the
+handshake: the first byte (command
+byte, or ready byte of the reply), length, body, CRC-32. Stuffed, it has no zero; a zero ends it.
+docs/protocol.md says more.
 """
+
 from moire.bus.protocol import (
     ADDRESSES,
     CRC_LENGTH,
@@ -15,7 +19,7 @@ from moire.bus.protocol import (
     ready_byte,
 )
 
-LONGEST_RUN = 254            # bytes after one code byte
+LONGEST_RUN = 254  # bytes after one code byte
 LONGEST_PACKET = 1 + 1 + LONGEST_BODY + CRC_LENGTH
 LONGEST_STUFFED = LONGEST_PACKET + LONGEST_PACKET // LONGEST_RUN + 1
 
@@ -36,7 +40,7 @@ def unstuff(stuffed: bytes) -> bytes | None:
     out, at = bytearray(), 0
     while at < len(stuffed):
         code = stuffed[at]
-        run = stuffed[at + 1:at + code]
+        run = stuffed[at + 1 : at + code]
         if code == 0 or len(run) != code - 1 or 0 in run:
             return None
         at += code
@@ -57,14 +61,20 @@ def sealed(content: bytes) -> bytes:
 
 def body_of(content: bytes) -> bytes | None:
     """None unless this is a packet, whole and with the right CRC-32."""
-    if len(content) < 2 or not 1 <= content[1] <= LONGEST_BODY or len(content) != 2 + content[1] + CRC_LENGTH:
+    if (
+        len(content) < 2
+        or not 1 <= content[1] <= LONGEST_BODY
+        or len(content) != 2 + content[1] + CRC_LENGTH
+    ):
         return None
     body = content[2:-CRC_LENGTH]
     return body if content[1:] == frame(content[0], body) else None
 
 
 def address_of(content: bytes, way: int) -> int | None:
-    """The node that a request (TO_NODE) is for, or that a reply (FROM_NODE) is from; None when it is neither."""
+    """The node that a request (TO_NODE) is for, or that a reply (FROM_NODE) is from; None when it
+    is neither.
+    """
     address = content[0] & 0xF if content else 0
     if address not in ADDRESSES:
         return None
@@ -73,7 +83,9 @@ def address_of(content: bytes, way: int) -> int | None:
 
 
 class PacketReader:
-    """Cuts a stream of bytes into the contents of packets; what is no packet is dropped and counted."""
+    """Cuts a stream of bytes into the contents of packets; what is no packet is dropped and
+    counted.
+    """
 
     def __init__(self):
         self.held, self.too_long = bytearray(), False

@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lets clients onto a line: RFC 2217, TCP and a pseudo terminal in front of any transport, the twin's above all.
+"""Lets clients onto a line: RFC 2217, TCP and a pseudo terminal in front of any transport, the
+twin's above all.
 
     gateway = Gateway(TwinTransport(Twin()))
     gateway.open_rfc2217("127.0.0.1", 2217)
     gateway.serve()
 
-A client of RFC 2217 with a parity has the 9-bit line itself; one without (8N1), and those of TCP and of the pseudo terminal, speak COBS
-packets, for which the gateway does the exchange. Packets are served one after the other, and wait while an exchange of a 9-bit client is
-under way. A transport whose time stands is kept at the pace of the clock, as far as this computer can.
+A client of RFC 2217 with a parity has the 9-bit line itself; one without (8N1), and those of TCP
+and of the pseudo terminal, speak COBS
+packets, for which the gateway does the exchange. Packets are served one after the other, and wait
+while an exchange of a 9-bit client is
+under way. A transport whose time stands is kept at the pace of the clock, as far as this computer
+can.
 """
+
 import errno
 import os
 import selectors
@@ -23,11 +28,13 @@ from moire.bus.protocol import CRC_LENGTH, FROM_NODE, NINTH, TO_NODE, Exchange, 
 from moire.bus.transport import BITS, Transport, plain
 from moire.errors import PortError
 
-ANSWER_S = 0.05              # patience with a node; the client asks again
-HOLD_S = 0.1                 # of the clock, that packets wait for a 9-bit client in the middle of an exchange
-REPLY_S = 0.01               # of the line's time, that a 9-bit client's words are answered in; it may run ahead of the clock for so long
-PIECE_S = 0.00025            # of the line's time between two looks at the clients
-LARGEST_DEBT_S = 0.01        # of a line that cannot keep up: what it is behind beyond this is forgotten
+ANSWER_S = 0.05  # patience with a node; the client asks again
+HOLD_S = 0.1  # of the clock, that packets wait for a 9-bit client in the middle of an exchange
+# of the line's time, that a 9-bit client's words are answered in; it may run ahead of the clock for
+# so long
+REPLY_S = 0.01
+PIECE_S = 0.00025  # of the line's time between two looks at the clients
+LARGEST_DEBT_S = 0.01  # of a line that cannot keep up: what it is behind beyond this is forgotten
 RECEIVE = 4096
 
 
@@ -35,9 +42,12 @@ class Gateway:
     def __init__(self, transport: Transport):
         self.transport, self.bus = transport, Bus(transport)
         self.selector, self.clients, self.waiting = selectors.DefaultSelector(), [], deque()
-        self.ninth_client, self.reply = None, None     # the 9-bit client that spoke last, and its reply as far as it has come
+        self.ninth_client, self.reply = (
+            None,
+            None,
+        )  # the 9-bit client that spoke last, and its reply as far as it has come
         self.held_until = self.ahead_until = 0.0
-        self.refused = 0               # packets that were none, or no request
+        self.refused = 0  # packets that were none, or no request
         self.origin = time.monotonic() - transport.now()
         self.own_baud = self.baud = round(BITS / transport.character_s)
 
@@ -54,8 +64,14 @@ class Gateway:
         try:
             listener = socket.create_server((host, port))
         except (OSError, OverflowError) as error:
-            why = os.strerror(error.errno).lower() if getattr(error, "errno", 0) in errno.errorcode else plain(error)
-            raise PortError(f"the TCP port {port} at {host} does not open: {why}; choose another, or 0 for any") from None
+            why = (
+                os.strerror(error.errno).lower()
+                if getattr(error, "errno", 0) in errno.errorcode
+                else plain(error)
+            )
+            raise PortError(
+                f"the TCP port {port} at {host} does not open: {why}; choose another, or 0 for any"
+            ) from None
         listener.setblocking(False)
         self.selector.register(listener, selectors.EVENT_READ, lambda: self.admit(listener, kind))
         return listener.getsockname()[1]
@@ -64,7 +80,7 @@ class Gateway:
         try:
             connection, _ = listener.accept()
         except OSError:
-            return                     # gone before it came in
+            return  # gone before it came in
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         connection.setblocking(False)
         self.add(kind(self, SocketStream(connection)))
@@ -120,7 +136,10 @@ class Gateway:
         if not self.transport.time_is_stopped:
             return PIECE_S
         now = self.transport.now()
-        behind, ahead = time.monotonic() - self.origin - now, now < self.ahead_until and not self.idle
+        behind, ahead = (
+            time.monotonic() - self.origin - now,
+            now < self.ahead_until and not self.idle,
+        )
         if behind > LARGEST_DEBT_S:
             self.origin += behind - LARGEST_DEBT_S
         if behind > 0 or ahead:
@@ -179,12 +198,17 @@ class Gateway:
     def answer(self, address: int, body: bytes) -> bytes:
         """The reply as a packet; nothing where the node does not answer."""
         self.speak_at(self.own_baud)
-        timing = Timing(self.transport.character_s, answer=ANSWER_S, quiet=max(REPLY_S, 3 * self.transport.character_s))
+        timing = Timing(
+            self.transport.character_s,
+            answer=ANSWER_S,
+            quiet=max(REPLY_S, 3 * self.transport.character_s),
+        )
         exchange = self.bus.run_exchange(Exchange(address, body, tries=1, timing=timing))
         return sealed(bytes(exchange.received)) if exchange.reply else b""
 
 
 # ------------------------------------------------------------------ clients
+
 
 class PacketClient:
     def __init__(self, gateway: Gateway, stream):
@@ -218,7 +242,11 @@ class Rfc2217Client(PacketClient):
     def take(self, data: bytes):
         characters = self.server.feed(data)
         self.put(self.server.take_answers())
-        words = [character.byte | character.ninth * NINTH for character in characters if character.parity != "N"]
+        words = [
+            character.byte | character.ninth * NINTH
+            for character in characters
+            if character.parity != "N"
+        ]
         if words:
             self.gateway.hear_words(self, words, self.server.baud)
         super().take(bytes(character.byte for character in characters if character.parity == "N"))
@@ -228,7 +256,9 @@ class Rfc2217Client(PacketClient):
 
 
 class SocketStream:
-    """read() returns None when the other side is gone; write() False when it does not take any more."""
+    """read() returns None when the other side is gone; write() False when it does not take any
+    more.
+    """
 
     def __init__(self, connection):
         self.connection = connection
@@ -273,7 +303,7 @@ class TerminalStream:
         try:
             os.write(self.near, data)
         except OSError:
-            pass                       # nobody reads: what does not fit is lost, as on a wire
+            pass  # nobody reads: what does not fit is lost, as on a wire
         return True
 
     def close(self):

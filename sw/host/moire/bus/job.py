@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The job of a main node: its program of stations, cut one after the other (S4). Angles in arcsec, or texts such as "12.5deg".
+"""The job of a main node: its program of stations, cut one after the other (S4). Angles in arcsec,
+or texts such as "12.5deg".
 
-    job = Job(bus.node(1))
-    job.load(["0deg", "10deg", "20deg"])         or read_stations("former.csv"), or equal_parts(36)
-    job.start()
-    state = job.wait()                           until it is done, or a person has to answer
-    if "again" in state.answers: job.do("again")
+job = Job(bus.node(1))
+job.load(["0deg", "10deg", "20deg"])         or read_stations("former.csv"), or equal_parts(36)
+job.start()
+state = job.wait()                           until it is done, or a person has to answer
+if "again" in state.answers: job.do("again")
 """
+
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -19,27 +21,33 @@ from moire.made.bus_tables import CAUSES, FAULTS, JOB_ACTIONS, JOB_FLAGS, JOB_ST
 
 ACTIONS = {name: code for code, (name, _) in JOB_ACTIONS.items()}
 AT_REST = ("idle", "finished", "paused", "unsure")
-SAVE_S = 30                      # a program of 360 stations takes less than one second on the bus
+SAVE_S = 30  # a program of 360 stations takes less than one second on the bus
 
 
 @dataclass(frozen=True)
 class JobState:
     state: str
-    cause: str                   # why it waits, or did not go on
-    station: int                 # from 0 on
+    cause: str  # why it waits, or did not go on
+    station: int  # from 0 on
     stations: int
-    answers: tuple               # actions that it takes now
+    answers: tuple  # actions that it takes now
     flags: tuple
-    table_faults: tuple = ()     # of the sub-node, where that is the cause
+    table_faults: tuple = ()  # of the sub-node, where that is the cause
 
     @property
     def words(self) -> str:
-        place = f", station {min(self.station + 1, self.stations)} of {self.stations}" if self.stations else ""
+        place = (
+            f", station {min(self.station + 1, self.stations)} of {self.stations}"
+            if self.stations
+            else ""
+        )
         return words(JOB_STATES, [self.state]) + place
 
     @property
     def cause_words(self) -> str:
-        return words(CAUSES, [self.cause]) + f" ({words(FAULTS, self.table_faults)})" * bool(self.table_faults)
+        return words(CAUSES, [self.cause]) + f" ({words(FAULTS, self.table_faults)})" * bool(
+            self.table_faults
+        )
 
     @property
     def flag_words(self) -> str:
@@ -48,10 +56,10 @@ class JobState:
 
 @dataclass(frozen=True)
 class StationList:
-    generation: int              # each saved one has one more; 0: there is none
-    angles: tuple                # arcsec
-    cause: str                   # why there is none
-    journal: int                 # lines written so far
+    generation: int  # each saved one has one more; 0: there is none
+    angles: tuple  # arcsec
+    cause: str  # why there is none
+    journal: int  # lines written so far
 
 
 def checked(angles) -> list:
@@ -66,7 +74,9 @@ def checked(angles) -> list:
         except MoireError as error:
             raise OutOfRange(f"station {number}: {error}") from None
         if number > 1 and counts[-1] <= counts[-2]:
-            raise OutOfRange(f"station {number} at {said(arcsec(counts[-1]))} does not lie above the one before it")
+            raise OutOfRange(
+                f"station {number} at {said(arcsec(counts[-1]))} does not lie above the one before it"
+            )
     return counts
 
 
@@ -82,7 +92,9 @@ def equal_parts(count: int) -> list:
 
 
 def read_stations(path) -> list:
-    """From a CSV file: the first column, with a unit or in degrees; # begins a remark, and the first line may be a title."""
+    """From a CSV file: the first column, with a unit or in degrees; # begins a remark, and the
+    first line may be a title.
+    """
     try:
         lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
     except OSError as error:
@@ -101,7 +113,9 @@ def read_stations(path) -> list:
                 raise BadFile(f"{path}, line {number}: {error}") from None
             titled = True
     if not angles:
-        raise BadFile(f"{path} has no stations: a line for each is wanted, with its angle in degrees")
+        raise BadFile(
+            f"{path} has no stations: a line for each is wanted, with its angle in degrees"
+        )
     return angles
 
 
@@ -120,8 +134,15 @@ class Job:
     def state(self) -> JobState:
         told = self.node.request("job")
         answers = tuple(name for name, code in ACTIONS.items() if told["answers"] >> code & 1)
-        return JobState(named(JOB_STATES, told["state"], "state"), named(CAUSES, told["cause"], "cause"), told["station"], told["stations"],
-                        answers, bits(JOB_FLAGS, told["flags"]), bits(FAULTS, told["table_faults"]))
+        return JobState(
+            named(JOB_STATES, told["state"], "state"),
+            named(CAUSES, told["cause"], "cause"),
+            told["station"],
+            told["stations"],
+            answers,
+            bits(JOB_FLAGS, told["flags"]),
+            bits(FAULTS, told["table_faults"]),
+        )
 
     def do(self, action: str):
         """start, pause, resume, stop, again or next; Refused says why not."""
@@ -139,7 +160,9 @@ class Job:
         return state
 
     def load(self, angles) -> StationList:
-        """Writes a program, and the settings of the node with it, into the EEPROM; MotionFailed says why it is not kept."""
+        """Writes a program, and the settings of the node with it, into the EEPROM; MotionFailed
+        says why it is not kept.
+        """
         counts = checked(angles)
         self.ready()
         self.node.request("job_begin")
@@ -148,19 +171,28 @@ class Job:
         self.node.request("job_save")
         ended = self.ready()
         if ended != "ok":
-            raise MotionFailed(ended, CAUSE_CODES[ended], f"node {self.node.address} did not keep the program: {words(CAUSES, [ended])}")
+            raise MotionFailed(
+                ended,
+                CAUSE_CODES[ended],
+                f"node {self.node.address} did not keep the program: {words(CAUSES, [ended])}",
+            )
         return self.read()
 
     def ready(self) -> str:
         """Waits until the EEPROM is not being read or written; how that ended."""
         transport = self.node.bus.transport
         begun = transport.now()
-        while (told := self.node.request("job_stations"))["writing"] and transport.now() - begun < SAVE_S:
+        while (told := self.node.request("job_stations"))[
+            "writing"
+        ] and transport.now() - begun < SAVE_S:
             transport.wait(self.node.bus.poll_s)
         return "eeprom_busy" if told["writing"] else named(CAUSES, told["ended"], "cause")
 
     def read(self) -> StationList:
         cause = self.ready()
         told = self.node.request("job_stations")
-        angles = tuple(arcsec(self.node.request("job_angle", station=station)["angle"]) for station in range(told["stations"]))
+        angles = tuple(
+            arcsec(self.node.request("job_angle", station=station)["angle"])
+            for station in range(told["stations"])
+        )
         return StationList(told["generation"], angles, cause, told["journal"])

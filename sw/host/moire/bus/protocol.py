@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The line protocol without any input or output: bodies, frames, 9-bit words, and the exchange as a state machine.
+"""The line protocol without any input or output: bodies, frames, 9-bit words, and the exchange as a
+state machine.
 
 Words are integers 0…511; bit 8 is the 9th bit. docs/protocol.md says what they mean.
 """
+
 import enum
 import struct
 import zlib
@@ -11,17 +13,27 @@ from typing import NamedTuple
 from moire.errors import BusGarbled, NoAnswer, OutOfRange
 from moire.made.bus_tables import LONGEST_BODY, OPERATIONS
 
-NINTH = 0x100                # marks a command byte
-TO_NODE, FROM_NODE = 2, 1    # D5 D4
-READY = 0x40                 # D7 D6 = 01
+NINTH = 0x100  # marks a command byte
+TO_NODE, FROM_NODE = 2, 1  # D5 D4
+READY = 0x40  # D7 D6 = 01
 ADDRESSES = range(1, 16)
-ODD_ADDRESSES = (1, 2, 4, 7, 8, 11, 13, 14)    # those that odd parity can reach
+ODD_ADDRESSES = (1, 2, 4, 7, 8, 11, 13, 14)  # those that odd parity can reach
 CRC_LENGTH = 4
 
-FORMATS = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i8": "b", "i16": "h", "i32": "i", "i64": "q"}
+FORMATS = {
+    "u8": "B",
+    "u16": "H",
+    "u32": "I",
+    "u64": "Q",
+    "i8": "b",
+    "i16": "h",
+    "i32": "i",
+    "i64": "q",
+}
 
 
 # ------------------------------------------------------------------ bodies
+
 
 def layout(fields) -> struct.Struct:
     return struct.Struct("<" + "".join(FORMATS[kind] for _, kind in fields))
@@ -47,9 +59,9 @@ def request_body(operation: str, sequence: int, /, **values) -> bytes:
 
 class Reply(NamedTuple):
     sequence: int
-    operation: int           # code
-    cause: int               # code
-    fields: dict             # empty unless the cause is ok
+    operation: int  # code
+    cause: int  # code
+    fields: dict  # empty unless the cause is ok
 
 
 def parse_reply(body: bytes) -> Reply | None:
@@ -62,7 +74,9 @@ def parse_reply(body: bytes) -> Reply | None:
         name = NAMES[code]
         if len(body) != 3 + REPLIES[name].size:
             return None
-        fields = dict(zip((field for field, _ in OPERATIONS[name].reply), REPLIES[name].unpack(body[3:])))
+        fields = dict(
+            zip((field for field, _ in OPERATIONS[name].reply), REPLIES[name].unpack(body[3:]))
+        )
     elif len(body) != 3:
         return None
     return Reply(sequence, code, cause, fields)
@@ -70,9 +84,12 @@ def parse_reply(body: bytes) -> Reply | None:
 
 # ------------------------------------------------------------------ frames
 
+
 def command_byte(address: int, way: int) -> int:
     if address not in ADDRESSES:
-        raise OutOfRange(f"there is no address {address}: allowed are {ADDRESSES[0]} to {ADDRESSES[-1]}")
+        raise OutOfRange(
+            f"there is no address {address}: allowed are {ADDRESSES[0]} to {ADDRESSES[-1]}"
+        )
     return way << 4 | address
 
 
@@ -103,18 +120,21 @@ def ready_byte(address: int, way: int) -> int:
 
 # ------------------------------------------------------------------ exchange
 
+
 class State(enum.Enum):
-    AWAIT_READY = enum.auto()      # write command sent
-    AWAIT_READING = enum.auto()    # payload and read command sent
+    AWAIT_READY = enum.auto()  # write command sent
+    AWAIT_READING = enum.auto()  # payload and read command sent
     AWAIT_LENGTH = enum.auto()
-    AWAIT_REST = enum.auto()       # body and CRC
-    QUIET = enum.auto()            # something went wrong: let the line fall silent before the next try
+    AWAIT_REST = enum.auto()  # body and CRC
+    QUIET = enum.auto()  # something went wrong: let the line fall silent before the next try
     DONE = enum.auto()
     FAILED = enum.auto()
 
 
 class Timing(NamedTuple):
-    """In seconds. `answer` is the patience with the node, `quiet` the silence that ends a garbled answer."""
+    """In seconds. `answer` is the patience with the node, `quiet` the silence that ends a garbled
+    answer.
+    """
 
     character: float = 11 / 115200
     answer: float = 0.1
@@ -124,20 +144,36 @@ class Timing(NamedTuple):
 class Exchange:
     """One request and its reply, repeated with the same sequence number until it is whole.
 
-    The owner sends what `words_to_send()` gives, then receives at most `wanted` words for at most `timeout_s`, tells
-    them with `feed(words)`, and tells with `silence()` when fewer came; until `finished`. Then `result()` has the reply
-    or raises. `events` tells what went wrong on the way: "no answer", "garbled", "old reply". Without `handshake` the request
+    The owner sends what `words_to_send()` gives, then receives at most `wanted` words for at most
+    `timeout_s`, tells
+    them with `feed(words)`, and tells with `silence()` when fewer came; until `finished`. Then
+    `result()` has the reply
+    or raises. `events` tells what went wrong on the way: "no answer", "garbled", "old reply".
+    Without `handshake` the request
     does not wait for the node's ready byte.
     """
 
-    LONGEST_NOISE = 1000           # words thrown away in one QUIET
+    LONGEST_NOISE = 1000  # words thrown away in one QUIET
 
-    def __init__(self, address: int, body: bytes, tries: int = 5, timing: Timing = Timing(), handshake: bool = True):
-        self.address, self.body, self.tries, self.timing, self.handshake = address, body, tries, timing, handshake
+    def __init__(
+        self,
+        address: int,
+        body: bytes,
+        tries: int = 5,
+        timing: Timing = Timing(),
+        handshake: bool = True,
+    ):
+        self.address, self.body, self.tries, self.timing, self.handshake = (
+            address,
+            body,
+            tries,
+            timing,
+            handshake,
+        )
         self.payload = list(frame(command_byte(address, TO_NODE), body))
         self.events = []
         self.attempts = 0
-        self.heard = False             # any word at all came back
+        self.heard = False  # any word at all came back
         self.reason = ""
         self.reply = None
         self.outgoing, self.received, self.noise = [], [], 0
@@ -240,9 +276,16 @@ class Exchange:
             self.fail("garbled", "the reply has a wrong CRC-32")
         elif reply is None:
             self.fail("garbled", "the reply has a wrong length")
-        elif (reply.sequence, reply.operation) != (self.body[0], self.body[1] if len(self.body) > 1 else 0):
+        elif (reply.sequence, reply.operation) != (
+            self.body[0],
+            self.body[1] if len(self.body) > 1 else 0,
+        ):
             # the node did not hear this request: the line is in order, so repeat at once
-            self.fail("old reply", "the node hears, but it never received the request whole", State.AWAIT_READY)
+            self.fail(
+                "old reply",
+                "the node hears, but it never received the request whole",
+                State.AWAIT_READY,
+            )
         else:
             self.reply, self.state = reply, State.DONE
 

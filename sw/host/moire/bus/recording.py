@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A session written down as it happens on the line, and given again to the same or another line.
 
-A record is a text of JSON objects, one a line: first what it is, then each call of the transport with its time in seconds:
-{"at": 0.31, "send": [289]} and {"at": 0.32, "receive": [97], "wanted": 1, "timeout_s": 0.1}, words being 9-bit; {"at": 0.4, "break": true}
+A record is a text of JSON objects, one a line: first what it is, then each call of the transport
+with its time in seconds:
+{"at": 0.31, "send": [289]} and {"at": 0.32, "receive": [97], "wanted": 1, "timeout_s": 0.1}, words
+being 9-bit; {"at": 0.4, "break": true}
 and {"at": 0.41, "baud": 1000000}, from then on.
 """
+
 import json
 from dataclasses import dataclass
 
@@ -24,9 +27,14 @@ from moire.errors import BadFile, MoireError
 from moire.made.bus_tables import CAUSES, OPERATIONS, PROTOCOL_CRC
 
 KIND = {"record": "moire bus", "version": 1}
-LONGEST_S = 1e9              # of a session
+LONGEST_S = 1e9  # of a session
 FASTEST_BAUD = 1e9
-KEYS = ({"at", "send"}, {"at", "receive", "wanted", "timeout_s"}, {"at", "break"}, {"at", "baud"})       # of a call
+KEYS = (
+    {"at", "send"},
+    {"at", "receive", "wanted", "timeout_s"},
+    {"at", "break"},
+    {"at", "baud"},
+)  # of a call
 
 
 class Recorder(Transport):
@@ -34,7 +42,11 @@ class Recorder(Transport):
 
     def __init__(self, transport: Transport, file):
         self.transport, self.file = transport, file
-        self.character_s, self.time_is_stopped, self.handshake = transport.character_s, transport.time_is_stopped, transport.handshake
+        self.character_s, self.time_is_stopped, self.handshake = (
+            transport.character_s,
+            transport.time_is_stopped,
+            transport.handshake,
+        )
         self.began = transport.now()
         self.write({**KIND, "protocol_crc": PROTOCOL_CRC})
 
@@ -74,14 +86,18 @@ class Recorder(Transport):
 
 
 def read(text: str, name: str = "text") -> list:
-    """The calls of a record; BadFile unless it is one of this version, made with this protocol table."""
+    """The calls of a record; BadFile unless it is one of this version, made with this protocol
+    table.
+    """
     try:
         head, *calls = [json.loads(row) for row in text.splitlines()]
         right = head.items() >= KIND.items() and "protocol_crc" in head and all(map(is_call, calls))
     except (ValueError, AttributeError):
         right = False
     if not right:
-        raise BadFile(f"the file {name} is no record of a bus: make one with 'moire --record {name} …'")
+        raise BadFile(
+            f"the file {name} is no record of a bus: make one with 'moire --record {name} …'"
+        )
     if head["protocol_crc"] != PROTOCOL_CRC:
         raise BadFile(f"the file {name} was recorded with another protocol table (bus.toml)")
     return calls
@@ -91,13 +107,23 @@ def is_call(call) -> bool:
     """Whether this is one of KEYS, each value of its type."""
     if not isinstance(call, dict) or set(call) not in KEYS:
         return False
-    words, numbers = call.get("send", call.get("receive", [])), [call[name] for name in ("at", "wanted", "timeout_s") if name in call]
-    return isinstance(words, list) and all(type(word) is int and 0 <= word < 512 for word in words) and \
-        all(type(number) in (int, float) and 0 <= number < LONGEST_S for number in numbers) and type(call.get("wanted", 0)) is int and \
-        type(call.get("baud", 1)) is int and 0 < call.get("baud", 1) < FASTEST_BAUD and call.get("break", True) is True
+    words, numbers = (
+        call.get("send", call.get("receive", [])),
+        [call[name] for name in ("at", "wanted", "timeout_s") if name in call],
+    )
+    return (
+        isinstance(words, list)
+        and all(type(word) is int and 0 <= word < 512 for word in words)
+        and all(type(number) in (int, float) and 0 <= number < LONGEST_S for number in numbers)
+        and type(call.get("wanted", 0)) is int
+        and type(call.get("baud", 1)) is int
+        and 0 < call.get("baud", 1) < FASTEST_BAUD
+        and call.get("break", True) is True
+    )
 
 
 # ------------------------------------------------------------------ replay
+
 
 class ReplayDiffers(MoireError):
     """A line answered otherwise than the record has it."""
@@ -105,12 +131,14 @@ class ReplayDiffers(MoireError):
 
 @dataclass
 class Comparison:
-    """Answers, counted: the very same bytes; the same operation and cause, but other values; anything else."""
+    """Answers, counted: the very same bytes; the same operation and cause, but other values;
+    anything else.
+    """
 
     same: int = 0
     other_values: int = 0
     different: int = 0
-    first: str = ""                # difference, in words
+    first: str = ""  # difference, in words
 
     @property
     def words(self) -> str:
@@ -150,21 +178,29 @@ def compare(result: Comparison, old: list, new: list, at: float):
         result.other_values += 1
     else:
         result.different += 1
-        result.first = result.first or f"at {at:.3f} s {hexadecimal(new)} came instead of {hexadecimal(old)}"
+        result.first = (
+            result.first or f"at {at:.3f} s {hexadecimal(new)} came instead of {hexadecimal(old)}"
+        )
 
 
 def outcome(words: list):
     """Sequence, operation and cause of a whole reply, else None."""
-    if len(words) < 2 + CRC_LENGTH or words[1:] != list(frame(words[0] & 0xFF, bytes(word & 0xFF for word in words[2:-CRC_LENGTH]))):
+    if len(words) < 2 + CRC_LENGTH or words[1:] != list(
+        frame(words[0] & 0xFF, bytes(word & 0xFF for word in words[2:-CRC_LENGTH]))
+    ):
         return None
     return words[2:5]
 
 
 def hexadecimal(words: list) -> str:
-    return " ".join(f"{word & 0xFF:02X}" + ("*" if word & NINTH else "") for word in words) or "nothing"
+    return (
+        " ".join(f"{word & 0xFF:02X}" + ("*" if word & NINTH else "") for word in words)
+        or "nothing"
+    )
 
 
 # ------------------------------------------------------------------ in words
+
 
 def listing(calls: list) -> list:
     """Requests and replies in the order of the line, one a row, by name and value."""
@@ -206,4 +242,6 @@ def answer_text(words: list) -> list:
     if reply is None or words[0] != ready_byte(words[0] & 0xF or 1, FROM_NODE):
         return [f"{'':12}no right reply: {hexadecimal(words)}"]
     cause = CAUSES.get(reply.cause, (str(reply.cause),))[0]
-    return [f"{'':12}{cause} " + " ".join(f"{field}={value}" for field, value in reply.fields.items())]
+    return [
+        f"{'':12}{cause} " + " ".join(f"{field}={value}" for field, value in reply.fields.items())
+    ]

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The server's side of RFC 2217 (a serial port over Telnet) without any input or output: bytes in, characters and answers out.
+"""The server's side of RFC 2217 (a serial port over Telnet) without any input or output: bytes in,
+characters and answers out.
 
-Every character comes out with the parity that was in force when it was sent, so a change of parity costs nothing.
+Every character comes out with the parity that was in force when it was sent, so a change of parity
+costs nothing.
 """
+
 from typing import NamedTuple
 
 SE, SB, WILL, WONT, DO, DONT, IAC = 0xF0, 0xFA, 0xFB, 0xFC, 0xFD, 0xFE, 0xFF
@@ -12,15 +15,15 @@ TAKEN = (BINARY, SUPPRESS_GO_AHEAD, COM_PORT)
 SET_BAUDRATE, SET_DATASIZE, SET_PARITY, SET_STOPSIZE, SET_CONTROL = 1, 2, 3, 4, 5
 SET_LINESTATE_MASK, SET_MODEMSTATE_MASK, PURGE = 10, 11, 12
 NOTIFY_MODEMSTATE = 7
-OF_SERVER = 100              # added to the number of a command in its answer
+OF_SERVER = 100  # added to the number of a command in its answer
 PARITIES = {1: "N", 2: "O", 3: "E", 4: "M", 5: "S"}
-READY_STATE = 0xB0           # carrier, DSR and CTS are there
-LONGEST_ASKED = 16           # bytes of a sub-negotiation; all that is known is shorter
+READY_STATE = 0xB0  # carrier, DSR and CTS are there
+LONGEST_ASKED = 16  # bytes of a sub-negotiation; all that is known is shorter
 
 
 class Character(NamedTuple):
     byte: int
-    parity: str              # N, O, E, M or S
+    parity: str  # N, O, E, M or S
 
     @property
     def ninth(self) -> int:
@@ -34,13 +37,20 @@ def escaped(data: bytes) -> bytes:
 
 
 class Server:
-    """feed() returns the characters of the client and puts what it is to be answered into `answers`."""
+    """feed() returns the characters of the client and puts what it is to be answered into
+    `answers`.
+    """
 
     def __init__(self, baud: int):
-        self.settings = {SET_BAUDRATE: baud.to_bytes(4, "big"), SET_DATASIZE: b"\x08", SET_PARITY: b"\x01", SET_STOPSIZE: b"\x01"}
+        self.settings = {
+            SET_BAUDRATE: baud.to_bytes(4, "big"),
+            SET_DATASIZE: b"\x08",
+            SET_PARITY: b"\x01",
+            SET_STOPSIZE: b"\x01",
+        }
         self.parity = "N"
         self.answers = bytearray()
-        self.said = set()              # options that this side has spoken of
+        self.said = set()  # options that this side has spoken of
         self.state, self.asked = self.plain, None
 
     def feed(self, arrived: bytes) -> list:
@@ -100,7 +110,9 @@ class Server:
 
     def com_port(self, command, value):
         if command in self.settings:
-            if len(value) == len(self.settings[command]) and any(value):      # zero asks for what is set
+            if len(value) == len(self.settings[command]) and any(
+                value
+            ):  # zero asks for what is set
                 self.settings[command] = value
                 self.parity = PARITIES.get(self.settings[SET_PARITY][0], "N")
             value = self.settings[command]
@@ -111,7 +123,9 @@ class Server:
             self.tell(NOTIFY_MODEMSTATE, bytes([READY_STATE]))
 
     def tell(self, command, value):
-        self.answers += bytes([IAC, SB, COM_PORT, OF_SERVER + command]) + escaped(value) + bytes([IAC, SE])
+        self.answers += (
+            bytes([IAC, SB, COM_PORT, OF_SERVER + command]) + escaped(value) + bytes([IAC, SE])
+        )
 
     @property
     def baud(self) -> int:

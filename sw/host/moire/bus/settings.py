@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """The settings of a station: one set a node, in a node whose firmware is the image `station`.
 
-    settings = Settings(node)
-    settings.get("turn_tolerance").value                  Fraction(1, 2), arcsec
-    settings.set("turn_tolerance", "0.3arcsec")
+settings = Settings(node)
+settings.get("turn_tolerance").value                  Fraction(1, 2), arcsec
+settings.set("turn_tolerance", "0.3arcsec")
 """
+
 from fractions import Fraction
 
 from moire.bus.client import ParameterValue, counts_of, one_count, value_of
 from moire.errors import UnknownName
 from moire.made.bus_tables import SETTINGS
 
-NO_PERIOD = Fraction(1)          # no setting is counted in periods
+NO_PERIOD = Fraction(1)  # no setting is counted in periods
+
 
 def known(name: str):
     if name not in SETTINGS:
@@ -35,10 +37,14 @@ class Settings:
         self.node = node
 
     def get(self, name: str) -> ParameterValue:
-        return setting_value(name, self.node.request("get_setting", setting=known(name).id)["value"])
+        return setting_value(
+            name, self.node.request("get_setting", setting=known(name).id)["value"]
+        )
 
     def set(self, name: str, value) -> ParameterValue:
-        """`value` is a number in the unit of get(), or a text with a unit. Returns what was set: the nearest count."""
+        """`value` is a number in the unit of get(), or a text with a unit. Returns what was set:
+        the nearest count.
+        """
         counts = setting_counts(name, value)
         self.node.request("set_setting", setting=known(name).id, value=counts)
         return setting_value(name, counts)

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What carries 9-bit words: a serial port with the 9th bit as parity, or any byte stream with COBS packets (plain 8N1).
+"""What carries 9-bit words: a serial port with the 9th bit as parity, or any byte stream with COBS
+packets (plain 8N1).
 A simulated machine brings its own (twin.TwinTransport).
 
-    open_bus("/dev/ttyUSB0")  open_bus("rfc2217://host:2217")  open_bus("socket://host:2218")  open_bus("/dev/pts/5")
+    open_bus("/dev/ttyUSB0")  open_bus("rfc2217://host:2217")  open_bus("socket://host:2218")
+    open_bus("/dev/pts/5")
 
 Only transports wait; nothing else in the package does.
 """
+
 import abc
 import errno
 import os
@@ -13,7 +16,7 @@ import time
 
 try:
     import termios
-except ImportError:              # not here: Windows
+except ImportError:  # not here: Windows
     termios = None
 
 from moire.bus.cobs import LONGEST_STUFFED, PacketReader, sealed
@@ -21,11 +24,12 @@ from moire.bus.protocol import FROM_NODE, NINTH, ODD_ADDRESSES, TO_NODE, ready_b
 from moire.errors import PortError
 
 BAUD = 115200
-BITS = 11                    # start, eight data, 9th, stop
+BITS = 11  # start, eight data, 9th, stop
 CMSPAR_OF_LINUX = 0o10000000000
-POLL_S = 0.005               # one wait for a byte; pyserial sets the whole port again when its time-out changes, so this stays
-BREAK_S = 0.01               # nodes want 2 ms
-NETWORK_S = 0.1              # what a network may add to an answer, and to the gaps in it
+# one wait for a byte; pyserial sets the whole port again when its time-out changes, so this stays
+POLL_S = 0.005
+BREAK_S = 0.01  # nodes want 2 ms
+NETWORK_S = 0.1  # what a network may add to an answer, and to the gaps in it
 PARITIES = ("auto", "mark", "odd", "none")
 PARITY_OF_RFC2217 = {"O": b"\x02", "E": b"\x03", "M": b"\x04", "S": b"\x05"}
 
@@ -34,8 +38,8 @@ class Transport(abc.ABC):
     """A word is 0…511, bit 8 is the 9th bit. `character_s` is the time that one takes."""
 
     character_s = BITS / BAUD
-    time_is_stopped = False          # true: time passes only in send, receive and wait
-    handshake = True             # false: a request goes out as a whole, without the node's ready byte
+    time_is_stopped = False  # true: time passes only in send, receive and wait
+    handshake = True  # false: a request goes out as a whole, without the node's ready byte
 
     @abc.abstractmethod
     def send(self, words):
@@ -62,7 +66,9 @@ class Transport(abc.ABC):
         self.character_s = BITS / baud
 
     def send_break(self):
-        """The line low for BREAK_S: every node is at the first baud rate again. Nothing where no line of nodes is at the other end."""
+        """The line low for BREAK_S: every node is at the first baud rate again. Nothing where no
+        line of nodes is at the other end.
+        """
 
     def close(self):
         """After this the transport is of no use any more."""
@@ -75,7 +81,8 @@ class Transport(abc.ABC):
 
 
 def open_bus(port: str, baud: int = BAUD, parity: str = "auto", open_port=None) -> Transport:
-    """The transport for a port. parity: as in SerialBus; "none": 8N1 with COBS packets, which "auto" takes for socket:// and
+    """The transport for a port. parity: as in SerialBus; "none": 8N1 with COBS packets, which
+    "auto" takes for socket:// and
     pseudo terminals, since those carry no parity."""
     if parity not in PARITIES:
         raise PortError(f"there is no parity '{parity}': allowed are {', '.join(PARITIES)}")
@@ -144,28 +151,39 @@ class PortBus(Transport):
 class SerialBus(PortBus):
     """A serial port that sends a parity bit; the 9th bit is made of it.
 
-    parity "mark": MARK sends a 1, SPACE a 0: all addresses. "odd": odd or even parity, whichever gives the bit that is
-    wanted; a command byte then needs an address with an odd number of ones (1, 2, 4, 7, 8, 11, 13, 14), as in S0.
-    "auto" takes "mark" where the port can do it. Received parity bits are not looked at: a node never sets the 9th bit,
+    parity "mark": MARK sends a 1, SPACE a 0: all addresses. "odd": odd or even parity, whichever
+    gives the bit that is
+    wanted; a command byte then needs an address with an odd number of ones (1, 2, 4, 7, 8, 11, 13,
+    14), as in S0.
+    "auto" takes "mark" where the port can do it. Received parity bits are not looked at: a node
+    never sets the 9th bit,
     and the CRC-32 tells a wrong frame.
     """
 
-    LATENCY_S = 0.002        # a USB adapter's own, before the parity may change
-    GAP_S = 0.02             # that an adapter may leave between two bytes of an answer
-    TURNAROUND = 2 / BITS    # of a character: the node's driver lets go of the line after its last stop bit
+    LATENCY_S = 0.002  # a USB adapter's own, before the parity may change
+    GAP_S = 0.02  # that an adapter may leave between two bytes of an answer
+    TURNAROUND = (
+        2 / BITS
+    )  # of a character: the node's driver lets go of the line after its last stop bit
 
     def __init__(self, port: str, baud: int = BAUD, parity: str = "auto", open_port=None):
         if parity not in ("auto", "mark", "odd"):
-            raise PortError(f"there is no parity '{parity}' with a 9th bit: allowed are auto, mark, odd")
+            raise PortError(
+                f"there is no parity '{parity}' with a 9th bit: allowed are auto, mark, odd"
+            )
         super().__init__(port, baud, open_port)
         self.sync = parity != "odd" and self.can("M")
         if parity == "mark" and not self.sync:
             self.close()
-            raise PortError(f"{port} has no MARK and SPACE parity: use parity odd with one of the addresses {addresses(ODD_ADDRESSES)}")
+            raise PortError(
+                f"{port} has no MARK and SPACE parity: use parity odd with one of the addresses {addresses(ODD_ADDRESSES)}"
+            )
         if not self.sync and not self.can("O"):
             self.close()
-            raise PortError(f"the port {port} sends no parity bit, which the line needs as 9th bit: use parity none where COBS packets "
-                            "are spoken")
+            raise PortError(
+                f"the port {port} sends no parity bit, which the line needs as 9th bit: use parity none where COBS packets "
+                "are spoken"
+            )
         self.current = None
         self.checked(self.port.reset_input_buffer)
 
@@ -184,8 +202,10 @@ class SerialBus(PortBus):
         try:
             flags = termios.tcgetattr(self.port.fileno())[2]
         except (AttributeError, ValueError, *port_errors()):
-            return True            # no local device: a URL
-        wanted = termios.PARENB | (getattr(termios, "CMSPAR", CMSPAR_OF_LINUX) if parity in "MS" else 0)
+            return True  # no local device: a URL
+        wanted = termios.PARENB | (
+            getattr(termios, "CMSPAR", CMSPAR_OF_LINUX) if parity in "MS" else 0
+        )
         return flags & wanted == wanted
 
     def reaches(self, address):
@@ -205,7 +225,9 @@ class SerialBus(PortBus):
         for word in words:
             # S0's rule: a command byte goes out with odd parity
             if word & NINTH and not self.sync and self.parity_for(word) != "O":
-                raise PortError(f"{self.name} has no MARK parity, and odd parity reaches only the addresses {addresses(ODD_ADDRESSES)}")
+                raise PortError(
+                    f"{self.name} has no MARK parity, and odd parity reaches only the addresses {addresses(ODD_ADDRESSES)}"
+                )
         self.wait(self.TURNAROUND * self.character_s)
         for parity, part in runs(words, self.parity_for):
             self.checked(self.set_parity, parity)
@@ -215,7 +237,9 @@ class SerialBus(PortBus):
             self.sleep_until(began + len(part) * self.character_s + self.LATENCY_S)
 
     def set_parity(self, parity: str):
-        """pyserial's own way over RFC 2217 polls for the answer and costs 0.15 s; the order in the stream is all that is needed."""
+        """pyserial's own way over RFC 2217 polls for the answer and costs 0.15 s; the order in the
+        stream is all that is needed.
+        """
         if parity == self.current:
             return
         in_stream = getattr(self.port, "rfc2217_send_subnegotiation", None)
@@ -226,7 +250,9 @@ class SerialBus(PortBus):
         self.current = parity
 
     def receive(self, count, timeout_s):
-        """The patience begins anew with every byte that comes: an adapter or a network may leave gaps."""
+        """The patience begins anew with every byte that comes: an adapter or a network may leave
+        gaps.
+        """
         words, end = [], time.monotonic() + timeout_s + self.network_s
         while len(words) < count:
             arrived = self.read(count - len(words), end)
@@ -241,7 +267,9 @@ class SerialBus(PortBus):
 
 
 class CobsBus(PortBus):
-    """A stream of plain bytes with COBS packets: what stands between two command bytes goes out as one, and what comes is unpacked."""
+    """A stream of plain bytes with COBS packets: what stands between two command bytes goes out as
+    one, and what comes is unpacked.
+    """
 
     handshake = False
 
@@ -277,7 +305,12 @@ class CobsBus(PortBus):
 def port_errors() -> tuple:
     """What a port may raise; termios.error is no OSError."""
     import serial
-    return (serial.SerialException, OSError) if termios is None else (serial.SerialException, OSError, termios.error)
+
+    return (
+        (serial.SerialException, OSError)
+        if termios is None
+        else (serial.SerialException, OSError, termios.error)
+    )
 
 
 def runs(words, key):
