@@ -2,7 +2,8 @@
 // node -- a complete motion controller on a multi-drop line: soft core, line, axes, links to other
 // things.
 //
-// latency  see axis and the rooms link and cpu     rate  see there
+// latency  see axis and the rooms link and cpu
+// rate     see there
 // source   S0: one slave computer per axis, many on one line; here one node may have several axes
 // model    the models of its blocks; proved in motion by tb/system
 `default_nettype none

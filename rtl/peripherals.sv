@@ -2,7 +2,8 @@
 // peripherals -- what a node speaks to besides its line: I2C, a PS/2 keyboard and its machine, a
 // peer, an angle sensor, a numeric display, status inputs; all behind one register block.
 //
-// latency  see the rooms link and sense     rate  see there
+// latency  see the rooms link and sense
+// rate     see there
 // source   S4: the main controller is a keyboard of the EDM machine, reads its lamps, has a panel
 //          and an EEPROM on I2C and a sub-controller at the peer port; the sub-controller reads a
 //          time-grating sensor. S0: numeric display

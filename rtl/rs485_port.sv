@@ -2,7 +2,8 @@
 // rs485_port -- a node's end of the multi-drop line: receiver, address filter, frame check, queues,
 // transmitter, behind a register block.
 //
-// latency  see the room link     rate  see there
+// latency  see the room link
+// rate     see there
 // source   S0: one master, many slaves on one pair of wires, the 9th bit syncs command bytes
 // model    the models of its blocks; proved in motion by tb/serial/test_rs485_port.py
 `default_nettype none

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // synchroniser -- bring levels of another clock, or of none, into clk.
 //
-// latency  STAGES clk                      rate  each bit by itself: bits of one word may arrive
+// latency  STAGES clk
+// rate     each bit by itself: bits of one word may arrive
 //          one clk apart
 // source   a row of flops; 2 stages below 100 MHz, 3 from there up
 // model    tb/common/synchroniser.py, equal in every bit of every cycle

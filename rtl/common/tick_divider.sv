@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // tick_divider -- a strobe every `period` clk.
 //
-// latency  the first tick comes `period` clk after reset or restart   rate  one tick each `period`
+// latency  the first tick comes `period` clk after reset or restart
+// rate     one tick each `period`
 //          clk, exactly
 // model    tb/common/tick_divider.py, equal in every bit of every cycle
 // proved   two ticks are never nearer than the shortest period in force between them, nor to a

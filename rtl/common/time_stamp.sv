@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // time_stamp -- count the clk since reset.
 //
-// latency  0 in the first clk after reset, then one more each clk     rate  every clk
+// latency  0 in the first clk after reset, then one more each clk
+// rate     every clk
 // source   the one time of a node: every latched event refers to it
 // model    tb/common/time_stamp.py, equal in every bit of every cycle
 `default_nettype none

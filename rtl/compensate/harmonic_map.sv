@@ -2,7 +2,8 @@
 // harmonic_map -- take a sum of harmonics of the angle off a position: sum over k = 1..K of
 // amplitude sin(k angle + phase).
 //
-// latency  3 clk from step to corrected                 rate  one step per clk
+// latency  3 clk from step to corrected
+// rate     one step per clk
 // method   the whole sum is worked out again and again, each time anew for the angle of that clk,
 //          (STEPS + 2) K + 35 clk a round, K one more if it is odd: two terms share the rotator,
 //          one is shifted while the other is added; between two sums each step adds the slope of

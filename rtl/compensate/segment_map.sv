@@ -2,7 +2,8 @@
 // segment_map -- take the error of equal segments of the turn off a position: straight lines
 // between their borders, round and round.
 //
-// latency  3 clk from step to corrected                 rate  one step per clk
+// latency  3 clk from step to corrected
+// rate     one step per clk
 // method   segment_table is asked for the angle of that clk, again and again, $clog2(2 SEGMENTS +
 //          2) + 23 clk a round; until the next answer the correction stands. At rest it is that of
 //          the angle after 2 rounds; moving m counts a round it is behind by what the table changes

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // segment_table -- take the error that a table of equal segments has for a place off the position.
 //
-// latency  INDEX + 22 clk from valid to done            rate  one position in as many clk; one that
+// latency  INDEX + 22 clk from valid to done
+// rate     one position in as many clk; one that
 //          comes earlier is not taken
 // table    the measured length, from origin on, in `segments` parts of segment_length; point n is
 //          the error at the border n of them, measured less true, and the same whichever way it is

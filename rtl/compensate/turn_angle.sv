@@ -2,7 +2,8 @@
 // turn_angle -- follow an incremental encoder through the turn: position, angle from the index, and
 // whether the index comes.
 //
-// latency  1 clk from step or index to all outputs      rate  one step per clk
+// latency  1 clk from step or index to all outputs
+// rate     one step per clk
 // angle    an accumulator of 2^-48 turn, zeroed at the index: counts_per_turn steps away it is
 //          wrong by counts_per_turn * 2^-49 turn at most, by 2^-24 turn for 2^25 counts; any
 //          counts_per_turn, not only powers of two

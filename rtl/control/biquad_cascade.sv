@@ -10,7 +10,7 @@
 // rate     a sample per 177 * SECTIONS + 1 clk; ready tells when, and one that comes earlier is
 //          ignored
 // accuracy y is rounded down to its LSB and what was cut off goes into the next sample: the error
-// of a section is that of
+//          of a section is that of
 //          (1 - z^-1) / A(z) fed with 0 to 1 LSB. So none of it is left at standstill, and no limit
 //          cycle: with
 //          b0 + b1 + b2 + c1 + c2 = 1 exactly, y comes to rest within one LSB of x

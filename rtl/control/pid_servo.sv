@@ -17,7 +17,7 @@
 //          the profile stands; it is zero in open loop and while the guard blocks both directions
 //          (drive off)
 // bumpless after the loop was closed, the drive came on or a gain changed, the command stands for
-// one tick as it stood (0
+//          one tick as it stood (0
 //          while the drive was off), and the integral takes what makes the next one go on from
 //          there, as far as integral_limit
 //          reaches; with ki = 0 there is nothing to take it, and the command follows the gains at

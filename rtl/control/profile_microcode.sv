@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// profile_microcode -- what profile_player does between two ticks, a line a clk; made by
-// tables/profile_microcode.py, not to be edited.
+// profile_microcode -- what profile_player does between two ticks, a line a clk; made by tables/profile_microcode.py, not to be edited.
 //
 // latency  1 clk from next to code      rate  one line per clk
 // code     target 7 bits, job 5, halved 1, acc 1, sign 2, place 5, word 5
@@ -9,11 +8,10 @@
 
 module profile_microcode (
     input  wire         clk,
-    input  wire  [ 6:0] next,
+    input  wire  [6:0]  next,
     output logic [25:0] code
 );
-    // block memory would answer too late for the adder behind it
-    (* rom_style = "logic" *) logic [25:0] lines[0:127];
+    (* rom_style = "logic" *) logic [25:0] lines [0:127];       // block memory would answer too late for the adder behind it
 
     initial begin
         lines[  0] = 26'h2465318;   // wait:          acc ; wait begin

@@ -19,7 +19,7 @@
 //          velocity itself steps between two segments, one step below 100 % may exceed it by half
 //          of that
 // override the rate goes to `feed_fraction`: it changes by `slope` a tick at most, its change by
-// `curve`, and it ends at the setting exactly,
+//          `curve`, and it ends at the setting exactly,
 //          whatever the setting did on the way; a profile begins at the setting
 // brake    from the step and the acceleration made last: the acceleration changes by stop_jerk a
 //          tick at most, a part of stop_jerk in the first and the last, is brought below

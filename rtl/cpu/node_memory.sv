@@ -2,7 +2,8 @@
 // node_memory -- block memory of the soft core, written by bytes, with the firmware in it at
 // power-up.
 //
-// latency  1 clk from address to rdata     rate  one access per clk, a read or a write
+// latency  1 clk from address to rdata
+// rate     one access per clk, a read or a write
 // source   one port: rdata keeps the last word read while a write is on
 // model    tb/cpu/node_memory.py, equal in every bit of every cycle
 `default_nettype none

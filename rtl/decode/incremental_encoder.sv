@@ -5,7 +5,7 @@
 // latency  N samples of the filter and 2 clk from a, b, z to count and index_found; 3 clk from
 //          own_a, own_b to count
 // rate     one edge per clk with the filter in bypass, else one edge of each level per N samples
-// own      levels that are made in clk have no disturbances, and may be shorter than the filter
+//          own      levels that are made in clk have no disturbances, and may be shorter than the filter
 //          passes: with own = 1 own_a and own_b are counted in place of the filtered a and b. The
 //          filter goes on for a, b and z
 // source   the features of HostMot2's encoder counter, with N-of-M, more modes, direction and

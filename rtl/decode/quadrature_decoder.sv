@@ -2,7 +2,8 @@
 // quadrature_decoder -- count the edges of two square waves a quarter period apart, in both
 // directions, or pulses by a direction.
 //
-// latency  1 clk from a, b to count        rate  one edge per clk
+// latency  1 clk from a, b to count
+// rate     one edge per clk
 // source   the Gray code of two bits. Each mode counts at fixed borders of the period, the same in
 //          both directions, so a reversal over any edge takes back what the edge gave: the two
 //          jitter cases that S0 patches by interrupt (over its edges B and C) need no patch

@@ -6,7 +6,7 @@
 // rate     one edge per `minimum_edge_separation` clk; a target further off is made up at that
 //          rate, the way back too
 // rounding a settled position is target rounded to the nearest count, a half goes up. Around it
-// `hysteresis` widens the band
+//          `hysteresis` widens the band
 //          in which nothing moves to 1/2 + hysteresis each way: a target that trembles by less than
 //          twice that makes no edge
 //          but the first one

@@ -5,7 +5,7 @@
 // latency  57 clk from tick to go or restart; target and trim are taken in the 8th clk after tick,
 //          when those of this tick stand
 // rate     a tick per 57 clk at most
-// restart     the first position after the drive came on, and after the target was moved by other
+//          restart     the first position after the drive came on, and after the target was moved by other
 //             than motion (rebase), is where
 //          the generator begins, without a step
 // model    tb/drive/step_follower.py, equal in every bit of every cycle

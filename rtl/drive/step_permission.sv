@@ -3,7 +3,7 @@
 // a side that the guard blocks.
 //
 // latency  none: wires and gates
-// rule     a target that goes up is not followed while block_up stands, one that goes down not
+//          rule     a target that goes up is not followed while block_up stands, one that goes down not
 //          while block_down does; one that stands still may be followed, so that an axis on a
 //          pressed limit switch holds its place and can go away from it
 // model    tb/drive/step_permission.py, equal for all inputs

@@ -4,7 +4,7 @@
 // latency  24, 28, 30 clk from valid to done for W = 8, 9, 10, 23 clk for wider samples
 // rate     one sample per latency; one that comes sooner is not taken
 // accuracy phase: every sample of 8, 9 and 10 bits is correctly rounded; wider ones are within
-// 0.517 LSB of the true phase from a
+//          0.517 LSB of the true phase from a
 //          quarter of full scale on. amplitude: within 1.5 counts and 0.00015 of itself. (0, 0)
 //          gives 0 and 0
 // source   CORDIC in vectoring mode, after TURNS digits as a division; the shorter leg is doubled

@@ -6,7 +6,7 @@
 //          STEPS, rounded up
 // rate     one sample per clk
 // accuracy phase: every sample of 8, 9 and 10 bits is correctly rounded; wider ones are within
-// 0.548 LSB of the true phase from a
+//          0.548 LSB of the true phase from a
 //          quarter of full scale on (of 12 bits, all tried: 0.510). amplitude: within 1.5 counts
 //          and 0.00015 of itself.
 //          (0, 0) gives 0 and 0

@@ -1,18 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// arctan_rom -- the arc tangent of 0 to 1 as 128 chords; made by tables/arctan.py, not to be
-// edited.
+// arctan_rom -- the arc tangent of 0 to 1 as 128 chords; made by tables/arctan.py, not to be edited.
 //
 // latency  1 clk from index to base, slope     rate  one word per clk
-// source   base = 2^21 atan(index / 128) / 2 pi, rounded, and 19 for rounding the phase; slope =
-//          next base - base
+// source   base = 2^21 atan(index / 128) / 2 pi, rounded, and 19 for rounding the phase; slope = next base - base
 // model    BASE and SLOPE of tables/arctan.py
 `default_nettype none
 
 module arctan_rom (
-    input  wire         clk,
-    input  wire  [ 7:0] index,  // 1/128 of the ratio; 128 is the ratio 1
-    output logic [18:0] base,   // 1/32 LSB of phase, 19 added for rounding
-    output logic [11:0] slope   // 1/32 LSB of phase, over the whole chord
+    input  wire                  clk,
+    input  wire        [7:0]     index,     // 1/128 of the ratio; 128 is the ratio 1
+    output logic       [18:0]    base,      // 1/32 LSB of phase, 19 added for rounding
+    output logic       [11:0]    slope      // 1/32 LSB of phase, over the whole chord
 );
     logic [30:0] chord;
 

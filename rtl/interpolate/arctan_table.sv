@@ -2,10 +2,11 @@
 // arctan_table -- the phase of a sine and a cosine sample: 2^16 atan2(sin, cos) / 2 pi, from 0 to
 // one LSB below a period.
 //
-// latency  23 clk from valid to done       rate  one sample per 23 clk; one that comes sooner is
+// latency  23 clk from valid to done
+// rate     one sample per 23 clk; one that comes sooner is
 //          not taken
 // accuracy 0.633 LSB of the true phase of any sample but (0, 0), for any W; exact at every octant
-// border; (0, 0) gives 0
+//          border; (0, 0) gives 0
 // source   S0: octant-folded arctan look-up, its constants 0, n/4, n/2, 3n/4; the ratio by
 //          restoring division, one bit a clk
 // model    tb/interpolate/arctan_table.py, equal in every bit of every cycle; bound and table from

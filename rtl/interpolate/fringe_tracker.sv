@@ -2,7 +2,8 @@
 // fringe_tracker -- the signed step from phase to phase, its whole periods found by foreseeing the
 // next phase.
 //
-// latency  1 clk from valid to done, no lag in the step        rate  one phase per clk
+// latency  1 clk from valid to done, no lag in the step
+// rate     one phase per clk
 // method   The tracker predicts that the last step comes again. Less than a quarter period from
 //          that: the step, at any speed below a period a sample.
 // strays   Farther away it is an overspeed. The step still ends on the phase, and the next phase is

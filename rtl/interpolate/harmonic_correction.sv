@@ -2,7 +2,8 @@
 // harmonic_correction -- subtract from a phase what a table of 256 points has for it, read off
 // along a straight line.
 //
-// latency  4 clk from valid to done        rate  one phase per clk; one table entry per clk
+// latency  4 clk from valid to done
+// rate     one phase per clk; one table entry per clk
 // table    Two of them. One is in force, the other is written; swap exchanges them between two
 //          phases, so that no phase ever meets a table half written. Until the first swap nothing
 //          is corrected.

@@ -2,7 +2,8 @@
 // signal_correction -- take offset, gain and phase error off a sine and a cosine sample: an ellipse
 // becomes a circle.
 //
-// latency  3 clk from valid to done        rate  one sample per clk
+// latency  3 clk from valid to done
+// rate     one sample per clk
 // source   Heydemann, Appl. Opt. 20 (1981) 3382: cos' = cos - cos_offset, sin' = gain (sin -
 //          sin_offset) + quadrature_error cos'. Both come out at half the size, so that a corrected
 //          channel may be larger than full scale; what is still too large is held

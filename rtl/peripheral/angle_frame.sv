@@ -2,7 +2,8 @@
 // angle_frame -- receive the frames of a time-grating angle sensor: A5, sequence, angle (4 bytes,
 // low first), CRC-16 (low first).
 //
-// latency  2 clk from the last byte to valid                    rate  one byte per 2 clk
+// latency  2 clk from the last byte to valid
+// rate     one byte per 2 clk
 // source   S4: absolute angle by RS-232. CRC-16 with 0x1021 from 0xFFFF over the six bytes before
 //          it
 // model    tb/peripheral/angle_frame.py, equal in every bit of every cycle

@@ -2,7 +2,8 @@
 // ps2_arbiter -- who speaks to the PS/2 host: the keyboard, whose bytes pass untouched, or a source
 // that injects sequences of its own.
 //
-// latency  none: a byte that stands is offered, and taken, in the same clk          rate  as the
+// latency  none: a byte that stands is offered, and taken, in the same clk
+// rate     as the
 //          lines
 // source   S4: the controller is a keyboard of the EDM machine. E0 and F0 announce one code more,
 //          E1 two; FF is answered by FA and later AA, F2 by three bytes, F0 00 by two, every other

@@ -2,7 +2,8 @@
 // ps2_inject_queue -- scan codes that wait to be injected, and can be taken back: a sequence that
 // is under way is finished whole.
 //
-// latency  2 clk from push to valid in an empty queue        rate  one push and one code per clk
+// latency  2 clk from push to valid in an empty queue
+// rate     one push and one code per clk
 // source   S4: who presses STOP means the keys too that still wait to start a cut
 // model    tb/peripheral/ps2_inject_queue.py, equal in every bit of every cycle
 // proof    DEPTH = 4

@@ -2,7 +2,8 @@
 // count_phase_check -- hold the interpolated position against the x4 count of the same signals: a
 // lost fringe shows.
 //
-// latency  3 clk from valid to disagreement    rate  one position per clk
+// latency  3 clk from valid to disagreement
+// rate     one position per clk
 // limit    must cover the quarter period between two counts, the offset of the two comparators, and
 //          twice the way that is covered while the deglitchers hold an edge back: the count lags
 //          one way going up and the other going down

@@ -2,7 +2,8 @@
 // count_to_phase -- make of quadrature counts the steps and phases that a position is added up
 // from, for scales without sine and cosine.
 //
-// latency  1 clk     rate  one count per clk
+// latency  1 clk
+// rate     one count per clk
 // align    moves the phase, and the position with it, by whole counts: so that the zero of a scale
 //          can lie on any of its edges
 // source   four counts are a period (S2: 0.5 um scales, S3: 1 um scale); a count is a step of a

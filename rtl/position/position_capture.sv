@@ -2,7 +2,8 @@
 // position_capture -- latch position and time at events, and keep them in order until they are
 // read.
 //
-// latency  2 clk from event to present in an empty queue        rate  one entry per clk
+// latency  2 clk from event to present in an empty queue
+// rate     one entry per clk
 // sources  bit 0 index, 1 tick, 2 software, then a rising edge of each probe, then a falling edge
 //          of each; events of one clk make one entry with all their bits set
 // entry    the position that stood on the port in the clk of the event, together with the time of

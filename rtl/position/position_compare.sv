@@ -2,7 +2,8 @@
 // position_compare -- a pulse at each of the points start + k * step, k = 0, 1, 2 …, passed in the
 // direction of step.
 //
-// latency  3 clk from valid to pulse        rate  one position per clk, one pulse per pulse_length
+// latency  3 clk from valid to pulse
+// rate     one position per clk, one pulse per pulse_length
 //          + gap_length clk
 // armed    from the clk after arm until `count` points are passed, or disarm. The first point
 //          counts only after a position before it was seen: what lies behind at the start makes no

@@ -2,7 +2,8 @@
 // unwrap -- add up steps to a position whose fraction is always the phase; its origin moves by
 // whole periods only.
 //
-// latency  1 clk from valid, shift to position     rate  one step and one shift per clk, also both
+// latency  1 clk from valid, shift to position
+// rate     one step and one shift per clk, also both
 //          at once
 // start    position is 0 until the first phase after reset, then that phase; its step is not looked
 //          at

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // zero_crossing -- say when the position passes its absolute zero, and which way.
 //
-// latency  1 clk from valid to up, down        rate  one position per clk
+// latency  1 clk from valid to up, down
+// rate     one position per clk
 // source   S0: the borrow of the last decade interrupts the 8031 at every pass of the absolute zero
 // shift    the position that stands in the clk after a shift is only learnt: moving the origin is
 //          no crossing

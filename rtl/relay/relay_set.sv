@@ -2,14 +2,15 @@
 // relay_set -- take the settings and coefficients of a relay as a row of bytes, and put them in
 // force only as a whole.
 //
-// latency  2 clk from the last byte to good or bad, swap and settings          rate  one byte per
+// latency  2 clk from the last byte to good or bad, swap and settings
+// rate     one byte per
 //          clk
 // set      32-bit words, low byte first: marker 4D4F49 and K in its low byte; counts_per_turn;
 //          angle_per_count, low word; its high half and minimum_edge_separation above;
 //          radians_per_count; hysteresis, filter_required from bit 16, {index_low, gate_mask, gate}
 //          from bit 24; amplitude and phase of each order from 1 up; CRC-32 of all before
 // segments with SEGMENTS the map is a table: the low byte of the marker is 128 + SEGMENTS, and K =
-// (SEGMENTS + 1) / 2 terms hold two
+//          (SEGMENTS + 1) / 2 terms hold two
 //          of its points each
 // safety   what a broken row leaves behind is never in force: settings change in one clk, together
 //          with swap. A whole row is refused too if its counts_per_turn are not 1609 to 2^25, or if

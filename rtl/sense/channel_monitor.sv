@@ -2,18 +2,18 @@
 // channel_monitor -- what is wrong with one channel (sine or cosine) of a signal, told from its
 // samples, the other channel and the comparators.
 //
-// latency  1 clk                                           rate  one sample per clk
-// channel_stuck   The channel stays within `band` of a sample for four samples and more while the
-// other channel is over `span` away, twice within four. Beside
-//          the top of a circle of amplitude A, where the good channel stays so, the other one moves
+// latency  1 clk
+// rate     one sample per clk
+// faults   channel_stuck: the channel stays within `band` of a sample for four samples and more while
+//          the other channel is more than `span` away, twice within four samples. Near the top of a
+//          circle of amplitude A, where a good channel also stays within `band`, the other one moves
 //          by 4 sqrt(A band) at most.
-// no_noise_samples    The same code for `no_noise_samples` samples, moving or not: the noise of a
-// living converter is missing. With 0.5 LSB of
-//          noise a code lives 256 samples once in 10^42, with 0.2 LSB 4096 samples once in 10^21;
-//          with less, leave no_noise_samples 0.
-// comparator_mismatch  Three samples in a row have the same sign and are beyond `sign_threshold`,
-// and the comparator has the other one in the midst
-//          of them: so it may be early or late by a sample.
+//          no_noise: the same code for `no_noise_samples` samples, moving or not: the noise of a
+//          working ADC is missing. With 0.5 LSB of noise a code lasts 256 samples once in 10^42,
+//          with 0.2 LSB 4096 samples once in 10^21; with less noise, set no_noise_samples to 0.
+//          comparator_mismatch: three samples in a row have the same sign and are beyond
+//          `sign_threshold`, and the comparator has the opposite sign at the middle one, so the
+//          comparator may be early or late by a sample.
 // source   S0: comparators and converter look at the same photo-receiver
 // model    tb/sense/channel_monitor.py, equal in every bit of every cycle
 // proof    depth 12

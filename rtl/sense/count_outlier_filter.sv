@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // count_outlier_filter -- hold a count against the one before it, as S0 printed it.
 //
-// latency  1 clk from valid to done        rate  one count per clk
+// latency  1 clk from valid to done
+// rate     one count per clk
 // source   S0, limit filter 2, its equation 9: a difference of 0 leaves the count, of 1 takes the
 //          count before, of more takes the mean of both, rounded down. S0 prints no sign: here the
 //          size of the difference decides; the count before is the one that came out. The price: a

@@ -2,7 +2,8 @@
 // lissajous_monitor -- learns the length of the signal vector in eight directions, and tells how
 // round and centred they are and whether a sample lies off the circle they draw.
 //
-// latency  5 clk from valid to the verdicts, 1 clk to ready    rate  one sample per clk
+// latency  5 clk from valid to the verdicts, 1 clk to ready
+// rate     one sample per clk
 // learns   a direction is ready when its sector has been crossed from one side to the other and a
 //          sample came within 1/8 of its axis or diagonal: what stands, or trembles about a place,
 //          teaches nothing. The mean with the value before.

@@ -2,7 +2,8 @@
 // outlier_filter -- hold back a sample that jumps further than the signal can, each channel for
 // itself.
 //
-// latency  1 clk from valid to done        rate  one sample per clk
+// latency  1 clk from valid to done
+// rate     one sample per clk
 // source   S0, limit filter 1: |Yn - Yn-1| <= dY takes Yn, else keeps Yn-1. As printed (hold = 255)
 //          a signal that once got away by more than dY never comes back; so after `hold` samples
 //          held back in a row the next one is taken

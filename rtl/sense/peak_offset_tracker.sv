@@ -7,7 +7,8 @@
 //   offset = |full - Pmax - Pmin| / 2, rounded down, with the samples counted from 0 to full = 2^W
 //   - 1
 //
-// latency  2 clk from valid to done        rate  one sample per clk
+// latency  2 clk from valid to done
+// rate     one sample per clk
 // sign     S0 prints the size of the offset; which way it lies is what full - Pmax - Pmin says
 //          without the bars. Nothing is taken off before both turning points of a channel are
 //          known; a corrected sample stops at full scale

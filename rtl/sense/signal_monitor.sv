@@ -3,8 +3,8 @@
 // with them.
 //
 // latency  from valid to bits 2, 5..9 2 clk, bit 4 5 clk, bits 0, 1 10 clk, bits 3, 10..12 14 clk,
-//          amplitude 9 clk; 1 clk from phase_jump, lost_count               rate  one sample per
-//          clk
+//          amplitude 9 clk; 1 clk from phase_jump, lost_count
+// rate     one sample per clk
 // faults   0 too_low, 1 too_high, 2 clipped, 3 off_circle, 4 jump, 5 channel_stuck, 6 no_noise, 7
 //          comparator_mismatch, 8 comparator_stuck, 9 channel_missing, 10 offset_drift, 11
 //          unbalanced, 12 not_in_quadrature, 13 phase_jump, 14 lost_count: docs/signal_faults.md

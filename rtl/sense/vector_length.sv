@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // vector_length -- the length of the vector (cos, sin), and roughly where it points.
 //
-// latency  8 clk from valid to done                        rate  one sample per clk
+// latency  8 clk from valid to done
+// rate     one sample per clk
 // source   Volder, IRE Trans. EC-8 (1959) 330: four rotations by atan 2^-k, k = 1..4, after folding
 //          into 45 degrees, leave at most 3.58 degrees; 55/64 takes off their gain of 1.16372. No
 //          multiplier

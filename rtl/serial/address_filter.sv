@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // address_filter -- pass only what is meant for this node of a multi-drop line.
 //
-// latency  1 clk                           rate  one word per clk
+// latency  1 clk
+// rate     one word per clk
 // source   S0: multiprocessor mode of the 8031 (SM2). A word with the 9th bit set is looked at by
 //          all nodes: `00 D5D4 address` with D5D4 01 or 10 and the own address passes and opens the
 //          gate for the words that follow; `00 10 0000` is for all nodes; any other closes it

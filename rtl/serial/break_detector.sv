@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // break_detector -- tells when a line has been low for longer than any character at any baud rate.
 //
-// latency  found comes TIME_US after the line went low, and 1 clk     rate  once a break
+// latency  found comes TIME_US after the line went low, and 1 clk
+// rate     once a break
 // source   of a UART line: a master that does not know the baud rate of its nodes can still send a
 //          break
 // model    tb/serial/break_detector.py, equal in every bit of every cycle

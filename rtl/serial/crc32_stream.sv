@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // crc32_stream -- CRC-32 of a row of bytes, as they come.
 //
-// latency  1 clk from a byte to crc        rate  one byte per clk
+// latency  1 clk from a byte to crc
+// rate     one byte per clk
 // source   CRC-32/ISO-HDLC (Ethernet, zlib): polynomial 04C11DB7 reflected, starts with all ones,
 //          inverted at the end
 // model    zlib.crc32

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // frame_check -- watch the words for this node and tell whole payloads from broken ones.
 //
-// latency  1 clk, `good` comes with the last byte          rate  one word per clk
+// latency  1 clk, `good` comes with the last byte
+// rate     one word per clk
 // source   after a command byte `00 10 address`: length (1..LONGEST), body, CRC-32 over command,
 //          length and body, low byte first. Taking the CRC in as well leaves a constant remainder
 //          behind when all is right

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // sync_fifo -- first in, first out; the oldest word stands at the output until it is popped.
 //
-// latency  2 clk from push to present in an empty queue        rate  one push and one pop per clk
+// latency  2 clk from push to present in an empty queue
+// rate     one push and one pop per clk
 // source   a ring in a memory with one write port and one clocked read port
 // model    tb/serial/sync_fifo.py, equal in every bit of every cycle
 // proved   no word is lost, doubled, invented or overtaken; a word refused is reported

@@ -2,7 +2,8 @@
 // transmit_timeout -- switch off the driver of a shared line that has been on for longer than any
 // reply takes.
 //
-// latency  0; expired off after BITS bit times and 1 clk     rate  -
+// latency  0; expired off after BITS bit times and 1 clk
+// rate     -
 // source   RS-485: one driver that stays on silences the line for everybody
 // model    tb/serial/transmit_timeout.py, equal in every bit of every cycle
 // proved   the driver is on only while it is requested; once expired off it rests until it is no

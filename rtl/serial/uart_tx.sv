@@ -2,7 +2,8 @@
 // uart_tx -- characters of a UART onto a line that is shared: start, 8 data bits LSB first, 9th bit
 // if any, stop.
 //
-// latency  from idle: 1 clk to driver_enable, one bit more to the start bit    rate  characters
+// latency  from idle: 1 clk to driver_enable, one bit more to the start bit
+// rate     characters
 //          without any gap
 // source   S0: the 9th bit syncs command bytes. Bit edges stand at the clk at or before n ·
 //          bit_time: never a sum of roundings

@@ -191,10 +191,10 @@ async def a_frame_for_all_nodes_is_a_mark_in_the_middle_of_its_last_stop_bit(dut
             await line.clk(level)
             at += [n * BIT + part] * int(dut.sync.value)
     assert len(at) == 1 and abs(at[0] - (len(levels) * BIT - BIT // 2)) <= BIT
-    assert await line.read("marks") == 1 and await line.read("frames_good") == 1
+    assert await line.read("syncs") == 1 and await line.read("frames_good") == 1
     await line.words(frame(0x20 | ADDRESS, b"\x08"))
     await line.levels([1] * 4)
-    assert await line.read("marks") == 1 and await line.read("frames_good") == 2
+    assert await line.read("syncs") == 1 and await line.read("frames_good") == 2
 
 
 @cocotb.test()

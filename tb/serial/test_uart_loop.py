@@ -143,4 +143,4 @@ async def sigrok_reads_8n1(dut):
 
 
 def test_character_loop():
-    run("character_loop", __file__)
+    run("uart_loop", __file__)

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// character_loop -- bench top: a transmitter of 8N1 characters and a receiver on the same wire, or
+// uart_loop -- bench top: a transmitter of 8N1 characters and a receiver on the same wire, or
 // on another.
 `default_nettype none
 
-module character_loop (
+module uart_loop (
     input  wire         clk,
     input  wire         rst,
     input  wire  [19:0] bit_time,

@@ -73,4 +73,4 @@ def test_a_mark_is_captured_by_both_nodes_in_the_same_microsecond(bus):
         taken[0][0], taken[1][0], strict=True
     ):  # reset ends for both in the same clk
         assert abs(first.time_clk - second.time_clk) / CLK_HZ < 1e-6
-    assert all(bus.node(n).counters()["marks"] == 3 for n in (1, 2))
+    assert all(bus.node(n).counters()["syncs"] == 3 for n in (1, 2))

@@ -36,7 +36,7 @@ def learned():
         curve=figures_calibration.curve_of_twin(),
         amplitude=parameters.values()["signal_amplitude"],
     )
-    assert machine.learner.settled
+    assert machine.calibration.complete
     return {
         **machine.values,
         "cosine": list(machine.values["cosine"]),

@@ -69,7 +69,7 @@ def test_power_up_finds_both_nodes_with_drives_off_and_no_zero():
         status = axis.status()
         assert (status.state, status.ended, status.enabled, status.homed, status.faults) == (
             "off",
-            "never",
+            "no_motion_yet",
             False,
             False,
             (),

@@ -165,7 +165,7 @@ def test_the_pc_asks_for_damaged_bytes_again_and_gets_its_answers():
     keyboard.outbox = list(keys)
     bench.order([0xED, 0x02, 0xEE])
     for _ in range(600 * CLK_HZ // 1000):
-        pulls(bench, keyboard, "machine")
+        pulls(bench, keyboard, "edm")
     state = bench.state
     assert [byte for byte in heard(bench) if byte not in (0xEE, 0xFA)] == keys
     assert (
@@ -188,7 +188,7 @@ def test_left_control_and_w_make_a_cut():
     bench = room()
     cut_once(bench)
     assert (
-        bench.state.edm_cutting and bench.cuts[0].end_s is None and bench.level("machine_cutting")
+        bench.state.edm_cutting and bench.cuts[0].end_s is None and bench.level("edm_cutting")
     )
     bench.cable(CUT_S)
     (cut,) = bench.cuts
@@ -199,7 +199,7 @@ def test_left_control_and_w_make_a_cut():
     )
     assert (
         not bench.state.edm_cutting
-        and not bench.level("machine_cutting")
+        and not bench.level("edm_cutting")
         and bench.state.edm_starts == 1
     )
     assert 0.05 < cut.start_s - bench.take_heard()[-1][0] < 0.0501
@@ -247,7 +247,7 @@ def test_an_alarm_ends_a_cut_and_holds_the_next_back():
         bench.cable(0.01)
         assert (
             bench.level("edm_alarm")
-            and not bench.level("machine_cutting")
+            and not bench.level("edm_cutting")
             and not bench.cuts[0].whole
         )
         cut_once(bench)
@@ -262,9 +262,9 @@ def test_a_machine_may_never_end_and_may_be_deaf():
     bench = room()
     with bench.fault("edm_endless"):
         cut_once(bench, 5 * CUT_S)
-        assert bench.level("machine_cutting")
+        assert bench.level("edm_cutting")
     bench.cable(0.01)
-    assert not bench.level("machine_cutting") and bench.cuts[0].whole
+    assert not bench.level("edm_cutting") and bench.cuts[0].whole
     with bench.fault("edm_deaf"):
         cut_once(bench)
     assert len(bench.cuts) == 1 and bench.state.edm_ignored == 1

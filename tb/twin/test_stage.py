@@ -44,7 +44,7 @@ def steady_speed(stage, voltage):
 @pytest.mark.parametrize("duty", (0.1, 0.5, 1.0, -1.0))
 def test_the_motor_reaches_the_speed_of_theory_when_the_bridge_brakes(duty):
     stage = Stage()
-    stage.place(60e-3)
+    stage.set_position(60e-3)
     stage.bridge(0.3, duty)
     expected = math.copysign(steady_speed(stage, 12 * abs(duty)), duty)
     assert stage.state.motor_rad_s == pytest.approx(expected, rel=1e-3)
@@ -75,7 +75,7 @@ def test_a_bridge_that_coasts_gives_the_charge_of_a_triangle():
 
 def test_the_speed_rises_with_the_mechanical_time_constant():
     stage = Stage(motor_inductance=1e-6, **SMOOTH)
-    stage.place(20e-3)
+    stage.set_position(20e-3)
     p = stage.plant
     tau = (
         (p["motor_inertia"] + p["table_mass"] * LEAD**2)
@@ -90,7 +90,7 @@ def test_the_speed_rises_with_the_mechanical_time_constant():
 
 def test_stiction_of_the_motor_holds_below_break_away_and_never_creeps():
     stage = Stage()
-    stage.place(20e-3)
+    stage.set_position(20e-3)
     p = stage.plant
     torque = [
         p["motor_constant"] * 12 / p["motor_resistance"] * on / stage.PERIOD for on in (2, 3, 5)
@@ -117,7 +117,7 @@ def test_stiction_of_the_motor_holds_below_break_away_and_never_creeps():
 
 def test_stiction_of_the_table_is_a_spring_that_lets_go_at_break_away():
     stage = Stage(screw_stiffness=1.0, screw_damping=0, screw_preload=0)  # as good as no screw
-    stage.place(20e-3)
+    stage.set_position(20e-3)
     p, start = stage.plant, stage.state.position_m
 
     def ramp(begin, end):  # slowly: a step would overshoot
@@ -161,7 +161,7 @@ def test_friction_is_stable_at_any_speed():
 
 def push_both_ways(stage, newton):
     """How far the table goes between a push up and a push down, m; the rotor is held."""
-    stage.place(20e-3)
+    stage.set_position(20e-3)
     stage.hold(rotor=True)
     ends = []
     for sign in (1, -1):
@@ -199,7 +199,7 @@ def test_friction_of_the_table_is_well_below_the_preload():
 
 def test_the_table_rings_on_the_screw_with_its_natural_frequency_and_damping():
     stage = Stage(**SMOOTH)
-    stage.place(20e-3)
+    stage.set_position(20e-3)
     stage.hold(rotor=True)
     p = stage.plant
     stage.push(10)
@@ -228,7 +228,7 @@ def actuations(seed, end, cycles=6):
     """Places where a switch presses and releases, driven slowly over its edge."""
     stage = Stage(seed=seed)
     outward = -1 if end == "low" else 1
-    stage.place(stage.plant[f"switch_{end}"] - outward * 1e-6)
+    stage.set_position(stage.plant[f"switch_{end}"] - outward * 1e-6)
     presses, releases = [], []
     for _ in range(cycles):
         for places, way, wanted in ((presses, outward, True), (releases, -outward, False)):
@@ -261,7 +261,7 @@ def test_the_stop_holds_the_table_at_full_voltage():
         (-1.5e-3, -1.0, lambda x: -4e-3 < x < -2e-3),
         (121.5e-3, 1.0, lambda x: 122e-3 < x < 124e-3),
     ):
-        stage.place(place)
+        stage.set_position(place)
         stage.bridge(0.5, duty)
         assert inside(stage.state.position_m) and abs(stage.state.velocity_m_s) < 1e-6
 

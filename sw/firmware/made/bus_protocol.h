@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x08F93E09u    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0x6D8DE9ADu    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u    // sequence, operation
@@ -97,6 +97,7 @@ enum bus_encoder_event {    // bits
     BUS_ENCODER_EVENT_AMPLITUDE_LOW = 1 << 2,    // signal too small
     BUS_ENCODER_EVENT_AMPLITUDE_HIGH = 1 << 3,    // signal too large
     BUS_ENCODER_EVENT_DISAGREEMENT = 1 << 4,    // interpolated position and quadrature count differ
+    BUS_ENCODER_EVENT_PULSE_TOO_SHORT = 1 << 5,    // a pulse, or the gap between two, was shorter than deglitch and was not counted
 };
 
 enum bus_state {
@@ -765,7 +766,7 @@ enum bus_parameter {
     BUS_PARAMETER_INTEGRAL_LIMIT = 21,    // [1/32768] servo: largest integral term, of full scale
     BUS_PARAMETER_DEAD_BAND = 22,    // [1/65536 period] servo: the integrator rests inside this at standstill
     BUS_PARAMETER_FOLLOWING_LIMIT = 23,    // [1/65536 period] guard: largest following error
-    BUS_PARAMETER_DEGLITCH = 24,    // [1e-9 s] deglitcher: a level must be stable this long
+    BUS_PARAMETER_DEGLITCH = 24,    // [1e-9 s] deglitcher: a level must be stable this long, a pulse of pulses and direction too
     BUS_PARAMETER_OUTLIER_STEP = 25,    // limit filter 1: largest step between samples; 0 off
     BUS_PARAMETER_OUTLIER_HOLD = 26,    // limit filter 1: samples in a row it may hold back
     BUS_PARAMETER_AMPLITUDE_LOW = 27,    // encoder: smallest good amplitude, converter counts
@@ -866,7 +867,7 @@ enum bus_parameter {
     X(amplitude_low, 27, 0LL, 65535LL, 32LL) \
     X(amplitude_high, 28, 0LL, 65535LL, 160LL) \
     X(disagreement_limit, 29, 0LL, 1048575LL, 32768LL) \
-    X(encoder_fault_mask, 30, 0LL, 31LL, 30LL) \
+    X(encoder_fault_mask, 30, 0LL, 63LL, 30LL) \
     X(pwm_frequency, 31, 1000LL, 200000LL, 20000LL) \
     X(watchdog_time, 32, 0LL, 65535LL, 500LL) \
     X(auto_calibration, 33, 0LL, 1LL, 0LL) \

@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0xb6ba37beu            // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0x45b847bau            // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -596,10 +596,13 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_ENCODER_EVENTS_DISAGREEMENT_MASK          0x00000010u  // interpolated position and quadrature count differ
 #define AXIS_ENCODER_EVENTS_DISAGREEMENT_SHIFT         4
 #define AXIS_ENCODER_EVENTS_DISAGREEMENT_WIDTH         1
+#define AXIS_ENCODER_EVENTS_PULSE_TOO_SHORT_MASK       0x00000020u  // decoder_mode 3: a pulse of a, or the gap between two, was too short for the deglitcher: not counted
+#define AXIS_ENCODER_EVENTS_PULSE_TOO_SHORT_SHIFT      5
+#define AXIS_ENCODER_EVENTS_PULSE_TOO_SHORT_WIDTH      1
 #define AXIS_ENCODER_FAULT_MASK                        0x060u  // rw: which encoder events are a fault; same order as encoder_events
-#define AXIS_ENCODER_FAULT_MASK_MASK                   0x0000001fu
+#define AXIS_ENCODER_FAULT_MASK_MASK                   0x0000003fu
 #define AXIS_ENCODER_FAULT_MASK_SHIFT                  0
-#define AXIS_ENCODER_FAULT_MASK_WIDTH                  5
+#define AXIS_ENCODER_FAULT_MASK_WIDTH                  6
 #define AXIS_REJECTED_PULSES                           0x064u  // rw: pulses that the deglitcher of a or b held back; writing clears
 #define AXIS_REJECTED_PULSES_MASK                      0xffffffffu
 #define AXIS_REJECTED_PULSES_SHIFT                     0

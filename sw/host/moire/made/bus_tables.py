@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x08F93E09
+PROTOCOL_CRC = 0x6D8DE9AD
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -118,6 +118,7 @@ ENCODER_EVENTS = {
     2: ("amplitude_low", "signal too small"),
     3: ("amplitude_high", "signal too large"),
     4: ("disagreement", "interpolated position and quadrature count differ"),
+    5: ("pulse_too_short", "a pulse, or the gap between two, was shorter than deglitch and was not counted"),
 }
 
 # code: (name, words)
@@ -508,7 +509,7 @@ PARAMETERS = {parameter.name: parameter for parameter in (
               "guard: largest following error"),
     Parameter("deglitch", 24, "s", Fraction(1, 1000000000),
               0, 1000000, 10000,
-              "deglitcher: a level must be stable this long"),
+              "deglitcher: a level must be stable this long, a pulse of pulses and direction too"),
     Parameter("outlier_step", 25, "", Fraction(1, 1),
               0, 255, 0,
               "limit filter 1: largest step between samples; 0 off"),
@@ -525,7 +526,7 @@ PARAMETERS = {parameter.name: parameter for parameter in (
               0, 1048575, 32768,
               "encoder: interpolated position against quadrature count; 0 off"),
     Parameter("encoder_fault_mask", 30, "", Fraction(1, 1),
-              0, 31, 30,
+              0, 63, 30,
               "encoder: which events are a fault (bits of encoder_event)"),
     Parameter("pwm_frequency", 31, "Hz", Fraction(1, 1),
               1000, 200000, 20000,

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0xB6BA37BE          # CRC-32 of tables/registers.rdl
+MAP_CRC = 0x45B847BA          # CRC-32 of tables/registers.rdl
 BLOCKS = {"node": (0x000, 0x000), "bus": (0x100, 0x000), "peripherals": (0x200, 0x000), "axis": (0x400, 0x100), "feedback": (0xC00, 0x100), "actuator": (0x1400, 0x100)}          # base, distance to the next one
 
 
@@ -325,7 +325,9 @@ FIELDS = (
           "what was wrong with the sensor since it was last cleared; write 1 to clear: amplitude high"),
     Field("axis", "encoder_events", "disagreement", 0x5C, 4, 1, False, "rw", "", Fraction(1),
           "interpolated position and quadrature count differ"),
-    Field("axis", "encoder_fault_mask", "value", 0x60, 0, 5, False, "rw", "", Fraction(1),
+    Field("axis", "encoder_events", "pulse_too_short", 0x5C, 5, 1, False, "rw", "", Fraction(1),
+          "decoder_mode 3: a pulse of a, or the gap between two, was too short for the deglitcher: not counted"),
+    Field("axis", "encoder_fault_mask", "value", 0x60, 0, 6, False, "rw", "", Fraction(1),
           "which encoder events are a fault; same order as encoder_events"),
     Field("axis", "rejected_pulses", "value", 0x64, 0, 32, False, "rw", "", Fraction(1),
           "pulses that the deglitcher of a or b held back; writing clears"),
