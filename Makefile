@@ -28,8 +28,13 @@ test: $(SETUP) $(FIRMWARE)   ## all tests; K=part of a name, SIM=icarus|verilato
 	$(call say,tests$(if $K, of $K)$(if $(SIM), under $(SIM))$(if $(SEED), with SEED=$(SEED)))
 	@SIM='$(SIM)' SEED='$(SEED)' WAVES='$(WAVES)' $(PYTHON) -m pytest -q -n $(JOBS) $(if $K,-k '$K') tb
 
-check: fresh lint test prove  ## what every change must pass: made files fresh, lint, tests, proofs
+check: fresh lint promises test prove  ## what every change must pass
 	@echo 'check: all passed'
+
+promises: $(SETUP)  ## what the project promises of its code: units, latencies, imports, tests, types
+	$(call say,promises: ports, latencies, imports, tests that can fail, strict types)
+	@failed=0; for check in $(PROMISES); do $(PYTHON) -m tools.check_$$check || failed=1; done; exit $$failed
+PROMISES := ports latency imports tests types
 
 lint: $(SETUP)   ## verilator -Wall over every module, ruff over the Python, the layout of all code
 	$(call say,lint: verilator -Wall over $(words $(RTL)) modules; ruff; the formatters)
@@ -105,4 +110,4 @@ clean:            ## remove what was built; the tools in build/venv stay (rm -rf
 $(SETUP): requirements.lock pyproject.toml sw/host/pyproject.toml tools/setup.sh
 	@tools/setup.sh
 
-.PHONY: help demo test check lint format prove tables fresh firmware figure figures soak board clean
+.PHONY: help demo test check lint format promises prove tables fresh firmware figure figures soak board clean

