@@ -111,8 +111,9 @@ def test_coming_into_force_the_stage_stays_and_its_position_is_told_on_the_other
         stage.segments.use(use)
         assert abs(stage.true_nm() - before) < NOISE_NM
         assert abs(stage.error_nm() - told) < CURVED_NM + NOISE_NM + (use == "rectangle") * 5
-        status = stage.axis.status()
-        assert abs(status.target_nm - status.position_nm) < NOISE_NM and status.state == "holding"
+        seen = [stage.axis.status() for _ in range(8)]  # friction lets single readings differ more
+        assert abs(sum(s.target_nm - s.position_nm for s in seen) / len(seen)) < NOISE_NM
+        assert {s.state for s in seen} == {"holding"}
 
 
 def test_a_homing_begins_without_the_table_and_finds_the_same_zero(stage, table):
