@@ -17,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from importlib.util import find_spec
 from pathlib import Path
@@ -72,16 +73,18 @@ class BuildError(Exception):
     """One line that says what is missing or what went wrong."""
 
 
-def package(name, why):
+def package(name: str, why: str) -> Path:
+    """Folder of an installed package; BuildError says why it is needed."""
     spec = find_spec(name)
-    if not spec:
+    if not spec or not spec.submodule_search_locations:
         raise BuildError(
             f"the package {name} is missing ({why}): pip install it into the virtual environment"
         )
     return Path(spec.submodule_search_locations[0])
 
 
-def compiler():
+def compiler() -> str:
+    """The C++ compiler: CXX of the environment, or g++."""
     found = shutil.which(os.environ.get("CXX", "g++"))
     if not found:
         raise BuildError(
@@ -90,14 +93,18 @@ def compiler():
     return found
 
 
-def say(text):
+def say(text: str) -> None:
+    """Report progress on standard error."""
     print(f"twin: {text}", file=sys.stderr, flush=True)
 
 
-def run(command, what, cwd=None, environment=None):
-    """Run a command; when it fails, its first error is the message and the whole output is kept in
-    a file.
-    """
+def run(
+    command: Sequence[object],
+    what: str,
+    cwd: Path | None = None,
+    environment: Mapping[str, str] | None = None,
+) -> str:
+    """The output of a command; BuildError has its first error, and a file the whole output."""
     result = subprocess.run(
         [str(c) for c in command], cwd=cwd, env=environment, capture_output=True, text=True
     )
@@ -114,20 +121,22 @@ def run(command, what, cwd=None, environment=None):
     return result.stdout
 
 
-def digest(files, *more):
+def digest(files: Iterable[Path], *more: object) -> str:
+    """A name for the contents of files and whatever else a build depends on."""
     total = hashlib.sha256(repr(more).encode())
     for file in files:
         total.update(str(file).removeprefix(str(ROOT)).encode() + b"\0" + file.read_bytes())
     return total.hexdigest()[:16]
 
 
-def own_sources():
+def own_sources() -> list[Path]:
+    """All sources of the twin."""
     return sorted(p for p in HERE.rglob("*") if p.suffix in (".cpp", ".h", ".toml", ".py"))
 
 
-def made_once(folder, result, make):
-    """The file `result` in `folder`, made by make(folder) in a folder of its own that then takes
-    its place.
+def made_once(folder: Path, result: str, make: Callable[[Path], None]) -> Path:
+    """The file `result` in `folder`. make(folder) makes it in a temporary folder, which then
+    replaces this one.
     """
     if (folder / result).exists():
         return folder / result
@@ -146,16 +155,16 @@ def made_once(folder, result, make):
     return folder / result
 
 
-def machine_sources():
+def machine_sources() -> list[Path]:
     """C++ of the machines: all but the nodes and their bus."""
     return [file for file in sorted(HERE.rglob("*.cpp")) if file.parent.name != "nodes"]
 
 
-def machine_library():
+def machine_library() -> Path:
     """libmachine.so: the machines without a node. No Verilator needed, a few seconds."""
     tool = compiler()
 
-    def make(folder):
+    def make(folder: Path) -> None:
         (folder / "parameters.h").write_text(parameters.header())
         run(
             [
@@ -174,17 +183,17 @@ def machine_library():
     return made_once(BUILD / f"machine-{digest(own_sources(), tool)}", "libmachine.so", make)
 
 
-def rtl_path():
+def rtl_path() -> list[Path]:
     """Every folder in which a module is found by its name."""
     rooms = sorted({p.parent for p in (ROOT / "rtl").rglob("*.sv")})
     return rooms + [package(CORE_PACKAGE, "the soft core") / "verilog"]
 
 
-def runtime(tool, verilator):
+def runtime(tool: str, verilator: Path) -> Path:
     """Verilator's own run-time part, the same for every design."""
     files = [verilator / "include" / name for name in ("verilated.cpp", "verilated_threads.cpp")]
 
-    def make(folder):
+    def make(folder: Path) -> None:
         objects = []
         for file in files:
             objects.append(folder / f"{file.stem}.o")
@@ -206,7 +215,14 @@ def runtime(tool, verilator):
     return made_once(BUILD / f"runtime-{digest(files, tool, COMPILE)}", "libverilated.a", make)
 
 
-def verilate(folder, verilator, source, prefix, values, *more):
+def verilate(
+    folder: Path,
+    verilator: Path,
+    source: Path,
+    prefix: str,
+    values: Mapping[str, object],
+    *more: object,
+) -> None:
     """C++ of the module in a source file, as a class named by the prefix; the modules below it are
     found by name.
     """
@@ -232,7 +248,7 @@ def verilate(folder, verilator, source, prefix, values, *more):
     )
 
 
-def simulation(driver, source, firmware=None, **parameters):
+def simulation(driver: Path, source: Path, firmware: str | None = None, **parameters: int) -> Path:
     """The program made of a C++ driver and the Verilated module of a source file, which the driver
     includes as Vtop.h; with the
     firmware of an image when it is named, whose register accesses the driver serves."""
@@ -250,7 +266,7 @@ def simulation(driver, source, firmware=None, **parameters):
             [*include, "-DMOIRE_REGISTER_ACCESS", *firmware_build.defines_of(firmware)],
         )
 
-    def make(folder):
+    def make(folder: Path) -> None:
         verilate(folder, verilator, source, "Vtop", parameters)
         objects = []
         for file in own:
@@ -300,7 +316,10 @@ def simulation(driver, source, firmware=None, **parameters):
     return made_once(ROOT / "build" / "simulation" / f"{driver.stem}-{name}", "run", make)
 
 
-def verilate_node(folder, verilator, clk_hz, axes, node):
+def verilate_node(
+    folder: Path, verilator: Path, clk_hz: int, axes: int, node: Mapping[str, int]
+) -> None:
+    """C++ of a node, and the header that names its memory."""
     values = {
         "CLK_HZ": clk_hz,
         "AXES": axes,
@@ -324,7 +343,8 @@ def verilate_node(folder, verilator, clk_hz, axes, node):
     ]
     if len(words) != 1:
         raise BuildError(
-            "the memory of the soft core was not found in Verilator's output: has node_memory been renamed?"
+            "the memory of the soft core was not found in Verilator's output: "
+            "has node_memory been renamed?"
         )
     once = "__Vtrigprevexpr___TOP__clk__0"
     alone = (
@@ -335,13 +355,16 @@ def verilate_node(folder, verilator, clk_hz, axes, node):
     rearm = f"#define REARM_CLK(pins) (pins).{once} = 0\n" if alone else ""
     includes = "".join(f'#include "{p.name}"\n' for p in sorted(folder.glob("Vnode*.cpp")))
     (folder / "verilated_node.h").write_text(
-        f"// SPDX-License-Identifier: Apache-2.0\n// Made by sw/twin/build.py.\n#pragma once\n{includes}"
+        "// SPDX-License-Identifier: Apache-2.0\n// Made by sw/twin/build.py.\n#pragma once\n"
+        f"{includes}"
         f"constexpr int CLK_HZ = {clk_hz}, AXES = {axes}, MEMORY_WORDS = {MEMORY_BYTES // 4};\n"
         f"#define NODE_MEMORY {words[0]}\n{rearm}"
     )
 
 
-def twin_library(clk_hz=2_400_000, axes=1, node=None):
+def twin_library(
+    clk_hz: int = 2_400_000, axes: int = 1, node: Mapping[str, int] | None = None
+) -> Path:
     """libtwin.so: Verilated nodes, machines and line. node: more parameters of rtl/node.sv, {name:
     value}.
     """
@@ -359,11 +382,12 @@ def twin_library(clk_hz=2_400_000, axes=1, node=None):
         return folder / "libtwin.so"
     start = time.monotonic()
     say(
-        f"building {folder.relative_to(ROOT)} (clk {clk_hz} Hz, {axes} {'axis' if axes == 1 else 'axes'} a node)"
+        f"building {folder.relative_to(ROOT)} "
+        f"(clk {clk_hz} Hz, {axes} {'axis' if axes == 1 else 'axes'} a node)"
     )
     support = runtime(tool, verilator)
 
-    def make(folder):
+    def make(folder: Path) -> None:
         (folder / "parameters.h").write_text(parameters.header())
         verilate_node(folder, verilator, clk_hz, axes, node or {})
         say(f"verilated after {time.monotonic() - start:.0f} s")
@@ -399,7 +423,7 @@ def twin_library(clk_hz=2_400_000, axes=1, node=None):
     return library
 
 
-def firmware(image="axis"):
+def firmware(image: str = "axis") -> list[int]:
     """The words of an image of the firmware, built first when it is not fresh."""
     BUILD.mkdir(parents=True, exist_ok=True)
     with open(BUILD / "firmware.lock", "w") as lock:
@@ -413,7 +437,7 @@ def firmware(image="axis"):
         )
 
 
-def words_of(file):
+def words_of(file: Path) -> list[int]:
     """Words of a $readmemh file, the zeros at its end left out."""
     words, address = {}, 0
     for token in Path(file).read_text().split():

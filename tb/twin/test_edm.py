@@ -274,7 +274,7 @@ def test_the_state_bounces_and_settles():
     bench = room(clk_hz=1_000_000)
     bench.type(START)
     levels = numpy.concatenate(
-        [bench.cable(0.02)["machine_cutting"], bench.cable(0.2)["machine_cutting"]]
+        [bench.cable(0.02)["edm_cutting"], bench.cable(0.2)["edm_cutting"]]
     ).astype(int)
     edges = numpy.flatnonzero(numpy.diff(levels))
     split = numpy.flatnonzero(numpy.diff(edges) > 50_000)

@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The machines: what can be done with that of an axis, and one without a node, whose pins are
-driven from here.
+"""The machine models: a handle for the machine of an axis, and a machine without a node, whose pins
+are driven from Python.
 """
 
 import ctypes
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import make_dataclass
 from functools import cache, partial
+from typing import Any
 
 import numpy
+import numpy.typing
 
 from twin import build
 from twin.parameters import tables as parameters
@@ -20,7 +23,10 @@ HANDLE, REAL, WHOLE, LONG, TEXT = (
     ctypes.c_uint64,
     ctypes.c_char_p,
 )
-FUNCTIONS = {
+Functions = Mapping[str, tuple[Any, list[Any]]]  # {name: (result, [arguments])}
+Trace = dict[str, numpy.typing.NDArray[numpy.float64]]
+
+FUNCTIONS: Functions = {
     "machine_parameters": (WHOLE, [TEXT]),
     "machine_state_names": (TEXT, [HANDLE]),
     "machine_faults": (TEXT, [HANDLE]),
@@ -34,7 +40,7 @@ FUNCTIONS = {
     "machine_trace_size": (WHOLE, [HANDLE]),
     "machine_trace_take": (None, [HANDLE, HANDLE]),
 }
-BENCH_FUNCTIONS = {
+BENCH_FUNCTIONS: Functions = {
     "bench_new": (HANDLE, [TEXT, LONG, REAL, HANDLE]),
     "bench_delete": (None, [HANDLE]),
     "bench_machine": (HANDLE, [HANDLE]),
@@ -88,43 +94,54 @@ SENSE = {
 DAC_ZERO, DAC_BITS = 32768, 16
 
 
-def declare(library, functions):
-    """functions: {name: (result, [arguments])}"""
+def declare(library: ctypes.CDLL, functions: Functions) -> None:
+    """Tell ctypes the results and the arguments of the functions of a library."""
     for name, (result, arguments) in functions.items():
         function = getattr(library, name)
         function.restype, function.argtypes = result, arguments
 
 
-def pack(kind, overrides, library):
+def pack(
+    kind: str, overrides: Mapping[str, float], library: ctypes.CDLL
+) -> "ctypes.Array[ctypes.c_double]":
     """The parameters of a machine as its C++ structure."""
     values = list(parameters.values(overrides, kind).values())
     if library.machine_parameters(kind.encode()) != len(values):
-        raise KeyError(f"the machine {kind} is no machine for an axis")
+        raise KeyError(f"the machine {kind} does not fit an axis")
     return (ctypes.c_double * len(values))(*values)
 
 
 class State:
-    """A machine as it truly is at a time: time_s and the values that machine.h's state_names lists
-    for it.
-    """
+    """The true state of a machine: time_s and the values that state_names of machine.h lists."""
+
+    position_m: float
 
     @property
-    def position_nm(self):
+    def position_nm(self) -> float:
         return self.position_m * 1e9
 
 
 @cache
-def state_class(names):
-    """A data class of the values, and how to make each of a double."""
-    makers = [{"?": bool, "#": int}.get(name[-1], float) for name in names.split()]
-    fields = [(name.rstrip("?#"), maker) for name, maker in zip(names.split(), makers)]
+def state_class(names: str) -> tuple[type[Any], list[Callable[[float], Any]]]:
+    """A data class of the values, and the conversion of each from a double."""
+    makers: list[Callable[[float], Any]] = [
+        {"?": bool, "#": int}.get(name[-1], float) for name in names.split()
+    ]
+    fields: list[Any] = [(name.rstrip("?#"), maker) for name, maker in zip(names.split(), makers)]
     return make_dataclass("State", fields, bases=(State,), frozen=True), makers
 
 
 class MachineHandle:
     """The machine of an axis, by its address in the library."""
 
-    def __init__(self, library, handle, kind, clk_hz, now):
+    def __init__(
+        self,
+        library: ctypes.CDLL,
+        handle: int,
+        kind: str,
+        clk_hz: int,
+        now: Callable[[], int],
+    ) -> None:
         self.library, self.handle, self.kind, self.clk_hz, self.now = (
             library,
             handle,
@@ -136,68 +153,73 @@ class MachineHandle:
         self.faults = library.machine_faults(handle).decode().split()
 
     @property
-    def state(self):
+    def state(self) -> Any:
+        """The true state now, see State."""
         kind, makers = state_class(self.names)
         out = (ctypes.c_double * len(makers))()
         self.library.machine_state(self.handle, self.now(), out)
         return kind(*(make(value) for make, value in zip(makers, out)))
 
-    def _unknown(self, name):
+    def _unknown(self, name: str) -> KeyError:
         return KeyError(
-            f"the machine {self.kind} has no parameter {name} to change while it runs; see {parameters.source(self.kind).name}"
+            f"the machine {self.kind} has no parameter {name} to change while it runs; "
+            f"see {parameters.source(self.kind).name}"
         )
 
-    def set(self, **values):
+    def set(self, **values: float) -> None:
         """Change parameters of the running machine; its time step is fixed."""
         for name, value in values.items():
             if not self.library.machine_set(self.handle, name.encode(), value):
                 raise self._unknown(name)
 
-    def get(self, name):
+    def get(self, name: str) -> float:
+        """A parameter of the running machine, in the unit of its table."""
         out = ctypes.c_double()
         if not self.library.machine_get(self.handle, name.encode(), ctypes.addressof(out)):
             raise self._unknown(name)
         return out.value
 
-    def set_position(self, position):
-        """Carry it there by hand, m or rad: at rest, nothing wound up."""
+    def set_position(self, position: float) -> None:
+        """Move it there by hand, in m or rad: at standstill, without tension."""
         self.library.machine_set_position(self.handle, position)
 
-    def push(self, force):
+    def push(self, force: float) -> None:
         """An outside force, N or Nm, from now on."""
         self.library.machine_push(self.handle, force)
 
-    def inject(self, fault, level=False):
-        """`level` is that of a stuck pin."""
+    def inject(self, fault: str, level: bool = False) -> None:
+        """Begin a fault; `level` is the level of a stuck pin."""
         self._fault(fault, True, level)
 
-    def clear(self, fault):
+    def clear(self, fault: str) -> None:
+        """End a fault."""
         self._fault(fault, False, False)
 
     @contextmanager
-    def fault(self, fault, level=False):
+    def fault(self, fault: str, level: bool = False) -> "Iterator[MachineHandle]":
+        """A fault as long as the block lasts."""
         self.inject(fault, level)
         try:
             yield self
         finally:
             self.clear(fault)
 
-    def _fault(self, fault, on, level):
+    def _fault(self, fault: str, on: bool, level: bool) -> None:
         if not self.library.machine_fault(self.handle, fault.encode(), on, level):
             raise KeyError(
-                f"there is no fault {fault} of a machine {self.kind}: there are {', '.join(self.faults)}"
+                f"a machine {self.kind} has no fault {fault}: there are {', '.join(self.faults)}"
             )
 
-    def trace(self, rate_hz=10_000):
-        """Record states from now on; the rate is rounded to whole time steps of the machine; 0 ends
-        it.
+    def trace(self, rate_hz: float = 10_000) -> None:
+        """Record states from now on, at a rate rounded to whole time steps of the machine; 0 ends
+        the recording.
         """
         self.library.machine_trace(
             self.handle, max(1, round(self.clk_hz / rate_hz)) if rate_hz else 0
         )
 
-    def take_trace(self):
-        """{name: array} of what was recorded since the last take."""
+    def take_trace(self) -> Trace:
+        """{name: array} of what was recorded since the previous call."""
         values = numpy.empty(self.library.machine_trace_size(self.handle))
         self.library.machine_trace_take(self.handle, values.ctypes.data)
         names = [name.rstrip("?#") for name in self.names.split()]
@@ -207,10 +229,10 @@ class MachineHandle:
 class Machine(MachineHandle):
     """A machine without a node. Time passes in run, watch, bridge, steps and dac."""
 
-    PERIOD = 200  # clk of the PWM: 20 kHz
+    PERIOD = 200  # of the PWM in cycles: 20 kHz
 
-    def __init__(self, kind, seed=1, clk_hz=4_000_000, **values):
-        self.bench = None
+    def __init__(self, kind: str, seed: int = 1, clk_hz: int = 4_000_000, **values: float) -> None:
+        self.bench: int | None = None
         library = ctypes.CDLL(str(build.machine_library()))
         declare(library, {**FUNCTIONS, **BENCH_FUNCTIONS})
         packed = pack(kind, values, library)
@@ -223,47 +245,52 @@ class Machine(MachineHandle):
             partial(library.bench_now, self.bench),
         )
 
-    def __del__(self):
+    def __del__(self) -> None:
         if self.bench:
             self.library.bench_delete(self.bench)
         self.bench = None
 
-    def clk(self, seconds):
+    def clk(self, seconds: float) -> int:
+        """A time in cycles."""
         return round(seconds * self.clk_hz)
 
-    def pins(self, **levels):
-        """Set pins that the node would drive; they hold from the next clk on."""
+    def pins(self, **levels: bool) -> None:
+        """Set pins that the node would drive, from the next cycle on."""
         which = sum(DRIVE[name] for name in levels)
         self.library.bench_pins(
             self.bench, sum(DRIVE[name] for name, level in levels.items() if level), which
         )
 
-    def run(self, seconds):
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
         self.library.bench_run(self.bench, self.clk(seconds))
 
-    def watch(self, seconds):
-        """Run; {pin: levels after each clk}."""
+    def watch(self, seconds: float) -> dict[str, numpy.typing.NDArray[numpy.int8]]:
+        """Run; {pin: levels after each cycle}."""
         out = numpy.zeros(self.clk(seconds), dtype=numpy.uint16)
         self.library.bench_watch(self.bench, len(out), out.ctypes.data)
         return {name: (out & bit > 0).astype(numpy.int8) for name, bit in SENSE.items()}
 
-    def level(self, pin):
+    def level(self, pin: str) -> bool:
+        """The level of a pin that the machine drives."""
         return bool(self.library.bench_levels(self.bench) & SENSE[pin])
 
-    def bridge(self, seconds, duty=0.0, brakes=True):
-        """Run with the drive enabled; duty -1..1 of the supply, the rest of the PWM period braking
-        or coasting.
+    def bridge(self, seconds: float, duty: float = 0.0, brakes: bool = True) -> None:
+        """Run with the drive enabled; duty -1..1 of the supply, braking or coasting in the
+        remainder of each PWM period.
         """
         self.library.bench_bridge(
             self.bench, self.clk(seconds), self.PERIOD, round(duty * self.PERIOD), brakes
         )
 
-    def steps(self, count, rate_hz, high_s=2e-6, setup_s=2e-6):
-        """`count` pulses of step, negative: down."""
+    def steps(
+        self, count: int, rate_hz: float, high_s: float = 2e-6, setup_s: float = 2e-6
+    ) -> None:
+        """Send `count` pulses of step; a negative count moves down."""
         self.library.bench_steps(
             self.bench, count, self.clk(1 / rate_hz), self.clk(high_s), self.clk(setup_s)
         )
 
-    def dac(self, code, bits=DAC_BITS):
-        """One frame to the converter."""
+    def dac(self, code: int, bits: int = DAC_BITS) -> None:
+        """Send one frame to the DAC."""
         self.library.bench_frame(self.bench, code, bits)

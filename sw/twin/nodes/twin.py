@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The machine without hardware: nodes as they ship (RTL and firmware), a machine at each axis, a
+"""The system without hardware: nodes as they ship (RTL and firmware), a machine at each axis, a
 line with a host at its end.
 
 Time is simulated: it passes in run, run_until_words and nowhere else, and the same seed gives the
@@ -18,18 +18,31 @@ An axis is counted through all nodes: axis = place of the node * axes a node + a
 
 import ctypes
 import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 import numpy
+import numpy.typing
 
 from twin import build
 from twin.devices.devices import FUNCTIONS as DEVICES_FUNCTIONS
 from twin.devices.devices import PEER_FUNCTIONS, Devices, DevicesHandle, PeerLineHandle
 from twin.devices.devices import pack as pack_devices
 from twin.machines.machine import FUNCTIONS as MACHINE_FUNCTIONS
-from twin.machines.machine import HANDLE, LONG, REAL, WHOLE, MachineHandle, declare, pack
+from twin.machines.machine import (
+    HANDLE,
+    LONG,
+    REAL,
+    WHOLE,
+    Functions,
+    MachineHandle,
+    Trace,
+    declare,
+    pack,
+)
 
 CLK_HZ = 2_400_000
 START_S = 0.15  # until the soft core of a node with one axis listens
@@ -47,7 +60,7 @@ PEER_BAUD = 9600  # between nodes
 ALL_PERIPHERALS = 63  # of rtl/peripherals.sv
 CUTS = {"none": 0, "idle": 1, "break": 2}
 
-FUNCTIONS = {
+FUNCTIONS: Functions = {
     "twin_axes": (WHOLE, []),
     "twin_memory_words": (WHOLE, []),
     "twin_new": (HANDLE, [LONG, WHOLE, HANDLE, HANDLE, WHOLE, HANDLE, HANDLE, REAL]),
@@ -78,26 +91,26 @@ FUNCTIONS = {
 
 @dataclass(frozen=True)
 class Axis:
-    """A machine by the name of its parameters_<machine>.toml, with what differs from that table."""
+    """A machine by the name of its parameters/<machine>.toml; `parameters` override that table."""
 
     machine: str = "stage"
-    parameters: dict = field(default_factory=dict)
+    parameters: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Node:
-    """A node by its address on the line, with a machine at each of its axes, and what stands around
-    it besides.
-    """
+    """A node by its address on the bus, with a machine at each of its axes, and its devices."""
 
     address: int
-    axes: list = field(default_factory=lambda: [Axis()])
+    axes: list[Axis] = field(default_factory=lambda: [Axis()])
     devices: Devices | None = None
 
 
 @dataclass(frozen=True)
 class BusState:
-    level: bool  # as the nodes hear it
+    """The RS-485 bus now."""
+
+    level: bool  # at the nodes
     host_drives: bool
     nodes_drive: int  # bit mask over the nodes
     collisions: int  # times that two drove at once
@@ -108,17 +121,20 @@ class BusState:
     words_waiting: int
 
 
-def library(clk_hz, axes, node=None):
+def library(clk_hz: int, axes: int, node: Mapping[str, int] | None = None) -> ctypes.CDLL:
+    """The library of a build, with its functions declared."""
     found = ctypes.CDLL(str(build.twin_library(clk_hz, axes, node)))
     declare(found, {**FUNCTIONS, **MACHINE_FUNCTIONS, **DEVICES_FUNCTIONS, **PEER_FUNCTIONS})
     return found
 
 
-def array(values, dtype):
+def array(values: Any, dtype: Any) -> numpy.typing.NDArray[Any]:
+    """The values as a contiguous array."""
     return numpy.ascontiguousarray(values, dtype=dtype)
 
 
-def memory_image(found, words):
+def memory_image(found: ctypes.CDLL, words: Sequence[int]) -> numpy.typing.NDArray[Any]:
+    """The words of the firmware as an array; BuildError if they do not fit."""
     image = array(words, numpy.uint32)
     if len(image) > found.twin_memory_words():
         raise build.BuildError(
@@ -128,47 +144,44 @@ def memory_image(found, words):
 
 
 class Twin:
-    """`nodes` are Nodes, or addresses of nodes with `axes` stages each. All nodes are of one build:
-    one with fewer axes than
-    another has unconnected ones behind them. `plant` overrides parameters of all machines,
-    `plant_of` {axis: {…}} those of one;
-    `firmware` is a list of words or None for the one in sw/firmware; `host_baud_error` 0.02 makes
-    the host 2 % fast;
-    `node_parameters` {"W": 12} are parameters of rtl/node.sv, {"DRIVES": 15} builds all that an
-    axis can drive, WITH_SEGMENTS
-    a segment table. Nodes have all links (PERIPHERALS = 63) if one of them has devices or peers;
-    `peers` are two places of nodes, joined by
-    a serial line."""
+    """Nodes, their machines and the bus between them and a host.
+
+    `nodes` are Nodes, or addresses of nodes with `axes` stages each. All nodes are of one build; a
+    node with fewer axes than another has unconnected ones. `plant` overrides parameters of all
+    machines, `plant_of` {axis: {…}} those of one. `firmware` is a list of words, or None for the
+    one in sw/firmware. `host_baud_error` 0.02 makes the host 2 % fast. `node_parameters` {"W": 12}
+    are parameters of rtl/node.sv; WITH_SEGMENTS builds a segment table. All nodes have all
+    peripherals if one of them has devices or peers; `peers` are the numbers of two nodes that a
+    serial line connects.
+    """
 
     def __init__(
         self,
-        nodes=(1, 2),
-        seed=1,
-        clk_hz=CLK_HZ,
-        baud=BAUD,
-        host_baud_error=0.0,
-        axes=1,
-        plant=None,
-        plant_of=None,
-        firmware=None,
-        node_parameters=NODE,
-        peers=None,
-        peer_baud=PEER_BAUD,
-    ):
-        self.handle = None
-        nodes = [node if isinstance(node, Node) else Node(node, [Axis()] * axes) for node in nodes]
-        self.addresses, self.node_axes = (
-            tuple(node.address for node in nodes),
-            max(len(node.axes) for node in nodes),
-        )
-        self.axes = self.node_axes * len(nodes)
+        nodes: Iterable[Node | int] = (1, 2),
+        seed: int = 1,
+        clk_hz: int = CLK_HZ,
+        baud: float = BAUD,
+        host_baud_error: float = 0.0,
+        axes: int = 1,
+        plant: Mapping[str, float] | None = None,
+        plant_of: Mapping[int, Mapping[str, float]] | None = None,
+        firmware: Sequence[int] | None = None,
+        node_parameters: Mapping[str, int] = NODE,
+        peers: tuple[int, int] | None = None,
+        peer_baud: float = PEER_BAUD,
+    ) -> None:
+        self.handle: int | None = None
+        built = [node if isinstance(node, Node) else Node(node, [Axis()] * axes) for node in nodes]
+        self.addresses = tuple(node.address for node in built)
+        self.node_axes = max(len(node.axes) for node in built)
+        self.axes = self.node_axes * len(built)
         if any(n not in range(self.axes) for n in plant_of or {}):
             raise IndexError(f"plant_of names an axis that is not there: there are {self.axes}")
-        if peers or any(node.devices for node in nodes):
+        if peers or any(node.devices for node in built):
             node_parameters = {"PERIPHERALS": ALL_PERIPHERALS, **node_parameters}
         fitted = [
             axis
-            for node in nodes
+            for node in built
             for axis in [*node.axes, *[Axis("unconnected")] * (self.node_axes - len(node.axes))]
         ]
         self.library, self.clk_hz, self.baud = (
@@ -207,7 +220,7 @@ class Twin:
         ]
         self.around = [
             self._attach_devices(n, node.devices or Devices(), seed, now)
-            for n, node in enumerate(nodes)
+            for n, node in enumerate(built)
             if node_parameters.get("PERIPHERALS")
         ]
         pairs = (
@@ -224,21 +237,24 @@ class Twin:
         if host_baud_error:
             self.set_host_baud(baud * (1 + host_baud_error))
 
-    def __enter__(self):
+    def __enter__(self) -> "Twin":
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self.close()
 
-    def __del__(self):
+    def __del__(self) -> None:
         self.close()
 
-    def close(self):
+    def close(self) -> None:
+        """Free the simulation."""
         if self.handle:
             self.library.twin_delete(self.handle)
         self.handle = None
 
-    def _attach_devices(self, node, around, seed, now):
+    def _attach_devices(
+        self, node: int, around: Devices, seed: int, now: Callable[[], int]
+    ) -> DevicesHandle:
         if around.table is not None and around.table not in range(self.axes):
             raise IndexError(
                 f"there is no axis {around.table} to be the table: there are {self.axes}"
@@ -256,40 +272,42 @@ class Twin:
 
     # time
 
-    def time(self):
+    def time(self) -> float:
         """Simulated seconds since reset."""
-        return self.library.twin_now(self.handle) / self.clk_hz
+        return float(self.library.twin_now(self.handle) / self.clk_hz)
 
-    def run(self, seconds):
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
         self.library.twin_run(self.handle, max(0, round(seconds * self.clk_hz)))
 
-    def run_until_words(self, count, timeout_s):
-        """Run until the host has `count` words waiting, at most timeout_s; returns how many wait."""
-        return self.library.twin_run_until_words(
-            self.handle, count, max(0, round(timeout_s * self.clk_hz))
-        )
+    def run_until_words(self, count: int, timeout_s: float) -> int:
+        """Run until the host has received `count` words, at most timeout_s; returns their count."""
+        longest = max(0, round(timeout_s * self.clk_hz))
+        return int(self.library.twin_run_until_words(self.handle, count, longest))
 
-    # line
+    # bus
 
-    def send_words(self, words, flip_cells=(), gap_cells=0):
-        """Put words (0…511) behind what the host is sending. flip_cells: bit cells to turn over,
-        counted from the first start
-        bit, 11 a word (and gap_cells more between two)."""
-        words, flips = array(words, numpy.uint16), array(flip_cells, numpy.uint32)
-        self.library.twin_send_words(
-            self.handle, words.ctypes.data, len(words), flips.ctypes.data, len(flips), gap_cells
-        )
-
-    def send_levels(self, levels, cell_s=0.0):
-        """The host's driver as it is told, cell by cell (0: of one bit time): breaks, nonsense,
-        half characters.
+    def send_words(
+        self, words: Sequence[int], flip_cells: Sequence[int] = (), gap_cells: int = 0
+    ) -> None:
+        """Queue words (0…511) that the host sends. flip_cells: bit cells to invert, counted from
+        the first start bit, 11 a word (and gap_cells more between two).
         """
-        levels = array(levels, numpy.uint8)
-        self.library.twin_send_levels(
-            self.handle, levels.ctypes.data, len(levels), cell_s * self.clk_hz
+        sent, flips = array(words, numpy.uint16), array(flip_cells, numpy.uint32)
+        self.library.twin_send_words(
+            self.handle, sent.ctypes.data, len(sent), flips.ctypes.data, len(flips), gap_cells
         )
 
-    def send_nonsense(self, cells, seed=1):
+    def send_levels(self, levels: Any, cell_s: float = 0.0) -> None:
+        """Drive levels from the host, each for cell_s (0: one bit time): breaks, noise, half
+        characters.
+        """
+        sent = array(levels, numpy.uint8)
+        self.library.twin_send_levels(
+            self.handle, sent.ctypes.data, len(sent), cell_s * self.clk_hz
+        )
+
+    def send_nonsense(self, cells: int, seed: int = 1) -> None:
         """Random levels, each of 0.1 to 3 bit times."""
         random = numpy.random.default_rng(seed)
         fine = 10
@@ -297,34 +315,49 @@ class Twin:
         levels = numpy.repeat(numpy.arange(cells) & 1, runs)[: cells * fine]
         self.send_levels(levels, 1 / self.baud / fine)
 
-    def receive_words(self, most=4096):
-        """Words that the host has received and not yet taken, as from a port of a PC: without a
-        stop bit too, but no break.
+    def receive_words(self, most: int = 4096) -> list[int]:
+        """Words that the host has received since the previous call, as from the port of a PC: also
+        those without a stop bit, but no break.
         """
         out = numpy.empty(most, dtype=numpy.uint16)
-        return out[: self.library.twin_receive_words(self.handle, out.ctypes.data, most)].tolist()
+        count = self.library.twin_receive_words(self.handle, out.ctypes.data, most)
+        return [int(word) for word in out[:count]]
 
-    def set_host_baud(self, baud):
+    def set_host_baud(self, baud: float) -> None:
+        """Change the baud rate of the host."""
         self.library.twin_host_bit_time(self.handle, self.clk_hz / baud)
 
-    def flip_reply_cells(self, cells):
-        """Turn over bit cells of what the host hears next, counted from the first start bit of the
-        next reply.
-        """
-        cells = array(cells, numpy.uint32)
-        self.library.twin_flip_reply(self.handle, cells.ctypes.data, len(cells))
+    def flip_reply_cells(self, cells: Sequence[int]) -> None:
+        """Invert bit cells of the next reply at the host, counted from its first start bit."""
+        flips = array(cells, numpy.uint32)
+        self.library.twin_flip_reply(self.handle, flips.ctypes.data, len(flips))
 
-    def bus_spikes(self, rate_hz, shortest_s=0.2e-6, longest_s=2e-6):
-        """Short wrong levels on the line, at random times; rate 0 ends them."""
+    def bus_spikes(
+        self, rate_hz: float, shortest_s: float = 0.2e-6, longest_s: float = 2e-6
+    ) -> None:
+        """Short wrong levels on the bus at random times; rate 0 ends them."""
         self.library.twin_bus_spikes(self.handle, rate_hz, shortest_s, longest_s)
 
-    def bus(self):
+    def bus(self) -> BusState:
+        """The state of the bus."""
         out = (ctypes.c_uint64 * 9)()
         self.library.twin_bus_state(self.handle, out)
-        return BusState(bool(out[0]), bool(out[1]), *out[2:7], out[7] / self.clk_hz, out[8])
+        level, host_drives, *counts, last_driven, words = (int(value) for value in out)
+        nodes_drive, collisions, framing_errors, start_glitches, edges = counts
+        return BusState(
+            bool(level),
+            bool(host_drives),
+            nodes_drive,
+            collisions,
+            framing_errors,
+            start_glitches,
+            edges,
+            last_driven / self.clk_hz,
+            words,
+        )
 
-    def bus_stays_idle(self, seconds):
-        """Run; true if nobody drove the line and no edge was on it."""
+    def bus_stays_idle(self, seconds: float) -> bool:
+        """Run; true if nobody drove the bus and there was no edge on it."""
         before = self.bus()
         self.run(seconds)
         after = self.bus()
@@ -337,7 +370,7 @@ class Twin:
 
     # machines
 
-    def machine(self, axis=0):
+    def machine(self, axis: int = 0) -> MachineHandle:
         """The machine of an axis: its state, parameters, faults and traces; see
         machine.MachineHandle.
         """
@@ -345,39 +378,41 @@ class Twin:
             raise IndexError(f"there is no axis {axis}: there are {self.axes}")
         return self.machines[axis]
 
-    def check_node(self, node):
+    def check_node(self, node: int) -> int:
+        """The number of a node; IndexError if it does not exist."""
         if node not in range(len(self.addresses)):
             raise IndexError(f"there is no node {node}: there are {len(self.addresses)}")
         return node
 
-    def truth(self, axis=0):
-        """The machine of an axis as it really is now."""
+    def truth(self, axis: int = 0) -> Any:
+        """The true state of the machine of an axis, see machine.State."""
         return self.machine(axis).state
 
-    def true_position_nm(self, axis=0):
-        return self.truth(axis).position_nm
+    def true_position_nm(self, axis: int = 0) -> float:
+        """The true position of an axis in nm."""
+        return float(self.truth(axis).position_nm)
 
-    def set_position(self, axis, position_m):
-        """Carry the table here by hand: at rest, nothing wound up. The node sees a jump."""
+    def set_position(self, axis: int, position_m: float) -> None:
+        """Move the table there by hand, without tension. The node sees a jump."""
         self.machine(axis).set_position(position_m)
 
-    def push(self, axis, newton):
+    def push(self, axis: int, newton: float) -> None:
         """An outside force on the table, from now on."""
         self.machine(axis).push(newton)
 
-    def set_plant(self, axis, **plant):
+    def set_plant(self, axis: int, **plant: float) -> None:
         """Change parameters of a running machine."""
         self.machine(axis).set(**plant)
 
-    # links
+    # peripherals
 
-    def devices(self, node=0):
-        """What stands around a node besides its axes; see devices.DevicesHandle."""
+    def devices(self, node: int = 0) -> DevicesHandle:
+        """The devices of a node, see devices.DevicesHandle."""
         if not self.around:
             raise LookupError("no node has devices: give a Node some, or build with PERIPHERALS")
         return self.around[self.check_node(node)]
 
-    def peer_line(self, sender, receiver):
+    def peer_line(self, sender: int, receiver: int) -> PeerLineHandle:
         """One direction of the serial line between two nodes; see devices.PeerLineHandle."""
         if (sender, receiver) not in self.peer_lines:
             raise LookupError(f"no serial line leads from node {sender} to node {receiver}")
@@ -385,109 +420,120 @@ class Twin:
 
     # power
 
-    def power_cut(self, node=0):
-        """A node loses its power, and with it its panel, its drives' enable and its memory; the
-        machines keep their state, the
-        EEPROM what was written to its end."""
+    def power_cut(self, node: int = 0) -> None:
+        """A node loses its power, its panel, the enable of its drives and its memory. The machines
+        keep their state, and the EEPROM keeps every completed write.
+        """
         self.library.twin_power(self.handle, self.check_node(node), False)
 
-    def power_on(self, node=0):
+    def power_on(self, node: int = 0) -> None:
+        """The power of a node returns."""
         self.library.twin_power(self.handle, self.check_node(node), True)
 
-    # faults: estop of a node, line_cut of a node or of "host"; all others are those of the machine
-    # of an axis
+    # faults: estop of a node, line_cut of a node or of "host"; all others are of the machine of an
+    # axis
 
-    def inject(self, fault, where=0, level=False):
-        """`where` is the axis, for estop and line_cut the node; `level` is that of a stuck pin, and
-        of a cut line: true
-        if the cut end hears ones, false for a break."""
+    def inject(self, fault: str, where: int | str = 0, level: bool = False) -> None:
+        """Begin a fault. `where` is the axis, for estop and line_cut the node; `level` is the level
+        of a stuck pin, and of a cut line: true if the cut end reads ones, false for a break.
+        """
         self._fault(fault, where, True, level)
 
-    def clear(self, fault, where=0):
+    def clear(self, fault: str, where: int | str = 0) -> None:
+        """End a fault."""
         self._fault(fault, where, False, False)
 
     @contextmanager
-    def fault(self, fault, where=0, level=False):
+    def fault(self, fault: str, where: int | str = 0, level: bool = False) -> "Iterator[Twin]":
+        """A fault as long as the block lasts."""
         self.inject(fault, where, level)
         try:
             yield self
         finally:
             self.clear(fault, where)
 
-    def _fault(self, fault, where, on, level):
+    def _fault(self, fault: str, where: int | str, on: bool, level: bool) -> None:
+        place = -1 if isinstance(where, str) else where
         if fault == "estop":
-            self.library.twin_estop(self.handle, self.check_node(where), on)
+            self.library.twin_estop(self.handle, self.check_node(place), on)
         elif fault == "line_cut":
-            node = -1 if where == "host" else self.check_node(where)
+            node = -1 if where == "host" else self.check_node(place)
             self.library.twin_cut(
                 self.handle, node, CUTS["none" if not on else "idle" if level else "break"]
             )
         elif on:
-            self.machine(where).inject(fault, level)
+            self.machine(place).inject(fault, level)
         else:
-            self.machine(where).clear(fault)
+            self.machine(place).clear(fault)
 
     # traces
 
-    def trace(self, axis=0, rate_hz=10_000):
-        """Record from now on; the rate is rounded to whole time steps of the machine (100 kHz at
-        most); 0 ends it.
+    def trace(self, axis: int = 0, rate_hz: float = 10_000) -> None:
+        """Record from now on, at a rate rounded to whole time steps of the machine (100 kHz at
+        most); 0 ends the recording.
         """
         self.machine(axis).trace(rate_hz)
 
-    def take_trace(self, axis=0):
-        """{name: array} of what was recorded since the last take."""
+    def take_trace(self, axis: int = 0) -> Trace:
+        """{name: array} of what was recorded since the previous call."""
         return self.machine(axis).take_trace()
 
 
 class TwinTransport:
-    """The transport that the host package asks for, over a twin; time passes only as far as needed."""
+    """The transport of the host package over a twin; time passes only as far as needed."""
 
     time_is_stopped = handshake = True
 
-    def __init__(self, twin):
+    def __init__(self, twin: Twin) -> None:
         self.twin, self.character_s, self.addresses = twin, CELLS / twin.baud, twin.addresses
 
-    def send(self, words):
+    def send(self, words: Sequence[int]) -> None:
+        """Send words of nine bits."""
         self.twin.run(TURNAROUND_CELLS / self.twin.baud)
         self.twin.send_words(list(words))
         self.twin.run(len(words) * self.character_s)
 
-    def receive(self, count, timeout_s):
+    def receive(self, count: int, timeout_s: float) -> list[int]:
         """At most `count` words; fewer when timeout_s of simulated time has passed."""
         self.twin.run_until_words(count, timeout_s)
         return self.twin.receive_words(count) if count else []
 
-    def now(self):
+    def now(self) -> float:
+        """Simulated time in s."""
         return self.twin.time()
 
-    def wait(self, seconds):
+    def wait(self, seconds: float) -> None:
+        """Let simulated time pass."""
         self.twin.run(seconds)
 
-    def reaches(self, address):
+    def reaches(self, address: int) -> bool:
+        """Whether this address can be called: all can."""
         return True
 
-    def set_baud(self, baud):
+    def set_baud(self, baud: float) -> None:
+        """Change the baud rate of the host."""
         self.twin.set_host_baud(baud)
         self.character_s = CELLS / baud
 
-    def send_break(self):
+    def send_break(self) -> None:
+        """Hold the bus low for BREAK_S."""
         self.twin.send_levels([0], BREAK_S)
         self.twin.run(BREAK_S + 2 * self.character_s)
 
-    def close(self):
+    def close(self) -> None:
+        """Free the twin."""
         self.twin.close()
 
-    def __enter__(self):
+    def __enter__(self) -> "TwinTransport":
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
-def cells_of(words, gap_cells=0):
-    """Levels of 9-bit words on the line, one a bit cell."""
-    levels = []
+def cells_of(words: Sequence[int], gap_cells: int = 0) -> list[int]:
+    """Levels of 9-bit words on the bus, one a bit cell."""
+    levels: list[int] = []
     for n, word in enumerate(words):
         levels += [1] * (gap_cells if n else 0) + [0, *(word >> bit & 1 for bit in range(9)), 1]
     return levels
@@ -501,8 +547,14 @@ class FrameBench:
     exchange(levels) puts bit cells on the line as they are and returns the words that the node
     answered."""
 
-    def __init__(self, address=1, clk_hz=1_840_000, baud=BAUD, firmware=None):
-        self.handle = None
+    def __init__(
+        self,
+        address: int = 1,
+        clk_hz: int = 1_840_000,
+        baud: float = BAUD,
+        firmware: Sequence[int] | None = None,
+    ) -> None:
+        self.handle: int | None = None
         self.library, self.clk_hz = library(clk_hz, 1, NODE), clk_hz
         image = memory_image(self.library, build.firmware() if firmware is None else firmware)
         self.handle = self.library.frame_bench_new(
@@ -510,37 +562,46 @@ class FrameBench:
         )
         self.words = numpy.empty(256, dtype=numpy.uint16)
 
-    def __del__(self):
+    def __del__(self) -> None:
         if self.handle:
             self.library.frame_bench_delete(self.handle)
         self.handle = None
 
-    def exchange(self, levels, enough=256, quiet_cells=100, most_cells=2000):
+    def exchange(
+        self, levels: Any, enough: int = 256, quiet_cells: int = 100, most_cells: int = 2000
+    ) -> list[int]:
         """Returns when `enough` words are there, or the line was quiet for quiet_cells after the
         last level or the answer; at
         the latest after most_cells. A node takes up to 60 cells to answer a request, at a low
         clk."""
-        levels = array(levels, numpy.uint8)
+        sent = array(levels, numpy.uint8)
         count = self.library.frame_bench_exchange(
             self.handle,
-            levels.ctypes.data,
-            len(levels),
+            sent.ctypes.data,
+            len(sent),
             enough,
             quiet_cells,
             most_cells,
             self.words.ctypes.data,
             len(self.words),
         )
-        return self.words[:count].tolist()
+        return [int(word) for word in self.words[:count]]
 
-    def idle(self, cells, baud=BAUD):
+    def idle(self, cells: float, baud: float = BAUD) -> None:
+        """Let bit cells pass."""
         self.library.frame_bench_idle(self.handle, round(cells * self.clk_hz / baud))
 
-    def time(self):
-        return self.library.frame_bench_now(self.handle) / self.clk_hz
+    def time(self) -> float:
+        """Simulated seconds since reset."""
+        return float(self.library.frame_bench_now(self.handle) / self.clk_hz)
 
 
-def realtime_factor(simulated_s=0.1, tries=5, nodes=(1, 2), **arguments):
+def realtime_factor(
+    simulated_s: float = 0.1,
+    tries: int = 5,
+    nodes: Iterable[Node | int] = (1, 2),
+    **arguments: Any,
+) -> float:
     """Simulated seconds per second of one processor, nodes and machines running; the best of the
     tries.
     """

@@ -1,25 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """The parameters of the machines: <machine>.toml as dictionaries, and as the C++ structures that
-build.py puts beside
-the libraries."""
+build.py writes beside the libraries.
+"""
 
 import tomllib
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 HERE = Path(__file__).parent
 MACHINES = tuple(sorted(file.stem for file in HERE.glob("*.toml")))
 
 
-def source(machine):
+def source(machine: str) -> Path:
+    """The file of a machine; KeyError names the machines that there are."""
     if machine not in MACHINES:
         raise KeyError(f"there is no machine {machine}; there are {', '.join(MACHINES)}")
     return HERE / f"{machine}.toml"
 
 
 @cache
-def load(machine="stage"):
-    """{name: entry}, name = section_key, entry = value, unit, why."""
+def load(machine: str = "stage") -> dict[str, dict[str, Any]]:
+    """{name: entry} with name = section_key; an entry has value, unit and why."""
     with open(source(machine), "rb") as file:
         sections = tomllib.load(file)
     return {
@@ -29,8 +32,10 @@ def load(machine="stage"):
     }
 
 
-def values(overrides=None, machine="stage"):
-    """{name: value} with the overrides in place; a name that does not exist is refused."""
+def values(
+    overrides: Mapping[str, float] | None = None, machine: str = "stage"
+) -> dict[str, float]:
+    """{name: value} with the overrides applied; KeyError for a name that does not exist."""
     result = {name: float(entry["value"]) for name, entry in load(machine).items()}
     for name, value in (overrides or {}).items():
         if name not in result:
@@ -41,7 +46,8 @@ def values(overrides=None, machine="stage"):
     return result
 
 
-def structure(machine):
+def structure(machine: str) -> str:
+    """The C++ structure of a machine's parameters, and the function that finds one by name."""
     name = "".join(word.capitalize() for word in machine.split("_")) + "Parameters"
     fields = "\n".join(
         f"    double {field};    // {entry['unit']}" for field, entry in load(machine).items()
@@ -60,7 +66,7 @@ inline double* find_parameter({name}& p, const char* name) {{
 """
 
 
-def header():
+def header() -> str:
     """Text of parameters.h."""
     structures = "\n".join(structure(machine) for machine in MACHINES)
     return f"""// SPDX-License-Identifier: Apache-2.0
