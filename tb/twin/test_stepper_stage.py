@@ -202,5 +202,5 @@ def test_the_switches_open_at_the_ends():
         assert (
             machine.level("encoder_a") and machine.level("encoder_b") and machine.level("encoder_z")
         )
-    with pytest.raises(KeyError, match="no fault sensor_cut of a machine stepper_stage"):
+    with pytest.raises(KeyError, match="a machine stepper_stage has no fault sensor_cut"):
         machine.inject("sensor_cut")

@@ -261,7 +261,7 @@ def test_what_does_not_exist_is_refused(twin):
         twin.set_plant(0, weight=1)
     with pytest.raises(KeyError, match="there is no machine lathe; there are .*, stage, "):
         Twin([Node(1, [Axis("lathe")])])
-    with pytest.raises(KeyError, match="rotary_ring is no machine for an axis"):
+    with pytest.raises(KeyError, match="rotary_ring does not fit an axis"):
         Twin([Node(1, [Axis("rotary_ring")])])
     with pytest.raises(KeyError, match="linear_motor has no parameter screw_lead"):
         Twin([Node(1, [Axis("linear_motor", {"screw_lead": 1e-3})])])
