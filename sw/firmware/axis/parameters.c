@@ -3,7 +3,6 @@
 #include "axis/parameters.h"
 
 #include "core/hardware.h"
-#include "axis/homing.h"
 #include "made/bus_protocol.h"
 
 #define PULSES_AND_DIRECTION 3u  // a mode of the decoder
@@ -250,9 +249,14 @@ static bool needs_sine(uint8_t id, int64_t value) {
     return false;
 }
 
+static bool home_method_exists(int64_t method) {
+    return method == 1 || method == 2 || method == 17 || method == 18 || method == 33 ||
+           method == 34 || method == 35 || method == 37 || method == -1 || method == -2;
+}
+
 uint8_t parameters_check(unsigned axis, uint8_t id, int64_t value) {
     if (id < 1 || id > BUS_PARAMETER_COUNT) return BUS_CAUSE_UNKNOWN_PARAMETER;
-    if (id == BUS_PARAMETER_HOME_METHOD && !homing_method_exists(value))
+    if (id == BUS_PARAMETER_HOME_METHOD && !home_method_exists(value))
         return BUS_CAUSE_OUT_OF_RANGE;
     if (value < table[id].low || value > table[id].high) return BUS_CAUSE_OUT_OF_RANGE;
     return needs_sine(id, value) && !hardware_has_sine(axis) ? BUS_CAUSE_NOT_BUILT : BUS_CAUSE_OK;
