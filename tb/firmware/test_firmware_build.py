@@ -25,7 +25,7 @@ def build(out, *options, **environment):
 
 
 def functions(elf):
-    return set(firmware_build.load_segments(elf.read_bytes())[1])
+    return set(firmware_build.read_elf(elf)[1])
 
 
 @pytest.fixture(scope="module")
@@ -93,3 +93,13 @@ def test_each_image_is_made_beside_the_others(made, tmp_path):
     assert (
         "settings_operation" not in axis and {"calibration_axes_work", "calibration_work"} <= axis
     )
+
+
+def test_two_sources_of_the_same_stem_are_refused(tmp_path):
+    for name in ("axis/clock.c", "core/clock.c", "core/clock.h"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    with pytest.raises(firmware_build.BuildError, match="same object clock.o: rename one"):
+        firmware_build.sources_of("axis", tmp_path)
+    (tmp_path / "axis" / "clock.c").unlink()
+    assert len(firmware_build.sources_of("axis", tmp_path)) == 2

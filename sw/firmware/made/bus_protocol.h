@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0xE4980B09u    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0xE5A01F8Eu    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u    // sequence, operation
@@ -69,7 +69,7 @@ enum bus_cause {
     BUS_CAUSE_PAUSED_BY_OPERATOR = 58,    // paused by the operator
     BUS_CAUSE_KEY_WITHOUT_FUNCTION = 59,    // this key has no function
     BUS_CAUSE_TABLE_POSITION_UNKNOWN = 60,    // the position of the table is not known
-    BUS_CAUSE_JOB_CHANGED = 61,    // the stored station list is not the one of this job
+    BUS_CAUSE_JOB_CHANGED = 61,    // this is not the list of the job
     BUS_CAUSE_CHECK_SUB_NODE = 66,    // check the sub-node: it did not report the end of its turn; its faults are shown and reset there
     BUS_CAUSE_NOTHING_SAVED = 67,    // no values are saved: the defaults are in use
     BUS_CAUSE_SAVED_DAMAGED = 68,    // the saved values are damaged: the defaults are in use
@@ -295,7 +295,7 @@ enum bus_job_flag {    // bits
     X(58, "paused by the operator") \
     X(59, "this key has no function") \
     X(60, "the position of the table is not known") \
-    X(61, "the stored station list is not the one of this job") \
+    X(61, "this is not the list of the job") \
     X(66, "check the sub-node") \
     X(67, "no values are saved") \
     X(68, "the saved values are damaged") \

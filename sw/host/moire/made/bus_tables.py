@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0xE4980B09
+PROTOCOL_CRC = 0xE5A01F8E
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -88,7 +88,7 @@ CAUSES = {
     58: ("paused_by_operator", "paused by the operator"),
     59: ("key_without_function", "this key has no function"),
     60: ("table_position_unknown", "the position of the table is not known"),
-    61: ("job_changed", "the stored station list is not the one of this job"),
+    61: ("job_changed", "this is not the list of the job"),
     66: ("check_sub_node", "check the sub-node: it did not report the end of its turn; its faults are shown and reset there"),
     67: ("nothing_saved", "no values are saved: the defaults are in use"),
     68: ("saved_damaged", "the saved values are damaged: the defaults are in use"),
