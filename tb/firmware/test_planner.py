@@ -204,7 +204,7 @@ def test_the_state_after_some_ticks_is_that_of_the_steps():
         pieces = taken(plan, ticks)
         assert all(piece[3] <= 64 for piece in pieces) and distance(
             pieces
-        ) == plan.at.state.gone == sum(every[:ticks])
+        ) == plan.at.state.moved == sum(every[:ticks])
         assert list(steps(segments_of(plan))) == every[ticks:]
 
 

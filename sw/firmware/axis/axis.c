@@ -62,8 +62,8 @@ static void hand_over(unsigned n, bool fine) {
     write_control(n, true);
 }
 
-// A motor whose command drops to 0 springs back. So its command decreases slowly enough for the fine
-// stage to follow, until friction alone holds the axis. A stepper keeps its command.
+// A motor whose command drops to 0 springs back. So its command decreases slowly enough for the
+// fine stage to follow, until friction alone holds the axis. A stepper keeps its command.
 static void ease(unsigned n) {
     struct axis* a = &axes[n];
     uint32_t now = clock_ms();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// motion -- one motion at a time of an axis: plans it, feeds the profile player, and detects the end
-// and the settling.
+// motion -- one motion at a time of an axis: plans it, feeds the profile player, and detects the
+// end and the settling.
 //
 // Distances and positions are in 2^-16 period. A `velocity_id` is the parameter that limits the
 // velocity.
@@ -26,7 +26,7 @@ uint8_t motion_play(unsigned n, int64_t distance, uint8_t velocity_id);
 // profile, or another axis is being replanned.
 uint8_t motion_retarget(unsigned n, int64_t target, uint8_t velocity_id);
 
-bool motion_played(unsigned n);      // the player is at rest and no piece is left
+bool motion_played(unsigned n);     // the player is at rest and no piece is left
 uint32_t motion_ticks(unsigned n);  // duration of the motion that was planned last
 
 // Settling: the error must stay inside the window for settle_time.

@@ -3,8 +3,8 @@
 //
 // The hardware passes only the words of frames for this node, and marks the last word of a frame
 // whose CRC is right. A frame without the mark is dropped at the next command byte. A request is
-// checked in this order: wrong_map, unknown_operation, wrong_length, no_such_axis, out_of_range of a
-// value, then the state of the axis (faulted, not_enabled, busy, not_homed, out_of_travel).
+// checked in this order: wrong_map, unknown_operation, wrong_length, no_such_axis, out_of_range of
+// a value, then the state of the axis (faulted, not_enabled, busy, not_homed, out_of_travel).
 #include "bus/bus.h"
 
 #include "axis/axis.h"
@@ -45,7 +45,7 @@ static uint8_t request[1 + BUS_LONGEST_BODY + CRC_BYTES];  // length, body, CRC-
 static uint8_t reply[1 + BUS_LONGEST_BODY + CRC_BYTES];
 static const uint8_t* current_request;  // bodies of the request that is being executed
 static uint8_t* current_reply;
-static bool answered;  // there was a request
+static bool answered;          // there was a request
 static uint32_t answered_crc;  // and this was its CRC-32
 static uint32_t repeated, refused;
 static uint8_t followed;           // axis whose present position goes into each reply

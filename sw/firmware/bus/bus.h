@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// bus -- the RS-485 bus: receives frames, executes their requests, sends replies. The protocol is in
-// docs/protocol.md.
+// bus -- the RS-485 bus: receives frames, executes their requests, sends replies. The protocol is
+// in docs/protocol.md.
 #ifndef MOIRE_BUS_H
 #define MOIRE_BUS_H
 

@@ -10,7 +10,7 @@
 
 #define SAMPLES 128u        // a power of two
 #define LONGEST_EVERY 200u  // ticks: 50 ms, so that a time fits into 16 bits up to 80 MHz
-#define HOLDS 16u  // open loop: a command lasts 1 to 16 samples, then its negative as long
+#define HOLDS 16u           // open loop: a command lasts 1 to 16 samples, then its negative as long
 
 struct setting {
     uint8_t axis;
@@ -134,10 +134,10 @@ void scope_work(void) {
         scope.due = now + scope.every;  // samples that were missed are left out
     take(n);
     if (scope.setting.amplitude) {
-        uint32_t gone = (uint32_t)scope.samples[(scope.next + SAMPLES - 1u) % SAMPLES].position -
-                        (uint32_t)scope.from;
-        if ((int32_t)gone < 0) gone = 0u - gone;
-        if (axis_state(n) != BUS_STATE_EXCITED || gone > scope.setting.level)
+        uint32_t moved = (uint32_t)scope.samples[(scope.next + SAMPLES - 1u) % SAMPLES].position -
+                         (uint32_t)scope.from;
+        if ((int32_t)moved < 0) moved = 0u - moved;
+        if (axis_state(n) != BUS_STATE_EXCITED || moved > scope.setting.level)
             scope.left = 0;
         else
             excite(n);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// arithmetic -- integer functions for the planner: wide, exact, and fast on a core that divides only
-// 32 bits.
+// arithmetic -- integer functions for the planner: wide, exact, and fast on a core that divides
+// only 32 bits.
 #ifndef MOIRE_ARITHMETIC_H
 #define MOIRE_ARITHMETIC_H
 

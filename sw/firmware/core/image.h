@@ -6,9 +6,9 @@
 
 #include <stdint.h>
 
-struct image_part {                // null: the part does not need this function
-    void (*start)(unsigned axes);  // number of axes that may be accessed
-    void (*work)(void);            // a small piece of work: well below 1 ms at 3 MHz
+struct image_part {                           // null: the part does not need this function
+    void (*start)(unsigned axes);             // number of axes that may be accessed
+    void (*work)(void);                       // a small piece of work: well below 1 ms at 3 MHz
     uint8_t (*operation)(uint8_t operation);  // a bus_cause; not_built: not of this part
 };
 
