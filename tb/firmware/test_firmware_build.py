@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""build.py: what it makes, when it makes it, and how it says that it cannot."""
+"""build.py: what it makes, when it makes it, and how it reports that it cannot."""
 
 import os
 import struct
@@ -58,7 +58,7 @@ def test_the_report_adds_up(made):
     assert program == (made[0] / "firmware.bin").stat().st_size
 
 
-def test_nothing_is_made_twice(made):
+def test_nothing_is_built_twice(made):
     before = (made[0] / "firmware.elf").stat().st_mtime_ns
     assert build(made[0]).stdout == made[1]
     assert (made[0] / "firmware.elf").stat().st_mtime_ns == before
@@ -71,7 +71,7 @@ def test_nothing_is_made_twice(made):
         ([], {"CROSS": "no-such-machine-"}, "no-such-machine-gcc was not found"),
     ],
 )
-def test_what_cannot_be_made_is_said_in_one_line(tmp_path, options, environment, words):
+def test_a_failed_build_is_reported_in_one_line(tmp_path, options, environment, words):
     run = build(tmp_path, *options, **environment)
     assert (
         run.returncode == 1
