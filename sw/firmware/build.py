@@ -6,8 +6,8 @@ its own name.
 An image consists of the parts that its image_NAME.c lists; the linker drops what they do not reach.
 The compiler is zig (PyPI ziglang, of the running Python), or GNU with CROSS=riscv64-unknown-elf-
 in the environment.
-The .hex is for $readmemh: one 32-bit word per line, little endian in memory, zeros up to the size of
-the memory.
+The .hex is for $readmemh: one 32-bit word per line, little endian in memory, filled with zeros up
+to the size of the memory.
 Nothing is built if nothing has changed. The exit code is 1, with one line of explanation, if a tool
 is missing, a source is wrong or the image does not fit.
 """

@@ -157,7 +157,7 @@ def compiled():
             *firmware_build.FLAGS,
             firmware_build.FAST,
             f"-DMEMORY_BYTES={BYTES}",
-            f"-Wl,-T,{here / 'program.ld'}",
+            f"-Wl,-T,{here / 'core_test.ld'}",
             "-o",
             str(elf),
             str(here / "core_test.c"),
