@@ -15,7 +15,8 @@
 #include "bus/bus.h"
 #include "made/bus_protocol.h"
 #include "station/job/edm.h"
-#include "station/panel/panel.h"
+#include "station/devices/display.h"
+#include "station/devices/keypad.h"
 #include "station/table/peer.h"
 #include "station/settings.h"
 #include "station/storage/store.h"
@@ -352,8 +353,8 @@ uint8_t job_save_list(void) {
 
 static uint8_t flags(void) {
     return (uint8_t)(BUS_JOB_FLAG_EEPROM * (store_state() != STORE_DEAD) |
-                     BUS_JOB_FLAG_KEYPAD * panel_has_keypad() |
-                     BUS_JOB_FLAG_DISPLAY * panel_has_display() |
+                     BUS_JOB_FLAG_KEYPAD * keypad_present() |
+                     BUS_JOB_FLAG_DISPLAY * display_present() |
                      BUS_JOB_FLAG_CUTTING * edm_cuts() | BUS_JOB_FLAG_ALARM * edm_alarms() |
                      BUS_JOB_FLAG_KEYS_PENDING * machine_keys_pending() |
                      BUS_JOB_FLAG_PAUSING * pausing |

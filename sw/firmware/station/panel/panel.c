@@ -15,9 +15,9 @@
 #include <stdint.h>
 
 #include "core/clock.h"
-#include "station/panel/display.h"
+#include "station/devices/display.h"
 #include "station/job/job.h"
-#include "station/panel/keypad.h"
+#include "station/devices/keypad.h"
 #include "made/bus_protocol.h"
 #include "station/table/peer.h"
 #include "station/settings.h"
@@ -383,7 +383,3 @@ void panel_work(void) {
     keypad_work();
     display_work();
 }
-
-bool panel_has_keypad(void) { return keypad_present(); }
-
-bool panel_has_display(void) { return display_present(); }

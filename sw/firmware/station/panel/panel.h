@@ -4,11 +4,7 @@
 #ifndef MOIRE_PANEL_H
 #define MOIRE_PANEL_H
 
-#include <stdbool.h>
-
 void panel_start(unsigned axes);
 void panel_work(void);
-bool panel_has_keypad(void);
-bool panel_has_display(void);
 
 #endif

@@ -13,8 +13,8 @@
 #include <stddef.h>
 
 #include "core/clock.h"
-#include "station/i2c.h"
-#include "station/storage/nonvolatile.h"
+#include "station/devices/i2c.h"
+#include "station/storage/saved_values.h"
 #include "made/bus_protocol.h"
 #include "station/settings.h"
 
@@ -163,12 +163,12 @@ static void end_values(void) {
 }
 
 static void restore_value(const struct saved_value* value) {
-    if (value->of == SAVED_END) {
+    if (value->owner == SAVED_END) {
         if (values_status.values == 0 && values_status.cause == BUS_CAUSE_OK)
             values_status.cause = BUS_CAUSE_NOTHING_SAVED;
         return end_values();
     }
-    if (value->of != SAVED_HEAD) {
+    if (value->owner != SAVED_HEAD) {
         values_status.values++;
         if (!saved_values_restore(value)) values_status.cause = BUS_CAUSE_SAVED_REFUSED;
     } else if ((uint32_t)((uint64_t)value->value >> 32) != saved_values_build()) {
@@ -201,9 +201,9 @@ static void check_value(const struct saved_value* value) {
     if (at == 0) {
         values_blank = never_written(VALUE);
         values_generation[values_copy] = (uint32_t)value->value;
-        if (value->of != SAVED_HEAD) return checked_copy(false);
+        if (value->owner != SAVED_HEAD) return checked_copy(false);
     }
-    if (value->of == SAVED_END) return checked_copy((uint32_t)value->value == ~crc);
+    if (value->owner == SAVED_END) return checked_copy((uint32_t)value->value == ~crc);
     crc = crc32(crc, (const uint8_t*)value, VALUE);
     at = (uint16_t)(at + VALUE);
     if (at == VALUES_BYTES) return checked_copy(false);
@@ -337,15 +337,15 @@ static void gather(void) {
     struct saved_value value = {
         (int64_t)((uint64_t)saved_values_build() << 32 | values_status.generation), SAVED_HEAD, 0};
     if ((at || filled) && !next_value(&value)) return;
-    if (value.of == SAVED_END)
+    if (value.owner == SAVED_END)
         value.value = ~crc;
     else
         crc = crc32(crc, (const uint8_t*)&value, VALUE);
     __builtin_memcpy(&out[2 + filled], &value, VALUE);
     filled = (uint8_t)(filled + VALUE);
-    values_status.values = (uint16_t)(values_status.values + (value.of <= SAVED_NODE));
+    values_status.values = (uint16_t)(values_status.values + (value.owner <= SAVED_NODE));
     page_address = (uint16_t)(VALUES_AT + values_copy * VALUES_BYTES + at);
-    final = value.of == SAVED_END;
+    final = value.owner == SAVED_END;
     if (final || filled == PAGE) write_page();
 }
 

@@ -4,10 +4,10 @@
 // The controller debounces, and keeps up to ten events; reading its event register takes the oldest
 // one. It is set up whenever its registers are not as they were left: it was missing, or lost its
 // power. What was pressed before the node started does not count.
-#include "station/panel/keypad.h"
+#include "station/devices/keypad.h"
 
 #include "core/clock.h"
-#include "station/i2c.h"
+#include "station/devices/i2c.h"
 
 #define DEVICE 0x34u
 #define CONFIGURATION 0x01u

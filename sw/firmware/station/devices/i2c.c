@@ -4,7 +4,7 @@
 // The hardware takes commands (start, a byte, stop) into a queue and answers each. A few are kept
 // ahead of the bus; those after an address wait until it was acknowledged, so that nobody waits for
 // bytes to a device that is busy or not there.
-#include "station/i2c.h"
+#include "station/devices/i2c.h"
 
 #include <stddef.h>
 

@@ -2,7 +2,7 @@
 // readout -- the position of axis 0 in mm, ten times a second (S0's display). The display's set-up
 // goes with each, so that one which lost its power comes back. A position that does not fit is a
 // row of dashes.
-#include "station/panel/readout.h"
+#include "station/devices/readout.h"
 
 #include "core/clock.h"
 #include "core/hardware.h"

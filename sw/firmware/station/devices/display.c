@@ -5,10 +5,10 @@
 // data when E falls, and at most 37 us for it; a byte on the bus takes 90 us. Half lines are
 // written as they change, all of them after the display has been away, and one a second to see that
 // it is still there.
-#include "station/panel/display.h"
+#include "station/devices/display.h"
 
 #include "core/clock.h"
-#include "station/i2c.h"
+#include "station/devices/i2c.h"
 
 #define DEVICE 0x27u
 #define RS 1u
