@@ -8,9 +8,11 @@ import sys
 import tomllib
 import zlib
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
-from tables import made_files
+from tables import made_files, registers
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "tables" / "bus.toml"
@@ -54,6 +56,8 @@ CODES = (
     "save_action",
 )  # numbers; the others are bits
 WORDS = ("cause", "fault", "job_state")  # lists whose words the firmware shows on its panel
+# Settings that share a register with a parameter and that the firmware leaves at 0.
+LEFT_AT_ZERO = ("axis.feed_override.pause",)
 
 
 def fields(head, declared):
@@ -66,6 +70,55 @@ def fields(head, declared):
         laid.append((name, kind, offset))
         offset += SIZES[kind]
     return laid, offset
+
+
+class Target(NamedTuple):
+    """The field of a register that takes the value of a parameter as it is."""
+
+    parameter: str
+    block: registers.Block
+    register: registers.Register
+    field: registers.Field
+
+    @property
+    def path(self):
+        return f"{self.block.name}.{self.register.name}.{self.field.name}"
+
+    @property
+    def limits(self):
+        if self.field.signed:
+            return -(1 << (self.field.width - 1)), (1 << (self.field.width - 1)) - 1
+        return 0, (1 << self.field.width) - 1
+
+    @property
+    def row(self):
+        register, field = self.register.name, self.register.port(self.field)
+        return f"    X({self.parameter}, {self.block.name}, {register}, {field})".upper()
+
+
+@cache
+def register_fields():
+    """{block.register.field: (block, register, field)} of registers.rdl."""
+    return {
+        f"{block.name}.{register.name}.{field.name}": (block, register, field)
+        for block in registers.read()
+        for register, field in block.fields
+    }
+
+
+def targets_of(parameters):
+    """The targets of all parameters that name a register, in the order of the addresses."""
+    targets = []
+    for name, parameter in parameters.items():
+        if "register" not in parameter:
+            continue
+        path = parameter["register"]
+        if path.count(".") == 1:
+            path += ".value"
+        if path not in register_fields():
+            raise ValueError(f"bus.toml: {name} names {path}, which registers.rdl does not have")
+        targets.append(Target(name, *register_fields()[path]))
+    return sorted(targets, key=lambda t: (t.block.base, t.register.offset, t.field.low))
 
 
 class Bus:
@@ -97,7 +150,29 @@ class Bus:
                 fields(REQUEST_HEAD, operation["request"]),
                 fields(REPLY_HEAD, operation["reply"]),
             )
+        self.targets = targets_of(self.parameters)
         self.check()
+        self.check_targets()
+
+    def check_targets(self):
+        """A register must take every value of its parameters, and hold nothing else."""
+        named = [target.path for target in self.targets]
+        once("registers of parameters", named)
+        for target in self.targets:
+            parameter = self.parameters[target.parameter]
+            low, high = target.limits
+            if "apply" in parameter:
+                raise ValueError(f"bus.toml: {target.parameter} has a register and a function")
+            if not target.block.stride or target.register.wide or target.field.kind != "setting":
+                raise ValueError(f"bus.toml: {target.path} is no setting of 32 bits of an axis")
+            if parameter["min"] < low or parameter["max"] > high:
+                raise ValueError(f"bus.toml: {target.parameter} does not fit into {target.path}")
+            if target.field.signed and len(target.register.fields) > 1:
+                raise ValueError(f"bus.toml: {target.path} is signed and not alone")
+            for field in target.register.fields:
+                path = f"{target.block.name}.{target.register.name}.{field.name}"
+                if field.kind == "setting" and path not in (*named, *LEFT_AT_ZERO):
+                    raise ValueError(f"bus.toml: {path} has no parameter, {target.path} has")
 
     def check(self):
         for name, entries in self.lists.items():
@@ -179,7 +254,8 @@ def header(bus: Bus) -> str:
         for name, operation in bus.operations.items()
     ]
     out += macro("BUS_OPERATIONS", rows)
-    out += values("parameter", bus.parameters) + values("setting", bus.settings)
+    out += values("parameter", bus.parameters) + register_rows(bus) + function_rows(bus)
+    out += values("setting", bus.settings)
     out += [
         f"#define BUS_VALUES_CRC 0x{bus.values_crc:08X}u     // of all of both: what a kept number means",
         "",
@@ -210,6 +286,25 @@ def values(kind, parameters):
             "",
         ]
     return out
+
+
+def register_rows(bus):
+    """The parameters whose value goes into a field of a register as it is."""
+    return [
+        "// X(parameter, block, register, field), in the order of the addresses",
+        *macro("BUS_PARAMETER_REGISTERS", [target.row for target in bus.targets]),
+    ]
+
+
+def function_rows(bus):
+    """The parameters that a function of the firmware computes registers from."""
+    applied = [(name, p["apply"]) for name, p in bus.parameters.items() if "apply" in p]
+    functions = list(dict.fromkeys(function for _, function in applied))
+    return [
+        "// X(number, function), and X(parameter, number of the function that applies it)",
+        *macro("BUS_PARAMETER_FUNCTIONS", [f"    X({f.upper()}, {f})" for f in functions]),
+        *macro("BUS_PARAMETERS_APPLIED", [f"    X({name}, {f})".upper() for name, f in applied]),
+    ]
 
 
 def of_one_count(parameter):

@@ -6,6 +6,7 @@ import zlib
 
 import pytest
 
+from tables.bus import register_fields
 from tb.bench import seed
 from twin.compiled.firmware import ROOT
 from twin.compiled.node import CLK_HZ, DEFINES, PARAMETER, PERIOD, TABLE, Axis, FakeNode
@@ -248,6 +249,27 @@ def test_start_writes_the_defaults_into_the_registers():
         machine.word[d["NODE_TICK_PERIOD"]] == CLK_HZ // 4000
         and machine.word[d["NODE_SAMPLE_PERIOD"]] == CLK_HZ // 100_000
     )
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_parameter_with_a_register_goes_into_its_field_and_leaves_the_others(axis):
+    machine = FakeNode(Axis(), Axis())
+    field = register_fields()
+    checked = 0
+    for name, parameter in PARAMETER.items():
+        if "register" not in parameter:
+            continue
+        path = parameter["register"]
+        block, register, part = field[path if path.count(".") == 2 else path + ".value"]
+        address = block.base + axis * block.stride + register.offset
+        mask = (1 << part.width) - 1 << part.low
+        before = machine.ask("read_register", address=address)["value"]
+        value = parameter["min"] if before == parameter["max"] << part.low else parameter["max"]
+        machine.set(axis=axis, **{name: value})
+        after = machine.ask("read_register", address=address)["value"]
+        assert after == before & ~mask | value << part.low & mask, name
+        checked += 1
+    assert checked == 31
 
 
 def test_values_too_large_for_a_register_stop_at_its_end():

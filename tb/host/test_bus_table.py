@@ -175,6 +175,14 @@ def test_a_compiler_reads_the_header_and_gets_the_same_numbers(tmp_path):
         (("default = 160,", "default = 0,  "), "default of counts_per_period"),
         (("longest_body = 64", "longest_body = 40"), "needs more than 40 bytes"),
         (('[1,  "the node', '[2,  "the node'), "cause codes repeat"),
+        (('"axis.kp"', '"axis.kq"'), "kp names axis.kq.value, which registers.rdl does not have"),
+        (('"axis.kp"', '"axis.ki"'), "registers of parameters repeat"),
+        (('"axis.kp"', '"axis.step_pulse"'), "kp names axis.step_pulse.value"),
+        (('"axis.kp"', '"axis.velocity"'), "axis.velocity.value is no setting"),
+        (('"axis.kp"', '"axis.kp", apply = "motion"'), "kp has a register and a function"),
+        (("max = 16777215", "max = 16777216"), "kp does not fit into axis.kp.value"),
+        (('register = "axis.servo_limits.output", ', ""), "servo_limits.output has no parameter"),
+        (('"actuator.dac_trim"', '"actuator.dac.refresh"'), "does not fit"),
     ],
 )
 def test_a_wrong_table_is_refused_by_name_in_one_line(change, said, tmp_path, monkeypatch, capsys):

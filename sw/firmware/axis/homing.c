@@ -58,12 +58,6 @@ static int64_t method_of(unsigned n) { return parameters_get(n, BUS_PARAMETER_HO
 
 static int64_t distance_of(unsigned n) { return parameters_get(n, BUS_PARAMETER_HOME_DISTANCE); }
 
-bool homing_method_exists(int64_t method) {
-    return method == 1 || method == 2 || method == 17 || method == 18 || method == 33 ||
-           method == 34 || method == 35 || method == 37 || method == S0_METHOD ||
-           method == S3_METHOD;
-}
-
 static bool at_high_end(unsigned n) {
     int64_t method = method_of(n);
     return method == S0_METHOD ? parameters_get(n, BUS_PARAMETER_HOME_END)

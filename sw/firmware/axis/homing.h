@@ -7,8 +7,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-bool homing_method_exists(int64_t method);
-
 // A bus_cause at once: ok if the homing has begun.
 uint8_t homing_begin(unsigned n);
 

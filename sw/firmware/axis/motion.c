@@ -6,6 +6,7 @@
 #include "core/hardware.h"
 #include "made/bus_protocol.h"
 #include "axis/parameters.h"
+#include "planner/plan.h"
 #include "planner/planner.h"
 
 #define PIECE_TICKS 128u  // 32 ms

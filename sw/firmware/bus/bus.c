@@ -9,7 +9,7 @@
 
 #include "axis/axis.h"
 #include "core/clock.h"
-#include "calibration/calibration_runner.h"
+#include "axis/feedback.h"
 #include "core/hardware.h"
 #include "axis/homing.h"
 #include "core/image.h"

@@ -9,6 +9,7 @@
 #include "calibration/calibration_runner.h"
 
 #include "axis/axis.h"
+#include "axis/feedback.h"
 #include "core/clock.h"
 #include "core/hardware.h"
 #include "made/bus_protocol.h"
@@ -18,10 +19,6 @@
 #define PIECES 32u        // of them at most
 #define LONGEST_MS 1000u  // of a burst
 #define LARGEST_EVERY 65535u
-#define USER_STROBES                                                            \
-    (FEEDBACK_STROBES_ARM_INDEX_MASK | FEEDBACK_STROBES_CAPTURE_NOW_MASK |      \
-     FEEDBACK_STROBES_CAPTURE_NEXT_MASK | FEEDBACK_STROBES_CAPTURE_CLEAR_MASK | \
-     FEEDBACK_STROBES_COMPARE_ARM_MASK | FEEDBACK_STROBES_COMPARE_DISARM_MASK)
 
 _Static_assert((int)BUS_CALIBRATION_REASON_CALIBRATING == CALIBRATION_RUNNING &&
                    (int)BUS_CALIBRATION_REASON_FROZEN == CALIBRATION_FROZEN &&
@@ -238,33 +235,3 @@ uint8_t calibration_runner_set_correction(unsigned n, const struct calibration_v
     restart(g);
     return BUS_CAUSE_OK;
 }
-
-void feedback_clear_signal_faults(unsigned n) {
-    feedback_write(n, FEEDBACK_STROBES, FEEDBACK_STROBES_CLEAR_SIGNAL_FAULTS_MASK);
-}
-
-uint8_t feedback_write_register(uint32_t offset, unsigned n, uint32_t value) {
-    switch (offset) {
-    case FEEDBACK_STROBES:
-        if (value & ~USER_STROBES) return BUS_CAUSE_OUT_OF_RANGE;
-        break;
-    case FEEDBACK_INDEX:
-    case FEEDBACK_COUNTS_PER_REVOLUTION:
-    case FEEDBACK_INDEX_EVENTS:
-    case FEEDBACK_CAPTURE_SOURCES:
-    case FEEDBACK_CAPTURE_STATE:
-    case FEEDBACK_COMPARE_START_LOW:
-    case FEEDBACK_COMPARE_START_HIGH:
-    case FEEDBACK_COMPARE_STEP_LOW:
-    case FEEDBACK_COMPARE_STEP_HIGH:
-    case FEEDBACK_COMPARE_COUNT:
-    case FEEDBACK_COMPARE_PULSE:
-    case FEEDBACK_COMPARE_GAP:
-    case FEEDBACK_COMPARE_STATE: break;
-    default: return BUS_CAUSE_NO_SUCH_REGISTER;
-    }
-    feedback_write(n, offset, value);
-    return BUS_CAUSE_OK;
-}
-
-bool feedback_may_read(uint32_t offset) { return offset != FEEDBACK_RECORDER_WORD; }

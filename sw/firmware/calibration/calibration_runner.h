@@ -21,10 +21,5 @@ uint8_t calibration_runner_set_harmonic(unsigned n, uint8_t order, int32_t cosin
                                         int32_t sine);  // waits for set_correction
 uint8_t calibration_runner_set_correction(unsigned n, const struct calibration_values* ellipse,
                                           bool apply);
-void feedback_clear_signal_faults(unsigned n);
-
-uint8_t feedback_write_register(uint32_t offset, unsigned n,
-                                uint32_t value);  // what a user may write, by offset in the block
-bool feedback_may_read(uint32_t offset);          // reading it changes nothing
 
 #endif

@@ -3,7 +3,7 @@
 #include "calibration/calibration_axes.h"
 #include "core/image.h"
 #include "bus/scope.h"
-#include "calibration/segments.h"
+#include "bus/segments.h"
 
 const struct image_part image_parts[] = {
     {calibration_axes_start, calibration_axes_work, calibration_axes_operation},

@@ -4,7 +4,7 @@
 #ifndef MOIRE_PLAN_H
 #define MOIRE_PLAN_H
 
-#include "planner/planner.h"
+#include "planner/plan_types.h"
 
 void plan_clear(struct plan* plan);  // no event, at rest; the union is left as it is
 bool plan_refuse(struct plan* plan, enum planner_cause cause);  // false
@@ -16,5 +16,10 @@ void plan_advance(struct planner_progress* at, uint32_t ticks);
 // The next piece from a place; see planner_take_up_to.
 bool plan_walk(const struct plan* plan, struct planner_progress* at, uint8_t* next,
                struct planner_segment* piece, bool* last, uint32_t longest);
+
+// The next piece to queue, of so many ticks at most; *last tells that the plan ends with it. false:
+// nothing is left.
+bool planner_take_up_to(struct plan* plan, struct planner_segment* piece, bool* last,
+                        uint32_t longest);
 
 #endif

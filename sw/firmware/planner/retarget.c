@@ -18,6 +18,8 @@
 //    units of 2^-40, whose sums are exact. For these the limits keep a part and a few units free.
 // Then the whole plan is checked; one that leaves the limits is made again with more of them kept
 // free, and never handed out.
+#include "planner/planner.h"
+
 #include "core/arithmetic.h"
 #include "planner/plan.h"
 

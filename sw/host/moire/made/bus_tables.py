@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x6D8DE9AD
+PROTOCOL_CRC = 0x8739EC1F
 VERSION = 1
 LONGEST_BODY = 64
 

@@ -5,7 +5,7 @@
 // nothing to correct, and a homing begins without. Coming into force and out of it moves position
 // and target alike, in hardware, and only while the axis is at rest: a way that was planned ends
 // where it should. Hardware is in force well within the time that it takes to read a request.
-#include "calibration/segments.h"
+#include "bus/segments.h"
 
 #include <stdbool.h>
 
