@@ -77,7 +77,7 @@ def torn(cuts=CUTS, seed=1):
             if what < JOURNAL_SHARE:
                 new_line = line + 1
                 assert (
-                    station.firmware.store_note(source.randrange(len(program)), STORE_STOPPED) == 0
+                    station.firmware.journal_write(source.randrange(len(program)), STORE_STOPPED) == 0
                 )
                 span = duration(1) / 2
             elif what < JOURNAL_SHARE + KEPT_SHARE:

@@ -16,6 +16,7 @@
 #include "station/table/sensor.h"
 #include "station/settings.h"
 #include "station/storage/store.h"
+#include "station/storage/value_store.h"
 
 _Static_assert(BUS_SETTING_COUNT + HARDWARE_AXES * BUS_PARAMETER_COUNT <= VALUE_STORE_MAX,
                "the EEPROM keeps all values");

@@ -19,7 +19,9 @@
 #include "station/devices/keypad.h"
 #include "station/table/peer.h"
 #include "station/settings.h"
-#include "station/storage/store.h"
+#include "station/storage/journal.h"
+#include "station/storage/station_list.h"
+#include "station/storage/value_store.h"
 
 #define LEGACY 1  // a peer_mode
 #define SUB 1     // a peer_role
@@ -243,9 +245,7 @@ static void take(const struct transition* t) {
 }
 
 static void write_note(void) {
-    if (to_note == JOURNAL_NOTHING || store_state() == STORE_WRITING ||
-        store_state() == STORE_LOADING)
-        return;
+    if (to_note == JOURNAL_NOTHING || store_busy()) return;
     note_refused = journal_write(station, to_note);
     to_note = JOURNAL_NOTHING;
 }
@@ -281,7 +281,7 @@ static uint8_t saved_trouble(void)  // why the values of this node are not in fo
 }
 
 uint8_t job_cause(void) {
-    if (state == LOADING && store_state() == STORE_DEAD) return BUS_CAUSE_EEPROM_MISSING;
+    if (state == LOADING && store_state() == STORE_MISSING) return BUS_CAUSE_EEPROM_MISSING;
     if (state != IDLE || cause != BUS_CAUSE_OK) return cause;
     if (station_list_count() == 0) return store_cause();
     return saved_trouble();
@@ -292,7 +292,7 @@ uint16_t job_station(void) { return station; }
 // Why an action that the table has is refused.
 static uint8_t refusal(uint8_t action) {
     if (action == STOP || action == PAUSE) return BUS_CAUSE_OK;
-    if (store_state() == STORE_DEAD) return BUS_CAUSE_EEPROM_MISSING;
+    if (store_state() == STORE_MISSING) return BUS_CAUSE_EEPROM_MISSING;
     if (store_state() != STORE_READY) return BUS_CAUSE_EEPROM_BUSY;
     if (settings_get(BUS_SETTING_PEER_ROLE) == SUB)
         return BUS_CAUSE_PEER_OFF;  // its journal is its count of stations
@@ -352,10 +352,10 @@ uint8_t job_save_list(void) {
 // ---- operations of the line
 
 static uint8_t flags(void) {
-    return (uint8_t)(BUS_JOB_FLAG_EEPROM * (store_state() != STORE_DEAD) |
+    return (uint8_t)(BUS_JOB_FLAG_EEPROM * (store_state() != STORE_MISSING) |
                      BUS_JOB_FLAG_KEYPAD * keypad_present() |
-                     BUS_JOB_FLAG_DISPLAY * display_present() |
-                     BUS_JOB_FLAG_CUTTING * edm_cuts() | BUS_JOB_FLAG_ALARM * edm_alarms() |
+                     BUS_JOB_FLAG_DISPLAY * display_present() | BUS_JOB_FLAG_CUTTING * edm_cuts() |
+                     BUS_JOB_FLAG_ALARM * edm_alarms() |
                      BUS_JOB_FLAG_KEYS_PENDING * machine_keys_pending() |
                      BUS_JOB_FLAG_PAUSING * pausing |
                      BUS_JOB_FLAG_COPY_DAMAGED * station_list_damaged());
@@ -373,8 +373,7 @@ static uint8_t report_job(void) {
 }
 
 static uint8_t report_station_list(void) {
-    bus_reply_field(BUS_JOB_STATIONS_REPLY_WRITING,
-                    store_state() == STORE_WRITING || store_state() == STORE_LOADING, 1);
+    bus_reply_field(BUS_JOB_STATIONS_REPLY_WRITING, store_busy(), 1);
     bus_reply_field(BUS_JOB_STATIONS_REPLY_ENDED, store_cause(), 1);
     bus_reply_field(BUS_JOB_STATIONS_REPLY_GENERATION, station_list_generation(), 4);
     bus_reply_field(BUS_JOB_STATIONS_REPLY_STATIONS, station_list_count(), 2);

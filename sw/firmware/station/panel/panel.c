@@ -21,7 +21,7 @@
 #include "made/bus_protocol.h"
 #include "station/table/peer.h"
 #include "station/settings.h"
-#include "station/storage/store.h"
+#include "station/storage/station_list.h"
 
 #define NOTICE_MS 3000u
 #define REFRESH_MS 100u

@@ -4,7 +4,7 @@
 
 #include "bus/bus.h"
 #include "made/bus_protocol.h"
-#include "station/storage/store.h"
+#include "station/storage/value_store.h"
 
 static uint8_t save_settings(void) {
     uint8_t action = (uint8_t)bus_request_field(BUS_SAVE_SETTINGS_REQUEST_ACTION, 1);
@@ -16,8 +16,7 @@ uint8_t nonvolatile_operation(uint8_t operation) {
     if (operation == BUS_OPERATION_SAVE_SETTINGS) return save_settings();
     if (operation != BUS_OPERATION_SAVED_SETTINGS) return BUS_CAUSE_NOT_BUILT;
     const struct value_store_status* status = value_store_status();
-    bus_reply_field(BUS_SAVED_SETTINGS_REPLY_WRITING,
-                    store_state() == STORE_WRITING || store_state() == STORE_LOADING, 1);
+    bus_reply_field(BUS_SAVED_SETTINGS_REPLY_WRITING, store_busy(), 1);
     bus_reply_field(BUS_SAVED_SETTINGS_REPLY_CAUSE, status->cause, 1);
     bus_reply_field(BUS_SAVED_SETTINGS_REPLY_DAMAGED, status->damaged, 1);
     bus_reply_field(BUS_SAVED_SETTINGS_REPLY_GENERATION, status->generation, 4);

@@ -36,5 +36,6 @@ bool saved_values_next(unsigned* cursor, struct saved_value* value) {
 bool saved_values_restore(const struct saved_value* value) {
     uint8_t id = (uint8_t)value->id;
     if (value->owner == SAVED_NODE) return settings_set(id, value->value) == BUS_CAUSE_OK;
-    return value->owner < axes && axis_set_parameter(value->owner, id, value->value) == BUS_CAUSE_OK;
+    return value->owner < axes &&
+           axis_set_parameter(value->owner, id, value->value) == BUS_CAUSE_OK;
 }

@@ -20,7 +20,8 @@
 #include "made/bus_protocol.h"
 #include "station/table/sensor.h"
 #include "station/settings.h"
-#include "station/storage/store.h"
+#include "station/storage/journal.h"
+#include "station/storage/station_list.h"
 
 #define BAUD 115200u
 #define BYTES_PER_POLL 16u
