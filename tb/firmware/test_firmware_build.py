@@ -9,14 +9,14 @@ import sys
 import pytest
 
 from firmware import build as firmware_build
-from twin.compiled.firmware import SOURCE
+from twin.compiled.host_library import FIRMWARE
 
 MEMORY = 98304
 
 
 def build(out, *options, **environment):
     return subprocess.run(
-        [sys.executable, SOURCE / "build.py", "--out", out, *options],
+        [sys.executable, FIRMWARE / "build.py", "--out", out, *options],
         capture_output=True,
         text=True,
         check=False,

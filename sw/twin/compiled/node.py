@@ -17,13 +17,14 @@ import tomllib
 import zlib
 from collections import deque
 
-from twin.compiled.firmware import READ, ROOT, SOURCE, WRITE, library
+from twin.compiled.firmware import READ, WRITE, library
+from twin.compiled.host_library import FIRMWARE, ROOT
 
 DEFINES = {
     name: int(value.rstrip("u"), 0)
     for name, value in re.findall(
         r"^#define (\w+)\s+(0x[0-9a-fA-F]+u?|\d+u?)\b",
-        (SOURCE / "made" / "registers.h").read_text(),
+        (FIRMWARE / "made" / "registers.h").read_text(),
         re.M,
     )
 }
