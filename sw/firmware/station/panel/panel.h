@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// panel -- key-pad and character display: what the job does, in words, and its program and answers
-// by key. Either may be missing.
+// panel -- key-pad and character display of a station: what the job does, in words, and by key its
+// station list and its actions. Either device may be absent.
 #ifndef MOIRE_PANEL_H
 #define MOIRE_PANEL_H
 
