@@ -127,7 +127,7 @@ def image(segments, memory):
     return bytes(words), used
 
 
-def sources_of(name, folder=HERE):
+def sources_of(name: str, folder: Path = HERE) -> list[Path]:
     """All of the folder but the lists of the other images."""
     others = {
         path for path in (folder / "images").glob("image_*.c") if path.name != f"image_{name}.c"
@@ -135,7 +135,7 @@ def sources_of(name, folder=HERE):
     return sorted(set(folder.rglob("*.[chS]")) - others)
 
 
-def defines_of(name):
+def defines_of(name: str) -> list[str]:
     return [f"-DHARDWARE_AXES={AXES[name]}u"] if name in AXES else []
 
 

@@ -264,7 +264,7 @@ def test_keeping_leaves_program_and_journal_as_they_are():
     before = bytes(station.eeprom.memory[:8192])
     station.set(kp=1)
     station.save_settings()
-    assert station.eeprom.memory[:8192] == before and station.program() == [1, 2, 3]
+    assert station.eeprom.memory[:8192] == before and station.station_list() == [1, 2, 3]
     assert (
         station.save_settings("clear") == "nothing_saved"
         and station.ask("job_stations")["ended"] == 0
