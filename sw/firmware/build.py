@@ -114,7 +114,7 @@ def image(segments, memory):
     return bytes(words), used
 
 
-def sources_of(name, folder=HERE):
+def sources_of(name: str, folder: Path = HERE) -> list[Path]:
     """All sources in the folder except the lists of the other images. Each makes an object that is
     named by its stem.
     """
@@ -129,7 +129,7 @@ def sources_of(name, folder=HERE):
     return sources
 
 
-def defines_of(name):
+def defines_of(name: str) -> list[str]:
     return [f"-DHARDWARE_AXES={AXES[name]}u"] if name in AXES else []
 
 

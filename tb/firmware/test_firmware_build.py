@@ -10,14 +10,14 @@ import sys
 import pytest
 
 from firmware import build as firmware_build
-from twin.compiled.firmware import SOURCE
+from twin.compiled.host_library import FIRMWARE
 
 MEMORY = 98304
 
 
 def build(out, *options, **environment):
     return subprocess.run(
-        [sys.executable, SOURCE / "build.py", "--out", out, *options],
+        [sys.executable, FIRMWARE / "build.py", "--out", out, *options],
         capture_output=True,
         text=True,
         check=False,
@@ -111,10 +111,10 @@ BESIDE = {"calibration", "station"}  # neither includes the other
 
 
 def includes():
-    """{module: modules that it includes}: a module is a .c with its .h, named by path without end."""
+    """{module: modules that it includes}; a module is a .c with its .h, named by its path."""
     graph = {}
-    for path in sorted(SOURCE.rglob("*.[ch]")):
-        module = path.relative_to(SOURCE).with_suffix("").as_posix()
+    for path in sorted(firmware_build.HERE.rglob("*.[ch]")):
+        module = path.relative_to(firmware_build.HERE).with_suffix("").as_posix()
         names = re.findall(r'^#include "(.+)\.h"', path.read_text(encoding="utf-8"), re.MULTILINE)
         graph.setdefault(module, set()).update(set(names) - {module})
     return graph
@@ -129,15 +129,3 @@ def test_a_module_includes_only_its_own_and_lower_layers():
             below = other.partition("/")[0]
             assert LAYERS.index(below) <= LAYERS.index(layer), f"{module} includes {other}"
             assert below == layer or {below, layer} != BESIDE, f"{module} includes {other}"
-
-
-def test_modules_below_the_station_do_not_include_each_other_in_a_circle():
-    left = {
-        module: {other for other in others if not other.startswith("station")}
-        for module, others in includes().items()
-        if not module.startswith("station")
-    }
-    while free := [module for module, others in left.items() if not others & left.keys()]:
-        for module in free:
-            del left[module]
-    assert not left, f"these include each other in a circle: {sorted(left)}"

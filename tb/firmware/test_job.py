@@ -364,7 +364,7 @@ def test_a_fault_of_the_sub_node_is_said_in_words_and_reset_by_resume_when_its_c
     start(station, "turning")
     station.run(50)
     station.sub_node.latch(fault, "cpu")
-    station.sub_node.cause_stands = True
+    station.sub_node.cause_persists = True
     job = station.until("paused")
     assert (
         job["cause"] == "ended_by_fault"
@@ -382,7 +382,7 @@ def test_a_fault_of_the_sub_node_is_said_in_words_and_reset_by_resume_when_its_c
         and job["table_faults"] == {fault}
         and station.sub_node.resets == 1
     )
-    station.sub_node.cause_stands = False
+    station.sub_node.cause_persists = False
     station.press("RESUME")
     station.until("finished")
     assert (
@@ -566,7 +566,11 @@ def test_a_job_of_another_program_is_not_resumed():
     station.eeprom.memory[90] ^= 1
     station.power_cut()
     job = station.ready()
-    assert job["state"] == "idle" and station.program() == [1, 2] and "copy_damaged" in job["flags"]
+    assert (
+        job["state"] == "idle"
+        and station.station_list() == [1, 2]
+        and "copy_damaged" in job["flags"]
+    )
 
 
 # the EEPROM in the job

@@ -34,7 +34,7 @@ def test_a_turn_is_divided_by_its_count(station):
     assert station.shown()[:2] == ["stations in a turn", "7_"]
     station.press("ENTER")
     assert station.saved() == "ok"
-    assert station.program() == [(n * TURN + 3) // 7 for n in range(7)]
+    assert station.station_list() == [(n * TURN + 3) // 7 for n in range(7)]
     assert station.shown() == ["ready        001/007", "             0.00000", "", "START"]
 
 
@@ -42,7 +42,7 @@ def test_a_list_is_entered_angle_by_angle(station):
     station.press("LIST", *"12.5", "ENTER")
     assert station.shown()[0] == "angle, degrees   002"
     station.press(*"359.99999", "ENTER", "ENTER")
-    assert station.saved() == "ok" and station.program() == [4_500_000, 129_599_996]
+    assert station.saved() == "ok" and station.station_list() == [4_500_000, 129_599_996]
 
 
 def test_stations_are_looked_through_with_up_and_down(station):
@@ -92,7 +92,7 @@ def test_what_cannot_be_is_said_in_words(station, keys, words):
         None,
     )
     assert at is not None and shown[at + 1 : at + len(words)] == words[1:], shown
-    assert station.program() == []
+    assert station.station_list() == []
 
 
 @pytest.mark.parametrize("key", [*range(25, 34), "5", ".", "ENTER"])
