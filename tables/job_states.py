@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The picture of the job's states in docs/job.md, made of the table of transitions in
-sw/firmware/station/job/job.c; and the rules it keeps.
+"""Make the picture of the job's states in docs/job.md from the table of transitions in
+sw/firmware/station/job/job.c, and check the rules that the table must keep.
 """
 
 import re
@@ -12,17 +12,19 @@ from tables import made_files
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "sw" / "firmware" / "station" / "job" / "job.c"
-LINE = ROOT / "tables" / "bus.toml"
+BUS = ROOT / "tables" / "bus.toml"
 PAGE = ROOT / "docs" / "job.md"
 BEGIN, END = "<!-- made by tables/job_states.py -->", "<!-- end of job_states -->"
 UNDER_WAY = "UNDER_WAY"  # in the table: from any state in which a job is under way
 FIRST = "LOADING"
-TABLE = tomllib.loads(LINE.read_text(encoding="utf-8"))
+TABLE = tomllib.loads(BUS.read_text(encoding="utf-8"))
 ACTIONS = {name.upper() for name in TABLE["job_action"]}
 
 
-def transitions(text):
-    """[(from, event, to)] in their order."""
+def transitions(text: str) -> list[tuple[str, ...]]:
+    """The rows (from, event, to) of the table in the text of job.c, in their order. Raises
+    ValueError if there is no table, or a row has another form.
+    """
     table = re.search(r"transitions\[\] = \{\n(.*?)\n\};", text, re.DOTALL)
     if not table:
         raise ValueError("job.c has no table of transitions")
@@ -35,9 +37,9 @@ def transitions(text):
     return found
 
 
-def check(rows, states):
-    """Every state is in bus.toml, can be reached and left; what waits for a person goes on by a
-    person only.
+def check(rows: list[tuple[str, ...]], states: set[str]) -> None:
+    """Raise ValueError unless the states are those of bus.toml, each can be reached and left, its
+    rows are neighbours, and a state that waits for a person is left by actions of a person only.
     """
     used = {row[0] for row in rows if row[0] != UNDER_WAY} | {row[2] for row in rows}
     if used != states:
@@ -60,10 +62,10 @@ def check(rows, states):
             raise ValueError(f"job.c: {state} ends without a person")
 
 
-def picture(rows):
-    """Mermaid; a person's actions in capitals."""
+def picture(rows: list[tuple[str, ...]]) -> list[str]:
+    """The lines of a Mermaid diagram, with the actions of a person in capitals."""
     out = ["```mermaid", "stateDiagram-v2", "    direction TB", f"    [*] --> {FIRST.lower()}"]
-    joined = {}
+    joined: dict[tuple[str, str], list[str]] = {}
     for start, event, to in rows:
         if start != UNDER_WAY:
             joined.setdefault((start, to), []).append(event)
@@ -74,11 +76,13 @@ def picture(rows):
     return [*out, "```"]
 
 
-def label(event):
+def label(event: str) -> str:
+    """An event as the picture shows it."""
     return event if event in ACTIONS else event.lower().replace("_", " ")
 
 
-def from_anywhere(rows):
+def from_anywhere(rows: list[tuple[str, ...]]) -> list[str]:
+    """A sentence for each row that holds in every state in which a job is under way."""
     return [
         f"From every state in which a job is under way {event} leads to {to.lower()}."
         for start, event, to in rows
@@ -86,19 +90,21 @@ def from_anywhere(rows):
     ]
 
 
-def made():
+def made() -> str:
+    """The text of docs/job.md with a new picture. Raises ValueError if it has no place for one."""
     rows = transitions(SOURCE.read_text(encoding="utf-8"))
     check(rows, {name.upper() for name in TABLE["job_state"]})
     text = PAGE.read_text(encoding="utf-8")
     if text.count(BEGIN) != 1 or text.count(END) != 1:
-        raise ValueError(f"docs/job.md needs the marks '{BEGIN}' and '{END}' exactly once")
+        raise ValueError(f"docs/job.md needs the lines '{BEGIN}' and '{END}' exactly once")
     before, after = text.split(BEGIN)[0], text.split(END)[1]
     return (
         before + "\n".join([BEGIN, "", *picture(rows), "", *from_anywhere(rows), "", END]) + after
     )
 
 
-def main(arguments=None) -> int:
+def main(arguments: list[str] | None = None) -> int:
+    """Write docs/job.md, or with --check compare it; returns the exit code."""
     return made_files.main(__doc__, lambda: {PAGE: made()}, arguments)
 
 

@@ -8,7 +8,7 @@
 //          phases, so that no phase ever meets a table half written. Until the first swap nothing
 //          is corrected.
 // source   Fourier series of the sub-division error, orders up to 9
-//          (sw/firmware/calibration/calibration.c); the chord of a sine of order 9 leaves 0.6 % of
+//          (sw/firmware/calibration/harmonics.c); the chord of a sine of order 9 leaves 0.6 % of
 //          it, of order 2 0.03 %
 // model    tb/interpolate/harmonic_correction.py, equal in every bit of every cycle
 `default_nettype none

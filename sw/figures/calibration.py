@@ -319,12 +319,12 @@ def acquire(count, amplitude, trials):
         )
         turn = 2 * np.pi * (draw.uniform() + np.arange(count) / count * draw.uniform(1, 5))
         sums, values = compiled.Ellipse(), compiled.Values.from_buffer_copy(learner.values)
-        library.calibration_ellipse_start(ctypes.byref(sums))
+        library.ellipse_start(ctypes.byref(sums))
         for word in words_of(*converted(*signal(turn, **setting), draw, amplitude=amplitude)):
-            library.calibration_ellipse_take(
+            library.ellipse_take(
                 ctypes.byref(sums), ctypes.byref(learner), ctypes.c_uint32(word)
             )
-        reason = library.calibration_ellipse_fit(ctypes.byref(sums), ctypes.byref(values))
+        reason = library.ellipse_fit(ctypes.byref(sums), ctypes.byref(values))
         left.append(
             np.inf
             if reason

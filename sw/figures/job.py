@@ -56,7 +56,7 @@ def torn(cuts=CUTS, seed=1):
         ]
 
     def state():
-        return station.program(), station.ask("job_stations")["journal"], values()
+        return station.station_list(), station.ask("job_stations")["journal"], values()
 
     kept_numbers = [
         PARAMETER[f"filter_{n}_{name}"]["id"]
@@ -66,7 +66,7 @@ def torn(cuts=CUTS, seed=1):
     source, station = random.Random(seed), Station(seed=seed)
     station.ready()
     duration, invalid, found, pages = writing_ms(station), 0, {"old": 0, "new": 0}, 0
-    station.keep()
+    station.save_settings()
     program, line, kept = state()
     with bar(f"{cuts} power cuts") as progress:
         for _ in progress.track(range(cuts)):
@@ -77,7 +77,7 @@ def torn(cuts=CUTS, seed=1):
             if what < JOURNAL_SHARE:
                 new_line = line + 1
                 assert (
-                    station.firmware.store_note(source.randrange(len(program)), STORE_STOPPED) == 0
+                    station.firmware.journal_write(source.randrange(len(program)), STORE_STOPPED) == 0
                 )
                 span = duration(1) / 2
             elif what < JOURNAL_SHARE + KEPT_SHARE:

@@ -15,6 +15,7 @@
 
 #include "Vplayer.h"
 extern "C" {
+#include "planner/plan.h"
 #include "planner/planner.h"
 }
 #include "verilated.h"

@@ -54,14 +54,10 @@ def fit(samples, **window):
         window.get("high", 65535),
     )
     values.gain = 65536
-    library().calibration_ellipse_start(ctypes.byref(sums))
+    library().ellipse_start(ctypes.byref(sums))
     for word in words(samples):
-        library().calibration_ellipse_take(
-            ctypes.byref(sums), ctypes.byref(calibration), ctypes.c_uint32(word)
-        )
-    return library().calibration_ellipse_fit(
-        ctypes.byref(sums), ctypes.byref(values)
-    ), values.as_dict()
+        library().ellipse_take(ctypes.byref(sums), ctypes.byref(calibration), ctypes.c_uint32(word))
+    return library().ellipse_fit(ctypes.byref(sums), ctypes.byref(values)), values.as_dict()
 
 
 def fresh(complete=False):
@@ -170,7 +166,7 @@ def test_any_values_give_the_table_of_the_model_held_to_18_bits():
         values.cosine[:] = [draw.randint(-size, size) for _ in range(model.ORDERS)]
         values.sine[:] = [draw.randint(-size, size) for _ in range(model.ORDERS)]
         for point in range(0, 256, 5):
-            entry = library().calibration_table_entry(ctypes.byref(values), point)
+            entry = library().harmonics_table_entry(ctypes.byref(values), point)
             assert entry == model.table_entry(values.as_dict(), point) and -131072 < entry < 131072
 
 

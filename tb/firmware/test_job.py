@@ -232,7 +232,7 @@ def test_an_alarm_in_the_cut_is_asked_about_with_its_words():
         and {"alarm"} <= job["flags"]
         and job["answers"] == {"next", "stop"}
     )
-    assert station.shown()[1:3] == ["the machine reports", "an alarm"]
+    assert station.shown()[1:3] == ["the EDM reports an", "alarm"]
     assert station.do("again") == "edm_alarm"
     station.edm.alarm(False)
     assert station.do("again") == "ok"
@@ -354,7 +354,7 @@ def test_what_the_sub_node_failed_of_is_told_and_resume_tries_again(cause):
     [
         ("estop", ["emergency stop", ""]),
         ("following_error", ["following error too", "large"]),
-        ("step_overrun", ["more steps were owed", "than may be"]),
+        ("step_overrun", ["too many steps are", "pending"]),
     ],
 )
 def test_a_fault_of_the_sub_node_is_said_in_words_and_reset_by_resume_when_its_cause_is_gone(
@@ -364,7 +364,7 @@ def test_a_fault_of_the_sub_node_is_said_in_words_and_reset_by_resume_when_its_c
     start(station, "turning")
     station.run(50)
     station.sub_node.latch(fault, "cpu")
-    station.sub_node.cause_stands = True
+    station.sub_node.cause_persists = True
     job = station.until("paused")
     assert (
         job["cause"] == "ended_by_fault"
@@ -382,7 +382,7 @@ def test_a_fault_of_the_sub_node_is_said_in_words_and_reset_by_resume_when_its_c
         and job["table_faults"] == {fault}
         and station.sub_node.resets == 1
     )
-    station.sub_node.cause_stands = False
+    station.sub_node.cause_persists = False
     station.press("RESUME")
     station.until("finished")
     assert (
@@ -566,7 +566,11 @@ def test_a_job_of_another_program_is_not_resumed():
     station.eeprom.memory[90] ^= 1
     station.power_cut()
     job = station.ready()
-    assert job["state"] == "idle" and station.program() == [1, 2] and "copy_damaged" in job["flags"]
+    assert (
+        job["state"] == "idle"
+        and station.station_list() == [1, 2]
+        and "copy_damaged" in job["flags"]
+    )
 
 
 # the EEPROM in the job
@@ -629,9 +633,9 @@ def test_the_panel_runs_a_job_by_its_keys():
     station.until("cutting")
     station.press("PAUSE")
     station.until("paused")
-    assert station.shown() == ["paused       002/004", "paused by a person", "", "RESUME STOP"]
+    assert station.shown() == ["paused       002/004", "paused by the", "operator", "RESUME STOP"]
     station.press("NEXT")
-    assert station.shown()[1:3] == ["the job does not", "wait for that now"]
+    assert station.shown()[1:3] == ["the job does not", "expect this now"]
     station.press("RESUME")
     station.until("finished")
     assert cuts(station) == STATIONS and station.shown()[0] == "all cut      004/004"

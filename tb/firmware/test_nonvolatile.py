@@ -48,7 +48,7 @@ def default(table):
 
 
 def rewrite(station, change, copy=0):
-    """The kept values of a copy as `change(list of bytearrays)` makes them, with the right CRC-32."""
+    """Writes the saved values of a copy as `change(list of bytearrays)` makes them, and their CRC."""
     at = COPIES[copy]
     memory = bytes(station.eeprom.memory)
     values = []
@@ -214,8 +214,8 @@ def test_values_of_another_build_are_not_taken_and_the_panel_says_so():
     assert restarted(station) == "saved_other_build" and parameters(station) == default(PARAMETER)
     assert station.run(2500) is False and station.shown()[:3] == [
         "ready        001/001",
-        "the kept values are",
-        "of another build",
+        "the saved values are",
+        "from another build",
     ]
 
 
@@ -264,7 +264,7 @@ def test_keeping_leaves_program_and_journal_as_they_are():
     before = bytes(station.eeprom.memory[:8192])
     station.set(kp=1)
     station.save_settings()
-    assert station.eeprom.memory[:8192] == before and station.program() == [1, 2, 3]
+    assert station.eeprom.memory[:8192] == before and station.station_list() == [1, 2, 3]
     assert (
         station.save_settings("clear") == "nothing_saved"
         and station.ask("job_stations")["ended"] == 0

@@ -17,7 +17,7 @@ def station():
 
 
 def test_a_node_without_a_program_says_so(station):
-    assert station.shown() == ["ready", "no program of", "stations is stored", ""]
+    assert station.shown() == ["ready", "no station list is", "stored", ""]
     assert {"keypad", "display", "eeprom"} <= station.job()["flags"]
 
 
@@ -34,7 +34,7 @@ def test_a_turn_is_divided_by_its_count(station):
     assert station.shown()[:2] == ["stations in a turn", "7_"]
     station.press("ENTER")
     assert station.saved() == "ok"
-    assert station.program() == [(n * TURN + 3) // 7 for n in range(7)]
+    assert station.station_list() == [(n * TURN + 3) // 7 for n in range(7)]
     assert station.shown() == ["ready        001/007", "             0.00000", "", "START"]
 
 
@@ -42,7 +42,7 @@ def test_a_list_is_entered_angle_by_angle(station):
     station.press("LIST", *"12.5", "ENTER")
     assert station.shown()[0] == "angle, degrees   002"
     station.press(*"359.99999", "ENTER", "ENTER")
-    assert station.saved() == "ok" and station.program() == [4_500_000, 129_599_996]
+    assert station.saved() == "ok" and station.station_list() == [4_500_000, 129_599_996]
 
 
 def test_stations_are_looked_through_with_up_and_down(station):
@@ -66,7 +66,7 @@ def test_longest_cut_and_speed_are_settings(station):
 @pytest.mark.parametrize(
     ("keys", "words"),
     [
-        (["DIVIDE", "0", "ENTER"], ["a program needs at", "least one station"]),
+        (["DIVIDE", "0", "ENTER"], ["a station list needs", "at least one station"]),
         (["DIVIDE", *"361", "ENTER"], ["the EEPROM is full:", "it holds 360"][:1]),
         (["DIVIDE", *"3.5", "ENTER"], ["the value is outside"]),
         (["DIVIDE", "ENTER"], ["the value is outside"]),
@@ -74,7 +74,7 @@ def test_longest_cut_and_speed_are_settings(station):
         (["LIST", *"10", "ENTER", *"10", "ENTER"], ["each angle must be", "larger than the last"]),
         (["LIST", ".", "ENTER"], ["the value is outside"]),
         (["LIST", *"1.2.3", "ENTER"], ["the value is outside"]),
-        (["LIST", "ENTER"], ["a program needs at", "least one station"]),
+        (["LIST", "ENTER"], ["a station list needs", "at least one station"]),
         (["LIST", *"99999999999", "9"], ["the value is outside"]),
         (["LIMIT", "0", "ENTER"], ["the value is outside"]),
         (["SPEED", *"101", "ENTER"], ["the value is outside"]),
@@ -92,7 +92,7 @@ def test_what_cannot_be_is_said_in_words(station, keys, words):
         None,
     )
     assert at is not None and shown[at + 1 : at + len(words)] == words[1:], shown
-    assert station.program() == []
+    assert station.station_list() == []
 
 
 @pytest.mark.parametrize("key", [*range(25, 34), "5", ".", "ENTER"])
@@ -101,7 +101,7 @@ def test_a_key_that_means_nothing_now_says_so(station, key):
     shown = station.shown()
     assert shown[1:3] == ["this key has no", "function"], shown
     station.run(3500)
-    assert station.shown()[1:3] == ["no program of", "stations is stored"]
+    assert station.shown()[1:3] == ["no station list is", "stored"]
 
 
 def test_clear_takes_back_the_entry_and_then_leaves(station):

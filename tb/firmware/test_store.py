@@ -19,10 +19,10 @@ def powered(**options):
 
 def test_a_program_is_read_back_as_written_and_after_a_power_cut():
     station = powered()
-    assert station.load(EVENLY) == "ok" and station.program() == EVENLY
+    assert station.load(EVENLY) == "ok" and station.station_list() == EVENLY
     station.power_cut()
     station.ready()
-    assert station.program() == EVENLY and station.ask("job_stations")["generation"] == 1
+    assert station.station_list() == EVENLY and station.ask("job_stations")["generation"] == 1
 
 
 def test_each_new_program_goes_over_the_older_copy():
@@ -32,7 +32,7 @@ def test_each_new_program_goes_over_the_older_copy():
         assert station.load(angles) == "ok"
         copies = {int.from_bytes(station.eeprom.memory[at : at + 4], "little") for at in (0, 2048)}
         assert copies == {generation, generation - 1 or 0xFFFFFFFF}
-        assert station.program() == angles
+        assert station.station_list() == angles
 
 
 def test_as_many_stations_as_fit_are_kept_and_one_more_is_refused():
@@ -43,10 +43,10 @@ def test_as_many_stations_as_fit_are_kept_and_one_more_is_refused():
         station.ask("job_add", station=n, angle=angle)
     assert station.request("job_add", station=360, angle=TURN - 1)[0] == "too_many_stations"
     station.ask("job_save")
-    assert station.saved() == "ok" and station.program() == angles
+    assert station.saved() == "ok" and station.station_list() == angles
     station.power_cut()
     station.ready()
-    assert station.program() == angles
+    assert station.station_list() == angles
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_an_angle_that_cannot_be_is_named_and_not_taken(angles, cause):
     assert station.request("job_add", station=len(angles) - 1, angle=angles[-1])[0] == cause
     station.ask("job_add", station=len(angles) - 1, angle=TURN - 1)  # the others are still there
     station.ask("job_save")
-    assert station.saved() == "ok" and station.program() == [*angles[:-1], TURN - 1]
+    assert station.saved() == "ok" and station.station_list() == [*angles[:-1], TURN - 1]
 
 
 def test_what_is_no_whole_program_is_refused():
@@ -115,10 +115,10 @@ def test_a_damaged_copy_is_told_and_the_other_one_is_in_force(copies):
     job = station.ready()
     assert "copy_damaged" in job["flags"]
     if copies == 1:
-        assert station.program() == [1, 2, 3]
+        assert station.station_list() == [1, 2, 3]
         assert station.load([7]) == "ok" and "copy_damaged" not in station.job()["flags"]
     else:
-        assert station.program() == [] and station.do("start") == "job_damaged"
+        assert station.station_list() == [] and station.do("start") == "job_damaged"
 
 
 def test_a_missing_eeprom_is_named_and_found_when_it_comes():
@@ -157,7 +157,7 @@ def test_a_worn_page_of_the_program_is_named_and_the_old_program_stays():
     station.load([1, 2, 3])
     station.eeprom.worn[2048 + 90] = 0xA5
     station.eeprom.worn[90] = 0xA5
-    assert station.load(EVENLY) == "eeprom_failed" and station.program() == [1, 2, 3]
+    assert station.load(EVENLY) == "eeprom_failed" and station.station_list() == [1, 2, 3]
 
 
 def test_a_write_that_the_device_never_ends_is_named():
@@ -178,7 +178,7 @@ def test_a_program_cut_off_at_any_moment_is_the_old_one_or_the_new_one_whole():
         station.run(source.uniform(0, 260))
         station.power_cut()
         station.ready()
-        found = station.program()
+        found = station.station_list()
         assert found in (old, new)
         seen.add(found == new)
         old = found

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// parameters -- the settings of the axes, and those registers that follow from them.
+// parameters -- the parameters of the axes, and the registers that follow from them.
+//
+// bus.toml names the register of most parameters; the functions apply_… compute the others.
 #include "axis/parameters.h"
 
 #include "core/hardware.h"
-#include "axis/homing.h"
 #include "made/bus_protocol.h"
 
-#define PULSES_AND_DIRECTION 3u  // a mode of the decoder
+#define PULSES_AND_DIRECTION 3u  // mode of the decoder
 #define STEP_CYCLES_MASK ACTUATOR_STEP_PULSE_HIGH_MASK
 #define COEFFICIENTS 5u  // of a filter
 
@@ -19,7 +20,7 @@ static const struct {
 static const uint8_t sine_parameters[] = {BUS_PARAMETERS_OF_SINE};
 
 static int64_t parameters[HARDWARE_AXES][BUS_PARAMETER_COUNT + 1];
-static struct planner_limits limits[HARDWARE_AXES];  // velocity: that of a move
+static struct planner_limits limits[HARDWARE_AXES];  // of a move
 
 static uint32_t saturate(uint64_t value, uint32_t mask) {
     return value > mask ? mask : (uint32_t)value;
@@ -62,7 +63,7 @@ static uint64_t cycles_of(int64_t nanoseconds) {
     return (uint64_t)nanoseconds * node_read(NODE_CLK_HZ) / 1000000000u;
 }
 
-// The deglitcher counts the samples that it takes: of all clk, or with some left out between two.
+// The deglitcher counts samples: one in each cycle, or one in skip + 1 cycles.
 static void apply_sensing(unsigned axis) {
     const int64_t* p = parameters[axis];
     uint32_t skip = saturate(cycles_of(p[BUS_PARAMETER_FILTER_SKIP]), 0xFFFF);
@@ -85,29 +86,6 @@ static void apply_source(unsigned axis) {
     feedback_write(axis, FEEDBACK_DECODER_MODE,
                    source == OWN_STEPS ? PULSES_AND_DIRECTION
                                        : (uint32_t)parameters[axis][BUS_PARAMETER_DECODER_MODE]);
-}
-
-static void apply_signal(unsigned axis) {
-    const int64_t* p = parameters[axis];
-    feedback_write(
-        axis, FEEDBACK_LISSAJOUS_LIMITS,
-        FIELD_PUT(FEEDBACK_LISSAJOUS_LIMITS_CLIP_LEVEL, p[BUS_PARAMETER_SIGNAL_CLIP_LEVEL]) |
-            FIELD_PUT(FEEDBACK_LISSAJOUS_LIMITS_TOLERANCE, p[BUS_PARAMETER_SIGNAL_TOLERANCE]));
-    feedback_write(axis, FEEDBACK_JUMP_LIMITS,
-                   FIELD_PUT(FEEDBACK_JUMP_LIMITS_JUMP, p[BUS_PARAMETER_SIGNAL_JUMP]) |
-                       FIELD_PUT(FEEDBACK_JUMP_LIMITS_NO_NOISE_SAMPLES,
-                                 p[BUS_PARAMETER_SIGNAL_NO_NOISE_SAMPLES]));
-    feedback_write(axis, FEEDBACK_CHANNEL_LIMITS,
-                   FIELD_PUT(FEEDBACK_CHANNEL_LIMITS_SPAN, p[BUS_PARAMETER_SIGNAL_SPAN]) |
-                       FIELD_PUT(FEEDBACK_CHANNEL_LIMITS_BAND, p[BUS_PARAMETER_SIGNAL_BAND]));
-    feedback_write(axis, FEEDBACK_DRIFT_LIMITS,
-                   FIELD_PUT(FEEDBACK_DRIFT_LIMITS_OFFSET, p[BUS_PARAMETER_SIGNAL_OFFSET]) |
-                       FIELD_PUT(FEEDBACK_DRIFT_LIMITS_BALANCE, p[BUS_PARAMETER_SIGNAL_BALANCE]));
-    feedback_write(axis, FEEDBACK_QUADRATURE_LIMITS,
-                   FIELD_PUT(FEEDBACK_QUADRATURE_LIMITS_QUADRATURE_ERROR,
-                             p[BUS_PARAMETER_SIGNAL_QUADRATURE_ERROR]) |
-                       FIELD_PUT(FEEDBACK_QUADRATURE_LIMITS_SIGN_THRESHOLD,
-                                 p[BUS_PARAMETER_SIGNAL_SIGN_THRESHOLD]));
 }
 
 static uint32_t step_cycles(unsigned axis, uint8_t id) {
@@ -140,10 +118,19 @@ static void apply_dac(unsigned axis) {
     actuator_write(axis, ACTUATOR_DAC,
                    FIELD_PUT(ACTUATOR_DAC_HALF_PERIOD, saturate(half_period, 0xFF)) |
                        FIELD_PUT(ACTUATOR_DAC_REFRESH, 0xFFFF));
-    actuator_write(axis, ACTUATOR_DAC_TRIM, (uint32_t)p[BUS_PARAMETER_DAC_TRIM]);
 }
 
-// A filter takes coefficients only while it is out of use.
+static void apply_pwm(unsigned axis) {
+    uint32_t frequency = (uint32_t)parameters[axis][BUS_PARAMETER_PWM_FREQUENCY];
+    actuator_write(axis, ACTUATOR_PWM_PERIOD,
+                   saturate(node_read(NODE_CLK_HZ) / frequency, ACTUATOR_PWM_PERIOD_MASK));
+}
+
+static void apply_watchdog(unsigned axis) {
+    bus_write(BUS_WATCHDOG_TIME, (uint32_t)parameters[axis][BUS_PARAMETER_WATCHDOG_TIME]);
+}
+
+// A filter accepts coefficients only while it is not in use.
 static void apply_filters(unsigned axis) {
     const int64_t* p = parameters[axis];
     for (uint32_t n = 0; n < 2 * COEFFICIENTS; n++) {
@@ -154,86 +141,50 @@ static void apply_filters(unsigned axis) {
     axis_write(axis, AXIS_FILTERS, FIELD_PUT(AXIS_FILTERS_IN_USE, p[BUS_PARAMETER_FILTERS]));
 }
 
-// The registers that follow from this parameter.
+#define NUMBER(number, function) APPLY_##number,
+#define FUNCTION(number, function) [APPLY_##number] = apply_##function,
+#define APPLIED(parameter, number) {BUS_PARAMETER_##parameter, APPLY_##number},
+#define TARGET(parameter, block, register, field) \
+    {block##_BASE + block##_##register, block##_##field##_SHIFT, BUS_PARAMETER_##parameter},
+
+enum { BUS_PARAMETER_FUNCTIONS(NUMBER) };
+
+static void (*const functions[])(unsigned axis) = {BUS_PARAMETER_FUNCTIONS(FUNCTION)};
+
+static const struct {
+    uint8_t id, function;
+} applied[] = {BUS_PARAMETERS_APPLIED(APPLIED)};
+
+// The fields of one register are neighbours; those without a parameter are 0.
+static const struct {
+    uint16_t address;  // of axis 0
+    uint8_t shift, id;
+} targets[] = {BUS_PARAMETER_REGISTERS(TARGET)};
+
+#define TARGETS (sizeof targets / sizeof *targets)
+
+_Static_assert(FEEDBACK_STRIDE == AXIS_STRIDE && ACTUATOR_STRIDE == AXIS_STRIDE,
+               "the blocks of an axis have the same stride");
+
+static void write_target(unsigned axis, uint8_t id) {
+    unsigned row = 0;
+    while (row < TARGETS && targets[row].id != id) row++;
+    if (row == TARGETS) return;
+    uint32_t address = targets[row].address, value = 0;
+    while (row > 0 && targets[row - 1].address == address) row--;
+    for (; row < TARGETS && targets[row].address == address; row++)
+        value |= (uint32_t)parameters[axis][targets[row].id] << targets[row].shift;
+    register_write(address + axis * AXIS_STRIDE, value);
+}
+
+// Writes the registers that follow from this parameter.
 static void apply(unsigned axis, uint8_t id) {
-    const int64_t* p = parameters[axis];
-    uint32_t value = (uint32_t)p[id];
-    switch (id) {
-    case BUS_PARAMETER_VELOCITY:
-    case BUS_PARAMETER_ACCELERATION:
-    case BUS_PARAMETER_JERK:
-    case BUS_PARAMETER_PROFILE: apply_motion(axis); break;
-    case BUS_PARAMETER_KP: axis_write(axis, AXIS_KP, value); break;
-    case BUS_PARAMETER_KI: axis_write(axis, AXIS_KI, value); break;
-    case BUS_PARAMETER_KD: axis_write(axis, AXIS_KD, value); break;
-    case BUS_PARAMETER_KV: axis_write(axis, AXIS_KV, value); break;
-    case BUS_PARAMETER_KA: axis_write(axis, AXIS_KA, value); break;
-    case BUS_PARAMETER_OUTPUT_LIMIT:
-    case BUS_PARAMETER_INTEGRAL_LIMIT:
-        axis_write(axis, AXIS_SERVO_LIMITS,
-                   FIELD_PUT(AXIS_SERVO_LIMITS_OUTPUT, p[BUS_PARAMETER_OUTPUT_LIMIT]) |
-                       FIELD_PUT(AXIS_SERVO_LIMITS_INTEGRAL, p[BUS_PARAMETER_INTEGRAL_LIMIT]));
-        break;
-    case BUS_PARAMETER_DEAD_BAND: axis_write(axis, AXIS_DEAD_BAND, value); break;
-    case BUS_PARAMETER_FOLLOWING_LIMIT: axis_write(axis, AXIS_FOLLOWING_LIMIT, value); break;
-    case BUS_PARAMETER_DEGLITCH:
-    case BUS_PARAMETER_OUTLIER_STEP:
-    case BUS_PARAMETER_OUTLIER_HOLD:
-    case BUS_PARAMETER_FILTER_SKIP:
-    case BUS_PARAMETER_FILTER_TOLERATED: apply_sensing(axis); break;
-    case BUS_PARAMETER_AMPLITUDE_LOW:
-    case BUS_PARAMETER_AMPLITUDE_HIGH:
-        axis_write(axis, AXIS_AMPLITUDE_WINDOW,
-                   FIELD_PUT(AXIS_AMPLITUDE_WINDOW_LOW, p[BUS_PARAMETER_AMPLITUDE_LOW]) |
-                       FIELD_PUT(AXIS_AMPLITUDE_WINDOW_HIGH, p[BUS_PARAMETER_AMPLITUDE_HIGH]));
-        break;
-    case BUS_PARAMETER_DISAGREEMENT_LIMIT: axis_write(axis, AXIS_DISAGREEMENT_LIMIT, value); break;
-    case BUS_PARAMETER_ENCODER_FAULT_MASK: axis_write(axis, AXIS_ENCODER_FAULT_MASK, value); break;
-    case BUS_PARAMETER_PWM_FREQUENCY:
-        actuator_write(axis, ACTUATOR_PWM_PERIOD,
-                       saturate(node_read(NODE_CLK_HZ) / value, ACTUATOR_PWM_PERIOD_MASK));
-        break;
-    case BUS_PARAMETER_WATCHDOG_TIME: bus_write(BUS_WATCHDOG_TIME, value); break;
-    case BUS_PARAMETER_POSITION_SOURCE:
-    case BUS_PARAMETER_DECODER_MODE: apply_source(axis); break;
-    case BUS_PARAMETER_VELOCITY_QUANTUM:
-        feedback_write(axis, FEEDBACK_VELOCITY_QUANTUM, value);
-        break;
-    case BUS_PARAMETER_SIGNAL_FAULT_MASK:
-        feedback_write(axis, FEEDBACK_SIGNAL_FAULT_MASK, value);
-        break;
-    case BUS_PARAMETER_SIGNAL_CLIP_LEVEL:
-    case BUS_PARAMETER_SIGNAL_TOLERANCE:
-    case BUS_PARAMETER_SIGNAL_JUMP:
-    case BUS_PARAMETER_SIGNAL_NO_NOISE_SAMPLES:
-    case BUS_PARAMETER_SIGNAL_SPAN:
-    case BUS_PARAMETER_SIGNAL_BAND:
-    case BUS_PARAMETER_SIGNAL_SIGN_THRESHOLD:
-    case BUS_PARAMETER_SIGNAL_OFFSET:
-    case BUS_PARAMETER_SIGNAL_BALANCE:
-    case BUS_PARAMETER_SIGNAL_QUADRATURE_ERROR: apply_signal(axis); break;
-    case BUS_PARAMETER_DRIVE:
-        actuator_write(axis, ACTUATOR_DRIVE, FIELD_PUT(ACTUATOR_DRIVE_KIND, value));
-        break;
-    case BUS_PARAMETER_STEPS_PER_PERIOD:
-    case BUS_PARAMETER_STEP_HIGH:
-    case BUS_PARAMETER_STEP_LOW:
-    case BUS_PARAMETER_STEP_SETUP:
-    case BUS_PARAMETER_STEP_HOLD:
-    case BUS_PARAMETER_STEP_OUTPUT:
-    case BUS_PARAMETER_STEP_INVERT:
-    case BUS_PARAMETER_STEP_TRIM: apply_steps(axis); break;
-    case BUS_PARAMETER_DAC_CLOCK:
-    case BUS_PARAMETER_DAC_TRIM: apply_dac(axis); break;
-    case BUS_PARAMETER_FINE_KP: actuator_write(axis, ACTUATOR_FINE_KP, value); break;
-    case BUS_PARAMETER_FINE_KI: actuator_write(axis, ACTUATOR_FINE_KI, value); break;
-    case BUS_PARAMETER_FINE_LIMIT: actuator_write(axis, ACTUATOR_FINE_LIMIT, value); break;
-    case BUS_PARAMETER_FEED_OVERRIDE: axis_write(axis, AXIS_FEED_OVERRIDE, value); break;
-    default:
-        if (id >= BUS_PARAMETER_FILTERS && id < BUS_PARAMETER_FILTER_1_B0 + 2 * COEFFICIENTS)
-            apply_filters(axis);
-        break;
-    }
+    for (unsigned row = 0; row < sizeof applied / sizeof *applied; row++)
+        if (applied[row].id == id) {
+            functions[applied[row].function](axis);
+            return;
+        }
+    write_target(axis, id);
 }
 
 void parameters_start(unsigned axis) {
@@ -250,9 +201,14 @@ static bool needs_sine(uint8_t id, int64_t value) {
     return false;
 }
 
+static bool home_method_exists(int64_t method) {
+    return method == 1 || method == 2 || method == 17 || method == 18 || method == 33 ||
+           method == 34 || method == 35 || method == 37 || method == -1 || method == -2;
+}
+
 uint8_t parameters_check(unsigned axis, uint8_t id, int64_t value) {
     if (id < 1 || id > BUS_PARAMETER_COUNT) return BUS_CAUSE_UNKNOWN_PARAMETER;
-    if (id == BUS_PARAMETER_HOME_METHOD && !homing_method_exists(value))
+    if (id == BUS_PARAMETER_HOME_METHOD && !home_method_exists(value))
         return BUS_CAUSE_OUT_OF_RANGE;
     if (value < table[id].low || value > table[id].high) return BUS_CAUSE_OUT_OF_RANGE;
     return needs_sine(id, value) && !hardware_has_sine(axis) ? BUS_CAUSE_NOT_BUILT : BUS_CAUSE_OK;
@@ -260,7 +216,7 @@ uint8_t parameters_check(unsigned axis, uint8_t id, int64_t value) {
 
 void parameters_set(unsigned axis, uint8_t id, int64_t value) {
     parameters[axis][id] = value;
-    if (id == BUS_PARAMETER_WATCHDOG_TIME)  // there is one line for all axes
+    if (id == BUS_PARAMETER_WATCHDOG_TIME)  // all axes share one bus
         for (unsigned other = 0; other < HARDWARE_AXES; other++) parameters[other][id] = value;
     apply(axis, id);
 }
@@ -276,7 +232,7 @@ struct planner_limits parameters_limits(unsigned axis, uint8_t velocity_id) {
     return made;
 }
 
-// A velocity below the first stair is that of all of them.
+// A velocity below the first step becomes the velocity of all steps.
 struct planner_stepped_profile parameters_stepped_profile(unsigned axis, uint8_t velocity_id) {
     const int64_t* p = parameters[axis];
     uint64_t top = planner_velocity((uint64_t)p[velocity_id] << 16),

@@ -1,36 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0
-// correction -- the calibrations of all axes as a part of an image: their turns and what the line
-// asks of them.
+// calibration_axes -- the calibrations of all axes as a part of an image: one axis a poll, and the
+// bus operations about them.
 #include "calibration/calibration_axes.h"
 
 #include "axis/axis.h"
-#include "calibration/calibration_runner.h"
+#include "calibration/calibration_driver.h"
 #include "core/hardware.h"
 #include "bus/bus.h"
 #include "made/bus_protocol.h"
 
 static unsigned axes;
-static unsigned turn;  // axis that was served last
+static unsigned served;  // axis that was polled last
 
-void calibration_axes_start(unsigned served_axes) {
-    axes = served_axes;
-    turn = 0;
-    for (unsigned n = 0; n < axes; n++) calibration_runner_start(n);
+void calibration_axes_start(unsigned axes_to_serve) {
+    axes = axes_to_serve;
+    served = 0;
+    for (unsigned n = 0; n < axes; n++) calibration_driver_start(n);
 }
 
 void calibration_axes_work(void) {
     if (axes == 0) return;
     for (unsigned n = 0; n < axes; n++)
-        if (axis_state(n) == BUS_STATE_HOMING) return;  // it has to see its switch in time
-    turn = turn + 1 < axes ? turn + 1 : 0;
-    calibration_runner_poll(turn);
+        if (axis_state(n) == BUS_STATE_HOMING) return;  // the poll must see its switch in time
+    served = served + 1 < axes ? served + 1 : 0;
+    calibration_driver_poll(served);
 }
 
 static uint8_t calibration(unsigned axis) {
-    const struct calibration* calibration = calibration_runner_state(axis);
+    const struct calibration* calibration = calibration_driver_state(axis);
     uint8_t cause =
-        calibration_runner_do(axis, (uint8_t)bus_request_field(BUS_CALIBRATION_REQUEST_ACTION, 1));
-    bus_reply_field(BUS_CALIBRATION_REPLY_REASON, calibration_runner_reason(axis), 1);
+        calibration_driver_do(axis, (uint8_t)bus_request_field(BUS_CALIBRATION_REQUEST_ACTION, 1));
+    bus_reply_field(BUS_CALIBRATION_REPLY_REASON, calibration_driver_reason(axis), 1);
     bus_reply_field(BUS_CALIBRATION_REPLY_CONVERGED, calibration->complete, 1);
     bus_reply_field(BUS_CALIBRATION_REPLY_FROZEN, calibration->frozen, 1);
     bus_reply_field(BUS_CALIBRATION_REPLY_ACCEPTED, calibration->accepted, 4);
@@ -40,7 +40,7 @@ static uint8_t calibration(unsigned axis) {
 }
 
 static uint8_t get_correction(unsigned axis) {
-    const struct calibration_values* values = &calibration_runner_state(axis)->values;
+    const struct calibration_values* values = &calibration_driver_state(axis)->values;
     bus_reply_field(BUS_GET_CORRECTION_REPLY_SIN_OFFSET, (uint64_t)values->sin_offset, 2);
     bus_reply_field(BUS_GET_CORRECTION_REPLY_COS_OFFSET, (uint64_t)values->cos_offset, 2);
     bus_reply_field(BUS_GET_CORRECTION_REPLY_GAIN, (uint64_t)values->gain, 4);
@@ -50,7 +50,7 @@ static uint8_t get_correction(unsigned axis) {
 }
 
 static uint8_t get_harmonic(unsigned axis) {
-    const struct calibration_values* values = &calibration_runner_state(axis)->values;
+    const struct calibration_values* values = &calibration_driver_state(axis)->values;
     uint8_t order = (uint8_t)bus_request_field(BUS_GET_HARMONIC_REQUEST_ORDER, 1);
     if (order < 1 || order > CALIBRATION_ORDERS) return BUS_CAUSE_OUT_OF_RANGE;
     bus_reply_field(BUS_GET_HARMONIC_REPLY_COSINE, (uint64_t)values->cosine[order - 1], 4);
@@ -67,11 +67,11 @@ static uint8_t set_correction(unsigned axis) {
         .quadrature_error =
             (int32_t)bus_request_field(BUS_SET_CORRECTION_REQUEST_QUADRATURE_ERROR, 4)};
     return apply > 1 ? BUS_CAUSE_OUT_OF_RANGE
-                     : calibration_runner_set_correction(axis, &values, apply);
+                     : calibration_driver_set_correction(axis, &values, apply);
 }
 
 static uint8_t set_harmonic(unsigned axis) {
-    return calibration_runner_set_harmonic(
+    return calibration_driver_set_harmonic(
         axis, (uint8_t)bus_request_field(BUS_SET_HARMONIC_REQUEST_ORDER, 1),
         (int32_t)bus_request_field(BUS_SET_HARMONIC_REQUEST_COSINE, 4),
         (int32_t)bus_request_field(BUS_SET_HARMONIC_REQUEST_SINE, 4));

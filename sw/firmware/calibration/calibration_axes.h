@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// correction -- the learners of all axes as a part of an image: their turns and what the line asks
-// of them.
+// calibration_axes -- the calibrations of all axes as a part of an image: one axis a poll, and the
+// bus operations about them.
 #ifndef MOIRE_CALIBRATION_AXES_H
 #define MOIRE_CALIBRATION_AXES_H
 
@@ -8,6 +8,6 @@
 
 void calibration_axes_start(unsigned axes);
 void calibration_axes_work(void);
-uint8_t calibration_axes_operation(uint8_t operation);
+uint8_t calibration_axes_operation(uint8_t operation);  // returns a bus_cause
 
 #endif

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// image_axis -- the axes of a measuring machine: their sines and cosines are corrected.
+// image_axis -- parts of a node for axes with sine/cosine encoders: calibration, segment tables,
+// scope.
 #include "calibration/calibration_axes.h"
 #include "core/image.h"
 #include "bus/scope.h"
-#include "calibration/segments.h"
+#include "bus/segments.h"
 
 const struct image_part image_parts[] = {
     {calibration_axes_start, calibration_axes_work, calibration_axes_operation},

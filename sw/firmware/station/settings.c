@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// settings -- what a station is told once: tolerances, times, roles. Each is looked up where it is
-// used.
+// settings -- what is set once in a station: tolerances, times, roles. Each is read where it is
+// used, so a change is in force at once.
 #include "station/settings.h"
 
 #include "bus/bus.h"
@@ -31,7 +31,7 @@ uint8_t settings_set(uint8_t id, int64_t value) {
 }
 
 uint8_t settings_operation(uint8_t operation) {
-    uint8_t id = (uint8_t)bus_request_field(BUS_REQUEST_HEAD, 1);  // both begin with it
+    uint8_t id = (uint8_t)bus_request_field(BUS_REQUEST_HEAD, 1);  // the first field of both
     if (operation != BUS_OPERATION_GET_SETTING && operation != BUS_OPERATION_SET_SETTING)
         return BUS_CAUSE_NOT_BUILT;
     if (id < 1 || id > BUS_SETTING_COUNT) return BUS_CAUSE_UNKNOWN_PARAMETER;

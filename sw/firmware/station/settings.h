@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// settings -- what a station is told once: tolerances, times, roles. The parameters of its axes are
-// another matter.
+// settings -- what is set once in a station: tolerances, times, roles. They belong to the node; the
+// parameters belong to its axes.
 #ifndef MOIRE_SETTINGS_H
 #define MOIRE_SETTINGS_H
 
 #include <stdint.h>
 
-void settings_start(unsigned axes);  // defaults
+void settings_start(unsigned axes);  // all are at their defaults
 uint8_t settings_operation(uint8_t operation);
-int64_t settings_get(uint8_t id);  // a bus_setting
+
+// By their bus_setting, in the unit of bus.toml.
+int64_t settings_get(uint8_t id);
 int64_t settings_default(uint8_t id);
-uint8_t settings_set(uint8_t id, int64_t value);  // a bus_cause
+uint8_t settings_set(uint8_t id, int64_t value);  // ok, unknown_parameter or out_of_range
 
 #endif

@@ -1,35 +1,37 @@
 # SPDX-License-Identifier: Apache-2.0
-"""sw/firmware/calibration/calibration.c on this computer, and the machine around it: recorder,
-correction and arctan as integers.
-"""
+"""The firmware's calibration (sw/firmware/calibration), compiled for this computer."""
 
 import ctypes
-import os
-import shutil
-import subprocess
-import sys
-import tempfile
+from collections.abc import Sequence
 from ctypes import c_bool, c_int16, c_int32, c_int64, c_uint8, c_uint16, c_uint32
 from functools import cache
-from pathlib import Path
+from typing import Any
 
-ROOT = Path(__file__).resolve().parents[3]
-SOURCE = ROOT / "sw" / "firmware" / "calibration" / "calibration.c"
-LIBRARY = ROOT / "build" / "firmware" / "host_calibration.so"
-ORDERS, POINTS, BURST, PHASES_OF_BURST, PASS, PERIODS, LINES, WORDS_AT_ONCE = (
-    10,
-    256,
-    1024,
-    2048,
-    39,
-    15,
-    128,
-    4,
-)
+from twin.compiled.host_library import FIRMWARE, host_library
+
+# The constants of calibration_types.h and calibration_values.h.
+ORDERS, POINTS, BURST, PHASES_OF_BURST, PASS = 10, 256, 1024, 2048, 39
+PERIODS, LINES, WORDS_AT_ONCE = 15, 128, 4
 NOTHING, SAMPLES, PHASES, WORDS, WORK, LOADING = range(6)
+MODULES = [
+    FIRMWARE / "calibration" / f"{name}.c"
+    for name in (
+        "calibration",
+        "calibration_values",
+        "ellipse",
+        "equations",
+        "harmonics",
+        "spectrum",
+        "waves",
+    )
+]
 
 
 class Values(ctypes.Structure):
+    """struct calibration_values: offsets in 2^-15 of full scale, gain and quadrature error in
+    2^-16, harmonics in 2^-24 period.
+    """
+
     _fields_ = [
         ("sin_offset", c_int16),
         ("cos_offset", c_int16),
@@ -39,7 +41,8 @@ class Values(ctypes.Structure):
         ("sine", c_int32 * ORDERS),
     ]
 
-    def as_dict(self):
+    def as_dict(self) -> dict[str, Any]:
+        """Numbers by the names of the fields; the harmonics as tuples."""
         return dict(
             sin_offset=self.sin_offset,
             cos_offset=self.cos_offset,
@@ -51,6 +54,8 @@ class Values(ctypes.Structure):
 
 
 class Ellipse(ctypes.Structure):
+    """struct calibration_ellipse."""
+
     _fields_ = [
         ("count", c_uint16),
         ("outside", c_uint16),
@@ -62,6 +67,8 @@ class Ellipse(ctypes.Structure):
 
 
 class Pass(ctypes.Structure):
+    """struct calibration_pass."""
+
     _fields_ = [
         ("slowest", c_uint32),
         ("fastest", c_uint32),
@@ -77,10 +84,14 @@ class Pass(ctypes.Structure):
 
 
 class Sums(ctypes.Union):
+    """The union of both in struct calibration."""
+
     _fields_ = [("ellipse", Ellipse), ("pass_", Pass)]
 
 
 class Calibration(ctypes.Structure):
+    """struct calibration."""
+
     _anonymous_ = ("sums",)
     _fields_ = [
         ("values", Values),
@@ -100,98 +111,65 @@ class Calibration(ctypes.Structure):
 
 
 @cache
-def library():
-    """Compile if the source is newer; gcc or clang of the system, else zig."""
-    sources = [SOURCE, SOURCE.with_suffix(".h")]
-    if not LIBRARY.exists() or LIBRARY.stat().st_mtime < max(
-        path.stat().st_mtime for path in sources
-    ):
-        command = next(
-            ([name] for name in ("cc", "gcc", "clang") if shutil.which(name)),
-            [sys.executable, "-m", "ziglang", "cc"],
-        )
-        LIBRARY.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(
-            dir=LIBRARY.parent
-        ) as folder:  # two runs at once must not meet
-            made = Path(folder) / LIBRARY.name
-            subprocess.run(
-                [
-                    *command,
-                    "-std=c11",
-                    "-O1",
-                    "-g",
-                    "-Wall",
-                    "-Wextra",
-                    "-Wconversion",
-                    "-Wno-sign-conversion",
-                    "-Werror",
-                    "-fsanitize=undefined",
-                    "-fsanitize-undefined-trap-on-error",
-                    "-shared",
-                    "-fPIC",
-                    f"-I{ROOT / 'sw' / 'firmware'}",
-                    str(SOURCE),
-                    "-o",
-                    str(made),
-                ],
-                check=True,
-            )
-            os.replace(made, LIBRARY)
-    loaded = ctypes.CDLL(str(LIBRARY))
-    loaded.calibration_restore.restype = loaded.calibration_values_fit.restype = (
-        loaded.calibration_open.restype
-    ) = c_bool
-    loaded.calibration_table_entry.restype = c_int32
+def library() -> ctypes.CDLL:
+    """The compiled calibration; its work area is one for all Calibration objects."""
+    loaded = host_library("calibration", [*MODULES, FIRMWARE / "core" / "arithmetic.c"])
+    loaded.calibration_restore.restype = c_bool
+    loaded.calibration_values_fit.restype = c_bool
+    loaded.calibration_open.restype = c_bool
+    loaded.harmonics_table_entry.restype = c_int32
     return loaded
 
 
 class CalibrationRun:
-    """The firmware's calibration; its need is served by the test."""
+    """A calibration whose needs are served: its work is done, its values are loaded."""
 
-    def __init__(self):
-        self.calibration, self.loads = Calibration(), 0
+    def __init__(self) -> None:
+        self.calibration = Calibration()
+        self.loads = 0  # how often values were put into force
+        self.table: list[int] = []  # of harmonic_correction, 2^-20 period
         self.call("start")
 
-    def call(self, name, *arguments):
-        return getattr(library(), f"calibration_{name}")(ctypes.byref(self.calibration), *arguments)
+    def call(self, name: str, *arguments: Any) -> Any:
+        """Calls calibration_NAME with this calibration and the arguments."""
+        function = getattr(library(), f"calibration_{name}")
+        return function(ctypes.byref(self.calibration), *arguments)
 
     @property
-    def values(self):
-        return self.calibration.values.as_dict()
+    def values(self) -> dict[str, Any]:
+        """The values in force, as Values.as_dict."""
+        values: Values = self.calibration.values
+        return values.as_dict()
 
-    def idle(self):
-        """All work done and values loaded; returns what the calibration needs now."""
+    def idle(self) -> int:
+        """Do all work and load all values; returns what the calibration needs now."""
         while self.calibration.need in (WORK, LOADING):
             if self.calibration.need == LOADING:
+                values = ctypes.byref(self.calibration.values)
                 self.table = [
-                    library().calibration_table_entry(ctypes.byref(self.calibration.values), point)
-                    for point in range(POINTS)
+                    library().harmonics_table_entry(values, point) for point in range(POINTS)
                 ]
                 self.loads += 1
                 self.call("loaded")
             else:
                 self.call("work")
-        return self.calibration.need
+        return int(self.calibration.need)
 
-    def burst(self, words, spoiled=False, every=1):
-        """A burst of words, given as often as it is wanted, then all work; returns the reason."""
+    def burst(self, words: Sequence[int], spoiled: bool = False, every: int = 1) -> int:
+        """Give the words of a burst as often as they are required, and do all work; returns the
+        reason, a bus_calibration_reason. `every` is the decimation of the recorder, and `spoiled`
+        says that the amplitude left its window.
+        """
         self.call("open", c_uint16(every), spoiled)
-        take, calibration, given = (
-            library().calibration_take,
-            ctypes.byref(self.calibration),
-            (c_uint32 * len(words))(*words),
-        )
+        take, calibration = library().calibration_take, ctypes.byref(self.calibration)
+        given = (c_uint32 * len(words))(*words)
         at_once = WORDS_AT_ONCE if self.calibration.harmonics else 1
         while self.idle() == WORDS:
             for n in range(0, len(words), at_once):
                 take(calibration, ctypes.byref(given, 4 * n))
-        return self.calibration.reason
+        return int(self.calibration.reason)
 
-    def phases(self, phases, spoiled=False, every=1):
-        """The same from single phases: calibration_recorder packs two into a word."""
-        return self.burst(
-            [later << 16 | earlier for earlier, later in zip(phases[::2], phases[1::2])],
-            spoiled,
-            every,
-        )
+    def phases(self, phases: Sequence[int], spoiled: bool = False, every: int = 1) -> int:
+        """The same from single phases, 2^-16 period: calibration_recorder packs two into a word."""
+        pairs = zip(phases[::2], phases[1::2], strict=True)
+        return self.burst([later << 16 | earlier for earlier, later in pairs], spoiled, every)

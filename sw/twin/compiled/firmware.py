@@ -2,23 +2,19 @@
 """The firmware as a shared library of this computer, its registers served by Python."""
 
 import ctypes
-import os
-import shutil
-import subprocess
-import sys
-import tempfile
 from functools import cache
 from pathlib import Path
 
 from firmware import build as firmware_build
+from twin.compiled.host_library import host_library
 
-ROOT = Path(__file__).resolve().parents[3]
-SOURCE = ROOT / "sw" / "firmware"
 BRIDGE = Path(__file__).with_name("register_bridge.c")
 EVENTS, SECTIONS = 60, 9
 
 
 class Limits(ctypes.Structure):
+    """struct planner_limits: 2^-40 period per tick, tick^2 and tick^3."""
+
     _fields_ = [
         ("velocity", ctypes.c_uint64),
         ("acceleration", ctypes.c_uint64),
@@ -27,6 +23,8 @@ class Limits(ctypes.Structure):
 
 
 class Segment(ctypes.Structure):
+    """struct planner_segment."""
+
     _fields_ = [
         ("velocity", ctypes.c_int64),
         ("acceleration", ctypes.c_int64),
@@ -36,14 +34,18 @@ class Segment(ctypes.Structure):
 
 
 class State(ctypes.Structure):
+    """struct planner_state."""
+
     _fields_ = [
-        ("gone", ctypes.c_uint64),
+        ("moved", ctypes.c_uint64),
         ("velocity", ctypes.c_int64),
         ("acceleration", ctypes.c_int64),
     ]
 
 
 class Event(ctypes.Structure):
+    """struct planner_event."""
+
     _fields_ = [
         ("jerk", ctypes.c_int64),
         ("tick", ctypes.c_uint32),
@@ -54,6 +56,8 @@ class Event(ctypes.Structure):
 
 
 class Progress(ctypes.Structure):
+    """struct planner_progress."""
+
     _fields_ = [
         ("state", State),
         ("jerk", ctypes.c_int64),
@@ -63,10 +67,14 @@ class Progress(ctypes.Structure):
 
 
 class Steps(ctypes.Union):
+    """The union of events and sections in struct plan."""
+
     _fields_ = [("event", Event * EVENTS), ("section", Segment * SECTIONS)]
 
 
 class Plan(ctypes.Structure):
+    """struct plan."""
+
     _fields_ = [
         ("ticks", ctypes.c_uint32),
         ("count", ctypes.c_uint8),
@@ -79,6 +87,8 @@ class Plan(ctypes.Structure):
 
 
 class SteppedProfile(ctypes.Structure):
+    """struct planner_stepped_profile."""
+
     _fields_ = [
         ("first", ctypes.c_uint64),
         ("top", ctypes.c_uint64),
@@ -93,48 +103,13 @@ WRITE = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32)
 
 
 @cache
-def library(image="axis"):
-    """Compile if a source is newer; gcc or clang of the system, else zig."""
-    sources = [*(path for path in firmware_build.sources_of(image) if path.suffix != ".S"), BRIDGE]
-    result = ROOT / "build" / "firmware" / f"host_firmware_{image}.so"
-    if not result.exists() or result.stat().st_mtime < max(
-        path.stat().st_mtime for path in sources
-    ):
-        command = next(
-            ([name] for name in ("cc", "gcc", "clang", "g++") if shutil.which(name)),
-            [sys.executable, "-m", "ziglang", "cc"],
-        )
-        result.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(
-            dir=result.parent
-        ) as folder:  # two runs at once must not meet
-            made = Path(folder) / result.name
-            subprocess.run(
-                [
-                    *command,
-                    "-std=c11",
-                    "-O1",
-                    "-g",
-                    "-Wall",
-                    "-Wextra",
-                    "-Wconversion",
-                    "-Wno-sign-conversion",
-                    "-Werror",
-                    "-fsanitize=undefined",
-                    "-fsanitize-undefined-trap-on-error",  # undefined behaviour ends the test
-                    "-shared",
-                    "-fPIC",
-                    "-DMOIRE_REGISTER_ACCESS",
-                    f"-I{SOURCE}",
-                    *firmware_build.defines_of(image),
-                    *(str(path) for path in sources if path.suffix == ".c"),
-                    "-o",
-                    str(made),
-                ],
-                check=True,
-            )
-            os.replace(made, result)
-    loaded = ctypes.CDLL(str(result))
+def library(image: str = "axis") -> ctypes.CDLL:
+    """The firmware of an image. Its state is one for all FakeNode objects of that image: who starts
+    one resets it.
+    """
+    sources = [path for path in firmware_build.sources_of(image) if path.suffix == ".c"]
+    options = ["-DMOIRE_REGISTER_ACCESS", *firmware_build.defines_of(image)]
+    loaded = host_library(f"firmware_{image}", [*sources, BRIDGE], options)
     loaded.planner_limits.restype = Limits
     loaded.planner_move.argtypes = [ctypes.POINTER(Plan), ctypes.POINTER(Limits), ctypes.c_int64]
     loaded.planner_retarget.argtypes = [

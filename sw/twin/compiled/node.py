@@ -1,50 +1,53 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A node without hardware: the registers as the firmware sees them, behind them a line, a clock and
-simple axes.
+"""A node without hardware: the compiled firmware, and in place of its registers a bus, a clock and
+simple axes in Python.
 
-The player adds up the segments as they were pushed, with no B-spline between their steps, no
-override and no limit of jerk: a brake
-takes stop_deceleration off the velocity each tick, and a profile starts at full speed. What
-rtl/control/profile_player.sv does beyond this
-is tested with its own model and with the RTL in tb/system. The position follows the target by half
-the way each tick, a drive that is
-off stands, and a limit switch lets it slide a little into the blocked way. Faults latch as
-drive_interlock does it.
+The player adds up the segments as they were pushed: without B-spline between their steps, feed
+override or limit of jerk. A controlled stop takes stop_deceleration off the velocity each tick, and
+a profile starts at full speed. What rtl/control/profile_player.sv does beyond this is tested with
+its own model, and with the RTL in tb/system. Each tick the position moves by half the distance to
+the target; an axis whose drive is off does not move, and it slides a little past a limit switch
+that has closed. Faults latch as drive_interlock does it.
 """
 
 import re
 import tomllib
 import zlib
 from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, Protocol
 
-from twin.compiled.firmware import READ, ROOT, SOURCE, WRITE, library
+from twin.compiled.firmware import READ, WRITE, library
+from twin.compiled.host_library import FIRMWARE, ROOT
 
 DEFINES = {
     name: int(value.rstrip("u"), 0)
     for name, value in re.findall(
         r"^#define (\w+)\s+(0x[0-9a-fA-F]+u?|\d+u?)\b",
-        (SOURCE / "made" / "registers.h").read_text(),
+        (FIRMWARE / "made" / "registers.h").read_text(),
         re.M,
     )
 }
 TABLE = tomllib.loads((ROOT / "tables" / "bus.toml").read_text())
-CAUSE = {code: name for name, (code, _) in TABLE["cause"].items()}
-STATE = {code: name for name, (code, _) in TABLE["state"].items()}
+CAUSE: dict[int, str] = {code: name for name, (code, _) in TABLE["cause"].items()}
+STATE: dict[int, str] = {code: name for name, (code, _) in TABLE["state"].items()}
 FAULT = {name: 1 << bit for name, (bit, _) in TABLE["fault"].items()}
 FLAG = {name: 1 << bit for name, (bit, _) in TABLE["flag"].items()}
 PARAMETER = TABLE["parameter"]
 CLK_HZ = 4_000_000
 PERIOD = 65536
-SLIDE = 30 * PERIOD  # into a pressed switch
+SLIDE = 30 * PERIOD  # past a closed switch
 BACKLASH = PERIOD // 2  # a switch opens so far from where it closed
 ALWAYS_LATCHED = FAULT["estop"] | FAULT["drive"] | FAULT["cpu"]
 
 
-def signed(value, bits):
+def signed(value: int, bits: int) -> int:
+    """The number that the low `bits` of a word hold as two's complement."""
     return value - (1 << bits) if value >> bits - 1 & 1 else value
 
 
-def fields(declarations, data):
+def fields(declarations: Iterable[str], data: bytes) -> dict[str, int]:
+    """The numbers in data by the declarations "name u16" of bus.toml, little endian."""
     values, at = {}, 0
     for declaration in declarations:
         name, kind = declaration.split()
@@ -56,27 +59,32 @@ def fields(declarations, data):
 
 
 class Player:
-    def __init__(self):
-        self.target = self.velocity = self.acceleration = self.jerk = self.left = self.last = (
-            0  # target: 2^-40 period
-        )
-        self.queue, self.moving, self.braking, self.stop_deceleration = deque(), False, False, 0
+    """The profile player: adds up segments, (velocity, acceleration, jerk, ticks, last)."""
 
-    def hold(self, position):
+    def __init__(self) -> None:
+        self.target = 0  # 2^-40 period
+        self.velocity = self.acceleration = self.jerk = self.left = self.last = 0
+        self.queue: deque[tuple[int, int, int, int, int]] = deque()
+        self.moving = self.braking = False
+        self.stop_deceleration = 0
+
+    def hold(self, position: int) -> None:
+        """Stand still at a position, 2^-16 period, without segments."""
         self.__init_motion()
         self.target = position << 24
 
-    def __init_motion(self):
+    def __init_motion(self) -> None:
         self.queue.clear()
         self.moving = self.braking = False
         self.left = self.last = self.velocity = 0
 
-    def controlled_stop(self):
+    def controlled_stop(self) -> None:
+        """Drop the segments and slow down."""
         self.queue.clear()
         self.braking = self.moving
 
-    def tick(self):
-        """True if the segments ran out."""
+    def tick(self) -> bool:
+        """One servo tick; returns True if the segments ran out."""
         if not self.moving:
             return False
         underrun = False
@@ -98,7 +106,7 @@ class Player:
                 self.acceleration + self.jerk,
                 self.left - 1,
             )
-            stop = self.last and self.left == 0
+            stop = bool(self.last) and self.left == 0
         if stop:
             self.target = self.target + (1 << 23) >> 24 << 24
             self.__init_motion()
@@ -106,11 +114,21 @@ class Player:
 
 
 class Axis:
-    def __init__(self, position=0, low=None, high=None, index=()):
-        """Positions of the switches and of each index are those of the machine: the origin of the
-        node does not move them.
+    """An axis with drive, limit switches and index marks."""
+
+    def __init__(
+        self,
+        position: int = 0,
+        low: int | None = None,
+        high: int | None = None,
+        index: Sequence[int] = (),
+    ) -> None:
+        """At a position, 2^-16 period. The limit switches close at `low` and `high`, and index
+        marks are at `index`; these are positions of the machine, which the origin of the node does
+        not move.
         """
-        self.word = {}
+        self.word: dict[int, int] = {}  # of registers that only hold what was written
+        self.latch = 0
         self.machine, self.origin = position, 0  # position = machine + origin
         self.low_at, self.high_at = low, high
         self.pressed_low = low is not None and position <= low
@@ -121,28 +139,34 @@ class Axis:
         self.faults = self.first_fault = self.fault_position = 0
         self.causes = 0  # those that the test sets
         self.enabled = self.seized = False
-        self.speed, self.passed = 0, None  # passed: position of the index met in the last tick
+        self.speed = 0
+        self.passed: int | None = None  # position of the index mark met in the last tick
         self.index = index
-        self.strobes = []  # (strobes, control) in order
-        self.pushed = []
+        self.strobes: list[tuple[int, int]] = []  # (strobes, control) in order
+        self.pushed: list[tuple[int, int, int, int, int]] = []
 
     @property
-    def position(self):
+    def position(self) -> int:
+        """As the node counts it, 2^-16 period."""
         return self.machine + self.origin
 
     @property
-    def target(self):
+    def target(self) -> int:
+        """Of the player, 2^-16 period."""
         return self.player.target >> 24
 
     @property
-    def error(self):
+    def error(self) -> int:
+        """The following error, 2^-16 period."""
         return self.target - self.position
 
     @property
-    def control(self):
+    def control(self) -> int:
+        """The control register."""
         return self.word.get(DEFINES["AXIS_CONTROL"], 0)
 
-    def interlock(self, strobe_cause=0):
+    def interlock(self, strobe_cause: int = 0) -> int:
+        """Latch the faults whose causes are present, and switch the drive; returns those causes."""
         causes = self.causes | strobe_cause
         if not self.control & DEFINES["AXIS_CONTROL_HOMING_MASK"]:
             causes |= (
@@ -151,21 +175,23 @@ class Axis:
         limit = self.word.get(DEFINES["AXIS_FOLLOWING_LIMIT"], 0)
         if self.enabled and limit and abs(self.error) > limit:
             causes |= FAULT["following_error"]
-        wants = self.control & DEFINES["AXIS_CONTROL_ENABLE_MASK"]
-        arrived = causes & (-1 if wants else ALWAYS_LATCHED)
+        enable = self.control & DEFINES["AXIS_CONTROL_ENABLE_MASK"]
+        arrived = causes & (-1 if enable else ALWAYS_LATCHED)
         if arrived and not self.faults:
             self.first_fault, self.fault_position = arrived & -arrived, self.position
         self.faults |= arrived
-        self.enabled = bool(wants) and not self.faults
+        self.enabled = bool(enable) and not self.faults
         return causes
 
-    def reset(self):
+    def reset(self) -> None:
+        """Reset the faults whose causes are gone, while the drive is disabled."""
         if not self.control & DEFINES["AXIS_CONTROL_ENABLE_MASK"]:
             self.faults &= self.interlock()
             if not self.faults:
                 self.first_fault = 0
 
-    def tick(self):
+    def tick(self) -> None:
+        """One servo tick of player, drive and switches."""
         underrun = self.player.tick()
         old = self.machine
         if self.enabled and not self.seized:
@@ -182,9 +208,7 @@ class Axis:
             )
         self.speed = self.machine - old
         met = [
-            place
-            for place in self.index
-            if min(old, self.machine) < place <= max(old, self.machine)
+            mark for mark in self.index if min(old, self.machine) < mark <= max(old, self.machine)
         ]
         self.passed = met[0 if self.speed > 0 else -1] + self.origin if met else None
         if self.low_at is not None:
@@ -199,7 +223,8 @@ class Axis:
                 self.pressed_high = False
         self.interlock(FAULT["profile_underrun"] if underrun else 0)
 
-    def read(self, offset):
+    def read(self, offset: int) -> int:
+        """A register of the axis block."""
         d = DEFINES
         wide = {
             d["AXIS_POSITION"]: self.position,
@@ -229,7 +254,8 @@ class Axis:
         }
         return special.get(offset, self.word.get(offset, 0)) & 0xFFFFFFFF
 
-    def write(self, offset, value):
+    def write(self, offset: int, value: int) -> None:
+        """Write a register of the axis block."""
         d = DEFINES
         if offset == d["AXIS_STROBES"]:
             self.strobes.append((value, self.control))
@@ -274,30 +300,37 @@ class Axis:
 
 
 class FakeFeedbackChannel:
-    """The registers of a grating; `burst(phases, every)` gives the 1024 words of a burst, which is
-    full after `delay` looks.
-    Without `sine` nothing of sine and cosine is built."""
+    """The registers of a feedback channel. `burst(phases, every)` gives the 1024 words of a burst,
+    which is full after `delay` polls. Without `sine` nothing of sine and cosine is built.
+    """
 
-    def __init__(self, sine=True):
+    def __init__(self, sine: bool = True) -> None:
         self.sine = sine
-        self.word, self.strobes, self.records = {}, [], []
-        self.burst, self.spoiled, self.delay = None, False, 0
-        self.waiting, self.words, self.taken, self.full = 0, [], 0, False
-        self.points, self.written = {}, {}  # table in force, table being written
-        self.correction, self.loads = None, 0
-        self.armed, self.captured, self.latch = False, None, 0
-        self.most_segments, self.segments, self.use, self.uses = (
-            255,
-            {},
-            None,
-            [],
-        )  # use: None, or the settings in force
+        self.word: dict[int, int] = {}
+        self.strobes: list[int] = []
+        self.records: list[tuple[bool, int]] = []  # (phases, decimation) of each recording
+        self.burst: Callable[[bool, int], Sequence[int]] | None = None
+        self.spoiled, self.delay = False, 0
+        self.waiting, self.taken, self.full = 0, 0, False
+        self.words: Sequence[int] = []
+        self.points: dict[int, int] = {}  # the table in force
+        self.written: dict[int, int] = {}  # the table that is being written
+        self.correction: dict[str, int] | None = None
+        self.loads = 0
+        self.captured: int | None = None
+        self.armed, self.latch = False, 0
+        self.most_segments = 255
+        self.segments: dict[int, int] = {}
+        self.use: dict[str, Any] | None = None  # the settings in force
+        self.uses: list[bool | None] = []  # whether linear, of each use; None: out of force
 
-    def index(self, position):
+    def index(self, position: int) -> None:
+        """An index mark passes at a position."""
         if self.armed and self.word.get(DEFINES["FEEDBACK_CAPTURE_SOURCES"], 0) & 1:
             self.armed, self.captured = False, position
 
-    def read(self, offset):
+    def read(self, offset: int) -> int:
+        """A register of the feedback block."""
         d = DEFINES
         if offset == d["FEEDBACK_RECORDER_STATE"]:
             self.waiting -= 1
@@ -309,7 +342,7 @@ class FakeFeedbackChannel:
             return self.words[(self.taken - 1) % len(self.words)]
         if offset == d["FEEDBACK_CAPTURE_STATE"]:
             return d["FEEDBACK_CAPTURE_STATE_PRESENT_MASK"] * (self.captured is not None)
-        if offset == d["FEEDBACK_CAPTURED_POSITION"]:
+        if offset == d["FEEDBACK_CAPTURED_POSITION"] and self.captured is not None:
             self.latch = self.captured >> 32 & 0xFFFF
             return self.captured & 0xFFFFFFFF
         if offset == d["FEEDBACK_CAPTURED_POSITION"] + 4:
@@ -326,14 +359,16 @@ class FakeFeedbackChannel:
             return self.word.get(offset, 0) | d["FEEDBACK_POSITION_SOURCE_SINE_MASK"] * self.sine
         return self.word.get(offset, 0)
 
-    def wide(self, name, bits):
+    def wide(self, name: str, bits: int) -> int:
+        """The signed number that was written to NAME_HIGH and NAME_LOW."""
         return signed(
             self.word[DEFINES[f"{name}_HIGH"]] << 32 & (1 << bits) - 1
             | self.word[DEFINES[f"{name}_LOW"]],
             bits,
         )
 
-    def use_segments(self, value):
+    def use_segments(self, value: int) -> None:
+        """Put the segment table into force, or out of it, as the register segment_use says."""
         self.use = (
             dict(
                 linear=bool(value & 2),
@@ -344,9 +379,10 @@ class FakeFeedbackChannel:
             if value & 1
             else None
         )
-        self.uses.append(self.use and self.use["linear"])
+        self.uses.append(self.use["linear"] if self.use else None)
 
-    def write(self, offset, value):
+    def write(self, offset: int, value: int) -> None:
+        """Write a register of the feedback block."""
         d = DEFINES
         self.word[offset] = value
         if offset == d["FEEDBACK_SEGMENT_POINT"]:
@@ -376,22 +412,38 @@ class FakeFeedbackChannel:
                     ),
                 )
             if value & d["FEEDBACK_STROBES_SWAP_HARMONICS_MASK"]:
-                assert len(self.written) == 256, "a table was taken that was not written whole"
+                assert len(self.written) == 256, "a table was put into force before it was complete"
                 self.points, self.written, self.loads = self.written, {}, self.loads + 1
 
 
+class Peripherals(Protocol):
+    """What stands behind the registers of the block `peripherals`."""
+
+    def read(self, offset: int) -> int:
+        """A register of the block."""
+
+    def write(self, offset: int, value: int) -> None:
+        """Write a register of the block."""
+
+    def millisecond(self, machine: "FakeNode") -> None:
+        """A millisecond of the node has passed."""
+
+
 class FakeNode:
-    """The node under the firmware; request() speaks to it as the master does."""
+    """The compiled firmware with its registers in Python; request() talks to it as a host does."""
 
     def __init__(
         self,
-        *axes,
-        map_crc=DEFINES["MAP_CRC"],
-        address=2,
-        image="axis",
-        peripherals=None,
-        sine=True,
-    ):
+        *axes: Axis,
+        map_crc: int = DEFINES["MAP_CRC"],
+        address: int = 2,
+        image: str = "axis",
+        peripherals: Peripherals | None = None,
+        sine: bool = True,
+    ) -> None:
+        """Power up. `sine`: sine and cosine are built; a `map_crc` other than that of the firmware
+        is a bitstream that does not fit it.
+        """
         self.axes, self.address, self.map_crc, self.clk = (
             list(axes) or [Axis()],
             address,
@@ -404,7 +456,10 @@ class FakeNode:
             {DEFINES["ACTUATOR_DRIVE"]: DEFINES["ACTUATOR_DRIVE_BUILT_MASK"]} for _ in self.axes
         ]
         self.peripherals = peripherals
-        self.received, self.sent, self.word, self.crc_bytes = deque(), [], {}, b""
+        self.received: deque[int] = deque()
+        self.sent: list[int] = []
+        self.word: dict[int, int] = {}
+        self.crc_bytes = b""
         self.sequence = 0
         self.answers = (
             READ(self.read),
@@ -414,7 +469,8 @@ class FakeNode:
         self.firmware.register_bridge(*self.answers)
         self.firmware.firmware_start()
 
-    def read(self, offset):
+    def read(self, offset: int) -> int:
+        """A register, as the firmware reads it."""
         d = DEFINES
         if offset >= d["ACTUATOR_BASE"]:
             return self.actuators[(offset - d["ACTUATOR_BASE"]) // d["ACTUATOR_STRIDE"]].get(
@@ -448,7 +504,8 @@ class FakeNode:
             d["NODE_TIME_STAMP"]: self.clk & 0xFFFFFFFF,
         }.get(offset, self.word.get(offset, 0))
 
-    def write(self, offset, value):
+    def write(self, offset: int, value: int) -> None:
+        """Write a register, as the firmware does."""
         d = DEFINES
         if offset >= d["ACTUATOR_BASE"]:
             built = (
@@ -480,21 +537,24 @@ class FakeNode:
         else:
             self.word[offset] = value
             if offset == d["NODE_START_AXES"]:
-                for n, axis in enumerate(self.axes):
-                    axis.player.moving |= bool(value >> n & 1 and axis.player.queue)
+                for n, started in enumerate(self.axes):
+                    started.player.moving |= bool(value >> n & 1 and started.player.queue)
 
-    def poll(self, times=1):
+    def poll(self, times: int = 1) -> None:
+        """Poll the firmware so often, without time passing."""
         for _ in range(times):
             self.firmware.firmware_poll()
 
-    def run(self, ms, until=None):
-        """One poll of the firmware a millisecond, four servo ticks between; True when `until` came."""
+    def run(self, ms: float, until: Callable[[], object] | None = None) -> bool:
+        """Run for `ms`: a poll of the firmware each millisecond, after four servo ticks. Stops
+        early and returns True once `until` is true.
+        """
         for _ in range(int(ms)):
             for _ in range(4):
-                for axis, grating in zip(self.axes, self.feedback_channels, strict=True):
+                for axis, channel in zip(self.axes, self.feedback_channels, strict=True):
                     axis.tick()
                     if axis.passed is not None:
-                        grating.index(axis.passed)
+                        channel.index(axis.passed)
             self.clk += CLK_HZ // 1000
             if self.peripherals:
                 self.peripherals.millisecond(self)
@@ -503,16 +563,16 @@ class FakeNode:
                 return True
         return False
 
-    def hear(self, words):
-        """Put words on the line and return what the node sends."""
+    def hear(self, words: Sequence[int]) -> bytes:
+        """Put words on the bus; returns what the node sends."""
         self.sent.clear()
         for n in range(0, len(words), 8):
             self.received.extend(words[n : n + 8])
             self.poll()
         return bytes(self.sent)
 
-    def frame(self, body, command=None):
-        """The words of a right frame, as the hardware passes them."""
+    def frame(self, body: bytes, command: int | None = None) -> list[int]:
+        """The words of a good frame, as the hardware passes them to the firmware."""
         command = 0x20 | self.address if command is None else command
         payload = bytes([len(body)]) + body
         payload += zlib.crc32(bytes([command]) + payload).to_bytes(4, "little")
@@ -520,10 +580,11 @@ class FakeNode:
         words[-1] |= DEFINES["BUS_RECEIVE_GOOD_MASK"]
         return words
 
-    def send(self, body):
+    def send(self, body: bytes) -> None:
+        """Send a request, which the node must acknowledge."""
         assert self.hear(self.frame(body)) == bytes([0x60 | self.address])
 
-    def reply(self):
+    def reply(self) -> bytes:
         """The body that the node sends when it is asked for its reply."""
         ready = 0x50 | self.address
         sent = self.hear([0x10 | self.address | DEFINES["BUS_RECEIVE_COMMAND_MASK"]])
@@ -531,8 +592,8 @@ class FakeNode:
         assert zlib.crc32(sent[:-4]) == int.from_bytes(sent[-4:], "little")
         return sent[2:-4]
 
-    def request(self, name, **values):
-        """(cause, fields) of an operation of bus.toml."""
+    def request(self, name: str, **values: int) -> tuple[str, dict[str, int]]:
+        """Do an operation of bus.toml; returns its cause and, if ok, the fields of the reply."""
         operation = TABLE["operation"][name]
         self.sequence = (self.sequence + 1) % 256
         body = bytes([self.sequence, operation["code"]])
@@ -549,12 +610,14 @@ class FakeNode:
             return cause, {}
         return cause, fields(operation["reply"], answer[3:])
 
-    def ask(self, name, **values):
+    def ask(self, name: str, **values: int) -> dict[str, int]:
+        """The same; the cause must be ok. Returns the fields."""
         cause, answer = self.request(name, **values)
         assert cause == "ok", cause
         return answer
 
-    def status(self, axis=0):
+    def status(self, axis: int = 0) -> dict[str, Any]:
+        """The reply to `status`, with the names of state, cause and flags."""
         answer = self.ask("status", axis=axis)
         return {
             **answer,
@@ -563,6 +626,7 @@ class FakeNode:
             "flags": {name for name, bit in FLAG.items() if answer["flags"] & bit},
         }
 
-    def set(self, axis=0, **values):
+    def set(self, axis: int = 0, **values: int) -> None:
+        """Set parameters of an axis by their names, in their LSB."""
         for name, value in values.items():
             self.ask("set_parameter", axis=axis, parameter=PARAMETER[name]["id"], value=value)

@@ -1,123 +1,116 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A main node of S4 without hardware: what stands around it, byte by byte, behind the registers of
-its peripherals.
+"""A main node of S4 without hardware: the compiled firmware, and its devices byte by byte behind
+the registers of the block `peripherals`.
 
-On the I2C bus an EEPROM 24AA128, a key-pad controller TCA8418 and a character display HD44780
-behind a PCF8574; on PS/2 the wire-EDM
-machine and a person at its keyboard; on the peer port a sub-node. Time is the node's: i2c commands
-take as long as the bus does.
+The I2C bus has an EEPROM 24AA128, a key-pad controller TCA8418, and a character display HD44780
+behind a PCF8574. On PS/2 are the wire-EDM machine and a person at its keyboard, on the peer port a
+sub-node. Time is that of the node, in cycles of its clock; I2C commands take as long as on the bus.
 """
 
 import random
 import zlib
 from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 from twin.compiled.node import CLK_HZ, DEFINES, TABLE, Axis, FakeNode
 
 BYTE_CLK, EDGE_CLK = CLK_HZ * 9 // 100_000, CLK_HZ // 100_000  # at 100 kHz
-STATE = {code: name for name, (code, _) in TABLE["job_state"].items()}
-CAUSE = {code: name for name, (code, _) in TABLE["cause"].items()}
+STATE: dict[int, str] = {code: name for name, (code, _) in TABLE["job_state"].items()}
+CAUSE: dict[int, str] = {code: name for name, (code, _) in TABLE["cause"].items()}
 ACTION = {name: code for name, (code, _) in TABLE["job_action"].items()}
 FLAG = {name: 1 << bit for name, (bit, _) in TABLE["job_flag"].items()}
 SETTING = {name: setting["id"] for name, setting in TABLE["setting"].items()}
 OPERATION = {name: operation["code"] for name, operation in TABLE["operation"].items()}
 OK, NOT_ACKNOWLEDGED, NO_BUS = 0, 1, 3
-KEYS = [
-    "7",
-    "8",
-    "9",
-    "START",
-    "PAUSE",
-    "RESUME",
-    "STOP",
-    "4",
-    "5",
-    "6",
-    "AGAIN",
-    "NEXT",
-    "UP",
-    "DOWN",
-    "1",
-    "2",
-    "3",
-    "DIVIDE",
-    "LIST",
-    "LIMIT",
-    "SPEED",
-    "0",
-    ".",
-    "ENTER",
-    "CLEAR",
-]
-TURN = 129_600_000
+KEYS = (
+    "7 8 9 START PAUSE RESUME STOP "
+    "4 5 6 AGAIN NEXT UP DOWN "
+    "1 2 3 DIVIDE LIST LIMIT SPEED "
+    "0 . ENTER CLEAR"
+).split()
+TURN = 129_600_000  # 0.01 arcsec
+WRITING = 2  # a store_state
 
 
-def ms(time):
-    return time * CLK_HZ // 1000
+def ms(time: float) -> int:
+    """Clock cycles of so many ms."""
+    return int(time * CLK_HZ // 1000)
 
 
 class Device:
-    """What a device on the bus does with bytes; this one has neither any to give nor takes any."""
+    """A device on the I2C bus; this one acknowledges everything and has no data."""
 
-    def begun(self, now, reads):
+    def begun(self, now: int, reads: int) -> bool:
+        """Its address came, for reading or writing; returns whether the device acknowledges."""
         return True
 
-    def written(self, now, byte):
+    def written(self, now: int, byte: int) -> bool:
+        """A byte came; returns whether the device acknowledges."""
         return True
 
-    def read(self, now):
+    def read(self, now: int) -> int:
+        """The byte that the device sends."""
         return 0xFF
 
-    def stopped(self, now):
+    def stopped(self, now: int) -> None:
+        """The transfer has ended."""
         pass
 
 
 class Eeprom(Device):
-    """Microchip 24AA128. A power cut while a page is written leaves each of its bytes as it was, as
-    it should be, or as anything.
+    """Microchip 24AA128. A power cut while a page is being written leaves in each of its bytes the
+    old value, the new one, or any other.
     """
 
     BYTES, PAGE, WRITE = 16384, 64, ms(5)
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.memory = bytearray(b"\xff" * self.BYTES)
-        self.worn = {}  # bytes that keep a value of their own
-        self.busy_until, self.came, self.pointer, self.page, self.writes = 0, [], 0, None, 0
+        self.worn: dict[int, int] = {}  # bytes that cannot be written, and their values
+        self.came: list[int] = []  # bytes of this transfer
+        self.busy_until = self.pointer = self.writes = 0
+        self.page = 0, b""  # that is being written: its address, and what it held before
 
-    def begun(self, now, reads):
+    def begun(self, now: int, reads: int) -> bool:
+        """Not acknowledged while a page is being written."""
         self.came = [] if not reads else self.came
         return now >= self.busy_until
 
-    def written(self, now, byte):
+    def written(self, now: int, byte: int) -> bool:
+        """Two bytes of address, then data."""
         self.came.append(byte)
         if len(self.came) == 2:
             self.pointer = int.from_bytes(self.came, "big") % self.BYTES
         return True
 
-    def read(self, now):
+    def read(self, now: int) -> int:
+        """The byte at the pointer, which advances."""
         self.pointer = (self.pointer + 1) % self.BYTES
         return self.memory[self.pointer - 1]
 
-    def stopped(self, now):
+    def stopped(self, now: int) -> None:
+        """Begin to write the page."""
         if len(self.came) > 2:
             start = self.pointer // self.PAGE * self.PAGE
             self.page = start, bytes(self.memory[start : start + self.PAGE])
             for n, byte in enumerate(self.came[2:]):
                 self.memory[start + (self.pointer + n) % self.PAGE] = byte
-            for place, byte in self.worn.items():
-                self.memory[place] = byte
+            for address, byte in self.worn.items():
+                self.memory[address] = byte
             self.busy_until, self.writes = now + self.WRITE, self.writes + 1
         self.came = []
 
-    def power_cut(self, now, source):
+    def power_cut(self, now: int, source: random.Random) -> bool:
+        """Cut the power; returns whether a page was being written."""
         if now < self.busy_until:
             start, before = self.page
             for n, old in enumerate(before):
                 self.memory[start + n] = source.choice(
                     (old, self.memory[start + n], source.randrange(256))
                 )
-        torn, self.busy_until, self.came = now < self.busy_until, 0, []
-        return torn
+        writing, self.busy_until, self.came = now < self.busy_until, 0, []
+        return writing
 
 
 class Keypad(Device):
@@ -125,30 +118,36 @@ class Keypad(Device):
 
     CFG, EVENT, ROWS, COLUMNS = 0x01, 0x04, 0x1D, 0x1E
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.power_cut()
 
-    def power_cut(self):
-        self.registers, self.events, self.pointer = bytearray(0x30), deque(), None
+    def power_cut(self) -> None:
+        """All registers lose what was written."""
+        self.registers = bytearray(0x30)
+        self.events: deque[int] = deque()
+        self.pointer: int | None = None
 
-    def begun(self, now, reads):
+    def begun(self, now: int, reads: int) -> bool:
+        """Always acknowledged."""
         self.pointer = self.pointer if reads else None
         return True
 
-    def written(self, now, byte):
+    def written(self, now: int, byte: int) -> bool:
+        """The number of a register, then its value."""
         if self.pointer is None:
             self.pointer = byte
         else:
             self.registers[self.pointer] = byte
         return True
 
-    def read(self, now):
+    def read(self, now: int) -> int:
+        """The register; of EVENT the oldest event, or 0."""
         if self.pointer == self.EVENT:
             return self.events.popleft() if self.events else 0
-        return self.registers[self.pointer]
+        return self.registers[self.pointer or 0]
 
-    def press(self, name):
-        """Press and let go a key by what is written on it, or by its number."""
+    def press(self, name: str | int) -> None:
+        """Press and release a key, by its label or its number."""
         row, column = divmod(name if isinstance(name, int) else KEYS.index(name), 7)
         if self.registers[self.ROWS] >> row & 1 and self.registers[self.COLUMNS] >> column & 1:
             for down in (0x80, 0):
@@ -160,28 +159,27 @@ class Display(Device):
 
     CLK, CLEAR_CLK = CLK_HZ * 37 // 1_000_000 + 1, CLK_HZ * 152 // 100_000
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.power_cut(0)
 
-    def power_cut(self, now):
-        self.port, self.four_bits, self.half, self.memory, self.address, self.on = (
-            0xFF,
-            False,
-            None,
-            {},
-            0,
-            False,
-        )
+    def power_cut(self, now: int) -> None:
+        """Cut the power; it takes 15 ms to start again."""
+        self.port, self.address = 0xFF, 0
+        self.four_bits = self.on = False
+        self.half: int | None = None  # the first nibble of a byte
+        self.memory: dict[int, str] = {}
         self.busy_until, self.too_soon, self.rs_moved = now + ms(15), 0, 0
 
-    def written(self, now, byte):
+    def written(self, now: int, byte: int) -> bool:
+        """A level of the port."""
         if self.port & ~byte & 4 and not self.port & 2:  # E falls, RW is low
             self.strobe(now, self.port & 1, self.port >> 4)
-        self.rs_moved += bool((self.port ^ byte) & 1 and byte & 4)  # RS must stand before E rises
+        self.rs_moved += bool((self.port ^ byte) & 1 and byte & 4)  # RS must be set before E rises
         self.port = byte
         return True
 
-    def strobe(self, now, data, nibble):
+    def strobe(self, now: int, data: int, nibble: int) -> None:
+        """E has fallen."""
         if not self.four_bits:
             self.execute(now, data, nibble << 4)
         elif self.half is None:
@@ -190,7 +188,8 @@ class Display(Device):
             byte, self.half = self.half << 4 | nibble, None
             self.execute(now, data, byte)
 
-    def execute(self, now, data, byte):
+    def execute(self, now: int, data: int, byte: int) -> None:
+        """An instruction, or a character if `data`."""
         self.too_soon += now < self.busy_until
         self.busy_until = now + (self.CLEAR_CLK if not data and byte < 4 else self.CLK)
         if data:
@@ -205,7 +204,8 @@ class Display(Device):
         elif byte == 1:
             self.memory, self.address = {}, 0
 
-    def lines(self):
+    def lines(self) -> list[str]:
+        """The four lines as they are shown; empty while the display is off."""
         return [
             "".join(self.memory.get(start + n, " ") for n in range(20)) if self.on else ""
             for start in (0x00, 0x40, 0x14, 0x54)
@@ -215,25 +215,34 @@ class Display(Device):
 class I2cBus:
     """The I2C master with its queues, and the devices by address."""
 
-    def __init__(self):
-        self.devices, self.stuck = {}, False
+    def __init__(self) -> None:
+        self.devices: dict[int, Device] = {}  # by address
+        self.stuck = False  # a line of the bus stays low
         self.power_cut()
 
-    def power_cut(self):
-        self.waiting, self.answers, self.end = deque(), deque(), 0  # (time when it ends, command)
-        self.device, self.mode = None, "idle"
+    def power_cut(self) -> None:
+        """The master loses its queues."""
+        # Commands: when each ends, code, data, acknowledge.
+        self.waiting: deque[tuple[int, int, int, int]] = deque()
+        self.answers: deque[int] = deque()
+        self.end = 0
+        self.device: Device | None = None
+        self.mode = "idle"
 
-    def command(self, now, word):
+    def command(self, now: int, word: int) -> None:
+        """The firmware puts a command into the queue."""
         assert len(self.waiting) < 128, "a command was lost: the queue was full"
         code = word >> 8 & 7
         self.end = max(self.end, now) + (BYTE_CLK if code in (2, 3) else EDGE_CLK)
         self.waiting.append((self.end, code, word & 0xFF, word >> 11 & 1))
 
-    def work(self, now):
+    def work(self, now: int) -> None:
+        """Execute the commands whose time has come."""
         while self.waiting and self.waiting[0][0] <= now:
             self.answers.append(self.execute(*self.waiting.popleft()))
 
-    def execute(self, now, code, data, acknowledge):
+    def execute(self, now: int, code: int, data: int, acknowledge: int) -> int:
+        """Execute a command; returns its answer."""
         if self.stuck:
             return NO_BUS << 8
         if code == 0:
@@ -243,9 +252,9 @@ class I2cBus:
                 self.device.stopped(now)
             self.device, self.mode = None, "idle"
         elif self.mode == "address":
-            self.device, reads = self.devices.get(data >> 1), data & 1
-            self.mode = "read" if reads else "write"
-            if self.device is None or not self.device.begun(now, reads):
+            self.device = self.devices.get(data >> 1)
+            self.mode = "read" if data & 1 else "write"
+            if self.device is None or not self.device.begun(now, data & 1):
                 self.device = None
                 return NOT_ACKNOWLEDGED << 8
         elif code == 2:
@@ -255,7 +264,8 @@ class I2cBus:
             return self.device.read(now) if self.device else 0xFF
         return OK
 
-    def take(self, now):
+    def take(self, now: int) -> int:
+        """The register with the oldest answer."""
         self.work(now)
         return (
             self.answers.popleft() | DEFINES["PERIPHERALS_I2C_ANSWER_PRESENT_MASK"]
@@ -263,7 +273,8 @@ class I2cBus:
             else 0
         )
 
-    def state(self, now):
+    def state(self, now: int) -> int:
+        """The register with the room in the queue."""
         self.work(now)
         return 128 - len(self.waiting) | DEFINES["PERIPHERALS_I2C_STATE_BUSY_MASK"] * bool(
             self.waiting
@@ -271,40 +282,47 @@ class I2cBus:
 
 
 class Edm:
-    """The machine at the end of the PS/2 line, and a person who types."""
+    """The machine at the end of the keyboard cable, and a person who types."""
 
     START = bytes([0x14, 0x1D, 0xF0, 0x1D, 0xF0, 0x14])
     IDLE, KEY = ms(300), ms(1)
 
-    def __init__(self):
-        self.heard, self.cuts = b"", []  # cuts: when they began
+    def __init__(self) -> None:
+        self.heard = b""  # scan codes
+        self.cuts: list[int] = []  # when they began
         self.cut_ms, self.reaction_ms = 400, 50
         self.deaf = self.endless = self.takes_nothing = False
         self.types_until = self.quiet_since = self.typed = 0
-        self.start_at = self.end_at = None
+        self.start_at: int | None = None
+        self.end_at: int | None = None
         self.inputs = 0
         self.power_cut()
 
-    def power_cut(self):  # of the node
-        self.queue, self.injecting, self.edges, self.next_key = deque(), False, 0, 0
+    def power_cut(self) -> None:
+        """The node loses its power: what it had queued is gone."""
+        self.queue: deque[tuple[int, int]] = deque()  # scan code, and whether it is the last one
+        self.injecting, self.edges, self.next_key = False, 0, 0
 
-    def take_back(self):
-        """What is queued; a sequence that is under way is finished."""
+    def take_back(self) -> None:
+        """Drop the queued keys; a sequence that is being sent is finished."""
         under_way = (
             next(n for n, (_, last) in enumerate(self.queue, 1) if last) if self.injecting else 0
         )
         self.queue = deque(list(self.queue)[:under_way])
 
-    def set(self, inputs):
+    def set(self, inputs: int) -> None:
+        """Set the status inputs, bits 0 (cutting) and 1 (alarm)."""
         self.edges |= (inputs & ~self.inputs) << 2 | (self.inputs & ~inputs) << 4
         self.inputs = inputs
 
-    def alarm(self, on=True):
+    def alarm(self, on: bool = True) -> None:
+        """Raise an alarm, which ends a cut, or clear it."""
         if on and self.inputs & 1:
             self.end_at = None
         self.set(2 if on else 0)
 
-    def work(self, now):
+    def work(self, now: int) -> None:
+        """What has happened until now."""
         if now < self.types_until:
             self.typed, self.quiet_since = self.typed + 1, now
         free = now - self.quiet_since > self.IDLE and not self.takes_nothing
@@ -327,13 +345,13 @@ class Edm:
 
 
 class Station(FakeNode):
-    """The node, powered up. `absent` names what is not there: eeprom, keypad, display. `built`: a
-    mask of the peripherals.
+    """The node, powered up. `absent` names the devices that are missing: eeprom, keypad, display.
+    `built` is the register of that name, `seed` that of the damage by power cuts.
     """
 
     CLK_HZ, POLL_CLK = CLK_HZ, CLK_HZ // 2000
 
-    def __init__(self, absent=(), built=63, seed=0):
+    def __init__(self, absent: Sequence[str] = (), built: int = 63, seed: int = 0) -> None:
         self.source = random.Random(seed)
         self.eeprom, self.keypad, self.display, self.edm, self.bus = (
             Eeprom(),
@@ -342,8 +360,9 @@ class Station(FakeNode):
             Edm(),
             I2cBus(),
         )
-        self.sub_node = None
-        self.built, self.peer_received = built, deque()
+        self.sub_node: SubNode | None = None
+        self.built = built
+        self.peer_received: deque[int] = deque()
         self.bus.devices = {
             address: device
             for name, address, device in (
@@ -355,21 +374,22 @@ class Station(FakeNode):
         }
         super().__init__(Axis(), image="station")
 
-    def power_cut(self):
-        """Of the node and what it feeds, just now; it has power again at once. Whether a page of
-        the EEPROM was being written.
+    def power_cut(self) -> bool:
+        """Cut the power of the node and of what it supplies; it has power again at once. Returns
+        whether a page of the EEPROM was being written.
         """
         self.bus.work(self.clk)
-        torn = self.eeprom.power_cut(self.clk, self.source)
+        writing = self.eeprom.power_cut(self.clk, self.source)
         self.keypad.power_cut()
         self.display.power_cut(self.clk)
         self.edm.power_cut()
         self.bus.power_cut()
         self.peer_received.clear()
         self.firmware.firmware_start()
-        return torn
+        return writing
 
-    def read(self, offset):
+    def read(self, offset: int) -> int:
+        """A register, as the firmware reads it."""
         d, at = DEFINES, offset - DEFINES["PERIPHERALS_BASE"]
         if not 0 <= at < 0x100:
             return super().read(offset)
@@ -398,11 +418,12 @@ class Station(FakeNode):
             return 64
         return self.word.get(offset, 0)
 
-    def write(self, offset, value):
+    def write(self, offset: int, value: int) -> None:
+        """Write a register, as the firmware does."""
         d, at = DEFINES, offset - DEFINES["PERIPHERALS_BASE"]
         if not 0 <= at < 0x100:
-            return super().write(offset, value)
-        if at == d["PERIPHERALS_I2C"]:
+            super().write(offset, value)
+        elif at == d["PERIPHERALS_I2C"]:
             self.bus.command(self.clk, value)
         elif at == d["PERIPHERALS_PS2_STATE"]:
             if value & d["PERIPHERALS_PS2_STATE_DROP_MASK"]:
@@ -416,10 +437,11 @@ class Station(FakeNode):
                 self.sub_node.hear(self.clk, value)
         else:
             self.word[offset] = value
-        return None
 
-    def run(self, ms, until=None):
-        """Two polls of the firmware a millisecond; True when `until` came."""
+    def run(self, ms: float, until: Callable[[], object] | None = None) -> bool:
+        """Run for `ms`, with two polls of the firmware a millisecond. Stops early and returns True
+        once `until` is true.
+        """
         for _ in range(int(ms * 2)):
             self.clk += self.POLL_CLK
             self.edm.work(self.clk)
@@ -430,7 +452,8 @@ class Station(FakeNode):
                 return True
         return False
 
-    def job(self):
+    def job(self) -> dict[str, Any]:
+        """The reply to `job`, with the names of state, cause, actions, flags and faults."""
         reported = self.ask("job")
         return {
             **reported,
@@ -445,88 +468,92 @@ class Station(FakeNode):
             },
         }
 
-    def do(self, action):
+    def do(self, action: str) -> str:
+        """Do a job_action; returns the cause."""
         return self.request("job_do", action=ACTION[action])[0]
 
-    def setting(self, **values):
+    def setting(self, **values: int) -> None:
+        """Set settings by their names, in their LSB."""
         for name, value in values.items():
             self.ask("set_setting", setting=SETTING[name], value=value)
 
-    def until(self, *states, ms=60_000):
-        """Runs until the job is in one of the states; what it tells then."""
+    def until(self, *states: str, ms: float = 60_000) -> dict[str, Any]:
+        """Run until the job is in one of the states; returns its report. Fails after `ms`."""
         codes = {code for code, name in STATE.items() if name in states}
         assert self.run(ms, until=lambda: self.firmware.job_state() in codes), (self.job(), states)
         return self.job()
 
-    def ready(self):
+    def ready(self) -> dict[str, Any]:
+        """Run until the EEPROM is loaded; returns the report of the job."""
         return self.until("idle", "paused", "unsure", "finished")
 
-    def load(self, angles):
-        """Writes a program; how that ended."""
+    def load(self, angles: Iterable[int]) -> str:
+        """Save a station list, in 0.01 arcsec; returns the cause with which that ended."""
         self.ask("job_begin")
         for station, angle in enumerate(angles):
             self.ask("job_add", station=station, angle=angle)
         self.ask("job_save")
         return self.saved()
 
-    def saved(self):
-        assert self.run(60_000, until=lambda: self.firmware.store_state() != 2)
+    def saved(self) -> str:
+        """Run until nothing is being written; returns the cause with which that ended."""
+        assert self.run(60_000, until=lambda: self.firmware.store_state() != WRITING)
         return CAUSE[self.ask("job_stations")["ended"]]
 
-    def save_settings(self, action="save"):
-        """How that ended."""
-        cause, _ = self.request("save_settings", action=TABLE["save_action"][action][0])
-        assert cause == "ok" and self.run(60_000, until=lambda: self.firmware.store_state() != 2), (
-            cause
-        )
-        return self.saved_settings()["cause"]
+    def save_settings(self, action: str = "save") -> str:
+        """Do a save_action; returns the cause with which that ended."""
+        self.ask("save_settings", action=TABLE["save_action"][action][0])
+        assert self.run(60_000, until=lambda: self.firmware.store_state() != WRITING)
+        return CAUSE[self.ask("saved_settings")["cause"]]
 
-    def saved_settings(self):
+    def saved_settings(self) -> dict[str, Any]:
+        """The reply to `saved_settings`, with the name of the cause."""
         reported = self.ask("saved_settings")
         return {**reported, "cause": CAUSE[reported["cause"]]}
 
-    def program(self):
-        """The angles that are in force."""
+    def station_list(self) -> list[int]:
+        """The angles of the list in force, 0.01 arcsec."""
         return [
             self.ask("job_angle", station=n)["angle"]
             for n in range(self.ask("job_stations")["stations"])
         ]
 
-    def press(self, *keys):
+    def press(self, *keys: str | int) -> None:
+        """Press keys one after the other."""
         for key in keys:
             self.keypad.press(key)
             self.run(60)
 
-    def shown(self):
+    def shown(self) -> list[str]:
+        """The lines of the display after a refresh."""
         self.run(400)
         return [line.rstrip() for line in self.display.lines()]
 
 
 class SubNode:
-    """A node that indexes, on the peer port: in `move_ms` it is there. `frames` or as printed;
-    faults from outside.
+    """A node on the peer port whose table takes `move_ms` for each turn; in mode frames or legacy.
+    Faults come from outside, by latch().
     """
 
-    def __init__(self, frames=True, move_ms=200):
+    def __init__(self, frames: bool = True, move_ms: float = 200) -> None:
         self.frames, self.move_ms = frames, move_ms
-        self.angles, self.came, self.to_send, self.heads = [], bytearray(), deque(), 0
-        self.target, self.there_at, self.ended, self.fault, self.dead, self.requests = (
-            0,
-            None,
-            CAUSE_CODE["no_motion_yet"],
-            None,
-            False,
-            0,
-        )
-        self.last_request = self.last_reply = None
-        self.speeds = []  # override that came before each order
-        self.faults, self.cause_stands, self.resets = (
-            (),
-            False,
-            0,
-        )  # latched ones, the first one first
+        self.angles: list[int | None] = []  # where the table has been
+        self.came, self.heads = bytearray(), 0
+        self.to_send: deque[int] = deque()
+        self.target: int | None = 0
+        self.there_at: int | None = None  # when the turn ends
+        self.ended = CAUSE_CODE["no_motion_yet"]
+        self.fault: str | None = None  # the cause with which a turn fails, or "never"
+        self.dead = False
+        self.requests = 0  # turns that were ordered
+        self.last_request = self.last_reply = b""
+        self.speeds: list[int] = []  # feed override that came before each order
+        self.faults: tuple[str, ...] = ()  # latched ones, the first one first
+        self.cause_persists = False  # a reset does not help
+        self.resets = 0
 
-    def hear(self, now, byte):
+    def hear(self, now: int, byte: int) -> None:
+        """A byte from the main node."""
         if self.dead:
             return
         if not self.frames:
@@ -546,7 +573,8 @@ class SubNode:
                     self.last_request, self.last_reply = body, self.do(now, body[:-4])
                 self.send(self.last_reply)
 
-    def begin(self, now, angle):
+    def begin(self, now: int, angle: int | None) -> None:
+        """Begin to turn; in mode legacy without an angle."""
         self.target, self.there_at, self.ended = (
             angle,
             now + ms(self.move_ms),
@@ -554,13 +582,14 @@ class SubNode:
         )
         self.requests += 1
 
-    def do(self, now, body):
+    def do(self, now: int, body: bytes) -> bytes:
+        """Do a request; returns the reply."""
         operation, cause = body[1], "ok"
         if operation == OPERATION["turn_to"] and self.faults:
             cause = "faulted"
         elif operation == OPERATION["reset_faults"]:
-            cause, self.resets = "fault_persists" if self.cause_stands else "ok", self.resets + 1
-            self.faults = self.faults if self.cause_stands else ()
+            cause, self.resets = "fault_persists" if self.cause_persists else "ok", self.resets + 1
+            self.faults = self.faults if self.cause_persists else ()
         elif operation == OPERATION["turn_to"]:
             self.begin(now, int.from_bytes(body[2:6], "little"))
         elif operation == OPERATION["set_parameter"]:
@@ -583,17 +612,18 @@ class SubNode:
                 reply += int(values.get(name, 0)).to_bytes(int(kind[1:]) // 8, "little")
         return reply
 
-    def latch(self, *faults):
-        """By their names, in the order in which they came; a turning table stops."""
+    def latch(self, *faults: str) -> None:
+        """Latch faults by their names, in the order in which they came; a turning table stops."""
         self.faults = faults
         if self.there_at is not None:
             self.there_at, self.ended = None, CAUSE_CODE["ended_by_fault"]
 
-    def send(self, body):
+    def send(self, body: bytes) -> None:
+        """Send a frame."""
         self.to_send.extend(b"\0" + cobs(body + zlib.crc32(body).to_bytes(4, "little")) + b"\0")
 
-    def work(self, now):
-        """What it sends just now."""
+    def work(self, now: int) -> bytes:
+        """Turn the table; returns what the sub-node sends now."""
         if self.there_at is not None and now >= self.there_at and self.fault != "never":
             self.there_at, self.ended = None, CAUSE_CODE[self.fault or "ok"]
             if self.fault is None:
@@ -608,11 +638,13 @@ class SubNode:
 CAUSE_CODE = {name: code for code, name in CAUSE.items()}
 
 
-def cobs(data):
+def cobs(data: bytes) -> bytes:
+    """Encode data, below 254 bytes between zeros, without the delimiters."""
     return b"".join(bytes([len(part) + 1]) + part for part in data.split(b"\0"))
 
 
-def uncobs(data):
+def uncobs(data: bytes) -> bytes:
+    """Decode what cobs has encoded."""
     parts, at = [], 0
     while at < len(data):
         parts.append(data[at + 1 : at + data[at]])

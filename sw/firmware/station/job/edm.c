@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// machine -- the wire-EDM machine: its keyboard keys start a cut, two status inputs tell whether it
-// cuts and whether something is wrong.
+// edm -- the wire-EDM machine: keys of its keyboard start a cut, and two status inputs say whether
+// it cuts and whether it has an alarm.
 //
-// When nobody has typed for a while the keys go whole into the queue of the PS/2 pass-through,
-// which sends them when the lines are free. What still waits there is taken back when the machine
-// is left or has failed, a sequence that is under way is finished. Nothing is put in while
-// something is there, and until it is empty the machine does not count as resting.
+// When nobody has typed for QUIET_MS, all keys go into the queue of the PS/2 pass-through, which
+// sends them when the keyboard lines are free. Keys that still wait there are taken back when the
+// machine is released or has failed; a sequence that is being sent is finished. Keys are put in
+// only while the queue is empty, and until it is empty again the machine does not count as at rest.
 #include "station/job/edm.h"
 
 #include "core/clock.h"
@@ -13,15 +13,15 @@
 #include "made/bus_protocol.h"
 #include "station/settings.h"
 
-#define QUEUE 32u   // scan codes
-#define CUTTING 1u  // status inputs
+#define QUEUE 32u   // scan codes of the pass-through
+#define CUTTING 1u  // bits of the status inputs
 #define ALARM 2u
 #define QUIET_MS 300u
 #define TAKE_MS 20000u  // the machine takes the keys within this, unless a person types
-#define END_MS 300u     // an alarm that ends a cut shows within this
+#define END_MS 300u     // an alarm that ended the cut shows within this
 
 static const uint8_t start_keys[] = {0x14, 0x1D, 0xF0,
-                                     0x1D, 0xF0, 0x14};  // left control and W, pressed and let go
+                                     0x1D, 0xF0, 0x14};  // left Ctrl and W, pressed and released
 
 static uint8_t state, cause;
 static uint32_t since_ms, begun_ms, typed;
@@ -65,13 +65,13 @@ bool edm_built(void) {
     return (peripherals_read(PERIPHERALS_BUILT) & needed) == needed;
 }
 
-bool edm_cuts(void) { return input(CUTTING); }
+bool edm_cutting(void) { return input(CUTTING); }
 
-bool edm_alarms(void) { return input(ALARM); }
+bool edm_alarm(void) { return input(ALARM); }
 
-bool machine_keys_pending(void) { return edm_built() && (state == EDM_QUIET || queued()); }
+bool edm_keys_pending(void) { return edm_built() && (state == EDM_QUIET || queued()); }
 
-bool edm_rests(void) { return !edm_cuts() && !queued(); }
+bool edm_at_rest(void) { return !edm_cutting() && !queued(); }
 
 enum edm_state edm_state(void) { return state; }
 
@@ -80,12 +80,12 @@ uint8_t edm_cause(void) { return cause; }
 void edm_start(unsigned axes) {
     (void)axes;
     cause = BUS_CAUSE_OK;
-    go(EDM_LEFT);
+    go(EDM_IDLE);
 }
 
 void edm_begin(void) {
-    if (edm_alarms()) return fail(BUS_CAUSE_EDM_ALARM);
-    if (!edm_rests()) return fail(BUS_CAUSE_EDM_BUSY);
+    if (edm_alarm()) return fail(BUS_CAUSE_EDM_ALARM);
+    if (!edm_at_rest()) return fail(BUS_CAUSE_EDM_BUSY);
     peripherals_write(PERIPHERALS_EDM_STATUS, PERIPHERALS_EDM_STATUS_ROSE_1_MASK);
     typed = peripherals_read(PERIPHERALS_PS2_TYPED);
     go(EDM_QUIET);
@@ -97,7 +97,7 @@ static void send_keys(void) {
         peripherals_write(PERIPHERALS_PS2_INJECT,
                           FIELD_PUT(PERIPHERALS_PS2_INJECT_DATA, start_keys[n]) |
                               FIELD_PUT(PERIPHERALS_PS2_INJECT_LAST, n + 1 == sizeof start_keys));
-    go(MACHINE_KEYS_PENDING);
+    go(EDM_KEYS_PENDING);
 }
 
 void edm_follow(void) {
@@ -105,9 +105,9 @@ void edm_follow(void) {
     begun();
 }
 
-void edm_leave(void) {
+void edm_release(void) {
     take_keys_back();
-    go(EDM_LEFT);
+    go(EDM_IDLE);
 }
 
 static bool person_types(void) {
@@ -126,14 +126,14 @@ void edm_work(void) {
         return fail(BUS_CAUSE_EDM_ALARM);
     switch (state) {
     case EDM_QUIET:
-        if (!edm_rests())
+        if (!edm_at_rest())
             fail(BUS_CAUSE_EDM_BUSY);
         else if (person_types())
             since_ms = clock_ms();
         else if (longer_than(QUIET_MS))
             send_keys();
         break;
-    case MACHINE_KEYS_PENDING:
+    case EDM_KEYS_PENDING:
         if (!queued())
             go(EDM_STARTING);
         else if (person_types())

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// job -- cuts all stations of the program, one after the other, with nobody touching it.
+// job -- cuts all stations of the list, one after the other, without an operator.
 //
-// Whatever is done to the work is in the journal before and after it. So after a loss of power it
-// is known whether a cut had begun, and if it is not known how it ended, a person is asked: no
-// station is ever cut twice unless a person said so. The table turns only while the machine rests.
-// A sub-node that counts its stations itself (peer_mode printed) is never reported twice to go to
-// the same one.
+// Everything that is done to the workpiece is in the journal before and after it. So after a loss
+// of power it is known whether a cut had begun, and if it is not known how it ended, a person is
+// asked: no station is ever cut twice unless a person said so. The table turns only while the EDM
+// machine is at rest. A sub-node that counts its stations itself (peer_mode legacy) is never sent
+// to the same station twice.
 //
-// tables/job_states.py makes the picture in docs/job.md of the table of transitions.
+// tables/job_states.py makes the picture in docs/job.md from the table of transitions.
 #include "station/job/job.h"
 
 #include <stddef.h>
@@ -15,15 +15,18 @@
 #include "bus/bus.h"
 #include "made/bus_protocol.h"
 #include "station/job/edm.h"
-#include "station/panel/panel.h"
+#include "station/devices/display.h"
+#include "station/devices/keypad.h"
 #include "station/table/peer.h"
 #include "station/settings.h"
-#include "station/storage/store.h"
+#include "station/storage/journal.h"
+#include "station/storage/station_list.h"
+#include "station/storage/value_store.h"
 
 #define LEGACY 1  // a peer_mode
 #define SUB 1     // a peer_role
 
-enum event {  // a person's actions, then what happens
+enum event {  // the actions of a person, then what happens by itself
     START = BUS_JOB_ACTION_START,
     PAUSE = BUS_JOB_ACTION_PAUSE,
     RESUME = BUS_JOB_ACTION_RESUME,
@@ -41,7 +44,7 @@ enum event {  // a person's actions, then what happens
     NOT_TURNED,
     ALARM,
     TO_PAUSE,
-    EDM_RESTS,
+    EDM_AT_REST,
     CUT,
     NOT_CUT,
 };
@@ -68,40 +71,42 @@ enum state {
 
 static uint8_t state, cause;
 static uint16_t station;
-static uint32_t list_identity;  // by its identity
+static uint32_t list_identity;  // of the list that is being cut
 static bool pausing;
-static uint8_t to_note, note_refused;  // a line of the journal that waits for the store, and how
-                                       // the store took the last one
-static bool ordered;  // the table was reported to go to a station, and did not say that it is there
+static uint8_t due;              // journal step that waits to be written
+static uint8_t journal_refused;  // why the last one could not be begun, or ok
+static bool table_ordered;       // the table was sent to a station and has not reported arrival
 static uint8_t order_refused;
 
-static void at_first(void) {
+static void begin_list(void) {
     list_identity = station_list_identity();
     station = 0;
-    pausing = ordered = false;
+    pausing = table_ordered = false;
     cause = BUS_CAUSE_OK;
 }
-static void at_next(void) { station++; }
-static void say_store(void) { cause = note_refused != BUS_CAUSE_OK ? note_refused : store_cause(); }
-static void say_table(void) {
+static void next_station(void) { station++; }
+static void cause_of_store(void) {
+    cause = journal_refused != BUS_CAUSE_OK ? journal_refused : store_cause();
+}
+static void cause_of_table(void) {
     cause = order_refused != BUS_CAUSE_OK ? order_refused : peer_cause();
 }
-static void say_edm(void) { cause = edm_cause(); }
-static void say_alarm(void) { cause = BUS_CAUSE_EDM_ALARM; }
-static void say_pause(void) { cause = BUS_CAUSE_PAUSED_BY_OPERATOR; }
-static void say_power(void) { cause = BUS_CAUSE_POWER_LOST; }
-static void go_on(void) {
+static void cause_of_edm(void) { cause = edm_cause(); }
+static void cause_alarm(void) { cause = BUS_CAUSE_EDM_ALARM; }
+static void cause_pause(void) { cause = BUS_CAUSE_PAUSED_BY_OPERATOR; }
+static void cause_power(void) { cause = BUS_CAUSE_POWER_LOST; }
+static void resume(void) {
     pausing = false;
     cause = BUS_CAUSE_OK;
 }
-static void reset_and_go_on(void) {
+static void reset_and_resume(void) {
     peer_reset_fault();
-    go_on();
+    resume();
 }
-static void leave_all(void) {
+static void stop_all(void) {
     peer_stop();
-    edm_leave();
-    go_on();
+    edm_release();
+    resume();
 }
 
 static const struct transition {
@@ -109,47 +114,48 @@ static const struct transition {
     void (*act)(void);
 } transitions[] = {
     {LOADING, ALL_CUT, FINISHING, NULL},
-    {LOADING, CUT_OPEN, UNSURE, say_power},
-    {LOADING, JOB_OPEN, PAUSED, say_power},
+    {LOADING, CUT_OPEN, UNSURE, cause_power},
+    {LOADING, JOB_OPEN, PAUSED, cause_power},
     {LOADING, LOADED, IDLE, NULL},
-    {IDLE, START, STARTING, at_first},
-    {FINISHED, START, STARTING, at_first},
+    {IDLE, START, STARTING, begin_list},
+    {FINISHED, START, STARTING, begin_list},
     {STARTING, RECORDED, TURNING, NULL},
-    {STARTING, NOT_RECORDED, IDLE, say_store},
+    {STARTING, NOT_RECORDED, IDLE, cause_of_store},
     {TURNING, TURNED, ARRIVED, NULL},
-    {TURNING, NOT_TURNED, PAUSED, say_table},
-    {ARRIVED, NOT_RECORDED, PAUSED, say_store},
-    {ARRIVED, TO_PAUSE, PAUSED, say_pause},
-    {ARRIVED, ALARM, PAUSED, say_alarm},
+    {TURNING, NOT_TURNED, PAUSED, cause_of_table},
+    {ARRIVED, NOT_RECORDED, PAUSED, cause_of_store},
+    {ARRIVED, TO_PAUSE, PAUSED, cause_pause},
+    {ARRIVED, ALARM, PAUSED, cause_alarm},
     {ARRIVED, RECORDED, BEGINNING, NULL},
     {BEGINNING, RECORDED, CUTTING, NULL},
-    {BEGINNING, NOT_RECORDED, PAUSED, say_store},
+    {BEGINNING, NOT_RECORDED, PAUSED, cause_of_store},
     {CUTTING, CUT, ENDED, NULL},
-    {CUTTING, NOT_CUT, UNSURE, say_edm},
+    {CUTTING, NOT_CUT, UNSURE, cause_of_edm},
     {FOLLOWING, CUT, ENDED, NULL},
-    {FOLLOWING, NOT_CUT, UNSURE, say_edm},
-    {ENDED, RECORDED, LEAVING, at_next},
-    {ENDED, NOT_RECORDED, UNSURE, say_store},
+    {FOLLOWING, NOT_CUT, UNSURE, cause_of_edm},
+    {ENDED, RECORDED, LEAVING, next_station},
+    {ENDED, NOT_RECORDED, UNSURE, cause_of_store},
     {LEAVING, ALL_CUT, FINISHING, NULL},
-    {LEAVING, TO_PAUSE, PAUSED, say_pause},
-    {LEAVING, EDM_RESTS, TURNING, NULL},
+    {LEAVING, TO_PAUSE, PAUSED, cause_pause},
+    {LEAVING, EDM_AT_REST, TURNING, NULL},
     {FINISHING, RECORDED, FINISHED, NULL},
-    {FINISHING, NOT_RECORDED, FINISHED, say_store},
-    {PAUSED, RESUME, TURNING, reset_and_go_on},
-    {UNSURE, RESUME, FOLLOWING, go_on},
-    {UNSURE, AGAIN, TURNING, go_on},
-    {UNSURE, NEXT, ENDED, go_on},
-    {UNDER_WAY, STOP, STOPPING, leave_all},
+    {FINISHING, NOT_RECORDED, FINISHED, cause_of_store},
+    {PAUSED, RESUME, TURNING, reset_and_resume},
+    {UNSURE, RESUME, FOLLOWING, resume},
+    {UNSURE, AGAIN, TURNING, resume},
+    {UNSURE, NEXT, ENDED, resume},
+    {UNDER_WAY, STOP, STOPPING, stop_all},
     {STOPPING, RECORDED, IDLE, NULL},
-    {STOPPING, NOT_RECORDED, IDLE, say_store},
+    {STOPPING, NOT_RECORDED, IDLE, cause_of_store},
 };
 #define TRANSITIONS (sizeof transitions / sizeof *transitions)
 
-static uint8_t first_row[UNDER_WAY + 1];  // of each state; its rows follow each other
+static uint8_t first_row[UNDER_WAY + 1];  // of each state, whose rows are neighbours
 
 static bool loaded(void) { return store_state() == STORE_READY; }
 
-// By the journal, which may be of another program.
+// The journal, which may be about another list, says that a job of this list had come to a step
+// from JOURNAL_STARTED to `most`.
 static bool open_until(enum journal_step most) {
     const struct journal_record* last = journal_last();
     return loaded() && last->list == station_list_identity() &&
@@ -159,8 +165,8 @@ static bool open_until(enum journal_step most) {
 
 static bool sub_node_counts(void) { return settings_get(BUS_SETTING_PEER_MODE) == LEGACY; }
 
-// By the journal, and without a new order.
-static bool table_is_there(void) {
+// The journal says that the table has been turned to this station already.
+static bool table_at_station(void) {
     const struct journal_record* last = journal_last();
     return sub_node_counts() && last->station == station &&
            (last->step == JOURNAL_TURNED || last->step == JOURNAL_CUT_BEGUN);
@@ -168,56 +174,58 @@ static bool table_is_there(void) {
 
 static void order_table(void) {
     order_refused = BUS_CAUSE_OK;
-    if (table_is_there()) return;
+    if (table_at_station()) return;
     order_refused = peer_turn_to(station, station_list_angle(station));
-    ordered = order_refused == BUS_CAUSE_OK;
+    table_ordered = order_refused == BUS_CAUSE_OK;
 }
 
-// What a state begins with.
+// Begins what a state does.
 static void enter(uint8_t to) {
     state = to;
     switch (to) {
-    case STARTING: to_note = JOURNAL_STARTED; break;
+    case STARTING: due = JOURNAL_STARTED; break;
     case TURNING: order_table(); break;
     case ARRIVED:
-        to_note = JOURNAL_TURNED;
-        ordered = false;
+        due = JOURNAL_TURNED;
+        table_ordered = false;
         break;
-    case BEGINNING: to_note = JOURNAL_CUT_BEGUN; break;
+    case BEGINNING: due = JOURNAL_CUT_BEGUN; break;
     case CUTTING: edm_begin(); break;
     case FOLLOWING: edm_follow(); break;
-    case ENDED: to_note = JOURNAL_CUT_DONE; break;
-    case FINISHING: to_note = JOURNAL_FINISHED; break;
-    case STOPPING: to_note = JOURNAL_STOPPED; break;
+    case ENDED: due = JOURNAL_CUT_DONE; break;
+    case FINISHING: due = JOURNAL_FINISHED; break;
+    case STOPPING: due = JOURNAL_STOPPED; break;
     case PAUSED: pausing = false; break;
     default: break;
     }
 }
 
-static bool noted(void) { return to_note == JOURNAL_NOTHING && store_state() != STORE_WRITING; }
+static bool journal_ended(void) { return due == JOURNAL_NOTHING && store_state() != STORE_WRITING; }
 
 static bool journal_written(void) {
-    return note_refused == BUS_CAUSE_OK && store_cause() == BUS_CAUSE_OK;
+    return journal_refused == BUS_CAUSE_OK && store_cause() == BUS_CAUSE_OK;
 }
 
+// Whether an event has happened that needs no person.
 static bool happened(uint8_t event) {
     switch (event) {
     case LOADED: return loaded();
     case JOB_OPEN: return open_until(JOURNAL_CUT_DONE);
     case CUT_OPEN: return open_until(JOURNAL_CUT_DONE) && journal_last()->step == JOURNAL_CUT_BEGUN;
     case ALL_CUT: return loaded() && station > 0 && station == station_list_count();
-    case RECORDED: return noted() && journal_written();
-    case NOT_RECORDED: return noted() && !journal_written();
-    case TURNED: return table_is_there() || (ordered && peer_state() == BUS_PEER_PHASE_TURNED);
+    case RECORDED: return journal_ended() && journal_written();
+    case NOT_RECORDED: return journal_ended() && !journal_written();
+    case TURNED:
+        return table_at_station() || (table_ordered && peer_state() == BUS_PEER_PHASE_TURNED);
     case NOT_TURNED:
         return order_refused != BUS_CAUSE_OK || peer_state() == BUS_PEER_PHASE_FAILED ||
                peer_state() == BUS_PEER_PHASE_SILENT;
-    case ALARM: return noted() && edm_alarms();
-    case TO_PAUSE: return noted() && pausing;
-    case EDM_RESTS: return edm_rests();
+    case ALARM: return journal_ended() && edm_alarm();
+    case TO_PAUSE: return journal_ended() && pausing;
+    case EDM_AT_REST: return edm_at_rest();
     case CUT: return edm_state() == EDM_CUT;
     case NOT_CUT: return edm_state() == EDM_FAILED;
-    default: return false;  // an action: job_do
+    default: return false;  // an action, which only job_do takes
     }
 }
 
@@ -241,21 +249,19 @@ static void take(const struct transition* t) {
     enter(t->to);
 }
 
-static void write_note(void) {
-    if (to_note == JOURNAL_NOTHING || store_state() == STORE_WRITING ||
-        store_state() == STORE_LOADING)
-        return;
-    note_refused = journal_write(station, to_note);
-    to_note = JOURNAL_NOTHING;
+static void write_journal(void) {
+    if (due == JOURNAL_NOTHING || store_busy()) return;
+    journal_refused = journal_write(station, due);
+    due = JOURNAL_NOTHING;
 }
 
 void job_start(unsigned axes) {
     (void)axes;
-    to_note = JOURNAL_NOTHING;
-    note_refused = order_refused = BUS_CAUSE_OK;
-    at_first();
+    due = JOURNAL_NOTHING;
+    journal_refused = order_refused = BUS_CAUSE_OK;
+    begin_list();
     for (unsigned n = TRANSITIONS; n-- > 0;) first_row[transitions[n].from] = (uint8_t)n;
-    ordered = true;  // perhaps, before the power went
+    table_ordered = true;  // it may have been, before the power went
     enter(LOADING);
 }
 
@@ -264,15 +270,15 @@ void job_work(void) {
         list_identity = station_list_identity();
         station = (uint16_t)(journal_last()->station + (journal_last()->step == JOURNAL_CUT_DONE));
     }
-    write_note();
+    write_journal();
     for (unsigned n = first_row[state]; n < TRANSITIONS && transitions[n].from == state; n++)
         if (happened(transitions[n].event)) return take(&transitions[n]);
 }
 
 uint8_t job_state(void) { return state; }
 
-static uint8_t saved_trouble(void)  // why the values of this node are not in force
-{
+// Why the saved values of this node are not in force, or ok.
+static uint8_t cause_of_defaults(void) {
     uint8_t reported = value_store_status()->cause;
     return reported >= BUS_CAUSE_SAVED_DAMAGED && reported <= BUS_CAUSE_SAVED_NOT_READ
                ? reported
@@ -280,33 +286,34 @@ static uint8_t saved_trouble(void)  // why the values of this node are not in fo
 }
 
 uint8_t job_cause(void) {
-    if (state == LOADING && store_state() == STORE_DEAD) return BUS_CAUSE_EEPROM_MISSING;
+    if (state == LOADING && store_state() == STORE_MISSING) return BUS_CAUSE_EEPROM_MISSING;
     if (state != IDLE || cause != BUS_CAUSE_OK) return cause;
     if (station_list_count() == 0) return store_cause();
-    return saved_trouble();
+    return cause_of_defaults();
 }
 
 uint16_t job_station(void) { return station; }
 
-// Why an action that the table has is refused.
+// Why an action that the table of transitions allows is refused.
 static uint8_t refusal(uint8_t action) {
     if (action == STOP || action == PAUSE) return BUS_CAUSE_OK;
-    if (store_state() == STORE_DEAD) return BUS_CAUSE_EEPROM_MISSING;
+    if (store_state() == STORE_MISSING) return BUS_CAUSE_EEPROM_MISSING;
     if (store_state() != STORE_READY) return BUS_CAUSE_EEPROM_BUSY;
     if (settings_get(BUS_SETTING_PEER_ROLE) == SUB)
-        return BUS_CAUSE_PEER_OFF;  // its journal is its count of stations
+        return BUS_CAUSE_PEER_OFF;  // its journal holds its count of stations
     if (action != START && list_identity != station_list_identity()) return BUS_CAUSE_JOB_CHANGED;
     if (action == NEXT) return BUS_CAUSE_OK;
-    if (action == RESUME && state == UNSURE) return edm_cuts() ? BUS_CAUSE_OK : BUS_CAUSE_NOT_NOW;
-    if (action != START && sub_node_counts() && ordered && !table_is_there())
+    if (action == RESUME && state == UNSURE)
+        return edm_cutting() ? BUS_CAUSE_OK : BUS_CAUSE_NOT_NOW;
+    if (action != START && sub_node_counts() && table_ordered && !table_at_station())
         return BUS_CAUSE_TABLE_POSITION_UNKNOWN;
     if (station_list_count() == 0) return store_cause();
     if (!edm_built()) return BUS_CAUSE_NOT_BUILT;
-    if (edm_alarms()) return BUS_CAUSE_EDM_ALARM;
-    return edm_rests() ? BUS_CAUSE_OK : BUS_CAUSE_EDM_BUSY;
+    if (edm_alarm()) return BUS_CAUSE_EDM_ALARM;
+    return edm_at_rest() ? BUS_CAUSE_OK : BUS_CAUSE_EDM_BUSY;
 }
 
-static bool known(uint8_t action) {
+static bool accepts(uint8_t action) {
     return action == PAUSE ? state >= STARTING && state <= LEAVING && !pausing
                            : transition_of(action) != NULL;
 }
@@ -314,17 +321,17 @@ static bool known(uint8_t action) {
 uint8_t job_answers(void) {
     uint8_t answers = 0;
     for (uint8_t action = 0; action < ACTIONS; action++)
-        if (known(action) && refusal(action) == BUS_CAUSE_OK) answers |= (uint8_t)(1u << action);
+        if (accepts(action) && refusal(action) == BUS_CAUSE_OK) answers |= (uint8_t)(1u << action);
     return answers;
 }
 
 uint8_t job_do(uint8_t action) {
     if (action >= ACTIONS) return BUS_CAUSE_OUT_OF_RANGE;
     if (action == START && under_way()) return BUS_CAUSE_JOB_ACTIVE;
-    if (action != START && !known(action)) return BUS_CAUSE_NOT_NOW;
+    if (action != START && !accepts(action)) return BUS_CAUSE_NOT_NOW;
     uint8_t refused = refusal(action);
     if (refused != BUS_CAUSE_OK) return refused;
-    if (!known(action)) return BUS_CAUSE_NOT_NOW;
+    if (!accepts(action)) return BUS_CAUSE_NOT_NOW;
     if (action == PAUSE)
         pausing = true;
     else
@@ -348,16 +355,19 @@ uint8_t job_save_list(void) {
     return refused == BUS_CAUSE_OK ? station_list_save() : refused;
 }
 
-// ---- operations of the line
+// ---- operations of the bus
 
 static uint8_t flags(void) {
-    return (uint8_t)(BUS_JOB_FLAG_EEPROM * (store_state() != STORE_DEAD) |
-                     BUS_JOB_FLAG_KEYPAD * panel_has_keypad() |
-                     BUS_JOB_FLAG_DISPLAY * panel_has_display() |
-                     BUS_JOB_FLAG_CUTTING * edm_cuts() | BUS_JOB_FLAG_ALARM * edm_alarms() |
-                     BUS_JOB_FLAG_KEYS_PENDING * machine_keys_pending() |
-                     BUS_JOB_FLAG_PAUSING * pausing |
-                     BUS_JOB_FLAG_COPY_DAMAGED * station_list_damaged());
+    unsigned flags = 0;
+    if (store_state() != STORE_MISSING) flags |= BUS_JOB_FLAG_EEPROM;
+    if (keypad_present()) flags |= BUS_JOB_FLAG_KEYPAD;
+    if (display_present()) flags |= BUS_JOB_FLAG_DISPLAY;
+    if (edm_cutting()) flags |= BUS_JOB_FLAG_CUTTING;
+    if (edm_alarm()) flags |= BUS_JOB_FLAG_ALARM;
+    if (edm_keys_pending()) flags |= BUS_JOB_FLAG_KEYS_PENDING;
+    if (pausing) flags |= BUS_JOB_FLAG_PAUSING;
+    if (station_list_damaged()) flags |= BUS_JOB_FLAG_COPY_DAMAGED;
+    return (uint8_t)flags;
 }
 
 static uint8_t report_job(void) {
@@ -372,8 +382,7 @@ static uint8_t report_job(void) {
 }
 
 static uint8_t report_station_list(void) {
-    bus_reply_field(BUS_JOB_STATIONS_REPLY_WRITING,
-                    store_state() == STORE_WRITING || store_state() == STORE_LOADING, 1);
+    bus_reply_field(BUS_JOB_STATIONS_REPLY_WRITING, store_busy(), 1);
     bus_reply_field(BUS_JOB_STATIONS_REPLY_ENDED, store_cause(), 1);
     bus_reply_field(BUS_JOB_STATIONS_REPLY_GENERATION, station_list_generation(), 4);
     bus_reply_field(BUS_JOB_STATIONS_REPLY_STATIONS, station_list_count(), 2);

@@ -1,33 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
-// panel -- key-pad and character display: what the job does, in words, and its program and answers
-// by key. Either may be missing.
+// panel -- key-pad and character display of a station: what the job does, in words, and by key its
+// station list and its actions. Either device may be absent.
 //
 //      7  8  9  START   PAUSE  RESUME  STOP
-//      4  5  6  AGAIN   NEXT   UP      DOWN       up, down: browse through the stored stations
-//      1  2  3  DIVIDE  LIST   LIMIT   SPEED      divide: so many equal parts of a turn; list:
-//      angle by angle 0  .     ENTER   CLEAR
+//      4  5  6  AGAIN   NEXT   UP      DOWN       UP, DOWN: browse through the stations
+//      1  2  3  DIVIDE  LIST   LIMIT   SPEED      DIVIDE: a turn into equal parts
+//      0  .     ENTER   CLEAR                     LIST: stations angle by angle
 //
-// An empty entry ends a list. Limit is the longest cut, speed that of the table in percent of full.
-// The keys that are left have no function.
+// An empty entry ends a list. LIMIT is the longest cut, in s; SPEED is the speed of the table, in
+// percent. The other keys have no function.
 #include "station/panel/panel.h"
 
 #include <stddef.h>
 #include <stdint.h>
 
 #include "core/clock.h"
-#include "station/panel/display.h"
+#include "station/devices/display.h"
 #include "station/job/job.h"
-#include "station/panel/keypad.h"
+#include "station/devices/keypad.h"
 #include "made/bus_protocol.h"
 #include "station/table/peer.h"
 #include "station/settings.h"
-#include "station/storage/store.h"
+#include "station/storage/station_list.h"
 
 #define NOTICE_MS 3000u
 #define REFRESH_MS 100u
 #define ENTRY 11u       // characters
 #define DEGREE 360000u  // in 0.01 arcsec
-#define TURN_MS 2048u   // cause and fault are shown in turn, each so long
+#define TURN_MS 2048u   // cause and fault are shown alternately, each for this long
 #define DECIMALS 5u     // of a shown angle
 
 enum mode {
@@ -39,7 +39,7 @@ enum mode {
     LAST_ENTRY = SPEED,
     DIVIDING,
     SAVING
-};  // what is shown and asked for
+};  // what is shown, and what an entry is for
 enum key {
     NONE,
     UP = 128,
@@ -51,7 +51,7 @@ enum key {
     ENTER,
     CLEAR,
     ACTION
-};  // others: the character; ACTION and up: a job_action
+};  // lower ones: the character; from ACTION on: a bus_job_action
 
 #define OF(action) (ACTION + BUS_JOB_ACTION_##action)
 static const uint8_t layout[KEYPAD_KEYS] = {
@@ -77,12 +77,13 @@ static const char* const state_words[] = {BUS_JOB_STATE_WORDS(WORDS)};
 static uint8_t mode, notice;  // notice: a cause, shown for a while
 static char entry[ENTRY + 1];
 static uint8_t entered;
-static uint16_t browsed, parts;  // parts: of the turn that is being divided
+static uint16_t browsed;  // station that is shown; STATION_LIST_MAX: that of the job
+static uint16_t parts;    // that a turn is being divided into
 static uint32_t noticed_ms, shown_ms;
 static uint8_t line;   // that is composed next
-static bool composed;  // it waits to be shown
+static bool composed;  // and is shown in the next call
 static char text[DISPLAY_COLUMNS + 1];
-static const char* remaining_words;  // words that are still to be said
+static const char* remaining_words;  // that did not fit the line before
 
 // ---- text
 
@@ -91,7 +92,7 @@ static unsigned put(char* row, unsigned at, const char* text) {
     return at;
 }
 
-// A number with at least so many digits, the last one left of `end`.
+// A number with at least `digits` digits, the last one left of `end`.
 static void put_number(char* row, unsigned end, uint32_t number, unsigned digits) {
     for (unsigned n = 0; n < digits || number; n++) {
         row[--end] = (char)('0' + number % 10u);
@@ -106,7 +107,7 @@ static void put_angle(char* row, unsigned end, uint32_t angle) {
     put_number(row, end - DECIMALS - 1, angle / DEGREE, 1);
 }
 
-// As many words as fit; returns the remaining_words, a null pointer after the last one.
+// As many words as fit; returns the remaining ones, a null pointer after the last word.
 static const char* put_words(char* row, const char* text) {
     unsigned column = 0;
     for (;;) {
@@ -126,7 +127,7 @@ static uint8_t shown_cause(void) {
     return notice != BUS_CAUSE_OK ? notice : mode == SHOW ? job_cause() : BUS_CAUSE_OK;
 }
 
-// Why it waits; a fault of the sub-node in its own words too.
+// Why the job waits; a fault of the sub-node alternates with its own words.
 static const char* words_of(uint8_t shown) {
     unsigned faults = peer_faults(), fault = 0;
     if (shown == BUS_CAUSE_OK) return NULL;
@@ -155,10 +156,10 @@ static void put_hints(char* row) {
 }
 
 static void put_title(char* row) {
-    bool looks = browsed < station_list_count();
+    bool browsing = browsed < station_list_count();
     if (mode == SHOW) {
-        put(row, 0, looks ? "station" : state_words[job_state()]);
-        put_station(row, looks ? browsed : job_station());
+        put(row, 0, browsing ? "station" : state_words[job_state()]);
+        put_station(row, browsing ? browsed : job_station());
     } else {
         put(row, 0, titles[mode]);
         if (mode == LIST) put_number(row, DISPLAY_COLUMNS, station_list_added() + 1u, 3);
@@ -176,7 +177,7 @@ static void put_entry(char* row) {
     if (mode <= LAST_ENTRY) put(row, at, "_");
 }
 
-// One line at a time, from the first to the last; what is said goes on over several lines.
+// Composes a line, from the first to the last; words continue over several lines.
 static void compose(unsigned n) {
     for (unsigned column = 0; column < DISPLAY_COLUMNS; column++) text[column] = ' ';
     if (n == 0) {
@@ -209,7 +210,7 @@ static void go(enum mode to) {
     clear_entry();
 }
 
-// The entry in parts of 1 / scale; false if it is none, or out of every range.
+// The entry in units of 1 / scale; returns false if it is no number or above INT32_MAX.
 static bool value_of_entry(uint32_t scale, uint32_t* value) {
     uint64_t number = 0, decimals = 1;
     bool point = false;
@@ -233,8 +234,8 @@ static void save(void) {
     go(cause == BUS_CAUSE_OK ? SAVING : SHOW);
 }
 
-static void begin(enum mode to)  // of a new program
-{
+// Begins a new station list.
+static void begin(enum mode to) {
     uint8_t cause = job_begin_list();
     show_notice(cause);
     if (cause == BUS_CAUSE_OK) go(to);
@@ -289,8 +290,8 @@ static void character_key(char character) {
     entry[entered] = 0;
 }
 
-static void clear_key(void)  // first what was entered, then out
-{
+// Clears the entry; without an entry, leaves the mode.
+static void clear_key(void) {
     show_notice(BUS_CAUSE_OK);
     browsed = STATION_LIST_MAX;
     if (entered)
@@ -331,7 +332,7 @@ static void key_pressed(uint8_t key) {
 
 // ---- work
 
-static void divide_on(void) {
+static void divide_next(void) {
     uint32_t n = station_list_added();
     if (n == parts) return save();
     uint8_t cause =
@@ -341,7 +342,7 @@ static void divide_on(void) {
     go(SHOW);
 }
 
-static void saved(void) {
+static void saving(void) {
     if (store_state() == STORE_WRITING) return;
     show_notice(store_cause());
     go(SHOW);
@@ -358,8 +359,8 @@ void panel_start(unsigned axes) {
     go(SHOW);
 }
 
-static bool refreshed(void)  // a line at a time
-{
+// One piece of a refresh, which goes line by line; returns false when none is under way.
+static bool refreshed(void) {
     if (composed)
         display_show(line++, text);
     else if (line < DISPLAY_LINES)
@@ -373,8 +374,8 @@ static bool refreshed(void)  // a line at a time
 void panel_work(void) {
     uint8_t key = keypad_take();
     if (key != KEYPAD_NONE) return key_pressed(layout[key]);
-    if (mode == DIVIDING) return divide_on();
-    if (mode == SAVING) saved();
+    if (mode == DIVIDING) return divide_next();
+    if (mode == SAVING) saving();
     if (refreshed()) return;
     if (clock_ms() - shown_ms >= REFRESH_MS && display_present()) {
         shown_ms = clock_ms();
@@ -383,7 +384,3 @@ void panel_work(void) {
     keypad_work();
     display_work();
 }
-
-bool panel_has_keypad(void) { return keypad_present(); }
-
-bool panel_has_display(void) { return display_present(); }

@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// panel -- key-pad and character display: what the job does, in words, and its program and answers
-// by key. Either may be missing.
+// panel -- key-pad and character display of a station: what the job does, in words, and by key its
+// station list and its actions. Either device may be absent.
 #ifndef MOIRE_PANEL_H
 #define MOIRE_PANEL_H
 
-#include <stdbool.h>
-
 void panel_start(unsigned axes);
 void panel_work(void);
-bool panel_has_keypad(void);
-bool panel_has_display(void);
 
 #endif

@@ -1,69 +1,53 @@
 // SPDX-License-Identifier: Apache-2.0
-// store -- the program of stations, the journal of the job and what the node keeps of its values,
-// in an EEPROM 24AA128, whole after a power cut at any moment.
+// store -- the EEPROM 24AA128 of a station as a block device: it reads bytes, and writes pages that
+// it reads back, for one client at a time.
+//
+// Three clients keep their data in it: value_store, station_list and journal. At power-up, and when
+// a missing EEPROM comes back, each loads in turn; afterwards one of them at a time may write. All
+// of it is polled: a client asks for a transfer or for its next step, and store calls it when that
+// is due. Whatever a client puts into several pages must be safe against a power cut on its own: a
+// page that is being written when the power goes may hold anything afterwards.
 #ifndef MOIRE_STORE_H
 #define MOIRE_STORE_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-#define STATION_LIST_MAX 360u         // most
-#define STATION_LIST_TURN 129600000u  // a turn in 0.01 arcsec
+#define STORE_PAGE 64u  // bytes
 
-enum journal_step {
-    JOURNAL_NOTHING,
-    JOURNAL_STARTED,
-    JOURNAL_TURNED,
-    JOURNAL_CUT_BEGUN,
-    JOURNAL_CUT_DONE,
-    JOURNAL_FINISHED,
-    JOURNAL_STOPPED,
-    JOURNAL_NEXT
-};  // of a sub-node that counts: its next station
+enum store_state { STORE_LOADING, STORE_READY, STORE_WRITING, STORE_MISSING };
 
-struct journal_record {  // a line of the journal, as in the EEPROM
-    uint32_t sequence;   // each has one more; 0: the journal is empty
-    uint32_t list;       // station_list_identity then
-    uint16_t station;
-    uint16_t step;  // journal_step
-    uint32_t crc;
+struct store_client {
+    void (*reset)(void);    // forgets what it loaded; called for all clients before any loads
+    void (*load)(void);     // begins to load
+    void (*read)(void);     // the bytes that store_read asked for are in store_bytes
+    void (*step)(void);     // the step that store_step asked for; null: it asks for none
+    void (*written)(void);  // the page that store_write wrote was read back as it should be
+    void (*rewrite)(void);  // it was not; null: the same page is written again
+    uint8_t* cause;         // receives how its writing ended; null: store_cause reports it
 };
 
-enum store_state { STORE_LOADING, STORE_READY, STORE_WRITING, STORE_DEAD };
+#define STORE_CLIENTS 3u
+extern const struct store_client* const store_clients[STORE_CLIENTS];  // in the order of loading
 
 void store_start(unsigned axes);
 void store_work(void);
 enum store_state store_state(void);
-uint8_t store_cause(void);  // how the last loading or writing ended
-bool station_list_damaged(
-    void);  // one copy of the program was found damaged, the other one is in force
+bool store_busy(void);          // it loads or writes
+bool store_powering_up(void);   // it loads for the first time since store_start
+uint8_t store_cause(void);      // a bus_cause: how the last loading or writing ended
+uint8_t store_may_write(void);  // ok, eeprom_busy or eeprom_missing
 
-// The program in force; nothing of it while it is loaded, or if there is none.
-uint16_t station_list_count(void);
-uint32_t station_list_angle(unsigned station);  // 0.01 arcsec
-uint32_t station_list_generation(void);         // each saved one has a higher one; 0: there is none
-uint32_t station_list_identity(void);           // its CRC-32
-
-const struct journal_record* journal_last(void);  // the last line of the journal
-
-// These return a bus_cause. A new program is begun, given its stations in their order, and comes
-// into force when it is saved.
-uint8_t station_list_begin(void);
-uint8_t station_list_add(uint32_t angle);
-uint16_t station_list_added(void);  // stations that the new program has so far
-uint8_t station_list_save(void);
-uint8_t journal_write(uint16_t station, enum journal_step step);  // a line into the journal
-
-#define VALUE_STORE_MAX 254u  // most
-
-// Values of the node: taken at power-up, settings only if the program is not newer.
-struct value_store_status {
-    uint32_t generation;  // of all that is saved, programs too; 0: nothing is there
-    uint16_t values;
-    uint8_t cause;  // what is kept, or why the defaults are in force
-    bool damaged;   // one copy was found damaged
-};
-const struct value_store_status* value_store_status(void);
-uint8_t value_store_save(bool nothing);  // a bus_cause
+// For the client that loads or writes.
+extern uint8_t store_bytes[STORE_PAGE];             // what was read
+void store_read(unsigned address, unsigned count);  // at most a page
+bool store_blank(unsigned count);                   // all these bytes of store_bytes are erased
+void store_step(void);
+void store_loaded(uint8_t cause);  // this client has loaded; the next one follows
+void store_begin(const struct store_client* client);  // begins to write; store_may_write said ok
+void store_put(const void* bytes, unsigned count);    // appends to the page that is written next
+unsigned store_filled(void);                          // bytes that it has so far
+void store_write(unsigned address);
+void store_end(uint8_t cause);  // the writing has ended
 
 #endif

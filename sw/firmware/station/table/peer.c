@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// peer -- 115200 baud, 8N1. Two modes:
+// peer -- the connection between main node and sub-node, 115200 baud, 8N1. It has two modes:
 //
-//   legacy   S4's bytes: FF FF AA "cutting done, index to the next station", FF FF 55 "indexing
-//   done". Found amid any other bytes.
-//             The sub-node has a program of stations and counts them, in its EEPROM: where it is to
-//             go next is known after a power cut too. Nothing is ever said twice, so what is lost
-//             is told by time.
-//   frames    00 · COBS of body and its CRC-32 · 00. The bodies are those of the line: the main
-//   node asks, the sub-node does what the
-//             line does. What is not answered is asked again; a request that comes again is
-//             answered again and not acted on again. Where a fault of the sub-node is the cause, it
-//             is asked which; it is reset only where a person wants it.
+//   legacy   S4's bytes: FF FF AA "cutting done, turn to the next station", FF FF 55 "turned". They
+//            are recognised among any other bytes. The sub-node has the list of stations and counts
+//            them; its count is in its EEPROM, so a power cut does not lose it. Nothing is ever
+//            sent twice: only a time-out shows that a message was lost.
+//   frames   00 · COBS of body and its CRC-32 · 00. The bodies are those of the RS-485 bus: the
+//            main node requests, and the sub-node acts as it does on the bus. A request without a
+//            reply is sent again; a request that arrives again gets the same reply and is not done
+//            again. If a fault of the sub-node was the cause, the main node asks which; it resets
+//            the fault only when a person wants that.
 #include "station/table/peer.h"
 
 #include "core/clock.h"
@@ -20,22 +19,23 @@
 #include "made/bus_protocol.h"
 #include "station/table/sensor.h"
 #include "station/settings.h"
-#include "station/storage/store.h"
+#include "station/storage/journal.h"
+#include "station/storage/station_list.h"
 
 #define BAUD 115200u
 #define BYTES_PER_POLL 16u
 #define CRC_BYTES 4u
 #define LONGEST_PART (1u + BUS_LONGEST_BODY + CRC_BYTES)  // between the zeros of a frame
 #define ANSWER_MS 100u                                    // then a request is sent again
-#define MOST_SENDINGS 20u                                 // then the sub-node is silent
-#define PAUSE_MS 50u                                      // between two looks at an index
-#define BEGIN_MS 10000u  // for a sub-node that is still at work to stop
+#define MOST_ATTEMPTS 20u                                 // then the sub-node is silent
+#define PAUSE_MS 50u                                      // from a reply to the next poll
+#define BEGIN_MS 10000u  // that a sub-node which is still busy may take to stop
 
 enum mode { NOT_IN_USE, LEGACY, FRAMES };
 enum role { MAIN, SUB };
 enum legacy { HEAD = 0xFF, DONE = 0x55, NEXT = 0xAA };  // twice the head, then one of the others
 enum step {
-    RESTING,
+    NOTHING,
     POLLING,
     CLEARING,
     RESETTING,
@@ -44,26 +44,26 @@ enum step {
     WATCHING,
     STOPPING,
     ASKING_FAULT
-};  // that was asked last
+};  // that was requested last
 
 static struct peer {
     uint8_t phase;  // bus_peer_phase
     uint8_t ended;  // bus_cause
     uint16_t station;
     uint32_t angle;
-    uint32_t since_ms;  // the index was asked for
+    uint32_t since_ms;  // when the turn was ordered
     uint32_t heard, garbage, repeated;
-    uint16_t faults;  // of the sub-node
-    uint8_t failure;  // cause, while it is asked for them
-    bool resets;      // a person wants them reset
-    bool noting;      // a sub-node in mode legacy writes its count
+    uint16_t faults;       // of the sub-node
+    uint8_t failure;       // the cause, while the faults are requested
+    bool reset_requested;  // by a person
+    bool noting;           // a sub-node in mode legacy is writing its count
 } peer;
 
 static struct requests {  // of a main node, frames
     uint8_t step;
     uint8_t body[BUS_SET_PARAMETER_REQUEST_LENGTH];  // the longest one
     uint8_t length;
-    uint8_t sendings;
+    uint8_t attempts;
     bool answered;  // the next poll_status waits for PAUSE_MS
     uint32_t sent_ms;
 } requests;
@@ -78,7 +78,7 @@ static struct replies {  // of a sub-node, frames
 static struct incoming {
     uint8_t heads;                // of a legacy order, two at most
     uint8_t bytes[LONGEST_PART];  // of a frame
-    uint32_t count;               // more than there is room for: it is too long
+    uint32_t count;               // LONGEST_PART + 1: the frame is too long
 } incoming;
 
 static uint8_t mode(void) { return (uint8_t)settings_get(BUS_SETTING_PEER_MODE); }
@@ -88,19 +88,19 @@ static uint8_t role(void) { return (uint8_t)settings_get(BUS_SETTING_PEER_ROLE);
 static void end(uint8_t phase, uint8_t cause) {
     peer.phase = phase;
     peer.ended = cause;
-    peer.resets = peer.noting = false;
-    requests.step = RESTING;
+    peer.reset_requested = peer.noting = false;
+    requests.step = NOTHING;
 }
 
-// legacy
+// ---- legacy
 
-static void say(uint8_t what) {
+static void send_legacy(uint8_t what) {
     const uint8_t bytes[] = {HEAD, HEAD, what};
     for (uint32_t n = 0; n < sizeof bytes; n++)
         peripherals_write(PERIPHERALS_PEER_TRANSMIT, bytes[n]);
 }
 
-// Of this sub-node: what was indexed last is in the journal.
+// The next station of this sub-node, from the journal.
 static uint16_t next_station(void) {
     const struct journal_record* record = journal_last();
     return record->step == JOURNAL_NEXT && record->list == station_list_identity() ? record->station
@@ -119,9 +119,8 @@ static void next_ordered(void) {
         cause == BUS_CAUSE_OK ? BUS_CAUSE_RUNNING : cause);
 }
 
-// The count is in the journal before the main node hears of it.
-static void turn_watched(void)  // by a sub-node
-{
+// A sub-node: the count is in the journal before the main node receives DONE.
+static void watch_turn(void) {
     uint8_t ended = turn_ended();
     if (peer.phase != BUS_PEER_PHASE_TURNING || ended == BUS_CAUSE_RUNNING ||
         store_state() == STORE_WRITING)
@@ -135,7 +134,7 @@ static void turn_watched(void)  // by a sub-node
         return;
     }
     end(BUS_PEER_PHASE_TURNED, BUS_CAUSE_OK);
-    say(DONE);
+    send_legacy(DONE);
 }
 
 static void legacy_byte(uint8_t byte) {
@@ -157,20 +156,20 @@ static void legacy_byte(uint8_t byte) {
 
 static void legacy_work(void) {
     if (role() == SUB)
-        turn_watched();
+        watch_turn();
     else if (peer.phase == BUS_PEER_PHASE_TURNING &&
              clock_ms() - peer.since_ms > (uint32_t)settings_get(BUS_SETTING_PEER_TIMEOUT))
         end(BUS_PEER_PHASE_SILENT, BUS_CAUSE_CHECK_SUB_NODE);
 }
 
-// frames
+// ---- frames
 
 static void send_frame(const uint8_t* body, uint32_t length) {
     uint8_t part[LONGEST_PART];
     uint32_t crc = bus_crc(body, length), whole = length + CRC_BYTES, code = 0;
     if (FIELD_GET(peripherals_read(PERIPHERALS_PEER_STATE), PERIPHERALS_PEER_STATE_TRANSMIT_FREE) <
         whole + 3u)
-        return;  // silence, rather than half of it
+        return;  // nothing is better than half a frame
     for (uint32_t n = 0; n < whole; n++) {
         uint8_t byte = (uint8_t)(n < length ? body[n] : crc >> 8 * (n - length));
         part[n + 1] = byte;
@@ -184,8 +183,8 @@ static void send_frame(const uint8_t* body, uint32_t length) {
     peripherals_write(PERIPHERALS_PEER_TRANSMIT, 0);
 }
 
-// In place, from the second byte on; the length of body and CRC-32, 0 if the codes do not lead to
-// the end.
+// Decodes COBS in place; the body begins at the second byte. Returns the length of body and CRC-32,
+// or 0 if the codes do not lead to the end.
 static uint32_t decode(uint8_t* part, uint32_t count) {
     uint32_t at = 0;
     while (at < count && part[at]) {
@@ -197,7 +196,7 @@ static uint32_t decode(uint8_t* part, uint32_t count) {
 }
 
 static void repeat_request(void) {
-    requests.sendings++;
+    requests.attempts++;
     requests.sent_ms = clock_ms();
     send_frame(requests.body, requests.length);
 }
@@ -209,7 +208,7 @@ static void ask(uint8_t step, uint8_t operation, uint64_t fields, uint8_t field_
     for (uint32_t n = 0; n < field_bytes; n++, fields >>= 8)
         requests.body[BUS_REQUEST_HEAD + n] = (uint8_t)fields;
     requests.length = BUS_REQUEST_HEAD + field_bytes;
-    requests.sendings = 0;
+    requests.attempts = 0;
     requests.answered = false;
     repeat_request();
 }
@@ -221,13 +220,13 @@ static void set_speed(void) {
         BUS_SET_PARAMETER_REQUEST_LENGTH - BUS_REQUEST_HEAD);  // of axis 0
 }
 
-// Looking before an order also makes the order differ from the last request, should this node have
-// begun its sequence anew.
+// A poll before an order also makes the order differ from the last request, even if this node began
+// its sequence from scratch.
 static void poll_status(uint8_t step) { ask(step, BUS_OPERATION_TURN_STATE, 0, 0); }
 
 static void stop(uint8_t step) { ask(step, BUS_OPERATION_STOP, 0, 1); }
 
-// An order has failed. Where a fault is the cause, it is asked which.
+// An order has failed. If a fault was the cause, the faults are requested.
 static void fail(uint8_t cause) {
     if (cause != BUS_CAUSE_FAULTED && cause != BUS_CAUSE_ENDED_BY_FAULT &&
         cause != BUS_CAUSE_FAULT_PERSISTS)
@@ -243,7 +242,7 @@ static uint32_t field_of(const uint8_t* reply, uint32_t at, uint32_t bytes) {
 }
 
 static void reset_fault(void) {
-    peer.resets = false;
+    peer.reset_requested = false;
     ask(RESETTING, BUS_OPERATION_RESET_FAULTS, 0, 1);
 }
 
@@ -255,7 +254,7 @@ static void report_faults(const uint8_t* reply, uint8_t cause) {
     end(BUS_PEER_PHASE_FAILED, peer.failure);
 }
 
-static void watched(const uint8_t* reply) {
+static void state_heard(const uint8_t* reply) {
     uint8_t ended = reply[BUS_TURN_STATE_REPLY_ENDED];
     if (ended == BUS_CAUSE_NO_MOTION_YET ||
         field_of(reply, BUS_TURN_STATE_REPLY_TARGET, 4) != peer.angle)
@@ -267,13 +266,13 @@ static void watched(const uint8_t* reply) {
 }
 
 static void reply_heard(const uint8_t* reply, uint32_t length) {
-    bool ours = requests.step != RESTING && !requests.answered && length >= BUS_REPLY_HEAD &&
+    bool ours = requests.step != NOTHING && !requests.answered && length >= BUS_REPLY_HEAD &&
                 reply[0] == requests.body[0] && reply[1] == requests.body[1];
     uint8_t cause = ours ? reply[2] : BUS_CAUSE_OK;
-    uint32_t wanted = reply[1] == BUS_OPERATION_TURN_STATE ? BUS_TURN_STATE_REPLY_LENGTH
-                      : reply[1] == BUS_OPERATION_STATUS   ? BUS_STATUS_REPLY_LENGTH
-                                                           : BUS_REPLY_HEAD;
-    if (!ours || (cause == BUS_CAUSE_OK && length != wanted)) {
+    uint32_t expected = reply[1] == BUS_OPERATION_TURN_STATE ? BUS_TURN_STATE_REPLY_LENGTH
+                        : reply[1] == BUS_OPERATION_STATUS   ? BUS_STATUS_REPLY_LENGTH
+                                                             : BUS_REPLY_HEAD;
+    if (!ours || (cause == BUS_CAUSE_OK && length != expected)) {
         peer.garbage++;
         return;
     }
@@ -289,14 +288,14 @@ static void reply_heard(const uint8_t* reply, uint32_t length) {
         report_faults(reply, cause);
     else if (cause != BUS_CAUSE_OK)
         fail(cause);
-    else if (requests.step == POLLING && peer.resets)
+    else if (requests.step == POLLING && peer.reset_requested)
         reset_fault();
     else if (requests.step == POLLING || requests.step == RESETTING)
         set_speed();
     else if (requests.step == SETTING_SPEED)
         ask(ORDERING, BUS_OPERATION_TURN_TO, peer.angle, 4);
     else if (requests.step == WATCHING)
-        watched(reply);
+        state_heard(reply);
 }
 
 static void request_heard(const uint8_t* request, uint32_t length, uint32_t crc) {
@@ -338,10 +337,10 @@ static void frame_byte(uint8_t byte) {
 }
 
 static void frames_work(void) {
-    if (requests.step == RESTING ||
+    if (requests.step == NOTHING ||
         clock_ms() - requests.sent_ms < (requests.answered ? PAUSE_MS : ANSWER_MS))
         return;
-    if (!requests.answered && requests.sendings == MOST_SENDINGS)
+    if (!requests.answered && requests.attempts == MOST_ATTEMPTS)
         end(BUS_PEER_PHASE_SILENT, BUS_CAUSE_PEER_SILENT);
     else if (!requests.answered)
         repeat_request();
@@ -353,7 +352,7 @@ void peer_start(unsigned axes) {
     uint64_t sixteenths = 16 * (uint64_t)node_read(NODE_CLK_HZ);
     (void)axes;
     peer = (struct peer){.phase = BUS_PEER_PHASE_IDLE, .ended = BUS_CAUSE_NO_MOTION_YET};
-    requests = (struct requests){.step = RESTING};
+    requests = (struct requests){.step = NOTHING};
     replies.any = false;
     incoming.heads = 0;
     incoming.count = 0;
@@ -363,7 +362,7 @@ void peer_start(unsigned axes) {
 void peer_work(void) {
     uint8_t used = mode();
     if (used == NOT_IN_USE || (used == LEGACY && store_state() == STORE_LOADING))
-        return;  // what comes waits in its queue
+        return;  // received bytes wait in the queue
     for (uint32_t n = 0; n < BYTES_PER_POLL; n++) {
         uint32_t received = peripherals_read(PERIPHERALS_PEER_RECEIVE);
         if (!(received & PERIPHERALS_PEER_RECEIVE_PRESENT_MASK)) break;
@@ -391,7 +390,7 @@ uint8_t peer_turn_to(uint16_t station, uint32_t angle) {
     peer.since_ms = clock_ms();
     peer.faults = 0;
     if (mode() == LEGACY)
-        say(NEXT);
+        send_legacy(NEXT);
     else
         poll_status(POLLING);
     return BUS_CAUSE_OK;
@@ -412,7 +411,7 @@ uint8_t peer_cause(void) { return peer.ended; }
 
 uint16_t peer_faults(void) { return peer.faults; }
 
-void peer_reset_fault(void) { peer.resets = peer.faults != 0; }
+void peer_reset_fault(void) { peer.reset_requested = peer.faults != 0; }
 
 static uint8_t take_next(void) {
     uint16_t station = (uint16_t)bus_request_field(BUS_PEER_NEXT_REQUEST_STATION, 2);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// sensor -- each good frame once, its age known, as long as it is asked for more often than frames
-// come.
+// sensor -- the absolute angle of the table, from the frames of a time-grating sensor.
+//
+// sensor_work must be called more often than frames come, every 10 ms: then it sees each good frame
+// once and knows its age.
 #include "station/table/sensor.h"
 
 #include "core/clock.h"
@@ -15,7 +17,7 @@
 
 static uint32_t cycles_per_ms;
 static uint32_t frames;    // good ones
-static uint32_t fresh_ms;  // when the last of them was sent; at first, when the wait for it began
+static uint32_t fresh_ms;  // when the last of them was sent; at first, the start
 static uint32_t word;      // its angle, 2^-32 turn
 static uint32_t changes;
 static uint32_t wrong_crc, broken, missed;
@@ -23,7 +25,7 @@ static uint32_t wrong_crc, broken, missed;
 static struct measurement {
     uint32_t since_ms;
     uint32_t first;  // 2^-32 turn
-    int64_t sum;     // of what the others differ
+    int64_t sum;     // of the differences of the others from it
     uint32_t required, got;
 } measurement;
 
@@ -45,8 +47,8 @@ void sensor_start(unsigned axes) {
     peripherals_write(PERIPHERALS_SENSOR_ERRORS, PERIPHERALS_SENSOR_ERRORS_CLEAR_MASK);
 }
 
-static void count_errors(void)  // before they reach their end
-{
+// Must be called before the counters of the hardware saturate.
+static void count_errors(void) {
     uint32_t errors = peripherals_read(PERIPHERALS_SENSOR_ERRORS);
     if (errors == 0) return;
     peripherals_write(PERIPHERALS_SENSOR_ERRORS, PERIPHERALS_SENSOR_ERRORS_CLEAR_MASK);
@@ -87,7 +89,7 @@ void sensor_measure(uint32_t required) {
 
 bool sensor_measured(void) { return measurement.got == measurement.required; }
 
-// From 2^-32 turn, above sensor_zero.
+// From 2^-32 turn to 0.01 arcsec above sensor_zero.
 static uint32_t angle_of(uint32_t turn) {
     uint32_t angle = (uint32_t)(((uint64_t)turn * SENSOR_TURN + (1u << 31)) >> 32),
              zero = (uint32_t)settings_get(BUS_SETTING_SENSOR_ZERO);

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// index -- turn the table of axis 0 to an absolute angle of its sensor (S4).
+// turn -- turns the indexing table of axis 0 to an absolute angle of its sensor (S4).
 //
-//   reading ─► going_below ─► coming_up ─► reading ─► closing_in ─► reading …      ended: no more
-//   than turn_tolerance is left
-//                   ▲ below the target by turn_allowance │                        each closing_in
-//                   goes turn_share of what is left └─────────── above the target ◄───────┘
+//   reading ─► going_below ─► coming_up ─► reading ─► closing_in ─► reading …
+//                   ▲                         │           ▲            │
+//                   └──── above the target ───┴───────────┴────────────┘
+//
+// coming_up ends turn_allowance below the target. Each closing_in goes turn_share of what remains.
+// It ends when a reading is within turn_tolerance of the target.
 //
 // The worm always pushes the table up: a distance up that is shorter than turn_take_up begins
-// farther below. The long directions are at the speed of a move of the axis, closing_in at its
-// homing_latch_speed. What the steps say is held against the sensor at each reading.
+// farther below. The long distances are done at the speed of a move of the axis, closing_in at its
+// homing_latch_speed. At each reading the steps are compared with the sensor.
 #include "station/table/turn.h"
 
 #include "axis/axis.h"
@@ -21,29 +23,29 @@
 
 #define AXIS 0u
 #define TURN ((int64_t)SENSOR_TURN)
-#define ABOUT_ZERO (TURN / 360)  // so far below angle 0 the table stands at angle 0
-#define FOLLOWED 4               // a table that sticks goes less than a quarter of its steps
+#define ABOUT_ZERO (TURN / 360)  // below angle 0 by up to this counts as angle 0
+#define FOLLOWED 4               // a table that sticks moves less than a quarter of its steps
 
 enum direction_choice { DIRECT, SHORTER, ALWAYS_UP };
 
 struct position {      // of the table, at rest
     uint32_t angle;    // by the sensor
     int64_t steps;     // by the steps, 2^-16 period
-    uint32_t changes;  // of the sensor until then
+    uint32_t changes;  // sensor_changes then
 };
 
 static struct turn {
     uint8_t phase;  // bus_turn_phase
     uint8_t ended;  // bus_cause
     uint8_t tries, overshoots;
-    uint8_t command_count;  // of the axis; when they change somebody else drives it
+    uint8_t command_count;  // of the axis; if it changes, the axis got another command
     bool begun;             // the first reading has been taken
     bool measuring;         // the table has settled
     bool closing;           // from `near` on
     uint32_t target;
-    uint32_t since_ms;                 // the table rests
-    int64_t up;                        // distance that follows going_below
-    struct position first, near, now;  // where it began, where closing in began, where it is
+    uint32_t since_ms;                 // since when the table is at rest
+    int64_t up;                        // distance of coming_up
+    struct position first, near, now;  // where turning began, where closing_in began, last reading
 } turn;
 
 static int64_t setting(uint8_t id) { return settings_get(id); }
@@ -55,18 +57,18 @@ static int64_t wrap_distance(int64_t distance) {
     return distance;
 }
 
-static int64_t apart(uint32_t to, uint32_t from) { return wrap_distance((int64_t)to - from); }
+static int64_t difference(uint32_t to, uint32_t from) { return wrap_distance((int64_t)to - from); }
 
-static int64_t size(int64_t distance) { return distance < 0 ? -distance : distance; }
+static int64_t magnitude(int64_t distance) { return distance < 0 ? -distance : distance; }
 
 static int64_t steps_of(int64_t distance) {
-    int64_t part = size(distance) * setting(BUS_SETTING_PERIODS_PER_TURN), whole = part / TURN;
+    int64_t part = magnitude(distance) * setting(BUS_SETTING_PERIODS_PER_TURN), whole = part / TURN;
     int64_t steps = (whole << 16) + ((part - whole * TURN) << 16) / TURN;
     return distance < 0 ? -steps : steps;
 }
 
 static int64_t distance_of(int64_t steps) {
-    int64_t periods = size(steps) >> 16, part = size(steps) & 0xFFFF,
+    int64_t periods = magnitude(steps) >> 16, part = magnitude(steps) & 0xFFFF,
             per_turn = setting(BUS_SETTING_PERIODS_PER_TURN);
     int64_t turns = periods / per_turn,
             distance = turns * TURN +
@@ -95,7 +97,7 @@ static void go(uint8_t phase, int64_t distance, uint8_t velocity_id) {
 
 static void come_up(void) { go(BUS_TURN_PHASE_COMING_UP, turn.up, BUS_PARAMETER_VELOCITY); }
 
-// To below the target, so far away, with the worm pushing up.
+// Goes to below the target, which is `distance` away, with the worm pushing up.
 static void approach(int64_t distance) {
     int64_t take_up = setting(BUS_SETTING_TURN_TAKE_UP), down;
     turn.closing = false;
@@ -118,60 +120,61 @@ static int64_t distance_up(void) {
     }
 }
 
-// Why the tries bring nothing.
-static uint8_t why_not(void) {
+// Why repeated closing_in does not reach the target.
+static uint8_t cause_of_failure(void) {
     int64_t distance = distance_of(turn.now.steps - turn.near.steps),
-            turned = apart(turn.now.angle, turn.near.angle);
+            turned = difference(turn.now.angle, turn.near.angle);
     if (turn.now.changes == turn.near.changes) return BUS_CAUSE_SENSOR_STUCK;
     if (distance < FOLLOWED * setting(BUS_SETTING_TURN_TOLERANCE)) return BUS_CAUSE_NOT_CONVERGED;
     if (turned * FOLLOWED <= -distance) return BUS_CAUSE_WRONG_SIGN;
     return turned * FOLLOWED < distance ? BUS_CAUSE_STICTION : BUS_CAUSE_NOT_CONVERGED;
 }
 
-// ok, or what is wrong when the table is not where its steps have brought it.
+// ok, or what is wrong if the table is not where its steps should have brought it.
 static uint8_t compare(void) {
     int64_t limit = setting(BUS_SETTING_TURN_DISAGREEMENT),
             distance = distance_of(turn.now.steps - turn.first.steps);
-    int64_t turned = apart(turn.now.angle, turn.first.angle);
-    if (size(wrap_distance(turned - distance)) <= limit) return BUS_CAUSE_OK;
-    uint8_t cause = turn.closing ? why_not() : BUS_CAUSE_NOT_CONVERGED;
+    int64_t turned = difference(turn.now.angle, turn.first.angle);
+    if (magnitude(wrap_distance(turned - distance)) <= limit) return BUS_CAUSE_OK;
+    uint8_t cause = turn.closing ? cause_of_failure() : BUS_CAUSE_NOT_CONVERGED;
     if (cause != BUS_CAUSE_NOT_CONVERGED) return cause;
     if (turn.now.changes == turn.first.changes) return BUS_CAUSE_SENSOR_STUCK;
-    if (size(turned) <= limit) return BUS_CAUSE_STICTION;
-    if (size(wrap_distance(turned + distance)) <= limit) return BUS_CAUSE_WRONG_SIGN;
+    if (magnitude(turned) <= limit) return BUS_CAUSE_STICTION;
+    if (magnitude(wrap_distance(turned + distance)) <= limit) return BUS_CAUSE_WRONG_SIGN;
     return BUS_CAUSE_SENSOR_DISAGREES;
 }
 
 static void decide(void) {
-    int64_t tolerance = setting(BUS_SETTING_TURN_TOLERANCE), left;
+    int64_t tolerance = setting(BUS_SETTING_TURN_TOLERANCE), remaining;
     uint8_t cause = BUS_CAUSE_OK;
     turn.now =
         (struct position){sensor_mean(), axis_read_position(AXIS, AXIS_TARGET), sensor_changes()};
-    left = apart(turn.target, turn.now.angle);
+    remaining = difference(turn.target, turn.now.angle);
     if (!turn.begun)
         turn.first = turn.now;
     else
         cause = compare();
-    if (cause != BUS_CAUSE_OK || size(left) <= tolerance) {
+    if (cause != BUS_CAUSE_OK || magnitude(remaining) <= tolerance) {
         finish(cause);
     } else if (!turn.begun) {
         turn.begun = true;
         approach(distance_up());
-    } else if (left < 0) {
+    } else if (remaining < 0) {
         if (turn.overshoots == setting(BUS_SETTING_TURN_OVERSHOOTS)) {
             finish(BUS_CAUSE_NOT_CONVERGED);
             return;
         }
         turn.overshoots++;
-        approach(left);
+        approach(remaining);
     } else if (turn.tries == setting(BUS_SETTING_TURN_TRIES)) {
-        finish(why_not());
+        finish(cause_of_failure());
     } else {
         turn.tries++;
         if (!turn.closing) turn.near = turn.now;
         turn.closing = true;
-        left = left * setting(BUS_SETTING_TURN_SHARE) / 100;
-        go(BUS_TURN_PHASE_CLOSING_IN, left > 0 ? left : 1, BUS_PARAMETER_HOMING_LATCH_SPEED);
+        remaining = remaining * setting(BUS_SETTING_TURN_SHARE) / 100;
+        go(BUS_TURN_PHASE_CLOSING_IN, remaining > 0 ? remaining : 1,
+           BUS_PARAMETER_HOMING_LATCH_SPEED);
     }
 }
 
@@ -247,6 +250,7 @@ uint8_t turn_operation(uint8_t operation) {
     bus_reply_field(BUS_TURN_STATE_REPLY_OVERSHOOTS, turn.overshoots, 1);
     bus_reply_field(BUS_TURN_STATE_REPLY_TARGET, turn.target, 4);
     bus_reply_field(BUS_TURN_STATE_REPLY_READING, turn.now.angle, 4);
-    bus_reply_field(BUS_TURN_STATE_REPLY_LEFT, (uint64_t)apart(turn.target, turn.now.angle), 4);
+    bus_reply_field(BUS_TURN_STATE_REPLY_LEFT, (uint64_t)difference(turn.target, turn.now.angle),
+                    4);
     return BUS_CAUSE_OK;
 }

@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 // i2c -- transfers on the I2C bus, one after the other, for the devices that share it.
 //
-// The hardware takes commands (start, a byte, stop) into a queue and answers each. A few are kept
-// ahead of the bus; those after an address wait until it was acknowledged, so that nobody waits for
-// bytes to a device that is busy or not there.
-#include "station/i2c.h"
+// The hardware takes commands (start, a byte, stop) into a queue and answers each. At most AHEAD
+// commands are in the queue. Those after an address wait until it was acknowledged: so a device
+// that is busy or absent costs no more than its address.
+#include "station/devices/i2c.h"
 
 #include <stddef.h>
 
 #include "core/hardware.h"
 
 #define AHEAD 16u    // commands in the queue
-#define PER_POLL 8u  // commands, and answers, of one call
+#define PER_POLL 8u  // commands, and answers, in one call
 
 enum { START, STOP, WRITE, READ, RECOVER };  // commands
 enum { DONE, NOT_ACKNOWLEDGED };             // answers; others: the bus was lost, or stays low
 
-static const struct i2c_transfer* transfers[I2C_CLIENTS];  // that wait or are under way
+static const struct i2c_transfer* transfers[I2C_CLIENTS];  // waiting or under way
 static uint8_t outcomes[I2C_CLIENTS];
-static uint8_t serving;           // client; I2C_CLIENTS: the bus is being cleared, or free
+static uint8_t serving;           // client; I2C_CLIENTS: the bus is free or being cleared
 static uint16_t asked, answered;  // commands of this transfer
 static bool closing;              // it failed: the last command is under way
 
@@ -26,12 +26,12 @@ static uint32_t byte_command(unsigned command, uint8_t data) {
     return FIELD_PUT(PERIPHERALS_I2C_COMMAND, command) | FIELD_PUT(PERIPHERALS_I2C_DATA, data);
 }
 
-// The commands of one way: start, address, bytes.
+// The commands of one direction: start, address, bytes.
 static unsigned direction_length(unsigned count) { return count ? 2u + count : 0; }
 
 static unsigned command_count(const struct i2c_transfer* t) {
     unsigned both = direction_length(t->write_count) + direction_length(t->read_count);
-    return (both ? both : 2u) + 1u;  // a transfer of no bytes asks whether somebody is there
+    return (both ? both : 2u) + 1u;  // without bytes: is the device present?
 }
 
 static uint32_t command_at(const struct i2c_transfer* t, unsigned n) {
@@ -50,8 +50,7 @@ static void end_transfer(void) {
 }
 
 static void next_client(void) {
-    for (unsigned client = 0; client < I2C_CLIENTS && serving == I2C_CLIENTS;
-         client++)  // the store comes before the panel
+    for (unsigned client = 0; client < I2C_CLIENTS && serving == I2C_CLIENTS; client++)
         if (transfers[client]) serving = (uint8_t)client;
     asked = answered = 0;
     closing = false;
@@ -97,7 +96,8 @@ enum i2c_outcome i2c_outcome(enum i2c_client client) {
 }
 
 void i2c_work(void) {
-    if (serving == I2C_CLIENTS) {  // what is left of a former life is thrown away
+    if (serving == I2C_CLIENTS) {
+        // Answers to commands from before a restart are discarded.
         if (peripherals_read(PERIPHERALS_I2C_ANSWER) & PERIPHERALS_I2C_ANSWER_PRESENT_MASK ||
             peripherals_read(PERIPHERALS_I2C_STATE) & PERIPHERALS_I2C_STATE_BUSY_MASK)
             return;
@@ -120,7 +120,7 @@ void i2c_work(void) {
     }
     if (answered < asked) return;
     if (closing) return end_transfer();
-    closing = true;  // the device lets go of the bus
+    closing = true;  // makes the device release the bus
     peripherals_write(PERIPHERALS_I2C,
                       byte_command(outcomes[serving] == I2C_ABSENT ? STOP : RECOVER, 0));
     asked++;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // keypad -- 34 keys on a key-pad controller TCA8418: 5 rows of 7, the last one short.
 //
-// The controller debounces, and keeps up to ten events; reading its event register takes the oldest
-// one. It is set up whenever its registers are not as they were left: it was missing, or lost its
-// power. What was pressed before the node started does not count.
-#include "station/panel/keypad.h"
+// The controller debounces the keys and queues up to ten events; reading its event register takes
+// the oldest one. It is set up again whenever its registers are not as they were left, because it
+// was absent or lost its power. Keys that were pressed before the node started do not count.
+#include "station/devices/keypad.h"
 
 #include "core/clock.h"
-#include "station/i2c.h"
+#include "station/devices/i2c.h"
 
 #define DEVICE 0x34u
 #define CONFIGURATION 0x01u
@@ -26,7 +26,7 @@
 enum step { CHECK, SET_ROWS, SET_COLUMNS, SET_CONFIGURATION, POLL };
 
 static uint8_t step, value, out[2];
-static bool present, under_way, fresh;  // fresh: all events of before have been taken
+static bool present, under_way, fresh;  // fresh: all earlier events were discarded
 static uint32_t last_ms, checked_ms;
 static uint8_t keys[QUEUE], first, count;
 static struct i2c_transfer transfer;

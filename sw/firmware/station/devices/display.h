@@ -12,6 +12,8 @@
 void display_start(unsigned axes);
 void display_work(void);
 bool display_present(void);
-void display_show(unsigned line, const char* text);  // no more than its columns; the rest is blank
+
+// Shows a text of at most DISPLAY_COLUMNS characters; the remaining columns become blank.
+void display_show(unsigned line, const char* text);
 
 #endif

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// readout -- the position of axis 0 in mm, ten times a second (S0's display). The display's set-up
-// goes with each, so that one which lost its power comes back. A position that does not fit is a
-// row of dashes.
-#include "station/panel/readout.h"
+// readout -- the position of axis 0 in mm on a numeric display of eight digits (MAX7219), ten times
+// a second (S0's display).
+//
+// The set-up of the display is sent each time, so that a display which lost its power comes back. A
+// position that does not fit is shown as a row of dashes.
+#include "station/devices/readout.h"
 
 #include "core/clock.h"
 #include "core/hardware.h"
@@ -13,7 +15,7 @@
 #define PERIOD_MS 100u
 #define DIGITS 8u
 #define PM_PER_MM_DIGITS 9u  // decimals of a mm in pm
-#define MINUS 10u            // of the display's code B, as the next
+#define MINUS 10u            // in the code B of the display, as is BLANK
 #define BLANK 15u
 #define POINT 0x80u
 #define WORDS (DIGITS + sizeof set_up / sizeof *set_up)
@@ -42,9 +44,9 @@ static void show_number(int64_t number, uint32_t decimals) {
     }
     for (uint32_t digit = 0, remainder = (uint32_t)size; digit < DIGITS;
          digit++, remainder /= 10u) {
-        bool leads = remainder == 0 && digit > decimals;
-        uint32_t code = !leads ? remainder % 10u : negative ? MINUS : BLANK;
-        if (leads) negative = false;
+        bool leading = remainder == 0 && digit > decimals;
+        uint32_t code = !leading ? remainder % 10u : negative ? MINUS : BLANK;
+        if (leading) negative = false;
         show(digit, code | (decimals && digit == decimals ? POINT : 0));
     }
 }

@@ -12,7 +12,8 @@
 void keypad_start(unsigned axes);
 void keypad_work(void);
 bool keypad_present(void);
-uint8_t keypad_take(
-    void);  // a key that was pressed, counted row by row; KEYPAD_NONE if there is none
+
+// The oldest key that was pressed, counted row by row from 0; KEYPAD_NONE if there is none.
+uint8_t keypad_take(void);
 
 #endif

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // display -- four lines of 20 characters: HD44780 behind an I2C port PCF8574.
 //
-// Wired as the common boards are: P0 RS, P1 RW, P2 E, P3 back light, P4..P7 data. The display takes
-// data when E falls, and at most 37 us for it; a byte on the bus takes 90 us. Half lines are
-// written as they change, all of them after the display has been away, and one a second to see that
-// it is still there.
-#include "station/panel/display.h"
+// It is wired as on the common boards: P0 RS, P1 RW, P2 E, P3 back light, P4..P7 data. The display
+// takes data when E falls and needs at most 37 us for it; a byte on the bus takes 90 us. Half lines
+// are written when they change. After the display was absent all of them are written, and without a
+// change one of them each second, which shows whether the display is still present.
+#include "station/devices/display.h"
 
 #include "core/clock.h"
-#include "station/i2c.h"
+#include "station/devices/i2c.h"
 
 #define DEVICE 0x27u
 #define RS 1u
@@ -20,9 +20,8 @@
 #define PARTS (2u * DISPLAY_LINES)
 
 static const uint8_t cell_address[PARTS] = {0x00, 0x0A, 0x40, 0x4A, 0x14, 0x1E, 0x54, 0x5E};
-static const uint8_t wake_up[] = {
-    0x3, 0x3, 0x3, 0x3,
-    0x2};  // to 8 bits whatever it was in, one more if the first comes too soon, then to 4
+// To 8 bits from any state, once more in case the first came too soon, then to 4 bits.
+static const uint8_t wake_up[] = {0x3, 0x3, 0x3, 0x3, 0x2};
 static const uint8_t set_up[] = {0x28, 0x01, 0x06, 0x0C};  // two rows, clear, to the right, on
 
 static char text[DISPLAY_LINES][DISPLAY_COLUMNS];
@@ -54,8 +53,8 @@ static void send(void) {
     last_ms = clock_ms();
 }
 
-static void begin(void)  // RS stands before E rises
-{
+// Sets RS before E rises.
+static void begin(void) {
     used = 0;
     out[used++] = LIGHT;
 }

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// feedback -- access of the host to the registers of a feedback channel.
+#include "axis/feedback.h"
+
+#include "core/hardware.h"
+#include "made/bus_protocol.h"
+
+#define USER_STROBES                                                            \
+    (FEEDBACK_STROBES_ARM_INDEX_MASK | FEEDBACK_STROBES_CAPTURE_NOW_MASK |      \
+     FEEDBACK_STROBES_CAPTURE_NEXT_MASK | FEEDBACK_STROBES_CAPTURE_CLEAR_MASK | \
+     FEEDBACK_STROBES_COMPARE_ARM_MASK | FEEDBACK_STROBES_COMPARE_DISARM_MASK)
+
+void feedback_clear_signal_faults(unsigned n) {
+    feedback_write(n, FEEDBACK_STROBES, FEEDBACK_STROBES_CLEAR_SIGNAL_FAULTS_MASK);
+}
+
+uint8_t feedback_write_register(uint32_t offset, unsigned n, uint32_t value) {
+    switch (offset) {
+    case FEEDBACK_STROBES:
+        if (value & ~USER_STROBES) return BUS_CAUSE_OUT_OF_RANGE;
+        break;
+    case FEEDBACK_INDEX:
+    case FEEDBACK_COUNTS_PER_REVOLUTION:
+    case FEEDBACK_INDEX_EVENTS:
+    case FEEDBACK_CAPTURE_SOURCES:
+    case FEEDBACK_CAPTURE_STATE:
+    case FEEDBACK_COMPARE_START_LOW:
+    case FEEDBACK_COMPARE_START_HIGH:
+    case FEEDBACK_COMPARE_STEP_LOW:
+    case FEEDBACK_COMPARE_STEP_HIGH:
+    case FEEDBACK_COMPARE_COUNT:
+    case FEEDBACK_COMPARE_PULSE:
+    case FEEDBACK_COMPARE_GAP:
+    case FEEDBACK_COMPARE_STATE: break;
+    default: return BUS_CAUSE_NO_SUCH_REGISTER;
+    }
+    feedback_write(n, offset, value);
+    return BUS_CAUSE_OK;
+}
+
+bool feedback_may_read(uint32_t offset) { return offset != FEEDBACK_RECORDER_WORD; }

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""C sources of the firmware as a shared library of this computer."""
+
+import ctypes
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[3]
+FIRMWARE = ROOT / "sw" / "firmware"
+OPTIONS = [
+    "-std=c11",
+    "-O1",
+    "-g",
+    "-Wall",
+    "-Wextra",
+    "-Wconversion",
+    "-Wno-sign-conversion",
+    "-Werror",
+    "-fsanitize=undefined",
+    "-fsanitize-undefined-trap-on-error",  # undefined behaviour ends the test
+    "-shared",
+    "-fPIC",
+    f"-I{FIRMWARE}",
+]
+
+
+def compiler() -> list[str]:
+    """The command of the system's gcc or clang, else of zig."""
+    for name in ("cc", "gcc", "clang"):
+        if shutil.which(name):
+            return [name]
+    return [sys.executable, "-m", "ziglang", "cc"]
+
+
+def host_library(name: str, sources: Sequence[Path], options: Sequence[str] = ()) -> ctypes.CDLL:
+    """Load build/firmware/host_NAME.so, compiled again if a source or any header of the firmware is
+    newer. Raises CalledProcessError if the compiler refuses a source.
+    """
+    library = ROOT / "build" / "firmware" / f"host_{name}.so"
+    newest = max(path.stat().st_mtime for path in (*sources, *FIRMWARE.rglob("*.h")))
+    if not library.exists() or library.stat().st_mtime < newest:
+        library.parent.mkdir(parents=True, exist_ok=True)
+        # In a directory of its own, so that two runs at once do not disturb each other.
+        with tempfile.TemporaryDirectory(dir=library.parent) as directory:
+            made = Path(directory) / library.name
+            files = [str(path) for path in sources]
+            subprocess.run([*compiler(), *OPTIONS, *options, *files, "-o", str(made)], check=True)
+            os.replace(made, library)
+    return ctypes.CDLL(str(library))
