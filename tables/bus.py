@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Makes of bus.toml the firmware's header, the host's tables and the made parts of the protocol
-page.
+"""Makes from bus.toml the header of the firmware, the tables of the host and the made parts of the
+protocol page.
 """
 
 import re
 import sys
+import textwrap
 import tomllib
 import zlib
 from fractions import Fraction
@@ -19,12 +20,13 @@ SOURCE = ROOT / "tables" / "bus.toml"
 HEADER = ROOT / "sw" / "firmware" / "made" / "bus_protocol.h"
 HOST = ROOT / "sw" / "host" / "moire" / "made" / "bus_tables.py"
 PAGE = ROOT / "docs" / "protocol.md"
+COLUMNS = 100  # of the made C and Python
 
 SIZES = {"u8": 1, "i8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "u64": 8, "i64": 8}
 REQUEST_HEAD = ["sequence u8", "operation u8"]
 REPLY_HEAD = ["sequence u8", "operation u8", "cause u8"]
-AXIS = "axis u8"  # first field of what asks an axis
-LISTS = (
+AXIS = "axis u8"  # first field of each request to an axis
+LISTS = (  # lists of codes or bits with their words
     "cause",
     "fault",
     "encoder_event",
@@ -54,7 +56,7 @@ CODES = (
     "job_state",
     "job_action",
     "save_action",
-)  # numbers; the others are bits
+)  # lists of codes; the others are lists of bits
 WORDS = ("cause", "fault", "job_state")  # lists whose words the firmware shows on its panel
 # Settings that share a register with a parameter and that the firmware leaves at 0.
 LEFT_AT_ZERO = ("axis.feed_override.pause",)
@@ -125,7 +127,7 @@ class Bus:
     """bus.toml, checked."""
 
     def __init__(self, text: bytes):
-        # the bytes of the checkout may end in CR LF; the CRC is of the LF form
+        # lines of a checkout may end in CR LF; the CRC is computed with LF
         text = text.replace(b"\r\n", b"\n")
         table = tomllib.loads(text.decode())
         self.crc = zlib.crc32(text)
@@ -201,6 +203,21 @@ def once(what, numbers):
 # ------------------------------------------------------------------ firmware
 
 
+def commented(code, text):
+    """A line of C with its comment, which goes above it if the line gets too long."""
+    line = f"{code}    // {text}"
+    if len(line) <= COLUMNS:
+        return [line]
+    return [*comment(text, len(code) - len(code.lstrip())), code]
+
+
+def comment(text, indent=0):
+    start = " " * indent + "// "
+    return textwrap.wrap(
+        text, COLUMNS, initial_indent=start, subsequent_indent=start, break_on_hyphens=False
+    )
+
+
 def header(bus: Bus) -> str:
     out = [
         "// SPDX-License-Identifier: Apache-2.0",
@@ -211,15 +228,15 @@ def header(bus: Bus) -> str:
         f"#define PROTOCOL_CRC         0x{bus.crc:08X}u    // CRC-32 of bus.toml",
         f"#define BUS_VERSION         {bus.version}u",
         f"#define BUS_LONGEST_BODY    {bus.longest_body}u",
-        f"#define BUS_REQUEST_HEAD    {fields(REQUEST_HEAD, [])[1]}u    // sequence, operation",
-        f"#define BUS_REPLY_HEAD      {fields(REPLY_HEAD, [])[1]}u    // sequence, operation, cause",
+        f"#define BUS_REQUEST_HEAD    {fields(REQUEST_HEAD, [])[1]}u  // sequence, operation",
+        f"#define BUS_REPLY_HEAD      {fields(REPLY_HEAD, [])[1]}u  // sequence, operation, cause",
         "",
     ]
     for name, entries in bus.lists.items():
         out.append(f"enum bus_{name} {{" + ("" if name in CODES else "    // bits"))
         for key, (code, words) in entries.items():
             value = str(code) if name in CODES else f"1 << {code}"
-            out.append(f"    BUS_{name}_{key}".upper() + f" = {value},    // {words}")
+            out += commented(f"    BUS_{name}_{key}".upper() + f" = {value},", words)
         out += ["};", ""]
     for name in WORDS:
         out.append("// X(code, words), up to a colon")
@@ -232,8 +249,8 @@ def header(bus: Bus) -> str:
         )
     out.append("enum bus_operation {")
     for name, operation in bus.operations.items():
-        out.append(
-            f"    BUS_OPERATION_{name.upper()} = {operation['code']},    // {operation['text']}"
+        out += commented(
+            f"    BUS_OPERATION_{name.upper()} = {operation['code']},", operation["text"]
         )
     out += ["};", ""]
     out.append("// Lengths of whole bodies and offsets of their fields, in bytes, little endian.")
@@ -245,8 +262,9 @@ def header(bus: Bus) -> str:
                     f"#define BUS_{name.upper()}_{way}_{field.upper()} {offset}u    // {kind}"
                 )
     out.append("")
-    out.append(
-        "// X(name, code, length of the request body, length of the reply body if the cause is ok, 1: of an axis, its first field)"
+    out += comment(
+        "X(name, code, length of the request body, length of the reply body if the cause is ok,"
+        " 1 if the first field is an axis)"
     )
     rows = [
         f"    X({name}, {operation['code']}, {bus.layouts[name][0][1]}, {bus.layouts[name][1][1]}, "
@@ -257,7 +275,8 @@ def header(bus: Bus) -> str:
     out += values("parameter", bus.parameters) + register_rows(bus) + function_rows(bus)
     out += values("setting", bus.settings)
     out += [
-        f"#define BUS_VALUES_CRC 0x{bus.values_crc:08X}u     // of all of both: what a kept number means",
+        "// Of all parameters and settings: it changes with the meaning of a saved number.",
+        f"#define BUS_VALUES_CRC 0x{bus.values_crc:08X}u",
         "",
     ]
     out += ["#endif", ""]
@@ -268,20 +287,22 @@ def values(kind, parameters):
     """Numbers and ranges of the parameters of an axis, or of the settings of a station."""
     out = [f"enum bus_{kind} {{"]
     for name, parameter in parameters.items():
-        out.append(
-            f"    BUS_{kind}_{name}".upper()
-            + f" = {parameter['id']},    // {of_one_count(parameter)}{parameter['text']}"
+        out += commented(
+            f"    BUS_{kind}_{name}".upper() + f" = {parameter['id']},",
+            of_one_count(parameter) + parameter["text"],
         )
     out += ["};", f"#define BUS_{kind.upper()}_COUNT {len(parameters)}u", ""]
     out.append("// X(name, id, min, max, default): all int64_t, in counts of the wire")
     rows = [
-        f"    X({name}, {parameter['id']}, {parameter['min']}LL, {parameter['max']}LL, {parameter['default']}LL)"
+        f"    X({name}, {parameter['id']}, "
+        + ", ".join(f"{parameter[key]}LL" for key in ("min", "max", "default"))
+        + ")"
         for name, parameter in parameters.items()
     ]
     out += macro(f"BUS_{kind.upper()}S", rows)
     if needy := [parameter["id"] for parameter in parameters.values() if "needs" in parameter]:
         out += [
-            f"// {kind}s of which a node without sine and cosine takes only 0 and the default",
+            f"// {kind}s of which a node without sine and cosine accepts only 0 and the default",
             f"#define BUS_{kind.upper()}S_OF_SINE {', '.join(map(str, needy))}",
             "",
         ]
@@ -340,8 +361,8 @@ def host(bus: Bus) -> str:
         "    name: str",
         "    id: int",
         "    unit: str",
-        "    lsb: Fraction           # value of one count of the wire, in unit",
-        "    min: int                # counts of the wire, as are max and default",
+        "    lsb: Fraction           # value of one count on the wire, in unit",
+        "    min: int                # in counts on the wire, as max and default",
         "    max: int",
         "    default: int",
         "    text: str",
@@ -355,10 +376,8 @@ def host(bus: Bus) -> str:
     for name, entries in bus.lists.items():
         out.append(f"# {'code' if name in CODES else 'bit'}: (name, words)")
         out.append(f"{name.upper()}S = {{")
-        out += [
-            f"    {code}: ({quoted(key)}, {quoted(words)}),"
-            for key, (code, words) in entries.items()
-        ]
+        for key, (code, words) in entries.items():
+            out += string(f"    {code}: ({quoted(key)}, ", words, "),")
         out += ["}", ""]
     out.append("OPERATIONS = {operation.name: operation for operation in (")
     for name, operation in bus.operations.items():
@@ -366,8 +385,8 @@ def host(bus: Bus) -> str:
             tuple(tuple(declaration.split()) for declaration in operation[way])
             for way in ("request", "reply")
         )
-        out.append(
-            f"    Operation({quoted(name)}, {operation['code']}, {quoted(operation['text'])},"
+        out += string(
+            f"    Operation({quoted(name)}, {operation['code']}, ", operation["text"], ","
         )
         out.append(f"              {pairs(request)},")
         out.append(f"              {pairs(reply)}),")
@@ -377,13 +396,12 @@ def host(bus: Bus) -> str:
         for name, parameter in parameters.items():
             lsb = Fraction(parameter["lsb"])
             value = f"Fraction({lsb.numerator}, {lsb.denominator})"
-            out.append(
-                f"    Parameter({quoted(name)}, {parameter['id']}, {quoted(parameter['unit'])}, {value},"
-            )
+            unit = quoted(parameter["unit"])
+            out.append(f"    Parameter({quoted(name)}, {parameter['id']}, {unit}, {value},")
             out.append(
                 f"              {parameter['min']}, {parameter['max']}, {parameter['default']},"
             )
-            out.append(f"              {quoted(parameter['text'])}),")
+            out += string(" " * 14, parameter["text"], "),")
         out += [")}", ""]
     return "\n".join(out)
 
@@ -392,10 +410,23 @@ def quoted(text):
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
+def string(before, text, after):
+    """A line of Python with this text, or several of which each holds a part of it."""
+    line = before + quoted(text) + after
+    if len(line) <= COLUMNS:
+        return [line]
+    indent = before.index("(") + 1 if "(" in before else len(before)
+    lines = [before.rstrip()] if before.strip() else []
+    parts = textwrap.wrap(text, COLUMNS - indent - len(after) - 3, break_on_hyphens=False)
+    assert " ".join(parts) == text, "blanks in a row"
+    lines += [" " * indent + quoted(part + " ") for part in parts[:-1]]
+    return [*lines, " " * indent + quoted(parts[-1]) + after]
+
+
 def pairs(declared):
-    """A tuple of pairs, four on a line."""
+    """A tuple of pairs, three on a line."""
     each = [f"({quoted(name)}, {quoted(kind)})," for name, kind in declared]
-    rows = [" ".join(each[at : at + 4]) for at in range(0, len(each), 4)]
+    rows = [" ".join(each[at : at + 3]) for at in range(0, len(each), 3)]
     return "(" + ("\n" + 15 * " ").join(rows) + ")"
 
 
@@ -434,7 +465,8 @@ def table(head, rows):
 def page_parts(bus: Bus) -> dict:
     parts = {}
     parts["identity"] = [
-        f"Version {bus.version}, CRC-32 of `tables/bus.toml` `{bus.crc:08X}`, longest body {bus.longest_body} bytes."
+        f"Version {bus.version}, CRC-32 of `tables/bus.toml` `{bus.crc:08X}`, "
+        f"longest body {bus.longest_body} bytes."
     ]
     overview = [
         (operation["code"], f"[`{name}`](#{name})", operation["text"])
@@ -513,7 +545,7 @@ def example(bus: Bus) -> list:
 
 
 def packets(bus: Bus) -> list:
-    """The same as packets; none of them is long enough for a run of 254."""
+    """The same exchange as packets; none of them is long enough for a run of 254."""
 
     def packet(content):
         return b"".join(bytes([len(part) + 1]) + part for part in content.split(b"\0")) + b"\0"
@@ -530,7 +562,7 @@ def packets(bus: Bus) -> list:
 
 
 def decimal(value: Fraction) -> str:
-    """Short and true to six digits."""
+    """The value in six significant digits at most."""
     return str(value.numerator) if value.denominator == 1 else f"{float(value):.6g}"
 
 

@@ -160,9 +160,7 @@ def node_faults(count, seed, done):
 def spoilt_firmware(instruction):
     """The firmware's words, with an instruction in the way of the request to reset faults."""
     words = list(build.firmware())
-    _, symbols = firmware_build.load_segments(
-        (ROOT / "build" / "firmware" / "firmware.elf").read_bytes()
-    )
+    _, symbols = firmware_build.read_elf(ROOT / "build" / "firmware" / "firmware.elf")
     words[symbols["axis_reset_faults"] // 4] = instruction
     return words
 

@@ -135,7 +135,7 @@ def in_flight(plan):
     last of them.
     """
     gone, velocity, acceleration, jerk = (
-        plan.at.state.gone,
+        plan.at.state.moved,
         plan.at.state.velocity,
         plan.at.state.acceleration,
         plan.at.jerk,
@@ -143,7 +143,7 @@ def in_flight(plan):
     events = [
         event
         for event in plan.steps.event[plan.next : plan.count]
-        if event.place < 4 and event.tick < plan.at.tick + event.place
+        if event.slot < 4 and event.tick < plan.at.tick + event.slot
     ]
     for tick in range(3):
         jerk += sum(event.jerk for event in events if event.tick == plan.at.tick + tick)

@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Build the firmware: build/firmware/firmware.elf, .bin and .hex; another image than `axis` under
+"""Build the firmware: build/firmware/firmware.elf, .bin and .hex; another image than `axis` gets
 its own name.
 
-An image is what its image_NAME.c lists; the linker drops whatever that does not reach.
-The compiler is zig (PyPI ziglang, from the running Python), or GNU with CROSS=riscv64-unknown-elf-
+An image consists of the parts that its image_NAME.c lists; the linker drops what they do not reach.
+The compiler is zig (PyPI ziglang, of the running Python), or GNU with CROSS=riscv64-unknown-elf-
 in the environment.
-The .hex is for $readmemh: one 32-bit word a line, little endian in memory, filled with zeros to the
-size of the memory.
-Nothing is done if nothing changed. Ends with 1 and one line if a tool is missing, the source is
-wrong or it does not fit.
+The .hex is for $readmemh: one 32-bit word per line, little endian in memory, filled with zeros up
+to the size of the memory.
+Nothing is built if nothing has changed. The exit code is 1, with one line of explanation, if a tool
+is missing, a source is wrong or the image does not fit.
 """
 
 import argparse
@@ -24,6 +24,8 @@ import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+
+from elftools.elf.elffile import ELFFile
 
 HERE = Path(__file__).resolve().parent
 OUT = HERE.parents[1] / "build" / "firmware"
@@ -42,13 +44,13 @@ FLAGS = [
     "-Wframe-larger-than=1536",
 ]  # the stack has 4096
 IMAGES = sorted(path.stem.removeprefix("image_") for path in (HERE / "images").glob("image_*.c"))
-AXES = {"station": 2}  # most that an image serves, where it is not the default
+AXES = {"station": 2}  # most axes that an image serves, where it is not the default
 SMALL, FAST = "-Os", "-O2"
-HOT = ("arithmetic.c",)  # the others wait more than they work
+HOT = ("arithmetic.c",)  # the only file in which speed counts more than size
 OUTLINE = [
     "-mllvm",
     "-enable-machine-outliner=always",
-]  # of them with zig: instructions that repeat stand once
+]  # for zig: sequences of instructions that repeat become functions
 ZIG = [
     "-target",
     "riscv32-freestanding-none",
@@ -72,7 +74,7 @@ class BuildError(Exception):
 
 
 def compiler():
-    """The command with the flags of its kind, and the libraries for the end."""
+    """The command with its flags, and the libraries that end the link command."""
     cross = os.environ.get("CROSS")
     if cross:
         command = f"{cross}gcc"
@@ -84,43 +86,28 @@ def compiler():
     return [sys.executable, "-m", "ziglang", "cc", *ZIG], []
 
 
-def load_segments(elf):
-    """(address, bytes) of what is to be loaded, and symbols by name, from a 32-bit little-endian
-    ELF.
-    """
-    if elf[:6] != b"\x7fELF\x01\x01":
-        raise BuildError("the linker did not make a 32-bit little-endian ELF")
-    program_at, section_at = struct.unpack_from("<II", elf, 28)
-    program_size, programs, section_size, sections = struct.unpack_from("<HHHH", elf, 42)
-    segments = []
-    for n in range(programs):
-        kind, offset, _, physical, size = struct.unpack_from(
-            "<IIIII", elf, program_at + n * program_size
-        )
-        if kind == 1 and size:
-            segments.append((physical, elf[offset : offset + size]))
-    headers = [
-        struct.unpack_from("<10I", elf, section_at + n * section_size) for n in range(sections)
-    ]
-    symbols = {}
-    for header in headers:
-        if header[1] != 2:
-            continue
-        names = headers[header[6]][4]
-        for at in range(header[4], header[4] + header[5], 16):
-            name, value = struct.unpack_from("<II", elf, at)
-            end = elf.index(b"\0", names + name)
-            symbols[elf[names + name : end].decode()] = value
+def read_elf(path):
+    """What is to be loaded, as (address, bytes), and the value of each symbol, of an ELF file."""
+    with open(path, "rb") as file:
+        elf = ELFFile(file)
+        segments = [
+            (segment["p_paddr"], segment.data())
+            for segment in elf.iter_segments("PT_LOAD")
+            if segment["p_filesz"]
+        ]
+        table = elf.get_section_by_name(".symtab")
+        symbols = {symbol.name: symbol["st_value"] for symbol in table.iter_symbols()}
     return segments, symbols
 
 
 def image(segments, memory):
+    """The contents of a memory of so many bytes, and how many of them are used."""
     words = bytearray(memory)
     used = 0
     for address, content in segments:
         if address + len(content) > memory:
             raise BuildError(
-                f"the program needs {address + len(content)} bytes, the memory has {memory}"
+                f"the firmware needs {address + len(content)} bytes, the memory has {memory}"
             )
         words[address : address + len(content)] = content
         used = max(used, address + len(content))
@@ -128,11 +115,18 @@ def image(segments, memory):
 
 
 def sources_of(name: str, folder: Path = HERE) -> list[Path]:
-    """All of the folder but the lists of the other images."""
+    """All sources in the folder except the lists of the other images. Each makes an object that is
+    named by its stem.
+    """
     others = {
         path for path in (folder / "images").glob("image_*.c") if path.name != f"image_{name}.c"
     }
-    return sorted(set(folder.rglob("*.[chS]")) - others)
+    sources = sorted(set(folder.rglob("*.[chS]")) - others)
+    stems = [path.stem for path in sources if path.suffix != ".h"]
+    for stem in stems:
+        if stems.count(stem) > 1:
+            raise BuildError(f"two sources would make the same object {stem}.o: rename one")
+    return sources
 
 
 def defines_of(name: str) -> list[str]:
@@ -155,13 +149,13 @@ def fingerprint(sources, command, memory):
 def run(command):
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
-        said = done.stderr.splitlines() or ["the compiler failed without a word"]
-        telling = [
+        lines = done.stderr.splitlines() or ["the compiler failed without a message"]
+        errors = [
             line
-            for line in said
+            for line in lines
             if re.search(r"error|undefined reference|does not fit|would not survive", line)
         ]
-        raise BuildError((telling or said)[0].strip())
+        raise BuildError((errors or lines)[0].strip())
 
 
 def build(memory, out, force, name="axis"):
@@ -170,19 +164,19 @@ def build(memory, out, force, name="axis"):
     sources = [*sources_of(name), LINK, HERE / "build.py"]
     stem = "firmware" if name == "axis" else name
     elf, binary, text, note = (out / f"{stem}.{end}" for end in ("elf", "bin", "hex", "note"))
-    mark = fingerprint(sources, command, memory)
+    state = fingerprint(sources, command, memory)
     if not force and all(path.exists() for path in (elf, binary, text, note)):
-        old_mark, _, report = note.read_text().partition("\n")
-        if old_mark == mark:
+        old_state, _, report = note.read_text().partition("\n")
+        if old_state == state:
             return report.strip()
     out.mkdir(parents=True, exist_ok=True)
     note.unlink(missing_ok=True)
 
     inputs = [path for path in sources if path.suffix in (".c", ".S")]
     script = out / f"{stem}.ld"  # zig's linker takes no --defsym
-    script.write_text(f"MEMORY_BYTES = {memory};\n" + (LINK).read_text())
+    script.write_text(f"MEMORY_BYTES = {memory};\n" + LINK.read_text())
     with tempfile.TemporaryDirectory(dir=out) as folder:
-        objects = [Path(folder) / f"{path.name}.o" for path in inputs]
+        objects = [Path(folder) / f"{path.stem}.o" for path in inputs]
         compiled = [
             [*command, *FLAGS, *flags_of(path), f"-I{HERE}", "-c", str(path), "-o", str(made)]
             for path, made in zip(inputs, objects, strict=True)
@@ -202,29 +196,29 @@ def build(memory, out, force, name="axis"):
             ]
         )
 
-    segments, symbols = load_segments(elf.read_bytes())
+    segments, symbols = read_elf(elf)
     content, program = image(segments, memory)
     used, stack = symbols["_zero_end"], symbols["_stack_top"] - symbols["_stack_limit"]
     binary.write_bytes(content[:program])
     text.write_text("".join(f"{word:08x}\n" for (word,) in struct.iter_unpack("<I", content)))
     report = (
-        f"{stem}: {program} bytes program + {used - program} data + {stack} stack = {used + stack} of {memory}, "
-        f"{memory - used - stack} free"
+        f"{stem}: {program} bytes program + {used - program} data + {stack} stack"
+        f" = {used + stack} of {memory}, {memory - used - stack} free"
     )
-    note.write_text(f"{mark}\n{report}\n")
+    note.write_text(f"{state}\n{report}\n")
     return report
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     parser.add_argument(
-        "--image", choices=IMAGES, default="axis", help="what the node is for (default axis)"
+        "--image", choices=IMAGES, default="axis", help="kind of node (default axis)"
     )
     parser.add_argument(
         "--memory", type=int, default=98304, help="bytes of the soft core's memory (default 98304)"
     )
     parser.add_argument(
-        "--out", type=Path, default=OUT, help="folder for what is made (default build/firmware)"
+        "--out", type=Path, default=OUT, help="folder of the results (default build/firmware)"
     )
     parser.add_argument("--force", action="store_true", help="build even if nothing changed")
     options = parser.parse_args()

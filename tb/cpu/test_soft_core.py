@@ -157,7 +157,7 @@ def compiled():
             *firmware_build.FLAGS,
             firmware_build.FAST,
             f"-DMEMORY_BYTES={BYTES}",
-            f"-Wl,-T,{here / 'program.ld'}",
+            f"-Wl,-T,{here / 'core_test.ld'}",
             "-o",
             str(elf),
             str(here / "core_test.c"),
@@ -166,7 +166,7 @@ def compiled():
         check=True,
         timeout=300,
     )
-    content, _ = firmware_build.image(firmware_build.load_segments(elf.read_bytes())[0], BYTES)
+    content, _ = firmware_build.image(firmware_build.read_elf(elf)[0], BYTES)
     words.write_text("".join(f"{word:08x}\n" for (word,) in struct.iter_unpack("<I", content)))
     return words
 

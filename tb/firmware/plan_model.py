@@ -28,7 +28,7 @@ def distance(plan):
 
 
 def steps(plan):
-    """The step of each tick, 2^-40 period: what the servo really sees."""
+    """The step of each tick, 2^-40 period: the input of the servo."""
     for segment in plan:
         velocity, acceleration, jerk, ticks = segment
         for _ in range(ticks):
@@ -60,7 +60,7 @@ def peaks(plan):
         )
         last = -1
         for n in near:
-            if n != last + 1:  # a gap: start the differences afresh
+            if n != last + 1:  # a gap: start the differences from scratch
                 before = [velocity + acceleration * (n - k) + jerk * comb(n - k, 2) for k in (2, 1)]
             step = velocity + acceleration * n + jerk * comb(n, 2)
             values = step, step - before[1], step - 2 * before[1] + before[0]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""line.c and parameters.c: what is answered, what is refused and why, what is ignored."""
+"""bus.c and parameters.c: which requests are answered, refused (and why) or ignored."""
 
 import random
 import zlib
@@ -21,7 +21,7 @@ WITH_AXIS = [
 
 
 def example(operation, **values):
-    """A body of right length, all fields 1 unless given; axis 0."""
+    """A body of the right length for axis 0, in which all fields are 1 unless given."""
     body = bytes([9, OPERATION[operation]])
     for declaration in TABLE["operation"][operation]["request"]:
         name, kind = declaration.split()
@@ -56,7 +56,7 @@ def test_a_known_exchange_byte_by_byte():
     ).to_bytes(4, "little")
 
 
-def test_identify_tells_what_was_built():
+def test_identify_reports_the_build():
     answer = FakeNode(Axis(), Axis(), address=13).ask("identify")
     assert (
         answer["map_crc"] == DEFINES["MAP_CRC"] and answer["address"] == 13 and answer["axes"] == 2
@@ -129,18 +129,18 @@ def test_frames_that_the_hardware_did_not_mark_good_change_nothing():
     words = machine.frame(example("set_parameter", parameter=PARAMETER["kp"]["id"], value=5))
     machine.hear([word & ~GOOD for word in words])
     assert machine.reply() == before
-    machine.hear(words[:5])  # broken off
+    machine.hear(words[:5])  # incomplete
     machine.hear(
         [word | GOOD for word in words[5:7]]
-    )  # marked good, but shorter than it says: not a frame
-    machine.hear([words[0], *[200] * 200])  # far longer than any frame
+    )  # marked good, but shorter than its length: not a frame
+    machine.hear([words[0], *[200] * 200])  # much longer than any frame
     assert (
         machine.reply() == before
         and machine.axes[0].word[DEFINES["AXIS_KP"]] == PARAMETER["kp"]["default"]
     )
 
 
-def test_nonsense_on_the_line_never_stops_the_node():
+def test_nonsense_on_the_bus_never_stops_the_node():
     draw = random.Random(seed())
     machine = FakeNode()
     for _ in range(300):
@@ -160,7 +160,7 @@ def test_refusals_are_counted():
     assert machine.ask("counters")["refused"] == 5
 
 
-def test_counters_are_those_of_the_line():
+def test_counters_come_from_the_bus_registers():
     machine = FakeNode()
     names = (
         "frames_good",
@@ -178,12 +178,11 @@ def test_counters_are_those_of_the_line():
     assert [answer[name] for name in names] == [*range(1000, 1008)]
 
 
-# own steps are counted as pulses and direction only; the converter serves the motor or the fine
-# stage
+# own steps are counted as pulse and direction only; the DAC serves the motor or the fine stage
 PARTNER = {"step_output": "position_source", "fine_reach": "drive"}
 
 
-def test_every_parameter_takes_both_ends_and_nothing_beyond():
+def test_every_parameter_accepts_both_ends_of_its_range_and_nothing_beyond():
     machine = FakeNode()
     for name, parameter in PARAMETER.items():
         assert (
@@ -272,7 +271,7 @@ def test_a_parameter_with_a_register_goes_into_its_field_and_leaves_the_others(a
     assert checked == 31
 
 
-def test_values_too_large_for_a_register_stop_at_its_end():
+def test_values_too_large_for_a_register_saturate():
     machine = FakeNode()
     machine.set(acceleration=100_000_000)
     assert machine.axes[0].word[DEFINES["AXIS_STOP_DECELERATION"]] == 2**32 - 1
@@ -343,7 +342,7 @@ def test_no_part_of_a_millisecond_is_lost():
     assert machine.firmware.clock_ms() - start == 5700
 
 
-def test_a_followed_position_is_told_afresh_at_each_reading_until_the_next_request():
+def test_a_followed_position_is_new_at_each_read_until_the_next_request():
     machine = FakeNode(Axis(), Axis(1000))
     assert machine.ask("follow", axis=1)["position"] == 1000
     for position in (7, -1, 2**47 - 1):
@@ -386,13 +385,13 @@ def test_a_baud_rate_out_of_range_is_refused(baud):
     assert bit_time(machine) == bit_time_of(115_200)
 
 
-def test_a_break_or_a_silence_of_five_seconds_brings_the_first_baud_rate_back():
+def test_a_break_or_a_silence_of_five_seconds_restores_the_first_baud_rate():
     machine, breaks = FakeNode(), DEFINES["BUS_BASE"] + DEFINES["BUS_BREAKS"]
     for _ in range(2):
         machine.ask("set_baud", baud=9600)
         machine.run(4999)
         assert bit_time(machine) == bit_time_of(9600)
-        machine.reply()  # a mere reading is a sign of the master too
+        machine.reply()  # a read alone shows that the master is present too
         machine.run(4999)
         assert bit_time(machine) == bit_time_of(9600)
         machine.run(3)
@@ -404,7 +403,7 @@ def test_a_break_or_a_silence_of_five_seconds_brings_the_first_baud_rate_back():
     assert bit_time(machine) == bit_time_of(115_200)
 
 
-def test_another_request_before_the_reply_was_read_takes_the_baud_rate_back():
+def test_another_request_before_the_reply_was_read_cancels_the_baud_rate():
     machine = FakeNode()
     machine.send(example("set_baud", baud=9600))
     machine.send(bytes([10, OPERATION["identify"]]))
@@ -413,7 +412,7 @@ def test_another_request_before_the_reply_was_read_takes_the_baud_rate_back():
     assert bit_time(machine) == bit_time_of(115_200)
 
 
-def test_the_encoder_is_shown_as_it_is():
+def test_the_encoder_is_reported_as_in_the_registers():
     machine = FakeNode()
     word, d = machine.axes[0].word, DEFINES
     word[d["AXIS_SAMPLE"]] = (-100 & 0xFFFF) | (-32768 & 0xFFFF) << 16

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""axis.c: enabling, moving, stopping, homing and what a fault does, on an axis that lives in
-fake_machine.
-"""
+"""axis.c: enable, move, stop, home and faults, on a simulated axis of FakeNode."""
 
 import random
 
@@ -71,7 +69,7 @@ def test_the_drive_is_off_at_start():
     assert machine.axes[0].control == 0
 
 
-def test_enable_holds_here_before_the_loop_is_closed():
+def test_enable_holds_the_present_position_before_the_loop_is_closed():
     axis = Axis(position=12345)
     machine = FakeNode(axis)
     axis.player.target, axis.strobes = 0, []
@@ -121,8 +119,8 @@ def test_enable_is_refused_while_a_fault_is_latched(fault):
     machine.ask("enable", axis=0, on=0)
 
 
-def test_enable_is_refused_if_the_guard_does_not_agree():
-    """Causes that latch only when the drive is asked for."""
+def test_enable_is_refused_if_the_interlock_refuses():
+    """Causes that latch only when the drive is requested."""
     machine = FakeNode()
     machine.axes[0].causes = FAULT["encoder"]
     assert machine.request("enable", axis=0, on=1)[0] == "faulted"
@@ -151,7 +149,7 @@ def test_the_duration_is_that_of_the_profile():
     assert not machine.axes[0].player.moving and machine.axes[0].target == 700 * PERIOD
 
 
-def test_each_limit_of_the_motion_counts_from_when_it_is_set():
+def test_each_limit_of_the_motion_is_in_force_from_when_it_is_set():
     machine = homed()
     last = machine.ask("move", axis=0, target=100 * PERIOD)["duration_ticks"]
     assert finish(machine) == "ok"
@@ -236,7 +234,7 @@ def test_parameters_are_refused_while_the_axis_moves():
 
 
 def begun(machine):
-    """The axes that the node was reported to start together."""
+    """The axes that the node had to start together."""
     return machine.word.pop(DEFINES["NODE_START_AXES"], 0)
 
 
@@ -285,7 +283,7 @@ def test_none_begins_if_one_of_them_is_not_prepared():
 
 
 def sync(machine):
-    """As the hardware does it: counts, and plays the queued segments of the axes that wait."""
+    """Does as the hardware: counts the sync, and plays the queued segments of the waiting axes."""
     line = DEFINES["BUS_BASE"]
     machine.word[line + DEFINES["BUS_SYNCS"]] = machine.word.get(line + DEFINES["BUS_SYNCS"], 0) + 1
     for n, axis in enumerate(machine.axes):
@@ -305,7 +303,7 @@ def sync(machine):
     )
 
 
-def test_a_mark_starts_the_axes_that_wait_for_it_and_no_other_and_is_not_answered():
+def test_a_sync_starts_the_axes_that_wait_for_it_and_no_other_and_has_no_reply():
     machine = two_homed()
     for n in (0, 1):
         machine.ask("prepare", axis=n, target=100 * PERIOD)
@@ -323,7 +321,7 @@ def test_a_mark_starts_the_axes_that_wait_for_it_and_no_other_and_is_not_answere
     assert machine.status(0)["state"] == "prepared"
 
 
-def test_what_waits_for_a_mark_can_be_taken_back_and_what_is_not_prepared_cannot_wait():
+def test_the_wait_for_a_sync_can_be_cancelled_and_only_prepared_axes_can_wait():
     machine = two_homed()
     machine.ask("prepare", axis=0, target=100 * PERIOD)
     assert (
@@ -338,7 +336,7 @@ def test_what_waits_for_a_mark_can_be_taken_back_and_what_is_not_prepared_cannot
 
 
 @pytest.mark.parametrize("end", ["stop", "disable", "estop"])
-def test_a_prepared_motion_that_is_given_up_is_not_begun_later(end):
+def test_a_prepared_motion_that_is_cancelled_does_not_start_later(end):
     machine = two_homed()
     machine.ask("prepare", axis=0, target=9 * PERIOD)
     if end == "stop":
@@ -378,7 +376,7 @@ def test_the_override_changes_in_motion_and_nothing_else_does():
 @pytest.mark.parametrize(
     "name, value", [("drive", 1), ("position_source", 1), ("step_output", 1), ("step_invert", 1)]
 )
-def test_what_the_drive_is_changes_only_with_the_drive_off(name, value):
+def test_the_kind_of_drive_changes_only_with_the_drive_off(name, value):
     machine = enabled()
     assert (
         machine.request("set_parameter", axis=0, parameter=PARAMETER[name]["id"], value=value)[0]
@@ -407,8 +405,8 @@ def test_a_drive_that_was_not_built_is_refused():
 SINE = [parameter for parameter in PARAMETER.values() if "needs" in parameter]
 
 
-def test_without_sine_and_cosine_a_parameter_that_needs_them_takes_what_asks_for_nothing():
-    wanted = {
+def test_without_sine_and_cosine_a_parameter_that_needs_them_accepts_only_0_and_its_default():
+    expected = {
         p["id"]: next(value for value in (p["min"] + 1, p["min"] + 2) if value != p["default"])
         if p["max"] > 1
         else 1
@@ -416,25 +414,25 @@ def test_without_sine_and_cosine_a_parameter_that_needs_them_takes_what_asks_for
     }
     machine = FakeNode(sine=False)
     for parameter in SINE:
-        asked = {"axis": 0, "parameter": parameter["id"]}
+        request = {"axis": 0, "parameter": parameter["id"]}
         for value in (0, parameter["default"]):
-            machine.ask("set_parameter", **asked, value=value)
-            assert machine.ask("get_parameter", **asked)["value"] == value
+            machine.ask("set_parameter", **request, value=value)
+            assert machine.ask("get_parameter", **request)["value"] == value
         assert (
-            machine.request("set_parameter", **asked, value=wanted[parameter["id"]])[0]
+            machine.request("set_parameter", **request, value=expected[parameter["id"]])[0]
             == "not_built"
         )
         assert (
-            machine.request("set_parameter", **asked, value=parameter["max"] + 1)[0]
+            machine.request("set_parameter", **request, value=parameter["max"] + 1)[0]
             == "out_of_range"
         )
-        assert machine.ask("get_parameter", **asked)["value"] == parameter["default"]
+        assert machine.ask("get_parameter", **request)["value"] == parameter["default"]
     machine = FakeNode()
-    for number, value in wanted.items():
+    for number, value in expected.items():
         machine.ask("set_parameter", axis=0, parameter=number, value=value)
 
 
-def test_without_sine_and_cosine_the_position_is_made_of_counts_from_power_up_on():
+def test_without_sine_and_cosine_the_position_comes_from_counts_after_power_up():
     machine, source = (
         FakeNode(sine=False),
         {"axis": 0, "parameter": PARAMETER["position_source"]["id"]},
@@ -479,7 +477,7 @@ def test_a_move_of_days_is_refused():
     assert machine.status()["state"] == "holding"
 
 
-def test_an_axis_that_does_not_arrive_is_not_settled_but_goes_on_holding():
+def test_an_axis_that_does_not_arrive_is_not_settled_but_continues_to_hold():
     machine = homed(settle_timeout=200, following_limit=2**31 - 1)
     machine.axes[0].seized = True
     machine.ask("move", axis=0, target=PERIOD)
@@ -505,7 +503,7 @@ def test_settling_means_the_whole_time_inside_the_window():
 # stop
 
 
-def test_stop_brakes_and_keeps_the_drive_on():
+def test_stop_decelerates_and_keeps_the_drive_on():
     machine = homed()
     machine.ask("move", axis=0, target=1500 * PERIOD)
     machine.run(100)
@@ -515,7 +513,7 @@ def test_stop_brakes_and_keeps_the_drive_on():
     assert [strobes for strobes, _ in machine.axes[0].strobes] == [
         CONTROLLED_STOP
     ] and machine.status()["state"] == "stopping"
-    machine.ask("stop", axis=0)  # once more changes nothing
+    machine.ask("stop", axis=0)  # a second stop changes nothing
     assert len(machine.axes[0].strobes) == 1
     assert machine.request("move", axis=0, target=0)[0] == "busy"
     assert finish(machine) == "stopped"
@@ -617,7 +615,7 @@ def test_a_pulse_that_was_too_short_is_a_fault_only_where_the_mask_says_so():
     assert machine.axes[0].word[DEFINES["AXIS_ENCODER_FAULT_MASK"]] == short == 32
 
 
-def test_reset_forgets_the_encoder_events():
+def test_reset_clears_the_encoder_events():
     machine = FakeNode()
     machine.axes[0].word[DEFINES["AXIS_ENCODER_EVENTS"]] = 0b110101
     assert machine.status()["encoder_events"] == 0b110101
@@ -625,7 +623,7 @@ def test_reset_forgets_the_encoder_events():
     assert machine.status()["encoder_events"] == 0
 
 
-def test_reset_is_asked_for_with_enable_off():
+def test_reset_is_requested_with_enable_off():
     machine = homed()
     axis = machine.axes[0]
     axis.causes = FAULT["estop"]
@@ -635,7 +633,7 @@ def test_reset_is_asked_for_with_enable_off():
     assert [(strobes, control & ENABLE) for strobes, control in axis.strobes] == [(RESET, 0)]
 
 
-def test_running_into_a_switch_is_a_fault_and_there_is_a_way_off_it():
+def test_running_into_a_switch_is_a_fault_and_the_axis_can_leave_it():
     machine = homed(Axis(position=50 * PERIOD, low=0, high=300 * PERIOD))
     axis = machine.axes[0]
     machine.ask("move", axis=0, target=1000 * PERIOD)
@@ -670,8 +668,8 @@ def test_faults_of_one_axis_leave_the_other_alone():
 # home
 
 
-def place(axis):
-    """Where the zero of the node lies, in positions of the machine."""
+def zero_position(axis):
+    """Position of the zero of the node, in coordinates of the machine."""
     return -axis.origin
 
 
@@ -682,17 +680,21 @@ def test_home_puts_the_zero_at_a_phase_zero_a_distance_from_the_edge(offset):
     machine = homed(Axis(position=50 * PERIOD, low=-10 * PERIOD + offset))
     axis, answer = machine.axes[0], machine.ask("encoder", axis=0)
     edge = axis.low_at + PERIOD // 2  # where the switch opens
-    assert place(axis) % PERIOD == 0
-    asked = place(axis) + answer["home_phase"]  # edge + distance, as the firmware saw it
+    assert zero_position(axis) % PERIOD == 0
+    request = (
+        zero_position(axis) + answer["home_phase"]
+    )  # edge + distance, as the firmware measured it
     assert abs(answer["home_phase"]) <= PERIOD // 2
-    assert 0 <= asked - edge - DISTANCE < PERIOD // 4  # the creep goes on for at most two polls
+    assert (
+        0 <= request - edge - DISTANCE < PERIOD // 4
+    )  # the latch motion continues for at most two polls
     assert axis.position == axis.target == 0 and machine.status()["state"] == "holding"
     assert (
         machine.status()["flags"] == {"enabled", "homed", "settled"} and not axis.control & HOMING
     )
 
 
-def test_home_stops_creeping_when_the_switch_opens():
+def test_home_stops_its_latch_motion_when_the_switch_opens():
     machine = homed()
     assert [strobes for strobes, _ in machine.axes[0].strobes].count(CONTROLLED_STOP) == 1
 
@@ -723,7 +725,7 @@ def test_the_longest_search_stays_inside_the_numbers():
     assert distance(segment[:4] for segment in axis.pushed) == -(2**46) << 24
 
 
-def test_home_comes_back_to_a_switch_that_threw_the_axis_off():
+def test_home_returns_to_a_switch_that_the_axis_bounced_off():
     axis = Axis(position=50 * PERIOD, low=0)
     machine = enabled(axis)
     machine.ask("home", axis=0)
@@ -732,25 +734,31 @@ def test_home_comes_back_to_a_switch_that_threw_the_axis_off():
     assert finish(machine) == "ok"
     assert (
         0
-        <= place(axis) + machine.ask("encoder", axis=0)["home_phase"] - DISTANCE - PERIOD // 2
+        <= zero_position(axis)
+        + machine.ask("encoder", axis=0)["home_phase"]
+        - DISTANCE
+        - PERIOD // 2
         < PERIOD // 4
     )
 
 
 def test_home_works_at_the_high_end_too():
     machine = homed(Axis(position=0, high=33 * PERIOD), home_end=1)
-    asked = place(machine.axes[0]) + machine.ask("encoder", axis=0)["home_phase"]
-    assert -PERIOD // 4 < asked - (33 * PERIOD - PERIOD // 2 - DISTANCE) <= 0
+    request = zero_position(machine.axes[0]) + machine.ask("encoder", axis=0)["home_phase"]
+    assert -PERIOD // 4 < request - (33 * PERIOD - PERIOD // 2 - DISTANCE) <= 0
 
 
 @pytest.mark.parametrize("depth", [0, PERIOD // 3, 20 * PERIOD])
-def test_home_from_a_pressed_switch_goes_away_first(depth):
+def test_home_from_a_pressed_switch_leaves_it_first(depth):
     axis = Axis(position=-depth, low=0)
     machine = homed(axis)
     assert axis.pushed[0][2] > 0  # the first jerk leads away
     assert (
         0
-        <= place(axis) + machine.ask("encoder", axis=0)["home_phase"] - DISTANCE - PERIOD // 2
+        <= zero_position(axis)
+        + machine.ask("encoder", axis=0)["home_phase"]
+        - DISTANCE
+        - PERIOD // 2
         < PERIOD // 4
     )
 
@@ -758,12 +766,12 @@ def test_home_from_a_pressed_switch_goes_away_first(depth):
 def test_home_twice_finds_the_same_zero():
     axis = Axis(position=50 * PERIOD, low=777)
     machine = homed(axis)
-    first = place(axis)
+    first = zero_position(axis)
     machine.ask("move", axis=0, target=500 * PERIOD)
     assert finish(machine) == "ok"
     machine.ask("home", axis=0)
     assert "homed" not in machine.status()["flags"] and machine.status()["state"] == "homing"
-    assert finish(machine) == "ok" and place(axis) == first
+    assert finish(machine) == "ok" and zero_position(axis) == first
 
 
 def test_home_without_a_switch_ends_within_the_travel():
@@ -783,7 +791,7 @@ def test_home_with_a_switch_that_does_not_open_ends_after_the_home_distance():
     assert machine.request("move", axis=0, target=0)[0] == "not_homed"
 
 
-def test_home_that_does_not_settle_says_so():
+def test_home_that_does_not_settle_reports_it():
     axis = Axis(position=30 * PERIOD, low=0)
     machine = enabled(axis, settle_timeout=100, following_limit=2**31 - 1)
     machine.ask("home", axis=0)

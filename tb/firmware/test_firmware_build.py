@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""build.py: what it makes, when it makes it, and how it says that it cannot."""
+"""build.py: what it makes, when it makes it, and how it reports that it cannot."""
 
 import os
+import re
 import struct
 import subprocess
 import sys
@@ -25,7 +26,7 @@ def build(out, *options, **environment):
 
 
 def functions(elf):
-    return set(firmware_build.load_segments(elf.read_bytes())[1])
+    return set(firmware_build.read_elf(elf)[1])
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +59,7 @@ def test_the_report_adds_up(made):
     assert program == (made[0] / "firmware.bin").stat().st_size
 
 
-def test_nothing_is_made_twice(made):
+def test_nothing_is_built_twice(made):
     before = (made[0] / "firmware.elf").stat().st_mtime_ns
     assert build(made[0]).stdout == made[1]
     assert (made[0] / "firmware.elf").stat().st_mtime_ns == before
@@ -71,7 +72,7 @@ def test_nothing_is_made_twice(made):
         ([], {"CROSS": "no-such-machine-"}, "no-such-machine-gcc was not found"),
     ],
 )
-def test_what_cannot_be_made_is_said_in_one_line(tmp_path, options, environment, words):
+def test_a_failed_build_is_reported_in_one_line(tmp_path, options, environment, words):
     run = build(tmp_path, *options, **environment)
     assert (
         run.returncode == 1
@@ -93,3 +94,60 @@ def test_each_image_is_made_beside_the_others(made, tmp_path):
     assert (
         "settings_operation" not in axis and {"calibration_axes_work", "calibration_work"} <= axis
     )
+
+
+def test_two_sources_of_the_same_stem_are_refused(tmp_path):
+    for name in ("axis/clock.c", "core/clock.c", "core/clock.h"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    with pytest.raises(firmware_build.BuildError, match="same object clock.o: rename one"):
+        firmware_build.sources_of("axis", tmp_path)
+    (tmp_path / "axis" / "clock.c").unlink()
+    assert len(firmware_build.sources_of("axis", tmp_path)) == 2
+
+
+LAYERS = ["made", "core", "planner", "axis", "bus", "calibration", "station", "images"]
+BESIDE = {"calibration", "station"}  # neither includes the other
+
+
+def includes():
+    """{module: modules that it includes}: a module is a .c with its .h, named by its path."""
+    graph = {}
+    for path in sorted(FIRMWARE.rglob("*.[ch]")):
+        module = path.relative_to(FIRMWARE).with_suffix("").as_posix()
+        names = re.findall(r'^#include "(.+)\.h"', path.read_text(encoding="utf-8"), re.MULTILINE)
+        graph.setdefault(module, set()).update(set(names) - {module})
+    return graph
+
+
+def test_a_module_includes_only_its_own_and_lower_layers():
+    graph = includes()
+    assert len(graph) > 30
+    for module, others in graph.items():
+        layer = module.partition("/")[0]
+        for other in others:
+            below = other.partition("/")[0]
+            assert LAYERS.index(below) <= LAYERS.index(layer), f"{module} includes {other}"
+            assert below == layer or {below, layer} != BESIDE, f"{module} includes {other}"
+
+
+def test_modules_do_not_include_each_other_in_a_circle():
+    left = includes()
+    while free := [module for module, others in left.items() if not others & left.keys()]:
+        for module in free:
+            del left[module]
+    assert not left, f"these include each other in a circle: {sorted(left)}"
+
+
+def test_directories_of_the_station_do_not_include_each_other_in_a_circle():
+    left = {}
+    for module, others in includes().items():
+        directory = module.rpartition("/")[0]
+        above = {other.rpartition("/")[0] for other in others} - {directory}
+        if directory.startswith("station/"):
+            left.setdefault(directory, set()).update(above)
+    assert len(left) == 5
+    while free := [directory for directory, others in left.items() if not others & left.keys()]:
+        for directory in free:
+            del left[directory]
+    assert not left, f"these include each other in a circle: {sorted(left)}"

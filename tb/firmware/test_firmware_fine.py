@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""axis.c: the motor hands over to the fine stage and takes over again, on an axis that lives in
-fake_machine.
-"""
+"""axis.c: the motor hands over to the fine stage and takes over again, on a simulated axis."""
 
 import pytest
 
@@ -15,12 +13,12 @@ KIND = DEFINES["ACTUATOR_DRIVE"]
 FINE_COMMAND = DEFINES["ACTUATOR_FINE_COMMAND"]
 LIMIT = 3000
 REACH = 1000
-EASE = 8  # of the motor's command, in a millisecond
+EASE = 8  # decrease of the motor command per millisecond
 FINE_MS = 10
 
 
 class Coarse(Axis):
-    """The test puts it where it wants while it is seized."""
+    """While it is seized, the test sets its position."""
 
     def stand(self, error):
         self.seized = True
@@ -62,7 +60,7 @@ def test_the_fine_stage_takes_over_when_the_error_was_in_reach_for_10_ms():
     assert axis.loop == FINE and axis.control & ENABLE
 
 
-def test_it_does_not_take_over_on_its_way_back_to_the_middle():
+def test_it_does_not_take_over_while_it_returns_to_the_middle():
     machine, axis = holding()
     machine.actuators[0][FINE_COMMAND] = 0xFFFF
     axis.stand(0)
@@ -74,7 +72,7 @@ def test_it_does_not_take_over_on_its_way_back_to_the_middle():
 
 
 @pytest.mark.parametrize("command", (500, -500))
-def test_the_motor_goes_on_from_its_command_and_is_eased_to_zero(command):
+def test_the_motor_continues_from_its_command_which_decreases_to_zero(command):
     machine, axis = holding(command)
     axis.stand(0)
     machine.run(FINE_MS + 2)
@@ -90,7 +88,7 @@ def test_the_motor_goes_on_from_its_command_and_is_eased_to_zero(command):
     assert axis.open_command == 0
 
 
-def test_a_stepper_stays_where_its_command_has_put_it():
+def test_a_stepper_keeps_its_command():
     machine, axis = holding()
     machine.actuators[0][KIND] |= 1
     machine.ask("enable", axis=0, on=0)
@@ -123,7 +121,7 @@ def test_the_motor_takes_over_beyond_four_times_the_reach_or_at_the_end_of_the_r
         assert axis.loop == FINE
 
 
-def test_a_move_is_the_motors_work_and_settles_by_the_fine_stage():
+def test_the_motor_makes_the_move_and_the_fine_stage_settles_it():
     machine, axis = holding(settle_window=10)
     axis.stand(0)
     machine.run(FINE_MS + 2)
@@ -138,7 +136,7 @@ def test_a_move_is_the_motors_work_and_settles_by_the_fine_stage():
     assert axis.loop == FINE
 
 
-def test_homing_is_content_with_the_reach():
+def test_homing_ends_within_the_reach():
     machine, axis = holding(settle_window=1)
     axis.seized = False
     machine.ask("home", axis=0)
@@ -160,7 +158,7 @@ def test_off_and_fault_end_it():
         assert axis.loop == 0 and not axis.control & ENABLE
 
 
-def test_no_fine_stage_behind_a_converter_that_drives():
+def test_a_dac_that_drives_has_no_fine_stage():
     machine = FakeNode(Coarse())
     for name, value, cause in (
         ("fine_reach", REACH, "ok"),

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""homing.c: the methods of CiA 402 and of S3 with an index, on an axis that lives in fake_machine.
-(S0's: test_firmware_axis.)
+"""homing.c: the methods of CiA 402, and of S3 with an index, on a simulated axis. The method of S0
+is tested in test_firmware_axis.py.
 """
 
 import random
@@ -22,7 +22,7 @@ TRAVEL = {
 
 
 def home(axis, method, source=COUNTS, **parameters):
-    """How it ended, and the machine."""
+    """How the homing ended, and the machine."""
     machine = FakeNode(axis)
     machine.set(**{**TRAVEL, "home_method": method, "position_source": source, **parameters})
     machine.ask("enable", axis=0, on=1)
@@ -33,11 +33,11 @@ def home(axis, method, source=COUNTS, **parameters):
 
 
 def zero_of(machine):
-    """Where on the machine the node's zero lies."""
+    """Position of the zero of the node on the machine."""
     return -machine.axes[0].origin
 
 
-def rest(machine):
+def zero_position(machine):
     machine.run(300)
     return machine.axes[0].machine
 
@@ -50,13 +50,11 @@ def rest(machine):
     [(33, 90), (34, -90), (-2, 90), (-2, -90), (-2, 250), (-2, -250), (-2, 1), (-2, -1)],
 )
 @pytest.mark.parametrize("quarters", range(4))
-def test_the_zero_is_the_count_of_the_index_whatever_side_it_was_sought_from(
-    method, start, quarters
-):
+def test_the_zero_is_the_count_of_the_index_from_either_side(method, start, quarters):
     index = 3 * PERIOD + quarters * QUARTER
     ended, machine = home(Axis(position=index + start * PERIOD, index=[index]), method)
     assert ended == "ok" and zero_of(machine) == index
-    assert abs(rest(machine) - index) <= 1638  # and there the axis stands
+    assert abs(zero_position(machine) - index) <= 1638  # and the axis is at that position
 
 
 def test_many_searches_of_s3_give_the_same_count():
@@ -77,7 +75,7 @@ def test_an_interpolated_scale_takes_the_phase_zero_nearest_to_the_index():
     assert machine.ask("encoder", axis=0)["home_phase"] == PERIOD // 3
 
 
-def test_the_zero_is_called_home_offset():
+def test_the_zero_gets_the_position_home_offset():
     ended, machine = home(Axis(position=-50 * PERIOD, index=[PERIOD]), 34, home_offset=-20)
     assert (
         ended == "ok"
@@ -89,12 +87,12 @@ def test_the_zero_is_called_home_offset():
 @pytest.mark.parametrize(
     ("method", "start"), [(33, -90), (34, 90), (34, -320), (-2, -650), (-2, 650)]
 )
-def test_no_index_within_the_home_distance_is_told(method, start):
+def test_no_index_within_the_home_distance_is_reported(method, start):
     ended, machine = home(Axis(position=start * PERIOD, index=[0]), method)
     assert ended == "no_index" and machine.axes[0].enabled and machine.axes[0].faults == 0
 
 
-def test_a_switch_in_the_way_turns_s3_round_and_ends_the_one_sided_methods():
+def test_a_switch_on_the_way_reverses_s3_and_ends_the_one_sided_methods():
     def axis():
         return Axis(position=50 * PERIOD, low=-80 * PERIOD, high=100 * PERIOD, index=[0])
 
@@ -113,10 +111,12 @@ def test_a_switch_in_the_way_turns_s3_round_and_ends_the_one_sided_methods():
 @pytest.mark.parametrize("start", [0, -90, 90])
 def test_methods_17_and_18_take_the_edge_of_the_switch(method, low, high, sign, start):
     edges = {
-        name: place * PERIOD for name, place in (("low", low), ("high", high)) if place is not None
+        name: position * PERIOD
+        for name, position in (("low", low), ("high", high))
+        if position is not None
     }
     ended, machine = home(Axis(position=start * PERIOD, **edges), method)
-    edge = sign * -70 * PERIOD + sign * PERIOD // 2  # where the switch of fake_machine opens
+    edge = sign * -70 * PERIOD + sign * PERIOD // 2  # where the switch of the fake node opens
     assert ended == "ok" and 0 <= sign * (zero_of(machine) - edge) <= PERIOD
 
 
@@ -141,12 +141,12 @@ def test_methods_1_and_2_take_the_first_index_after_the_switch(method, switch, s
 
 
 @pytest.mark.parametrize("method", [35, 37])
-def test_methods_35_and_37_take_the_place_where_the_axis_stands(method):
+def test_methods_35_and_37_take_the_present_position(method):
     ended, machine = home(Axis(position=12 * PERIOD + 3 * QUARTER), method)
     assert (
         ended == "ok"
         and zero_of(machine) == 12 * PERIOD + 3 * QUARTER
-        and rest(machine) == 12 * PERIOD + 3 * QUARTER
+        and zero_position(machine) == 12 * PERIOD + 3 * QUARTER
     )
 
 

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""motion.c and what axis.c makes of it: pieces kept short, another target in flight, override, fine
-stage.
-"""
+"""motion.c and its use by axis.c: short queues, change of target, feed override, fine stage."""
 
 import random
 
@@ -44,7 +42,7 @@ def finish(machine, axis=0, ms=20_000):
 # feeding
 
 
-def test_what_is_queued_lasts_16_ms_and_150_000_clk_and_a_piece():
+def test_the_queue_lasts_16_ms_and_150_000_cycles_and_a_piece():
     machine = homed()
     axis = machine.axes[0]
     axis.pushed = []
@@ -64,7 +62,7 @@ def test_what_is_queued_lasts_16_ms_and_150_000_clk_and_a_piece():
 
 @pytest.mark.parametrize("second", [9000, 200, 100, -2000, 0, 7000])
 @pytest.mark.parametrize("after_ms", [1, 60, 140, 300])
-def test_a_move_in_motion_goes_on_to_the_new_target(second, after_ms):
+def test_a_move_in_motion_continues_to_the_new_target(second, after_ms):
     machine = homed()
     machine.ask("move", axis=0, target=8000 * PERIOD)
     machine.run(after_ms)
@@ -76,7 +74,7 @@ def test_a_move_in_motion_goes_on_to_the_new_target(second, after_ms):
     )
 
 
-def test_targets_that_change_all_the_time_end_at_the_last_one_taken():
+def test_targets_that_change_all_the_time_end_at_the_last_accepted_one():
     draw, machine, taken = random.Random(seed()), homed(), 0
     for _ in range(12):
         target = draw.randrange(-4000 * PERIOD, 9000 * PERIOD)
@@ -142,7 +140,7 @@ def played_steps(axis):
     ]
 
 
-def test_a_trapezoid_is_at_full_acceleration_within_three_ticks_and_brakes_without_a_limit_of_jerk():
+def test_a_trapezoid_has_full_acceleration_within_three_ticks_and_stops_without_limit_of_jerk():
     machine = homed(profile=1)
     axis = machine.axes[0]
     axis.pushed = []
@@ -165,7 +163,7 @@ def test_a_trapezoid_is_at_full_acceleration_within_three_ticks_and_brakes_witho
 
 
 @pytest.mark.parametrize("border_3, sections", [(32768, (400, 1200)), (21846, (400, 800))])
-def test_stairs_climb_as_in_s4_and_come_down_the_mirror(border_3, sections):
+def test_a_stepped_profile_rises_as_in_s4_and_falls_as_its_mirror(border_3, sections):
     """f0 = 50, top 2450, rises of 50, 100, 200 period/s every 20 ms; sections 2 and 3 begin at 1/6
     and 1/2, or 1/3, of the climb.
     """
@@ -180,31 +178,31 @@ def test_stairs_climb_as_in_s4_and_come_down_the_mirror(border_3, sections):
     axis.pushed = []
     machine.ask("move", axis=0, target=3000 * PERIOD)
     assert finish(machine) == "ok" and axis.target == 3000 * PERIOD
-    every = played_steps(axis)[1:]  # the first is that of rest
+    every = played_steps(axis)[1:]  # the first is from rest
     climb = [round(step * 4000 / 2**40) for step in every[: len(every) // 2 : 80]]
-    wanted = [50]
-    while wanted[-1] < 2450:
-        wanted.append(
-            wanted[-1]
+    levels = [50]
+    while levels[-1] < 2450:
+        levels.append(
+            levels[-1]
             + (
                 50
-                if wanted[-1] < 50 + sections[0]
+                if levels[-1] < 50 + sections[0]
                 else 100
-                if wanted[-1] < 50 + sections[1]
+                if levels[-1] < 50 + sections[1]
                 else 200
             )
         )
-    wanted = [step for step in wanted if step <= 2450]
-    assert climb[: len(wanted) - 1] == wanted[:-1]
-    assert all(len(set(every[n : n + 80])) == 1 for n in range(0, 80 * (len(wanted) - 1), 80))
+    levels = [step for step in levels if step <= 2450]
+    assert climb[: len(levels) - 1] == levels[:-1]
+    assert all(len(set(every[n : n + 80])) == 1 for n in range(0, 80 * (len(levels) - 1), 80))
     down = every[::-1]
-    assert [round(step * 4000 / 2**40) for step in down[: 80 * (len(wanted) - 1) : 80]] == wanted[
+    assert [round(step * 4000 / 2**40) for step in down[: 80 * (len(levels) - 1) : 80]] == levels[
         :-1
     ]
     assert all(piece[1:3] == (0, 0) for piece in axis.pushed)
 
 
-def test_stairs_go_on_to_where_they_were_going():
+def test_a_stepped_profile_continues_to_its_target():
     machine = homed(profile=2, velocity=2450)
     machine.ask("move", axis=0, target=3000 * PERIOD)
     machine.run(100)
@@ -216,13 +214,13 @@ def test_stairs_go_on_to_where_they_were_going():
     assert finish(machine) == "ok" and machine.axes[0].target == 3000 * PERIOD
 
 
-def test_a_short_way_on_stairs_and_a_low_velocity_keep_their_speed():
+def test_a_short_stepped_profile_and_a_low_velocity_keep_their_speed():
     machine = homed(profile=2, velocity=2450)
     axis = machine.axes[0]
-    for velocity, way in ((2450, PERIOD // 4), (5, 3 * PERIOD)):
+    for velocity, distance in ((2450, PERIOD // 4), (5, 3 * PERIOD)):
         machine.set(velocity=velocity)
         axis.pushed = []
-        machine.ask("move", axis=0, target=axis.target + way)
+        machine.ask("move", axis=0, target=axis.target + distance)
         assert finish(machine) == "ok"
         every = played_steps(axis)[1:]
         assert max(every) - min(every) <= 1 and max(every) <= min(12.5, velocity) * 2**40 / 4000
@@ -232,7 +230,7 @@ def test_a_short_way_on_stairs_and_a_low_velocity_keep_their_speed():
     "wrong",
     [{"stepped_border_2": 40_000}, {"stepped_rise_1": 1, "stepped_rise_2": 1, "stepped_rise_3": 1}],
 )
-def test_stairs_that_cannot_be_climbed_are_refused_with_their_cause(wrong):
+def test_an_invalid_stepped_profile_is_refused_with_its_cause(wrong):
     machine = homed(profile=2, velocity=2450, **wrong)
     assert machine.request("move", axis=0, target=15_000 * PERIOD)[0] == "stepped_profile_invalid"
     machine.set(profile=0)
@@ -243,7 +241,7 @@ def test_stairs_that_cannot_be_climbed_are_refused_with_their_cause(wrong):
 # fine stage
 
 
-def test_the_fine_stage_takes_over_within_its_reach_and_rests_in_motion():
+def test_the_fine_stage_takes_over_within_its_reach_and_is_off_in_motion():
     machine = homed(fine_reach=PERIOD // 10)
     axis = machine.axes[0]
     machine.run(20)
@@ -251,7 +249,7 @@ def test_the_fine_stage_takes_over_within_its_reach_and_rests_in_motion():
     machine.ask("move", axis=0, target=500 * PERIOD)
     assert axis.control == ENABLE | CLOSED_LOOP
     assert finish(machine) == "ok" and axis.control == ENABLE | FINE
-    axis.machine += PERIOD // 5  # inside four times the reach it stays, beyond it lets go
+    axis.machine += PERIOD // 5  # it holds inside four times the reach, and releases beyond
     axis.seized = True
     machine.run(30)
     assert axis.control == ENABLE | FINE

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""scope.c: what is kept before and after each trigger, at which distance, and the open loop that
-goes with it.
-"""
+"""scope.c: samples before and after each trigger, their distance in time, and the open loop."""
 
 import pytest
 
@@ -9,8 +7,8 @@ from twin.compiled.node import CLK_HZ, DEFINES, FAULT, PERIOD, TABLE, Axis, Fake
 
 TRIGGER = {name: code for name, (code, _) in TABLE["scope_trigger"].items()}
 SCOPE_STATE = {code: name for name, (code, _) in TABLE["scope_state"].items()}
-SAMPLES, CLK = 128, 64
-TICK_CLK = CLK_HZ // 4000
+SAMPLES, CYCLES = 128, 64
+TICK_CYCLES = CLK_HZ // 4000
 SETTING = dict(axis=0, trigger=TRIGGER["now"], before=0, every=4, level=0, amplitude=0)
 
 
@@ -58,16 +56,16 @@ def test_a_record_at_once_is_full_and_evenly_spaced(machine, every):
     taken, before = samples(machine)
     assert len(taken) == SAMPLES and before == 0
     assert {sample["time"] for sample in taken[1:]} == {
-        every * TICK_CLK // CLK,
-        every * TICK_CLK // CLK + 1,
-    } - ({every * TICK_CLK // CLK + 1} if every * TICK_CLK % CLK == 0 else set())
-    assert sum(sample["time"] for sample in taken[1:]) * CLK == pytest.approx(
-        (SAMPLES - 1) * every * TICK_CLK, abs=CLK
+        every * TICK_CYCLES // CYCLES,
+        every * TICK_CYCLES // CYCLES + 1,
+    } - ({every * TICK_CYCLES // CYCLES + 1} if every * TICK_CYCLES % CYCLES == 0 else set())
+    assert sum(sample["time"] for sample in taken[1:]) * CYCLES == pytest.approx(
+        (SAMPLES - 1) * every * TICK_CYCLES, abs=CYCLES
     )
     assert machine.request("read_scope", first=SAMPLES)[0] == "out_of_range"
 
 
-def test_samples_hold_what_the_registers_held(machine):
+def test_samples_hold_the_values_of_the_registers(machine):
     axis = machine.axes[0]
     axis.word[DEFINES["AXIS_COMMAND"]] = 0xFF9C
     held = []
@@ -81,7 +79,7 @@ def test_samples_hold_what_the_registers_held(machine):
 
 
 @pytest.mark.parametrize("before", [0, 1, 40, SAMPLES - 1])
-def test_a_motion_triggers_and_what_went_before_is_kept(machine, before):
+def test_a_motion_triggers_and_the_samples_before_it_are_kept(machine, before):
     assert arm(machine, trigger=TRIGGER["motion"], before=before) == "ok"
     machine.run(SAMPLES + 50)
     assert state(machine) == "waiting"
@@ -127,7 +125,7 @@ def test_settling_error_and_fault_trigger(machine):
     assert state(machine) == "full"
 
 
-def test_only_the_axis_that_was_asked_for_triggers(machine):
+def test_only_the_requested_axis_triggers(machine):
     arm(machine, axis=1, trigger=TRIGGER["motion"])
     machine.ask("move", axis=0, target=10 * PERIOD)
     machine.run(50)
@@ -149,7 +147,7 @@ def test_only_the_axis_that_was_asked_for_triggers(machine):
         dict(amplitude=100, before=1),
     ],
 )
-def test_settings_that_make_no_sense_are_refused(machine, setting):
+def test_invalid_settings_are_refused(machine, setting):
     assert arm(machine, **setting) == "out_of_range" and state(machine) == "empty"
 
 
@@ -169,7 +167,7 @@ def open_commands(machine, ms):
     return given
 
 
-def test_the_open_loop_is_driven_by_steps_and_their_mirrors_and_then_held(machine):
+def test_the_open_loop_has_steps_and_their_negatives_and_then_holds(machine):
     control = DEFINES["AXIS_CONTROL_CLOSED_LOOP_MASK"]
     assert excite(machine) == "ok"
     assert machine.status()["state"] == "excited" and not machine.axes[0].control & control
@@ -198,20 +196,20 @@ def test_moves_wait_for_the_end_of_the_open_loop_and_a_second_one_too(machine):
     assert excite(machine) == "busy" and arm(machine) == "busy"
 
 
-@pytest.mark.parametrize("way", ["stop", "disable", "fault"])
-def test_stop_disable_and_fault_end_the_open_loop_and_the_record(machine, way):
+@pytest.mark.parametrize("end", ["stop", "disable", "fault"])
+def test_stop_disable_and_fault_end_the_open_loop_and_the_record(machine, end):
     excite(machine)
     machine.run(50)
-    if way == "stop":
+    if end == "stop":
         machine.ask("stop", axis=0)
-    elif way == "disable":
+    elif end == "disable":
         machine.ask("enable", axis=0, on=0)
     else:
         machine.axes[0].causes = FAULT["estop"]
     machine.run(5)
     reported = machine.status()
-    assert reported["state"] == {"stop": "holding", "disable": "off", "fault": "faulted"}[way]
-    assert reported["ended"] == ("ended_by_fault" if way == "fault" else "stopped")
+    assert reported["state"] == {"stop": "holding", "disable": "off", "fault": "faulted"}[end]
+    assert reported["ended"] == ("ended_by_fault" if end == "fault" else "stopped")
     before = machine.axes[0].word[DEFINES["AXIS_OPEN_COMMAND"]]
     machine.run(50)
     assert (
@@ -220,7 +218,7 @@ def test_stop_disable_and_fault_end_the_open_loop_and_the_record(machine, way):
     )
 
 
-def test_an_axis_that_goes_too_far_is_held(machine):
+def test_an_axis_that_moves_too_far_is_held(machine):
     excite(machine)
     machine.run(20)
     machine.axes[0].seized = True  # the machine of this bench knows no open loop
@@ -234,6 +232,6 @@ def test_an_axis_that_is_off_is_not_excited(machine):
     assert excite(machine) == "not_enabled" and state(machine) == "empty"
 
 
-def test_the_position_alone_is_told(machine):
+def test_the_position_alone_is_reported(machine):
     machine.axes[0].machine = -5 * PERIOD - 7
     assert machine.ask("position", axis=0)["position"] == machine.axes[0].position

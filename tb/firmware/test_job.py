@@ -230,7 +230,7 @@ def test_after_an_alarm_in_the_cut_a_person_is_asked_and_the_panel_shows_why():
         and {"alarm"} <= job["flags"]
         and job["answers"] == {"next", "stop"}
     )
-    assert station.shown()[1:3] == ["the machine reports", "an alarm"]
+    assert station.shown()[1:3] == ["the EDM reports an", "alarm"]
     assert station.do("again") == "edm_alarm"
     station.edm.alarm(False)
     assert station.do("again") == "ok"
@@ -352,7 +352,7 @@ def test_the_cause_of_the_sub_node_is_reported_and_resume_tries_again(cause):
     [
         ("estop", ["emergency stop", ""]),
         ("following_error", ["following error too", "large"]),
-        ("step_overrun", ["more steps were owed", "than may be"]),
+        ("step_overrun", ["too many steps are", "pending"]),
     ],
 )
 def test_a_fault_of_the_sub_node_is_shown_and_reset_by_resume_when_its_cause_is_gone(fault, words):
@@ -629,9 +629,9 @@ def test_a_job_is_run_by_the_keys_of_the_panel():
     station.until("cutting")
     station.press("PAUSE")
     station.until("paused")
-    assert station.shown() == ["paused       002/004", "paused by a person", "", "RESUME STOP"]
+    assert station.shown() == ["paused       002/004", "paused by the", "operator", "RESUME STOP"]
     station.press("NEXT")
-    assert station.shown()[1:3] == ["the job does not", "wait for that now"]
+    assert station.shown()[1:3] == ["the job does not", "expect this now"]
     station.press("RESUME")
     station.until("finished")
     assert cuts(station) == STATIONS and station.shown()[0] == "all cut      004/004"

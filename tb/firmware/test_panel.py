@@ -17,7 +17,7 @@ def station():
 
 
 def test_the_panel_shows_that_there_is_no_station_list(station):
-    assert station.shown() == ["ready", "no program of", "stations is stored", ""]
+    assert station.shown() == ["ready", "no station list is", "stored", ""]
     assert {"keypad", "display", "eeprom"} <= station.job()["flags"]
 
 
@@ -66,7 +66,7 @@ def test_longest_cut_and_speed_are_settings(station):
 @pytest.mark.parametrize(
     ("keys", "words"),
     [
-        (["DIVIDE", "0", "ENTER"], ["a program needs at", "least one station"]),
+        (["DIVIDE", "0", "ENTER"], ["a station list needs", "at least one station"]),
         (["DIVIDE", *"361", "ENTER"], ["the EEPROM is full:", "it holds 360"][:1]),
         (["DIVIDE", *"3.5", "ENTER"], ["the value is outside"]),
         (["DIVIDE", "ENTER"], ["the value is outside"]),
@@ -74,7 +74,7 @@ def test_longest_cut_and_speed_are_settings(station):
         (["LIST", *"10", "ENTER", *"10", "ENTER"], ["each angle must be", "larger than the last"]),
         (["LIST", ".", "ENTER"], ["the value is outside"]),
         (["LIST", *"1.2.3", "ENTER"], ["the value is outside"]),
-        (["LIST", "ENTER"], ["a program needs at", "least one station"]),
+        (["LIST", "ENTER"], ["a station list needs", "at least one station"]),
         (["LIST", *"99999999999", "9"], ["the value is outside"]),
         (["LIMIT", "0", "ENTER"], ["the value is outside"]),
         (["SPEED", *"101", "ENTER"], ["the value is outside"]),
@@ -101,7 +101,7 @@ def test_a_key_without_a_function_is_refused_in_words(station, key):
     shown = station.shown()
     assert shown[1:3] == ["this key has no", "function"], shown
     station.run(3500)
-    assert station.shown()[1:3] == ["no program of", "stations is stored"]
+    assert station.shown()[1:3] == ["no station list is", "stored"]
 
 
 def test_clear_clears_the_entry_and_then_leaves_the_mode(station):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""planner: every move lands exactly, keeps its limits and is nearly as short as motion can be."""
+"""planner: every move ends exactly at its target, keeps its limits and is nearly the shortest."""
 
 import ctypes
 import random
@@ -13,7 +13,7 @@ from twin.compiled.firmware import Plan, Segment, SteppedProfile, library
 FOREVER, LONGEST = 1 << 40, 0x800000
 S0 = 6000, 125_000, 12_500_000  # the stage of S0: period/s, /s2, /s3
 FEWEST_TICKS = 5
-LONGER_TICKS = 4  # a move is at most so many ticks ...
+LONGER_TICKS = 4  # a move is at most this many ticks ...
 LONGER = 1.001  # ... and this factor longer than the continuous optimum (jerk >= 10 000)
 LONGER_AT_LOW_JERK = 1.03  # down to 1 period/s3, where one unit of jerk is 6 percent of it
 
@@ -74,11 +74,11 @@ def test_no_distance_is_no_segment():
 @pytest.mark.parametrize(
     "length", [1, 2, 3, 65535, 65536, 65537, 125 << 16, 150_000 << 16, (1 << 38) - 1]
 )
-def test_a_move_of_s0_lands_exactly_inside_its_limits(length, sign):
+def test_a_move_of_s0_ends_exactly_at_its_target_inside_its_limits(length, sign):
     check(sign * length, S0)
 
 
-def test_the_way_back_is_the_mirror():
+def test_the_reverse_motion_is_the_mirror():
     for length in (1, 777, 123_456_789):
         there, back = plan_of(length)[0], plan_of(-length)[0]
         assert back == [(-v, -a, -j, n) for v, a, j, n in there]
@@ -98,7 +98,8 @@ def test_any_move_lands_exactly_inside_its_limits():
         if best > 40:
             worst[kind] = max(worst[kind], (ticks / best, ticks - best))
     print(
-        f"worst time over optimum: S0 {worst['S0'][0]:.4f}, any limits {worst['any'][0]:.4f} (moves above 40 ticks, seed {seed()})"
+        f"worst time over optimum: S0 {worst['S0'][0]:.4f}, any limits {worst['any'][0]:.4f} "
+        f"(moves above 40 ticks, seed {seed()})"
     )
 
 
@@ -112,7 +113,7 @@ def test_any_move_lands_exactly_inside_its_limits():
         (100, 300, 1),
     ],
 )
-def test_limits_of_few_units_are_reached_but_not_passed(rates):
+def test_limits_of_few_units_are_reached_but_not_exceeded(rates):
     draw = random.Random(seed())
     highest = [0, 0, 0]
     for _ in range(1500):
@@ -125,7 +126,7 @@ def test_limits_of_few_units_are_reached_but_not_passed(rates):
 
 
 def test_every_step_of_short_moves_is_inside_the_limits():
-    """All steps, one by one, instead of the ends of segments: `peaks` itself is checked."""
+    """Checks `peaks` itself: all steps one by one, instead of the ends of segments."""
     draw = random.Random(seed())
     for _ in range(300):
         rates = random_rates(draw)
@@ -175,7 +176,7 @@ def segments_of(plan):
 
 
 def taken(plan, ticks, longest=64):
-    """Pieces for so many ticks."""
+    """Takes pieces for a number of ticks."""
     pieces, piece, last = [], Segment(), ctypes.c_bool()
     while ticks and library().planner_take_up_to(
         ctypes.byref(plan), ctypes.byref(piece), ctypes.byref(last), min(longest, ticks)
@@ -204,7 +205,7 @@ def test_the_state_after_some_ticks_is_that_of_the_steps():
         pieces = taken(plan, ticks)
         assert all(piece[3] <= 64 for piece in pieces) and distance(
             pieces
-        ) == plan.at.state.gone == sum(every[:ticks])
+        ) == plan.at.state.moved == sum(every[:ticks])
         assert list(steps(segments_of(plan))) == every[ticks:]
 
 
@@ -240,14 +241,14 @@ def test_retargets_land_exactly_inside_the_limits():
             assert peak <= limit, (name, peak, limit, rates, goal)
 
 
-def test_limits_lowered_in_motion_are_kept_from_then_on():
+def test_limits_lowered_in_motion_are_kept_afterwards():
     plan, made = plan_for(2000 << 16, S0)
     played = taken(plan, 600)  # it cruises
     lower = library().planner_limits(*(rate // 2 for rate in S0))
     assert retargeted(plan, lower, 3000 << 16)
-    rest = segments_of(plan)
-    every = list(steps(rest))
-    assert distance(played + rest) == 3000 << 40
+    remaining = segments_of(plan)
+    every = list(steps(remaining))
+    assert distance(played + remaining) == 3000 << 40
     assert (
         lower.velocity < every[0] <= made.velocity
         and max(every) <= every[0] + 8
@@ -267,8 +268,8 @@ def test_a_retarget_may_begin_some_ticks_ahead():
         soon, _ = plan_for(2000 << 16, S0)
         played_soon = taken(soon, 50 + ticks)
         assert retargeted(plan, made, -300 << 16, ticks) and retargeted(soon, made, -300 << 16)
-        rest = segments_of(soon)
-        assert segments_of(plan) == rest and distance(played_soon + rest) == -300 << 40
+        remaining = segments_of(soon)
+        assert segments_of(plan) == remaining and distance(played_soon + remaining) == -300 << 40
 
 
 def test_a_refused_retarget_leaves_the_plan_as_it_was():
@@ -278,7 +279,7 @@ def test_a_refused_retarget_leaves_the_plan_as_it_was():
     assert distance(played) + distance(segments_of(plan)) == 125 << 40
 
 
-def test_a_retarget_to_the_same_place_ends_at_the_same_time():
+def test_a_retarget_to_the_same_target_ends_at_the_same_time():
     for ticks in (1, 40, 200):
         plan, made = plan_for(125 << 16, S0)
         whole, played = plan.ticks, taken(plan, ticks)
@@ -336,28 +337,31 @@ def test_impossible_limits_are_refused_with_their_cause():
 
 
 @pytest.mark.parametrize("as_printed", [False, True])
-def test_stairs_climb_by_sections_and_come_down_the_mirror(as_printed):
+def test_a_stepped_profile_rises_by_sections_and_falls_as_its_mirror(as_printed):
     """S4: f0 = 50 Hz, steps of 50, 100, 200 Hz every 20 ms, to 2450 Hz; a period is a pulse."""
     hertz = 2**40 // 4000
-    stairs = SteppedProfile(first=50 * hertz, top=2450 * hertz, ticks=80)
-    stairs.rise[:] = 50 * hertz, 100 * hertz, 200 * hertz
+    stepped = SteppedProfile(first=50 * hertz, top=2450 * hertz, ticks=80)
+    stepped.rise[:] = 50 * hertz, 100 * hertz, 200 * hertz
     library().planner_stepped_borders(
-        ctypes.byref(stairs), 65536 // 6 + 1, 65536 // 3 + 1 if as_printed else 65536 // 2
+        ctypes.byref(stepped), 65536 // 6 + 1, 65536 // 3 + 1 if as_printed else 65536 // 2
     )
-    assert [round(border / hertz) for border in stairs.border] == [450, 850 if as_printed else 1250]
+    assert [round(border / hertz) for border in stepped.border] == [
+        450,
+        850 if as_printed else 1250,
+    ]
     for pulses in (1, 7, 100, 5000, -20000):
         plan = Plan()
         assert library().planner_stepped_move(
-            ctypes.byref(plan), ctypes.byref(stairs), pulses << 16
+            ctypes.byref(plan), ctypes.byref(stepped), pulses << 16
         )
         ticks, pieces = plan.ticks, taken(plan, FOREVER, LONGEST)
         assert distance(pieces) == pulses << 40 and sum(piece[3] for piece in pieces) == ticks
         assert all(piece[1:3] == (0, 0) for piece in pieces)
-        assert pieces[0] == (0, 0, 0, 1)  # the player joins the step after it to this one
+        assert pieces[0] == (0, 0, 0, 1)  # a tick at rest
         pieces = pieces[1:]
         levels = [abs(piece[0]) for piece in pieces]
-        assert max(levels) <= stairs.top
-    top = levels.index(max(levels))  # the longest reaches it
+        assert max(levels) <= stepped.top
+    top = levels.index(max(levels))  # the longest move reaches it
     climb, fall = (
         [level // hertz for level in levels[:top]],
         [level // hertz for level in levels[:top:-1]],
@@ -367,9 +371,9 @@ def test_stairs_climb_by_sections_and_come_down_the_mirror(as_printed):
     assert (
         fall[: len(climb)] == climb and len(fall) <= len(climb) + 1
     )  # the top may be two pieces, one unit apart
-    assert all(piece[3] == stairs.ticks for piece in pieces[:top] + pieces[-len(climb) :])
-    stairs.border[1] = stairs.border[0] - 1
+    assert all(piece[3] == stepped.ticks for piece in pieces[:top] + pieces[-len(climb) :])
+    stepped.border[1] = stepped.border[0] - 1
     assert (
-        not library().planner_stepped_move(ctypes.byref(plan), ctypes.byref(stairs), 1 << 16)
+        not library().planner_stepped_move(ctypes.byref(plan), ctypes.byref(stepped), 1 << 16)
         and plan.cause == 5
     )

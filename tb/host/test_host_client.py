@@ -259,7 +259,7 @@ def test_a_fault_is_told_in_words_until_it_is_reset():
     )
     with pytest.raises(Refused, match=r"remove its cause and reset it first \(emergency stop\)"):
         axis.enable()
-    with pytest.raises(Refused, match=r"the cause of the fault still stands \(emergency stop\)"):
+    with pytest.raises(Refused, match=r"the cause of the fault is still present \(emergency stop\)"):
         axis.reset()
     node.axes[0].standing = 0
     axis.reset()
@@ -715,7 +715,7 @@ def test_wrong_values_say_what_is_allowed():
     ):
         axis.get_parameter("speed")
     node.do_set_parameter = lambda *_, **__: ("out_of_range", {})
-    with pytest.raises(Refused, match=r"outside what this parameter allows \(velocity 5mm/s\)"):
+    with pytest.raises(Refused, match=r"outside the range of this parameter \(velocity 5mm/s\)"):
         axis.set_parameter("velocity", "5mm/s")
     assert node.axes[0].writes == []
 

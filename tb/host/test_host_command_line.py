@@ -129,7 +129,7 @@ def test_a_node_without_sine_and_cosine_says_so():
         and "converter counts" not in call.out
     )
     assert [told["sine"] for told in Call("status -- encoder --json", node).told] == [False, False]
-    assert "built without that" in sentence(Call("signal", node), 1)
+    assert "built without this function" in sentence(Call("signal", node), 1)
     call = Call("status -- encoder")
     assert "without" not in call.out and "converter counts" in call.out
 

@@ -83,7 +83,7 @@ def test_what_is_not_learned_in_time_is_told_with_its_reason():
     inside.learns_in = None
     inside.parameters[VELOCITY] = 900
     with pytest.raises(
-        NotCalibrated, match="learned no correction within 3s: learning \\(0 accepted, 0 refused\\)"
+        NotCalibrated, match="learned no correction within 3s: calibrating \\(0 accepted, 0 refused\\)"
     ) as caught:
         axis.calibrate(timeout="3s")
     assert (
@@ -179,7 +179,7 @@ def test_signal_faults_are_told_by_name_and_in_words():
     assert signal.faults == ("channel_missing", "lost_count") and signal.first == (
         "channel_missing",
     )
-    assert signal.first_words == "the comparators change, a leg never changes sign"
+    assert signal.first_words == "the comparators change, a channel never changes its sign"
 
 
 def test_captures_are_taken_oldest_first_and_losses_are_told():
@@ -287,7 +287,7 @@ def test_a_person_sees_learning_go_on(monkeypatch):
         )
         == 0
     )
-    assert "learning; not settled (0 accepted, 0 refused)" in err.getvalue()
+    assert "calibrating; not settled (0 accepted, 0 refused)" in err.getvalue()
 
 
 def test_signal_capture_and_compare_in_calls_of_moire():

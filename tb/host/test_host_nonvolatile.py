@@ -30,7 +30,7 @@ def test_what_is_kept_is_there_after_a_power_cut(workshop):
     assert workshop.call("params get kp")[1].split()[1].startswith("0.0001")
     assert workshop.saved.restore_defaults().cause == "nothing_saved"
     workshop.station.power_cut()
-    assert workshop.saved.state().words == "no values are kept: the defaults are in force"
+    assert workshop.saved.state().words == "no values are saved: the defaults are in use"
 
 
 def test_the_commands_keep_forget_and_tell(workshop):
@@ -39,7 +39,7 @@ def test_the_commands_keep_forget_and_tell(workshop):
     assert code == 0 and json.loads(out)["cause"] == "ok" and json.loads(out)["values"] == 1
     assert (
         workshop.call("params restore-defaults -- params saved-in-node")[1].count(
-            "the defaults are in force"
+            "the defaults are in use"
         )
         == 2
     )
@@ -57,7 +57,7 @@ def test_what_cannot_be_kept_is_said_in_words(workshop):
     workshop.saved.state()
     workshop.station.eeprom.worn[8192 + 1] = 0xA5
     with pytest.raises(
-        MotionFailed, match="node 2 did not save its values: the EEPROM does not keep"
+        MotionFailed, match="node 2 did not save its values: the EEPROM did not store"
     ):
         workshop.saved.save()
     workshop.station.bus.devices.pop(0x50)

@@ -140,9 +140,9 @@ def test_settings_that_were_saved_come_back():
 
 def test_a_node_of_the_other_image_says_that_it_was_built_without():
     panel = Panel(FakeNode(Axis()))
-    with pytest.raises(Refused, match="built without that"):
+    with pytest.raises(Refused, match="built without this function"):
         panel.settings.get("turn_direction")
-    with pytest.raises(Refused, match="built without that"):
+    with pytest.raises(Refused, match="built without this function"):
         panel.table.begin("1deg")
 
 

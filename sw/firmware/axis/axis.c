@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// axis -- what an axis is doing.
+// axis -- state machine of an axis.
 //
-// The switches: while homing, and from `enable` or `reset_faults` on a pressed switch until it is
-// released (leaving), a switch only blocks the way into it. At any other time it is a fault.
+// A limit switch normally is a fault. It only blocks motion into the switch while the axis homes,
+// and after `enable` or `reset_faults` on a pressed switch until it is released (leaving).
+//
+// With a fine stage the motor brings the axis within the reach of the fine stage and then rests. If
+// the error leaves the reach, or the fine stage is at the end of its range, the motor takes over
+// again until the fine stage is back in the middle of its range. Both changes continue from the
+// present command of the motor.
 #include "axis/axis.h"
 
 #include "core/clock.h"
@@ -13,9 +18,9 @@
 #include "axis/parameters.h"
 
 #define FINE_BUILT 8u      // bit of actuator.drive.built
-#define FINE_HYSTERESIS 4  // the fine stage lets go at so many times its reach
-#define FINE_MS 10u        // the axis is within its reach for so long before it takes over
-#define EASE 8             // of the motor's command, in a millisecond, while the fine stage holds
+#define FINE_HYSTERESIS 4  // the fine stage releases the axis at this multiple of its reach
+#define FINE_MS 10u        // the axis must be within the reach for this time
+#define EASE 8             // decrease of the motor command per millisecond in the fine stage
 
 enum drive { BRIDGE, STEPS, DAC_OUTPUT };
 
@@ -23,13 +28,13 @@ static struct axis {
     uint8_t state;  // bus_state
     uint8_t ended;  // bus_cause
     bool homed;
-    uint8_t command_count;  // off, home, move, prepare, stop since start; wraps
-    bool homing;            // a switch only blocks, until this motion has ended
-    bool leaving;           // a switch only blocks, until it is released
+    uint8_t command_count;  // requests to switch off, home, move, prepare or stop; wraps
+    bool homing;            // a switch only blocks until this motion has ended
+    bool leaving;           // a switch only blocks until it is released
     bool fine;              // the fine stage holds the position
-    bool near;              // the error has been within its reach since near_ms
+    bool near;              // the error has been within the reach since near_ms
     uint32_t near_ms;
-    uint32_t eased_ms;  // the motor's command was eased up to here
+    uint32_t eased_ms;  // time of the last decrease of the motor command
 } axes[HARDWARE_AXES];
 
 static bool is_busy(const struct axis* a) { return a->ended == BUS_CAUSE_RUNNING; }
@@ -47,9 +52,6 @@ static void write_control(unsigned n, bool on) {
     axis_write(n, AXIS_CONTROL, only_blocks | (on ? AXIS_CONTROL_ENABLE_MASK | loop : 0));
 }
 
-// With a fine stage the motor brings the axis within its reach and rests; out of reach, or at the
-// end of the fine stage's range, the motor takes over again, and keeps the axis until the fine
-// stage is back in its middle. Both ways the motor's command goes on from where it stands.
 static void hand_over(unsigned n, bool fine) {
     struct axis* a = &axes[n];
     a->near = fine;
@@ -60,9 +62,8 @@ static void hand_over(unsigned n, bool fine) {
     write_control(n, true);
 }
 
-// A motor that rests springs back by what it was wound up: its command goes down slowly enough for
-// the fine stage to follow, until friction alone holds. A stepper stays where its command has put
-// it.
+// A motor whose command drops to 0 springs back. So its command decreases slowly enough for the
+// fine stage to follow, until friction alone holds the axis. A stepper keeps its command.
 static void ease(unsigned n) {
     struct axis* a = &axes[n];
     uint32_t now = clock_ms();
@@ -117,7 +118,7 @@ void axis_poll(unsigned n) {
     if (faults) fault(n, faults);
     if (a->state == BUS_STATE_OFF || a->state == BUS_STATE_FAULTED) return;
     motion_feed(n);
-    state = axis_read(n, AXIS_STATE);  // what homing looks at comes right before it looks
+    state = axis_read(n, AXIS_STATE);  // read last, so that homing sees the present state
     if (a->leaving && !pressed(state)) {
         a->leaving = false;
         write_control(n, true);
@@ -175,11 +176,11 @@ uint8_t axis_enable(unsigned n, bool on) {
     motion_set_target_to_position(n);
     a->state = BUS_STATE_HOLDING;
     write_control(n, true);
-    axis_poll(n);  // whether the guard agrees
+    axis_poll(n);  // the interlock may have refused
     return a->state == BUS_STATE_FAULTED ? BUS_CAUSE_FAULTED : BUS_CAUSE_OK;
 }
 
-// What every motion asks first.
+// The checks before any motion.
 static uint8_t check_ready(unsigned n) {
     const struct axis* a = &axes[n];
     axis_poll(n);
@@ -196,8 +197,7 @@ uint8_t axis_home(unsigned n) {
     if (cause != BUS_CAUSE_OK) return cause;
 
     hand_over(n, false);
-    feedback_write(n, FEEDBACK_SEGMENT_USE,
-                   0);  // homing looks for phases; the target takes the step with it
+    feedback_write(n, FEEDBACK_SEGMENT_USE, 0);  // homing needs phases; the target moves along
     cause = homing_begin(n);
     if (cause != BUS_CAUSE_OK) return cause;
     a->homed = false;
@@ -208,8 +208,7 @@ uint8_t axis_home(unsigned n) {
     return BUS_CAUSE_OK;
 }
 
-// What every motion to a position asks first. One that only settles is over as soon as another is
-// wanted.
+// The checks before a motion to a position. Another motion may begin while the last one settles.
 static uint8_t check_move(unsigned n, int64_t target) {
     struct axis* a = &axes[n];
     a->command_count++;
@@ -327,7 +326,7 @@ uint8_t axis_reset_faults(unsigned n) {
     struct axis* a = &axes[n];
     axis_poll(n);
     if (axis_read(n, AXIS_FAULTS) & BUS_FAULT_ENCODER)
-        axis_write(n, AXIS_SHIFT_ORIGIN, 0);  // position and count agree from here on
+        axis_write(n, AXIS_SHIFT_ORIGIN, 0);  // position and count agree from now on
     axis_write(n, AXIS_ENCODER_EVENTS, AXIS_ENCODER_FAULT_MASK_MASK);
     if (a->state != BUS_STATE_FAULTED) return BUS_CAUSE_OK;
     a->leaving = pressed(axis_read(n, AXIS_STATE));
@@ -338,7 +337,7 @@ uint8_t axis_reset_faults(unsigned n) {
     return BUS_CAUSE_OK;
 }
 
-// What may change in motion, and what only with the drive off.
+// Whether a parameter may change now: some may during a motion, some only while the drive is off.
 static uint8_t check_parameter(unsigned n, uint8_t id, int64_t value) {
     const struct axis* a = &axes[n];
     bool on = a->state != BUS_STATE_OFF && a->state != BUS_STATE_FAULTED;
@@ -351,7 +350,7 @@ static uint8_t check_parameter(unsigned n, uint8_t id, int64_t value) {
         if (value == DAC_OUTPUT && parameters_get(n, BUS_PARAMETER_FINE_REACH))
             return BUS_CAUSE_OUT_OF_RANGE;
         return on ? BUS_CAUSE_BUSY : BUS_CAUSE_OK;
-    case BUS_PARAMETER_POSITION_SOURCE:  // own steps are counted as pulses and direction
+    case BUS_PARAMETER_POSITION_SOURCE:  // own steps are counted as pulse and direction
         if (value == OWN_STEPS && parameters_get(n, BUS_PARAMETER_STEP_OUTPUT))
             return BUS_CAUSE_OUT_OF_RANGE;
         return on ? BUS_CAUSE_BUSY : BUS_CAUSE_OK;

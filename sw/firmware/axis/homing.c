@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// homing -- find the zero of an axis.
+// homing -- finds the zero of an axis.
 //
 // method  zero
 //   1, 2  first index after the switch at the low, high end has opened
-//  17, 18 place where the switch at the low, high end opens
-//  33, 34 first index going down, going up
-//  35, 37 here
-//  -1     S0: home_distance away from the place where the switch at home_end opens
-//  -2     S3: index within home_distance on either side, always met going up
+//  17, 18 position at which the switch at the low, high end opens
+//  33, 34 first index in the downward, upward direction
+//  35, 37 present position
+//  -1     S0: home_distance away from the position at which the switch at home_end opens
+//  -2     S3: index within home_distance on either side, always passed in the upward direction
 //
-// A position between two phase zeros is never zero: with an interpolated scale the nearest phase
-// zero is taken, with a counted one the count itself. All but 17, 18, 35 and 37 end at the zero.
-// Where it is called is home_offset.
+// The zero is always a whole phase: with an interpolated scale the nearest phase zero, with a
+// counted scale the count itself. All methods but 17, 18, 35 and 37 end at the zero. The zero gets
+// the position home_offset.
 #include "axis/homing.h"
 
 #include "core/clock.h"
@@ -22,9 +22,9 @@
 
 #define S0_METHOD (-1)
 #define S3_METHOD (-2)
-#define STANDSTILL_MS 4u  // an axis that was caught by a switch at_standstill when in this time
-#define STANDSTILL_DISTANCE 8192  // it moved less than an eighth of a period
-#define CLEAR_DISTANCE 65536      // a search that met the index sooner may have begun on it
+#define STANDSTILL_MS 4u          // an axis is at standstill if in this time it
+#define STANDSTILL_DISTANCE 8192  // moves by less than an eighth of a period
+#define CLEAR_DISTANCE 65536      // a search that finds the index sooner may have started on it
 #define LONGEST_SEARCH (1LL << 46)
 #define CAPTURE_INDEX 1u  // bit of capture_sources
 
@@ -48,10 +48,10 @@ static struct homing {
     bool up;       // direction of the search
     bool second;   // S3: the first side had no index
     uint32_t sampled_ms;
-    int64_t sampled;        // position then
-    int64_t zero_position;  // where the zero is to be
-    int32_t zero;           // what it was called, in periods
-    int32_t phase;
+    int64_t sampled;        // position at that time
+    int64_t zero_position;  // position that becomes the zero
+    int32_t zero;           // position that the zero gets, in periods
+    int32_t phase;          // of the position that was found, relative to the zero
 } homings[HARDWARE_AXES];
 
 static int64_t method_of(unsigned n) { return parameters_get(n, BUS_PARAMETER_HOME_METHOD); }
@@ -78,22 +78,21 @@ static uint8_t go(unsigned n, enum home_step step) {
     return BUS_CAUSE_RUNNING;
 }
 
-// Homing is the motor's work: with a fine stage it brings the axis within the reach of that, and no
-// nearer.
+// Homing uses the motor alone. With a fine stage it brings the axis only within its reach.
 static int64_t settle_window(unsigned n) {
     int64_t window = parameters_get(n, BUS_PARAMETER_SETTLE_WINDOW),
             reach = parameters_get(n, BUS_PARAMETER_FINE_REACH);
     return reach > window ? reach : window;
 }
 
-// Each step that drives begins here; what the planner refuses ends the homing.
+// Starts a step that moves. If the planner refuses the motion, the homing ends.
 static uint8_t drive(unsigned n, enum home_step step, int64_t distance, uint8_t velocity_id) {
     uint8_t cause = motion_play(n, distance, velocity_id);
     return cause == BUS_CAUSE_OK ? go(n, step) : cause;
 }
 
-// A switch stops the axis and the guard lets it go no farther: the target follows it until it
-// at_standstill.
+// A switch stops the axis, and the interlock blocks the drive in its direction: the target follows
+// the position until the axis is at standstill.
 static uint8_t follow_switch_stop(unsigned n, enum home_step step) {
     struct homing* h = &homings[n];
     motion_set_target_to_position(n);
@@ -102,7 +101,7 @@ static uint8_t follow_switch_stop(unsigned n, enum home_step step) {
     return go(n, step);
 }
 
-// running, ok when it at_standstill, not_settled.
+// running, ok at standstill, or not_settled.
 static uint8_t at_standstill(unsigned n) {
     struct homing* h = &homings[n];
     motion_set_target_to_position(n);
@@ -115,15 +114,15 @@ static uint8_t at_standstill(unsigned n) {
                                                                        : BUS_CAUSE_RUNNING;
 }
 
-// Which way the index is taken; what else the register holds is the user's.
+// Selects the directions in which the index is used; the user owns the other fields.
 static void take_index(unsigned n, uint32_t directions) {
     uint32_t other =
         feedback_read(n, FEEDBACK_INDEX) & ~(FEEDBACK_INDEX_UP_MASK | FEEDBACK_INDEX_DOWN_MASK);
     feedback_write(n, FEEDBACK_INDEX, other | directions);
 }
 
-// Only the way of the search counts: an axis that rests on the edge of its mark may go back over it
-// before it sets off.
+// Only the direction of the search counts: an axis at rest on the edge of its index may move back
+// over it before it starts.
 static void arm(unsigned n, bool up) {
     homings[n].up = up;
     take_index(n, up ? FEEDBACK_INDEX_UP_MASK : FEEDBACK_INDEX_DOWN_MASK);
@@ -152,7 +151,7 @@ static uint8_t not_met(unsigned n) {
     return seek(n, false, 2 * distance_of(n));
 }
 
-// The axis at_standstill. Its origin moves so that `zero_position` is called home_offset.
+// The axis is at standstill. Its origin moves so that `zero_position` becomes home_offset.
 static void zero(unsigned n) {
     struct homing* h = &homings[n];
     int32_t periods = (int32_t)((h->zero_position + 32768) >> 16), quarters = 0;
@@ -198,7 +197,7 @@ uint8_t homing_begin(unsigned n) {
 
 static uint8_t opened(unsigned n) {
     struct homing* h = &homings[n];
-    if (method_of(n) == 1 || method_of(n) == 2) {  // on as before, now with an eye on the index
+    if (method_of(n) == 1 || method_of(n) == 2) {  // continue, now searching the index
         arm(n, !at_high_end(n));
         return go(n, SEEK);
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// homing -- find the zero of an axis by one of the methods of CiA 402-2, of S0 or of S3 (parameter
+// homing -- finds the zero of an axis by a method of CiA 402-2, of S0 or of S3 (parameter
 // home_method).
 #ifndef MOIRE_HOMING_H
 #define MOIRE_HOMING_H
@@ -7,14 +7,17 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-// A bus_cause at once: ok if the homing has begun.
+// Starts the homing. Returns ok, or the cause of a motion that the planner refuses.
 uint8_t homing_begin(unsigned n);
 
-// running, or how it ended.
+// Continues the homing; `state` is the axis register of that name. Returns running, ok, or the
+// cause of the failure: no_switch, switch_stuck, no_index, not_settled.
 uint8_t homing_poll(unsigned n, uint32_t state);
 
-int32_t homing_phase(
-    unsigned n);  // [2^-16 period] place of the last zero above the phase zero that was chosen
-int32_t homing_zero(unsigned n);  // what the zero was called by the last homing, in periods
+// Position that the last homing found, relative to the zero that it chose, in 2^-16 period.
+int32_t homing_phase(unsigned n);
+
+// Position that the last homing gave to the zero, in periods.
+int32_t homing_zero(unsigned n);
 
 #endif

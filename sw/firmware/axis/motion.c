@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // motion -- one motion at a time of an axis.
+//
+// What is in the queue of the player cannot be taken back when the target changes. So the queue is
+// filled only as far as needed: for QUEUED_MS, plus the longest time between two calls of
+// motion_feed. What counts is the duration of the queued pieces, since pieces may be short.
 #include "axis/motion.h"
 
 #include "core/clock.h"
@@ -9,33 +13,30 @@
 #include "planner/plan.h"
 #include "planner/planner.h"
 
-#define PIECE_TICKS 128u  // 32 ms
-#define QUEUE 16u
-#define QUEUED_MS \
-    16u  // What is queued cannot be taken back when the target changes, so it is kept short: this,
-         // and what
-#define BUSY_KILOCYCLES \
-    150u  // the firmware may be busy with before it looks here again. Pieces are short too where a
-          // move begins:
-          // it is time that counts.
-static const uint16_t plan_kilocycles[] = {
-    300, 800};  // what another target is given to be planned, and half of what is queued
+#define PIECE_TICKS 128u      // longest piece: 32 ms
+#define QUEUE 16u             // pieces that the player can queue
+#define QUEUED_MS 16u         // least duration of the queue
+#define BUSY_KILOCYCLES 150u  // longest time between two calls of motion_feed
+
+// Time to plan another target: the first try, and a second if the first was too short.
+static const uint16_t plan_kilocycles[] = {300, 800};
 
 static struct motion {
     struct plan plan;
     int64_t from;           // target when the plan began
-    uint8_t queued[QUEUE];  // ticks of the pieces queued last
-    uint8_t pieces;         // queued so far
+    uint8_t queued[QUEUE];  // ticks of the last pieces that were queued
+    uint8_t pieces;         // number of pieces queued so far
     bool inside;            // the error has been inside the window since inside_ms
     uint32_t inside_ms;
     uint32_t since_ms;  // start of settling
 } motions[HARDWARE_AXES];
 
-static struct {  // a way to another target, which follows when the old one has been fed so far
+// The plan to another target. It replaces the plan in flight at the tick `join` of that plan.
+static struct {
     struct plan plan;
     unsigned axis;
-    uint32_t join;  // tick of the old plan; 0: there is none
-    bool ready;     // it is planned
+    uint32_t join;  // 0: there is no other plan
+    bool ready;     // it has been planned
 } next;
 
 static bool joins(unsigned n) { return next.join && next.axis == n; }
@@ -61,7 +62,7 @@ static uint32_t ticks_of(uint32_t kilocycles) {
 
 static bool at_join(unsigned n) { return joins(n) && motions[n].plan.at.tick == next.join; }
 
-// One piece into the queue, which has room for it. Its ticks; 0: nothing is left.
+// Queues one piece; the queue must have room. Returns its ticks, or 0 when nothing is left.
 static uint32_t push(unsigned n) {
     struct motion* m = &motions[n];
     struct planner_segment piece;
@@ -90,8 +91,8 @@ void motion_feed(unsigned n) {
         ticks += m->queued[(m->pieces - piece_back) % QUEUE];
     for (uint32_t more = 1; more && pieces < QUEUE; pieces++) {
         if (!joins(n) && ticks >= most) break;
-        if (at_join(n) && !next.ready && ticks >= most / 2)
-            break;  // wait for the new way as long as that may be
+        // Near the join, wait for the new plan while half of the queue is left.
+        if (at_join(n) && !next.ready && ticks >= most / 2) break;
         ticks += more = push(n);
     }
 }
@@ -126,8 +127,8 @@ uint8_t motion_prepare(unsigned n, int64_t distance, uint8_t velocity_id) {
     return BUS_CAUSE_OK;
 }
 
-// The new way begins so far ahead that the old one can be fed while it is planned. Where that took
-// too long, once more with more.
+// The new plan joins the old one so far ahead that the old one can be fed while the new one is
+// planned. If the planning took longer, it is tried again with more time.
 uint8_t motion_retarget(unsigned n, int64_t target, uint8_t velocity_id) {
     const struct plan* old = &motions[n].plan;
     const struct planner_limits limits = parameters_limits(n, velocity_id);
@@ -143,7 +144,7 @@ uint8_t motion_retarget(unsigned n, int64_t target, uint8_t velocity_id) {
             next.join = 0;
             return refusal(&next.plan);
         }
-        if (next.join == 0) continue;  // the old one had to be fed beyond
+        if (next.join == 0) continue;  // the old plan was fed beyond the join
         next.ready = true;
         motion_feed(n);
         return BUS_CAUSE_OK;

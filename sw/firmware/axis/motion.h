@@ -1,33 +1,38 @@
 // SPDX-License-Identifier: Apache-2.0
-// motion -- one motion at a time of an axis: plan it, feed the player, know when it has been played
-// and has settled.
+// motion -- one motion at a time of an axis: plans it, feeds the profile player, and detects the
+// end and the settling.
+//
+// Distances and positions are in 2^-16 period. A `velocity_id` is the parameter that limits the
+// velocity.
 #ifndef MOIRE_MOTION_H
 #define MOIRE_MOTION_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-void motion_set_target_to_position(unsigned n);  // target := position, standing, nothing queued
-void motion_controlled_stop(unsigned n);         // controlled stop
-void motion_feed(unsigned n);                    // to be called often while something is played
+void motion_set_target_to_position(unsigned n);  // at once, at velocity 0, with an empty queue
+void motion_controlled_stop(unsigned n);         // within the limits of acceleration and jerk
+void motion_feed(unsigned n);  // fills the queue of the player; to be called often while it plays
 
-// The player must stand. A distance of zero plays nothing. ok, or why the planner refuses it.
-// motion_play starts at once.
+// Plans a motion and fills the queue; the player must be at rest. A distance of 0 plays nothing.
+// Returns ok, or why the planner refuses: out_of_range, too_long, stepped_profile_invalid.
+// motion_play starts it too.
 uint8_t motion_prepare(unsigned n, int64_t distance, uint8_t velocity_id);
 void motion_start(unsigned n);
 uint8_t motion_play(unsigned n, int64_t distance, uint8_t velocity_id);
 
-// Another target (2^-16 period) while a motion is played. Refused, it goes on as it was; busy: it
-// is too near its end, or climbs stairs.
+// Changes the target of the motion in flight. If it is refused, the motion continues unchanged.
+// Returns the causes of motion_prepare, and busy when the motion is too near its end, has a stepped
+// profile, or another axis is being replanned.
 uint8_t motion_retarget(unsigned n, int64_t target, uint8_t velocity_id);
 
-bool motion_played(unsigned n);
-uint32_t motion_ticks(unsigned n);  // duration of the motion planned last
+bool motion_played(unsigned n);     // the player is at rest and no piece is left
+uint32_t motion_ticks(unsigned n);  // duration of the motion that was planned last
 
-// ok, not_settled, or running as long as neither is decided.
+// Settling: the error must stay inside the window for settle_time.
 void motion_settle_begin(unsigned n);
-uint8_t motion_settle(unsigned n, int64_t window);
+uint8_t motion_settle(unsigned n, int64_t window);  // ok, not_settled, or running
 bool motion_overdue(unsigned n);  // settle_timeout has passed since motion_settle_begin
-bool motion_inside(unsigned n, int64_t window);  // the following error is
+bool motion_inside(unsigned n, int64_t window);  // the following error is inside the window now
 
 #endif

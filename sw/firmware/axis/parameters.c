@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// parameters -- the settings of the axes, and those registers that follow from them.
+// parameters -- the parameters of the axes, and the registers that follow from them.
+//
+// bus.toml names the register of most parameters; the functions apply_… compute the others.
 #include "axis/parameters.h"
 
 #include "core/hardware.h"
 #include "made/bus_protocol.h"
 
-#define PULSES_AND_DIRECTION 3u  // a mode of the decoder
+#define PULSES_AND_DIRECTION 3u  // mode of the decoder
 #define STEP_CYCLES_MASK ACTUATOR_STEP_PULSE_HIGH_MASK
 #define COEFFICIENTS 5u  // of a filter
 
@@ -18,7 +20,7 @@ static const struct {
 static const uint8_t sine_parameters[] = {BUS_PARAMETERS_OF_SINE};
 
 static int64_t parameters[HARDWARE_AXES][BUS_PARAMETER_COUNT + 1];
-static struct planner_limits limits[HARDWARE_AXES];  // velocity: that of a move
+static struct planner_limits limits[HARDWARE_AXES];  // of a move
 
 static uint32_t saturate(uint64_t value, uint32_t mask) {
     return value > mask ? mask : (uint32_t)value;
@@ -61,7 +63,7 @@ static uint64_t cycles_of(int64_t nanoseconds) {
     return (uint64_t)nanoseconds * node_read(NODE_CLK_HZ) / 1000000000u;
 }
 
-// The deglitcher counts the samples that it takes: of all clk, or with some left out between two.
+// The deglitcher counts samples: one in each cycle, or one in skip + 1 cycles.
 static void apply_sensing(unsigned axis) {
     const int64_t* p = parameters[axis];
     uint32_t skip = saturate(cycles_of(p[BUS_PARAMETER_FILTER_SKIP]), 0xFFFF);
@@ -128,7 +130,7 @@ static void apply_watchdog(unsigned axis) {
     bus_write(BUS_WATCHDOG_TIME, (uint32_t)parameters[axis][BUS_PARAMETER_WATCHDOG_TIME]);
 }
 
-// A filter takes coefficients only while it is out of use.
+// A filter accepts coefficients only while it is not in use.
 static void apply_filters(unsigned axis) {
     const int64_t* p = parameters[axis];
     for (uint32_t n = 0; n < 2 * COEFFICIENTS; n++) {
@@ -214,7 +216,7 @@ uint8_t parameters_check(unsigned axis, uint8_t id, int64_t value) {
 
 void parameters_set(unsigned axis, uint8_t id, int64_t value) {
     parameters[axis][id] = value;
-    if (id == BUS_PARAMETER_WATCHDOG_TIME)  // there is one line for all axes
+    if (id == BUS_PARAMETER_WATCHDOG_TIME)  // all axes share one bus
         for (unsigned other = 0; other < HARDWARE_AXES; other++) parameters[other][id] = value;
     apply(axis, id);
 }
@@ -230,7 +232,7 @@ struct planner_limits parameters_limits(unsigned axis, uint8_t velocity_id) {
     return made;
 }
 
-// A velocity below the first stair is that of all of them.
+// A velocity below the first step becomes the velocity of all steps.
 struct planner_stepped_profile parameters_stepped_profile(unsigned axis, uint8_t velocity_id) {
     const int64_t* p = parameters[axis];
     uint64_t top = planner_velocity((uint64_t)p[velocity_id] << 16),

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// line -- frames in, requests done, replies out.
+// bus -- receives frames, executes their requests, sends replies.
 //
-// The hardware passes only words of frames for this node and syncs the last word of a right one; a
-// frame that it does not mark is forgotten when the next command byte comes. Causes are looked for
-// in this order: wrong_map, unknown_operation, wrong_length, no_such_axis, out_of_range of a value,
-// then what the axis says (faulted, not_enabled, busy, not_homed, out_of_travel).
+// The hardware passes only the words of frames for this node, and marks the last word of a frame
+// whose CRC is right. A frame without the mark is dropped at the next command byte. A request is
+// checked in this order: wrong_map, unknown_operation, wrong_length, no_such_axis, out_of_range of
+// a value, then the state of the axis (faulted, not_enabled, busy, not_homed, out_of_travel).
 #include "bus/bus.h"
 
 #include "axis/axis.h"
@@ -24,11 +24,11 @@
 #define READY 0x40u
 #define CRC_BYTES 4u
 #define CAUSE (BUS_REPLY_HEAD - 1u)  // of a reply body
-#define WORDS_PER_POLL 8u            // then the axes have their turn
+#define WORDS_PER_POLL 8u            // then the axes are polled
 #define LOWEST_BAUD 9600u
 #define HIGHEST_BAUD 3000000u
-#define SHORTEST_BIT_CYCLES 8u  // that receiver and transmitter can do
-#define BAUD_TIMEOUT_MS 5000u   // of a master at another baud rate than the first
+#define SHORTEST_BIT_CYCLES 8u  // that receiver and transmitter support
+#define BAUD_TIMEOUT_MS 5000u   // without the master, until BAUD is set again
 #define NO_AXIS 0xFFu
 
 #define OPERATION_SHAPE(name, code, request, reply, of_axis) [code] = {request, reply, of_axis},
@@ -43,17 +43,17 @@ static bool receiving;
 static uint8_t received;                                   // bytes in request
 static uint8_t request[1 + BUS_LONGEST_BODY + CRC_BYTES];  // length, body, CRC-32
 static uint8_t reply[1 + BUS_LONGEST_BODY + CRC_BYTES];
-static const uint8_t* current_request;  // bodies of what is being done
+static const uint8_t* current_request;  // bodies of the request that is being executed
 static uint8_t* current_reply;
-static bool answered;  // there was a request, with this CRC-32:
-static uint32_t answered_crc;
+static bool answered;          // there was a request
+static uint32_t answered_crc;  // and this was its CRC-32
 static uint32_t repeated, refused;
-static uint8_t followed;           // whose position each reply tells afresh
-static uint32_t baud, next_baud;   // next: 0, or what comes after this reply
-static uint32_t sync_axes, syncs;  // those that the next mark starts, and the syncs before
-static bool reply_sent;            // it is in the queue at least
-static uint32_t last_command_ms,
-    breaks;  // when the master called last, and the breaks before this baud rate
+static uint8_t followed;           // axis whose present position goes into each reply
+static uint32_t baud, next_baud;   // next: 0, or the baud rate after this reply
+static uint32_t sync_axes, syncs;  // axes that the next sync starts, and the syncs so far
+static bool reply_sent;            // at least it is in the transmit queue
+static uint32_t last_command_ms;   // time of the last command byte
+static uint32_t breaks;            // break conditions before this baud rate was set
 
 static uint64_t get(const uint8_t* from, unsigned bytes) {
     uint64_t value = 0;
@@ -110,9 +110,8 @@ static uint8_t enable(unsigned axis) {
 
 typedef uint8_t motion_request(unsigned n, int64_t target, uint32_t* duration_ticks);
 
-static uint8_t motion(unsigned axis,
-                      motion_request* begin)  // move and prepare have the same bodies
-{
+// move and prepare have the same bodies
+static uint8_t motion(unsigned axis, motion_request* begin) {
     uint32_t ticks = 0;
     uint8_t cause = begin(axis, (int64_t)get(&current_request[BUS_MOVE_REQUEST_TARGET], 8), &ticks);
     put(BUS_MOVE_REPLY_DURATION_TICKS, ticks, 4);
@@ -161,12 +160,12 @@ static uint8_t encoder(unsigned axis) {
     return BUS_CAUSE_OK;
 }
 
-static bool of_axis(uint32_t block, uint32_t base)  // the blocks of an axis have the same stride
-{
+// The blocks of an axis have the same stride.
+static bool of_axis(uint32_t block, uint32_t base) {
     return block >= base && block < base + axes * AXIS_STRIDE;
 }
 
-// Reading these would take something away from the firmware.
+// Reading these registers would take data from the firmware.
 static bool has_read_effect(uint32_t address) {
     return address == BUS_BASE + BUS_RECEIVE ||
            address == PERIPHERALS_BASE + PERIPHERALS_I2C_ANSWER ||
@@ -222,7 +221,7 @@ static uint8_t set_baud(void) {
     return BUS_CAUSE_OK;
 }
 
-// The hardware starts them; the firmware learns it from the count of syncs.
+// The hardware starts the axes; the firmware detects it by the count of syncs.
 static uint8_t start_at_sync(uint32_t mask) {
     uint8_t cause = mask ? axis_may_start(axes, mask) : BUS_CAUSE_OK;
     if (cause != BUS_CAUSE_OK) return cause;
@@ -247,7 +246,7 @@ static uint8_t image_operation(uint8_t operation) {
 }
 
 static uint8_t execute(uint8_t operation, uint8_t length) {
-    unsigned axis = current_request[BUS_REQUEST_HEAD];  // of those operations that have one
+    unsigned axis = current_request[BUS_REQUEST_HEAD];  // if the operation has one
     if (wrong_map && operation != BUS_OPERATION_IDENTIFY) return BUS_CAUSE_WRONG_MAP;
     if (length < BUS_REQUEST_HEAD) return BUS_CAUSE_WRONG_LENGTH;
     if (operation >= sizeof shapes / sizeof *shapes || shapes[operation].request == 0)
@@ -286,8 +285,8 @@ static uint8_t own_address(void) {
     return (uint8_t)FIELD_GET(node_read(NODE_BUILD), NODE_BUILD_ADDRESS);
 }
 
-static uint32_t crc_of(const uint8_t* bytes, uint32_t count)  // of what went before, and of these
-{
+// Continues the CRC with these bytes.
+static uint32_t crc_of(const uint8_t* bytes, uint32_t count) {
     while (count--) bus_write(BUS_CRC_BYTE, *bytes++);
     return bus_read(BUS_CRC);
 }
@@ -297,8 +296,8 @@ uint32_t bus_crc(const uint8_t* bytes, uint32_t count) {
     return crc_of(bytes, count);
 }
 
-static void seal(void)  // length and CRC-32 around the body
-{
+// Completes the reply with its CRC-32, over the command byte too.
+static void seal(void) {
     uint8_t command = READY | DIRECTION_FROM_NODE | own_address();
     uint32_t length = reply[0], crc;
     bus_crc(&command, 1);
@@ -340,14 +339,14 @@ static void command_byte(uint8_t data) {
     uint32_t bytes = 1;
     last_command_ms = clock_ms();
     receiving = false;
-    if ((data & ADDRESS_MASK) == 0) return;  // a mark for all nodes: the hardware took it
+    if ((data & ADDRESS_MASK) == 0) return;  // sync for all nodes: the hardware handled it
     receiving = (data & DIRECTION_MASK) == DIRECTION_TO_NODE;
     received = 0;
     if (!receiving) bytes += 1 + reply[0] + CRC_BYTES;
-    if (FIELD_GET(bus_read(BUS_STATE), BUS_STATE_TRANSMIT_FREE) < bytes)
-        return;  // silence, rather than half an current_reply
+    // no reply rather than half a reply
+    if (FIELD_GET(bus_read(BUS_STATE), BUS_STATE_TRANSMIT_FREE) < bytes) return;
     send(READY | (data & 0x3F));
-    if (!receiving && followed != NO_AXIS) {  // while the ready byte is under way
+    if (!receiving && followed != NO_AXIS) {  // while the ready byte is sent
         current_reply = &reply[1];
         position(followed);
         seal();

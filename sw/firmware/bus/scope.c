@@ -9,20 +9,19 @@
 #include "planner/planner.h"
 
 #define SAMPLES 128u        // a power of two
-#define LONGEST_EVERY 200u  // ticks: 50 ms, so that a time fits its 16 bits up to a clk of 80 MHz
-#define HOLDS \
-    16u  // of the open loop: a command stays for 1 to so many samples, then its mirror as long
+#define LONGEST_EVERY 200u  // ticks: 50 ms, so that a time fits into 16 bits up to 80 MHz
+#define HOLDS 16u           // open loop: a command lasts 1 to 16 samples, then its negative as long
 
 struct setting {
     uint8_t axis;
     uint8_t trigger;    // bus_scope_trigger
-    uint8_t before;     // samples kept from before the trigger
+    uint8_t before;     // samples from before the trigger
     uint16_t every;     // ticks from sample to sample, at least
-    uint32_t level;     // of the error; with an amplitude: how far the axis may go. LSB of position
-    int16_t amplitude;  // of the open loop, 0: none
+    uint32_t level;     // of the error, or with an amplitude the largest movement; 2^-16 period
+    int16_t amplitude;  // of the open loop; 0: closed loop
 };
 
-struct sample {        // as on the line
+struct sample {        // as on the bus
     int32_t position;  // low word
     int32_t error;
     int16_t command;
@@ -32,13 +31,13 @@ struct sample {        // as on the line
 static struct scope {
     struct setting setting;
     struct sample samples[SAMPLES];
-    uint32_t every, due, last;  // clk
+    uint32_t every, due, last;  // cycles
     uint32_t random;
     int32_t from;  // position when it was armed
     uint8_t state;
-    uint8_t next, taken, left;  // place of the next sample, samples there, samples still wanted
+    uint8_t next, taken, left;  // index of the next sample, samples taken, samples missing
     uint8_t before;
-    uint8_t hold, holds;  // samples still to go with this command, and its length
+    uint8_t hold, holds;  // samples left with this command, and all of them
     bool mirrored;
 } scope;
 
@@ -107,7 +106,7 @@ static void take(unsigned n) {
     }
 }
 
-// Steps of random length, each followed by its mirror, so that the axis comes back.
+// Commands of random duration, each followed by its negative, so that the axis returns.
 static void excite(unsigned n) {
     if (scope.hold == 0) {
         scope.mirrored = !scope.mirrored;
@@ -132,13 +131,13 @@ void scope_work(void) {
     if ((int32_t)(now - scope.due) < 0) return;
     scope.due += scope.every;
     if ((int32_t)(now - scope.due) >= 0)
-        scope.due = now + scope.every;  // too late for one: they are not made up for
+        scope.due = now + scope.every;  // samples that were missed are left out
     take(n);
     if (scope.setting.amplitude) {
-        uint32_t gone = (uint32_t)scope.samples[(scope.next + SAMPLES - 1u) % SAMPLES].position -
-                        (uint32_t)scope.from;
-        if ((int32_t)gone < 0) gone = 0u - gone;
-        if (axis_state(n) != BUS_STATE_EXCITED || gone > scope.setting.level)
+        uint32_t moved = (uint32_t)scope.samples[(scope.next + SAMPLES - 1u) % SAMPLES].position -
+                         (uint32_t)scope.from;
+        if ((int32_t)moved < 0) moved = 0u - moved;
+        if (axis_state(n) != BUS_STATE_EXCITED || moved > scope.setting.level)
             scope.left = 0;
         else
             excite(n);
@@ -146,10 +145,8 @@ void scope_work(void) {
     if (scope.left == 0) end();
 }
 
-static uint8_t byte_of(
-    uint32_t first,
-    uint32_t n)  // of the samples from this one on, 0 behind the last; the oldest is 0
-{
+// Byte n of the samples from `first` on, where 0 is the oldest; 0 after the last sample.
+static uint8_t byte_of(uint32_t first, uint32_t n) {
     uint32_t number = first + n / sizeof(struct sample);
     const struct sample* sample =
         &scope.samples[(scope.next + SAMPLES - scope.taken + number) % SAMPLES];

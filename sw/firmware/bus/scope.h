@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// scope -- records position, error and command of one axis, from before a trigger on. With an
-// amplitude it drives the axis in open loop meanwhile, to see how it answers. There is one for all
-// axes. Times are in SCOPE_CYCLES clk since the sample before.
+// scope -- records position, error and command of one axis, from before a trigger on.
+//
+// With an amplitude it drives the axis in open loop meanwhile, to measure its response. One scope
+// serves all axes. Times are since the sample before, in SCOPE_CYCLES cycles.
 #ifndef MOIRE_SCOPE_H
 #define MOIRE_SCOPE_H
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// segments -- keeps the segment table of each axis in force or out of it.
+// segments -- switches the segment table of each axis on and off.
 //
-// Its places count from the one that homing finds, whatever that is called: before homing there is
-// nothing to correct, and a homing begins without. Coming into force and out of it moves position
-// and target alike, in hardware, and only while the axis is at rest: a way that was planned ends
-// where it should. Hardware is in force well within the time that it takes to read a request.
+// The positions of the table count from the position that homing finds, whatever home_offset is.
+// Before homing there is nothing to correct, and homing begins without the table. When the table is
+// switched, the hardware moves position and target alike, and only while the axis is at rest, so
+// that a planned motion ends at its target. The hardware needs less time for this than it takes to
+// receive a request.
 #include "bus/segments.h"
 
 #include <stdbool.h>
@@ -24,7 +25,7 @@
 
 static struct table {
     uint16_t loaded;  // points
-    uint8_t use;      // what it was put in force as; OFF once it was taken out
+    uint8_t use;      // value of the parameter with which it was switched on; else OFF
 } tables[HARDWARE_AXES];
 
 static unsigned axes;
@@ -40,7 +41,7 @@ static uint8_t in_force(unsigned n) {
                : OFF;
 }
 
-// ok, or why the use that is required_use is not in force.
+// ok, or why the required use is not in force.
 static uint8_t reason(unsigned n) {
     if (required_use(n) == in_force(n)) return BUS_CAUSE_OK;
     if (tables[n].loaded <= parameters_get(n, BUS_PARAMETER_SEGMENT_COUNT))
@@ -72,10 +73,10 @@ void segments_start(unsigned served_axes) {
     }
 }
 
-// One use follows on another with a turn without any between them.
+// Between two different uses the table is off for one turn.
 void segments_work(void) {
     turn = turn + 1 < axes ? turn + 1 : 0;
-    if (required_use(turn) == OFF && tables[turn].use == OFF) return;  // as a rule
+    if (required_use(turn) == OFF && tables[turn].use == OFF) return;  // the usual case
     if (axis_ended(turn) == BUS_CAUSE_RUNNING) return;
     uint8_t now = in_force(turn), use = axis_homed(turn) ? required_use(turn) : OFF;
     if (now == use) return;
@@ -115,7 +116,7 @@ static uint8_t set_segments(unsigned n) {
     return BUS_CAUSE_OK;
 }
 
-// From the hardware: what it holds is what corrects.
+// Reads the points back from the hardware, which corrects with them.
 static uint8_t get_segments(unsigned n) {
     uint32_t border = (uint32_t)bus_request_field(BUS_GET_SEGMENTS_REQUEST_BORDER, 1);
     for (uint32_t i = 0; i < POINTS; i++) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// segments -- the segment table of each axis as a part of an image: loaded by the host, in force
-// while the parameter `segments` wants it and the zero is known.
+// segments -- the segment table of each axis, as a part of an image. The host loads it; it is in
+// force while the parameter `segments` requests it and the zero is known.
 #ifndef MOIRE_SEGMENTS_H
 #define MOIRE_SEGMENTS_H
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// arithmetic -- integers as the planner needs them.
+// arithmetic -- integer functions for the planner.
 #include "core/arithmetic.h"
 
 int bits(uint64_t x) {
@@ -13,7 +13,7 @@ int bits(uint64_t x) {
 uint64_t pairs(uint32_t n) { return n ? (uint64_t)n * (n - 1) / 2 : 0; }
 
 uint64_t triples(uint32_t n) {
-    return n < 3 ? 0 : pairs(n) * (n - 2) * 0xAAAAAAAAAAAAAAABu;  // a third
+    return n < 3 ? 0 : pairs(n) * (n - 2) * 0xAAAAAAAAAAAAAAABu;  // divided by 3, modulo 2^64
 }
 
 int64_t product(int64_t x, uint32_t m, int shift) {
@@ -42,7 +42,7 @@ int64_t share(int64_t x, uint64_t part, uint64_t whole) {
     return product(x, dividend / divisor, 16 - a + b);
 }
 
-// Of the upper half by Newton from above, then of the lower half by one quotient.
+// Newton's method from above gives the upper half of the digits, one division the lower half.
 uint32_t root(uint64_t x) {
     if (x == 0) return 0;
     const int shift = (64 - bits(x)) & ~1;

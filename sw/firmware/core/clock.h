@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 void clock_start(void);
-void clock_poll(void);    // at least once in 2^32 clk
+void clock_poll(void);    // to be called at least once in 2^32 cycles
 uint32_t clock_ms(void);  // wraps
 
 #endif

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// hardware -- all that the firmware knows of the machine below it: the made register map and three
-// things of the core. With MOIRE_REGISTER_ACCESS defined, register_read and register_write come
-// from a test and the core is the host's.
+// hardware -- the firmware's view of the hardware: the made register map and three features of the
+// soft core.
+//
+// With MOIRE_REGISTER_ACCESS defined, a test provides register_read and register_write, and the
+// firmware runs on the host computer.
 #ifndef MOIRE_HARDWARE_H
 #define MOIRE_HARDWARE_H
 
@@ -11,7 +13,7 @@
 #include "made/registers.h"
 
 #ifndef HARDWARE_AXES
-#define HARDWARE_AXES 8u  // the most that are served
+#define HARDWARE_AXES 8u  // most axes that the firmware serves
 #endif
 
 // A position of 48 bits.
@@ -26,12 +28,11 @@ static inline bool hardware_has_sine(unsigned axis) {
 static inline bool hardware_map_fits(void) { return node_read(NODE_MAP_CRC) == MAP_CRC; }
 
 #ifndef MOIRE_REGISTER_ACCESS
-#define STACK_MARK 0x4d6f6972u  // start.S writes it to the lowest word of the stack
+#define STACK_MARK 0x4d6f6972u  // start.S writes it into the lowest word of the stack
 extern const volatile uint32_t _stack_limit;
 static inline bool hardware_stack_intact(void) { return _stack_limit == STACK_MARK; }
-static inline void hardware_halt(void) {
-    __asm__ volatile("ebreak");
-}  // the core stops, the guard switches the drives off
+// The core stops, and the drive-enable interlock switches the drives off.
+static inline void hardware_halt(void) { __asm__ volatile("ebreak"); }
 #else
 static inline bool hardware_stack_intact(void) { return true; }
 static inline void hardware_halt(void) {}

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// image -- what a firmware image consists of besides line and axes: the list of one image_NAME.c,
-// which build.py chooses.
+// image -- the parts of a firmware image besides bus and axes: one image_NAME.c lists them, and
+// build.py chooses the file.
 #ifndef MOIRE_IMAGE_H
 #define MOIRE_IMAGE_H
 
 #include <stdint.h>
 
-struct image_part {                // a function that a part has no need of is null
-    void (*start)(unsigned axes);  // those that may be touched
-    void (*work)(void);            // one small piece of work: well below 1 ms at 3 MHz
-    uint8_t (*operation)(
-        uint8_t operation);  // a bus_cause; not_built: it is not one of this part's
+struct image_part {                           // null: the part does not need this function
+    void (*start)(unsigned axes);             // number of axes that may be accessed
+    void (*work)(void);                       // a small piece of work: well below 1 ms at 3 MHz
+    uint8_t (*operation)(uint8_t operation);  // a bus_cause; not_built: not of this part
 };
 
 extern const struct image_part image_parts[];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// memory -- the two functions that GCC calls for structs; zig brings its own.
+// memory -- the two functions that GCC calls to copy and clear structs; zig has its own.
 #if defined(__riscv) && !defined(__clang__)
 #include <stddef.h>
 

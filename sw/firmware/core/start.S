@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# start -- from reset to main: stack, zeroed data. A return, like any trap, stops the core; the guard then switches the drives off.
+# start -- from reset to main: sets the stack and clears the data. If main returns, the core stops, as after any trap, and the
+# drive-enable interlock switches the drives off.
     .section .start, "ax"
     .globl _start
 _start:

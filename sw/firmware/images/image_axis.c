@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// image_axis -- the axes of a measuring machine: their sines and cosines are corrected.
+// image_axis -- parts of a node for axes with sine/cosine encoders: calibration, segment tables,
+// scope.
 #include "calibration/calibration_axes.h"
 #include "core/image.h"
 #include "bus/scope.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// image_station -- a station of an indexing machine (S4), main node and sub-node alike.
+// image_station -- parts of a station of an indexing machine (S4), both main node and sub-node.
 #include "core/hardware.h"
 #include "station/devices/i2c.h"
 #include "core/image.h"
@@ -19,7 +19,7 @@
 #include "station/storage/value_store.h"
 
 _Static_assert(BUS_SETTING_COUNT + HARDWARE_AXES * BUS_PARAMETER_COUNT <= VALUE_STORE_MAX,
-               "the EEPROM keeps all values");
+               "the EEPROM holds all values");
 
 const struct image_part image_parts[] = {
     {settings_start, 0, settings_operation},

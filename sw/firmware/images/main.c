@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// main -- start, then poll for ever: line, clock, axes, and the parts of the image. There are no
-// interrupts; nothing waits.
+// main -- starts everything, then polls bus, clock, axes and the parts of the image in turn. There
+// are no interrupts, and no function waits.
 #include "axis/axis.h"
 #include "core/clock.h"
 #include "core/hardware.h"
@@ -8,7 +8,7 @@
 #include "bus/bus.h"
 #include "axis/parameters.h"
 
-static unsigned axes;  // those that may be touched: none if the register maps differ
+static unsigned axes;  // number that may be accessed: 0 if the register maps differ
 
 void firmware_start(void) {
     unsigned built = FIELD_GET(node_read(NODE_BUILD), NODE_BUILD_AXES);

@@ -3,11 +3,11 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x8739EC1Fu    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0x21544602u    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
-#define BUS_REQUEST_HEAD    2u    // sequence, operation
-#define BUS_REPLY_HEAD      3u    // sequence, operation, cause
+#define BUS_REQUEST_HEAD    2u  // sequence, operation
+#define BUS_REPLY_HEAD      3u  // sequence, operation, cause
 
 enum bus_cause {
     BUS_CAUSE_OK = 0,    // done
@@ -15,67 +15,81 @@ enum bus_cause {
     BUS_CAUSE_WRONG_LENGTH = 2,    // the command has the wrong length
     BUS_CAUSE_NO_SUCH_AXIS = 3,    // the node has no axis of this number
     BUS_CAUSE_UNKNOWN_PARAMETER = 4,    // the node has no parameter of this number
-    BUS_CAUSE_OUT_OF_RANGE = 5,    // the value is outside what this parameter allows
+    BUS_CAUSE_OUT_OF_RANGE = 5,    // the value is outside the range of this parameter
     BUS_CAUSE_OUT_OF_TRAVEL = 6,    // the target is outside the travel
     BUS_CAUSE_NOT_HOMED = 7,    // the axis has no zero yet: home it first
     BUS_CAUSE_NOT_ENABLED = 8,    // the drive is off: enable it first
     BUS_CAUSE_FAULTED = 9,    // a fault is latched: remove its cause and reset it first
-    BUS_CAUSE_FAULT_PERSISTS = 10,    // the cause of the fault still stands
+    BUS_CAUSE_FAULT_PERSISTS = 10,    // the cause of the fault is still present
     BUS_CAUSE_BUSY = 11,    // the axis is moving: stop it or wait
-    BUS_CAUSE_WRONG_MAP = 12,    // firmware and hardware were not made for each other (register maps differ)
+    BUS_CAUSE_WRONG_MAP = 12,    // firmware and FPGA do not match (register maps differ)
     BUS_CAUSE_NO_SUCH_REGISTER = 13,    // the node has no register at this address
     BUS_CAUSE_STOPPED = 14,    // stopped by the host
     BUS_CAUSE_NO_SWITCH = 15,    // no limit switch was found within the travel
     BUS_CAUSE_SWITCH_STUCK = 16,    // the limit switch did not open within the home distance
     BUS_CAUSE_NOT_SETTLED = 17,    // the target was not reached within the settling time
     BUS_CAUSE_ENDED_BY_FAULT = 18,    // a fault ended the motion
-    BUS_CAUSE_RUNNING = 19,    // the motion is under way
-    BUS_CAUSE_NO_MOTION_YET = 20,    // no motion was asked for yet
+    BUS_CAUSE_RUNNING = 19,    // the motion is in progress
+    BUS_CAUSE_NO_MOTION_YET = 20,    // no motion was requested yet
     BUS_CAUSE_NO_INDEX = 21,    // no index was found within the home distance
     BUS_CAUSE_NOT_PREPARED = 22,    // the axis has no motion prepared
-    BUS_CAUSE_NOT_BUILT = 23,    // this node was built without that
-    BUS_CAUSE_TOO_LONG = 24,    // the motion would take days, or go too far for a change of target
-    BUS_CAUSE_STEPPED_PROFILE_INVALID = 25,    // the stairs of this profile are not in order, or too many
-    BUS_CAUSE_NO_SEGMENTS = 26,    // no whole segment table is loaded
+    BUS_CAUSE_NOT_BUILT = 23,    // this node was built without this function
+    BUS_CAUSE_TOO_LONG = 24,    // the motion would take days, or is too long for a change of target
+    // the steps of the stepped profile are not in order, or too many
+    BUS_CAUSE_STEPPED_PROFILE_INVALID = 25,
+    BUS_CAUSE_NO_SEGMENTS = 26,    // no complete segment table is loaded
     BUS_CAUSE_SEGMENTS_IN_USE = 27,    // the segment table is in use: switch it off first
-    BUS_CAUSE_SENSOR_TIMED_OUT = 30,    // no good frame came from the angle sensor: check its power and its cable
-    BUS_CAUSE_SENSOR_STUCK = 31,    // the angle sensor stands still: it sent one and the same angle while the table was turned
-    BUS_CAUSE_STICTION = 32,    // the table did not follow its steps: it sticks, or the motor lost them
-    BUS_CAUSE_WRONG_SIGN = 33,    // the table turned against its steps: turn the sign of steps_per_period
+    // no good frame came from the angle sensor: check its power and its cable
+    BUS_CAUSE_SENSOR_TIMED_OUT = 30,
+    // the angle sensor is stuck: it sent the same angle while the table was turned
+    BUS_CAUSE_SENSOR_STUCK = 31,
+    // the table did not follow its steps: it sticks, or the motor lost steps
+    BUS_CAUSE_STICTION = 32,
+    // the table turned against its steps: reverse the sign of steps_per_period
+    BUS_CAUSE_WRONG_SIGN = 33,
     BUS_CAUSE_NOT_CONVERGED = 34,    // the tolerance was not reached within the allowed tries
-    BUS_CAUSE_SENSOR_DISAGREES = 35,    // angle sensor and steps disagree: they tell different ways of the table
-    BUS_CAUSE_PEER_SILENT = 36,    // the other node does not answer: check the cable between the two and its peer_mode
-    BUS_CAUSE_NO_STATION = 37,    // the other node has no such station: write the program to both
-    BUS_CAUSE_PEER_OFF = 38,    // the peer port is not in use: see the settings peer_mode and peer_role
-    BUS_CAUSE_PEER_RESTARTED = 39,    // the other node lost its power while it indexed
+    // angle sensor and steps disagree: they show different movements of the table
+    BUS_CAUSE_SENSOR_DISAGREES = 35,
+    // the other node does not answer: check the cable between the nodes and its peer_mode
+    BUS_CAUSE_PEER_SILENT = 36,
+    // the other node has no such station: write the station list to both
+    BUS_CAUSE_NO_STATION = 37,
+    // the peer port is not in use: see the settings peer_mode and peer_role
+    BUS_CAUSE_PEER_OFF = 38,
+    BUS_CAUSE_PEER_RESTARTED = 39,    // the other node lost its power while it turned its table
     BUS_CAUSE_EEPROM_MISSING = 40,    // the EEPROM does not answer
-    BUS_CAUSE_EEPROM_FAILED = 41,    // the EEPROM does not keep what is written
+    BUS_CAUSE_EEPROM_FAILED = 41,    // the EEPROM did not store the data
     BUS_CAUSE_EEPROM_BUSY = 42,    // the EEPROM is being read or written
-    BUS_CAUSE_NO_JOB = 43,    // no program of stations is stored
-    BUS_CAUSE_JOB_DAMAGED = 44,    // the stored program is damaged
-    BUS_CAUSE_JOB_INCOMPLETE = 45,    // give all stations of a program in order
-    BUS_CAUSE_NO_STATIONS = 46,    // a program needs at least one station
+    BUS_CAUSE_NO_JOB = 43,    // no station list is stored
+    BUS_CAUSE_JOB_DAMAGED = 44,    // the stored station list is damaged
+    BUS_CAUSE_JOB_INCOMPLETE = 45,    // write all stations of a list in order
+    BUS_CAUSE_NO_STATIONS = 46,    // a station list needs at least one station
     BUS_CAUSE_TOO_MANY_STATIONS = 47,    // the EEPROM is full: it holds 360 stations
     BUS_CAUSE_ANGLE_OUT_OF_TURN = 48,    // angles must be below 360 degrees
     BUS_CAUSE_ANGLES_NOT_ASCENDING = 49,    // each angle must be larger than the last
-    BUS_CAUSE_JOB_ACTIVE = 50,    // a job is under way: stop it first
-    BUS_CAUSE_NOT_NOW = 51,    // the job does not wait for that now
-    BUS_CAUSE_EDM_BUSY = 52,    // the machine cuts, or its keys still wait
-    BUS_CAUSE_EDM_ALARM = 53,    // the machine reports an alarm
-    BUS_CAUSE_KEYS_NOT_TAKEN = 54,    // the machine does not take our keys
+    BUS_CAUSE_JOB_ACTIVE = 50,    // a job is in progress: stop it first
+    BUS_CAUSE_NOT_NOW = 51,    // the job does not expect this now
+    BUS_CAUSE_EDM_BUSY = 52,    // the EDM cuts, or its keys are pending
+    BUS_CAUSE_EDM_ALARM = 53,    // the EDM reports an alarm
+    BUS_CAUSE_KEYS_NOT_TAKEN = 54,    // the EDM does not accept our keys
     BUS_CAUSE_CUT_NOT_STARTED = 55,    // the cut did not start in time
     BUS_CAUSE_CUT_NOT_ENDED = 56,    // the cut did not end in time
     BUS_CAUSE_POWER_LOST = 57,    // the power was lost during the job
-    BUS_CAUSE_PAUSED_BY_OPERATOR = 58,    // paused by a person
+    BUS_CAUSE_PAUSED_BY_OPERATOR = 58,    // paused by the operator
     BUS_CAUSE_KEY_WITHOUT_FUNCTION = 59,    // this key has no function
-    BUS_CAUSE_TABLE_POSITION_UNKNOWN = 60,    // nobody knows where the table stands
-    BUS_CAUSE_JOB_CHANGED = 61,    // this is not the program of the job
-    BUS_CAUSE_CHECK_SUB_NODE = 66,    // look at the sub-node: it did not say that it has indexed; its faults are told and reset there
-    BUS_CAUSE_NOTHING_SAVED = 67,    // no values are kept: the defaults are in force
-    BUS_CAUSE_SAVED_DAMAGED = 68,    // the kept values are damaged: the defaults are in force
-    BUS_CAUSE_SAVED_OTHER_BUILD = 69,    // the kept values are of another build: the defaults are in force
-    BUS_CAUSE_SAVED_REFUSED = 70,    // not all kept values are allowed: the others are in force
-    BUS_CAUSE_SAVED_NOT_READ = 71,    // the kept values were not taken: the EEPROM did not answer at power-up, the defaults are in force
+    BUS_CAUSE_TABLE_POSITION_UNKNOWN = 60,    // the position of the table is not known
+    BUS_CAUSE_JOB_CHANGED = 61,    // this is not the list of the job
+    // check the sub-node: it did not report the end of its turn; its faults are shown and reset
+    // there
+    BUS_CAUSE_CHECK_SUB_NODE = 66,
+    BUS_CAUSE_NOTHING_SAVED = 67,    // no values are saved: the defaults are in use
+    BUS_CAUSE_SAVED_DAMAGED = 68,    // the saved values are damaged: the defaults are in use
+    // the saved values are from another build: the defaults are in use
+    BUS_CAUSE_SAVED_OTHER_BUILD = 69,
+    BUS_CAUSE_SAVED_REFUSED = 70,    // some saved values are not allowed: the others are in use
+    // the saved values were not read: the EEPROM did not answer at power-up, the defaults are in
+    // use
+    BUS_CAUSE_SAVED_NOT_READ = 71,
 };
 
 enum bus_fault {    // bits
@@ -84,20 +98,22 @@ enum bus_fault {    // bits
     BUS_FAULT_ESTOP = 1 << 2,    // emergency stop
     BUS_FAULT_FOLLOWING_ERROR = 1 << 3,    // following error too large
     BUS_FAULT_ENCODER = 1 << 4,    // encoder fault
-    BUS_FAULT_BUS_WATCHDOG = 1 << 5,    // the line fell silent
+    BUS_FAULT_BUS_WATCHDOG = 1 << 5,    // the bus is silent
     BUS_FAULT_DRIVE = 1 << 6,    // the drive reports a fault
     BUS_FAULT_CPU = 1 << 7,    // the soft core stopped or hangs
     BUS_FAULT_PROFILE_UNDERRUN = 1 << 8,    // the profile ran out of segments
-    BUS_FAULT_STEP_OVERRUN = 1 << 9,    // more steps were owed than may be: too fast for the step timing, or blocked
+    // too many steps are pending: too fast for the step timing, or blocked
+    BUS_FAULT_STEP_OVERRUN = 1 << 9,
 };
 
 enum bus_encoder_event {    // bits
     BUS_ENCODER_EVENT_ILLEGAL_EDGE = 1 << 0,    // both quadrature levels changed at once
-    BUS_ENCODER_EVENT_OVERSPEED = 1 << 1,    // the phase jumped: too fast, or the signal is broken
+    BUS_ENCODER_EVENT_OVERSPEED = 1 << 1,    // the phase jumped: too fast, or the signal is damaged
     BUS_ENCODER_EVENT_AMPLITUDE_LOW = 1 << 2,    // signal too small
     BUS_ENCODER_EVENT_AMPLITUDE_HIGH = 1 << 3,    // signal too large
     BUS_ENCODER_EVENT_DISAGREEMENT = 1 << 4,    // interpolated position and quadrature count differ
-    BUS_ENCODER_EVENT_PULSE_TOO_SHORT = 1 << 5,    // a pulse, or the gap between two, was shorter than deglitch and was not counted
+    // a pulse, or the gap between two pulses, was shorter than deglitch and was not counted
+    BUS_ENCODER_EVENT_PULSE_TOO_SHORT = 1 << 5,
 };
 
 enum bus_state {
@@ -109,7 +125,7 @@ enum bus_state {
     BUS_STATE_STOPPING = 5,    // stopping
     BUS_STATE_FAULTED = 6,    // faulted
     BUS_STATE_PREPARED = 7,    // waiting for the common start
-    BUS_STATE_EXCITED = 8,    // driven in open loop for a record
+    BUS_STATE_EXCITED = 8,    // driven in open loop for a recording
 };
 
 enum bus_flag {    // bits
@@ -123,48 +139,54 @@ enum bus_flag {    // bits
 };
 
 enum bus_calibration_reason {
-    BUS_CALIBRATION_REASON_CALIBRATING = 0,    // learning
+    BUS_CALIBRATION_REASON_CALIBRATING = 0,    // calibrating
     BUS_CALIBRATION_REASON_FROZEN = 1,    // frozen
-    BUS_CALIBRATION_REASON_STANDSTILL = 2,    // the scale stands still
-    BUS_CALIBRATION_REASON_PARTIAL_CIRCLE = 3,    // too little motion: no whole circles
-    BUS_CALIBRATION_REASON_AMPLITUDE = 4,    // amplitude outside its window
-    BUS_CALIBRATION_REASON_DISTORTED = 5,    // offset, gain or phase farther off than can be corrected
-    BUS_CALIBRATION_REASON_TOO_FAST = 6,    // fewer than eight samples a period
+    BUS_CALIBRATION_REASON_STANDSTILL = 2,    // the scale does not move
+    BUS_CALIBRATION_REASON_PARTIAL_CIRCLE = 3,    // too little motion: no complete periods
+    BUS_CALIBRATION_REASON_AMPLITUDE = 4,    // the amplitude is outside its window
+    // offset, gain or quadrature error is larger than the correction allows
+    BUS_CALIBRATION_REASON_DISTORTED = 5,
+    BUS_CALIBRATION_REASON_TOO_FAST = 6,    // fewer than eight samples per period
     BUS_CALIBRATION_REASON_UNSTEADY = 7,    // the speed changes too much
-    BUS_CALIBRATION_REASON_ONE_SPEED = 8,    // all at one speed: a vibration locked to the fringe would not show
-    BUS_CALIBRATION_REASON_VIBRATION = 9,    // vibration locked to the fringe: the bursts disagree
+    // all data are from one speed: a vibration that is synchronous to the signal would not be seen
+    BUS_CALIBRATION_REASON_ONE_SPEED = 8,
+    // a vibration is synchronous to the signal: the bursts disagree
+    BUS_CALIBRATION_REASON_VIBRATION = 9,
 };
 
 enum bus_signal_fault {    // bits
     BUS_SIGNAL_FAULT_TOO_LOW = 1 << 0,    // signal too small
     BUS_SIGNAL_FAULT_TOO_HIGH = 1 << 1,    // signal too large
-    BUS_SIGNAL_FAULT_CLIPPED = 1 << 2,    // the converter is at its end
+    BUS_SIGNAL_FAULT_CLIPPED = 1 << 2,    // the ADC is at the end of its range
     BUS_SIGNAL_FAULT_OFF_CIRCLE = 1 << 3,    // sine and cosine left their circle
-    BUS_SIGNAL_FAULT_JUMP = 1 << 4,    // a sudden step that no motion makes
-    BUS_SIGNAL_FAULT_CHANNEL_STUCK = 1 << 5,    // a leg stands while the other one moves
-    BUS_SIGNAL_FAULT_NO_NOISE = 1 << 6,    // the same code for too long: the noise of a living converter is missing
+    BUS_SIGNAL_FAULT_JUMP = 1 << 4,    // a sudden jump that no motion causes
+    BUS_SIGNAL_FAULT_CHANNEL_STUCK = 1 << 5,    // one channel does not change while the other does
+    // the same code for too long: the noise of a working ADC is missing
+    BUS_SIGNAL_FAULT_NO_NOISE = 1 << 6,
     BUS_SIGNAL_FAULT_COMPARATOR_MISMATCH = 1 << 7,    // comparators and samples have opposite signs
-    BUS_SIGNAL_FAULT_COMPARATOR_STUCK = 1 << 8,    // a leg changes sign, its comparator never does
-    BUS_SIGNAL_FAULT_CHANNEL_MISSING = 1 << 9,    // the comparators change, a leg never changes sign
+    // a channel changes its sign, its comparator does not
+    BUS_SIGNAL_FAULT_COMPARATOR_STUCK = 1 << 8,
+    // the comparators change, a channel never changes its sign
+    BUS_SIGNAL_FAULT_CHANNEL_MISSING = 1 << 9,
     BUS_SIGNAL_FAULT_OFFSET_DRIFT = 1 << 10,    // offset too large
-    BUS_SIGNAL_FAULT_UNBALANCED = 1 << 11,    // amplitudes of sine and cosine too different
-    BUS_SIGNAL_FAULT_NOT_IN_QUADRATURE = 1 << 12,    // sine and cosine not at right angles
+    BUS_SIGNAL_FAULT_UNBALANCED = 1 << 11,    // amplitudes of sine and cosine differ too much
+    BUS_SIGNAL_FAULT_NOT_IN_QUADRATURE = 1 << 12,    // sine and cosine are not at right angles
     BUS_SIGNAL_FAULT_PHASE_JUMP = 1 << 13,    // the phase jumped
     BUS_SIGNAL_FAULT_LOST_COUNT = 1 << 14,    // interpolated position and quadrature count differ
 };
 
 enum bus_calibration_action {
-    BUS_CALIBRATION_ACTION_READ = 0,    // only look
-    BUS_CALIBRATION_ACTION_CALIBRATE = 1,    // learn from here on
-    BUS_CALIBRATION_ACTION_FREEZE = 2,    // learn no more; what was learned stays in force
-    BUS_CALIBRATION_ACTION_CLEAR = 3,    // correct nothing, begin afresh
+    BUS_CALIBRATION_ACTION_READ = 0,    // change nothing, only report
+    BUS_CALIBRATION_ACTION_CALIBRATE = 1,    // calibrate from now on
+    BUS_CALIBRATION_ACTION_FREEZE = 2,    // stop the calibration; the correction stays in use
+    BUS_CALIBRATION_ACTION_CLEAR = 3,    // remove the correction and start again
 };
 
 enum bus_scope_trigger {
     BUS_SCOPE_TRIGGER_NOW = 0,    // at once
     BUS_SCOPE_TRIGGER_MOTION = 1,    // the axis moves or homes
-    BUS_SCOPE_TRIGGER_SETTLING = 2,    // a motion has been played
-    BUS_SCOPE_TRIGGER_ERROR = 3,    // the error reaches the level
+    BUS_SCOPE_TRIGGER_SETTLING = 2,    // a motion has ended and settling begins
+    BUS_SCOPE_TRIGGER_ERROR = 3,    // the following error reaches the level
     BUS_SCOPE_TRIGGER_FAULT = 4,    // a fault latches
 };
 
@@ -178,15 +200,15 @@ enum bus_scope_state {
 enum bus_turn_phase {
     BUS_TURN_PHASE_IDLE = 0,    // at rest
     BUS_TURN_PHASE_READING = 1,    // waiting for the table to settle, and reading its angle
-    BUS_TURN_PHASE_GOING_BELOW = 2,    // going down, below the target
-    BUS_TURN_PHASE_COMING_UP = 3,    // coming up on the long way
+    BUS_TURN_PHASE_GOING_BELOW = 2,    // moving down to below the target
+    BUS_TURN_PHASE_COMING_UP = 3,    // approaching the target from below
     BUS_TURN_PHASE_CLOSING_IN = 4,    // closing in on the target
 };
 
 enum bus_peer_phase {
-    BUS_PEER_PHASE_IDLE = 0,    // nothing was asked for
-    BUS_PEER_PHASE_TURNING = 1,    // the sub-node indexes
-    BUS_PEER_PHASE_TURNED = 2,    // the sub-node has indexed
+    BUS_PEER_PHASE_IDLE = 0,    // nothing was requested
+    BUS_PEER_PHASE_TURNING = 1,    // the sub-node is turning
+    BUS_PEER_PHASE_TURNED = 2,    // the sub-node has turned
     BUS_PEER_PHASE_FAILED = 3,    // the sub-node failed
     BUS_PEER_PHASE_SILENT = 4,    // the sub-node does not answer
 };
@@ -195,14 +217,14 @@ enum bus_job_state {
     BUS_JOB_STATE_LOADING = 0,    // loading
     BUS_JOB_STATE_IDLE = 1,    // ready
     BUS_JOB_STATE_FINISHED = 2,    // all cut
-    BUS_JOB_STATE_STARTING = 3,    // starts
+    BUS_JOB_STATE_STARTING = 3,    // starting
     BUS_JOB_STATE_TURNING = 4,    // table turns
     BUS_JOB_STATE_ARRIVED = 5,    // at station
-    BUS_JOB_STATE_BEGINNING = 6,    // begins cut
+    BUS_JOB_STATE_BEGINNING = 6,    // cut begins
     BUS_JOB_STATE_CUTTING = 7,    // cutting
     BUS_JOB_STATE_FOLLOWING = 8,    // cutting
     BUS_JOB_STATE_ENDED = 9,    // cut done
-    BUS_JOB_STATE_LEAVING = 10,    // leaves
+    BUS_JOB_STATE_LEAVING = 10,    // leaving
     BUS_JOB_STATE_FINISHING = 11,    // finishing
     BUS_JOB_STATE_PAUSED = 12,    // paused
     BUS_JOB_STATE_UNSURE = 13,    // is it cut?
@@ -211,27 +233,32 @@ enum bus_job_state {
 
 enum bus_job_action {
     BUS_JOB_ACTION_START = 0,    // cut all stations from the first one on
-    BUS_JOB_ACTION_PAUSE = 1,    // stand before the next cut or the next station
-    BUS_JOB_ACTION_RESUME = 2,    // go on; if it is unsure whether a station was cut, wait for the end of the cut under way
-    BUS_JOB_ACTION_STOP = 3,    // end the job; a cut under way is left to the machine
+    BUS_JOB_ACTION_PAUSE = 1,    // stop before the next cut or the next station
+    // continue; if it is not known whether a station was cut, wait for the end of the cut in
+    // progress
+    BUS_JOB_ACTION_RESUME = 2,
+    BUS_JOB_ACTION_STOP = 3,    // end the job; the EDM finishes a cut in progress
     BUS_JOB_ACTION_AGAIN = 4,    // cut the station again
-    BUS_JOB_ACTION_NEXT = 5,    // the station is cut: go to the next one
+    BUS_JOB_ACTION_NEXT = 5,    // the station is cut: continue with the next one
 };
 
 enum bus_save_action {
-    BUS_SAVE_ACTION_SAVE = 0,    // keep what differs from the defaults, for the next power-up
-    BUS_SAVE_ACTION_CLEAR = 1,    // begin with the defaults at the next power-up
+    // save all values that differ from their defaults, for the next power-up
+    BUS_SAVE_ACTION_SAVE = 0,
+    BUS_SAVE_ACTION_CLEAR = 1,    // use the defaults from the next power-up on
 };
 
 enum bus_job_flag {    // bits
     BUS_JOB_FLAG_EEPROM = 1 << 0,    // the EEPROM answers
-    BUS_JOB_FLAG_KEYPAD = 1 << 1,    // the key-pad answers
+    BUS_JOB_FLAG_KEYPAD = 1 << 1,    // the keypad answers
     BUS_JOB_FLAG_DISPLAY = 1 << 2,    // the character display answers
-    BUS_JOB_FLAG_CUTTING = 1 << 3,    // the machine cuts
-    BUS_JOB_FLAG_ALARM = 1 << 4,    // the machine reports an alarm
-    BUS_JOB_FLAG_KEYS_PENDING = 1 << 5,    // keys for the machine wait: a person types, or it does not take them
-    BUS_JOB_FLAG_PAUSING = 1 << 6,    // a pause comes next
-    BUS_JOB_FLAG_COPY_DAMAGED = 1 << 7,    // one copy of the program is damaged, the other one is in force
+    BUS_JOB_FLAG_CUTTING = 1 << 3,    // the EDM is cutting
+    BUS_JOB_FLAG_ALARM = 1 << 4,    // the EDM reports an alarm
+    // keys for the EDM are pending: a person is typing, or it does not accept them
+    BUS_JOB_FLAG_KEYS_PENDING = 1 << 5,
+    BUS_JOB_FLAG_PAUSING = 1 << 6,    // the job pauses next
+    // one copy of the station list is damaged, the other one is in use
+    BUS_JOB_FLAG_COPY_DAMAGED = 1 << 7,
 };
 
 // X(code, words), up to a colon
@@ -241,31 +268,31 @@ enum bus_job_flag {    // bits
     X(2, "the command has the wrong length") \
     X(3, "the node has no axis of this number") \
     X(4, "the node has no parameter of this number") \
-    X(5, "the value is outside what this parameter allows") \
+    X(5, "the value is outside the range of this parameter") \
     X(6, "the target is outside the travel") \
     X(7, "the axis has no zero yet") \
     X(8, "the drive is off") \
     X(9, "a fault is latched") \
-    X(10, "the cause of the fault still stands") \
+    X(10, "the cause of the fault is still present") \
     X(11, "the axis is moving") \
-    X(12, "firmware and hardware were not made for each other (register maps differ)") \
+    X(12, "firmware and FPGA do not match (register maps differ)") \
     X(13, "the node has no register at this address") \
     X(14, "stopped by the host") \
     X(15, "no limit switch was found within the travel") \
     X(16, "the limit switch did not open within the home distance") \
     X(17, "the target was not reached within the settling time") \
     X(18, "a fault ended the motion") \
-    X(19, "the motion is under way") \
-    X(20, "no motion was asked for yet") \
+    X(19, "the motion is in progress") \
+    X(20, "no motion was requested yet") \
     X(21, "no index was found within the home distance") \
     X(22, "the axis has no motion prepared") \
-    X(23, "this node was built without that") \
-    X(24, "the motion would take days, or go too far for a change of target") \
-    X(25, "the stairs of this profile are not in order, or too many") \
-    X(26, "no whole segment table is loaded") \
+    X(23, "this node was built without this function") \
+    X(24, "the motion would take days, or is too long for a change of target") \
+    X(25, "the steps of the stepped profile are not in order, or too many") \
+    X(26, "no complete segment table is loaded") \
     X(27, "the segment table is in use") \
     X(30, "no good frame came from the angle sensor") \
-    X(31, "the angle sensor stands still") \
+    X(31, "the angle sensor is stuck") \
     X(32, "the table did not follow its steps") \
     X(33, "the table turned against its steps") \
     X(34, "the tolerance was not reached within the allowed tries") \
@@ -273,35 +300,35 @@ enum bus_job_flag {    // bits
     X(36, "the other node does not answer") \
     X(37, "the other node has no such station") \
     X(38, "the peer port is not in use") \
-    X(39, "the other node lost its power while it indexed") \
+    X(39, "the other node lost its power while it turned its table") \
     X(40, "the EEPROM does not answer") \
-    X(41, "the EEPROM does not keep what is written") \
+    X(41, "the EEPROM did not store the data") \
     X(42, "the EEPROM is being read or written") \
-    X(43, "no program of stations is stored") \
-    X(44, "the stored program is damaged") \
-    X(45, "give all stations of a program in order") \
-    X(46, "a program needs at least one station") \
+    X(43, "no station list is stored") \
+    X(44, "the stored station list is damaged") \
+    X(45, "write all stations of a list in order") \
+    X(46, "a station list needs at least one station") \
     X(47, "the EEPROM is full") \
     X(48, "angles must be below 360 degrees") \
     X(49, "each angle must be larger than the last") \
-    X(50, "a job is under way") \
-    X(51, "the job does not wait for that now") \
-    X(52, "the machine cuts, or its keys still wait") \
-    X(53, "the machine reports an alarm") \
-    X(54, "the machine does not take our keys") \
+    X(50, "a job is in progress") \
+    X(51, "the job does not expect this now") \
+    X(52, "the EDM cuts, or its keys are pending") \
+    X(53, "the EDM reports an alarm") \
+    X(54, "the EDM does not accept our keys") \
     X(55, "the cut did not start in time") \
     X(56, "the cut did not end in time") \
     X(57, "the power was lost during the job") \
-    X(58, "paused by a person") \
+    X(58, "paused by the operator") \
     X(59, "this key has no function") \
-    X(60, "nobody knows where the table stands") \
-    X(61, "this is not the program of the job") \
-    X(66, "look at the sub-node") \
-    X(67, "no values are kept") \
-    X(68, "the kept values are damaged") \
-    X(69, "the kept values are of another build") \
-    X(70, "not all kept values are allowed") \
-    X(71, "the kept values were not taken")
+    X(60, "the position of the table is not known") \
+    X(61, "this is not the list of the job") \
+    X(66, "check the sub-node") \
+    X(67, "no values are saved") \
+    X(68, "the saved values are damaged") \
+    X(69, "the saved values are from another build") \
+    X(70, "some saved values are not allowed") \
+    X(71, "the saved values were not read")
 
 // X(code, words), up to a colon
 #define BUS_FAULT_WORDS(X) \
@@ -310,78 +337,128 @@ enum bus_job_flag {    // bits
     X(2, "emergency stop") \
     X(3, "following error too large") \
     X(4, "encoder fault") \
-    X(5, "the line fell silent") \
+    X(5, "the bus is silent") \
     X(6, "the drive reports a fault") \
     X(7, "the soft core stopped or hangs") \
     X(8, "the profile ran out of segments") \
-    X(9, "more steps were owed than may be")
+    X(9, "too many steps are pending")
 
 // X(code, words), up to a colon
 #define BUS_JOB_STATE_WORDS(X) \
     X(0, "loading") \
     X(1, "ready") \
     X(2, "all cut") \
-    X(3, "starts") \
+    X(3, "starting") \
     X(4, "table turns") \
     X(5, "at station") \
-    X(6, "begins cut") \
+    X(6, "cut begins") \
     X(7, "cutting") \
     X(8, "cutting") \
     X(9, "cut done") \
-    X(10, "leaves") \
+    X(10, "leaving") \
     X(11, "finishing") \
     X(12, "paused") \
     X(13, "is it cut?") \
     X(14, "stopping")
 
 enum bus_operation {
-    BUS_OPERATION_IDENTIFY = 1,    // who is there, and what was it built from
-    BUS_OPERATION_STATUS = 2,    // state, position and faults of an axis; ended is the cause of the last motion
-    BUS_OPERATION_ENABLE = 3,    // drive on (1) or off (0)
-    BUS_OPERATION_HOME = 4,    // find the zero by the method of the parameter home_method
-    BUS_OPERATION_MOVE = 5,    // go to a position; also while the axis moves to another (duration_ticks is 0 then): it goes on from where it is
+    BUS_OPERATION_IDENTIFY = 1,    // build and identity of the node
+    // state, position and faults of an axis; ended is how the last motion ended (a cause)
+    BUS_OPERATION_STATUS = 2,
+    BUS_OPERATION_ENABLE = 3,    // switch the drive on (1) or off (0)
+    BUS_OPERATION_HOME = 4,    // find the zero with the method of the parameter home_method
+    // move to a position; while the axis is already moving it changes the target in flight, and
+    // duration_ticks is 0
+    BUS_OPERATION_MOVE = 5,
     BUS_OPERATION_STOP = 6,    // controlled stop; the drive stays on
-    BUS_OPERATION_RESET_FAULTS = 7,    // clear latched faults whose cause is gone; the drive stays off
+    // clear latched faults whose cause is gone; the drive stays off
+    BUS_OPERATION_RESET_FAULTS = 7,
     BUS_OPERATION_GET_PARAMETER = 8,    // read a parameter
     BUS_OPERATION_SET_PARAMETER = 9,    // write a parameter; not while the axis moves
-    BUS_OPERATION_COUNTERS = 10,    // what happened on the line
-    BUS_OPERATION_ENCODER = 11,    // the sensor as it is now, and where the last homing met its phase zero
+    BUS_OPERATION_COUNTERS = 10,    // counters of the bus
+    // signals of the encoder now, and the phase zero that the last homing found
+    BUS_OPERATION_ENCODER = 11,
     BUS_OPERATION_READ_REGISTER = 12,    // one word of the register map, by byte address
-    BUS_OPERATION_CALIBRATION = 13,    // correction of the sine and cosine: what its learner does, or what it shall do; scatter is in 2^-20 period
-    BUS_OPERATION_GET_CORRECTION = 14,    // offsets in 2^-15 of full scale, factors in 2^-16: sin' = gain (sin - offset) + quadrature_error (cos - offset)
-    BUS_OPERATION_GET_HARMONIC = 15,    // phase error of order k, 1 to 10, in 2^-24 period: cosine cos k phase + sine sin k phase is subtracted
-    BUS_OPERATION_SET_CORRECTION = 16,    // as got; with apply 1 it comes into force with all harmonics set since the last time, with 0 it waits
-    BUS_OPERATION_SET_HARMONIC = 17,    // as got; waits for set_correction, and is 0 unless set
-    BUS_OPERATION_SIGNAL = 18,    // what is wrong with the sine and cosine now, and what came first since reset_faults (bits of signal_fault)
-    BUS_OPERATION_WRITE_REGISTER = 19,    // one word of the register map: only index, capture and compare of the grating blocks
-    BUS_OPERATION_PREPARE = 20,    // plan to go to a position, and wait for start
-    BUS_OPERATION_START = 21,    // begin the prepared motions of these axes (bit n: axis n), all in one tick; none if one of them has none
-    BUS_OPERATION_SEGMENTS = 22,    // the segment table: points loaded, the use in force (as the parameter segments), why not the one wanted
-    BUS_OPERATION_SET_SEGMENTS = 23,    // its points from this border on, in order: position there less the true one; border 0 begins a new table
-    BUS_OPERATION_GET_SEGMENTS = 24,    // its points from this border on
-    BUS_OPERATION_POSITION = 30,    // where an axis is: the shortest answer that tells it
-    BUS_OPERATION_FOLLOW = 34,    // from here to the next request each command to send is answered with the position at that moment
-    BUS_OPERATION_SET_BAUD = 35,    // another baud rate, once this reply has been sent; 115200 again after a break, or 5 s without a request
-    BUS_OPERATION_START_AT_SYNC = 36,    // as start, but at the next mark, which all nodes of the line hear at once; 0 takes it back
-    BUS_OPERATION_ARM_SCOPE = 31,    // record every so many ticks, from before a trigger on; an amplitude drives in open loop, to level at most
-    BUS_OPERATION_SCOPE = 32,    // how far the record is; count is 0 until it is complete
-    BUS_OPERATION_READ_SCOPE = 33,    // five samples from this one on, 0 behind the end; time from sample to sample in 64 clk, position: low word
+    // read or control the sine/cosine calibration; scatter is in 2^-20 period
+    BUS_OPERATION_CALIBRATION = 13,
+    // offsets in 2^-15 of full scale, factors in 2^-16: sin' = gain (sin - offset) +
+    // quadrature_error (cos - offset)
+    BUS_OPERATION_GET_CORRECTION = 14,
+    // phase error of order k, 1 to 10, in 2^-24 period: cosine cos k phase + sine sin k phase is
+    // subtracted
+    BUS_OPERATION_GET_HARMONIC = 15,
+    // the fields of get_correction; apply 1 puts them into use, with all harmonics that were set
+    // before, apply 0 keeps them waiting
+    BUS_OPERATION_SET_CORRECTION = 16,
+    // the fields of get_harmonic; they wait for set_correction; harmonics that are not set are 0
+    BUS_OPERATION_SET_HARMONIC = 17,
+    // signal faults of sine and cosine that are present now, and the first since reset_faults (bits
+    // of signal_fault)
+    BUS_OPERATION_SIGNAL = 18,
+    // one word of the register map: only index, capture and compare of the feedback channels
+    BUS_OPERATION_WRITE_REGISTER = 19,
+    BUS_OPERATION_PREPARE = 20,    // plan a motion to a position, and wait for start
+    // start the prepared motions of these axes (bit n: axis n) in the same tick; none starts if one
+    // of them has no prepared motion
+    BUS_OPERATION_START = 21,
+    // the segment table: number of loaded points, the use in force (as the parameter segments), and
+    // why the requested use is not in force
+    BUS_OPERATION_SEGMENTS = 22,
+    // points of the segment table from this border on, in order: measured minus true position;
+    // border 0 starts a new table
+    BUS_OPERATION_SET_SEGMENTS = 23,
+    BUS_OPERATION_GET_SEGMENTS = 24,    // points of the segment table from this border on
+    BUS_OPERATION_POSITION = 30,    // position of an axis, in the shortest reply
+    // until the next request, each read of the reply returns the position at that moment
+    BUS_OPERATION_FOLLOW = 34,
+    // change the baud rate after this reply; it returns to 115200 after a break, or after 5 s
+    // without a request
+    BUS_OPERATION_SET_BAUD = 35,
+    // as start, but at the next sync, which all nodes of the bus receive at the same time; 0
+    // cancels it
+    BUS_OPERATION_START_AT_SYNC = 36,
+    // record a sample every so many ticks, from before a trigger on; an amplitude other than 0
+    // drives the axis in open loop, until it has moved farther than level
+    BUS_OPERATION_ARM_SCOPE = 31,
+    BUS_OPERATION_SCOPE = 32,    // progress of the recording; count is 0 until it is complete
+    // five samples from this one on, 0 after the end; time between two samples in 64 cycles,
+    // position: low word
+    BUS_OPERATION_READ_SCOPE = 33,
     BUS_OPERATION_GET_SETTING = 40,    // read a setting of a station
     BUS_OPERATION_SET_SETTING = 41,    // write a setting of a station
-    BUS_OPERATION_TURN_TO = 42,    // turn the table of axis 0 to an absolute angle, 0.01 arcsec; refused while an axis moves
-    BUS_OPERATION_TURN_STATE = 43,    // what the table does, how its last index ended, the angle of its last reading; all in 0.01 arcsec
-    BUS_OPERATION_SENSOR = 44,    // the last good frame of the angle sensor in 0.01 arcsec, its age in clk, and frames since power-up
-    BUS_OPERATION_PEER = 45,    // what the peer port does: the last index asked for, the stations of a sub-node that counts them, what was heard
-    BUS_OPERATION_PEER_NEXT = 47,    // the station of its program to which the next order goes in mode printed; kept in the EEPROM
-    BUS_OPERATION_JOB = 48,    // what the job does, at which station (from 0 on), why it waits, for which answers: bits of job_action
+    // turn the table of axis 0 to an absolute angle, in 0.01 arcsec; refused while an axis moves
+    BUS_OPERATION_TURN_TO = 42,
+    // what the table does, how its last turn ended, and the angle of its last reading; all angles
+    // in 0.01 arcsec
+    BUS_OPERATION_TURN_STATE = 43,
+    // the last good frame of the angle sensor in 0.01 arcsec, its age in cycles, and the frames
+    // since power-up
+    BUS_OPERATION_SENSOR = 44,
+    // state of the peer port: the last turn that was requested, the stations of a sub-node that
+    // counts them, and what was received
+    BUS_OPERATION_PEER = 45,
+    // the station of its list to which the next order goes in mode legacy; saved in the EEPROM
+    BUS_OPERATION_PEER_NEXT = 47,
+    // what the job does, its station (from 0), why it waits, and which answers it expects (bits of
+    // job_action)
+    BUS_OPERATION_JOB = 48,
     BUS_OPERATION_JOB_DO = 49,    // start, pause, resume or stop the job, or answer its question
-    BUS_OPERATION_JOB_STATIONS = 50,    // the stored program; writing 1 while it is written or read, then how that ended, or why there is none
-    BUS_OPERATION_JOB_ANGLE = 51,    // angle of a station of the stored program, in 0.01 arcsec
-    BUS_OPERATION_JOB_BEGIN = 52,    // begin a new program; it comes into force when it is saved, and not while a job is under way
-    BUS_OPERATION_JOB_ADD = 53,    // give the new program a station; in their order, from 0 on, with ascending angles
-    BUS_OPERATION_JOB_SAVE = 54,    // write the new program and the settings into the EEPROM; job_stations tells when and how that ended
-    BUS_OPERATION_SAVE_SETTINGS = 58,    // keep parameters and settings in the EEPROM, or forget them; kept tells when and how that ended
-    BUS_OPERATION_SAVED_SETTINGS = 59,    // what is kept, or why not; writing 1 while the EEPROM is written or read; torn 1: one copy was damaged
+    // the stored station list; writing is 1 while it is written or read; ended is how that ended,
+    // or why there is no list
+    BUS_OPERATION_JOB_STATIONS = 50,
+    BUS_OPERATION_JOB_ANGLE = 51,    // angle of a station of the stored list, in 0.01 arcsec
+    // begin a new station list; it replaces the stored one when it is saved; refused while a job is
+    // in progress
+    BUS_OPERATION_JOB_BEGIN = 52,
+    // add a station to the new list: in order, from 0 on, with ascending angles
+    BUS_OPERATION_JOB_ADD = 53,
+    // write the new station list and the settings to the EEPROM; job_stations reports the end
+    BUS_OPERATION_JOB_SAVE = 54,
+    // save parameters and settings to the EEPROM, or clear them; saved_settings reports the end
+    BUS_OPERATION_SAVE_SETTINGS = 58,
+    // the saved values, or why there are none; writing is 1 while the EEPROM is written or read;
+    // damaged 1: one copy was damaged
+    BUS_OPERATION_SAVED_SETTINGS = 59,
 };
 
 // Lengths of whole bodies and offsets of their fields, in bytes, little endian.
@@ -692,7 +769,8 @@ enum bus_operation {
 #define BUS_SAVED_SETTINGS_REPLY_GENERATION 6u    // u32
 #define BUS_SAVED_SETTINGS_REPLY_VALUES 10u    // u16
 
-// X(name, code, length of the request body, length of the reply body if the cause is ok, 1: of an axis, its first field)
+// X(name, code, length of the request body, length of the reply body if the cause is ok, 1 if the
+// first field is an axis)
 #define BUS_OPERATIONS(X) \
     X(identify, 1, 2, 27, 0) \
     X(status, 2, 3, 41, 1) \
@@ -744,73 +822,117 @@ enum bus_operation {
 
 enum bus_parameter {
     BUS_PARAMETER_PERIOD = 1,    // [1 pm] length of one signal period
-    BUS_PARAMETER_COUNTS_PER_PERIOD = 2,    // subdivision N of the read-out
+    BUS_PARAMETER_COUNTS_PER_PERIOD = 2,    // counts of the read-out in one period
     BUS_PARAMETER_TRAVEL_LOW = 3,    // [1/65536 period] lowest target
     BUS_PARAMETER_TRAVEL_HIGH = 4,    // [1/65536 period] highest target
     BUS_PARAMETER_VELOCITY = 5,    // [1 period/s] top speed of a move
     BUS_PARAMETER_ACCELERATION = 6,    // [1 period/s2] largest acceleration
     BUS_PARAMETER_JERK = 7,    // [1 period/s3] largest jerk
-    BUS_PARAMETER_HOMING_SEARCH_SPEED = 8,    // [1 period/s] speed towards the limit switch
-    BUS_PARAMETER_HOMING_LATCH_SPEED = 9,    // [1 period/s] speed while the switch edge is sought
-    BUS_PARAMETER_HOME_DISTANCE = 10,    // [1/65536 period] from the switch edge to the zero
+    // [1 period/s] speed at which homing searches the switch or the index
+    BUS_PARAMETER_HOMING_SEARCH_SPEED = 8,
+    // [1 period/s] speed at which homing searches the edge of the switch
+    BUS_PARAMETER_HOMING_LATCH_SPEED = 9,
+    // [1/65536 period] distance from the edge of the switch to the zero
+    BUS_PARAMETER_HOME_DISTANCE = 10,
     BUS_PARAMETER_HOME_END = 11,    // switch that homing uses: 0 low end, 1 high end
-    BUS_PARAMETER_SETTLE_WINDOW = 12,    // [1/65536 period] a move has ended when the error stays inside this
-    BUS_PARAMETER_SETTLE_TIME = 13,    // [0.001 s] for this long
-    BUS_PARAMETER_SETTLE_TIMEOUT = 14,    // [0.001 s] or is given up after this
-    BUS_PARAMETER_KP = 15,    // [1/65536] servo: proportional gain, see axis_registers.kp
+    // [1/65536 period] a motion has ended when the error has stayed inside this window
+    BUS_PARAMETER_SETTLE_WINDOW = 12,
+    BUS_PARAMETER_SETTLE_TIME = 13,    // [0.001 s] for this time
+    // [0.001 s] a motion that has not ended after this time has failed
+    BUS_PARAMETER_SETTLE_TIMEOUT = 14,
+    // [1/65536] servo: proportional gain, command (2^-15 of full scale) per 2^-16 period
+    BUS_PARAMETER_KP = 15,
     BUS_PARAMETER_KI = 16,    // [1/16777216] servo: integral gain per tick
     BUS_PARAMETER_KD = 17,    // [1/65536] servo: derivative gain
     BUS_PARAMETER_KV = 18,    // [1/65536] servo: velocity feed-forward
     BUS_PARAMETER_KA = 19,    // [1/256] servo: acceleration feed-forward
     BUS_PARAMETER_OUTPUT_LIMIT = 20,    // [1/32768] servo: largest command, of full scale
     BUS_PARAMETER_INTEGRAL_LIMIT = 21,    // [1/32768] servo: largest integral term, of full scale
-    BUS_PARAMETER_DEAD_BAND = 22,    // [1/65536 period] servo: the integrator rests inside this at standstill
-    BUS_PARAMETER_FOLLOWING_LIMIT = 23,    // [1/65536 period] guard: largest following error
-    BUS_PARAMETER_DEGLITCH = 24,    // [1e-9 s] deglitcher: a level must be stable this long, a pulse of pulses and direction too
-    BUS_PARAMETER_OUTLIER_STEP = 25,    // limit filter 1: largest step between samples; 0 off
-    BUS_PARAMETER_OUTLIER_HOLD = 26,    // limit filter 1: samples in a row it may hold back
-    BUS_PARAMETER_AMPLITUDE_LOW = 27,    // encoder: smallest good amplitude, converter counts
-    BUS_PARAMETER_AMPLITUDE_HIGH = 28,    // encoder: largest good amplitude, converter counts
-    BUS_PARAMETER_DISAGREEMENT_LIMIT = 29,    // [1/65536 period] encoder: interpolated position against quadrature count; 0 off
-    BUS_PARAMETER_ENCODER_FAULT_MASK = 30,    // encoder: which events are a fault (bits of encoder_event)
+    // [1/65536 period] servo: the integrator holds while the error at standstill is inside this
+    BUS_PARAMETER_DEAD_BAND = 22,
+    BUS_PARAMETER_FOLLOWING_LIMIT = 23,    // [1/65536 period] interlock: largest following error
+    // [1e-9 s] deglitcher: a level counts when it is stable for this time; a pulse in pulse and
+    // direction mode too
+    BUS_PARAMETER_DEGLITCH = 24,
+    BUS_PARAMETER_OUTLIER_STEP = 25,    // outlier filter: largest difference of two samples; 0 off
+    // outlier filter: largest number of samples in a row that it replaces
+    BUS_PARAMETER_OUTLIER_HOLD = 26,
+    BUS_PARAMETER_AMPLITUDE_LOW = 27,    // encoder: smallest good amplitude, in ADC counts
+    BUS_PARAMETER_AMPLITUDE_HIGH = 28,    // encoder: largest good amplitude, in ADC counts
+    // [1/65536 period] encoder: largest difference of interpolated position and quadrature count; 0
+    // off
+    BUS_PARAMETER_DISAGREEMENT_LIMIT = 29,
+    // encoder: events that are a fault (bits of encoder_event)
+    BUS_PARAMETER_ENCODER_FAULT_MASK = 30,
     BUS_PARAMETER_PWM_FREQUENCY = 31,    // [1 Hz] drive: PWM frequency
-    BUS_PARAMETER_WATCHDOG_TIME = 32,    // [0.001 s] guard: longest silence of the line while a drive is on (all axes); 0: for ever, for a machine that runs by itself
-    BUS_PARAMETER_AUTO_CALIBRATION = 33,    // correction of sine and cosine: 0 frozen, 1 learns
-    BUS_PARAMETER_DECODER_MODE = 34,    // decoder: 0 every edge, 1 every second, 2 every fourth, 3 pulses and direction; other than 0 needs disagreement_limit 0
-    BUS_PARAMETER_FILTER_SKIP = 35,    // [1e-9 s] deglitcher: time between two samples of a level; 0 every clk
-    BUS_PARAMETER_FILTER_TOLERATED = 36,    // deglitcher: samples of the old level that may lie between
-    BUS_PARAMETER_VELOCITY_QUANTUM = 37,    // [1/65536 period] velocity: smallest step of the position; 0 plain difference
-    BUS_PARAMETER_SIGNAL_FAULT_MASK = 38,    // signal: which faults take the drive (bits of signal_fault)
-    BUS_PARAMETER_SIGNAL_CLIP_LEVEL = 39,    // signal: largest good code, converter counts, as in all that follow; 65535 off
-    BUS_PARAMETER_SIGNAL_TOLERANCE = 40,    // signal: largest good distance from the circle; 65535 off
-    BUS_PARAMETER_SIGNAL_JUMP = 41,    // signal: smallest sudden step that is bad; 65535 off
-    BUS_PARAMETER_SIGNAL_NO_NOISE_SAMPLES = 42,    // signal: samples with the same code that are bad; 0 off. Needs noise: 1024 for 0.5 counts rms
-    BUS_PARAMETER_SIGNAL_SPAN = 43,    // signal: way of one leg in which the other must leave its band; 65535 off
-    BUS_PARAMETER_SIGNAL_BAND = 44,    // signal: noise of a leg that stands, largest deviation
-    BUS_PARAMETER_SIGNAL_SIGN_THRESHOLD = 45,    // signal: larger samples have a sure sign; 65535 off
+    // [0.001 s] interlock: longest silence of the bus while a drive is on (all axes); 0: no limit,
+    // for a machine that runs without a host
+    BUS_PARAMETER_WATCHDOG_TIME = 32,
+    // correction of sine and cosine: 0 frozen, 1 calibrates while the axis moves
+    BUS_PARAMETER_AUTO_CALIBRATION = 33,
+    // decoder: 0 every edge, 1 every second, 2 every fourth, 3 pulse and direction; other than 0
+    // needs disagreement_limit 0
+    BUS_PARAMETER_DECODER_MODE = 34,
+    // [1e-9 s] deglitcher: time between two samples of a level; 0: a sample in each cycle
+    BUS_PARAMETER_FILTER_SKIP = 35,
+    // deglitcher: samples of the old level that are tolerated in between
+    BUS_PARAMETER_FILTER_TOLERATED = 36,
+    // [1/65536 period] velocity: smallest step of the position; 0 plain difference
+    BUS_PARAMETER_VELOCITY_QUANTUM = 37,
+    // signal: signal faults that switch the drive off (bits of signal_fault)
+    BUS_PARAMETER_SIGNAL_FAULT_MASK = 38,
+    // signal: largest good code, in ADC counts, as all limits below; 65535 off
+    BUS_PARAMETER_SIGNAL_CLIP_LEVEL = 39,
+    // signal: largest good distance from the circle; 65535 off
+    BUS_PARAMETER_SIGNAL_TOLERANCE = 40,
+    // signal: smallest jump between two samples that is a fault; 65535 off
+    BUS_PARAMETER_SIGNAL_JUMP = 41,
+    // signal: number of samples with the same code that is a fault; 0 off. It needs noise: 1024 for
+    // 0.5 counts rms
+    BUS_PARAMETER_SIGNAL_NO_NOISE_SAMPLES = 42,
+    // signal: movement of one channel in which the other must leave its band; 65535 off
+    BUS_PARAMETER_SIGNAL_SPAN = 43,
+    // signal: largest deviation by noise of a channel that does not move
+    BUS_PARAMETER_SIGNAL_BAND = 44,
+    // signal: the sign of samples above this is reliable; 65535 off
+    BUS_PARAMETER_SIGNAL_SIGN_THRESHOLD = 45,
     BUS_PARAMETER_SIGNAL_OFFSET = 46,    // signal: largest good offset; 65535 off
-    BUS_PARAMETER_SIGNAL_BALANCE = 47,    // signal: largest good difference of the amplitudes; 65535 off
-    BUS_PARAMETER_SIGNAL_QUADRATURE_ERROR = 48,    // signal: largest good amplitude times sine of the phase error; 65535 off
-    BUS_PARAMETER_POSITION_SOURCE = 49,    // position from: 0 phases of sine and cosine (needs SINE, else 1 is the default), 1 counts of A/B, 2 the axis' own steps
-    BUS_PARAMETER_HOME_METHOD = 50,    // homing: CiA 402 methods 1, 2, 17, 18, 33, 34, 35, 37; -1 S0 (switch, way, phase zero), -2 S3 (index on either side)
-    BUS_PARAMETER_HOME_OFFSET = 51,    // [1 period] what the zero that homing finds is called
+    // signal: largest good difference of the amplitudes; 65535 off
+    BUS_PARAMETER_SIGNAL_BALANCE = 47,
+    // signal: largest good amplitude times sine of the phase error; 65535 off
+    BUS_PARAMETER_SIGNAL_QUADRATURE_ERROR = 48,
+    // position from: 0 interpolated sine and cosine (needs SINE, else 1 is the default), 1 counts
+    // of A/B, 2 the steps that the axis sends
+    BUS_PARAMETER_POSITION_SOURCE = 49,
+    // homing: CiA 402 methods 1, 2, 17, 18, 33, 34, 35, 37; -1 S0 (switch, distance, phase zero),
+    // -2 S3 (index on either side)
+    BUS_PARAMETER_HOME_METHOD = 50,
+    BUS_PARAMETER_HOME_OFFSET = 51,    // [1 period] position of the zero that homing finds
     BUS_PARAMETER_DRIVE = 52,    // drive: 0 bridge, 1 steps, 2 DAC
-    BUS_PARAMETER_STEPS_PER_PERIOD = 53,    // [1/4294967296] steps: in one period; the sign turns the direction
+    // [1/4294967296] steps: number in one period; a negative sign reverses the direction
+    BUS_PARAMETER_STEPS_PER_PERIOD = 53,
     BUS_PARAMETER_STEP_HIGH = 54,    // [1e-9 s] steps: shortest pulse
     BUS_PARAMETER_STEP_LOW = 55,    // [1e-9 s] steps: shortest gap
-    BUS_PARAMETER_STEP_SETUP = 56,    // [1e-9 s] steps: direction before a pulse
-    BUS_PARAMETER_STEP_HOLD = 57,    // [1e-9 s] steps: direction after a pulse
-    BUS_PARAMETER_STEP_OUTPUT = 58,    // steps: 0 step and direction, 1 quadrature, 2 pulses up and pulses down
-    BUS_PARAMETER_STEP_INVERT = 59,    // steps: 1 step is active low, 2 direction is low going up, 3 both
-    BUS_PARAMETER_STEP_TRIM = 60,    // steps: the servo's command moves the target by command 2^trim / 65536 period
-    BUS_PARAMETER_DAC_CLOCK = 61,    // [1 Hz] converter: highest clock of its frames
-    BUS_PARAMETER_DAC_TRIM = 62,    // [1/32768] converter: what puts out 0 V, of full scale
+    BUS_PARAMETER_STEP_SETUP = 56,    // [1e-9 s] steps: shortest time from direction to a pulse
+    BUS_PARAMETER_STEP_HOLD = 57,    // [1e-9 s] steps: shortest time from a pulse to direction
+    // steps: 0 step and direction, 1 quadrature, 2 pulses up and pulses down
+    BUS_PARAMETER_STEP_OUTPUT = 58,
+    // steps: 1 step is active low, 2 direction is low when going up, 3 both
+    BUS_PARAMETER_STEP_INVERT = 59,
+    // steps: the servo command shifts the target by command 2^trim / 65536 period
+    BUS_PARAMETER_STEP_TRIM = 60,
+    BUS_PARAMETER_DAC_CLOCK = 61,    // [1 Hz] DAC: highest clock of its frames
+    BUS_PARAMETER_DAC_TRIM = 62,    // [1/32768] DAC: value for an output of 0 V, of full scale
     BUS_PARAMETER_FINE_KP = 63,    // [1/65536] fine stage: proportional gain
     BUS_PARAMETER_FINE_KI = 64,    // [1/16777216] fine stage: integral gain per tick
     BUS_PARAMETER_FINE_LIMIT = 65,    // [1/32768] fine stage: largest command, of full scale
-    BUS_PARAMETER_FINE_REACH = 66,    // [1/65536 period] fine stage: error inside which it takes over; 0 there is none
-    BUS_PARAMETER_FEED_OVERRIDE = 67,    // [1/65536] speed of all profiles, of full; 0 pauses; may change in motion
-    BUS_PARAMETER_FILTERS = 68,    // servo: which filters are in use, 1 the first, 2 the second, 3 both
+    // [1/65536 period] fine stage: it takes over when the error is inside this; 0: there is no fine
+    // stage
+    BUS_PARAMETER_FINE_REACH = 66,
+    // [1/65536] feed override: fraction of full speed of all profiles; 0 pauses; it may change
+    // during a motion
+    BUS_PARAMETER_FEED_OVERRIDE = 67,
+    BUS_PARAMETER_FILTERS = 68,    // servo: filters in use, 1 the first, 2 the second, 3 both
     BUS_PARAMETER_FILTER_1_B0 = 69,    // [1/1073741824] servo: filter 1, coefficient b0
     BUS_PARAMETER_FILTER_1_B1 = 70,    // [1/1073741824] servo: filter 1, coefficient b1
     BUS_PARAMETER_FILTER_1_B2 = 71,    // [1/1073741824] servo: filter 1, coefficient b2
@@ -821,18 +943,30 @@ enum bus_parameter {
     BUS_PARAMETER_FILTER_2_B2 = 76,    // [1/1073741824] servo: filter 2, coefficient b2
     BUS_PARAMETER_FILTER_2_A1 = 77,    // [1/1073741824] servo: filter 2, coefficient -a1
     BUS_PARAMETER_FILTER_2_A2 = 78,    // [1/1073741824] servo: filter 2, coefficient -a2
-    BUS_PARAMETER_PROFILE = 79,    // profile of motions: 0 S-curve, 1 trapezoid (jerk does not count), 2 stairs (velocity and the stepped_ parameters)
-    BUS_PARAMETER_STEPPED_FIRST = 80,    // [1/65536 period/s] stairs (S4): speed of the first, f0
-    BUS_PARAMETER_STEPPED_TIME = 81,    // [0.00025 s] stairs: time on each
-    BUS_PARAMETER_STEPPED_RISE_1 = 82,    // [1/65536 period/s] stairs: height of those in section 1, the mirror of 7
-    BUS_PARAMETER_STEPPED_RISE_2 = 83,    // [1/65536 period/s] stairs: height in section 2, the mirror of 6
-    BUS_PARAMETER_STEPPED_RISE_3 = 84,    // [1/65536 period/s] stairs: height in section 3, the mirror of 5
-    BUS_PARAMETER_STEPPED_BORDER_2 = 85,    // [1/65536] stairs: where section 2 begins, of the way from stepped_first to velocity
-    BUS_PARAMETER_STEPPED_BORDER_3 = 86,    // [1/65536] stairs: where section 3 begins: 1/2 is 1:2:3, S4 prints 1/3
-    BUS_PARAMETER_SEGMENT_COUNT = 87,    // segment table: its segments
+    // profile of motions: 0 S-curve, 1 trapezoid (jerk is ignored), 2 stepped (velocity and the
+    // stepped_ parameters)
+    BUS_PARAMETER_PROFILE = 79,
+    // [1/65536 period/s] stepped profile (S4): speed of the first step, f0
+    BUS_PARAMETER_STEPPED_FIRST = 80,
+    BUS_PARAMETER_STEPPED_TIME = 81,    // [0.00025 s] stepped profile: duration of each step
+    // [1/65536 period/s] stepped profile: increment of a step in section 1, mirrored in 7
+    BUS_PARAMETER_STEPPED_RISE_1 = 82,
+    // [1/65536 period/s] stepped profile: increment in section 2, mirrored in 6
+    BUS_PARAMETER_STEPPED_RISE_2 = 83,
+    // [1/65536 period/s] stepped profile: increment in section 3, mirrored in 5
+    BUS_PARAMETER_STEPPED_RISE_3 = 84,
+    // [1/65536] stepped profile: where section 2 begins, as a fraction between stepped_first and
+    // velocity
+    BUS_PARAMETER_STEPPED_BORDER_2 = 85,
+    // [1/65536] stepped profile: where section 3 begins: 1/2 gives 1:2:3, S4 prints 1/3
+    BUS_PARAMETER_STEPPED_BORDER_3 = 86,
+    BUS_PARAMETER_SEGMENT_COUNT = 87,    // segment table: number of segments
     BUS_PARAMETER_SEGMENT_LENGTH = 88,    // [1/65536 period] segment table: length of a segment
-    BUS_PARAMETER_SEGMENT_FIRST = 89,    // [1/65536 period] segment table: first border, from the place that homing finds
-    BUS_PARAMETER_SEGMENTS = 90,    // segment table: 0 off, 1 a segment has the mean of its borders (S0), 2 straight lines; in force from homing on
+    // [1/65536 period] segment table: first border, from the position that homing finds
+    BUS_PARAMETER_SEGMENT_FIRST = 89,
+    // segment table: 0 off, 1 each segment has the mean of its borders (S0), 2 linear
+    // interpolation; it is in force after homing
+    BUS_PARAMETER_SEGMENTS = 90,
 };
 #define BUS_PARAMETER_COUNT 90u
 
@@ -929,7 +1063,7 @@ enum bus_parameter {
     X(segment_first, 89, -70368744177664LL, 70368744177664LL, 0LL) \
     X(segments, 90, 0LL, 2LL, 0LL)
 
-// parameters of which a node without sine and cosine takes only 0 and the default
+// parameters of which a node without sine and cosine accepts only 0 and the default
 #define BUS_PARAMETERS_OF_SINE 25, 26, 27, 28, 29, 33, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48
 
 // X(parameter, block, register, field), in the order of the addresses
@@ -1013,26 +1147,42 @@ enum bus_parameter {
     X(PROFILE, MOTION)
 
 enum bus_setting {
-    BUS_SETTING_TURN_TOLERANCE = 1,    // [0.01 arcsec] index: it has ended when no more than this is left by the sensor
-    BUS_SETTING_TURN_ALLOWANCE = 2,    // [0.01 arcsec] index: the long way ends so far below the target; more than the error of the worm
-    BUS_SETTING_TURN_TAKE_UP = 3,    // [0.01 arcsec] index: shortest way up before a reading counts; more than the backlash
-    BUS_SETTING_TURN_SHARE = 4,    // [1/100] index: each try goes this share of what is left
-    BUS_SETTING_TURN_TRIES = 5,    // index: tries before it is given up
-    BUS_SETTING_TURN_OVERSHOOTS = 6,    // index: how often it may back off from above the target and come again
-    BUS_SETTING_TURN_SETTLE = 7,    // [0.001 s] index: rest before a reading; more than the latency of the sensor
-    BUS_SETTING_TURN_FRAMES = 8,    // index: frames whose mean is a reading
-    BUS_SETTING_TURN_DISAGREEMENT = 9,    // [0.01 arcsec] index: largest difference of sensor and steps; more than worm error and backlash
-    BUS_SETTING_TURN_DIRECTION = 10,    // index: 0 not through angle 0, 1 the shorter way round, 2 always up
-    BUS_SETTING_PERIODS_PER_TURN = 11,    // periods of axis 0 in a turn of the table; four steps are a period
-    BUS_SETTING_SENSOR_TIMEOUT = 12,    // [0.001 s] sensor: dead when no good frame came for this long
-    BUS_SETTING_SENSOR_ZERO = 13,    // [0.01 arcsec] sensor: what it sends at angle 0
+    // [0.01 arcsec] turn: it has ended when the remainder by the sensor is not larger than this
+    BUS_SETTING_TURN_TOLERANCE = 1,
+    // [0.01 arcsec] turn: the first move ends this far below the target; more than the error of the
+    // worm
+    BUS_SETTING_TURN_ALLOWANCE = 2,
+    // [0.01 arcsec] turn: shortest move up before a reading is valid; more than the backlash
+    BUS_SETTING_TURN_TAKE_UP = 3,
+    BUS_SETTING_TURN_SHARE = 4,    // [1/100] turn: each try moves this share of the remainder
+    BUS_SETTING_TURN_TRIES = 5,    // turn: number of tries before it fails
+    // turn: how often it may move back from above the target and approach again
+    BUS_SETTING_TURN_OVERSHOOTS = 6,
+    // [0.001 s] turn: time at rest before a reading; more than the latency of the sensor
+    BUS_SETTING_TURN_SETTLE = 7,
+    BUS_SETTING_TURN_FRAMES = 8,    // turn: number of frames that are averaged for a reading
+    // [0.01 arcsec] turn: largest difference of sensor and steps; more than worm error and backlash
+    BUS_SETTING_TURN_DISAGREEMENT = 9,
+    // turn: 0 never through angle 0, 1 the shorter direction, 2 always up
+    BUS_SETTING_TURN_DIRECTION = 10,
+    // periods of axis 0 in one turn of the table; four steps are a period
+    BUS_SETTING_PERIODS_PER_TURN = 11,
+    // [0.001 s] sensor: it has failed when no good frame has come for this time
+    BUS_SETTING_SENSOR_TIMEOUT = 12,
+    BUS_SETTING_SENSOR_ZERO = 13,    // [0.01 arcsec] sensor: its reading at angle 0
     BUS_SETTING_READOUT_DECIMALS = 14,    // numeric display: decimals of the position in mm
-    BUS_SETTING_PEER_MODE = 15,    // peer port: 0 not in use, 1 S4's bytes as printed, 2 frames with CRC-32
-    BUS_SETTING_PEER_ROLE = 16,    // peer port: 0 this is the main node, 1 the sub-node that indexes
-    BUS_SETTING_PEER_TIMEOUT = 17,    // [0.001 s] peer port: in mode printed, an index that takes longer has failed
-    BUS_SETTING_JOB_START_LIMIT = 18,    // [1 s] job: longest time from the start keys to the beginning of the cut
+    // peer port: 0 not in use, 1 legacy (bytes of S4), 2 frames with CRC-32
+    BUS_SETTING_PEER_MODE = 15,
+    // peer port: 0 this is the main node, 1 the sub-node, which turns its table
+    BUS_SETTING_PEER_ROLE = 16,
+    // [0.001 s] peer port: in mode legacy, a turn that takes longer has failed
+    BUS_SETTING_PEER_TIMEOUT = 17,
+    // [1 s] job: longest time from the start keys to the beginning of the cut
+    BUS_SETTING_JOB_START_LIMIT = 18,
     BUS_SETTING_JOB_CUT_LIMIT = 19,    // [1 s] job: longest cut
-    BUS_SETTING_JOB_SPEED = 20,    // [1/100] job: speed of the table, of full; told to the sub-node with each order, in mode frames
+    // [1/100] job: speed of the table, of full; sent to the sub-node with each order, in mode
+    // frames
+    BUS_SETTING_JOB_SPEED = 20,
 };
 #define BUS_SETTING_COUNT 20u
 
@@ -1059,6 +1209,7 @@ enum bus_setting {
     X(job_cut_limit, 19, 1LL, 1000000LL, 14400LL) \
     X(job_speed, 20, 1LL, 100LL, 100LL)
 
-#define BUS_VALUES_CRC 0x522AA65Du     // of all of both: what a kept number means
+// Of all parameters and settings: it changes with the meaning of a saved number.
+#define BUS_VALUES_CRC 0x522AA65Du
 
 #endif

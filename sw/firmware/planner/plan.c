@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// plan -- a move as what changes at instants.
+// plan -- a motion as a list of changes at instants.
 //
-// The player adds each tick: target += v, v += a, a += j.
+// In each tick the player adds: target += v, v += a, a += j. The sums over several ticks are in
+// docs/planner.md.
 #include "planner/plan.h"
 
 #include "core/arithmetic.h"
@@ -39,14 +40,14 @@ void plan_add(struct plan* plan, uint32_t tick, struct planner_event event) {
 void plan_advance(struct planner_progress* at, uint32_t ticks) {
     struct planner_state* s = &at->state;
     int64_t jerk = at->jerk + at->landing;
-    s->gone += (uint64_t)s->velocity * ticks + (uint64_t)s->acceleration * pairs(ticks) +
-               (uint64_t)jerk * triples(ticks);
+    s->moved += (uint64_t)s->velocity * ticks + (uint64_t)s->acceleration * pairs(ticks) +
+                (uint64_t)jerk * triples(ticks);
     s->velocity += (int64_t)((uint64_t)s->acceleration * ticks + (uint64_t)jerk * pairs(ticks));
     s->acceleration += jerk * ticks;
     at->tick += ticks;
 }
 
-// What begins at the instant of this slot, which may be a copy of the plan's own.
+// Adds the events of the instant at which `at` is; `at` may be a copy of the progress of the plan.
 static void plan_settle(const struct plan* plan, struct planner_progress* at, uint8_t* next) {
     if (plan->stepped) {
         const struct planner_segment* section = &plan->section[*next];
@@ -77,7 +78,8 @@ bool plan_walk(const struct plan* plan, struct planner_progress* at, uint8_t* ne
         until = plan->event[*next].tick - at->tick;
     }
     const int64_t jerk = at->jerk + at->landing;
-    const bool fits = (int32_t)jerk == jerk;  // of a single tick it tells nothing
+    const bool fits = (int32_t)jerk ==
+                      jerk;  // a jerk above 32 bits is left out: it has no effect within one tick
     if (until > longest) until = longest;
     if (!fits) until = 1;
     *piece = (struct planner_segment){at->state.velocity, at->state.acceleration,

@@ -1,30 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
-// plan_types -- a move as a list of events, and how far it was played.
+// plan_types -- a plan: a motion as a list of events, and how far it has been played.
+//
+// Units: velocity, acceleration and jerk are 2^-40 period per tick, per tick^2 and per tick^3.
+// docs/planner.md has the formulae.
 #ifndef MOIRE_PLAN_TYPES_H
 #define MOIRE_PLAN_TYPES_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-#define PLANNER_EVENTS 60u   // instants at which a move changes; 57 at most
-#define PLANNER_SECTIONS 9u  // of stepped: a tick of rest, three up, two at the top, three down
-#define PLANNER_LONGEST_PIECE 0x800000u  // ticks in one push; profile_player takes 24 bits
+#define PLANNER_EVENTS 60u   // instants at which a motion changes; 57 at most
+#define PLANNER_SECTIONS 9u  // of a stepped profile: a tick at rest, 3 up, 2 at the top, 3 down
+#define PLANNER_LONGEST_PIECE 0x800000u  // ticks in one segment; profile_player has 24 bits
 
 enum planner_cause {
     PLANNER_OK,
-    PLANNER_NO_VELOCITY,  // the limit is zero in units of the player; for a retarget, below
+    PLANNER_NO_VELOCITY,  // the limit is 0 in units of the player; for a retarget, below
                           // PLANNER_LEAST_LIMIT
     PLANNER_NO_ACCELERATION,
-    PLANNER_NO_JERK,   // below two units: no pulse of jerk can be made
-    PLANNER_TOO_LONG,  // a cruise of 2^30 ticks (3 days), a retarget with ramps of 2^27 ticks or
+    PLANNER_NO_JERK,   // below two units: no pulse of jerk is possible
+    PLANNER_TOO_LONG,  // a cruise of 2^30 ticks (3 days); a retarget with ramps of 2^27 ticks or
                        // 2^22 periods, or more
-    PLANNER_BORDERS,   // stepped whose borders or steps are not in order
-    PLANNER_TOO_MANY_LEVELS,  // above 4096
-    PLANNER_STEPPED,          // stepped go on to where they were planned to go
-    PLANNER_NO_PLAN  // none inside the limits was found, even with an eighth of them kept free
+    PLANNER_BORDERS,   // stepped profile: borders or steps are not in order
+    PLANNER_TOO_MANY_LEVELS,  // stepped profile: more than 4096 steps in a section
+    PLANNER_STEPPED,          // the target of a stepped profile cannot change in flight
+    PLANNER_NO_PLAN  // no plan inside the limits was found, even with an eighth of them kept free
 };
 
-struct planner_segment {  // values at its start
+struct planner_segment {  // velocity and acceleration at its start
     int64_t velocity;
     int64_t acceleration;
     int32_t jerk;
@@ -36,36 +39,35 @@ struct planner_event {  // what is added at one instant
     uint32_t tick;
     int8_t velocity;
     int8_t acceleration;
-    uint8_t slot;  // 0..3: of the events of one change of jerk; PLANNER_LANDING: it makes the
-                   // landing exact
+    uint8_t slot;  // 0..3: number of the event in a change of jerk; or PLANNER_LANDING
 };
 
-#define PLANNER_LANDING 4u
+#define PLANNER_LANDING 4u  // slot of an event that makes the landing exact
 
 struct planner_state {  // after a tick
-    uint64_t gone;      // 2^-40 period since the plan began, modulo 2^64
+    uint64_t moved;     // distance since the plan began, in 2^-40 period, modulo 2^64
     int64_t velocity;   // of the next tick
     int64_t acceleration;
 };
 
-struct planner_progress {  // how far a plan was taken
+struct planner_progress {  // how far a plan has been taken
     struct planner_state state;
     int64_t jerk;
-    int64_t landing;  // jerk of the events that make the landing exact
-    uint32_t tick;    // since the plan was made or retargeted, or of this section of stepped
+    int64_t landing;  // jerk of the landing events
+    uint32_t tick;    // since the plan was made or retargeted, or in this section
 };
 
 struct plan {
-    uint32_t ticks;  // of the whole move, from where it was made or retargeted
-    uint8_t count;   // events, or sections of stepped
-    uint8_t next;    // first of them not yet taken; `count`: nothing is left
+    uint32_t ticks;  // of the whole motion, from where it was made or retargeted
+    uint8_t count;   // number of events, or of sections of a stepped profile
+    uint8_t next;    // first event or section that has not been taken; `count`: nothing is left
     uint8_t cause;   // planner_cause: why the last request was refused
     bool stepped;
     struct planner_progress at;
     union {
         struct planner_event event[PLANNER_EVENTS];
-        struct planner_segment section[PLANNER_SECTIONS];  // `jerk` + 1 stepped of constant
-                                                           // velocity, `acceleration` apart
+        // a section is `jerk` + 1 steps of constant velocity, which differ by `acceleration`
+        struct planner_segment section[PLANNER_SECTIONS];
     };
 };
 

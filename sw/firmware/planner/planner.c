@@ -1,40 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
-// planner -- limits, moves from remainder to remainder, stepped.
+// planner -- limits, motions from rest to rest, stepped profiles.
 //
-// The player adds each tick: target += v, v += a, a += j. So a move is three nested sums over its
-// third difference: a pulse of jerk (sum `peak_acceleration` over `jerk_ticks`), its negative
-// `acceleration_ticks` later, and the negative of both `velocity_ticks` later. Sums multiply: the
-// distance is peak_acceleration x acceleration_ticks x velocity_ticks, whatever the shape of the
-// pulse. The three durations are chosen first. Three divisions then leave three remainders, each
-// smaller than the duration it was divided by, and each goes in as one more unit of 2^-40 during
-// just that many ticks: of velocity, of acceleration, of jerk. Nothing is rounded, so nothing is
-// left over at the end.
-//
-// The pulse is that of a continuous motion whose jerk changes at a tick, its positions taken at the
-// ticks: the third difference follows in three steps, 1:4:1, which is the cubic B-spline
-// (Schoenberg, Quart. Appl. Math. 4 (1946) 45). So a retarget finds a motion that it can go on with
-// (retarget.c). A pulse of one tick is a kick, whose third difference stays below its sum.
+// The derivation is in docs/planner.md. In short: a motion is a pulse of jerk, its negative
+// `acceleration` ticks later, and the negative of both `velocity` ticks later. Its distance is the
+// product of the sum of the pulse and these two durations. The durations are chosen first; what the
+// divisions leave over is added in single units, so that nothing is rounded.
 #include "planner/planner.h"
 
 #include "core/arithmetic.h"
 #include "planner/plan.h"
 
-#define ROOM 8u        // kept free for a retarget, of larger limits of jerk and acceleration
-#define ROOM_SHIFT 13  // and a 2^-13th of the velocity
-#define ROOM_JERK \
-    1u  // what those units may add to a peak; those of velocity and acceleration are rounded up
-        // already
-#define LONGEST_RAMP 0x10000000u
-#define LONGEST_CRUISE_BITS 30
-#define MOST_LEVELS 4096u
-#define OVERRIDE_PART 4u  // of the acceleration and the jerk
-#define LEAD 2u           // ticks until a third difference is a step ...
-#define LEFT_OUT 1u       // ... of which the player needs one
+#define ROOM 8u        // units of acceleration and jerk that are kept free for a retarget
+#define ROOM_SHIFT 13  // 2^-13 of the velocity is kept free for it too
+#define ROOM_JERK 1u   // unit that the remainder of a pulse adds to its jerk
+#define LONGEST_RAMP 0x10000000u  // ticks
+#define LONGEST_CRUISE_BITS 30    // of its ticks
+#define MOST_LEVELS 4096u         // steps in a section of a stepped profile
+#define OVERRIDE_PART 4u          // the override adds at most 1/4 of acceleration and jerk
+#define LEAD 2u                   // ticks until a change of jerk is complete
+#define LEFT_OUT 1u               // ticks at the start in which nothing moves
 
-struct durations {
-    uint32_t jerk;          // >= 1
-    uint32_t acceleration;  // >= jerk
-    uint32_t velocity;      // >= jerk + acceleration
+struct durations {          // ticks
+    uint32_t jerk;          // of a pulse of jerk; >= 1
+    uint32_t acceleration;  // from a pulse to its negative; >= jerk
+    uint32_t velocity;      // from the first ramp to the second; >= jerk + acceleration
 };
 
 uint64_t planner_velocity(uint64_t velocity) {
@@ -51,8 +40,8 @@ struct planner_limits planner_limits(uint32_t velocity, uint32_t acceleration, u
 }
 
 void planner_feed_override(const struct planner_limits* limits, uint32_t* slope, uint32_t* curve) {
-    // |velocity| slope <= acceleration / 4;  3 |acceleration| slope + |velocity| curve <= jerk / 4,
-    // half for each
+    // velocity slope <= acceleration / 4, and 3 acceleration slope + velocity curve <= jerk / 4, of
+    // which each term gets half
     uint64_t steep = (uint64_t)ratio((int64_t)(limits->acceleration / OVERRIDE_PART), 32,
                                      limits->velocity | 1),
              bend = 0;
@@ -65,23 +54,24 @@ void planner_feed_override(const struct planner_limits* limits, uint32_t* slope,
     *curve = (uint32_t)least(bend, UINT32_MAX);
 }
 
-static uint64_t held_product(uint64_t wide, uint32_t narrow)  // all ones if it does not fit
-{
+// Saturates at UINT64_MAX.
+static uint64_t saturated_product(uint64_t wide, uint32_t narrow) {
     uint64_t high = (wide >> 32) * narrow, low = (uint64_t)(uint32_t)wide * narrow,
              sum = (high << 32) + low;
     return high >> 32 || sum < low ? UINT64_MAX : sum;
 }
 
-// The velocity reached with such ramps inside the limits.
+// The largest velocity that ramps of these durations reach inside the limits.
 static uint64_t peak_velocity(const struct planner_limits* limits, uint32_t jerk_ticks,
                               uint32_t acceleration_ticks) {
-    uint64_t peak = held_product(limits->acceleration, acceleration_ticks);
-    uint64_t by_jerk = held_product(held_product(limits->jerk, jerk_ticks), acceleration_ticks);
+    uint64_t peak = saturated_product(limits->acceleration, acceleration_ticks);
+    uint64_t by_jerk =
+        saturated_product(saturated_product(limits->jerk, jerk_ticks), acceleration_ticks);
     if (limits->jerk != PLANNER_ANY_JERK && by_jerk < peak) peak = by_jerk;
     return limits->velocity < peak ? limits->velocity : peak;
 }
 
-// Whether `distance` can be gone in these durations inside the limits.
+// Whether a motion of these durations reaches `distance` inside the limits.
 static bool reaches(const struct planner_limits* limits, const struct durations* d,
                     uint64_t distance) {
     uint64_t peak = peak_velocity(limits, d->jerk, d->acceleration);
@@ -95,20 +85,20 @@ static void ramps_of(struct durations* d, uint32_t acceleration_ticks, uint32_t 
     d->velocity = d->acceleration + d->jerk;
 }
 
-// The shortest ramps to the velocity limit.
+// The shortest ramps to the limit of velocity.
 static struct durations ramps_to_top(const struct planner_limits* limits) {
     struct durations d = {0, 0, 0};
     bool trapezoid = limits->jerk == PLANNER_ANY_JERK;
     uint64_t jerk = trapezoid ? 1 : ceiling(limits->acceleration, limits->jerk);
     uint64_t acceleration = ceiling(limits->velocity, limits->acceleration);
-    if (acceleration < jerk) {  // top speed comes before full acceleration
+    if (acceleration < jerk) {  // it is reached before the limit of acceleration
         jerk = acceleration = root(ceiling(limits->velocity, limits->jerk) - 1) + 1ull;
     }
     ramps_of(&d, (uint32_t)least(acceleration, LONGEST_RAMP), (uint32_t)least(jerk, LONGEST_RAMP));
     return d;
 }
 
-// Take single ticks away while the distance is still reached.
+// Takes single ticks away while the distance is still reached.
 static void tighten(const struct planner_limits* limits, struct durations* d, uint64_t distance) {
     bool shorter = true;
     while (shorter) {
@@ -128,10 +118,12 @@ static void tighten(const struct planner_limits* limits, struct durations* d, ui
     }
 }
 
-static bool choose(const struct planner_limits* limits, struct durations* d, uint64_t distance) {
+// Chooses the durations; false: the cruise is too long.
+static bool choose_durations(const struct planner_limits* limits, struct durations* d,
+                             uint64_t distance) {
     *d = ramps_to_top(limits);
     uint64_t top = peak_velocity(limits, d->jerk, d->acceleration);
-    uint32_t shift = 24;  // both of the division fit 64 bits
+    uint32_t shift = 24;  // so that dividend and divisor fit into 64 bits
     uint64_t divisor = top;
     while (divisor >> 32) divisor >>= 1, shift--;
     if (distance >> (LONGEST_CRUISE_BITS + 32 - shift)) return false;
@@ -140,7 +132,7 @@ static bool choose(const struct planner_limits* limits, struct durations* d, uin
 
     if (cruise >= (uint64_t)d->acceleration + d->jerk) {
         d->velocity = (uint32_t)cruise;
-    } else {  // too short for the top speed
+    } else {  // too short to reach the limit of velocity
         uint32_t low = 0, high = d->acceleration, longest_jerk = d->jerk;
         while (high - low > 1) {
             uint32_t middle = low + (high - low) / 2;
@@ -156,32 +148,32 @@ static bool choose(const struct planner_limits* limits, struct durations* d, uin
     return true;
 }
 
-// Whether the limits are possible.
-static enum planner_cause judge(const struct planner_limits* limits) {
+// Whether the limits allow a motion.
+static enum planner_cause check_limits(const struct planner_limits* limits) {
     if (limits->velocity == 0) return PLANNER_NO_VELOCITY;
     if (limits->acceleration == 0) return PLANNER_NO_ACCELERATION;
     if (limits->jerk <= ROOM_JERK) return PLANNER_NO_JERK;
     return PLANNER_OK;
 }
 
-// Events of one change of jerk, from `instant` on.
-static void change(struct plan* plan, uint32_t instant, uint8_t slot, int64_t jerk) {
+// Adds an event of a change of jerk that begins at `instant`.
+static void add_change(struct plan* plan, uint32_t instant, uint8_t slot, int64_t jerk) {
     if (jerk) plan_add(plan, instant + slot, (struct planner_event){.jerk = jerk, .slot = slot});
 }
 
-// A pulse of jerk of this sum.
+// Adds a pulse of jerk with this sum. Its edges are the steps 1/6, 4/6, 1/6 of a cubic B-spline.
 static void pulse(struct plan* plan, uint32_t instant, int64_t sum, uint32_t ticks) {
     const int64_t sign = sum < 0 ? -1 : 1, jerk = sum / ticks, more = sum - jerk * ticks;
     const int64_t outer = sign * (int64_t)((size(jerk) + 5) / 6), inner = jerk - 2 * outer;
     if (ticks == 1) {
         const int64_t kick[] = {outer, inner - outer, outer - inner, -outer};
-        for (uint8_t n = 0; n < 4; n++) change(plan, instant, n, kick[n]);
+        for (uint8_t n = 0; n < 4; n++) add_change(plan, instant, n, kick[n]);
         return;
     }
     const int64_t steps[] = {outer, inner, outer};
     for (uint8_t n = 0; n < 3; n++) {
-        change(plan, instant, n, steps[n]);
-        change(plan, instant + ticks, n, -steps[n]);
+        add_change(plan, instant, n, steps[n]);
+        add_change(plan, instant + ticks, n, -steps[n]);
     }
     if (more == 0) return;
     plan_add(plan, instant + LEAD, (struct planner_event){.jerk = sign, .slot = PLANNER_LANDING});
@@ -189,7 +181,7 @@ static void pulse(struct plan* plan, uint32_t instant, int64_t sum, uint32_t tic
              (struct planner_event){.jerk = -sign, .slot = PLANNER_LANDING});
 }
 
-// Single units of acceleration or velocity for so many ticks.
+// Adds single units of acceleration or velocity for a number of ticks.
 static void units(struct plan* plan, uint32_t instant, int8_t acceleration, int8_t velocity,
                   uint32_t ticks) {
     if (ticks == 0) return;
@@ -202,8 +194,8 @@ static void units(struct plan* plan, uint32_t instant, int8_t acceleration, int8
                                     .slot = PLANNER_LANDING});
 }
 
-// Begin so many ticks later; their steps are zero.
-static void skip(struct plan* plan, uint32_t ticks) {
+// Removes the first ticks of a plan, in which nothing moves.
+static void remove_start(struct plan* plan, uint32_t ticks) {
     struct planner_segment piece;
     bool last;
     while (plan->at.tick < ticks) planner_take_up_to(plan, &piece, &last, ticks - plan->at.tick);
@@ -212,6 +204,7 @@ static void skip(struct plan* plan, uint32_t ticks) {
     plan->at.tick = 0;
 }
 
+// Units that are kept free for a retarget; none of a small limit.
 static uint64_t room(uint64_t limit) { return least(limit >> 20, ROOM); }
 
 bool planner_move(struct plan* plan, const struct planner_limits* limits, int64_t distance) {
@@ -220,15 +213,16 @@ bool planner_move(struct plan* plan, const struct planner_limits* limits, int64_
     struct durations d;
     const int8_t sign = distance < 0 ? -1 : 1;
     const uint64_t length = size(distance);
-    const enum planner_cause cause = judge(limits);
+    const enum planner_cause cause = check_limits(limits);
 
     plan_clear(plan);
     if (cause) return plan_refuse(plan, cause);
     if (length == 0) return true;
     if (inner.jerk != PLANNER_ANY_JERK) inner.jerk -= ROOM_JERK + (uint32_t)room(limits->jerk);
-    if (!choose(&inner, &d, length)) return plan_refuse(plan, PLANNER_TOO_LONG);
+    if (!choose_durations(&inner, &d, length)) return plan_refuse(plan, PLANNER_TOO_LONG);
 
-    // length x 2^24 = velocity x d.velocity + more_velocity, and so on down
+    // length 2^24 = velocity d.velocity + more_velocity, velocity = acceleration d.acceleration +
+    // more_acceleration, and pulse() does the same with the jerk
     const uint64_t whole = length / d.velocity, remainder = (length - whole * d.velocity) << 24,
                    part = remainder / d.velocity;
     const uint64_t velocity = (whole << 24) + part;
@@ -245,7 +239,7 @@ bool planner_move(struct plan* plan, const struct planner_limits* limits, int64_
     units(plan, LEAD + d.velocity, (int8_t)-sign, 0, more_acceleration);
     units(plan, LEAD, 0, sign, more_velocity);
     plan_add(plan, plan->ticks, (struct planner_event){.slot = PLANNER_LANDING});
-    skip(plan, LEFT_OUT);
+    remove_start(plan, LEFT_OUT);
     return true;
 }
 
@@ -274,9 +268,9 @@ bool planner_stepped_move(struct plan* plan, const struct planner_stepped_profil
     if (left >> 38) return plan_refuse(plan, PLANNER_TOO_LONG);
     left <<= 24;
     uint64_t ramp =
-        left / 2 / stepped->ticks;  // sum of the velocities that still fits into half of the way
+        left / 2 / stepped->ticks;  // sum of velocities that fits into half the distance
 
-    // up, as long as the mirrored way down still fits
+    // steps up, while the mirrored steps down fit too
     for (; sections < 3; sections++) {
         uint64_t border = sections < 2 ? stepped->border[sections] : stepped->top,
                  rise = stepped->rise[sections];
@@ -293,14 +287,13 @@ bool planner_stepped_move(struct plan* plan, const struct planner_stepped_profil
         up[sections].jerk = (int32_t)steps;
     }
 
-    // the remainder at the velocity that was reached, or just below it: more_velocity ticks are one
-    // unit faster
+    // the remainder at the velocity that was reached or less: `more` ticks are one unit faster
     uint64_t ticks = ceiling(left, velocity);
     if (ticks >> LONGEST_CRUISE_BITS) return plan_refuse(plan, PLANNER_TOO_LONG);
     uint64_t slow = left / ticks;
     uint32_t more = (uint32_t)(left - slow * ticks);
-    plan->section[plan->count++] = (struct planner_segment){
-        .ticks = 1};  // the player adds half of the first step to the second
+    // a tick at rest first: each step of the player is the mean of two steps of the plan
+    plan->section[plan->count++] = (struct planner_segment){.ticks = 1};
     for (int n = 0; n < 3; n++)
         if (up[n].jerk) {
             up[n].jerk--;

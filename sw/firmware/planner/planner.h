@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// planner -- a move as segments of constant jerk for profile_player, landing exactly. No hardware,
-// no state, no floating point.
+// planner -- plans a motion as segments of constant jerk for profile_player. It ends exactly at the
+// target and stays inside its limits.
 //
-// Limits and moves: planner.c. Another target in flight: retarget.c. What a plan is, and taking it
-// piece by piece: plan.c.
+// The functions use no hardware, no state and no floating point. planner.c has the limits and the
+// motions from rest to rest, retarget.c the change of target in flight, plan.c the list of events.
+// Units: distance 2^-16 period; velocity, acceleration and jerk 2^-40 period per tick, per tick^2
+// and per tick^3. docs/planner.md has the formulae.
 #ifndef MOIRE_PLANNER_H
 #define MOIRE_PLANNER_H
 
@@ -13,51 +15,50 @@
 #include "planner/plan_types.h"
 
 #define PLANNER_TICK_HZ 4000u
-#define PLANNER_ANY_JERK \
-    UINT32_MAX  // limits.jerk: trapezoid, the acceleration changes within three ticks
-#define PLANNER_LEAST_LIMIT \
-    64u  // smaller limits leave a retarget no room for the units that make it exact
+#define PLANNER_ANY_JERK UINT32_MAX  // trapezoid: the acceleration changes within three ticks
+#define PLANNER_LEAST_LIMIT 64u      // least limit for a retarget, which needs units to spare
 
-struct planner_limits {  // 2^-40 period per tick, tick^2, tick^3
+struct planner_limits {
     uint64_t velocity;
     uint64_t acceleration;
     uint32_t jerk;
 };
 
-struct planner_stepped_profile {  // S4: velocity in steps of constant duration, three sections up
-                                  // and three down
-    uint64_t first, top;          // 2^-40 period/tick
-    uint64_t rise[3];             // of a step in sections 1, 2, 3
-    uint64_t border[2];           // velocity at which section 2 and 3 begin
-    uint32_t ticks;               // of a step
+// S4: velocity in steps of constant duration, in three sections up and three down.
+struct planner_stepped_profile {
+    uint64_t first, top;  // velocity of the first and of the last step
+    uint64_t rise[3];     // increment of a step in sections 1, 2, 3
+    uint64_t border[2];   // velocity at which sections 2 and 3 begin
+    uint32_t ticks;       // duration of a step
 };
 
-// In units of the player from 2^-16 period/s; rounded down.
+// Velocity in units of the player, from 2^-16 period/s; rounded down.
 uint64_t planner_velocity(uint64_t velocity);
 
-// The limits from period/s, period/s^2, period/s^3; rounded down, and jerk held to 31 bits.
+// Limits from period/s, period/s^2 and period/s^3; rounded down, the jerk saturates at 31 bits.
 struct planner_limits planner_limits(uint32_t velocity, uint32_t acceleration, uint32_t jerk);
 
-// How fast an override may change while a plan is played, so that this adds a quarter of
-// acceleration and jerk at most: 2^-32 per tick, and per tick^2 (0: not limited).
+// How fast the feed override may change while a plan is played, so that this adds at most a quarter
+// of the limits of acceleration and jerk: in 2^-32 per tick, and per tick^2 (0: not limited).
 void planner_feed_override(const struct planner_limits* limits, uint32_t* slope, uint32_t* curve);
 
-// From rest to rest over `distance` (2^-16 period). false: refused, plan->cause says why.
+// Plans a motion from rest to rest over `distance`. Returns false if it is refused: plan->cause
+// says why.
 bool planner_move(struct plan* plan, const struct planner_limits* limits, int64_t distance);
 
-// The same with S4's seven sections.
+// The same with the stepped profile.
 bool planner_stepped_move(struct plan* plan, const struct planner_stepped_profile* stepped,
                           int64_t distance);
 
-// Where sections 2 and 3 begin, 2^-16 of the way from first to top. S4: 1/6 and 1/2, which is
-// 1:2:3; 1/6 and 1/3 as its paper prints it.
+// Sets the borders of the sections 2 and 3, as fractions between first and top in 2^-16. S4 uses
+// 1/6 and 1/2, which is 1:2:3; its paper prints 1/6 and 1/3.
 void planner_stepped_borders(struct planner_stepped_profile* stepped, uint32_t second,
                              uint32_t third);
 
-// The plan that goes on from where `plan` is when `ticks` more than those taken have been played,
-// which must not be its end, to rest at `distance` (2^-16 period) from where `plan` began. false:
-// refused, made->cause says why. It takes its time, so it calls `meanwhile` now and then, if that
-// is not null; this may take pieces of `plan`.
+// Plans the continuation of `plan` to another target: it joins `plan` `ticks` after the last
+// segment that was taken, which must be before its end, and ends at rest at `distance` from where
+// `plan` began. Returns false if it is refused: made->cause says why. It takes about 300 000 cycles
+// and calls `meanwhile` repeatedly, if that is not null; `meanwhile` may take segments of `plan`.
 bool planner_retarget(struct plan* made, const struct plan* plan, uint32_t ticks,
                       const struct planner_limits* limits, int64_t distance,
                       void (*meanwhile)(void));

@@ -37,7 +37,7 @@ class State(ctypes.Structure):
     """struct planner_state."""
 
     _fields_ = [
-        ("gone", ctypes.c_uint64),
+        ("moved", ctypes.c_uint64),
         ("velocity", ctypes.c_int64),
         ("acceleration", ctypes.c_int64),
     ]
