@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What sw/firmware/calibration/calibration.c computes, in Python's integers: the sine, the ellipse,
-the table, the bursts of a pass.
+"""What sw/firmware/calibration computes, in Python's integers: the sine, the ellipse, the table and
+the bursts of a pass.
 """
 
 from math import isqrt
@@ -94,7 +94,9 @@ def fits(values):
 
 
 def solve(m, largest=4 * UNIT):
-    """The solution of the equations, column 5 the right side, in units of 2^-28, or None."""
+    """The solution of the equations, in 2^-28, or None if they are ill-conditioned; column 5 is the
+    right side.
+    """
     m, size = [row[:] for row in m], len(m)
     columns = [*range(size), 5]
     for i in range(size):
@@ -108,10 +110,10 @@ def solve(m, largest=4 * UNIT):
                 m[j][k] -= factor * m[i][k] >> 28
     solution = [0] * 5
     for i in reversed(range(size)):
-        rest = m[i][5] - sum(m[i][j] * solution[j] >> 28 for j in range(i + 1, size))
-        coarse = quotient(rest * 16, m[i][i])
+        residual = m[i][5] - sum(m[i][j] * solution[j] >> 28 for j in range(i + 1, size))
+        coarse = quotient(residual * 16, m[i][i])
         solution[i] = coarse * (UNIT // 16) + quotient(
-            (rest * 16 - coarse * m[i][i]) * (UNIT // 16), m[i][i]
+            (residual * 16 - coarse * m[i][i]) * (UNIT // 16), m[i][i]
         )
         if abs(solution[i]) > largest:
             return None
@@ -212,7 +214,7 @@ def judge(phases, spoiled=False):
 
 
 def travels(phases):
-    """Way from the first phase to each, 2^-16 period."""
+    """Distance from the first phase to each, 2^-16 period."""
     found, travel, last = [], 0, phases[0]
     for phase in phases:
         travel += (phase - last + 32768 & 65535) - 32768
@@ -252,10 +254,10 @@ def attenuation(half):
 
 
 def fit(block, vibration=None):
-    """The motion, and with it the vibration, through the blocks; None: not well conditioned."""
+    """Fit the motion, and the vibration with it, to the blocks; None if ill-conditioned."""
     size = 3 if vibration is None else 5
     m = [[0] * 6 for _ in range(size)]
-    for n, place in enumerate(block):
+    for n, position in enumerate(block):
         base, window = motion_of(n), window_of(n)
         if vibration is not None:
             base += tuple(
@@ -266,7 +268,7 @@ def fit(block, vibration=None):
             weighed = window * base[i] >> 15
             for j in range(i + 1):  # of two factors the later one is weighed,
                 m[j][i] += weighed * base[j] >> 10
-            m[i][5] += weighed * place
+            m[i][5] += weighed * position
     for i in range(3):
         for j in range(i, 3):  # in the motion alone the earlier one
             m[i][j] = sum(
@@ -278,13 +280,13 @@ def fit(block, vibration=None):
     return solve(m, 1 << 33)
 
 
-def transform(rest):
+def transform(residual):
     """(real, imaginary) of the lines of BLOCKS real numbers: even ones real, odd ones imaginary;
     radix 2 in time, halved at every level.
     """
     points = BLOCKS // 2
     order = [int(f"{n:07b}"[::-1], 2) for n in range(points)]
-    real, imaginary = [rest[2 * n] for n in order], [rest[2 * n + 1] for n in order]
+    real, imaginary = [residual[2 * n] for n in order], [residual[2 * n + 1] for n in order]
     for level in range(7):
         half = 1 << level
         for a in (n for n in range(points) if not n & half):
@@ -312,7 +314,7 @@ def quarter_log2(power):
 
 
 def vibration_of(line, lines):
-    """2^-16 cycle a burst of the line that stays, or None."""
+    """The frequency of the strongest common line, 2^-16 cycle a burst, or None."""
     power = [x * x + y * y for x, y in lines]
     at = max(range(2, LINES - 2), key=lambda n: (line[n], -n))
     at += (power[at + 1] > power[at]) or -(power[at - 1] > power[at])
@@ -327,7 +329,7 @@ def vibration_of(line, lines):
 
 
 class Pass:
-    """A pass of bursts, none of them refused."""
+    """A pass of bursts, none of which is refused."""
 
     def __init__(self, values=IDENTITY):
         self.values, self.bursts, self.spectra, self.every, self.line = values, 0, 0, 0, [0] * LINES
@@ -351,7 +353,7 @@ class Pass:
         return self.values | channels
 
     def take(self, phases, every=1):
-        """False: the burst is refused, since the motion could not be fitted."""
+        """Take a burst; returns False if the motion could not be fitted, which refuses it."""
         candidate = self.candidate()
         _, travel = judge(phases)
         gone, table = travels(phases), [table_entry(candidate, 2 * n + 1) for n in range(BINS)]
@@ -363,11 +365,11 @@ class Pass:
         vibration, solution = 0, fit(block)
         if solution is None:
             return False
-        rest = [
+        residual = [
             clamp(p - position_of_motion(solution, motion_of(n)), 32767) * window_of(n) >> 16
             for n, p in enumerate(block)
         ]
-        lines = transform(rest)
+        lines = transform(residual)
         levels = [quarter_log2(x * x + y * y) for x, y in lines]
         if every != self.every:
             self.spectra = 0
@@ -395,12 +397,12 @@ class Pass:
             for channel, wave in zip(seen[1:], waves):
                 channel[phases[8 * n] >> 9] += window * wave >> 5
             for phase, travelled in zip(phases[8 * n : 8 * n + 8], gone[8 * n :]):
-                rest = clamp(travelled * 16 - table[phase >> 9] - smooth - swing, 32767)
-                seen[0][phase >> 9] += window * rest >> 5
+                residual = clamp(travelled * 16 - table[phase >> 9] - smooth - swing, 32767)
+                seen[0][phase >> 9] += window * residual >> 5
                 smooth += speed
                 swinging -= bend * swing + (1 << 16) >> 17
                 swing += swinging
-            power += window * rest * rest
+            power += window * residual * residual
         square = power >> 17
         weight = 32768 if square <= 1 << 20 else (1 << 35) // square
         step, own = vibration // PHASES, quotient(travel, PHASES - 1)

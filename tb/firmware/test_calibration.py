@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""calibration: equal to its model in every integer, learned from reset, each gate refuses with its
-reason, values stored and restored.
+"""The calibration of the firmware: equal to its model in every integer, complete from reset, each
+check refuses with its reason, values are stored and restored.
 """
 
 import ctypes
@@ -29,12 +29,12 @@ from twin.compiled.calibration import (
 
 
 def circle(turns, count=1024, size=0.8, gain=1.0, phase=0.0, offset=(0.0, 0.0)):
-    """Samples (cos, sin) at equal steps over so many turns, full scale 2^15."""
-    places = [math.tau * (0.1 + turns * n / count) for n in range(count)]
-    hold = lambda leg: max(-32768, min(32767, round(leg * size * 32768)))
+    """Samples (cos, sin) at equal steps over `turns` turns, full scale 2^15."""
+    angles = [math.tau * (0.1 + turns * n / count) for n in range(count)]
+    hold = lambda sample: max(-32768, min(32767, round(sample * size * 32768)))
     return [
         (hold(math.cos(p) + offset[0]), hold(gain * math.sin(p + phase) + offset[1]))
-        for p in places
+        for p in angles
     ]
 
 
@@ -61,7 +61,7 @@ def fit(samples, **window):
 
 
 def fresh(complete=False):
-    """A machine that wants samples; complete: phases."""
+    """A calibration that needs samples; `complete`: one that needs phases."""
     machine = CalibrationRun()
     if complete:
         assert machine.call("restore", ctypes.byref(machine.calibration.values))
@@ -69,7 +69,7 @@ def fresh(complete=False):
     return machine
 
 
-def learned():
+def calibrated():
     machine, _, _, curve = signals.learn(5, 150)
     assert machine.calibration.complete and machine.calibration.reason == model.RUNNING
     return machine, curve
@@ -91,12 +91,14 @@ def test_any_samples_give_the_ellipse_of_the_model():
         )
         noise = draw.choice((0, 30, 3000))
         samples = [
-            tuple(max(-32768, min(32767, leg + draw.randint(-noise, noise))) for leg in sample)
+            tuple(
+                max(-32768, min(32767, sample + draw.randint(-noise, noise))) for sample in sample
+            )
             for sample in samples
         ]
         window = dict(low=draw.choice((0, 5000)), high=draw.choice((65535, 30000)))
-        got, want = fit(samples, **window), model.ellipse_fit(samples, **window)
-        assert got == want
+        got, expected = fit(samples, **window), model.ellipse_fit(samples, **window)
+        assert got == expected
         seen.add(got[0])
     assert seen >= {
         model.RUNNING,
@@ -118,43 +120,52 @@ def test_a_pass_of_any_phases_gives_the_values_of_the_model():
     that is refused between.
     """
     draw, machine = np.random.default_rng(seed()), fresh(complete=True)
-    want = model.Pass(model.IDENTITY)
+    expected = model.Pass(model.IDENTITY)
     line_of_vibration = draw.uniform(3, 120)
     while machine.calibration.accepted + machine.calibration.refused < 2:
         ramp = np.arange(PHASES_OF_BURST) / PHASES_OF_BURST
-        place = (
+        position = (
             draw.uniform()
             + draw.uniform(10, 22) * ramp * draw.choice([-1, 1])
             + draw.uniform(-1, 1) * ramp**2
         )
-        place = place + 0.02 * np.sin(2 * np.pi * (line_of_vibration * ramp + draw.uniform()))
-        place = place + 0.01 * np.sin(2 * np.pi * 2 * place) + draw.normal(0, 0.001, len(place))
-        phases, every = (np.rint(place * 65536).astype(int) & 65535).tolist(), 1 + (want.bursts > 6)
-        assert model.judge(phases)[0] == model.RUNNING and want.take(phases, every)
+        position = position + 0.02 * np.sin(2 * np.pi * (line_of_vibration * ramp + draw.uniform()))
+        position = (
+            position
+            + 0.01 * np.sin(2 * np.pi * 2 * position)
+            + draw.normal(0, 0.001, len(position))
+        )
+        phases, every = (
+            (np.rint(position * 65536).astype(int) & 65535).tolist(),
+            1 + (expected.bursts > 6),
+        )
+        assert model.judge(phases)[0] == model.RUNNING and expected.take(phases, every)
         machine.phases(phases, every=every)
-        if want.bursts == 20:
+        if expected.bursts == 20:
             assert machine.phases(line(0)) == model.STANDSTILL
-        if want.bursts < model.PASS:
+        if expected.bursts < model.PASS:
             got = machine.calibration.pass_
             assert (got.bursts, got.spectra, got.every, got.squares) == (
-                want.bursts,
-                want.spectra,
-                want.every,
-                want.squares,
+                expected.bursts,
+                expected.spectra,
+                expected.every,
+                expected.squares,
             )
             assert (list(got.line), list(got.information), list(got.cosine), list(got.sine)) == (
-                want.line,
-                want.information,
-                want.cosine,
-                want.sine,
+                expected.line,
+                expected.information,
+                expected.cosine,
+                expected.sine,
             )
-            assert (got.slowest, got.fastest) == (min(want.travels), max(want.travels))
+            assert (got.slowest, got.fastest) == (min(expected.travels), max(expected.travels))
     assert (
-        want.bursts == model.PASS
+        expected.bursts == model.PASS
         and machine.calibration.accepted == 1
         and machine.calibration.refused == 1
     )
-    assert machine.values == want.candidate() and machine.calibration.scatter == want.scatter()
+    assert (
+        machine.values == expected.candidate() and machine.calibration.scatter == expected.scatter()
+    )
     assert machine.table == model.table_of(machine.values)
     assert machine.values["sine"][1] == pytest.approx(0.01 * 2**24, rel=0.02)
 
@@ -176,7 +187,7 @@ def test_the_sine_is_true_within_its_points():
     )
 
 
-# ---- what is learned
+# ---- what is found
 
 
 def test_an_ellipse_is_found_to_the_last_bits():
@@ -201,11 +212,11 @@ def test_one_turn_of_64_samples_is_enough_for_the_ellipse():
 def test_a_harmonic_of_the_phase_is_found_whatever_its_size_in_one_pass():
     draw, machine = np.random.default_rng(3), fresh(complete=True)
     while not machine.calibration.accepted:
-        phase = place = (
+        phase = position = (
             draw.uniform() + draw.uniform(12, 20) * np.arange(PHASES_OF_BURST) / PHASES_OF_BURST
         )
-        for _ in range(30):  # the phase at which place = phase - 0.01 sin 3 phase
-            phase = place + 0.01 * np.sin(6 * np.pi * phase)
+        for _ in range(30):  # the phase at which position = phase - 0.01 sin 3 phase
+            phase = position + 0.01 * np.sin(6 * np.pi * phase)
         machine.phases((np.rint(phase * 65536).astype(int) & 65535).tolist())
     found = np.array(machine.values["sine"]) / 2**24, np.array(machine.values["cosine"]) / 2**24
     assert (
@@ -216,7 +227,7 @@ def test_a_harmonic_of_the_phase_is_found_whatever_its_size_in_one_pass():
 
 
 @pytest.mark.parametrize("harmonic", [2, 5, -2, -5])
-def test_the_length_of_the_vector_tells_plus_from_minus(harmonic):
+def test_the_length_of_the_vector_distinguishes_plus_from_minus(harmonic):
     order, size = (harmonic - 1 if harmonic > 0 else 1 - harmonic), 0.001 * np.exp(0.7j)
     turn = np.arange(64) / 64 * 2 * np.pi
     wave = np.exp(1j * turn) + size * np.exp(1j * harmonic * turn)
@@ -229,23 +240,23 @@ def test_the_length_of_the_vector_tells_plus_from_minus(harmonic):
     )
 
 
-def test_one_learner_waits_while_another_is_at_work():
+def test_a_calibration_waits_while_another_one_works_on_its_burst():
     first, second = fresh(complete=True), fresh(complete=True)
     assert first.call("open", ctypes.c_uint16(1), False) and not second.call(
         "open", ctypes.c_uint16(1), False
     )
     assert second.calibration.need == PHASES and second.calibration.refused == 0
-    first.call("freeze", True)  # leaves its burst
+    first.call("freeze", True)  # releases its burst
     assert second.phases(line(15)) == model.RUNNING and second.calibration.pass_.bursts == 1
 
 
-def test_the_test_signal_is_learned_from_reset_within_610_fringes():
-    machine, curve = learned()
+def test_the_test_signal_is_calibrated_from_reset_within_610_fringes():
+    machine, curve = calibrated()
     assert signals.remaining_nm(machine.values, machine.table, curve) <= 0.1
     assert machine.calibration.accepted == 2 and machine.calibration.refused == 0
 
 
-# ---- the gates
+# ---- what is refused
 
 
 @pytest.mark.parametrize(
@@ -261,7 +272,7 @@ def test_the_test_signal_is_learned_from_reset_within_610_fringes():
         (circle(3, phase=0.9), False, model.DISTORTED),
     ],
 )
-def test_the_ellipse_is_refused(samples, spoiled, reason):
+def test_samples_that_give_no_ellipse_are_refused(samples, spoiled, reason):
     machine = fresh()
     machine.calibration.amplitude_low, machine.calibration.amplitude_high = 8000, 40000
     before = machine.values
@@ -278,7 +289,7 @@ def test_the_ellipse_is_refused(samples, spoiled, reason):
         machine.burst(words(circle(3)))
     assert (
         machine.calibration.reason == model.RUNNING and machine.calibration.accepted == 1
-    )  # and it comes back by itself
+    )  # and it recovers by itself
 
 
 @pytest.mark.parametrize(
@@ -306,7 +317,7 @@ def test_the_ellipse_is_refused(samples, spoiled, reason):
         (line(30, 1300) + line(-15, PHASES_OF_BURST - 1300), False, model.UNSTEADY),
     ],
 )
-def test_a_burst_of_phases_is_refused(phases, spoiled, reason):
+def test_a_burst_of_phases_that_cannot_be_used_is_refused(phases, spoiled, reason):
     machine = fresh(complete=True)
     assert machine.phases(phases, spoiled) == reason == model.judge(phases, spoiled)[0]
     assert machine.calibration.pass_.bursts == 0 and machine.calibration.refused == 1
@@ -314,7 +325,7 @@ def test_a_burst_of_phases_is_refused(phases, spoiled, reason):
 
 
 @pytest.mark.parametrize("multiple", [1, 2, 3])
-def test_a_vibration_locked_to_the_fringe_at_one_of_two_speeds_is_taken_off(multiple):
+def test_a_vibration_locked_to_the_fringe_at_one_of_two_speeds_is_subtracted(multiple):
     speeds = iter([600, 700] * 100)
     machine, _, _, curve = signals.learn(3, 600 * multiple, speeds=lambda: next(speeds))
     assert (
@@ -338,7 +349,7 @@ def test_one_speed_is_refused_since_a_locked_vibration_would_not_show():
     machine.call("freeze", True)  # a pass of the same signal from its start
     machine.call("freeze", False)
     machine.calibration.reason = model.ONE_SPEED
-    for _ in range(model.PASS - 1):  # what the pass was refused for stands while the next one runs
+    for _ in range(model.PASS - 1):  # the reason of a refused pass stays while the next one runs
         assert machine.phases(line(draw.uniform(12, 18))) == model.ONE_SPEED
     assert machine.phases(line(15)) == model.RUNNING and machine.calibration.complete
 
@@ -346,8 +357,8 @@ def test_one_speed_is_refused_since_a_locked_vibration_would_not_show():
 # ---- read, freeze, store, restore
 
 
-def test_what_is_restored_equals_what_was_stored():
-    machine, _ = learned()
+def test_restored_values_equal_the_stored_ones():
+    machine, _ = calibrated()
     stored, table, again = bytes(machine.calibration.values), machine.table, fresh()
     assert (
         again.call("restore", ctypes.byref(Values.from_buffer_copy(stored)))
@@ -378,8 +389,8 @@ def test_values_out_of_range_are_not_restored():
     assert not machine.call("restore", ctypes.byref(wrong)) and machine.calibration.need == SAMPLES
 
 
-def test_frozen_values_stand_and_learning_goes_on_when_thawed():
-    machine, _ = learned()
+def test_frozen_values_stay_and_calibration_continues_when_unfrozen():
+    machine, _ = calibrated()
     values = machine.values
     machine.call("freeze", True)
     assert machine.calibration.need == NOTHING
@@ -405,8 +416,8 @@ def test_restored_values_are_loaded_even_if_frozen():
     )
 
 
-def test_forgetting_starts_from_nothing():
-    machine, _ = learned()
+def test_forgetting_starts_from_scratch():
+    machine, _ = calibrated()
     machine.call("forget")
     assert (
         machine.idle() == SAMPLES
@@ -416,7 +427,7 @@ def test_forgetting_starts_from_nothing():
     )
 
 
-def test_a_word_that_was_not_asked_for_changes_nothing():
+def test_a_word_that_was_not_requested_changes_nothing():
     machine = fresh()
     machine.call("freeze", True)
     before = bytes(machine.calibration)

@@ -129,3 +129,17 @@ def test_a_module_includes_only_its_own_and_lower_layers():
             below = other.partition("/")[0]
             assert LAYERS.index(below) <= LAYERS.index(layer), f"{module} includes {other}"
             assert below == layer or {below, layer} != BESIDE, f"{module} includes {other}"
+
+
+def test_directories_of_the_station_do_not_include_each_other_in_a_circle():
+    left = {}
+    for module, others in includes().items():
+        directory = module.rpartition("/")[0]
+        above = {other.rpartition("/")[0] for other in others} - {directory}
+        if directory.startswith("station/"):
+            left.setdefault(directory, set()).update(above)
+    assert len(left) == 5
+    while free := [directory for directory, others in left.items() if not others & left.keys()]:
+        for directory in free:
+            del left[directory]
+    assert not left, f"these include each other in a circle: {sorted(left)}"

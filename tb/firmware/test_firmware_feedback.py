@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""feedback.c: the learner is served burst by burst, what it says reaches the hardware whole, and
-the host is refused what it may not.
+"""The calibration of the image `axis`: it gets its bursts, its values reach the hardware
+together, and the host is refused what would disturb it.
 """
 
 import math
@@ -36,9 +36,10 @@ class Signal:
         self.count += 1
         periods = self.periods[self.count % len(self.periods)]
         if phases:
-            place = [0.123 * self.count + periods * n / 2048 for n in range(2048)]
+            position = [0.123 * self.count + periods * n / 2048 for n in range(2048)]
             seen = [
-                round(65536 * (p + self.error * math.sin(2 * math.tau * p))) & 65535 for p in place
+                round(65536 * (p + self.error * math.sin(2 * math.tau * p))) & 65535
+                for p in position
             ]
             return [later << 16 | earlier for earlier, later in zip(seen[::2], seen[1::2])]
         turn = [math.tau * periods * n / 1024 for n in range(1024)]
@@ -52,19 +53,19 @@ class Signal:
         return [(cos & 65535) << 16 | sin & 65535 for cos, sin in legs]
 
 
-def look(machine, action="read", axis=0):
+def calibration(machine, action="read", axis=0):
     reported = machine.ask("calibration", axis=axis, action=ACTION[action])
     return {**reported, "reason": REASON[reported["reason"]]}
 
 
 def moving(signal=None, learning=True):
-    """A machine that goes at 600 periods a second."""
+    """A machine that moves at 600 periods a second."""
     machine = FakeNode()
     machine.feedback_channels[0].burst = signal or Signal()
     machine.axes[0].speed = speed(600)
     machine.poll(30)
     if learning:
-        look(machine, "calibrate")
+        calibration(machine, "calibrate")
     return machine
 
 
@@ -75,17 +76,17 @@ def correction(machine):
 # ---- from power-up
 
 
-def test_at_power_up_nothing_is_corrected_and_nothing_is_learned():
+def test_at_power_up_nothing_is_corrected_or_calibrated():
     machine = moving(learning=False)
-    grating = machine.feedback_channels[0]
+    channel = machine.feedback_channels[0]
     machine.poll(100)
     assert (
-        grating.correction == IDENTITY
-        and set(grating.points.values()) == {0}
-        and grating.loads == 1
-        and grating.records == []
+        channel.correction == IDENTITY
+        and set(channel.points.values()) == {0}
+        and channel.loads == 1
+        and channel.records == []
     )
-    assert look(machine) == dict(
+    assert calibration(machine) == dict(
         reason="frozen", converged=0, frozen=1, accepted=0, refused=0, scatter=0
     )
     assert correction(machine) == IDENTITY and machine.ask(
@@ -93,7 +94,7 @@ def test_at_power_up_nothing_is_corrected_and_nothing_is_learned():
     ) == dict(cosine=0, sine=0)
 
 
-def test_the_settings_of_the_user_reach_the_grating():
+def test_the_parameters_of_the_user_reach_the_feedback_channel():
     machine = FakeNode()
     word = machine.feedback_channels[0].word
     assert (
@@ -133,7 +134,7 @@ def test_the_settings_of_the_user_reach_the_grating():
     assert word[DEFINES["FEEDBACK_DECODER_MODE"]] == 2
 
 
-def test_the_deglitcher_counts_samples_that_lie_so_far_apart():
+def test_the_deglitcher_counts_samples_at_the_set_distance():
     machine = FakeNode()
     machine.set(
         deglitch=10_000, filter_skip=1000, filter_tolerated=3
@@ -142,111 +143,112 @@ def test_the_deglitcher_counts_samples_that_lie_so_far_apart():
     assert machine.axes[0].word[DEFINES["AXIS_SENSING"]] & 0xFFFF == (40 + 4) // 5
 
 
-# ---- the learner
+# ---- the calibration
 
 
-def test_it_learns_in_motion_and_what_it_learned_is_loaded_at_once():
+def test_an_axis_is_calibrated_in_motion_and_its_values_are_loaded_at_once():
     machine = moving()
-    grating = machine.feedback_channels[0]
+    channel = machine.feedback_channels[0]
     for _ in range(20000):
         machine.poll()
-        if grating.loads == 3:
+        if channel.loads == 3:
             break
-    reported, learned = look(machine), correction(machine)
+    reported, values = calibration(machine), correction(machine)
     assert (
         reported["reason"],
         reported["converged"],
         reported["accepted"],
         reported["refused"],
     ) == ("calibrating", 1, 2, 0)
-    assert learned["sin_offset"] == pytest.approx(1000, abs=8) and learned[
+    assert values["sin_offset"] == pytest.approx(1000, abs=8) and values[
         "cos_offset"
     ] == pytest.approx(-600, abs=8)
-    assert grating.correction == learned
+    assert channel.correction == values
     second = machine.ask("get_harmonic", axis=0, order=2)
     assert second["sine"] == pytest.approx(0.002 * 2**24, rel=0.02) and abs(second["cosine"]) < 1000
-    assert grating.points[32] == pytest.approx(0.002 * 2**20, rel=0.03) and grating.points[
+    assert channel.points[32] == pytest.approx(0.002 * 2**20, rel=0.03) and channel.points[
         96
     ] == pytest.approx(-0.002 * 2**20, rel=0.03)
     both = (
         DEFINES["FEEDBACK_STROBES_LOAD_CORRECTION_MASK"]
         | DEFINES["FEEDBACK_STROBES_SWAP_HARMONICS_MASK"]
     )
-    assert {strobes & both for strobes in grating.strobes} == {0, both}
-    # 2048 phases of 100 kHz at 600 periods a second are 12 periods: every one is kept. 1024
+    assert {strobes & both for strobes in channel.strobes} == {0, both}
+    # 2048 phases of 100 kHz at 600 periods a second are 12 periods: every one is recorded. 1024
     # samples: every second
-    assert grating.records[0] == (False, 2) and set(grating.records[2:]) == {(True, 1)}
+    assert channel.records[0] == (False, 2) and set(channel.records[2:]) == {(True, 1)}
 
-    look(machine, "freeze")
-    records = len(grating.records)
+    calibration(machine, "freeze")
+    records = len(channel.records)
     machine.poll(200)
     assert (
-        look(machine)["reason"] == "frozen"
-        and correction(machine) == learned
-        and len(grating.records) == records
+        calibration(machine)["reason"] == "frozen"
+        and correction(machine) == values
+        and len(channel.records) == records
     )
-    look(machine, "clear")
+    calibration(machine, "clear")
     machine.poll(50)
     assert (
-        grating.correction == IDENTITY
-        and set(grating.points.values()) == {0}
-        and look(machine)["converged"] == 0
+        channel.correction == IDENTITY
+        and set(channel.points.values()) == {0}
+        and calibration(machine)["converged"] == 0
     )
 
 
-def test_a_slow_axis_keeps_fewer_samples_and_a_standing_one_none():
+def test_a_slow_axis_records_fewer_samples_and_one_at_standstill_none():
     for rate, every in ((30, 48), (150, 9), (6000, 1)):
         machine = moving(learning=False)
         machine.axes[0].speed = -speed(rate)
-        look(machine, "calibrate")
+        calibration(machine, "calibrate")
         machine.poll(5)
         assert machine.feedback_channels[0].records[0] == (False, pytest.approx(every, abs=1))
     for standing in (0, speed(10), -speed(10)):
         machine = moving(learning=False)
         machine.axes[0].speed = standing
-        look(machine, "calibrate")
+        calibration(machine, "calibrate")
         machine.poll(50)
         assert (
-            machine.feedback_channels[0].records == [] and look(machine)["reason"] == "standstill"
+            machine.feedback_channels[0].records == []
+            and calibration(machine)["reason"] == "standstill"
         )
     machine.axes[0].speed = speed(600)
     machine.poll(2)
-    assert look(machine)["reason"] == "calibrating"
+    assert calibration(machine)["reason"] == "calibrating"
 
 
 def test_a_burst_is_begun_again_when_the_speed_changed_twofold():
     machine = moving(learning=False)
-    grating = machine.feedback_channels[0]
-    grating.delay = 10**6
+    channel = machine.feedback_channels[0]
+    channel.delay = 10**6
     machine.axes[0].speed = speed(30)
-    look(machine, "calibrate")
+    calibration(machine, "calibrate")
     machine.poll(3)
     machine.axes[0].speed = speed(100)
     machine.poll(3)
-    assert len(grating.records) == 2 and grating.records[1][1] < grating.records[0][1] / 2
+    assert len(channel.records) == 2 and channel.records[1][1] < channel.records[0][1] / 2
     machine.axes[0].speed = speed(120)
     machine.poll(3)
-    assert len(grating.records) == 2
+    assert len(channel.records) == 2
     machine.axes[0].speed = 0
     machine.poll(3)
-    assert len(grating.records) == 2 and look(machine)["reason"] == "standstill"
+    assert len(channel.records) == 2 and calibration(machine)["reason"] == "standstill"
 
 
-def test_a_spoiled_burst_is_refused_in_words():
+def test_a_spoiled_burst_is_refused_with_its_reason():
     machine = moving(learning=False)
     machine.feedback_channels[0].spoiled = True
-    look(machine, "calibrate")
+    calibration(machine, "calibrate")
     machine.poll(70)
-    assert look(machine)["reason"] == "amplitude" and look(machine)["refused"] >= 1
+    assert calibration(machine)["reason"] == "amplitude" and calibration(machine)["refused"] >= 1
 
 
 def test_a_poll_takes_no_more_words_than_fit_its_time():
     machine = moving()
     machine.poll(3)
-    grating = machine.feedback_channels[0]
-    before = grating.taken
+    channel = machine.feedback_channels[0]
+    before = channel.taken
     machine.poll()
-    assert grating.taken - before == 32
+    assert channel.taken - before == 32
     plain = machine.read
 
     def read(offset):  # a word takes 0.4 ms
@@ -255,19 +257,19 @@ def test_a_poll_takes_no_more_words_than_fit_its_time():
 
     machine.answers = type(machine.answers[0])(read), machine.answers[1]
     machine.firmware.register_bridge(*machine.answers)
-    before = grating.taken
+    before = channel.taken
     machine.poll()
-    assert grating.taken - before == 3
+    assert channel.taken - before == 3
 
 
-def test_nothing_is_learned_while_an_axis_homes():
+def test_nothing_is_calibrated_while_an_axis_homes():
     machine = FakeNode(Axis(low=-(10**7)), Axis())
     machine.feedback_channels[1].burst = Signal()
     machine.axes[1].speed = speed(600)
     machine.poll(100)
     machine.ask("enable", axis=0, on=1)
     machine.ask("home", axis=0)
-    look(machine, "calibrate", axis=1)
+    calibration(machine, "calibrate", axis=1)
     machine.poll(50)
     assert machine.status(0)["state"] == "homing" and machine.feedback_channels[1].records == []
 
@@ -275,24 +277,24 @@ def test_nothing_is_learned_while_an_axis_homes():
 # ---- values stored and restored
 
 
-def test_values_that_were_stored_come_into_force_together():
+def test_stored_values_come_into_force_together():
     machine = moving(learning=False)
-    grating = machine.feedback_channels[0]
+    channel = machine.feedback_channels[0]
     machine.ask("set_harmonic", axis=0, order=3, cosine=5008, sine=-7000)
     machine.ask("set_correction", axis=0, apply=0, **VALUES)
     machine.poll(50)
-    assert grating.loads == 1 and correction(machine) == IDENTITY
+    assert channel.loads == 1 and correction(machine) == IDENTITY
     machine.ask("set_correction", axis=0, apply=1, **VALUES)
     machine.poll(50)
-    assert grating.loads == 2 and grating.correction == VALUES == correction(machine)
+    assert channel.loads == 2 and channel.correction == VALUES == correction(machine)
     assert machine.ask("get_harmonic", axis=0, order=3) == dict(cosine=5008, sine=-7000)
-    assert grating.points[0] == 313 and look(machine)["converged"] == 1
+    assert channel.points[0] == 313 and calibration(machine)["converged"] == 1
     machine.ask(
         "set_correction", axis=0, apply=1, **VALUES
     )  # harmonics are those set since the last time: none
     machine.poll(50)
     assert machine.ask("get_harmonic", axis=0, order=3) == dict(cosine=0, sine=0) and set(
-        grating.points.values()
+        channel.points.values()
     ) == {0}
 
 
@@ -320,28 +322,30 @@ def test_values_out_of_range_are_refused_and_change_nothing(name, values):
     assert correction(machine) == IDENTITY and machine.feedback_channels[0].loads == 1
 
 
-def test_the_learner_and_the_parameter_are_one_switch():
+def test_the_operation_and_the_parameter_are_one_switch():
     machine = moving()
     known = dict(axis=0, parameter=PARAMETER["auto_calibration"]["id"])
-    assert machine.ask("get_parameter", **known)["value"] == 1 and look(machine)["frozen"] == 0
+    assert (
+        machine.ask("get_parameter", **known)["value"] == 1 and calibration(machine)["frozen"] == 0
+    )
     machine.set(auto_calibration=0)
     machine.poll()
-    assert look(machine)["frozen"] == 1
+    assert calibration(machine)["frozen"] == 1
 
 
 # ---- signal faults and registers
 
 
-def test_signal_faults_are_shown_and_the_first_ones_forgotten_with_the_faults():
+def test_signal_faults_are_reported_and_cleared_with_the_faults():
     machine = FakeNode()
-    grating = machine.feedback_channels[0]
-    grating.word.update(
+    channel = machine.feedback_channels[0]
+    channel.word.update(
         {DEFINES["FEEDBACK_SIGNAL_FAULTS"]: 0x4001, DEFINES["FEEDBACK_FIRST_SIGNAL_FAULTS"]: 0x10}
     )
     assert machine.ask("signal", axis=0) == dict(faults=0x4001, first=0x10)
-    grating.strobes.clear()
+    channel.strobes.clear()
     machine.ask("reset_faults", axis=0)
-    assert grating.strobes == [DEFINES["FEEDBACK_STROBES_CLEAR_SIGNAL_FAULTS_MASK"]]
+    assert channel.strobes == [DEFINES["FEEDBACK_STROBES_CLEAR_SIGNAL_FAULTS_MASK"]]
 
 
 def test_only_index_capture_and_compare_may_be_written():
@@ -382,17 +386,17 @@ def test_only_index_capture_and_compare_may_be_written():
         "COMPARE_GAP",
         "COMPARE_STATE",
     }
-    places = {address(name, axis) for name in allowed for axis in (0, 1)}
-    for place in range(0, 0x1000, 4):
-        cause = machine.request("write_register", address=place, value=0)[0]
-        assert cause == ("ok" if place in places else "no_such_register"), hex(place)
+    addresses = {address(name, axis) for name in allowed for axis in (0, 1)}
+    for offset in range(0, 0x1000, 4):
+        cause = machine.request("write_register", address=offset, value=0)[0]
+        assert cause == ("ok" if offset in addresses else "no_such_register"), hex(offset)
     assert (
         machine.request("write_register", address=address("INDEX") + 1, value=0)[0]
         == "no_such_register"
     )
 
 
-def test_the_burst_of_the_learner_is_not_read_by_others():
+def test_the_burst_of_the_calibration_cannot_be_read_by_the_host():
     machine = FakeNode()
     assert (
         machine.request("read_register", address=address("RECORDER_WORD"))[0] == "no_such_register"

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""peer.c: two nodes over a line that adds, loses and damages bytes; the main node's side is that
-which job.c will call.
+"""The peer port: two nodes over a cable that adds, loses and damages bytes. For a main node the
+test calls what the job calls.
 """
 
 import ctypes
@@ -32,15 +32,15 @@ AXIS = {
 
 
 class Node(FakeNode):
-    """The firmware has one set of variables: so this is one of the two, the test speaks for the
-    other.
+    """One of the two nodes; the test plays the other one, since the compiled firmware has its
+    variables only once.
     """
 
     def __init__(self, mode, role):
         self.random = random.Random(seed())
         self.table = Table(self.random)
         self.sensor, self.port, self.i2c = Sensor(self.random, self.table), PeerPort(), I2c()
-        self.reported = {"peer_mode": mode, "peer_role": role}
+        self.settings = {"peer_mode": mode, "peer_role": role}
         super().__init__(
             Axis(), image="station", peripherals=FakePeripherals(self.sensor, self.port, self.i2c)
         )
@@ -49,18 +49,18 @@ class Node(FakeNode):
     def begin(self):
         assert self.run(5000, until=lambda: self.firmware.store_state() == READY)
         self.set(**AXIS)
-        self.tell(**self.reported)
+        self.configure(**self.settings)
         self.run(50)
 
     def power_cut(self):
-        """Of the node just now; it has power again at once, and is reported its values."""
+        """Cut the power; it is there again at once, and the node is given its settings again."""
         self.i2c.power_cut(self.random)
         self.port.received.clear()
         self.port.sent.clear()
         self.firmware.firmware_start()
         self.begin()
 
-    def tell(self, **settings):
+    def configure(self, **settings):
         for name, value in settings.items():
             self.ask("set_setting", setting=SETTING[name]["id"], value=value)
 
@@ -72,7 +72,7 @@ class Node(FakeNode):
         return {**peer, "phase": PHASE[peer["phase"]], "ended": CAUSE[peer["ended"]]}
 
     def heard(self, ms=20):
-        """What it sends meanwhile."""
+        """What the node sends meanwhile."""
         self.other = self.port.other = PeerPort()
         self.run(ms)
         return bytes(self.other.received)
@@ -83,8 +83,8 @@ class Node(FakeNode):
 
 def stations(node, *arcsec):
     node.ask("job_begin")
-    for number, place in enumerate(arcsec):
-        node.ask("job_add", station=number, angle=place * ARCSEC)
+    for number, angle in enumerate(arcsec):
+        node.ask("job_add", station=number, angle=angle * ARCSEC)
     node.ask("job_save")
     assert node.run(2000, until=lambda: node.firmware.store_state() == READY)
 
@@ -101,7 +101,7 @@ def frame(body):
 
 
 def bodies(data):
-    """Of all good frames."""
+    """The bodies of all good frames."""
     found = []
     for part in data.split(b"\0"):
         whole, at = b"", 0
@@ -117,23 +117,23 @@ def turn_to(sequence, arcsec):
     return bytes([sequence, OPERATION["turn_to"]]) + round(arcsec * ARCSEC).to_bytes(4, "little")
 
 
-def look(sequence):
+def poll(sequence):
     return bytes([sequence, OPERATION["turn_state"]])
 
 
-# ------------------------------------------------------------------ the sub-node, printed
+# ------------------------------------------------------------------ the sub-node, legacy
 
 
-def test_the_order_as_printed_indexes_to_the_next_station_and_is_answered_as_printed():
+def test_the_legacy_order_turns_to_the_next_station_and_gets_the_legacy_answer():
     node = Node(LEGACY, SUB)
     stations(node, 600, 900, 1500)
-    for place in (600, 900, 1500):
+    for angle in (600, 900, 1500):
         node.say(ORDER)
         assert node.heard(200) == b"" and node.peer()["phase"] == "turning"
         node.port.other = PeerPort()
         assert node.run(60_000, until=lambda: node.port.other.received and not node.port.sent)
         assert bytes(node.port.other.received) == DONE and node.peer()["phase"] == "turned"
-        assert abs(node.table.angle - place) <= 2
+        assert abs(node.table.angle - angle) <= 2
     node.say(ORDER)
     assert node.heard(3000) == b""
     assert (node.peer()["phase"], node.peer()["ended"]) == ("failed", "no_station")
@@ -185,7 +185,7 @@ def test_a_node_that_hears_nothing_but_garbage_for_long_still_hears_an_order():
     assert node.peer()["phase"] == "turning"
 
 
-def test_an_index_that_fails_is_not_answered_and_the_next_order_goes_there_again():
+def test_a_turn_that_fails_is_not_answered_and_the_next_order_tries_it_again():
     node = Node(LEGACY, SUB)
     stations(node, 3600, 7200)
     node.say(ORDER)
@@ -205,7 +205,7 @@ def test_an_index_that_fails_is_not_answered_and_the_next_order_goes_there_again
     )
 
 
-def test_a_second_order_while_it_indexes_is_nothing():
+def test_an_order_that_comes_while_the_table_turns_is_ignored():
     node = Node(LEGACY, SUB)
     stations(node, 600, 1200)
     node.say(ORDER)
@@ -216,17 +216,17 @@ def test_a_second_order_while_it_indexes_is_nothing():
     assert abs(node.table.angle - 600) <= 2 and node.peer()["phase"] == "turned"
 
 
-def indexed(node, place):
-    """An order, and the table is there."""
+def turned(node, angle):
+    """Orders a turn and checks where the table is."""
     node.say(ORDER)
     node.port.other = PeerPort()
     assert node.run(60_000, until=lambda: node.port.other.received and not node.port.sent), (
         node.peer()
     )
-    assert bytes(node.port.other.received) == DONE and abs(node.table.angle - place) <= 2
+    assert bytes(node.port.other.received) == DONE and abs(node.table.angle - angle) <= 2
 
 
-def test_the_next_station_can_be_told_and_is_that_of_before_after_a_power_cut():
+def test_the_next_station_can_be_set_and_survives_a_power_cut():
     node = Node(LEGACY, SUB)
     stations(node, 600, 900, 1500)
     assert node.request("peer_next", station=3)[0] == "no_station"
@@ -234,18 +234,18 @@ def test_the_next_station_can_be_told_and_is_that_of_before_after_a_power_cut():
     node.run(100)
     node.power_cut()
     assert (node.peer()["stations"], node.peer()["next"]) == (3, 2)
-    indexed(node, 1500)
+    turned(node, 1500)
     assert node.peer()["next"] == 3
 
 
-def test_a_sub_node_goes_on_with_its_list_after_a_power_cut_at_any_moment():
-    """What was answered is not gone to again; what was not is, or was counted and the answer lost:
-    never is one left out unseen.
+def test_a_sub_node_continues_its_list_after_a_power_cut_at_any_moment():
+    """A station that was answered is not repeated. One that was not answered is, unless only its
+    answer was lost. None is ever left out unnoticed.
     """
-    node, places = Node(LEGACY, SUB), [300 + 90 * n for n in range(12)]
-    stations(node, *places)
+    node, angles = Node(LEGACY, SUB), [300 + 90 * n for n in range(12)]
+    stations(node, *angles)
     done = 0
-    while done < len(places):
+    while done < len(angles):
         node.say(ORDER)
         node.port.other = PeerPort()
         node.run(
@@ -256,16 +256,16 @@ def test_a_sub_node_goes_on_with_its_list_after_a_power_cut_at_any_moment():
         node.power_cut()
         assert node.peer()["next"] in ((done + 1,) if answered else (done, done + 1))
         done = node.peer()["next"]
-    assert node.peer()["stations"] == len(places)
+    assert node.peer()["stations"] == len(angles)
 
 
-def test_an_order_that_comes_while_the_eeprom_is_read_is_done_when_the_list_is_there():
+def test_an_order_that_comes_while_the_eeprom_is_read_is_done_once_the_list_is_loaded():
     node = Node(LEGACY, SUB)
     stations(node, 300)
     node.i2c.power_cut(node.random)
     node.firmware.firmware_start()
     node.say(ORDER)
-    node.tell(**node.reported)
+    node.configure(**node.settings)
     node.set(**AXIS)
     assert node.peer()["stations"] == 0 and node.peer()["heard"] == 0
     assert (
@@ -274,7 +274,7 @@ def test_an_order_that_comes_while_the_eeprom_is_read_is_done_when_the_list_is_t
     )
 
 
-def test_done_is_said_only_when_the_count_is_in_the_journal():
+def test_done_is_sent_only_when_the_count_is_in_the_journal():
     node = Node(LEGACY, SUB)
     stations(node, 300)
     node.say(ORDER)
@@ -290,7 +290,7 @@ def test_done_is_said_only_when_the_count_is_in_the_journal():
 def test_a_new_list_begins_with_its_first_station():
     node = Node(LEGACY, SUB)
     stations(node, 300, 600)
-    indexed(node, 300)
+    turned(node, 300)
     assert node.peer()["next"] == 1
     stations(node, 300, 600)
     assert node.peer()["next"] == 0
@@ -313,10 +313,10 @@ def test_only_a_sub_node_has_a_next_station():
     )
 
 
-# ------------------------------------------------------------------ the main node, printed
+# ------------------------------------------------------------------ the main node, legacy
 
 
-def test_the_main_node_orders_as_printed_and_waits_for_the_answer():
+def test_the_main_node_sends_the_legacy_order_and_waits_for_the_answer():
     node = Node(LEGACY, MAIN)
     assert node.order(3) == "ok" and node.heard() == ORDER
     assert node.peer()["phase"] == "turning" and node.order(4) == "busy"
@@ -328,12 +328,12 @@ def test_the_main_node_orders_as_printed_and_waits_for_the_answer():
     )
 
 
-def test_an_answer_that_never_comes_is_told_by_time_and_one_that_nobody_waits_for_is_nothing():
+def test_a_missing_answer_is_a_time_out_and_an_unexpected_one_is_ignored():
     node = Node(LEGACY, MAIN)
     node.say(DONE)
     node.run(5)
     assert node.peer()["phase"] == "idle"
-    node.tell(peer_timeout=500)
+    node.configure(peer_timeout=500)
     node.order()
     node.run(490)
     assert node.peer()["phase"] == "turning"
@@ -354,11 +354,11 @@ def test_a_stopped_order_is_over_for_the_main_node():
 # ------------------------------------------------------------------ the sub-node, frames
 
 
-def test_a_frame_is_done_and_answered_with_the_body_of_the_line():
+def test_a_request_in_a_frame_is_done_and_answered_with_the_body_of_the_bus():
     node = Node(FRAMES, SUB)
     node.say(frame(turn_to(7, 600)))
     assert bodies(node.heard()) == [bytes([7, OPERATION["turn_to"], 0])]
-    node.say(frame(look(8)))
+    node.say(frame(poll(8)))
     reply = bodies(node.heard())[0]
     assert (
         reply[:3] == bytes([8, OPERATION["turn_state"], 0])
@@ -370,7 +370,7 @@ def test_a_frame_is_done_and_answered_with_the_body_of_the_line():
     )
 
 
-def test_a_request_that_comes_again_is_answered_again_and_not_acted_on_again():
+def test_a_repeated_request_is_answered_again_and_not_done_again():
     node = Node(FRAMES, SUB)
     node.say(frame(turn_to(1, 600)))
     first = bodies(node.heard())
@@ -388,7 +388,7 @@ def test_a_request_that_comes_again_is_answered_again_and_not_acted_on_again():
     assert len(node.axes[0].pushed) > pushed  # another one is
 
 
-def test_what_is_refused_is_answered_with_its_cause():
+def test_a_refused_request_is_answered_with_its_cause():
     node = Node(FRAMES, SUB)
     for sequence, (body, cause) in enumerate(
         [
@@ -405,7 +405,7 @@ def test_damaged_frames_are_counted_and_not_answered_and_the_next_one_is():
     node, source = Node(FRAMES, SUB), random.Random(seed())
     good = bytes([9, OPERATION["identify"]])
     for _ in range(200):
-        whole = bytearray(frame(look(source.randrange(256))))
+        whole = bytearray(frame(poll(source.randrange(256))))
         kind = source.randrange(4)
         if kind == 0:
             whole[source.randrange(1, len(whole) - 1)] ^= 1 << source.randrange(8)
@@ -433,7 +433,7 @@ def test_a_frame_without_an_end_does_not_hang_the_port():
     for _ in range(100):
         node.say(b"\x55" * 50)
         node.run(5)
-    node.say(frame(look(1)))
+    node.say(frame(poll(1)))
     assert len(bodies(node.heard())) == 1
 
 
@@ -441,7 +441,7 @@ def test_a_frame_without_an_end_does_not_hang_the_port():
 
 
 class Answering:
-    """The sub-node: answers what the main node asks, if `hears` says so."""
+    """The sub-node: answers the requests of the main node, if `hears` says so."""
 
     def __init__(self, node):
         self.node, self.asked, self.phase, self.ended, self.target, self.cause = (
@@ -505,7 +505,7 @@ class Answering:
         return [names[body[1]] for body in self.asked]
 
 
-def test_the_main_node_looks_orders_and_watches_until_the_table_has_indexed():
+def test_the_main_node_polls_orders_and_polls_until_the_table_has_turned():
     node = Node(FRAMES, MAIN)
     sub = Answering(node)
     assert node.order(5, 600) == "ok"
@@ -528,7 +528,7 @@ def test_the_main_node_looks_orders_and_watches_until_the_table_has_indexed():
 
 
 @pytest.mark.parametrize("ended", ["sensor_timed_out", "stiction", "ended_by_fault"])
-def test_the_cause_of_the_sub_node_is_that_of_the_main_node(ended):
+def test_the_main_node_reports_the_cause_of_the_sub_node(ended):
     node = Node(FRAMES, MAIN)
     sub = Answering(node)
     node.order(0, 600)
@@ -544,7 +544,7 @@ def test_the_cause_of_the_sub_node_is_that_of_the_main_node(ended):
 def test_the_speed_goes_before_each_order():
     node = Node(FRAMES, MAIN)
     sub = Answering(node)
-    node.tell(job_speed=25)
+    node.configure(job_speed=25)
     node.order(0, 600)
     sub.run(200)
     reported = next(body for body in sub.asked if body[1] == OPERATION["set_parameter"])
@@ -564,7 +564,7 @@ def test_an_order_that_is_refused_has_failed():
 
 
 @pytest.mark.parametrize("after", [0, 200])
-def test_a_silent_sub_node_is_told_after_two_seconds_of_asking(after):
+def test_a_silent_sub_node_is_reported_after_two_seconds_of_requests(after):
     node = Node(FRAMES, MAIN)
     sub = Answering(node)
     sub.answers = after > 0
@@ -578,7 +578,7 @@ def test_a_silent_sub_node_is_told_after_two_seconds_of_asking(after):
     assert len({body[0] for body in sub.asked[-20:]}) == 1  # the same request each time
 
 
-def test_a_sub_node_that_lost_its_power_is_told():
+def test_a_sub_node_that_lost_its_power_is_reported():
     node = Node(FRAMES, MAIN)
     sub = Answering(node)
     node.order(0, 600)
@@ -622,23 +622,24 @@ def test_stop_reaches_the_sub_node():
     )
 
 
-def test_a_noisy_line_costs_repetitions_and_nothing_else():
+def test_a_noisy_cable_costs_repetitions_and_nothing_else():
     node, source = Node(FRAMES, MAIN), random.Random(seed())
     sub = Answering(node)
 
     def spoil(data):
-        kept = [byte for byte in data if source.random() > 0.01]
+        received = [byte for byte in data if source.random() > 0.01]
         return [
-            byte ^ (1 << source.randrange(8)) if source.random() < 0.01 else byte for byte in kept
+            byte ^ (1 << source.randrange(8)) if source.random() < 0.01 else byte
+            for byte in received
         ]
 
     node.port.spoil, answer = spoil, node.say
     node.say = lambda data: answer(spoil(data))
     for station in range(10):
         assert node.order(station, 100 + station) == "ok"
-        before, place = sub.target, (100 + station) * ARCSEC
+        before, angle = sub.target, (100 + station) * ARCSEC
         assert (
-            sub.run(3000, until=lambda before=before: sub.target != before) and sub.target == place
+            sub.run(3000, until=lambda before=before: sub.target != before) and sub.target == angle
         )
         sub.phase, sub.ended = 0, "ok"
         assert sub.run(3000, until=lambda: node.peer()["phase"] == "turned")
@@ -657,13 +658,13 @@ def test_a_node_whose_peer_port_is_not_in_use_orders_nothing_and_obeys_nothing()
     assert node.order() == "peer_off" and node.heard() == b""
     node = Node(0, SUB)
     stations(node, 600)
-    node.say(ORDER + frame(look(1)))
+    node.say(ORDER + frame(poll(1)))
     assert node.heard() == b"" and node.peer()["phase"] == "idle"
     node = Node(LEGACY, SUB)
     assert node.order() == "peer_off"
 
 
-def test_a_node_without_a_peer_port_says_so():
+def test_a_node_without_a_peer_port_reports_that():
     node = Node(FRAMES, MAIN)
     node.peripherals.parts = [node.sensor]
     assert node.order() == "not_built"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""readout.c: the position of axis 0 in mm on eight digits."""
+"""The readout: the position of axis 0 in mm on eight digits."""
 
 from fractions import Fraction
 

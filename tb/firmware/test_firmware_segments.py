@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""segments.c: a table is loaded in order and whole or not used, in force only at rest and with a
-zero, and it lies where the zero is.
+"""The segment table: it is loaded in order and used only when complete, in force only at rest and
+with a zero, and it begins at the zero.
 """
 
 import pytest
@@ -19,7 +19,7 @@ def table(machine, points=POINTS, **more):
     machine.set(segment_count=len(points) - 1, segment_length=LENGTH, segment_first=FIRST, **more)
 
 
-def look(machine):
+def state(machine):
     reported = machine.ask("segments", axis=0)
     return reported["loaded"], reported["in_force"], CAUSE[reported["reason"]]
 
@@ -44,14 +44,14 @@ def block(point=0, border=0, points=1):
 def test_a_table_in_force_is_the_one_that_was_loaded_and_reads_back():
     machine = homed()
     table(machine)
-    assert look(machine) == (30, 0, "ok")
+    assert state(machine) == (30, 0, "ok")
     machine.set(segments=2)
     machine.poll(4)
-    grating = machine.feedback_channels[0]
-    assert look(machine) == (30, 2, "ok") and grating.use == dict(
+    channel = machine.feedback_channels[0]
+    assert state(machine) == (30, 2, "ok") and channel.use == dict(
         linear=True, segments=29, length=LENGTH, origin=FIRST
     )
-    assert [grating.segments[n] for n in range(30)] == POINTS
+    assert [channel.segments[n] for n in range(30)] == POINTS
     back = [
         machine.ask("get_segments", axis=0, border=border)[f"point_{n}"]
         for border in (0, 12, 24)
@@ -61,7 +61,7 @@ def test_a_table_in_force_is_the_one_that_was_loaded_and_reads_back():
 
 
 @pytest.mark.parametrize("offset", [-3, 0, 70])
-def test_the_table_counts_from_the_place_that_homing_finds_whatever_it_is_called(offset):
+def test_the_table_counts_from_the_position_that_homing_finds_whatever_its_number(offset):
     machine = homed(home_offset=offset)
     table(machine, segments=1)
     machine.set(home_offset=offset + 5)  # counts from the next homing on
@@ -70,52 +70,52 @@ def test_the_table_counts_from_the_place_that_homing_finds_whatever_it_is_called
     machine.ask("home", axis=0)
     assert machine.feedback_channels[0].use is None
     machine.run(300)
-    assert machine.feedback_channels[0].use["origin"] == FIRST + (offset + 5) * PERIOD and look(
+    assert machine.feedback_channels[0].use["origin"] == FIRST + (offset + 5) * PERIOD and state(
         machine
     ) == (30, 1, "ok")
 
 
-def test_without_a_zero_it_is_not_in_force_and_says_so():
+def test_without_a_zero_the_table_is_not_in_force_and_the_reason_is_reported():
     machine = FakeNode(Axis(position=0))
     table(machine, segments=1)
     machine.poll(4)
-    assert look(machine) == (30, 0, "not_homed") and machine.feedback_channels[0].use is None
+    assert state(machine) == (30, 0, "not_homed") and machine.feedback_channels[0].use is None
 
 
-def test_a_zero_that_is_lost_takes_it_out_of_force():
+def test_losing_the_zero_takes_the_table_out_of_force():
     machine = homed()
     table(machine, segments=1)
     machine.poll(4)
     machine.axes[0].causes = 1 << 4  # encoder
     machine.poll(4)
     machine.axes[0].causes = 0
-    assert look(machine) == (30, 0, "not_homed") and machine.feedback_channels[0].use is None
+    assert state(machine) == (30, 0, "not_homed") and machine.feedback_channels[0].use is None
 
 
-def test_without_a_whole_table_it_is_not_in_force_and_says_so():
+def test_an_incomplete_table_is_not_in_force_and_the_reason_is_reported():
     machine = homed()
     table(machine, POINTS[:24])
     machine.set(segment_count=24, segments=1)
     machine.poll(4)
-    assert look(machine) == (24, 0, "no_segments")
+    assert state(machine) == (24, 0, "no_segments")
     machine.set(segments=0)
     machine.set(segment_count=23)
     machine.set(segments=1)
     machine.poll(4)
-    assert look(machine) == (24, 1, "ok")
+    assert state(machine) == (24, 1, "ok")
 
 
-def test_one_use_follows_on_another_with_none_between():
+def test_the_use_of_the_table_changes_directly_to_another_one():
     machine = homed()
     table(machine, segments=1)
     machine.poll(4)
     machine.feedback_channels[0].uses.clear()
     machine.set(segments=2)
     machine.poll(4)
-    assert machine.feedback_channels[0].uses == [None, True] and look(machine) == (30, 2, "ok")
+    assert machine.feedback_channels[0].uses == [None, True] and state(machine) == (30, 2, "ok")
     machine.set(segments=0)
     machine.poll(4)
-    assert machine.feedback_channels[0].use is None and look(machine) == (30, 0, "ok")
+    assert machine.feedback_channels[0].use is None and state(machine) == (30, 0, "ok")
 
 
 def test_a_moving_axis_is_refused_a_change():
@@ -133,7 +133,7 @@ def test_a_table_in_use_is_not_changed():
     assert machine.request("set_segments", **block())[0] == "segments_in_use"
     for name in ("segment_count", "segment_length", "segment_first"):
         assert refused(machine, name, 1) == "segments_in_use"
-    assert look(machine) == (30, 1, "ok")
+    assert state(machine) == (30, 1, "ok")
 
 
 def test_points_out_of_order_too_many_or_too_large_are_refused():
@@ -151,10 +151,10 @@ def test_points_out_of_order_too_many_or_too_large_are_refused():
         machine.ask("set_segments", **block(point=-(1 << 23) + 1, border=border, points=12))
     assert machine.request("set_segments", **block(border=252, points=5))[0] == "out_of_range"
     machine.ask("set_segments", **block(border=252, points=4))
-    assert look(machine)[0] == 256
+    assert state(machine)[0] == 256
 
 
-def test_a_node_without_a_table_says_so():
+def test_a_node_without_a_table_reports_that():
     machine = homed()
     machine.feedback_channels[0].most_segments = 0
     assert machine.request("set_segments", **block())[0] == "not_built"

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""settings.c and the images: what a node of one image answers, and what one of the other does not
-have.
+"""The settings and the images: what a node of each image answers, and what it refuses because its
+image does not have it.
 """
 
 import pytest
@@ -46,7 +46,7 @@ def test_an_operation_that_an_image_lacks_is_not_built(station):
     assert FakeNode().request("turn_to", angle=0)[0] == "not_built"
 
 
-def test_an_axis_that_does_not_exist_is_told_by_both_images(station):
+def test_both_images_refuse_an_axis_that_does_not_exist(station):
     assert station.request("calibration", axis=1, action=0)[0] == "no_such_axis"
     assert FakeNode().request("calibration", axis=1, action=0)[0] == "no_such_axis"
 

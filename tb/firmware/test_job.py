@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""job.c with machine.c: whole jobs between a sub-node and the machine, every failure provoked, and
-no station ever cut twice.
-"""
+"""Jobs: all stations are cut, every failure is provoked, and no station is ever cut twice."""
 
 import random
 
@@ -16,7 +14,7 @@ FRAMES, PRINTED = 2, 1
 
 
 def node(frames=True, angles=ANGLES, panel=False, **options):
-    """A main node with a sub-node and a program."""
+    """A main node with a sub-node and a station list."""
     station = Station(absent=() if panel else ("keypad", "display"), **options)
     station.sub_node = SubNode(frames=frames)
     station.setting(
@@ -52,14 +50,14 @@ def test_a_job_cuts_every_station_once_and_in_order(frames):
     assert cuts(station) == 2 * STATIONS
 
 
-def test_the_sub_node_is_told_the_speed_before_each_station():
+def test_the_sub_node_receives_the_speed_before_each_station():
     station = node()
     station.setting(job_speed=50)
     start(station)
     assert station.sub_node.speeds == [32768] * STATIONS
 
 
-def test_the_table_turns_only_while_the_machine_rests():
+def test_the_table_turns_only_while_the_machine_is_at_rest():
     station = node()
     assert station.do("start") == "ok"
     while station.job()["state"] != "finished":
@@ -79,7 +77,7 @@ def test_every_cut_is_in_the_journal_before_the_keys_are_sent():
                 for at in range(0, len(record), 64)
                 if record[at : at + 4] != b"\xff" * 4
             ),
-            key=lambda line: int.from_bytes(line[:4], "little"),
+            key=lambda record: int.from_bytes(record[:4], "little"),
         )
         assert (newest[8], newest[10]) == (n, 3)  # station, cut begun
         station.until("ended", "leaving", "turning", "finishing")
@@ -88,7 +86,7 @@ def test_every_cut_is_in_the_journal_before_the_keys_are_sent():
 # a person
 
 
-def test_pause_stands_before_the_next_cut_and_resume_goes_on():
+def test_pause_stops_before_the_next_cut_and_resume_continues():
     station = node()
     start(station, "cutting")
     assert station.do("pause") == "ok" and "pausing" in station.job()["flags"]
@@ -106,7 +104,7 @@ def test_pause_stands_before_the_next_cut_and_resume_goes_on():
     assert cuts(station) == STATIONS
 
 
-def test_pause_while_the_table_turns_stands_before_the_cut():
+def test_pause_while_the_table_turns_stops_before_the_cut():
     station = node()
     start(station, "turning")
     station.do("pause")
@@ -129,7 +127,7 @@ def test_stop_ends_the_job_wherever_it_is(at):
     station.run(3000)
     assert cuts(station) == begun and station.sub_node.there_at is None
     station.power_cut()
-    assert station.ready()["state"] == "idle"  # nothing is left of it
+    assert station.ready()["state"] == "idle"  # nothing remains of the job
 
 
 @pytest.mark.parametrize(
@@ -142,13 +140,13 @@ def test_stop_ends_the_job_wherever_it_is(at):
         ("pause", "not_now"),
     ],
 )
-def test_answers_that_nobody_waits_for_are_refused(action, cause):
+def test_actions_that_do_not_apply_are_refused(action, cause):
     station = node()
     assert station.do(action) == cause and station.job()["answers"] == {"start"}
     assert station.request("job_do", action=6)[0] == "out_of_range"
 
 
-def test_a_program_is_not_changed_while_a_job_is_under_way():
+def test_the_station_list_cannot_change_while_a_job_is_under_way():
     station = node()
     start(station, "cutting")
     for operation, fields in (("job_begin", {}), ("job_save", {})):
@@ -158,7 +156,7 @@ def test_a_program_is_not_changed_while_a_job_is_under_way():
     assert station.load([5]) == "ok"
 
 
-def test_the_keys_pending_while_a_person_types():
+def test_the_keys_wait_while_a_person_types():
     station = node()
     station.edm.types_until = station.clk + ms(25_000)
     start(station, "cutting")
@@ -173,7 +171,7 @@ def test_the_keys_pending_while_a_person_types():
 # the machine
 
 
-def test_a_cut_that_does_not_start_is_asked_about_and_no_key_is_sent_again():
+def test_after_a_cut_that_does_not_start_a_person_is_asked_and_no_key_is_sent_again():
     station = node()
     station.edm.deaf = True
     job = start(station, "unsure")
@@ -186,7 +184,7 @@ def test_a_cut_that_does_not_start_is_asked_about_and_no_key_is_sent_again():
     assert cuts(station) == STATIONS
 
 
-def test_next_takes_the_station_for_cut():
+def test_next_counts_the_station_as_cut():
     station = node()
     station.edm.deaf = True
     start(station, "unsure")
@@ -196,12 +194,12 @@ def test_next_takes_the_station_for_cut():
     assert cuts(station) == STATIONS - 1 and station.sub_node.angles == ANGLES
 
 
-def test_a_cut_that_does_not_end_is_asked_about_and_may_be_followed():
+def test_after_a_cut_that_does_not_end_a_person_is_asked_and_may_follow_it():
     station = node()
     station.edm.endless = True
     job = start(station, "unsure")
     assert job["cause"] == "cut_not_ended" and job["answers"] == {"resume", "next", "stop"}
-    assert station.do("again") == "edm_busy"  # it would cut twice
+    assert station.do("again") == "edm_busy"  # else it would cut twice
     assert station.do("resume") == "ok"
     station.until("following")
     station.edm.endless = False
@@ -209,7 +207,7 @@ def test_a_cut_that_does_not_end_is_asked_about_and_may_be_followed():
     assert cuts(station) == STATIONS
 
 
-def test_next_waits_until_the_machine_rests():
+def test_next_waits_until_the_machine_is_at_rest():
     station = node()
     station.edm.endless = True
     start(station, "unsure")
@@ -221,7 +219,7 @@ def test_next_waits_until_the_machine_rests():
     assert cuts(station) == STATIONS
 
 
-def test_an_alarm_in_the_cut_is_asked_about_with_its_words():
+def test_after_an_alarm_in_the_cut_a_person_is_asked_and_the_panel_shows_why():
     station = node(panel=True)
     start(station, "cutting")
     assert station.run(2000, until=lambda: station.edm.inputs & 1)
@@ -240,7 +238,7 @@ def test_an_alarm_in_the_cut_is_asked_about_with_its_words():
     assert cuts(station) == STATIONS + 1  # the person said so
 
 
-def test_an_alarm_that_comes_a_little_after_the_end_of_the_cut_counts():
+def test_an_alarm_shortly_after_the_end_of_the_cut_counts():
     station = node()
     start(station, "cutting")
     assert station.run(2000, until=lambda: station.edm.inputs & 1)
@@ -266,14 +264,14 @@ def test_an_alarm_before_the_cut_pauses():
     assert cuts(station) == STATIONS
 
 
-def test_a_cut_of_a_few_milliseconds_is_seen():
+def test_a_cut_of_a_few_milliseconds_is_noticed():
     station = node()
     station.edm.cut_ms = 0.1
     start(station)
     assert cuts(station) == STATIONS
 
 
-def test_keys_that_the_machine_does_not_take_are_taken_back_and_never_come_late():
+def test_keys_that_the_machine_does_not_take_are_dropped_and_never_come_late():
     station = node()
     station.edm.takes_nothing = True
     job = start(station, "unsure")
@@ -290,7 +288,7 @@ def test_keys_that_the_machine_does_not_take_are_taken_back_and_never_come_late(
     assert cuts(station) == STATIONS and station.edm.heard == station.edm.START * STATIONS
 
 
-def test_a_machine_that_takes_half_the_keys_is_named_and_gets_the_others_once():
+def test_a_machine_that_takes_half_the_keys_is_reported_and_gets_the_others_once():
     station = node()
     start(station, "cutting")
     assert station.run(5000, until=lambda: station.edm.injecting)
@@ -307,7 +305,7 @@ def test_a_machine_that_takes_half_the_keys_is_named_and_gets_the_others_once():
     assert cuts(station) == STATIONS and station.edm.heard == station.edm.START * STATIONS
 
 
-def test_stop_takes_back_the_keys_that_wait():
+def test_stop_drops_the_keys_that_wait():
     station = node()
     station.edm.takes_nothing = True
     start(station, "cutting")
@@ -338,7 +336,7 @@ def test_a_node_without_keyboard_or_status_inputs_does_no_job(missing):
 @pytest.mark.parametrize(
     "cause", ["sensor_timed_out", "not_converged", "sensor_disagrees", "stiction"]
 )
-def test_what_the_sub_node_failed_of_is_told_and_resume_tries_again(cause):
+def test_the_cause_of_the_sub_node_is_reported_and_resume_tries_again(cause):
     station = node()
     station.sub_node.fault = cause
     job = start(station, "paused")
@@ -357,9 +355,7 @@ def test_what_the_sub_node_failed_of_is_told_and_resume_tries_again(cause):
         ("step_overrun", ["too many steps are", "pending"]),
     ],
 )
-def test_a_fault_of_the_sub_node_is_said_in_words_and_reset_by_resume_when_its_cause_is_gone(
-    fault, words
-):
+def test_a_fault_of_the_sub_node_is_shown_and_reset_by_resume_when_its_cause_is_gone(fault, words):
     station = node(panel=True)
     start(station, "turning")
     station.run(50)
@@ -410,7 +406,7 @@ def test_a_fault_of_the_sub_node_is_reset_by_resume_only():
     assert station.sub_node.resets == 1 and cuts(station) == 1 + STATIONS
 
 
-def test_a_fault_that_comes_between_two_tries_is_told_before_it_is_reset():
+def test_a_fault_that_comes_between_two_tries_is_reported_before_it_is_reset():
     station = node()
     station.sub_node.fault = "stiction"
     start(station, "paused")
@@ -420,7 +416,7 @@ def test_a_fault_that_comes_between_two_tries_is_told_before_it_is_reset():
     assert station.until("paused")["cause"] == "faulted" and station.sub_node.resets == 0
 
 
-def test_a_sub_node_that_is_silent_is_named():
+def test_a_silent_sub_node_pauses_the_job_with_that_cause():
     station = node()
     station.sub_node.dead = True
     assert start(station, "paused")["cause"] == "peer_silent"
@@ -430,19 +426,19 @@ def test_a_sub_node_that_is_silent_is_named():
     assert cuts(station) == STATIONS
 
 
-def test_a_sub_node_starts_no_job_of_its_own():
+def test_a_sub_node_starts_no_job():
     station = node()
     station.setting(peer_role=1)
     assert station.do("start") == "peer_off" and station.ask("job_stations")["journal"] == 0
 
 
-def test_a_peer_port_that_is_not_in_use_is_named():
+def test_a_peer_port_that_is_not_in_use_pauses_the_job_with_that_cause():
     station = node()
     station.setting(peer_mode=0)
     assert start(station, "paused")["cause"] == "peer_off"
 
 
-def test_a_sub_node_that_counts_is_never_sent_on_when_its_place_is_not_known():
+def test_a_sub_node_that_counts_is_never_sent_on_while_its_position_is_unknown():
     station = node(frames=False)
     station.sub_node.fault = "no_motion_yet"
     assert start(station, "paused")["cause"] == "check_sub_node"
@@ -455,7 +451,7 @@ def test_a_sub_node_that_counts_is_never_sent_on_when_its_place_is_not_known():
     station.until("idle")
 
 
-def test_a_sub_node_that_counts_is_not_told_twice_to_go_to_a_station():
+def test_a_sub_node_that_counts_is_not_sent_to_the_same_station_twice():
     station = node(frames=False)
     station.edm.deaf = True
     start(station, "unsure")
@@ -512,7 +508,7 @@ def test_a_cut_that_ended_without_power_is_cut_again_only_if_a_person_says_so(an
     assert cuts(station) == STATIONS + (answer == "again")
 
 
-def test_a_job_whose_power_went_between_the_cuts_waits_for_resume_and_misses_none():
+def test_a_job_whose_power_failed_between_cuts_waits_for_resume_and_misses_none():
     station = node()
     start(station, "cutting")
     station.until("turning")
@@ -529,7 +525,7 @@ def test_a_job_whose_power_went_between_the_cuts_waits_for_resume_and_misses_non
 
 
 def test_power_cuts_at_any_moment_leave_no_station_uncut_and_cut_none_twice():
-    """A person who looks at the work answers: the cut that was begun was made, or it was not."""
+    """A person inspects the workpiece and answers: the cut that had begun was made, or was not."""
     source = random.Random(seed())
     station = node()
     for _ in range(6):
@@ -559,7 +555,7 @@ def test_power_cuts_at_any_moment_leave_no_station_uncut_and_cut_none_twice():
             assert len(station.edm.cuts) == STATIONS, cut_at
 
 
-def test_a_job_of_another_program_is_not_resumed():
+def test_a_job_of_another_station_list_is_not_resumed():
     station = node(angles=[1, 2])
     assert station.load(ANGLES) == "ok"  # over the older copy, the first
     start(station, "cutting")
@@ -614,7 +610,7 @@ def test_another_eeprom_in_the_middle_of_a_job_is_refused():
     assert cuts(station) == STATIONS
 
 
-def test_a_cut_whose_end_cannot_be_noted_is_asked_about():
+def test_after_a_cut_whose_end_cannot_be_recorded_a_person_is_asked():
     station = node()
     start(station, "cutting")
     station.bus.devices.pop(0x50)
@@ -627,7 +623,7 @@ def test_a_cut_whose_end_cannot_be_noted_is_asked_about():
     assert cuts(station) == STATIONS
 
 
-def test_the_panel_runs_a_job_by_its_keys():
+def test_a_job_is_run_by_the_keys_of_the_panel():
     station = node(panel=True)
     station.press("START")
     station.until("cutting")

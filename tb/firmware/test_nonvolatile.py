@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""keep.c and store.c: parameters and settings kept in the EEPROM through power cuts, and why they
-are not in force where they are not.
+"""nonvolatile and value_store: parameters and settings survive power cuts, and the node reports why
+the defaults are in force.
 """
 
 import random
@@ -48,7 +48,7 @@ def default(table):
 
 
 def rewrite(station, change, copy=0):
-    """Writes the saved values of a copy as `change(list of bytearrays)` makes them, and their CRC."""
+    """Replace the values of a copy by `change(list of bytearrays)`, with a valid CRC-32."""
     at = COPIES[copy]
     memory = bytes(station.eeprom.memory)
     values = []
@@ -70,7 +70,7 @@ def test_parameters_and_settings_are_in_force_after_a_power_cut_and_all_others_a
         and station.saved_settings()["values"] == 6
         and station.saved_settings()["generation"] == 1
     )
-    station.set(jerk=4242)  # not kept
+    station.set(jerk=4242)  # not saved
     assert restarted(station) == "ok"
     assert parameters(station) == {
         **default(PARAMETER),
@@ -90,7 +90,7 @@ def test_parameters_and_settings_are_in_force_after_a_power_cut_and_all_others_a
 
 
 def test_a_sub_node_listens_to_its_main_node_only_when_its_axis_is_as_it_was():
-    station, kept = (
+    station, saved = (
         powered(),
         {
             name: 4242 + n
@@ -99,7 +99,7 @@ def test_a_sub_node_listens_to_its_main_node_only_when_its_axis_is_as_it_was():
             )
         },
     )
-    station.set(**kept)
+    station.set(**saved)
     station.setting(peer_mode=2, peer_role=1)
     station.save_settings()
     station.power_cut()
@@ -108,7 +108,7 @@ def test_a_sub_node_listens_to_its_main_node_only_when_its_axis_is_as_it_was():
         station.run(0.5)
         listens, taken = (
             settings(station, "peer_mode")["peer_mode"] == 2,
-            parameters(station, *kept) == kept,
+            parameters(station, *saved) == saved,
         )
         assert taken or not listens
         seen.append((taken, listens))
@@ -119,7 +119,7 @@ def test_a_sub_node_listens_to_its_main_node_only_when_its_axis_is_as_it_was():
     )
 
 
-def test_registers_follow_what_is_kept():
+def test_registers_follow_the_saved_values():
     station = powered()
     station.set(kp=12345)
     station.save_settings()
@@ -128,7 +128,7 @@ def test_registers_follow_what_is_kept():
     assert 12345 in station.axes[0].word.values()
 
 
-def test_every_value_at_either_end_of_its_range_is_kept():
+def test_every_value_at_either_end_of_its_range_is_saved():
     station, source = powered(), random.Random(seed())
     for parameter in PARAMETER.values():
         station.request(
@@ -147,7 +147,7 @@ def test_every_value_at_either_end_of_its_range_is_kept():
     assert restarted(station) == "ok" and (parameters(station), settings(station)) == before
 
 
-def test_each_keeping_goes_over_the_older_copy():
+def test_each_save_overwrites_the_older_copy():
     station = powered()
     for generation in range(1, 5):
         station.set(kp=generation)
@@ -157,7 +157,7 @@ def test_each_keeping_goes_over_the_older_copy():
         assert restarted(station) == "ok" and parameters(station, "kp") == {"kp": generation}
 
 
-def test_what_is_forgotten_is_at_its_default_from_the_next_power_up_on():
+def test_cleared_values_are_at_their_defaults_from_the_next_power_up_on():
     station = powered()
     station.set(kp=1)
     station.save_settings()
@@ -168,7 +168,7 @@ def test_what_is_forgotten_is_at_its_default_from_the_next_power_up_on():
     assert station.saved_settings()["generation"] == 2 and station.saved_settings()["damaged"] == 0
 
 
-def test_a_blank_eeprom_keeps_nothing_and_the_panel_does_not_mention_it():
+def test_a_blank_eeprom_holds_nothing_and_the_panel_does_not_mention_it():
     station = powered()
     assert station.saved_settings() == {
         "writing": 0,
@@ -182,7 +182,7 @@ def test_a_blank_eeprom_keeps_nothing_and_the_panel_does_not_mention_it():
 
 
 @pytest.mark.parametrize("copies", [1, 2])
-def test_a_damaged_copy_is_told_and_the_other_one_is_in_force(copies):
+def test_a_damaged_copy_is_reported_and_the_other_one_is_in_force(copies):
     station = powered()
     station.load([1])
     for kp in (1, 2):
@@ -205,7 +205,7 @@ def test_a_damaged_copy_is_told_and_the_other_one_is_in_force(copies):
     assert restarted(station) == "ok" and parameters(station, "kp") == {"kp": 3}
 
 
-def test_values_of_another_build_are_not_taken_and_the_panel_says_so():
+def test_values_of_another_build_are_not_restored_and_the_panel_shows_that():
     station = powered()
     station.load([1])
     station.set(kp=1)
@@ -229,7 +229,7 @@ def test_values_of_a_node_with_another_count_of_axes_are_of_another_build():
     assert restarted(station) == "saved_other_build"
 
 
-def test_a_value_that_is_not_allowed_is_named_and_the_others_are_in_force():
+def test_a_saved_value_that_is_refused_is_reported_and_the_others_are_in_force():
     station = powered()
     station.set(velocity=777, kp=5)
     station.save_settings()
@@ -246,17 +246,17 @@ def test_a_value_that_is_not_allowed_is_named_and_the_others_are_in_force():
     }
 
 
-@pytest.mark.parametrize("last", ["program", "values"])
-def test_settings_of_program_and_values_are_those_of_the_newer_one(last):
+@pytest.mark.parametrize("last", ["list", "values"])
+def test_the_settings_in_force_are_those_that_were_saved_last(last):
     station = powered()
-    for what in ("values", "program") if last == "program" else ("program", "values"):
+    for what in ("values", "list") if last == "list" else ("list", "values"):
         station.setting(job_cut_limit=100 if what == last else 200)
-        assert (station.load([1]) if what == "program" else station.save_settings()) == "ok"
+        assert (station.load([1]) if what == "list" else station.save_settings()) == "ok"
     restarted(station)
     assert settings(station, "job_cut_limit") == {"job_cut_limit": 100}
 
 
-def test_keeping_leaves_program_and_journal_as_they_are():
+def test_saving_leaves_station_list_and_journal_as_they_are():
     station = powered()
     station.load([1, 2, 3])
     station.firmware.journal_write(0, 6)
@@ -271,7 +271,7 @@ def test_keeping_leaves_program_and_journal_as_they_are():
     )
 
 
-def test_without_a_program_keeping_does_not_make_it_look_like_one():
+def test_saving_does_not_make_a_station_list():
     station = powered()
     station.set(kp=1)
     assert (
@@ -281,7 +281,7 @@ def test_without_a_program_keeping_does_not_make_it_look_like_one():
     )
 
 
-def test_a_missing_eeprom_is_named_and_what_it_keeps_is_taken_at_power_up_only():
+def test_a_missing_eeprom_is_reported_and_its_values_are_restored_at_power_up_only():
     station = powered()
     station.set(kp=1)
     station.save_settings()
@@ -301,7 +301,7 @@ def test_a_missing_eeprom_is_named_and_what_it_keeps_is_taken_at_power_up_only()
     assert restarted(station) == "ok" and parameters(station, "kp") == {"kp": 1}
 
 
-def test_a_worn_page_is_named_and_the_old_values_stay():
+def test_a_worn_page_is_reported_and_the_old_values_stay():
     station = powered()
     station.set(kp=1)
     station.save_settings()
@@ -311,7 +311,7 @@ def test_a_worn_page_is_named_and_the_old_values_stay():
     assert restarted(station) == "ok" and parameters(station, "kp") == {"kp": 1}
 
 
-def test_keeping_is_refused_while_the_eeprom_is_written_and_so_is_an_unknown_action():
+def test_saving_is_refused_while_the_eeprom_is_written_and_so_is_an_unknown_action():
     station = powered()
     assert station.request("save_settings", action=2)[0] == "out_of_range"
     station.ask("save_settings", action=0)
@@ -331,7 +331,7 @@ def test_values_that_change_while_they_are_written_leave_a_whole_copy():
     assert restarted(station) == "ok" and station.saved_settings()["damaged"] == 0
 
 
-def test_a_power_cut_at_any_moment_of_keeping_leaves_the_old_values_or_the_new_ones():
+def test_a_power_cut_at_any_moment_of_a_save_leaves_the_old_values_or_the_new_ones():
     source, station = random.Random(seed()), powered()
     names = [name for name in PARAMETER if name.startswith(("filter_1", "filter_2"))]
     station.save_settings()
@@ -354,7 +354,7 @@ def test_a_power_cut_at_any_moment_of_keeping_leaves_the_old_values_or_the_new_o
     assert seen == {True, False}
 
 
-def test_the_image_of_the_axes_keeps_nothing():
+def test_the_axis_image_saves_nothing():
     machine = FakeNode()
     assert (
         machine.request("save_settings", action=0)[0]
@@ -363,7 +363,7 @@ def test_the_image_of_the_axes_keeps_nothing():
     )
 
 
-def test_a_blank_eeprom_that_comes_late_keeps_nothing():
+def test_a_blank_eeprom_that_comes_late_holds_nothing():
     station = Station(absent=["eeprom"])
     station.run(500)
     assert station.saved_settings()["cause"] == "saved_not_read"

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""panel.c with keypad.c and display.c: programs entered by key, everything said in words, and parts
-that are missing.
+"""The panel: station lists are entered by key, causes are shown in words, and devices may be absent
+or come late.
 """
 
 import pytest
@@ -16,12 +16,12 @@ def station():
     return made
 
 
-def test_a_node_without_a_program_says_so(station):
+def test_the_panel_shows_that_there_is_no_station_list(station):
     assert station.shown() == ["ready", "no station list is", "stored", ""]
     assert {"keypad", "display", "eeprom"} <= station.job()["flags"]
 
 
-def test_the_display_gets_nothing_too_soon_and_rs_stands_before_e(station):
+def test_the_display_gets_nothing_too_soon_and_rs_is_set_before_e(station):
     station.press("DIVIDE", "6", "ENTER")
     station.run(3000)
     assert (
@@ -45,7 +45,7 @@ def test_a_list_is_entered_angle_by_angle(station):
     assert station.saved() == "ok" and station.station_list() == [4_500_000, 129_599_996]
 
 
-def test_stations_are_looked_through_with_up_and_down(station):
+def test_up_and_down_browse_through_the_stations(station):
     station.load([0, 360_000, 45 * 360_000 + 180_000])
     station.press("UP", "UP", "UP")
     assert station.shown()[:2] == ["station      003/003", "            45.50000"]
@@ -80,7 +80,7 @@ def test_longest_cut_and_speed_are_settings(station):
         (["SPEED", *"101", "ENTER"], ["the value is outside"]),
     ],
 )
-def test_what_cannot_be_is_said_in_words(station, keys, words):
+def test_an_entry_out_of_range_is_refused_in_words(station, keys, words):
     station.press(*keys)
     shown = station.shown()
     at = next(
@@ -96,7 +96,7 @@ def test_what_cannot_be_is_said_in_words(station, keys, words):
 
 
 @pytest.mark.parametrize("key", [*range(25, 34), "5", ".", "ENTER"])
-def test_a_key_that_means_nothing_now_says_so(station, key):
+def test_a_key_without_a_function_is_refused_in_words(station, key):
     station.press(key)
     shown = station.shown()
     assert shown[1:3] == ["this key has no", "function"], shown
@@ -104,7 +104,7 @@ def test_a_key_that_means_nothing_now_says_so(station, key):
     assert station.shown()[1:3] == ["no station list is", "stored"]
 
 
-def test_clear_takes_back_the_entry_and_then_leaves(station):
+def test_clear_clears_the_entry_and_then_leaves_the_mode(station):
     station.press("LIST", *"12")
     station.press("CLEAR")
     assert station.shown()[1] == "_"
@@ -126,7 +126,7 @@ def test_every_cause_of_a_station_fits_the_panel():
 
 
 @pytest.mark.parametrize("absent", [["keypad"], ["display"], ["keypad", "display"]])
-def test_a_node_without_its_panel_works_and_tells_what_is_missing(absent):
+def test_a_node_without_its_panel_works_and_reports_what_is_missing(absent):
     station = Station(absent=absent)
     station.ready()
     station.run(2500)
@@ -136,7 +136,7 @@ def test_a_node_without_its_panel_works_and_tells_what_is_missing(absent):
     ) == 2 - len(absent)
 
 
-def test_a_panel_that_comes_later_is_found_and_what_was_pressed_before_does_not_count():
+def test_a_panel_that_comes_later_is_found_and_earlier_keys_do_not_count():
     station = Station(absent=["keypad", "display"])
     station.ready()
     station.keypad.registers[0x1D:0x1F] = b"\x1f\x7f"  # set up by the node before a reset

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""store.c: program and journal in the EEPROM, kept through power cuts, and every failure named."""
+"""store, station_list and journal: they survive power cuts, and every failure is reported."""
 
 import random
 
@@ -17,7 +17,7 @@ def powered(**options):
     return station
 
 
-def test_a_program_is_read_back_as_written_and_after_a_power_cut():
+def test_a_station_list_reads_back_as_written_also_after_a_power_cut():
     station = powered()
     assert station.load(EVENLY) == "ok" and station.station_list() == EVENLY
     station.power_cut()
@@ -25,7 +25,7 @@ def test_a_program_is_read_back_as_written_and_after_a_power_cut():
     assert station.station_list() == EVENLY and station.ask("job_stations")["generation"] == 1
 
 
-def test_each_new_program_goes_over_the_older_copy():
+def test_each_new_station_list_overwrites_the_older_copy():
     station = powered()
     for generation in range(1, 5):
         angles = [generation, 2 * generation + 5]
@@ -35,7 +35,7 @@ def test_each_new_program_goes_over_the_older_copy():
         assert station.station_list() == angles
 
 
-def test_as_many_stations_as_fit_are_kept_and_one_more_is_refused():
+def test_as_many_stations_as_fit_are_saved_and_one_more_is_refused():
     station = powered()
     angles = [n * TURN // 360 for n in range(360)]
     station.ask("job_begin")
@@ -58,7 +58,7 @@ def test_as_many_stations_as_fit_are_kept_and_one_more_is_refused():
         ([5, 4], "angles_not_ascending"),
     ],
 )
-def test_an_angle_that_cannot_be_is_named_and_not_taken(angles, cause):
+def test_an_invalid_angle_is_refused_with_its_cause(angles, cause):
     station = powered()
     station.ask("job_begin")
     for n, angle in enumerate(angles[:-1]):
@@ -69,7 +69,7 @@ def test_an_angle_that_cannot_be_is_named_and_not_taken(angles, cause):
     assert station.saved() == "ok" and station.station_list() == [*angles[:-1], TURN - 1]
 
 
-def test_what_is_no_whole_program_is_refused():
+def test_an_incomplete_station_list_is_refused():
     station = powered()
     assert station.request("job_save")[0] == "no_stations"
     assert station.request("job_add", station=0, angle=0)[0] == "job_incomplete"
@@ -80,7 +80,7 @@ def test_what_is_no_whole_program_is_refused():
     assert station.request("job_angle", station=0)[0] == "out_of_range"
 
 
-def test_settings_are_kept_with_the_program():
+def test_settings_are_saved_with_the_station_list():
     station = powered()
     station.setting(job_cut_limit=77, peer_mode=2)
     assert station.load(EVENLY) == "ok"
@@ -105,7 +105,7 @@ def test_a_blank_eeprom_has_no_job():
 
 
 @pytest.mark.parametrize("copies", [1, 2])
-def test_a_damaged_copy_is_told_and_the_other_one_is_in_force(copies):
+def test_a_damaged_copy_is_reported_and_the_other_one_is_in_force(copies):
     station = powered()
     station.load([1, 2, 3])
     station.load([4, 5, 6])  # over copy 0
@@ -121,7 +121,7 @@ def test_a_damaged_copy_is_told_and_the_other_one_is_in_force(copies):
         assert station.station_list() == [] and station.do("start") == "job_damaged"
 
 
-def test_a_missing_eeprom_is_named_and_found_when_it_comes():
+def test_a_missing_eeprom_is_reported_and_found_when_it_comes():
     station = Station(absent=["eeprom"])
     station.run(2000)
     job = station.job()
@@ -137,7 +137,7 @@ def test_a_missing_eeprom_is_named_and_found_when_it_comes():
     assert station.load(EVENLY) == "ok"
 
 
-def test_a_stuck_bus_is_named_and_forgotten_when_it_is_free():
+def test_a_stuck_bus_is_reported_until_it_is_free():
     station = Station()
     station.bus.stuck = True
     station.run(2000)
@@ -146,13 +146,13 @@ def test_a_stuck_bus_is_named_and_forgotten_when_it_is_free():
     station.ready()
 
 
-def test_a_node_without_the_link_says_so():
+def test_a_node_without_i2c_reports_a_missing_eeprom():
     station = Station(built=0)
     station.run(500)
     assert station.job()["cause"] == "eeprom_missing"
 
 
-def test_a_worn_page_of_the_program_is_named_and_the_old_program_stays():
+def test_a_worn_page_of_the_station_list_is_reported_and_the_old_list_stays():
     station = powered()
     station.load([1, 2, 3])
     station.eeprom.worn[2048 + 90] = 0xA5
@@ -160,13 +160,13 @@ def test_a_worn_page_of_the_program_is_named_and_the_old_program_stays():
     assert station.load(EVENLY) == "eeprom_failed" and station.station_list() == [1, 2, 3]
 
 
-def test_a_write_that_the_device_never_ends_is_named():
+def test_a_write_that_the_device_never_ends_is_reported():
     station = powered()
     station.eeprom.WRITE = ms(10_000)
     assert station.load(EVENLY) == "eeprom_missing"
 
 
-def test_a_program_cut_off_at_any_moment_is_the_old_one_or_the_new_one_whole():
+def test_a_power_cut_at_any_moment_leaves_the_old_station_list_or_the_new_one():
     source, station = random.Random(seed()), powered()
     old, seen = [], set()
     for _ in range(40):
@@ -212,30 +212,30 @@ def test_writes_are_spread_over_the_pages_of_the_journal():
 def test_a_worn_page_of_the_journal_is_passed_over():
     station = powered()
     station.load([1])
-    station.eeprom.worn[4096 + 64 * 1 + 3] = 0x5A  # where the first line goes
+    station.eeprom.worn[4096 + 64 * 1 + 3] = 0x5A  # where the first record goes
     assert station.firmware.journal_write(0, 1) == 0 and station.saved() == "ok"
     assert station.ask("job_stations")["journal"] == 2
 
 
-def test_lines_behind_worn_pages_that_stay_blank_are_found():
+def test_records_behind_worn_pages_that_stay_blank_are_found():
     station = powered()
     station.load([1])
-    for page in (1, 2):  # as many as a line passes over
+    for page in (1, 2):  # as many as a record passes over
         station.eeprom.worn.update({4096 + 64 * page + n: 0xFF for n in range(64)})
-    for line in (3, 4):
+    for sequence in (3, 4):
         assert station.firmware.journal_write(0, 1) == 0 and station.saved() == "ok"
         station.power_cut()
         station.ready()
-        assert station.ask("job_stations")["journal"] == line
+        assert station.ask("job_stations")["journal"] == sequence
 
 
-def test_a_journal_that_was_hardly_written_is_not_read_to_its_end():
+def test_a_journal_with_few_records_is_not_read_to_its_end():
     station = powered()
-    for lines in (1, 20):  # 6: the job was stopped
+    for records in (1, 20):  # 6: the job was stopped
         station.load([1])
-        for _ in range(lines):
+        for _ in range(records):
             assert station.firmware.journal_write(0, 6) == 0 and station.saved() == "ok"
         station.power_cut()
         begun = station.clk
         station.ready()
-        assert station.clk - begun < ms(60 + 7 * lines)
+        assert station.clk - begun < ms(60 + 7 * records)

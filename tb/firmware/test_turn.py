@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""index.c and sensor.c: a worm table with errors, backlash and stiction is turned to angles of its
-sensor; each named cause provoked.
+"""Turning a table with worm errors, backlash and stiction to angles of its sensor; every cause is
+provoked.
 """
 
 import random
@@ -34,7 +34,7 @@ class Station(FakeNode):
         self.set(**{**AXIS, **(parameters or {})})
         self.run(50)
 
-    def tell(self, **settings):
+    def configure(self, **settings):
         for name, value in settings.items():
             self.ask("set_setting", setting=SETTING[name]["id"], value=value)
 
@@ -48,14 +48,14 @@ class Station(FakeNode):
     def until(self, phase, ms=60_000):
         assert self.run(ms, until=lambda: self.state()["phase"] == phase), self.state()
 
-    def index(self, arcsec):
-        """How it ended."""
+    def turn(self, arcsec):
+        """Turn to an angle, arcsec; returns the cause with which that ended."""
         assert self.begin(arcsec) == "ok"
         self.until("idle", 120_000)
         return self.state()["ended"]
 
     def error(self, arcsec):
-        """Of the true angle, the shorter way round."""
+        """Of the true angle, arcsec, in the shorter direction."""
         return (self.table.angle - arcsec + TURN_ARCSEC / 2) % TURN_ARCSEC - TURN_ARCSEC / 2
 
 
@@ -67,19 +67,19 @@ def test_every_target_is_reached_within_two_arcsec_of_the_truth_from_either_side
         5 * DEGREE + 30,
         *(source.uniform(0, TURN_ARCSEC / 36) for _ in range(4)),
     ]:
-        assert station.index(arcsec) == "ok"
+        assert station.turn(arcsec) == "ok"
         assert abs(station.state()["left"]) <= 50 and abs(station.error(arcsec)) <= 2
 
 
 def test_the_worm_always_pushes_up_at_the_end_so_backlash_is_taken_up():
     station = Station(backlash=50)
     for arcsec in (2 * DEGREE, DEGREE, DEGREE + 20, DEGREE - 20):
-        assert station.index(arcsec) == "ok"
+        assert station.turn(arcsec) == "ok"
         worm = station.axes[0].machine / 65536 * 4 * 0.18
         assert station.table.nut == worm
 
 
-def test_the_long_way_ends_below_the_target_and_the_tries_halve_what_is_left():
+def test_the_long_distance_ends_below_the_target_and_each_try_halves_the_remainder():
     station = Station(worm_error=0, wheel_error=0, stick=0, sensor={"noise": 0, "wave": 0})
     station.begin(DEGREE)
     station.until("closing_in")
@@ -100,22 +100,22 @@ def test_the_share_of_a_try_is_a_setting():
     tries = []
     for share in (30, 50, 80):
         station = Station(stick=0, sensor={"noise": 0, "wave": 0})
-        station.tell(turn_share=share)
-        assert station.index(DEGREE) == "ok"
+        station.configure(turn_share=share)
+        assert station.turn(DEGREE) == "ok"
         tries.append(station.state()["tries"])
     assert tries[0] > tries[1] > tries[2] > 1
 
 
-def test_a_table_that_is_there_already_does_not_move():
+def test_a_table_at_the_target_does_not_move():
     station = Station(angle=DEGREE + 0.1, sensor={"noise": 0, "wave": 0})
-    assert station.index(DEGREE) == "ok"
+    assert station.turn(DEGREE) == "ok"
     assert (
         station.axes[0].pushed == [] and station.state()["tries"] == 0 and station.axes[0].enabled
     )
 
 
 @pytest.mark.parametrize(
-    ("way", "begin", "target", "turned"),
+    ("direction", "begin", "target", "turned"),
     [
         (0, 1 * DEGREE, 359 * DEGREE, 358),
         (1, 1 * DEGREE, 359 * DEGREE, -2),
@@ -126,59 +126,59 @@ def test_a_table_that_is_there_already_does_not_move():
         (0, TURN_ARCSEC - 1, 1 * DEGREE, 1),
     ],
 )
-def test_the_way_round_is_a_setting_and_the_table_stands_at_zero_a_little_below_it_too(
-    way, begin, target, turned
+def test_the_direction_is_a_setting_and_a_little_below_zero_counts_as_zero(
+    direction, begin, target, turned
 ):
     station = Station(
         angle=begin,
         parameters={"velocity": 900_000, "acceleration": 90_000_000, "jerk": 2_000_000_000},
     )
-    station.tell(turn_direction=way)
-    assert station.index(target) == "ok"
+    station.configure(turn_direction=direction)
+    assert station.turn(target) == "ok"
     assert (
         station.table.angle - begin == pytest.approx(turned * DEGREE, abs=5)
         and abs(station.error(target)) <= 2
     )
 
 
-def test_an_overshoot_backs_off_below_and_comes_again():
+def test_after_an_overshoot_the_table_goes_below_the_target_and_comes_up_again():
     station = Station(worm_error=30)
-    station.tell(turn_allowance=0, turn_overshoots=10)
+    station.configure(turn_allowance=0, turn_overshoots=10)
     assert all(
-        station.index(arcsec) == "ok" for arcsec in (DEGREE, 2 * DEGREE, 3 * DEGREE, 4 * DEGREE)
+        station.turn(arcsec) == "ok" for arcsec in (DEGREE, 2 * DEGREE, 3 * DEGREE, 4 * DEGREE)
     )
     met = []
     for arcsec in range(5, 10):
-        assert station.index(arcsec * DEGREE) == "ok" and abs(station.error(arcsec * DEGREE)) <= 2
+        assert station.turn(arcsec * DEGREE) == "ok" and abs(station.error(arcsec * DEGREE)) <= 2
         met.append(station.state()["overshoots"])
     assert any(met)
 
 
 def test_overshoots_are_limited():
     station = Station(worm_error=0, wheel_error=0)
-    station.tell(turn_allowance=0, turn_overshoots=0, turn_tolerance=1)
+    station.configure(turn_allowance=0, turn_overshoots=0, turn_tolerance=1)
     station.table.angle += 25  # an error of the worm that was not there before
     station.table.offset += 25
-    assert "not_converged" in {station.index(arcsec * DEGREE) for arcsec in range(1, 9)}
+    assert "not_converged" in {station.turn(arcsec * DEGREE) for arcsec in range(1, 9)}
 
 
 def test_the_zero_of_the_sensor_is_a_setting():
     station = Station(angle=1000)
-    station.tell(sensor_zero=900 * PER_ARCSEC)
+    station.configure(sensor_zero=900 * PER_ARCSEC)
     assert station.ask("sensor")["angle"] == pytest.approx(100 * PER_ARCSEC, abs=110)
-    assert station.index(500) == "ok" and abs(station.error(1400)) <= 2
-    station.tell(sensor_zero=1500 * PER_ARCSEC)
+    assert station.turn(500) == "ok" and abs(station.error(1400)) <= 2
+    station.configure(sensor_zero=1500 * PER_ARCSEC)
     assert station.ask("sensor")["angle"] == pytest.approx(
         (TURN_ARCSEC - 100) * PER_ARCSEC, abs=210
     )
 
 
-# frames that do not come, or come damaged
+# frames that are lost or damaged
 
 
-def test_lost_and_damaged_frames_are_counted_and_change_nothing():
+def test_lost_and_damaged_frames_are_counted_and_change_nothing_else():
     station = Station(sensor={"lost": 0.1, "damaged": 0.2})
-    assert station.index(3 * DEGREE) == "ok" and abs(station.error(3 * DEGREE)) <= 2
+    assert station.turn(3 * DEGREE) == "ok" and abs(station.error(3 * DEGREE)) <= 2
     reported = station.ask("sensor")
     assert reported["frames"] == station.sensor.frames and reported["timed_out"] == 0
     assert reported["missed"] > reported["wrong_crc"] > 0.1 * reported["frames"]
@@ -186,16 +186,16 @@ def test_lost_and_damaged_frames_are_counted_and_change_nothing():
 
 def test_a_reading_takes_only_frames_sent_after_the_table_had_settled():
     station = Station(stick=0, sensor={"noise": 0, "wave": 0})
-    station.tell(turn_settle=0, turn_frames=1)
+    station.configure(turn_settle=0, turn_frames=1)
     station.begin(DEGREE)
     station.until("closing_in")
     assert station.state()["reading"] / PER_ARCSEC == pytest.approx(station.table.angle, abs=0.7)
 
 
-# each named cause
+# every cause
 
 
-def test_a_sensor_that_never_spoke_is_dead():
+def test_a_sensor_that_never_sent_a_frame_has_timed_out():
     station = Station()
     station.sensor.dead = True
     station.run(300)
@@ -203,7 +203,7 @@ def test_a_sensor_that_never_spoke_is_dead():
     assert station.begin(DEGREE) == "sensor_timed_out" and station.axes[0].pushed == []
 
 
-def test_a_sensor_that_dies_on_the_way_stops_the_table_under_control():
+def test_a_sensor_that_fails_during_a_move_stops_the_table_under_control():
     station = Station(parameters={"velocity": 2000})
     station.begin(90 * DEGREE)
     station.until("coming_up")
@@ -218,7 +218,7 @@ def test_a_sensor_that_dies_on_the_way_stops_the_table_under_control():
     assert station.table.angle < 2 * DEGREE
 
 
-def test_a_sensor_that_dies_while_it_is_read_is_told():
+def test_a_sensor_that_fails_while_it_is_read_is_reported():
     station = Station()
     station.begin(DEGREE)
     station.until("closing_in")
@@ -232,10 +232,10 @@ def test_a_sensor_that_sends_one_angle_for_ever_is_stuck():
     station = Station()
     station.sensor.stuck = True
     station.run(50)
-    assert station.index(DEGREE) == "sensor_stuck"
+    assert station.turn(DEGREE) == "sensor_stuck"
 
 
-def test_a_sensor_that_sticks_while_closing_in_is_told():
+def test_a_sensor_that_sticks_while_closing_in_is_reported():
     station = Station()
     station.begin(DEGREE)
     station.until("closing_in")
@@ -244,13 +244,13 @@ def test_a_sensor_that_sticks_while_closing_in_is_told():
     assert station.state()["ended"] == "sensor_stuck"
 
 
-def test_a_table_that_does_not_turn_is_told_from_a_stuck_sensor():
+def test_a_table_that_does_not_turn_is_distinguished_from_a_stuck_sensor():
     station = Station()
     station.table.blocked = True
-    assert station.index(DEGREE) == "stiction"
+    assert station.turn(DEGREE) == "stiction"
 
 
-def test_a_table_that_sticks_at_the_end_is_told():
+def test_a_table_that_sticks_at_the_end_is_reported():
     station = Station()
     station.begin(DEGREE)
     station.until("closing_in")
@@ -260,21 +260,21 @@ def test_a_table_that_sticks_at_the_end_is_told():
 
 
 @pytest.mark.parametrize("arcsec", [DEGREE, -DEGREE, 20])
-def test_a_motor_that_turns_the_wrong_way_is_told(arcsec):
+def test_a_motor_that_turns_in_the_wrong_direction_is_reported(arcsec):
     station = Station(angle=10 * DEGREE, sign=-1)
-    assert station.index(10 * DEGREE + arcsec) == "wrong_sign"
+    assert station.turn(10 * DEGREE + arcsec) == "wrong_sign"
 
 
 def test_a_wrong_number_of_steps_a_turn_shows_as_disagreement():
     station = Station()
-    station.tell(periods_per_turn=2_000_000)
-    assert station.index(2 * DEGREE) == "sensor_disagrees"
+    station.configure(periods_per_turn=2_000_000)
+    assert station.turn(2 * DEGREE) == "sensor_disagrees"
 
 
-def test_a_tolerance_that_cannot_be_met_is_given_up():
+def test_a_tolerance_that_cannot_be_met_ends_with_not_converged():
     station = Station(sensor={"noise": 3})
-    station.tell(turn_tolerance=1, turn_frames=1, turn_tries=10, turn_overshoots=1)
-    assert "not_converged" in {station.index(arcsec * DEGREE) for arcsec in (1, 2)}
+    station.configure(turn_tolerance=1, turn_frames=1, turn_tries=10, turn_overshoots=1)
+    assert "not_converged" in {station.turn(arcsec * DEGREE) for arcsec in (1, 2)}
 
 
 @pytest.mark.parametrize("hundredths", [129_600_000, 2**32 - 1])
@@ -283,7 +283,7 @@ def test_an_angle_beyond_a_turn_is_refused(hundredths):
     assert station.request("turn_to", angle=hundredths)[0] == "out_of_range"
 
 
-def test_a_node_without_a_sensor_says_so():
+def test_a_node_without_a_sensor_reports_that():
     machine = FakeNode(image="station")
     assert (
         machine.request("turn_to", angle=0)[0] == "not_built"
@@ -291,10 +291,10 @@ def test_a_node_without_a_sensor_says_so():
     )
 
 
-# others who drive the axis
+# other commands to the axis
 
 
-def test_a_second_index_waits_for_the_first():
+def test_a_second_turn_is_refused_until_the_first_has_ended():
     station = Station()
     station.begin(DEGREE)
     assert station.begin(2 * DEGREE) == "busy"
@@ -303,7 +303,7 @@ def test_a_second_index_waits_for_the_first():
 
 
 @pytest.mark.parametrize("phase", ["reading", "going_below", "coming_up", "closing_in"])
-def test_the_host_stops_an_index_at_any_time(phase):
+def test_the_host_can_stop_a_turn_at_any_time(phase):
     station = Station(angle=10 * DEGREE)
     station.begin(5 * DEGREE)
     station.until(phase)
@@ -314,7 +314,7 @@ def test_the_host_stops_an_index_at_any_time(phase):
     assert station.begin(9 * DEGREE) == "ok"
 
 
-def test_a_drive_that_is_switched_off_ends_the_index():
+def test_a_drive_that_is_switched_off_ends_the_turn():
     station = Station()
     station.begin(DEGREE)
     station.until("coming_up")
@@ -324,7 +324,7 @@ def test_a_drive_that_is_switched_off_ends_the_index():
 
 
 @pytest.mark.parametrize("phase", ["reading", "coming_up"])
-def test_a_fault_ends_the_index_and_stands_before_the_next(phase):
+def test_a_fault_ends_the_turn_and_prevents_the_next_one(phase):
     station = Station()
     station.begin(DEGREE)
     station.until(phase)
@@ -334,10 +334,10 @@ def test_a_fault_ends_the_index_and_stands_before_the_next(phase):
     assert station.begin(DEGREE) == "faulted"
     station.axes[0].causes = 0
     station.ask("reset_faults", axis=0)
-    assert station.index(DEGREE) == "ok"
+    assert station.turn(DEGREE) == "ok"
 
 
-def test_an_axis_that_moves_for_the_host_is_not_taken():
+def test_a_turn_is_refused_while_the_host_moves_the_axis():
     station = Station()
     station.set(home_method=35, travel_high=10**9)
     station.ask("enable", axis=0, on=1)
@@ -347,7 +347,7 @@ def test_an_axis_that_moves_for_the_host_is_not_taken():
     assert station.begin(DEGREE) == "busy"
 
 
-def test_creep_is_the_speed_of_closing_in():
+def test_closing_in_uses_the_homing_latch_speed():
     station = Station(parameters={"homing_latch_speed": 40})
     station.begin(DEGREE)
     station.until("closing_in")

@@ -18,7 +18,7 @@ from moire.bus.settings import Settings
 from moire.cli import command_line
 from moire.made.bus_tables import CAUSES, FAULTS
 from tb.bench import seed
-from tb.firmware.test_firmware_peer import OPERATION, bodies, frame, look, turn_to
+from tb.firmware.test_firmware_peer import OPERATION, bodies, frame, poll, turn_to
 from twin import Devices, Twin, TwinTransport, build
 from twin.nodes.twin import Axis, Node
 
@@ -120,7 +120,7 @@ def test_a_frame_from_the_peer_turns_the_table_amid_garbage(station):
     assert any(
         reply[:3] == bytes([8 + n, OPERATION["turn_state"], 0])
         for n in range(10)
-        for reply in station.ask(look(8 + n))
+        for reply in station.ask(poll(8 + n))
     )
     station.to_sub.garbage(0)
     assert station.table.wait().ended == "ok" and abs(station.error(target)) <= 2

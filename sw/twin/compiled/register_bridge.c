@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// register_bridge -- the firmware's registers, served by two functions of the test.
+// register_bridge -- the registers of the compiled firmware, read and written by two functions of
+// Python.
 #include <stdint.h>
 
 #include "core/hardware.h"
