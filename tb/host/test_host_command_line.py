@@ -458,7 +458,7 @@ def test_ports_are_exit_code_4(monkeypatch):
 
 
 def test_without_a_checkout_the_port_twin_says_what_to_do(monkeypatch):
-    monkeypatch.setattr("moire.cli.twin.entry_points", lambda **_: ())
+    monkeypatch.setattr("moire.bus.twin_port.entry_points", lambda **_: ())
     err = io.StringIO()
     assert command_line.main(["--port", "twin", "status"], err=err) == 4
     assert err.getvalue() == (

@@ -8,8 +8,8 @@ import json
 
 import pytest
 
-from moire.bus.client import Bus
 from moire.cli import command_line
+from moire.client.bus import Bus
 from moire.errors import MotionFailed, NotCalibrated, OutOfRange, Refused, UnknownName
 from moire.made.bus_tables import PARAMETERS
 from tb.fakes.fake_node import FakeBus, FakeNode
@@ -126,7 +126,7 @@ def test_the_learner_knows_its_actions():
     )
     assert axis.calibration("freeze").reason == "frozen"
     with pytest.raises(
-        OutOfRange, match="knows no 'rest': allowed are read, calibrate, freeze, clear"
+        OutOfRange, match="has no action 'rest': allowed are read, calibrate, freeze, clear"
     ):
         axis.calibration("rest")
 
@@ -164,7 +164,7 @@ def test_a_correction_out_of_range_changes_nothing():
     for wrong in ({**VALUES, "gain": 0}, {**VALUES, "cosine": [1 << 23] * 10}):
         with pytest.raises(Refused, match="outside"):
             axis.set_correction(wrong)
-    with pytest.raises(OutOfRange, match="does not fit on the line"):
+    with pytest.raises(OutOfRange, match="does not fit on the bus"):
         axis.set_correction({**VALUES, "sin_offset": 1 << 15})
     assert axis.correction() == before
 

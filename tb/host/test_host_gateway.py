@@ -17,11 +17,11 @@ import serial
 import serial.rfc2217
 
 from moire.bus import cobs
-from moire.bus.client import Bus
 from moire.bus.gateway import Gateway
 from moire.bus.protocol import request_body
 from moire.bus.transport import CobsBus, SerialBus, open_bus
 from moire.cli import command_line
+from moire.client.bus import Bus
 from moire.errors import BusGarbled, MoireError, NoAnswer, PortError
 from tb.bench import seed
 from tb.fakes.fake_node import FakeBus, FakeNode
@@ -279,7 +279,7 @@ def test_a_port_unplugged_in_mid_move_is_one_sentence_that_says_who_stops_the_ax
     said = complaint(f"--port {served.ports[entrance]} move 100mm", 4)
     assert (
         served.ports[entrance] in said
-        and "axis 0 of node 1 could not be told to stop, its watchdog has to" in said
+        and "axis 0 of node 1 could not be stopped by the host, its watchdog has to" in said
     )
 
 
@@ -310,7 +310,7 @@ def fake_twin(baud, machine, seed, nodes=(1, 2)):
 
 
 def test_ctrl_c_is_the_good_end_of_a_served_twin(monkeypatch):
-    monkeypatch.setattr("moire.cli.twin.make_twin", fake_twin)
+    monkeypatch.setattr("moire.cli.twin.open_twin", fake_twin)
 
     def interrupt(*_):
         raise KeyboardInterrupt
@@ -324,7 +324,7 @@ def test_ctrl_c_is_the_good_end_of_a_served_twin(monkeypatch):
 
 
 def test_the_ports_are_told_as_json(monkeypatch, tmp_path):
-    monkeypatch.setattr("moire.cli.twin.make_twin", fake_twin)
+    monkeypatch.setattr("moire.cli.twin.open_twin", fake_twin)
     out, link = io.StringIO(), tmp_path / "link"
     arguments = [
         "twin",

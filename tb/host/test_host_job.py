@@ -8,9 +8,9 @@ import json
 
 import pytest
 
-from moire.bus.client import Bus
-from moire.bus.job import Job, equal_parts, read_stations
 from moire.cli import command_line
+from moire.client.bus import Bus
+from moire.client.job import Job, equal_parts, read_stations
 from moire.errors import BadFile, OutOfRange, Refused
 from tb.fakes.firmware_bus import FakeNodeBus
 from twin.compiled.station import OPERATION, Station, SubNode

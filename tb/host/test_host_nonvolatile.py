@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from moire.bus.nonvolatile import SavedSettings
+from moire.client.nonvolatile import SavedSettings
 from moire.errors import MotionFailed, Refused
 from moire.made.bus_tables import CAUSES
 from tb.host.test_host_job import Workshop

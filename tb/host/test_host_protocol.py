@@ -7,7 +7,6 @@ import random
 
 import pytest
 
-from moire.bus.client import Bus
 from moire.bus.protocol import (
     Exchange,
     State,
@@ -18,6 +17,7 @@ from moire.bus.protocol import (
     parse_reply,
     request_body,
 )
+from moire.client.bus import Bus
 from moire.errors import BusError, BusGarbled, NoAnswer, OutOfRange
 from moire.made.bus_tables import LONGEST_BODY, OPERATIONS
 from tb.bench import seed
@@ -145,7 +145,7 @@ def test_an_old_reply_repeats_the_same_words_at_once():
     exchange.feed(
         reply_words(sequence=7, operation=2, cause=3)
     )  # right number, another operation: old too
-    with pytest.raises(BusGarbled, match="never received the request whole"):
+    with pytest.raises(BusGarbled, match="never received the whole request"):
         exchange.result()
 
 
@@ -175,11 +175,11 @@ def test_a_line_that_never_falls_silent_is_given_up():
 
 def test_patience_grows_with_what_is_awaited():
     exchange = Exchange(1, ENABLE, timing=Timing(character=0.001, answer=0.1, quiet=0.01))
-    assert exchange.timeout_s == pytest.approx(0.101) and exchange.wanted == 1
+    assert exchange.timeout_s == pytest.approx(0.101) and exchange.expected == 1
     exchange.feed([0x61, 0x51, 3])
-    assert exchange.wanted == 7 and exchange.timeout_s == pytest.approx(0.107)
+    assert exchange.expected == 7 and exchange.timeout_s == pytest.approx(0.107)
     exchange.feed([7, 3, 0])
-    assert exchange.wanted == 4
+    assert exchange.expected == 4
 
 
 # ------------------------------------------------------------------ with a node at the other end

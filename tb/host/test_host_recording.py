@@ -8,7 +8,7 @@ import json
 import pytest
 
 from moire.bus import recording
-from moire.bus.client import Bus
+from moire.client.bus import Bus
 from moire.errors import BadFile
 from moire.made.bus_tables import PARAMETERS
 from tb.fakes.fake_node import ESTOP, FakeBus, FakeNode
@@ -122,7 +122,7 @@ def test_a_record_that_broke_off_at_another_baud_rate_leaves_the_nodes_at_the_fi
 def test_a_record_with_another_baud_rate_is_not_replayed_through_a_door(tmp_path):
     bus = FakeBus(FakeNode())
     bus.handshake = False
-    assert "the nodes' own line" in sentence(
+    assert "the bus of the nodes itself" in sentence(
         Call(f"replay {recorded(tmp_path, 'baud 9600 1')}", bus=bus), 3
     )
 
@@ -133,12 +133,12 @@ def test_a_record_with_another_baud_rate_is_not_replayed_through_a_door(tmp_path
         "",
         "{}",
         "no json",
-        '{"record": "moire bus", "version": 2, "protocol_crc": 0}',
+        '{"record": "moire bus", "version": 1, "protocol_crc": 0}',
         json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + '\n{"at": 1}',
         json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC})
         + '\n{"at": 1, "send": [512]}',
         json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC})
-        + '\n{"at": 1, "receive": [1], "wanted": 1}',
+        + '\n{"at": 1, "receive": [1], "expected": 1}',
         *(
             json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC})
             + f'\n{{"at": 1, {call}}}'

@@ -13,7 +13,9 @@ import pytest
 
 from moire.analysis.harmonic_fit import fit, read_readings
 from moire.bus.protocol import NINTH
-from moire.bus.relay import (
+from moire.bus.transport import Transport
+from moire.cli import relay as command_relay
+from moire.client.relay import (
     COUNTS,
     FIRST,
     SECOND,
@@ -25,8 +27,6 @@ from moire.bus.relay import (
     make_set,
     terms_of,
 )
-from moire.bus.transport import Transport
-from moire.cli import relay as command_relay
 from moire.errors import BadFile, BusGarbled, NoAnswer, OutOfRange
 from tb.bench import seed
 from tb.compensate.harmonic_map import exact, term_of

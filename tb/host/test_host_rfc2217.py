@@ -107,7 +107,7 @@ def test_nonsense_neither_grows_nor_stops_it():
     source = random.Random(SEED)
     line = server()
     line.feed(bytes([IAC, SB]) + b"\x2c" * 100_000)
-    assert len(line.asked) <= rfc2217.LONGEST_ASKED + 1
+    assert len(line.option) <= rfc2217.LONGEST_OPTION + 1
     line.feed(bytes([IAC, SE]))
     for _ in range(3000):
         line.feed(

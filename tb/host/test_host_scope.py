@@ -9,7 +9,7 @@ import random
 import pytest
 
 from moire.analysis.scope import NoRecord, Scope, excite, lsb
-from moire.bus.client import Bus
+from moire.client.bus import Bus
 from moire.errors import OutOfRange, Refused
 from tb.fakes.fake_node import FakeBus, FakeNode
 from tb.host.test_host_command_line import Call, sentence

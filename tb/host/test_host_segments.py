@@ -8,8 +8,8 @@ from fractions import Fraction
 
 import pytest
 
-from moire.bus.client import Bus
-from moire.bus.segments import NotInForce, Segments, SegmentTable, read_table, text_of
+from moire.client.bus import Bus
+from moire.client.segments import NotInForce, Segments, SegmentTable, read_table, text_of
 from moire.errors import BadFile, OutOfRange
 from tb.fakes.fake_node import FakeBus, FakeNode
 from tb.host.test_host_command_line import Call, sentence
@@ -72,7 +72,7 @@ def test_a_table_is_read_with_its_units(file, lines):
         (["0, 0", "1, nan", "2, 2"], "line 2: the error is nan"),
         (["0, 0", "1, about 5", "2, 2"], "line 2: the error is no length: 'about 5'"),
         (["0, 0", "1, 5 kg"], "line 2: the error is no length: '5 kg'"),
-        (["0, 0", "1, 2, 3"], "line 2: two columns are wanted"),
+        (["0, 0", "1, 2, 3"], "line 2: it needs two columns"),
         (["# nothing", "0, 0"], "1 borders are too few"),
         (["0, 0", "1,"], "line 2: the error is no number"),
     ],

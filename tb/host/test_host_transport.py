@@ -8,9 +8,9 @@ import pytest
 import serial
 
 from moire.bus import transport
-from moire.bus.client import Bus
 from moire.bus.protocol import ODD_ADDRESSES
 from moire.bus.transport import SerialBus
+from moire.client.bus import Bus
 from moire.errors import PortError
 from tb.fakes.fake_node import FakeNode
 

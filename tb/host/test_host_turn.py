@@ -10,11 +10,11 @@ from fractions import Fraction
 
 import pytest
 
-from moire.bus.client import Bus
-from moire.bus.indexing_table import IndexingTable
-from moire.bus.job import Job
-from moire.bus.settings import Settings
 from moire.cli import command_line
+from moire.client.bus import Bus
+from moire.client.indexing_table import IndexingTable
+from moire.client.job import Job
+from moire.client.settings import Settings
 from moire.errors import MotionFailed, OutOfRange, Refused, UnknownName
 from moire.made.bus_tables import SETTINGS
 from tb.fakes.firmware_bus import FakeNodeBus

@@ -9,8 +9,8 @@ import pytest
 
 from experiments.s2_stage import SCALES
 from experiments.s4_job import CLK_HZ, NODE
-from moire.bus.client import Bus
 from moire.bus.protocol import sync_words
+from moire.client.bus import Bus
 from moire.errors import BusError
 from tb.bench import seed
 from twin import START_S, Node, Twin, TwinTransport

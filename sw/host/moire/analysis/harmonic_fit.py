@@ -26,7 +26,7 @@ from pathlib import Path
 
 import numpy as np
 
-from moire.bus.columns import number, rows
+from moire.columns import number, rows
 from moire.errors import BadFile, OutOfRange
 
 LARGEST_ERROR = 3600.0  # arc seconds; a ring that is farther off is not mounted, it has fallen down

@@ -14,7 +14,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from moire import units
-from moire.bus.client import COUNTS, FULL_SCALE, Axis, named
+from moire.client.access import COUNTS, FULL_SCALE
+from moire.client.axis import Axis
+from moire.client.names import code_name
 from moire.errors import MoireError, OutOfRange
 from moire.made.bus_tables import OPERATIONS, SCOPE_STATES, SCOPE_TRIGGERS
 
@@ -116,7 +118,7 @@ class Scope:
         )
 
     def state(self) -> str:
-        return named(SCOPE_STATES, self.node.request("scope")["state"], "state")
+        return code_name(SCOPE_STATES, self.node.request("scope")["state"], "state")
 
     def wait(self, timeout="10s") -> Record:
         """Until the record is complete; it talks often enough for the watchdog."""

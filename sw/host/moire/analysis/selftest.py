@@ -6,7 +6,7 @@ words.
 from typing import NamedTuple
 
 from moire import units
-from moire.bus.client import Node
+from moire.client.node import Node
 from moire.errors import MoireError
 from moire.made.bus_tables import PARAMETERS
 from moire.made.registers import MAP_CRC
