@@ -204,6 +204,95 @@ def test_home_and_move_go_where_they_should():
         axis.move("fast")
 
 
+@pytest.mark.parametrize("operation", ["move", "begin_move", "prepare"])
+def test_a_target_without_its_unit_is_refused_and_the_axis_does_not_move(operation):
+    fake, node, axis = homed_stage()
+    for number in (1.5, 0, Fraction(3, 2)):
+        with pytest.raises(UnitError, match="has no unit: write mm="):
+            getattr(axis, operation)(number)
+    assert operation not in node.executed and "move" not in node.executed
+
+
+@pytest.mark.parametrize("number", [float("nan"), float("inf"), -float("inf"), "far", None])
+@pytest.mark.parametrize("unit", ["nm", "um", "mm"])
+def test_a_target_that_is_no_finite_number_is_out_of_range(unit, number):
+    fake, node, axis = homed_stage()
+    with pytest.raises(OutOfRange, match="is no length: give a finite number|needs one target"):
+        axis.move(**{unit: number})
+    assert "move" not in node.executed
+
+
+@pytest.mark.parametrize(
+    "target", [{"um": 1500}, {"mm": 1.5}, {"nm": 1.5e6}, {"mm": Fraction(3, 2)}]
+)
+def test_a_target_may_have_any_of_three_units(target):
+    fake, node, axis = homed_stage()
+    assert axis.move(**target).position_nm == 1_500_000
+
+
+def test_the_end_of_a_with_block_switches_the_drive_off():
+    fake, node, axis = stage()
+    with axis as same:
+        assert same is axis
+        axis.enable()
+        axis.home()
+        assert node.axes[0].enabled
+    assert not node.axes[0].enabled
+
+
+def test_a_with_block_leaves_a_drive_on_that_was_on_before_also_when_nested():
+    fake, node, axis = homed_stage()
+    with axis:
+        axis.move(mm=1)
+        with axis:
+            axis.move(mm=2)
+    assert node.axes[0].enabled and axis.status().position_nm == 2_000_000
+
+
+@pytest.mark.parametrize("was_on", [False, True])
+def test_an_exception_in_a_with_block_stops_the_axis_before_the_drive_is_off(was_on):
+    fake, node, axis = homed_stage()
+    if not was_on:
+        axis.disable()
+    with pytest.raises(ZeroDivisionError):
+        with axis:
+            axis.enable()
+            axis.begin_move(mm=10)
+            raise ZeroDivisionError
+    assert node.axes[0].kind is None and node.axes[0].enabled == was_on
+    assert node.executed.count("stop") == 1
+    last = [name for name in node.executed if name in ("stop", "enable")][-1]
+    assert last == ("stop" if was_on else "enable")
+
+
+def test_the_error_in_a_with_block_is_raised_and_not_that_of_its_end():
+    fake, node, axis = stage()
+    with pytest.raises(ZeroDivisionError):
+        with axis:
+            fake.to_node = lambda word: []
+            raise ZeroDivisionError
+    fake, node, axis = stage()
+    with pytest.raises(NoAnswer):
+        with axis:
+            fake.to_node = lambda word: []
+
+
+def test_a_travel_whose_ends_are_swapped_is_refused_by_the_host():
+    fake, node, axis = stage()
+    with pytest.raises(
+        OutOfRange, match=r"travel_high \(-1mm\) would lie below travel_low \(-800um\)"
+    ):
+        axis.set_parameter("travel_high", "-1mm")
+    with pytest.raises(OutOfRange, match="would lie below travel_low"):
+        axis.set_parameter("travel_low", "120mm")
+    with pytest.raises(OutOfRange, match="would lie below travel_low"):
+        axis.load_parameters({"kp": "0.5", "travel_low": "2mm", "travel_high": "1mm"})
+    assert node.axes[0].writes == []
+    axis.set_parameter("travel_high", "-800um")
+    axis.load_parameters({"travel_low": "-3mm", "travel_high": "-2mm"})
+    assert axis.get_parameter("travel_high").value == -2_000_000
+
+
 def test_refusals_carry_the_words_of_the_table_and_the_values():
     fake, node, axis = stage()
     with pytest.raises(

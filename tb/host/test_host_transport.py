@@ -11,8 +11,8 @@ from moire.bus import transport
 from moire.bus.protocol import ODD_ADDRESSES
 from moire.bus.transport import SerialBus
 from moire.client.bus import Bus
-from moire.errors import PortError
-from tb.fakes.fake_node import FakeNode
+from moire.errors import PortError, UnknownName
+from tb.fakes.fake_node import FakeBus, FakeNode
 
 
 class FakePort:
@@ -262,3 +262,25 @@ def test_an_answer_with_gaps_is_read_whole_and_its_end_is_still_seen(monkeypatch
     assert line.receive(1, 0.02) == [] and clock.now == pytest.approx(
         0.016 * 5 + line.GAP_S + 0.02, abs=0.006
     )
+
+
+def test_open_bus_opens_a_simulated_machine_by_name(monkeypatch):
+    opened = []
+
+    class EntryPoint:
+        @staticmethod
+        def load():
+            return lambda machine, seed: opened.append(machine) or FakeBus(FakeNode())
+
+    def entry_points(**which):
+        assert which == {"group": "moire.ports", "name": "twin"}
+        return [EntryPoint]
+
+    monkeypatch.setattr("moire.bus.twin_port.entry_points", entry_points)
+    for port, machine in (("twin", "s0"), ("twin:s2", "s2"), ("twin:", "s0")):
+        with transport.open_bus(port, baud=9600) as bus:
+            assert bus.baud == 9600 and opened.pop() == machine
+            bus.set_baud(115200)
+            assert [node.address for node in Bus(bus).find()] == [1]
+    with pytest.raises(UnknownName, match="no simulated machine 's9': known are s0, s0_fine"):
+        transport.open_bus("twin:s9")
