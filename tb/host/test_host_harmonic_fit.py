@@ -110,7 +110,7 @@ def test_one_revolution_says_nothing_of_its_noise_and_takes_what_it_is_told():
 def test_a_good_table_is_read_with_or_without_heading_and_comments(tmp_path):
     for lines in (table(), table()[1:], ["# laser, 2026-11-21", "", *table()]):
         read = read_readings(written(tmp_path, lines))
-        assert np.array_equal(read.angle, TEN) and read.places == 36 and read.revolutions == 1
+        assert np.array_equal(read.angle, TEN) and read.angles == 36 and read.revolutions == 1
 
 
 def test_angles_that_fall_back_begin_the_next_revolution(tmp_path):
@@ -119,7 +119,7 @@ def test_angles_that_fall_back_begin_the_next_revolution(tmp_path):
     )
     assert (
         np.array_equal(read.angle, np.arange(0, 721, 10))
-        and read.places == 36
+        and read.angles == 36
         and read.revolutions == 2
     )
 
@@ -127,8 +127,8 @@ def test_angles_that_fall_back_begin_the_next_revolution(tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({5: "40"}, "line 5: two columns"),
-        ({5: "30,1,2"}, "line 5: two columns"),
+        ({5: "40"}, "line 5: it needs two columns"),
+        ({5: "30,1,2"}, "line 5: it needs two columns"),
         ({5: "30,abc"}, "line 5: the error is no number: 'abc'"),
         ({5: "x,1"}, "line 5: the angle is no number: 'x'"),
         ({5: "30,nan"}, "line 5: the error is nan"),

@@ -256,11 +256,11 @@ def spoil_register(node):
 @pytest.mark.parametrize(
     "spoil, name, said",
     [
-        (spoil_estop, "axis 0 guard", "emergency stop pressed"),
+        (spoil_estop, "axis 0 interlock", "emergency stop pressed"),
         (spoil_limits, "axis 0 sensor", "amplitude 103, allowed 200 to 160"),
         (spoil_signal, "axis 0 sensor", "signal too large"),
         (spoil_parameter, "axis 0 parameters", "out of range: pwm_frequency"),
-        (spoil_register, "line", "wrong_values 50"),
+        (spoil_register, "bus", "wrong_values 50"),
     ],
 )
 def test_selftest_finds_and_names_what_is_wrong(spoil, name, said):
@@ -285,4 +285,4 @@ def test_selftest_counts_what_is_wrong_on_the_line():
 
     bus.to_node = every_hundredth
     call = Call("selftest", bus=bus)
-    assert "FAILED   line" in call.out and "frames_bad" in call.out and "repeats" in call.out
+    assert "FAILED   bus" in call.out and "frames_bad" in call.out and "repeats" in call.out

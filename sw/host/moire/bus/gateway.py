@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Connects clients to a bus: RFC 2217, TCP and a pseudo terminal in front of any transport, above all
+"""Connects clients to a bus: RFC 2217, TCP and a pseudo terminal in front of any transport, such as
 that of a simulated machine.
 
     gateway = Gateway(TwinTransport(Twin()))

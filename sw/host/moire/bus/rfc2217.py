@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The server of RFC 2217 (a serial port over Telnet) without any input or output: it takes bytes, and
-returns characters and answers.
+"""The server of RFC 2217 (a serial port over Telnet) without any input or output.
+
+It takes the bytes of a client, and returns characters and answers.
 
 Each character carries the parity that was in force when it was sent, so that a change of parity
 needs no waiting. The PortManager of pyserial has no such thing; it also raises struct.error on a

@@ -83,11 +83,11 @@ class Harmonics(Protocol):
     """The harmonics of an error in arcsec, by order from 1, as harmonic_fit finds them."""
 
     @property
-    def cosine(self) -> Sequence[float]:
+    def cosine(self) -> Iterable[float]:
         """The cosine terms."""
 
     @property
-    def sine(self) -> Sequence[float]:
+    def sine(self) -> Iterable[float]:
         """The sine terms."""
 
 
