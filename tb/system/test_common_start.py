@@ -119,7 +119,7 @@ def test_a_node_that_missed_the_mark_is_reported_and_does_not_move(prepared):
 
     twin_bus, bus.transport = bus.transport, Deaf()
     with pytest.raises(
-        BusError, match="the node did not hear the mark at which its motion should begin"
+        BusError, match="did not receive the sync at which its motion should begin"
     ) as caught:
         bus.start(*prepared)
     bus.transport = twin_bus
