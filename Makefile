@@ -44,6 +44,10 @@ lint: $(SETUP)   ## verilator -Wall over every module, ruff over the Python, the
 	@$(CLANG_FORMAT) --dry-run -Werror $(C_SOURCES)
 	@$(VERIBLE) --verify $(SV_SOURCES)
 
+types: $(SETUP)  ## mypy --strict over the host package
+	$(call say,types: mypy)
+	@$(PYTHON) -m mypy
+
 format: $(SETUP) ## lay out all code as `make lint` wants it
 	@$(PYTHON) -m ruff format -q .
 	@$(CLANG_FORMAT) -i $(C_SOURCES)
@@ -110,4 +114,4 @@ clean:            ## remove what was built; the tools in build/venv stay (rm -rf
 $(SETUP): requirements.lock pyproject.toml sw/host/pyproject.toml tools/setup.sh
 	@tools/setup.sh
 
-.PHONY: help demo test check lint format promises prove tables fresh firmware figure figures soak board clean
+.PHONY: help demo test check lint types promises format prove tables fresh firmware figure figures soak board clean

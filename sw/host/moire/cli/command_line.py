@@ -17,16 +17,7 @@ from functools import cache, partial
 from pathlib import Path
 
 from moire import units
-from moire.bus.client import (
-    CAPTURE_SOURCES,
-    HOME_METHODS,
-    Bus,
-    capture_source,
-    register_fields,
-    whole,
-)
 from moire.bus.protocol import ADDRESSES
-from moire.bus.segments import Segments
 from moire.bus.transport import BAUD, PARITIES, open_bus
 from moire.cli import job as command_job
 from moire.cli import nonvolatile as command_keep
@@ -37,6 +28,11 @@ from moire.cli import segments as command_segments
 from moire.cli import turn as command_index
 from moire.cli import twin as command_twin
 from moire.cli import watch as command_look
+from moire.client.bus import Bus
+from moire.client.capture import CAPTURE_SOURCES, capture_source
+from moire.client.node import register_fields
+from moire.client.segments import Segments
+from moire.client.values import HOME_METHODS, whole
 from moire.errors import BadFile, BusError, MoireError, OutOfRange, PortError, Refused, UnitError
 from moire.made.bus_tables import PARAMETERS
 from moire.made.registers import FIELDS
@@ -871,9 +867,6 @@ def open_port(options):
         raise PortError(
             "no port: write --port /dev/ttyUSB0, or --port twin for the simulated stage"
         )
-    machine = command_twin.machine_of(port)
-    if machine is not None:
-        return command_twin.make_twin(options.baud, machine)
     return open_bus(port, options.baud, options.parity)
 
 
@@ -1013,10 +1006,10 @@ def do_move(session, command):
         do_motion(
             session,
             command,
-            lambda axis, show: axis.move(command.target, by=command.by, progress=show),
+            lambda axis, show: axis.move(nm=command.target, by=command.by, progress=show),
         )
         return
-    seconds = session.switch_on(command).begin_move(command.target, by=command.by)
+    seconds = session.switch_on(command).begin_move(nm=command.target, by=command.by)
     session.say(
         {**node_and_axis(command), "duration_s": seconds},
         f"{where(command)}: on its way, {seconds:.3f} s at full speed",
@@ -1028,7 +1021,7 @@ def do_finish(session, command):
 
 
 def do_prepare(session, command):
-    seconds = session.switch_on(command).prepare(command.target, by=command.by)
+    seconds = session.switch_on(command).prepare(nm=command.target, by=command.by)
     session.say(
         {**node_and_axis(command), "duration_s": seconds},
         f"{where(command)}: prepared, {seconds:.3f} s at full speed",

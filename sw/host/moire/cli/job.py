@@ -8,8 +8,9 @@ add_to(group, command)
 from dataclasses import asdict
 from pathlib import Path
 
-from moire.bus.client import CAUSE_CODES
-from moire.bus.job import Job, equal_parts, read_stations, said
+from moire.client.indexing_table import angle_text
+from moire.client.job import Job, equal_parts, read_stations
+from moire.client.names import CAUSE_CODES
 from moire.errors import BadFile, MotionFailed
 
 ANSWERS = ("again", "next", "resume", "stop")
@@ -157,7 +158,7 @@ def do_load(session, options):
     program = job_of(session, options).load(angles)
     session.say(
         {"stations": len(program.angles), "generation": program.generation},
-        f"{len(program.angles)} stations from {said(program.angles[0])} to {said(program.angles[-1])}, kept in the EEPROM",
+        f"{len(program.angles)} stations from {angle_text(program.angles[0])} to {angle_text(program.angles[-1])}, kept in the EEPROM",
     )
 
 

@@ -7,7 +7,7 @@ add_to(actions, command)
 
 from dataclasses import asdict
 
-from moire.bus.nonvolatile import SavedSettings
+from moire.client.nonvolatile import SavedSettings
 
 
 def add_to(actions, command):

@@ -8,7 +8,7 @@ add_to(group, command)
 from pathlib import Path
 
 from moire.analysis import report
-from moire.bus.relay import Relay, Settings, make_set, terms_of
+from moire.client.relay import Relay, Settings, make_set, terms_of
 from moire.errors import BadFile
 
 

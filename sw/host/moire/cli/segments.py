@@ -6,7 +6,7 @@ parser.
 from dataclasses import asdict
 
 from moire.analysis import report
-from moire.bus.segments import USES, Segments, read_table, text_of
+from moire.client.segments import USES, Segments, read_table, text_of
 from moire.units import format_length
 
 

@@ -11,8 +11,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 from moire import units
-from moire.bus.indexing_table import IndexingTable
-from moire.bus.settings import Settings
+from moire.client.indexing_table import IndexingTable
+from moire.client.settings import Settings
 from moire.errors import BadFile, MoireError
 from moire.made.bus_tables import SETTINGS
 

@@ -5,20 +5,12 @@ pseudo terminal; and the port `twin`.
 
 import os
 from contextlib import contextmanager
-from importlib.metadata import entry_points
 
 from moire.bus.gateway import Gateway
-from moire.errors import OutOfRange, PortError, TwinNotBuilt, UnknownName
+from moire.bus.twin_port import MACHINES, open_twin
+from moire.errors import OutOfRange, PortError
 
 RFC2217_PORT, TCP_PORT = 2217, 2218
-PORT = "twin"  # of the command line; "twin:s2" is that of another machine
-MACHINES = {  # made by experiments.machines
-    "s0": "X-Y stage with a grating interferometer, a node an axis",
-    "s0_fine": "X axis of that with a piezo on its table",
-    "s2": "three stepper axes with scales in one node",
-    "s3": "linear motor with a scale and its reference mark",
-    "s4": "indexing table and wire-EDM machine, node 1 with the panel, node 2 with the table",
-}
 
 
 def add_to(command, address_number, waiting_time):
@@ -76,37 +68,11 @@ def add_to(command, address_number, waiting_time):
     )
 
 
-def machine_of(port: str) -> str | None:
-    """The machine that a port names: "twin", "twin:s2"; None where it is another port."""
-    kind, _, name = port.partition(":")
-    if kind != PORT:
-        return None
-    if name and name not in MACHINES:
-        raise UnknownName(
-            f"there is no simulated machine '{name}': known are {', '.join(MACHINES)}"
-        )
-    return name or "s0"
-
-
-def make_twin(baud: int, machine: str = "s0", seed: int = 1, **settings):
-    """The transport of a simulated machine. A checkout of Moire offers it as the entry point `twin`
-    of the group `moire.ports`.
-    """
-    found = tuple(entry_points(group="moire.ports", name=PORT))
-    if not found:
-        raise TwinNotBuilt(
-            "the simulated machine needs a checkout of Moire: run `make demo` there and use its build/venv/bin/moire"
-        )
-    transport = found[0].load()(machine, seed, **settings)
-    transport.set_baud(baud)
-    return transport
-
-
 def do_twin(session, command):
     if command.nodes and command.machine != "s0":
         raise OutOfRange(f"--nodes is for s0: the nodes of {command.machine} have their addresses")
     settings = {"nodes": tuple(dict.fromkeys(command.nodes))} if command.nodes else {}
-    transport = make_twin(command.baud, command.machine, command.seed, **settings)
+    transport = open_twin(command.baud, command.machine, command.seed, **settings)
     gateway, nodes = Gateway(transport), list(transport.addresses)
     try:
         rfc2217 = f"rfc2217://{command.bind}:{gateway.open_rfc2217(command.bind, command.rfc2217)}"

@@ -6,7 +6,7 @@ from math import inf
 
 from moire import units
 from moire.analysis import selftest
-from moire.bus.client import Signal
+from moire.client.records import Signal
 
 EVERY_S = 0.2  # of watch
 

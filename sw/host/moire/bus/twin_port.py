@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The ports "twin" and "twin:s2": simulated machines, which a checkout of Moire provides."""
+
+from __future__ import annotations
+
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING, Any
+
+from moire.errors import TwinNotBuilt, UnknownName
+
+if TYPE_CHECKING:
+    from moire.bus.transport import Transport
+
+PORT = "twin"
+DEFAULT = "s0"
+MACHINES = {  # made by experiments.machines
+    "s0": "X-Y stage with a grating interferometer, a node an axis",
+    "s0_fine": "X axis of that with a piezo on its table",
+    "s2": "three stepper axes with scales in one node",
+    "s3": "linear motor with a scale and its reference mark",
+    "s4": "indexing table and wire-EDM machine, node 1 with the panel, node 2 with the table",
+}
+
+
+def machine_of(port: str) -> str | None:
+    """The machine that a port names: "twin" is s0, "twin:s2" is s2; None for any other port.
+
+    Raises UnknownName for a machine that does not exist.
+    """
+    kind, _, name = port.partition(":")
+    if kind != PORT:
+        return None
+    if name and name not in MACHINES:
+        raise UnknownName(
+            f"there is no simulated machine '{name}': known are {', '.join(MACHINES)}"
+        )
+    return name or DEFAULT
+
+
+def open_twin(baud: int, machine: str = DEFAULT, seed: int = 1, **settings: Any) -> Transport:
+    """The transport of a simulated machine; raises TwinNotBuilt where none is installed.
+
+    A checkout of Moire offers it as the entry point `twin` of the group `moire.ports`.
+    """
+    found = tuple(entry_points(group="moire.ports", name=PORT))
+    if not found:
+        raise TwinNotBuilt(
+            "the simulated machine needs a checkout of Moire: run `make demo` there and use its "
+            "build/venv/bin/moire"
+        )
+    transport: Transport = found[0].load()(machine, seed, **settings)
+    transport.set_baud(baud)
+    return transport
