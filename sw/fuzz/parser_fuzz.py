@@ -27,6 +27,9 @@ from moire.bus import cobs, protocol, recording, relay, rfc2217
 from moire.bus.client import Axis
 from moire.bus.transport import Transport
 from moire.cli import command_line
+from moire.cli.commands.params import read_parameters
+from moire.cli.commands.tune import read_record
+from moire.cli.options import Options
 from moire.errors import MoireError
 from moire.made.bus_tables import OPERATIONS, PARAMETERS
 
@@ -117,9 +120,8 @@ def quantities(data):
 
 
 def command(data):
-    options = command_line.argparse.Namespace(**command_line.DEFAULTS)
     try:
-        command_line.parse_line(text_of(data), options)
+        command_line.parse_line(text_of(data), Options())
     except SystemExit as end:
         assert end.code == 0, "only --help ends the program here"
 
@@ -137,14 +139,14 @@ def parameters(data):
     axis = object.__new__(Axis)
     axis.period_nm = Fraction(800)
     with standard_input(data) as file:
-        texts, _ = command_line.read_parameters(file)
+        texts, _ = read_parameters(file)
     for name, text in texts.items():
         axis.parameter_counts(name, text)
 
 
 def tuning_record(data):
     with standard_input(data) as file:
-        command_line.read_record(file)
+        read_record(file)
 
 
 def readings(data):

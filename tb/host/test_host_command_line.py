@@ -11,7 +11,7 @@ import pytest
 
 from experiments import machines
 from moire.analysis import tune
-from moire.cli import command_line
+from moire.cli import command_line, shell
 from moire.cli.twin import MACHINES
 from moire.errors import PortError
 from moire.made.bus_tables import PARAMETERS
@@ -361,10 +361,16 @@ def test_errors_are_json_too():
         ("", "a command is missing"),
         ("status --", "a command is missing beside --"),
         ("-- status", "a command is missing beside --"),
-        ("fly", "invalid choice: 'fly' (choose from"),
+        ("fly", "there is no command 'fly' (see: moire --help)"),
+        ("hom", "there is no command 'hom', did you mean home?"),
+        ("capture reed", "there is no command 'reed', did you mean read?"),
+        ("status --adress 2", "there is no option '--adress', did you mean --address?"),
+        ("move 1mm 2mm", "'2mm' is one argument too many (see: moire move --help)"),
+        ("status --port", "requires an argument"),
+        ("job load", "give either FILE or --equal N"),
         ("move 1", "'1' has no unit: write a number with pm nm um mm cm m"),
         ("move fast", "'fast' is no length"),
-        ("move", "required: LENGTH"),
+        ("move", "LENGTH is missing"),
         ("wait 5mm", "'5mm' is no time: write a number with ns us ms s min, such as 20ms"),
         ("wait -1s", "in the past"),
         ("status --address 16", "'16' is no address: allowed are 1 to 15"),
@@ -372,17 +378,18 @@ def test_errors_are_json_too():
         ("find 0", "allowed are 1 to 15"),
         ("status --axis -1", "'-1' is no axis: the first is 0"),
         ("status --baud 0", "'0' is no whole number above 0"),
-        ("status --parity even", "invalid choice: 'even'"),
-        ("params", "required: ACTION"),
-        ("params get speed", "invalid choice: 'speed' (choose from"),
-        ("params set velocity", "required: VALUE"),
+        ("status --parity even", "there is no parity 'even': allowed are auto, mark, odd, none"),
+        ("params", "an ACTION is missing (see: moire params --help)"),
+        ("params get speed", "there is no parameter 'speed': 'moire params list' lists all"),
+        ("params get velocty", "did you mean velocity or velocity_quantum?"),
+        ("params set velocity", "VALUE is missing"),
         ("params set velocity 900mm/s", "velocity allows 800nm/s to 800mm/s, not 900mm/s"),
         ("params set velocity 5mm", "'5mm' is no speed"),
         ("params set kp x", "'x' is no number: write a plain number, such as 0.5"),
         ("override 120%", "'120%' is no share of full speed: write 0% to 100%, or 0 to 1"),
         ("home --method zero", "'zero' is no method: allowed are a number of CiA 402, s0, s3"),
-        ("start", "required: AXIS"),
-        ("tune record.csv", "required: --bandwidth"),
+        ("start", "AXIS is missing"),
+        ("tune record.csv", "--bandwidth is missing"),
         ("tune /no/such/file --bandwidth 40Hz", "cannot be read"),
         ("register axis.speed", "there is no register 'axis.speed'"),
         ("register 0x401", "multiples of 4"),
@@ -390,7 +397,7 @@ def test_errors_are_json_too():
         ("params load /no/such/file", "the file /no/such/file cannot be read: No such file"),
         ("params save /no/such/file", "cannot be written"),
         ("run /no/such/file", "cannot be read"),
-        ("status -- shell", "'shell' stands alone"),
+        ("status -- shell", "'shell' must be the only command of its call"),
     ],
 )
 def test_wrong_usage_is_one_sentence_and_exit_code_2(text, said):
@@ -487,7 +494,7 @@ def test_a_simulated_machine_that_does_not_exist_is_named():
     assert "--nodes is for s0: the nodes of s2 have their addresses" in sentence(
         Call("twin --machine s2 --nodes 1"), 2
     )
-    assert "invalid choice: 's9'" in sentence(Call("twin --machine s9"), 2)
+    assert "there is no machine 's9'" in sentence(Call("twin --machine s9"), 2)
 
 
 def test_another_build_is_exit_code_5():
@@ -569,7 +576,7 @@ def test_a_file_of_commands_is_carried_out(tmp_path):
     "text, said",
     [
         ("home\nmove 1\n", "line 2 of"),
-        ("shell\n", "cannot stand inside a file"),
+        ("shell\n", "'shell' is not allowed in a file or a shell"),
         ("status --baud 9600\n", "--baud holds for the whole call"),
         ("move '1mm\n", "cannot be read: No closing quotation"),
     ],
@@ -651,7 +658,7 @@ def test_a_waiting_shell_talks_on_a_line_whose_time_runs(monkeypatch):
     bus = FakeBus(node)
     bus.time_is_stopped = False
     monkeypatch.setattr(sys, "stdin", Keyboard())
-    monkeypatch.setattr(command_line, "KEEP_ALIVE_S", 0.01)
+    monkeypatch.setattr(shell, "KEEP_ALIVE_S", 0.01)
     assert Call("shell", bus=bus).code == 0 and node.executed.count("status") >= 2
 
 

@@ -3,10 +3,8 @@
 failures, and every refusal.
 """
 
-import argparse
 import math
 import random
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -26,7 +24,8 @@ from moire.bus.relay import (
     terms_of,
 )
 from moire.bus.transport import Transport
-from moire.cli import relay as command_relay
+from moire.cli import command_line
+from moire.cli.session import Call, Session
 from moire.errors import BadFile, BusGarbled, NoAnswer, OutOfRange
 from tb.bench import seed
 from tb.compensate.harmonic_map import exact, term_of
@@ -319,18 +318,13 @@ def call(transport, *words):
     """What the command says, as the command line would run it."""
     said = []
 
-    def command(name, handler, text, example, group):
-        made = group.add_parser(name)
-        made.set_defaults(handler=handler)
-        return made
+    class Heard(Call):
+        def say(self, values, text):
+            said.append((values, text))
 
-    parser = argparse.ArgumentParser()
-    command_relay.add_to(parser.add_subparsers(), command)
-    options = parser.parse_args(words)
-    session = SimpleNamespace(
-        bus=SimpleNamespace(transport=transport), say=lambda told, text: said.append((told, text))
-    )
-    options.handler(session, options)
+    (planned,) = command_line.parse_call(["relay", *words])
+    session = Session(planned.options, lambda options: transport)
+    planned.handler(Heard(session, planned), **planned.arguments)
     return said[0]
 
 

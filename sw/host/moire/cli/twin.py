@@ -1,83 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command `moire twin`: serves a simulated machine to any client, over RFC 2217, TCP and a
-pseudo terminal; and the port `twin`.
-"""
+"""The port `twin`: a simulated machine instead of a serial port."""
 
-import os
-from contextlib import contextmanager
 from importlib.metadata import entry_points
+from typing import Any
 
-from moire.bus.gateway import Gateway
-from moire.errors import OutOfRange, PortError, TwinNotBuilt, UnknownName
+from moire.bus.transport import Transport
+from moire.errors import TwinNotBuilt, UnknownName
 
-RFC2217_PORT, TCP_PORT = 2217, 2218
-PORT = "twin"  # of the command line; "twin:s2" is that of another machine
+PORT = "twin"  # --port twin; --port twin:s2 names the machine too
 MACHINES = {  # made by experiments.machines
-    "s0": "X-Y stage with a grating interferometer, a node an axis",
-    "s0_fine": "X axis of that with a piezo on its table",
+    "s0": "X-Y stage with a grating interferometer, one node per axis",
+    "s0_fine": "X axis of the stage s0 with a piezo on its table",
     "s2": "three stepper axes with scales in one node",
     "s3": "linear motor with a scale and its reference mark",
     "s4": "indexing table and wire-EDM machine, node 1 with the panel, node 2 with the table",
 }
 
 
-def add_to(command, address_number, waiting_time):
-    """command(name, handler, text, example): makes the parser."""
-    twin = command(
-        "twin",
-        do_twin,
-        "serve a simulated machine to any client, until Ctrl-C",
-        "moire twin --machine s2 --link moire.tty",
-    )
-    twin.add_argument(
-        "--machine",
-        choices=MACHINES,
-        default="s0",
-        help="; ".join(f"{name}: {words}" for name, words in MACHINES.items())
-        + "; s0 unless given",
-    )
-    twin.add_argument(
-        "--nodes",
-        nargs="+",
-        type=address_number,
-        metavar="N",
-        help="of s0, their addresses; 1 2 unless given",
-    )
-    twin.add_argument(
-        "--bind",
-        default="127.0.0.1",
-        metavar="HOST",
-        help="who may come in: 127.0.0.1, this computer only, unless given",
-    )
-    twin.add_argument(
-        "--rfc2217",
-        type=int,
-        default=RFC2217_PORT,
-        metavar="PORT",
-        help=f"9-bit line by mark and space parity, or COBS packets by 8N1; {RFC2217_PORT} unless given, 0: any that is free",
-    )
-    twin.add_argument(
-        "--tcp",
-        type=int,
-        default=TCP_PORT,
-        metavar="PORT",
-        help=f"COBS packets; {TCP_PORT} unless given, 0: any that is free",
-    )
-    twin.add_argument("--link", metavar="FILE", help="a symbolic link to the pseudo terminal")
-    twin.add_argument(
-        "--seed",
-        type=int,
-        default=1,
-        metavar="N",
-        help="of all that is random in it; 1 unless given",
-    )
-    twin.add_argument(
-        "--for", dest="time", type=waiting_time, metavar="TIME", help="end after this, with a unit"
-    )
-
-
 def machine_of(port: str) -> str | None:
-    """The machine that a port names: "twin", "twin:s2"; None where it is another port."""
+    """The machine that a port such as "twin" or "twin:s2" names; None for all other ports."""
     kind, _, name = port.partition(":")
     if kind != PORT:
         return None
@@ -88,68 +29,15 @@ def machine_of(port: str) -> str | None:
     return name or "s0"
 
 
-def make_twin(baud: int, machine: str = "s0", seed: int = 1, **settings):
-    """The transport of a simulated machine. A checkout of Moire offers it as the entry point `twin`
-    of the group `moire.ports`.
+def make_twin(baud: int, machine: str = "s0", seed: int = 1, **settings: Any) -> Transport:
+    """The transport of a simulated machine. A checkout of Moire provides it as the entry point
+    `twin` of the group `moire.ports`; an installed package alone has none.
     """
     found = tuple(entry_points(group="moire.ports", name=PORT))
     if not found:
         raise TwinNotBuilt(
             "the simulated machine needs a checkout of Moire: run `make demo` there and use its build/venv/bin/moire"
         )
-    transport = found[0].load()(machine, seed, **settings)
+    transport: Transport = found[0].load()(machine, seed, **settings)
     transport.set_baud(baud)
     return transport
-
-
-def do_twin(session, command):
-    if command.nodes and command.machine != "s0":
-        raise OutOfRange(f"--nodes is for s0: the nodes of {command.machine} have their addresses")
-    settings = {"nodes": tuple(dict.fromkeys(command.nodes))} if command.nodes else {}
-    transport = make_twin(command.baud, command.machine, command.seed, **settings)
-    gateway, nodes = Gateway(transport), list(transport.addresses)
-    try:
-        rfc2217 = f"rfc2217://{command.bind}:{gateway.open_rfc2217(command.bind, command.rfc2217)}"
-        tcp = f"socket://{command.bind}:{gateway.open_tcp(command.bind, command.tcp)}"
-        terminal = gateway.open_pty()
-        with linked(terminal, command.link):
-            rows = [
-                f"simulated {MACHINES[command.machine]}; {'nodes' if len(nodes) > 1 else 'node'} {', '.join(map(str, nodes))}; "
-                "Ctrl-C ends it",
-                f"  {rfc2217:<28} 9-bit line by mark and space parity; COBS packets by 8N1",
-                f"  {tcp:<28} COBS packets",
-                f"  {command.link or terminal:<28} COBS packets",
-            ]
-            session.say(
-                {
-                    "command": "twin",
-                    "machine": command.machine,
-                    "nodes": nodes,
-                    "rfc2217": rfc2217,
-                    "tcp": tcp,
-                    "terminal": terminal,
-                },
-                "\n".join(rows),
-            )
-            gateway.serve(None if command.time is None else float(command.time))
-    except KeyboardInterrupt:
-        pass  # how it is meant to end
-    finally:
-        gateway.close()
-
-
-@contextmanager
-def linked(terminal: str, link: str | None):
-    if link is None:
-        yield
-        return
-    try:
-        if os.path.islink(link):
-            os.unlink(link)  # of a twin that was killed
-        os.symlink(terminal, link)
-    except OSError as error:
-        raise PortError(f"the link {link} cannot be made: {error.strerror}") from None
-    try:
-        yield
-    finally:
-        os.unlink(link)
