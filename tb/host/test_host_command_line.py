@@ -3,15 +3,19 @@
 that says what is allowed.
 """
 
+import importlib.metadata
 import io
 import json
+import os
+import subprocess
 import sys
+import threading
 
 import pytest
 
 from experiments import machines
 from moire.analysis import tune
-from moire.cli import command_line, shell
+from moire.cli import command_line, completion, shell
 from moire.cli.twin import MACHINES
 from moire.errors import PortError
 from moire.made.bus_tables import PARAMETERS
@@ -352,6 +356,31 @@ def test_errors_are_json_too():
     )
 
 
+@pytest.mark.parametrize(
+    "text, command",
+    [
+        ("status -- move 1", "move"),
+        ("fly", "fly"),
+        ("params get speed", "params"),
+        ("params fly", "params"),
+        ("--baud 0 status", "status"),
+        ("move 1mm --address", "move"),
+        ("status -- shell", "shell"),
+        ("", None),
+    ],
+)
+def test_a_usage_error_names_its_command(text, command):
+    (told,) = Call(["--json", *text.split()] if text else ["--json", "--"]).told
+    assert told["command"] == command and told["error"] == "UsageError" and told["exit_code"] == 2
+
+
+def test_no_value_of_an_answer_overwrites_the_name_of_the_command():
+    node = FakeNode()
+    node.registers.update({0x1400: 1 | 0b0111 << 2, 0x1420: 25, 0x143C: 0})
+    told = Call("drive --json", node).told[0]
+    assert told["command"] == "drive" and told["drive_command"] == 0 and told["steps"] == 25
+
+
 # ------------------------------------------------------------------ errors and exit codes
 
 
@@ -538,6 +567,44 @@ def test_ctrl_c_in_another_command_stops_what_moves_too():
     assert node.axes[0].target != 100_000_000 * 65536 // 800
 
 
+def test_an_output_that_nobody_reads_any_more_stops_the_axis():
+    node = FakeNode()
+    node.axes[0].homed = True
+    reader, writer = os.pipe()
+    os.close(reader)
+    with pytest.raises(BrokenPipeError), os.fdopen(writer, "w") as out:
+        out.write("x")
+        out.flush()
+    reader, writer = os.pipe()
+    os.close(reader)
+    err, out = io.StringIO(), os.fdopen(writer, "w")
+    arguments = ["move", "100mm", "--no-wait"]
+    bus = FakeBus(node)
+    assert command_line.main(arguments, lambda _: bus, out, err) == 0 and err.getvalue() == ""
+    assert "stop" in node.executed and node.axes[0].ended == "stopped" and bus.closed
+
+
+def test_a_full_disk_is_one_sentence_and_stops_the_axis():
+    node, err = FakeNode(), io.StringIO()
+    node.axes[0].homed = True
+    for more in ([], ["--json"]):
+        with open("/dev/full", "w") as out:
+            arguments = ["move", "100mm", "--no-wait", *more]
+            assert command_line.main(arguments, lambda _: FakeBus(node), out, err) == 2
+        assert node.axes[0].ended == "stopped" and not node.axes[0].enabled
+    sentence = "moire: the output cannot be written: No space left on device\n"
+    assert err.getvalue() == 2 * sentence
+
+
+@pytest.mark.parametrize("arguments", [["register"], ["--help"], ["register", "--json", "x"]])
+def test_a_program_whose_output_cannot_be_written_ends_without_a_traceback(arguments):
+    with open("/dev/full", "w") as out:
+        ended = subprocess.run(
+            [sys.executable, "-m", "moire", *arguments], stdout=out, stderr=subprocess.PIPE
+        )
+    assert ended.returncode == 2 and ended.stderr.count(b"\n") == 1
+
+
 def test_baud_and_parity_reach_the_port():
     call = Call("status --baud 9600 --parity odd --port COM3")
     assert (call.options.port, call.options.baud, call.options.parity) == ("COM3", 9600, "odd")
@@ -554,6 +621,46 @@ def test_help_names_every_command_and_gives_examples(capsys):
         with pytest.raises(SystemExit) as left:
             command_line.main(arguments)
         assert left.value.code == 0 and said in capsys.readouterr().out
+
+
+def test_the_version_is_the_one_of_the_package(capsys):
+    with pytest.raises(SystemExit) as left:
+        command_line.main(["--version"])
+    assert left.value.code == 0
+    assert capsys.readouterr().out == f"moire {importlib.metadata.version('moire')}\n"
+
+
+def test_help_loads_neither_numpy_nor_matplotlib():
+    program = (
+        "import sys; from moire.cli import command_line\n"
+        "try: command_line.main(['tune', '--help'])\n"
+        "finally: print({'numpy', 'matplotlib', 'serial'} & set(sys.modules))"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert ended.returncode == 0 and ended.stdout.splitlines()[-1] == "set()"
+
+
+@pytest.mark.parametrize(
+    "typed, offered",
+    [
+        ("moire mov", {"move"}),
+        ("moire home -- move 1mm -- stat", {"status"}),
+        ("moire home -- move 1mm --b", {"--by", "--baud"}),
+        ("moire --port twin params get veloc", {"velocity", "velocity_quantum"}),
+        ("moire params re", {"restore-defaults"}),
+        ("moire status --parity m", {"mark"}),
+    ],
+)
+def test_bash_completes_the_last_command_of_a_chain(typed, offered):
+    words = {"COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split()) - 1)}
+    ended = subprocess.run(
+        [sys.executable, "-m", "moire"],
+        env={**os.environ, **words, "_MOIRE_COMPLETE": "bash_complete"},
+        capture_output=True,
+        text=True,
+    )
+    assert {row.removeprefix("plain,") for row in ended.stdout.split()} == offered
+    assert set(completion.candidates(typed.removeprefix("moire "))) == offered
 
 
 # ------------------------------------------------------------------ files and the shell
@@ -625,6 +732,47 @@ def test_commands_from_a_pipe_end_at_the_first_error(monkeypatch):
     assert "move" not in node.executed
 
 
+def test_ctrl_c_in_the_shell_stops_what_moves(monkeypatch):
+    class Keyboard:
+        def isatty(self):
+            return True
+
+        def __iter__(self):
+            yield from ("home\n", "move 100mm --no-wait\n")
+            raise KeyboardInterrupt
+
+    node = FakeNode()
+    monkeypatch.setattr(sys, "stdin", Keyboard())
+    call = Call("shell", node)
+    assert call.code == 0 and "stopped" in call.err and node.axes[0].ended == "stopped"
+
+
+def test_the_shell_has_help(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "stdin", io.StringIO("help move\nhelp\n"))
+    assert Call("shell").code == 0
+    said = capsys.readouterr().out
+    assert "Usage: moire move" in said and "Usage: moire [OPTIONS] COMMAND" in said
+
+
+def test_a_shell_whose_node_falls_silent_ends(monkeypatch):
+    class Keyboard:
+        def isatty(self):
+            return True
+
+        def __iter__(self):
+            yield "enable\n"
+            bus.nodes = ()
+            for _ in range(500):
+                threading.Event().wait(0.01)
+                yield "\n"
+
+    bus = FakeBus(FakeNode())
+    bus.time_is_stopped = False
+    monkeypatch.setattr(sys, "stdin", Keyboard())
+    monkeypatch.setattr(shell, "KEEP_ALIVE_S", 0.001)
+    assert "nobody answers" in Call("shell", bus=bus).err
+
+
 def test_a_person_may_mistype_in_the_shell(monkeypatch):
     class Keyboard(io.StringIO):
         def isatty(self):
@@ -651,8 +799,6 @@ def test_a_waiting_shell_talks_on_a_line_whose_time_runs(monkeypatch):
                     break
                 threading.Event().wait(0.01)
             yield "quit\n"
-
-    import threading
 
     node = FakeNode()
     bus = FakeBus(node)

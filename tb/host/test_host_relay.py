@@ -5,6 +5,7 @@ failures, and every refusal.
 
 import math
 import random
+from types import SimpleNamespace
 
 import numpy as np
 import pytest

@@ -131,6 +131,9 @@ def test_commands_arm_move_and_read_in_one_call(tmp_path):
     )
     told = Call(["scope", "arm", "--", "scope", "read", str(file), "--json"], node).told[1]
     assert told["before"] == 0 and len(told["position_nm"]) == 12
+    assert (told["command"], told["action"]) == ("scope", "read") and len(
+        told["drive_command"]
+    ) == 12
 
 
 def test_a_scope_without_a_record_is_exit_code_1(tmp_path):

@@ -8,9 +8,10 @@ import sys
 from typing import TextIO
 
 from moire.cli import commands, completion
+from moire.cli.files import OutputError
 from moire.cli.options import Options
 from moire.cli.parser import moire, parse_call, parse_line
-from moire.cli.session import Interrupted, OpenTransport, OutputError, Session
+from moire.cli.session import Interrupted, OpenTransport, Session
 from moire.errors import MoireError
 
 __all__ = ["commands", "main", "moire", "parse_call", "parse_line"]
@@ -27,34 +28,37 @@ def main(
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     session = Session(Options(json="--json" in arguments), open_transport, out, err)
     try:
-        for planned in parse_call(arguments):
-            session.carry_out(planned)
-        return 0
+        try:
+            for planned in parse_call(arguments):
+                session.carry_out(planned)
+            return 0
+        except OutputError:
+            raise
+        except MoireError as error:
+            session.complain(error)
+            return error.exit_code
+        except KeyboardInterrupt:
+            session.stop_axes()
+            session.complain(Interrupted("interrupted; what moved was stopped under control"))
+            return Interrupted.exit_code
     except OutputError as error:
         session.stop_axes()
-        close_output()
-        session.complain(error)
-        return error.exit_code
-    except MoireError as error:
+        close_output(session.out)
         session.complain(error)
         return error.exit_code
     except BrokenPipeError:  # nobody reads any more, as in 'moire watch | head'
         session.stop_axes()
-        close_output()
+        close_output(session.out)
         return 0
-    except KeyboardInterrupt:
-        session.stop_axes()
-        session.complain(Interrupted("interrupted; what moved was stopped under control"))
-        return Interrupted.exit_code
     finally:
         session.close()
 
 
-def close_output() -> None:
-    """Send the rest of the standard output nowhere, so that Python does not fail on it at its
+def close_output(out: TextIO) -> None:
+    """Send what Python has not yet written nowhere, so that Python does not fail on it at its
     end.
     """
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    os.dup2(os.open(os.devnull, os.O_WRONLY), out.fileno())
 
 
 if __name__ == "__main__":

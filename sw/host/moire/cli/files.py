@@ -6,7 +6,16 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from moire.errors import BadFile
+from moire.errors import BadFile, MoireError
+
+
+class OutputError(MoireError):
+    """The standard output cannot be written."""
+
+    exit_code = 2
+
+    def __init__(self, error: OSError) -> None:
+        super().__init__(f"the output cannot be written: {error.strerror}")
 
 
 def read_text(file: str) -> str:

@@ -47,9 +47,9 @@ COMMON = (
         "--port",
         metavar="PORT",
         type=TEXT,
-        help="The serial port (/dev/ttyUSB0, COM3, rfc2217://host:port, socket://host:port). 'twin' "
-        "is the simulated stage and 'twin:s2' another simulated machine. Without this option the "
-        "environment variable MOIRE_PORT names the port.",
+        help="The serial port (/dev/ttyUSB0, COM3, rfc2217://host:port, socket://host:port). "
+        "'twin' is the simulated stage and 'twin:s2' another simulated machine. Without this "
+        "option the environment variable MOIRE_PORT names the port.",
     ),
     Common(
         "--baud",
@@ -61,9 +61,9 @@ COMMON = (
         "--parity",
         type=Name("parity", PARITIES),
         metavar=",".join(PARITIES),
-        help="How the port sends the 9th bit. 'auto' takes mark parity where the port has it. 'odd' "
-        "reaches only the addresses 1 2 4 7 8 11 13 14. 'none' sends COBS packets in 8N1, which "
-        "'auto' takes for socket:// and pseudo terminals.",
+        help="How the port sends the 9th bit. 'auto' takes mark parity where the port has it. "
+        "'odd' reaches only the addresses 1 2 4 7 8 11 13 14. 'none' sends COBS packets in 8N1, "
+        "which 'auto' takes for socket:// and pseudo terminals.",
     ),
     Common(
         "--record",

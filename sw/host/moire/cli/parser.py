@@ -4,12 +4,13 @@ chain is parsed completely before its first command is carried out.
 """
 
 import shlex
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import click
 
+from moire.cli.files import OutputError
 from moire.cli.options import COMMON, GIVEN, OF_THE_CALL, OF_THE_PORT, Common, Options
 from moire.cli.values import did_you_mean, marked, near_names
 from moire.errors import MoireError
@@ -72,7 +73,8 @@ class UsageError(MoireError):
 
     def __init__(self, sentence: str, command: str | None = None) -> None:
         super().__init__(sentence)
-        self.command = command
+        if command is not None:
+            self.command = command
 
 
 @dataclass(frozen=True)
@@ -90,8 +92,8 @@ class Planned:
 class Several(click.Option):
     """An option that takes all values up to the next option: --nodes 1 2 3."""
 
-    def __init__(self, *names: Any, **settings: Any) -> None:
-        super().__init__(*names, multiple=True, **settings)
+    def __init__(self, names: Sequence[str], **settings: Any) -> None:
+        super().__init__(names, **{**settings, "multiple": True})
 
 
 class Parsed(click.Command):
@@ -255,6 +257,8 @@ def parse_part(part: list[str]) -> Planned:
     """One command. SystemExit after --help or --version, which click has printed."""
     try:
         planned = moire.main(part, prog_name="moire", standalone_mode=False)
+    except OSError as error:  # of --help
+        raise OutputError(error) from None
     except click.Abort:  # Ctrl-C
         raise KeyboardInterrupt from None
     except click.UsageError as error:

@@ -11,6 +11,7 @@ from typing import Any, TextIO
 from moire.bus.client import Axis, Bus, Node, Status
 from moire.bus.transport import Transport
 from moire.cli import ports
+from moire.cli.files import OutputError
 from moire.cli.options import Options
 from moire.cli.parser import Planned
 from moire.errors import MoireError
@@ -23,12 +24,6 @@ class Interrupted(MoireError):
     """Ctrl-C."""
 
     exit_code = 130
-
-
-class OutputError(MoireError):
-    """What a command prints cannot be written."""
-
-    exit_code = 2
 
 
 class Session:
@@ -64,8 +59,7 @@ class Session:
         try:
             planned.handler(Call(self, planned), **planned.arguments)
         except MoireError as error:
-            if getattr(error, "command", None) is None:
-                setattr(error, "command", planned.name)
+            error.__dict__.setdefault("command", planned.name)
             raise
 
     def keep_alive(self) -> None:
@@ -88,20 +82,20 @@ class Session:
         except BrokenPipeError:
             raise
         except OSError as error:
-            raise OutputError(f"the output cannot be written: {error.strerror}") from None
+            raise OutputError(error) from None
 
     def complain(self, error: MoireError) -> None:
         """One error, on the standard error or as JSON."""
+        values = {
+            "command": getattr(error, "command", None),
+            "error": type(error).__name__,
+            "message": str(error),
+            "exit_code": error.exit_code,
+        }
+        if hasattr(error, "cause"):
+            values["cause"] = error.cause
         if self.options.json and not isinstance(error, OutputError):
-            values = {
-                "command": getattr(error, "command", None),
-                "error": type(error).__name__,
-                "message": str(error),
-                "exit_code": error.exit_code,
-            }
-            if hasattr(error, "cause"):
-                values["cause"] = error.cause
-            print(json.dumps(values), file=self.out, flush=True)
+            self.print(json.dumps(values))
         else:
             print(f"moire: {error}", file=self.err, flush=True)
 

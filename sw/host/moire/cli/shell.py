@@ -55,6 +55,11 @@ def run_shell(call: Call) -> None:
                 pass  # --help
 
 
+def at_terminal() -> bool:
+    """Whether a line can be edited while it is typed."""
+    return sys.stdin.isatty() and sys.stdout.isatty() and sys.stdin is sys.__stdin__
+
+
 def help_line(text: str) -> str:
     """'help move' is 'move --help'."""
     words = text.split()
@@ -63,7 +68,7 @@ def help_line(text: str) -> str:
 
 def next_line(session: Session, lines: Iterator[str], person: bool) -> str | None:
     """The next line; None at the end of the input."""
-    if person and sys.stdin is sys.__stdin__ and sys.stdout.isatty():
+    if at_terminal():
         try:
             return input(PROMPT)
         except EOFError:
@@ -111,7 +116,7 @@ class KeptAlive:
 @contextmanager
 def history() -> Iterator[None]:
     """Lines of earlier shells, and completion by the Tab key, where readline is there."""
-    if readline is None or not sys.stdin.isatty():
+    if readline is None or not at_terminal():
         yield
         return
     file = Path(click.get_app_dir("moire")) / "history"

@@ -36,7 +36,8 @@ def make_twin(baud: int, machine: str = "s0", seed: int = 1, **settings: Any) ->
     found = tuple(entry_points(group="moire.ports", name=PORT))
     if not found:
         raise TwinNotBuilt(
-            "the simulated machine needs a checkout of Moire: run `make demo` there and use its build/venv/bin/moire"
+            "the simulated machine needs a checkout of Moire: run `make demo` there and "
+            "use its build/venv/bin/moire"
         )
     transport: Transport = found[0].load()(machine, seed, **settings)
     transport.set_baud(baud)

@@ -14,7 +14,7 @@ from moire.cli.values import DURATION, LENGTH, POSITIVE
 group = Group(
     "compare",
     help="Put out pulses at equidistant positions.",
-    example="moire --port /dev/ttyUSB0 compare from 1mm 10um --count 50 -- move 2mm -- compare show",
+    example="moire --port twin home -- compare from 1mm 10um --count 50 -- move 2mm",
 )
 moire.add_command(group)
 
@@ -61,8 +61,8 @@ def compare_from(
     call.axis.compare_from(start, step, count, pulse, gap)
     call.say_of_axis(
         {"start_nm": start, "step_nm": step, "count": count},
-        f"{call.where}: pulses from {units.format_length(start)} every {units.format_length(step)}, "
-        f"count: {count or 'no end'}",
+        f"{call.where}: pulses from {units.format_length(start)} "
+        f"every {units.format_length(step)}, count: {count or 'no end'}",
     )
 
 

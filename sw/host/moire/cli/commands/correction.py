@@ -84,7 +84,7 @@ def load(call: Call, file: str) -> None:
 )
 def calibrate(call: Call) -> None:
     """Moves nothing itself."""
-    act(call)
+    act(call, "calibrate")
 
 
 @group.command(
@@ -94,7 +94,7 @@ def calibrate(call: Call) -> None:
 )
 def freeze(call: Call) -> None:
     """The correction no longer changes."""
-    act(call)
+    act(call, "freeze")
 
 
 @group.command(
@@ -104,12 +104,12 @@ def freeze(call: Call) -> None:
 )
 def clear(call: Call) -> None:
     """The signals are used as they are."""
-    act(call)
+    act(call, "clear")
 
 
-def act(call: Call) -> None:
-    """The action of that name of the node."""
-    state = call.axis.calibration(call.planned.action)
+def act(call: Call, action: str) -> None:
+    """An action of the calibration of the node."""
+    state = call.axis.calibration(action)
     call.say_of_axis(
         {"calibration": calibration_values(state)}, f"{call.where}: {calibration_words(state)}"
     )

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The commands that find what is wrong: fault, selftest."""
 
-from dataclasses import asdict
-
 from moire import units
 from moire.analysis import selftest as checks
 from moire.bus.client import Signal

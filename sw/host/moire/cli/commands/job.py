@@ -60,7 +60,7 @@ def one_source(arguments: Mapping[str, Any]) -> str | None:
 )
 def load(call: Call, file: str | None, equal: int | None) -> None:
     """All angles are checked before the first is written."""
-    angles = read_stations(file) if file is not None else equal_parts(equal)
+    angles = equal_parts(equal) if equal is not None else read_stations(file)
     program = Job(call.node).load(angles)
     first, last = said(program.angles[0]), said(program.angles[-1])
     call.say(

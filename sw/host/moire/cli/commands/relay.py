@@ -42,7 +42,8 @@ def clear(call: Call) -> None:
 
 @group.command(
     "calibrate",
-    help="Fit harmonics to a table of readings, write them to the relay and save them in its flash.",
+    help="Fit harmonics to a table of readings, write them to the relay and save them in its "
+    "flash.",
     example="moire --port /dev/ttyUSB0 relay calibrate ring.csv --counts 32768 --picture ring.png",
 )
 @click.argument(

@@ -43,8 +43,8 @@ def status(call: Call) -> None:
     "file",
     type=FILE,
     metavar="FILE",
-    help="CSV: position and error (the reading of the scale minus the true position) at the borders "
-    "of equal segments, in mm and nm unless the cells or the heading name other units.",
+    help="CSV: position and error (the reading of the scale minus the true position) at the "
+    "borders of equal segments, in mm and nm unless the cells or the heading name other units.",
 )
 @click.option(
     "--rectangle",

@@ -16,8 +16,8 @@ from moire.errors import BadFile
 
 @moire.command(
     "tune",
-    help="Compute the gains of the servo from the open-loop response of the axis, which is recorded "
-    "now or read from a file.",
+    help="Compute the gains of the servo from the open-loop response of the axis, which is "
+    "recorded now or read from a file.",
     example="moire --port /dev/ttyUSB0 tune --bandwidth 40Hz --picture tuning.png",
 )
 @click.argument(
@@ -92,7 +92,8 @@ def tune(
     tick_s = float(tick or Fraction(1, call.node.identity.tick_hz))
     if file is None:
         record = scope.excite(call.switch_on(), amplitude, every, reach)
-        plant = tuner.identify_samples(*scope.lsb(record), tick_s)
+        times, commands, positions = scope.lsb(record)
+        plant = tuner.identify_samples(times, commands, positions, tick_s)
     else:
         plant = tuner.identify(tuner.Record(*read_record(file), tick_s))
     tuning = tuner.propose(plant, float(bandwidth), margin)
@@ -105,8 +106,8 @@ def tune(
     written = f"written to {call.where}" if write else "not written: add --write"
     rows = [
         f"plant: {plant.gain:.4g} LSB per tick per command, "
-        f"time constant {1e3 * plant.time_constant_s:.3g} ms, delay {plant.delay} ticks{resonance}, "
-        f"{100 * plant.unexplained:.0f} % unexplained",
+        f"time constant {1e3 * plant.time_constant_s:.3g} ms, "
+        f"delay {plant.delay} ticks{resonance}, {100 * plant.unexplained:.0f} % unexplained",
         f"loop: {tuning.bandwidth_hz:.1f} Hz, "
         f"phase margin {tuning.phase_margin_degree:.0f} degrees, "
         f"gain margin {tuning.gain_margin:.2f}",

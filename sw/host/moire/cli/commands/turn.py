@@ -65,8 +65,8 @@ def status(call: Call) -> None:
 
 @group.command(
     "next",
-    help="Set the station to which the next order in legacy mode turns the table. The stations come "
-    "from 'job load' to this sub-node.",
+    help="Set the station to which the next order in legacy mode turns the table. The stations "
+    "come from 'job load' to this sub-node.",
     example="moire --port /dev/ttyUSB0 turn next 3",
 )
 @click.argument(

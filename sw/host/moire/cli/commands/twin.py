@@ -51,8 +51,8 @@ RFC2217_PORT, TCP_PORT = 2217, 2218
     type=WHOLE,
     default=RFC2217_PORT,
     metavar="PORT",
-    help="The port of the 9-bit bus by mark and space parity, or COBS packets by 8N1. The default is "
-    f"{RFC2217_PORT}; 0 takes any free port.",
+    help="The port of the 9-bit bus by mark and space parity, or COBS packets by 8N1. The default "
+    f"is {RFC2217_PORT}; 0 takes any free port.",
 )
 @click.option(
     "--tcp",
@@ -93,8 +93,8 @@ def twin(
     if nodes and machine != "s0":
         raise OutOfRange(f"--nodes is for s0: the nodes of {machine} have their addresses")
     settings: dict[str, Any] = {"nodes": tuple(dict.fromkeys(nodes))} if nodes else {}
-    transport = simulated.make_twin(call.options.baud, machine, seed, **settings)
-    gateway, addresses = Gateway(transport), list(getattr(transport, "addresses"))
+    transport: Any = simulated.make_twin(call.options.baud, machine, seed, **settings)
+    gateway, addresses = Gateway(transport), list(transport.addresses)
     try:
         by_rfc2217 = f"rfc2217://{bind}:{gateway.open_rfc2217(bind, rfc2217)}"
         by_tcp = f"socket://{bind}:{gateway.open_tcp(bind, tcp)}"

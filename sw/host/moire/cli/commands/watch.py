@@ -45,7 +45,8 @@ def watch(call: Call, every: Fraction | None, duration: Fraction | None) -> None
             faults = f": {status.fault_words}" if status.faults else ""
             call.say_of_axis(
                 {"time_s": seconds, **asdict(status)},
-                f"{seconds:9.3f} s  {status.position_nm / 1e6:14.6f} mm  error {error_nm:10.1f} nm  "
+                f"{seconds:9.3f} s  {status.position_nm / 1e6:14.6f} mm  "
+                f"error {error_nm:10.1f} nm  "
                 f"{status.velocity_mm_s:9.4f} mm/s  {status.words}{faults}",
             )
             shown = max(shown + step_s, call.now())
