@@ -7,9 +7,11 @@ import importlib.metadata
 import io
 import json
 import os
+import select
 import subprocess
 import sys
 import threading
+import time
 
 import pytest
 
@@ -79,7 +81,8 @@ def test_drives_are_switched_off_after_an_error_too():
 def test_options_of_the_first_command_hold_for_all_and_may_be_given_again():
     nodes = FakeNode(1), FakeNode(2, axes=2)
     call = Call(
-        "--address 2 home --axis 1 -- status -- status --axis 0 -- status --address 1 --axis 0 --json",
+        "--address 2 home --axis 1 -- status -- status --axis 0 "
+        "-- status --address 1 --axis 0 --json",
         *nodes,
     )
     assert [(told["address"], told["axis"]) for told in call.told] == [
@@ -130,12 +133,12 @@ def test_a_node_without_sine_and_cosine_says_so():
     call = Call("status -- encoder", node)
     assert (
         call.out.count("counts only: built without sine and cosine") == 2
-        and "converter counts" not in call.out
+        and "ADC counts" not in call.out
     )
     assert [told["sine"] for told in Call("status -- encoder --json", node).told] == [False, False]
     assert "built without that" in sentence(Call("signal", node), 1)
     call = Call("status -- encoder")
-    assert "without" not in call.out and "converter counts" in call.out
+    assert "without" not in call.out and "ADC counts" in call.out
 
 
 def test_registers_by_address_and_by_name():
@@ -144,8 +147,8 @@ def test_registers_by_address_and_by_name():
     call = Call("register 0x110 272 bus.frames_good axis.control", node)
     assert call.code == 0
     assert (
-        "0x110 = 0x00000102 258\n272 = 0x00000102 258\nbus.frames_good: value = 258\naxis.control: enable = 1"
-        in call.out
+        "0x110 = 0x00000102 258\n272 = 0x00000102 258\n"
+        "bus.frames_good: value = 258\naxis.control: enable = 1" in call.out
     )
     assert "axis.position" in Call("register").out
     assert Call("register 0x110 --json", node).told[0]["registers"] == {"0x110": 258}
@@ -196,7 +199,8 @@ def test_two_axes_begin_together():
 def test_a_motion_is_slowed_paused_resumed_and_awaited():
     node = FakeNode()
     call = Call(
-        "home -- override 50% -- move 1mm --no-wait -- pause -- wait 20s -- resume -- finish -- override",
+        "home -- override 50% -- move 1mm --no-wait -- pause -- wait 20s "
+        "-- resume -- finish -- override",
         node,
     )
     assert call.code == 0, call.err
@@ -752,6 +756,60 @@ def test_the_shell_has_help(monkeypatch, capsys):
     assert Call("shell").code == 0
     said = capsys.readouterr().out
     assert "Usage: moire move" in said and "Usage: moire [OPTIONS] COMMAND" in said
+
+
+SHELL_AT_A_TERMINAL = """
+import sys
+from moire.cli import command_line
+from tb.fakes.fake_node import FakeBus, FakeNode
+sys.exit(command_line.main(["shell"], lambda _: FakeBus(FakeNode())))
+"""
+
+
+def test_a_terminal_has_line_editing_completion_and_history(tmp_path):
+    pty = pytest.importorskip("pty")
+    pytest.importorskip("readline")
+    person, terminal = pty.openpty()
+    program = subprocess.Popen(
+        [sys.executable, "-c", SHELL_AT_A_TERMINAL],
+        stdin=terminal,
+        stdout=terminal,
+        stderr=terminal,
+        env={**os.environ, "HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path)},
+    )
+    os.close(terminal)
+    seen = b""
+
+    def until(text):
+        nonlocal seen
+        end = time.monotonic() + 60
+        while text not in seen and time.monotonic() < end:
+            if select.select([person], [], [], 0.1)[0]:
+                seen += os.read(person, 4096)
+        assert text in seen
+        seen = seen.partition(text)[2]
+
+    try:
+        until(b"moire> ")
+        os.write(person, b"sta\bat\t")  # a typing error taken back, then the Tab key
+        until(b"atus ")
+        os.write(person, b"\n")
+        until(b"drive off")
+        until(b"moire> ")
+        os.write(person, b"\x1b[A --json\n")  # the line before, and more
+        until(b'"command": "status"')
+        until(b"moire> ")
+        os.write(person, b"quit\n")
+        assert program.wait(60) == 0
+    finally:
+        program.kill()
+        os.close(person)
+    (history,) = tmp_path.rglob("history")
+    assert [line.split() for line in history.read_text().splitlines()][-3:] == [
+        ["status"],
+        ["status", "--json"],
+        ["quit"],
+    ]
 
 
 def test_a_shell_whose_node_falls_silent_ends(monkeypatch):

@@ -248,9 +248,7 @@ def test_learn_save_forget_load_in_calls_of_moire(tmp_path):
     node, file = FakeNode(), str(tmp_path / "correction.json")
     call = Call("home -- calibrate --distance 80um --timeout 1min -- correction show", node)
     assert (
-        call.code == 0
-        and "correction learned in" in call.out
-        and "known to 0.020 nm, frozen" in call.out
+        call.code == 0 and "calibrated in" in call.out and "known to 0.020 nm, frozen" in call.out
     )
     assert "harmonics of the phase, nm: 1: 0.000" in call.out and not node.axes[0].enabled
     node.axes[0].correction["sin_offset"] = 77
@@ -305,7 +303,7 @@ def test_signal_capture_and_compare_in_calls_of_moire():
         and "captures from tick, software" in call.out
         and "captures from nothing" in call.out
     )
-    assert "1 captures\n  0.000800 mm at clk 1000, its sample 0.00 us before: tick" in call.out
+    assert "1 captures\n  0.000800 mm at cycle 1000, its sample 0.00 us before: tick" in call.out
     node.registers.update({0xC94: 1, 0xC98: 2})
     assert "under way, 2 points passed" in Call("compare show", node).out
     call = Call("compare from -1mm 10um --count 3 -- compare off", node)

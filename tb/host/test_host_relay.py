@@ -354,7 +354,7 @@ def test_calibrate_writes_saves_and_draws(tmp_path):
         told["orders"] == K
         and told["before"] == pytest.approx(80)
         and told["left"] < 0.01
-        and "kept in flash" in text
+        and "saved in flash" in text
     )
     assert (
         transport.set.identity == identity_of(whole)

@@ -142,4 +142,6 @@ def complete(_: str, number: int) -> str | None:
     """The candidates for the word before the cursor, one by one, as readline asks for them."""
     assert readline is not None
     found = candidates(readline.get_line_buffer()[: readline.get_endidx()])
+    if len(found) == 1:
+        found = [f"{found[0]} "]
     return found[number] if number < len(found) else None

@@ -69,8 +69,8 @@ def run_calibration(call: Call, *how: Fraction) -> None:
     seconds = call.now() - began
     call.say_of_axis(
         {**calibration_values(state), "time_s": seconds},
-        f"{call.where}: correction learned in {seconds:.1f} s, "
-        f"known to {state.scatter_nm:.3f} nm, frozen",
+        f"{call.where}: calibrated in {seconds:.1f} s; "
+        f"correction known to {state.scatter_nm:.3f} nm, frozen",
     )
 
 

@@ -62,7 +62,7 @@ def capture_read(call: Call) -> None:
         rows[0] += ", MORE WERE LOST: read more often"
     for capture in captures:
         rows.append(
-            f"  {capture.position_nm / 1e6:.6f} mm at clk {capture.time_clk}, "
+            f"  {capture.position_nm / 1e6:.6f} mm at cycle {capture.time_clk}, "
             f"its sample {capture.age_s * 1e6:.2f} us before: {', '.join(capture.sources)}"
         )
     call.say_of_axis(

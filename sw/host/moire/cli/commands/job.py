@@ -65,7 +65,7 @@ def load(call: Call, file: str | None, equal: int | None) -> None:
     first, last = said(program.angles[0]), said(program.angles[-1])
     call.say(
         {"stations": len(program.angles), "generation": program.generation},
-        f"{len(program.angles)} stations from {first} to {last}, kept in the EEPROM",
+        f"{len(program.angles)} stations from {first} to {last}, saved in the EEPROM",
     )
 
 

@@ -116,7 +116,7 @@ def calibrate(
         written = "in force"
         if not no_flash:
             relay.save(whole)
-            written = "in force, and kept in flash"
+            written = "in force, and saved in flash"
     call.say(
         {
             "orders": found.orders,

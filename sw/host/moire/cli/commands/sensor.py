@@ -20,9 +20,9 @@ def encoder(call: Call) -> None:
     rows = [("sensor", WITHOUT_SINE)]
     if sine:
         rows = [
-            ("sine, cosine", f"{state.sin} {state.cos} converter counts"),
+            ("sine, cosine", f"{state.sin} {state.cos} ADC counts"),
             ("phase", f"{360 * state.phase:.3f} degrees"),
-            ("amplitude", f"{state.amplitude} converter counts"),
+            ("amplitude", f"{state.amplitude} ADC counts"),
         ]
     rows += [
         ("quadrature", f"{state.quadrature_count} quarter periods"),
