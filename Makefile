@@ -39,6 +39,10 @@ lint: $(SETUP)   ## verilator -Wall over every module, ruff over the Python, the
 	@$(CLANG_FORMAT) --dry-run -Werror $(C_SOURCES)
 	@$(VERIBLE) --verify $(SV_SOURCES)
 
+types: $(SETUP)  ## mypy --strict over the host package
+	$(call say,types: mypy)
+	@$(PYTHON) -m mypy
+
 format: $(SETUP) ## lay out all code as `make lint` wants it
 	@$(PYTHON) -m ruff format -q .
 	@$(CLANG_FORMAT) -i $(C_SOURCES)
@@ -105,4 +109,4 @@ clean:            ## remove what was built; the tools in build/venv stay (rm -rf
 $(SETUP): requirements.lock pyproject.toml sw/host/pyproject.toml tools/setup.sh
 	@tools/setup.sh
 
-.PHONY: help demo test check lint format prove tables fresh firmware figure figures soak board clean
+.PHONY: help demo test check lint types format prove tables fresh firmware figure figures soak board clean

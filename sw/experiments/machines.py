@@ -3,7 +3,7 @@
 twin:s2`.
 
 Each is powered up, with the parameters of its experiment in force; the names are those of
-moire.cli.twin.
+moire.bus.twin_port.
 """
 
 from experiments import s0_fine, s2_stage, s3_zero, s4_job

@@ -28,7 +28,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from experiments.s0_stage import ADDRESSES, POLL_S, ROOT, Stage, random_moves, table
 from moire.analysis import report
-from moire.bus.client import Bus
+from moire.client.bus import Bus
 from moire.errors import MoireError
 from twin import START_S, BuildError, Twin, TwinTransport
 
@@ -87,7 +87,7 @@ class FineStage(Stage):
         learned = self.calibrate_ellipse(name)
         self.home(name)
         self.switch_fine_on(name)
-        axis.move(0, progress=self.record_while_moving(name))
+        axis.move(nm=0, progress=self.record_while_moving(name))
         self.sine_zero_nm[name] = self.zero_nm[name]
         self.zero_nm[name] += float(np.mean(self.watch(name, ZERO_S)["true_nm"]))
         return learned

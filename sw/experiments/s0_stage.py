@@ -22,7 +22,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from moire.analysis import report
-from moire.bus.client import Bus
+from moire.client.bus import Bus
 from moire.errors import MoireError
 from twin import START_S, BuildError, Twin, TwinTransport
 
@@ -102,7 +102,9 @@ class Stage:
     def move(self, name, target_nm, progress=None):
         """Go there, wait until the node says that it arrived, and judge it by the true position."""
         began = self.bus.transport.now()
-        status = self.axes[name].move(target_nm, progress=self.record_while_moving(name, progress))
+        status = self.axes[name].move(
+            nm=target_nm, progress=self.record_while_moving(name, progress)
+        )
         took = self.bus.transport.now() - began
         true = self.true_nm(name)
         return report.Move(name, target_nm, status.position_nm, true, true - target_nm, took)

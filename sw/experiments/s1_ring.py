@@ -27,8 +27,8 @@ from rich.table import Table
 
 from moire.analysis import report
 from moire.analysis.harmonic_fit import Readings, fit, read_readings
-from moire.bus.relay import Relay, Settings, make_set, terms_of
 from moire.bus.transport import BITS, Transport
+from moire.client.relay import Relay, Settings, make_set, terms_of
 from moire.errors import BadFile, MoireError
 from twin import BuildError
 from twin.build import simulation

@@ -26,7 +26,7 @@ from rich.table import Table
 
 from experiments.report_page import ROOT, page, picture
 from moire.analysis import report
-from moire.bus.client import Bus
+from moire.client.bus import Bus
 from moire.errors import MoireError
 from twin import START_S, BuildError, Twin, TwinTransport
 from twin.nodes.twin import Axis, Node

@@ -27,11 +27,11 @@ from rich.table import Table as Rows
 
 from experiments.report_page import ROOT, page, picture
 from moire.analysis import report
-from moire.bus.client import Bus
-from moire.bus.indexing_table import TURN, IndexingTable
-from moire.bus.job import Job, equal_parts
-from moire.bus.nonvolatile import SavedSettings
-from moire.bus.settings import Settings
+from moire.client.bus import Bus
+from moire.client.indexing_table import TURN, IndexingTable
+from moire.client.job import Job, equal_parts
+from moire.client.nonvolatile import SavedSettings
+from moire.client.settings import Settings
 from moire.errors import MoireError
 from twin import START_S, Axis, BuildError, Devices, Node, Twin, TwinTransport, build
 

@@ -15,8 +15,8 @@ from functools import cache
 from pathlib import Path
 
 from figures.common import Figure, bar, console
-from moire.bus.client import Bus
 from moire.bus.protocol import parse_reply, read_words
+from moire.client.bus import Bus
 from moire.errors import BusError
 from twin import Node, Twin, TwinTransport
 from twin.build import run, simulation

@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from figures.common import Figure, bar, console
-from moire.bus.client import CORRECTION, Bus
+from moire.client.axis import CORRECTION
+from moire.client.bus import Bus
 from twin import START_S, Twin, TwinTransport
 from twin.compiled import calibration as compiled
 from twin.compiled.calibration import PHASES, SAMPLES, CalibrationRun

@@ -12,8 +12,8 @@ from multiprocessing import get_context
 
 from experiments import s4_job
 from figures.common import Figure, bar, console
-from moire.bus.client import Bus
-from moire.bus.indexing_table import IndexingTable
+from moire.client.bus import Bus
+from moire.client.indexing_table import IndexingTable
 from twin import START_S, Axis, Node, Twin, TwinTransport, build
 
 PROCESSES = 2

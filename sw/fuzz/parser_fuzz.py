@@ -23,13 +23,14 @@ from pathlib import Path
 import moire
 from moire import units
 from moire.analysis import harmonic_fit as calibration
-from moire.bus import cobs, protocol, recording, relay, rfc2217
-from moire.bus.client import Axis
+from moire.bus import cobs, protocol, recording, rfc2217
 from moire.bus.transport import Transport
 from moire.cli import command_line
 from moire.cli.commands.params import read_parameters
 from moire.cli.commands.tune import read_record
 from moire.cli.options import Options
+from moire.client import relay
+from moire.client.axis import Axis
 from moire.errors import MoireError
 from moire.made.bus_tables import OPERATIONS, PARAMETERS
 
@@ -69,7 +70,7 @@ def fed(exchange, data):
         if exchange.finished:
             break
         exchange.words_to_send()
-        exchange.feed([word] if exchange.wanted else [])
+        exchange.feed([word] if exchange.expected else [])
         if data[2 * n + 1] & 2:
             exchange.silence()
     while not exchange.finished:
@@ -165,7 +166,7 @@ def good_reply():
     return bytes(byte for word in words for byte in (word, 0))
 
 
-HEAD = '{"record": "moire bus", "version": 1, "protocol_crc": %d}\n' % recording.PROTOCOL_CRC
+HEAD = '{"record": "moire bus", "version": 2, "protocol_crc": %d}\n' % recording.PROTOCOL_CRC
 SEEDS = {
     packets: [
         cobs.packet(0x51, bytes([7, 2, 3])),
@@ -180,7 +181,7 @@ SEEDS = {
     record: [
         (
             HEAD
-            + '{"at": 0.5, "send": [289]}\n{"at": 0.6, "receive": [97], "wanted": 1, "timeout_s": 0.1}'
+            + '{"at": 0.5, "send": [289]}\n{"at": 0.6, "receive": [97], "expected": 1, "timeout_s": 0.1}'
         ).encode(),
         (HEAD + '{"at": 0.5, "baud": 9600}\n{"at": 0.6, "break": true}').encode(),
     ],

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A node in Python, written from docs/protocol.md and not from the host's code, and a line to it
-that can be spoilt.
+"""A node in Python, and a bus to it that can damage words.
+
+It was written from docs/protocol.md, and shares no code with the host except the made tables.
 """
 
 import binascii
@@ -30,44 +31,47 @@ LIMIT_LOW, ESTOP = 1 << 0, 1 << 2
 
 
 def bytes_of(value, kind):
+    """The bytes of a field."""
     return value.to_bytes(SIZE[kind], "little", signed=kind.startswith("i"))
 
 
 class FakeAxis:
-    """An axis that gets where it should, at a constant speed."""
+    """An axis that reaches every target, at a constant speed."""
 
     def __init__(self):
         self.parameters = {known.id: known.default for known in PARAMETERS.values()}
         self.enabled = self.homed = False
-        self.faults = self.standing = self.events = 0
+        self.faults = self.active_faults = self.events = 0
         self.position = self.target = 123456
         self.begin, self.until, self.stop_until = 0.0, 0.0, None
-        self.kind, self.ended, self.end_as = None, "no_motion_yet", "ok"
+        self.kind, self.ended, self.end_cause = None, "no_motion_yet", "ok"
         self.writes = []
-        self.learner = dict(reason=1, converged=0, frozen=1, accepted=0, refused=0, scatter=0)
-        self.learns_in = 4  # moves while it learns; None: never
+        self.calibration_state = dict(
+            reason=1, converged=0, frozen=1, accepted=0, refused=0, scatter=0
+        )
+        self.moves_to_calibrate = 4  # moves until the calibration has converged; None: never
         self.correction = dict(sin_offset=0, cos_offset=0, gain=65536, quadrature_error=0)
         self.harmonics = {order: (0, 0) for order in range(1, 11)}
         self.waiting = dict(self.harmonics)
         self.signal = dict(faults=0, first=0)
-        self.points = []  # of the segment table
+        self.points = []  # of the segment table, in counts
         self.speeds = []  # of moves, period/s
-        self.full_speed_s = 0.0  # left of a motion that is paused
+        self.full_speed_s = 0.0  # what remains of a paused motion, at full speed
 
     def advance(self, now):
-        """The motion as it stands at this time."""
-        if self.standing and self.enabled:
-            self.faults |= self.standing
+        """Continues the motion up to this time."""
+        if self.active_faults and self.enabled:
+            self.faults |= self.active_faults
             self.enabled = False
             if self.kind:
                 self.kind, self.ended = None, "ended_by_fault"
         if self.kind and now >= self.until:
             if self.kind == "homing":
-                self.homed = self.end_as == "ok"
-            if self.kind != "stopping" and self.end_as == "ok":
+                self.homed = self.end_cause == "ok"
+            if self.kind != "stopping" and self.end_cause == "ok":
                 self.position = self.target
             self.target = self.position
-            self.ended = "stopped" if self.kind == "stopping" else self.end_as
+            self.ended = "stopped" if self.kind == "stopping" else self.end_cause
             self.kind = None
         elif self.kind in ("moving", "homing"):
             share = (now - self.begin) / (self.until - self.begin)
@@ -79,12 +83,14 @@ class FakeAxis:
         return self.parameters[67] / 65536
 
     def go(self, kind, now, seconds, target=None):
+        """Begins a motion that takes so long at full speed."""
         self.kind, self.begin, self.ended = kind, now, "running"
         self.start, self.target = self.position, self.target if target is None else target
         self.full_speed_s = seconds
         self.until = now + seconds / self.override if self.override else inf
 
     def change_override(self, now, value):
+        """Changes the feed override, also during a motion."""
         if self.override:
             self.full_speed_s = (self.until - now) * self.override
         self.parameters[67] = value
@@ -98,6 +104,8 @@ class FakeAxis:
 
 
 class FakeNode:
+    """A node with its bus interface and its firmware."""
+
     def __init__(self, address=1, axes=1, map_crc=MAP_CRC, protocol_crc=PROTOCOL_CRC, sine=True):
         self.address, self.map_crc, self.protocol_crc = address, map_crc, protocol_crc
         self.axes = [FakeAxis() for _ in range(axes)]
@@ -107,7 +115,7 @@ class FakeNode:
         self.captures = []  # words of captured, captured_time and captured_position, oldest first
         self.expecting, self.payload = None, []
         self.baud = self.next_baud = BAUD
-        self.powered_up = 0.0  # when its time stamp was zero
+        self.powered_up = 0.0  # time at which its time stamp was zero
         self.last, self.reply = None, bytes([0, 0, 0])
         self.counters = dict.fromkeys(
             (
@@ -124,7 +132,7 @@ class FakeNode:
             ),
             0,
         )
-        self.marked = 0  # mask of the axes that the next mark starts
+        self.waiting_for_sync = 0  # mask of the axes that the next sync starts
         self.scope, self.armed, self.samples = (
             "empty",
             None,
@@ -132,13 +140,13 @@ class FakeNode:
         )  # samples: position, error, command, time
         self.executed = []  # names of the operations, without repetitions
         self.wrong_map = False
-        self.most_segments = 0  # of a table; 0: it was not built
-        self.spoils_points = False
+        self.most_segments = 0  # of a segment table; 0: it was not built
+        self.damages_points = False
 
     # the bus
 
-    def hear(self, word):
-        """Words that the node answers to this one."""
+    def receive_word(self, word):
+        """The words with which the node answers this one."""
         if word >> 8:
             if self.expecting and self.payload:
                 self.counters["frames_bad"] += 1
@@ -151,7 +159,7 @@ class FakeNode:
                 return []
             if word & 0xFF == 0x10 | self.address:
                 inside = bytes([0x50 | self.address, len(self.reply)]) + self.reply
-                self.baud = self.next_baud  # when it has been sent
+                self.baud = self.next_baud  # after this reply has been sent
                 return list(inside + binascii.crc32(inside).to_bytes(4, "little"))
             return []
         if self.expecting is None:
@@ -174,8 +182,8 @@ class FakeNode:
         self.counters["frames_good"] += 1
         if self.expecting == 0x20:
             self.counters["syncs"] += 1
-            self.do_start(None, self.marked)
-            self.marked = 0
+            self.do_start(None, self.waiting_for_sync)
+            self.waiting_for_sync = 0
             return
         if self.last == (inside[1], crc):
             self.counters["repeated"] += 1
@@ -192,13 +200,13 @@ class FakeNode:
         cause, fields = "unknown_operation", {}
         if operation:
             self.executed.append(operation.name)
-            values, place = {}, 2
+            values, offset = {}, 2
             for name, kind in operation.request:
                 values[name] = int.from_bytes(
-                    body[place : place + SIZE[kind]], "little", signed=kind.startswith("i")
+                    body[offset : offset + SIZE[kind]], "little", signed=kind.startswith("i")
                 )
-                place += SIZE[kind]
-            if place != len(body):
+                offset += SIZE[kind]
+            if offset != len(body):
                 cause = "wrong_length"
             elif self.wrong_map and operation.name != "identify":
                 cause = "wrong_map"
@@ -231,8 +239,8 @@ class FakeNode:
         flags = (
             axis.enabled
             | axis.homed << 1
-            | (axis.standing & LIMIT_LOW) << 2
-            | bool(axis.standing & ESTOP) << 4
+            | (axis.active_faults & LIMIT_LOW) << 2
+            | bool(axis.active_faults & ESTOP) << 4
             | (axis.kind is None and axis.enabled) << 5
         )
         return "ok", dict(
@@ -274,7 +282,7 @@ class FakeNode:
         axis.go("homing", self.now, 0.8, 0)
         return "ok", {}
 
-    def may_go(self, axis, target):
+    def motion_refusal(self, axis, target):
         if self.ready(axis) != "ok":
             return self.ready(axis)
         if not axis.homed:
@@ -285,7 +293,7 @@ class FakeNode:
         return abs(target - axis.position) / 65536 / axis.parameters[5] + 0.05
 
     def do_prepare(self, axis, target):
-        cause = self.may_go(axis, target)
+        cause = self.motion_refusal(axis, target)
         if cause != "ok":
             return cause, {}
         axis.kind, axis.prepared, axis.until, axis.ended = "prepared", target, inf, "running"
@@ -304,7 +312,7 @@ class FakeNode:
     def do_start_at_sync(self, _, axes):
         if any(axis.kind != "prepared" for n, axis in enumerate(self.axes) if axes >> n & 1):
             return "not_prepared", {}
-        self.marked = axes
+        self.waiting_for_sync = axes
         return "ok", {}
 
     def do_set_baud(self, _, baud):
@@ -314,13 +322,13 @@ class FakeNode:
         return "ok", {}
 
     def do_move(self, axis, target):
-        if (cause := self.may_go(axis, target)) != "ok":
+        if (cause := self.motion_refusal(axis, target)) != "ok":
             return cause, {}
         axis.speeds.append(axis.parameters[5])
-        if not axis.learner["frozen"] and axis.learns_in is not None:
-            axis.learns_in -= 1
-            if axis.learns_in == 0:
-                axis.learner.update(converged=1, accepted=2, scatter=26)
+        if not axis.calibration_state["frozen"] and axis.moves_to_calibrate is not None:
+            axis.moves_to_calibrate -= 1
+            if axis.moves_to_calibrate == 0:
+                axis.calibration_state.update(converged=1, accepted=2, scatter=26)
         seconds = self.seconds(axis, target)
         axis.go("moving", self.now, seconds, target)
         return "ok", {"duration_ticks": round(seconds * TICK_HZ)}
@@ -333,7 +341,7 @@ class FakeNode:
         return "ok", {}
 
     def do_reset_faults(self, axis):
-        if axis.standing:
+        if axis.active_faults:
             return "fault_persists", {}
         axis.faults = 0
         return "ok", {}
@@ -379,10 +387,10 @@ class FakeNode:
         if action > 3:
             return "out_of_range", {}
         if action in (1, 2):
-            axis.learner.update(frozen=action - 1, reason=action - 1)
+            axis.calibration_state.update(frozen=action - 1, reason=action - 1)
         if action == 3:
-            axis.learner.update(converged=0)
-        return "ok", axis.learner
+            axis.calibration_state.update(converged=0)
+        return "ok", axis.calibration_state
 
     def do_get_correction(self, axis):
         return "ok", axis.correction
@@ -431,9 +439,9 @@ class FakeNode:
             return "out_of_range", {}
         padded = self.samples[first : first + 5] + [(0, 0, 0, 0)] * 5
         return "ok", {
-            f"{name}_{n}": padded[n][place]
+            f"{name}_{n}": padded[n][column]
             for n in range(5)
-            for place, name in enumerate(("position", "error", "command", "time"))
+            for column, name in enumerate(("position", "error", "command", "time"))
         }
 
     def do_segments(self, axis):
@@ -462,7 +470,7 @@ class FakeNode:
         return "ok", {}
 
     def do_get_segments(self, axis, border):
-        points = [point + self.spoils_points for point in axis.points[border : border + 12]]
+        points = [point + self.damages_points for point in axis.points[border : border + 12]]
         return "ok", {
             f"point_{n}": point for n, point in enumerate(points + [0] * (12 - len(points)))
         }
@@ -472,7 +480,7 @@ class FakeNode:
             return "no_such_register", {}
         self.written.append((address, value))
         self.registers[address] = value
-        if address == 0xC10 and value & 1 << 6:  # done with the oldest capture
+        if address == 0xC10 and value & 1 << 6:  # the oldest capture has been read
             self.captures.pop(0)
         return "ok", {}
 
@@ -498,8 +506,8 @@ class FakeNode:
 
 
 class FakeBus(Transport):
-    """All nodes on one pair of wires. `to_node` and `from_node` may change, lose or multiply each
-    word: word -> list of words.
+    """Nodes on one bus. `to_node` and `from_node` change a word into a list of words, and so may
+    damage, lose or repeat it.
     """
 
     time_is_stopped = True
@@ -507,9 +515,9 @@ class FakeBus(Transport):
     def __init__(self, *nodes):
         self.nodes, self.arrived, self.clock, self.closed = nodes, [], 0.0, False
         self.to_node = self.from_node = lambda word: [word]
-        # as on the wire: what several nodes send at once is their AND; else one after the other
+        # true: words that several nodes send at once are combined by AND, as on a wire
         self.wired_and = False
-        self.at = []  # (time, action), done when the time comes
+        self.at = []  # (time, action) that happen at their times
         self.baud = BAUD
 
     def pass_time(self, seconds):
@@ -527,7 +535,8 @@ class FakeBus(Transport):
             self.pass_time(self.character_s)
             for heard in self.to_node(word):
                 answers = [
-                    node.hear(heard) if node.baud == self.baud else [] for node in self.nodes
+                    node.receive_word(heard) if node.baud == self.baud else []
+                    for node in self.nodes
                 ]
                 if self.wired_and:
                     answers = [[reduce(and_, several) for several in zip(*answers)]]
@@ -559,7 +568,7 @@ class FakeBus(Transport):
 
 
 def spoil(source: random.Random, share: float):
-    """Loses, changes or doubles this share of the words."""
+    """Makes a function that loses, damages or doubles this share of the words."""
 
     def change(word):
         if source.random() >= share:

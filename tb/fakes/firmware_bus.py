@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The transport of the host package over fake_machine.FakeNode: host and firmware together, without
+"""A transport of the host package to fake_machine.FakeNode: host and firmware together, without
 hardware and without the twin.
 """
 
@@ -8,6 +8,8 @@ from twin.compiled.node import DEFINES
 
 
 class FakeNodeBus(Transport):
+    """The bus of one node, in the time of its firmware."""
+
     time_is_stopped = True
 
     def __init__(self, machine):

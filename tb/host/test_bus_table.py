@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tables/bus.py: nothing made is stale, the made files say what bus.toml says, and a wrong table is
+"""tables/bus.py: no made file is stale, the made files agree with bus.toml, and a wrong table is
 refused.
 """
 
@@ -46,7 +46,7 @@ def test_a_stale_file_is_found_named_and_made_again(tmp_path, monkeypatch, capsy
     assert generator.main(["--check"]) == 0
 
 
-def test_the_crc_is_that_of_the_source_whatever_its_line_ends():
+def test_the_crc_does_not_depend_on_the_line_ends_of_the_source():
     text = SOURCE.read_bytes()
     assert (
         zlib.crc32(text)
@@ -94,7 +94,7 @@ def test_the_host_has_every_entry_of_the_source():
         )
 
 
-def test_offsets_and_lengths_in_the_header_are_those_of_a_packed_struct():
+def test_offsets_and_lengths_in_the_header_match_a_packed_struct():
     formats = {
         "u8": "B",
         "u16": "H",
@@ -131,7 +131,8 @@ def test_a_compiler_reads_the_header_and_gets_the_same_numbers(tmp_path):
         '#include <stdio.h>\n#include <stdint.h>\n#include "made/bus_protocol.h"\n'
         '#define P(name, id, min, max, default) printf("%s %d %lld %lld %lld\\n", #name, id, '
         "(long long)min, (long long)max, (long long)default);\n"
-        '#define O(name, code, request, reply, of_axis) printf("%s %d %d %d %d\\n", #name, code, (int)request, (int)reply, of_axis);\n'
+        "#define O(name, code, request, reply, of_axis) "
+        'printf("%s %d %d %d %d\\n", #name, code, (int)request, (int)reply, of_axis);\n'
         "int main(void) { BUS_PARAMETERS(P) BUS_SETTINGS(P) BUS_OPERATIONS(O) "
         "return BUS_CAUSE_NO_MOTION_YET - 20 + BUS_FAULT_PROFILE_UNDERRUN - 256; }\n"
     )
@@ -149,21 +150,22 @@ def test_a_compiler_reads_the_header_and_gets_the_same_numbers(tmp_path):
         ],
         check=True,
     )
-    told = subprocess.run(
+    reported = subprocess.run(
         [tmp_path / "print"], check=True, capture_output=True, text=True
     ).stdout.splitlines()
-    wanted = [
+    expected = [
         f"{p.name} {p.id} {p.min} {p.max} {p.default}"
         for table in (bus_tables.PARAMETERS, bus_tables.SETTINGS)
         for p in table.values()
     ]
     size = {"8": 1, "16": 2, "32": 4, "64": 8}
-    wanted += [
-        f"{o.name} {o.code} {2 + sum(size[kind[1:]] for _, kind in o.request)} {3 + sum(size[kind[1:]] for _, kind in o.reply)} "
+    expected += [
+        f"{o.name} {o.code} {2 + sum(size[kind[1:]] for _, kind in o.request)} "
+        f"{3 + sum(size[kind[1:]] for _, kind in o.reply)} "
         f"{int(('axis', 'u8') in o.request)}"
         for o in bus_tables.OPERATIONS.values()
     ]
-    assert told == wanted
+    assert reported == expected
 
 
 @pytest.mark.parametrize(
@@ -183,10 +185,10 @@ def test_a_wrong_table_is_refused_by_name_in_one_line(change, said, tmp_path, mo
     monkeypatch.setattr(generator, "SOURCE", tmp_path / "bus.toml")
     generator.SOURCE.write_text(text.replace(*change, 1), encoding="utf-8")
     assert generator.main([]) == 1
-    told = capsys.readouterr()
-    assert said in told.err and told.err.count("\n") == 1 and not told.out
+    reported = capsys.readouterr()
+    assert said in reported.err and reported.err.count("\n") == 1 and not reported.out
 
 
-def test_a_page_without_its_marks_is_refused():
+def test_a_page_without_its_markers_is_refused():
     with pytest.raises(ValueError, match="needs the marks"):
         generator.page(generator.Bus(SOURCE.read_bytes()), "# nothing")

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""client: what a node says in real units and words, every refusal with its values, motions that end
-well, badly and by Ctrl-C.
+"""moire.client: the answers of a node in real units and in words, every refusal with its values,
+and motions that succeed, fail, or are interrupted.
 """
 
 import random
@@ -10,7 +10,8 @@ from fractions import Fraction
 import pytest
 
 from moire.analysis.tune import Tuning
-from moire.bus.client import CHOICES, Bus
+from moire.client.bus import Bus
+from moire.client.values import CHOICES
 from moire.errors import (
     BusError,
     BusGarbled,
@@ -43,10 +44,10 @@ def homed_stage():
     return fake, node, axis
 
 
-# ------------------------------------------------------------------ who is there
+# ------------------------------------------------------------------ finding nodes
 
 
-def test_find_tells_every_node_of_any_build():
+def test_find_lists_every_node_of_any_build():
     fake = FakeBus(FakeNode(3, axes=2), FakeNode(15, map_crc=5))
     found = Bus(fake).find()
     assert [(node.address, node.axes, node.matches) for node in found] == [
@@ -57,7 +58,7 @@ def test_find_tells_every_node_of_any_build():
     assert fake.now() < 10
 
 
-def test_nobody_is_a_clear_exception():
+def test_no_answer_is_a_clear_exception():
     with pytest.raises(NoAnswer, match="nobody answers at address 4, asked 5 times: check power"):
         Bus(FakeBus(FakeNode(1))).axis(4)
 
@@ -74,14 +75,14 @@ def test_a_node_of_another_build_is_refused_with_both_numbers(crc, value, words)
     assert (caught.value.node, caught.value.host) == (0xBEEF, value)
 
 
-def test_an_axis_that_is_not_there_is_refused():
+def test_an_axis_that_does_not_exist_is_refused():
     with pytest.raises(Refused, match="node 1 has no axis 1: it has only axis 0"):
         Bus(FakeBus(FakeNode())).axis(1, 1)
     with pytest.raises(Refused, match="axes 0 to 1"):
         Bus(FakeBus(FakeNode(axes=2))).axis(1, 2)
 
 
-def test_a_garbled_line_is_told_from_a_silent_one():
+def test_a_garbled_bus_and_a_silent_bus_are_different_errors():
     fake = FakeBus(FakeNode())
     fake.from_node = lambda word: [word ^ 4]
     with pytest.raises(BusGarbled, match="garbled, tried 5 times: 65 came instead of 61"):
@@ -148,7 +149,9 @@ def test_encoder_counters_and_registers():
         and encoder.home_margin == 0.5
         and encoder.fault_position_nm == 800
     )
-    assert axis.node.counters()["frames_good"] == 4  # identify, period, encoder and its own
+    assert (
+        axis.node.counters()["frames_good"] == 4
+    )  # identify, period, encoder and the request itself
     assert axis.node.read_register(0x400) == 7
     with pytest.raises(Refused, match=r"no register at this address \(address 0x0404\)"):
         axis.node.read_register(0x404)
@@ -160,10 +163,10 @@ def test_encoder_counters_and_registers():
 def test_registers_are_read_by_name_and_wide_ones_low_word_first():
     _, node, axis = stage()
     known = {(field.block, field.register): field for field in FIELDS}
-    place = known["axis", "position"].address()
+    position = known["axis", "position"].address()
     node.registers = {
-        place: 0xFFFF0000,
-        place + 4: 0x0000FFFF,
+        position: 0xFFFF0000,
+        position + 4: 0x0000FFFF,
         known["axis", "control"].address(): 0b101,
     }
     assert axis.node.read_named("axis.position") == {"value": -65536}
@@ -184,7 +187,7 @@ def test_registers_are_read_by_name_and_wide_ones_low_word_first():
 # ------------------------------------------------------------------ motion
 
 
-def test_home_and_move_go_where_they_should():
+def test_home_and_move_reach_their_targets():
     fake, node, axis = stage()
     axis.enable()
     seen = []
@@ -196,11 +199,100 @@ def test_home_and_move_go_where_they_should():
     )
     assert axis.move(mm=1.5).position_nm == 1_500_000
     assert axis.move("-200um", by=True).position_nm == 1_300_000
-    assert axis.move(50).position_nm == pytest.approx(50, abs=0.01)
-    with pytest.raises(OutOfRange, match="in nm or in mm, and not both"):
-        axis.move(1, mm=1)
+    assert axis.move(nm=50).position_nm == pytest.approx(50, abs=0.01)
+    with pytest.raises(OutOfRange, match="a move needs one target"):
+        axis.move("1nm", mm=1)
     with pytest.raises(UnitError):
         axis.move("fast")
+
+
+@pytest.mark.parametrize("operation", ["move", "begin_move", "prepare"])
+def test_a_target_without_its_unit_is_refused_and_the_axis_does_not_move(operation):
+    fake, node, axis = homed_stage()
+    for number in (1.5, 0, Fraction(3, 2)):
+        with pytest.raises(UnitError, match="has no unit: write mm="):
+            getattr(axis, operation)(number)
+    assert operation not in node.executed and "move" not in node.executed
+
+
+@pytest.mark.parametrize("number", [float("nan"), float("inf"), -float("inf"), "far", None])
+@pytest.mark.parametrize("unit", ["nm", "um", "mm"])
+def test_a_target_that_is_no_finite_number_is_out_of_range(unit, number):
+    fake, node, axis = homed_stage()
+    with pytest.raises(OutOfRange, match="is no length: give a finite number|needs one target"):
+        axis.move(**{unit: number})
+    assert "move" not in node.executed
+
+
+@pytest.mark.parametrize(
+    "target", [{"um": 1500}, {"mm": 1.5}, {"nm": 1.5e6}, {"mm": Fraction(3, 2)}]
+)
+def test_a_target_may_have_any_of_three_units(target):
+    fake, node, axis = homed_stage()
+    assert axis.move(**target).position_nm == 1_500_000
+
+
+def test_the_end_of_a_with_block_switches_the_drive_off():
+    fake, node, axis = stage()
+    with axis as same:
+        assert same is axis
+        axis.enable()
+        axis.home()
+        assert node.axes[0].enabled
+    assert not node.axes[0].enabled
+
+
+def test_a_with_block_leaves_a_drive_on_that_was_on_before_also_when_nested():
+    fake, node, axis = homed_stage()
+    with axis:
+        axis.move(mm=1)
+        with axis:
+            axis.move(mm=2)
+    assert node.axes[0].enabled and axis.status().position_nm == 2_000_000
+
+
+@pytest.mark.parametrize("was_on", [False, True])
+def test_an_exception_in_a_with_block_stops_the_axis_before_the_drive_is_off(was_on):
+    fake, node, axis = homed_stage()
+    if not was_on:
+        axis.disable()
+    with pytest.raises(ZeroDivisionError):
+        with axis:
+            axis.enable()
+            axis.begin_move(mm=10)
+            raise ZeroDivisionError
+    assert node.axes[0].kind is None and node.axes[0].enabled == was_on
+    assert node.executed.count("stop") == 1
+    last = [name for name in node.executed if name in ("stop", "enable")][-1]
+    assert last == ("stop" if was_on else "enable")
+
+
+def test_the_error_in_a_with_block_is_raised_and_not_that_of_its_end():
+    fake, node, axis = stage()
+    with pytest.raises(ZeroDivisionError):
+        with axis:
+            fake.to_node = lambda word: []
+            raise ZeroDivisionError
+    fake, node, axis = stage()
+    with pytest.raises(NoAnswer):
+        with axis:
+            fake.to_node = lambda word: []
+
+
+def test_a_travel_whose_ends_are_swapped_is_refused_by_the_host():
+    fake, node, axis = stage()
+    with pytest.raises(
+        OutOfRange, match=r"travel_high \(-1mm\) would lie below travel_low \(-800um\)"
+    ):
+        axis.set_parameter("travel_high", "-1mm")
+    with pytest.raises(OutOfRange, match="would lie below travel_low"):
+        axis.set_parameter("travel_low", "120mm")
+    with pytest.raises(OutOfRange, match="would lie below travel_low"):
+        axis.load_parameters({"kp": "0.5", "travel_low": "2mm", "travel_high": "1mm"})
+    assert node.axes[0].writes == []
+    axis.set_parameter("travel_high", "-800um")
+    axis.load_parameters({"travel_low": "-3mm", "travel_high": "-2mm"})
+    assert axis.get_parameter("travel_high").value == -2_000_000
 
 
 def test_refusals_carry_the_words_of_the_table_and_the_values():
@@ -246,9 +338,9 @@ def test_hardware_and_firmware_that_do_not_fit_are_refused_in_words():
         Bus(fake).axis()
 
 
-def test_a_fault_is_told_in_words_until_it_is_reset():
+def test_a_fault_is_reported_in_words_until_it_is_reset():
     fake, node, axis = homed_stage()
-    node.axes[0].standing = ESTOP
+    node.axes[0].active_faults = ESTOP
     status = axis.status()
     assert (status.state, status.faults, status.first_fault, status.fault_words, status.estop) == (
         "faulted",
@@ -261,26 +353,27 @@ def test_a_fault_is_told_in_words_until_it_is_reset():
         axis.enable()
     with pytest.raises(Refused, match=r"the cause of the fault still stands \(emergency stop\)"):
         axis.reset()
-    node.axes[0].standing = 0
+    node.axes[0].active_faults = 0
     axis.reset()
     assert axis.status().faults == ()
 
 
 def test_a_motion_that_a_fault_ends_names_the_first_fault():
     fake, node, axis = homed_stage()
-    fake.at.append((fake.now() + 0.2, lambda: setattr(node.axes[0], "standing", LIMIT_LOW)))
+    fake.at.append((fake.now() + 0.2, lambda: setattr(node.axes[0], "active_faults", LIMIT_LOW)))
     with pytest.raises(
         MotionFailed,
-        match=r"axis 0 of node 1: a fault ended the motion: limit switch at the low end \(at .*, target 10mm\)",
+        match=r"axis 0 of node 1: a fault ended the motion: limit switch at the low end "
+        r"\(at .*, target 10mm\)",
     ) as caught:
         axis.move(mm=10)
     assert caught.value.cause == "ended_by_fault"
 
 
 @pytest.mark.parametrize("cause", ["no_switch", "switch_stuck", "not_settled"])
-def test_a_motion_that_ends_badly_says_how(cause):
+def test_a_motion_that_fails_says_why(cause):
     fake, node, axis = homed_stage()
-    node.axes[0].end_as = cause
+    node.axes[0].end_cause = cause
     with pytest.raises(MotionFailed, match=dict(CAUSES.values())[cause]):
         axis.home()
 
@@ -308,24 +401,24 @@ def test_whatever_interrupts_the_wait_brings_the_axis_to_rest_first(what, motion
 
 
 def test_ctrl_c_in_the_middle_of_an_exchange_stops_the_axis_too():
-    for place in range(40):
+    for position in range(40):
         fake, node, axis = homed_stage()
         seen = []
 
-        def interrupt(word, place=place, seen=seen):
+        def interrupt(word, position=position, seen=seen):
             seen.append(word)
-            if len(seen) == place + 1:
+            if len(seen) == position + 1:
                 raise KeyboardInterrupt
             return [word]
 
         fake.to_node = interrupt
         with pytest.raises(KeyboardInterrupt):
             axis.move(mm=10)
-        assert node.axes[0].kind is None, place
+        assert node.axes[0].kind is None, position
         assert axis.move(mm=1).position_nm == 1_000_000  # and the bus is in order again
 
 
-def test_an_axis_that_cannot_be_told_to_stop_is_said():
+def test_an_axis_that_cannot_be_stopped_is_reported():
     fake, node, axis = homed_stage()
 
     def cut_and_interrupt(status):
@@ -334,15 +427,17 @@ def test_an_axis_that_cannot_be_told_to_stop_is_said():
 
     with pytest.raises(
         BusError,
-        match="axis 0 of node 1 could not be told to stop, its watchdog has to: nobody answers",
+        match="axis 0 of node 1 could not be stopped by the host, its watchdog has to: nobody",
     ):
         axis.move(mm=10, progress=cut_and_interrupt)
 
 
-def test_waiting_talks_often_enough_for_the_watchdog():
+def test_waiting_sends_requests_often_enough_for_the_watchdog():
     fake, node, axis = homed_stage()
     times = []
-    node.do_status = lambda inside, told=node.do_status: times.append(fake.now()) or told(inside)
+    node.do_status = lambda inside, reported=node.do_status: (
+        times.append(fake.now()) or reported(inside)
+    )
     began = fake.now()
     axis.dwell(1.0)
     assert 1.0 <= fake.now() - began < 1.2
@@ -384,7 +479,7 @@ def two_nodes():
     return fake, bus
 
 
-def test_axes_of_two_nodes_begin_at_one_mark():
+def test_axes_of_two_nodes_begin_at_one_sync():
     fake, bus = two_nodes()
     chosen = [bus.axis(1), bus.axis(2, 1)]
     for axis in chosen:
@@ -412,19 +507,19 @@ def test_none_of_two_nodes_starts_if_one_was_not_prepared():
     assert fake.nodes[0].axes[0].kind == "prepared"
 
 
-def test_a_node_that_does_not_hear_the_mark_is_named_and_the_others_are_stopped():
+def test_a_node_that_misses_the_sync_is_named_and_the_others_are_stopped():
     fake, bus = two_nodes()
     for axis in (bus.axis(1), bus.axis(2)):
         axis.prepare(mm=1)
-    deaf, hears = fake.nodes[1], fake.nodes[1].hear
-    deaf.hear = lambda word: [] if deaf.marked and word == 0x120 else hears(word)
-    with pytest.raises(BusError, match="the node did not hear the mark"):
+    deaf, hears = fake.nodes[1], fake.nodes[1].receive_word
+    deaf.receive_word = lambda word: [] if deaf.waiting_for_sync and word == 0x120 else hears(word)
+    with pytest.raises(BusError, match="node 2 did not receive the sync"):
         bus.start(bus.axis(1), bus.axis(2))
     fake.wait(1)
-    assert bus.axis(1).status().ended == "stopped" and not deaf.marked
+    assert bus.axis(1).status().ended == "stopped" and not deaf.waiting_for_sync
 
 
-def test_another_baud_rate_is_that_of_all_nodes_or_of_none():
+def test_a_new_baud_rate_is_set_in_all_nodes_or_in_none():
     fake, bus = two_nodes()
     bus.set_baud(1_000_000, [1, 2])
     assert bus.baud_changed and fake.character_s == pytest.approx(11e-6)
@@ -438,7 +533,7 @@ def test_another_baud_rate_is_that_of_all_nodes_or_of_none():
 
 
 @pytest.mark.parametrize("rate", [115_200, 1_000_000, 9_600])
-def test_nodes_at_any_usual_baud_rate_are_found_and_the_line_stays_there(rate):
+def test_nodes_at_any_usual_baud_rate_are_found_and_the_bus_keeps_that_rate(rate):
     fake, bus = two_nodes()
     for node in fake.nodes:
         node.baud = rate
@@ -447,7 +542,7 @@ def test_nodes_at_any_usual_baud_rate_are_found_and_the_line_stays_there(rate):
     assert bus.axis(2).status().state == "holding"
 
 
-def test_a_rate_that_the_port_cannot_do_is_passed_over_and_a_port_that_is_gone_is_not():
+def test_a_rate_that_the_port_cannot_do_is_skipped_but_a_missing_port_is_an_error():
     fake, bus = two_nodes()
     fake.nodes[0].baud, able, set_baud = 9_600, {115_200, 9_600}, fake.set_baud
 
@@ -463,7 +558,7 @@ def test_a_rate_that_the_port_cannot_do_is_passed_over_and_a_port_that_is_gone_i
         bus.find_baud()
 
 
-def test_nobody_at_any_rate_leaves_the_first_one_and_what_was_garbled_is_said():
+def test_without_a_node_the_first_rate_is_kept_and_garbled_answers_are_reported():
     fake, bus = two_nodes()
     assert bus.find_baud([5], rates=(9_600,)) == ([], 115_200) and fake.baud == 115_200
     fake.from_node = lambda word: [word ^ 1]
@@ -471,18 +566,18 @@ def test_nobody_at_any_rate_leaves_the_first_one_and_what_was_garbled_is_said():
         bus.find_baud(rates=(9_600,))
 
 
-def test_find_tells_two_nodes_with_one_address_that_identify_themselves_alike():
+def test_find_reports_two_nodes_with_one_address_that_identify_themselves_alike():
     fake = FakeBus(FakeNode(), FakeNode())
     fake.wired_and = True
     assert [identity.address for identity in Bus(fake).find()] == [
         1
-    ]  # to the very clk the same: nothing could tell
+    ]  # equal in every cycle: the two could not be distinguished
     fake.nodes[1].powered_up = 0.3
     with pytest.raises(BusGarbled, match="two nodes with the address 1"):
         Bus(fake).find()
 
 
-def test_what_needs_the_own_line_is_refused_through_a_door():
+def test_what_needs_the_bus_itself_is_refused_through_a_gateway():
     fake, bus = two_nodes()
     fake.handshake = False
     for action in (
@@ -491,7 +586,7 @@ def test_what_needs_the_own_line_is_refused_through_a_door():
         bus.find_baud,
         lambda: bus.start(bus.axis(1)),
     ):
-        with pytest.raises(BusError, match="the nodes' own line"):
+        with pytest.raises(BusError, match="the bus of the nodes itself"):
             action()
 
 
@@ -501,7 +596,7 @@ def test_none_starts_if_one_was_not_prepared():
     with pytest.raises(Refused, match="the axis has no motion prepared"):
         node.start(0, 1)
     assert fake.nodes[0].axes[0].kind == "prepared"
-    with pytest.raises(OutOfRange, match="which axes"):
+    with pytest.raises(OutOfRange, match="no axis is given"):
         node.start()
     with pytest.raises(Refused, match="node 1 has no axis 2"):
         node.start(2)
@@ -527,21 +622,21 @@ def test_a_prepared_move_beyond_the_travel_says_where_it_ends():
     _, _, axis = homed_stage()
     with pytest.raises(Refused, match="target 200mm, allowed -800um to 119.6mm"):
         axis.prepare("200mm")
-    with pytest.raises(OutOfRange, match="a prepare needs a target"):
+    with pytest.raises(OutOfRange, match="a prepare needs one target"):
         axis.prepare()
 
 
-def test_pause_stands_and_resume_goes_on_at_the_override_before():
+def test_pause_halts_and_resume_continues_at_the_earlier_override():
     fake, node, axis = homed_stage()
     assert axis.override() == 1 and axis.override("50%") == Fraction(1, 2)
     seconds = axis.begin_move("4.8mm")
     assert seconds == pytest.approx(1.05, abs=0.01)
     fake.wait(0.5)
     axis.pause()
-    axis.pause()  # twice is once
-    stands = axis.status().position_nm
+    axis.pause()  # a second pause changes nothing
+    halted = axis.status().position_nm
     fake.wait(10)
-    assert axis.status().position_nm == stands and axis.status().in_motion and 0 < stands < 4.8e6
+    assert axis.status().position_nm == halted and axis.status().in_motion and 0 < halted < 4.8e6
     assert axis.resume() == Fraction(1, 2)
     assert axis.motion_end().position_nm == pytest.approx(4.8e6, abs=1)
 
@@ -553,7 +648,7 @@ def test_resume_of_what_another_program_paused_is_full_speed():
 
 
 @pytest.mark.parametrize("share", ["120%", "-1%", 1.5, "fast", "50 mm"])
-def test_an_override_that_is_no_share_is_refused(share):
+def test_an_override_outside_0_to_1_is_refused(share):
     fake, node, axis = homed_stage()
     with pytest.raises(UnitError):
         axis.override(share)
@@ -572,7 +667,7 @@ def test_ctrl_c_while_waiting_for_a_motion_stops_it():
     assert node.axes[0].ended == "stopped"
 
 
-def test_home_keeps_the_method_that_was_asked_for():
+def test_home_stores_the_requested_method():
     _, node, axis = homed_stage()
     for method, counts in ((35, 35), ("17", 17), ("s3", -2), ("s0", -1)):
         assert axis.home(method=method).homed
@@ -581,7 +676,7 @@ def test_home_keeps_the_method_that_was_asked_for():
         axis.home(method=99)
 
 
-def test_the_drive_is_told_in_words():
+def test_the_drive_is_reported_in_words():
     _, node, axis = homed_stage()
     node.registers.update(
         {0x1400: 1 | 0b1111 << 2, 0x1420: -7 & 0xFFFFFFFF, 0x143C: -16384 & 0xFFFF}
@@ -596,7 +691,7 @@ def test_the_drive_is_told_in_words():
     assert drive.override == 1
 
 
-def test_a_parameter_that_is_a_choice_takes_and_tells_its_words():
+def test_a_parameter_that_is_a_choice_is_written_and_read_by_name():
     _, node, axis = stage()
     for name, known in PARAMETERS.items():
         if name not in CHOICES:
@@ -684,7 +779,7 @@ def test_parameters_are_in_real_units():
 
 
 @pytest.mark.parametrize("name", list(PARAMETERS))
-def test_both_ends_of_each_parameter_are_taken_and_what_is_beyond_is_not_sent(name):
+def test_both_ends_of_each_range_are_accepted_and_values_beyond_are_not_sent(name):
     fake, node, axis = stage()
     known = PARAMETERS[name]
     value = axis.get_parameter(name)
@@ -692,6 +787,10 @@ def test_both_ends_of_each_parameter_are_taken_and_what_is_beyond_is_not_sent(na
     for end, beyond, counts in ((value.minimum, -one, known.min), (value.maximum, one, known.max)):
         if name == "period":
             fake, node, axis = stage()
+        if name == "travel_low":
+            axis.set_parameter("travel_high", value.maximum)
+        if name == "travel_high":
+            axis.set_parameter("travel_low", value.minimum)
         assert axis.set_parameter(name, end).counts == counts == node.axes[0].parameters[known.id]
         written = len(node.axes[0].writes)
         if name != "period":
@@ -720,22 +819,24 @@ def test_wrong_values_say_what_is_allowed():
     assert node.axes[0].writes == []
 
 
-def test_saved_parameters_come_back_to_the_last_bit():
+def test_saved_parameters_are_restored_to_the_last_bit():
     print("SEED", SEED)
     source = random.Random(SEED)
     for _ in range(10):
         fake, node, axis = stage()
-        wanted = {
+        counts = {
             known.id: source.choice([known.min, known.max, source.randint(known.min, known.max)])
             for known in PARAMETERS.values()
         }
-        node.axes[0].parameters.update(wanted)
+        low, high = (PARAMETERS[name].id for name in ("travel_low", "travel_high"))
+        counts[low], counts[high] = sorted((counts[low], counts[high]))
+        node.axes[0].parameters.update(counts)
         axis.period_nm = axis.read_period()
         saved = axis.save_parameters()
         _, other, fresh = stage()
         assert len(fresh.load_parameters(saved)) == len(PARAMETERS)
-        assert other.axes[0].parameters == wanted and other.axes[0].writes[0] == "period"
-        assert fresh.period_nm == Fraction(wanted[1], 1000)
+        assert other.axes[0].parameters == counts and other.axes[0].writes[0] == "period"
+        assert fresh.period_nm == Fraction(counts[1], 1000)
 
 
 def test_a_file_with_one_wrong_value_writes_nothing():

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""cobs: stuffing against the published examples and its own inverse, and a reader that nothing can
-throw off.
+"""moire.bus.cobs: stuffing as in the published examples, packets, and a reader that any noise
+leaves in order.
 """
 
 import random
@@ -29,15 +29,17 @@ BODY = b"\x07\x03\x00\x01"
         (bytes(range(1, 255)) + b"\xff", "ff" + bytes(range(1, 255)).hex() + "02ff"),
     ],
 )
-def test_stuffing_is_that_of_the_paper(plain, stuffed):
-    assert cobs.stuff(plain).hex() == stuffed and cobs.unstuff(bytes.fromhex(stuffed)) == plain
+def test_stuffing_is_as_in_the_cobs_paper(plain, stuffed):
+    assert cobs.sealed(plain).hex() == f"00{stuffed}00"
+    assert cobs.unstuff(bytes.fromhex(stuffed)) == plain
 
 
-def test_stuffed_bytes_have_no_zero_and_come_back_whole():
+def test_stuffed_bytes_have_no_zero_and_can_be_unstuffed():
     source = random.Random(SEED)
     for length in [*range(20), *range(250, 260), 600]:
         plain = bytes(source.choice([0, 1, 255, source.randrange(256)]) for _ in range(length))
-        assert 0 not in cobs.stuff(plain) and cobs.unstuff(cobs.stuff(plain)) == plain
+        stuffed = cobs.sealed(plain)[1:-1]
+        assert 0 not in stuffed and cobs.unstuff(stuffed) == plain
 
 
 def test_the_packet_of_the_protocol_page():
@@ -48,7 +50,7 @@ def test_the_packet_of_the_protocol_page():
     assert cobs.PacketReader().feed(cobs.packet(0x21, BODY)) == [bytes([0x21]) + frame(0x21, BODY)]
 
 
-def test_a_packet_tells_its_body_and_its_node_only_if_it_is_right():
+def test_only_a_correct_packet_has_a_body_and_a_node():
     content = bytes([0x2B]) + frame(0x2B, BODY)
     assert cobs.body_of(content) == BODY
     assert cobs.address_of(content, TO_NODE) == 11 and cobs.address_of(content, FROM_NODE) is None
@@ -63,7 +65,7 @@ def test_a_packet_tells_its_body_and_its_node_only_if_it_is_right():
     assert all(cobs.body_of(content[:length]) is None for length in range(len(content)))
 
 
-def test_a_reader_takes_bytes_one_by_one_as_in_one_piece():
+def test_a_reader_takes_bytes_one_by_one_or_in_one_piece():
     stream = cobs.packet(0x21, BODY) + cobs.packet(0x22, b"\0" * 64)
     reader = cobs.PacketReader()
     assert sum((reader.feed(bytes([byte])) for byte in stream), []) == cobs.PacketReader().feed(
@@ -72,7 +74,7 @@ def test_a_reader_takes_bytes_one_by_one_as_in_one_piece():
     assert reader.dropped == 0
 
 
-def test_the_packet_after_any_noise_is_taken():
+def test_the_packet_after_any_noise_is_read():
     source = random.Random(SEED)
     for _ in range(2000):
         reader = cobs.PacketReader()
@@ -83,7 +85,7 @@ def test_the_packet_after_any_noise_is_taken():
         assert len(reader.held) == 0
 
 
-def test_what_is_too_long_is_dropped_and_counted_and_never_held():
+def test_a_packet_that_is_too_long_is_dropped_and_counted_and_not_stored():
     reader = cobs.PacketReader()
     assert reader.feed(b"\x01" * 100_000) == [] and len(reader.held) <= cobs.LONGEST_STUFFED
     assert reader.feed(b"\0") == [] and reader.dropped == 1

@@ -17,8 +17,8 @@ import pytest
 
 from experiments import machines
 from moire.analysis import tune
+from moire.bus.twin_port import MACHINES
 from moire.cli import command_line, completion, shell
-from moire.cli.twin import MACHINES
 from moire.errors import PortError
 from moire.made.bus_tables import PARAMETERS
 from tb.fakes.fake_node import CAUSE, ESTOP, FakeBus, FakeNode
@@ -332,7 +332,7 @@ def test_every_command_tells_one_json_object_a_line(text):
 
 def test_status_in_json_has_numbers_and_words():
     node = FakeNode()
-    node.axes[0].standing = node.axes[0].faults = ESTOP
+    node.axes[0].active_faults = node.axes[0].faults = ESTOP
     told = Call("status --json", node).told[0]
     assert (
         told["faults"] == ["estop"]
@@ -460,7 +460,7 @@ def sentence_of_last(text, code):
 
 def test_a_motion_that_ends_badly_is_exit_code_1():
     node = FakeNode()
-    node.axes[0].end_as = "no_switch"
+    node.axes[0].end_cause = "no_switch"
     assert "no limit switch was found within the travel" in sentence(Call("home", node), 1)
     told = Call("home --json", node).told[-1]
     assert (told["error"], told["cause"]) == ("MotionFailed", "no_switch") and CAUSE[
@@ -498,7 +498,7 @@ def test_ports_are_exit_code_4(monkeypatch):
 
 
 def test_without_a_checkout_the_port_twin_says_what_to_do(monkeypatch):
-    monkeypatch.setattr("moire.cli.twin.entry_points", lambda **_: ())
+    monkeypatch.setattr("moire.bus.twin_port.entry_points", lambda **_: ())
     err = io.StringIO()
     assert command_line.main(["--port", "twin", "status"], err=err) == 4
     assert err.getvalue() == (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Learning, correction, signal faults, capture and compare, through the client and through the
+"""Calibration, correction, signal faults, capture and compare, through the client and through the
 command line.
 """
 
@@ -8,8 +8,8 @@ import json
 
 import pytest
 
-from moire.bus.client import Bus
 from moire.cli import command_line
+from moire.client.bus import Bus
 from moire.errors import MotionFailed, NotCalibrated, OutOfRange, Refused, UnknownName
 from moire.made.bus_tables import PARAMETERS
 from tb.fakes.fake_node import FakeBus, FakeNode
@@ -35,17 +35,22 @@ def stage(homed=True):
     return node, node.axes[0], axis
 
 
-# ---- learning
+# ---- calibration
 
 
-def test_learning_goes_to_and_fro_at_several_speeds_and_ends_frozen_where_it_began():
+def test_calibration_moves_at_several_speeds_and_ends_frozen_where_it_began():
     _, inside, axis = stage()
-    inside.learns_in = 7
+    inside.moves_to_calibrate = 7
     start, seen = inside.position, []
-    told = axis.calibrate(seen.append)
-    assert (told.settled, told.frozen, told.reason, told.words) == (True, True, "frozen", "frozen")
+    reported = axis.calibrate(seen.append)
+    assert (reported.settled, reported.frozen, reported.reason, reported.words) == (
+        True,
+        True,
+        "frozen",
+        "frozen",
+    )
     assert (
-        told.scatter_nm == pytest.approx(26 / 2**20 * 800)
+        reported.scatter_nm == pytest.approx(26 / 2**20 * 800)
         and len(seen) == 8
         and inside.position == start
     )
@@ -74,13 +79,13 @@ def test_calibrate_homes_learns_and_saves(tmp_path):
     )
     assert node.axes[0].homed and json.loads(file.read_text())["correction"]["gain"] == 65000
     before = node.executed.count("home")
-    node.axes[0].learns_in = 4
+    node.axes[0].moves_to_calibrate = 4
     assert Call(["commission", str(file)], node).code == 0 and node.executed.count("home") == before
 
 
-def test_what_is_not_learned_in_time_is_told_with_its_reason():
+def test_a_calibration_that_takes_too_long_fails_with_its_reason():
     _, inside, axis = stage()
-    inside.learns_in = None
+    inside.moves_to_calibrate = None
     inside.parameters[VELOCITY] = 900
     with pytest.raises(
         NotCalibrated, match="learned no correction within 3s: learning \\(0 accepted, 0 refused\\)"
@@ -88,13 +93,13 @@ def test_what_is_not_learned_in_time_is_told_with_its_reason():
         axis.calibrate(timeout="3s")
     assert (
         caught.value.cause == "calibrating"
-        and inside.learner["frozen"] == 1
+        and inside.calibration_state["frozen"] == 1
         and inside.parameters[VELOCITY] == 900
     )
     assert max(inside.speeds) == 900
 
 
-def test_learning_needs_a_zero_room_and_a_distance():
+def test_calibration_needs_a_homed_axis_and_room_and_a_distance():
     _, _, axis = stage(homed=False)
     axis.enable()
     with pytest.raises(Refused, match="home it first"):
@@ -106,27 +111,27 @@ def test_learning_needs_a_zero_room_and_a_distance():
     with pytest.raises(OutOfRange, match="no room for 200mm: the travel is -800um to 119.6mm"):
         axis.calibrate(distance="200mm")
     axis.move(mm=119.5)
-    axis.calibrate(distance="0.5mm")  # to the other side
+    axis.calibrate(distance="0.5mm")  # to the side with room
     assert inside.position == axis.to_counts("119.5mm") and "calibration" in node.executed
 
 
-def test_a_fault_while_learning_is_the_error_that_is_told():
+def test_a_fault_during_calibration_is_the_error_that_is_raised():
     node, inside, axis = stage()
-    inside.learns_in = None
-    inside.end_as = "not_settled"
+    inside.moves_to_calibrate = None
+    inside.end_cause = "not_settled"
     with pytest.raises(MotionFailed, match="the target was not reached"):
         axis.calibrate()
-    assert inside.learner["frozen"] == 1
+    assert inside.calibration_state["frozen"] == 1
 
 
-def test_the_learner_knows_its_actions():
+def test_calibration_actions_are_checked():
     _, inside, axis = stage()
     assert (
         axis.calibration("calibrate").reason == "calibrating" and axis.calibration().frozen is False
     )
     assert axis.calibration("freeze").reason == "frozen"
     with pytest.raises(
-        OutOfRange, match="knows no 'rest': allowed are read, calibrate, freeze, clear"
+        OutOfRange, match="has no action 'rest': allowed are read, calibrate, freeze, clear"
     ):
         axis.calibration("rest")
 
@@ -134,7 +139,7 @@ def test_the_learner_knows_its_actions():
 # ---- correction
 
 
-def test_a_correction_is_read_and_put_back_whole():
+def test_a_correction_is_read_and_written_back_as_a_whole():
     _, inside, axis = stage()
     axis.set_correction(VALUES)
     assert axis.correction() == VALUES and inside.harmonics[3] == (2, -2)
@@ -151,7 +156,7 @@ def test_a_correction_is_read_and_put_back_whole():
         {**VALUES, "cosine": ["1"] * 10},
     ],
 )
-def test_what_is_no_correction_is_refused_before_anything_is_sent(wrong):
+def test_an_incomplete_correction_is_refused_before_anything_is_sent(wrong):
     node, _, axis = stage()
     with pytest.raises(OutOfRange, match="this is no correction"):
         axis.set_correction(wrong)
@@ -164,7 +169,7 @@ def test_a_correction_out_of_range_changes_nothing():
     for wrong in ({**VALUES, "gain": 0}, {**VALUES, "cosine": [1 << 23] * 10}):
         with pytest.raises(Refused, match="outside"):
             axis.set_correction(wrong)
-    with pytest.raises(OutOfRange, match="does not fit on the line"):
+    with pytest.raises(OutOfRange, match="does not fit on the bus"):
         axis.set_correction({**VALUES, "sin_offset": 1 << 15})
     assert axis.correction() == before
 
@@ -172,7 +177,7 @@ def test_a_correction_out_of_range_changes_nothing():
 # ---- signal, capture, compare
 
 
-def test_signal_faults_are_told_by_name_and_in_words():
+def test_signal_faults_are_reported_by_name_and_in_words():
     _, inside, axis = stage()
     inside.signal = dict(faults=1 << 9 | 1 << 14, first=1 << 9)
     signal = axis.signal()
@@ -182,7 +187,7 @@ def test_signal_faults_are_told_by_name_and_in_words():
     assert signal.first_words == "the comparators change, a leg never changes sign"
 
 
-def test_captures_are_taken_oldest_first_and_losses_are_told():
+def test_captures_are_read_oldest_first_and_losses_are_reported():
     node, _, axis = stage()
     node.captures = [
         [0b0001 | 40 << 7, 1000, 65536, 0],
@@ -199,7 +204,7 @@ def test_captures_are_taken_oldest_first_and_losses_are_told():
     assert axis.captures() == ([], False)
 
 
-def test_sources_are_switched_by_name():
+def test_capture_sources_are_selected_by_name():
     node, _, axis = stage()
     axis.capture_from("probe_1_falling", "index")
     assert node.written == [(0xC60, 0b1000001), (0xC10, 1)]
@@ -210,7 +215,7 @@ def test_sources_are_switched_by_name():
         axis.capture_from("probe")
 
 
-def test_compare_is_set_up_whole_and_armed_last():
+def test_compare_is_set_up_completely_and_armed_last():
     node, _, axis = stage()
     axis.compare_from("0.8mm", "-80um", 5, "2us", "1ms")
     words = dict(node.written)
@@ -232,7 +237,7 @@ def test_compare_is_set_up_whole_and_armed_last():
             axis.compare_from(**{"start": 0, "step": "1um", "count": 0, **wrong})
 
 
-def test_only_words_go_to_registers():
+def test_only_32_bit_words_are_written_to_registers():
     _, _, axis = stage()
     for wrong in ((2, 0), (-4, 0), (65536, 0), (0xC60, -1), (0xC60, 1 << 32)):
         with pytest.raises(OutOfRange, match="32-bit words"):
@@ -244,7 +249,7 @@ def test_only_words_go_to_registers():
 # ---- the command line
 
 
-def test_learn_save_forget_load_in_calls_of_moire(tmp_path):
+def test_calibrate_save_clear_load_on_the_command_line(tmp_path):
     node, file = FakeNode(), str(tmp_path / "correction.json")
     call = Call("home -- calibrate --distance 80um --timeout 1min -- correction show", node)
     assert (
@@ -261,19 +266,23 @@ def test_learn_save_forget_load_in_calls_of_moire(tmp_path):
     for action, frozen in (("calibrate", 0), ("freeze", 1), ("clear", 1)):
         assert (
             Call(f"correction {action}", node).code == 0
-            and node.axes[0].learner["frozen"] == frozen
+            and node.axes[0].calibration_state["frozen"] == frozen
         )
     assert "not settled" in Call("correction show", node).out
 
 
-def test_learning_that_fails_is_exit_code_1_with_its_cause():
+def test_a_calibration_that_fails_is_exit_code_1_with_its_cause():
     node = FakeNode()
-    node.axes[0].learns_in = None
-    told = Call("home -- calibrate --timeout 2s --json", node).told[-1]
-    assert (told["error"], told["cause"], told["exit_code"]) == ("NotCalibrated", "calibrating", 1)
+    node.axes[0].moves_to_calibrate = None
+    reported = Call("home -- calibrate --timeout 2s --json", node).told[-1]
+    assert (reported["error"], reported["cause"], reported["exit_code"]) == (
+        "NotCalibrated",
+        "calibrating",
+        1,
+    )
 
 
-def test_a_person_sees_learning_go_on(monkeypatch):
+def test_the_progress_of_the_calibration_is_shown(monkeypatch):
     class Screen(io.StringIO):
         def isatty(self):
             return True
@@ -288,7 +297,7 @@ def test_a_person_sees_learning_go_on(monkeypatch):
     assert "learning; not settled (0 accepted, 0 refused)" in err.getvalue()
 
 
-def test_signal_capture_and_compare_in_calls_of_moire():
+def test_signal_capture_and_compare_on_the_command_line():
     node = FakeNode()
     assert "nothing is wrong with the signal\n  first since reset: none" in Call("signal", node).out
     node.axes[0].signal = dict(faults=1, first=3)
@@ -326,13 +335,13 @@ def test_signal_capture_and_compare_in_calls_of_moire():
         "home -- calibrate",
     ],
 )
-def test_each_tells_one_json_object_a_line(text):
+def test_each_command_prints_one_json_object_in_a_line(text):
     node = FakeNode()
     node.registers.update({0xC94: 0, 0xC98: 0})
     node.captures = [[1, 2, 3, 0]]
     call = Call(text + " --json", node)
     assert call.code == 0 and call.err == ""
-    assert [told["command"] for told in call.told] == [
+    assert [reported["command"] for reported in call.told] == [
         part.split()[0] for part in text.split(" -- ")
     ]
 

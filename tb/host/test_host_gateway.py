@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""gateway and the transports that come in by it: the stock pyserial client and our own, against
-nodes in Python behind the real sockets
-and pseudo terminals of this computer."""
+"""moire.bus.gateway and its clients: pyserial and our own transports, against nodes in Python
+behind real sockets and pseudo terminals.
+"""
 
 import contextlib
 import io
@@ -17,11 +17,11 @@ import serial
 import serial.rfc2217
 
 from moire.bus import cobs
-from moire.bus.client import Bus
 from moire.bus.gateway import Gateway
 from moire.bus.protocol import request_body
 from moire.bus.transport import CobsBus, SerialBus, open_bus
 from moire.cli import command_line
+from moire.client.bus import Bus
 from moire.errors import BusGarbled, MoireError, NoAnswer, PortError
 from tb.bench import seed
 from tb.fakes.fake_node import FakeBus, FakeNode
@@ -30,7 +30,7 @@ pytestmark = pytest.mark.filterwarnings(
     "ignore:set(Daemon|Name).. is deprecated:DeprecationWarning"
 )  # in pyserial
 SEED = seed()
-HANG_S = 60  # what has not come by then never will
+HANG_S = 60  # what has not arrived by then never will
 
 
 class Served:
@@ -85,7 +85,7 @@ ENTRANCES = [
 ]
 
 
-# ------------------------------------------------------------------ in by every entrance
+# ------------------------------------------------------------------ every entrance
 
 
 @pytest.mark.parametrize("entrance, parity", ENTRANCES)
@@ -104,7 +104,7 @@ def test_the_same_work_is_done_through_every_entrance(served, entrance, parity):
     assert node.counters["frames_bad"] == 0
 
 
-def test_auto_takes_the_nine_bit_line_of_rfc2217_and_packets_of_the_others(served):
+def test_auto_uses_nine_bits_over_rfc2217_and_packets_elsewhere(served):
     kinds = []
     for entrance in served.ports:
         with opened(served, entrance) as port:
@@ -124,7 +124,7 @@ def test_every_byte_arrives_with_the_ninth_bit_it_was_sent_with(served):
 
 
 def test_a_change_of_parity_over_rfc2217_waits_for_nothing(served, monkeypatch):
-    """pyserial's own setter sleeps until the far end has agreed."""
+    """The setter of pyserial would sleep until the other end has agreed."""
 
     def sleep(seconds):
         raise AssertionError(f"slept {seconds} s")
@@ -203,23 +203,23 @@ def test_a_reply_that_comes_too_late_is_not_taken_for_the_next(served):
         assert bus.request(1, "read_register", address=0x400) == {"value": 7}
 
 
-def test_nobody_answers_through_packets_either(served):
+def test_no_answer_is_reported_through_packets_too(served):
     with opened(served, "tcp") as port:
         with pytest.raises(
             NoAnswer,
-            match="nobody answers at address 5, asked 2 times: check power, wiring, baud rate and address",
+            match="nobody answers at address 5, asked 2 times: check power, wiring, baud rate",
         ):
             Bus(port, tries=2).node(5)
 
 
-def test_a_client_that_goes_is_forgotten(served):
+def test_a_client_that_disconnects_is_forgotten(served):
     for _ in range(3):
         with opened(served, "tcp") as port:
             Bus(port).node()
     served.wait_until(lambda: len(served.gateway.clients) == 1)  # the terminal stays
 
 
-# ------------------------------------------------------------------ what can be wrong
+# ------------------------------------------------------------------ errors
 
 
 def complaint(text, code):
@@ -243,7 +243,7 @@ def test_a_tcp_port_in_use_is_one_sentence():
         number = taken.getsockname()[1]
         with pytest.raises(
             PortError,
-            match=f"the TCP port {number} at 127.0.0.1 does not open: .*already in use; choose another",
+            match=f"the TCP port {number} at 127.0.0.1 does not open: .*already in use; choose",
         ):
             Gateway(FakeBus(FakeNode())).open_tcp("127.0.0.1", number)
 
@@ -269,7 +269,7 @@ def test_no_permission_is_one_sentence(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("entrance", ["rfc2217", "tcp", "terminal"])
-def test_a_port_unplugged_in_mid_move_is_one_sentence_that_says_who_stops_the_axis(entrance):
+def test_a_port_unplugged_during_a_move_is_one_sentence_that_names_the_watchdog(entrance):
     served = Served()
     node = served.far.nodes[0]
     node.axes[0].homed = True
@@ -279,7 +279,7 @@ def test_a_port_unplugged_in_mid_move_is_one_sentence_that_says_who_stops_the_ax
     said = complaint(f"--port {served.ports[entrance]} move 100mm", 4)
     assert (
         served.ports[entrance] in said
-        and "axis 0 of node 1 could not be told to stop, its watchdog has to" in said
+        and "axis 0 of node 1 could not be stopped by the host, its watchdog has to" in said
     )
 
 
@@ -309,8 +309,8 @@ def fake_twin(baud, machine, seed, nodes=(1, 2)):
     return bus
 
 
-def test_ctrl_c_is_the_good_end_of_a_served_twin(monkeypatch):
-    monkeypatch.setattr("moire.cli.twin.make_twin", fake_twin)
+def test_ctrl_c_ends_a_served_twin_without_an_error(monkeypatch):
+    monkeypatch.setattr("moire.cli.commands.twin.open_twin", fake_twin)
 
     def interrupt(*_):
         raise KeyboardInterrupt
@@ -323,8 +323,8 @@ def test_ctrl_c_is_the_good_end_of_a_served_twin(monkeypatch):
     )
 
 
-def test_the_ports_are_told_as_json(monkeypatch, tmp_path):
-    monkeypatch.setattr("moire.cli.twin.make_twin", fake_twin)
+def test_the_ports_are_printed_as_json(monkeypatch, tmp_path):
+    monkeypatch.setattr("moire.cli.commands.twin.open_twin", fake_twin)
     out, link = io.StringIO(), tmp_path / "link"
     arguments = [
         "twin",
@@ -342,10 +342,10 @@ def test_the_ports_are_told_as_json(monkeypatch, tmp_path):
         "--json",
     ]
     assert command_line.main(arguments, None, out, io.StringIO()) == 0
-    told = json.loads(out.getvalue())
+    reported = json.loads(out.getvalue())
     assert (
-        told["machine"] == "s0"
-        and told["nodes"] == [3, 4]
-        and told["rfc2217"].startswith("rfc2217://127.0.0.1:")
+        reported["machine"] == "s0"
+        and reported["nodes"] == [3, 4]
+        and reported["rfc2217"].startswith("rfc2217://127.0.0.1:")
         and not link.exists()
     )

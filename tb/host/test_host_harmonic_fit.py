@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""calibration.py: harmonics found by hand and in noise, what the readings carry, and every bad
-table named by its line.
+"""moire.analysis.harmonic_fit: harmonics made by hand and in noise, how many orders the readings
+carry, and errors in a table reported with their lines.
 """
 
 import math
@@ -35,7 +35,7 @@ def written(tmp_path, lines):
 
 
 def table(angles=TEN, change=None):
-    """Lines of a good table; change: {number of a line: text}, None takes the line away."""
+    """Lines of a correct table; change: {number of a line: text}, None removes the line."""
     lines = ["angle_deg,error_arcsec"] + [
         f"{angle:g},{ring(np.array([angle]), [100, 20], [0, -7])[0]:.4f}" for angle in angles
     ]
@@ -64,15 +64,15 @@ def test_harmonics_without_noise_are_found_exactly():
         (np.arange(0, 361, 60.0), 2),
     ],
 )
-def test_as_many_orders_are_fitted_as_the_places_carry(angles, orders):
+def test_as_many_orders_are_fitted_as_the_angles_carry(angles, orders):
     made = readings(ring(angles, [100], [0]), angles)
     assert fit(made).orders == orders
     with pytest.raises(OutOfRange, match=f"carry 1 to {orders} orders, not {orders + 1}"):
         fit(made, orders=orders + 1)
 
 
-def test_an_order_above_half_the_places_looks_like_its_alias():
-    found = fit(readings(ring(TEN, [0] * 33 + [5], [0] * 34)))  # order 34 at 36 places
+def test_an_order_above_half_the_angles_looks_like_its_alias():
+    found = fit(readings(ring(TEN, [0] * 33 + [5], [0] * 34)))  # order 34 at 36 angles
     assert (
         found.amplitude[1] == pytest.approx(5)
         and "34 as 2" in found.words()
@@ -80,7 +80,7 @@ def test_an_order_above_half_the_places_looks_like_its_alias():
     )
 
 
-def test_noise_is_estimated_and_weighted_away():
+def test_noise_is_estimated_and_reduced_by_weights():
     source = np.random.default_rng(seed())
     angle = np.arange(0, 3600.5, 10.0)
     gains = []
@@ -96,7 +96,7 @@ def test_noise_is_estimated_and_weighted_away():
     assert np.median(gains) > 1.5
 
 
-def test_one_revolution_says_nothing_of_its_noise_and_takes_what_it_is_told():
+def test_the_noise_of_one_revolution_is_unknown_unless_given():
     error = ring(TEN, [90, 25, 8], [0, 0, 0]) + np.random.default_rng(seed()).uniform(
         -2, 2, len(TEN)
     )
@@ -107,10 +107,10 @@ def test_one_revolution_says_nothing_of_its_noise_and_takes_what_it_is_told():
 # files
 
 
-def test_a_good_table_is_read_with_or_without_heading_and_comments(tmp_path):
+def test_a_correct_table_is_read_with_or_without_heading_and_comments(tmp_path):
     for lines in (table(), table()[1:], ["# laser, 2026-11-21", "", *table()]):
         read = read_readings(written(tmp_path, lines))
-        assert np.array_equal(read.angle, TEN) and read.places == 36 and read.revolutions == 1
+        assert np.array_equal(read.angle, TEN) and read.angles == 36 and read.revolutions == 1
 
 
 def test_angles_that_fall_back_begin_the_next_revolution(tmp_path):
@@ -119,7 +119,7 @@ def test_angles_that_fall_back_begin_the_next_revolution(tmp_path):
     )
     assert (
         np.array_equal(read.angle, np.arange(0, 721, 10))
-        and read.places == 36
+        and read.angles == 36
         and read.revolutions == 2
     )
 
@@ -127,8 +127,8 @@ def test_angles_that_fall_back_begin_the_next_revolution(tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({5: "40"}, "line 5: two columns"),
-        ({5: "30,1,2"}, "line 5: two columns"),
+        ({5: "40"}, "line 5: it needs two columns"),
+        ({5: "30,1,2"}, "line 5: it needs two columns"),
         ({5: "30,abc"}, "line 5: the error is no number: 'abc'"),
         ({5: "x,1"}, "line 5: the angle is no number: 'x'"),
         ({5: "30,nan"}, "line 5: the error is nan"),
@@ -140,7 +140,7 @@ def test_angles_that_fall_back_begin_the_next_revolution(tmp_path):
         ({20: "180,-20"}, "line 20: the error -20 arcsec at 180 degrees is"),
     ],
 )
-def test_what_is_wrong_with_a_table_is_told_with_its_line(tmp_path, change, words):
+def test_an_error_in_a_table_is_reported_with_its_line(tmp_path, change, words):
     with pytest.raises(BadFile, match=words):
         read_readings(written(tmp_path, table(change=change)))
 
@@ -153,11 +153,11 @@ def test_what_is_wrong_with_a_table_is_told_with_its_line(tmp_path, change, word
         (table(np.arange(0, 181, 10)), "cover 180 degrees; a whole revolution"),
     ],
 )
-def test_a_table_that_says_too_little_is_refused(tmp_path, lines, words):
+def test_a_table_with_too_few_readings_is_refused(tmp_path, lines, words):
     with pytest.raises(BadFile, match=words):
         read_readings(written(tmp_path, lines))
 
 
-def test_a_file_that_is_not_there_is_told(tmp_path):
+def test_a_missing_file_is_reported(tmp_path):
     with pytest.raises(BadFile, match="cannot be read: No such file"):
         read_readings(tmp_path / "none.csv")

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""job and its commands, against the firmware of a main node with its EEPROM, the machine and a
-sub-node.
+"""moire.client.job and its commands, against the firmware of a main node with its EEPROM, the EDM
+and a sub-node.
 """
 
 import io
@@ -8,9 +8,9 @@ import json
 
 import pytest
 
-from moire.bus.client import Bus
-from moire.bus.job import Job, equal_parts, read_stations
 from moire.cli import command_line
+from moire.client.bus import Bus
+from moire.client.job import Job, equal_parts, read_stations
 from moire.errors import BadFile, OutOfRange, Refused
 from tb.fakes.firmware_bus import FakeNodeBus
 from twin.compiled.station import OPERATION, Station, SubNode
@@ -26,7 +26,7 @@ class Workshop:
         self.job = Job(Bus(FakeNodeBus(self.station)).node(ADDRESS))
 
     def call(self, text):
-        """Exit code, what was told, what was complained."""
+        """Exit code, standard output and standard error of a command."""
         out, err = io.StringIO(), io.StringIO()
         code = command_line.main(
             ["--address", str(ADDRESS), *text.split()],
@@ -37,7 +37,7 @@ class Workshop:
         return code, out.getvalue(), err.getvalue()
 
 
-def test_a_program_is_loaded_read_and_cut():
+def test_a_station_list_is_loaded_read_and_cut():
     workshop = Workshop()
     program = workshop.job.load(["0deg", "1.5deg", "7200arcsec"])
     assert program.angles == (0, 5400, 7200) and program.generation == 1
@@ -79,7 +79,7 @@ def test_a_turn_is_divided_to_the_nearest_count():
         (["2deg", "1deg"], "station 2 at 1deg"),
     ],
 )
-def test_a_program_that_cannot_be_is_refused_before_the_first_byte(angles, words):
+def test_a_wrong_station_list_is_refused_before_the_first_byte(angles, words):
     workshop = Workshop()
     with pytest.raises(OutOfRange, match=words):
         workshop.job.load(angles)
@@ -111,7 +111,7 @@ def test_a_bad_line_of_a_file_is_named(tmp_path, text, words):
         read_stations(tmp_path / "none.csv")
 
 
-def test_answers_that_nobody_waits_for_are_refused_in_words():
+def test_answers_that_the_job_does_not_wait_for_are_refused_in_words():
     workshop = Workshop()
     workshop.job.load(["0deg"])
     with pytest.raises(Refused, match="the job does not wait for that now"):
@@ -129,37 +129,39 @@ def test_the_commands_do_a_whole_job(tmp_path):
         and file.read_text() == "0.0000000\n90.0000000\n180.0000000\n270.0000000\n"
     )
     assert workshop.call(f"job load {file}")[0] == 0
-    code, told, _ = workshop.call("job start --wait")
+    code, reported, _ = workshop.call("job start --wait")
     assert (
         code == 0
-        and told.startswith("all cut, station 4 of 4\n  takes    start\n")
+        and reported.startswith("all cut, station 4 of 4\n  takes    start\n")
         and len(workshop.station.edm.cuts) == 4
     )
-    told = json.loads(workshop.call("job status --json")[1])
+    reported = json.loads(workshop.call("job status --json")[1])
     assert (
-        told["state"] == "finished" and told["answers"] == ["start"] and told["flags"] == ["eeprom"]
+        reported["state"] == "finished"
+        and reported["answers"] == ["start"]
+        and reported["flags"] == ["eeprom"]
     )
 
 
-def test_a_question_is_told_and_answered():
+def test_a_question_is_printed_and_answered():
     workshop = Workshop()
     workshop.call("settings set job_start_limit 1s")
     workshop.call("job load --equal 2")
     workshop.station.edm.deaf = True
-    code, told, complained = workshop.call("job start --wait")
+    code, reported, errors = workshop.call("job start --wait")
     assert (
         code == 1
-        and "because  the cut did not start in time" in told
-        and "takes    stop, again, next" in told
+        and "because  the cut did not start in time" in reported
+        and "takes    stop, again, next" in reported
     )
-    assert complained == "moire: the job waits: the cut did not start in time\n"
+    assert errors == "moire: the job waits: the cut did not start in time\n"
     assert workshop.call("job resume")[2].endswith("the job does not wait for that now\n")
     workshop.station.edm.deaf = False
     assert workshop.call("job answer again")[0] == 0
     assert workshop.call("job wait")[0] == 0 and len(workshop.station.edm.cuts) == 2
 
 
-def test_waiting_asks_the_table_too():
+def test_waiting_polls_the_table_too():
     workshop, operations = Workshop(), []
     workshop.call("job load --equal 2")
     hear = workshop.station.hear
@@ -171,8 +173,8 @@ def test_waiting_asks_the_table_too():
         workshop.call("job start --wait --table 2")[0] == 0
         and operations.count(OPERATION["status"]) > 20
     )
-    code, _, complained = workshop.call("job wait --table 3")
-    assert code == 3 and "address 3" in complained
+    code, _, errors = workshop.call("job wait --table 3")
+    assert code == 3 and "address 3" in errors
 
 
 def test_pause_resume_and_stop_from_the_command_line():
@@ -187,10 +189,10 @@ def test_pause_resume_and_stop_from_the_command_line():
     )
 
 
-def test_a_missing_eeprom_is_said_in_words():
+def test_a_missing_eeprom_is_reported_in_words():
     workshop = Workshop(absent=("eeprom", "keypad", "display"))
     workshop.station.run(1500)
-    code, _, complained = workshop.call("job load --equal 3")
-    assert code == 1 and complained.endswith("the EEPROM does not answer\n")
+    code, _, errors = workshop.call("job load --equal 3")
+    assert code == 1 and errors.endswith("the EEPROM does not answer\n")
     assert workshop.call("job start")[2].endswith("the EEPROM does not answer\n")
     assert "because  the EEPROM does not answer" in workshop.call("job status")[1]

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""keep and its commands, against the firmware of a station with its EEPROM."""
+"""moire.client.nonvolatile and its commands, against the firmware of a station with its EEPROM."""
 
 import json
 
 import pytest
 
-from moire.bus.nonvolatile import SavedSettings
+from moire.client.nonvolatile import SavedSettings
 from moire.errors import MotionFailed, Refused
 from moire.made.bus_tables import CAUSES
 from tb.host.test_host_job import Workshop
@@ -18,7 +18,7 @@ def workshop():
     return made
 
 
-def test_what_is_kept_is_there_after_a_power_cut(workshop):
+def test_saved_values_survive_a_power_cut(workshop):
     workshop.station.set(kp=7)
     assert (
         (state := workshop.saved.save()).cause == "ok"
@@ -33,7 +33,7 @@ def test_what_is_kept_is_there_after_a_power_cut(workshop):
     assert workshop.saved.state().words == "no values are kept: the defaults are in force"
 
 
-def test_the_commands_keep_forget_and_tell(workshop):
+def test_the_commands_save_clear_and_report(workshop):
     assert workshop.call("params save-to-node") == (0, "1 value is kept\n", "")
     code, out, _ = workshop.call("params saved-in-node --json")
     assert code == 0 and json.loads(out)["cause"] == "ok" and json.loads(out)["values"] == 1
@@ -45,7 +45,7 @@ def test_the_commands_keep_forget_and_tell(workshop):
     )
 
 
-def test_a_damaged_copy_is_told(workshop):
+def test_a_damaged_copy_is_reported(workshop):
     for _ in range(2):
         workshop.saved.save()
     workshop.station.eeprom.memory[8192 + 1] ^= 1
@@ -53,7 +53,7 @@ def test_a_damaged_copy_is_told(workshop):
     assert workshop.saved.state().words == "1 value is kept; one copy of them was damaged"
 
 
-def test_what_cannot_be_kept_is_said_in_words(workshop):
+def test_a_save_that_fails_is_reported_in_words(workshop):
     workshop.saved.state()
     workshop.station.eeprom.worn[8192 + 1] = 0xA5
     with pytest.raises(
@@ -68,7 +68,7 @@ def test_what_cannot_be_kept_is_said_in_words(workshop):
     assert workshop.call("params save-to-node")[0] != 0
 
 
-def test_a_fault_of_the_sub_node_stands_beside_the_cause(workshop):
+def test_a_fault_of_the_sub_node_is_reported_with_the_cause(workshop):
     workshop.job.load(["0deg", "10deg"])
     workshop.station.sub_node.latch("estop")
     workshop.job.start()

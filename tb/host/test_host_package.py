@@ -11,11 +11,12 @@ import venv
 from pathlib import Path
 
 import click
+import cobs
 import pytest
 import serial
 
 HOST = Path(__file__).resolve().parents[2] / "sw" / "host"
-DEPENDENCIES = (click, serial)  # NumPy and Matplotlib are loaded only where they are needed
+DEPENDENCIES = (click, cobs, serial)  # NumPy and Matplotlib are loaded only where they are needed
 
 
 def run(*command, **settings):

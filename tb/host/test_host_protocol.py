@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""protocol: known bytes, every way in which an exchange can fail, and random noise against the node
-in fake_node.py.
+"""moire.bus.protocol: known bytes, every kind of failure of an exchange, and random noise against
+the node in fake_node.py.
 """
 
 import random
 
 import pytest
 
-from moire.bus.client import Bus
 from moire.bus.protocol import (
     Exchange,
     State,
@@ -18,6 +17,7 @@ from moire.bus.protocol import (
     parse_reply,
     request_body,
 )
+from moire.client.bus import Bus
 from moire.errors import BusError, BusGarbled, NoAnswer, OutOfRange
 from moire.made.bus_tables import LONGEST_BODY, OPERATIONS
 from tb.bench import seed
@@ -41,7 +41,7 @@ def test_the_bytes_of_a_known_exchange():
     assert exchange.finished and exchange.result() == (7, 3, 0, {}) and exchange.events == []
 
 
-def test_crc_is_that_of_ethernet():
+def test_the_crc_is_the_one_of_ethernet():
     def by_definition(several):
         register = 0xFFFFFFFF
         for byte in several:
@@ -54,7 +54,7 @@ def test_crc_is_that_of_ethernet():
     assert frame(0x21, bytes([7, 1]))[-4:] == by_definition([0x21, 2, 7, 1]).to_bytes(4, "little")
 
 
-def test_command_bytes_are_those_of_the_8031_stage():
+def test_command_bytes_match_the_8031_stage():
     assert command_byte(1, 1) == 0b0001_0001 and command_byte(2, 2) == 0b0010_0010
     for address in (0, 16, -1):
         with pytest.raises(OutOfRange, match="1 to 15"):
@@ -91,7 +91,7 @@ def test_a_reply_of_the_wrong_length_is_none():
     assert parse_reply(b"\x01\x63\x05").cause == 5
 
 
-def test_silence_is_nobody_answers_after_all_tries():
+def test_silence_is_no_answer_after_all_tries():
     exchange = Exchange(9, ENABLE, tries=3)
     for _ in range(20):
         if exchange.finished:
@@ -125,7 +125,7 @@ def test_each_garbled_answer_is_named(words, reason):
         exchange.result()
 
 
-def test_an_answer_that_breaks_off_is_garbled_and_not_nobody():
+def test_an_answer_that_breaks_off_is_garbled_and_not_missing():
     exchange = Exchange(1, ENABLE, tries=1)
     exchange.feed([0x61, 0x51, 3, 7])
     exchange.silence()
@@ -144,12 +144,12 @@ def test_an_old_reply_repeats_the_same_words_at_once():
     assert exchange.words_to_send() == first
     exchange.feed(
         reply_words(sequence=7, operation=2, cause=3)
-    )  # right number, another operation: old too
-    with pytest.raises(BusGarbled, match="never received the request whole"):
+    )  # the right number with another operation is old too
+    with pytest.raises(BusGarbled, match="never received the whole request"):
         exchange.result()
 
 
-def test_after_nonsense_the_line_is_left_quiet_before_the_repetition():
+def test_after_a_garbled_answer_the_bus_is_silent_before_the_repetition():
     exchange = Exchange(1, ENABLE)
     exchange.words_to_send()
     exchange.feed([0x55])
@@ -158,13 +158,13 @@ def test_after_nonsense_the_line_is_left_quiet_before_the_repetition():
         and exchange.state == State.QUIET
         and exchange.timeout_s == Timing().quiet
     )
-    exchange.feed([0x61, 0x51, 0x100])  # the rest of the nonsense
+    exchange.feed([0x61, 0x51, 0x100])  # the remainder of the garbled answer
     assert exchange.words_to_send() == []
     exchange.silence()
     assert exchange.words_to_send() == [0x121]
 
 
-def test_a_line_that_never_falls_silent_is_given_up():
+def test_an_exchange_on_a_bus_that_is_never_silent_is_given_up():
     exchange = Exchange(1, ENABLE, tries=3)
     for _ in range(3 * Exchange.LONGEST_NOISE):
         exchange.words_to_send()
@@ -173,37 +173,37 @@ def test_a_line_that_never_falls_silent_is_given_up():
         exchange.result()
 
 
-def test_patience_grows_with_what_is_awaited():
+def test_the_timeout_grows_with_the_number_of_expected_words():
     exchange = Exchange(1, ENABLE, timing=Timing(character=0.001, answer=0.1, quiet=0.01))
-    assert exchange.timeout_s == pytest.approx(0.101) and exchange.wanted == 1
+    assert exchange.timeout_s == pytest.approx(0.101) and exchange.expected == 1
     exchange.feed([0x61, 0x51, 3])
-    assert exchange.wanted == 7 and exchange.timeout_s == pytest.approx(0.107)
+    assert exchange.expected == 7 and exchange.timeout_s == pytest.approx(0.107)
     exchange.feed([7, 3, 0])
-    assert exchange.wanted == 4
+    assert exchange.expected == 4
 
 
 # ------------------------------------------------------------------ with a node at the other end
 
 
-def test_a_lost_word_at_any_place_is_repeated_and_acted_on_once():
+def test_a_request_with_any_word_lost_is_repeated_and_executed_once():
     for to_node in (True, False):
-        for place in range(60):
+        for position in range(60):
             node = FakeNode()
             fake, seen = FakeBus(node), []
 
-            def lose(word, place=place, seen=seen):
+            def lose(word, position=position, seen=seen):
                 seen.append(word)
-                return [] if len(seen) == place + 1 else [word]
+                return [] if len(seen) == position + 1 else [word]
 
             setattr(fake, "to_node" if to_node else "from_node", lose)
             bus = Bus(fake, random_source=random.Random(1))
             bus.request(1, "enable", axis=0, on=1)
             bus.request(1, "set_parameter", axis=0, parameter=15, value=4)
-            assert node.executed == ["enable", "set_parameter"], place
+            assert node.executed == ["enable", "set_parameter"], position
             assert node.axes[0].writes == ["kp"]
-            if place >= len(seen):
+            if position >= len(seen):
                 break
-        assert place > 5
+        assert position > 5
 
 
 def test_a_repeated_request_is_counted_by_node_and_host():
@@ -217,7 +217,7 @@ def test_a_repeated_request_is_counted_by_node_and_host():
     assert bus.statistics.repeats == 1 and bus.statistics.garbled == 1
 
 
-def test_any_noise_ends_in_the_right_reply_or_in_a_line_error():
+def test_any_noise_ends_in_the_correct_reply_or_in_a_bus_error():
     print("SEED", SEED)
     source = random.Random(SEED)
     done = failed = 0
@@ -239,7 +239,7 @@ def test_any_noise_ends_in_the_right_reply_or_in_a_line_error():
             except BusError:
                 assert len(node.axes[0].writes) <= before + 1
                 failed += 1
-        # when the noise is over the line works again
+        # after the noise the bus works again
         fake.to_node = fake.from_node = lambda word: [word]
         assert (
             bus.request(1, "get_parameter", axis=0, parameter=15)["value"]
@@ -278,5 +278,5 @@ def test_a_new_host_with_the_number_of_the_last_one_still_gets_fresh_answers():
     node.axes[0].position += 65536
     axis = Bus(
         fake, random_source=Always5()
-    ).axis()  # identify is the repetition, and its answer is the same anyway
+    ).axis()  # identify may be taken for a repetition, since its answer is the same
     assert axis.status().position_nm == pytest.approx(before + 800)

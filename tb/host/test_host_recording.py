@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""recording, selftest and the commands that only look: a session is written down whole and given
-again; what is wrong is found.
+"""moire.bus.recording, the self-test and the commands that only read: a session is recorded and
+replayed, and faults are found.
 """
 
 import json
@@ -8,7 +8,7 @@ import json
 import pytest
 
 from moire.bus import recording
-from moire.bus.client import Bus
+from moire.client.bus import Bus
 from moire.errors import BadFile
 from moire.made.bus_tables import PARAMETERS
 from tb.fakes.fake_node import ESTOP, FakeBus, FakeNode
@@ -34,23 +34,23 @@ def test_a_session_replays_to_the_same_machine_with_the_same_bytes(tmp_path):
     assert node.axes[0].position == 1_000_000 * 65536 // 800
 
 
-def test_other_values_are_told_apart_from_other_outcomes(tmp_path):
+def test_other_values_are_distinguished_from_other_outcomes(tmp_path):
     file, other, broken = recorded(tmp_path, "status"), FakeNode(), FakeNode()
     other.axes[0].position += 1
-    told = Call(f"replay {file} --json", other).told[0]
-    assert (told["same"], told["other_values"], told["different"]) == (7, 1, 0)
+    reported = Call(f"replay {file} --json", other).told[0]
+    assert (reported["same"], reported["other_values"], reported["different"]) == (7, 1, 0)
     broken.wrong_map = True
     said = sentence(Call(f"replay {file}", broken), 1)
     assert "answers differ from the record: at 0." in said and "came instead of" in said
 
 
-def test_a_node_that_does_not_answer_differs(tmp_path):
+def test_a_replay_to_a_silent_node_differs(tmp_path):
     assert "nothing came instead of 61" in sentence(
         Call(f"replay {recorded(tmp_path, 'status')}", FakeNode(2)), 1
     )
 
 
-def test_a_record_is_told_in_words_without_a_port(tmp_path):
+def test_a_record_is_shown_in_words_without_a_port(tmp_path):
     rows = Call(f"replay --show {recorded(tmp_path)}").out.splitlines()
     assert rows[0].split()[2:] == ["node", "1:", "identify"] and rows[1].strip().startswith(
         "ok map_crc="
@@ -61,7 +61,7 @@ def test_a_record_is_told_in_words_without_a_port(tmp_path):
     )
 
 
-def test_what_went_wrong_on_the_line_is_in_the_record(tmp_path):
+def test_errors_on_the_bus_are_in_the_record(tmp_path):
     bus = FakeBus(FakeNode())
     broken = [True]
     bus.from_node = lambda word: [word ^ broken.pop()] if broken else [word]
@@ -119,10 +119,10 @@ def test_a_record_that_broke_off_at_another_baud_rate_leaves_the_nodes_at_the_fi
     assert call.code == 0 and call.bus.nodes[0].baud == call.bus.baud == 115200
 
 
-def test_a_record_with_another_baud_rate_is_not_replayed_through_a_door(tmp_path):
+def test_a_record_with_another_baud_rate_is_not_replayed_through_a_gateway(tmp_path):
     bus = FakeBus(FakeNode())
     bus.handshake = False
-    assert "the nodes' own line" in sentence(
+    assert "the bus of the nodes itself" in sentence(
         Call(f"replay {recorded(tmp_path, 'baud 9600 1')}", bus=bus), 3
     )
 
@@ -133,12 +133,12 @@ def test_a_record_with_another_baud_rate_is_not_replayed_through_a_door(tmp_path
         "",
         "{}",
         "no json",
-        '{"record": "moire bus", "version": 2, "protocol_crc": 0}',
+        '{"record": "moire bus", "version": 1, "protocol_crc": 0}',
         json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC}) + '\n{"at": 1}',
         json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC})
         + '\n{"at": 1, "send": [512]}',
         json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC})
-        + '\n{"at": 1, "receive": [1], "wanted": 1}',
+        + '\n{"at": 1, "receive": [1], "expected": 1}',
         *(
             json.dumps({**recording.KIND, "protocol_crc": recording.PROTOCOL_CRC})
             + f'\n{{"at": 1, {call}}}'
@@ -170,12 +170,12 @@ def test_a_record_that_cannot_be_written_is_one_sentence(tmp_path):
     assert "such.jsonl cannot be written" in sentence(call, 2) and call.bus.closed
 
 
-# ------------------------------------------------------------------ look
+# ------------------------------------------------------------------ watch, fault and self-test
 
 
-def test_watch_tells_the_state_as_often_as_asked_and_ends_in_time():
+def test_watch_prints_the_state_as_often_as_asked_and_ends_in_time():
     call = Call("watch --every 0.1s --for 0.5s --json")
-    assert [round(told["time_s"], 1) for told in call.told] == [
+    assert [round(reported["time_s"], 1) for reported in call.told] == [
         0.0,
         0.1,
         0.2,
@@ -186,16 +186,16 @@ def test_watch_tells_the_state_as_often_as_asked_and_ends_in_time():
     assert "drive off" in Call("watch --for 0s").out
 
 
-def test_watch_talks_often_enough_for_the_watchdog():
+def test_watch_sends_requests_often_enough_for_the_watchdog():
     node = FakeNode()
     Call("watch --every 10s --for 20s", node)
     assert node.executed.count("status") > 100
 
 
-def test_fault_tells_cause_place_and_what_to_do():
+def test_fault_reports_cause_position_and_what_to_do():
     assert "no fault is latched" in Call("fault").out
     node = FakeNode()
-    node.axes[0].standing = node.axes[0].faults = ESTOP
+    node.axes[0].active_faults = node.axes[0].faults = ESTOP
     node.axes[0].events, node.axes[0].signal = 4, dict(faults=0, first=1)
     out = Call("fault", node).out
     assert (
@@ -227,14 +227,14 @@ def test_selftest_passes_a_sound_node_without_sine_and_cosine():
     )
 
 
-def test_fault_of_a_node_without_sine_and_cosine_tells_what_there_is():
+def test_fault_of_a_node_without_sine_and_cosine_reports_what_exists():
     node = FakeNode(sine=False)
-    node.axes[0].standing = node.axes[0].faults = ESTOP
+    node.axes[0].active_faults = node.axes[0].faults = ESTOP
     assert "emergency stop" in Call("fault", node).out and "signal" not in Call("fault", node).out
 
 
 def spoil_estop(node):
-    node.axes[0].standing = ESTOP
+    node.axes[0].active_faults = ESTOP
 
 
 def spoil_limits(node):
@@ -256,11 +256,11 @@ def spoil_register(node):
 @pytest.mark.parametrize(
     "spoil, name, said",
     [
-        (spoil_estop, "axis 0 guard", "emergency stop pressed"),
+        (spoil_estop, "axis 0 interlock", "emergency stop pressed"),
         (spoil_limits, "axis 0 sensor", "amplitude 103, allowed 200 to 160"),
         (spoil_signal, "axis 0 sensor", "signal too large"),
         (spoil_parameter, "axis 0 parameters", "out of range: pwm_frequency"),
-        (spoil_register, "line", "wrong_values 50"),
+        (spoil_register, "bus", "wrong_values 50"),
     ],
 )
 def test_selftest_finds_and_names_what_is_wrong(spoil, name, said):
@@ -269,14 +269,14 @@ def test_selftest_finds_and_names_what_is_wrong(spoil, name, said):
     call = Call("selftest", node)
     assert f"FAILED   {name}" in call.out and said in call.out
     assert f"node 1 failed 1 of 8 checks: {name}" in sentence(call, 1)
-    told = Call("selftest --json", node).told
-    assert told[0]["passed"] is False and [
-        check["name"] for check in told[0]["checks"] if not check["passed"]
+    reported = Call("selftest --json", node).told
+    assert reported[0]["passed"] is False and [
+        check["name"] for check in reported[0]["checks"] if not check["passed"]
     ] == [name]
-    assert told[1]["error"] == "SelfTestFailed"
+    assert reported[1]["error"] == "SelfTestFailed"
 
 
-def test_selftest_counts_what_is_wrong_on_the_line():
+def test_selftest_counts_errors_on_the_bus():
     bus, count = FakeBus(FakeNode()), [0]
 
     def every_hundredth(word):
@@ -285,4 +285,4 @@ def test_selftest_counts_what_is_wrong_on_the_line():
 
     bus.to_node = every_hundredth
     call = Call("selftest", bus=bus)
-    assert "FAILED   line" in call.out and "frames_bad" in call.out and "repeats" in call.out
+    assert "FAILED   bus" in call.out and "frames_bad" in call.out and "repeats" in call.out

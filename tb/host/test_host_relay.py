@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""relay.py against a relay of models (requests, set, flash): sets by hand, a noisy line, power
-failures, and every refusal.
+"""moire.client.relay against a relay made of models: sets by hand, a noisy bus, power failures, and
+every refusal.
 """
 
 import math
@@ -12,7 +12,10 @@ import pytest
 
 from moire.analysis.harmonic_fit import fit, read_readings
 from moire.bus.protocol import NINTH
-from moire.bus.relay import (
+from moire.bus.transport import Transport
+from moire.cli import command_line
+from moire.cli.session import Call, Session
+from moire.client.relay import (
     COUNTS,
     FIRST,
     SECOND,
@@ -24,9 +27,6 @@ from moire.bus.relay import (
     make_set,
     terms_of,
 )
-from moire.bus.transport import Transport
-from moire.cli import command_line
-from moire.cli.session import Call, Session
 from moire.errors import BadFile, BusGarbled, NoAnswer, OutOfRange
 from tb.bench import seed
 from tb.compensate.harmonic_map import exact, term_of
@@ -49,7 +49,7 @@ LIMITS = [
 
 
 class FakeRelay(Transport):
-    """The relay behind its UART, byte by byte. spoil(words) may break what passes, in both
+    """The relay behind its UART, byte by byte. spoil(words) may damage the words in both
     directions.
     """
 
@@ -141,16 +141,16 @@ def noise(source, share):
             how = source.randrange(3)
             if how == 0:
                 return words[: source.randrange(len(words))]
-            place = source.randrange(len(words))
-            words[place] = (
-                words[place] ^ 1 << source.randrange(8) if how == 1 else source.randrange(512)
+            index = source.randrange(len(words))
+            words[index] = (
+                words[index] ^ 1 << source.randrange(8) if how == 1 else source.randrange(512)
             )
         return words
 
     return spoil
 
 
-def test_a_set_is_that_of_the_model_of_the_hardware():
+def test_a_set_equals_the_one_of_the_model_of_the_hardware():
     settings = Settings(
         40_000,
         minimum_edge_separation=7,
@@ -164,20 +164,20 @@ def test_a_set_is_that_of_the_model_of_the_hardware():
     assert make_set(SOME, settings, K) == relay_set.image(words, 40_000, 7, 0x2000, 3, 1, 2, 1)
 
 
-def test_the_terms_of_a_correction_take_off_what_it_describes():
+def test_the_terms_of_a_correction_remove_the_error():
     source = np.random.default_rng(seed())
     found = SimpleNamespace(cosine=source.uniform(-50, 50, 3), sine=source.uniform(-50, 50, 3))
     counts = 32768
     for index_at in (0.0, 77.0):
         terms = [term_of(*term) for term in terms_of(found, counts, index_at)]
         for degrees in (0, 10, 123.4, 359):
-            wanted = sum(
+            expected = sum(
                 c * math.cos(k * math.radians(degrees + index_at))
                 + s * math.sin(k * math.radians(degrees + index_at))
                 for k, (c, s) in enumerate(zip(found.cosine, found.sine, strict=True), 1)
             )
             assert exact(terms, degrees / 360) * 1_296_000 / counts == pytest.approx(
-                wanted, abs=0.01
+                expected, abs=0.01
             )
 
 
@@ -187,7 +187,7 @@ def test_settings_outside_their_range_are_refused_by_name(change, name):
         make_set(SOME, Settings(**{"counts_per_turn": 32768, **change}), K)
 
 
-def test_both_ends_of_the_ranges_are_taken_by_the_hardware():
+def test_both_ends_of_the_ranges_are_accepted_by_the_hardware():
     for counts in (COUNTS[0], COUNTS[-1]):
         relay = Relay(FakeRelay())
         assert relay.write(a_set(counts=counts)).levels & 2
@@ -212,9 +212,9 @@ def test_status_in_words():
     relay.write(a_set())
     status = relay.status()
     assert status.orders == K and status.correction == -1.0 and status.position == 7
-    assert (
-        f"a set is in force; 4 orders, set {identity_of(a_set()):08X}, at power-up from the first copy in flash"
-        in status.words()
+    identity = f"{identity_of(a_set()):08X}"
+    assert f"a set is in force; 4 orders, set {identity}, at power-up from the first copy" in (
+        status.words()
     )
     assert "flag" not in status.words()
 
@@ -224,7 +224,7 @@ def test_a_set_for_other_hardware_is_refused_and_the_one_in_force_stays():
     relay.write(a_set())
     with pytest.raises(
         RelayRefused,
-        match=f"refused the set .*{identity_of(a_set()):08X} stays in force: is it one for 4 orders",
+        match=f"refused the set .*{identity_of(a_set()):08X} stays in force: is it one for 4",
     ):
         relay.write(make_set(SOME, Settings(32768), K + 1))
     assert relay.status().flags == 32 and "flag: a set was refused" in relay.status().words()
@@ -232,7 +232,7 @@ def test_a_set_for_other_hardware_is_refused_and_the_one_in_force_stays():
     assert relay.status().identity == identity_of(a_set())
 
 
-def test_a_saved_set_stands_in_both_copies_and_is_not_written_twice():
+def test_a_saved_set_is_in_both_copies_and_is_not_written_twice():
     transport = FakeRelay(chip=awake())
     relay, whole = Relay(transport), a_set()
     relay.save(whole)
@@ -261,7 +261,7 @@ def test_power_may_fail_anywhere_while_a_set_is_saved():
         assert copies[0] in (old, new) or copies[1] in (old, new)
 
 
-def test_a_noisy_line_leads_to_the_same_set_or_to_an_error():
+def test_a_noisy_bus_leads_to_the_same_set_or_to_an_error():
     source, done = random.Random(seed()), 0
     for _ in range(10):
         transport = FakeRelay(chip=awake(), spoil=noise(source, 0.2))
@@ -279,7 +279,7 @@ def test_a_noisy_line_leads_to_the_same_set_or_to_an_error():
     assert done > 5
 
 
-def test_a_repeated_request_is_not_acted_on_again():
+def test_a_repeated_request_is_not_executed_again():
     lost = []
 
     def lose_answers(words):
@@ -297,7 +297,7 @@ def test_a_repeated_request_is_not_acted_on_again():
     )
 
 
-def test_nobody_answers_and_noise_are_told_apart():
+def test_no_answer_and_noise_are_different_errors():
     with pytest.raises(NoAnswer):
         Relay(FakeRelay(spoil=lambda words: []))
     with pytest.raises(BusGarbled, match="wrong CRC-32"):
@@ -316,7 +316,7 @@ def test_nobody_answers_and_noise_are_told_apart():
 
 
 def call(transport, *words):
-    """What the command says, as the command line would run it."""
+    """Runs a command as the command line does; returns what it prints."""
     said = []
 
     class Heard(Call):
@@ -338,9 +338,9 @@ def readings_file(tmp_path, amplitude=80.0):
     return path
 
 
-def test_calibrate_writes_saves_and_draws(tmp_path):
+def test_relay_calibrate_writes_saves_and_draws(tmp_path):
     transport, table = FakeRelay(chip=awake()), readings_file(tmp_path)
-    told, text = call(
+    reported, text = call(
         transport,
         "calibrate",
         str(table),
@@ -351,9 +351,9 @@ def test_calibrate_writes_saves_and_draws(tmp_path):
     )
     whole = make_set(terms_of(fit(read_readings(table), orders=K), 32768), Settings(32768), K)
     assert (
-        told["orders"] == K
-        and told["before"] == pytest.approx(80)
-        and told["left"] < 0.01
+        reported["orders"] == K
+        and reported["before"] == pytest.approx(80)
+        and reported["left"] < 0.01
         and "saved in flash" in text
     )
     assert (
@@ -363,7 +363,7 @@ def test_calibrate_writes_saves_and_draws(tmp_path):
     assert (tmp_path / "ring.png").read_bytes()[1:4] == b"PNG"
 
 
-def test_calibrate_dry_and_a_bad_table_write_nothing(tmp_path):
+def test_relay_calibrate_dry_and_with_a_bad_table_writes_nothing(tmp_path):
     transport, table = FakeRelay(chip=awake()), readings_file(tmp_path)
     assert (
         "nothing written"
@@ -377,7 +377,7 @@ def test_calibrate_dry_and_a_bad_table_write_nothing(tmp_path):
     assert transport.sent == 0
 
 
-def test_status_and_clear_tell_flags():
+def test_status_and_clear_report_flags():
     transport = FakeRelay(chip=awake())
     transport.requests.flags = 6
     assert "flag: a whole turn without its index" in call(transport, "status")[1]

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""report: the page holds every move, every picture is a PNG inside it, texts are escaped, and what
-is missing is said.
+"""moire.analysis.report: the page contains every move, every picture is a PNG inside it, texts are
+escaped, and what cannot be done is reported.
 """
 
 import base64
@@ -58,7 +58,7 @@ def full_result():
 
 
 class Page(html.parser.HTMLParser):
-    """Checks that tags close in order, and keeps the texts."""
+    """Checks that tags close in order, and stores the texts."""
 
     def __init__(self, text):
         super().__init__()
@@ -79,7 +79,7 @@ class Page(html.parser.HTMLParser):
         self.texts.append(data.strip())
 
 
-def test_the_page_holds_everything_and_needs_no_other_file(tmp_path):
+def test_the_page_contains_everything_and_needs_no_other_file(tmp_path):
     path = report.write(full_result(), tmp_path / "report")
     assert path == tmp_path / "report" / "index.html" and [path] == list(path.parent.iterdir())
     page = Page(path.read_text(encoding="utf-8"))
@@ -119,7 +119,7 @@ def test_a_result_of_moves_alone_has_the_histogram_alone(tmp_path):
     assert len(page.images) == 1 and "How it was measured" not in page.texts
 
 
-def test_errors_are_summed_up_by_hand_too():
+def test_the_summary_of_errors_matches_a_calculation_by_hand():
     errors = report.Errors.of(MOVES)
     assert (errors.count, errors.largest, errors.mean) == (
         3,
@@ -142,7 +142,7 @@ def test_any_size_of_error_is_drawn(error):
     )
 
 
-def test_what_cannot_be_done_is_said(tmp_path):
+def test_what_cannot_be_done_is_reported(tmp_path):
     with pytest.raises(MoireError, match="at least one move"):
         report.write(report.Result("nothing", []), tmp_path)
     (tmp_path / "file").write_text("")

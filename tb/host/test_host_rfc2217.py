@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""rfc2217: what RFC 854 and RFC 2217 say of single bytes; test_host_door has the stock client
-against it.
+"""moire.bus.rfc2217: the bytes of RFC 854 and RFC 2217; test_host_gateway has the client of
+pyserial against it.
 """
 
 import random
@@ -27,14 +27,14 @@ def server():
     [(1, "N", (0, 0)), (2, "O", (1, 0)), (3, "E", (0, 1)), (4, "M", (1, 1)), (5, "S", (0, 0))],
 )
 def test_each_parity_makes_its_ninth_bit(code, parity, ninths):
-    line = server()
-    characters = line.feed(ask(3, code) + b"\x03\x01")
+    port = server()
+    characters = port.feed(ask(3, code) + b"\x03\x01")
     assert [(character.byte, character.parity) for character in characters] == [
         (3, parity),
         (1, parity),
     ]
     assert tuple(character.ninth for character in characters) == ninths
-    assert line.take_answers() == ask(103, code) and line.take_answers() == b""
+    assert port.take_answers() == ask(103, code) and port.take_answers() == b""
 
 
 def test_characters_keep_the_parity_that_was_in_force_when_they_were_sent():
@@ -53,8 +53,8 @@ def test_ff_is_doubled_both_ways():
 
 
 def test_settings_are_answered_and_zero_only_asks():
-    line = server()
-    line.feed(
+    port = server()
+    port.feed(
         ask(1, 0, 0, 0, 0)
         + ask(2, 0)
         + ask(1, 0, 0, 0x25, 0x80)
@@ -62,61 +62,61 @@ def test_settings_are_answered_and_zero_only_asks():
         + ask(2, 8)
         + ask(4, 2)
     )
-    assert line.take_answers() == (
+    assert port.take_answers() == (
         ask(101, 0, 1, 0xC2, 0)
         + ask(102, 8)
         + ask(101, 0, 0, 0x25, 0x80) * 2
         + ask(102, 8)
         + ask(104, 2)
     )
-    assert line.baud == 9600
+    assert port.baud == 9600
 
 
-def test_a_setting_with_255_in_it_is_taken_and_answered_doubled():
-    line = server()
-    line.feed(bytes([IAC, SB, COM_PORT, 1, 0, 0, 0xFF, 0xFF, 0, IAC, SE]))
-    assert line.baud == 0xFF00 and line.take_answers() == bytes(
+def test_a_setting_with_255_in_it_is_accepted_and_answered_doubled():
+    port = server()
+    port.feed(bytes([IAC, SB, COM_PORT, 1, 0, 0, 0xFF, 0xFF, 0, IAC, SE]))
+    assert port.baud == 0xFF00 and port.take_answers() == bytes(
         [IAC, SB, COM_PORT, 101, 0, 0, 0xFF, 0xFF, 0, IAC, SE]
     )
 
 
 def test_options_are_agreed_once_and_unknown_ones_declined():
-    line = server()
-    line.feed(bytes([IAC, 0xFB, 44, IAC, 0xFD, 44, IAC, 0xFB, 0, IAC, 0xFD, 1, IAC, 0xFB, 99]) * 3)
-    assert line.take_answers() == bytes(
+    port = server()
+    port.feed(bytes([IAC, 0xFB, 44, IAC, 0xFD, 44, IAC, 0xFB, 0, IAC, 0xFD, 1, IAC, 0xFB, 99]) * 3)
+    assert port.take_answers() == bytes(
         [IAC, 0xFD, 44, IAC, 0xFB, 44, IAC, 0xFD, 0, IAC, 0xFC, 1, IAC, 0xFE, 99]
     )
 
 
-def test_a_purge_and_controls_are_answered_and_the_modem_state_told():
-    line = server()
-    line.feed(ask(12, 3) + ask(5, 8) + ask(11, 255, 255) + ask(99, 1))
-    assert line.take_answers() == ask(112, 3) + ask(105, 8) + bytes(
+def test_a_purge_and_controls_are_answered_and_the_modem_state_reported():
+    port = server()
+    port.feed(ask(12, 3) + ask(5, 8) + ask(11, 255, 255) + ask(99, 1))
+    assert port.take_answers() == ask(112, 3) + ask(105, 8) + bytes(
         [IAC, SB, COM_PORT, 111, 255, 255, IAC, SE]
     ) + ask(107, 0xB0)
 
 
-def test_bytes_in_pieces_are_the_same_as_in_one():
+def test_bytes_may_arrive_in_pieces():
     stream = ask(3, 4) + b"\x21\xff\xff" + ask(3, 5) + b"\x04"
     whole, pieces = server(), server()
     assert whole.feed(stream) == sum((pieces.feed(bytes([byte])) for byte in stream), [])
     assert whole.take_answers() == pieces.take_answers()
 
 
-def test_nonsense_neither_grows_nor_stops_it():
+def test_random_bytes_are_neither_stored_nor_stop_the_server():
     source = random.Random(SEED)
-    line = server()
-    line.feed(bytes([IAC, SB]) + b"\x2c" * 100_000)
-    assert len(line.asked) <= rfc2217.LONGEST_ASKED + 1
-    line.feed(bytes([IAC, SE]))
+    port = server()
+    port.feed(bytes([IAC, SB]) + b"\x2c" * 100_000)
+    assert len(port.option) <= rfc2217.LONGEST_OPTION + 1
+    port.feed(bytes([IAC, SE]))
     for _ in range(3000):
-        line.feed(
+        port.feed(
             bytes(
                 source.choice([IAC, SB, SE, COM_PORT, 3, source.randrange(256)]) for _ in range(30)
             )
         )
-    line.feed(bytes([IAC, SE, IAC, SE]))
-    line.take_answers()
-    assert [character.parity for character in line.feed(bytes([0]) + ask(3, 4) + b"\x55")][
+    port.feed(bytes([IAC, SE, IAC, SE]))
+    port.take_answers()
+    assert [character.parity for character in port.feed(bytes([0]) + ask(3, 4) + b"\x55")][
         -1
     ] == "M"

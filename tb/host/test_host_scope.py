@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""scope: what is asked of the node, and its samples as times, lengths and shares;
-test_firmware_scope has the node's side.
+"""moire.analysis.scope: the requests to the node, and its samples as times, lengths and fractions;
+test_firmware_scope has the side of the node.
 """
 
 import math
@@ -9,7 +9,7 @@ import random
 import pytest
 
 from moire.analysis.scope import NoRecord, Scope, excite, lsb
-from moire.bus.client import Bus
+from moire.client.bus import Bus
 from moire.errors import OutOfRange, Refused
 from tb.fakes.fake_node import FakeBus, FakeNode
 from tb.host.test_host_command_line import Call, sentence
@@ -26,14 +26,14 @@ def low(position):
 
 
 def ramp(node, count=12, step=PERIOD // 4):
-    """Samples that end where the axis is: 62 or 63 units of 64 clk apart."""
+    """Samples that end where the axis is: 62 or 63 units of 64 cycles apart."""
     end = node.axes[0].position
     node.samples = [
         (low(end - (count - 1 - n) * step), 3 * n, -16384 + n, 62 + n % 2) for n in range(count)
     ]
 
 
-def test_settings_go_out_in_counts():
+def test_scope_settings_are_sent_in_counts():
     node = FakeNode()
     Scope(axis_of(node)).arm("error", before=7, every="2.5ms", level="1.6um")
     assert node.armed == dict(trigger=3, before=7, every=10, level=2 * PERIOD, amplitude=0)
@@ -49,14 +49,14 @@ def test_settings_go_out_in_counts():
         (dict(every="51ms"), "250us to 50ms"),
     ],
 )
-def test_settings_that_make_no_sense_are_not_sent(wrong, said):
+def test_wrong_scope_settings_are_not_sent(wrong, said):
     node = FakeNode()
     with pytest.raises(OutOfRange, match=said):
         Scope(axis_of(node)).arm(**wrong)
     assert node.armed is None
 
 
-def test_samples_come_back_in_time_and_length():
+def test_samples_are_read_in_seconds_and_nm():
     node = FakeNode()
     ramp(node)
     scope = Scope(axis_of(node))
@@ -73,7 +73,7 @@ def test_samples_come_back_in_time_and_length():
     assert record.error_nm[2] == pytest.approx(6 / PERIOD * 800) and record.command[0] == -0.5
 
 
-def test_positions_are_whole_where_the_low_word_wraps():
+def test_positions_are_complete_where_the_low_word_wraps():
     node = FakeNode()
     node.axes[0].position = node.axes[0].target = 5 * 2**32 + 40 * PERIOD
     ramp(node, count=20, step=10 * PERIOD)
@@ -86,7 +86,7 @@ def test_positions_are_whole_where_the_low_word_wraps():
     )
 
 
-def test_a_trigger_that_does_not_come_and_a_scope_that_is_not_armed_are_one_sentence():
+def test_a_missing_trigger_and_a_scope_that_is_not_armed_are_one_sentence():
     node = FakeNode()
     scope = Scope(axis_of(node))
     with pytest.raises(NoRecord, match="the scope of node 1 has no record: arm it first"):
@@ -129,10 +129,10 @@ def test_commands_arm_move_and_read_in_one_call(tmp_path):
         and len(rows) == 13
         and picture.read_bytes().startswith(b"\x89PNG")
     )
-    told = Call(["scope", "arm", "--", "scope", "read", str(file), "--json"], node).told[1]
-    assert told["before"] == 0 and len(told["position_nm"]) == 12
-    assert (told["command"], told["action"]) == ("scope", "read") and len(
-        told["drive_command"]
+    reported = Call(["scope", "arm", "--", "scope", "read", str(file), "--json"], node).told[1]
+    assert reported["before"] == 0 and len(reported["position_nm"]) == 12
+    assert (reported["command"], reported["action"]) == ("scope", "read") and len(
+        reported["drive_command"]
     ) == 12
 
 
@@ -144,8 +144,8 @@ def test_a_scope_without_a_record_is_exit_code_1(tmp_path):
 
 
 def answering(node, time_constant_s=0.008, gain=50_000.0):
-    """Samples of an axis that answers as a first-order velocity, LSB/s by a command, each 2 ms; as
-    identify_samples wants them.
+    """Samples for identify_samples() every 2 ms, of an axis with a first-order velocity in LSB/s
+    per command.
     """
     draw, position, velocity, sign, left = random.Random(1), 0.0, 0.0, 1, 0
     decay, commands, positions = math.exp(-0.002 / time_constant_s), [0], []
@@ -155,9 +155,9 @@ def answering(node, time_constant_s=0.008, gain=50_000.0):
         left -= 1
         positions.append(round(position))
         commands.append(3000 * sign)
-        wanted = gain * commands[-1] / 1000
-        position += wanted * 0.002 + (velocity - wanted) * time_constant_s * (1 - decay)
-        velocity = wanted + (velocity - wanted) * decay
+        expected = gain * commands[-1] / 1000
+        position += expected * 0.002 + (velocity - expected) * time_constant_s * (1 - decay)
+        velocity = expected + (velocity - expected) * decay
     node.samples = [
         (position, 0, command, 125 * (n > 0))
         for n, (position, command) in enumerate(zip(positions, commands))
@@ -165,7 +165,7 @@ def answering(node, time_constant_s=0.008, gain=50_000.0):
     node.axes[0].position = node.axes[0].target = positions[-1]
 
 
-def test_the_open_loop_needs_the_drive_and_tells_amplitude_and_reach():
+def test_the_open_loop_needs_the_drive_and_sends_amplitude_and_reach():
     node = FakeNode()
     answering(node)
     axis = axis_of(node)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""segments: tables as people write them, every wrong row named by its line, written and read back,
-and the commands.
+"""moire.client.segments: tables in files, errors reported with their lines, tables written and read
+back, and the commands.
 """
 
 import json
@@ -8,8 +8,8 @@ from fractions import Fraction
 
 import pytest
 
-from moire.bus.client import Bus
-from moire.bus.segments import NotInForce, Segments, SegmentTable, read_table, text_of
+from moire.client.bus import Bus
+from moire.client.segments import NotInForce, Segments, SegmentTable, read_table, text_of
 from moire.errors import BadFile, OutOfRange
 from tb.fakes.fake_node import FakeBus, FakeNode
 from tb.host.test_host_command_line import Call, sentence
@@ -72,15 +72,15 @@ def test_a_table_is_read_with_its_units(file, lines):
         (["0, 0", "1, nan", "2, 2"], "line 2: the error is nan"),
         (["0, 0", "1, about 5", "2, 2"], "line 2: the error is no length: 'about 5'"),
         (["0, 0", "1, 5 kg"], "line 2: the error is no length: '5 kg'"),
-        (["0, 0", "1, 2, 3"], "line 2: two columns are wanted"),
+        (["0, 0", "1, 2, 3"], "line 2: it needs two columns"),
         (["# nothing", "0, 0"], "1 borders are too few"),
         (["0, 0", "1,"], "line 2: the error is no number"),
     ],
 )
-def test_what_is_wrong_is_told_with_its_line(file, lines, said):
-    with pytest.raises(BadFile) as told:
+def test_an_error_in_the_file_is_reported_with_its_line(file, lines, said):
+    with pytest.raises(BadFile) as reported:
         read_table(file(*lines))
-    assert said in str(told.value)
+    assert said in str(reported.value)
 
 
 def test_a_file_that_is_not_there_is_one_sentence(tmp_path):
@@ -90,7 +90,7 @@ def test_a_file_that_is_not_there_is_one_sentence(tmp_path):
 
 def test_the_rectangle_has_the_mean_of_its_borders_and_the_line_goes_through_them():
     table = SegmentTable(Fraction(100), Fraction(10), (0, 4, -6))
-    assert [table.at(place) for place in (99, 100, 105, 110, 115, 120, 121)] == [
+    assert [table.at(position) for position in (99, 100, 105, 110, 115, 120, 121)] == [
         0,
         0,
         2,
@@ -99,7 +99,7 @@ def test_the_rectangle_has_the_mean_of_its_borders_and_the_line_goes_through_the
         -6,
         -6,
     ]
-    assert [table.at(place, "rectangle") for place in (99, 100, 109, 110, 119, 120)] == [
+    assert [table.at(position, "rectangle") for position in (99, 100, 109, 110, 119, 120)] == [
         0,
         2,
         2,
@@ -109,20 +109,25 @@ def test_the_rectangle_has_the_mean_of_its_borders_and_the_line_goes_through_the
     ]
 
 
-def test_a_table_is_written_whole_and_comes_into_force():
+def test_a_table_is_written_completely_and_comes_into_force():
     node = node_with_table()
     table = SegmentTable(
         Fraction(-(10**6)), Fraction(10**6), tuple(Fraction(n * 50) for n in range(-15, 16))
     )
-    told = Segments(axis_of(node)).load(table, "rectangle")
+    reported = Segments(axis_of(node)).load(table, "rectangle")
     axis = node.axes[0]
     assert axis.points == [n * 50 * 65536 // 800 for n in range(-15, 16)]
     assert [axis.parameters[n] for n in (87, 88, 89, 90)] == [30, 1250 * 65536, -1250 * 65536, 1]
-    assert (told.in_force, told.reason, told.loaded, told.error_nm) == ("rectangle", "ok", 31, -100)
+    assert (reported.in_force, reported.reason, reported.loaded, reported.error_nm) == (
+        "rectangle",
+        "ok",
+        31,
+        -100,
+    )
     assert Segments(axis_of(node)).read() == table
 
 
-def test_positions_are_told_from_the_zero_whatever_it_is_called():
+def test_positions_count_from_the_zero_whatever_the_home_offset():
     node = node_with_table()
     node.axes[0].parameters[51] = 250  # home_offset: 200 um
     table = SegmentTable(Fraction(10**6), Fraction(10**6), (Fraction(0), Fraction(100)))
@@ -134,11 +139,11 @@ def test_positions_are_told_from_the_zero_whatever_it_is_called():
 def test_without_a_zero_the_table_waits_and_says_why():
     node = node_with_table()
     node.axes[0].homed = False
-    told = Segments(axis_of(node)).load(SegmentTable(Fraction(0), Fraction(10**6), (0, 1)))
-    assert (told.in_force, told.reason) == (
+    reported = Segments(axis_of(node)).load(SegmentTable(Fraction(0), Fraction(10**6), (0, 1)))
+    assert (reported.in_force, reported.reason) == (
         "off",
         "not_homed",
-    ) and "off: the axis has no zero yet: home it first" in told.words()
+    ) and "off: the axis has no zero yet: home it first" in reported.words()
 
 
 @pytest.mark.parametrize(
@@ -160,9 +165,9 @@ def test_a_table_that_does_not_fit_leaves_the_old_one_in_force(errors, said):
     assert node.axes[0].points == [0, 65536] and node.axes[0].parameters[90] == 2
 
 
-def test_what_does_not_read_back_is_not_put_in_force():
+def test_a_table_that_does_not_read_back_is_not_put_in_force():
     node = node_with_table()
-    node.spoils_points = True
+    node.damages_points = True
     with pytest.raises(NotInForce, match="does not hold"):
         Segments(axis_of(node)).load(SegmentTable(Fraction(0), Fraction(10**6), (0, 100)))
     assert node.axes[0].parameters[90] == 0
@@ -176,7 +181,7 @@ def test_the_file_of_a_table_reads_back_digit_by_digit(tmp_path):
     assert read_table(tmp_path / "again.csv") == table
 
 
-def test_the_commands_load_tell_use_and_save(file, tmp_path):
+def test_the_commands_load_report_use_and_save(file, tmp_path):
     node, saved, png = node_with_table(), str(tmp_path / "saved.csv"), tmp_path / "scale.png"
     call = Call(
         [
@@ -229,6 +234,6 @@ def test_parameters_are_saved_and_loaded_with_the_table(tmp_path):
         other.axes[0].points == node.axes[0].points
         and other.axes[0].parameters == node.axes[0].parameters
     )
-    told = json.loads((tmp_path / "stage.json").read_text())
-    (tmp_path / "stage.json").write_text(json.dumps({**told, "segment_points": ["1"]}))
+    reported = json.loads((tmp_path / "stage.json").read_text())
+    (tmp_path / "stage.json").write_text(json.dumps({**reported, "segment_points": ["1"]}))
     assert "no list of whole numbers" in sentence(Call(["params", "load", saved], other), 2)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""transport: the parity of each byte, and what a port that does not open says."""
+"""moire.bus.transport: the parity of each byte, and the error for a port that does not open."""
 
 import errno
 import os
@@ -8,15 +8,15 @@ import pytest
 import serial
 
 from moire.bus import transport
-from moire.bus.client import Bus
 from moire.bus.protocol import ODD_ADDRESSES
 from moire.bus.transport import SerialBus
-from moire.errors import PortError
-from tb.fakes.fake_node import FakeNode
+from moire.client.bus import Bus
+from moire.errors import PortError, UnknownName
+from tb.fakes.fake_node import FakeBus, FakeNode
 
 
 class FakePort:
-    """Stands for serial.Serial: turns bytes and parity into words for a node, as the wire would."""
+    """Replaces serial.Serial: turns bytes and parity into words for a node, as the bus does."""
 
     def __init__(self, name="fake", mark=True, node=None, **settings):
         self.settings, self.node, self.sync = settings, node or FakeNode(), mark
@@ -43,7 +43,7 @@ class FakePort:
             ones = byte.bit_count() & 1
             ninth = {"M": 1, "S": 0, "E": ones, "O": ones ^ 1}[self.held]
             self.words.append(byte | ninth << 8)
-            self.answers += bytes(self.node.hear(self.words[-1]))
+            self.answers += bytes(self.node.receive_word(self.words[-1]))
 
     def flush(self):
         pass
@@ -66,7 +66,7 @@ class FakePort:
         self.is_open = False
 
 
-def serial_line(parity="auto", **port):
+def serial_bus(parity="auto", **port):
     made = []
 
     def open_port(name, **settings):
@@ -80,51 +80,51 @@ def serial_line(parity="auto", **port):
     "mark, parity", [(True, "auto"), (True, "odd"), (False, "auto"), (False, "odd"), (True, "mark")]
 )
 def test_an_exchange_has_the_ninth_bit_on_command_bytes_only(mark, parity):
-    line, port = serial_line(parity, mark=mark, node=FakeNode(address=7))
-    assert Bus(line).axis(address=7).status().state == "off"
+    bus, port = serial_bus(parity, mark=mark, node=FakeNode(address=7))
+    assert Bus(bus).axis(address=7).status().state == "off"
     assert [word for word in port.words if word >> 8] == [0x127, 0x117] * 3
     assert port.node.counters["frames_bad"] == 0 and port.node.counters["frames_good"] == 3
     assert port.settings["baudrate"] == 1_000_000 and port.settings["stopbits"] == 1
 
 
 @pytest.mark.parametrize("mark", [True, False])
-def test_every_byte_goes_out_with_the_bit_that_is_wanted(mark):
-    line, port = serial_line(mark=mark)
-    line.send(range(256))
+def test_every_byte_is_sent_with_the_required_ninth_bit(mark):
+    bus, port = serial_bus(mark=mark)
+    bus.send(range(256))
     assert port.words == list(range(256))
 
 
 def test_mark_reaches_all_addresses_and_odd_parity_eight():
-    line, port = serial_line(mark=True)
-    assert all(line.reaches(address) for address in range(1, 16))
-    line.send([0x123])
+    bus, port = serial_bus(mark=True)
+    assert all(bus.reaches(address) for address in range(1, 16))
+    bus.send([0x123])
     assert port.words == [0x123]
-    line, port = serial_line(mark=False)
+    bus, port = serial_bus(mark=False)
     assert (
-        tuple(address for address in range(1, 16) if line.reaches(address))
+        tuple(address for address in range(1, 16) if bus.reaches(address))
         == ODD_ADDRESSES
         == (1, 2, 4, 7, 8, 11, 13, 14)
     )
     with pytest.raises(
         PortError, match="odd parity reaches only the addresses 1, 2, 4, 7, 8, 11, 13, 14"
     ):
-        line.send([0x123])
+        bus.send([0x123])
     assert port.words == []
 
 
-def test_find_asks_only_whom_odd_parity_reaches():
-    line, port = serial_line(mark=False, node=FakeNode(address=11))
-    client = Bus(line)
+def test_find_calls_only_addresses_that_odd_parity_reaches():
+    bus, port = serial_bus(mark=False, node=FakeNode(address=11))
+    client = Bus(bus)
     client.FIND_ANSWER_S = 0.001
     assert [node.address for node in client.find()] == [11]
     assert {word & 15 for word in port.words if word >> 8} == set(ODD_ADDRESSES)
 
 
-def test_mark_that_is_demanded_and_missing_is_refused():
+def test_mark_parity_that_is_requested_and_missing_is_refused():
     with pytest.raises(PortError, match="no MARK and SPACE parity: use parity odd"):
-        serial_line("mark", mark=False)
+        serial_bus("mark", mark=False)
     with pytest.raises(PortError, match="allowed are auto, mark, odd"):
-        serial_line("even")
+        serial_bus("even")
 
 
 @pytest.mark.parametrize(
@@ -177,20 +177,20 @@ def test_a_port_that_does_not_open_says_why_in_one_sentence(error, sentence):
     assert str(caught.value).startswith(sentence) and "\n" not in str(caught.value)
 
 
-def test_a_missing_device_is_said_by_the_real_library_too():
+def test_a_missing_device_is_reported_with_the_real_library_too():
     with pytest.raises(PortError, match="there is no port /dev/no_such_port"):
         SerialBus("/dev/no_such_port")
 
 
-def test_a_port_that_vanishes_is_a_port_error():
-    line, port = serial_line()
+def test_a_port_that_disappears_is_a_port_error():
+    bus, port = serial_bus()
 
     def gone(_):
         raise serial.SerialException("device reports readiness to read but returned no data")
 
     port.read = gone
     with pytest.raises(PortError, match="the port COM7 failed: device reports readiness"):
-        line.receive(1, 0.1)
+        bus.receive(1, 0.1)
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no pseudo terminals")
@@ -212,7 +212,7 @@ def test_a_port_that_drops_the_parity_bit_is_refused_and_not_trusted(parity, sai
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no pseudo terminals")
-def test_a_port_in_use_is_said_by_the_real_library_too():
+def test_a_port_in_use_is_reported_with_the_real_library_too():
     near, far = os.openpty()
     with serial.Serial(os.ttyname(far), exclusive=True):
         with pytest.raises(PortError, match="is in use by another program"):
@@ -222,13 +222,13 @@ def test_a_port_in_use_is_said_by_the_real_library_too():
 
 
 def test_receive_ends_when_its_time_has_passed():
-    line, _ = serial_line()
-    began = line.now()
-    assert line.receive(3, 0.03) == [] and 0.02 < line.now() - began < 1
+    bus, _ = serial_bus()
+    began = bus.now()
+    assert bus.receive(3, 0.03) == [] and 0.02 < bus.now() - began < 1
 
 
 class Clock:
-    """Stands for the module time: passes only where it is told to."""
+    """Replaces the module time: time passes only in sleep and read."""
 
     def __init__(self):
         self.now = 0.0
@@ -240,11 +240,11 @@ class Clock:
         self.now += seconds
 
 
-def test_an_answer_with_gaps_is_read_whole_and_its_end_is_still_seen(monkeypatch):
-    """As from a USB adapter that hands over its bytes every 16 ms: all gaps together are longer
-    than the answer may take.
+def test_an_answer_with_gaps_is_read_completely_and_its_end_is_detected(monkeypatch):
+    """A USB adapter delivers its bytes every 16 ms, and all gaps together are longer than the
+    answer may take.
     """
-    line, port = serial_line()
+    bus, port = serial_bus()
     clock, chunks = Clock(), [bytes([n]) * 3 for n in range(5)]
     monkeypatch.setattr(transport, "time", clock)
 
@@ -257,8 +257,30 @@ def test_an_answer_with_gaps_is_read_whole_and_its_end_is_still_seen(monkeypatch
         return taken
 
     port.read = read
-    assert line.receive(100, 0.02) == [n for n in range(5) for _ in range(3)]
-    assert clock.now == pytest.approx(0.016 * 5 + line.GAP_S, abs=0.005)
-    assert line.receive(1, 0.02) == [] and clock.now == pytest.approx(
-        0.016 * 5 + line.GAP_S + 0.02, abs=0.006
+    assert bus.receive(100, 0.02) == [n for n in range(5) for _ in range(3)]
+    assert clock.now == pytest.approx(0.016 * 5 + bus.GAP_S, abs=0.005)
+    assert bus.receive(1, 0.02) == [] and clock.now == pytest.approx(
+        0.016 * 5 + bus.GAP_S + 0.02, abs=0.006
     )
+
+
+def test_open_bus_opens_a_simulated_machine_by_name(monkeypatch):
+    opened = []
+
+    class EntryPoint:
+        @staticmethod
+        def load():
+            return lambda machine, seed: opened.append(machine) or FakeBus(FakeNode())
+
+    def entry_points(**which):
+        assert which == {"group": "moire.ports", "name": "twin"}
+        return [EntryPoint]
+
+    monkeypatch.setattr("moire.bus.twin_port.entry_points", entry_points)
+    for port, machine in (("twin", "s0"), ("twin:s2", "s2"), ("twin:", "s0")):
+        with transport.open_bus(port, baud=9600) as bus:
+            assert bus.baud == 9600 and opened.pop() == machine
+            bus.set_baud(115200)
+            assert [node.address for node in Bus(bus).find()] == [1]
+    with pytest.raises(UnknownName, match="no simulated machine 's9': known are s0, s0_fine"):
+        transport.open_bus("twin:s9")

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tune: a plant is found again from its own answer, gains hold the margin they promise, and what
-cannot be told is refused.
+"""moire.analysis.tune: a plant is identified from its own response, gains hold the margin that they
+announce, and records without information are refused.
 """
 
 import io
@@ -18,9 +18,7 @@ TICK = 1 / 4000
 
 
 def simulated(plant, command, noise=0.0, friction=0.0, seed=1):
-    """Whole LSB at each tick, as the node would report them; written apart from the code under
-    test.
-    """
+    """Whole LSB at each tick, as a node reports them; shares no code with the code under test."""
     draw = numpy.random.default_rng(seed)
     position = velocity = 0.0
     out = []
@@ -45,7 +43,7 @@ PLANTS = [
 @pytest.mark.parametrize(
     "kind", [dict(kind="steps"), dict(kind="chirp", tick_s=TICK, low_hz=1, high_hz=800)]
 )
-def test_a_plant_is_found_again(plant, kind):
+def test_a_plant_is_identified_from_its_record(plant, kind):
     found = tune.identify(
         simulated(plant, tune.excitation(3000, 8000, **kind), noise=0.3, friction=0.5)
     )
@@ -57,8 +55,9 @@ def test_a_plant_is_found_again(plant, kind):
 
 
 def sampled(time_constant_s, gain, delay_s, noise=0.0, seed=1, count=128):
-    """Times, commands and positions of a continuous plant, sampled unevenly; written apart from the
-    code under test, in small steps.
+    """Times, commands and positions of a continuous plant, sampled unevenly.
+
+    It is computed in small steps, and shares no code with the code under test.
     """
     draw, step = numpy.random.default_rng(seed), 5e-6
     lengths = numpy.round((0.002 + 0.0008 * draw.random(count)) / step).astype(int)
@@ -84,7 +83,7 @@ def sampled(time_constant_s, gain, delay_s, noise=0.0, seed=1, count=128):
     "time_constant_s, gain, delay_s",
     [(0.008, 50.0, 0.0), (0.008, 5.0, 0.0005), (0.03, 200.0, 0.001)],
 )
-def test_a_plant_is_found_from_few_uneven_samples(time_constant_s, gain, delay_s):
+def test_a_plant_is_identified_from_few_uneven_samples(time_constant_s, gain, delay_s):
     plant = tune.identify_samples(*sampled(time_constant_s, gain, delay_s, noise=1.0), TICK)
     assert plant.time_constant_s == pytest.approx(time_constant_s, rel=0.05)
     assert plant.gain == pytest.approx(
@@ -102,14 +101,14 @@ def test_a_plant_is_found_from_few_uneven_samples(time_constant_s, gain, delay_s
         (dict(gain=-50.0), "moves the axis down"),
     ],
 )
-def test_samples_that_tell_nothing_are_refused(change, said):
+def test_samples_without_information_are_refused(change, said):
     with pytest.raises(tune.NotTuned, match=said):
         tune.identify_samples(
             *sampled(**{**dict(time_constant_s=0.008, gain=50.0, delay_s=0.0), **change}), TICK
         )
 
 
-def test_a_gain_by_hand():
+def test_a_gain_matches_a_calculation_by_hand():
     plant = tune.Plant(0.9, 0.5, 0, TICK)
     assert plant.gain == pytest.approx(5.0)
     assert plant.time_constant_s == pytest.approx(TICK / 0.10536, rel=1e-4)
@@ -132,7 +131,7 @@ def test_gains_hold_bandwidth_and_margin(plant, bandwidth_hz, margin):
 
 
 def test_the_servo_itself_comes_to_rest_with_these_gains():
-    """The model of pid_servo, equal to the RTL, around the plant."""
+    """With the model of pid_servo, which equals the RTL, around the plant."""
     plant = PLANTS[1]
     tuning = tune.propose(plant, 60, filters=[tune.notch(700, TICK), tune.low_pass(900, TICK)])
     servo = PidServo()
@@ -210,12 +209,12 @@ def test_filters_pass_a_constant_exactly_in_the_block(make):
         (simulated(tune.Plant(0.95, -0.01, 0, TICK), tune.excitation(1000, 8000)), "swap"),
     ],
 )
-def test_a_record_that_cannot_tell_is_refused(record, word):
+def test_a_record_without_information_is_refused(record, word):
     with pytest.raises(tune.NotTuned, match=word):
         tune.identify(record)
 
 
-def test_what_cannot_be_had_is_refused():
+def test_requirements_that_no_gains_meet_are_refused():
     for plant, bandwidth, margin, word in (
         (PLANTS[2], 600, 60, "less bandwidth"),
         (PLANTS[0], 0, 50, "quarter"),
@@ -250,7 +249,7 @@ def test_steps_leave_the_axis_where_it_is_and_a_seed_repeats_them():
     assert (steps != tune.excitation(2000, 700, seed=2)).any()
 
 
-def test_the_picture_is_a_picture():
+def test_the_picture_is_a_png():
     plant = PLANTS[0]
     image = Image.open(io.BytesIO(tune.picture(plant, tune.propose(plant, 30))))
     assert image.format == "PNG" and image.size[0] > 400

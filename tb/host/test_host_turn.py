@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""index, settings and their commands, against the firmware of a station with a table, a sensor and
-a peer port.
+"""moire.client.indexing_table, settings and their commands, against the firmware of a station with
+a table, a sensor and a peer port.
 """
 
 import io
@@ -10,11 +10,11 @@ from fractions import Fraction
 
 import pytest
 
-from moire.bus.client import Bus
-from moire.bus.indexing_table import IndexingTable
-from moire.bus.job import Job
-from moire.bus.settings import Settings
 from moire.cli import command_line
+from moire.client.bus import Bus
+from moire.client.indexing_table import IndexingTable
+from moire.client.job import Job
+from moire.client.settings import Settings
 from moire.errors import MotionFailed, OutOfRange, Refused, UnknownName
 from moire.made.bus_tables import SETTINGS
 from tb.fakes.firmware_bus import FakeNodeBus
@@ -34,7 +34,7 @@ class Panel:
         self.table, self.settings = IndexingTable(self.node), Settings(self.node)
 
     def call(self, text):
-        """Exit code, what was told, what was complained."""
+        """Exit code, standard output and standard error of a command."""
         out, err = io.StringIO(), io.StringIO()
         code = command_line.main(
             ["--address", str(ADDRESS), *text.split()],
@@ -45,7 +45,7 @@ class Panel:
         return code, out.getvalue(), err.getvalue()
 
 
-def test_an_index_ends_at_the_angle_and_tells_what_is_left():
+def test_a_turn_ends_at_the_angle_and_reports_what_is_left():
     panel, phases = Panel(), []
     state = panel.table.turn("1deg", progress=lambda state: phases.append(state.phase))
     assert (
@@ -66,7 +66,7 @@ def test_an_index_ends_at_the_angle_and_tells_what_is_left():
     )
 
 
-def test_what_went_wrong_is_said_in_words():
+def test_a_failed_turn_is_reported_in_words():
     panel = Panel()
     panel.machine.table.blocked = True
     with pytest.raises(
@@ -90,7 +90,7 @@ def test_whatever_interrupts_the_wait_stops_the_table():
 
 
 @pytest.mark.parametrize("angle", ["360deg", "-1arcsec", "1000deg"])
-def test_an_angle_beyond_a_turn_never_reaches_the_line(angle):
+def test_an_angle_beyond_one_turn_is_never_sent(angle):
     panel = Panel()
     with pytest.raises(OutOfRange, match="0deg or more and below 360deg"):
         panel.table.begin(angle)
@@ -123,7 +123,7 @@ def test_settings_are_real_units_and_words():
         panel.settings.get("tolerance")
 
 
-def test_settings_that_were_saved_come_back():
+def test_saved_settings_are_restored():
     panel = Panel()
     panel.settings.set("turn_direction", "shorter")
     saved = panel.settings.save()
@@ -147,7 +147,7 @@ def test_a_node_of_the_other_image_says_that_it_was_built_without():
 
 
 def sub_node():
-    """That counts its stations, with its EEPROM."""
+    """A sub-node in legacy mode, which counts its stations itself, with its EEPROM."""
     source = random.Random(1)
     panel = Panel(
         FakeNode(
@@ -160,7 +160,7 @@ def sub_node():
     return panel
 
 
-def test_a_sub_node_counts_the_stations_of_its_program():
+def test_a_sub_node_counts_the_stations_of_its_list():
     panel = sub_node()
     Job(panel.node).load(["0deg", "10deg", "350deg"])
     assert (panel.table.peer().stations, panel.table.peer().next) == (3, 0)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""units: known answers, what is refused and how, and random values there and back."""
+"""moire.units: known values, refusals with what is allowed, and random values written and read
+back.
+"""
 
 import random
 from fractions import Fraction
@@ -62,7 +64,7 @@ def test_what_is_no_length_is_refused_with_what_is_allowed(text):
         units.parse_length(text)
 
 
-def test_speeds_and_their_kin_are_read():
+def test_speeds_accelerations_and_times_are_read():
     assert units.parse_speed("5mm/s") == 5
     assert units.parse_speed("200 um/s") == Fraction(1, 5)
     assert units.ACCELERATION.parse("0.1m/s^2") == 100
@@ -111,7 +113,7 @@ def test_numbers_are_written_as_people_read_them():
     ],
     ids=lambda q: q.name,
 )
-def test_any_value_comes_back_from_its_exact_text(quantity):
+def test_any_value_is_restored_from_its_exact_text(quantity):
     print("SEED", SEED)
     source = random.Random(SEED)
     for _ in range(500):
@@ -147,7 +149,7 @@ def test_any_text_is_a_value_or_a_clear_refusal():
         (0.5, Fraction(1, 2)),
     ],
 )
-def test_a_share_is_a_percentage_or_a_part_of_one(text, share):
+def test_a_share_is_a_percentage_or_a_fraction(text, share):
     assert units.parse_share(text) == share
 
 

@@ -7,8 +7,8 @@ import random
 
 import pytest
 
-from moire.bus.client import Bus
 from moire.bus.protocol import FROM_NODE, command_byte, parse_reply, read_words
+from moire.client.bus import Bus
 from moire.errors import NoAnswer
 from tb.bench import seed
 from twin import START_S, Twin, TwinTransport

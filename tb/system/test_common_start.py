@@ -9,8 +9,8 @@ import pytest
 
 from experiments.s2_stage import SCALES
 from experiments.s4_job import CLK_HZ, NODE
-from moire.bus.client import Bus
 from moire.bus.protocol import sync_words
+from moire.client.bus import Bus
 from moire.errors import BusError
 from tb.bench import seed
 from twin import START_S, Node, Twin, TwinTransport
@@ -119,7 +119,7 @@ def test_a_node_that_missed_the_mark_is_reported_and_does_not_move(prepared):
 
     twin_bus, bus.transport = bus.transport, Deaf()
     with pytest.raises(
-        BusError, match="the node did not hear the mark at which its motion should begin"
+        BusError, match="did not receive the sync at which its motion should begin"
     ) as caught:
         bus.start(*prepared)
     bus.transport = twin_bus

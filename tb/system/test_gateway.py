@@ -16,9 +16,9 @@ import pytest
 
 from moire.analysis.scope import Scope, excite, lsb
 from moire.analysis.tune import identify_samples
-from moire.bus.client import Bus
 from moire.bus.transport import open_bus
 from moire.cli import command_line
+from moire.client.bus import Bus
 from moire.errors import BusGarbled, NoAnswer
 from twin import START_S, Twin, TwinTransport
 

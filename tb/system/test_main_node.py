@@ -6,10 +6,10 @@ panel and machine, and a power cut.
 import math
 import random
 
-from moire.bus.client import Bus
-from moire.bus.indexing_table import TURN, IndexingTable
-from moire.bus.job import Job
-from moire.bus.settings import Settings
+from moire.client.bus import Bus
+from moire.client.indexing_table import TURN, IndexingTable
+from moire.client.job import Job
+from moire.client.settings import Settings
 from tb.bench import seed
 from twin import Twin, TwinTransport, build
 from twin.devices.devices import Devices

@@ -9,7 +9,7 @@ import random
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from moire.bus.relay import (
+from moire.client.relay import (
     BEGIN_SET,
     CLEAR,
     FLASH,

@@ -5,7 +5,7 @@ directions, and takes no other set.
 
 import cocotb
 
-from moire.bus.relay import identity_of
+from moire.client.relay import identity_of
 from tb.bench import run
 from tb.relay.relay_set import image
 from tb.system.test_relay import (

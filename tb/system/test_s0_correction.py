@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from figures import calibration as figures_calibration
-from moire.bus.client import CORRECTION, Bus
+from moire.client.axis import CORRECTION
+from moire.client.bus import Bus
 from twin import START_S, Twin, TwinTransport
 from twin.parameters import tables as parameters
 

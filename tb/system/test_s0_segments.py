@@ -13,8 +13,8 @@ import random
 
 import pytest
 
-from moire.bus.client import Bus
-from moire.bus.segments import Segments, SegmentTable
+from moire.client.bus import Bus
+from moire.client.segments import Segments, SegmentTable
 from moire.errors import Refused
 from twin import START_S, WITH_SEGMENTS, Twin, TwinTransport
 

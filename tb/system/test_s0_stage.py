@@ -8,9 +8,11 @@ import random
 import pytest
 
 from experiments.s0_stage import ADDRESSES, PERIOD_NM, Stage
-from moire.bus import client
 from moire.bus.protocol import request_body
-from moire.errors import BusGarbled, MotionFailed, NoAnswer, Refused, WrongBuild
+from moire.client import records
+from moire.client.bus import Bus
+from moire.errors import BusGarbled, MotionFailed, NoAnswer, OutOfRange, Refused, WrongBuild
+from moire.made.bus_tables import CAUSES, PARAMETERS
 from tb.bench import seed
 
 SEED = seed()
@@ -414,7 +416,7 @@ def test_a_repeated_request_is_answered_again_and_not_acted_on_again(stage):
     stage.move("X", 0)
     counted = axis.node.counters()["repeated"]
     body = request_body(
-        "set_parameter", 99, axis=0, parameter=client.PARAMETERS["settle_time"].id, value=21
+        "set_parameter", 99, axis=0, parameter=PARAMETERS["settle_time"].id, value=21
     )
     for _ in range(3):
         ready, _ = send_frame(stage, ADDRESSES["X"], body)
@@ -441,7 +443,7 @@ def test_unknown_command_and_wrong_length_are_refused_in_words(stage, monkeypatc
         transport.send([0x110 | ADDRESSES["X"]])
         reply = transport.receive(9, 0.01)
         assert reply[0] == 0x50 | ADDRESSES["X"] and reply[2] == body[0]
-        assert words in client.CAUSES[reply[4]][1]
+        assert words in CAUSES[reply[4]][1]
     assert rest(stage, "X")[1] == before[1]
     stage.axes["X"].status()
 
@@ -462,13 +464,13 @@ def test_target_outside_the_travel_is_refused_with_the_travel(stage):
 def test_parameter_out_of_range_is_refused_by_host_and_node(stage):
     axis = stage.axes["X"]
     kept = axis.get_parameter("kp").counts
-    with pytest.raises(client.OutOfRange, match="kp allows"):
+    with pytest.raises(OutOfRange, match="kp allows"):
         axis.set_parameter("kp", 1000)
     refused(
         "out_of_range",
         axis.request,
         "set_parameter",
-        parameter=client.PARAMETERS["kp"].id,
+        parameter=PARAMETERS["kp"].id,
         value=-1,
     )
     refused("unknown_parameter", axis.request, "get_parameter", parameter=250)
@@ -483,15 +485,15 @@ def test_commands_for_another_axis_and_in_mid_move_are_refused(stage):
     axis.request("move", target=axis.to_counts(here + 0.3e6))
     refused("busy", axis.request, "move", target=0)
     refused("busy", axis.request, "home")
-    refused("busy", axis.request, "set_parameter", parameter=client.PARAMETERS["kp"].id, value=1)
+    refused("busy", axis.request, "set_parameter", parameter=PARAMETERS["kp"].id, value=1)
     axis.wait(stage.record_while_moving("X"))
     assert abs(stage.true_nm("X") - here - 0.3e6) <= 2 * BOUND_NM
 
 
 def test_a_node_of_another_build_is_refused(stage, monkeypatch):
-    monkeypatch.setattr(client, "MAP_CRC", client.MAP_CRC ^ 1)
+    monkeypatch.setattr(records, "MAP_CRC", records.MAP_CRC ^ 1)
     with pytest.raises(WrongBuild, match="register map"):
-        client.Bus(stage.bus.transport, random_source=random.Random(SEED)).node(ADDRESSES["X"])
+        Bus(stage.bus.transport, random_source=random.Random(SEED)).node(ADDRESSES["X"])
 
 
 def test_a_line_with_much_noise_still_brings_every_command_through_or_says_so(stage):

@@ -18,7 +18,7 @@ from experiments.s4_job import (
     random_stations,
     random_worm,
 )
-from moire.bus.job import JobState
+from moire.client.job import JobState
 from tb.bench import seed
 
 SEED = seed()

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from moire.bus.client import Bus
-from moire.bus.indexing_table import TURN, IndexingTable
-from moire.bus.job import Job
-from moire.bus.settings import Settings
 from moire.cli import command_line
+from moire.client.bus import Bus
+from moire.client.indexing_table import TURN, IndexingTable
+from moire.client.job import Job
+from moire.client.settings import Settings
 from moire.made.bus_tables import CAUSES, FAULTS
 from tb.bench import seed
 from tb.firmware.test_firmware_peer import OPERATION, bodies, frame, look, turn_to

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from firmware import build as firmware_build
-from moire.bus.client import Bus
+from moire.client.bus import Bus
 from moire.made.registers import BY_NAME
 from twin import Axis, Devices, Node, Twin, TwinTransport
 

@@ -171,7 +171,7 @@ def test_a_trace_holds_what_was_true(twin):
 
 
 def test_each_fault_is_seen_by_the_node(twin):
-    from moire.bus.client import Bus
+    from moire.client.bus import Bus
 
     axis = Bus(TwinTransport(twin)).axis(1)
     assert not axis.status().faults and not axis.status().encoder_events
@@ -198,7 +198,7 @@ def test_parameters_are_set_and_read_by_name(twin):
 
 
 def test_a_node_drives_any_machine():
-    from moire.bus.client import Bus
+    from moire.client.bus import Bus
 
     with Twin(
         [

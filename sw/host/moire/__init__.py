@@ -1,9 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Host package of Moire: talks to motion controllers on a multi-drop line."""
+"""Host package of Moire: controls motion controllers on an RS-485 bus."""
 
-from moire.bus.client import Axis, Bus, Node, Status
-from moire.bus.transport import SerialBus, Transport
+from moire.bus.transport import SerialBus, Transport, open_bus
+from moire.client.axis import Axis
+from moire.client.bus import Bus
+from moire.client.indexing_table import IndexingTable
+from moire.client.node import Node
+from moire.client.records import Status
+from moire.errors import MoireError
 
-from .errors import MoireError
-
-__all__ = ["Axis", "Bus", "MoireError", "Node", "SerialBus", "Status", "Transport"]
+__all__ = [
+    "Axis",
+    "Bus",
+    "IndexingTable",
+    "MoireError",
+    "Node",
+    "SerialBus",
+    "Status",
+    "Transport",
+    "open_bus",
+]

@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lengths, speeds and times as people write them ("1.5mm", "5mm/s", "20ms") and as exact fractions."""
+"""Lengths, speeds, times and other quantities: from text such as "1.5mm", "5mm/s" or "20ms" to
+exact fractions, and back.
+"""
 
 import re
+from collections.abc import Mapping
 from fractions import Fraction
 
-from .errors import UnitError
+from moire.errors import UnitError
+
+Number = int | float | Fraction
+Value = str | Number  # a text with a unit, or a number in the base unit of the quantity
 
 SPELLINGS = str.maketrans(
     {
@@ -34,43 +40,49 @@ ANGLES = {"arcsec": Fraction(1), "arcmin": Fraction(60), "deg": Fraction(3600)}
 FREQUENCIES = {"Hz": Fraction(1), "kHz": Fraction(1000), "MHz": Fraction(10**6)}
 
 
-def over_seconds(power: str) -> dict:
-    """Lengths over s, s2 or s3, worth in mm/s…"""
+NUMBER_AND_UNIT = re.compile(
+    r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?)"
+    r"\s*([A-Za-z]*(?:/[A-Za-z]+\^?[0-9]?)?)"
+)
+
+
+def over_seconds(power: str) -> dict[str, Fraction]:
+    """The units of length over s, s2 or s3, each worth so many mm/s, mm/s2 or mm/s3."""
     return {f"{name}/{power}": worth / LENGTHS["mm"] for name, worth in LENGTHS.items()}
 
 
 class Quantity:
-    """What may be written: units and what each is worth in the base unit."""
+    """One kind of quantity: its base unit, and what each unit is worth in the base unit."""
 
-    def __init__(self, name, base, worth, written):
-        self.name, self.base, self.worth, self.written = name, base, worth, written
+    def __init__(self, name: str, base: str, worth: Mapping[str, Fraction], example: str):
+        self.name, self.base, self.worth, self.example = name, base, worth, example
 
     def allowed(self) -> str:
+        """What may be written, for an error."""
         first = "a plain number" if not self.worth else f"a number with {' '.join(self.worth)}"
-        return f"{first}, such as {self.written}"
+        return f"{first}, such as {self.example}"
 
-    def parse(self, text) -> Fraction:
-        """The value in the base unit. Numbers that are no text are in the base unit already."""
-        if not isinstance(text, str):
+    def parse(self, value: Value) -> Fraction:
+        """The value in the base unit; a number is in the base unit already.
+
+        Raises UnitError for anything else, also for a text without a unit unless it is zero.
+        """
+        if not isinstance(value, str):
             try:
-                return Fraction(text)
+                return Fraction(value)
             except (TypeError, ValueError, OverflowError):
-                raise UnitError(f"{text!r} is no {self.name}: write {self.allowed()}") from None
-        plain = text.strip().translate(SPELLINGS)
-        found = re.fullmatch(
-            r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?)\s*([A-Za-z]*(?:/[A-Za-z]+\^?[0-9]?)?)",
-            plain,
-        )
+                raise UnitError(f"{value!r} is no {self.name}: write {self.allowed()}") from None
+        found = NUMBER_AND_UNIT.fullmatch(value.strip().translate(SPELLINGS))
         if found is None:
-            raise UnitError(f"'{text}' is no {self.name}: write {self.allowed()}")
+            raise UnitError(f"'{value}' is no {self.name}: write {self.allowed()}")
         number, unit = Fraction(found[1]), found[2].replace("^", "")
         if not unit and (number == 0 or not self.worth):
             return number
         if not unit:
-            raise UnitError(f"'{text}' has no unit: write {self.allowed()}")
+            raise UnitError(f"'{value}' has no unit: write {self.allowed()}")
         if unit in self.worth:
             return number * self.worth[unit]
-        raise UnitError(f"'{text}' is no {self.name}: write {self.allowed()}")
+        raise UnitError(f"'{value}' is no {self.name}: write {self.allowed()}")
 
 
 LENGTH = Quantity("length", "nm", LENGTHS, "1.5mm or 50nm")
@@ -83,70 +95,71 @@ ANGLE = Quantity("angle", "arcsec", ANGLES, "12.5deg or 0.5arcsec")
 NUMBER = Quantity("number", "", {}, "0.5")
 
 
-def parse_length(text) -> Fraction:
-    """In nm."""
-    return LENGTH.parse(text)
+def parse_length(value: Value) -> Fraction:
+    """In nm; raises UnitError."""
+    return LENGTH.parse(value)
 
 
-def parse_speed(text) -> Fraction:
-    """In mm/s."""
-    return SPEED.parse(text)
+def parse_speed(value: Value) -> Fraction:
+    """In mm/s; raises UnitError."""
+    return SPEED.parse(value)
 
 
-def parse_angle(text) -> Fraction:
-    """In arcsec."""
-    return ANGLE.parse(text)
+def parse_angle(value: Value) -> Fraction:
+    """In arcsec; raises UnitError."""
+    return ANGLE.parse(value)
 
 
-def parse_time(text) -> Fraction:
-    """In s."""
-    return TIME.parse(text)
+def parse_time(value: Value) -> Fraction:
+    """In s; raises UnitError."""
+    return TIME.parse(value)
 
 
-def parse_share(text) -> Fraction:
-    """Of the whole: "50%" or 0.5."""
-    plain = text.strip() if isinstance(text, str) else text
-    share = (
-        NUMBER.parse(plain[:-1]) / 100
-        if isinstance(plain, str) and plain.endswith("%")
-        else NUMBER.parse(plain)
-    )
+def parse_share(value: Value) -> Fraction:
+    """A fraction of full speed, from "50%" or 0.5; raises UnitError below 0 and above 1."""
+    plain = value.strip() if isinstance(value, str) else value
+    if isinstance(plain, str) and plain.endswith("%"):
+        share = NUMBER.parse(plain[:-1]) / 100
+    else:
+        share = NUMBER.parse(plain)
     if not 0 <= share <= 1:
-        raise UnitError(f"'{text}' is no share of full speed: write 0% to 100%, or 0 to 1")
+        raise UnitError(f"'{value}' is no share of full speed: write 0% to 100%, or 0 to 1")
     return share
 
 
-def decimal(value) -> str:
-    """Every digit of a fraction; of one without an end, 15 places."""
+def decimal(value: Number) -> str:
+    """All digits of a fraction; 15 decimals where it has endlessly many."""
     value = Fraction(value)
-    rest, twos, fives = value.denominator, 0, 0
-    while rest % 2 == 0:
-        rest, twos = rest // 2, twos + 1
-    while rest % 5 == 0:
-        rest, fives = rest // 5, fives + 1
-    places = max(twos, fives) if rest == 1 else 15
-    digits = str(abs(round(value * 10**places))).rjust(places + 1, "0")
-    whole, part = (digits[:-places], digits[-places:].rstrip("0")) if places else (digits, "")
+    remainder, twos, fives = value.denominator, 0, 0
+    while remainder % 2 == 0:
+        remainder, twos = remainder // 2, twos + 1
+    while remainder % 5 == 0:
+        remainder, fives = remainder // 5, fives + 1
+    decimals = max(twos, fives) if remainder == 1 else 15
+    digits = str(abs(round(value * 10**decimals))).rjust(decimals + 1, "0")
+    whole, part = (digits[:-decimals], digits[-decimals:]) if decimals else (digits, "")
+    part = part.rstrip("0")
     return ("-" if value < 0 else "") + whole + ("." + part if part else "")
 
 
-def rounded(value, digits: int) -> str:
-    """So many significant digits, never with an exponent, no idle zeros."""
+def rounded(value: Number, digits: int) -> str:
+    """A number with so many significant digits, without an exponent and without trailing zeros."""
     value = Fraction(value)
     if value == 0:
         return "0"
-    places = digits - 1
+    decimals = digits - 1
     magnitude = abs(value)
     while magnitude >= 10:
-        magnitude, places = magnitude / 10, places - 1
+        magnitude, decimals = magnitude / 10, decimals - 1
     while magnitude < 1:
-        magnitude, places = magnitude * 10, places + 1
-    return decimal(Fraction(round(value * Fraction(10) ** places)) / Fraction(10) ** places)
+        magnitude, decimals = magnitude * 10, decimals + 1
+    return decimal(Fraction(round(value * Fraction(10) ** decimals)) / Fraction(10) ** decimals)
 
 
-def with_unit(quantity: Quantity, value, digits: int | None = None) -> str:
-    """The value (in the base unit) with the largest unit that leaves a digit before the point;
-    exact unless digits are given.
+def with_unit(quantity: Quantity, value: Number, digits: int | None = None) -> str:
+    """A value in the base unit as text, exact unless `digits` are given.
+
+    The unit is the largest one that leaves a digit before the point; cm, m and min are not used.
     """
     value = Fraction(value)
     unit, worth = quantity.base, Fraction(1)
@@ -157,22 +170,24 @@ def with_unit(quantity: Quantity, value, digits: int | None = None) -> str:
     ]
     if value and candidates:
         fitting = [item for item in candidates if abs(value) >= item[1]]
-        unit, worth = (
-            max(fitting, key=lambda item: item[1])
-            if fitting
-            else min(candidates, key=lambda item: item[1])
-        )
+        if fitting:
+            unit, worth = max(fitting, key=lambda item: item[1])
+        else:
+            unit, worth = min(candidates, key=lambda item: item[1])
     number = decimal(value / worth) if digits is None else rounded(value / worth, digits)
     return number + unit
 
 
-def format_length(nm, digits: int | None = 9) -> str:
+def format_length(nm: Number, digits: int | None = 9) -> str:
+    """A length in nm as text."""
     return with_unit(LENGTH, nm, digits)
 
 
-def format_speed(mm_per_s, digits: int | None = 6) -> str:
+def format_speed(mm_per_s: Number, digits: int | None = 6) -> str:
+    """A speed in mm/s as text."""
     return with_unit(SPEED, mm_per_s, digits)
 
 
-def format_time(s, digits: int | None = 6) -> str:
+def format_time(s: Number, digits: int | None = 6) -> str:
+    """A time in s as text."""
     return with_unit(TIME, s, digits)

@@ -1,23 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From readings of a circular grating against a reference to the harmonics that correct it (S1).
+"""Finds the harmonics that correct a circular grating, from readings against a reference (S1).
 
-    readings = read_readings("ring.csv")            # angle in degrees, error in arc seconds:
-                                                    encoder minus reference
+    readings = read_readings("ring.csv")    # angle in degrees; encoder minus reference in arcsec
     found = fit(readings)
     print(found.words())
     left = readings.error - found.at(readings.angle)
 
-error(angle) = constant + sum over the orders k of cosine_k cos(k angle) + sine_k sin(k angle); the
-corrected angle is the angle
-less that sum. The constant is where the reference put its zero, and is not corrected.
+The error of an angle is a constant, plus the sum over the orders k of cosine_k cos(k angle) +
+sine_k sin(k angle); the corrected angle is the angle less that sum. The constant depends on where
+the reference has its zero, and is not corrected.
 
-n places evenly round the circle carry the orders below n / 2; order n - k looks there as order k
-does. Each order is weighted by
-signal / (signal + noise) (Wiener): what drowns in noise is left out rather than put in. The power
-of the signal is taken from
-the order itself for the first three, which mounting makes; above, where a single order says little,
-from the power law
-c / k^p that makes the powers seen, noise included, most probable.
+Readings at n angles, evenly round the circle, carry the orders below n / 2: at these angles, order
+n - k looks like order k. Each order is weighted by signal / (signal + noise) (Wiener), so that an
+order below the noise is left out rather than made worse. For the first three orders, which the
+mounting makes, the power of the signal is taken from the order itself. Above them a single order
+says little, and the power comes from the power law c / k^p that makes the observed powers, noise
+included, most probable.
 """
 
 import math
@@ -25,13 +23,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from moire.bus.columns import number, rows
+from moire.columns import number, rows
 from moire.errors import BadFile, OutOfRange
 
-LARGEST_ERROR = 3600.0  # arc seconds; a ring that is farther off is not mounted, it has fallen down
-MOST_ORDERS = 32  # that the relay evaluates
-CLOSE = 1e-6  # degrees: readings at one place
+Array = NDArray[np.float64]
+
+LARGEST_ERROR = 3600.0  # arcsec; no mounted ring has a larger one
+MOST_ORDERS = 32  # as many as the relay evaluates
+CLOSE = 1e-6  # degrees: closer readings are at the same angle
 WIDEST_GAP = 1.6  # times the usual distance of two readings
 OUTLIER = 8.0  # times the usual scatter around the fit
 MOUNTING_ORDERS = 3  # eccentricity, tilt, distortion
@@ -41,54 +42,55 @@ FEWEST_FOR_NOISE = 12  # degrees of freedom
 
 @dataclass(frozen=True)
 class Readings:
-    """Arrays of one length. angle grows from one revolution to the next; line: where in the file
-    each one stands.
-    """
+    """Readings in the order of the motion: arrays of equal length."""
 
-    angle: np.ndarray  # degrees
-    error: np.ndarray  # arc seconds
-    line: np.ndarray
+    angle: Array  # degrees; it rises from one revolution to the next
+    error: Array  # arcsec
+    line: NDArray[np.int64]  # number of the line in the file
     name: str = "the readings"
 
     @property
-    def places(self) -> int:
-        """Distinct places on the circle."""
-        return len(
-            np.unique(np.round(self.angle % 360 / CLOSE).astype(np.int64) % round(360 / CLOSE))
-        )
+    def angles(self) -> int:
+        """The number of distinct angles on the circle."""
+        return len(np.unique(on_circle(self.angle)))
 
     @property
     def revolutions(self) -> int:
-        return max(1, round((self.angle[-1] - self.angle[0]) / 360))
+        """The number of revolutions that the readings cover."""
+        return max(1, round(float(self.angle[-1] - self.angle[0]) / 360))
 
     @property
     def most_orders(self) -> int:
-        return (self.places - 1) // 2
+        """How many orders these readings carry."""
+        return (self.angles - 1) // 2
 
 
 @dataclass(frozen=True)
 class Harmonics:
-    """Arrays by order, from 1; arc seconds."""
+    """The harmonics of an error, in arcsec; arrays by order, from 1."""
 
-    cosine: np.ndarray
-    sine: np.ndarray
-    weight: np.ndarray  # 0 to 1: what the noise left of each
+    cosine: Array
+    sine: Array
+    weight: Array  # 0 to 1: the share of each order that is used
     constant: float
     noise: float | None  # of one reading, rms; None: not known
     left: float  # largest error of the readings after correction
-    before: float  # and before it
-    places: int
+    before: float  # largest error of the readings before it
+    angles: int  # number of distinct angles of the readings
 
     @property
     def orders(self) -> int:
+        """The number of orders."""
         return len(self.cosine)
 
     @property
-    def amplitude(self) -> np.ndarray:
-        return np.hypot(self.cosine, self.sine)
+    def amplitude(self) -> Array:
+        """The amplitude of each order, in arcsec."""
+        amplitude: Array = np.hypot(self.cosine, self.sine)
+        return amplitude
 
-    def at(self, angle) -> np.ndarray:
-        """The error at these angles (degrees), without the constant."""
+    def at(self, angle: ArrayLike) -> Array:
+        """The error in arcsec at these angles (degrees), without the constant."""
         turn = np.radians(np.asarray(angle, dtype=float))
         total = np.zeros(turn.shape)
         for order, (cosine, sine) in enumerate(zip(self.cosine, self.sine, strict=True), start=1):
@@ -96,11 +98,12 @@ class Harmonics:
         return total
 
     def words(self) -> str:
+        """The result in words, in several lines."""
         aliases = ", ".join(
-            f"{self.places - order} as {order}" for order in range(1, min(self.orders, 3) + 1)
+            f"{self.angles - order} as {order}" for order in range(1, min(self.orders, 3) + 1)
         )
         noise = (
-            "not known: one revolution does not tell it"
+            "not known: one revolution does not show it"
             if self.noise is None
             else f"{self.noise:.2f} arcsec rms"
         )
@@ -115,26 +118,39 @@ class Harmonics:
             phase = math.degrees(math.atan2(cosine, sine))
             lines.append(f"{order:5}   {amplitude:9.3f}   {phase:+11.2f}   {weight:6.2f}")
         lines.append(
-            f"{self.places} places cannot tell apart: order {aliases}{', ...' if self.orders > 3 else ''}"
+            f"{self.angles} angles cannot distinguish: order {aliases}"
+            f"{', ...' if self.orders > 3 else ''}"
         )
         return "\n".join(lines)
 
 
-def read_readings(path) -> Readings:
-    """A table `angle in degrees, error in arc seconds`, one reading a line, in the order of the
-    motion; `#` begins a comment, a
-    heading may stand above. An angle that falls back towards 0 begins the next revolution. What is
-    wrong is told with its line."""
+def on_circle(angle: Array) -> NDArray[np.int64]:
+    """A whole number for each angle, equal for angles at the same position on the circle."""
+    steps: NDArray[np.int64] = np.round(angle % 360 / CLOSE).astype(np.int64)
+    return steps % round(360 / CLOSE)
+
+
+def read_readings(path: str | Path) -> Readings:
+    """Reads a CSV file with an angle in degrees and an error in arcsec in each line.
+
+    The readings are in the order of the motion; `#` begins a comment, and the first row may be a
+    heading. An angle that falls back towards 0 begins the next revolution. Raises BadFile with the
+    line that is wrong.
+    """
     path = Path(path)
-    angles, errors, lines, turn = [], [], [], 0
+    angles: list[float] = []
+    errors: list[float] = []
+    lines: list[int] = []
+    turn = 0
     for line, cells in rows(path)[1]:
         where = f"{path}, line {line}"
         if len(cells) != 2:
-            raise BadFile(f"{where}: two columns are wanted, angle and error, not {len(cells)}")
+            raise BadFile(f"{where}: it needs two columns, angle and error, not {len(cells)}")
         angle, error = number(cells[0], "the angle", where), number(cells[1], "the error", where)
         if abs(error) > LARGEST_ERROR:
             raise BadFile(
-                f"{where}: an error of {error:g} arcsec is absurd; at most {LARGEST_ERROR:g} are taken"
+                f"{where}: an error of {error:g} arcsec is absurd; at most {LARGEST_ERROR:g} are "
+                "taken"
             )
         if not 0 <= angle <= 36000:
             raise BadFile(f"{where}: an angle of {angle:g} degrees is outside 0 to 36000")
@@ -148,8 +164,8 @@ def read_readings(path) -> Readings:
                 )
             if step < -CLOSE:
                 raise BadFile(
-                    f"{where}: the angle {angle:g} comes after {angles[-1] - 360 * turn:g} in line {lines[-1]}: "
-                    "not in the order of the motion"
+                    f"{where}: the angle {angle:g} comes after {angles[-1] - 360 * turn:g} in line "
+                    f"{lines[-1]}: not in the order of the motion"
                 )
         angles.append(angle + 360 * turn)
         errors.append(error)
@@ -162,39 +178,42 @@ def read_readings(path) -> Readings:
     return readings
 
 
-def refuse_gaps(readings: Readings):
+def refuse_gaps(readings: Readings) -> None:
+    """Raises BadFile where a reading is missing."""
     steps = np.diff(readings.angle)
     usual = float(np.median(steps[steps > CLOSE]))
     for at in np.flatnonzero(steps > WIDEST_GAP * usual):
         raise BadFile(
-            f"{readings.name}, line {readings.line[at + 1]}: from {readings.angle[at]:g} to {readings.angle[at + 1]:g} degrees "
-            f"a reading is missing; the others are {usual:g} degrees apart"
+            f"{readings.name}, line {readings.line[at + 1]}: from {readings.angle[at]:g} to "
+            f"{readings.angle[at + 1]:g} degrees a reading is missing; the others are {usual:g} "
+            "degrees apart"
         )
-    way = readings.angle[-1] - readings.angle[0]
-    if way < 360 - WIDEST_GAP * usual:
+    covered = readings.angle[-1] - readings.angle[0]
+    if covered < 360 - WIDEST_GAP * usual:
         raise BadFile(
-            f"{readings.name}: the readings cover {way:g} degrees; a whole revolution is wanted"
+            f"{readings.name}: the readings cover {covered:g} degrees; a whole revolution is needed"
         )
 
 
-def refuse_outliers(readings: Readings):
-    """A reading that no smooth ring gives: far off what the low orders say, as the others measure
-    `far`.
+def refuse_outliers(readings: Readings) -> None:
+    """Raises BadFile for a reading that no smooth ring gives.
+
+    It is far from a fit of the low orders, compared with the scatter of the other readings.
     """
     orders = min(8, readings.most_orders // 2)
-    rest = readings.error - design(readings.angle, orders) @ least_squares(readings, orders)
-    usual = 1.4826 * float(np.median(np.abs(rest))) + 0.01
-    worst = int(np.argmax(np.abs(rest)))
-    if abs(rest[worst]) > OUTLIER * usual:
+    left = readings.error - design(readings.angle, orders) @ least_squares(readings, orders)
+    usual = 1.4826 * float(np.median(np.abs(left))) + 0.01
+    worst = int(np.argmax(np.abs(left)))
+    if abs(left[worst]) > OUTLIER * usual:
         raise BadFile(
-            f"{readings.name}, line {readings.line[worst]}: the error {readings.error[worst]:g} arcsec at "
-            f"{readings.angle[worst]:g} degrees is {abs(rest[worst]):.1f} off what the other readings say; "
-            f"they scatter by {usual:.1f}"
+            f"{readings.name}, line {readings.line[worst]}: the error {readings.error[worst]:g} "
+            f"arcsec at {readings.angle[worst]:g} degrees is {abs(left[worst]):.1f} off what the "
+            f"other readings say; they scatter by {usual:.1f}"
         )
 
 
-def design(angle, orders: int) -> np.ndarray:
-    """Columns 1, cos, sin of each order."""
+def design(angle: Array, orders: int) -> Array:
+    """The matrix of the fit: columns 1, and cos and sin of each order."""
     turn = np.radians(angle)[:, None] * np.arange(1, orders + 1)
     return np.hstack(
         [
@@ -204,30 +223,34 @@ def design(angle, orders: int) -> np.ndarray:
     )
 
 
-def least_squares(readings: Readings, orders: int) -> np.ndarray:
-    return np.linalg.lstsq(design(readings.angle, orders), readings.error, rcond=None)[0]
+def least_squares(readings: Readings, orders: int) -> Array:
+    """The constant, and cosine and sine of each order."""
+    solved, *_ = np.linalg.lstsq(design(readings.angle, orders), readings.error, rcond=None)
+    return np.asarray(solved, np.float64)
 
 
-def noise_of(readings: Readings, rest: np.ndarray, orders: int) -> float | None:
-    """rms of one reading: from what differs between readings of one place, or from what the fit
-    left over; None where there is too
-    little of both to tell noise from orders."""
-    place = np.round(readings.angle % 360 / CLOSE).astype(np.int64) % round(360 / CLOSE)
-    _, which, count = np.unique(place, return_inverse=True, return_counts=True)
+def noise_of(readings: Readings, residual: Array, orders: int) -> float | None:
+    """The noise of one reading, rms in arcsec.
+
+    It comes from the differences between readings at the same angle, or from the residual of the
+    fit; None where there are too few of both to distinguish noise from orders.
+    """
+    _, which, count = np.unique(on_circle(readings.angle), return_inverse=True, return_counts=True)
     repeated = len(readings.error) - len(count)
     left = len(readings.error) - 1 - 2 * orders
     if repeated >= FEWEST_FOR_NOISE:
         mean = np.bincount(which, readings.error) / count
         return math.sqrt(float(np.sum((readings.error - mean[which]) ** 2)) / repeated)
-    return math.sqrt(float(np.sum(rest**2)) / left) if left >= FEWEST_FOR_NOISE else None
+    return math.sqrt(float(np.sum(residual**2)) / left) if left >= FEWEST_FOR_NOISE else None
 
 
-def signal_power(power: np.ndarray, floor: float) -> np.ndarray:
-    """Of each order, without the noise that lies under it. power: as fitted; each is exponential
-    with the mean signal + floor.
+def signal_power(power: Array, floor: float) -> Array:
+    """The power of the signal in each order, without the noise.
+
+    `power` is as fitted; each is distributed exponentially with the mean signal + floor.
     """
     order = np.arange(1, len(power) + 1)
-    single = np.maximum(power - floor, 0.0)
+    single: Array = np.maximum(power - floor, 0.0)
     high = order > MOUNTING_ORDERS
     if np.count_nonzero(high) < 4:
         return single
@@ -245,20 +268,22 @@ def signal_power(power: np.ndarray, floor: float) -> np.ndarray:
 def fit(
     readings: Readings, orders: int | None = None, noise: float | None = None, weighted: bool = True
 ) -> Harmonics:
-    """The harmonics of these readings: `orders` of them, as many as they carry if None. noise: rms
-    of a reading in arc seconds,
-    estimated if None. weighted False is the plain least-squares fit of the paper."""
+    """The harmonics of these readings; raises OutOfRange.
+
+    Without `orders` it finds as many as the readings carry. `noise` is the rms of a reading in
+    arcsec, estimated if None. With weighted=False it is the plain least-squares fit of the paper.
+    """
     most = min(readings.most_orders, MOST_ORDERS)
     if orders is None:
         orders = most
     if not 1 <= orders <= most:
-        raise OutOfRange(f"{readings.places} places carry 1 to {most} orders, not {orders}")
+        raise OutOfRange(f"{readings.angles} angles carry 1 to {most} orders, not {orders}")
     solved = least_squares(readings, orders)
     constant, cosine, sine = solved[0], solved[1::2], solved[2::2]
-    rest = readings.error - design(readings.angle, orders) @ solved
+    residual = readings.error - design(readings.angle, orders) @ solved
     power = cosine**2 + sine**2
     if noise is None and weighted:
-        noise = noise_of(readings, rest, orders)
+        noise = noise_of(readings, residual, orders)
     floor = 4 * noise**2 / len(readings.error) if noise and weighted else 0.0
     signal = signal_power(power, floor) if floor else power
     weight = signal / np.maximum(signal + floor, 1e-30)
@@ -270,7 +295,7 @@ def fit(
         noise,
         0.0,
         float(np.max(np.abs(readings.error))),
-        readings.places,
+        readings.angles,
     )
     return replace(
         made, left=float(np.max(np.abs(readings.error - constant - made.at(readings.angle))))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One page of what an experiment measured: moves, pictures, and the paper's numbers beside ours.
+"""One page with the results of an experiment: moves, pictures, and the numbers of the paper.
 
-    report.write(report.Result(title="S0", moves=moves, traces=traces, lissajous=[...],
-    compared=[...], seed=1), "build/report")
+    result = report.Result(title="S0", moves=moves, traces=traces, compared=[...], seed=1)
+    report.write(result, "build/report")
 
 The page is one file: the pictures are inside it. Errors are true position minus target, in nm.
 """
@@ -11,10 +11,19 @@ import base64
 import html
 import io
 import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from moire.errors import BadFile, MoireError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Cell = str | tuple[str, str]  # the text of a cell of a table, or (text, class)
+Values = Sequence[float]
 
 PAPER_ERROR_NM = 800.0  # S0, its Fig. 6: below one pulse equivalent
 COLOURS = ("#1f5fa8", "#c2571a", "#2c7a4b", "#7a3b8f")
@@ -23,6 +32,8 @@ DOTS_PER_INCH = 110
 
 @dataclass(frozen=True)
 class Move:
+    """One move of an axis."""
+
     axis: str
     target_nm: float
     reached_nm: float  # by the encoder
@@ -33,25 +44,27 @@ class Move:
 
 @dataclass(frozen=True)
 class Trace:
-    """What an axis did over time; arrays of one length."""
+    """The motion of an axis over time; sequences of equal length."""
 
     axis: str
-    time_s: object
-    target_nm: object
-    position_nm: object  # by the encoder
-    true_nm: object = None  # of the model, at the same times; None where it is not known at them
+    time_s: Values
+    target_nm: Values
+    position_nm: Values  # by the encoder
+    true_nm: Values | None = None  # of the model, at the same times, if known
 
 
 @dataclass(frozen=True)
 class Lissajous:
+    """Samples of sine and cosine, in ADC counts."""
+
     axis: str
-    sin: object
-    cos: object
+    sin: Values
+    cos: Values
 
 
 @dataclass(frozen=True)
 class Compared:
-    """A number of the paper and ours; `better` None where neither is."""
+    """A number of the paper and ours; `better` is None where neither is better."""
 
     what: str
     paper: str
@@ -61,23 +74,24 @@ class Compared:
 
 @dataclass
 class Result:
+    """The content of a page."""
+
     title: str
-    moves: list
-    traces: list = field(default_factory=list)
-    lissajous: list = field(default_factory=list)
-    compared: list = field(default_factory=list)
+    moves: list[Move]
+    traces: list[Trace] = field(default_factory=list)
+    lissajous: list[Lissajous] = field(default_factory=list)
+    compared: list[Compared] = field(default_factory=list)
     seed: int | None = None
-    facts: dict = field(default_factory=dict)  # whatever else a reader should know: name -> words
+    facts: dict[str, str] = field(default_factory=dict)  # what else a reader should know
     summary: str = ""
     paper_error_nm: float = PAPER_ERROR_NM
-    drawn: dict = field(
-        default_factory=dict
-    )  # more pictures, of this experiment only: name -> (caption, PNG)
+    # more pictures, of this experiment only: name -> (caption, PNG)
+    drawn: dict[str, tuple[str, bytes]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Of many moves, in nm."""
+    """The errors of many moves, in nm."""
 
     count: int
     largest: float
@@ -85,7 +99,8 @@ class Errors:
     mean: float
 
     @classmethod
-    def of(cls, moves):
+    def of(cls, moves: Iterable[Move]) -> "Errors":
+        """The errors of these moves; raises MoireError without a move."""
         errors = [move.error_nm for move in moves]
         if not errors:
             raise MoireError("a report needs at least one move")
@@ -96,7 +111,10 @@ class Errors:
 # ------------------------------------------------------------------ pictures
 
 
-def drawing(width=9.0, height=3.4, **panels):
+def drawing(
+    width: float = 9.0, height: float = 3.4, **panels: Any
+) -> "tuple[Figure, Sequence[Axes]]":
+    """A figure and its panels; width and height in inches, `panels` as for Figure.subplots."""
     try:
         from matplotlib.figure import Figure
     except ImportError:
@@ -104,7 +122,7 @@ def drawing(width=9.0, height=3.4, **panels):
             "the package matplotlib is missing, a report needs it: pip install matplotlib"
         ) from None
     figure = Figure(figsize=(width, height), dpi=DOTS_PER_INCH, layout="constrained")
-    axes = figure.subplots(squeeze=False, **panels).ravel()
+    axes: Sequence[Axes] = figure.subplots(squeeze=False, **panels).ravel().tolist()
     for panel in axes:
         panel.grid(True, color="#dddddd", linewidth=0.6)
         panel.set_axisbelow(True)
@@ -113,14 +131,15 @@ def drawing(width=9.0, height=3.4, **panels):
     return figure, axes
 
 
-def png(figure) -> bytes:
+def png(figure: "Figure") -> bytes:
+    """The figure as PNG."""
     out = io.BytesIO()
     figure.savefig(out, format="png")
     return out.getvalue()
 
 
-def legend(figure, panel):
-    """Above the panels, where it hides nothing."""
+def legend(figure: "Figure", panel: "Axes") -> None:
+    """Puts the legend above the panels, where it hides nothing."""
     figure.legend(
         *panel.get_legend_handles_labels(),
         loc="outside upper center",
@@ -130,12 +149,13 @@ def legend(figure, panel):
     )
 
 
-def colour(number):
+def colour(number: int) -> str:
+    """The colour of a curve."""
     return COLOURS[number % len(COLOURS)]
 
 
-def length_unit(largest_nm):
-    """(nm in one unit, name) that suits a scale up to this."""
+def length_unit(largest_nm: float) -> tuple[float, str]:
+    """The unit, as nm and name, that suits a scale up to this length."""
     return next(
         (
             (worth, name)
@@ -146,13 +166,15 @@ def length_unit(largest_nm):
     )
 
 
-def largest(arrays):
+def largest(arrays: Iterable[Values]) -> float:
+    """The largest magnitude in all arrays."""
     return max(
         (abs(float(value)) for array in arrays for value in (min(array), max(array))), default=0.0
     )
 
 
-def trajectories(traces) -> bytes:
+def trajectories(traces: Sequence[Trace]) -> bytes:
+    """A picture of target and position over time."""
     worth, unit = length_unit(largest([trace.position_nm for trace in traces]))
     figure, (panel,) = drawing()
     for number, trace in enumerate(traces):
@@ -177,7 +199,8 @@ def trajectories(traces) -> bytes:
     return png(figure)
 
 
-def following_errors(traces) -> bytes:
+def following_errors(traces: Sequence[Trace]) -> bytes:
+    """A picture of the following error over time."""
     errors = [
         [target - position for target, position in zip(trace.target_nm, trace.position_nm)]
         for trace in traces
@@ -212,7 +235,8 @@ def following_errors(traces) -> bytes:
     return png(figure)
 
 
-def circles(several) -> bytes:
+def circles(several: Sequence[Lissajous]) -> bytes:
+    """A picture of sine against cosine."""
     figure, panels = drawing(width=min(4.5 * len(several), 9.0), height=4.3, ncols=len(several))
     for number, (panel, signal) in enumerate(zip(panels, several)):
         radius = math.sqrt(
@@ -230,14 +254,14 @@ def circles(several) -> bytes:
             signal.cos, signal.sin, linestyle="", marker=".", markersize=2.5, color=colour(number)
         )
         panel.set_aspect("equal")
-        panel.set_xlabel(f"{signal.axis}: cosine / converter counts")
-        panel.set_ylabel("sine / converter counts")
+        panel.set_xlabel(f"{signal.axis}: cosine / ADC counts")
+        panel.set_ylabel("sine / ADC counts")
         panel.set_title(f"samples, and a circle of {radius:.1f}", fontsize="medium")
     return png(figure)
 
 
-def histogram(moves, paper_error_nm) -> bytes:
-    """Left on the scale of the paper, right as fine as the errors are."""
+def histogram(moves: Sequence[Move], paper_error_nm: float) -> bytes:
+    """A picture of the errors: left on the scale of the paper, right on that of the errors."""
     names = list(dict.fromkeys(move.axis for move in moves))
     errors = [[move.error_nm for move in moves if move.axis == name] for name in names]
     widest = largest(errors) or 1.0
@@ -272,8 +296,8 @@ def histogram(moves, paper_error_nm) -> bytes:
     return png(figure)
 
 
-def pictures(result: Result) -> dict:
-    """name -> (caption, PNG)."""
+def pictures(result: Result) -> dict[str, tuple[str, bytes]]:
+    """The pictures of a page: name -> (caption, PNG)."""
     drawn = dict(result.drawn)
     if result.traces:
         drawn["trajectories"] = (
@@ -297,7 +321,10 @@ def pictures(result: Result) -> dict:
 
 STYLE = """\
 :root { color-scheme: light; }
-body { font: 16px/1.5 system-ui, "Segoe UI", Roboto, sans-serif; color: #1c2733; background: #f4f6f8; margin: 0; }
+body {
+  font: 16px/1.5 system-ui, "Segoe UI", Roboto, sans-serif; color: #1c2733;
+  background: #f4f6f8; margin: 0;
+}
 main { max-width: 62rem; margin: 0 auto; padding: 2rem 1.25rem 4rem; }
 h1 { font-size: 1.7rem; margin: 0 0 .25rem; }
 h2 { font-size: 1.15rem; margin: 2.2rem 0 .6rem; }
@@ -308,31 +335,46 @@ section.tall { max-height: 34rem; overflow-y: auto; }
 figure { margin: 1rem 0; padding: 1rem; }
 figure img { max-width: 100%; height: auto; display: block; margin: 0 auto; }
 figcaption { color: #48586a; font-size: .9rem; margin-top: .5rem; }
-table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; font-size: .92rem; }
-th, td { padding: .4rem .8rem; text-align: right; border-bottom: 1px solid #e8edf2; white-space: nowrap; }
+table {
+  border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums;
+  font-size: .92rem;
+}
+th, td {
+  padding: .4rem .8rem; text-align: right; border-bottom: 1px solid #e8edf2;
+  white-space: nowrap;
+}
 th { background: #eef2f6; position: sticky; top: 0; font-weight: 600; }
 th.text, td.text { text-align: left; white-space: normal; }
 tbody tr:last-child td { border-bottom: 0; }
 .good { color: #1d6b3a; font-weight: 600; }
 .bad { color: #a3161f; font-weight: 600; }
-.numbers { display: grid; grid-template-columns: repeat(auto-fit, minmax(10rem, 1fr)); gap: .8rem; margin: 1rem 0; }
-.numbers div { background: #fff; border: 1px solid #dde3e9; border-radius: 8px; padding: .7rem .9rem; }
+.numbers {
+  display: grid; grid-template-columns: repeat(auto-fit, minmax(10rem, 1fr)); gap: .8rem;
+  margin: 1rem 0;
+}
+.numbers div {
+  background: #fff; border: 1px solid #dde3e9; border-radius: 8px; padding: .7rem .9rem;
+}
 .numbers b { display: block; font-size: 1.35rem; font-variant-numeric: tabular-nums; }
 .numbers span { color: #48586a; font-size: .85rem; }
 """
 
 
-def cell(text, tag="td", kind=""):
-    return f"<{tag}{f' class={chr(34)}{kind}{chr(34)}' if kind else ''}>{html.escape(str(text))}</{tag}>"
+def cell(text: object, tag: str = "td", kind: str = "") -> str:
+    """One cell of a table; `kind` is its class."""
+    attribute = f' class="{kind}"' if kind else ""
+    return f"<{tag}{attribute}>{html.escape(str(text))}</{tag}>"
 
 
-def table(head, rows, text_columns=1, tall=False) -> str:
-    """Rows of texts, or of (text, class)."""
+def table(
+    head: Sequence[Cell], rows: Iterable[Sequence[Cell]], text_columns: int = 1, tall: bool = False
+) -> str:
+    """A table; the first columns hold text, the others numbers. A tall one scrolls."""
 
-    def line(cells, tag):
+    def line(cells: Sequence[Cell], tag: str) -> str:
         made = []
-        for number, text in enumerate(cells):
-            text, kind = text if isinstance(text, tuple) else (text, "")
+        for number, content in enumerate(cells):
+            text, kind = content if isinstance(content, tuple) else (content, "")
             made.append(
                 cell(
                     text,
@@ -343,19 +385,25 @@ def table(head, rows, text_columns=1, tall=False) -> str:
         return "<tr>" + "".join(made) + "</tr>"
 
     body = "\n".join(line(row, "td") for row in rows)
-    return f"<section{' class=tall' if tall else ''}><table><thead>{line(head, 'th')}</thead><tbody>\n{body}\n</tbody></table></section>"
+    section = "<section class=tall>" if tall else "<section>"
+    return (
+        f"{section}<table><thead>{line(head, 'th')}</thead><tbody>\n{body}\n</tbody></table>"
+        "</section>"
+    )
 
 
-def verdict(better):
+def verdict(better: bool | None) -> tuple[str, str]:
+    """The text and the class of a comparison."""
     return ("", "") if better is None else ("better", "good") if better else ("worse", "bad")
 
 
-def move_rows(result: Result):
+def move_rows(result: Result) -> Iterator[Sequence[Cell]]:
+    """The rows of the table of moves."""
     for number, move in enumerate(result.moves, 1):
         kind = "bad" if abs(move.error_nm) > result.paper_error_nm else ""
         yield (
             move.axis,
-            number,
+            str(number),
             f"{move.target_nm / 1e6:.6f}",
             f"{move.reached_nm / 1e6:.6f}",
             f"{move.true_nm / 1e6:.6f}",
@@ -365,6 +413,7 @@ def move_rows(result: Result):
 
 
 def page(result: Result) -> str:
+    """The whole page as HTML."""
     errors = Errors.of(result.moves)
     share = 100 * errors.largest / result.paper_error_nm
     numbers = [
@@ -385,7 +434,7 @@ def page(result: Result) -> str:
     if result.summary:
         parts.insert(1, f'<p class="summary">{html.escape(result.summary)}</p>')
     if result.compared:
-        rows = [
+        rows: list[Sequence[Cell]] = [
             (entry.what, entry.paper, entry.ours, verdict(entry.better))
             for entry in result.compared
         ]
@@ -395,13 +444,15 @@ def page(result: Result) -> str:
         source = "data:image/png;base64," + base64.b64encode(image).decode()
         words = html.escape(caption)
         parts.append(
-            f'<figure id="{name}"><img alt="{words}" src="{source}"><figcaption>{words}</figcaption></figure>'
+            f'<figure id="{name}"><img alt="{words}" src="{source}">'
+            f"<figcaption>{words}</figcaption></figure>"
         )
     head = ("axis", "move", "target / mm", "encoder / mm", "true / mm", "error / nm", "time / s")
     parts += ["<h2>Moves</h2>", table(head, move_rows(result), tall=True)]
-    facts = {**({"seed": result.seed} if result.seed is not None else {}), **result.facts}
+    seed = {} if result.seed is None else {"seed": str(result.seed)}
+    facts = list({**seed, **result.facts}.items())
     if facts:
-        parts += ["<h2>How it was measured</h2>", table(("", ""), facts.items(), text_columns=2)]
+        parts += ["<h2>How it was measured</h2>", table(("", ""), facts, text_columns=2)]
     title = html.escape(result.title)
     return "\n".join(
         [
@@ -418,12 +469,13 @@ def page(result: Result) -> str:
     )
 
 
-def write(result: Result, folder="build/report") -> Path:
-    """Makes index.html in the folder; returns its path."""
+def write(result: Result, folder: str | Path = "build/report") -> Path:
+    """Writes index.html in the folder and returns its path; raises BadFile."""
     return write_text(Path(folder) / "index.html", page(result))
 
 
 def write_text(path: Path, text: str) -> Path:
+    """Writes a file, in a new directory if needed, and returns its path; raises BadFile."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")

@@ -1,46 +1,51 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The scope of a node: position, error and command of one axis, recorded from before a trigger on.
+"""The scope of a node, which records position, error and command of one axis around a trigger.
 
     scope = Scope(axis)
     scope.arm("motion", before=20)
     axis.move(mm=1.5)
     Path("move.csv").write_text(scope.wait().csv())
 
-With an amplitude the axis is driven in open loop meanwhile; moire.tune makes gains of such a
-record.
+With an amplitude the axis is driven in open loop meanwhile; moire.analysis.tune makes gains from
+such a record.
 """
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 from moire import units
-from moire.bus.client import COUNTS, FULL_SCALE, Axis, named
+from moire.client.access import COUNTS, FULL_SCALE
+from moire.client.axis import Axis
+from moire.client.names import code_name
 from moire.errors import MoireError, OutOfRange
 from moire.made.bus_tables import OPERATIONS, SCOPE_STATES, SCOPE_TRIGGERS
 
 TRIGGERS = {name: code for code, (name, _) in SCOPE_TRIGGERS.items()}
-SAMPLES = 128  # of a record; the firmware keeps so many
+SAMPLES = 128  # of a record, as many as the firmware stores
 LONGEST_TICKS = 200  # from sample to sample
-TIME_CLK = 64  # of `time` on the line
+TIME_CYCLES = 64  # cycles in one count of `time` on the bus
 AT_ONCE = sum(field.startswith("time_") for field, _ in OPERATIONS["read_scope"].reply)
 
 
 class NoRecord(MoireError):
-    """The scope was not armed, or its trigger did not come."""
+    """The scope was not armed, or there was no trigger."""
 
 
 @dataclass(frozen=True)
 class Record:
-    """One value a sample in each list; time 0 is the trigger."""
+    """A record: each list has one value for each sample; time 0 is the trigger."""
 
-    before: int  # samples from before the trigger
-    time_s: list
-    position_nm: list
-    error_nm: list
-    command: list  # of full scale, -1…1; that in force when the sample was taken
+    before: int  # samples before the trigger
+    time_s: list[float]
+    position_nm: list[float]
+    error_nm: list[float]
+    command: list[float]  # of full scale, -1 to 1: in force when the sample was taken
     period_nm: float
 
     def csv(self) -> str:
+        """The record as CSV, with a heading."""
         rows = ["time_s,position_nm,error_nm,command"]
         rows += [
             f"{time:.6f},{position:.3f},{error:.3f},{command:.6f}"
@@ -51,7 +56,7 @@ class Record:
         return "\n".join(rows) + "\n"
 
     def picture(self) -> bytes:
-        """As PNG."""
+        """The record as PNG."""
         from moire.analysis import report
 
         figure, panels = report.drawing(height=6.0, nrows=3, sharex=True)
@@ -85,13 +90,25 @@ class Record:
 
 
 class Scope:
+    """The scope of the node of an axis."""
+
     def __init__(self, axis: Axis):
         self.axis, self.node = axis, axis.node
 
-    def arm(self, trigger: str = "now", before: int = 0, every="1ms", level="0nm", amplitude=0):
-        """Begins afresh. `every` is rounded to servo ticks; `level` is the error that triggers, or,
-        with an amplitude of the open loop
-        (of full scale), how far the axis may go."""
+    def arm(
+        self,
+        trigger: str = "now",
+        before: int = 0,
+        every: units.Value = "1ms",
+        level: units.Value = "0nm",
+        amplitude: units.Value = 0,
+    ) -> None:
+        """Begins a new record; raises OutOfRange.
+
+        `before` is the number of samples before the trigger. `every` (s, or a text) is rounded to
+        servo ticks. `level` (nm, or a text) is the error that triggers. With an amplitude of the
+        open loop (of full scale, or "20%"), `level` is how far the axis may move.
+        """
         if trigger not in TRIGGERS:
             raise OutOfRange(
                 f"the scope has no trigger '{trigger}': there are {', '.join(TRIGGERS)}"
@@ -116,10 +133,14 @@ class Scope:
         )
 
     def state(self) -> str:
-        return named(SCOPE_STATES, self.node.request("scope")["state"], "state")
+        """ "empty", "full" or another name of SCOPE_STATES."""
+        return code_name(SCOPE_STATES, self.node.request("scope")["state"], "state")
 
-    def wait(self, timeout="10s") -> Record:
-        """Until the record is complete; it talks often enough for the watchdog."""
+    def wait(self, timeout: units.Value = "10s") -> Record:
+        """The record, as soon as it is complete; raises NoRecord.
+
+        It sends requests often enough for the watchdog.
+        """
         transport, patience = self.axis.transport, units.parse_time(timeout)
         end = transport.now() + float(patience)
         while (state := self.state()) != "full":
@@ -127,59 +148,69 @@ class Scope:
                 raise NoRecord(f"the scope of node {self.node.address} has no record: arm it first")
             if transport.now() > end:
                 raise NoRecord(
-                    f"the scope of node {self.node.address} has no record after {units.format_time(patience)}: "
-                    f"{dict(SCOPE_STATES.values())[state]}"
+                    f"the scope of node {self.node.address} has no record after "
+                    f"{units.format_time(patience)}: {dict(SCOPE_STATES.values())[state]}"
                 )
             transport.wait(self.node.bus.poll_s)
         return self.read()
 
     def read(self) -> Record:
-        told = self.node.request("scope")
-        rows = []
-        while len(rows) < told["count"]:
+        """The record, as far as it is complete."""
+        reply = self.node.request("scope")
+        rows: list[list[int]] = []
+        while len(rows) < reply["count"]:
             fields = self.node.request("read_scope", first=len(rows))
             rows += [
                 [fields[f"{name}_{n}"] for name in ("time", "position", "error", "command")]
                 for n in range(AT_ONCE)
             ]
-        times, positions, errors, commands = zip(*rows[: told["count"]])
-        unit_s, clk, time_s = TIME_CLK / self.node.identity.clk_hz, 0, []
-        for time in times:
-            clk += time
-            time_s.append(clk * unit_s)
+        times, positions, errors, commands = zip(*rows[: reply["count"]])
+        unit_s = TIME_CYCLES / self.node.identity.clk_hz
+        time_s = [units_passed * unit_s for units_passed in itertools.accumulate(times)]
         return Record(
-            told["before"],
-            [time - time_s[told["before"]] for time in time_s],
+            reply["before"],
+            [time - time_s[reply["before"]] for time in time_s],
             [self.axis.to_nm(position) for position in self.unwrapped(positions)],
             [self.axis.to_nm(error) for error in errors],
             [command / FULL_SCALE for command in commands],
             float(self.axis.period_nm),
         )
 
-    def unwrapped(self, low_words) -> list:
-        """Whole positions: the last is within half a range of the present one, and each of its
-        neighbour.
+    def unwrapped(self, low_words: Sequence[int]) -> list[int]:
+        """Whole positions from their low 32 bits.
+
+        The last one is less than half the range from the present position, and each of the others
+        from its successor.
         """
-        near, out = self.node.request("position", axis=self.axis.number)["position"], []
+        near = self.node.request("position", axis=self.axis.number)["position"]
+        out: list[int] = []
         for low in reversed(low_words):
             near += (low - near + (1 << 31)) % (1 << 32) - (1 << 31)
             out.append(near)
         return out[::-1]
 
 
-def excite(axis: Axis, amplitude="20%", every="2ms", reach="1mm") -> Record:
-    """A record of how the axis answers in open loop; it must be enabled and at rest, and ends held
-    where it is.
+def excite(
+    axis: Axis,
+    amplitude: units.Value = "20%",
+    every: units.Value = "2ms",
+    reach: units.Value = "1mm",
+) -> Record:
+    """A record of the response of an axis in open loop.
+
+    The axis must be enabled and at rest. It moves up to `reach` (nm, or a text), and at the end
+    holds its position.
     """
     scope = Scope(axis)
     scope.arm("now", every=every, level=reach, amplitude=amplitude)
     return axis.stopping_on_error(scope.wait)
 
 
-def lsb(record: Record) -> tuple:
-    """(times in s, commands of full scale 2^15 given at them, positions in 2^-16 period), as
-    moire.tune takes them: the command of a
-    sample is the one that stood until then."""
+def lsb(record: Record) -> tuple[list[float], list[float], list[float]]:
+    """Times in s, commands of full scale 2^15 from these times on, and positions in 2^-16 period.
+
+    This is what moire.analysis.tune takes. The command of a sample was in force until that sample.
+    """
     commands = [*record.command[1:], 0.0]
     return (
         record.time_s,

@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What can be found wrong with a node without moving anything: checks, each with its finding in
-words.
-"""
+"""Checks of a node that move nothing, each with its finding in words."""
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from moire import units
-from moire.bus.client import Node
+from moire.client.axis import Axis
+from moire.client.node import Node
+from moire.client.records import Status
+from moire.client.values import ParameterValue
 from moire.errors import MoireError
 from moire.made.bus_tables import PARAMETERS
 from moire.made.registers import MAP_CRC
 
-EXCHANGES = 50  # of the line check
-CLOCK_S = 0.2  # of the clock check
+EXCHANGES = 50  # in the check of the bus
+CLOCK_S = 0.2  # duration of the check of the clock
 BUS_ERRORS = ("frames_bad", "framing_errors", "start_glitches", "overruns")
 
 
@@ -21,27 +23,34 @@ class SelfTestFailed(MoireError):
 
 
 class Check(NamedTuple):
+    """The result of one check."""
+
     name: str
     passed: bool
     words: str
 
 
-def checks(node: Node):
-    """Yields a Check after the other. That the node is of this build was checked when it was made."""
+def checks(node: Node) -> Iterator[Check]:
+    """Carries out one check after the other.
+
+    That the node has the right build was checked when the Node was made.
+    """
+    identity = node.identity
     yield Check(
         "build",
         True,
-        f"register map {node.identity.map_crc:08X}, protocol {node.identity.protocol_crc:08X}: as in this host",
+        f"register map {identity.map_crc:08X}, protocol {identity.protocol_crc:08X}: as in this "
+        "host",
     )
-    yield line_check(node)
+    yield bus_check(node)
     yield clock_check(node)
-    for number in range(node.identity.axes):
+    for number in range(identity.axes):
         for check in axis_checks(node.axis(number)):
             yield check._replace(name=f"axis {number} {check.name}")
 
 
-def line_check(node) -> Check:
-    """Everybody's errors are counted, not only those of this host."""
+def bus_check(node: Node) -> Check:
+    """Many exchanges; the node counts the errors of all hosts and nodes, not only of this one."""
     statistics, before = node.bus.statistics, node.counters()
     repeats, wrong = statistics.repeats, 0
     for _ in range(EXCHANGES):
@@ -52,79 +61,80 @@ def line_check(node) -> Check:
         found["repeats"] = statistics.repeats - repeats
     if wrong:
         found["wrong_values"] = wrong
-    told = ", ".join(f"{name} {count}" for name, count in found.items()) or "no error"
-    return Check("line", not found, f"{EXCHANGES} exchanges: {told}")
+    errors = ", ".join(f"{name} {count}" for name, count in found.items()) or "no error"
+    return Check("bus", not found, f"{EXCHANGES} exchanges: {errors}")
 
 
-def clock_check(node) -> Check:
-    """Against the clock of the transport; a simulated node may run slower than that."""
+def clock_check(node: Node) -> Check:
+    """Compares with the clock of the transport; a simulated node may run slower than that."""
     transport = node.bus.transport
     first, began = node.read_named("node.time_stamp")["value"], transport.now()
     transport.wait(CLOCK_S)
-    clk = node.read_named("node.time_stamp")["value"] - first
+    cycles = node.read_named("node.time_stamp")["value"] - first
     return Check(
         "clock",
-        clk > 0,
-        f"{clk / (transport.now() - began) / 1e6:.2f} MHz by this computer's clock, "
-        f"{node.identity.clk_hz / 1e6:g} MHz told",
+        cycles > 0,
+        f"{cycles / (transport.now() - began) / 1e6:.2f} MHz by this computer's clock, "
+        f"{node.identity.clk_hz / 1e6:g} MHz by the node",
     )
 
 
-def axis_checks(axis):
-    status = axis.status()
-    yield Check(
-        "guard",
-        not status.faults and not status.estop,
-        ", ".join(
-            filter(None, [status.fault_words, "emergency stop pressed" if status.estop else ""])
-        )
-        or "no fault, no emergency stop",
-    )
-    both = status.limit_low and status.limit_high
-    yield Check(
-        "switches",
-        not both,
-        "both ends pressed: a wire is broken"
-        if both
-        else "low end pressed"
-        if status.limit_low
-        else "high end pressed"
-        if status.limit_high
-        else "free",
-    )
-    values = axis.parameters()
-    out = [
+def axis_checks(axis: Axis) -> Iterator[Check]:
+    """The checks of one axis."""
+    status, values = axis.status(), axis.parameters()
+    yield interlock_check(status)
+    yield switch_check(status)
+    yield parameter_check(values)
+    if values["position_source"].written() == "phases":
+        yield signal_check(axis, values)
+    else:
+        yield count_check(axis, status)
+    zero = "zero known" if status.homed else "not homed"
+    yield Check("position", True, f"{units.format_length(status.position_nm)}, {zero}")
+
+
+def interlock_check(status: Status) -> Check:
+    """No fault is present, and the emergency stop is not pressed."""
+    estop = "emergency stop pressed" if status.estop else ""
+    words = ", ".join(filter(None, [status.fault_words, estop]))
+    return Check("interlock", not words, words or "no fault, no emergency stop")
+
+
+def switch_check(status: Status) -> Check:
+    """Not both limit switches are pressed."""
+    if status.limit_low and status.limit_high:
+        return Check("switches", False, "both ends pressed: a wire is broken")
+    ends = {"low end pressed": status.limit_low, "high end pressed": status.limit_high}
+    pressed = [words for words, on in ends.items() if on]
+    return Check("switches", True, pressed[0] if pressed else "free")
+
+
+def parameter_check(values: dict[str, ParameterValue]) -> Check:
+    """All parameters are inside their ranges."""
+    outside = [
         name
         for name, known in PARAMETERS.items()
         if not known.min <= values[name].counts <= known.max
     ]
-    yield Check(
-        "parameters",
-        not out,
-        f"out of range: {', '.join(out)}" if out else f"{len(values)}, all in range",
+    words = f"out of range: {', '.join(outside)}" if outside else f"{len(values)}, all in range"
+    return Check("parameters", not outside, words)
+
+
+def signal_check(axis: Axis, values: dict[str, ParameterValue]) -> Check:
+    """Sine and cosine have the right amplitude, and no fault."""
+    amplitude, signal = axis.encoder().amplitude, axis.signal()
+    low, high = (values[name].counts for name in ("amplitude_low", "amplitude_high"))
+    return Check(
+        "sensor",
+        low <= amplitude <= high and not signal.faults,
+        f"amplitude {amplitude}, allowed {low} to {high}; "
+        f"{signal.fault_words or 'signal without fault'}",
     )
-    if values["position_source"].written() == "phases":
-        amplitude, low, high = (
-            axis.encoder().amplitude,
-            values["amplitude_low"].counts,
-            values["amplitude_high"].counts,
-        )
-        signal = axis.signal()
-        yield Check(
-            "sensor",
-            low <= amplitude <= high and not signal.faults,
-            f"amplitude {amplitude}, allowed {low} to {high}; {signal.fault_words or 'signal without fault'}",
-        )
-    else:
-        illegal = "illegal_edge" in status.encoder_events
-        yield Check(
-            "sensor",
-            not illegal,
-            ("both quadrature levels changed at once" if illegal else "no illegal edge")
-            + ("" if axis.has_sine() else "; built without sine and cosine"),
-        )
-    yield Check(
-        "position",
-        True,
-        f"{units.format_length(status.position_nm)}, {'zero known' if status.homed else 'not homed'}",
-    )
+
+
+def count_check(axis: Axis, status: Status) -> Check:
+    """The incremental encoder had no illegal edge."""
+    illegal = "illegal_edge" in status.encoder_events
+    words = "both quadrature levels changed at once" if illegal else "no illegal edge"
+    built = "" if axis.has_sine() else "; built without sine and cosine"
+    return Check("sensor", not illegal, words + built)

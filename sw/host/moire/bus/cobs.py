@@ -1,66 +1,49 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Packets for lines of plain 8N1 bytes: consistent overhead byte stuffing (COBS), and what Moire
-puts into one.
+"""Packets for connections of plain 8N1 bytes, by consistent overhead byte stuffing (COBS).
 
-A packet holds the bytes of one way of an exchange as they stand on the 9-bit line, without the
-handshake: the first byte (command
-byte, or ready byte of the reply), length, body, CRC-32. Stuffed, it has no zero; a zero ends it.
-docs/protocol.md says more.
+A packet holds the bytes of one direction of an exchange as they are on the 9-bit bus, without the
+handshake: the first byte (command byte of the request, or ready byte of the reply), length, body,
+CRC-32. Stuffed, it contains no zero; a zero ends it. docs/protocol.md has examples. The package
+`cobs` does the stuffing.
 """
+
+from cobs import cobs
 
 from moire.bus.protocol import (
     ADDRESSES,
     CRC_LENGTH,
     FROM_NODE,
-    LONGEST_BODY,
     TO_NODE,
     command_byte,
     frame,
     ready_byte,
 )
+from moire.made.bus_tables import LONGEST_BODY
 
-LONGEST_RUN = 254  # bytes after one code byte
 LONGEST_PACKET = 1 + 1 + LONGEST_BODY + CRC_LENGTH
-LONGEST_STUFFED = LONGEST_PACKET + LONGEST_PACKET // LONGEST_RUN + 1
-
-
-def stuff(content: bytes) -> bytes:
-    """COBS, without the zero at its end."""
-    out = bytearray()
-    for part in content.split(b"\0"):
-        while len(part) >= LONGEST_RUN:
-            out += b"\xff" + part[:LONGEST_RUN]
-            part = part[LONGEST_RUN:]
-        out += bytes([len(part) + 1]) + part
-    return bytes(out)
+LONGEST_STUFFED = LONGEST_PACKET + 1  # a packet is shorter than 254 bytes: one byte more
 
 
 def unstuff(stuffed: bytes) -> bytes | None:
-    """None when this is no COBS."""
-    out, at = bytearray(), 0
-    while at < len(stuffed):
-        code = stuffed[at]
-        run = stuffed[at + 1 : at + code]
-        if code == 0 or len(run) != code - 1 or 0 in run:
-            return None
-        at += code
-        out += run
-        if code <= LONGEST_RUN and at < len(stuffed):
-            out.append(0)
-    return bytes(out)
+    """The content of a stuffed packet without its final zero; None when it is no COBS."""
+    try:
+        return bytes(cobs.decode(stuffed))
+    except cobs.DecodeError:
+        return None
 
 
 def packet(first: int, body: bytes) -> bytes:
-    """As it is sent: a zero in front ends whatever noise came before."""
+    """The bytes to send for a body; `first` is the command byte or the ready byte."""
     return sealed(bytes([first]) + frame(first, body))
 
 
 def sealed(content: bytes) -> bytes:
-    return b"\0" + stuff(content) + b"\0"
+    """The bytes to send for a content: a zero in front ends whatever noise came before."""
+    return b"\0" + bytes(cobs.encode(content)) + b"\0"
 
 
 def body_of(content: bytes) -> bytes | None:
-    """None unless this is a packet, whole and with the right CRC-32."""
+    """The body of a packet; None unless it is complete and its CRC-32 is right."""
     if (
         len(content) < 2
         or not 1 <= content[1] <= LONGEST_BODY
@@ -71,27 +54,31 @@ def body_of(content: bytes) -> bytes | None:
     return body if content[1:] == frame(content[0], body) else None
 
 
-def address_of(content: bytes, way: int) -> int | None:
-    """The node that a request (TO_NODE) is for, or that a reply (FROM_NODE) is from; None when it
-    is neither.
+def address_of(content: bytes, direction: int) -> int | None:
+    """The node that a request (TO_NODE) is for, or that a reply (FROM_NODE) is from.
+
+    None when the packet is neither.
     """
     address = content[0] & 0xF if content else 0
     if address not in ADDRESSES:
         return None
-    first = command_byte(address, TO_NODE) if way == TO_NODE else ready_byte(address, FROM_NODE)
+    request = direction == TO_NODE
+    first = command_byte(address, TO_NODE) if request else ready_byte(address, FROM_NODE)
     return address if content[0] == first else None
 
 
 class PacketReader:
-    """Cuts a stream of bytes into the contents of packets; what is no packet is dropped and
-    counted.
+    """Cuts a stream of bytes into the contents of packets.
+
+    `dropped` counts the pieces between two zeros that are no packet.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.held, self.too_long = bytearray(), False
         self.dropped = 0
 
-    def feed(self, arrived: bytes) -> list:
+    def feed(self, arrived: bytes) -> list[bytes]:
+        """Takes the bytes that arrived; returns the contents of the packets that they complete."""
         contents = []
         for byte in arrived:
             if byte:

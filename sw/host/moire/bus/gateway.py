@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lets clients onto a line: RFC 2217, TCP and a pseudo terminal in front of any transport, the
-twin's above all.
+"""Connects clients to a bus: RFC 2217, TCP and a pseudo terminal in front of any transport, such as
+that of a simulated machine.
 
     gateway = Gateway(TwinTransport(Twin()))
     gateway.open_rfc2217("127.0.0.1", 2217)
     gateway.serve()
 
-A client of RFC 2217 with a parity has the 9-bit line itself; one without (8N1), and those of TCP
-and of the pseudo terminal, speak COBS
-packets, for which the gateway does the exchange. Packets are served one after the other, and wait
-while an exchange of a 9-bit client is
-under way. A transport whose time stands is kept at the pace of the clock, as far as this computer
-can.
+A client of RFC 2217 with a parity uses the 9-bit bus itself. One without (8N1), and the clients of
+TCP and of the pseudo terminal, send COBS packets, for which the gateway does the exchange. Packets
+are served one after the other, and wait while an exchange of a 9-bit client is under way. A
+transport whose time is stopped runs at the speed of the clock, as far as this computer can.
+
+The loop uses selectors and not asyncio: a transport blocks while it sends, and a simulated machine
+has to run a little between two polls of the clients, so that coroutines would have nothing to wait
+for together.
 """
 
 import errno
@@ -20,73 +22,96 @@ import selectors
 import socket
 import time
 from collections import deque
+from collections.abc import Callable
+from typing import Protocol
 
 from moire.bus import rfc2217
-from moire.bus.client import Bus
 from moire.bus.cobs import PacketReader, address_of, body_of, sealed
+from moire.bus.exchanges import Exchanges
 from moire.bus.protocol import CRC_LENGTH, FROM_NODE, NINTH, TO_NODE, Exchange, Timing
 from moire.bus.transport import BITS, Transport, plain
 from moire.errors import PortError
 
 ANSWER_S = 0.05  # patience with a node; the client asks again
-HOLD_S = 0.1  # of the clock, that packets wait for a 9-bit client in the middle of an exchange
-# of the line's time, that a 9-bit client's words are answered in; it may run ahead of the clock for
-# so long
+HOLD_S = 0.1  # of the clock: how long packets wait for a 9-bit client in the middle of an exchange
+# of the time of the bus: within it the words of a 9-bit client are answered, and so long a stopped
+# time may run ahead of the clock
 REPLY_S = 0.01
-PIECE_S = 0.00025  # of the line's time between two looks at the clients
-LARGEST_DEBT_S = 0.01  # of a line that cannot keep up: what it is behind beyond this is forgotten
+PIECE_S = 0.00025  # of the time of the bus, between two polls of the clients
+LARGEST_LAG_S = 0.01  # of a bus that is too slow: a larger lag behind the clock is forgotten
 RECEIVE = 4096
 
 
+class Stream(Protocol):
+    """The connection to a client."""
+
+    def fileno(self) -> int:
+        """The file descriptor to poll."""
+
+    def read(self) -> bytes | None:
+        """The bytes that arrived, None when the client has gone."""
+
+    def write(self, data: bytes) -> bool:
+        """Sends bytes; False when the client does not take them."""
+
+    def close(self) -> None:
+        """Ends the connection."""
+
+
 class Gateway:
+    """All clients of one transport. `refused` counts packets that were no request."""
+
     def __init__(self, transport: Transport):
-        self.transport, self.bus = transport, Bus(transport)
-        self.selector, self.clients, self.waiting = selectors.DefaultSelector(), [], deque()
-        self.ninth_client, self.reply = (
-            None,
-            None,
-        )  # the 9-bit client that spoke last, and its reply as far as it has come
+        self.transport, self.exchanges = transport, Exchanges(transport)
+        self.selector = selectors.DefaultSelector()
+        self.listeners: list[socket.socket] = []
+        self.clients: list[PacketClient] = []
+        self.waiting: deque[tuple[PacketClient, int, bytes]] = deque()  # client, address, body
+        self.ninth_client: PacketClient | None = None  # the 9-bit client that sent last
+        self.reply: list[int] | None = None  # its reply, as far as it has arrived
         self.held_until = self.ahead_until = 0.0
-        self.refused = 0  # packets that were none, or no request
+        self.refused = 0
         self.origin = time.monotonic() - transport.now()
         self.own_baud = self.baud = round(BITS / transport.character_s)
 
     # entrances
 
     def open_rfc2217(self, host: str, port: int) -> int:
+        """Listens for clients of RFC 2217; returns the TCP port, which is any free one for 0."""
         return self.listen(host, port, Rfc2217Client)
 
     def open_tcp(self, host: str, port: int) -> int:
+        """Listens for clients with COBS packets; returns the TCP port, any free one for 0."""
         return self.listen(host, port, PacketClient)
 
-    def listen(self, host: str, port: int, kind) -> int:
-        """Returns the port; 0 takes any that is free."""
+    def listen(self, host: str, port: int, kind: "type[PacketClient]") -> int:
+        """Listens on a TCP port; raises PortError."""
         try:
             listener = socket.create_server((host, port))
         except (OSError, OverflowError) as error:
-            why = (
-                os.strerror(error.errno).lower()
-                if getattr(error, "errno", 0) in errno.errorcode
-                else plain(error)
-            )
+            number = getattr(error, "errno", 0)
+            reason = os.strerror(number).lower() if number in errno.errorcode else plain(error)
             raise PortError(
-                f"the TCP port {port} at {host} does not open: {why}; choose another, or 0 for any"
+                f"the TCP port {port} at {host} does not open: {reason}; choose another, or 0 for "
+                "any"
             ) from None
         listener.setblocking(False)
+        self.listeners.append(listener)
         self.selector.register(listener, selectors.EVENT_READ, lambda: self.admit(listener, kind))
-        return listener.getsockname()[1]
+        return int(listener.getsockname()[1])
 
-    def admit(self, listener, kind):
+    def admit(self, listener: socket.socket, kind: "type[PacketClient]") -> None:
+        """Accepts a client."""
         try:
             connection, _ = listener.accept()
         except OSError:
-            return  # gone before it came in
+            return  # it has gone already
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         connection.setblocking(False)
         self.add(kind(self, SocketStream(connection)))
 
     def open_pty(self) -> str:
-        """Returns the name of the terminal."""
+        """Opens a pseudo terminal for COBS packets; returns its name. Raises PortError."""
         try:
             import tty
         except ImportError:
@@ -97,11 +122,13 @@ class Gateway:
         self.add(PacketClient(self, TerminalStream(near, far)))
         return os.ttyname(far)
 
-    def add(self, client):
+    def add(self, client: "PacketClient") -> None:
+        """Polls a client from now on."""
         self.clients.append(client)
         self.selector.register(client.stream, selectors.EVENT_READ, client.arrive)
 
-    def dismiss(self, client):
+    def dismiss(self, client: "PacketClient") -> None:
+        """Forgets a client that has gone."""
         if client in self.clients:
             self.clients.remove(client)
             self.selector.unregister(client.stream)
@@ -111,17 +138,19 @@ class Gateway:
 
     # service
 
-    def serve(self, seconds: float | None = None):
+    def serve(self, seconds: float | None = None) -> None:
+        """Serves the clients, for ever or so long."""
         end = None if seconds is None else time.monotonic() + seconds
         while end is None or time.monotonic() < end:
             self.poll(self.follow_clock())
 
-    def poll(self, patience_s: float):
-        """One look at all clients, then what they want of the line."""
+    def poll(self, patience_s: float) -> None:
+        """Polls all clients once, waiting at most so long, then does what they ask for."""
         for key, _ in self.selector.select(patience_s):
-            key.data()
+            handle: Callable[[], None] = key.data
+            handle()
         if self.ninth_client is not None:
-            self.forward(self.transport.receive(RECEIVE, 0))
+            self.forward(self.ninth_client, self.transport.receive(RECEIVE, 0))
         if self.waiting and self.idle:
             client, address, body = self.waiting.popleft()
             client.send(self.answer(address, body))
@@ -132,62 +161,63 @@ class Gateway:
         return time.monotonic() >= self.held_until
 
     def follow_clock(self) -> float:
-        """Lets the line live as long as the clock went on; returns how long it may rest then."""
+        """Lets a stopped time follow the clock; returns how long the gateway may then wait."""
         if not self.transport.time_is_stopped:
             return PIECE_S
         now = self.transport.now()
-        behind, ahead = (
-            time.monotonic() - self.origin - now,
-            now < self.ahead_until and not self.idle,
-        )
-        if behind > LARGEST_DEBT_S:
-            self.origin += behind - LARGEST_DEBT_S
+        behind = time.monotonic() - self.origin - now
+        ahead = now < self.ahead_until and not self.idle
+        if behind > LARGEST_LAG_S:
+            self.origin += behind - LARGEST_LAG_S
         if behind > 0 or ahead:
             self.transport.wait(PIECE_S)
         return 0 if behind > PIECE_S or ahead or self.waiting and self.idle else PIECE_S
 
-    def close(self):
+    def close(self) -> None:
+        """Closes all connections and the transport."""
         for client in list(self.clients):
             self.dismiss(client)
-        for key in list(self.selector.get_map().values()):
-            key.fileobj.close()
+        for listener in self.listeners:
+            listener.close()
         self.selector.close()
         self.transport.close()
 
-    # what clients want
+    # requests of clients
 
-    def speak_at(self, baud: int):
+    def use_baud(self, baud: int) -> None:
+        """Changes the rate of the bus if it must change."""
         if baud != self.baud:
             self.baud = baud
             self.transport.set_baud(baud)
 
-    def hear_words(self, client, words: list, baud: int):
-        """Words of a 9-bit client, straight to the line; what comes back is for who spoke last."""
+    def send_words(self, client: "PacketClient", words: list[int], baud: int) -> None:
+        """Sends the words of a 9-bit client; what comes back is for the client that sent last."""
         self.ninth_client = client
         if any(word & NINTH for word in words):
             asks = words[-1] & NINTH and words[-1] >> 4 & 3 == FROM_NODE
             self.reply = [] if asks else None
-        self.speak_at(baud)
+        self.use_baud(baud)
         self.transport.send(words)
         self.hold()
 
-    def hold(self):
+    def hold(self) -> None:
+        """An exchange of a 9-bit client is under way: packets wait."""
         self.held_until = time.monotonic() + HOLD_S
         self.ahead_until = self.transport.now() + REPLY_S
 
-    def forward(self, words: list):
-        """To the 9-bit client; a whole reply ends its exchange."""
+    def forward(self, client: "PacketClient", words: list[int]) -> None:
+        """Passes received words to the 9-bit client; a complete reply ends its exchange."""
         if not words:
             return
-        self.ninth_client.send(bytes(word & 0xFF for word in words))
+        client.send(bytes(word & 0xFF for word in words))
         self.hold()
         if self.reply is not None:
             self.reply += words
             if len(self.reply) > 1 and len(self.reply) >= 2 + self.reply[1] + CRC_LENGTH:
                 self.reply, self.held_until = None, 0.0
 
-    def hear_packet(self, client, content: bytes):
-        """A client that asks again has given up what it asked before."""
+    def take_packet(self, client: "PacketClient", content: bytes) -> None:
+        """Queues a request. A client that asks again has given up its earlier request."""
         address, body = address_of(content, TO_NODE), body_of(content)
         if address is None or body is None:
             self.refused += 1
@@ -197,13 +227,13 @@ class Gateway:
 
     def answer(self, address: int, body: bytes) -> bytes:
         """The reply as a packet; nothing where the node does not answer."""
-        self.speak_at(self.own_baud)
+        self.use_baud(self.own_baud)
         timing = Timing(
             self.transport.character_s,
             answer=ANSWER_S,
             quiet=max(REPLY_S, 3 * self.transport.character_s),
         )
-        exchange = self.bus.run_exchange(Exchange(address, body, tries=1, timing=timing))
+        exchange = self.exchanges.run(Exchange(address, body, tries=1, timing=timing))
         return sealed(bytes(exchange.received)) if exchange.reply else b""
 
 
@@ -211,35 +241,42 @@ class Gateway:
 
 
 class PacketClient:
-    def __init__(self, gateway: Gateway, stream):
+    """A client that sends COBS packets."""
+
+    def __init__(self, gateway: Gateway, stream: Stream):
         self.gateway, self.stream, self.packets = gateway, stream, PacketReader()
 
-    def arrive(self):
+    def arrive(self) -> None:
+        """Reads what the client sent; forgets a client that has gone."""
         data = self.stream.read()
         if data is None:
             self.gateway.dismiss(self)
         elif data:
             self.take(data)
 
-    def take(self, data: bytes):
+    def take(self, data: bytes) -> None:
+        """Passes the packets in the data to the gateway."""
         for content in self.packets.feed(data):
-            self.gateway.hear_packet(self, content)
+            self.gateway.take_packet(self, content)
 
-    def send(self, data: bytes):
-        """What came from the line."""
+    def send(self, data: bytes) -> None:
+        """Sends what came from the bus."""
         self.put(data)
 
-    def put(self, data: bytes):
+    def put(self, data: bytes) -> None:
+        """Sends bytes; forgets a client that does not take them."""
         if data and not self.stream.write(data):
             self.gateway.dismiss(self)
 
 
 class Rfc2217Client(PacketClient):
-    def __init__(self, gateway: Gateway, stream):
+    """A client of RFC 2217: 9-bit words where its port has a parity, COBS packets where not."""
+
+    def __init__(self, gateway: Gateway, stream: Stream):
         super().__init__(gateway, stream)
         self.server = rfc2217.Server(gateway.own_baud)
 
-    def take(self, data: bytes):
+    def take(self, data: bytes) -> None:
         characters = self.server.feed(data)
         self.put(self.server.take_answers())
         words = [
@@ -248,25 +285,25 @@ class Rfc2217Client(PacketClient):
             if character.parity != "N"
         ]
         if words:
-            self.gateway.hear_words(self, words, self.server.baud)
+            self.gateway.send_words(self, words, self.server.baud)
         super().take(bytes(character.byte for character in characters if character.parity == "N"))
 
-    def send(self, data: bytes):
+    def send(self, data: bytes) -> None:
         self.put(rfc2217.escaped(data))
 
 
 class SocketStream:
-    """read() returns None when the other side is gone; write() False when it does not take any
-    more.
-    """
+    """A TCP connection."""
 
-    def __init__(self, connection):
+    def __init__(self, connection: socket.socket):
         self.connection = connection
 
-    def fileno(self):
+    def fileno(self) -> int:
+        """The file descriptor to poll."""
         return self.connection.fileno()
 
-    def read(self):
+    def read(self) -> bytes | None:
+        """The bytes that arrived, None when the client has gone."""
         try:
             return self.connection.recv(RECEIVE) or None
         except BlockingIOError:
@@ -275,37 +312,43 @@ class SocketStream:
             return None
 
     def write(self, data: bytes) -> bool:
+        """Sends bytes; False when the client does not take them."""
         try:
             return self.connection.send(data) == len(data)
         except OSError:
             return False
 
-    def close(self):
+    def close(self) -> None:
+        """Ends the connection."""
         self.connection.close()
 
 
 class TerminalStream:
-    """Holds the far end open too, so that it outlives its clients."""
+    """A pseudo terminal. It holds the far end open too, so that it outlives its clients."""
 
     def __init__(self, near: int, far: int):
         self.near, self.far = near, far
 
-    def fileno(self):
+    def fileno(self) -> int:
+        """The file descriptor to poll."""
         return self.near
 
-    def read(self):
+    def read(self) -> bytes | None:
+        """The bytes that arrived."""
         try:
             return os.read(self.near, RECEIVE)
         except OSError:
             return b""
 
     def write(self, data: bytes) -> bool:
+        """Sends bytes. What does not fit is lost, as on a wire that no client reads."""
         try:
             os.write(self.near, data)
         except OSError:
-            pass  # nobody reads: what does not fit is lost, as on a wire
+            pass
         return True
 
-    def close(self):
+    def close(self) -> None:
+        """Closes both ends."""
         os.close(self.near)
         os.close(self.far)

@@ -1,21 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The line protocol without any input or output: bodies, frames, 9-bit words, and the exchange as a
+"""The bus protocol without any input or output: bodies, frames, 9-bit words, and the exchange as a
 state machine.
 
-Words are integers 0…511; bit 8 is the 9th bit. docs/protocol.md says what they mean.
+A word is an integer from 0 to 511; bit 8 is the 9th bit. docs/protocol.md defines the bytes.
 """
 
 import enum
 import struct
 import zlib
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from moire.errors import BusGarbled, NoAnswer, OutOfRange
 from moire.made.bus_tables import LONGEST_BODY, OPERATIONS
 
 NINTH = 0x100  # marks a command byte
-TO_NODE, FROM_NODE = 2, 1  # D5 D4
-READY = 0x40  # D7 D6 = 01
+TO_NODE, FROM_NODE = 2, 1  # the directions, bits 5 and 4 of a command byte
+READY = 0x40  # bits 7 and 6 of a ready byte are 01
 ADDRESSES = range(1, 16)
 ODD_ADDRESSES = (1, 2, 4, 7, 8, 11, 13, 14)  # those that odd parity can reach
 CRC_LENGTH = 4
@@ -35,7 +36,8 @@ FORMATS = {
 # ------------------------------------------------------------------ bodies
 
 
-def layout(fields) -> struct.Struct:
+def layout(fields: Iterable[tuple[str, str]]) -> struct.Struct:
+    """The bytes of fields that are given as (name, type)."""
     return struct.Struct("<" + "".join(FORMATS[kind] for _, kind in fields))
 
 
@@ -44,28 +46,30 @@ REPLIES = {name: layout(operation.reply) for name, operation in OPERATIONS.items
 NAMES = {operation.code: name for name, operation in OPERATIONS.items()}
 
 
-def request_body(operation: str, sequence: int, /, **values) -> bytes:
-    """Raises OutOfRange when a value does not fit its field."""
+def request_body(operation: str, sequence: int, /, **values: int) -> bytes:
+    """The body of a request; raises OutOfRange when a value does not fit its field."""
     known = OPERATIONS[operation]
     try:
         fields = REQUESTS[operation].pack(*(values.pop(name) for name, _ in known.request))
     except struct.error:
         declared = ", ".join(" ".join(field) for field in known.request)
-        raise OutOfRange(f"a value of '{operation}' does not fit on the line: {declared}") from None
+        raise OutOfRange(f"a value of '{operation}' does not fit on the bus: {declared}") from None
     if values:
         raise TypeError(f"'{operation}' has no {', '.join(values)}")
     return bytes([sequence & 0xFF, known.code]) + fields
 
 
 class Reply(NamedTuple):
+    """The content of a reply."""
+
     sequence: int
     operation: int  # code
     cause: int  # code
-    fields: dict  # empty unless the cause is ok
+    fields: dict[str, int]  # empty unless the cause is ok
 
 
 def parse_reply(body: bytes) -> Reply | None:
-    """None when the body has not the length that its operation and cause demand."""
+    """The content of a body; None when its length does not fit its operation and cause."""
     if len(body) < 3:
         return None
     sequence, code, cause = body[:3]
@@ -85,55 +89,61 @@ def parse_reply(body: bytes) -> Reply | None:
 # ------------------------------------------------------------------ frames
 
 
-def command_byte(address: int, way: int) -> int:
+def command_byte(address: int, direction: int) -> int:
+    """The byte with the 9th bit set that begins a transfer; raises OutOfRange."""
     if address not in ADDRESSES:
         raise OutOfRange(
             f"there is no address {address}: allowed are {ADDRESSES[0]} to {ADDRESSES[-1]}"
         )
-    return way << 4 | address
+    return direction << 4 | address
 
 
 def frame(first: int, body: bytes) -> bytes:
-    """length · body · CRC-32; the CRC is over `first`, the byte that went before, too."""
+    """Length, body and CRC-32; the CRC also covers `first`, the byte that precedes them."""
     if not 1 <= len(body) <= LONGEST_BODY:
         raise OutOfRange(f"a body has 1 to {LONGEST_BODY} bytes, not {len(body)}")
     inside = bytes([len(body)]) + body
     return inside + zlib.crc32(bytes([first]) + inside).to_bytes(CRC_LENGTH, "little")
 
 
-def write_words(address: int) -> list:
+def write_words(address: int) -> list[int]:
+    """The words that begin a request."""
     return [command_byte(address, TO_NODE) | NINTH]
 
 
-def read_words(address: int) -> list:
+def read_words(address: int) -> list[int]:
+    """The words that ask for the reply."""
     return [command_byte(address, FROM_NODE) | NINTH]
 
 
-def sync_words(number: int) -> list:
-    """A frame for all nodes, which nobody answers: its end is the same moment for all of them."""
+def sync_words(number: int) -> list[int]:
+    """A frame for all nodes, which no node answers; its end is the same moment for all of them."""
     return [TO_NODE << 4 | NINTH, *frame(TO_NODE << 4, bytes([number % 256]))]
 
 
-def ready_byte(address: int, way: int) -> int:
-    return READY | command_byte(address, way)
+def ready_byte(address: int, direction: int) -> int:
+    """The byte with which a node acknowledges a command byte."""
+    return READY | command_byte(address, direction)
 
 
 # ------------------------------------------------------------------ exchange
 
 
 class State(enum.Enum):
+    """What an exchange waits for."""
+
     AWAIT_READY = enum.auto()  # write command sent
     AWAIT_READING = enum.auto()  # payload and read command sent
     AWAIT_LENGTH = enum.auto()
-    AWAIT_REST = enum.auto()  # body and CRC
-    QUIET = enum.auto()  # something went wrong: let the line fall silent before the next try
+    AWAIT_BODY = enum.auto()  # body and CRC
+    QUIET = enum.auto()  # something went wrong: the bus must be silent before the next try
     DONE = enum.auto()
     FAILED = enum.auto()
 
 
 class Timing(NamedTuple):
-    """In seconds. `answer` is the patience with the node, `quiet` the silence that ends a garbled
-    answer.
+    """Times in seconds: of one character, of the longest wait for a reply, and of the silence that
+    ends a garbled reply.
     """
 
     character: float = 11 / 115200
@@ -144,13 +154,11 @@ class Timing(NamedTuple):
 class Exchange:
     """One request and its reply, repeated with the same sequence number until it is whole.
 
-    The owner sends what `words_to_send()` gives, then receives at most `wanted` words for at most
-    `timeout_s`, tells
-    them with `feed(words)`, and tells with `silence()` when fewer came; until `finished`. Then
-    `result()` has the reply
-    or raises. `events` tells what went wrong on the way: "no answer", "garbled", "old reply".
-    Without `handshake` the request
-    does not wait for the node's ready byte.
+    Until it is `finished`, the owner sends `words_to_send()`, receives at most `expected` words
+    for at most `timeout_s`, passes them to `feed()`, and calls `silence()` when fewer came (see
+    exchanges.step). Then `result()` returns the reply or raises. `events` lists what went wrong:
+    "no answer", "garbled", "old reply". Without `handshake` the request does not wait for the
+    ready byte of the node.
     """
 
     LONGEST_NOISE = 1000  # words thrown away in one QUIET
@@ -163,81 +171,85 @@ class Exchange:
         timing: Timing = Timing(),
         handshake: bool = True,
     ):
-        self.address, self.body, self.tries, self.timing, self.handshake = (
-            address,
-            body,
-            tries,
-            timing,
-            handshake,
-        )
+        self.address, self.body, self.tries = address, body, tries
+        self.timing, self.handshake = timing, handshake
         self.payload = list(frame(command_byte(address, TO_NODE), body))
-        self.events = []
+        self.events: list[str] = []
         self.attempts = 0
-        self.heard = False  # any word at all came back
-        self.reason = ""
-        self.reply = None
-        self.outgoing, self.received, self.noise = [], [], 0
+        self.any_word = False  # whether any word at all came back
+        self.reason = ""  # why the last attempt failed
+        self.reply: Reply | None = None
+        self.outgoing: list[int] = []
+        self.received: list[int] = []
+        self.noise = 0  # words thrown away in this QUIET
         self.begin()
 
-    # what the owner has to do
+    # for the owner
 
-    def words_to_send(self) -> list:
+    def words_to_send(self) -> list[int]:
+        """The words to send now; each is given once."""
         words, self.outgoing = self.outgoing, []
         return words
 
     @property
     def finished(self) -> bool:
+        """Whether the exchange has succeeded or failed."""
         return self.state in (State.DONE, State.FAILED)
 
     @property
-    def wanted(self) -> int:
+    def expected(self) -> int:
+        """How many words to receive next at most."""
         if self.finished:
             return 0
-        if self.state == State.AWAIT_REST:
+        if self.state == State.AWAIT_BODY:
             return self.received[1] + CRC_LENGTH - (len(self.received) - 2)
         return 1
 
     @property
     def timeout_s(self) -> float:
+        """How long to wait for them, in seconds."""
         if self.state == State.QUIET:
             return self.timing.quiet
-        return self.timing.answer + self.wanted * self.timing.character
+        return self.timing.answer + self.expected * self.timing.character
 
     def result(self) -> Reply:
-        if self.state == State.DONE:
+        """The reply; raises BusGarbled or NoAnswer when the exchange failed."""
+        if self.reply is not None:
             return self.reply
-        if self.heard:
+        if self.any_word:
             raise BusGarbled(self.address, self.reason, self.attempts)
         raise NoAnswer(self.address, self.attempts)
 
-    # what happened
-
-    def feed(self, words):
+    def feed(self, words: Iterable[int]) -> None:
+        """Takes the words that arrived."""
         for word in words:
-            self.heard = True
-            self.take(word)
+            self.any_word = True
+            self.receive_word(word)
 
-    def silence(self):
-        """Nothing more came in time."""
+    def silence(self) -> None:
+        """Fewer words than expected arrived in time."""
         if self.state == State.QUIET:
             self.begin()
         elif not self.finished:
             self.fail("no answer", "no answer" if not self.received else "the answer broke off")
 
-    # the machine
+    # the state machine
 
-    def begin(self):
+    def begin(self) -> None:
+        """Begins an attempt."""
         self.attempts += 1
         self.state, self.received, self.noise = State.AWAIT_READY, [], 0
         self.outgoing = write_words(self.address)
         if not self.handshake:
             self.send_request()
 
-    def send_request(self):
+    def send_request(self) -> None:
+        """The node is ready: sends the request, and asks for the reply."""
         self.outgoing += self.payload + read_words(self.address)
         self.state = State.AWAIT_READING
 
-    def take(self, word: int):
+    def receive_word(self, word: int) -> None:
+        """Takes one word, by state."""
         if self.state == State.QUIET:
             self.noise += 1
             if self.noise >= self.LONGEST_NOISE:
@@ -247,29 +259,31 @@ class Exchange:
         elif word & NINTH:
             self.fail("garbled", "a byte with the 9th bit set came back")
         elif self.state == State.AWAIT_READY:
-            if self.expect(word, TO_NODE):
+            if self.is_ready(word, TO_NODE):
                 self.send_request()
         elif self.state == State.AWAIT_READING:
-            if self.expect(word, FROM_NODE):
+            if self.is_ready(word, FROM_NODE):
                 self.received, self.state = [word], State.AWAIT_LENGTH
         elif self.state == State.AWAIT_LENGTH:
             if not 1 <= word <= LONGEST_BODY:
                 self.fail("garbled", f"a length of {word} was announced")
             else:
                 self.received.append(word)
-                self.state = State.AWAIT_REST
+                self.state = State.AWAIT_BODY
         else:
             self.received.append(word)
-            if self.wanted == 0:
-                self.judge()
+            if self.expected == 0:
+                self.check_reply()
 
-    def expect(self, word: int, way: int) -> bool:
-        ready = ready_byte(self.address, way)
+    def is_ready(self, word: int, direction: int) -> bool:
+        """Whether this is the ready byte; the attempt fails for any other."""
+        ready = ready_byte(self.address, direction)
         if word != ready:
             self.fail("garbled", f"{word:02X} came instead of {ready:02X}")
         return word == ready
 
-    def judge(self):
+    def check_reply(self) -> None:
+        """The reply is complete: accepts it, or lets the attempt fail."""
         first, body = self.received[0], bytes(self.received[2:-CRC_LENGTH])
         reply = parse_reply(body)
         if list(frame(first, body)) != self.received[1:]:
@@ -280,16 +294,17 @@ class Exchange:
             self.body[0],
             self.body[1] if len(self.body) > 1 else 0,
         ):
-            # the node did not hear this request: the line is in order, so repeat at once
+            # the node did not receive this request: the bus is in order, so repeat at once
             self.fail(
                 "old reply",
-                "the node hears, but it never received the request whole",
+                "the node answers, but it never received the whole request",
                 State.AWAIT_READY,
             )
         else:
             self.reply, self.state = reply, State.DONE
 
-    def fail(self, event: str, reason: str, afterwards: State = State.QUIET):
+    def fail(self, event: str, reason: str, afterwards: State = State.QUIET) -> None:
+        """The attempt failed: begins the next one after a silence, or at once, or gives up."""
         self.events.append(event)
         self.reason, self.outgoing = reason, []
         if self.attempts >= self.tries:

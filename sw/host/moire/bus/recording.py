@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A session written down as it happens on the line, and given again to the same or another line.
+"""Records a session as it happens on the bus, and replays it on the same or another bus.
 
-A record is a text of JSON objects, one a line: first what it is, then each call of the transport
-with its time in seconds:
-{"at": 0.31, "send": [289]} and {"at": 0.32, "receive": [97], "wanted": 1, "timeout_s": 0.1}, words
-being 9-bit; {"at": 0.4, "break": true}
-and {"at": 0.41, "baud": 1000000}, from then on.
+A record is a text of JSON objects, one in each line. The first says what the file is; the others
+are the calls of the transport with their time in seconds. The words have 9 bits:
+
+    {"at": 0.31, "send": [289]}
+    {"at": 0.32, "receive": [97], "expected": 1, "timeout_s": 0.1}
+    {"at": 0.4, "break": true}
+    {"at": 0.41, "baud": 1000000}
 """
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, TextIO
 
 from moire.bus.protocol import (
     CRC_LENGTH,
@@ -26,68 +30,69 @@ from moire.bus.transport import Transport
 from moire.errors import BadFile, MoireError
 from moire.made.bus_tables import CAUSES, OPERATIONS, PROTOCOL_CRC
 
-KIND = {"record": "moire bus", "version": 1}
+Call = dict[str, Any]  # one of KEYS
+
+KIND = {"record": "moire bus", "version": 2}
 LONGEST_S = 1e9  # of a session
 FASTEST_BAUD = 1e9
 KEYS = (
     {"at", "send"},
-    {"at", "receive", "wanted", "timeout_s"},
+    {"at", "receive", "expected", "timeout_s"},
     {"at", "break"},
     {"at", "baud"},
-)  # of a call
+)  # of each kind of call
 
 
 class Recorder(Transport):
-    """Passes everything on to a transport, and writes it to a file that is open for text."""
+    """Passes every call on to a transport, and writes it to a file that is open for text."""
 
-    def __init__(self, transport: Transport, file):
+    def __init__(self, transport: Transport, file: TextIO):
         self.transport, self.file = transport, file
-        self.character_s, self.time_is_stopped, self.handshake = (
-            transport.character_s,
-            transport.time_is_stopped,
-            transport.handshake,
-        )
+        self.character_s, self.handshake = transport.character_s, transport.handshake
+        self.time_is_stopped = transport.time_is_stopped
         self.began = transport.now()
         self.write({**KIND, "protocol_crc": PROTOCOL_CRC})
 
-    def write(self, told: dict):
-        self.file.write(json.dumps(told) + "\n")
+    def write(self, entry: dict[str, Any]) -> None:
+        """Writes one line."""
+        self.file.write(json.dumps(entry) + "\n")
 
-    def send(self, words):
+    def send(self, words: Sequence[int]) -> None:
         self.write({"at": self.now() - self.began, "send": list(words)})
         self.transport.send(words)
 
-    def receive(self, count, timeout_s):
+    def receive(self, count: int, timeout_s: float) -> list[int]:
         at, words = self.now() - self.began, self.transport.receive(count, timeout_s)
-        self.write({"at": at, "receive": list(words), "wanted": count, "timeout_s": timeout_s})
+        self.write({"at": at, "receive": list(words), "expected": count, "timeout_s": timeout_s})
         return words
 
-    def now(self):
+    def now(self) -> float:
         return self.transport.now()
 
-    def wait(self, seconds):
+    def wait(self, seconds: float) -> None:
         self.transport.wait(seconds)
 
-    def reaches(self, address):
+    def reaches(self, address: int) -> bool:
         return self.transport.reaches(address)
 
-    def send_break(self):
+    def send_break(self) -> None:
         self.write({"at": self.now() - self.began, "break": True})
         self.transport.send_break()
 
-    def set_baud(self, baud):
+    def set_baud(self, baud: int) -> None:
         self.write({"at": self.now() - self.began, "baud": baud})
         self.transport.set_baud(baud)
         self.character_s = self.transport.character_s
 
-    def close(self):
+    def close(self) -> None:
         self.file.close()
         self.transport.close()
 
 
-def read(text: str, name: str = "text") -> list:
-    """The calls of a record; BadFile unless it is one of this version, made with this protocol
-    table.
+def read(text: str, name: str = "text") -> list[Call]:
+    """The calls of a record.
+
+    Raises BadFile unless it is a record of this version, made with this protocol table.
     """
     try:
         head, *calls = [json.loads(row) for row in text.splitlines()]
@@ -103,19 +108,19 @@ def read(text: str, name: str = "text") -> list:
     return calls
 
 
-def is_call(call) -> bool:
-    """Whether this is one of KEYS, each value of its type."""
+def is_call(call: object) -> bool:
+    """Whether this has the keys of one kind of call, and each value the type that it must have."""
     if not isinstance(call, dict) or set(call) not in KEYS:
         return False
     words, numbers = (
         call.get("send", call.get("receive", [])),
-        [call[name] for name in ("at", "wanted", "timeout_s") if name in call],
+        [call[name] for name in ("at", "expected", "timeout_s") if name in call],
     )
     return (
         isinstance(words, list)
         and all(type(word) is int and 0 <= word < 512 for word in words)
         and all(type(number) in (int, float) and 0 <= number < LONGEST_S for number in numbers)
-        and type(call.get("wanted", 0)) is int
+        and type(call.get("expected", 0)) is int
         and type(call.get("baud", 1)) is int
         and 0 < call.get("baud", 1) < FASTEST_BAUD
         and call.get("break", True) is True
@@ -126,34 +131,40 @@ def is_call(call) -> bool:
 
 
 class ReplayDiffers(MoireError):
-    """A line answered otherwise than the record has it."""
+    """A bus answered differently from the record."""
 
 
 @dataclass
 class Comparison:
-    """Answers, counted: the very same bytes; the same operation and cause, but other values;
-    anything else.
+    """How many answers are the same in every byte, have the same operation and cause but other
+    values, or differ in anything else.
     """
 
     same: int = 0
     other_values: int = 0
     different: int = 0
-    first: str = ""  # difference, in words
+    first: str = ""  # the first difference, in words
 
     @property
     def words(self) -> str:
+        """The counts in words."""
         total = self.same + self.other_values + self.different
-        return f"{total} answers: {self.same} the same, {self.other_values} with other values, {self.different} different"
+        return (
+            f"{total} answers: {self.same} the same, {self.other_values} with other values, "
+            f"{self.different} different"
+        )
 
 
-def last_baud(calls: list) -> int | None:
-    """The rate at which a record leaves the line; None where it never changes."""
+def last_baud(calls: list[Call]) -> int | None:
+    """The baud rate at the end of a record; None where it never changes."""
     return next((call["baud"] for call in reversed(calls) if "baud" in call), None)
 
 
-def replay(calls: list, transport: Transport) -> Comparison:
+def replay(calls: list[Call], transport: Transport) -> Comparison:
     """Sends what was sent, at the same times, and compares what comes back."""
-    result, began, old, new = Comparison(), transport.now(), [], []
+    result, began = Comparison(), transport.now()
+    old: list[int] = []
+    new: list[int] = []
     for call in calls:
         transport.wait(call["at"] - (transport.now() - began))
         if "send" in call:
@@ -166,12 +177,13 @@ def replay(calls: list, transport: Transport) -> Comparison:
             transport.set_baud(call["baud"])
         else:
             old += call["receive"]
-            new += transport.receive(call["wanted"], call["timeout_s"])
+            new += transport.receive(call["expected"], call["timeout_s"])
     compare(result, old, new, calls[-1]["at"] if calls else 0.0)
     return result
 
 
-def compare(result: Comparison, old: list, new: list, at: float):
+def compare(result: Comparison, old: list[int], new: list[int], at: float) -> None:
+    """Counts one answer: the recorded words, and the words that came."""
     if old == new:
         result.same += bool(old)
     elif outcome(old) is not None and outcome(old) == outcome(new):
@@ -183,8 +195,8 @@ def compare(result: Comparison, old: list, new: list, at: float):
         )
 
 
-def outcome(words: list):
-    """Sequence, operation and cause of a whole reply, else None."""
+def outcome(words: list[int]) -> list[int] | None:
+    """Sequence, operation and cause of a complete reply, else None."""
     if len(words) < 2 + CRC_LENGTH or words[1:] != list(
         frame(words[0] & 0xFF, bytes(word & 0xFF for word in words[2:-CRC_LENGTH]))
     ):
@@ -192,7 +204,8 @@ def outcome(words: list):
     return words[2:5]
 
 
-def hexadecimal(words: list) -> str:
+def hexadecimal(words: list[int]) -> str:
+    """Words as text; a star marks the 9th bit."""
     return (
         " ".join(f"{word & 0xFF:02X}" + ("*" if word & NINTH else "") for word in words)
         or "nothing"
@@ -202,15 +215,18 @@ def hexadecimal(words: list) -> str:
 # ------------------------------------------------------------------ in words
 
 
-def listing(calls: list) -> list:
-    """Requests and replies in the order of the line, one a row, by name and value."""
-    rows, answer, address = [], [], 0
+def listing(calls: list[Call]) -> list[str]:
+    """Requests and replies in the order of the bus, one in each row, by name and value."""
+    rows: list[str] = []
+    answer: list[int] = []
+    address = 0
     for call in calls:
         if "receive" in call:
             answer += call["receive"]
             continue
         rows += answer_text(answer)
-        answer, request = [], []
+        answer = []
+        request: list[int] = []
         if "break" in call:
             rows.append(f"{call['at']:9.4f} s  break")
         if "baud" in call:
@@ -226,6 +242,7 @@ def listing(calls: list) -> list:
 
 
 def request_text(payload: bytes) -> str:
+    """A request in words."""
     body = payload[1:-CRC_LENGTH]
     name = NAMES.get(body[1]) if len(body) > 1 else None
     if name is None or len(body) != 2 + REQUESTS[name].size:
@@ -234,7 +251,8 @@ def request_text(payload: bytes) -> str:
     return f"{name} " + " ".join(f"{field}={value}" for field, value in fields)
 
 
-def answer_text(words: list) -> list:
+def answer_text(words: list[int]) -> list[str]:
+    """A reply in words, as rows; none for the handshake."""
     if outcome(words) is None:
         ready = len(words) == 1 and words[0] == ready_byte(words[0] & 0xF or 1, TO_NODE)
         return [] if not words or ready else [f"{'':12}no right reply: {hexadecimal(words)}"]

@@ -5,7 +5,6 @@ import os
 
 from moire.bus import recording
 from moire.bus.transport import Transport, open_bus
-from moire.cli import twin
 from moire.cli.options import Options
 from moire.errors import BadFile, PortError
 
@@ -17,9 +16,6 @@ def open_port(options: Options) -> Transport:
         raise PortError(
             "no port: write --port /dev/ttyUSB0, or --port twin for the simulated stage"
         )
-    machine = twin.machine_of(port)
-    if machine is not None:
-        return twin.make_twin(options.baud, machine)
     return open_bus(port, options.baud, options.parity)
 
 

@@ -8,12 +8,15 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, TextIO
 
-from moire.bus.client import Axis, Bus, Node, Status
 from moire.bus.transport import Transport
 from moire.cli import ports
 from moire.cli.files import OutputError
 from moire.cli.options import Options
 from moire.cli.parser import Planned
+from moire.client.axis import Axis
+from moire.client.bus import Bus
+from moire.client.node import Node
+from moire.client.records import Status
 from moire.errors import MoireError
 
 WIDTH = 100  # of a line that is overwritten while a motion goes on

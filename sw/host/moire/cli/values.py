@@ -11,8 +11,8 @@ import click
 from click.shell_completion import CompletionItem
 
 from moire import units
-from moire.bus.client import HOME_METHODS
 from moire.bus.protocol import ADDRESSES
+from moire.client.values import HOME_METHODS
 from moire.errors import MoireError, OutOfRange, UnitError
 
 MARK = " "  # in front of a value below zero, so that click takes it for no option

@@ -7,10 +7,10 @@ from typing import Any
 
 import click
 
-from moire.bus.client import Status
 from moire.cli.parser import moire
 from moire.cli.session import Call
 from moire.cli.values import WAITING_TIME
+from moire.client.records import Status
 
 POLL_S = 0.1  # while an axis stops
 WITHOUT_SINE = "counts only: built without sine and cosine"

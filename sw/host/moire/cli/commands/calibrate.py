@@ -7,11 +7,12 @@ from typing import Any
 
 import click
 
-from moire.bus.client import Axis, CalibrationState
 from moire.cli.files import write_json
 from moire.cli.parser import moire
 from moire.cli.session import Call
 from moire.cli.values import DISTANCE, DURATION, FILE
+from moire.client.axis import Axis
+from moire.client.records import CalibrationState
 
 
 @moire.command(

@@ -5,10 +5,10 @@ from dataclasses import asdict
 
 import click
 
-from moire.bus.client import CAPTURE_SOURCES
 from moire.cli.parser import Group, moire
 from moire.cli.session import Call
 from moire.cli.values import Name
+from moire.client.capture import CAPTURE_SOURCES
 
 group = Group(
     "capture",

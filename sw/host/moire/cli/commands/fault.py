@@ -3,10 +3,10 @@
 
 from moire import units
 from moire.analysis import selftest as checks
-from moire.bus.client import Signal
 from moire.cli.commands.axis import table
 from moire.cli.parser import moire
 from moire.cli.session import Call
+from moire.client.records import Signal
 
 
 @moire.command(

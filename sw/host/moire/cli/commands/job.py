@@ -3,18 +3,19 @@
 stop, answer.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from typing import Any
 
 import click
 
-from moire.bus.client import CAUSE_CODES
-from moire.bus.job import Job, equal_parts, read_stations, said
 from moire.cli.files import write_text
 from moire.cli.parser import Group, moire
 from moire.cli.session import Call
 from moire.cli.values import ADDRESS, FILE, WHOLE, Name
+from moire.client.indexing_table import angle_text
+from moire.client.job import Job, JobState, equal_parts, read_stations
+from moire.client.names import CAUSE_CODES
 from moire.errors import MotionFailed
 
 ANSWERS = ("again", "next", "resume", "stop")
@@ -60,9 +61,9 @@ def one_source(arguments: Mapping[str, Any]) -> str | None:
 )
 def load(call: Call, file: str | None, equal: int | None) -> None:
     """All angles are checked before the first is written."""
-    angles = equal_parts(equal) if equal is not None else read_stations(file)
+    angles = equal_parts(equal) if equal is not None else read_stations(file or "")
     program = Job(call.node).load(angles)
-    first, last = said(program.angles[0]), said(program.angles[-1])
+    first, last = angle_text(program.angles[0]), angle_text(program.angles[-1])
     call.say(
         {"stations": len(program.angles), "generation": program.generation},
         f"{len(program.angles)} stations from {first} to {last}, saved in the EEPROM",
@@ -194,8 +195,11 @@ def act(call: Call, action: str) -> None:
 
 def wait_for_end(call: Call, table: int | None) -> None:
     """Wait for the end of the job, or for a question."""
-    axis = None if table is None else call.bus.axis(table)
-    state = Job(call.node).wait(axis and (lambda _: axis.status()))
+    progress: Callable[[JobState], object] | None = None
+    if table is not None:
+        axis = call.bus.axis(table)
+        progress = lambda _: axis.status()
+    state = Job(call.node).wait(progress)
     say_state(call, state)
     if state.cause != "ok":
         raise MotionFailed(
@@ -203,7 +207,7 @@ def wait_for_end(call: Call, table: int | None) -> None:
         )
 
 
-def say_state(call: Call, state: Any) -> None:
+def say_state(call: Call, state: JobState) -> None:
     """Print the state of the job."""
     rows = [state.words]
     if state.cause != "ok":

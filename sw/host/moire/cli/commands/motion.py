@@ -8,10 +8,11 @@ from typing import Any
 import click
 
 from moire import units
-from moire.bus.client import Axis, Status
 from moire.cli.parser import moire
 from moire.cli.session import Call
 from moire.cli.values import AXIS_OF_A_NODE, HOME_METHOD, LENGTH, SHARE
+from moire.client.axis import Axis
+from moire.client.records import Status
 
 TARGET = click.argument(
     "target",
@@ -56,10 +57,10 @@ def home(call: Call, method: str | None) -> None:
 def move(call: Call, target: Fraction, by: bool, no_wait: bool) -> None:
     """Returns when the axis has settled at its target."""
     if no_wait:
-        seconds = call.switch_on().begin_move(target, by=by)
+        seconds = call.switch_on().begin_move(nm=target, by=by)
         say_duration(call, "on its way", seconds)
     else:
-        run_motion(call, lambda axis, show: axis.move(target, by=by, progress=show))
+        run_motion(call, lambda axis, show: axis.move(nm=target, by=by, progress=show))
 
 
 @moire.command(
@@ -81,7 +82,7 @@ def finish(call: Call) -> None:
 @BY
 def prepare(call: Call, target: Fraction, by: bool) -> None:
     """The axis does not move yet."""
-    seconds = call.switch_on().prepare(target, by=by)
+    seconds = call.switch_on().prepare(nm=target, by=by)
     say_duration(call, "prepared", seconds)
 
 

@@ -5,11 +5,11 @@ from dataclasses import asdict
 
 import click
 
-from moire.bus.client import Identity
 from moire.bus.protocol import ADDRESSES
 from moire.cli.parser import moire
 from moire.cli.session import Call
 from moire.cli.values import ADDRESS, POSITIVE
+from moire.client.records import Identity
 from moire.errors import BusError
 
 

@@ -8,14 +8,15 @@ from typing import Any
 
 import click
 
-from moire.bus.client import Axis, ParameterValue
-from moire.bus.client import whole as is_whole
-from moire.bus.nonvolatile import SavedSettings
-from moire.bus.segments import Segments
 from moire.cli.files import read_json, write_json
 from moire.cli.parser import Group, moire
 from moire.cli.session import Call
 from moire.cli.values import FILE, TEXT, Name
+from moire.client.axis import Axis
+from moire.client.nonvolatile import SavedSettings
+from moire.client.segments import Segments
+from moire.client.values import ParameterValue
+from moire.client.values import whole as is_whole
 from moire.errors import BadFile, Refused
 from moire.made.bus_tables import PARAMETERS
 

@@ -6,11 +6,11 @@ from typing import Any
 import click
 
 from moire.analysis import report
-from moire.bus.relay import Relay, Settings, make_set, terms_of
 from moire.cli.files import write_bytes
 from moire.cli.parser import Group, moire
 from moire.cli.session import Call
 from moire.cli.values import FILE, NUMBER, POSITIVE
+from moire.client.relay import Relay, Settings, make_set, terms_of
 
 group = Group(
     "relay",
@@ -140,7 +140,7 @@ def draw(readings: Any, found: Any) -> bytes:
     halves = int(2 * (readings.angle[-1] - readings.angle[0])) + 1
     fine = [readings.angle[0] + n * 0.5 for n in range(halves)]
     error = readings.error - found.constant
-    points = {"linestyle": "", "marker": "o", "markersize": 3.5}
+    points: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 3.5}
     before.plot(fine, found.at(fine), color=report.colour(0), linewidth=1.2, label="correction")
     before.plot(readings.angle, error, color="#555555", label="readings", **points)
     left = error - found.at(readings.angle)

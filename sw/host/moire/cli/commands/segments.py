@@ -7,11 +7,11 @@ from typing import Any
 import click
 
 from moire.analysis import report
-from moire.bus.segments import USES, Segments, read_table, text_of
 from moire.cli.files import write_bytes
 from moire.cli.parser import Group, moire
 from moire.cli.session import Call
 from moire.cli.values import FILE, Name
+from moire.client.segments import USES, Segments, read_table, text_of
 from moire.units import format_length
 
 POINTS = 16  # of a picture, per segment

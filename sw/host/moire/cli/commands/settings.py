@@ -5,11 +5,11 @@ from typing import Any
 
 import click
 
-from moire.bus.settings import Settings
 from moire.cli.files import read_json, write_json
 from moire.cli.parser import Group, moire
 from moire.cli.session import Call
 from moire.cli.values import FILE, TEXT, Name
+from moire.client.settings import Settings
 from moire.errors import BadFile
 from moire.made.bus_tables import SETTINGS
 

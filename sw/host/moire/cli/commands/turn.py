@@ -7,10 +7,10 @@ from fractions import Fraction
 import click
 
 from moire import units
-from moire.bus.indexing_table import IndexingTable
 from moire.cli.parser import Group, moire
 from moire.cli.session import Call
 from moire.cli.values import ANGLE, WHOLE
+from moire.client.indexing_table import IndexingTable
 
 group = Group(
     "turn",

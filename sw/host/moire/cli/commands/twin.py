@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from moire.bus.gateway import Gateway
-from moire.cli import twin as simulated
+from moire.bus.twin_port import MACHINES, open_twin
 from moire.cli.parser import Several, moire
 from moire.cli.session import Call
 from moire.cli.values import ADDRESS, FILE, TEXT, WAITING_TIME, WHOLE, Name
@@ -26,11 +26,10 @@ RFC2217_PORT, TCP_PORT = 2217, 2218
 )
 @click.option(
     "--machine",
-    type=Name("machine", simulated.MACHINES),
+    type=Name("machine", MACHINES),
     default="s0",
-    metavar=",".join(simulated.MACHINES),
-    help="; ".join(f"{name}: {words}" for name, words in simulated.MACHINES.items())
-    + ". The default is s0.",
+    metavar=",".join(MACHINES),
+    help="; ".join(f"{name}: {words}" for name, words in MACHINES.items()) + ". The default is s0.",
 )
 @click.option(
     "--nodes",
@@ -93,7 +92,7 @@ def twin(
     if nodes and machine != "s0":
         raise OutOfRange(f"--nodes is for s0: the nodes of {machine} have their addresses")
     settings: dict[str, Any] = {"nodes": tuple(dict.fromkeys(nodes))} if nodes else {}
-    transport: Any = simulated.make_twin(call.options.baud, machine, seed, **settings)
+    transport: Any = open_twin(call.options.baud, machine, seed, **settings)
     gateway, addresses = Gateway(transport), list(transport.addresses)
     try:
         by_rfc2217 = f"rfc2217://{bind}:{gateway.open_rfc2217(bind, rfc2217)}"
@@ -102,7 +101,7 @@ def twin(
         with linked(terminal, link):
             words = f"{'nodes' if len(addresses) > 1 else 'node'} {', '.join(map(str, addresses))}"
             rows = (
-                f"simulated {simulated.MACHINES[machine]}; {words}; Ctrl-C ends it",
+                f"simulated {MACHINES[machine]}; {words}; Ctrl-C ends it",
                 f"  {by_rfc2217:<28} 9-bit bus by mark and space parity; COBS packets by 8N1",
                 f"  {by_tcp:<28} COBS packets",
                 f"  {link or terminal:<28} COBS packets",

@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The port `twin`: a simulated machine instead of a serial port."""
+"""The ports "twin" and "twin:s2": simulated machines, which a checkout of Moire provides."""
+
+from __future__ import annotations
 
 from importlib.metadata import entry_points
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from moire.bus.transport import Transport
 from moire.errors import TwinNotBuilt, UnknownName
 
-PORT = "twin"  # --port twin; --port twin:s2 names the machine too
+if TYPE_CHECKING:
+    from moire.bus.transport import Transport
+
+PORT = "twin"
+DEFAULT = "s0"
 MACHINES = {  # made by experiments.machines
     "s0": "X-Y stage with a grating interferometer, one node per axis",
     "s0_fine": "X axis of the stage s0 with a piezo on its table",
@@ -18,7 +23,10 @@ MACHINES = {  # made by experiments.machines
 
 
 def machine_of(port: str) -> str | None:
-    """The machine that a port such as "twin" or "twin:s2" names; None for all other ports."""
+    """The machine that a port names: "twin" is s0, "twin:s2" is s2; None for any other port.
+
+    Raises UnknownName for a machine that does not exist.
+    """
     kind, _, name = port.partition(":")
     if kind != PORT:
         return None
@@ -26,18 +34,19 @@ def machine_of(port: str) -> str | None:
         raise UnknownName(
             f"there is no simulated machine '{name}': known are {', '.join(MACHINES)}"
         )
-    return name or "s0"
+    return name or DEFAULT
 
 
-def make_twin(baud: int, machine: str = "s0", seed: int = 1, **settings: Any) -> Transport:
-    """The transport of a simulated machine. A checkout of Moire provides it as the entry point
-    `twin` of the group `moire.ports`; an installed package alone has none.
+def open_twin(baud: int, machine: str = DEFAULT, seed: int = 1, **settings: Any) -> Transport:
+    """The transport of a simulated machine; raises TwinNotBuilt where none is installed.
+
+    A checkout of Moire offers it as the entry point `twin` of the group `moire.ports`.
     """
     found = tuple(entry_points(group="moire.ports", name=PORT))
     if not found:
         raise TwinNotBuilt(
-            "the simulated machine needs a checkout of Moire: run `make demo` there and "
-            "use its build/venv/bin/moire"
+            "the simulated machine needs a checkout of Moire: run `make demo` there and use its "
+            "build/venv/bin/moire"
         )
     transport: Transport = found[0].load()(machine, seed, **settings)
     transport.set_baud(baud)

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The relay between a circular grating and its controller (S1): make its set, bring it into force,
-save it, read what it tells.
+"""The relay between a circular grating and its controller (S1): makes its correction set, brings it
+into force, saves it, and reads the status.
 
-    found = calibration.fit(calibration.read_readings("ring.csv"))
+    found = harmonic_fit.fit(harmonic_fit.read_readings("ring.csv"))
     with SerialBus("/dev/ttyUSB0") as port:
         relay = Relay(port)
-        whole = make_set(terms_of(found, 32768), Settings(counts_per_turn=32768),
-        relay.status().orders)
+        settings = Settings(counts_per_turn=32768)
+        whole = make_set(terms_of(found, 32768), settings, relay.status().orders)
         relay.write(whole)                         # in force now
         relay.save(whole)                          # and at every power-up
         print(relay.status().words())
 
-docs/relay.md says what the bytes mean. Exchange is the protocol without any input or output; only
+docs/relay.md defines the bytes. Exchange is the protocol without any input or output; only
 transports wait.
 """
 
@@ -19,26 +19,29 @@ import math
 import random
 import struct
 import zlib
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, Self
 
+from moire.bus.exchanges import step
 from moire.bus.protocol import CRC_LENGTH, NINTH, READY, TO_NODE, Timing, command_byte, frame
+from moire.bus.transport import Transport
 from moire.errors import BusGarbled, MoireError, NoAnswer, OutOfRange
 
 ADDRESS = 1
 STATUS, CLEAR, BEGIN_SET, SET, FLASH = range(5)
 LONGEST_BODY = 64
-HEAD = 2  # sequence and kind
+HEAD = 2  # bytes of sequence and kind
 PIECE = LONGEST_BODY - HEAD
 
 MARKER = 0x4D4F4900
 MOST_ORDERS = 32
 COUNTS = range(1609, (1 << 25) + 1)  # per turn
 GAIN = math.prod(math.sqrt(1 + 4.0**-n) for n in range(22))  # of the rotations in the relay
-LARGEST = (1 << 29) - 1  # of the amplitudes, summed as they are written
+LARGEST = (1 << 29) - 1  # sum of the amplitudes, as they are written
 ARCSEC_PER_TURN = 1_296_000
 
-FIRST, SECOND = 0x100000, 0x101000  # where the copies lie in flash
+FIRST, SECOND = 0x100000, 0x101000  # addresses of the two copies in flash
 SECTOR, PAGE = 4096, 256
 READ, PROGRAM, READ_FLASH_STATUS, WRITE_ENABLE, ERASE = 0x03, 0x02, 0x05, 0x06, 0x20
 FLASH_BUSY = 1
@@ -57,7 +60,7 @@ READING_FLASH = 8
 
 
 class RelayRefused(MoireError):
-    """The relay hears, but what was asked for did not come about."""
+    """The relay answers, but it did not do what was requested."""
 
 
 # ------------------------------------------------------------------ the set
@@ -65,24 +68,44 @@ class RelayRefused(MoireError):
 
 @dataclass(frozen=True)
 class Settings:
+    """What a set holds beside the correction."""
+
     counts_per_turn: int
-    minimum_edge_separation: int = 1  # shortest distance of two edges that go out, clk
+    minimum_edge_separation: int = 1  # shortest time between two output edges, in cycles
     hysteresis: float = 0.25  # counts
     filter_samples: int = 0
     index_low: bool = False
-    index_gate_mask: int = 0  # b in bit 1, a in bit 0: those that gate the index
-    index_gate: int = 0  # and their levels in it
+    index_gate_mask: int = 0  # signals that gate the index: b in bit 1, a in bit 0
+    index_gate: int = 0  # the levels that these signals have during the index
 
 
-def ranged(value, low, high, what):
+class Harmonics(Protocol):
+    """The harmonics of an error in arcsec, by order from 1, as harmonic_fit finds them."""
+
+    @property
+    def cosine(self) -> Iterable[float]:
+        """The cosine terms."""
+
+    @property
+    def sine(self) -> Iterable[float]:
+        """The sine terms."""
+
+
+Terms = Sequence[tuple[float, float]]  # (amplitude in counts, phase in rad), by order from 1
+
+
+def check_range(value: float, low: float, high: float, what: str) -> None:
+    """Raises OutOfRange unless a value is inside its limits."""
     if not low <= value <= high:
         raise OutOfRange(f"{what} of {value:g} is outside {low:g} to {high:g}")
-    return value
 
 
-def terms_of(harmonics, counts_per_turn: int, index_at: float = 0.0) -> list:
-    """[(amplitude in counts, phase in rad)] by order from 1. index_at: degrees of the table where
-    the index stands.
+def terms_of(
+    harmonics: Harmonics, counts_per_turn: int, index_at: float = 0.0
+) -> list[tuple[float, float]]:
+    """The terms of a set from the harmonics of an error.
+
+    `index_at` is the angle of the table at the index, in degrees.
     """
     terms = []
     for order, (cosine, sine) in enumerate(
@@ -93,14 +116,15 @@ def terms_of(harmonics, counts_per_turn: int, index_at: float = 0.0) -> list:
     return terms
 
 
-def packed(marker: int, settings: Settings, words) -> bytes:
-    """The bytes of a set with these words after the settings."""
-    counts = ranged(settings.counts_per_turn, COUNTS[0], COUNTS[-1], "a number of counts per turn")
-    ranged(settings.minimum_edge_separation, 0, 0xFFFF, "a minimum_edge_separation")
-    ranged(settings.hysteresis, 0, 0xFFFF / 65536, "a hysteresis")
-    ranged(settings.filter_samples, 0, 255, "a number of filter samples")
-    ranged(settings.index_gate_mask, 0, 3, "an index gate mask")
-    ranged(settings.index_gate, 0, 3, "an index gate")
+def packed(marker: int, settings: Settings, words: Iterable[int]) -> bytes:
+    """The bytes of a set with these words after the settings; raises OutOfRange."""
+    counts = settings.counts_per_turn
+    check_range(counts, COUNTS[0], COUNTS[-1], "a number of counts per turn")
+    check_range(settings.minimum_edge_separation, 0, 0xFFFF, "a minimum_edge_separation")
+    check_range(settings.hysteresis, 0, 0xFFFF / 65536, "a hysteresis")
+    check_range(settings.filter_samples, 0, 255, "a number of filter samples")
+    check_range(settings.index_gate_mask, 0, 3, "an index gate mask")
+    check_range(settings.index_gate, 0, 3, "an index gate")
     angle = round(2**48 / counts)
     gate = settings.index_low << 4 | settings.index_gate_mask << 2 | settings.index_gate
     head = [
@@ -111,16 +135,17 @@ def packed(marker: int, settings: Settings, words) -> bytes:
         round(math.tau * 2**40 / counts),
         round(settings.hysteresis * 65536) | settings.filter_samples << 16 | gate << 24,
     ]
-    words = [*head, *(word % 2**32 for word in words)]
-    body = struct.pack(f"<{len(words)}I", *words)
+    written = [*head, *(word % 2**32 for word in words)]
+    body = struct.pack(f"<{len(written)}I", *written)
     return body + zlib.crc32(body).to_bytes(CRC_LENGTH, "little")
 
 
-def make_set(terms, settings: Settings, orders: int) -> bytes:
-    """The bytes of a set for a relay of so many orders: corrected = position - sum of amplitude
-    sin(order angle + phase).
+def make_set(terms: Terms, settings: Settings, orders: int) -> bytes:
+    """The bytes of a set for a relay of so many orders; raises OutOfRange.
+
+    The relay puts out the position less the sum of amplitude * sin(order * angle + phase).
     """
-    ranged(orders, 1, MOST_ORDERS, "a number of orders")
+    check_range(orders, 1, MOST_ORDERS, "a number of orders")
     if len(terms) > orders:
         raise OutOfRange(f"the relay has {orders} orders, the correction {len(terms)}")
     if not all(math.isfinite(value) for term in terms for value in term):
@@ -131,7 +156,8 @@ def make_set(terms, settings: Settings, orders: int) -> bytes:
     ]
     if (total := sum(abs(amplitude) for amplitude, _ in written)) > LARGEST:
         raise OutOfRange(
-            f"the amplitudes are {total * GAIN / 65536:.0f} counts together; at most {LARGEST * GAIN / 65536:.0f} are taken"
+            f"the amplitudes are {total * GAIN / 65536:.0f} counts together; at most "
+            f"{LARGEST * GAIN / 65536:.0f} are taken"
         )
     return packed(
         MARKER + orders,
@@ -141,7 +167,7 @@ def make_set(terms, settings: Settings, orders: int) -> bytes:
 
 
 def identity_of(whole: bytes) -> int:
-    """What a relay tells as the identity of this set while it is in force."""
+    """The identity that a relay reports for this set while it is in force."""
     return int.from_bytes(whole[-CRC_LENGTH:], "little")
 
 
@@ -149,24 +175,28 @@ def identity_of(whole: bytes) -> int:
 
 
 class Status(NamedTuple):
+    """The state of a relay."""
+
     flags: int
     levels: int
     source: int  # of the set at power-up
-    orders: int  # that the relay evaluates
+    orders: int  # how many the relay evaluates
     identity: int  # of the set in force
     position: int  # counts
     correction: float  # counts
 
     @classmethod
-    def of(cls, fields: bytes):
+    def of(cls, fields: bytes) -> Self:
+        """From the fields of an answer."""
         flags, levels, source, identity, position, correction = struct.unpack("<BBBIii", fields)
         return cls(flags, levels, source & 3, source >> 2, identity, position, correction / 65536)
 
     def words(self) -> str:
-        named = [name for bit, name in enumerate(LEVELS) if self.levels >> bit & 1]
+        """The state in words, in several lines."""
+        levels = [name for bit, name in enumerate(LEVELS) if self.levels >> bit & 1]
         lines = [
-            f"{', '.join(named) or 'passing the encoder uncorrected'}; {self.orders} orders, set {self.identity:08X}, "
-            f"at power-up from {SOURCES[self.source]}",
+            f"{', '.join(levels) or 'passing the encoder uncorrected'}; {self.orders} orders, "
+            f"set {self.identity:08X}, at power-up from {SOURCES[self.source]}",
             f"position {self.position} counts, correction {self.correction:+.3f}",
         ]
         return "\n".join(
@@ -175,8 +205,9 @@ class Status(NamedTuple):
 
 
 class Exchange:
-    """One request and its answer, repeated with the same sequence number until it is whole; used as
-    protocol.Exchange is.
+    """One request and its answer, repeated with the same sequence number until it is whole.
+
+    It is used like protocol.Exchange.
     """
 
     def __init__(
@@ -185,30 +216,33 @@ class Exchange:
         if not HEAD <= len(body) <= LONGEST_BODY:
             raise OutOfRange(f"a request has {HEAD} to {LONGEST_BODY} bytes, not {len(body)}")
         self.body, self.address, self.tries, self.timing = bytes(body), address, tries, timing
+        self.attempts, self.any_word, self.quiet, self.reason = 0, False, False, ""
+        self.answer: bytes | None = None
+        self.received: list[int] = []
+        self.outgoing: list[int] = []
         self.first = READY | command_byte(address, TO_NODE)
         command = command_byte(address, TO_NODE)
         self.request = [command | NINTH, *frame(command, self.body)]
-        self.attempts, self.heard, self.answer, self.quiet, self.reason = 0, False, None, False, ""
         self.begin()
 
-    def begin(self):
-        self.attempts, self.quiet, self.received, self.outgoing = (
-            self.attempts + 1,
-            False,
-            [],
-            self.request,
-        )
+    def begin(self) -> None:
+        """Begins an attempt."""
+        self.attempts += 1
+        self.quiet, self.received, self.outgoing = False, [], self.request
 
-    def words_to_send(self) -> list:
+    def words_to_send(self) -> list[int]:
+        """The words to send now; each is given once."""
         words, self.outgoing = self.outgoing, []
         return words
 
     @property
     def finished(self) -> bool:
+        """Whether the exchange has succeeded or failed."""
         return self.answer is not None or (self.quiet and self.attempts >= self.tries)
 
     @property
-    def wanted(self) -> int:
+    def expected(self) -> int:
+        """How many words to receive next at most."""
         if self.finished:
             return 0
         if self.quiet or len(self.received) < 2:
@@ -217,15 +251,15 @@ class Exchange:
 
     @property
     def timeout_s(self) -> float:
-        return (
-            self.timing.quiet
-            if self.quiet
-            else self.timing.answer + self.wanted * self.timing.character
-        )
+        """How long to wait for them, in seconds."""
+        if self.quiet:
+            return self.timing.quiet
+        return self.timing.answer + self.expected * self.timing.character
 
-    def feed(self, words):
+    def feed(self, words: Iterable[int]) -> None:
+        """Takes the words that arrived."""
         for word in words:
-            self.heard = True
+            self.any_word = True
             if self.quiet or self.finished:
                 continue
             self.received.append(word & 0xFF)
@@ -233,11 +267,11 @@ class Exchange:
                 self.fail(f"{word & 0xFF:02X} came instead of {self.first:02X}")
             elif len(self.received) == 2 and not HEAD <= self.received[1] <= LONGEST_BODY:
                 self.fail(f"a length of {self.received[1]} was announced")
-            elif len(self.received) > 2 and self.wanted == 0:
-                self.judge()
+            elif len(self.received) > 2 and self.expected == 0:
+                self.check_answer()
 
-    def silence(self):
-        """Nothing more came in time."""
+    def silence(self) -> None:
+        """Fewer words than expected arrived in time."""
         if self.finished:
             return
         if not self.quiet:
@@ -245,7 +279,8 @@ class Exchange:
         if not self.finished:
             self.begin()
 
-    def judge(self):
+    def check_answer(self) -> None:
+        """The answer is complete: accepts it, or lets the attempt fail."""
         first, body = self.received[0], bytes(self.received[2:-CRC_LENGTH])
         if list(frame(first, body)) != self.received[1:]:
             self.fail("the answer has a wrong CRC-32")
@@ -254,14 +289,15 @@ class Exchange:
         else:
             self.answer = body[HEAD:]
 
-    def fail(self, reason):
+    def fail(self, reason: str) -> None:
+        """The attempt failed: the bus must be silent before the next one."""
         self.reason, self.quiet = reason, True
 
     def result(self) -> bytes:
-        """The answer without sequence and kind."""
+        """The answer without sequence and kind; raises BusGarbled or NoAnswer."""
         if self.answer is not None:
             return self.answer
-        if self.heard:
+        if self.any_word:
             raise BusGarbled(self.address, self.reason, self.attempts)
         raise NoAnswer(self.address, self.attempts)
 
@@ -275,37 +311,39 @@ class Relay:
     PATIENCE_S = 5.0  # with its boot and with the flash chip
     POLL_S = 0.005
 
-    def __init__(self, transport, tries: int = 5, random_source=random):
+    def __init__(
+        self,
+        transport: Transport,
+        tries: int = 5,
+        random_source: random.Random | None = None,
+    ):
         self.transport, self.tries = transport, tries
         self.timing = Timing(
             character=transport.character_s, quiet=max(Timing().quiet, 3 * transport.character_s)
         )
-        self.sequence = random_source.randrange(256)
+        self.sequence = (random_source or random.Random()).randrange(256)
         self.ask(STATUS)  # so that no later request looks like a repeated one
 
     def ask(self, kind: int, payload: bytes = b"") -> bytes:
+        """Carries out one exchange; returns the answer."""
         self.sequence = (self.sequence + 1) % 256
         exchange = Exchange(
             bytes([self.sequence, kind]) + payload, tries=self.tries, timing=self.timing
         )
         while not exchange.finished:
-            if sending := exchange.words_to_send():
-                self.transport.send(sending)
-            wanted = exchange.wanted
-            received = self.transport.receive(wanted, exchange.timeout_s)
-            exchange.feed(received)
-            if len(received) < wanted:
-                exchange.silence()
+            step(self.transport, exchange)
         return exchange.result()
 
     def status(self) -> Status:
+        """The state of the relay."""
         return Status.of(self.ask(STATUS))
 
     def clear(self, flags: int = 0xFF) -> Status:
-        """Let flags fall; those whose cause stands rise again."""
+        """Clears flags; those whose cause is still there are set again."""
         return Status.of(self.ask(CLEAR, bytes([flags])))
 
-    def until(self, done, what: str):
+    def wait_until(self, done: Callable[[], bool], what: str) -> None:
+        """Waits until `done` is true; raises RelayRefused with `what` after PATIENCE_S."""
         end = self.transport.now() + self.PATIENCE_S
         while not done():
             if self.transport.now() > end:
@@ -313,56 +351,60 @@ class Relay:
             self.transport.wait(self.POLL_S)
 
     def write(self, whole: bytes) -> Status:
-        """Bring a set into force, and see that it is."""
-        self.until(
-            lambda: not self.status().levels & READING_FLASH,
-            "the relay does not come to an end with its flash",
+        """Brings a set into force; raises RelayRefused if the relay does not take it."""
+        self.wait_until(
+            lambda: self.status().levels & READING_FLASH == 0,
+            "the relay does not finish with its flash",
         )
         for begin in range(0, len(whole), PIECE):
-            told = Status.of(self.ask(SET if begin else BEGIN_SET, whole[begin : begin + PIECE]))
-        if told.identity != identity_of(whole):
+            piece = whole[begin : begin + PIECE]
+            status = Status.of(self.ask(SET if begin else BEGIN_SET, piece))
+        if status.identity != identity_of(whole):
             raise RelayRefused(
-                f"the relay refused the set {identity_of(whole):08X}; {told.identity:08X} stays in force: "
-                f"is it one for {told.orders} orders?"
+                f"the relay refused the set {identity_of(whole):08X}; {status.identity:08X} stays "
+                f"in force: is it one for {status.orders} orders?"
             )
-        return told
+        return status
 
     # flash
 
     def flash(self, command: int, address: int | None = None, more: bytes = b"") -> bytes:
-        """One row of bytes to the chip; what came back for `more`."""
+        """Sends a command to the flash chip; returns what came back for `more`."""
         row = bytes([command]) + (b"" if address is None else address.to_bytes(3, "big"))
         return self.ask(FLASH, row + more)[len(row) :]
 
-    def change_flash(self, command: int, address: int, more: bytes = b""):
+    def change_flash(self, command: int, address: int, more: bytes = b"") -> None:
+        """Erases or programs, and waits until the chip has finished; raises RelayRefused."""
         self.flash(WRITE_ENABLE)
         self.flash(command, address, more)
-        self.until(
-            lambda: not self.flash(READ_FLASH_STATUS, more=b"\0")[0] & FLASH_BUSY,
-            "the flash does not come to an end",
+        self.wait_until(
+            lambda: self.flash(READ_FLASH_STATUS, more=b"\0")[0] & FLASH_BUSY == 0,
+            "the flash does not finish",
         )
 
     def read_copy(self, address: int, length: int) -> bytes:
-        step = PIECE - 4
+        """Reads bytes of the flash."""
+        block = PIECE - 4
         return b"".join(
-            self.flash(READ, address + n, bytes(min(step, length - n)))
-            for n in range(0, length, step)
+            self.flash(READ, address + n, bytes(min(block, length - n)))
+            for n in range(0, length, block)
         )
 
-    def write_copy(self, whole: bytes, address: int):
-        """Erase, program and read back one copy."""
-        step = 32  # divides a page
+    def write_copy(self, whole: bytes, address: int) -> None:
+        """Erases, programs and reads back one copy; raises RelayRefused if it differs."""
+        block = 32  # divides a page
         self.change_flash(ERASE, address)
-        for n in range(0, len(whole), step):
-            self.change_flash(PROGRAM, address + n, whole[n : n + step])
+        for n in range(0, len(whole), block):
+            self.change_flash(PROGRAM, address + n, whole[n : n + block])
         if self.read_copy(address, len(whole)) != whole:
             raise RelayRefused(
                 f"the flash at {address:06X} does not hold what was written: is it protected?"
             )
 
-    def save(self, whole: bytes, first: int = FIRST, second: int = SECOND):
-        """Keep a set for every power-up. The second copy first: whenever power fails, one of the
-        two is whole.
+    def save(self, whole: bytes, first: int = FIRST, second: int = SECOND) -> None:
+        """Saves a set for every power-up.
+
+        The second copy is written first: whenever the power fails, one of the two is complete.
         """
         for address in (second, first):
             if self.read_copy(address, len(whole)) != whole:

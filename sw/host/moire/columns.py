@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of numbers that people write: CSV, one row a line, `#` begins a comment, a heading may
-stand above.
+"""Tables of numbers that people write, as CSV files.
+
+Each line is a row, `#` begins a comment, and the first row may be a heading.
 """
 
 import csv
@@ -11,6 +12,7 @@ from moire.errors import BadFile
 
 
 def number(text: str, what: str, where: str) -> float:
+    """A finite number; raises BadFile with what it should be, and where it is written."""
     try:
         value = float(text)
     except ValueError:
@@ -20,9 +22,10 @@ def number(text: str, what: str, where: str) -> float:
     return value
 
 
-def rows(path: Path) -> tuple:
-    """The cells of the heading, none if there is no heading, and [(line, cells)] of what is neither
-    that, nor empty, nor a comment.
+def rows(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """The cells of the heading, and the other rows as [(line number, cells)]; raises BadFile.
+
+    Without a heading the first list is empty. Empty rows and comments are left out.
     """
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:

@@ -1,0 +1,421 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One axis of a node: its drive, its motions, its correction and its signals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self, TypeVar
+
+from moire import units
+from moire.client import calibration
+from moire.client.access import COUNTS, FULL_SCALE
+from moire.client.capture import AxisCapture
+from moire.client.names import CAUSE_CODES, bit_names, code_name, descriptions
+from moire.client.parameters import TRAVEL, AxisParameters
+from moire.client.records import CalibrationState, Drive, Encoder, Progress, Signal, Status
+from moire.client.values import CHOICES, whole
+from moire.errors import (
+    BusError,
+    MoireError,
+    MotionFailed,
+    OutOfRange,
+    PortError,
+    Refused,
+    UnitError,
+    with_more,
+)
+from moire.made.bus_tables import (
+    CALIBRATION_ACTIONS,
+    CALIBRATION_REASONS,
+    FAULTS,
+    SIGNAL_FAULTS,
+)
+
+if TYPE_CHECKING:
+    from moire.client.node import Node
+
+HARMONICS = 10  # orders of phase error that are corrected
+SCATTER = 1 << 20  # counts of the calibration's scatter in one signal period
+CORRECTION = ("sin_offset", "cos_offset", "gain", "quadrature_error")
+
+Result = TypeVar("Result")
+
+
+class Axis(AxisParameters, AxisCapture):
+    """One axis of a node. Bus.axis() or Node.axis() makes it.
+
+    As a context manager it stops a motion that is under way at the end of the block, and switches
+    the drive off if it was off at the beginning.
+    """
+
+    def __init__(self, node: Node, number: int):
+        super().__init__(node, number)
+        self.override_before_pause: Fraction | None = None
+        self.was_enabled: list[bool] = []  # at the beginning of each block that is open
+
+    def __enter__(self) -> Self:
+        self.was_enabled.append(self.status().enabled)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        was_enabled = self.was_enabled.pop()
+        try:
+            try:
+                if self.status().in_motion:
+                    self.stop_and_wait()
+            finally:
+                if not was_enabled:
+                    self.disable()
+        except MoireError:
+            if error is None:  # otherwise that one explains more
+                raise
+
+    # drive
+
+    def enable(self) -> None:
+        """Switches the drive on; raises Refused while a fault is latched."""
+        self.request("enable", on=1)
+
+    def disable(self) -> None:
+        """Switches the drive off at once, without a stop."""
+        self.request("enable", on=0)
+
+    def reset(self) -> None:
+        """Clears latched faults whose cause is gone. The drive stays off."""
+        self.request("reset_faults")
+
+    def drive(self) -> Drive:
+        """Which output the drive command goes to, and its present value."""
+        drive, steps, fine = (
+            self.node.read_named(f"actuator.{name}", self.number)
+            for name in ("drive", "steps", "fine_command")
+        )
+        kinds = CHOICES["drive"]
+        return Drive(
+            kind=kinds[drive["kind"]],
+            built=tuple(
+                name for bit, name in enumerate((*kinds, "fine")) if drive["built"] >> bit & 1
+            ),
+            command=self.status().drive_command,
+            steps=steps["value"],
+            fine_command=fine["value"] / FULL_SCALE,
+            override=self.override(),
+        )
+
+    # motion
+
+    def home(self, progress: Progress | None = None, method: str | int | None = None) -> Status:
+        """Finds the zero of the axis; returns when it is reached.
+
+        `method` is a number of CiA 402, "s0" or "s3", and is stored in the parameter home_method;
+        without it that parameter holds. `progress` is called with a Status from time to time.
+        Raises Refused or MotionFailed.
+        """
+        if method is not None:
+            self.set_parameter("home_method", method)
+        return self.motion("home", progress)
+
+    def move(
+        self,
+        target: str | None = None,
+        *,
+        nm: units.Number | None = None,
+        um: units.Number | None = None,
+        mm: units.Number | None = None,
+        by: bool = False,
+        progress: Progress | None = None,
+    ) -> Status:
+        """Moves to a position; returns when the axis has settled there.
+
+        The target is a text with a unit such as "1.5mm", or a number with the name of its unit:
+        mm=1.5. With `by` it is a distance from the present target. `progress` is called with a
+        Status from time to time. Raises UnitError, OutOfRange, Refused or MotionFailed. Whatever
+        interrupts the wait, Ctrl-C too, stops the axis under control first.
+        """
+        length = length_of("move", target, nm, um, mm)
+        return self.to_target(length, by, lambda at: self.motion("move", progress, target=at))
+
+    def begin_move(
+        self,
+        target: str | None = None,
+        *,
+        nm: units.Number | None = None,
+        um: units.Number | None = None,
+        mm: units.Number | None = None,
+        by: bool = False,
+    ) -> float:
+        """Begins the motion of move(), and returns at once.
+
+        Returns the seconds that the motion takes at full speed. See wait(), pause() and stop().
+        """
+        length = length_of("move", target, nm, um, mm)
+        return self.to_target(length, by, lambda at: self.duration_s("move", at))
+
+    def prepare(
+        self,
+        target: str | None = None,
+        *,
+        nm: units.Number | None = None,
+        um: units.Number | None = None,
+        mm: units.Number | None = None,
+        by: bool = False,
+    ) -> float:
+        """Plans the motion of move(), which then waits for Node.start() or Bus.start().
+
+        Returns the seconds that the motion takes at full speed.
+        """
+        length = length_of("prepare", target, nm, um, mm)
+        return self.to_target(length, by, lambda at: self.duration_s("prepare", at))
+
+    def duration_s(self, operation: str, target: int) -> float:
+        """Requests a motion to a target in counts; returns its duration in seconds."""
+        ticks = self.request(operation, target=target)["duration_ticks"]
+        return ticks / self.node.identity.tick_hz
+
+    def to_target(self, nm: Fraction, by: bool, begin: Callable[[int], Result]) -> Result:
+        """Calls `begin` with the target in counts; a refusal of the target names the travel."""
+        target_nm = Fraction(self.status().target_nm) + nm if by else nm
+        try:
+            return begin(self.to_counts(target_nm))
+        except Refused as refused:
+            if refused.cause == "out_of_travel":
+                low, high = (self.get_parameter(name).written(9) for name in TRAVEL)
+                raise with_more(
+                    refused, f"target {units.format_length(target_nm)}, allowed {low} to {high}"
+                ) from None
+            raise
+
+    def motion(self, operation: str, progress: Progress | None, **fields: int) -> Status:
+        """Requests a motion and waits for its end; stops the axis when the wait is interrupted."""
+
+        def carry_out() -> Status:
+            self.request(operation, **fields)
+            return self.wait(progress)
+
+        return self.stopping_on_error(carry_out)
+
+    def motion_end(self, progress: Progress | None = None) -> Status:
+        """Waits for the end of the motion that is under way, like move()."""
+        return self.stopping_on_error(lambda: self.wait(progress))
+
+    def stopping_on_error(self, work: Callable[[], Result]) -> Result:
+        """Calls `work`, and stops the axis under control if something interrupts it.
+
+        Errors of the bus or of the motion itself do not: the node handles these.
+        """
+        try:
+            return work()
+        except (BusError, Refused, MotionFailed):
+            raise
+        except BaseException:
+            self.stop_and_wait()
+            raise
+
+    def wait(self, progress: Progress | None = None) -> Status:
+        """Waits for the end of the motion; raises MotionFailed unless it reached its target."""
+        while True:
+            status = self.status()
+            if progress is not None:
+                progress(status)
+            if status.ended != "running":
+                break
+            self.transport.wait(self.node.bus.poll_s)
+        if status.ended in ("ok", "no_motion_yet"):
+            return status
+        sentence = f"axis {self.number} of node {self.node.address}: {status.ended_words}"
+        if status.ended == "ended_by_fault":
+            sentence += f": {descriptions(FAULTS, status.first_fault or status.faults)}"
+        position, target = (
+            units.format_length(nm) for nm in (status.position_nm, status.target_nm)
+        )
+        sentence += f" (at {position}, target {target})"
+        raise MotionFailed(status.ended, CAUSE_CODES.get(status.ended, -1), sentence)
+
+    def dwell(self, seconds: float, progress: Progress | None = None) -> Status:
+        """Waits this long, with requests often enough for the watchdog."""
+        end = self.transport.now() + seconds
+        while True:
+            status = self.status()
+            if progress is not None:
+                progress(status)
+            left = end - self.transport.now()
+            if left <= 0:
+                return status
+            self.transport.wait(min(self.node.bus.poll_s, left))
+
+    def stop(self) -> None:
+        """Begins a controlled stop; the drive stays on. It does not wait: see wait()."""
+        self.request("stop")
+
+    def stop_and_wait(self) -> None:
+        """Stops under control and waits until the axis is at rest; not an error if it is off."""
+        try:
+            self.stop()
+            while self.status().in_motion:
+                self.transport.wait(self.node.bus.poll_s)
+        except Refused:
+            pass  # the drive is off
+        except (BusError, PortError) as error:
+            error.args = (
+                f"axis {self.number} of node {self.node.address} could not be stopped by the host, "
+                f"its watchdog has to: {error}",
+            )
+            raise error from None
+
+    def stop_if_enabled(self) -> None:
+        """Like stop_and_wait(), but drops errors: one of several axes must not keep the others."""
+        try:
+            self.stop_and_wait()
+        except MoireError:
+            pass
+
+    def override(self, fraction: units.Value | None = None) -> Fraction:
+        """The speed at which profiles are played, as a fraction of full speed.
+
+        Given a fraction ("50%" or 0.5), it changes that speed, also during a motion.
+        """
+        if fraction is None:
+            return self.get_parameter("feed_override").value
+        self.override_before_pause = None
+        return self.set_parameter("feed_override", units.parse_share(fraction)).value
+
+    def pause(self) -> None:
+        """Halts the motion within its limits of acceleration; resume() continues it."""
+        before = self.override()
+        if before:
+            self.override(0)
+            self.override_before_pause = before
+
+    def resume(self) -> Fraction:
+        """Continues with the override before pause(); at full speed if another host paused."""
+        return self.override(self.override_before_pause or 1)
+
+    # correction of sine and cosine
+
+    def calibration(self, action: str = "read") -> CalibrationState:
+        """The state of the auto-calibration, after "calibrate", "freeze" or "clear" if given."""
+        actions = {name: code for code, (name, _) in CALIBRATION_ACTIONS.items()}
+        if action not in actions:
+            raise OutOfRange(
+                f"the calibration has no action '{action}': allowed are {', '.join(actions)}"
+            )
+        reply = self.request("calibration", action=actions[action])
+        return CalibrationState(
+            reason=code_name(CALIBRATION_REASONS, reply["reason"], "reason"),
+            settled=bool(reply["converged"]),
+            frozen=bool(reply["frozen"]),
+            accepted=reply["accepted"],
+            refused=reply["refused"],
+            scatter_nm=float(reply["scatter"] * self.period_nm / SCATTER),
+        )
+
+    def calibrate(
+        self,
+        progress: Callable[[CalibrationState], object] | None = None,
+        distance: units.Value = "1mm",
+        timeout: units.Value = "120s",
+    ) -> CalibrationState:
+        """Learns the correction from scratch, then freezes it.
+
+        The axis must be enabled and homed. It moves over `distance` (nm, or a text) at several
+        speeds, to the side where the travel has room, until the correction is settled, and comes
+        back. A longer distance allows a higher speed, and the sine periods must pass faster than
+        the stage can follow or ring. `progress` is called with a CalibrationState after each
+        stroke. Raises NotCalibrated with the reason if it is not settled after `timeout` (s, or a
+        text). The parameter `velocity` has its old value afterwards.
+        """
+        return calibration.calibrate(self, progress, distance, timeout)
+
+    def correction(self) -> dict[str, int | list[int]]:
+        """The correction in force, in counts, ready for a JSON file."""
+        reply = self.request("get_correction")
+        harmonics = [self.request("get_harmonic", order=order) for order in range(1, HARMONICS + 1)]
+        return {
+            **reply,
+            "cosine": [harmonic["cosine"] for harmonic in harmonics],
+            "sine": [harmonic["sine"] for harmonic in harmonics],
+        }
+
+    def set_correction(self, values: Mapping[str, Any]) -> None:
+        """Sets a correction as correction() returns it, at once and as a whole.
+
+        Raises OutOfRange, and changes nothing, when it is not complete.
+        """
+        cosine, sine = values.get("cosine"), values.get("sine")
+        complete = all(whole(values.get(name)) for name in CORRECTION) and all(
+            isinstance(terms, list) and len(terms) == HARMONICS and all(map(whole, terms))
+            for terms in (cosine, sine)
+        )
+        if not complete or cosine is None or sine is None:
+            raise OutOfRange(
+                f"this is no correction: it has the whole numbers {', '.join(CORRECTION)} and the "
+                f"lists cosine and sine of {HARMONICS} whole numbers each"
+            )
+        for order, (cosine_term, sine_term) in enumerate(zip(cosine, sine, strict=True), 1):
+            self.request("set_harmonic", order=order, cosine=cosine_term, sine=sine_term)
+        self.request("set_correction", **{name: values[name] for name in CORRECTION}, apply=1)
+
+    # encoder
+
+    def encoder(self) -> Encoder:
+        """The raw signals of the encoder, and what homing found."""
+        reply = self.request("encoder")
+        return Encoder(
+            sin=reply["sin"],
+            cos=reply["cos"],
+            phase=reply["phase"] / COUNTS,
+            amplitude=reply["amplitude"],
+            quadrature_count=reply["quadrature_count"],
+            rejected_pulses=reply["rejected_pulses"],
+            rejected_samples=reply["rejected_samples"],
+            home_phase_nm=self.to_nm(reply["home_phase"]),
+            home_margin=1 - abs(reply["home_phase"]) / (COUNTS / 2),
+            fault_position_nm=self.to_nm(reply["fault_position"]),
+        )
+
+    def has_sine(self) -> bool:
+        """Whether this node was built with sine and cosine.
+
+        Without them the position is made of counts, and the node refuses what needs them.
+        """
+        return bool(self.feedback("position_source")["sine"])
+
+    def signal(self) -> Signal:
+        """What is wrong with sine and cosine."""
+        reply = self.request("signal")
+        return Signal(
+            bit_names(SIGNAL_FAULTS, reply["faults"]), bit_names(SIGNAL_FAULTS, reply["first"])
+        )
+
+
+def length_of(
+    operation: str,
+    text: str | None,
+    nm: units.Number | None,
+    um: units.Number | None,
+    mm: units.Number | None,
+) -> Fraction:
+    """The one length that is given, in nm; raises UnitError or OutOfRange."""
+    if text is not None and not isinstance(text, str):
+        raise UnitError(
+            f"a {operation} to {text!r} has no unit: write mm={text!r}, um={text!r} or "
+            f"nm={text!r}, or a text such as '1.5mm'"
+        )
+    numbers = {"nm": nm, "um": um, "mm": mm}
+    given = {unit: number for unit, number in numbers.items() if number is not None}
+    if len(given) + (text is not None) != 1:
+        raise OutOfRange(f"a {operation} needs one target: a text such as '1.5mm', mm=, um= or nm=")
+    if text is not None:
+        return units.parse_length(text)
+    [(unit, number)] = given.items()
+    try:
+        return Fraction(number) * units.LENGTHS[unit]
+    except (TypeError, ValueError, OverflowError):
+        raise OutOfRange(f"{unit}={number!r} is no length: give a finite number") from None

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The motion that calibrates sine and cosine: strokes over a distance at several speeds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from moire import units
+from moire.client.records import CalibrationState
+from moire.client.values import ParameterValue
+from moire.errors import MoireError, NotCalibrated, OutOfRange
+
+if TYPE_CHECKING:
+    from moire.client.axis import Axis
+
+# fractions of the top speed: the calibration needs several speeds
+SPEEDS = (Fraction(1), Fraction(3, 5), Fraction(4, 5))
+SAMPLES = 20  # in one period at the top speed; the calibration needs eight
+STROKE_S = 0.5  # for one stroke at the top speed: most of it is then at a constant speed
+
+
+def calibrate(
+    axis: Axis,
+    progress: Callable[[CalibrationState], object] | None,
+    distance: units.Value,
+    timeout: units.Value,
+) -> CalibrationState:
+    """See Axis.calibrate()."""
+    stroke, patience = units.parse_length(distance), units.parse_time(timeout)
+    if stroke <= 0 or patience <= 0:
+        raise OutOfRange("distance and timeout of the calibration must be above zero")
+    start, far = ends_of_stroke(axis, stroke)
+    velocity = axis.get_parameter("velocity")
+    fastest = min(
+        Fraction(velocity.counts),
+        Fraction(axis.node.identity.sample_hz // SAMPLES),
+        stroke / axis.period_nm / Fraction(STROKE_S),
+    )
+    axis.calibration("clear")
+    axis.calibration("calibrate")
+    end, strokes = axis.transport.now() + float(patience), 0
+    try:
+        while True:
+            speed = fastest * SPEEDS[strokes // 2 % len(SPEEDS)]
+            axis.write_parameter("velocity", max(1, round(speed)))
+            axis.move(nm=start if strokes % 2 else far)
+            strokes += 1
+            state = axis.calibration()
+            if progress is not None:
+                progress(state)
+            if state.settled and strokes % 2 == 0:
+                return axis.calibration("freeze")
+            if axis.transport.now() > end:
+                raise NotCalibrated(
+                    state.reason,
+                    f"axis {axis.number} of node {axis.node.address} learned no correction within "
+                    f"{units.format_time(patience)}: {state.words} ({state.accepted} accepted, "
+                    f"{state.refused} refused)",
+                )
+    finally:
+        end_calibration(axis, velocity)
+
+
+def ends_of_stroke(axis: Axis, stroke: Fraction) -> tuple[Fraction, Fraction]:
+    """The present target, and the far end on the side where the travel has room, both in nm."""
+    low, high = (axis.get_parameter(name).value for name in ("travel_low", "travel_high"))
+    start = Fraction(axis.status().target_nm)
+    far = start + stroke if start + stroke <= high else start - stroke
+    if far < low:
+        raise OutOfRange(
+            f"there is no room for {units.format_length(stroke)}: the travel is "
+            f"{units.format_length(low)} to {units.format_length(high)}"
+        )
+    return start, far
+
+
+def end_calibration(axis: Axis, velocity: ParameterValue) -> None:
+    """Freezes the correction and restores the velocity, as far as that is possible.
+
+    An error here is dropped, since the one that ended the calibration explains more.
+    """
+    try:
+        axis.calibration("freeze")
+        axis.write_parameter("velocity", velocity.counts)
+    except MoireError:
+        pass

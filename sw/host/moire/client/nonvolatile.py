@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a node keeps without power: the parameters of its axes and its settings, in the EEPROM of a
+node with the firmware image `station`.
+
+    saved = SavedSettings(bus.node(2))
+    saved.save()                  # all that differs from the defaults; the next power-up uses it
+    saved.state().cause           # "ok", or why the defaults are in force
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from moire.client.names import CAUSE_CODES, code_name, descriptions
+from moire.client.node import Node
+from moire.errors import MotionFailed
+from moire.made.bus_tables import CAUSES, SAVE_ACTIONS
+
+ACTIONS = {name: code for code, (name, _) in SAVE_ACTIONS.items()}
+SAVE_TIMEOUT_S = 10  # a node with two axes needs less than one second
+NOTHING = "nothing_saved"
+
+
+@dataclass(frozen=True)
+class SavedState:
+    """What is in the EEPROM, or why nothing there can be used."""
+
+    cause: str
+    damaged: bool  # one of the two copies is damaged, the other one is in force
+    generation: int  # rises by one with every save
+    values: int  # how many differ from their defaults
+
+    @property
+    def words(self) -> str:
+        """The state in words."""
+        if self.cause != "ok":
+            state = descriptions(CAUSES, [self.cause])
+        else:
+            state = "1 value is kept" if self.values == 1 else f"{self.values} values are kept"
+        return state + "; one copy of them was damaged" * self.damaged
+
+
+class SavedSettings:
+    """The saved values of a node."""
+
+    def __init__(self, node: Node):
+        self.node = node
+
+    def state(self) -> SavedState:
+        """The state, as soon as the EEPROM is not being read or written."""
+        transport = self.node.bus.transport
+        began = transport.now()
+        reply = self.node.request("saved_settings")
+        while reply["writing"] and transport.now() - began < SAVE_TIMEOUT_S:
+            transport.wait(self.node.bus.poll_s)
+            reply = self.node.request("saved_settings")
+        cause = "eeprom_busy" if reply["writing"] else code_name(CAUSES, reply["cause"], "cause")
+        return SavedState(cause, bool(reply["damaged"]), reply["generation"], reply["values"])
+
+    def save(self) -> SavedState:
+        """Saves the present values; raises MotionFailed with the reason when that fails."""
+        return self._do("save", ("ok", NOTHING))
+
+    def restore_defaults(self) -> SavedState:
+        """Erases the saved values: the next power-up uses the defaults. Raises MotionFailed."""
+        return self._do("clear", (NOTHING,))
+
+    def _do(self, action: str, good: Sequence[str]) -> SavedState:
+        self.state()
+        self.node.request("save_settings", action=ACTIONS[action])
+        state = self.state()
+        if state.cause not in good:
+            raise MotionFailed(
+                state.cause,
+                CAUSE_CODES[state.cause],
+                f"node {self.node.address} did not {action} its values: {state.words}",
+            )
+        return state

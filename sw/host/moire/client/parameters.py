@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The parameters of an axis: read, check, set, save and load."""
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import Protocol
+
+from moire import units
+from moire.client.access import AxisAccess
+from moire.client.values import (
+    FILTER,
+    FILTERS,
+    ParameterValue,
+    counts_of,
+    one_count,
+    parameter,
+    value_of,
+)
+from moire.errors import OutOfRange, Refused, with_more
+from moire.made.bus_tables import PARAMETERS
+
+TRAVEL = ("travel_low", "travel_high")
+GAINS = ("kp", "ki", "kd", "kv", "ka")
+
+
+class Tuning(Protocol):
+    """Gains and filters of the servo in counts on the bus, as moire.analysis.tune makes them."""
+
+    @property
+    def kp(self) -> int:
+        """Proportional gain."""
+
+    @property
+    def ki(self) -> int:
+        """Integral gain."""
+
+    @property
+    def kd(self) -> int:
+        """Derivative gain."""
+
+    @property
+    def kv(self) -> int:
+        """Velocity feedforward."""
+
+    @property
+    def ka(self) -> int:
+        """Acceleration feedforward."""
+
+    @property
+    def filters(self) -> Sequence[Sequence[int]]:
+        """Coefficients of each filter, in the order of FILTER."""
+
+
+class AxisParameters(AxisAccess):
+    """The part of an axis that holds its parameters."""
+
+    def parameter_value(
+        self, name: str, counts: int, period_nm: Fraction | None = None
+    ) -> ParameterValue:
+        """The value in real units of so many counts."""
+        known = parameter(name)
+        return value_of(known, counts, one_count(known, period_nm or self.period_nm))
+
+    def parameter_counts(
+        self, name: str, value: units.Value, period_nm: Fraction | None = None
+    ) -> int:
+        """The counts on the bus of a value in real units; raises OutOfRange or UnknownName."""
+        known = parameter(name)
+        return counts_of(known, value, one_count(known, period_nm or self.period_nm))
+
+    def get_parameter(self, name: str) -> ParameterValue:
+        """Reads one parameter; raises UnknownName."""
+        reply = self.request("get_parameter", parameter=parameter(name).id)
+        return self.parameter_value(name, reply["value"])
+
+    def set_parameter(self, name: str, value: units.Value) -> ParameterValue:
+        """Sets one parameter and returns its new value, which is the nearest count.
+
+        `value` is a number in the unit of get_parameter(), or a text with a unit. Raises
+        UnknownName, OutOfRange, or Refused.
+        """
+        counts = self.parameter_counts(name, value)
+        if name in TRAVEL:
+            limits = {limit: self.get_parameter(limit).counts for limit in TRAVEL}
+            self.check_travel({**limits, name: counts})
+        return self.write_parameter(name, counts)
+
+    def write_parameter(self, name: str, counts: int) -> ParameterValue:
+        """Sets one parameter in counts; only the node checks the value."""
+        try:
+            self.request("set_parameter", parameter=parameter(name).id, value=counts)
+        except Refused as refused:
+            value = self.parameter_value(name, counts)
+            raise with_more(refused, f"{name} {value.written(6)}") from None
+        if name == "period":
+            self.period_nm = self.read_period()
+        return self.parameter_value(name, counts)
+
+    def check_travel(self, counts: Mapping[str, int], period_nm: Fraction | None = None) -> None:
+        """Raises OutOfRange when the upper end of the travel lies below the lower end."""
+        if counts["travel_high"] < counts["travel_low"]:
+            low, high = (
+                self.parameter_value(name, counts[name], period_nm).written(9) for name in TRAVEL
+            )
+            raise OutOfRange(f"travel_high ({high}) would lie below travel_low ({low})")
+
+    def parameters(self) -> dict[str, ParameterValue]:
+        """All parameters, by name."""
+        return {name: self.get_parameter(name) for name in PARAMETERS}
+
+    def save_parameters(self) -> dict[str, str]:
+        """All parameters as exact texts, ready for a JSON file."""
+        return {name: value.written() for name, value in self.parameters().items()}
+
+    def load_parameters(self, texts: Mapping[str, units.Value]) -> dict[str, ParameterValue]:
+        """Sets some or all parameters from the texts of save_parameters().
+
+        Every one is checked before the first is written. The period is written first, since
+        lengths depend on it.
+        """
+        return {
+            name: self.write_parameter(name, counts)
+            for name, counts in self.check_parameters(texts).items()
+        }
+
+    def check_parameters(self, texts: Mapping[str, units.Value]) -> dict[str, int]:
+        """The counts of some or all parameters, the period first, without writing any.
+
+        Raises OutOfRange or UnknownName when they cannot be loaded.
+        """
+        period_nm = self.period_nm
+        if "period" in texts:
+            period_nm = Fraction(self.parameter_counts("period", texts["period"]), 1000)
+        counts = {
+            name: self.parameter_counts(name, texts[name], period_nm)
+            for name in sorted(texts, key=lambda name: name != "period")
+        }
+        if all(name in counts for name in TRAVEL):
+            self.check_travel(counts, period_nm)
+        return counts
+
+    def set_tuning(self, tuning: Tuning) -> None:
+        """Sets the gains and filters that moire.analysis.tune made.
+
+        Filters that the tuning does not use are switched off.
+        """
+        if len(tuning.filters) > FILTERS:
+            raise OutOfRange(f"the servo has {FILTERS} filters, the tuning {len(tuning.filters)}")
+        self.write_parameter("filters", 0)
+        for name in GAINS:
+            self.write_parameter(name, getattr(tuning, name))
+        for number, coefficients in enumerate(tuning.filters, 1):
+            for name, value in zip(FILTER, coefficients, strict=True):
+                self.write_parameter(f"filter_{number}_{name}", value)
+        self.write_parameter("filters", (1 << len(tuning.filters)) - 1)
