@@ -50,7 +50,10 @@ def commission(call: Call, file: str) -> None:
     """All that a new sensor needs."""
     axis = call.switch_on()
     if not axis.status().homed:
-        axis.home(call.progress())
+        try:
+            axis.home(call.progress())
+        finally:
+            call.end_progress()
     run_calibration(call)
     save_correction(axis, file)
 
