@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Makes docs/commands, one page a command of `moire`, of the parser of the command line."""
+"""Makes docs/commands, one page per command of `moire`, from the commands themselves."""
 
-import argparse
 import sys
 from pathlib import Path
 
-from moire.cli.command_line import EXAMPLES, common_options, make_parser
+import click
+
+from moire.cli.command_line import moire
+from moire.cli.options import COMMON, Common
+from moire.cli.parser import EXAMPLES, SECTIONS, Several
 from tables import made_files
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -13,109 +16,70 @@ PAGES = ROOT / "docs" / "commands"
 
 HEAD = [
     "<!-- SPDX-License-Identifier: Apache-2.0 -->",
-    "<!-- Made by tables/commands.py of the parser in sw/host/moire: do not edit. -->",
+    "<!-- Made by tables/commands.py from sw/host/moire/cli: do not edit. -->",
 ]
-COMMON = {option for action in common_options()._actions for option in action.option_strings}
 
 
-def below(parser) -> dict:
-    """Parsers of the commands, or of the actions of a command, by name."""
-    found = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
-    return found[0].choices if found else {}
+def below(command: click.Command) -> dict:
+    """The commands of a group by name; none if the command is no group."""
+    return command.commands if isinstance(command, click.Group) else {}
 
 
 def words(text: str) -> str:
-    return text.replace("%%", "%").replace("|", "\\|")
+    return text.replace("|", "\\|")
 
 
-def name_of(action) -> str:
-    value = action.metavar or (
-        ",".join(map(str, action.choices)) if action.choices else action.dest.upper()
-    )
-    if not action.option_strings:
-        return value + {"*": " …", "+": " …"}.get(action.nargs, "")
-    return action.option_strings[-1] + (
-        "" if action.nargs == 0 else f" {value}" + (" …" if action.nargs == "+" else "")
-    )
+def name_of(parameter: click.Parameter) -> str:
+    """A parameter as a user writes it; what may be left out is in brackets."""
+    value = parameter.metavar or parameter.human_readable_name
+    if isinstance(parameter, click.Option):
+        value = parameter.opts[-1] + ("" if parameter.is_flag else f" {value}")
+    more = " …" if parameter.nargs == -1 or isinstance(parameter, Several) else ""
+    return value + more if parameter.required else f"[{value}{more}]"
 
 
-def arguments(actions) -> list:
-    """A table of them; what is in brackets may be left out."""
-    rows = []
-    for action in actions:
-        may_miss = action.option_strings and not action.required or action.nargs in ("?", "*")
-        rows.append(
-            f"| `{f'[{name_of(action)}]' if may_miss else name_of(action)}` | {words(action.help or '')} |"
-        )
+def table(parameters) -> list:
+    rows = [f"| `{name_of(each)}` | {words(each.help)} |" for each in parameters]
     return ["", "| argument | |", "| --- | --- |", *rows] if rows else []
 
 
-def own(parser) -> list:
-    return [
-        action
-        for action in parser._actions
-        if not isinstance(action, argparse._SubParsersAction)
-        and not COMMON & set(action.option_strings)
-        and action.dest != "help"
-    ]
+def own(command: click.Command) -> list:
+    """The parameters of a command without the options of every command."""
+    return [each for each in command.params if not isinstance(each, Common)]
 
 
-def section(parser) -> list:
-    out = [parser.description]
-    if parser.epilog:
-        out += ["", "    " + words(parser.epilog).removeprefix("example: ")]
-    return out + arguments(own(parser))
+def section(command: click.Command) -> list:
+    return [command.help, "", f"    {command.example}", *table(own(command))]
 
 
-def page(name: str, parser) -> str:
-    out = [*HEAD, f"# moire {name}", "", *section(parser)]
-    for action, part in below(parser).items():
+def page(name: str, command: click.Command) -> str:
+    out = [*HEAD, f"# moire {name}", "", *section(command)]
+    for action, part in below(command).items():
         out += ["", f"## {name} {action}", "", *section(part)]
     return "\n".join([*out, ""])
 
 
-def first_page(parser) -> str:
-    rows = [
-        f"| [`{name}`]({name}.md) | {words(made.description)} |"
-        for name, made in below(parser).items()
-    ]
-    common = [action for action in common_options()._actions if action.option_strings]
-    return "\n".join(
-        [
-            *HEAD,
-            "# The commands of moire",
-            "",
-            parser.description,
-            "",
-            "| command | |",
-            "| --- | --- |",
-            *rows,
-            "",
-            "## With every command",
-            *arguments(common),
-            "",
-            "## How they go together",
-            "",
-            "```",
-            EXAMPLES.strip(),
-            "```",
-            "",
-        ]
-    )
+def first_page() -> str:
+    out = [*HEAD, "# The commands of moire", "", moire.help]
+    for title, names in SECTIONS.items():
+        out += ["", f"## {title}", "", "| command | |", "| --- | --- |"]
+        out += [f"| [`{name}`]({name}.md) | {words(moire.commands[name].help)} |" for name in names]
+    out += ["", "## Options of every command", *table(COMMON)]
+    out += ["", "## How they go together", "", "```", EXAMPLES.strip(), "```", ""]
+    return "\n".join(out)
 
 
 def pages() -> dict:
-    parser = make_parser()
     return {
-        PAGES / "README.md": first_page(parser),
-        **{PAGES / f"{name}.md": page(name, made) for name, made in below(parser).items()},
+        PAGES / "README.md": first_page(),
+        **{PAGES / f"{name}.md": page(name, command) for name, command in below(moire).items()},
     }
 
 
 def made() -> dict:
-    """{path: text}, None of a page whose command is gone."""
-    wanted = pages()
-    return wanted | dict.fromkeys(set(PAGES.glob("*.md")) - set(wanted))
+    """{path: text}; the text is None for the page of a command that no longer exists."""
+    fresh = pages()
+    return fresh | dict.fromkeys(set(PAGES.glob("*.md")) - set(fresh))
 
 
 def main(arguments=None) -> int:

@@ -55,7 +55,7 @@ def rfc2217_reads_per_s(seconds=READ_S):
     command = [
         sys.executable,
         "-m",
-        "moire.cli.command_line",
+        "moire",
         "twin",
         "--nodes",
         "1",

@@ -26,6 +26,9 @@ from moire.analysis import harmonic_fit as calibration
 from moire.bus import cobs, protocol, recording, rfc2217
 from moire.bus.transport import Transport
 from moire.cli import command_line
+from moire.cli.commands.params import read_parameters
+from moire.cli.commands.tune import read_record
+from moire.cli.options import Options
 from moire.client import relay
 from moire.client.axis import Axis
 from moire.errors import MoireError
@@ -118,9 +121,8 @@ def quantities(data):
 
 
 def command(data):
-    options = command_line.argparse.Namespace(**command_line.DEFAULTS)
     try:
-        command_line.parse_line(text_of(data), options)
+        command_line.parse_line(text_of(data), Options())
     except SystemExit as end:
         assert end.code == 0, "only --help ends the program here"
 
@@ -138,14 +140,14 @@ def parameters(data):
     axis = object.__new__(Axis)
     axis.period_nm = Fraction(800)
     with standard_input(data) as file:
-        texts, _ = command_line.read_parameters(file)
+        texts, _ = read_parameters(file)
     for name, text in texts.items():
         axis.parameter_counts(name, text)
 
 
 def tuning_record(data):
     with standard_input(data) as file:
-        command_line.read_record(file)
+        read_record(file)
 
 
 def readings(data):

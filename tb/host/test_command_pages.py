@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from moire.cli import command_line
+from moire.cli.parser import SECTIONS
 from tables import commands as generator
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -17,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def test_the_made_pages_are_fresh_and_there_is_one_for_each_command():
     assert generator.main(["--check"]) == 0
-    names = set(generator.below(command_line.make_parser()))
+    names = set(command_line.moire.commands)
     assert {path.stem for path in generator.PAGES.glob("*.md")} == names | {"README"}
     assert names >= {
         "find",
@@ -56,15 +57,33 @@ def test_a_stale_page_and_one_of_no_command_are_found_and_put_right(tmp_path, mo
 
 
 def test_every_argument_of_every_command_is_on_its_page():
-    for name, parser in generator.below(command_line.make_parser()).items():
+    for name, command in command_line.moire.commands.items():
         text = (generator.PAGES / f"{name}.md").read_text()
-        for part in [parser, *generator.below(parser).values()]:
-            assert part.description in text
-            for action in generator.own(part):
-                assert (
-                    f"`{generator.name_of(action)}`" in text
-                    or f"`[{generator.name_of(action)}]`" in text
-                )
+        for part in [command, *generator.below(command).values()]:
+            assert part.help in text and f"    {part.example}\n" in text
+            for parameter in generator.own(part):
+                assert f"| `{generator.name_of(parameter)}` | " in text
+    move = (generator.PAGES / "move.md").read_text()
+    assert "| `LENGTH` | " in move and "| `[--by]` | " in move
+    assert "| `[--nodes N …]` | " in (generator.PAGES / "twin.md").read_text()
+    assert "| `--bandwidth FREQUENCY` | " in (generator.PAGES / "tune.md").read_text()
+
+
+def every_command():
+    for command in command_line.moire.commands.values():
+        yield from [command, *generator.below(command).values()]
+
+
+def test_every_help_text_is_a_full_sentence():
+    for command in every_command():
+        for text in [command.help, *(parameter.help for parameter in generator.own(command))]:
+            assert text[0] in "0123456789" or text[0].isupper() or ":" in text, text
+            assert text.endswith("."), text
+
+
+def test_the_sections_of_the_help_name_every_command_once():
+    names = [name for names in SECTIONS.values() for name in names]
+    assert sorted(names) == sorted(command_line.moire.commands)
 
 
 def written_commands():
@@ -83,4 +102,4 @@ def written_commands():
 @pytest.mark.parametrize("line", list(written_commands()))
 def test_every_command_on_a_page_is_understood(line):
     arguments = shlex.split(line, comments=True)[1:]
-    assert command_line.parse(arguments, command_line.DEFAULTS)
+    assert command_line.parse_call(arguments)

@@ -3,16 +3,22 @@
 that says what is allowed.
 """
 
+import importlib.metadata
 import io
 import json
+import os
+import select
+import subprocess
 import sys
+import threading
+import time
 
 import pytest
 
 from experiments import machines
 from moire.analysis import tune
-from moire.cli import command_line
-from moire.cli.twin import MACHINES
+from moire.bus.twin_port import MACHINES
+from moire.cli import command_line, completion, shell
 from moire.errors import PortError
 from moire.made.bus_tables import PARAMETERS
 from tb.fakes.fake_node import CAUSE, ESTOP, FakeBus, FakeNode
@@ -75,7 +81,8 @@ def test_drives_are_switched_off_after_an_error_too():
 def test_options_of_the_first_command_hold_for_all_and_may_be_given_again():
     nodes = FakeNode(1), FakeNode(2, axes=2)
     call = Call(
-        "--address 2 home --axis 1 -- status -- status --axis 0 -- status --address 1 --axis 0 --json",
+        "--address 2 home --axis 1 -- status -- status --axis 0 "
+        "-- status --address 1 --axis 0 --json",
         *nodes,
     )
     assert [(told["address"], told["axis"]) for told in call.told] == [
@@ -126,12 +133,12 @@ def test_a_node_without_sine_and_cosine_says_so():
     call = Call("status -- encoder", node)
     assert (
         call.out.count("counts only: built without sine and cosine") == 2
-        and "converter counts" not in call.out
+        and "ADC counts" not in call.out
     )
     assert [told["sine"] for told in Call("status -- encoder --json", node).told] == [False, False]
     assert "built without this function" in sentence(Call("signal", node), 1)
     call = Call("status -- encoder")
-    assert "without" not in call.out and "converter counts" in call.out
+    assert "without" not in call.out and "ADC counts" in call.out
 
 
 def test_registers_by_address_and_by_name():
@@ -140,8 +147,8 @@ def test_registers_by_address_and_by_name():
     call = Call("register 0x110 272 bus.frames_good axis.control", node)
     assert call.code == 0
     assert (
-        "0x110 = 0x00000102 258\n272 = 0x00000102 258\nbus.frames_good: value = 258\naxis.control: enable = 1"
-        in call.out
+        "0x110 = 0x00000102 258\n272 = 0x00000102 258\n"
+        "bus.frames_good: value = 258\naxis.control: enable = 1" in call.out
     )
     assert "axis.position" in Call("register").out
     assert Call("register 0x110 --json", node).told[0]["registers"] == {"0x110": 258}
@@ -192,7 +199,8 @@ def test_two_axes_begin_together():
 def test_a_motion_is_slowed_paused_resumed_and_awaited():
     node = FakeNode()
     call = Call(
-        "home -- override 50% -- move 1mm --no-wait -- pause -- wait 20s -- resume -- finish -- override",
+        "home -- override 50% -- move 1mm --no-wait -- pause -- wait 20s "
+        "-- resume -- finish -- override",
         node,
     )
     assert call.code == 0, call.err
@@ -352,6 +360,31 @@ def test_errors_are_json_too():
     )
 
 
+@pytest.mark.parametrize(
+    "text, command",
+    [
+        ("status -- move 1", "move"),
+        ("fly", "fly"),
+        ("params get speed", "params"),
+        ("params fly", "params"),
+        ("--baud 0 status", "status"),
+        ("move 1mm --address", "move"),
+        ("status -- shell", "shell"),
+        ("", None),
+    ],
+)
+def test_a_usage_error_names_its_command(text, command):
+    (told,) = Call(["--json", *text.split()] if text else ["--json", "--"]).told
+    assert told["command"] == command and told["error"] == "UsageError" and told["exit_code"] == 2
+
+
+def test_no_value_of_an_answer_overwrites_the_name_of_the_command():
+    node = FakeNode()
+    node.registers.update({0x1400: 1 | 0b0111 << 2, 0x1420: 25, 0x143C: 0})
+    told = Call("drive --json", node).told[0]
+    assert told["command"] == "drive" and told["drive_command"] == 0 and told["steps"] == 25
+
+
 # ------------------------------------------------------------------ errors and exit codes
 
 
@@ -361,10 +394,16 @@ def test_errors_are_json_too():
         ("", "a command is missing"),
         ("status --", "a command is missing beside --"),
         ("-- status", "a command is missing beside --"),
-        ("fly", "invalid choice: 'fly' (choose from"),
+        ("fly", "there is no command 'fly' (see: moire --help)"),
+        ("hom", "there is no command 'hom', did you mean home?"),
+        ("capture reed", "there is no command 'reed', did you mean read?"),
+        ("status --adress 2", "there is no option '--adress', did you mean --address?"),
+        ("move 1mm 2mm", "'2mm' is one argument too many (see: moire move --help)"),
+        ("status --port", "requires an argument"),
+        ("job load", "give either FILE or --equal N"),
         ("move 1", "'1' has no unit: write a number with pm nm um mm cm m"),
         ("move fast", "'fast' is no length"),
-        ("move", "required: LENGTH"),
+        ("move", "LENGTH is missing"),
         ("wait 5mm", "'5mm' is no time: write a number with ns us ms s min, such as 20ms"),
         ("wait -1s", "in the past"),
         ("status --address 16", "'16' is no address: allowed are 1 to 15"),
@@ -372,17 +411,18 @@ def test_errors_are_json_too():
         ("find 0", "allowed are 1 to 15"),
         ("status --axis -1", "'-1' is no axis: the first is 0"),
         ("status --baud 0", "'0' is no whole number above 0"),
-        ("status --parity even", "invalid choice: 'even'"),
-        ("params", "required: ACTION"),
-        ("params get speed", "invalid choice: 'speed' (choose from"),
-        ("params set velocity", "required: VALUE"),
+        ("status --parity even", "there is no parity 'even': allowed are auto, mark, odd, none"),
+        ("params", "an ACTION is missing (see: moire params --help)"),
+        ("params get speed", "there is no parameter 'speed': 'moire params list' lists all"),
+        ("params get velocty", "did you mean velocity or velocity_quantum?"),
+        ("params set velocity", "VALUE is missing"),
         ("params set velocity 900mm/s", "velocity allows 800nm/s to 800mm/s, not 900mm/s"),
         ("params set velocity 5mm", "'5mm' is no speed"),
         ("params set kp x", "'x' is no number: write a plain number, such as 0.5"),
         ("override 120%", "'120%' is no share of full speed: write 0% to 100%, or 0 to 1"),
         ("home --method zero", "'zero' is no method: allowed are a number of CiA 402, s0, s3"),
-        ("start", "required: AXIS"),
-        ("tune record.csv", "required: --bandwidth"),
+        ("start", "AXIS is missing"),
+        ("tune record.csv", "--bandwidth is missing"),
         ("tune /no/such/file --bandwidth 40Hz", "cannot be read"),
         ("register axis.speed", "there is no register 'axis.speed'"),
         ("register 0x401", "multiples of 4"),
@@ -390,7 +430,7 @@ def test_errors_are_json_too():
         ("params load /no/such/file", "the file /no/such/file cannot be read: No such file"),
         ("params save /no/such/file", "cannot be written"),
         ("run /no/such/file", "cannot be read"),
-        ("status -- shell", "'shell' stands alone"),
+        ("status -- shell", "'shell' must be the only command of its call"),
     ],
 )
 def test_wrong_usage_is_one_sentence_and_exit_code_2(text, said):
@@ -487,7 +527,7 @@ def test_a_simulated_machine_that_does_not_exist_is_named():
     assert "--nodes is for s0: the nodes of s2 have their addresses" in sentence(
         Call("twin --machine s2 --nodes 1"), 2
     )
-    assert "invalid choice: 's9'" in sentence(Call("twin --machine s9"), 2)
+    assert "there is no machine 's9'" in sentence(Call("twin --machine s9"), 2)
 
 
 def test_another_build_is_exit_code_5():
@@ -531,6 +571,44 @@ def test_ctrl_c_in_another_command_stops_what_moves_too():
     assert node.axes[0].target != 100_000_000 * 65536 // 800
 
 
+def test_an_output_that_nobody_reads_any_more_stops_the_axis():
+    node = FakeNode()
+    node.axes[0].homed = True
+    reader, writer = os.pipe()
+    os.close(reader)
+    with pytest.raises(BrokenPipeError), os.fdopen(writer, "w") as out:
+        out.write("x")
+        out.flush()
+    reader, writer = os.pipe()
+    os.close(reader)
+    err, out = io.StringIO(), os.fdopen(writer, "w")
+    arguments = ["move", "100mm", "--no-wait"]
+    bus = FakeBus(node)
+    assert command_line.main(arguments, lambda _: bus, out, err) == 0 and err.getvalue() == ""
+    assert "stop" in node.executed and node.axes[0].ended == "stopped" and bus.closed
+
+
+def test_a_full_disk_is_one_sentence_and_stops_the_axis():
+    node, err = FakeNode(), io.StringIO()
+    node.axes[0].homed = True
+    for more in ([], ["--json"]):
+        with open("/dev/full", "w") as out:
+            arguments = ["move", "100mm", "--no-wait", *more]
+            assert command_line.main(arguments, lambda _: FakeBus(node), out, err) == 2
+        assert node.axes[0].ended == "stopped" and not node.axes[0].enabled
+    sentence = "moire: the output cannot be written: No space left on device\n"
+    assert err.getvalue() == 2 * sentence
+
+
+@pytest.mark.parametrize("arguments", [["register"], ["--help"], ["register", "--json", "x"]])
+def test_a_program_whose_output_cannot_be_written_ends_without_a_traceback(arguments):
+    with open("/dev/full", "w") as out:
+        ended = subprocess.run(
+            [sys.executable, "-m", "moire", *arguments], stdout=out, stderr=subprocess.PIPE
+        )
+    assert ended.returncode == 2 and ended.stderr.count(b"\n") == 1
+
+
 def test_baud_and_parity_reach_the_port():
     call = Call("status --baud 9600 --parity odd --port COM3")
     assert (call.options.port, call.options.baud, call.options.parity) == ("COM3", 9600, "odd")
@@ -547,6 +625,46 @@ def test_help_names_every_command_and_gives_examples(capsys):
         with pytest.raises(SystemExit) as left:
             command_line.main(arguments)
         assert left.value.code == 0 and said in capsys.readouterr().out
+
+
+def test_the_version_is_the_one_of_the_package(capsys):
+    with pytest.raises(SystemExit) as left:
+        command_line.main(["--version"])
+    assert left.value.code == 0
+    assert capsys.readouterr().out == f"moire {importlib.metadata.version('moire')}\n"
+
+
+def test_help_loads_neither_numpy_nor_matplotlib():
+    program = (
+        "import sys; from moire.cli import command_line\n"
+        "try: command_line.main(['tune', '--help'])\n"
+        "finally: print({'numpy', 'matplotlib', 'serial'} & set(sys.modules))"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert ended.returncode == 0 and ended.stdout.splitlines()[-1] == "set()"
+
+
+@pytest.mark.parametrize(
+    "typed, offered",
+    [
+        ("moire mov", {"move"}),
+        ("moire home -- move 1mm -- stat", {"status"}),
+        ("moire home -- move 1mm --b", {"--by", "--baud"}),
+        ("moire --port twin params get veloc", {"velocity", "velocity_quantum"}),
+        ("moire params re", {"restore-defaults"}),
+        ("moire status --parity m", {"mark"}),
+    ],
+)
+def test_bash_completes_the_last_command_of_a_chain(typed, offered):
+    words = {"COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split()) - 1)}
+    ended = subprocess.run(
+        [sys.executable, "-m", "moire"],
+        env={**os.environ, **words, "_MOIRE_COMPLETE": "bash_complete"},
+        capture_output=True,
+        text=True,
+    )
+    assert {row.removeprefix("plain,") for row in ended.stdout.split()} == offered
+    assert set(completion.candidates(typed.removeprefix("moire "))) == offered
 
 
 # ------------------------------------------------------------------ files and the shell
@@ -569,7 +687,7 @@ def test_a_file_of_commands_is_carried_out(tmp_path):
     "text, said",
     [
         ("home\nmove 1\n", "line 2 of"),
-        ("shell\n", "cannot stand inside a file"),
+        ("shell\n", "'shell' is not allowed in a file or a shell"),
         ("status --baud 9600\n", "--baud holds for the whole call"),
         ("move '1mm\n", "cannot be read: No closing quotation"),
     ],
@@ -618,6 +736,101 @@ def test_commands_from_a_pipe_end_at_the_first_error(monkeypatch):
     assert "move" not in node.executed
 
 
+def test_ctrl_c_in_the_shell_stops_what_moves(monkeypatch):
+    class Keyboard:
+        def isatty(self):
+            return True
+
+        def __iter__(self):
+            yield from ("home\n", "move 100mm --no-wait\n")
+            raise KeyboardInterrupt
+
+    node = FakeNode()
+    monkeypatch.setattr(sys, "stdin", Keyboard())
+    call = Call("shell", node)
+    assert call.code == 0 and "stopped" in call.err and node.axes[0].ended == "stopped"
+
+
+def test_the_shell_has_help(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "stdin", io.StringIO("help move\nhelp\n"))
+    assert Call("shell").code == 0
+    said = capsys.readouterr().out
+    assert "Usage: moire move" in said and "Usage: moire [OPTIONS] COMMAND" in said
+
+
+SHELL_AT_A_TERMINAL = """
+import sys
+from moire.cli import command_line
+from tb.fakes.fake_node import FakeBus, FakeNode
+sys.exit(command_line.main(["shell"], lambda _: FakeBus(FakeNode())))
+"""
+
+
+def test_a_terminal_has_line_editing_completion_and_history(tmp_path):
+    pty = pytest.importorskip("pty")
+    pytest.importorskip("readline")
+    person, terminal = pty.openpty()
+    program = subprocess.Popen(
+        [sys.executable, "-c", SHELL_AT_A_TERMINAL],
+        stdin=terminal,
+        stdout=terminal,
+        stderr=terminal,
+        env={**os.environ, "HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path)},
+    )
+    os.close(terminal)
+    seen = b""
+
+    def until(text):
+        nonlocal seen
+        end = time.monotonic() + 60
+        while text not in seen and time.monotonic() < end:
+            if select.select([person], [], [], 0.1)[0]:
+                seen += os.read(person, 4096)
+        assert text in seen
+        seen = seen.partition(text)[2]
+
+    try:
+        until(b"moire> ")
+        os.write(person, b"sta\bat\t")  # a typing error taken back, then the Tab key
+        until(b"atus ")
+        os.write(person, b"\n")
+        until(b"drive off")
+        until(b"moire> ")
+        os.write(person, b"\x1b[A --json\n")  # the line before, and more
+        until(b'"command": "status"')
+        until(b"moire> ")
+        os.write(person, b"quit\n")
+        assert program.wait(60) == 0
+    finally:
+        program.kill()
+        os.close(person)
+    (history,) = tmp_path.rglob("history")
+    assert [line.split() for line in history.read_text().splitlines()][-3:] == [
+        ["status"],
+        ["status", "--json"],
+        ["quit"],
+    ]
+
+
+def test_a_shell_whose_node_falls_silent_ends(monkeypatch):
+    class Keyboard:
+        def isatty(self):
+            return True
+
+        def __iter__(self):
+            yield "enable\n"
+            bus.nodes = ()
+            for _ in range(500):
+                threading.Event().wait(0.01)
+                yield "\n"
+
+    bus = FakeBus(FakeNode())
+    bus.time_is_stopped = False
+    monkeypatch.setattr(sys, "stdin", Keyboard())
+    monkeypatch.setattr(shell, "KEEP_ALIVE_S", 0.001)
+    assert "nobody answers" in Call("shell", bus=bus).err
+
+
 def test_a_person_may_mistype_in_the_shell(monkeypatch):
     class Keyboard(io.StringIO):
         def isatty(self):
@@ -645,13 +858,11 @@ def test_a_waiting_shell_talks_on_a_line_whose_time_runs(monkeypatch):
                 threading.Event().wait(0.01)
             yield "quit\n"
 
-    import threading
-
     node = FakeNode()
     bus = FakeBus(node)
     bus.time_is_stopped = False
     monkeypatch.setattr(sys, "stdin", Keyboard())
-    monkeypatch.setattr(command_line, "KEEP_ALIVE_S", 0.01)
+    monkeypatch.setattr(shell, "KEEP_ALIVE_S", 0.01)
     assert Call("shell", bus=bus).code == 0 and node.executed.count("status") >= 2
 
 

@@ -253,9 +253,7 @@ def test_calibrate_save_clear_load_on_the_command_line(tmp_path):
     node, file = FakeNode(), str(tmp_path / "correction.json")
     call = Call("home -- calibrate --distance 80um --timeout 1min -- correction show", node)
     assert (
-        call.code == 0
-        and "correction learned in" in call.out
-        and "known to 0.020 nm, frozen" in call.out
+        call.code == 0 and "calibrated in" in call.out and "known to 0.020 nm, frozen" in call.out
     )
     assert "harmonics of the phase, nm: 1: 0.000" in call.out and not node.axes[0].enabled
     node.axes[0].correction["sin_offset"] = 77
@@ -314,7 +312,7 @@ def test_signal_capture_and_compare_on_the_command_line():
         and "captures from tick, software" in call.out
         and "captures from nothing" in call.out
     )
-    assert "1 captures\n  0.000800 mm at clk 1000, its sample 0.00 us before: tick" in call.out
+    assert "1 captures\n  0.000800 mm at cycle 1000, its sample 0.00 us before: tick" in call.out
     node.registers.update({0xC94: 1, 0xC98: 2})
     assert "under way, 2 points passed" in Call("compare show", node).out
     call = Call("compare from -1mm 10um --count 3 -- compare off", node)
@@ -354,10 +352,10 @@ def test_each_command_prints_one_json_object_in_a_line(text):
         ("calibrate --distance 1", "has no unit"),
         ("calibrate --distance 0mm", "not above zero"),
         ("calibrate --timeout -1s", "not above zero"),
-        ("correction", "required: ACTION"),
+        ("correction", "an ACTION is missing"),
         ("correction load /no/such/file", "cannot be read"),
-        ("capture from probe", "no capture source 'probe'"),
-        ("compare from 1mm", "required: STEP"),
+        ("capture from probe", "there is no source 'probe'"),
+        ("compare from 1mm", "STEP is missing"),
         ("compare from 1mm 0mm", "the step not zero"),
         ("compare from 1mm 1um --count 0", "no whole number above 0"),
         ("compare from 1mm 1um --pulse 9s", "pulse and gap allow"),

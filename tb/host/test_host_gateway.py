@@ -333,7 +333,7 @@ def fake_twin(baud, machine, seed, nodes=(1, 2)):
 
 
 def test_ctrl_c_ends_a_served_twin_without_an_error(monkeypatch):
-    monkeypatch.setattr("moire.cli.twin.open_twin", fake_twin)
+    monkeypatch.setattr("moire.cli.commands.twin.open_twin", fake_twin)
 
     def interrupt(*_):
         raise KeyboardInterrupt
@@ -347,7 +347,7 @@ def test_ctrl_c_ends_a_served_twin_without_an_error(monkeypatch):
 
 
 def test_the_ports_are_printed_as_json(monkeypatch, tmp_path):
-    monkeypatch.setattr("moire.cli.twin.open_twin", fake_twin)
+    monkeypatch.setattr("moire.cli.commands.twin.open_twin", fake_twin)
     out, link = io.StringIO(), tmp_path / "link"
     arguments = [
         "twin",

@@ -122,7 +122,7 @@ def test_the_commands_do_a_whole_job(tmp_path):
     workshop, file = Workshop(), tmp_path / "read.csv"
     assert workshop.call("job load --equal 4")[:2] == (
         0,
-        "4 stations from 0arcsec to 270deg, kept in the EEPROM\n",
+        "4 stations from 0arcsec to 270deg, saved in the EEPROM\n",
     )
     assert (
         workshop.call(f"job read {file}")[0] == 0

@@ -3,7 +3,6 @@
 every refusal.
 """
 
-import argparse
 import math
 import random
 from types import SimpleNamespace
@@ -14,7 +13,8 @@ import pytest
 from moire.analysis.harmonic_fit import fit, read_readings
 from moire.bus.protocol import NINTH
 from moire.bus.transport import Transport
-from moire.cli import relay as command_relay
+from moire.cli import command_line
+from moire.cli.session import Call, Session
 from moire.client.relay import (
     COUNTS,
     FIRST,
@@ -319,19 +319,13 @@ def call(transport, *words):
     """Runs a command as the command line does; returns what it prints."""
     said = []
 
-    def command(name, handler, text, example, group):
-        made = group.add_parser(name)
-        made.set_defaults(handler=handler)
-        return made
+    class Heard(Call):
+        def say(self, values, text):
+            said.append((values, text))
 
-    parser = argparse.ArgumentParser()
-    command_relay.add_to(parser.add_subparsers(), command)
-    options = parser.parse_args(words)
-    session = SimpleNamespace(
-        bus=SimpleNamespace(transport=transport),
-        say=lambda reported, text: said.append((reported, text)),
-    )
-    options.handler(session, options)
+    (planned,) = command_line.parse_call(["relay", *words])
+    session = Session(planned.options, lambda options: transport)
+    planned.handler(Heard(session, planned), **planned.arguments)
     return said[0]
 
 
@@ -360,7 +354,7 @@ def test_relay_calibrate_writes_saves_and_draws(tmp_path):
         reported["orders"] == K
         and reported["before"] == pytest.approx(80)
         and reported["left"] < 0.01
-        and "kept in flash" in text
+        and "saved in flash" in text
     )
     assert (
         transport.set.identity == identity_of(whole)

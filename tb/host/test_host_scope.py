@@ -131,6 +131,9 @@ def test_commands_arm_move_and_read_in_one_call(tmp_path):
     )
     reported = Call(["scope", "arm", "--", "scope", "read", str(file), "--json"], node).told[1]
     assert reported["before"] == 0 and len(reported["position_nm"]) == 12
+    assert (reported["command"], reported["action"]) == ("scope", "read") and len(
+        reported["drive_command"]
+    ) == 12
 
 
 def test_a_scope_without_a_record_is_exit_code_1(tmp_path):

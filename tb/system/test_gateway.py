@@ -34,7 +34,7 @@ def served(*arguments):
     command = [
         sys.executable,
         "-m",
-        "moire.cli.command_line",
+        "moire",
         "twin",
         *arguments,
         "--rfc2217",

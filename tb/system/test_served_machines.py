@@ -6,7 +6,7 @@ experiment.
 import pytest
 
 from experiments.machines import MACHINES
-from moire.cli import twin as command_twin
+from moire.bus import twin_port
 from tb.system.test_gateway import moire, served
 
 pytestmark = pytest.mark.filterwarnings(
@@ -15,7 +15,7 @@ pytestmark = pytest.mark.filterwarnings(
 
 
 def test_the_machines_that_are_told_are_those_that_are_made():
-    assert list(command_twin.MACHINES) == list(MACHINES)
+    assert list(twin_port.MACHINES) == list(MACHINES)
 
 
 @pytest.mark.parametrize(

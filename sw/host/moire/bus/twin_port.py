@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 PORT = "twin"
 DEFAULT = "s0"
 MACHINES = {  # made by experiments.machines
-    "s0": "X-Y stage with a grating interferometer, a node an axis",
-    "s0_fine": "X axis of that with a piezo on its table",
+    "s0": "X-Y stage with a grating interferometer, one node per axis",
+    "s0_fine": "X axis of the stage s0 with a piezo on its table",
     "s2": "three stepper axes with scales in one node",
     "s3": "linear motor with a scale and its reference mark",
     "s4": "indexing table and wire-EDM machine, node 1 with the panel, node 2 with the table",

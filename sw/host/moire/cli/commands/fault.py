@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The commands that find what is wrong: fault, selftest."""
+
+from moire import units
+from moire.analysis import selftest as checks
+from moire.cli.commands.axis import table
+from moire.cli.parser import moire
+from moire.cli.session import Call
+from moire.client.records import Signal
+
+
+@moire.command(
+    "fault",
+    help="Show the latched faults, which of them came first and where, and what to do.",
+    example="moire --port /dev/ttyUSB0 fault -- reset",
+)
+def fault(call: Call) -> None:
+    """Clears nothing."""
+    axis = call.axis
+    status, encoder = axis.status(), axis.encoder()
+    signal = axis.signal() if axis.has_sine() else Signal((), ())
+    values = {
+        "faults": status.faults,
+        "first_fault": status.first_fault,
+        "words": status.fault_words,
+        "fault_position_nm": encoder.fault_position_nm if status.faults else None,
+        "encoder_events": status.encoder_events,
+        "signal_faults": signal.faults,
+        "first_signal_faults": signal.first,
+    }
+    if not status.faults:
+        call.say_of_axis(values, f"{call.where}: no fault is latched")
+        return
+    place = units.format_length(encoder.fault_position_nm)
+    rows = [("first", f"{status.first_fault_words}, at {place}")]
+    if status.encoder_events:
+        rows.append(("encoder", status.encoder_event_words))
+    if signal.first:
+        rows.append(("signal", signal.first_words))
+    home = "" if status.homed else ", then 'moire home'"
+    rows.append(("to do", f"remove the cause, then 'moire reset'{home}"))
+    call.say_of_axis(values, table(f"{call.where}: {status.fault_words}", rows, 9))
+
+
+@moire.command(
+    "selftest",
+    help="Check a node without moving anything.",
+    example="moire --port /dev/ttyUSB0 selftest",
+)
+def selftest(call: Call) -> None:
+    """Every check is made, even if one has failed."""
+    found, address = [], call.options.address
+    for check in checks.checks(call.node):
+        found.append(check)
+        if not call.options.json:
+            result = "passed" if check.passed else "FAILED"
+            call.say({}, f"{result:<8} {check.name:<18} {check.words}")
+    failed = [check.name for check in found if not check.passed]
+    if call.options.json:
+        reports = [check._asdict() for check in found]
+        call.say({"address": address, "passed": not failed, "checks": reports}, "")
+    if failed:
+        raise checks.SelfTestFailed(
+            f"node {address} failed {len(failed)} of {len(found)} checks: {', '.join(failed)}"
+        )

@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The commands about the parameters of an axis: params list, get, set, save, load, save-to-node,
+saved-in-node, restore-defaults.
+"""
+
+from dataclasses import asdict
+from typing import Any
+
+import click
+
+from moire.cli.files import read_json, write_json
+from moire.cli.parser import Group, moire
+from moire.cli.session import Call
+from moire.cli.values import FILE, TEXT, Name
+from moire.client.axis import Axis
+from moire.client.nonvolatile import SavedSettings
+from moire.client.segments import Segments
+from moire.client.values import ParameterValue
+from moire.client.values import whole as is_whole
+from moire.errors import BadFile, Refused
+from moire.made.bus_tables import PARAMETERS
+
+NAME = Name("parameter", PARAMETERS, "params list")
+
+group = Group(
+    "params",
+    help="Show, set, save and load the parameters of an axis.",
+    example="moire --port /dev/ttyUSB0 params set velocity 5mm/s -- params save stage.json",
+)
+moire.add_command(group)
+
+
+@group.command(
+    "list",
+    help="Show all parameters with their values, units and ranges.",
+    example="moire --port twin params list",
+)
+def show_all(call: Call) -> None:
+    """In the order of the tables."""
+    axis = call.axis
+    say_parameters(call, [axis.get_parameter(name) for name in PARAMETERS])
+
+
+@group.command(
+    "get",
+    help="Show one or several parameters.",
+    example="moire --port twin params get velocity kp",
+)
+@click.argument(
+    "names",
+    nargs=-1,
+    required=True,
+    type=NAME,
+    metavar="NAME",
+    help="A name that 'moire params list' shows.",
+)
+def get(call: Call, names: tuple[str, ...]) -> None:
+    """In the order in which they are asked for."""
+    axis = call.axis
+    say_parameters(call, [axis.get_parameter(name) for name in names])
+
+
+@group.command(
+    "set",
+    help="Set one parameter.",
+    example="moire --port twin params set velocity 5mm/s",
+)
+@click.argument("name", type=NAME, metavar="NAME", help="A name that 'moire params list' shows.")
+@click.argument(
+    "value",
+    type=TEXT,
+    metavar="VALUE",
+    help="The value, with its unit if it has one: 5mm/s, 20ms, 20kHz, 0.5.",
+)
+def put(call: Call, name: str, value: str) -> None:
+    """The node reads it back."""
+    say_parameters(call, [call.axis.set_parameter(name, value)])
+
+
+@group.command(
+    "save",
+    help="Save all parameters, and the segment table if there is one, in a JSON file.",
+    example="moire --port twin params save stage.json",
+)
+@click.argument("file", type=FILE, metavar="FILE", help="The file to write.")
+def save(call: Call, file: str) -> None:
+    """For 'params load'."""
+    axis = call.axis
+    saved, points = axis.save_parameters(), segment_points(axis)
+    write_json(file, {"parameters": saved} | ({"segment_points": points} if points else {}))
+    call.say_of_axis(
+        {"file": file, "count": len(saved)}, f"{amount(saved, points)} saved in {file}"
+    )
+
+
+@group.command(
+    "load",
+    help="Load the parameters from a JSON file. All are checked before the first is written.",
+    example="moire --port twin params load stage.json",
+)
+@click.argument("file", type=FILE, metavar="FILE", help="The file of 'params save'.")
+def load(call: Call, file: str) -> None:
+    """The file need not have all parameters."""
+    texts, points = read_parameters(file)
+    axis = call.axis
+    if points:
+        axis.check_parameters(texts)
+        Segments(axis).write_points(points)
+    loaded = axis.load_parameters(texts)
+    call.say_of_axis(
+        {"file": file, "count": len(loaded)}, f"{amount(loaded, points)} loaded from {file}"
+    )
+
+
+@group.command(
+    "save-to-node",
+    help="Save the parameters of all axes and the settings in the EEPROM of the node, for its next "
+    "power-up.",
+    example="moire --port /dev/ttyUSB0 params save-to-node",
+)
+def save_to_node(call: Call) -> None:
+    """Returns when the EEPROM has been written."""
+    say_saved(call, SavedSettings(call.node).save())
+
+
+@group.command(
+    "restore-defaults",
+    help="Start with the default values at the next power-up of the node.",
+    example="moire --port /dev/ttyUSB0 params restore-defaults",
+)
+def restore_defaults(call: Call) -> None:
+    """What is in force now stays in force."""
+    say_saved(call, SavedSettings(call.node).restore_defaults())
+
+
+@group.command(
+    "saved-in-node",
+    help="Show whether the values saved in the node are in force, and why not.",
+    example="moire --port /dev/ttyUSB0 params saved-in-node",
+)
+def saved_in_node(call: Call) -> None:
+    """Since the power-up of the node."""
+    say_saved(call, SavedSettings(call.node).state())
+
+
+def say_parameters(call: Call, values: list[ParameterValue]) -> None:
+    """Print parameters with range and meaning."""
+    rows = [
+        f"{value.name:<19} {value.written(6):<14} {value.range_words:<32} {value.text}"
+        for value in values
+    ]
+    call.say_of_axis({"parameters": [parameter_values(value) for value in values]}, "\n".join(rows))
+
+
+def parameter_values(value: ParameterValue) -> dict[str, Any]:
+    """A parameter for JSON."""
+    return {
+        "name": value.name,
+        "value": value.value,
+        "unit": value.unit,
+        "written": value.written(),
+        "minimum": value.minimum,
+        "maximum": value.maximum,
+        "default": value.default,
+        "text": value.text,
+    }
+
+
+def say_saved(call: Call, state: Any) -> None:
+    """Print what the node has saved."""
+    call.say({**asdict(state), "words": state.words}, state.words)
+
+
+def amount(parameters: dict[str, Any], points: list[int]) -> str:
+    """What a file holds, in words."""
+    return f"{len(parameters)} parameters{' and a segment table' if points else ''}"
+
+
+def segment_points(axis: Axis) -> list[int]:
+    """The points of the segment table; none if the node was built without one."""
+    try:
+        return list(Segments(axis).read_points())
+    except Refused as refused:
+        if refused.cause != "not_built":
+            raise
+        return []
+
+
+def read_parameters(file: str) -> tuple[dict[str, str], list[int]]:
+    """The parameters in a file as text, and the points of its segment table in counts."""
+    content = read_json(file)
+    texts = content.get("parameters") if isinstance(content, dict) else None
+    if not isinstance(texts, dict) or not all(isinstance(text, str) for text in texts.values()):
+        raise BadFile(
+            f"the file {file} holds no parameters: it must look like "
+            '{"parameters": {"velocity": "5mm/s"}}'
+        )
+    points = content.get("segment_points", [])
+    if not isinstance(points, list) or not all(map(is_whole, points)):
+        raise BadFile(f"the segment_points in the file {file} are no list of whole numbers")
+    return texts, points

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command watch."""
+
+from dataclasses import asdict
+from fractions import Fraction
+from math import inf
+
+import click
+
+from moire.cli.parser import moire
+from moire.cli.session import Call
+from moire.cli.values import WAITING_TIME
+
+EVERY_S = 0.2
+
+
+@moire.command(
+    "watch",
+    help="Show the state and the position of an axis again and again.",
+    example="moire --port /dev/ttyUSB0 watch --every 0.5s",
+)
+@click.option(
+    "--every",
+    type=WAITING_TIME,
+    metavar="TIME",
+    help=f"The time from row to row, with its unit. The default is {EVERY_S}s.",
+)
+@click.option(
+    "--for",
+    "duration",
+    type=WAITING_TIME,
+    metavar="TIME",
+    help="The command ends after this time. Without it Ctrl-C ends the command.",
+)
+def watch(call: Call, every: Fraction | None, duration: Fraction | None) -> None:
+    """Polls between the rows too, so that the watchdog of the node leaves the drive on."""
+    axis, step_s = call.axis, float(every or EVERY_S)
+    began = shown = call.now()
+    end = inf if duration is None else began + float(duration)
+    while True:
+        status = axis.status()
+        if call.now() >= shown:
+            seconds = call.now() - began
+            error_nm = status.target_nm - status.position_nm
+            faults = f": {status.fault_words}" if status.faults else ""
+            call.say_of_axis(
+                {"time_s": seconds, **asdict(status)},
+                f"{seconds:9.3f} s  {status.position_nm / 1e6:14.6f} mm  "
+                f"error {error_nm:10.1f} nm  "
+                f"{status.velocity_mm_s:9.4f} mm/s  {status.words}{faults}",
+            )
+            shown = max(shown + step_s, call.now())
+        if call.now() >= end:
+            return
+        call.bus.transport.wait(min(call.bus.poll_s, max(0.0, min(shown, end) - call.now())))

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The options that every command takes."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import click
+from click.core import ParameterSource
+
+from moire.bus.protocol import ADDRESSES
+from moire.bus.transport import BAUD, PARITIES
+from moire.cli.values import ADDRESS, AXIS, FILE, POSITIVE, TEXT, Name
+
+OF_THE_PORT = ("port", "baud", "parity", "record")
+OF_THE_CALL = (*OF_THE_PORT, "json")
+GIVEN = "moire.given"  # key in the meta data of a context
+
+
+@dataclass(frozen=True)
+class Options:
+    """The values of the options of every command; the defaults hold where the user gives none."""
+
+    port: str | None = None
+    baud: int = BAUD
+    parity: str = "auto"
+    record: str | None = None
+    address: int = 1
+    axis: int = 0
+    json: bool = False
+
+
+class Common(click.Option):
+    """An option of every command. It may be given to `moire`, to a group or to the command."""
+
+    def __init__(self, *names: str, **settings: Any) -> None:
+        super().__init__(names, callback=remember, expose_value=False, **settings)
+
+
+def remember(context: click.Context, option: click.Parameter, value: Any) -> None:
+    """Keep what the user gave, so that the innermost command overrides the outer ones."""
+    if context.get_parameter_source(option.name) is ParameterSource.COMMANDLINE:
+        context.meta.setdefault(GIVEN, {})[option.name] = value
+
+
+COMMON = (
+    Common(
+        "--port",
+        metavar="PORT",
+        type=TEXT,
+        help="The serial port (/dev/ttyUSB0, COM3, rfc2217://host:port, socket://host:port). "
+        "'twin' is the simulated stage and 'twin:s2' another simulated machine. Without this "
+        "option the environment variable MOIRE_PORT names the port.",
+    ),
+    Common(
+        "--baud",
+        metavar="RATE",
+        type=POSITIVE,
+        help=f"The baud rate of the bus. The default is {BAUD}.",
+    ),
+    Common(
+        "--parity",
+        type=Name("parity", PARITIES),
+        metavar=",".join(PARITIES),
+        help="How the port sends the 9th bit. 'auto' takes mark parity where the port has it. "
+        "'odd' reaches only the addresses 1 2 4 7 8 11 13 14. 'none' sends COBS packets in 8N1, "
+        "which 'auto' takes for socket:// and pseudo terminals.",
+    ),
+    Common(
+        "--record",
+        metavar="FILE",
+        type=FILE,
+        help="Write everything that is sent and received into FILE, for 'moire replay'.",
+    ),
+    Common(
+        "--address",
+        metavar="N",
+        type=ADDRESS,
+        help=f"The address of the node, {ADDRESSES[0]} to {ADDRESSES[-1]}. The default is 1.",
+    ),
+    Common("--axis", metavar="N", type=AXIS, help="The axis of the node. The default is 0."),
+    Common(
+        "--json",
+        is_flag=True,
+        help="Print one JSON object per line for each command, and errors as JSON too.",
+    ),
+)

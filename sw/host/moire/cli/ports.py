@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Opens the port that the options name, and records what goes over it."""
+
+import os
+
+from moire.bus import recording
+from moire.bus.transport import Transport, open_bus
+from moire.cli.options import Options
+from moire.errors import BadFile, PortError
+
+
+def open_port(options: Options) -> Transport:
+    """The transport of --port or of the variable MOIRE_PORT."""
+    port = options.port or os.environ.get("MOIRE_PORT")
+    if not port:
+        raise PortError(
+            "no port: write --port /dev/ttyUSB0, or --port twin for the simulated stage"
+        )
+    return open_bus(port, options.baud, options.parity)
+
+
+def recorded(transport: Transport, file: str) -> Transport:
+    """The transport, with everything on it written to a file, line by line, so that the file is
+    complete up to the point where a call broke off.
+    """
+    try:
+        opened = open(file, "w", encoding="utf-8", buffering=1)
+    except OSError as error:
+        transport.close()
+        raise BadFile(f"the file {file} cannot be written: {error.strerror}") from None
+    return recording.Recorder(transport, opened)
