@@ -1,34 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
-// arctan_pipelined -- phase and amplitude of a sine and a cosine sample: 2^16 atan2(sin, cos) / 2
-// pi, and their length.
+// arctan_pipelined -- compute phase and amplitude of a sine and a cosine sample: 2^16 atan2(sin,
+// cos) / 2 pi, and their length.
 //
-// latency  24, 28, 29 clk from valid to done for W = 8, 9, 10, 23 clk for wider samples; divided by
-//          STEPS, rounded up
-// rate     one sample per clk
+// latency  24, 28, 29 cycles from valid to done for W = 8, 9, 10 and 23 cycles for wider samples;
+//          divided by STEPS and rounded up
+// rate     one sample per cycle
 // accuracy phase: every sample of 8, 9 and 10 bits is correctly rounded; wider ones are within
-//          0.548 LSB of the true phase from a
-//          quarter of full scale on (of 12 bits, all tried: 0.510). amplitude: within 1.5 counts
-//          and 0.00015 of itself.
-//          (0, 0) gives 0 and 0
-// source   CORDIC in vectoring mode, after TURNS digits as a division; the shorter leg is doubled
-//          at each digit (Y = 2^i y), so that both legs lose a bit a digit; the angles of four or
-//          five digits come from one look-up
+//          0.548 LSB of the true phase from a quarter of full scale on (all samples of 12 bits
+//          were tried: 0.510). amplitude: within 1.5 counts plus 0.00015 of itself. (0, 0) gives 0
+//          and 0.
+// method   CORDIC in vectoring mode, after TURNS digits as a division. The shorter component is
+//          doubled at each digit (Y = 2^i y), so both components lose one bit per digit; the
+//          angles of four or five digits come from one look-up.
+// source   Volder, IRE Trans. EC-8 (1959) 330
 // model    tb/interpolate/arctan_pipelined.py, equal in every bit of every cycle; bound and angles
 //          from tables/arctan_rotation.py
 `default_nettype none
 
 module arctan_pipelined #(
     parameter int W     = 12,  // bits of a sample, 8 to 16
-    parameter int STEPS = 1    // steps from register to register
+    parameter int STEPS = 1    // steps from one register to the next
 ) (
     input  wire                clk,
-    input  wire                rst,       // drops the samples in work; phase and amplitude become 0
+    input  wire                rst,       // level: drops all samples, outputs become 0
     input  wire                valid,     // strobe: sin and cos are a new sample
-    input  wire signed [W-1:0] sin,       // full scale = 2^(W-1)
-    input  wire signed [W-1:0] cos,       // full scale = 2^(W-1)
+    input  wire signed [W-1:0] sin,       // counts, full scale = 2^(W-1)
+    input  wire signed [W-1:0] cos,       // counts, full scale = 2^(W-1)
     output logic               done,      // strobe: phase and amplitude are new
-    output logic       [ 15:0] phase,     // one signal period = 2^16; stands until the next
-    output logic       [W-1:0] amplitude  // counts of the converter; stands until the next
+    output logic       [ 15:0] phase,     // 2^-16 period; held until the next sample
+    output logic       [W-1:0] amplitude  // counts of the ADC; held until the next sample
 );
     if (W < 8 || W > 16) begin : g_check_w
         W_MUST_BE_FROM_8_TO_16 u_error ();
