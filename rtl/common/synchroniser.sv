@@ -45,9 +45,11 @@ module synchroniser #(
         if (!past) assume (rst);
         if (past) begin
             for (int n = 0; n < STAGES; n++) if (!taken[n]) assert (stages[W*n+:W] == W'(RESET));
-            if (taken[STAGES-1])
+            if (taken[STAGES-1]) begin
                 assert (q == $past(d, STAGES));
-                else assert (q == W'(RESET));
+            end else begin
+                assert (q == W'(RESET));
+            end
             cover (taken[STAGES-1] && q == 2 && $past(q) == 1);
         end
     end

@@ -54,7 +54,8 @@ module encoder_counter #(
         SKIP_W_MUST_BE_FROM_0_TO_12 u_error ();
     end
 
-    localparam logic [3:0]  REQUIRED = 4'((1 << FILTER_W) - 1);           // the bits of the settings that there are
+    // the bits of the settings that exist
+    localparam logic [3:0] REQUIRED = 4'((1 << FILTER_W) - 1);
     localparam logic [3:0] TOLERATED = 4'((1 << TOLERATED_W) - 1);
     localparam logic [11:0] SKIP = 12'((1 << SKIP_W) - 1);
 
@@ -66,9 +67,11 @@ module encoder_counter #(
     wire [2:0] filtered, rejected;
     wire signed [15:0] count, index_count;
     wire signed [1:0] step;
-    wire                a_later, b_later, ready, stepping, direction, illegal, clear, armed, found, revolution_wrong;
+    wire a_later, b_later, ready, stepping, direction, illegal;
+    wire clear, armed, found, revolution_wrong;
 
-    wire status_write = select && write && word == 2'd1;
+    wire [3:0] flags = {illegal_seen, probed_seen, found_seen, armed};
+    wire       status_write = select && write && word == 2'd1;
 
     event_filter #(
         .LEVELS     (3),
@@ -151,7 +154,7 @@ module encoder_counter #(
         if (select)
             case (word)
                 2'd0:    rdata <= {edge_time, count};
-                2'd1:    rdata <= {index_count, 8'd0, illegal_seen, probed_seen, found_seen, armed, probe_q, filtered};
+                2'd1:    rdata <= {index_count, 8'd0, flags, probe_q, filtered};
                 2'd2:    rdata <= settings;
                 default: rdata <= '0;
             endcase

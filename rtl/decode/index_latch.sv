@@ -52,8 +52,7 @@ module index_latch #(
     output logic                revolution_wrong        // strobe: turned neither 0 nor one turn
 );
     logic z_later;
-    // a_later, b_later, z_later have just come into the index; it is taken if that was going up,
-    // down
+    // the delayed levels have just entered the index; taken if that was going up, going down
     logic from_below, from_above;
     logic wants;  // an index would be taken: each or armed
     logic used;  // this index was met already
@@ -78,8 +77,8 @@ module index_latch #(
         used       <= (used || met) && (z ^ active_low);
         armed      <= arm || (armed && !take);
         found      <= take;
-        // less the reverse of the step: an adder of its own costs nothing here, that of the decoder
-        // shared costs W cells
+        // The count before the step, by a subtraction of its own: it costs no extra cells here,
+        // while sharing the adder of the decoder would cost W cells.
         if (take || probe) index_count <= count - {{W - 1{stepped && direction}}, stepped};
         if (rst) begin
             from_below  <= 1'b0;
@@ -98,6 +97,7 @@ module index_latch #(
         logic [W-1:0] reference, turn;  // count at the preceding index; counts since then
 
         wire on = each && counts_per_revolution != '0;
+        wire one_turn = turn == counts_per_revolution || turn == -counts_per_revolution;
 
         always_ff @(posedge clk) begin
             if (take) zeroed <= clears;
@@ -105,7 +105,7 @@ module index_latch #(
             judge            <= take && known && on;
             turn             <= index_count - reference;
             judge_q          <= judge;
-            revolution_wrong <= judge_q && turn != '0 && turn != counts_per_revolution && turn != -counts_per_revolution;
+            revolution_wrong <= judge_q && turn != '0 && !one_turn;
             known            <= on && (known || take);
             if (rst) begin
                 known            <= 1'b0;
@@ -120,8 +120,10 @@ module index_latch #(
     end
 
 `ifdef FORMAL
-    logic past = 1'b0;
-    logic free;  // z has been inactive since an index was met
+    logic         past = 1'b0;
+    wire  [  2:0] levels = {a_later, b_later, z_later};
+    wire  [W-1:0] count_now = !stepped ? count : direction ? count + 1'b1 : count - 1'b1;
+    logic         free;  // z has been inactive since an index was met
     always @(posedge clk) begin
         past <= 1'b1;
         free <= rst || !(z ^ active_low) || (free && !met);
@@ -130,28 +132,18 @@ module index_latch #(
             assert (used == !free);
             assert (!clear || (take && clears));
             if (take) begin
-                assert ({a_later, b_later, z_later} != {$past(
-                    a_later
-                ), $past(
-                    b_later
-                ), $past(
-                    z_later
-                )});
+                assert (levels != $past(levels));
                 assert ((z_later ^ $past(active_low)) && $past(ready) && $past(free));
                 assert ($past(each || armed) && (direction ? $past(take_up) : $past(take_down)));
             end
         end
         if (past && !$past(rst)) begin
             assert (found == $past(take));
-            if (found || $past(probe))
-                assert (index_count == W'($past(
-                    count
-                ) + ($past(
-                    stepped
-                ) ? $past(
-                    direction
-                ) ? 1 : -1 : 0)));
-                else assert (index_count == $past(index_count));
+            if (found || $past(probe)) begin
+                assert (index_count == $past(count_now));
+            end else begin
+                assert (index_count == $past(index_count));
+            end
             assert (!armed || !found || $past(arm));
             cover (found && gate_mask == 3 && !each);
             cover (found && $past(found, 2));

@@ -101,11 +101,15 @@ module quadrature_decoder #(
     wire  [  1:0] turned = quarter - quarter_q;
     wire  [W+1:0] travelled_now = travelled + {{W{turned == 3}}, turned};
 
-    // borders passed on the way: between quarters 3 and 0 none but in x4; x2 has those behind 0 and
-    // 2, x1 the one behind 0
+    // Borders passed while travelling: x4 counts all, x2 those after quarters 0 and 2, x1 the one
+    // after quarter 0.
     function automatic [W-1:0] borders(input [1:0] of_mode, input [W+1:0] of_travelled);
         logic [W+1:0] passed;
-        passed  = of_mode == X4 ? of_travelled : of_mode == 1 ? (of_travelled + 1'b1) >> 1 : (of_travelled + 2'd3) >> 2;
+        case (of_mode)
+            X4:      passed = of_travelled;
+            2'd1:    passed = (of_travelled + 1'b1) >> 1;
+            default: passed = (of_travelled + 2'd3) >> 2;
+        endcase
         borders = passed[W-1:0];
     endfunction
 
@@ -115,7 +119,8 @@ module quadrature_decoder #(
         mode_q <= mode;
         travelled    <= rst || !ready ? {{W{1'b0}}, quarter} : travelled_now;
         if (rst || !ready) zero <= borders(mode, {{W{1'b0}}, quarter});
-        else if (clear || turned == 2 || mode != mode_q) zero <= borders(mode, travelled_now) - count_now;
+        else if (clear || turned == 2 || mode != mode_q)
+            zero <= borders(mode, travelled_now) - count_now;
         if (!past) assume (rst);
         if (past) begin
             assert (ready == (settle == '0));
@@ -128,7 +133,8 @@ module quadrature_decoder #(
             assert (count == ($past(clear) ? W'(0) : W'($past(count) + {{W - 2{step[1]}}, step})));
             assert (!(illegal && step != 0));
             if (step != 0) assert ($past(ready) && ($past(a ^ a_q) ^ $past(b ^ b_q)));
-            if (step != 0 && mode_q != PULSES) assert ($past(quarter) == 2'($past(quarter_q) + step));
+            if (step != 0 && mode_q != PULSES)
+                assert ($past(quarter) == 2'($past(quarter_q) + step));
             if (step != 0 && mode_q == PULSES) assert ($past(a && !a_q) && step[1] == $past(b));
             if (step != 0) assert (upward == (step == 1));
             cover (count == 3);

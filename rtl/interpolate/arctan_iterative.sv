@@ -30,10 +30,13 @@ module arctan_iterative #(
         W_MUST_BE_FROM_8_TO_16 u_error ();
     end
 
-    localparam int TURNS  = W == 9 ? 9 : W == 10 ? 9 : 7;               // these four as in tables/arctan_rotation.py
+    // made by tables/arctan_rotation.py, not to be edited
+    localparam int TURNS = W == 8 ? 7 : W == 9 ? 9 : W == 10 ? 9 : 7;
     localparam int DIGITS = W == 8 ? 23 : W == 9 ? 27 : W == 10 ? 29 : 22;
     localparam int F = W == 8 ? 12 : W == 9 ? 14 : W == 10 ? 16 : 10;
     localparam int GUARD = W == 8 ? 14 : W == 9 ? 16 : W == 10 ? 17 : 11;
+    // end of the made constants
+
     localparam int Z = 16 + GUARD;
     localparam int P = $clog2(TURNS);
 
@@ -80,7 +83,8 @@ module arctan_iterative #(
     wire [Z-1:0] sum = Z'(({angle, 1'b1} + {turn[digit] ^ {Z{turned}}, turned}) >> 1);
 
     wire [W+2:0] eighths = longer[W+F-1:F-3];
-    wire [W-1:0]    part     = W'(eighths >> (digit == 5'(TURNS + 2) ? 3 : digit == 5'(TURNS + 3) ? 6 : 11));
+    wire [  3:0] shift = digit == 5'(TURNS + 2) ? 4'd3 : digit == 5'(TURNS + 3) ? 4'd6 : 4'd11;
+    wire [W-1:0] part = W'(eighths >> shift);
 
     always_ff @(posedge clk) begin
         done <= 1'b0;

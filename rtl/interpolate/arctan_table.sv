@@ -28,12 +28,17 @@ module arctan_table #(
         W_MUST_BE_FROM_8_TO_16 u_error ();
     end
 
-    localparam int RATIO = 16;  // bits behind the point; these three as in tables/arctan.py
-    localparam int FRACTION = 9;
-    localparam int GUARD = 5;
+    // made by tables/arctan.py, not to be edited
+    localparam int RATIO = 16;  // fraction bits of the ratio
+    localparam int FRACTION = 9;  // bits of the ratio along the chord
+    localparam int GUARD = 5;  // bits of base and slope below the phase LSB
+    // end of the made constants
 
-    localparam [4:0] IDLE = 5'd0, FOLD = 5'd1, DIVIDE = 5'd2, LOOK_UP = DIVIDE + 5'(RATIO + 1), MULTIPLY = LOOK_UP + 5'd1,
-                     ADD = MULTIPLY + 5'd1, UNFOLD = ADD + 5'd1;
+    localparam [4:0] IDLE = 5'd0, FOLD = 5'd1, DIVIDE = 5'd2;
+    localparam [4:0] LOOK_UP = DIVIDE + 5'(RATIO + 1);
+    localparam [4:0] MULTIPLY = LOOK_UP + 5'd1;
+    localparam [4:0] ADD = MULTIPLY + 5'd1;
+    localparam [4:0] UNFOLD = ADD + 5'd1;
 
     logic [4:0] stage;
     // steep: |sin| > |cos|, in octants 2, 3, 6, 7

@@ -107,10 +107,10 @@ module fringe_tracker (
         end
     end
 
-    // a scale that moves by `increment` a sample, seen with now and then a bad sample: three good
-    // ones at least in between
+    // A scale moves by `increment` per sample; now and then a sample is bad, with at least three
+    // good ones in between.
     (* anyconst *)logic signed [16:0] increment;
-    (* anyconst *)logic               modelled;  // the phases follow the model below; 0: they are arbitrary
+    (* anyconst *)logic               modelled;  // the phases follow this model; 0: any
     (* anyseq *)logic               bad;
     // position of the scale at the next sample; sum of the steps
     logic signed [23:0] scale, seen;
@@ -142,21 +142,28 @@ module fringe_tracker (
             // the claim; the further assertions only make it inductive
             if (samples != 0 && good != 0) assert (away == 0);
             assert (started == (samples != 0) && samples <= 2);
-            if (started)
+            if (started) begin
                 assert (sum[15:0] == last);
-                else assert (sum == 0 && scale == 0);
-            if (samples < 2)
+            end else begin
+                assert (sum == 0 && scale == 0);
+            end
+            if (samples < 2) begin
                 assert (!outlier && speed == 0 && predicted_step == 0 && good == 3);
-                else
-                    case (good)
-                        0: if (outlier) assert (speed == increment && 24'(predicted_step) == 24'(increment) - away && away >= -32768 && away < 32768);
-                   else assert (drag == away && predicted_step == 18'(speed) && away > -16384 && away < 16384);
-                        1: if (outlier) assert (24'(predicted_step) == 24'(increment) + drag + drag + drag && drag > -16384 && drag < 16384
-                                        && (drag >= 8192 || drag <= -8192));
-                   else assert (predicted_step == 18'(speed) && drag > -8192 && drag < 8192);
-                        2: assert (!outlier && predicted_step == 18'(speed) && (speed == increment || speed == 0));
-                        default: assert (!outlier && predicted_step == 18'(speed) && speed == increment);
-                    endcase
+            end else if (good == 0 && outlier) begin
+                assert (speed == increment && 24'(predicted_step) == 24'(increment) - away);
+                assert (away >= -32768 && away < 32768);
+            end else if (good == 0) begin
+                assert (drag == away && predicted_step == 18'(speed));
+                assert (away > -16384 && away < 16384);
+            end else if (good == 1 && outlier) begin
+                assert (24'(predicted_step) == 24'(increment) + drag + drag + drag);
+                assert (drag > -16384 && drag < 16384 && (drag >= 8192 || drag <= -8192));
+            end else if (good == 1) begin
+                assert (predicted_step == 18'(speed) && drag > -8192 && drag < 8192);
+            end else begin
+                assert (!outlier && predicted_step == 18'(speed));
+                assert (speed == increment || (good == 2 && speed == 0));
+            end
         end
         cover (past && modelled && good == 0 && outlier && increment == 17'sd1000);
     end

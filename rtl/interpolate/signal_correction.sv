@@ -45,6 +45,8 @@ module signal_correction #(
     wire signed [35:0] sum = 36'(sin_part) + 36'(cos_part) + 36'sd65536;
     wire signed [18:0] sin_half = 19'(sum >>> 17);  // rounded
     wire signed [16:0] cos_half = 17'((18'(cos_kept) + 18'sd1) >>> 1);
+    wire               sin_fits = sin_half[18:15] == {4{sin_half[18]}};
+    wire               cos_fits = cos_half[16] == cos_half[15];
 
     always_ff @(posedge clk) begin
         centred    <= valid;
@@ -60,8 +62,8 @@ module signal_correction #(
             cos_kept <= cos_channel;
         end
         if (multiplied) begin
-            sin_out <= sin_half[18:15] == {4{sin_half[18]}} ? sin_half[15:0] : {sin_half[18], {15{!sin_half[18]}}};
-            cos_out <= cos_half[16] == cos_half[15] ? cos_half[15:0] : {cos_half[16], {15{!cos_half[16]}}};
+            sin_out <= sin_fits ? sin_half[15:0] : {sin_half[18], {15{!sin_half[18]}}};
+            cos_out <= cos_fits ? cos_half[15:0] : {cos_half[16], {15{!cos_half[16]}}};
         end
         if (load) begin
             sin_centre <= sin_offset;

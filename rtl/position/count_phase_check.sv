@@ -57,20 +57,16 @@ module count_phase_check (
     end
 
 `ifdef FORMAL
-    (* anyconst *)logic still;  // only the origin moves
-    logic past = 1'b0;
+    (* anyconst *)logic              still;  // only the origin moves
+    wire signed [47:0] by = shift ? $signed({shift_periods, 16'b0}) : 48'sd0;
+    wire signed [47:0] next_position = position + by;
+    logic              past = 1'b0;
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
         if (past && still) begin
             assume (count == $past(count));
-            assume (position == $past(
-                position
-            ) + ($past(
-                shift
-            ) ? $signed(
-                {$past(shift_periods), 16'b0}
-            ) : 48'sd0));
+            assume (position == $past(next_position));
         end
         if (past) begin
             if ($past(limit) == 0) assert (!disagreement);

@@ -40,7 +40,8 @@ module count_to_phase (
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
-        assume (count_step != -2'sd2 && (!align || (align_counts >= -3'sd2 && align_counts <= 3'sd2)));
+        assume (count_step != -2'sd2);
+        if (align) assume (align_counts >= -3'sd2 && align_counts <= 3'sd2);
         if (past && !$past(rst)) begin
             assert (phase[13:0] == '0 && phase == 16'($past(phase) + step[15:0]));
             assert (valid || step == '0);

@@ -44,13 +44,13 @@ module position_compare (
 );
     logic        [31:0] origin;  // periods that the origin has moved since reset
     logic               arrived;  // `here` is new
-    // position from the origin of the reset; as all below mirrored if step is
+    // The position relative to the origin at reset. It and all below are mirrored if step is
+    // negative, so that the points always lie upwards.
     logic signed [47:0] here;
-    // negative, so that the way of the points is always
-    // up
     // reach is valid: a position before the first point was seen
     logic               ready;
-    logic signed [47:0] reach, point, stride;  // farthest position; the next point; magnitude of step
+    // farthest position; the next point; magnitude of step
+    logic signed [47:0] reach, point, stride;
     logic down, single;  // down: step is negative; single: step is 0
     // points to come, less one; a count of 0 (no end) wraps
     logic [31:0] left;
@@ -151,10 +151,14 @@ module position_compare (
             assert (gap_taken != 0 && (!pulse || pulse_taken != 0));
             if (high && !pulse) assert (high_for == pulse_taken);
             if (rises) assert (low_for >= gap_taken);
-            if (pulse)
-                assert (timer < pulse_taken && high_for == pulse_taken - 1'b1 - timer && high == (high_for != 0));
-                else
-                    assert (resting ? timer < gap_taken && low_for == gap_taken - 1'b1 - timer : low_for >= gap_taken);
+            if (pulse) begin
+                assert (timer < pulse_taken && high_for == pulse_taken - 1'b1 - timer);
+                assert (high == (high_for != 0));
+            end else if (resting) begin
+                assert (timer < gap_taken && low_for == gap_taken - 1'b1 - timer);
+            end else begin
+                assert (low_for >= gap_taken);
+            end
         end
         if (past && !$past(rst)) begin
             if (rises) begin

@@ -24,13 +24,12 @@ module unwrap (
     output logic               done,           // strobe: position belongs to a new phase
     output logic signed [47:0] position        // Q32.16 periods, wraps
 );
-    logic started;
+    logic               started;
     logic signed [31:0] periods;
-    logic [15:0] fraction;
+    logic        [15:0] fraction;
 
-    wire signed [31:0] carry = started && valid ? (32'(step) + $signed(
-        {16'b0, fraction}
-    )) >>> 16 : 32'sd0;
+    wire signed  [31:0] moved = 32'(step) + $signed({16'b0, fraction});
+    wire signed  [31:0] carry = started && valid ? moved >>> 16 : 32'sd0;
 
     assign position = {periods, fraction};
 
@@ -50,8 +49,12 @@ module unwrap (
     end
 
 `ifdef FORMAL
-    logic        past = 1'b0;
-    logic [15:0] last;  // the last phase
+    wire signed [31:0] by = shift ? shift_periods : 32'sd0;
+    wire signed [31:0] shifted_periods = periods + by;
+    wire signed [47:0] stepped_position = position + (valid ? 48'(step) : 48'sd0);
+    wire signed [47:0] moved_position = stepped_position + $signed({by, 16'b0});
+    logic              past = 1'b0;
+    logic       [15:0] last;  // the last phase
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
@@ -61,26 +64,11 @@ module unwrap (
         if (past) assert (position[15:0] == last);
         if (past && !$past(rst)) begin
             assert (done == $past(valid));
-            if ($past(started))
-                assert (position == $past(
-                    position
-                ) + ($past(
-                    valid
-                ) ? 48'($past(
-                    step
-                )) : 48'sd0) + ($past(
-                    shift
-                ) ? $signed(
-                    {$past(shift_periods), 16'b0}
-                ) : 48'sd0));
-                else
-                    assert (position[47:16] == $past(
-                        position[47:16]
-                    ) + ($past(
-                        shift
-                    ) ? $past(
-                        shift_periods
-                    ) : 32'sd0));
+            if ($past(started)) begin
+                assert (position == $past(moved_position));
+            end else begin
+                assert (position[47:16] == $past(shifted_periods));
+            end
             cover (position == 48'sh0003_8000 && done && $past(shift) && $past(step) < 0);
             cover (position < 0 && !$past(shift));
         end

@@ -61,7 +61,8 @@ module velocity_estimator #(
     logic       [N-1:0] now;
 
     wire signed [P-1:0] move = here - here_q;
-    wire signed [P-1:0] step_from = here_q + (down ? $signed({{(P - 16) {1'b0}}, quantum}) : '0);
+    wire signed [P-1:0] one_quantum = $signed({{(P - 16) {1'b0}}, quantum});
+    wire signed [P-1:0] step_from = down ? here_q + one_quantum : here_q;
 
     // the distance of the tick, and the limits around it
     logic               known;  // last is valid
@@ -71,7 +72,8 @@ module velocity_estimator #(
     logic              done;
 
     wire               fits = distance[P-1:31] == {(P - 31) {distance[31]}};
-    wire signed [33:0] held = fits ? {{2{distance[31]}}, distance[31:0]} : distance[P-1] ? -TOP - 34'sd1 : TOP;
+    wire signed [33:0] nearest = distance[P-1] ? -TOP - 34'sd1 : TOP;  // end of the range
+    wire signed [33:0] held = fits ? {{2{distance[31]}}, distance[31:0]} : nearest;
     wire signed [33:0] above = held + $signed({18'd0, quantum});
     wire signed [33:0] below = held - $signed({18'd0, quantum});
 
@@ -105,11 +107,7 @@ module velocity_estimator #(
     wire [N+2:0] left = {1'b0, remainder} - {2'b0, divisor};
     wire longer = divisor > tick_wide;
     wire goes = !left[N+2];
-    wire signed [P-1:0] bound = speed < 0 ? -$signed(
-        {{(P - 16) {1'b0}}, quantum}
-    ) : $signed(
-        {{(P - 16) {1'b0}}, quantum}
-    );
+    wire signed [P-1:0] bound = speed < 0 ? -one_quantum : one_quantum;
     /* verilator lint_off UNUSEDSIGNAL */  // rounding drops the low bits
     wire signed [40:0] rounding = {fine[39], fine} + 41'sd128;
     /* verilator lint_on UNUSEDSIGNAL */
@@ -138,8 +136,11 @@ module velocity_estimator #(
             low  <= below < -TOP - 34'sd1 ? 32'h80000000 : below[31:0];
         end
         done <= ticked[2];
-        if (ticked[2])
-            fine <= speed > high_fine ? high_fine[39:0] : speed < low_fine ? low_fine[39:0] : speed[39:0];
+        if (ticked[2]) begin
+            if (speed > high_fine) fine <= high_fine[39:0];
+            else if (speed < low_fine) fine <= low_fine[39:0];
+            else fine <= speed[39:0];
+        end
         if (done) velocity <= rounding[39:8];
 
         quiet      <= stepped ? '0 : quiet == '1 ? quiet : quiet + 1'b1;
@@ -190,7 +191,8 @@ module velocity_estimator #(
             step_time  <= now;
             fresh      <= 1'b1;
             anchored   <= 1'b1;
-            if (!anchored || quiet == '1) begin  // the first step after a standstill: measure from here
+            // the first step after a standstill: measure from here
+            if (!anchored || quiet == '1) begin
                 state      <= CHOOSE;
                 fresh      <= 1'b0;
                 run_position  <= step_from;
@@ -221,22 +223,20 @@ module velocity_estimator #(
     end
 
 `ifdef FORMAL
-    (* anyconst *)logic still;  // only the origin moves
-    logic past = 1'b0;
+    (* anyconst *)logic               still;  // only the origin moves
+    wire signed [ 47:0] by = shift && !rst ? $signed({shift_periods, 16'b0}) : 48'sd0;
+    wire signed [ 47:0] next_position = position + by;
+    wire signed [P-1:0] on_scale = {position[P-1:16] - origin, position[15:0]};
+    logic               past = 1'b0;
     // the distance of the tick that fine and velocity belong to
     logic signed [31:0] travelled, travelled_q;
     logic [15:0] allowed, allowed_q;
+    wire signed [33:0] allowed_wide = $signed({18'd0, allowed});
+    wire signed [33:0] allowed_q_wide = $signed({18'd0, allowed_q});
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
-        if (past && still)
-            assume (position == $past(
-                position
-            ) + ($past(
-                shift && !rst
-            ) ? $signed(
-                {$past(shift_periods), 16'b0}
-            ) : 48'sd0));
+        if (past && still) assume (position == $past(next_position));
         if (ticked[1]) begin
             travelled   <= held[31:0];
             allowed <= quantum;
@@ -256,21 +256,16 @@ module velocity_estimator #(
             allowed_q    <= '0;
         end
         if (past) begin
-            if (ticked[2])
-                assert (34'(high) <= 34'(travelled) + $signed(
-                    {18'd0, allowed}
-                ) && 34'(low) >= 34'(travelled) - $signed(
-                    {18'd0, allowed}
-                ) && high >= travelled && low <= travelled);
-            assert (34'(velocity) <= 34'(travelled_q) + $signed(
-                {18'd0, allowed_q}
-            ) && 34'(velocity) >= 34'(travelled_q) - $signed(
-                {18'd0, allowed_q}
-            ));
+            if (ticked[2]) begin
+                assert (34'(high) <= 34'(travelled) + allowed_wide && high >= travelled);
+                assert (34'(low) >= 34'(travelled) - allowed_wide && low <= travelled);
+            end
+            assert (34'(velocity) <= 34'(travelled_q) + allowed_q_wide);
+            assert (34'(velocity) >= 34'(travelled_q) - allowed_q_wide);
             assert (fine <= $signed({fine_top, 8'd0}) && fine >= $signed({fine_bottom, 8'd0}));
         end
         if (past && still && !$past(rst)) begin
-            assert (here_valid == 0 || here == $signed({position[P-1:16] - origin, position[15:0]}));
+            assert (here_valid == 0 || here == on_scale);
             if (here_valid[1]) assert (here_q == here);
             assert (!stepped && !anchored && !fresh && speed == 0 && state == CHOOSE);
             if (known) assert (last == here && here_valid != 0);

@@ -16,7 +16,7 @@ module zero_crossing (
     input  wire               clk,
     input  wire               rst,       // level: the next position is only taken as reference
     input  wire               valid,     // strobe: position is new
-    /* verilator lint_off UNUSEDSIGNAL */  // the sign and the bit below it tell all; the port is the whole stream
+    /* verilator lint_off UNUSEDSIGNAL */  // only the two top bits matter
     input  wire signed [47:0] position,  // Q32.16 periods
     /* verilator lint_on UNUSEDSIGNAL */
     input  wire               shift,     // strobe: the origin moves in the next cycle

@@ -59,19 +59,23 @@ module channel_monitor #(
     logic [1:0] side;  // the last sure sign
     // edge_other: other_level at the last change of level
     logic level_q, edge_other;
-    // sign changes of the channel since its comparator changed; half periods of the comparators since the
+    // sign changes of the channel since its comparator changed; half periods of the comparators
+    // since the channel changed its sign; both up to 3
     logic [1:0] changes, turns;
 
     wire [W-1:0] size = channel < 0 ? -channel : channel;
-    wire at_rest = started && 18'(channel) >= rest_low && 18'(channel) <= rest_high;
-    wire far = span != '1 && (18'(other) < far_low || 18'(other) > far_high);
-    wire [1:0] sign_now = 17'(size) <= {1'b0, sign_threshold} ? 2'd0 : {channel[W-1], 1'b1};
-    wire crossing = sign_now[0] && side[0] && sign_now != side;
-    wire toggled = started && level != level_q;
-    wire [15:0] same_now = !started || channel != last ? '0 : &same ? same : same + 1'b1;
-    wire        [1:0] changes_now = toggled ? 2'd0 : crossing && changes != 2'd3 ? changes + 1'b1 : changes;
-    wire        [1:0] turns_now  = crossing ? 2'd0 : !toggled ? turns : other_level == edge_other ? 2'd0 : turns == 2'd3 ? turns
-                                 : turns + 1'b1;
+    wire         at_rest = started && 18'(channel) >= rest_low && 18'(channel) <= rest_high;
+    wire         far = span != '1 && (18'(other) < far_low || 18'(other) > far_high);
+    wire [  1:0] sign_now = 17'(size) <= {1'b0, sign_threshold} ? 2'd0 : {channel[W-1], 1'b1};
+    wire         sure = sign_now[0] && sign == sign_now && sign_q == sign_now;
+    wire         crossing = sign_now[0] && side[0] && sign_now != side;
+    wire         toggled = started && level != level_q;
+    wire [ 15:0] same_now = !started || channel != last ? '0 : &same ? same : same + 1'b1;
+    wire         half_period = toggled && other_level != edge_other;
+    wire [  1:0] changes_next = changes == 2'd3 ? changes : changes + 1'b1;
+    wire [  1:0] turns_next = turns == 2'd3 ? turns : turns + 1'b1;
+    wire [  1:0] changes_now = toggled ? 2'd0 : crossing ? changes_next : changes;
+    wire [  1:0] turns_now = crossing ? 2'd0 : half_period ? turns_next : toggled ? 2'd0 : turns;
 
     always_ff @(posedge clk) begin
         if (valid) begin
@@ -95,7 +99,7 @@ module channel_monitor #(
             sign    <= sign_now;
             sign_q  <= sign;
             if (sign_now[0]) side <= sign_now;
-            comparator_mismatch <= sign_now[0] && sign == sign_now && sign_q == sign_now && level_q == channel[W-1];
+            comparator_mismatch <= sure && level_q == channel[W-1];
 
             level_q <= level;
             if (toggled) edge_other <= other_level;
@@ -134,9 +138,11 @@ module channel_monitor #(
             // the further assertions make the claim inductive
             if (sign[0]) assert (started && level_q == !sign[1]);
             if (sign_q[0]) assert (started);
-            if (!side[0])
+            if (!side[0]) begin
                 assert (changes == 0 && !sign[0]);
-                else assert (started && changes <= (level_q == !side[1]));
+            end else begin
+                assert (started && changes <= (level_q == !side[1]));
+            end
             cover (crossing && changes == 1);
             cover (channel_missing);
         end

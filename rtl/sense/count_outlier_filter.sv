@@ -53,6 +53,7 @@ module count_outlier_filter #(
     logic limited;  // count_out was computed from two counts
     logic signed [W-1:0] whole, new_count;  // difference from the preceding output to the new count
     wire signed [W-1:0] left = new_count - count_out;
+    wire signed [W-1:0] done_part = whole - left;
     always @(posedge clk) begin
         past      <= 1'b1;
         limited   <= enable && known;
@@ -61,16 +62,17 @@ module count_outlier_filter #(
         if (!past) assume (rst);
         if (past && !$past(rst)) begin
             assert (done == $past(valid));
-            if (!done)
+            if (!done) begin
                 assert (count_out == $past(count_out));
-                else if (!limited || whole == 0)
-                    assert (left == 0);
-                    else if (whole == 1 || whole == -1)
-                        assert (left == whole);
-                        else if (whole > 0)
-                            assert (left > 0 && left - (whole - left) <= 1 && left >= whole - left);
-                            else
-                                assert (left <= 0 && whole - left - left <= 0 && whole - left - left >= -1);
+            end else if (!limited || whole == 0) begin
+                assert (left == 0);
+            end else if (whole == 1 || whole == -1) begin
+                assert (left == whole);
+            end else if (whole > 0) begin
+                assert (left > 0 && left - done_part <= 1 && left >= done_part);
+            end else begin
+                assert (left <= 0 && done_part - left <= 0 && done_part - left >= -1);
+            end
             cover (done && limited && whole == 7);
             cover (done && limited && whole == -7);
         end

@@ -69,8 +69,8 @@ module event_filter #(
         // samples of the old level since the first of the new
         logic [TOLERATED_W-1:0] against;
 
-        // a number counted up from 0 contains all bits of another one for the first time when they are
-        // equal: this needs no adder, and the counter never passes all ones
+        // A number counted up from 0 contains all bits of another one for the first time when
+        // they are equal. The comparison needs no adder, and the counter never overflows.
         wire                    differs = level[i] ^ filtered[i];
         wire                    ripe = &(seen | ~last);
         wire                    over = &(against | ~tolerated);

@@ -96,18 +96,10 @@ module lissajous_monitor #(
         always @(posedge clk)
             if (past && !$past(rst)) begin
                 for (int n = 0; n < 4; n++)
-                if (learned[n*R+:R] != $past(learned[n*R+:R]) || have[n] != $past(have[n]))
-                    assert ($past(
-                        valid && started
-                    ) && $past(
-                        sector
-                    ) == n && $past(
-                        met
-                    ) && $past(
-                        side[0]
-                    ) && sector == 2'(n) + $past(
-                        side
-                    ));
+                if (learned[n*R+:R] != $past(learned[n*R+:R]) || have[n] != $past(have[n])) begin
+                    assert ($past(valid && started && met && side[0]));
+                    assert ($past(sector) == n && sector == 2'(n) + $past(side));
+                end
             end
 `endif
     end
@@ -119,7 +111,10 @@ module lissajous_monitor #(
     logic [2:0] tilt_1, tilt_2;
     logic signed [R+3:0] rise, gap_2, gap_3, climbed, away;
     logic [3:0] in_progress, judge;  // a sample is in progress; the circle was known
-    wire [R+3:0] distance = away < 0 ? -away : away;
+    wire        [R+3:0] distance = away < 0 ? -away : away;
+    wire signed [R+3:0] rise_4 = tilt_2[2] ? rise <<< 2 : '0;
+    wire signed [R+3:0] rise_2 = tilt_2[1] ? rise <<< 1 : '0;
+    wire signed [R+3:0] rise_1 = tilt_2[0] ? rise : '0;
 
     always_ff @(posedge clk) begin
         in_progress <= {in_progress[2:0], valid};
@@ -136,7 +131,7 @@ module lissajous_monitor #(
             tilt_2  <= tilt_1;
         end
         if (in_progress[1]) begin
-            climbed <= (tilt_2[2] ? rise <<< 2 : '0) + (tilt_2[1] ? rise <<< 1 : '0) + (tilt_2[0] ? rise : '0);
+            climbed <= rise_4 + rise_2 + rise_1;
             gap_3   <= gap_2;
         end
         if (in_progress[2]) away <= gap_3 - (climbed >>> 2);
@@ -173,7 +168,8 @@ module lissajous_monitor #(
             end
         end
         wire [15:0] limit = kind == 0 ? balance_limit : quadrature_limit;
-        assign uncentred[kind] = offset_limit != '1 && 19'(offset_size) > {2'b0, offset_limit, 1'b0};
+        wire [18:0] offset_limit_2 = {2'b0, offset_limit, 1'b0};
+        assign uncentred[kind] = offset_limit != '1 && 19'(offset_size) > offset_limit_2;
         assign beyond[kind]    = limit != '1 && 19'(oval_size_4) > {2'b0, limit, 1'b0};
     end
 

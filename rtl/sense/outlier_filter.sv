@@ -64,62 +64,30 @@ module outlier_filter #(
     end
 
 `ifdef FORMAL
-    logic past = 1'b0;
+    logic              past = 1'b0;
+    logic signed [W:0] largest;  // step of the preceding cycle
+    wire               sin_exhausted = sin_held >= hold && !no_end;
+    wire               cos_exhausted = cos_held >= hold && !no_end;
     logic signed [W-1:0] sin_before, cos_before;
     wire signed [W:0] sin_jump = sin_out - sin_before;
     wire signed [W:0] cos_jump = cos_out - cos_before;
     always @(posedge clk) begin
         past       <= 1'b1;
+        largest    <= $signed({1'b0, step});
         sin_before <= sin_out;
         cos_before <= cos_out;
         if (!past) assume (rst);
         if (past && !$past(rst)) begin
-            if (sin_jump > $signed({1'b0, $past(step)}) || -sin_jump > $signed({1'b0, $past(step)}))
-                assert (done && (!$past(
-                    taken
-                ) || $past(
-                    step
-                ) == 0 || ($past(
-                    sin_held
-                ) >= $past(
-                    hold
-                ) && !$past(
-                    no_end
-                ))));
-            if (cos_jump > $signed({1'b0, $past(step)}) || -cos_jump > $signed({1'b0, $past(step)}))
-                assert (done && (!$past(
-                    taken
-                ) || $past(
-                    step
-                ) == 0 || ($past(
-                    cos_held
-                ) >= $past(
-                    hold
-                ) && !$past(
-                    no_end
-                ))));
+            if (sin_jump > largest || -sin_jump > largest)
+                assert (done && $past(!active || sin_exhausted));
+            if (cos_jump > largest || -cos_jump > largest)
+                assert (done && $past(!active || cos_exhausted));
             if (rejected) assert (done && $past(taken) && (sin_jump == 0 || cos_jump == 0));
             if (done && !rejected) assert (sin_out == $past(sin) && cos_out == $past(cos));
             if (sin_held != 0 && sin_held != $past(sin_held))
-                assert (rejected && sin_held == $past(
-                    sin_held
-                ) + 1 && ($past(
-                    sin_held
-                ) < $past(
-                    hold
-                ) || $past(
-                    no_end
-                )));
+                assert (rejected && sin_held == $past(sin_held) + 1 && !$past(sin_exhausted));
             if (cos_held != 0 && cos_held != $past(cos_held))
-                assert (rejected && cos_held == $past(
-                    cos_held
-                ) + 1 && ($past(
-                    cos_held
-                ) < $past(
-                    hold
-                ) || $past(
-                    no_end
-                )));
+                assert (rejected && cos_held == $past(cos_held) + 1 && !$past(cos_exhausted));
             cover (rejected && sin_held == 3);
             cover (done && !rejected && $past(sin_held) == 3 && $past(step) != 0);
         end

@@ -65,6 +65,7 @@ module peak_offset_tracker #(
         wire signed [  W:0] drift = !(high_known && low_known) ? '0 : span[W] ? -size : size;
         wire signed [W+1:0] less = {{2{sample[W-1]}}, sample} - {drift[W], drift};
         wire                fits = less[W+1:W-1] == {3{less[W-1]}};
+        wire        [W-1:0] full = {less[W+1], {(W - 1) {~less[W+1]}}};
 
         always_ff @(posedge clk) begin
             if (valid) begin
@@ -82,7 +83,7 @@ module peak_offset_tracker #(
             end
             if (held) begin
                 offset     <= drift[W-1:0];
-                sample_out <= !enable ? sample : fits ? less[W-1:0] : {less[W+1], {(W-1){~less[W+1]}}};
+                sample_out <= !enable ? sample : fits ? less[W-1:0] : full;
             end
             if (rst) begin
                 rising     <= 1'b0;
@@ -125,8 +126,10 @@ module peak_offset_tracker #(
             if (samples != 0)
                 assert (g_channel[0].sample == old_sin && g_channel[1].sample == old_cos);
             if (held) assert (taken);
-            if (samples < 2)
-                assert (!g_channel[0].high_known && !g_channel[0].low_known && !g_channel[0].rising);
+            if (samples < 2) begin
+                assert (!g_channel[0].high_known && !g_channel[0].low_known);
+                assert (!g_channel[0].rising);
+            end
         end
         if (past && !$past(rst)) begin
             if (done && enable_q) begin

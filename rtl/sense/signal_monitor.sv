@@ -86,7 +86,8 @@ module signal_monitor #(
     end
 
     // one monitor per channel
-    wire [1:0] clipped, channel_stuck, no_noise, comparator_mismatch, comparator_stuck, channel_missing;
+    wire [1:0] clipped, channel_stuck, no_noise;
+    wire [1:0] comparator_mismatch, comparator_stuck, channel_missing;
 
     channel_monitor #(
         .W(W)

@@ -49,7 +49,11 @@ module vector_length #(
     wire [1:0] nearest = steep ? {sin_low, 1'b1} : {cos_low, 1'b0};
     wire [W+2:0] one = (W + 3)'(major);  // compared with eight times minor
     wire [W+2:0] eight = {minor, 3'b0};
-    wire [2:0]   slope   = 3'(eight > one) + 3'(eight > one + (one << 1)) + 3'(eight > one + (one << 2)) + 3'(eight > (one << 3) - one);
+    wire beyond_1 = eight > one;
+    wire beyond_3 = eight > one + (one << 1);
+    wire beyond_5 = eight > one + (one << 2);
+    wire beyond_7 = eight > (one << 3) - one;
+    wire [2:0] slope = 3'(beyond_1) + 3'(beyond_3) + 3'(beyond_5) + 3'(beyond_7);
     wire signed [N-1:0] x_0 = $signed({1'b0, major, {F{1'b0}}});
     wire signed [N-1:0] y_0 = $signed({1'b0, minor, {F{1'b0}}});
     wire [N-1:0] whole = scaled + N'(1 << (F - 1));  // rounded to nearest
