@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/common/tick_divider.sv does, in integers: step(period, restart) is one clk and returns
+"""What rtl/common/tick_divider.sv does, in integers: step(period, restart) is one cycle and returns
 tick after it.
 """
 

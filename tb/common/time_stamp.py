@@ -2,6 +2,6 @@
 """What rtl/common/time_stamp.sv does, in integers."""
 
 
-def time_stamp(clks, w=64):
-    """The count after `clks` clk without reset."""
-    return clks % (1 << w)
+def time_stamp(cycles, w=64):
+    """The count after `cycles` cycles without reset."""
+    return cycles % (1 << w)

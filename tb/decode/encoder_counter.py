@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/decode/encoder_counter.sv does: step(...) is one clk, and returns rdata after it."""
+"""What rtl/decode/encoder_counter.sv does: step(...) is one cycle, and returns rdata after it."""
 
 from tb.decode.index_latch import IndexLatch, Settings
 from tb.decode.quadrature_decoder import QuadratureDecoder

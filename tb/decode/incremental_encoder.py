@@ -38,7 +38,7 @@ class IncrementalEncoder:
         self.seen = self.fault = self.revolution = 0
 
     def step(self, setup, a, b, z, now, arm=0, clear_flags=0, rst=0, own_a=0, own_b=0):
-        """One clk; the pins after it by name. edge_time is None while it means nothing."""
+        """One cycle; the pins after it by name. edge_time is None while it means nothing."""
         later, decoder = self.index.later, self.decoder
         direction, moves, _ = decoder.look(later[0], later[1], setup.mode)
         clear = self.index.clear(setup.index, direction)

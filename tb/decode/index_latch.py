@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/decode/index_latch.sv does: clear() tells what goes to the decoder in this clk, step()
-ends the clk.
+"""What rtl/decode/index_latch.sv does: clear() tells what goes to the decoder in this cycle, step()
+ends the cycle.
 """
 
 from dataclasses import dataclass, replace
@@ -45,7 +45,7 @@ class IndexLatch:
         return int(self.met(direction) and self.wanted and settings.clears)
 
     def step(self, settings, levels, ready, direction, stepped, count, arm=0, rst=0, probe=0):
-        """levels (a, b, z); stepped is -1, 0, +1 of the decoder in this clk. Returns (armed, found,
+        """levels (a, b, z); stepped is -1, 0, +1 of the decoder in this cycle. Returns (armed, found,
         index_count, revolution_wrong).
         """
         met = self.met(direction)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/decode/quadrature_decoder.sv does: step(a, b, mode, clear, rst) is one clk, and returns
+"""What rtl/decode/quadrature_decoder.sv does: step(a, b, mode, clear, rst) is one cycle, and returns
 what is on the pins after it.
 """
 
@@ -25,7 +25,7 @@ class QuadratureDecoder:
         return int(self.settle == 0)
 
     def look(self, a, b, mode=X4):
-        """(direction, what count would move by, illegal) with these levels in this clk, ready or
+        """(direction, what count would move by, illegal) with these levels in this cycle, ready or
         not.
         """
         if mode == PULSES:

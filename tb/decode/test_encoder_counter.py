@@ -30,12 +30,12 @@ class Bench:
         await FallingEdge(dut.clk)
         for _ in range(3):
             bench.model.step(0, 0, 0, rst=1)
-        await bench.clk(rst=1)
+        await bench.cycle(rst=1)
         await bench.wait(12)
         await bench.write(2, settings)
         return bench
 
-    async def clk(self, levels=None, rst=0, **access):
+    async def cycle(self, levels=None, rst=0, **access):
         a, b = levels or TURN[self.place % 4]
         self.now = (self.now + 1) % 65536
         pins = dict(
@@ -56,20 +56,20 @@ class Bench:
         )
         return want
 
-    async def wait(self, clk, **more):
-        for _ in range(clk):
-            await self.clk(**more)
+    async def wait(self, cycle, **more):
+        for _ in range(cycle):
+            await self.cycle(**more)
 
     async def write(self, word, wdata):
-        await self.clk(select=1, write=1, word=word, wdata=wdata)
+        await self.cycle(select=1, write=1, word=word, wdata=wdata)
 
     async def read(self, word):
-        return await self.clk(select=1, word=word)
+        return await self.cycle(select=1, word=word)
 
-    async def go(self, places, clk=1):
+    async def go(self, places, cycle=1):
         for place in places:
             self.place = place
-            await self.wait(clk)
+            await self.wait(cycle)
 
     async def count(self):
         return await self.read(0) & 0xFFFF
@@ -84,17 +84,17 @@ class Bench:
 @cocotb.test()
 async def count_and_the_time_of_its_last_edge_are_one_word(dut):
     bench = await Bench.begin(dut)
-    await bench.go(range(1, 8), clk=5)
-    moved = bench.now - 4  # the clk in which the last edge came to the pins
+    await bench.go(range(1, 8), cycle=5)
+    moved = bench.now - 4  # the cycle in which the last edge came to the pins
     assert (
         await bench.read(0) == moved + 3 - 1 << 16 | 7
-    )  # 3 clk to count; the time is that of the clk before
-    await bench.go(range(6, -4, -1), clk=5)
+    )  # 3 cycles to count; the time is that of the cycle before
+    await bench.go(range(6, -4, -1), cycle=5)
     assert await bench.count() == 0xFFFD
 
 
 @cocotb.test()
-async def latency_is_3_clk_from_the_pins_without_filter_and_1_clk_to_rdata(dut):
+async def latency_is_3_cycles_from_the_pins_without_filter_and_1_cycle_to_rdata(dut):
     bench = await Bench.begin(dut)
     await bench.go(range(1, 5))  # the time means nothing before the first step
     await bench.wait(4)
@@ -107,7 +107,7 @@ async def rdata_is_0_when_nothing_is_read_and_word_3_does_not_exist(dut):
     bench = await Bench.begin(dut, UP | EACH)
     await bench.go(range(1, 4))
     assert (
-        await bench.clk(word=2) == 0
+        await bench.cycle(word=2) == 0
         and await bench.read(3) == 0
         and await bench.read(2) == UP | EACH
     )
@@ -136,7 +136,7 @@ async def an_index_clears_and_latches_exactly_on_a_count_edge(dut):
         bench = await Bench.begin(dut, UP | EACH | clears)
         for place in range(1, 10):
             bench.z = int(place == 6)
-            await bench.go([place], clk=2)
+            await bench.go([place], cycle=2)
         bench.z = 0
         await bench.wait(6)
         assert (
@@ -157,7 +157,7 @@ async def once_takes_one_index_for_each_arm(dut):
             assert await bench.flags() == ARM
         before = await bench.flags()
         bench.z = 1
-        await bench.go([bench.place + 1], clk=6)
+        await bench.go([bench.place + 1], cycle=6)
         bench.z = 0
         await bench.wait(6)
         assert await bench.flags() == (FOUND if armed else before & ~ARM)
@@ -168,7 +168,7 @@ async def once_takes_one_index_for_each_arm(dut):
 async def a_probe_latches_the_count_of_its_own_pins_at_its_wanted_edge(dut):
     for low in (0, 1):
         bench = await Bench.begin(dut, PROBE | low * PROBE_LOW)
-        for place in range(1, 13):  # one edge a clk: latched is that of the very clk
+        for place in range(1, 13):  # one edge a cycle: latched is that of the very cycle
             bench.probe = int(4 <= place < 9)
             await bench.go([place])
         await bench.wait(4)
@@ -180,7 +180,7 @@ async def a_probe_latches_the_count_of_its_own_pins_at_its_wanted_edge(dut):
 
 
 @cocotb.test()
-async def probe_is_3_clk_to_latched(dut):
+async def probe_is_3_cycles_to_latched(dut):
     bench = await Bench.begin(dut, PROBE)
     await bench.go(range(1, 6))
     await bench.wait(4)
@@ -205,7 +205,7 @@ async def an_illegal_edge_is_not_counted_and_stands_until_told(dut):
     bench = await Bench.begin(dut)
     await bench.go(range(1, 3))
     await bench.wait(4)
-    await bench.go([4], clk=5)  # from (1, 1) to (0, 0)
+    await bench.go([4], cycle=5)  # from (1, 1) to (0, 0)
     assert await bench.count() == 2 and await bench.flags() == ILLEGAL
     await bench.write(1, FOUND | PROBED)
     assert await bench.flags() == ILLEGAL
@@ -214,7 +214,7 @@ async def an_illegal_edge_is_not_counted_and_stands_until_told(dut):
 
 
 @cocotb.test()
-async def a_flag_that_comes_again_in_the_clk_in_which_it_is_forgotten_stays(dut):
+async def a_flag_that_comes_again_in_the_cycle_in_which_it_is_forgotten_stays(dut):
     bench = await Bench.begin(dut)
     await bench.go([2])
     for _ in range(6):  # one of these meets it
@@ -228,7 +228,7 @@ async def a_flag_that_comes_again_in_the_clk_in_which_it_is_forgotten_stays(dut)
 async def pulses_shorter_than_the_filter_never_count(dut):
     required = (1 << int(dut.FILTER_W.value)) - 1
     bench = await Bench.begin(dut, required)
-    await bench.go(range(1, 3), clk=required + 4)
+    await bench.go(range(1, 3), cycle=required + 4)
     for _ in range(5):
         await bench.wait(required - 1, levels=(0, 1))
         await bench.wait(required + 2)
@@ -241,8 +241,8 @@ async def pulses_shorter_than_the_filter_never_count(dut):
 async def reset_in_mid_flow_forgets_all_but_the_pins(dut):
     bench = await Bench.begin(dut, UP | EACH | PROBE)
     bench.z = 1
-    await bench.go(range(1, 6), clk=2)
-    await bench.clk(rst=1)
+    await bench.go(range(1, 6), cycle=2)
+    await bench.cycle(rst=1)
     await bench.wait(20)
     assert (
         await bench.count() == 0
@@ -253,14 +253,14 @@ async def reset_in_mid_flow_forgets_all_but_the_pins(dut):
 
 
 @cocotb.test()
-async def any_pins_and_accesses_match_the_model_in_every_clk(dut):
+async def any_pins_and_accesses_match_the_model_in_every_cycle(dut):
     bench, bits = await Bench.begin(dut), random.getrandbits
     for _ in range(100):
         mask = 0xFFF3FFF3 if random.random() < 0.2 else 0x0011FFF3  # short filters, or any
         await bench.write(2, bits(32) & mask)
-        way, clk = random.choice([-1, 1]), random.choice([1, 1, 2, 6])
+        way, cycle = random.choice([-1, 1]), random.choice([1, 1, 2, 6])
         for n in range(60):
-            if n % clk == 0:
+            if n % cycle == 0:
                 way = -way if random.random() < 0.1 else way
                 bench.place += way * random.choice([0, 1, 1, 1, 1, 1, 1, 2])
                 bench.z, bench.probe = (
@@ -272,7 +272,7 @@ async def any_pins_and_accesses_match_the_model_in_every_clk(dut):
                 if random.random() < 0.2
                 else dict(select=bits(1), write=0, word=bits(2), wdata=bits(32))
             )
-            await bench.clk(rst=int(random.random() < 0.002), **told)
+            await bench.cycle(rst=int(random.random() < 0.002), **told)
 
 
 @pytest.mark.parametrize("filter_w, tolerated_w, skip_w", [(4, 0, 0), (1, 0, 0), (3, 2, 4)])

@@ -67,14 +67,14 @@ class Bench:
             getattr(dut, name).value = value
 
     async def play(self, rows, rst=0, arm=0, clear_flags=0, own=None):
-        """Levels (a, b, z), one row a clk; the strobes stand in the first of them. `own` are the
+        """Levels (a, b, z), one row a cycle; the strobes stand in the first of them. `own` are the
         node's own levels (a, b) in each
-        clk. Returns the pins of each clk by name."""
+        cycles. Returns the pins of each cycle by name."""
         out = []
-        for clk, levels in enumerate(rows):
+        for cycle, levels in enumerate(rows):
             self.now = (self.now + 1) % (1 << int(self.dut.TIME_W.value))
-            strobes = {"arm": arm, "clear_flags": clear_flags} if clk == 0 else {}
-            own_now = own[clk] if own else (0, 0)
+            strobes = {"arm": arm, "clear_flags": clear_flags} if cycle == 0 else {}
+            own_now = own[cycle] if own else (0, 0)
             self.put(levels, rst, **strobes, own=own_now)
             await RisingEdge(self.dut.clk)
             await FallingEdge(self.dut.clk)
@@ -91,7 +91,7 @@ class Bench:
             wrong = {
                 name: (value, want[name]) for name, value in got.items() if value != want[name]
             }
-            assert not wrong, f"clk {clk}, {self.setup}: (design, model) {wrong}"
+            assert not wrong, f"cycle {cycle}, {self.setup}: (design, model) {wrong}"
             out.append(want | {"now": self.now})
         return out
 
@@ -99,10 +99,10 @@ class Bench:
         value = getattr(self.dut, name).value
         return value.to_signed() if name in ("count", "step", "index_count") else int(value)
 
-    async def go(self, places, at_index=lambda place: 0, clk=1, **strobes):
-        """Visit these places, clk each, then wait for what is on its way; the pins of each clk."""
+    async def go(self, places, at_index=lambda place: 0, cycle=1, **strobes):
+        """Visit these places, cycles each, then wait for what is on its way; the pins of each cycle."""
         rows = [
-            (*TURN[place % 4], int(bool(at_index(place)))) for place in places for _ in range(clk)
+            (*TURN[place % 4], int(bool(at_index(place)))) for place in places for _ in range(cycle)
         ]
         return await self.play(rows + rows[-1:] * 6, **strobes)
 
@@ -122,7 +122,7 @@ def there_and_back(*turns):
 
 
 @cocotb.test()
-async def latency_is_needed_samples_and_2_clk(dut):
+async def latency_is_needed_samples_and_2_cycles(dut):
     for required in (0, 1, 3):
         bench = await Bench.begin(dut, Setup(required=required))
         out = await bench.play([(1, 0, 0)] * 12)
@@ -139,15 +139,15 @@ async def index_and_count_arrive_together(dut):
 
 @cocotb.test()
 async def an_index_that_coincides_with_a_count_edge_clears_and_latches_exactly(dut):
-    for clk in (1, 2, 5):  # riocore acknowledges it and does not clear
+    for cycle in (1, 2, 5):  # riocore acknowledges it and does not clear
         bench = await Bench.begin(dut, Setup(index=CLEARS))
-        out = await bench.go(there_and_back(0, 9), lambda place: place == 6, clk)
+        out = await bench.go(there_and_back(0, 9), lambda place: place == 6, cycle)
         assert found(out) == [6] and out[-1]["count"] == 3
         bench = await Bench.begin(dut, Setup(index=EACH))
-        out = await bench.go(there_and_back(0, 9, 2), lambda place: place == 6, clk)
+        out = await bench.go(there_and_back(0, 9, 2), lambda place: place == 6, cycle)
         assert found(out) == [6, 6] and out[-1]["count"] == 2
         bench = await Bench.begin(dut, Setup(index=CLEARS))
-        out = await bench.go(there_and_back(0, -9), lambda place: place == -6, clk)
+        out = await bench.go(there_and_back(0, -9), lambda place: place == -6, cycle)
         assert found(out) == [-6] and out[-1]["count"] == -3
 
 
@@ -294,7 +294,7 @@ async def a_stale_illegal_edge_fires_nothing_when_it_is_enabled(dut):
 
 
 @cocotb.test()
-async def an_illegal_edge_in_the_clk_of_clear_flags_is_kept(dut):
+async def an_illegal_edge_in_the_cycle_of_clear_flags_is_kept(dut):
     bench = await Bench.begin(dut)
     await bench.play([(1, 1, 0)] * 3)
     assert (await bench.play([(1, 1, 0)] * 3, clear_flags=1))[-1]["illegal_seen"]
@@ -303,7 +303,7 @@ async def an_illegal_edge_in_the_clk_of_clear_flags_is_kept(dut):
 @cocotb.test()
 async def edge_time_is_that_of_the_last_counted_edge_and_changes_with_count(dut):
     bench = await Bench.begin(dut)
-    out = await bench.go(there_and_back(0, 9, 3), clk=3)
+    out = await bench.go(there_and_back(0, 9, 3), cycle=3)
     for before, row in zip(out, out[1:]):
         assert (row["count"] != before["count"]) == (row["edge_time"] != before["edge_time"])
         if row["step"]:
@@ -326,7 +326,7 @@ async def reset_in_mid_flow_makes_zero_of_where_it_is(dut):
 
 
 @cocotb.test()
-async def own_steps_of_one_clk_are_all_counted_whatever_the_filter_is_set_to(dut):
+async def own_steps_of_one_cycle_are_all_counted_whatever_the_filter_is_set_to(dut):
     for required, skip in ((0, 0), (255, 0), (3, 200)):
         bench = await Bench.begin(
             dut, Setup(skip=skip, required=required, tolerated=2, mode=3, own=1)
@@ -338,7 +338,7 @@ async def own_steps_of_one_clk_are_all_counted_whatever_the_filter_is_set_to(dut
 
 
 @cocotb.test()
-async def latency_is_3_clk_from_own_a_to_count(dut):
+async def latency_is_3_cycles_from_own_a_to_count(dut):
     bench = await Bench.begin(dut, Setup(required=200, own=1))
     out = await bench.play([(0, 0, 0)] * 8, own=[(1, 0)] * 8)
     assert [row["count"] for row in out].index(1) + 1 == 3
@@ -381,12 +381,12 @@ async def any_pins_settings_and_strobes_match_the_model(dut):
         if random.random() < 0.3:
             rows = [(bits(1), bits(1), bits(1)) for _ in range(60)]
         else:
-            place, rows, clk = bits(4), [], random.choice([1, 2, 6])
+            place, rows, cycle = bits(4), [], random.choice([1, 2, 6])
             way = random.choice([-1, 1])
-            for _ in range(60 // clk):
+            for _ in range(60 // cycle):
                 way = -way if random.random() < 0.1 else way
                 place += way
-                rows += [(*TURN[place % 4], int(place % 12 in (0, 1)))] * clk
+                rows += [(*TURN[place % 4], int(place % 12 in (0, 1)))] * cycle
         for first in range(0, len(rows), 15):
             await bench.play(
                 rows[first : first + 15],

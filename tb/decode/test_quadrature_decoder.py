@@ -16,7 +16,7 @@ TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]  # a leads b: up
 
 
 async def begin(dut, a=0, b=0, mode=X4, ready=True):
-    """Reset with the pins at these levels; the model has seen the same clk."""
+    """Reset with the pins at these levels; the model has seen the same cycle."""
     await start(dut, a=a, b=b, mode=mode, clear=0)
     model = QuadratureDecoder(int(dut.W.value), int(dut.SETTLE.value))
     model.mode = mode
@@ -27,12 +27,12 @@ async def begin(dut, a=0, b=0, mode=X4, ready=True):
 
 
 async def drive(dut, model, levels, rst=0, clear=0):
-    """Put each (a, b) on the pins for one clk and hold the model beside the design; return (count,
-    step, illegal) of each clk.
+    """Put each (a, b) on the pins for one cycle and hold the model beside the design; return (count,
+    step, illegal) of each cycle.
     """
     out = []
     dut.rst.value, dut.clear.value, dut.mode.value = rst, clear, model.mode
-    for clk, (a, b) in enumerate(levels):
+    for cycle, (a, b) in enumerate(levels):
         dut.a.value, dut.b.value = a, b
         await ReadOnly()
         direction, moves, _ = model.look(a, b, model.mode)
@@ -46,7 +46,7 @@ async def drive(dut, model, levels, rst=0, clear=0):
         want = model.step(a, b, model.mode, clear, rst)
         got = dut.count.value.to_signed(), dut.step.value.to_signed(), int(dut.illegal.value)
         assert got == want, (
-            f"clk {clk}, mode {model.mode}: (count, step, illegal) is {got}, the model has {want}"
+            f"cycle {cycle}, mode {model.mode}: (count, step, illegal) is {got}, the model has {want}"
         )
         out.append(got)
     dut.rst.value, dut.clear.value = 0, 0
@@ -148,7 +148,7 @@ async def a_pulse_whose_direction_changes_with_it_is_illegal_and_not_counted(dut
 
 
 @cocotb.test()
-async def clear_makes_zero_of_the_state_in_which_its_clk_ends(dut):
+async def clear_makes_zero_of_the_state_in_which_its_cycle_ends(dut):
     for here, then in ((1, 2), (2, 1), (1, 1)):
         model = await begin(dut)
         await turn(dut, model, [1, 2] if here == 2 else [1])

@@ -4,8 +4,8 @@ Smoothieware controller, go through
 deglitcher and decoder, clean and with spikes, and must count what a plain offline decoder counts,
 at every recorded edge.
 
-A recording is millions of samples, mostly still. One sample is one clk, but a stretch without any
-edge is cut to STILL clk,
+A recording is millions of samples, mostly still. One sample is one cycle, but a stretch without any
+edge is cut to STILL cycles,
 eight times what the deglitcher waits; the order of the edges and every shorter distance stay as
 recorded.
 """
@@ -25,13 +25,13 @@ from tb.decode.quadrature_decoder import PULSES, X4
 CAPTURES = bench.ROOT.parent / "shared" / "captures"
 RECORDINGS = [("hdns2000_fast", X4), ("hdns2000_left_right", X4), ("smoothieware_steps", PULSES)]
 ROWS = 5000  # of a recording, at most
-STABLE = 5  # setting of the deglitchers, clk
-STILL = 40  # longest stretch without an edge, clk
+STABLE = 5  # setting of the deglitchers, cycles
+STILL = 40  # longest stretch without an edge, cycles
 NAMES = ["x clean", "y clean", "x with spikes", "y with spikes"]
 
 
 def recording(name):
-    """Rows of (duration in clk, xa, xb, ya, yb); a is step, b is direction where these are
+    """Rows of (duration in cycles, xa, xb, ya, yb); a is step, b is direction where these are
     recorded.
     """
     with open(CAPTURES / f"{name}.csv", newline="") as lines:
@@ -64,7 +64,7 @@ def offline(levels, mode):
 
 
 def spikes(duration):
-    """A pulse too short to pass, somewhere in a stretch: (clk at which it starts, clk at which it
+    """A pulse too short to pass, somewhere in a stretch: (cycles at which it starts, cycles at which it
     ends), clear of both ends.
     """
     width = random.randrange(1, STABLE)
@@ -83,17 +83,17 @@ async def play(dut, rows):
         changes = {
             0: (0, 0),
             duration: (0, 0),
-        }  # clk of the row -> lines turned over from there on, a and b
+        }  # cycle within the row -> lines turned over from there on, a and b
         if duration > 2 * STABLE:
             for line in range(4):  # xa, xb, ya, yb
                 if random.random() < 0.5:
                     begin, end = spikes(duration)
                     mask = 4 << line // 2
                     sent[line // 2] += 1
-                    for clk in (begin, end):
-                        turned = list(changes.get(clk, (0, 0)))
+                    for cycle in (begin, end):
+                        turned = list(changes.get(cycle, (0, 0)))
                         turned[line % 2] ^= mask
-                        changes[clk] = tuple(turned)
+                        changes[cycle] = tuple(turned)
         turned_a = turned_b = 0
         for now, then in pairwise(sorted(changes)):
             turned_a, turned_b = turned_a ^ changes[now][0], turned_b ^ changes[now][1]

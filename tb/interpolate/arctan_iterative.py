@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rtl/interpolate/arctan_iterative.sv does, in integers: sample() is one sample,
-ArctanIterative.step() one clk.
+ArctanIterative.step() one cycle.
 """
 
 from functools import cache

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rtl/interpolate/arctan_pipelined.sv does, in integers: sample() is one sample,
-ArctanPipelined.step() one clk.
+ArctanPipelined.step() one cycle.
 """
 
 from collections import deque

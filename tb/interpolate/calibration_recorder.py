@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/interpolate/calibration_recorder.sv does; step() is one clk."""
+"""What rtl/interpolate/calibration_recorder.sv does; step() is one cycle."""
 
 
 class CalibrationRecorder:
-    """step() returns (word, full, invalid) as they are after the clk; word is None until that place
+    """step() returns (word, full, invalid) as they are after the cycle; word is None until that place
     has been written.
     """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/interpolate/fringe_tracker.sv does, in integers: step(valid, phase) is one clk."""
+"""What rtl/interpolate/fringe_tracker.sv does, in integers: step(valid, phase) is one cycle."""
 
 PERIOD, QUARTER = 1 << 16, 1 << 14
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rtl/interpolate/signal_correction.sv does: corrected(sin, cos, ...) is a sample,
-SignalCorrection.step one clk.
+SignalCorrection.step one cycle.
 """
 
 from typing import NamedTuple
@@ -31,7 +31,7 @@ def corrected(sin, cos, settings, w=8):
 
 
 class SignalCorrection:
-    """step() returns (done, sin_out, cos_out) as they are after the clk."""
+    """step() returns (done, sin_out, cos_out) as they are after the cycle."""
 
     def __init__(self, w=8):
         self.w = w
@@ -45,7 +45,7 @@ class SignalCorrection:
         if rst:
             self.reset()
             return 0, 0, 0
-        # an offset acts on the sample of its clk; the factors multiply one clk later, so they too
+        # an offset acts on the sample of its cycle; the factors multiply one cycle later, so they too
         # act from that sample on
         self.settings = load or self.settings
         self.flow.append(corrected(sin, cos, self.settings, self.w) if valid else None)

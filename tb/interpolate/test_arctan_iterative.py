@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""arctan_iterative: by hand, its latency, samples that come too soon, every clk against the model;
+"""arctan_iterative: by hand, its latency, samples that come too soon, every cycle against the model;
 the model against math.atan2.
 
 All 8-bit pairs: the model for every pair; the RTL against it for all of them under SIM=verilator,
@@ -91,10 +91,10 @@ async def latency_is_as_the_header_says(dut):
 
 
 @cocotb.test()
-async def any_input_matches_the_model_in_every_clk(dut):
+async def any_input_matches_the_model_in_every_cycle(dut):
     w = await begin(dut)
     model = ArctanIterative(w)
-    for clk in range(3000):
+    for cycle in range(3000):
         rst, size = int(random.random() < 0.005), 1 << random.choice((w - 1, w - 1, 3))
         valid, sin, cos = (
             random.choice((0, 0, 1)),
@@ -106,7 +106,7 @@ async def any_input_matches_the_model_in_every_clk(dut):
         want = model.step(valid, sin, cos)
         if rst:
             model, want = ArctanIterative(w), (0, 0, 0)
-        assert out(dut) == want, f"clk {clk}"
+        assert out(dut) == want, f"cycle {cycle}"
 
 
 @cocotb.test()

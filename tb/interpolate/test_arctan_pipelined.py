@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""arctan_pipelined: by hand, its latency, one sample a clk, every clk against the model; the model
+"""arctan_pipelined: by hand, its latency, one sample a cycle, every cycle against the model; the model
 against math.atan2.
 
 All 8-bit pairs: the model for every pair, the RTL against it for all of them under SIM=verilator,
@@ -36,8 +36,8 @@ def out(dut):
     return int(dut.done.value), dut.phase.value.to_unsigned(), dut.amplitude.value.to_unsigned()
 
 
-async def clk(dut, model, pair=None):
-    """One clk with this sample or none; the design is held against the model."""
+async def cycle(dut, model, pair=None):
+    """One cycle with this sample or none; the design is held against the model."""
     sin, cos = pair or (random.choice((0, 5)), 0)
     dut.valid.value, dut.sin.value, dut.cos.value = int(pair is not None), sin, cos
     await FallingEdge(dut.clk)
@@ -47,9 +47,9 @@ async def clk(dut, model, pair=None):
 
 
 async def ask(dut, model, pairs):
-    """Send the pairs one a clk; (phase, amplitude) of each."""
-    answers = [await clk(dut, model, pair) for pair in pairs]
-    answers += [await clk(dut, model) for _ in range(len(model.coming) - 1)]
+    """Send the pairs one a cycle; (phase, amplitude) of each."""
+    answers = [await cycle(dut, model, pair) for pair in pairs]
+    answers += [await cycle(dut, model) for _ in range(len(model.coming) - 1)]
     assert [done for done, *_ in answers].count(1) == len(pairs)
     return [tuple(answer) for done, *answer in answers if done]
 
@@ -106,7 +106,9 @@ async def latency_is_as_the_header_says(dut):
     steps = int(dut.STEPS.value)
     want = -(-{8: 24, 9: 28, 10: 29}.get(w, 23) // steps)
     assert want == latency(w, steps)
-    answers = [await clk(dut, model, (0, -5))] + [await clk(dut, model) for _ in range(want + 3)]
+    answers = [await cycle(dut, model, (0, -5))] + [
+        await cycle(dut, model) for _ in range(want + 3)
+    ]
     assert [done for done, *_ in answers] == [0] * (want - 1) + [1] + [0] * 4
 
 
@@ -116,28 +118,28 @@ async def the_answer_stands_until_the_next(dut):
     full = (1 << w - 1) - 1
     (answer,) = await ask(dut, model, [(full, full)])
     assert answer[0] == 8192
-    assert {(await clk(dut, model))[1:] for _ in range(60)} == {answer}
+    assert {(await cycle(dut, model))[1:] for _ in range(60)} == {answer}
 
 
 @cocotb.test()
 async def reset_drops_the_samples_in_work(dut):
     w, model = await begin(dut)
     for _ in range(2 * latency(w)):
-        await clk(dut, model, (77, -33))
+        await cycle(dut, model, (77, -33))
     dut.rst.value, dut.valid.value = 1, 1
     await FallingEdge(dut.clk)
     assert out(dut) == (0, 0, 0)
     dut.rst.value, model = 0, ArctanPipelined(w, int(dut.STEPS.value))
-    assert {await clk(dut, model) for _ in range(40)} == {(0, 0, 0)}
+    assert {await cycle(dut, model) for _ in range(40)} == {(0, 0, 0)}
 
 
 @cocotb.test()
-async def any_input_matches_the_model_in_every_clk(dut):
+async def any_input_matches_the_model_in_every_cycle(dut):
     w, model = await begin(dut)
     for _ in range(30):
         often, size = random.choice((1, 1, 2, 5)), 1 << random.choice((w - 1, w - 1, w - 2, 3))
         for _ in range(60):
-            await clk(
+            await cycle(
                 dut,
                 model,
                 None

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """arctan_table: by hand, all 8-bit pairs against math.atan2 within the bound of the table's maker,
-every clk against the model.
+every cycle against the model.
 
 The model is held against atan2 for all 65 535 pairs. The RTL is held against the model for all
 pairs under SIM=verilator;
@@ -78,21 +78,21 @@ async def the_ends_of_the_range_match_the_model(dut):
 async def latency_is_23(dut):
     await start(dut, **IDLE)
     dut.valid.value, dut.cos.value = 1, -5
-    clk = 0
-    while not clk or not int(dut.done.value):
+    cycle = 0
+    while not cycle or not int(dut.done.value):
         await RisingEdge(dut.clk)
-        clk += 1
+        cycle += 1
         await FallingEdge(dut.clk)
         dut.valid.value = 0
-        assert clk <= 23
-    assert clk == 23 and dut.phase.value == 32768
+        assert cycle <= 23
+    assert cycle == 23 and dut.phase.value == 32768
 
 
 @cocotb.test()
-async def any_input_matches_the_model_in_every_clk(dut):
+async def any_input_matches_the_model_in_every_cycle(dut):
     await begin(dut)
     w, model, rst = int(dut.W.value), ArctanTable(), 0
-    for clk in range(4000):
+    for cycle in range(4000):
         rst = int(random.random() < 0.005)
         valid, sin, cos = (
             random.choice((0, 0, 1)),
@@ -104,7 +104,7 @@ async def any_input_matches_the_model_in_every_clk(dut):
         want = model.step(valid, sin, cos)
         if rst:
             model, want = ArctanTable(), (0, 0)
-        assert (int(dut.done.value), dut.phase.value.to_unsigned()) == want, f"clk {clk}"
+        assert (int(dut.done.value), dut.phase.value.to_unsigned()) == want, f"cycle {cycle}"
 
 
 @cocotb.test()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fringe_tracker: steps by hand, speeds up to a period a sample, bad samples, and every clk against
+"""fringe_tracker: steps by hand, speeds up to a period a sample, bad samples, and every cycle against
 the model.
 """
 
@@ -27,7 +27,7 @@ async def again(dut):
 
 
 async def clock(dut, valid, phase):
-    """One clk; returns done, step, overspeed."""
+    """One cycle; returns done, step, overspeed."""
     dut.valid.value, dut.phase.value = valid, phase % 65536
     await FallingEdge(dut.clk)
     assert not int(dut.done.value) or dut.phase_out.value == phase % 65536
@@ -128,10 +128,10 @@ async def after_noise_a_slow_scale_is_caught_again(dut):
 
 
 @cocotb.test()
-async def any_input_matches_the_model_in_every_clk(dut):
+async def any_input_matches_the_model_in_every_cycle(dut):
     await begin(dut)
     model, phase, speed = FringeTracker(), 0, 0
-    for clk in range(20_000):
+    for cycle in range(20_000):
         rst, valid = int(random.random() < 0.003), random.getrandbits(1)
         speed = (
             max(-70_000, min(70_000, speed + random.randrange(-3000, 3000)))
@@ -146,7 +146,7 @@ async def any_input_matches_the_model_in_every_clk(dut):
         want = model.step(valid, phase % 65536)
         if rst:
             model, want = FringeTracker(), (0, 0, 0)
-        assert got == want, f"clk {clk}"
+        assert got == want, f"cycle {cycle}"
 
 
 def test_fringe_tracker():

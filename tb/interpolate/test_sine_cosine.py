@@ -21,7 +21,7 @@ from tb.interpolate.fringe_tracker import FringeTracker
 from tb.position.unwrap import Unwrap
 
 PERIOD_NM = 800
-LATENCY = 22  # clk from a converter word to its position
+LATENCY = 22  # cycles from a converter word to its position
 ARCTAN = arctan_rotation.quarter_bound(
     arctan_rotation.PIPELINED, 16
 )  # LSB of phase; a corrected leg is half of 16 bits large
@@ -173,19 +173,19 @@ async def follow(dut, sin, cos):
     dut.valid.value = 0
     await ClockCycles(
         dut.clk, LATENCY, FallingEdge
-    )  # the first clk brought it into the bench's register
+    )  # the first cycle brought it into the bench's register
     assert dut.done.value == 1
     return dut.position.value.to_signed()
 
 
 @cocotb.test()
-async def latency_is_22_clk_from_converter_word_to_position(dut):
+async def latency_is_22_cycles_from_converter_word_to_position(dut):
     await begin(dut)
     dut.valid.value, dut.sin.value, dut.cos.value = 1, 50, 0
-    for clk in range(LATENCY + 4):  # after clk 0 the word stands in the bench's register
+    for cycle in range(LATENCY + 4):  # after cycle 0 the word stands in the bench's register
         await FallingEdge(dut.clk)
         dut.valid.value = 0
-        assert int(dut.done.value) == (clk == LATENCY)
+        assert int(dut.done.value) == (cycle == LATENCY)
     assert dut.position.value == 16384
 
 
@@ -214,7 +214,7 @@ async def a_learned_correction_and_harmonics_act_within_the_same_latency(dut):
 
 
 @cocotb.test()
-async def a_sample_every_clk_comes_out_every_clk(dut):
+async def a_sample_every_cycle_comes_out_every_cycle(dut):
     await begin(dut)
     w, draw = int(dut.W.value), np.random.default_rng(seed())
     words, chain, positions = samples(0.4 + np.arange(80) * 0.037, w, draw, **CLEAN), Chain(w), []

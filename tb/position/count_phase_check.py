@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/position/count_phase_check.sv does, in integers: step() is one clk and returns the
+"""What rtl/position/count_phase_check.sv does, in integers: step() is one cycle and returns the
 disagreement.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/position/position_compare.sv does, in integers: step() is one clk and returns armed,
+"""What rtl/position/position_compare.sv does, in integers: step() is one cycle and returns armed,
 pulse, late, passed.
 """
 
@@ -10,10 +10,12 @@ def wrapped(value):
 
 class PositionCompare:
     def __init__(self):
-        self.origin, self.here = 0, None  # here: of the position one clk ago, if it was new
+        self.origin, self.here = 0, None  # here: of the position one cycle ago, if it was new
         self.armed = self.ready = False
         self.reach = self.point = self.stride = self.passed = self.count = 0
-        self.pulse = self.resting = self.timer = 0  # timer: clk left of pulse or gap, with this one
+        self.pulse = self.resting = self.timer = (
+            0  # timer: cycles left of pulse or gap, with this one
+        )
         self.waited = False
 
     def past(self, place, mark):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""count_phase_check: a true scale agrees, a lost fringe shows, shifts hide nothing, and every clk
+"""count_phase_check: a true scale agrees, a lost fringe shows, shifts hide nothing, and every cycle
 against the model.
 """
 
@@ -49,13 +49,13 @@ async def rest(dut, position, count, limit=LIMIT):
 async def latency_is_3(dut):
     await begin(dut)
     await rest(dut, 0, 0)
-    dut.position.value, clk = LIMIT + 1, 0
+    dut.position.value, cycle = LIMIT + 1, 0
     while not int(dut.disagreement.value):
         await RisingEdge(dut.clk)
-        clk += 1
+        cycle += 1
         await FallingEdge(dut.clk)
-        assert clk <= 3
-    assert clk == 3
+        assert cycle <= 3
+    assert cycle == 3
 
 
 @cocotb.test()
@@ -145,10 +145,10 @@ async def the_count_wraps_without_a_disagreement(dut):
 
 
 @cocotb.test()
-async def any_input_matches_the_model_in_every_clk(dut):
+async def any_input_matches_the_model_in_every_cycle(dut):
     await begin(dut)
     model, position, count = CountPhaseCheck(), 0, 0
-    for clk in range(20_000):
+    for cycle in range(20_000):
         rst, valid, shift = (int(random.random() < share) for share in (0.002, 0.5, 0.05))
         moved = random.choice(
             (0, 0, 0, 1, -1, random.randrange(-1 << 30, 1 << 30) if random.random() < 0.02 else 1)
@@ -164,7 +164,7 @@ async def any_input_matches_the_model_in_every_clk(dut):
         want = model.step(limit, valid, position, count, shift, periods)
         if rst:
             model, want = CountPhaseCheck(), 0
-        assert got == want, f"clk {clk}"
+        assert got == want, f"cycle {cycle}"
         position += shift * periods << 16
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """position_compare: a pulse a point in both directions, jitter, jumps, both ends of the settings,
-and every clk against the model.
+and every cycle against the model.
 """
 
 import random
@@ -38,8 +38,8 @@ class Compare:
             0,
         )
 
-    async def clk(self, rst=0, **inputs):
-        """One clk with the model beside it; (armed, pulse, late, passed)."""
+    async def cycle(self, rst=0, **inputs):
+        """One cycle with the model beside it; (armed, pulse, late, passed)."""
         dut, values = self.dut, INPUTS | self.settings | inputs
         dut.rst.value = rst
         for name, value in values.items():
@@ -67,23 +67,23 @@ class Compare:
 
     async def arm(self, **settings):
         self.settings, self.pulses, self.late = settings, 0, 0
-        await self.clk(arm=1)
+        await self.cycle(arm=1)
 
     async def ride(self, positions, gap=0):
-        """Each position for one sample, `gap` clk between samples."""
+        """Each position for one sample, `gap` cycles between samples."""
         for position in positions:
-            await self.clk(valid=1, position=position)
+            await self.cycle(valid=1, position=position)
             for _ in range(gap):
-                await self.clk(position=position)
+                await self.cycle(position=position)
 
-    async def rest(self, clk):
-        return [(await self.clk())[1] for _ in range(clk)]
+    async def rest(self, cycle):
+        return [(await self.cycle())[1] for _ in range(cycle)]
 
 
 async def begin(dut):
     await start(dut, **INPUTS)
     compare = Compare(dut)
-    await compare.clk(rst=1)
+    await compare.cycle(rst=1)
     return compare
 
 
@@ -93,8 +93,8 @@ async def latency_is_3(dut):
     await compare.arm(start=100, step=10)
     await compare.ride([0])
     await compare.rest(5)
-    await compare.clk(valid=1, position=100)
-    assert await compare.rest(2) == [0, 1]  # the third clk edge after valid raises it
+    await compare.cycle(valid=1, position=100)
+    assert await compare.rest(2) == [0, 1]  # the third clock edge after valid raises it
 
 
 @cocotb.test()
@@ -108,7 +108,7 @@ async def a_pulse_at_each_point_in_both_directions(dut):
             await compare.ride([sign * place], 4)
             seen += [place] * (compare.pulses - before)
         assert [0 <= place - (1000 + 300 * k) < 7 for k, place in enumerate(seen)] == [True] * 5
-        assert await compare.clk() == (0, 0, 0, 5)
+        assert await compare.cycle() == (0, 0, 0, 5)
 
 
 @cocotb.test()
@@ -183,7 +183,7 @@ async def the_count_ends_it_and_0_has_no_end(dut):
     for count, want in ((1, 1), (7, 7), (0, 200)):
         await compare.arm(start=1, step=5, count=count)
         await compare.ride([0, 1000], 600)
-        assert compare.pulses == want and (await compare.clk())[0] == (count == 0)
+        assert compare.pulses == want and (await compare.cycle())[0] == (count == 0)
 
 
 @cocotb.test()
@@ -199,7 +199,7 @@ async def disarm_ends_it_and_lets_the_pulse_end_at_its_time(dut):
     compare = await begin(dut)
     await compare.arm(start=10, step=1, pulse_length=9)
     await compare.ride([0, 50], 4)
-    await compare.clk(disarm=1)
+    await compare.cycle(disarm=1)
     assert sum(await compare.rest(40)) == 5 and compare.pulses == 1
 
 
@@ -216,13 +216,13 @@ async def arming_again_starts_with_the_first_point(dut):
 @cocotb.test()
 async def a_shift_leaves_the_points_on_the_scale(dut):
     compare = await begin(dut)
-    await compare.clk(shift=1, shift_periods=-12)
+    await compare.cycle(shift=1, shift_periods=-12)
     await compare.arm(start=1000, step=1000)
     await compare.ride([0, 999], 5)
-    await compare.clk(shift=1, shift_periods=7)
+    await compare.cycle(shift=1, shift_periods=7)
     await compare.ride([999 + 7 * PERIOD], 5)
     assert compare.pulses == 0
-    await compare.clk(valid=1, position=999 + 7 * PERIOD, shift=1, shift_periods=-1 << 31)
+    await compare.cycle(valid=1, position=999 + 7 * PERIOD, shift=1, shift_periods=-1 << 31)
     far = wrapped(7 * PERIOD - (1 << 47))
     await compare.ride([999 + far, 1000 + far, 2000 + far], 5)
     assert compare.pulses == 2
@@ -259,10 +259,10 @@ async def pulses_are_the_points_passed_at_any_speed(dut):
 
 
 @cocotb.test()
-async def any_input_matches_the_model_in_every_clk(dut):
+async def any_input_matches_the_model_in_every_cycle(dut):
     compare, position = await begin(dut), 0
-    for clk in range(12_000):
-        if clk % 400 == 0:
+    for cycle in range(12_000):
+        if cycle % 400 == 0:
             compare.settings = dict(
                 start=position + random.randrange(-300, 300),
                 step=random.randrange(-50, 50),
@@ -273,7 +273,7 @@ async def any_input_matches_the_model_in_every_clk(dut):
         arm, shift, rst = (int(random.random() < share) for share in (0.01, 0.01, 0.002))
         position = wrapped(position + random.randrange(-20, 22))
         periods = random.choice((1, -3, random.randrange(-1 << 31, 1 << 31)))
-        await compare.clk(
+        await compare.cycle(
             rst,
             arm=arm,
             disarm=int(random.random() < 0.002),

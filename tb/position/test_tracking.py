@@ -16,8 +16,8 @@ from tb.position.unwrap import Unwrap
 
 PERIOD, QUARTER = 1 << 16, 1 << 14
 LIMIT = PERIOD // 2  # the quarter period between two counts, and as much for comparators and lag
-PACE = 6  # clk from sample to sample, as close as the check can tell them apart
-LATENCY = 5  # clk from phase to disagreement
+PACE = 6  # cycles from sample to sample, as close as the check can tell them apart
+LATENCY = 5  # cycles from phase to disagreement
 
 
 class Scale:
@@ -43,15 +43,15 @@ class Scale:
             place // QUARTER if count is None else count,
             0,
         )
-        for clk in range(PACE):
-            dut.valid.value = int(clk == 0)
+        for cycle in range(PACE):
+            dut.valid.value = int(cycle == 0)
             await FallingEdge(dut.clk)
             overspeed |= int(dut.overspeed.value)
         step, strayed = self.tracker.follow(phase)
         position = self.unwrap.step(1, step, phase, 0, 0)[1]
-        for clk in range(4):
+        for cycle in range(4):
             disagreement = self.coarse.step(
-                LIMIT, int(clk == 0), position, int(dut.count.value.to_signed()), 0, 0
+                LIMIT, int(cycle == 0), position, int(dut.count.value.to_signed()), 0, 0
             )
         got = dut.position.value.to_signed(), overspeed, int(dut.disagreement.value)
         assert got == (position, strayed, disagreement)
@@ -69,10 +69,10 @@ async def latency_from_phase_to_disagreement_is_5(dut):
     await scale.begin()
     await scale.sample(100)
     dut.count.value, dut.valid.value = 40, 1
-    for clk in range(1, LATENCY + 1):
+    for cycle in range(1, LATENCY + 1):
         await FallingEdge(dut.clk)
         dut.valid.value = 0
-        assert int(dut.disagreement.value) == (clk == LATENCY)
+        assert int(dut.disagreement.value) == (cycle == LATENCY)
 
 
 @cocotb.test()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""unwrap: by hand, the ends of the range, shifts with and without a step, and every clk against the
+"""unwrap: by hand, the ends of the range, shifts with and without a step, and every cycle against the
 model.
 """
 
@@ -66,10 +66,10 @@ async def the_ends_of_the_range_wrap(dut):
 
 
 @cocotb.test()
-async def any_input_matches_the_model_in_every_clk(dut):
+async def any_input_matches_the_model_in_every_cycle(dut):
     await begin(dut)
     model = Unwrap()
-    for clk in range(10_000):
+    for cycle in range(10_000):
         rst, valid, shift = (
             int(random.random() < 0.003),
             random.getrandbits(1),
@@ -89,7 +89,7 @@ async def any_input_matches_the_model_in_every_clk(dut):
         )
         if rst:
             model, want = Unwrap(), (0, 0)
-        assert got == want, f"clk {clk}"
+        assert got == want, f"cycle {cycle}"
 
 
 def test_unwrap():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""velocity_estimator: by hand, both ends, shifts, the sweep of speeds, resolution, and every clk
+"""velocity_estimator: by hand, both ends, shifts, the sweep of speeds, resolution, and every cycle
 against the model.
 """
 
@@ -74,7 +74,7 @@ async def with_quantum_0_it_is_the_way_of_the_tick(dut):
 
 
 @cocotb.test()
-async def a_tick_in_every_clk_is_the_way_of_a_clk(dut):
+async def a_tick_in_every_cycle_is_the_way_of_a_cycle(dut):
     await begin(dut)
     where = [n * n for n in range(20)]
     seen = [await clock(dut, p, 1) for p in where]
@@ -88,7 +88,9 @@ async def a_shift_leaves_no_trace(dut):
     assert await ticks(dut, [1010]) == 10
     await clock(dut, 1015, 0, 1, -7)  # between ticks
     assert await ticks(dut, [1020 - (7 << 16)]) == 10
-    await clock(dut, 1030 - (7 << 16), 1, 1, 100_000)  # in the clk of a tick: still the old origin
+    await clock(
+        dut, 1030 - (7 << 16), 1, 1, 100_000
+    )  # in the cycle of a tick: still the old origin
     here = 1030 + (99_993 << 16)
     assert [await clock(dut, here) for _ in range(LATENCY)][-1] == 10
     assert await ticks(dut, [here + 10]) == 10
@@ -121,9 +123,9 @@ async def the_wrap_of_the_position_is_no_velocity(dut):
 async def by_hand_one_edge_in_five_ticks(dut):
     await begin(dut)
     period, seen = 100, []
-    for clk in range(0, 4000):
-        velocity = await clock(dut, clk // 500 * X4, clk % period == 0, quantum=X4)
-        if clk > 1500 and clk % period == 99:
+    for cycle in range(0, 4000):
+        velocity = await clock(dut, cycle // 500 * X4, cycle % period == 0, quantum=X4)
+        if cycle > 1500 and cycle % period == 99:
             seen.append((velocity, dut.fine.value.to_signed()))
     ((velocity, fine),) = set(seen)
     assert (
@@ -135,9 +137,11 @@ async def by_hand_one_edge_in_five_ticks(dut):
 async def an_edge_that_trembles_has_no_velocity(dut):
     await begin(dut)
     seen = []
-    for clk in range(3000):
-        position = X4 * (7 + (clk // 13 + clk // 101) % 2)  # to and fro over one edge of the scale
-        seen.append(await clock(dut, position, clk % 97 == 0, quantum=X4))
+    for cycle in range(3000):
+        position = X4 * (
+            7 + (cycle // 13 + cycle // 101) % 2
+        )  # to and fro over one edge of the scale
+        seen.append(await clock(dut, position, cycle % 97 == 0, quantum=X4))
     assert set(seen[300:]) == {0}
     assert max(map(abs, seen)) <= X4
 
@@ -146,11 +150,11 @@ async def an_edge_that_trembles_has_no_velocity(dut):
 async def after_a_stop_the_velocity_dies_away_as_one_over_the_time_and_ends(dut):
     await begin(dut)
     position, seen, longest = 0, [], (1 << int(dut.TIME_W.value)) - 1
-    for clk in range(4000):
-        if clk < 1500:
-            position = clk // 50 * X4
-        velocity = await clock(dut, position, clk % 100 == 0, quantum=X4)
-        if clk % 100 == 50:
+    for cycle in range(4000):
+        if cycle < 1500:
+            position = cycle // 50 * X4
+        velocity = await clock(dut, position, cycle % 100 == 0, quantum=X4)
+        if cycle % 100 == 50:
             seen.append(velocity)
     assert seen[10] == 2 * X4
     for n, velocity in enumerate(seen[17:], 2):  # n ticks and more since the last edge
@@ -160,38 +164,38 @@ async def after_a_stop_the_velocity_dies_away_as_one_over_the_time_and_ends(dut)
 
 
 @cocotb.test()
-async def the_step_it_rests_on_is_24_to_50_clk_old(dut):
+async def the_step_it_rests_on_is_24_to_50_cycles_old(dut):
     await begin(dut)
     for age in (23, 24, 49, 50):
         taken = set()
-        for late in range(0, 24, 5):  # against the divisions, one every 24 clk
+        for late in range(0, 24, 5):  # against the divisions, one every 24 cycles
             await again(dut)
-            for clk in range(820 + late):  # two edges, the second `age` before the tick
-                position = X4 * ((clk >= 100) + (clk >= 800 + late - age))
-                velocity = await clock(dut, position, clk in (400 + late, 800 + late), quantum=X4)
+            for cycle in range(820 + late):  # two edges, the second `age` before the tick
+                position = X4 * ((cycle >= 100) + (cycle >= 800 + late - age))
+                velocity = await clock(dut, position, cycle in (400 + late, 800 + late), quantum=X4)
             taken.add(velocity > 0)
         assert taken == {True} if age >= 50 else taken == {False} if age < 24 else True
 
 
 def ride(speed, period, count, quantum=X4, backwards=False):
-    """(speed, velocity / quantum) at each tick of the model on a scale with this speed(clk), in
+    """(speed, velocity / quantum) at each tick of the model on a scale with this speed(cycles), in
     quanta a tick.
     """
     model, where, out = VelocityEstimator(), 0.5, []
-    for clk in range(period * count):
-        where += (-speed(clk) if backwards else speed(clk)) / period
-        _, fine = model.step(quantum, clk % period == 0, math.floor(where) * quantum, 0, 0)
-        if clk % period == LATENCY:
-            out.append((speed(clk), (-fine if backwards else fine) / 256 / quantum))
+    for cycle in range(period * count):
+        where += (-speed(cycle) if backwards else speed(cycle)) / period
+        _, fine = model.step(quantum, cycle % period == 0, math.floor(where) * quantum, 0, 0)
+        if cycle % period == LATENCY:
+            out.append((speed(cycle), (-fine if backwards else fine) / 256 / quantum))
     return out
 
 
 @pytest.mark.parametrize("backwards", [False, True])
-def test_at_constant_speed_the_error_is_below_2_clk_of_a_tick(backwards):
+def test_at_constant_speed_the_error_is_below_2_cycles_of_a_tick(backwards):
     period = 500
     for speed in (0.04, 0.37, 0.77, 0.99, 1, 1.01, 1.99, 2, 2.5, 7.3, 50.1):
         for true, got in ride(
-            lambda clk, speed=speed: speed, period, int(10 + 3 / speed), backwards=backwards
+            lambda cycle, speed=speed: speed, period, int(10 + 3 / speed), backwards=backwards
         )[int(4 + 2 / speed) :]:
             assert abs(got - true) <= 2 / period * true + 2**-17
 
@@ -201,7 +205,7 @@ def test_no_speed_has_a_step_where_time_stamps_and_differences_meet(backwards):
     count, period, slow, fast = 200, 400, 0.1, 10
     growth = math.log(fast / slow) / count  # of the speed, a tick
     seen = ride(
-        lambda clk: slow * math.exp(growth * clk / period), period, count, backwards=backwards
+        lambda cycle: slow * math.exp(growth * cycle / period), period, count, backwards=backwards
     )[30:]
     for (_, before), (true, now) in zip(seen, seen[1:]):
         assert -4 / period * true <= now - before
@@ -212,9 +216,9 @@ def test_no_speed_has_a_step_where_time_stamps_and_differences_meet(backwards):
 
 def test_a_fraction_of_a_unit_a_tick_is_told():
     for speed in (0.15, 1.4):
-        for true, got in ride(lambda clk, speed=speed: speed, 500, int(10 + 4 / speed), quantum=1)[
-            int(5 + 3 / speed) :
-        ]:
+        for true, got in ride(
+            lambda cycle, speed=speed: speed, 500, int(10 + 4 / speed), quantum=1
+        )[int(5 + 3 / speed) :]:
             assert abs(got - true) <= 2 / 500 * true + 1 / 256
 
 
@@ -222,23 +226,23 @@ def test_a_fraction_of_a_unit_a_tick_is_told():
 async def a_ramp_across_the_joint_matches_the_model(dut):
     await begin(dut)
     model, period, where = VelocityEstimator(int(dut.TIME_W.value)), 150, 0.5
-    for clk in range(9_000):
-        where += (clk / 9_000) ** 2 * 4 / period  # up to four cells a tick
-        position, tick = int(where) * X4, int(clk % period == 0)
+    for cycle in range(9_000):
+        where += (cycle / 9_000) ** 2 * 4 / period  # up to four cells a tick
+        position, tick = int(where) * X4, int(cycle % period == 0)
         got = await clock(dut, position, tick, quantum=X4)
         assert (got, dut.fine.value.to_signed()) == model.step(X4, tick, position, 0, 0), (
-            f"clk {clk}"
+            f"cycle {cycle}"
         )
 
 
 @cocotb.test()
-async def any_input_matches_the_model_in_every_clk(dut):
+async def any_input_matches_the_model_in_every_cycle(dut):
     await begin(dut)
     time_w = int(dut.TIME_W.value)
     model, position, lively, pace, quantum = VelocityEstimator(time_w), 0, 0.5, 0.1, X4
     await again(dut)
-    for clk in range(12_000):
-        if clk % 500 == 0:
+    for cycle in range(12_000):
+        if cycle % 500 == 0:
             lively, pace = (
                 random.choice((0, 0.003, 0.05, 0.5, 1)),
                 random.choice((0.0, 0.004, 0.02, 0.3)),
@@ -262,7 +266,7 @@ async def any_input_matches_the_model_in_every_clk(dut):
         want = model.step(quantum, tick, position, shift, periods)
         if rst:
             model, want, shift = VelocityEstimator(time_w), (0, 0), 0
-        assert got == want, f"clk {clk}"
+        assert got == want, f"cycle {cycle}"
         position = (position + (shift * periods << 16) + (1 << 47)) % (1 << 48) - (1 << 47)
 
 

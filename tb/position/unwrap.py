@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/position/unwrap.sv does, in integers: step() is one clk and returns done, position."""
+"""What rtl/position/unwrap.sv does, in integers: step() is one cycle and returns done, position."""
 
 
 class Unwrap:

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/position/velocity_estimator.sv does, in integers: step() is one clk and returns
+"""What rtl/position/velocity_estimator.sv does, in integers: step() is one cycle and returns
 velocity, fine.
 """
 
 K = 20  # bits of tick / time between two steps
-BUSY = K + 3  # clk from the choice of a division to its last
+BUSY = K + 3  # cycles from the choice of a division to its last
 P = 33  # bits of a place
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/position/zero_crossing.sv does, in integers: step() is one clk and returns up, down."""
+"""What rtl/position/zero_crossing.sv does, in integers: step() is one cycle and returns up, down."""
 
 
 class ZeroCrossing:

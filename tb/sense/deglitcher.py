@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/deglitcher.sv does: step(stable_cycles, level, rst) is one clk, and returns what
+"""What rtl/sense/deglitcher.sv does: step(stable_cycles, level, rst) is one cycle, and returns what
 is on the pins after it.
 """
 

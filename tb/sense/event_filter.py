@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/event_filter.sv does: step(skip, required, tolerated, levels, rst) is one clk, and
+"""What rtl/sense/event_filter.sv does: step(skip, required, tolerated, levels, rst) is one cycle, and
 returns the pins after it.
 """
 

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/status_inputs.sv does, in integers: step(...) is one clk and returns the pins
+"""What rtl/sense/status_inputs.sv does, in integers: step(...) is one cycle and returns the pins
 after it, lists of level, rose, fell.
 """
 
 from tb.common.synchroniser import Synchroniser
 
-SETTLE = 4  # clk after reset in which the level follows
+SETTLE = 4  # cycles after reset in which the level follows
 
 
 class StatusInputs:
     def __init__(self, clk_hz, w=2):
-        self.ms, self.w, self.age = clk_hz // 1000, w, 0  # age: clk since reset
+        self.ms, self.w, self.age = clk_hz // 1000, w, 0  # age: cycles since reset
         self.synchronisers = [Synchroniser() for _ in range(w)]
         self.now, self.level, self.stood = [0] * w, [0] * w, [0] * w
 

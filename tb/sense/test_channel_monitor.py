@@ -39,7 +39,7 @@ async def begin(dut, **settings):
 
 
 async def sample(dut, model, channel, other=0, level=0, other_level=0, gap=0):
-    """One sample, 1 clk later its flags as the model has them; then some clk without one. Returns
+    """One sample, 1 cycle later its flags as the model has them; then some cycles without one. Returns
     the names that stand.
     """
     dut.valid.value, dut.channel.value, dut.other.value, dut.level.value, dut.other_level.value = (
@@ -65,7 +65,7 @@ async def sample(dut, model, channel, other=0, level=0, other_level=0, gap=0):
         )
         got = tuple(int(getattr(dut, name).value) for name in OUTPUTS)
         assert got == want, (
-            f"clk {n} after channel {channel}, other {other}, levels {level}{other_level}: {OUTPUTS} are {got}, not {want}"
+            f"cycle {n} after channel {channel}, other {other}, levels {level}{other_level}: {OUTPUTS} are {got}, not {want}"
         )
     return [name for name, stands in zip(OUTPUTS, want) if stands]
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """count_outlier_filter: the three lines of S0's equation, its lag and its rest, both ends of the
-range, and every clk against the model.
+range, and every cycle against the model.
 """
 
 import random
@@ -105,7 +105,7 @@ async def any_counts_match_the_model(dut):
     await begin(dut)
     w = int(dut.W.value)
     model, count, last = CountOutlierFilter(w), 0, None
-    for clk in range(6000):
+    for cycle in range(6000):
         rst, valid, enable = (
             int(random.random() < 0.005),
             random.getrandbits(1),
@@ -123,7 +123,7 @@ async def any_counts_match_the_model(dut):
             last = model.follow(enable, count)
         if rst:
             model = CountOutlierFilter(w)
-        assert done == (valid and not rst) and (last is None or out == last), f"clk {clk}"
+        assert done == (valid and not rst) and (last is None or out == last), f"cycle {cycle}"
 
 
 @pytest.mark.parametrize("w", [8, 32])

@@ -14,7 +14,7 @@ from tb.sense.deglitcher import Deglitcher
 
 
 async def begin(dut, level=0, stable_cycles=0):
-    """Reset with the pins at these levels; the model has seen the same clk."""
+    """Reset with the pins at these levels; the model has seen the same cycle."""
     await start(dut, level=level, stable_cycles=stable_cycles)
     model = Deglitcher(int(dut.SETTLE.value))
     model.step(stable_cycles, level, 1)
@@ -22,11 +22,11 @@ async def begin(dut, level=0, stable_cycles=0):
 
 
 async def drive(dut, model, stable_cycles, levels, rst=0):
-    """Put each level on the pin for one clk and hold the model beside the design; return (filtered,
-    rejected) of each clk.
+    """Put each level on the pin for one cycle and hold the model beside the design; return (filtered,
+    rejected) of each cycle.
     """
     dut.stable_cycles.value, dut.rst.value, out = stable_cycles, rst, []
-    for clk, level in enumerate(levels):
+    for cycle, level in enumerate(levels):
         dut.level.value = level
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
@@ -35,7 +35,7 @@ async def drive(dut, model, stable_cycles, levels, rst=0):
             model.step(stable_cycles, level, rst),
         )
         assert got == want, (
-            f"clk {clk}, stable_cycles {stable_cycles}: (filtered, rejected) is {got}, the model has {want}"
+            f"cycle {cycle}, stable_cycles {stable_cycles}: (filtered, rejected) is {got}, the model has {want}"
         )
         out.append(got)
     dut.rst.value = 0
@@ -54,7 +54,7 @@ async def latency_is_stable(dut):
 
 
 @cocotb.test()
-async def a_pulse_shorter_by_one_clk_is_rejected_and_reported_once(dut):
+async def a_pulse_shorter_by_one_cycle_is_rejected_and_reported_once(dut):
     model = await begin(dut)
     await drive(dut, model, 5, [0] * 10)
     out = await drive(dut, model, 5, [1] * 4 + [0] * 8)

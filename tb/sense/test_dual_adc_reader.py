@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """dual_adc_reader: against a converter that times its bits as the data sheet says, known codes, its
-timing, and the model in every clk.
+timing, and the model in every cycle.
 """
 
 import random
@@ -49,8 +49,8 @@ def sizes(dut):
     return int(dut.W.value), int(dut.LEADING.value), int(dut.FRAME.value)
 
 
-async def clk(dut, model, start_now, lines, rst=0):
-    """One clk; the pins after it, which are the model's too."""
+async def cycle(dut, model, start_now, lines, rst=0):
+    """One cycle; the pins after it, which are the model's too."""
     dut.start.value, dut.rst.value = start_now, rst
     dut.sdata_a.value, dut.sdata_b.value = lines
     await RisingEdge(dut.clk)
@@ -76,13 +76,13 @@ async def begin(dut):
 
 
 async def convert(dut, model, converter, codes):
-    """One conversion: (sin, cos), clk to valid, clk until cs_n is high again, falling edges of
+    """One conversion: (sin, cos), cycles to valid, cycles until cs_n is high again, falling edges of
     sclk.
     """
     sample, latency, falls, was, n, lines = None, None, 0, 1, 0, (0, 0)
     while True:
         n += 1
-        cs_n, sclk, valid, now = await clk(dut, model, int(n == 1), lines)
+        cs_n, sclk, valid, now = await cycle(dut, model, int(n == 1), lines)
         lines = converter.lines(
             codes if n == 1 else (random.getrandbits(8), random.getrandbits(8)), cs_n, sclk
         )
@@ -112,10 +112,10 @@ async def known_codes_by_hand(dut):
 
 
 @cocotb.test()
-async def latency_is_two_clk_a_bit_and_rate_is_as_stated(dut):
+async def latency_is_two_cycle_a_bit_and_rate_is_as_stated(dut):
     model, converter = await begin(dut)
     w, leading, frame = sizes(dut)
-    for _ in range(3):  # back to back: start with the clk in which cs_n was seen high
+    for _ in range(3):  # back to back: start with the cycle in which cs_n was seen high
         _, latency, length, falls = await convert(dut, model, converter, (1, 2))
         assert (latency, length, falls) == (2 * (leading + w), 2 * frame + 1, frame)
     assert 2 * frame + 1 <= 40  # 100 kS/s at 4 MHz
@@ -126,7 +126,7 @@ async def start_is_not_heard_during_a_conversion(dut):
     model, converter = await begin(dut)
     lines, starts, valids = (0, 0), 0, 0
     for n in range(10 * (2 * sizes(dut)[2] + 1)):
-        cs_n, sclk, valid, _ = await clk(dut, model, 1, lines)
+        cs_n, sclk, valid, _ = await cycle(dut, model, 1, lines)
         starts, valids = starts + (converter.cs_n and not cs_n), valids + valid
         lines = converter.lines((n, n), cs_n, sclk)
     assert starts == valids == 10
@@ -138,7 +138,7 @@ async def a_dead_converter_reads_as_the_end_of_the_range(dut):
     w, _, frame = sizes(dut)
     for level, value in ((0, -(1 << w - 1)), (1, (1 << w - 1) - 1)):
         for n in range(2 * frame + 1):
-            sample = (await clk(dut, model, int(n == 0), (level, level)))[3]
+            sample = (await cycle(dut, model, int(n == 0), (level, level)))[3]
         assert sample == (value, value)
 
 
@@ -148,10 +148,10 @@ async def reset_in_a_frame_ends_it_without_a_sample(dut):
     w, leading, frame = sizes(dut)
     for at in (1, 2, 2 * (leading + w) - 1, 2 * (leading + w), 2 * frame):
         for n in range(at):
-            await clk(dut, model, int(n == 0), (1, 1))
-        assert (await clk(dut, model, 0, (1, 1), rst=1))[:3] == (1, 1, 0)
+            await cycle(dut, model, int(n == 0), (1, 1))
+        assert (await cycle(dut, model, 0, (1, 1), rst=1))[:3] == (1, 1, 0)
         for _ in range(2 * frame):
-            assert (await clk(dut, model, 0, (1, 1)))[:3] == (1, 1, 0)
+            assert (await cycle(dut, model, 0, (1, 1)))[:3] == (1, 1, 0)
         assert (await convert(dut, model, converter, (0, 0)))[0] == (-(1 << w - 1),) * 2
 
 
@@ -165,7 +165,7 @@ async def any_signal_matches_the_model(dut):
         sample = (await convert(dut, model, converter, codes))[0]
         assert sample == tuple((code >> bits - w) - (1 << w - 1) for code in codes)
         for _ in range(random.choice([0, 0, 1, 7])):
-            await clk(dut, model, 0, (random.getrandbits(1), random.getrandbits(1)))
+            await cycle(dut, model, 0, (random.getrandbits(1), random.getrandbits(1)))
 
 
 @pytest.mark.parametrize("w, leading, frame", [(8, 2, 14), (12, 2, 14), (14, 2, 16), (16, 0, 16)])

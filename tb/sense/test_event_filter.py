@@ -42,7 +42,7 @@ class Bench:
         return sum(level << n for n, level in enumerate(levels))
 
     async def set(self, skip=0, required=0, tolerated=0):
-        """New settings, and the clk that they take, in which the levels stand still."""
+        """New settings, and the cycle that they take, in which the levels stand still."""
         self.settings = skip, required, tolerated
         await self.rows([[own.filtered for own in self.model.levels]])
 
@@ -50,7 +50,7 @@ class Bench:
         dut, out = self.dut, []
         dut.skip.value, dut.required.value, dut.tolerated.value = self.settings
         dut.rst.value = rst
-        for clk, levels in enumerate(rows):
+        for cycle, levels in enumerate(rows):
             dut.level.value = self.word(levels)
             await RisingEdge(dut.clk)
             await FallingEdge(dut.clk)
@@ -60,7 +60,7 @@ class Bench:
                 (self.word(filtered), self.word(rejected)),
             )
             assert got == want, (
-                f"clk {clk}, (skip, required, tolerated) {self.settings}: (filtered, rejected) is {got}, the model has {want}"
+                f"cycle {cycle}, (skip, required, tolerated) {self.settings}: (filtered, rejected) is {got}, the model has {want}"
             )
             out.append((filtered[0], rejected[0]))
         dut.rst.value = 0
@@ -93,7 +93,7 @@ async def with_spare_0_and_skip_0_it_is_the_deglitcher(dut):
 
 
 @cocotb.test()
-async def bypass_passes_every_clk(dut):
+async def bypass_passes_every_cycle(dut):
     bench = await Bench.begin(dut)
     levels = [random.getrandbits(1) for _ in range(60)]
     assert await bench.play(levels) == [(level, 0) for level in levels]

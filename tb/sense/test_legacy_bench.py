@@ -22,7 +22,7 @@ APART, LARGEST_MOVE, SUBDIVISION = (
     30,
     40,
     160,
-)  # clk from sample to sample; counts; counts of a period
+)  # cycles from sample to sample; counts; counts of a period
 IDLE = dict(
     valid=0,
     sin=0,

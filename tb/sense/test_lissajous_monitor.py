@@ -37,7 +37,7 @@ async def begin(dut, **limits):
 
 
 async def sample(dut, model, length, place, gap=0):
-    """One sample, 1 clk later its verdict as the model has it; then some clk without one. Returns
+    """One sample, 1 cycle later its verdict as the model has it; then some cycles without one. Returns
     the verdict.
     """
     axis, quadrant, tilt = place
@@ -56,7 +56,7 @@ async def sample(dut, model, length, place, gap=0):
         got = tuple(int(getattr(dut, name).value) for name in OUTPUTS)
         stands = want if n >= LATENCY - 1 else (want[0], *model.stands[1:])
         assert got == stands, (
-            f"clk {n} after {length} at {place}: {OUTPUTS} are {got}, the model has {stands}"
+            f"cycle {n} after {length} at {place}: {OUTPUTS} are {got}, the model has {stands}"
         )
         assert int(dut.done.value) == (n == LATENCY - 1)
     model.stands = want

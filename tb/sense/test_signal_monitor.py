@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """signal_monitor: each fault by its name and in its time, what must not alarm, and the model in
-every clk.
+every cycle.
 """
 
 import random
@@ -30,10 +30,10 @@ class Watch:
 
     def __init__(self, dut, settings):
         self.dut, self.settings, self.model = dut, settings, SignalMonitor()
-        self.due, self.now, self.first, self.clks, self.seen, self.rose = {}, 0, 0, 0, 0, {}
+        self.due, self.now, self.first, self.cycle, self.seen, self.rose = {}, 0, 0, 0, 0, {}
         self.full = 1 << int(dut.W.value) - 1
 
-    async def clk(self, sample=None, phase_jump=0, lost_count=0, clear=0):
+    async def cycle(self, sample=None, phase_jump=0, lost_count=0, clear=0):
         dut, bits = self.dut, 0
         dut.valid.value, dut.clear.value = int(sample is not None), clear
         dut.phase_jump.value, dut.lost_count.value = phase_jump, lost_count
@@ -41,29 +41,29 @@ class Watch:
             dut.sin.value, dut.cos.value, dut.a.value, dut.b.value = sample
             bits = int(self.model.sample(*(np.array([x]) for x in sample), self.settings)[0])
             for n, lag in CLKS.items():
-                self.due.setdefault(self.clks + lag, []).append((1 << n, bits))
+                self.due.setdefault(self.cycle + lag, []).append((1 << n, bits))
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
-        self.clks += 1
+        self.cycle += 1
         self.first = self.now if clear or not self.first else self.first
-        for mask, value in self.due.pop(self.clks, []):
+        for mask, value in self.due.pop(self.cycle, []):
             self.now = self.now & ~mask | value & mask
         self.now = self.now & ALL | phase_jump << 13 | lost_count << 14
-        self.rose |= {name: self.clks for name in names(self.now & ~self.seen)}
+        self.rose |= {name: self.cycle for name in names(self.now & ~self.seen)}
         self.seen |= self.now
         got = int(dut.faults.value), int(dut.first.value)
         assert got == (self.now, self.first), (
-            f"clk {self.clks}: {names(got[0])}, first {names(got[1])}, the model has "
+            f"cycle {self.cycles}: {names(got[0])}, first {names(got[1])}, the model has "
             f"{names(self.now)}, first {names(self.first)}"
         )
 
     async def sample(self, cos, sin, a=None, b=None, gap=0):
         cos, sin = (round(min(self.full - 1, max(-self.full, channel))) for channel in (cos, sin))
-        await self.clk(
+        await self.cycle(
             (sin, cos, int(cos > 0) if a is None else a, int(sin > 0) if b is None else b)
         )
         for _ in range(gap):
-            await self.clk()
+            await self.cycle()
 
     async def turn(
         self, size, fringes=1.0, begin=0.0, steps=60, gap=0, distort=lambda cos, sin: (cos, sin)
@@ -72,9 +72,9 @@ class Watch:
             angle = 2 * np.pi * (begin + np.sign(fringes) * n / steps)
             await self.sample(*distort(size * np.cos(angle), size * np.sin(angle)), gap=gap)
 
-    async def rest(self, clks=LATEST):
-        for _ in range(clks):
-            await self.clk()
+    async def rest(self, cycles=LATEST):
+        for _ in range(cycles):
+            await self.cycle()
 
 
 async def begin(dut, settings=None):
@@ -117,7 +117,7 @@ async def latency_is_2_5_10_and_14(dut):
         await watch.turn(90, 2.25, steps=80)
         await watch.rest()
         assert not watch.seen
-        decides = watch.clks + (
+        decides = watch.cycle + (
             name != "jump"
         )  # the first sample of a jump, the second one of the others
         await watch.sample(0, 126)
@@ -125,17 +125,17 @@ async def latency_is_2_5_10_and_14(dut):
         await watch.rest()
         assert watch.rose[name] == decides + lag
     watch = await begin(dut)
-    await watch.clk(phase_jump=1, lost_count=1)
+    await watch.cycle(phase_jump=1, lost_count=1)
     assert names(int(dut.faults.value)) == ["phase_jump", "lost_count"]
 
 
 @cocotb.test()
-async def amplitude_comes_9_clk_after_its_sample(dut):
+async def amplitude_comes_9_cycles_after_its_sample(dut):
     watch = await begin(dut)
     await watch.sample(30, 40)
     for n in range(1, 12):
         assert int(dut.amplitude.value) == (50 if n >= 9 else 0)
-        await watch.clk()
+        await watch.cycle()
 
 
 @cocotb.test()
@@ -242,7 +242,7 @@ async def a_signal_lost_in_both_channels_is_told_at_the_second_sample_moving_or_
                 await watch.sample(size * np.cos(angle), size * np.sin(angle))
             await watch.rest()
             assert "too_low" not in names(watch.seen)
-            second = watch.clks + 1
+            second = watch.cycle + 1
             for _ in range(2):
                 await watch.sample(0, 0)
             await watch.rest()
@@ -259,13 +259,13 @@ async def the_first_fault_persists_until_it_is_cleared(dut):
         "too_high",
         "clipped",
     ]
-    await watch.clk(clear=1)
+    await watch.cycle(clear=1)
     assert names(int(dut.first.value)) == ["too_high", "clipped"]
     for _ in range(17):
         await watch.sample(0, 5)
     await watch.rest()
     assert not int(dut.faults.value) and int(dut.first.value)
-    await watch.clk(clear=1)
+    await watch.cycle(clear=1)
     assert not int(dut.first.value)
 
 
@@ -281,7 +281,7 @@ async def reset_in_mid_flow_drops_faults_and_samples(dut):
 
 
 @cocotb.test()
-async def any_signal_in_any_settings_matches_the_model_in_every_clk(dut):
+async def any_signal_in_any_settings_matches_the_model_in_every_cycle(dut):
     for _ in range(8):
         top = (1 << int(dut.W.value) - 1) - 1
         level = lambda top=top: random.choice([0, top // 10, top // 4, top, 65535])
@@ -317,7 +317,7 @@ async def any_signal_in_any_settings_matches_the_model_in_every_clk(dut):
             upset = {"a": random.getrandbits(1)} if random.random() < 0.05 else {}
             await watch.sample(size * np.cos(angle), channel * size * np.sin(angle), **upset)
             for _ in range(random.choice([0, 0, 0, 1, 5])):
-                await watch.clk(
+                await watch.cycle(
                     phase_jump=int(random.random() < 0.02),
                     lost_count=int(random.random() < 0.02),
                     clear=int(random.random() < 0.05),
