@@ -23,7 +23,7 @@ async def cycle(dut, d, rst=0):
 
 
 @cocotb.test()
-async def latency_is_the_number_of_stages(dut):
+async def latency_is_stages(dut):
     await start(dut, d=0)
     stages = int(dut.STAGES.value)
     for _ in range(stages):

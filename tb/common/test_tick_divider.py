@@ -26,7 +26,7 @@ async def ticks(dut, period, n):
 
 
 @cocotb.test()
-async def a_tick_comes_each_period_and_the_first_a_period_after_reset(dut):
+async def latency_is_period_to_the_first_tick_and_between_ticks(dut):
     longest = (1 << int(dut.W.value)) - 1
     await start(dut, period=0, restart=0)
     for period in (1, 2, 3, 10, min(longest, 1000)):
@@ -51,7 +51,7 @@ async def period_0_never_ticks_and_the_next_period_begins_whole(dut):
 
 
 @cocotb.test()
-async def a_shorter_period_counts_at_once(dut):
+async def a_shorter_period_takes_effect_at_once(dut):
     await start(dut, period=0, restart=0)
     assert await ticks(dut, 200, 50) == []
     assert await ticks(dut, 20, 41) == [1, 21, 41]
@@ -59,7 +59,7 @@ async def a_shorter_period_counts_at_once(dut):
 
 
 @cocotb.test()
-async def a_period_begins_at_restart_wherever_the_one_before_was(dut):
+async def latency_is_period_from_a_restart_at_any_time(dut):
     await start(dut, period=0, restart=0)
     for before in range(13):
         await cycle(dut, 10, rst=1)

@@ -10,7 +10,7 @@ from tb.common.time_stamp import time_stamp
 
 
 @cocotb.test()
-async def every_cycle_counts_and_the_end_wraps(dut):
+async def latency_is_0_and_every_cycle_counts_and_the_end_wraps(dut):
     w = int(dut.W.value)
     await start(dut)
     for cycle in range(1, min(3 << w, 2000)):

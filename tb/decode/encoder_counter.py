@@ -50,7 +50,7 @@ class EncoderCounter:
 
     def step(self, a, b, z, probe=0, now=0, select=0, write=0, word=0, wdata=0, rst=0):
         rdata = self.read(word) if select and not rst else 0
-        told = wdata if select and write and word == 1 else 0
+        written = wdata if select and write and word == 1 else 0
         index = Settings(
             active_low=self.bit(6),
             gate_mask=3 * self.bit(7),
@@ -67,7 +67,10 @@ class EncoderCounter:
             self.edge_time = now
         ready, count = decoder.ready, decoder.count
         self.seen = (
-            self.seen & ~told | self.found * FOUND | self.probing * PROBED | self.illegal * ILLEGAL
+            self.seen & ~written
+            | self.found * FOUND
+            | self.probing * PROBED
+            | self.illegal * ILLEGAL
         )
         _, _, self.illegal = decoder.step(later[0], later[1], mode, clear, rst)
         _, self.found, _, _ = self.index.step(
@@ -77,7 +80,7 @@ class EncoderCounter:
             direction,
             moves if ready else 0,
             count,
-            int(bool(told & ARM)),
+            int(bool(written & ARM)),
             rst,
             self.probing,
         )

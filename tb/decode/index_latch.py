@@ -28,7 +28,7 @@ class Settings:
 class IndexLatch:
     def __init__(self, w=32, check=1):
         self.w, self.check = w, check
-        self.later, self.wanted, self.zeroed, self.reference = (0, 0, 0), 0, 0, 0
+        self.later, self.enabled, self.zeroed, self.reference = (0, 0, 0), 0, 0, 0
         self.reset()
 
     def reset(self):
@@ -42,14 +42,14 @@ class IndexLatch:
         return self.up if direction else self.down
 
     def clear(self, settings, direction):
-        return int(self.met(direction) and self.wanted and settings.clears)
+        return int(self.met(direction) and self.enabled and settings.clears)
 
     def step(self, settings, levels, ready, direction, stepped, count, arm=0, rst=0, probe=0):
         """levels (a, b, z); stepped is -1, 0, +1 of the decoder in this cycle. Returns (armed, found,
         index_count, revolution_wrong).
         """
         met = self.met(direction)
-        take = int(met and self.wanted)
+        take = int(met and self.enabled)
         entering = (
             ready and settings.holds(*levels) and not settings.holds(*self.later) and not self.used
         )
@@ -76,7 +76,7 @@ class IndexLatch:
             int(entering and settings.take_up),
             int(entering and settings.take_down),
         )
-        self.wanted = int(settings.each or self.armed)
+        self.enabled = int(settings.each or self.armed)
         self.armed, self.found = int(arm or (self.armed and not take)), take
         self.later = tuple(levels)
         if rst:

@@ -47,10 +47,13 @@ async def cycle(
     dut.direction.value, dut.stepping.value, dut.count.value = direction, abs(stepped), count
     dut.ready.value, dut.arm.value, dut.probe.value, dut.rst.value = ready, arm, probe, rst
     await ReadOnly()
-    clear, wanted = int(dut.clear.value), model.clear(settings, direction)
+    clear, expected = int(dut.clear.value), model.clear(settings, direction)
     await RisingEdge(dut.clk)
     await FallingEdge(dut.clk)
-    want = wanted, *model.step(settings, levels, ready, direction, stepped, count, arm, rst, probe)
+    want = (
+        expected,
+        *model.step(settings, levels, ready, direction, stepped, count, arm, rst, probe),
+    )
     got = (
         clear,
         int(dut.armed.value),
@@ -66,7 +69,7 @@ async def cycle(
 
 
 @cocotb.test()
-async def found_comes_2_cycles_after_z_and_clear_in_the_cycle_before(dut):
+async def latency_is_2_from_z_to_found_and_1_to_clear(dut):
     model = await begin(dut)
     settings = Settings(each=1, clears=1)
     await cycle(dut, model, settings, (0, 0, 0))
@@ -80,7 +83,7 @@ async def found_comes_2_cycles_after_z_and_clear_in_the_cycle_before(dut):
 
 
 @cocotb.test()
-async def a_wrong_revolution_comes_4_cycles_after_z_and_distances_wrap(dut):
+async def latency_is_4_from_z_to_revolution_wrong_and_distances_wrap(dut):
     needs(int(dut.CHECK.value), "built without the check of revolutions")
     top = 1 << int(dut.W.value) - 1
     for second, wrong in (
@@ -119,7 +122,7 @@ async def reset_in_the_middle_of_an_index_forgets_it(dut):
 
 
 @cocotb.test()
-async def a_probe_latches_the_count_with_the_step_of_its_cycle_and_is_no_index(dut):
+async def latency_is_1_from_probe_to_index_count_with_the_step_of_its_cycle(dut):
     model = await begin(dut)
     for stepped, want in ((0, 5), (1, 6), (-1, 4)):
         row = await cycle(

@@ -53,9 +53,12 @@ async def drive(dut, model, levels, rst=0, clear=0):
     return out
 
 
-async def turn(dut, model, places):
+async def turn(dut, model, positions):
     """Visit these quarters of the period; the count after each."""
-    return [count for count, _, _ in await drive(dut, model, [TURN[place % 4] for place in places])]
+    return [
+        count
+        for count, _, _ in await drive(dut, model, [TURN[position % 4] for position in positions])
+    ]
 
 
 @cocotb.test()
@@ -148,7 +151,7 @@ async def a_pulse_whose_direction_changes_with_it_is_illegal_and_not_counted(dut
 
 
 @cocotb.test()
-async def clear_makes_zero_of_the_state_in_which_its_cycle_ends(dut):
+async def clear_makes_the_state_at_the_end_of_its_cycle_zero(dut):
     for here, then in ((1, 2), (2, 1), (1, 1)):
         model = await begin(dut)
         await turn(dut, model, [1, 2] if here == 2 else [1])
@@ -221,10 +224,10 @@ async def any_levels_match_the_model(dut):
         await drive(
             dut, model, [(random.getrandbits(1), random.getrandbits(1)) for _ in range(150)]
         )
-        place, path = 0, []
+        position, path = 0, []
         for _ in range(150):  # legal edges only, with pauses
-            place += random.choice([-1, 0, 0, 1])
-            path.append(TURN[place % 4])
+            position += random.choice([-1, 0, 0, 1])
+            path.append(TURN[position % 4])
         await drive(dut, model, path)
         await drive(dut, model, path[:1], clear=1)
         if random.random() < 0.3:

@@ -34,12 +34,12 @@ def sample(w, sin, cos):
     angle = ((sin < 0 if steep else cos < 0) << 15 | steep << 14) << guard | 1 << guard - 1
     for digit in range(1, digits + 1):
         negative = shorter < 0 and digit > 1
-        rest = ~shorter if negative else shorter
+        magnitude = ~shorter if negative else shorter
         turned ^= negative
         angle += -angles(w)[digit] if turned else angles(w)[digit]
-        shorter = 2 * rest + (not negative) - longer - negative
+        shorter = 2 * magnitude + (not negative) - longer - negative
         if digit <= turns:
-            longer += (rest + (digit == 1) >> 2 * digit - 2) + 1 >> 1
+            longer += (magnitude + (digit == 1) >> 2 * digit - 2) + 1 >> 1
     eighths = longer >> f - 3
     size = (eighths | 7) - 3 - (eighths >> 3) - (eighths >> 6) - (eighths >> 11) >> 3
     return (angle >> guard) % (1 << 16), size

@@ -13,9 +13,9 @@ def latency(w, steps=1):
     return -(-(arctan_rotation.PIPELINED[w][1] + 1) // steps)
 
 
-def moved(value, places):
+def moved(value, bits):
     """Up by so many bits, or down, cut off."""
-    return value << places if places >= 0 else value >> -places
+    return value << bits if bits >= 0 else value >> -bits
 
 
 @cache
@@ -48,22 +48,22 @@ def sample(w, sin, cos):
     )  # bits behind the point; shorter is less by 1 than it is
     for digit in range(2, digits):
         negative = shorter < 0
-        rest, one = (
+        magnitude, one = (
             ~shorter if negative else shorter,
             int(not negative),
-        )  # rest + one is the shorter leg without its sign
+        )  # magnitude + one is the shorter leg without its sign
         found.append(found[-1] ^ negative)
         new_y_bits = min(head - digit - 1, max(y_bits - 1, x_bits))
         up = new_y_bits - y_bits + 1
-        doubled, taken = (rest << up) + ((one << up) - one), moved(longer, new_y_bits - x_bits)
+        doubled, taken = (magnitude << up) + ((one << up) - one), moved(longer, new_y_bits - x_bits)
         less = negative if digit <= turns + 2 else moved(longer, new_y_bits - x_bits + 1) & 1
         if digit <= turns:
             new_x_bits = min(head - digit - 2, max(x_bits, y_bits + 2 * digit - 1))
             down = y_bits + 2 * digit - 1 - new_x_bits
             longer = (
                 moved(longer, new_x_bits - x_bits)
-                + (rest >> down)
-                + (rest >> down - 1 & 1 if down else one)
+                + (magnitude >> down)
+                + (magnitude >> down - 1 & 1 if down else one)
             )
             x_bits = new_x_bits
         shorter, y_bits = doubled - taken - less, new_y_bits

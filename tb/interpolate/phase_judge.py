@@ -24,8 +24,8 @@ def close_calls(w, allowed):
     """All pairs whose true phase is nearer to a tie than an arctan may be wrong there:
     allowed(radius) is its bound less one half.
     """
-    leg = np.arange(-1 << w - 1, 1 << w - 1)
-    sin, cos = (a.ravel() for a in np.meshgrid(leg, leg))
+    channel = np.arange(-1 << w - 1, 1 << w - 1)
+    sin, cos = (a.ravel() for a in np.meshgrid(channel, channel))
     true, radius = np.arctan2(sin, cos) * LSB, np.hypot(sin, cos)
     chosen = (np.abs(true - np.floor(true) - 0.5) <= allowed(np.maximum(radius, 1))) & (radius > 0)
     return list(zip(sin[chosen].tolist(), cos[chosen].tolist()))
@@ -36,8 +36,8 @@ def turned(smaller, larger, octant, largest):
     negative.
     """
     first, second = (
-        -leg if leg == largest or octant >> bit & 1 else leg
-        for bit, leg in enumerate((smaller, larger))
+        -channel if channel == largest or octant >> bit & 1 else channel
+        for bit, channel in enumerate((smaller, larger))
     )
     return (second, first) if octant & 4 else (first, second)
 

@@ -40,9 +40,9 @@ async def ask(dut, sin, cos):
     await FallingEdge(dut.clk)
     dut.valid.value = 0
     await ClockCycles(dut.clk, latency(int(dut.W.value)) - 1, FallingEdge)
-    done, *answer = out(dut)
+    done, *result = out(dut)
     assert done == 1
-    return tuple(answer)
+    return tuple(result)
 
 
 @cocotb.test()
@@ -119,11 +119,11 @@ async def all_pairs_of_8_bits_match_the_model(dut):
 
 def test_every_sample_of_8_bits_is_correctly_rounded():
     pairs = [pair for pair in product(range(-128, 128), repeat=2) if pair != (0, 0)]
-    answers = [sample(8, *pair) for pair in pairs]
-    assert max(abs(error(phase, *pair)) for (phase, _), pair in zip(answers, pairs)) < 0.5
+    results = [sample(8, *pair) for pair in pairs]
+    assert max(abs(error(phase, *pair)) for (phase, _), pair in zip(results, pairs)) < 0.5
     assert all(
         abs(size - math.hypot(*pair)) <= arctan_rotation.amplitude_bound(math.hypot(*pair))
-        for (_, size), pair in zip(answers, pairs)
+        for (_, size), pair in zip(results, pairs)
     )
 
 

@@ -48,10 +48,10 @@ async def cycle(dut, model, pair=None):
 
 async def ask(dut, model, pairs):
     """Send the pairs one a cycle; (phase, amplitude) of each."""
-    answers = [await cycle(dut, model, pair) for pair in pairs]
-    answers += [await cycle(dut, model) for _ in range(len(model.coming) - 1)]
-    assert [done for done, *_ in answers].count(1) == len(pairs)
-    return [tuple(answer) for done, *answer in answers if done]
+    results = [await cycle(dut, model, pair) for pair in pairs]
+    results += [await cycle(dut, model) for _ in range(len(model.coming) - 1)]
+    assert [done for done, *_ in results].count(1) == len(pairs)
+    return [tuple(result) for done, *result in results if done]
 
 
 @cocotb.test()
@@ -60,17 +60,17 @@ async def the_octant_borders_are_exact(dut):
     full = 1 << w - 1
     eighths = [(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)]
     sizes = [full // 4, full // 2, full - 1] + [1, 3] * (w < 11)
-    answers = await ask(
+    results = await ask(
         dut, model, [(sin * size, cos * size) for size in sizes for sin, cos in eighths]
     )
-    assert [phase for phase, _ in answers] == [eighth * 8192 for eighth in range(8)] * len(sizes)
+    assert [phase for phase, _ in results] == [eighth * 8192 for eighth in range(8)] * len(sizes)
 
 
 @cocotb.test()
 async def by_hand(dut):
     w, model = await begin(dut)
     unit = 1 << w - 8
-    answers = await ask(
+    results = await ask(
         dut,
         model,
         [
@@ -78,7 +78,7 @@ async def by_hand(dut):
             for s, c in ((48, 64), (64, 48), (-48, 64), (1, 100), (-1, -100), (0, 0))
         ],
     )
-    assert [phase for phase, _ in answers] == [
+    assert [phase for phase, _ in results] == [
         6712,
         16384 - 6712,
         65536 - 6712,
@@ -88,9 +88,9 @@ async def by_hand(dut):
     ]  # atan 0.75, 0.01
     assert all(
         abs(size - 80 * unit) <= arctan_rotation.amplitude_bound(80 * unit)
-        for _, size in answers[:3]
+        for _, size in results[:3]
     )  # 3, 4, 5
-    assert answers[-1] == (0, 0)
+    assert results[-1] == (0, 0)
 
 
 @cocotb.test()
@@ -106,23 +106,23 @@ async def latency_is_as_the_header_says(dut):
     steps = int(dut.STEPS.value)
     want = -(-{8: 24, 9: 28, 10: 29}.get(w, 23) // steps)
     assert want == latency(w, steps)
-    answers = [await cycle(dut, model, (0, -5))] + [
+    results = [await cycle(dut, model, (0, -5))] + [
         await cycle(dut, model) for _ in range(want + 3)
     ]
-    assert [done for done, *_ in answers] == [0] * (want - 1) + [1] + [0] * 4
+    assert [done for done, *_ in results] == [0] * (want - 1) + [1] + [0] * 4
 
 
 @cocotb.test()
-async def the_answer_stands_until_the_next(dut):
+async def the_result_is_held_until_the_next(dut):
     w, model = await begin(dut)
     full = (1 << w - 1) - 1
-    (answer,) = await ask(dut, model, [(full, full)])
-    assert answer[0] == 8192
-    assert {(await cycle(dut, model))[1:] for _ in range(60)} == {answer}
+    (result,) = await ask(dut, model, [(full, full)])
+    assert result[0] == 8192
+    assert {(await cycle(dut, model))[1:] for _ in range(60)} == {result}
 
 
 @cocotb.test()
-async def reset_drops_the_samples_in_work(dut):
+async def reset_drops_the_samples_in_progress(dut):
     w, model = await begin(dut)
     for _ in range(2 * latency(w)):
         await cycle(dut, model, (77, -33))
@@ -157,12 +157,12 @@ async def all_pairs_of_8_bits_match_the_model(dut):
 
 def test_every_sample_of_8_bits_is_correctly_rounded():
     pairs = [pair for pair in product(range(-128, 128), repeat=2) if pair != (0, 0)]
-    answers = [sample(8, *pair) for pair in pairs]
+    results = [sample(8, *pair) for pair in pairs]
     assert len(pairs) == 65535
-    assert max(abs(error(phase, *pair)) for (phase, _), pair in zip(answers, pairs)) < 0.5
+    assert max(abs(error(phase, *pair)) for (phase, _), pair in zip(results, pairs)) < 0.5
     assert all(
         abs(size - math.hypot(*pair)) <= arctan_rotation.amplitude_bound(math.hypot(*pair))
-        for (_, size), pair in zip(answers, pairs)
+        for (_, size), pair in zip(results, pairs)
     )
 
 

@@ -16,7 +16,7 @@ from tb.bench import run
 
 
 @cocotb.test()
-async def every_entry_is_that_of_its_maker(dut):
+async def latency_is_0_and_every_entry_equals_its_generator(dut):
     turns, first, count, guard = (
         int(getattr(dut, name).value) for name in ("TURNS", "FIRST", "COUNT", "GUARD")
     )

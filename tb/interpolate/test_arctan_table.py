@@ -129,8 +129,8 @@ def turned(smaller, larger, octant):
     negative.
     """
     first, second = (
-        -leg if leg == 128 or octant >> bit & 1 else leg
-        for bit, leg in enumerate((smaller, larger))
+        -channel if channel == 128 or octant >> bit & 1 else channel
+        for bit, channel in enumerate((smaller, larger))
     )
     return (second, first) if octant & 4 else (first, second)
 

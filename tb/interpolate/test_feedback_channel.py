@@ -51,7 +51,7 @@ async def converted(dut):
 
 
 @cocotb.test()
-async def latency_is_22_cycles_from_a_converter_word_to_position_and_1_more_with_a_segment_table(
+async def latency_is_22_from_an_adc_word_to_position_and_23_with_a_segment_table(
     dut,
 ):
     latency = LATENCY + bool(int(dut.SEGMENTS.value))

@@ -85,7 +85,7 @@ async def a_change_of_speed_below_a_quarter_period_is_followed_up_to_a_period_a_
 
 
 @cocotb.test()
-async def a_quarter_period_from_the_foreseen_phase_is_an_overspeed(dut):
+async def a_quarter_period_from_the_predicted_phase_is_an_overspeed(dut):
     await begin(dut)
     for jump, strobe in ((QUARTER - 1, 0), (QUARTER, 1), (1 - QUARTER, 0), (-QUARTER, 1)):
         await again(dut)
@@ -120,7 +120,7 @@ async def one_bad_sample_costs_only_itself(dut):
 
 
 @cocotb.test()
-async def after_noise_a_slow_scale_is_caught_again(dut):
+async def after_noise_a_slow_scale_is_tracked_again(dut):
     await begin(dut)
     await feed(dut, [random.getrandbits(16) for _ in range(50)])
     slow = await feed(dut, [n * 4000 for n in range(20)])

@@ -75,7 +75,7 @@ async def by_hand(dut):
 
 
 @cocotb.test()
-async def what_is_too_large_is_held(dut):
+async def a_value_that_is_too_large_saturates(dut):
     model, full = await begin(dut), 1 << int(dut.W.value) - 1
     await cycle(dut, model, load=Settings(-32768, -32768, 131071, 65535))
     assert await ask(dut, model, full - 1, full - 1) == (

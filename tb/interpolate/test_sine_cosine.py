@@ -24,7 +24,7 @@ PERIOD_NM = 800
 LATENCY = 22  # cycles from a converter word to its position
 ARCTAN = arctan_rotation.quarter_bound(
     arctan_rotation.PIPELINED, 16
-)  # LSB of phase; a corrected leg is half of 16 bits large
+)  # LSB of phase; a corrected channel is half of 16 bits large
 SETTINGS = dict(
     outlier_step=0,
     outlier_hold=0,
@@ -65,7 +65,7 @@ def offset_bound(offset, amplitude=1.0):
 
 
 def gain_bound(gain):
-    """One leg is longer by `gain`: at worst, near 45 degrees."""
+    """One channel is longer by `gain`: at worst, near 45 degrees."""
     return math.asin(abs(gain) / (2 + gain))
 
 
@@ -101,9 +101,9 @@ def samples(where, w, draw, offset, gain, phase, noise):
         (1 + gain) * np.sin(angle + half) + offset
     ) + noise * full * draw.uniform(-1, 1, len(angle))
     cos = AMPLITUDE * full * np.cos(angle - half) + noise * full * draw.uniform(-1, 1, len(angle))
-    words = [np.rint(leg).astype(int) for leg in (sin, cos)]
-    assert all(-full <= leg.min() and leg.max() < full for leg in words)
-    return list(zip(*(leg.tolist() for leg in words)))
+    words = [np.rint(channel).astype(int) for channel in (sin, cos)]
+    assert all(-full <= channel.min() and channel.max() < full for channel in words)
+    return list(zip(*(channel.tolist() for channel in words)))
 
 
 def top_acceleration(error):
@@ -140,7 +140,7 @@ def counts(position, subdivision):
 
 def phase_of(w, sin, cos):
     """Of a word that the correction leaves as it is: both legs come out of it at half the size."""
-    return sample(16, *((leg << 16 - w) + 1 >> 1 for leg in (sin, cos)))[0]
+    return sample(16, *((channel << 16 - w) + 1 >> 1 for channel in (sin, cos)))[0]
 
 
 class Chain:
@@ -179,7 +179,7 @@ async def follow(dut, sin, cos):
 
 
 @cocotb.test()
-async def latency_is_22_cycles_from_converter_word_to_position(dut):
+async def latency_is_22_from_an_adc_word_to_position(dut):
     await begin(dut)
     dut.valid.value, dut.sin.value, dut.cos.value = 1, 50, 0
     for cycle in range(LATENCY + 4):  # after cycle 0 the word stands in the bench's register
@@ -190,7 +190,7 @@ async def latency_is_22_cycles_from_converter_word_to_position(dut):
 
 
 @cocotb.test()
-async def a_learned_correction_and_harmonics_act_within_the_same_latency(dut):
+async def latency_is_22_with_a_correction_and_harmonics_too(dut):
     await begin(dut)
     w = int(dut.W.value)
     dut.load.value, dut.sin_offset.value, dut.gain.value, dut.enable.value = (
@@ -247,10 +247,10 @@ async def every_motion_stays_within_the_bound_of_every_disturbance(dut):
         for motion, where in motions(60, limit).items():
             await again(dut)
             chain, worst = Chain(w), 0
-            for place, (sin, cos) in zip(where, samples(where, w, draw, **amounts)):
+            for true, (sin, cos) in zip(where, samples(where, w, draw, **amounts)):
                 position = await follow(dut, sin, cos)
                 assert (position, 0) == chain.follow(sin, cos), (disturbance, motion)
-                worst = max(worst, abs(position - place * 65536))
+                worst = max(worst, abs(position - true * 65536))
             assert worst <= limit, f"{disturbance}, {motion}: {worst:.1f} LSB of {limit:.1f}"
 
 
@@ -264,14 +264,14 @@ async def the_centre_of_every_count_reads_exactly(dut):
         where = (
             np.concatenate([np.arange(steps), np.arange(steps)[::-1], -1 - np.arange(steps)]) + 0.5
         ) / steps
-        for place, (sin, cos) in zip(where, samples(where, w, draw, **CLEAN)):
+        for true, (sin, cos) in zip(where, samples(where, w, draw, **CLEAN)):
             assert counts(await follow(dut, sin, cos), subdivision) == math.floor(
-                place * subdivision
+                true * subdivision
             )
 
 
 @cocotb.test()
-async def too_hard_a_jerk_is_an_overspeed(dut):
+async def a_jerk_above_the_limit_is_an_overspeed(dut):
     await begin(dut)
     w, draw = int(dut.W.value), np.random.default_rng(seed())
     limit = bound(w, **CLEAN)
@@ -312,24 +312,24 @@ def test_long_motions_stay_within_the_bound_and_come_near_to_it(disturbance):
     limit, worst = bound(8, **amounts), 0
     for motion, where in motions(4000, limit).items():
         chain = Chain(8)
-        for place, (sin, cos) in zip(where, samples(where, 8, draw, **amounts)):
+        for true, (sin, cos) in zip(where, samples(where, 8, draw, **amounts)):
             position, overspeed = chain.follow(sin, cos)
-            worst = max(worst, abs(position - place * 65536))
+            worst = max(worst, abs(position - true * 65536))
             assert not overspeed and worst <= limit, f"{motion}: {worst:.1f} LSB of {limit:.1f}"
     assert worst > 0.6 * limit
 
 
 @pytest.mark.parametrize("subdivision", [1, 7, 160, 1000, 65536])
-def test_the_read_out_is_the_floor_of_the_place(subdivision):
+def test_the_readout_is_the_floor_of_the_true_position(subdivision):
     draw, chain, w = np.random.default_rng(1), Chain(16), 16
     where = np.concatenate([np.linspace(0.5, 3, 1500), np.linspace(3, -3, 3500)])
     away = bound(w, **CLEAN) / 65536
-    for place, (sin, cos) in zip(where, samples(where, w, draw, **CLEAN)):
+    for true, (sin, cos) in zip(where, samples(where, w, draw, **CLEAN)):
         read = counts(chain.follow(sin, cos)[0], subdivision)
         assert (
-            math.floor((place - away) * subdivision)
+            math.floor((true - away) * subdivision)
             <= read
-            <= math.floor((place + away) * subdivision)
+            <= math.floor((true + away) * subdivision)
         )
 
 

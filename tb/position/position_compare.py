@@ -18,9 +18,9 @@ class PositionCompare:
         )
         self.waited = False
 
-    def past(self, place, mark):
-        """How far place has come beyond mark in the direction of the points."""
-        return wrapped(mark - place if self.stride < 0 else place - mark)
+    def past(self, position, point):
+        """How far position has come beyond point in the direction of the points."""
+        return wrapped(point - position if self.stride < 0 else position - point)
 
     def step(
         self,

@@ -40,7 +40,7 @@ async def clock(dut, position, count, valid=1, limit=LIMIT, shift=0, shift_perio
     return int(dut.disagreement.value)
 
 
-async def rest(dut, position, count, limit=LIMIT):
+async def settle(dut, position, count, limit=LIMIT):
     """Long enough for two positions to come through."""
     return [await clock(dut, position, count, limit=limit) for _ in range(6)][-1]
 
@@ -48,7 +48,7 @@ async def rest(dut, position, count, limit=LIMIT):
 @cocotb.test()
 async def latency_is_3(dut):
     await begin(dut)
-    await rest(dut, 0, 0)
+    await settle(dut, 0, 0)
     dut.position.value, cycle = LIMIT + 1, 0
     while not int(dut.disagreement.value):
         await RisingEdge(dut.clk)
@@ -64,10 +64,10 @@ async def the_limit_itself_still_agrees(dut):
     for limit in (1, LIMIT, (1 << 20) - 1):
         for direction in (1, -1):
             await again(dut)
-            await rest(dut, 1000, 7, limit)
-            assert not await rest(dut, 1000 + direction * limit, 7, limit)
-            assert await rest(dut, 1000 + direction * (limit + 1), 7, limit)
-            assert not await rest(dut, 1000 + direction * (limit + 16384), 7 + direction, limit)
+            await settle(dut, 1000, 7, limit)
+            assert not await settle(dut, 1000 + direction * limit, 7, limit)
+            assert await settle(dut, 1000 + direction * (limit + 1), 7, limit)
+            assert not await settle(dut, 1000 + direction * (limit + 16384), 7 + direction, limit)
 
 
 @cocotb.test()
@@ -89,21 +89,21 @@ async def one_lost_fringe_shows_in_both_directions(dut):
     await begin(dut)
     for lost in (65536, -65536):
         await again(dut)
-        await rest(dut, 5000, 0)
-        assert await rest(dut, 5000 + lost, 0)
-        assert await rest(dut, 5000 + lost + 16384, 1)
-        assert not await rest(dut, 5000 + 16384, 1)
+        await settle(dut, 5000, 0)
+        assert await settle(dut, 5000 + lost, 0)
+        assert await settle(dut, 5000 + lost + 16384, 1)
+        assert not await settle(dut, 5000 + 16384, 1)
 
 
 @cocotb.test()
 async def a_lost_fringe_shows_at_the_next_position_wherever_the_constant_was_learned(dut):
     await begin(dut)
-    for learned in (0, 1, 8000, 16383):  # place within a count
+    for reference in (0, 1, 8000, 16383):  # place within a count
         for place in (0, 16383):
             for lost in (65536, -65536):
                 await again(dut)
-                await rest(dut, learned, 0)
-                assert not await rest(dut, place, 0)
+                await settle(dut, reference, 0)
+                assert not await settle(dut, place, 0)
                 await clock(dut, place + lost, 0)
                 assert [await clock(dut, place + lost, 0) for _ in range(2)] == [0, 1]
 
@@ -113,35 +113,35 @@ async def a_shift_hides_no_disagreement_and_makes_none(dut):
     await begin(dut)
     for periods in (3, -100_000, (1 << 31) - 1):
         await again(dut)
-        await rest(dut, 5000, 0)
+        await settle(dut, 5000, 0)
         await clock(dut, 5000, 0, shift=1, shift_periods=periods)
         here = (5000 + (periods << 16) + (1 << 47)) % (1 << 48) - (1 << 47)
         for _ in range(6):
             assert not await clock(dut, here, 0)
-        assert await rest(dut, here - 65536, 0)
+        assert await settle(dut, here - 65536, 0)
         await clock(dut, here - 65536, 0, shift=1, shift_periods=-1)
-        assert await rest(dut, here - 131072, 0)
+        assert await settle(dut, here - 131072, 0)
 
 
 @cocotb.test()
-async def a_shift_by_0_periods_or_limit_0_learns_anew(dut):
+async def a_shift_by_0_periods_or_limit_0_learns_the_constant_again(dut):
     await begin(dut)
-    await rest(dut, 0, 0)
-    assert await rest(dut, 65536, 0)
+    await settle(dut, 0, 0)
+    assert await settle(dut, 65536, 0)
     await clock(dut, 65536, 0, shift=1, shift_periods=0)
-    assert not await rest(dut, 65536, 0)
-    assert await rest(dut, 131072, 0)
+    assert not await settle(dut, 65536, 0)
+    assert await settle(dut, 131072, 0)
     assert not await clock(dut, 131072, 0, limit=0)
-    await rest(dut, 131072, 0, limit=0)
-    assert not await rest(dut, 131072, 0)
-    assert await rest(dut, 65536, 0)
+    await settle(dut, 131072, 0, limit=0)
+    assert not await settle(dut, 131072, 0)
+    assert await settle(dut, 65536, 0)
 
 
 @cocotb.test()
 async def the_count_wraps_without_a_disagreement(dut):
     await begin(dut)
     for count in ((1 << 31) - 1, -1 << 31, (1 << 31) - 2):
-        assert not await rest(dut, (count % (1 << 32)) << 14, count)
+        assert not await settle(dut, (count % (1 << 32)) << 14, count)
 
 
 @cocotb.test()

@@ -41,7 +41,7 @@ class Counts:
 
 
 @cocotb.test()
-async def by_hand_with_latency_1(dut):
+async def latency_is_1_and_steps_are_right_by_hand(dut):
     counts = await Counts(dut).begin()
     assert await counts.cycle() == (0, 0, 0)
     assert await counts.cycle(tick=1) == (1, 0, 0)

@@ -75,7 +75,7 @@ async def begin(dut, probe=0):
 
 
 @cocotb.test()
-async def latency_from_event_to_present_is_2(dut):
+async def latency_is_2_from_event_to_present(dut):
     capture = await begin(dut)
     assert (await capture.cycle(index=1, valid=1, position=5))[0] == 0
     assert (await capture.cycle())[1] == (INDEX, 0, 2, 5)
@@ -129,7 +129,7 @@ async def only_enabled_sources_capture(dut):
 
 
 @cocotb.test()
-async def a_probe_that_stands_at_reset_or_when_it_is_enabled_is_no_edge(dut):
+async def a_probe_that_is_high_at_reset_or_when_it_is_enabled_is_no_edge(dut):
     capture = await begin(dut, probe=1)
     for enabled in (capture.all, capture.all, 0, capture.all, capture.all):
         assert (await capture.cycle(enabled=enabled, probe=1))[2] == capture.depth
@@ -138,7 +138,7 @@ async def a_probe_that_stands_at_reset_or_when_it_is_enabled_is_no_edge(dut):
 
 
 @cocotb.test()
-async def the_age_is_the_cycle_since_the_position_came_and_stops_at_its_end(dut):
+async def the_age_counts_the_cycles_since_the_position_came_and_saturates(dut):
     capture = await begin(dut)
     await capture.cycle(software=1)
     await capture.cycle(valid=1)
@@ -149,7 +149,7 @@ async def the_age_is_the_cycle_since_the_position_came_and_stops_at_its_end(dut)
 
 
 @cocotb.test()
-async def a_full_queue_tells_what_it_drops_and_keeps_the_rest(dut):
+async def a_full_queue_reports_what_it_drops_and_keeps_its_entries(dut):
     capture = await begin(dut)
     for n in range(capture.depth):
         assert (await capture.cycle(index=1, position=n))[2:] == (capture.depth - 1 - n, 0)
@@ -161,7 +161,7 @@ async def a_full_queue_tells_what_it_drops_and_keeps_the_rest(dut):
 
 
 @cocotb.test()
-async def the_head_stands_until_it_is_popped(dut):
+async def the_head_is_constant_until_it_is_popped(dut):
     capture = await begin(dut)
     await capture.cycle(index=1, position=-1 << 47)
     await capture.cycle()

@@ -67,14 +67,14 @@ async def latency_is_5(dut):
 
 
 @cocotb.test()
-async def with_quantum_0_it_is_the_way_of_the_tick(dut):
+async def with_quantum_0_the_velocity_is_the_distance_of_the_tick(dut):
     await begin(dut)
     seen = [await ticks(dut, [p]) for p in (1000, 1004, 1004, 900, 70_000, 69_999)]
     assert seen == [0, 4, 0, -104, 69_100, -1]
 
 
 @cocotb.test()
-async def a_tick_in_every_cycle_is_the_way_of_a_cycle(dut):
+async def with_a_tick_in_every_cycle_the_velocity_is_the_distance_of_a_cycle(dut):
     await begin(dut)
     where = [n * n for n in range(20)]
     seen = [await clock(dut, p, 1) for p in where]
@@ -97,7 +97,7 @@ async def a_shift_leaves_no_trace(dut):
 
 
 @cocotb.test()
-async def the_velocity_stops_at_both_ends(dut):
+async def the_velocity_saturates_at_both_ends(dut):
     await begin(dut)
     end = 1 << 31
     for far, want in (
@@ -120,7 +120,7 @@ async def the_wrap_of_the_position_is_no_velocity(dut):
 
 
 @cocotb.test()
-async def by_hand_one_edge_in_five_ticks(dut):
+async def one_edge_in_five_ticks_gives_a_fifth_of_a_quantum_by_hand(dut):
     await begin(dut)
     period, seen = 100, []
     for cycle in range(0, 4000):
@@ -147,7 +147,7 @@ async def an_edge_that_trembles_has_no_velocity(dut):
 
 
 @cocotb.test()
-async def after_a_stop_the_velocity_dies_away_as_one_over_the_time_and_ends(dut):
+async def after_a_stop_the_velocity_falls_as_one_over_the_time_to_0(dut):
     await begin(dut)
     position, seen, longest = 0, [], (1 << int(dut.TIME_W.value)) - 1
     for cycle in range(4000):
@@ -164,7 +164,7 @@ async def after_a_stop_the_velocity_dies_away_as_one_over_the_time_and_ends(dut)
 
 
 @cocotb.test()
-async def the_step_it_rests_on_is_24_to_50_cycles_old(dut):
+async def latency_is_24_to_50_from_the_step_that_is_used_to_its_tick(dut):
     await begin(dut)
     for age in (23, 24, 49, 50):
         taken = set()
@@ -214,7 +214,7 @@ def test_no_speed_has_a_step_where_time_stamps_and_differences_meet(backwards):
         )  # what the speed gains from edge to edge
 
 
-def test_a_fraction_of_a_unit_a_tick_is_told():
+def test_a_fraction_of_a_unit_per_tick_is_resolved():
     for speed in (0.15, 1.4):
         for true, got in ride(
             lambda cycle, speed=speed: speed, 500, int(10 + 4 / speed), quantum=1
@@ -223,7 +223,7 @@ def test_a_fraction_of_a_unit_a_tick_is_told():
 
 
 @cocotb.test()
-async def a_ramp_across_the_joint_matches_the_model(dut):
+async def a_ramp_from_low_to_high_speed_matches_the_model(dut):
     await begin(dut)
     model, period, where = VelocityEstimator(int(dut.TIME_W.value)), 150, 0.5
     for cycle in range(9_000):
@@ -239,16 +239,16 @@ async def a_ramp_across_the_joint_matches_the_model(dut):
 async def any_input_matches_the_model_in_every_cycle(dut):
     await begin(dut)
     time_w = int(dut.TIME_W.value)
-    model, position, lively, pace, quantum = VelocityEstimator(time_w), 0, 0.5, 0.1, X4
+    model, position, lively, tick_share, quantum = VelocityEstimator(time_w), 0, 0.5, 0.1, X4
     await again(dut)
     for cycle in range(12_000):
         if cycle % 500 == 0:
-            lively, pace = (
+            lively, tick_share = (
                 random.choice((0, 0.003, 0.05, 0.5, 1)),
                 random.choice((0.0, 0.004, 0.02, 0.3)),
             )
             quantum = random.choice((0, 1, 128, X4, 65535))
-        rst, tick, shift = (int(random.random() < share) for share in (0.001, pace, 0.02))
+        rst, tick, shift = (int(random.random() < share) for share in (0.001, tick_share, 0.02))
         if random.random() < lively:
             position += random.choice(
                 (

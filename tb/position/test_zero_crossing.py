@@ -49,7 +49,7 @@ async def latency_is_1(dut):
 
 
 @cocotb.test()
-async def every_pass_is_told_with_its_direction(dut):
+async def every_pass_is_reported_with_its_direction(dut):
     await begin(dut)
     assert await ride(dut, [5, 0, -1, -2, 0, -1, 65535, 3, -65536, -1]) == "..d.udu.d."
 

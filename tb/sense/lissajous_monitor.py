@@ -46,10 +46,10 @@ class LissajousMonitor:
                 (onward % 2 == 1) & (self.side[kind] == onward) & self.met[kind]
             )
             if crossed.size:
-                place = kind, self.sector[kind, crossed], crossed
-                before, middle = self.lengths[place], self.middle[kind, crossed]
-                self.lengths[place] = np.where(self.known[place], before + middle + 1 >> 1, middle)
-                self.known[place] = True
+                entry = kind, self.sector[kind, crossed], crossed
+                before, middle = self.lengths[entry], self.middle[kind, crossed]
+                self.lengths[entry] = np.where(self.known[entry], before + middle + 1 >> 1, middle)
+                self.known[entry] = True
             self.met[kind] = close | self.met[kind] & (onward == 0)
             self.middle[kind] = np.where(close, length, self.middle[kind])
             self.side[kind] = np.where(

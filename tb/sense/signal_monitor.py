@@ -102,9 +102,9 @@ class SignalMonitor:
         lane.
         """
         s = settings
-        way = np.maximum(abs(sin - self.last_sin), abs(cos - self.last_cos))
-        jumped = (self.seen >= 2) & (s.jump != NEVER) & (way > 2 * self.step + s.jump)
-        self.last_sin, self.last_cos, self.step, self.seen = sin, cos, way, self.seen + 1
+        distance = np.maximum(abs(sin - self.last_sin), abs(cos - self.last_cos))
+        jumped = (self.seen >= 2) & (s.jump != NEVER) & (distance > 2 * self.step + s.jump)
+        self.last_sin, self.last_cos, self.step, self.seen = sin, cos, distance, self.seen + 1
 
         channels = zip(
             self.cos.sample(

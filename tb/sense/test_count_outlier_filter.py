@@ -45,7 +45,7 @@ async def latency_is_1(dut):
 
 
 @cocotb.test()
-async def by_hand_the_three_lines_of_the_equation(dut):
+async def the_three_cases_of_the_equation_are_right_by_hand(dut):
     await begin(dut)
     assert await feed(dut, [100, 100]) == [100, 100]  # difference 0: it stays
     assert await feed(dut, [101, 99, 101]) == [100, 100, 100]  # difference 1: the count before
@@ -54,7 +54,7 @@ async def by_hand_the_three_lines_of_the_equation(dut):
 
 
 @cocotb.test()
-async def out_of_use_every_count_passes(dut):
+async def with_enable_0_every_count_passes(dut):
     await begin(dut)
     counts = [0, 1, 5, 90, -90, 7]
     assert await feed(dut, counts, enable=0) == counts
@@ -81,7 +81,7 @@ async def it_lags_v_counts_going_up_and_one_less_going_down(dut):
 
 
 @cocotb.test()
-async def at_rest_it_may_stay_one_count_off_for_ever(dut):
+async def at_rest_the_output_may_stay_one_count_off(dut):
     await begin(dut)
     assert (await feed(dut, [0] + [50] * 20))[-1] == 49
     assert (await feed(dut, [0] * 20))[-1] == 1

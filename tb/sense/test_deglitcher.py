@@ -43,7 +43,7 @@ async def drive(dut, model, stable_cycles, levels, rst=0):
 
 
 @cocotb.test()
-async def latency_is_stable(dut):
+async def latency_is_stable_cycles(dut):
     model = await begin(dut)
     await drive(dut, model, 1, [0] * 10)
     for stable_cycles in (0, 1, 2, 3, 7):
@@ -72,7 +72,7 @@ async def a_train_of_short_pulses_never_passes(dut):
 
 
 @cocotb.test()
-async def a_level_that_stands_from_power_up_makes_no_edge(dut):
+async def a_level_that_is_constant_from_power_up_makes_no_edge(dut):
     for level in (1, 0):
         model = await begin(dut, level=level, stable_cycles=15)
         assert await drive(dut, model, 15, [level] * 40) == [(level, 0)] * 40

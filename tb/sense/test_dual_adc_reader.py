@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""dual_adc_reader: against a converter that times its bits as the data sheet says, known codes, its
+"""dual_adc_reader: against a adc that times its bits as the data sheet says, known codes, its
 timing, and the model in every cycle.
 """
 
@@ -13,7 +13,7 @@ from tb.bench import run, start
 from tb.sense.dual_adc_reader import DualAdcReader
 
 
-class Converter:
+class Adc:
     """Two converters: sampled when cs_n falls, one bit a falling edge of sclk, its line wrong until
     half an sclk later.
     """
@@ -40,8 +40,8 @@ class Converter:
         self.cs_n, self.sclk = cs_n, sclk
         if cs_n:
             return random.getrandbits(1), random.getrandbits(1)  # high impedance
-        place = self.bits - 1 - (self.edges - self.leading)
-        levels = [code >> place & 1 if 0 <= place < self.bits else 0 for code in self.codes]
+        bit = self.bits - 1 - (self.edges - self.leading)
+        levels = [code >> bit & 1 if 0 <= bit < self.bits else 0 for code in self.codes]
         return tuple(1 - level if early else level for level in levels)
 
 
@@ -72,10 +72,10 @@ async def begin(dut):
     model = DualAdcReader(w, leading, frame)
     model.known = False  # sin and cos mean nothing before the first sample
     model.step(0, 0, 0, 1)
-    return model, Converter(leading, frame - leading)
+    return model, Adc(leading, frame - leading)
 
 
-async def convert(dut, model, converter, codes):
+async def convert(dut, model, adc, codes):
     """One conversion: (sin, cos), cycles to valid, cycles until cs_n is high again, falling edges of
     sclk.
     """
@@ -83,7 +83,7 @@ async def convert(dut, model, converter, codes):
     while True:
         n += 1
         cs_n, sclk, valid, now = await cycle(dut, model, int(n == 1), lines)
-        lines = converter.lines(
+        lines = adc.lines(
             codes if n == 1 else (random.getrandbits(8), random.getrandbits(8)), cs_n, sclk
         )
         falls, was = falls + (was and not sclk), sclk
@@ -96,9 +96,9 @@ async def convert(dut, model, converter, codes):
 
 @cocotb.test()
 async def known_codes_by_hand(dut):
-    model, converter = await begin(dut)
+    model, adc = await begin(dut)
     w, leading, frame = sizes(dut)
-    bits = frame - leading  # of this converter
+    bits = frame - leading  # of this adc
     one = 1 << bits - w  # what one step of sin is worth to it
     half, top = 1 << bits - 1, (1 << bits) - 1
     low, high = -(1 << w - 1), (1 << w - 1) - 1
@@ -108,32 +108,32 @@ async def known_codes_by_hand(dut):
         (half, half - 1): (0, -1),
         (half + 5 * one, half - 5 * one): (5, -5),
     }.items():
-        assert (await convert(dut, model, converter, codes))[0] == want
+        assert (await convert(dut, model, adc, codes))[0] == want
 
 
 @cocotb.test()
-async def latency_is_two_cycle_a_bit_and_rate_is_as_stated(dut):
-    model, converter = await begin(dut)
+async def latency_is_2_times_leading_plus_w_and_the_rate_is_2_times_frame_plus_1(dut):
+    model, adc = await begin(dut)
     w, leading, frame = sizes(dut)
     for _ in range(3):  # back to back: start with the cycle in which cs_n was seen high
-        _, latency, length, falls = await convert(dut, model, converter, (1, 2))
+        _, latency, length, falls = await convert(dut, model, adc, (1, 2))
         assert (latency, length, falls) == (2 * (leading + w), 2 * frame + 1, frame)
     assert 2 * frame + 1 <= 40  # 100 kS/s at 4 MHz
 
 
 @cocotb.test()
-async def start_is_not_heard_during_a_conversion(dut):
-    model, converter = await begin(dut)
+async def start_is_ignored_during_a_conversion(dut):
+    model, adc = await begin(dut)
     lines, starts, valids = (0, 0), 0, 0
     for n in range(10 * (2 * sizes(dut)[2] + 1)):
         cs_n, sclk, valid, _ = await cycle(dut, model, 1, lines)
-        starts, valids = starts + (converter.cs_n and not cs_n), valids + valid
-        lines = converter.lines((n, n), cs_n, sclk)
+        starts, valids = starts + (adc.cs_n and not cs_n), valids + valid
+        lines = adc.lines((n, n), cs_n, sclk)
     assert starts == valids == 10
 
 
 @cocotb.test()
-async def a_dead_converter_reads_as_the_end_of_the_range(dut):
+async def a_dead_adc_reads_as_the_end_of_the_range(dut):
     model, _ = await begin(dut)
     w, _, frame = sizes(dut)
     for level, value in ((0, -(1 << w - 1)), (1, (1 << w - 1) - 1)):
@@ -144,7 +144,7 @@ async def a_dead_converter_reads_as_the_end_of_the_range(dut):
 
 @cocotb.test()
 async def reset_in_a_frame_ends_it_without_a_sample(dut):
-    model, converter = await begin(dut)
+    model, adc = await begin(dut)
     w, leading, frame = sizes(dut)
     for at in (1, 2, 2 * (leading + w) - 1, 2 * (leading + w), 2 * frame):
         for n in range(at):
@@ -152,17 +152,17 @@ async def reset_in_a_frame_ends_it_without_a_sample(dut):
         assert (await cycle(dut, model, 0, (1, 1), rst=1))[:3] == (1, 1, 0)
         for _ in range(2 * frame):
             assert (await cycle(dut, model, 0, (1, 1)))[:3] == (1, 1, 0)
-        assert (await convert(dut, model, converter, (0, 0)))[0] == (-(1 << w - 1),) * 2
+        assert (await convert(dut, model, adc, (0, 0)))[0] == (-(1 << w - 1),) * 2
 
 
 @cocotb.test()
 async def any_signal_matches_the_model(dut):
-    model, converter = await begin(dut)
+    model, adc = await begin(dut)
     w, leading, frame = sizes(dut)
     bits = frame - leading
     for _ in range(60):
         codes = random.getrandbits(bits), random.getrandbits(bits)
-        sample = (await convert(dut, model, converter, codes))[0]
+        sample = (await convert(dut, model, adc, codes))[0]
         assert sample == tuple((code >> bits - w) - (1 << w - 1) for code in codes)
         for _ in range(random.choice([0, 0, 1, 7])):
             await cycle(dut, model, 0, (random.getrandbits(1), random.getrandbits(1)))

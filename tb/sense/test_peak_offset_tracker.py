@@ -84,7 +84,7 @@ async def latency_is_2(dut):
 
 
 @cocotb.test()
-async def by_hand_as_printed(dut):
+async def the_offset_is_that_of_s0_by_hand(dut):
     remover = await begin(dut)
     needs(remover.w == 8, "the paper has 8 bits")
     sin = [
@@ -114,7 +114,7 @@ async def an_offset_is_gone_after_one_fringe_and_a_quarter(dut):
 
 
 @cocotb.test()
-async def noise_makes_turning_points_that_are_none(dut):
+async def noise_makes_false_turning_points(dut):
     remover = await begin(dut)
     out = await remover.feed(circle(remover.top, 6, noise=0.03 * remover.top))
     assert (
@@ -123,7 +123,7 @@ async def noise_makes_turning_points_that_are_none(dut):
 
 
 @cocotb.test()
-async def out_of_use_samples_pass_and_the_offset_is_still_known(dut):
+async def with_enable_0_samples_pass_and_the_offset_is_still_known(dut):
     remover = await begin(dut)
     samples = circle(remover.top, 2, sin_offset=9)
     out = await remover.feed(samples, enable=0)
@@ -131,7 +131,7 @@ async def out_of_use_samples_pass_and_the_offset_is_still_known(dut):
 
 
 @cocotb.test()
-async def a_corrected_sample_stops_at_full_scale(dut):
+async def a_corrected_sample_saturates_at_full_scale(dut):
     remover = await begin(dut)
     top = remover.top
     out = await remover.feed(

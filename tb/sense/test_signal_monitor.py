@@ -72,7 +72,7 @@ class Watch:
             angle = 2 * np.pi * (begin + np.sign(fringes) * n / steps)
             await self.sample(*distort(size * np.cos(angle), size * np.sin(angle)), gap=gap)
 
-    async def rest(self, cycles=LATEST):
+    async def idle(self, cycles=LATEST):
         for _ in range(cycles):
             await self.cycle()
 
@@ -105,24 +105,24 @@ async def ready(dut, **more):
     size = 0.78 * watch.full
     await watch.turn(size, 2.25, steps=24)
     await watch.turn(size, -0.25, begin=0.25)
-    await watch.rest()
+    await watch.idle()
     assert int(dut.ready.value) and not watch.seen
     return watch, size
 
 
 @cocotb.test()
-async def latency_is_2_5_10_and_14(dut):
+async def latency_is_2_5_10_or_14_by_fault(dut):
     for name, lag in [("clipped", 2), ("jump", 5), ("too_high", 10), ("off_circle", 14)]:
         watch = await begin(dut, Settings(clip_level=110, jump=10, high=120, tolerance=20))
         await watch.turn(90, 2.25, steps=80)
-        await watch.rest()
+        await watch.idle()
         assert not watch.seen
         decides = watch.cycle + (
             name != "jump"
         )  # the first sample of a jump, the second one of the others
         await watch.sample(0, 126)
         await watch.sample(0, 126)
-        await watch.rest()
+        await watch.idle()
         assert watch.rose[name] == decides + lag
     watch = await begin(dut)
     await watch.cycle(phase_jump=1, lost_count=1)
@@ -130,7 +130,7 @@ async def latency_is_2_5_10_and_14(dut):
 
 
 @cocotb.test()
-async def amplitude_comes_9_cycles_after_its_sample(dut):
+async def latency_is_9_to_amplitude(dut):
     watch = await begin(dut)
     await watch.sample(30, 40)
     for n in range(1, 12):
@@ -155,13 +155,13 @@ async def a_good_signal_without_noise_raises_nothing_moving_or_at_rest(dut):
     watch, size = await ready(dut)
     for steps in (200, 60, 13, 7, 5, 4.1):
         await watch.turn(size, 2.0, steps=steps)
-    for place in (0, 3, 10):
-        await watch.turn(size, -place / 16, steps=90)
+    for fringe in (0, 3, 10):
+        await watch.turn(size, -fringe / 16, steps=90)
         for _ in range(30):
             await watch.sample(
-                size * np.cos(place / 16 * 2 * np.pi), -size * np.sin(place / 16 * 2 * np.pi)
+                size * np.cos(fringe / 16 * 2 * np.pi), -size * np.sin(fringe / 16 * 2 * np.pi)
             )
-        await watch.turn(size, place / 16, begin=-place / 16, steps=90)
+        await watch.turn(size, fringe / 16, begin=-fringe / 16, steps=90)
     assert not watch.seen & ~(1 << FAULTS.index("jump"))
 
 
@@ -170,7 +170,7 @@ async def a_single_spike_is_only_a_jump(dut):
     watch, size = await ready(dut)
     for n in range(60):
         await watch.sample(size if n != 30 else 0, 0)
-    await watch.rest()
+    await watch.idle()
     assert names(watch.seen) == ["jump"]
 
 
@@ -188,7 +188,7 @@ async def each_fault_of_a_moving_signal_has_its_name(dut):
     ]:
         watch, size = await ready(dut)
         await watch.turn(size, 4.0, distort=distort)
-        await watch.rest()
+        await watch.idle()
         assert name in names(watch.seen), f"{name} is not among {names(watch.seen)}"
 
 
@@ -202,13 +202,13 @@ async def each_fault_of_a_comparator_or_channel_has_its_name(dut):
         for n in range(120):
             angle = 2 * np.pi * n / 60
             await watch.sample(size * np.cos(angle), size * np.sin(angle), a=a(n))
-        await watch.rest()
+        await watch.idle()
         assert name in names(watch.seen)
     watch, size = await ready(dut)
     for n in range(180):
         angle = 2 * np.pi * (n + 0.5) / 60
         await watch.sample(size, 0, a=int(np.cos(angle) > 0), b=int(np.sin(angle) > 0))
-    await watch.rest()
+    await watch.idle()
     assert "channel_missing" in names(watch.seen)
     watch, size = await ready(dut, no_noise_samples=50)
     for _ in range(52):
@@ -218,34 +218,34 @@ async def each_fault_of_a_comparator_or_channel_has_its_name(dut):
 
 @cocotb.test()
 async def a_channel_that_opens_at_rest_is_found_at_the_second_sample(dut):
-    for place in (0.08, 0.1, 0.2, 0.4):  # fringe; the sine goes to zero
+    for fringe in (0.08, 0.1, 0.2, 0.4):  # fringe; the sine goes to zero
         watch, size = await ready(dut)
-        await watch.turn(size, place, steps=400)
-        angle = 2 * np.pi * place
+        await watch.turn(size, fringe, steps=400)
+        angle = 2 * np.pi * fringe
         for _ in range(50):
             await watch.sample(size * np.cos(angle), size * np.sin(angle))
         assert not watch.seen
         for _ in range(2):
             await watch.sample(size * np.cos(angle), 0)
-        await watch.rest()
+        await watch.idle()
         assert "jump" in names(watch.seen) and "off_circle" in names(watch.seen)
 
 
 @cocotb.test()
-async def a_signal_lost_in_both_channels_is_told_at_the_second_sample_moving_or_at_rest(dut):
-    for steps in (4.1, 60, None):  # samples a fringe; None: at rest
-        for place in (0.125, 0.77):
+async def a_signal_lost_in_both_channels_is_reported_at_the_second_sample_moving_or_at_rest(dut):
+    for steps in (4.1, 60, None):  # samples a fringe; None: at idle
+        for fringe in (0.125, 0.77):
             watch, size = await ready(dut)
-            await watch.turn(size, place, steps=200)
+            await watch.turn(size, fringe, steps=200)
             for n in range(20):
-                angle = 2 * np.pi * (place + (n / steps if steps else 0))
+                angle = 2 * np.pi * (fringe + (n / steps if steps else 0))
                 await watch.sample(size * np.cos(angle), size * np.sin(angle))
-            await watch.rest()
+            await watch.idle()
             assert "too_low" not in names(watch.seen)
             second = watch.cycle + 1
             for _ in range(2):
                 await watch.sample(0, 0)
-            await watch.rest()
+            await watch.idle()
             assert watch.rose["too_low"] == second + CLKS[FAULTS.index("too_low")]
 
 
@@ -254,7 +254,7 @@ async def the_first_fault_persists_until_it_is_cleared(dut):
     watch = await begin(dut, Settings(clip_level=10, high=10))
     for _ in range(3):
         await watch.sample(0, 50)
-    await watch.rest()
+    await watch.idle()
     assert names(int(dut.first.value)) == ["clipped"] and names(int(dut.faults.value)) == [
         "too_high",
         "clipped",
@@ -263,7 +263,7 @@ async def the_first_fault_persists_until_it_is_cleared(dut):
     assert names(int(dut.first.value)) == ["too_high", "clipped"]
     for _ in range(17):
         await watch.sample(0, 5)
-    await watch.rest()
+    await watch.idle()
     assert not int(dut.faults.value) and int(dut.first.value)
     await watch.cycle(clear=1)
     assert not int(dut.first.value)
@@ -276,7 +276,7 @@ async def reset_in_mid_flow_drops_faults_and_samples(dut):
         await watch.sample(0, 50)
     assert int(dut.faults.value)
     watch = await begin(dut, Settings(clip_level=10, high=10))
-    await watch.rest(20)
+    await watch.idle(20)
     assert not watch.seen
 
 
@@ -324,7 +324,7 @@ async def any_signal_in_any_settings_matches_the_model_in_every_cycle(dut):
                 )
 
 
-def test_the_campaigns_tracker_is_that_of_the_house():
+def test_the_tracker_of_the_campaign_equals_the_model_of_the_module():
     from figures.faults import LOST, Tracker
     from tb.interpolate.fringe_tracker import FringeTracker
     from tb.position.count_phase_check import CountPhaseCheck
@@ -339,8 +339,8 @@ def test_the_campaigns_tracker_is_that_of_the_house():
     phase, count = np.zeros(lanes, np.int64), np.zeros(lanes, np.int64)
     speed = source.integers(-16000, 16000, lanes)
     for _ in range(300):
-        stray = (source.random(lanes) < 0.05) * source.integers(0, 65536, lanes)
-        phase = (phase + speed + source.integers(-300, 300, lanes) + stray) % 65536
+        outlier = (source.random(lanes) < 0.05) * source.integers(0, 65536, lanes)
+        phase = (phase + speed + source.integers(-300, 300, lanes) + outlier) % 65536
         count = count + source.integers(-1, 2, lanes)
         jump, lost = many.follow(phase, count)
         for n in range(lanes):
@@ -348,8 +348,8 @@ def test_the_campaigns_tracker_is_that_of_the_house():
             step, overspeed = each[n].follow(int(phase[n]))
             position[n] = int(phase[n]) if first else position[n] + step
             for valid in (1, 0, 0):
-                told = checks[n].step(LOST, valid, position[n], int(count[n]), 0, 0)
-            assert (overspeed, told) == (int(jump[n]), int(lost[n]))
+                disagrees = checks[n].step(LOST, valid, position[n], int(count[n]), 0, 0)
+            assert (overspeed, disagrees) == (int(jump[n]), int(lost[n]))
 
 
 @pytest.mark.parametrize("w", [8, 16])

@@ -41,7 +41,7 @@ async def drive(dut, samples):
 
 
 @cocotb.test()
-async def known_vectors_by_hand_latency_is_8(dut):
+async def latency_is_8_and_known_vectors_are_right_by_hand(dut):
     await start(dut, valid=0, sin=0, cos=0)
     got = await drive(dut, [(0, 100), (100, 0), (0, -100), (-100, 0), (60, 80), (-60, -80), (0, 0)])
     assert got == [
@@ -56,7 +56,7 @@ async def known_vectors_by_hand_latency_is_8(dut):
 
 
 @cocotb.test()
-async def ends_of_the_range(dut):
+async def the_ends_of_the_range_are_right(dut):
     await start(dut, valid=0, sin=0, cos=0)
     low, high = -(1 << int(dut.W.value) - 1), (1 << int(dut.W.value) - 1) - 1
     ends = (low, low + 1, -1, 0, 1, high)
@@ -64,7 +64,7 @@ async def ends_of_the_range(dut):
 
 
 @cocotb.test()
-async def reset_drops_the_samples_in_flight(dut):
+async def reset_drops_the_samples_in_progress(dut):
     await start(dut, valid=0, sin=0, cos=0)
     for _ in range(5):
         await cycle(dut, (50, 60))
