@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""synchroniser: its latency, its state at reset, and random levels against the model."""
+"""Tests of synchroniser: its latency, its state at reset, and random levels against the model."""
 
 import random
 

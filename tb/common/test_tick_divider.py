@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tick_divider: exact periods at both ends of the range, a period changed under way, and starting
-anew, and random
-settings against the model."""
+"""Tests of tick_divider: exact periods at both ends of the range, a period changed while it runs, a
+restart, and random settings against the model.
+"""
 
 import random
 
@@ -21,7 +21,7 @@ async def cycle(dut, period, restart=0, rst=0):
 
 
 async def ticks(dut, period, n):
-    """The cycles, counted from 1, in which ticks came."""
+    """The numbers of the cycles, counted from 1, in which a tick came."""
     return [k for k in range(1, n + 1) if await cycle(dut, period)]
 
 
@@ -64,7 +64,7 @@ async def latency_is_period_from_a_restart_at_any_time(dut):
     for before in range(13):
         await cycle(dut, 10, rst=1)
         await ticks(dut, 10, before)
-        assert await cycle(dut, 10, restart=1) == 0  # not even where a tick was due
+        assert await cycle(dut, 10, restart=1) == 0  # even if a tick was due
         assert await ticks(dut, 10, 20) == [10, 20]
 
 

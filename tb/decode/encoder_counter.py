@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/decode/encoder_counter.sv does: step(...) is one cycle, and returns rdata after it."""
+"""Model of rtl/decode/encoder_counter.sv: step(...) advances one cycle and returns rdata."""
 
 from tb.decode.index_latch import IndexLatch, Settings
 from tb.decode.quadrature_decoder import QuadratureDecoder
@@ -31,7 +31,7 @@ class EncoderCounter:
         return self.settings >> n & (1 << width) - 1
 
     def read(self, word):
-        """What a word reads as now; None where it means nothing yet."""
+        """The word as it reads now; None while it is undefined."""
         if word == 0:
             return (
                 None

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/decode/index_latch.sv does: clear() tells what goes to the decoder in this cycle, step()
-ends the cycle.
+"""Model of rtl/decode/index_latch.sv: clear() returns the signal to the decoder in this cycle,
+step() completes the cycle.
 """
 
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ class Settings:
         return replace(self, **changes)
 
     def holds(self, a, b, z):
-        """Levels stand on the gated index."""
+        """The levels are within the gated index."""
         return bool((z ^ self.active_low) and not ((self.gate ^ (a | b << 1)) & self.gate_mask))
 
 
@@ -45,8 +45,8 @@ class IndexLatch:
         return int(self.met(direction) and self.enabled and settings.clears)
 
     def step(self, settings, levels, ready, direction, stepped, count, arm=0, rst=0, probe=0):
-        """levels (a, b, z); stepped is -1, 0, +1 of the decoder in this cycle. Returns (armed, found,
-        index_count, revolution_wrong).
+        """Complete a cycle with levels (a, b, z); stepped is the step of the decoder in this cycle:
+        -1, 0, +1. Returns (armed, found, index_count, revolution_wrong).
         """
         met = self.met(direction)
         take = int(met and self.enabled)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""encoder_counter: its words by hand, latencies, flags, probe and index, and random pins and
-accesses against the model.
+"""Tests of encoder_counter: its words by hand, latencies, flags, probe and index, and random pins
+and accesses against the model.
 """
 
 import random
@@ -9,7 +9,7 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge
 
-from tb.bench import run, start
+from tb.bench import needs, run, start
 from tb.decode.encoder_counter import ARM, FOUND, ILLEGAL, PROBED, EncoderCounter
 
 TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]  # a leads b: up
@@ -17,7 +17,7 @@ UP, DOWN, EACH, CLEARS, PROBE, PROBE_LOW = (1 << n for n in range(10, 16))
 
 
 class Bench:
-    """Design and model side by side, the pins of a scale at `position`."""
+    """The design and its model side by side, with the pins of a scale at `position`."""
 
     @classmethod
     async def begin(cls, dut, settings=0):
@@ -85,21 +85,36 @@ class Bench:
 async def count_and_the_time_of_its_last_edge_are_read_together(dut):
     bench = await Bench.begin(dut)
     await bench.go(range(1, 8), cycle=5)
-    moved = bench.now - 4  # the cycle in which the last edge came to the pins
+    moved = bench.now - 4  # the cycle in which the last edge reached the pins
     assert (
         await bench.read(0) == moved + 3 - 1 << 16 | 7
-    )  # 3 cycles to count; the time is that of the cycle before
+    )  # 3 cycles to count; the time is that of the preceding cycle
     await bench.go(range(6, -4, -1), cycle=5)
     assert await bench.count() == 0xFFFD
 
 
 @cocotb.test()
-async def latency_is_3_from_the_pins_to_count_in_bypass_and_1_to_rdata(dut):
-    bench = await Bench.begin(dut)
-    await bench.go(range(1, 5))  # the time means nothing before the first step
+async def latency_is_n_samples_and_2_cycles_from_the_pins_and_1_to_rdata(dut):
+    for required in (0, 1):
+        bench = await Bench.begin(dut, required)
+        await bench.go(range(1, 5), cycle=5)  # the time is undefined before the first step
+        await bench.wait(4)
+        bench.position = 5
+        assert [await bench.count() for _ in range(4)] == [4, 4, 4, 5]
+    needs(int(dut.FILTER_W.value) > 1, "built without longer filters")
+    bench = await Bench.begin(dut, 3)
+    await bench.go(range(1, 5), cycle=5)
     await bench.wait(4)
     bench.position = 5
-    assert [await bench.count() for _ in range(4)] == [4, 4, 4, 5]
+    assert [await bench.count() for _ in range(6)] == [4] * 5 + [5]
+
+
+@cocotb.test()
+async def latency_is_1_from_select_to_rdata_and_from_a_write_to_the_new_setting(dut):
+    bench = await Bench.begin(dut)
+    await bench.write(2, UP)
+    dut.write.value, dut.wdata.value = 0, 0
+    assert int(dut.rdata.value) == 0 and await bench.read(2) == UP == int(dut.rdata.value)
 
 
 @cocotb.test()
@@ -168,7 +183,8 @@ async def once_takes_one_index_for_each_arm(dut):
 async def a_probe_latches_the_count_of_its_own_cycle_at_the_chosen_edge(dut):
     for low in (0, 1):
         bench = await Bench.begin(dut, PROBE | low * PROBE_LOW)
-        for position in range(1, 13):  # one edge a cycle: latched is that of the very cycle
+        # one edge per cycle: the count of exactly this cycle is latched
+        for position in range(1, 13):
             bench.probe = int(4 <= position < 9)
             await bench.go([position])
         await bench.wait(4)
@@ -217,7 +233,7 @@ async def an_illegal_edge_is_not_counted_and_its_flag_stays_until_it_is_cleared(
 async def an_event_in_the_cycle_that_clears_its_flag_sets_it_again(dut):
     bench = await Bench.begin(dut)
     await bench.go([2])
-    for _ in range(6):  # one of these meets it
+    for _ in range(6):  # one of these cycles coincides with the edge
         await bench.write(1, ILLEGAL)
         bench.position += 2
     await bench.wait(4)

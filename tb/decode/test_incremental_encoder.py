@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""incremental_encoder: latencies, its flags, every index fault known from the field, time stamps,
-and random pins against the model.
+"""Tests of incremental_encoder: latencies, flags, every index fault known from the field, time
+stamps, and random pins against the model.
 """
 
 import random
@@ -19,8 +19,8 @@ CLEARS = Settings(each=1, clears=1)
 
 
 class Bench:
-    """Design and model side by side. An encoder with its index where `at_index(position)` holds is
-    moved over them.
+    """The design and its model side by side. An encoder whose index is active where
+    `at_index(position)` holds is moved over them.
     """
 
     @classmethod
@@ -67,9 +67,10 @@ class Bench:
             getattr(dut, name).value = value
 
     async def play(self, rows, rst=0, arm=0, clear_flags=0, own=None):
-        """Levels (a, b, z), one row a cycle; the strobes stand in the first of them. `own` are the
-        node's own levels (a, b) in each
-        cycles. Returns the pins of each cycle by name."""
+        """Apply levels (a, b, z), one row per cycle; the strobes are applied in the first row.
+        `own` holds the levels (a, b) made by the node, one per cycle. Returns the outputs of each
+        cycle by name.
+        """
         out = []
         for cycle, levels in enumerate(rows):
             self.now = (self.now + 1) % (1 << int(self.dut.TIME_W.value))
@@ -100,7 +101,9 @@ class Bench:
         return value.to_signed() if name in ("count", "step", "index_count") else int(value)
 
     async def go(self, positions, at_index=lambda position: 0, cycle=1, **strobes):
-        """Visit these positions, cycles each, then wait for what is on its direction; the pins of each cycle."""
+        """Visit these positions, `cycle` cycles each, then wait for the pipeline; the outputs of
+        each cycle.
+        """
         rows = [
             (*TURN[position % 4], int(bool(at_index(position))))
             for position in positions
@@ -110,12 +113,12 @@ class Bench:
 
 
 def found(out):
-    """index_count at each index found."""
+    """The index_count at each index found."""
     return [row["index_count"] for row in out if row["index_found"]]
 
 
 def there_and_back(*turns):
-    """Places from the first of the turning points to each next one."""
+    """The positions from the first turning point to each next one."""
     path = [turns[0]]
     for turn in turns[1:]:
         step = 1 if turn > path[-1] else -1
@@ -141,7 +144,7 @@ async def index_and_count_arrive_together(dut):
 
 @cocotb.test()
 async def an_index_that_coincides_with_a_count_edge_clears_and_latches_exactly(dut):
-    for cycle in (1, 2, 5):  # riocore acknowledges it and does not clear
+    for cycle in (1, 2, 5):  # riocore acknowledges the index and does not clear
         bench = await Bench.begin(dut, Setup(index=CLEARS))
         out = await bench.go(there_and_back(0, 9), lambda position: position == 6, cycle)
         assert found(out) == [6] and out[-1]["count"] == 3
@@ -164,11 +167,11 @@ async def a_cleared_count_never_shows_the_old_number_at_the_index(dut):
 async def a_wide_index_clears_once(dut):
     bench = await Bench.begin(
         dut, Setup(index=CLEARS)
-    )  # PandABlocks clears for as long as it stands
+    )  # PandABlocks clears for as long as the index is present
     out = await bench.go(there_and_back(0, 12, 8), lambda position: 3 <= position <= 11)
     assert (
         found(out) == [3, 8] and out[-1]["count"] == -3
-    )  # the far side is another edge: gate it or take one direction
+    )  # the far side is another edge: gate the index or take one direction
 
 
 @cocotb.test()
@@ -244,7 +247,7 @@ async def counts_per_revolution_are_checked_at_any_number(dut):
         (10, 1),
         (7, 0),
         (16, 1),
-    ):  # not a power of two, not even a whole period
+    ):  # not a power of two, and not a multiple of the period
         setup = Setup(index=EACH.but(counts_per_revolution=per, clears=clears))
         bench = await Bench.begin(dut, setup)
         out = await bench.go(
@@ -254,7 +257,7 @@ async def counts_per_revolution_are_checked_at_any_number(dut):
         assert len(found(out)) > 7 and not any(row["revolution_wrong"] for row in out)
         out = await bench.go(
             there_and_back(per + 2, 4 * per), lambda position, per=per: position % per == 4
-        )  # it has slipped
+        )  # the scale has slipped
         assert sum(row["revolution_wrong"] for row in out) == 1 and out[-1]["revolution_fault"]
         out = await bench.go([4 * per], clear_flags=1)
         assert not out[-1]["revolution_fault"]

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""index_latch alone: its latencies, clear in the cycle of the edge, the wrap of the check, and random
-inputs against the model.
-
-What it does with a decoder before and behind it stands in test_incremental_encoder.py.
+"""Tests of index_latch alone: its latencies, clear in the cycle of the edge, the wrap of the check,
+and random inputs against the model. Its work together with a decoder is tested in
+test_incremental_encoder.py.
 """
 
 import random
@@ -38,8 +37,8 @@ async def begin(dut, levels=(0, 0, 0)):
 async def cycle(
     dut, model, settings, levels, direction=1, stepped=0, count=0, ready=1, arm=0, rst=0, probe=0
 ):
-    """One cycle of both; returns (clear in this cycle, armed, found, index_count, revolution_wrong
-    after it).
+    """Advance design and model by one cycle; returns (clear in this cycle, then armed, found,
+    index_count, revolution_wrong after it).
     """
     for name in PORTS:
         getattr(dut, name).value = getattr(settings, name)
@@ -62,10 +61,19 @@ async def cycle(
         int(dut.revolution_wrong.value),
     )
     assert got == want, (
-        f"{settings}: (clear, armed, found, index_count, revolution_wrong) is {got}, the model has {want}"
+        f"{settings}: (clear, armed, found, index_count, revolution_wrong) is {got}, "
+        f"the model has {want}"
     )
     assert (int(dut.a_later.value), int(dut.b_later.value)) == levels[:2]
     return got
+
+
+@cocotb.test()
+async def latency_is_1_from_a_and_b_to_a_later_and_b_later(dut):
+    model = await begin(dut)
+    for levels in ((0, 0), (1, 0), (1, 1), (0, 1), (1, 0)):
+        await cycle(dut, model, Settings(), (*levels, 0))
+        assert (int(dut.a_later.value), int(dut.b_later.value)) == levels
 
 
 @cocotb.test()
@@ -89,7 +97,7 @@ async def latency_is_4_from_z_to_revolution_wrong_and_distances_wrap(dut):
     for second, wrong in (
         (-top + 4, 0),
         (-top + 5, 1),
-    ):  # from top - 1 on: 5 counts up through the wrap, and 6
+    ):  # from top - 1 on: 5 counts up through the wrap, then 6
         model = await begin(dut)
         settings = Settings(each=1, counts_per_revolution=5)
         rows = []

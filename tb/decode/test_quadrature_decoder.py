@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""quadrature_decoder: a known turn in each mode, the jitter of S0, the wrap, the illegal edge,
-clearing, its start, and random levels
-against the model."""
+"""Tests of quadrature_decoder: a known turn in each mode, the jitter of S0, the wrap, the illegal
+edge, clearing, start-up, and random levels against the model.
+"""
 
 import random
 
@@ -27,8 +27,8 @@ async def begin(dut, a=0, b=0, mode=X4, ready=True):
 
 
 async def drive(dut, model, levels, rst=0, clear=0):
-    """Put each (a, b) on the pins for one cycle and hold the model beside the design; return (count,
-    step, illegal) of each cycle.
+    """Apply each (a, b) for one cycle and compare design and model; return (count, step, illegal)
+    of each cycle.
     """
     out = []
     dut.rst.value, dut.clear.value, dut.mode.value = rst, clear, model.mode
@@ -46,7 +46,8 @@ async def drive(dut, model, levels, rst=0, clear=0):
         want = model.step(a, b, model.mode, clear, rst)
         got = dut.count.value.to_signed(), dut.step.value.to_signed(), int(dut.illegal.value)
         assert got == want, (
-            f"cycle {cycle}, mode {model.mode}: (count, step, illegal) is {got}, the model has {want}"
+            f"cycle {cycle}, mode {model.mode}: (count, step, illegal) is {got}, "
+            f"the model has {want}"
         )
         out.append(got)
     dut.rst.value, dut.clear.value = 0, 0
@@ -113,7 +114,7 @@ async def x2_counts_the_edges_of_a_and_x1_those_with_b_low(dut):
 @cocotb.test()
 async def s0_jitter_over_any_edge_leaves_no_trace_in_x4_x2_and_x1(dut):
     for mode in (X4, X2, X1):
-        for before in range(4):  # S0's edge B lies behind quarter 0, its edge C behind quarter 2
+        for before in range(4):  # S0's edge B follows quarter 0, its edge C follows quarter 2
             model = await begin(dut, *TURN[before], mode=mode)
             (there,) = await turn(dut, model, [before + 1])
             for _ in range(3):
@@ -178,7 +179,7 @@ async def power_up_at_any_levels_makes_no_count(dut):
 @cocotb.test()
 async def levels_that_arrive_late_after_reset_make_no_count(dut):
     model = await begin(dut, 0, 0, ready=False)
-    late = int(dut.SETTLE.value) - 1  # what is in front fills meanwhile
+    late = int(dut.SETTLE.value) - 1  # the blocks before the decoder start up meanwhile
     assert await drive(dut, model, [(0, 0)] * late + [(1, 1)] * 9) == [(0, 0, 0)] * (late + 9)
     assert (await drive(dut, model, [(0, 1)]))[-1] == (1, 1, 0)
 
@@ -196,7 +197,7 @@ async def illegal_edges_are_reported_and_never_count(dut):
         2,
         1,
         0,
-    )  # the new levels are the state from here on
+    )  # the new levels become the present state
 
 
 @cocotb.test()

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/interpolate/arctan_pipelined.sv does, in integers: sample() is one sample,
-ArctanPipelined.step() one cycle.
+"""Model of rtl/interpolate/arctan_pipelined.sv: sample() computes one sample,
+ArctanPipelined.step() advances one cycle.
 """
 
 from collections import deque
@@ -14,7 +14,7 @@ def latency(w, steps=1):
 
 
 def moved(value, bits):
-    """Up by so many bits, or down, cut off."""
+    """Shift left by this many bits, or right with truncation if negative."""
     return value << bits if bits >= 0 else value >> -bits
 
 
@@ -33,7 +33,7 @@ def sums(w):
 
 
 def sample(w, sin, cos):
-    """(phase, amplitude)"""
+    """Returns (phase, amplitude)."""
     if not sin and not cos:
         return 0, 0
     turns, digits, head, guard = arctan_rotation.PIPELINED[w]
@@ -45,13 +45,13 @@ def sample(w, sin, cos):
         2 * y - x - 1,
         1,
         0,
-    )  # bits behind the point; shorter is less by 1 than it is
+    )  # fraction bits; shorter is stored as its value less 1
     for digit in range(2, digits):
         negative = shorter < 0
         magnitude, one = (
             ~shorter if negative else shorter,
             int(not negative),
-        )  # magnitude + one is the shorter leg without its sign
+        )  # magnitude + one is the magnitude of the shorter component
         found.append(found[-1] ^ negative)
         new_y_bits = min(head - digit - 1, max(y_bits - 1, x_bits))
         up = new_y_bits - y_bits + 1
@@ -84,7 +84,7 @@ class ArctanPipelined:
         self.w, self.coming, self.out = w, deque([None] * latency(w, steps)), (0, 0)
 
     def step(self, valid, sin, cos):
-        """(done, phase, amplitude)"""
+        """Returns (done, phase, amplitude)."""
         self.coming.popleft()
         self.coming.append(sample(self.w, sin, cos) if valid else None)
         self.out = self.coming[0] or self.out

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""calibration_recorder: a burst by hand, thinning, what spoils it, its reading, and random use
-against the model in every cycle.
+"""Tests of calibration_recorder: a burst by hand, decimation, disturbed bursts, read-out, and
+random use against the model in every cycle.
 """
 
 import random
@@ -33,7 +33,7 @@ async def begin(dut):
 
 
 async def cycle(dut, model, **inputs):
-    """One cycle; returns (word or None, full, invalid)."""
+    """Advance one cycle; returns (word or None, full, invalid)."""
     for name, value in (IDLE | dict(rst=0) | inputs).items():
         getattr(dut, name).value = value
     await FallingEdge(dut.clk)
@@ -56,6 +56,22 @@ async def words(dut, model):
 
 
 @cocotb.test()
+async def latency_is_1_to_full_and_2_to_the_first_and_each_next_word(dut):
+    model, depth, shift = await begin(dut), int(dut.DEPTH.value), 16 - int(dut.W.value)
+    await cycle(dut, model, start=1)
+    for n in range(depth):
+        assert not int(dut.full.value)
+        await cycle(dut, model, sampled=1, sin=n % 100)
+    assert int(dut.full.value)
+    await cycle(dut, model)
+    assert (await cycle(dut, model))[0] == 0
+    for n in (1, 2, 3):
+        await cycle(dut, model, read=1)
+        assert int(dut.word.value) == (n - 1) % depth % 100 << shift
+        assert (await cycle(dut, model))[0] == n % depth % 100 << shift
+
+
+@cocotb.test()
 async def a_burst_of_samples_is_read_back_left_aligned(dut):
     model, depth, shift = await begin(dut), int(dut.DEPTH.value), 16 - int(dut.W.value)
     await cycle(dut, model, start=1)
@@ -64,11 +80,12 @@ async def a_burst_of_samples_is_read_back_left_aligned(dut):
         assert (await cycle(dut, model, sampled=1, sin=-n % 100, cos=-(n % 100)))[1] == (
             n == depth - 1
         )
-    await cycle(dut, model, sampled=1, sin=1, cos=1)  # one too many
+    await cycle(dut, model, sampled=1, sin=1, cos=1)  # one strobe too many
     want = [
         ((-(n % 100) << shift) & 65535) << 16 | (-n % 100 << shift) & 65535 for n in range(depth)
     ]
-    assert await words(dut, model) == want == await words(dut, model)  # reading goes round
+    # the read-out starts again at the first word
+    assert await words(dut, model) == want == await words(dut, model)
 
 
 @cocotb.test()

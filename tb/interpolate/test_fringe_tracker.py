@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fringe_tracker: steps by hand, speeds up to a period a sample, bad samples, and every cycle against
-the model.
+"""Tests of fringe_tracker: steps by hand, speeds up to a period per sample, bad samples, and every
+cycle against the model.
 """
 
 import random
@@ -20,14 +20,14 @@ async def begin(dut):
 
 
 async def again(dut):
-    """Reset in mid-flow, the clock runs on."""
+    """Reset while the clock runs."""
     dut.rst.value, dut.valid.value = 1, 0
     await FallingEdge(dut.clk)
     dut.rst.value = 0
 
 
 async def clock(dut, valid, phase):
-    """One cycle; returns done, step, overspeed."""
+    """Advance one cycle; returns done, step, overspeed."""
     dut.valid.value, dut.phase.value = valid, phase % 65536
     await FallingEdge(dut.clk)
     assert not int(dut.done.value) or dut.phase_out.value == phase % 65536

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""harmonic_correction: by hand, the ends of table and phase, its two tables, and random use against
-the model in every cycle.
+"""Tests of harmonic_correction: by hand, the ends of table and phase, its two tables, and random
+use against the model in every cycle.
 """
 
 import math
@@ -19,7 +19,7 @@ async def begin(dut):
     await start(dut, **IDLE)
     await FallingEdge(dut.clk)
     model = HarmonicCorrection()
-    for _ in range(2):  # both tables known to both
+    for _ in range(2):  # both tables are known to design and model
         await load(dut, model, [0] * POINTS)
     await cycle(dut, model, rst=1)
     return model

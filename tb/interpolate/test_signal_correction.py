@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""signal_correction: by hand, both ends of every range, its load, and random samples against the
-model in every cycle.
+"""Tests of signal_correction: by hand, both ends of every range, load, and random samples against
+the model in every cycle.
 """
 
 import math
@@ -24,7 +24,7 @@ async def begin(dut):
 
 
 async def cycle(dut, model, valid=0, sin=0, cos=0, load=None, rst=0):
-    """One cycle of design and model; returns (done, sin_out, cos_out)."""
+    """Advance design and model by one cycle; returns (done, sin_out, cos_out)."""
     dut.rst.value, dut.valid.value, dut.sin.value, dut.cos.value, dut.load.value = (
         rst,
         valid,

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""count_phase_check: a true scale agrees, a lost fringe shows, shifts hide nothing, and every cycle
-against the model.
+"""Tests of count_phase_check: an undisturbed scale agrees, a lost fringe is detected, shifts hide
+nothing, and every cycle against the model.
 """
 
 import random
@@ -12,8 +12,8 @@ from tb.bench import run, start
 from tb.position.count_phase_check import CountPhaseCheck
 
 IDLE = dict(limit=0, valid=0, position=0, count=0, shift=0, shift_periods=0)
-LIMIT = 32768  # as in tables/bus.toml: as far from the quarter period between two counts
-# as from the 3/4 period that a lost fringe leaves at worst
+LIMIT = 32768  # as in tables/bus.toml: halfway between the quarter period between two counts and
+# the 3/4 period that a lost fringe leaves at least
 
 
 async def begin(dut):
@@ -22,7 +22,7 @@ async def begin(dut):
 
 
 async def again(dut):
-    """Reset in mid-flow, the clock runs on."""
+    """Reset while the clock runs."""
     dut.rst.value, dut.valid.value = 1, 0
     await FallingEdge(dut.clk)
     dut.rst.value = 0
@@ -41,7 +41,7 @@ async def clock(dut, position, count, valid=1, limit=LIMIT, shift=0, shift_perio
 
 
 async def settle(dut, position, count, limit=LIMIT):
-    """Long enough for two positions to come through."""
+    """Wait long enough for two positions to pass."""
     return [await clock(dut, position, count, limit=limit) for _ in range(6)][-1]
 
 
@@ -73,7 +73,7 @@ async def the_limit_itself_still_agrees(dut):
 @cocotb.test()
 async def a_scale_in_motion_with_a_late_count_agrees(dut):
     await begin(dut)
-    position, speed, lag = 12345, 0, 3  # the count is that of the position three samples before
+    position, speed, lag = 12345, 0, 3  # the count is that of three samples before
     past = [position] * (lag + 1)
     for _ in range(3000):
         speed = max(-4096, min(4096, speed + random.randrange(-300, 301)))
@@ -98,7 +98,7 @@ async def one_lost_fringe_shows_in_both_directions(dut):
 @cocotb.test()
 async def a_lost_fringe_shows_at_the_next_position_wherever_the_constant_was_learned(dut):
     await begin(dut)
-    for reference in (0, 1, 8000, 16383):  # place within a count
+    for reference in (0, 1, 8000, 16383):  # position within a count
         for place in (0, 16383):
             for lost in (65536, -65536):
                 await again(dut)

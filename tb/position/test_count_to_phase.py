@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""count_to_phase: by hand, every count with every alignment, reset in mid-flow, and every cycle
+"""Tests of count_to_phase: by hand, every count with every alignment, a reset, and every cycle
 against the model.
 """
 
@@ -15,7 +15,7 @@ IDLE = dict(tick=0, count_step=0, align=0, align_counts=0)
 
 
 class Counts:
-    """The design with the model beside it in every cycle."""
+    """The design compared with its model in every cycle."""
 
     def __init__(self, dut):
         self.dut, self.model = dut, CountToPhase()
@@ -35,7 +35,7 @@ class Counts:
             step=self.dut.step.value.to_signed(),
             phase=int(self.dut.phase.value),
         )
-        want = self.model.cycle(rst, **now)
+        want = self.model.step(rst, **now)
         assert got == want, f"{now}: {got}, the model has {want}"
         return got["valid"], got["step"], got["phase"]
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""position_capture: every source, order, age, both ends of the queue, and every cycle against the
-model.
+"""Tests of position_capture: every source, order, age, both ends of the queue, and every cycle
+against the model.
 """
 
 import random
@@ -32,7 +32,7 @@ class Capture:
         self.model, self.time = PositionCapture(self.probes, self.depth), 0
 
     async def cycle(self, rst=0, **inputs):
-        """One cycle with the model beside it; (present, entry, free, overrun)."""
+        """Advance design and model by one cycle; returns (present, entry, free, overrun)."""
         dut, self.time = self.dut, (self.time + 1) % (1 << len(self.dut.now))
         values = INPUTS | dict(enabled=self.all, now=self.time) | inputs
         dut.rst.value = rst
@@ -59,7 +59,7 @@ class Capture:
         return got
 
     async def read(self):
-        """All entries, one after the other; nothing captures meanwhile."""
+        """Read all entries in order; nothing captures meanwhile."""
         entries = []
         while (await self.cycle(enabled=0))[0]:
             entries.append(self.model.entries[0])

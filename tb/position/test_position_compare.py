@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""position_compare: a pulse a point in both directions, jitter, jumps, both ends of the settings,
-and every cycle against the model.
+"""Tests of position_compare: one pulse per point in both directions, jitter, jumps, both ends of
+the settings, and every cycle against the model.
 """
 
 import random
@@ -39,7 +39,7 @@ class Compare:
         )
 
     async def cycle(self, rst=0, **inputs):
-        """One cycle with the model beside it; (armed, pulse, late, passed)."""
+        """Advance design and model by one cycle; returns (armed, pulse, late, passed)."""
         dut, values = self.dut, INPUTS | self.settings | inputs
         dut.rst.value = rst
         for name, value in values.items():
@@ -70,7 +70,7 @@ class Compare:
         await self.cycle(arm=1)
 
     async def ride(self, positions, gap=0):
-        """Each position for one sample, `gap` cycles between samples."""
+        """Apply each position for one sample, with `gap` cycles between samples."""
         for position in positions:
             await self.cycle(valid=1, position=position)
             for _ in range(gap):
@@ -153,7 +153,8 @@ async def a_jump_over_many_points_makes_all_their_pulses_in_a_row(dut):
     await compare.ride([199])
     assert await compare.idle(70) == [0] + [1, 1, 1, 0, 0] * 10 + [0] * 19  # 100, 110 … 190
     assert (compare.pulses, compare.late) == (10, 9)
-    await compare.ride([200, 50, 400, 60], 1)  # what was reached counts, also if it is left at once
+    # a point that was reached counts, even if it is left at once
+    await compare.ride([200, 50, 400, 60], 1)
     await compare.idle(200)
     assert compare.pulses == 31
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fringe_tracker, unwrap and count_phase_check in a row: full resolution without lag up to a
-quarter period a sample, and whatever makes
-the position wrong is reported within two samples, or the position is right again."""
+"""Tests of fringe_tracker, unwrap and count_phase_check in series: full resolution without lag up
+to a quarter period per sample, and whatever makes the position wrong is reported within two
+samples, or the position is right again.
+"""
 
 import random
 from pathlib import Path
@@ -15,14 +16,15 @@ from tb.position.count_phase_check import CountPhaseCheck
 from tb.position.unwrap import Unwrap
 
 PERIOD, QUARTER = 1 << 16, 1 << 14
-LIMIT = PERIOD // 2  # the quarter period between two counts, and as much for comparators and lag
-SPACING = 6  # cycles from sample to sample, as close as the check can tell them apart
+# the quarter period between two counts, and as much again for comparators and lag
+LIMIT = PERIOD // 2
+SPACING = 6  # cycles from sample to sample, the fewest that the check can distinguish
 LATENCY = 5  # cycles from phase to disagreement
 
 
 class Scale:
-    """The bench with the models beside it; sample() puts the scale at a true_position and returns
-    (position, alarm of this sample).
+    """The bench and its models; sample() moves the scale to a position and returns (position, alarm
+    of this sample).
     """
 
     def __init__(self, dut):
@@ -81,7 +83,7 @@ async def every_bit_comes_through_without_lag_up_to_a_quarter_period_a_sample(du
     for speed in (1, -1, 77, -4095, 10_007, QUARTER - 1, 1 - QUARTER):
         await scale.begin()
         first = random.getrandbits(16)
-        for n in range(40):  # from standstill to full speed at once, and on
+        for n in range(40):  # from standstill to full speed at once, then constant
             true_position = first + n * speed
             assert await scale.sample(true_position) == (true_position, False)
 
@@ -152,10 +154,11 @@ async def a_phase_that_is_stuck_while_the_count_continues_is_reported_within_two
         PERIOD // 2,
         -QUARTER,
         -PERIOD,
-    ):  # a converter that hangs: slower, it takes 3/4 period of way
+    ):  # an ADC that hangs: at a lower speed it takes 3/4 period
         await scale.begin()
         true_position = 20_000
-        while abs(true_position - 20_000) < 3 * PERIOD:  # up to speed in steps that are followed
+        # accelerate in steps that the tracker follows
+        while abs(true_position - 20_000) < 3 * PERIOD:
             increment = min(abs(speed), abs(true_position - 20_000) // 4 + QUARTER // 2)
             true_position += increment if speed > 0 else -increment
             _, alarm = await scale.sample(true_position)
@@ -170,7 +173,8 @@ async def a_phase_that_is_stuck_while_the_count_continues_is_reported_within_two
 @cocotb.test()
 async def a_count_that_is_stuck_or_loses_edges_is_reported_when_it_is_half_a_period_off(dut):
     scale = await begin(dut)
-    for lost in (3, -3, 4, 100):  # counts; with a quarter period between counts, 3 are always seen
+    # counts; with a quarter period between counts, 3 are always detected
+    for lost in (3, -3, 4, 100):
         await scale.begin()
         for n in range(4):
             assert not (await scale.sample(1000 + 99 * n))[1]
@@ -180,5 +184,5 @@ async def a_count_that_is_stuck_or_loses_edges_is_reported_when_it_is_half_a_per
 def test_tracking(monkeypatch):
     monkeypatch.setattr(
         "tb.bench.source_of", lambda top: Path(__file__).with_name(f"{top}.sv")
-    )  # a bench top is no part of rtl/
+    )  # a bench top is not under rtl/
     run("tracking_bench", __file__)

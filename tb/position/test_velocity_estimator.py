@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""velocity_estimator: by hand, both ends, shifts, the sweep of speeds, resolution, and every cycle
-against the model.
+"""Tests of velocity_estimator: by hand, both ends, shifts, a sweep of speeds, resolution, and every
+cycle against the model.
 """
 
 import math
@@ -24,7 +24,7 @@ async def begin(dut):
 
 
 async def again(dut):
-    """Reset in mid-flow, the clock runs on."""
+    """Reset while the clock runs."""
     dut.rst.value = 1
     await FallingEdge(dut.clk)
     dut.rst.value = 0
@@ -43,7 +43,7 @@ async def clock(dut, position, tick=0, shift=0, shift_periods=0, quantum=0):
 
 
 async def ticks(dut, positions, quantum=0):
-    """A tick at each position; the velocity of the last."""
+    """Send a tick at each position; returns the last velocity."""
     for position in positions:
         await clock(dut, position, 1, quantum=quantum)
         for _ in range(LATENCY):
@@ -90,7 +90,7 @@ async def a_shift_leaves_no_trace(dut):
     assert await ticks(dut, [1020 - (7 << 16)]) == 10
     await clock(
         dut, 1030 - (7 << 16), 1, 1, 100_000
-    )  # in the cycle of a tick: still the old origin
+    )  # the cycle of a tick still uses the old origin
     here = 1030 + (99_993 << 16)
     assert [await clock(dut, here) for _ in range(LATENCY)][-1] == 10
     assert await ticks(dut, [here + 10]) == 10
@@ -130,7 +130,7 @@ async def one_edge_in_five_ticks_gives_a_fifth_of_a_quantum_by_hand(dut):
     ((velocity, fine),) = set(seen)
     assert (
         velocity == round(X4 / 5) and abs(fine / 256 - X4 / 5) < X4 * 2**-19
-    )  # 3276.8: fine tells what is cut off
+    )  # 3276.8: fine holds the fraction
 
 
 @cocotb.test()
@@ -157,7 +157,7 @@ async def after_a_stop_the_velocity_falls_as_one_over_the_time_to_0(dut):
         if cycle % 100 == 50:
             seen.append(velocity)
     assert seen[10] == 2 * X4
-    for n, velocity in enumerate(seen[17:], 2):  # n ticks and more since the last edge
+    for n, velocity in enumerate(seen[17:], 2):  # n ticks or more since the last edge
         assert velocity <= X4 // (n - 1)
         assert velocity > X4 // (n + 2) or n * 100 > longest - 200
     assert (seen[-1] == 0) == (longest < 2000)
@@ -168,9 +168,10 @@ async def latency_is_24_to_50_from_the_step_that_is_used_to_its_tick(dut):
     await begin(dut)
     for age in (23, 24, 49, 50):
         taken = set()
-        for late in range(0, 24, 5):  # against the divisions, one every 24 cycles
+        for late in range(0, 24, 5):  # relative to the divisions, one every 24 cycles
             await again(dut)
-            for cycle in range(820 + late):  # two edges, the second `age` before the tick
+            # two edges, the second one `age` cycles before the tick
+            for cycle in range(820 + late):
                 position = X4 * ((cycle >= 100) + (cycle >= 800 + late - age))
                 velocity = await clock(dut, position, cycle in (400 + late, 800 + late), quantum=X4)
             taken.add(velocity > 0)
@@ -178,8 +179,8 @@ async def latency_is_24_to_50_from_the_step_that_is_used_to_its_tick(dut):
 
 
 def ride(speed, period, count, quantum=X4, backwards=False):
-    """(speed, velocity / quantum) at each tick of the model on a scale with this speed(cycles), in
-    quanta a tick.
+    """(speed, velocity / quantum) at each tick of the model on a scale with this speed(cycle), in
+    quanta per tick.
     """
     model, where, out = VelocityEstimator(), 0.5, []
     for cycle in range(period * count):
@@ -203,7 +204,7 @@ def test_at_constant_speed_the_error_is_below_2_cycles_of_a_tick(backwards):
 @pytest.mark.parametrize("backwards", [False, True])
 def test_no_speed_has_a_step_where_time_stamps_and_differences_meet(backwards):
     count, period, slow, fast = 200, 400, 0.1, 10
-    growth = math.log(fast / slow) / count  # of the speed, a tick
+    growth = math.log(fast / slow) / count  # of the speed, per tick
     seen = ride(
         lambda cycle: slow * math.exp(growth * cycle / period), period, count, backwards=backwards
     )[30:]
@@ -211,7 +212,7 @@ def test_no_speed_has_a_step_where_time_stamps_and_differences_meet(backwards):
         assert -4 / period * true <= now - before
         assert (
             now - before <= (growth * (2 + 1 / true) + 4 / period) * true
-        )  # what the speed gains from edge to edge
+        )  # increase of the speed from edge to edge
 
 
 def test_a_fraction_of_a_unit_per_tick_is_resolved():
@@ -227,7 +228,7 @@ async def a_ramp_from_low_to_high_speed_matches_the_model(dut):
     await begin(dut)
     model, period, where = VelocityEstimator(int(dut.TIME_W.value)), 150, 0.5
     for cycle in range(9_000):
-        where += (cycle / 9_000) ** 2 * 4 / period  # up to four cells a tick
+        where += (cycle / 9_000) ** 2 * 4 / period  # up to four quanta per tick
         position, tick = int(where) * X4, int(cycle % period == 0)
         got = await clock(dut, position, tick, quantum=X4)
         assert (got, dut.fine.value.to_signed()) == model.step(X4, tick, position, 0, 0), (

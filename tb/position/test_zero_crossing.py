@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""zero_crossing: every pass and its direction, none from a shift or a wrap, and every cycle against
-the model.
+"""Tests of zero_crossing: every pass and its direction, none from a shift or a wrap, and every
+cycle against the model.
 """
 
 import random
@@ -20,7 +20,7 @@ async def begin(dut):
 
 
 async def again(dut):
-    """Reset in mid-flow, the clock runs on."""
+    """Reset while the clock runs."""
     dut.rst.value, dut.valid.value = 1, 0
     await FallingEdge(dut.clk)
     dut.rst.value = 0
@@ -69,7 +69,7 @@ async def a_shift_is_no_crossing(dut):
     assert await clock(dut, 6, 0, 1) == (0, 0)
     assert await clock(dut, 6 - 131072, 0) == (0, 0)
     assert await ride(dut, [7 - 131072, -1, 0]) == "..u"
-    assert await clock(dut, -1, 1, 1) == (0, 1)  # the cycle of the strobe still has the old origin
+    assert await clock(dut, -1, 1, 1) == (0, 1)  # the cycle of the strobe still uses the old origin
     assert await ride(dut, [131071, 131072, -1]) == "..d"
 
 

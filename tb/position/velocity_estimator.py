@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/position/velocity_estimator.sv does, in integers: step() is one cycle and returns
-velocity, fine.
+"""Model of rtl/position/velocity_estimator.sv: step() advances one cycle and returns velocity,
+fine.
 """
 
-K = 20  # bits of tick / time between two steps
-BUSY = K + 3  # cycles from the choice of a division to its last
-P = 33  # bits of a edge
+K = 20  # fraction bits of tick / time between two steps
+BUSY = K + 3  # cycles from the start of a division to its end
+P = 33  # bits of a position
 
 
 def wrapped(value, bits):
@@ -17,13 +17,13 @@ def between(value, low, high):
 
 
 def quotient(distance, period, span):
-    """2^-24 period/tick: distance * period / span, the quotient of the times cut off behind K bits; at
-    most twice the distance.
+    """2^-24 period/tick: distance * period / span, with the quotient of the times truncated after K
+    bits; at most twice the distance.
     """
     divisor = max(2 * span, period)
     ratio = (
         (period << K) // divisor if divisor else (1 << K + 1) - 1
-    )  # the divider's answer to a division by 0
+    )  # the result of the divider for a division by 0
     return wrapped((distance * ratio) >> K - 9, P + 10)
 
 
@@ -33,8 +33,8 @@ class VelocityEstimator:
         self.velocity = self.fine = self.speed = 0
         self.origin = self.now = self.quiet = self.since_tick = self.period = self.age = 0
         self.here = self.here_q = self.last = None
-        self.stepped = None  # the edge just stepped from is known: True upwards, False downwards
-        self.ticks = [None] * 5  # what each tick still carries, the youngest first
+        self.stepped = None  # here_q has just moved: True upwards, False downwards
+        self.ticks = [None] * 5  # pipeline of each tick, the youngest first
         self.latest = self.run = self.base = None  # (edge, time) of steps
         self.fresh, self.busy, self.task = False, 0, None
 
@@ -47,7 +47,7 @@ class VelocityEstimator:
             self.quiet,
         )
         run, speed, now, base = self.run, self.speed, self.now, self.base
-        # the tick on its distance to the velocity
+        # the pipeline from tick to velocity
         self.ticks = [True if tick else None, None, None, None, None]
         ticked = before[0]
         if ticked:
@@ -65,7 +65,7 @@ class VelocityEstimator:
             self.velocity = (self.fine + 128) >> 8
         if before[2] is not None:
             self.fine = between(speed, low_high[0] << 8, low_high[1] << 8)
-        # the divisions, one after the other
+        # the divisions in turn
         if self.busy:
             self.busy -= 1
             if not self.busy:
@@ -75,11 +75,11 @@ class VelocityEstimator:
                     self.speed = found
                 elif quiet == self.longest:
                     self.speed = 0
-                elif 2 * span <= period:  # half a tick and less says nothing about a limit
+                elif 2 * span <= period:  # half a tick or less gives no limit
                     pass
                 elif speed < found if speed < 0 else speed > found:
                     self.speed = found
-            elif self.busy == BUSY - 1:  # the length of the tick is taken with the times
+            elif self.busy == BUSY - 1:  # the length of the tick is latched together with the times
                 distance, span, _, bounding = self.task
                 self.task = distance, span, self.period, bounding
         elif self.latest is not None:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/channel_monitor.sv does, in integers, for many signals side by side: sample() is
-one sample of each of them.
+"""Model of rtl/sense/channel_monitor.sv for many signals side by side: sample() processes one
+sample of each.
 """
 
 import numpy as np
@@ -38,7 +38,9 @@ class ChannelMonitor:
         no_noise_samples,
         sign_threshold,
     ):
-        """clipped, channel_stuck, no_noise, comparator_mismatch, comparator_stuck, channel_missing"""
+        """Returns clipped, channel_stuck, no_noise, comparator_mismatch, comparator_stuck,
+        channel_missing.
+        """
         size = abs(channel)
         clipped = (clip_level != NEVER) & (size > clip_level)
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/dual_adc_reader.sv does: step(start, sdata_a, sdata_b, rst) is one cycle, and
-returns what is on the pins after it.
+"""Model of rtl/sense/dual_adc_reader.sv: step(start, sdata_a, sdata_b, rst) advances one cycle and
+returns the outputs after it.
 """
 
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/status_inputs.sv does, in integers: step(...) is one cycle and returns the pins
-after it, lists of level, rose, fell.
+"""Model of rtl/sense/status_inputs.sv: step(...) advances one cycle and returns the lists level,
+rose, fell after it.
 """
 
 from tb.common.synchroniser import Synchroniser
 
-SETTLE = 4  # cycles after reset in which the level follows
+SETTLE = 4  # cycles after reset in which the level follows the input
 
 
 class StatusInputs:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""channel_monitor: each verdict at its limit and one short of it, both ends of every range, and the
-model sample by sample.
+"""Tests of channel_monitor: each flag at its limit and one count below it, both ends of every
+range, and random samples against the model.
 """
 
 import random
@@ -39,8 +39,8 @@ async def begin(dut, **settings):
 
 
 async def sample(dut, model, channel, other=0, level=0, other_level=0, gap=0):
-    """One sample, 1 cycle later its flags as the model has them; then some cycles without one. Returns
-    the names that stand.
+    """Send one sample and compare the flags one cycle later with the model, then wait some cycles.
+    Returns the names of the flags that are high.
     """
     dut.valid.value, dut.channel.value, dut.other.value, dut.level.value, dut.other_level.value = (
         1,
@@ -65,7 +65,8 @@ async def sample(dut, model, channel, other=0, level=0, other_level=0, gap=0):
         )
         got = tuple(int(getattr(dut, name).value) for name in OUTPUTS)
         assert got == want, (
-            f"cycle {n} after channel {channel}, other {other}, levels {level}{other_level}: {OUTPUTS} are {got}, not {want}"
+            f"cycle {n} after channel {channel}, other {other}, levels {level}{other_level}: "
+            f"{OUTPUTS} are {got}, not {want}"
         )
     return [name for name, flag in zip(OUTPUTS, want) if flag]
 

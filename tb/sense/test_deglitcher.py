@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""deglitcher: pulses just too short and just long enough, both ends of the setting, its start, and
-random levels against the model.
+"""Tests of deglitcher: pulses just too short and just long enough, both ends of the setting, start-
+up, and random levels against the model.
 """
 
 import random
@@ -14,7 +14,7 @@ from tb.sense.deglitcher import Deglitcher
 
 
 async def begin(dut, level=0, stable_cycles=0):
-    """Reset with the pins at these levels; the model has seen the same cycle."""
+    """Reset with the input at this level; the model has seen the same cycle."""
     await start(dut, level=level, stable_cycles=stable_cycles)
     model = Deglitcher(int(dut.SETTLE.value))
     model.step(stable_cycles, level, 1)
@@ -22,8 +22,8 @@ async def begin(dut, level=0, stable_cycles=0):
 
 
 async def drive(dut, model, stable_cycles, levels, rst=0):
-    """Put each level on the pin for one cycle and hold the model beside the design; return (filtered,
-    rejected) of each cycle.
+    """Apply each level for one cycle and compare design and model; return (filtered, rejected) of
+    each cycle.
     """
     dut.stable_cycles.value, dut.rst.value, out = stable_cycles, rst, []
     for cycle, level in enumerate(levels):
@@ -35,7 +35,8 @@ async def drive(dut, model, stable_cycles, levels, rst=0):
             model.step(stable_cycles, level, rst),
         )
         assert got == want, (
-            f"cycle {cycle}, stable_cycles {stable_cycles}: (filtered, rejected) is {got}, the model has {want}"
+            f"cycle {cycle}, stable_cycles {stable_cycles}: "
+            f"(filtered, rejected) is {got}, the model has {want}"
         )
         out.append(got)
     dut.rst.value = 0
@@ -79,7 +80,7 @@ async def a_level_that_is_constant_from_power_up_makes_no_edge(dut):
 
 
 @cocotb.test()
-async def synchronisers_that_fill_after_reset_make_no_edge_later(dut):
+async def latency_is_1_during_start_up_so_filling_synchronisers_make_no_edge(dut):
     model = await begin(dut, level=0, stable_cycles=15)
     filling = int(dut.SETTLE.value) - 1
     out = await drive(dut, model, 15, [0] * filling + [1] * 40)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""dual_adc_reader: against a adc that times its bits as the data sheet says, known codes, its
-timing, and the model in every cycle.
+"""Tests of dual_adc_reader against a pair of ADCs that time their bits as the data sheet says:
+known codes, timing, and every cycle against the model.
 """
 
 import random
@@ -14,8 +14,8 @@ from tb.sense.dual_adc_reader import DualAdcReader
 
 
 class Adc:
-    """Two converters: sampled when cs_n falls, one bit a falling edge of sclk, its line wrong until
-    half an sclk later.
+    """Two ADCs: they sample when cs_n falls and send one bit per falling edge of sclk; their
+    outputs are wrong until half an sclk period later.
     """
 
     def __init__(self, leading, bits):
@@ -29,14 +29,14 @@ class Adc:
         )
 
     def lines(self, codes, cs_n, sclk):
-        """Levels of sdata_a, sdata_b while cs_n and sclk stand like this; codes is what the inputs
-        would give now.
+        """The levels of sdata_a, sdata_b for these levels of cs_n and sclk; `codes` are the present
+        values of the inputs.
         """
         if self.cs_n and not cs_n:
             self.codes, self.edges = codes, 0
         elif self.sclk and not sclk:
             self.edges += 1
-        early = sclk == 0  # the first half after the falling edge: not there yet
+        early = sclk == 0  # in the first half after the falling edge the bit is not valid yet
         self.cs_n, self.sclk = cs_n, sclk
         if cs_n:
             return random.getrandbits(1), random.getrandbits(1)  # high impedance
@@ -50,7 +50,7 @@ def sizes(dut):
 
 
 async def cycle(dut, model, start_now, lines, rst=0):
-    """One cycle; the pins after it, which are the model's too."""
+    """Advance one cycle; return the outputs after it, which equal those of the model."""
     dut.start.value, dut.rst.value = start_now, rst
     dut.sdata_a.value, dut.sdata_b.value = lines
     await RisingEdge(dut.clk)
@@ -70,14 +70,14 @@ async def begin(dut):
     await start(dut, start=0, sdata_a=0, sdata_b=0)
     w, leading, frame = sizes(dut)
     model = DualAdcReader(w, leading, frame)
-    model.known = False  # sin and cos mean nothing before the first sample
+    model.known = False  # sin and cos are undefined before the first sample
     model.step(0, 0, 0, 1)
     return model, Adc(leading, frame - leading)
 
 
 async def convert(dut, model, adc, codes):
-    """One conversion: (sin, cos), cycles to valid, cycles until cs_n is high again, falling edges of
-    sclk.
+    """Run one conversion: (sin, cos), cycles to valid, cycles until cs_n is high again, falling
+    edges of sclk.
     """
     sample, latency, falls, was, n, lines = None, None, 0, 1, 0, (0, 0)
     while True:
@@ -98,8 +98,8 @@ async def convert(dut, model, adc, codes):
 async def known_codes_by_hand(dut):
     model, adc = await begin(dut)
     w, leading, frame = sizes(dut)
-    bits = frame - leading  # of this adc
-    one = 1 << bits - w  # what one step of sin is worth to it
+    bits = frame - leading  # resolution of this ADC
+    one = 1 << bits - w  # codes of this ADC per count of sin
     half, top = 1 << bits - 1, (1 << bits) - 1
     low, high = -(1 << w - 1), (1 << w - 1) - 1
     for codes, want in {
@@ -115,10 +115,17 @@ async def known_codes_by_hand(dut):
 async def latency_is_2_times_leading_plus_w_and_the_rate_is_2_times_frame_plus_1(dut):
     model, adc = await begin(dut)
     w, leading, frame = sizes(dut)
-    for _ in range(3):  # back to back: start with the cycle in which cs_n was seen high
+    for _ in range(3):  # back to back: each start is in the first cycle with cs_n high
         _, latency, length, falls = await convert(dut, model, adc, (1, 2))
         assert (latency, length, falls) == (2 * (leading + w), 2 * frame + 1, frame)
     assert 2 * frame + 1 <= 40  # 100 kS/s at 4 MHz
+
+
+@cocotb.test()
+async def latency_is_1_from_start_to_the_falling_edge_of_cs_n(dut):
+    model, _ = await begin(dut)
+    assert (await cycle(dut, model, 0, (0, 0)))[0] == 1
+    assert (await cycle(dut, model, 1, (0, 0)))[0] == 0
 
 
 @cocotb.test()

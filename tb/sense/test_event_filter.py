@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""event_filter: N samples in a row and N of M, the sampling divider, the bypass, both ends, random
-levels against the model.
+"""Tests of event_filter: N samples in a row and N of M, the sampling divider, the bypass, both ends
+of the settings, and random levels against the model.
 """
 
 import random
@@ -15,8 +15,8 @@ from tb.sense.event_filter import EventFilter
 
 
 class Bench:
-    """Design and model side by side; play() gives the same levels to every line and returns
-    (filtered, rejected) of line 0.
+    """The design and its model side by side; play() applies the same levels to every input and
+    returns (filtered, rejected) of input 0.
     """
 
     @classmethod
@@ -42,7 +42,7 @@ class Bench:
         return sum(level << n for n, level in enumerate(levels))
 
     async def set(self, skip=0, required=0, tolerated=0):
-        """New settings, and the cycle that they take, in which the levels stand still."""
+        """Apply new settings, and wait until they are in force, with constant levels."""
         self.settings = skip, required, tolerated
         await self.rows([[own.filtered for own in self.model.levels]])
 
@@ -60,7 +60,8 @@ class Bench:
                 (self.word(filtered), self.word(rejected)),
             )
             assert got == want, (
-                f"cycle {cycle}, (skip, required, tolerated) {self.settings}: (filtered, rejected) is {got}, the model has {want}"
+                f"cycle {cycle}, (skip, required, tolerated) {self.settings}: "
+                f"(filtered, rejected) is {got}, the model has {want}"
             )
             out.append((filtered[0], rejected[0]))
         dut.rst.value = 0
@@ -68,6 +69,13 @@ class Bench:
 
     async def play(self, levels, rst=0):
         return await self.rows([[level] * self.lines for level in levels], rst)
+
+
+@cocotb.test()
+async def latency_is_1_during_start_up(dut):
+    bench = await Bench.begin(dut, skip=9, required=7, started=False)
+    for level in [1, 0] * (int(dut.SETTLE.value) // 2):
+        assert await bench.play([level]) == [(level, 0)]
 
 
 @cocotb.test()

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""legacy_bench: both of its paths, sample by sample, against their models in a row; what the
-comparison of sw/figures/legacy.py rests on.
+"""Tests of legacy_bench: both of its paths, sample by sample, against their models in series; the
+comparison of sw/figures/legacy.py depends on it.
 """
 
 import math
@@ -22,7 +22,7 @@ APART, LARGEST_MOVE, SUBDIVISION = (
     30,
     40,
     160,
-)  # cycles from sample to sample; counts; counts of a period
+)  # cycles from sample to sample; counts; counts per period
 IDLE = dict(
     valid=0,
     sin=0,
@@ -42,7 +42,7 @@ IDLE = dict(
 
 
 class Follower:
-    """Phases to position."""
+    """Model of the path from phases to position."""
 
     def __init__(self):
         self.tracker, self.unwrap = FringeTracker(), Unwrap()
@@ -68,7 +68,7 @@ async def load_calibration(dut, values, table):
 
 
 async def send(dut, sin, cos):
-    """(count as printed, position) of one sample; each must come once, before the next one."""
+    """(count of S0, position) of one sample; each must appear exactly once before the next."""
     await strobe(dut, valid=1, sin=sin, cos=cos)
     dut.valid.value, found = 0, ([], [])
     for _ in range(APART - 1):
@@ -106,7 +106,7 @@ async def both_paths_equal_their_models_in_series(dut):
         position = ours.follow(harmonic_correction.corrected(phase, table))
         assert await send(dut, sin, cos) == ([count], [position]), f"sample {n}: {sin}, {cos}"
         errors.append(position / 65536 - where)
-    assert max(errors) - min(errors) < 1.2  # ours has stayed on its fringe
+    assert max(errors) - min(errors) < 1.2  # our path has stayed on its fringe
 
 
 def test_legacy_bench():

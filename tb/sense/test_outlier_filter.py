@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""outlier_filter: a spike by hand, both ends of both settings, S0's filter as printed, and random
-samples with gaps against the model.
+"""Tests of outlier_filter: a spike by hand, both ends of both settings, the filter of S0, and
+random samples with gaps against the model.
 """
 
 import random
@@ -19,7 +19,7 @@ async def begin(dut):
 
 
 async def stream(dut, model, samples, step, hold, gaps=False):
-    """Send the samples, each checked against the model 1 cycle later; return (sin_out, cos_out,
+    """Send the samples and compare each with the model one cycle later; return (sin_out, cos_out,
     rejected) of each.
     """
     dut.step.value, dut.hold.value, out = step, hold, []
@@ -49,7 +49,7 @@ async def stream(dut, model, samples, step, hold, gaps=False):
 
 @cocotb.test()
 async def latency_is_1_and_a_spike_is_held_back_on_its_own_channel(dut):
-    model = await begin(dut)  # stream() sees done 1 cycle after valid
+    model = await begin(dut)  # stream() checks done 1 cycle after valid
     out = await stream(
         dut, model, [(0, 100), (5, 99), (90, 98), (10, 97), (15, -100), (20, 95)], 10, 3
     )

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""peak_offset_tracker: by hand as S0 printed it, what it can and what it cannot, and every sample
-against the model.
+"""Tests of peak_offset_tracker: the example of S0 by hand, what the method can and cannot correct,
+and every sample against the model.
 """
 
 import math
@@ -20,8 +20,8 @@ class Remover:
         self.model, self.top, self.expected = PeakOffsetTracker(self.w), (1 << self.w - 1) - 1, []
 
     async def cycle(self, sin=0, cos=0, valid=1, enable=1, rst=0):
-        """One cycle with the model beside it; (sin_out, cos_out, sin_offset, cos_offset) with done,
-        else None.
+        """Advance design and model by one cycle; return (sin_out, cos_out, sin_offset, cos_offset)
+        with done, else None.
         """
         dut = self.dut
         dut.sin.value, dut.cos.value, dut.valid.value, dut.enable.value, dut.rst.value = (

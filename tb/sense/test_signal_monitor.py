@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""signal_monitor: each fault by its name and in its time, what must not alarm, and the model in
-every cycle.
+"""Tests of signal_monitor: each fault by its name and at its time, signals that must not cause a
+fault, and every cycle against the model.
 """
 
 import random
@@ -14,7 +14,8 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import run, start
 from tb.sense.signal_monitor import FAULTS, Settings, SignalMonitor
 
-CLKS = dict(enumerate([10, 10, 2, 14, 5, 2, 2, 2, 2, 2, 14, 14, 14]))  # from valid to each fault
+# latency from valid to each fault
+CLKS = dict(enumerate([10, 10, 2, 14, 5, 2, 2, 2, 2, 2, 14, 14, 14]))
 LATEST = max(CLKS.values())
 ALL = (1 << 13) - 1
 
@@ -24,13 +25,13 @@ def names(bits):
 
 
 class Watch:
-    """The design beside its model; `seen` are all the faults since it was made, `rose` when each
-    rose first.
+    """The design and its model; `seen` holds all faults since the start, `rose` the cycle in which
+    each rose first.
     """
 
     def __init__(self, dut, settings):
         self.dut, self.settings, self.model = dut, settings, SignalMonitor()
-        self.due, self.now, self.first, self.cycle, self.seen, self.rose = {}, 0, 0, 0, 0, {}
+        self.due, self.now, self.first, self.elapsed, self.seen, self.rose = {}, 0, 0, 0, 0, {}
         self.full = 1 << int(dut.W.value) - 1
 
     async def cycle(self, sample=None, phase_jump=0, lost_count=0, clear=0):
@@ -41,19 +42,19 @@ class Watch:
             dut.sin.value, dut.cos.value, dut.a.value, dut.b.value = sample
             bits = int(self.model.sample(*(np.array([x]) for x in sample), self.settings)[0])
             for n, lag in CLKS.items():
-                self.due.setdefault(self.cycle + lag, []).append((1 << n, bits))
+                self.due.setdefault(self.elapsed + lag, []).append((1 << n, bits))
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
-        self.cycle += 1
+        self.elapsed += 1
         self.first = self.now if clear or not self.first else self.first
-        for mask, value in self.due.pop(self.cycle, []):
+        for mask, value in self.due.pop(self.elapsed, []):
             self.now = self.now & ~mask | value & mask
         self.now = self.now & ALL | phase_jump << 13 | lost_count << 14
-        self.rose |= {name: self.cycle for name in names(self.now & ~self.seen)}
+        self.rose |= {name: self.elapsed for name in names(self.now & ~self.seen)}
         self.seen |= self.now
         got = int(dut.faults.value), int(dut.first.value)
         assert got == (self.now, self.first), (
-            f"cycle {self.cycles}: {names(got[0])}, first {names(got[1])}, the model has "
+            f"cycle {self.elapsed}: {names(got[0])}, first {names(got[1])}, the model has "
             f"{names(self.now)}, first {names(self.first)}"
         )
 
@@ -100,7 +101,7 @@ def advised(dut, **more):
 
 
 async def ready(dut, **more):
-    """A monitor that has seen a good signal, and its amplitude."""
+    """Returns a monitor that has seen a good signal, and the amplitude of that signal."""
     watch = await begin(dut, advised(dut, **more))
     size = 0.78 * watch.full
     await watch.turn(size, 2.25, steps=24)
@@ -117,14 +118,19 @@ async def latency_is_2_5_10_or_14_by_fault(dut):
         await watch.turn(90, 2.25, steps=80)
         await watch.idle()
         assert not watch.seen
-        decides = watch.cycle + (
-            name != "jump"
-        )  # the first sample of a jump, the second one of the others
+        # the first sample of a jump, the second sample of the others
+        decides = watch.elapsed + (name != "jump")
         await watch.sample(0, 126)
         await watch.sample(0, 126)
         await watch.idle()
         assert watch.rose[name] == decides + lag
+
+
+@cocotb.test()
+async def latency_is_1_from_phase_jump_and_lost_count(dut):
     watch = await begin(dut)
+    await watch.cycle()
+    assert int(dut.faults.value) == 0
     await watch.cycle(phase_jump=1, lost_count=1)
     assert names(int(dut.faults.value)) == ["phase_jump", "lost_count"]
 
@@ -218,7 +224,7 @@ async def each_fault_of_a_comparator_or_channel_has_its_name(dut):
 
 @cocotb.test()
 async def a_channel_that_opens_at_rest_is_found_at_the_second_sample(dut):
-    for fringe in (0.08, 0.1, 0.2, 0.4):  # fringe; the sine goes to zero
+    for fringe in (0.08, 0.1, 0.2, 0.4):  # in periods; the sine goes to zero
         watch, size = await ready(dut)
         await watch.turn(size, fringe, steps=400)
         angle = 2 * np.pi * fringe
@@ -233,7 +239,7 @@ async def a_channel_that_opens_at_rest_is_found_at_the_second_sample(dut):
 
 @cocotb.test()
 async def a_signal_lost_in_both_channels_is_reported_at_the_second_sample_moving_or_at_rest(dut):
-    for steps in (4.1, 60, None):  # samples a fringe; None: at idle
+    for steps in (4.1, 60, None):  # samples per period; None: at rest
         for fringe in (0.125, 0.77):
             watch, size = await ready(dut)
             await watch.turn(size, fringe, steps=200)
@@ -242,7 +248,7 @@ async def a_signal_lost_in_both_channels_is_reported_at_the_second_sample_moving
                 await watch.sample(size * np.cos(angle), size * np.sin(angle))
             await watch.idle()
             assert "too_low" not in names(watch.seen)
-            second = watch.cycle + 1
+            second = watch.elapsed + 1
             for _ in range(2):
                 await watch.sample(0, 0)
             await watch.idle()

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""status_inputs: bounce, both ends of the filter's time, what stands at reset, and random levels
-against the model.
+"""Tests of status_inputs: bounce, both ends of the filter time, levels present at reset, and random
+levels against the model.
 """
 
 import random
@@ -33,12 +33,14 @@ class Contacts:
         return self
 
     async def cycle(self, *levels, n=1, rst=0):
-        """n cycles with these levels; the cycle of them after which the filtered level was there."""
+        """Apply these levels for n cycles; returns the numbers of the cycles after which the
+        filtered level had changed.
+        """
         levels = (*levels, *[0] * (self.w - len(levels)))
         d, there = self.dut, None
         d.inputs.value, d.time_ms.value, d.rst.value = word(levels), self.time_ms, rst
         for cycle in range(n):
-            await FallingEdge(d.cycle)
+            await FallingEdge(d.clk)
             level, rose, fell = self.model.step(self.time_ms, levels, rst)
             got = int(d.level.value), int(d.rose.value), int(d.fell.value)
             assert got == (word(level), word(rose), word(fell)), (

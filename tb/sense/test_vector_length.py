@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""vector_length: known vectors, the stated bound over every 8-bit pair, the sectors, and the model
-cycles by cycles.
+"""Tests of vector_length: known vectors, the stated bound over every 8-bit pair, the sectors, and
+every cycle against the model.
 """
 
 import random
@@ -21,7 +21,7 @@ def model(sin, cos):
 
 
 async def cycle(dut, sample=None, rst=0):
-    """One cycle with this sample or none; what stands at the outputs, None without done."""
+    """Advance one cycle with this sample or none; returns the outputs, None without done."""
     dut.valid.value, dut.rst.value = int(sample is not None), rst
     dut.sin.value, dut.cos.value = sample or (random.getrandbits(6), random.getrandbits(6))
     await RisingEdge(dut.clk)
@@ -32,7 +32,7 @@ async def cycle(dut, sample=None, rst=0):
 
 
 async def drive(dut, samples):
-    """Hold the outputs against the model in every cycle; samples may have None for a gap."""
+    """Compare the outputs with the model in every cycle; None in `samples` is a gap."""
     want = [None] * (LATENCY - 1) + [sample and model(*sample) for sample in samples]
     for n, sample in enumerate([*samples, *[None] * (LATENCY - 1)]):
         got = await cycle(dut, sample)
