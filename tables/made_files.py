@@ -22,6 +22,15 @@ def stale(made: dict) -> dict:
     }
 
 
+def filled(path, begin: str, end: str, lines: list) -> str:
+    """The text of a file with these lines between its two marks."""
+    before, found, inside = path.read_text(encoding="utf-8").partition(begin)
+    _, closed, after = inside.partition(end)
+    if not found or not closed:
+        raise ValueError(f"{path.name} must have the lines `{begin.strip()}` and `{end.strip()}`")
+    return before + "\n".join([begin, *lines, end]) + after
+
+
 def main(about: str, make, arguments=None, figures=None) -> int:
     """Exit code of a generator: make() returns {path: text}, figures() what `--bound` prints. A
     ValueError says what is wrong with

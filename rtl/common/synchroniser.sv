@@ -1,22 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-// synchroniser -- bring levels of another clock, or of none, into clk.
+// synchroniser -- bring asynchronous levels, or levels of another clock, into the domain of clk.
 //
-// latency  STAGES clk
-// rate     each bit by itself: bits of one word may arrive
-//          one clk apart
-// source   a row of flops; 2 stages below 100 MHz, 3 from there up
+// latency  STAGES cycles from d to q
+// rate     one level of each bit per cycle
+// source   a chain of STAGES flip-flops: 2 are enough below 100 MHz, use 3 from 100 MHz up
+// limits   The bits are independent: bits of one word that change together may arrive one cycle
+//          apart.
 // model    tb/common/synchroniser.py, equal in every bit of every cycle
-// proved   q is d of STAGES clk before, and RESET until a level taken after reset has come through
+// proved   q equals d of STAGES cycles ago; until the first level taken after reset arrives, q is
+//          RESET
 // proof    W = 2, STAGES = 3, RESET = 1
 `default_nettype none
 
 module synchroniser #(
-    parameter int W      = 1,  // independent levels
-    parameter int STAGES = 2,  // flops in a row
-    parameter int RESET  = 0   // q during and just after reset
+    parameter int W      = 1,  // number of independent levels
+    parameter int STAGES = 2,  // flip-flops in each chain, at least 2
+    parameter int RESET  = 0   // value of q during reset and until the first level arrives
 ) (
     input  wire          clk,
-    input  wire          rst,
+    input  wire          rst,  // level: q becomes RESET
     input  wire  [W-1:0] d,    // levels, asynchronous
     output logic [W-1:0] q     // levels, synchronous to clk
 );
@@ -35,7 +37,7 @@ module synchroniser #(
 
 `ifdef FORMAL
     logic              past = 1'b0;
-    // q of 0, 1, … clk from now comes of a level, not of reset
+    // bit n: stage n holds a level taken after reset
     logic [STAGES-1:0] taken;
     always @(posedge clk) begin
         past  <= 1'b1;
@@ -43,9 +45,11 @@ module synchroniser #(
         if (!past) assume (rst);
         if (past) begin
             for (int n = 0; n < STAGES; n++) if (!taken[n]) assert (stages[W*n+:W] == W'(RESET));
-            if (taken[STAGES-1])
+            if (taken[STAGES-1]) begin
                 assert (q == $past(d, STAGES));
-                else assert (q == W'(RESET));
+            end else begin
+                assert (q == W'(RESET));
+            end
             cover (taken[STAGES-1] && q == 2 && $past(q) == 1);
         end
     end

@@ -1,24 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-// tick_divider -- a strobe every `period` clk.
+// tick_divider -- make a strobe every `period` cycles.
 //
-// latency  the first tick comes `period` clk after reset or restart
-// rate     one tick each `period`
-//          clk, exactly
+// latency  `period` cycles from reset or restart to the first tick
+// rate     exactly one tick per `period` cycles
+// behaviour A shorter period takes effect at once: a tick follows in the next cycle if it is
+//          already due.
 // model    tb/common/tick_divider.py, equal in every bit of every cycle
-// proved   two ticks are never nearer than the shortest period in force between them, nor to a
-//          restart; no tick while period is 0
+// proved   two ticks, or a restart and a tick, are never closer together than the shortest period
+//          that was set between them; there is no tick while period is 0
 `default_nettype none
 
 module tick_divider #(
     parameter int W = 24  // bits of period
 ) (
-    input wire clk,
-    input wire rst,
-    input wire [W-1:0] period,  // clk; 0: no ticks. A shorter one counts at once
-    input wire restart,  // strobe: a period begins here; a tick that is due now is left out
-    output logic tick  // strobe
+    input  wire          clk,
+    input  wire          rst,      // level: a new period begins
+    input  wire  [W-1:0] period,   // cycles between two ticks; 0: no ticks
+    input  wire          restart,  // strobe: a new period begins; suppresses a tick that is due now
+    output logic         tick      // strobe: a period has ended
 );
-    logic [W-1:0] elapsed;  // clk since the last tick
+    logic [W-1:0] elapsed;  // cycles since the last tick
 
     wire          on = |period;
     wire          due = elapsed >= period - 1'b1;
@@ -34,7 +35,7 @@ module tick_divider #(
 
 `ifdef FORMAL
     logic past = 1'b0;
-    // clk since the last tick, least period seen in that time
+    // cycles since the last tick; shortest period set in that time
     logic [W-1:0] since, shortest;
     always @(posedge clk) begin
         past <= 1'b1;

@@ -1,48 +1,48 @@
 // SPDX-License-Identifier: Apache-2.0
-// encoder_counter -- an incremental encoder behind three words of a bus: for who wants a counter
-// and not an axis.
+// encoder_counter -- an incremental encoder input with three registers, for designs that need a
+// counter but no axis.
 //
-//   word 0  read   {time of the last edge, count}, both of one clk
-//   word 1  read   {latched count, 8'b0, illegal, probed, found, armed, probe, z, b, a}: flags that
-//   stand, levels behind the filter
-//           write  bit 4: arm the index; bit 5, 6, 7: found, probed, illegal fall, unless they come
-//           again in that clk
-//   word 2  both   settings, 0 after reset: [3:0] filter_required [5:4] mode [6] index_low [7]
-//   index needs [9:8] = {b, a}
-//                  [10] index_up [11] index_down [12] index_each [13] index_clears [14]
-//                  probe_latches [15] probe_low
-//                  [19:16] filter_tolerated [31:20] filter_skip, as far as there are any; meaning
-//                  as in incremental_encoder
+//   word 0  read   {time of the last edge, count}, both of the same cycle
+//   word 1  read   {latched count, 8'b0, illegal, probed, found, armed, probe, z, b, a}
+//   flags (illegal, probed, found), the state `armed`, and levels after the filter
+//   write  bit 4 arms the index; bits 5, 6, 7 clear found, probed, illegal: an event in
+//   that cycle sets its flag again
+//   word 2  both   settings, 0 after reset: [3:0] filter_required [5:4] mode [6] index_low
+//   [7] the index requires [9:8] = {b, a} [10] index_up [11] index_down
+//   [12] index_each [13] index_clears [14] probe_latches [15] probe_low
+//   [19:16] filter_tolerated [31:20] filter_skip, as far as the widths allow;
+//   their meaning is given in incremental_encoder
 //
-// latency  1 clk from select to rdata, and from a write to the new value. N samples of the filter
-//          and 2 clk from a, b, z to count and latched count, 3 clk from probe: with the filter in
-//          bypass the count of the same pins
-// rate     one access per clk
-// source   the features of HostMot2's encoder counter: count, time of its last edge, count latched
-//          by index or probe, flags
+// latency  1 cycle from select to rdata and from a write to the new setting; N samples of the
+//          filter and 2 cycles from a, b, z to count and latched count; 3 cycles from probe to
+//          latched count. The latched count is the count of the pins at the edge of probe, if the
+//          filter is bypassed.
+// rate     one access per cycle
+// source   the functions of HostMot2's encoder counter: count, time of its last edge, count
+//          latched by index or probe, flags
 // model    tb/decode/encoder_counter.py, equal in every bit of every cycle
-// proved   a flag falls only when told to; the latched count changes only with a flag, the time
-//          only with a step of count
+// proved   a flag is cleared only by a write; the latched count changes only together with a flag,
+//          the time only together with a step of count
 // proof    FILTER_W = 1
 `default_nettype none
 
 module encoder_counter #(
-    parameter int FILTER_W = 4,  // bits of filter_required, 1 to 4
-    parameter int TOLERATED_W  = 0,             // bits of filter_tolerated, 0 to 4; 0: N samples in a row, no N of M
-    parameter int SKIP_W = 0  // bits of filter_skip, 0 to 12; 0: a sample every clk
+    parameter int FILTER_W    = 4,  // bits of filter_required, 1 to 4
+    parameter int TOLERATED_W = 0,  // bits of filter_tolerated, 0 to 4
+    parameter int SKIP_W      = 0   // bits of filter_skip, 0 to 12
 ) (
-    input wire clk,
-    input wire rst,  // count and settings become zero
-    input wire select,  // an access to this block
-    input wire write,  // with select: wdata goes into the word
-    input wire [1:0] word,  // word 3 reads 0
-    input wire [31:0] wdata,
-    input wire [15:0] now,  // the time, in any unit
-    input wire a,  // levels, synchronous to clk
-    input wire b,
-    input wire z,
-    input wire probe,  // level, synchronous to clk and clean: its rising edge latches the count
-    output logic [31:0] rdata  // what was read, for one clk; 0 in every other
+    input  wire         clk,
+    input  wire         rst,     // level: count and settings become 0
+    input  wire         select,  // level: an access to this block in this cycle
+    input  wire         write,   // level: with select, wdata is written to the word
+    input  wire  [ 1:0] word,    // word address, 0 to 2; word 3 reads 0
+    input  wire  [31:0] wdata,   // bits to be written
+    input  wire  [15:0] now,     // time stamp, in any unit
+    input  wire         a,       // level: channel A, synchronous to clk
+    input  wire         b,       // level: channel B, synchronous to clk
+    input  wire         z,       // level: index, synchronous to clk
+    input  wire         probe,   // level, synchronous and free of bounce; its edge latches
+    output logic [31:0] rdata    // the word read, for one cycle; 0 in all other cycles
 );
     if (FILTER_W < 1 || FILTER_W > 4) begin : g_check_filter
         FILTER_W_MUST_BE_FROM_1_TO_4 u_error ();
@@ -54,7 +54,8 @@ module encoder_counter #(
         SKIP_W_MUST_BE_FROM_0_TO_12 u_error ();
     end
 
-    localparam logic [3:0]  REQUIRED = 4'((1 << FILTER_W) - 1);           // the bits of the settings that there are
+    // the bits of the settings that exist
+    localparam logic [3:0] REQUIRED = 4'((1 << FILTER_W) - 1);
     localparam logic [3:0] TOLERATED = 4'((1 << TOLERATED_W) - 1);
     localparam logic [11:0] SKIP = 12'((1 << SKIP_W) - 1);
 
@@ -66,9 +67,11 @@ module encoder_counter #(
     wire [2:0] filtered, rejected;
     wire signed [15:0] count, index_count;
     wire signed [1:0] step;
-    wire                a_later, b_later, ready, stepping, direction, illegal, clear, armed, found, revolution_wrong;
+    wire a_later, b_later, ready, stepping, direction, illegal;
+    wire clear, armed, found, revolution_wrong;
 
-    wire told = select && write && word == 2'd1;
+    wire [3:0] flags = {illegal_seen, probed_seen, found_seen, armed};
+    wire       status_write = select && write && word == 2'd1;
 
     event_filter #(
         .LEVELS     (3),
@@ -117,7 +120,7 @@ module encoder_counter #(
         .each                 (settings[12]),
         .clears               (settings[13]),
         .counts_per_revolution(16'd0),
-        .arm                  (told && wdata[4]),
+        .arm                  (status_write && wdata[4]),
         .probe                (probing),
         .ready,
         .direction,
@@ -142,16 +145,16 @@ module encoder_counter #(
         probe_2q <= probe_q;
         probing  <= settings[14] && probe_q != probe_2q && probe_q != settings[15];
         if (stepping) edge_time <= now;
-        found_seen   <= found || (found_seen && !(told && wdata[5]));
-        probed_seen  <= probing || (probed_seen && !(told && wdata[6]));
-        illegal_seen <= illegal || (illegal_seen && !(told && wdata[7]));
+        found_seen   <= found || (found_seen && !(status_write && wdata[5]));
+        probed_seen  <= probing || (probed_seen && !(status_write && wdata[6]));
+        illegal_seen <= illegal || (illegal_seen && !(status_write && wdata[7]));
         if (select && write && word == 2'd2)
             settings <= wdata & {SKIP, TOLERATED, 12'hFFF, REQUIRED};
         rdata <= '0;
         if (select)
             case (word)
                 2'd0:    rdata <= {edge_time, count};
-                2'd1:    rdata <= {index_count, 8'd0, illegal_seen, probed_seen, found_seen, armed, probe_q, filtered};
+                2'd1:    rdata <= {index_count, 8'd0, flags, probe_q, filtered};
                 2'd2:    rdata <= settings;
                 default: rdata <= '0;
             endcase
@@ -174,9 +177,9 @@ module encoder_counter #(
         if (past && !$past(rst)) begin
             if ($past(found)) assert (found_seen);
             if ($past(illegal)) assert (illegal_seen);
-            if (!found_seen && $past(found_seen)) assert ($past(told && wdata[5]));
-            if (!probed_seen && $past(probed_seen)) assert ($past(told && wdata[6]));
-            if (!illegal_seen && $past(illegal_seen)) assert ($past(told && wdata[7]));
+            if (!found_seen && $past(found_seen)) assert ($past(status_write && wdata[5]));
+            if (!probed_seen && $past(probed_seen)) assert ($past(status_write && wdata[6]));
+            if (!illegal_seen && $past(illegal_seen)) assert ($past(status_write && wdata[7]));
             if (probing) assert ($past(settings[14]) && $past(probe_q) != $past(probe_2q));
             if (index_count != $past(index_count)) assert (found || probed_seen);
             if (ready && $past(ready) && edge_time != $past(edge_time)) assert (step != 0);

@@ -1,66 +1,68 @@
 // SPDX-License-Identifier: Apache-2.0
-// index_latch -- find the index (reference mark) of a grating, latch or clear the count exactly
-// there, check the counts between; latch it at a probe as well.
+// index_latch -- find the index (reference mark) of a scale, latch or clear the count exactly at
+// it, check the counts between two of them, and latch the count at a probe.
 //
-// latency  1 clk to a_later, b_later, from which the decoder counts: so clear meets the edge that
-//          it belongs to. found and index_count 2 clk after a, b, z, together with the count of the
-//          state in which the index first stands, which is zero then if it clears; revolution_wrong
-//          4 clk after a, b, z. probe 1 clk: the count that stands then
-// rate     one index per 2 clk
+// latency  1 cycle from a, b to a_later, b_later; 2 cycles from a, b, z to found and index_count;
+//          4 cycles from a, b, z to revolution_wrong; 1 cycle from probe to index_count
+// rate     one index per 2 cycles
+// behaviour The decoder counts the delayed a_later and b_later, so clear arrives together with the
+//          edge it belongs to. index_count is the count of the first state in which the index is
+//          present, and the count is 0 there if the index clears it. A probe latches the count of
+//          its own cycle.
 // source   S3: a rising edge on R latches the position and sets a flag. An index counts once,
-//          however wide it is; gated by a and b it is one quarter period wide and lies at the same
-//          count in both directions
+//          however wide it is. Gated by a and b it is one quarter period wide and lies at the same
+//          count in both directions.
 // model    tb/decode/index_latch.py, equal in every bit of every cycle
-// proved   found only after an edge of a, b or z into the gated index, in a wanted direction, armed
-//          or each, and never again before z has fallen; settings alone never make one; count is
-//          cleared only with found; index_count changes only with found or by probe
+// proved   found follows only an edge of a, b or z into the gated index, in an enabled direction,
+//          armed or with `each`, and never again before z has become inactive; a change of
+//          settings alone never causes it; count is cleared only together with found; index_count
+//          changes only with found or probe
 // proof    W = 4
 `default_nettype none
 
 module index_latch #(
     parameter int W     = 32,  // bits of count
-    parameter int CHECK = 1    // 0: without the check of counts_per_revolution
+    parameter int CHECK = 1    // 1: counts_per_revolution is checked; 0: not
 ) (
-    input wire clk,
-    input wire rst,
-    input wire active_low,  // polarity: the index is 0: z high, 1: z low
-    input wire [1:0] gate_mask,  // {b, a}: 1 the index needs this level to be as in gate
-    input wire [1:0] gate,  // {b, a}
-    input wire take_up,  // take an index that is met going up
-    input wire take_down,  // and going down
-    input wire each,  // 1: every index, 0: one for each arm
-    input wire clears,  // 1: an index that is found clears the count
-    input  wire        [W-1:0]   counts_per_revolution, // in counts of the decoder's mode; 0, or each = 0: not checked
-    input wire arm,  // strobe: take the next index
-    input wire probe,  // strobe: latch the count
-    input  wire                  ready,   // from the decoder behind a_later, b_later, as are direction, stepping, count
-    input wire direction,
-    input wire stepping,
-    input wire signed [W-1:0] count,
-    input wire a,  // levels, synchronous to clk and already filtered
-    input wire b,
-    input wire z,
-    output logic a_later,  // a, b and clear: to the decoder
-    output logic b_later,
-    output logic clear,
-    output logic armed,
-    output logic found,  // strobe
-    output logic signed [W-1:0]  index_count, // count of the last index found, before it cleared, or of a probe since then
-    output logic                 revolution_wrong // strobe: neither 0 nor counts_per_revolution since the index before
+    input  wire                 clk,
+    input  wire                 rst,                    // level: disarms, index_count becomes 0
+    input  wire                 active_low,             // level: the index is present at z = 0
+    input  wire         [  1:0] gate_mask,              // {b, a}: 1: this level is required
+    input  wire         [  1:0] gate,                   // {b, a}: the levels required
+    input  wire                 take_up,                // level: take an index that is met going up
+    input  wire                 take_down,              // level: take an index met going down
+    input  wire                 each,                   // level: take each index; 0: one per arm
+    input  wire                 clears,                 // level: an index clears the count
+    input  wire         [W-1:0] counts_per_revolution,  // counts; 0, or each = 0: not checked
+    input  wire                 arm,                    // strobe: take the next index
+    input  wire                 probe,                  // strobe: latch the count
+    input  wire                 ready,                  // level: ready of the decoder
+    input  wire                 direction,              // level: direction of the decoder
+    input  wire                 stepping,               // level: stepping of the decoder
+    input  wire signed  [W-1:0] count,                  // counts: count of the decoder
+    input  wire                 a,                      // level: filtered channel A, synchronous
+    input  wire                 b,                      // level: filtered channel B, synchronous
+    input  wire                 z,                      // level: filtered index, synchronous to clk
+    output logic                a_later,                // level: a for the decoder
+    output logic                b_later,                // level: b for the decoder
+    output logic                clear,                  // strobe: clear for the decoder
+    output logic                armed,                  // level: the next index will be taken
+    output logic                found,                  // strobe: an index was taken
+    output logic signed [W-1:0] index_count,            // counts at the last index or probe
+    output logic                revolution_wrong        // strobe: turned neither 0 nor one turn
 );
     logic z_later;
-    // a_later, b_later, z_later have just come into the index; it is taken if that was going up,
-    // down
+    // the delayed levels have just entered the index; taken if that was going up, going down
     logic from_below, from_above;
-    logic wanted;  // every index, or armed
-    logic used;  // this index has been met already
+    logic wants;  // an index would be taken: each or armed
+    logic used;  // this index was met already
 
     wire  at_index = (z ^ active_low) && ((gate ^ {b, a}) & gate_mask) == 0;
-    // settings of now: they make no edge
+    // with the present settings, so that a new setting makes no edge
     wire  at_index_q = (z_later ^ active_low) && ((gate ^ {b_later, a_later}) & gate_mask) == 0;
     wire  entering = ready && at_index && !at_index_q && !used;
     wire  met = direction ? from_below : from_above;
-    wire  take = met && wanted;
+    wire  take = met && wants;
     wire  stepped = ready && stepping;
 
     assign clear = take && clears;
@@ -71,12 +73,12 @@ module index_latch #(
         z_later    <= z;
         from_below <= entering && take_up;
         from_above <= entering && take_down;
-        wanted     <= each || armed;
+        wants     <= each || armed;
         used       <= (used || met) && (z ^ active_low);
         armed      <= arm || (armed && !take);
         found      <= take;
-        // less the reverse of the step: an adder of its own costs nothing here, that of the decoder
-        // shared costs W cells
+        // The count before the step, by a subtraction of its own: it costs no extra cells here,
+        // while sharing the adder of the decoder would cost W cells.
         if (take || probe) index_count <= count - {{W - 1{stepped && direction}}, stepped};
         if (rst) begin
             from_below  <= 1'b0;
@@ -89,12 +91,13 @@ module index_latch #(
     end
 
     if (CHECK != 0) begin : g_check
-        // there was an index before; the last one cleared the count
+        // known: there was an index before; zeroed: it cleared the count
         logic known, zeroed;
-        logic judge, judge_q;  // index_count, then turn, is to be judged
-        logic [W-1:0] reference, turn;  // count of the index before; counts from there
+        logic judge, judge_q;  // index_count is ready to be judged, then turn
+        logic [W-1:0] reference, turn;  // count at the preceding index; counts since then
 
         wire on = each && counts_per_revolution != '0;
+        wire one_turn = turn == counts_per_revolution || turn == -counts_per_revolution;
 
         always_ff @(posedge clk) begin
             if (take) zeroed <= clears;
@@ -102,7 +105,7 @@ module index_latch #(
             judge            <= take && known && on;
             turn             <= index_count - reference;
             judge_q          <= judge;
-            revolution_wrong <= judge_q && turn != '0 && turn != counts_per_revolution && turn != -counts_per_revolution;
+            revolution_wrong <= judge_q && turn != '0 && !one_turn;
             known            <= on && (known || take);
             if (rst) begin
                 known            <= 1'b0;
@@ -117,8 +120,10 @@ module index_latch #(
     end
 
 `ifdef FORMAL
-    logic past = 1'b0;
-    logic free;  // z has not been the index since one was met
+    logic         past = 1'b0;
+    wire  [  2:0] levels = {a_later, b_later, z_later};
+    wire  [W-1:0] count_now = !stepped ? count : direction ? count + 1'b1 : count - 1'b1;
+    logic         free;  // z has been inactive since an index was met
     always @(posedge clk) begin
         past <= 1'b1;
         free <= rst || !(z ^ active_low) || (free && !met);
@@ -127,28 +132,18 @@ module index_latch #(
             assert (used == !free);
             assert (!clear || (take && clears));
             if (take) begin
-                assert ({a_later, b_later, z_later} != {$past(
-                    a_later
-                ), $past(
-                    b_later
-                ), $past(
-                    z_later
-                )});
+                assert (levels != $past(levels));
                 assert ((z_later ^ $past(active_low)) && $past(ready) && $past(free));
                 assert ($past(each || armed) && (direction ? $past(take_up) : $past(take_down)));
             end
         end
         if (past && !$past(rst)) begin
             assert (found == $past(take));
-            if (found || $past(probe))
-                assert (index_count == W'($past(
-                    count
-                ) + ($past(
-                    stepped
-                ) ? $past(
-                    direction
-                ) ? 1 : -1 : 0)));
-                else assert (index_count == $past(index_count));
+            if (found || $past(probe)) begin
+                assert (index_count == $past(count_now));
+            end else begin
+                assert (index_count == $past(index_count));
+            end
             assert (!armed || !found || $past(arm));
             cover (found && gate_mask == 3 && !each);
             cover (found && $past(found, 2));

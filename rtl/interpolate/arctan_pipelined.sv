@@ -1,34 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
-// arctan_pipelined -- phase and amplitude of a sine and a cosine sample: 2^16 atan2(sin, cos) / 2
-// pi, and their length.
+// arctan_pipelined -- compute phase and amplitude of a sine and a cosine sample: 2^16 atan2(sin,
+// cos) / 2 pi, and their length.
 //
-// latency  24, 28, 29 clk from valid to done for W = 8, 9, 10, 23 clk for wider samples; divided by
-//          STEPS, rounded up
-// rate     one sample per clk
+// latency  24, 28 or 29 cycles from valid to done for W of 8, 9 or 10; 23 cycles for wider samples;
+//          divided by STEPS and rounded up
+// rate     one sample per cycle
 // accuracy phase: every sample of 8, 9 and 10 bits is correctly rounded; wider ones are within
-//          0.548 LSB of the true phase from a
-//          quarter of full scale on (of 12 bits, all tried: 0.510). amplitude: within 1.5 counts
-//          and 0.00015 of itself.
-//          (0, 0) gives 0 and 0
-// source   CORDIC in vectoring mode, after TURNS digits as a division; the shorter leg is doubled
-//          at each digit (Y = 2^i y), so that both legs lose a bit a digit; the angles of four or
-//          five digits come from one look-up
+//          0.548 LSB of the true phase from a quarter of full scale on (all samples of 12 bits
+//          were tried: 0.510). amplitude: within 1.5 counts plus 0.00015 of itself. (0, 0) gives 0
+//          and 0.
+// method   CORDIC in vectoring mode, after TURNS digits as a division. The shorter component is
+//          doubled at each digit (Y = 2^i y), so both components lose one bit per digit; the
+//          angles of four or five digits come from one look-up.
+// source   Volder, IRE Trans. EC-8 (1959) 330
 // model    tb/interpolate/arctan_pipelined.py, equal in every bit of every cycle; bound and angles
 //          from tables/arctan_rotation.py
 `default_nettype none
 
 module arctan_pipelined #(
     parameter int W     = 12,  // bits of a sample, 8 to 16
-    parameter int STEPS = 1    // steps from register to register
+    parameter int STEPS = 1    // steps from one register to the next
 ) (
     input  wire                clk,
-    input  wire                rst,       // drops the samples in work; phase and amplitude become 0
+    input  wire                rst,       // level: drops all samples, outputs become 0
     input  wire                valid,     // strobe: sin and cos are a new sample
-    input  wire signed [W-1:0] sin,       // full scale = 2^(W-1)
-    input  wire signed [W-1:0] cos,       // full scale = 2^(W-1)
+    input  wire signed [W-1:0] sin,       // counts, full scale = 2^(W-1)
+    input  wire signed [W-1:0] cos,       // counts, full scale = 2^(W-1)
     output logic               done,      // strobe: phase and amplitude are new
-    output logic       [ 15:0] phase,     // one signal period = 2^16; stands until the next
-    output logic       [W-1:0] amplitude  // counts of the converter; stands until the next
+    output logic       [ 15:0] phase,     // 2^-16 period; held until the next sample
+    output logic       [W-1:0] amplitude  // counts of the ADC; held until the next sample
 );
     if (W < 8 || W > 16) begin : g_check_w
         W_MUST_BE_FROM_8_TO_16 u_error ();
@@ -37,61 +37,76 @@ module arctan_pipelined #(
         STEPS_MUST_BE_AT_LEAST_1 u_error ();
     end
 
-    localparam int TURNS = W < 11 ? W : 6;  // these four as in tables/arctan_rotation.py
+    // made by tables/arctan_rotation.py, not to be edited
+    localparam int TURNS = W == 8 ? 8 : W == 9 ? 9 : W == 10 ? 10 : 6;
     localparam int DIGITS = W == 8 ? 23 : W == 9 ? 27 : W == 10 ? 28 : 22;
-    localparam int HEAD = W == 8 ? 19 : W == 9 ? 22 : W == 10 ? 24 : 26 - W;
     localparam int GUARD = W == 8 ? 12 : W == 9 ? 15 : W == 10 ? 16 : 9;
-    localparam int LEAD = (DIGITS - 11) % 4 + 1;  // digits in the first sum of angles
+    localparam int ROW = 232 * (W - 8);  // one row per W, one signed byte per step
+    // fraction bits of longer after each step, step 0 at the right
+    // (a negative number: integer bits that are dropped)
+    localparam [9*232-1:0] LONGER = {
+        232'h000000000000f4f5f6f7f8f9fafbfcfdfeff0001020203040503010000,  // W = 16
+        232'h000000000000f5f6f7f8f9fafbfcfdfeff000102030304050603010000,  // W = 15
+        232'h000000000000f6f7f8f9fafbfcfdfeff00010203040405060603010000,  // W = 14
+        232'h000000000000f7f8f9fafbfcfdfeff0001020304050506070603010000,  // W = 13
+        232'h000000000000f8f9fafbfcfdfeff000102030405060607080603010000,  // W = 12
+        232'h000000000000f9fafbfcfdfeff00010203040506070708090603010000,  // W = 11
+        232'hfcfdfeff000102030405060708090a0b0c0c0d0e0f100f0a0603010000,  // W = 10
+        232'h00fbfcfdfeff000102030405060708090a0b0b0c0d0e0f0a0603010000,  // W = 9
+        232'h0000000000fcfdfeff00010203040506070809090a0b0c0a0603010000  // W = 8
+    };
+    // fraction bits of shorter after each step
+    localparam [9*232-1:0] SHORTER = {
+        232'h000000000000f4f5f6f7f8f9fafbfcfdfeff0001020304050301000000,  // W = 16
+        232'h000000000000f5f6f7f8f9fafbfcfdfeff000102030405060301000000,  // W = 15
+        232'h000000000000f6f7f8f9fafbfcfdfeff00010203040506060301000000,  // W = 14
+        232'h000000000000f7f8f9fafbfcfdfeff0001020304050607060301000000,  // W = 13
+        232'h000000000000f8f9fafbfcfdfeff000102030405060708060301000000,  // W = 12
+        232'h000000000000f9fafbfcfdfeff00010203040506070809060301000000,  // W = 11
+        232'hfcfdfeff000102030405060708090a0b0c0d0e0f100f0a060301000000,  // W = 10
+        232'h00fbfcfdfeff000102030405060708090a0b0c0d0e0f0a060301000000,  // W = 9
+        232'h0000000000fcfdfeff000102030405060708090a0b0c0a060301000000  // W = 8
+    };
+    // digits whose angles are in the sum after each step
+    localparam [9*232-1:0] SUMMED = {
+        232'h000000000000111111110c0c0c0c0c0808080804040404000000000000,  // W = 16
+        232'h000000000000111111110c0c0c0c0c0808080804040404000000000000,  // W = 15
+        232'h000000000000111111110c0c0c0c0c0808080804040404000000000000,  // W = 14
+        232'h000000000000111111110c0c0c0c0c0808080804040404000000000000,  // W = 13
+        232'h000000000000111111110c0c0c0c0c0808080804040404000000000000,  // W = 12
+        232'h000000000000111111110c0c0c0c0c0808080804040404000000000000,  // W = 11
+        232'h1717171712121212120e0e0e0e0a0a0a0a060606060202020200000000,  // W = 10
+        232'h001616161611111111110d0d0d0d090909090505050501010101000000,  // W = 9
+        232'h0000000000121212120d0d0d0d0d090909090505050501010101000000  // W = 8
+    };
+    // end of the made constants
+
     localparam int LAST = DIGITS + 1;  // the last step
     localparam int LATENCY = (LAST + STEPS - 1) / STEPS;
     localparam int Z = 16 + GUARD;
-
-    // bits behind the point of longer and of shorter when a step is done; step 1 folds, step t
-    // finds digit t - 1
-    function int fraction(input int stage, input bit of_longer);
-        int l, s, l_now;
-        begin
-            l = 1;
-            s = 0;
-            for (int i = 2; i < stage; i++) begin
-                l_now = l;
-                if (i <= TURNS) begin
-                    if (s + 2 * i - 1 > l) l = s + 2 * i - 1;
-                    if (l > HEAD - i - 2) l = HEAD - i - 2;
-                end
-                s = l_now > s - 1 ? l_now : s - 1;
-                if (s > HEAD - i - 1) s = HEAD - i - 1;
-            end
-            if (stage < 2) l = 0;
-            if (stage > TURNS + 1 && l > s) l = s;
-            fraction = of_longer ? l : s;
-        end
-    endfunction
-
-    // digits whose angles are in the sum when this step is done
-    function int summed(input int stage);
-        summed = stage < LEAD + 2 ? 0 : stage > DIGITS - 4 ? DIGITS - 5 : stage > DIGITS - 9 ? DIGITS - 10 : LEAD + (stage - LEAD - 2) / 4 * 4;
-    endfunction
 
     logic [LATENCY-1:0] coming;
     wire  [  LATENCY:0] strobes = {coming, valid};
 
     for (genvar t = 1; t < LAST; t++) begin : g_step
-        localparam int L = fraction(t, 1'b1), L_IN = fraction(t - 1, 1'b1);
-        localparam int S = fraction(t, 1'b0), S_IN = fraction(t - 1, 1'b0);
-        localparam int SUM = summed(t), SUM_IN = summed(t - 1);
-        /* verilator lint_off UNUSEDSIGNAL */           // what no later step needs is left to the synthesis to leave out
-        // turned to the axis it becomes the amplitude
+        localparam int L = 32'($signed(LONGER[ROW+8*t+:8]));
+        localparam int L_IN = 32'($signed(LONGER[ROW+8*(t-1)+:8]));
+        localparam int S = 32'($signed(SHORTER[ROW+8*t+:8]));
+        localparam int S_IN = 32'($signed(SHORTER[ROW+8*(t-1)+:8]));
+        localparam int SUM = 32'(SUMMED[ROW+8*t+:8]);
+        localparam int SUM_IN = 32'(SUMMED[ROW+8*(t-1)+:8]);
+        /* verilator lint_off UNUSEDSIGNAL */  // the synthesis removes what no later step needs
+        // rotated to the axis it becomes the amplitude
         logic [W+L-1:0] longer, longer_q;
-        // 2^(t-2) times what is left across, less 1 (less 1/2 from TURNS + 3 on)
+        // 2^(t-2) times the component across, less 1 (less 1/2 from TURNS + 3 on)
         logic signed [W+S:0] shorter, shorter_q;
-        logic [DIGITS:1] turned, turned_q;  // digits: 1 is a negative one
-        // angle from which, and in which direction, digits count
+        logic [DIGITS:1] turned, turned_q;  // one bit per digit: 1 is a negative one
+        // angle at which the digits start, and their direction
         logic [1:0] quadrant, quadrant_q;
         logic zero, zero_q;  // the sample is (0, 0)
-        logic [Z-1:0] angle, angle_q;  // sum of the angles, half an LSB included
+        logic [Z-1:0] angle, angle_q;  // sum of the angles, including half an LSB
         logic [W:0] size, size_q;  // amplitude in halves
-        // what is to be taken off it for the gain of the turns
+        // to be subtracted from it for the gain of the rotations
         logic [W-2:0] part, part_q;
         /* verilator lint_on UNUSEDSIGNAL */
 
@@ -119,10 +134,10 @@ module arctan_pipelined #(
         end
 
         if (t == 1) begin : g_fold
-            wire [W-1:0] sin_size = sin ^ {W{sin[W-1]}};  // 1 short if negative
+            wire [W-1:0] sin_size = sin ^ {W{sin[W-1]}};  // one too small if negative
             wire [W-1:0] cos_size = cos ^ {W{cos[W-1]}};
             wire steep = 1'(({1'b0, cos_size, cos[W-1]} - {1'b0, sin_size, sin[W-1]}) >> (W + 1));
-            assign longer   = sin_size + W'(sin[W-1]);              // not yet in order
+            assign longer   = sin_size + W'(sin[W-1]);              // not yet sorted
             assign shorter  = {1'b0, cos_size + W'(cos[W-1])};
             assign turned   = {{(DIGITS - 1){1'b0}}, steep ^ sin[W-1] ^ cos[W-1]};
             assign quadrant = {steep ? sin[W-1] : cos[W-1], steep};
@@ -149,8 +164,9 @@ module arctan_pipelined #(
             wire [     W+S:0] x_once = (W + S + 1)'({x, 20'd0} >> (20 + L_IN - S));
             wire              x_half = 1'({x, 20'd0} >> (19 + L_IN - S));
             wire              less = t <= TURNS + 3 ? negative : x_half;
-            assign shorter = (W+S+1)'(({y_twice, 1'b0} - {x_once, less}) >> 1);
-            assign turned  = g_step[t-1].turned_q | {{(DIGITS - 1){1'b0}}, g_step[t-1].turned_q[t-2] ^ negative} << (t - 2);
+            assign shorter = (W + S + 1)'(({y_twice, 1'b0} - {x_once, less}) >> 1);
+            wire [DIGITS-1:0] new_digit = DIGITS'(g_step[t-1].turned_q[t-2] ^ negative);
+            assign turned = g_step[t-1].turned_q | new_digit << (t - 2);
             if (t <= TURNS + 1) begin : g_turn
                 localparam int DOWN = S_IN + 2 * t - 3 - L;
                 wire [W+L-1:0] x_now = (W + L)'({x, 20'd0} >> (20 + L_IN - L));
@@ -186,7 +202,8 @@ module arctan_pipelined #(
         if (t < TURNS + 2) begin : g_turning
             assign size = '0;
             assign part = '0;
-        end else if (t == TURNS + 2) begin : g_part                 // 1 / gain of the turns = 1 - 2^-3 - 2^-6 - 2^-11
+        end else if (t == TURNS + 2) begin : g_part
+            // 1 / gain of the rotations = 1 - 2^-3 - 2^-6 - 2^-11
             assign size = (W+1)'(g_step[t-1].longer_q >> (L_IN - 1));
             assign part = (W-1)'((W-4)'(size >> 6) + (W-4)'(size >> 11));
         end else if (t == TURNS + 3) begin : g_parts
@@ -201,8 +218,9 @@ module arctan_pipelined #(
         end
     end
 
-    wire signed [Z-DIGITS+3:0] rest;
-    wire                       negative = g_step[LAST-1].shorter_q[W+fraction(LAST-1, 1'b0)];
+    wire signed [Z-DIGITS+3:0] last_sum;
+    localparam int S_LAST = 32'($signed(SHORTER[ROW+8*(LAST-1)+:8]));
+    wire negative = g_step[LAST-1].shorter_q[W+S_LAST];
     arctan_rotation_rom #(
         .TURNS(TURNS),
         .FIRST(DIGITS - 4),
@@ -212,9 +230,9 @@ module arctan_pipelined #(
         .negative({
             g_step[LAST-1].turned_q[DIGITS-1] ^ negative, g_step[LAST-1].turned_q[DIGITS-1:DIGITS-4]
         }),
-        .sum(rest)
+        .sum(last_sum)
     );
-    wire [Z-1:0] angle = g_step[LAST-1].angle_q + Z'(rest);
+    wire [Z-1:0] angle = g_step[LAST-1].angle_q + Z'(last_sum);
 
     always_ff @(posedge clk) begin
         coming <= strobes[LATENCY-1:0];

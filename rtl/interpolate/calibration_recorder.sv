@@ -1,35 +1,41 @@
 // SPDX-License-Identifier: Apache-2.0
-// calibration_recorder -- keep a burst of samples or phases at equal times, for the firmware to
-// learn from at its own pace.
+// calibration_recorder -- record a burst of samples or phases at equal intervals, so that the
+// firmware can compute a calibration from it in its own time.
 //
-// latency  full rises 1 clk after the last one kept; word is the first one 2 clk after full, the
-//          next one 2 clk after read; the first one again after the last
-// rate     one sample or phase per clk while it records; one word per 2 clk while it is read
-// model    tb/interpolate/calibration_recorder.py, equal in decimation bit of decimation cycle
+// latency  1 cycle from the last recorded sample to full; 2 cycles from full to the first word and
+//          from read to the next word
+// rate     one sample or phase per cycle while it records; one word per 2 cycles while it is read
+// behaviour After the last word the first one follows again. A new burst overwrites the old one.
+//          phases and decimation must not change while a burst is recorded. Phases are taken
+//          before harmonic_correction.
+// model    tb/interpolate/calibration_recorder.py, equal in every bit of every cycle
+// proved   full is high exactly when DEPTH samples or 2 DEPTH phases have been recorded since
+//          start; nothing is written then; invalid is high exactly when disturbed was high
+//          meanwhile
 // proof    depth 16, W = 8, DEPTH = 2
-// proved   full exactly when DEPTH samples or 2 DEPTH phases have been kept since start; nothing is
-//          written then; invalid exactly when disturbed was up meanwhile
+//
+// A word is {cos, sin} of 16 bits each with full scale 2^15, or {later phase, earlier phase}.
 `default_nettype none
 
 module calibration_recorder #(
-    parameter int W     = 8,    // bits of a sample
+    parameter int W     = 8,    // bits of a sample, 8 to 16
     parameter int DEPTH = 1024  // samples of a burst, half its phases; a power of two
 ) (
-    input wire clk,
-    input wire rst,  // records nothing
-    input wire start,  // strobe: a new burst from the next clk on; the old one is lost
-    input wire phases,  // 1: phases, 0: samples; stands while a burst is recorded
-    input  wire        [15:0]    decimation,     // keep one of so many, the first one at once; 0 is taken as 1; stands meanwhile
-    input wire sampled,  // strobe: sin and cos are new
-    input wire signed [W-1:0] sin,  // as the converter gave them
-    input wire signed [W-1:0] cos,
-    input wire phase_valid,  // strobe: phase is new
-    input wire [15:0] phase,  // before harmonic_correction
-    input wire disturbed,  // level: the signal is not to be learned from
-    input wire read,  // strobe: go on to the next word
-    output logic       [31:0]    word,      // {cos, sin}, 16 bits each, full scale 2^15; or {later phase, earlier phase}
-    output logic full,  // level: the burst is complete
-    output logic invalid  // level: disturbed has been up since start
+    input  wire                clk,
+    input  wire                rst,          // level: recording stops, the burst is lost
+    input  wire                start,        // strobe: record a new burst from the next cycle on
+    input  wire                phases,       // level: 1: record phases, 0: samples
+    input  wire        [ 15:0] decimation,   // keep one in this many, the first too; 0 acts as 1
+    input  wire                sampled,      // strobe: sin and cos are new
+    input  wire signed [W-1:0] sin,          // counts of the ADC, full scale = 2^(W-1)
+    input  wire signed [W-1:0] cos,          // counts of the ADC, full scale = 2^(W-1)
+    input  wire                phase_valid,  // strobe: phase is new
+    input  wire        [ 15:0] phase,        // 2^-16 period
+    input  wire                disturbed,    // level: the signal is not fit for a calibration
+    input  wire                read,         // strobe: go on to the next word
+    output logic       [ 31:0] word,         // two samples or two phases of 16 bits
+    output logic               full,         // level: the burst is complete
+    output logic               invalid       // level: disturbed was high during the burst
 );
     if (W < 8 || W > 16) begin : g_check_w
         W_MUST_BE_FROM_8_TO_16 u_error ();
@@ -42,9 +48,9 @@ module calibration_recorder #(
 
     logic [31:0] burst     [0:DEPTH-1];
     logic        recording;
-    logic [A-1:0] kept, next;  // words kept, the word to be read
-    logic [15:0] left;  // strobes to pass over
-    logic        half;  // the earlier phase of a word waits
+    logic [A-1:0] kept, next;  // words recorded; address of the word to be read
+    logic [15:0] left;  // strobes to skip
+    logic        half;  // the earlier phase of a word has been recorded
     logic [15:0] earlier;
 
     wire         strobe = phases ? phase_valid : sampled;
@@ -96,13 +102,13 @@ module calibration_recorder #(
 
 `ifdef FORMAL
     logic         past = 1'b0;
-    (* anyconst *)logic         lawful;  // which of the two is recorded
-    logic [A+1:0] count;  // halves of a word kept since start
+    (* anyconst *)logic         of_phases;  // phases are recorded, not samples
+    logic [A+1:0] count;  // halves of words recorded since start
     logic         seen;  // disturbed since start
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
-        assume (phases == lawful);
+        assume (phases == of_phases);
         count <= rst || start ? '0 : count + (due ? (A + 2)'(2 - 32'(phases)) : '0);
         seen  <= rst || start ? 1'b0 : seen || (recording && disturbed);
         if (past) begin

@@ -1,42 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
-// fringe_tracker -- the signed step from phase to phase, its whole periods found by foreseeing the
-// next phase.
+// fringe_tracker -- compute the signed step from phase to phase, including whole periods, by
+// predicting the next phase.
 //
-// latency  1 clk from valid to done, no lag in the step
-// rate     one phase per clk
-// method   The tracker predicts that the last step comes again. Less than a quarter period from
-//          that: the step, at any speed below a period a sample.
-// strays   Farther away it is an overspeed. The step still ends on the phase, and the next phase is
-//          awaited where it would be without this one, so one bad sample costs nothing but itself
-//          (below a quarter period a sample; proved there). A second one in a row, or a step of a
-//          period or more: the nearest step is taken, from then on as from standstill; whole
-//          periods may then be lost, and the overspeed says so.
-// source   S0 limit filter 2 (a count is held against the one before it), with the speed in the
-//          prediction
+// latency  1 cycle from valid to done; the step itself has no lag
+// rate     one phase per cycle
+// method   The tracker predicts that the last step is repeated. A phase less than a quarter period
+//          from the prediction gives the step, at any speed below one period per sample. A phase
+//          farther away is an overspeed: the step still ends on the phase, but an outlier does not
+//          update the prediction, so one bad sample affects nothing but itself (below a quarter
+//          period per sample; proved there). At a second outlier in a row, or a step of a period
+//          or more, the nearest step is taken, and tracking continues from there as from
+//          standstill; whole periods may then be lost, which overspeed reports.
+// source   S0 limit filter 2 (a count is compared with its predecessor), with the speed added to
+//          the prediction
 // model    tb/interpolate/fringe_tracker.py, equal in every bit of every cycle
+// proved   modulo a period the step is the phase less the preceding phase; without overspeed it is
+//          less than a quarter period from the predicted step; at any constant speed below a
+//          quarter period per sample, one bad sample in four moves nothing
 // proof    depth 6
-// proved   modulo a period the step is the phase less the phase before; without overspeed it is
-//          less than a quarter period from the one predicted_step; at any constant speed below a
-//          quarter period a sample, one bad sample in four moves nothing
 `default_nettype none
 
 module fringe_tracker (
-    input wire clk,
-    input wire rst,  // forgets the phase; the next one is the first, with step 0
-    input wire valid,  // strobe: phase is new
-    input wire [15:0] phase,  // one signal period = 2^16
-    output logic done,  // strobe: step is new
-    output logic signed [16:0] step,  // 2^-16 period since the phase before
-    output logic [15:0] phase_out,  // the phase that step leads to; stands until the next
-    output logic                 overspeed  // strobe, with done: a quarter period or more from where it was expected
+    input  wire                clk,
+    input  wire                rst,        // level: the phase is forgotten; the next one has step 0
+    input  wire                valid,      // strobe: phase is new
+    input  wire         [15:0] phase,      // 2^-16 period
+    output logic               done,       // strobe: step is new
+    output logic signed [16:0] step,       // 2^-16 period since the preceding phase
+    output logic        [15:0] phase_out,  // 2^-16 period: the phase after step; held until done
+    output logic               overspeed   // strobe, with done: a quarter period or more off
 );
     localparam signed [15:0] QUARTER = 16'sd16384;
 
     logic started, outlier;  // outlier: the last phase was an overspeed
-    // predicted_phase: the phase that is predicted_step
+    // predicted_phase = last + predicted_step
     logic [15:0] last, predicted_phase;
-    logic signed [16:0] speed;  // step per sample, of the samples that did not stray
-    // step: speed, or what leads back to the line after a stray one
+    logic signed [16:0] speed;  // step per sample, without outliers
+    // speed, or after an outlier the step that leads back to the line
     logic signed [17:0] predicted_step;
 
     wire signed  [15:0] deviation = $signed(phase - predicted_phase);
@@ -107,58 +107,65 @@ module fringe_tracker (
         end
     end
 
-    // a scale that moves by `increment` a sample, seen with now and then a bad sample: three good
-    // ones at least in between
+    // A scale moves by `increment` per sample; now and then a sample is bad, with at least three
+    // good ones in between.
     (* anyconst *)logic signed [16:0] increment;
-    (* anyconst *)logic               lawful;  // 0: any phase may come
+    (* anyconst *)logic               modelled;  // the phases follow this model; 0: any
     (* anyseq *)logic               bad;
-    // where the scale will be at the next sample; the sum of the steps
+    // position of the scale at the next sample; sum of the steps
     logic signed [23:0] scale, seen;
-    // samples since the last bad one, up to 3; since reset, up to 2: phase and speed are known
-    logic [1:0] good, settled;
+    // samples since the last bad one, up to 3; samples since reset, up to 2
+    logic [1:0] good, samples;
     wire signed [23:0] sum = done ? seen + 24'(step) : seen;
     wire signed [23:0] away = sum - (scale - 24'(increment));
-    // what a bad sample that did not stray left in the speed
+    // error of speed left by a bad sample that was no outlier
     wire signed [23:0] drag = 24'(speed) - 24'(increment);
     always @(posedge clk) begin
-        if (lawful) begin
+        if (modelled) begin
             assume (increment > -17'sd16384 && increment < 17'sd16384);
-            if (bad) assume (good == 3 && settled == 2);
+            if (bad) assume (good == 3 && samples == 2);
             if (valid && !bad) assume (phase == scale[15:0]);
         end
         if (done) seen <= sum;
         if (valid) begin
             scale   <= scale + 24'(increment);
             good    <= bad ? 2'd0 : good == 3 ? 2'd3 : good + 1'b1;
-            settled <= settled == 2 ? 2'd2 : settled + 1'b1;
+            samples <= samples == 2 ? 2'd2 : samples + 1'b1;
         end
         if (rst) begin
             scale   <= '0;
             seen    <= '0;
             good    <= 2'd3;
-            settled <= '0;
+            samples <= '0;
         end
-        if (past && lawful) begin
-            // the claim; what follows only leads to it
-            if (settled != 0 && good != 0) assert (away == 0);
-            assert (started == (settled != 0) && settled <= 2);
-            if (started)
+        if (past && modelled) begin
+            // the claim; the further assertions only make it inductive
+            if (samples != 0 && good != 0) assert (away == 0);
+            assert (started == (samples != 0) && samples <= 2);
+            if (started) begin
                 assert (sum[15:0] == last);
-                else assert (sum == 0 && scale == 0);
-            if (settled < 2)
+            end else begin
+                assert (sum == 0 && scale == 0);
+            end
+            if (samples < 2) begin
                 assert (!outlier && speed == 0 && predicted_step == 0 && good == 3);
-                else
-                    case (good)
-                        0: if (outlier) assert (speed == increment && 24'(predicted_step) == 24'(increment) - away && away >= -32768 && away < 32768);
-                   else assert (drag == away && predicted_step == 18'(speed) && away > -16384 && away < 16384);
-                        1: if (outlier) assert (24'(predicted_step) == 24'(increment) + drag + drag + drag && drag > -16384 && drag < 16384
-                                        && (drag >= 8192 || drag <= -8192));
-                   else assert (predicted_step == 18'(speed) && drag > -8192 && drag < 8192);
-                        2: assert (!outlier && predicted_step == 18'(speed) && (speed == increment || speed == 0));
-                        default: assert (!outlier && predicted_step == 18'(speed) && speed == increment);
-                    endcase
+            end else if (good == 0 && outlier) begin
+                assert (speed == increment && 24'(predicted_step) == 24'(increment) - away);
+                assert (away >= -32768 && away < 32768);
+            end else if (good == 0) begin
+                assert (drag == away && predicted_step == 18'(speed));
+                assert (away > -16384 && away < 16384);
+            end else if (good == 1 && outlier) begin
+                assert (24'(predicted_step) == 24'(increment) + drag + drag + drag);
+                assert (drag > -16384 && drag < 16384 && (drag >= 8192 || drag <= -8192));
+            end else if (good == 1) begin
+                assert (predicted_step == 18'(speed) && drag > -8192 && drag < 8192);
+            end else begin
+                assert (!outlier && predicted_step == 18'(speed));
+                assert (speed == increment || (good == 2 && speed == 0));
+            end
         end
-        cover (past && lawful && good == 0 && outlier && increment == 17'sd1000);
+        cover (past && modelled && good == 0 && outlier && increment == 17'sd1000);
     end
 `endif
 endmodule

@@ -1,31 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
-// signal_correction -- take offset, gain and phase error off a sine and a cosine sample: an ellipse
-// becomes a circle.
+// signal_correction -- remove offset, gain and phase error from a sine and a cosine sample: an
+// ellipse becomes a circle.
 //
-// latency  3 clk from valid to done
-// rate     one sample per clk
+// latency  3 cycles from valid to done
+// rate     one sample per cycle
+// behaviour Both outputs have half the size of the inputs, so a corrected channel may be larger
+//          than full scale; what is still too large saturates.
 // source   Heydemann, Appl. Opt. 20 (1981) 3382: cos' = cos - cos_offset, sin' = gain (sin -
-//          sin_offset) + quadrature_error cos'. Both come out at half the size, so that a corrected
-//          channel may be larger than full scale; what is still too large is held
+//          sin_offset) + quadrature_error cos'
 // model    tb/interpolate/signal_correction.py, equal in every bit of every cycle
 `default_nettype none
 
 module signal_correction #(
-    parameter int W = 8  // bits of a sample
+    parameter int W = 8  // bits of a sample, 8 to 16
 ) (
-    input wire clk,
-    input wire rst,  // nothing is corrected until load
-    input wire load,  // strobe: take the four settings, for the samples from this clk on
-    input wire signed [15:0] sin_offset,  // full scale = 2^15
-    input wire signed [15:0] cos_offset,  // full scale = 2^15
-    input wire [16:0] gain,  // 1.0 = 2^16
-    input wire signed [16:0] quadrature_error,  // 1.0 = 2^16
-    input wire valid,  // strobe: sin and cos are a new sample
-    input wire signed [W-1:0] sin,  // full scale = 2^(W-1)
-    input wire signed [W-1:0] cos,
-    output logic done,  // strobe: sin_out and cos_out are new
-    output logic signed [15:0] sin_out,  // full scale of sin = 2^14
-    output logic signed [15:0] cos_out
+    input  wire                 clk,
+    input  wire                 rst,               // level: nothing is corrected until load
+    input  wire                 load,              // strobe: use the settings from this cycle on
+    input  wire signed  [ 15:0] sin_offset,        // full scale = 2^15
+    input  wire signed  [ 15:0] cos_offset,        // full scale = 2^15
+    input  wire         [ 16:0] gain,              // factor, 1.0 = 2^16
+    input  wire signed  [ 16:0] quadrature_error,  // factor, 1.0 = 2^16
+    input  wire                 valid,             // strobe: sin and cos are a new sample
+    input  wire signed  [W-1:0] sin,               // counts, full scale = 2^(W-1)
+    input  wire signed  [W-1:0] cos,               // counts, full scale = 2^(W-1)
+    output logic                done,              // strobe: sin_out and cos_out are new
+    output logic signed [ 15:0] sin_out,           // full scale of sin = 2^14
+    output logic signed [ 15:0] cos_out            // full scale of cos = 2^14
 );
     if (W < 8 || W > 16) begin : g_check
         W_MUST_BE_FROM_8_TO_16 u_error ();
@@ -44,6 +45,8 @@ module signal_correction #(
     wire signed [35:0] sum = 36'(sin_part) + 36'(cos_part) + 36'sd65536;
     wire signed [18:0] sin_half = 19'(sum >>> 17);  // rounded
     wire signed [16:0] cos_half = 17'((18'(cos_kept) + 18'sd1) >>> 1);
+    wire               sin_fits = sin_half[18:15] == {4{sin_half[18]}};
+    wire               cos_fits = cos_half[16] == cos_half[15];
 
     always_ff @(posedge clk) begin
         centred    <= valid;
@@ -59,8 +62,8 @@ module signal_correction #(
             cos_kept <= cos_channel;
         end
         if (multiplied) begin
-            sin_out <= sin_half[18:15] == {4{sin_half[18]}} ? sin_half[15:0] : {sin_half[18], {15{!sin_half[18]}}};
-            cos_out <= cos_half[16] == cos_half[15] ? cos_half[15:0] : {cos_half[16], {15{!cos_half[16]}}};
+            sin_out <= sin_fits ? sin_half[15:0] : {sin_half[18], {15{!sin_half[18]}}};
+            cos_out <= cos_fits ? cos_half[15:0] : {cos_half[16], {15{!cos_half[16]}}};
         end
         if (load) begin
             sin_centre <= sin_offset;

@@ -1,34 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
-// count_phase_check -- hold the interpolated position against the x4 count of the same signals: a
-// lost fringe shows.
+// count_phase_check -- compare the interpolated position with the x4 count of the same signals, so
+// that a lost fringe is detected.
 //
-// latency  3 clk from valid to disagreement
-// rate     one position per clk
-// limit    must cover the quarter period between two counts, the offset of the two comparators, and
-//          twice the way that is covered while the deglitchers hold an edge back: the count lags
-//          one way going up and the other going down
-// learns   the constant between the two at the first position after reset, while limit is 0, and at
-//          the next position after a shift by 0 periods. A shift by other periods is taken along
+// latency  3 cycles from valid to disagreement
+// rate     one position per cycle
+// behaviour The constant difference between position and count is learned from the first position
+//          after reset, from every position while limit is 0, and from the next position after a
+//          shift by 0 periods. A shift by any other number of periods is added to the constant
 //          exactly: moving the origin hides no disagreement.
-// source   S0: fringe count and arctan come from the same two photo-receivers
+// limits   `limit` must cover the quarter period between two counts, the offset of the two
+//          comparators, and twice the distance travelled while the deglitchers delay an edge: the
+//          count lags that distance in each direction.
+// source   S0: the fringe count and the arctangent come from the same two photodetectors
 // model    tb/position/count_phase_check.py, equal in every bit of every cycle
-// proved   no disagreement while limit is 0, nor from any shift
+// proved   there is no disagreement while limit is 0, and no shift ever causes one
 `default_nettype none
 
 module count_phase_check (
-    input wire clk,
-    input wire rst,  // disagreement falls, the next position is learnt
-    input wire [19:0] limit,  // 2^-16 period; 0: not checked
-    input wire valid,  // strobe: position is that of a new sample
+    input  wire               clk,
+    input  wire               rst,            // level: clears disagreement, learns the constant
+    input  wire        [19:0] limit,          // 2^-16 period; 0: not checked
+    input  wire               valid,          // strobe: position belongs to a new sample
     /* verilator lint_off UNUSEDSIGNAL */  // the count has no more than 46 bits to compare with
-    input wire signed [47:0] position,  // Q32.16 periods
+    input  wire signed [47:0] position,       // Q32.16 periods
     /* verilator lint_on UNUSEDSIGNAL */
-    input wire signed [31:0] count,  // 1/4 period, wraps
-    input wire shift,  // strobe: position grows by shift_periods in the next clk
-    input wire signed [31:0] shift_periods,  // periods; 0: learn anew
-    output logic disagreement  // level: they differ by more than limit
+    input  wire signed [31:0] count,          // 1/4 period, wraps
+    input  wire               shift,          // strobe: shift_periods is added in the next cycle
+    input  wire signed [31:0] shift_periods,  // periods; 0: learn the constant again
+    output logic              disagreement    // level: the two differ by more than limit
 );
-    localparam int D = 46;  // bits of the difference: the count wraps at 2^32 / 4 periods
+    localparam int D = 46;  // bits of the difference; the count wraps at 2^32 / 4 periods
 
     logic known, measured, compared;
     logic signed [D-1:0] between, constant, difference;
@@ -56,20 +57,16 @@ module count_phase_check (
     end
 
 `ifdef FORMAL
-    (* anyconst *)logic still;  // nothing moves but the origin
-    logic past = 1'b0;
+    (* anyconst *)logic              still;  // only the origin moves
+    wire signed [47:0] by = shift ? $signed({shift_periods, 16'b0}) : 48'sd0;
+    wire signed [47:0] next_position = position + by;
+    logic              past = 1'b0;
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
         if (past && still) begin
             assume (count == $past(count));
-            assume (position == $past(
-                position
-            ) + ($past(
-                shift
-            ) ? $signed(
-                {$past(shift_periods), 16'b0}
-            ) : 48'sd0));
+            assume (position == $past(next_position));
         end
         if (past) begin
             if ($past(limit) == 0) assert (!disagreement);

@@ -1,67 +1,67 @@
 // SPDX-License-Identifier: Apache-2.0
-// position_compare -- a pulse at each of the points start + k * step, k = 0, 1, 2 …, passed in the
-// direction of step.
+// position_compare -- make a pulse at each of the points start + k * step, k = 0, 1, 2, …, passed
+// in the direction of step.
 //
-// latency  3 clk from valid to pulse
-// rate     one position per clk, one pulse per pulse_length
-//          + gap_length clk
-// armed    from the clk after arm until `count` points are passed, or disarm. The first point
-//          counts only after a position before it was seen: what lies behind at the start makes no
-//          burst
-// passed   once a position has reached the next point or gone beyond. Only the next point is looked
-//          at and the farthest position is kept: going back and forth over a point passes it once,
-//          and a step over many points passes them all
-// crowded  points that are reached while a pulse or its gap is still running are passed one by one
-//          as soon as it has ended, in order, none left out: pulses then stand exactly gap_length
-//          apart, and each that had to wait is told by late
-// shift    the points stay where they are on the scale
+// latency  3 cycles from valid to pulse
+// rate     one position per cycle; one pulse per pulse_length + gap_length cycles
+// behaviour The comparator is armed from the cycle after arm until `count` points are passed, or
+//          until disarm. The first point counts only after a position before it has been seen, so
+//          points behind the start cause no burst of pulses. A point is passed when a position
+//          reaches it or goes beyond. Only the next point is compared, and with the farthest
+//          position so far: moving to and fro over a point passes it once, and a step over many
+//          points passes them all. Points that are reached during a pulse or its gap are passed
+//          one by one, in order and without omission, as soon as it has ended: such pulses are
+//          exactly gap_length apart, and each of them is reported by late. With step = 0 there is
+//          one point, passed upwards. A shift of the origin leaves the points where they are on
+//          the scale.
 // model    tb/position/position_compare.py, equal in every bit of every cycle
+// proved   the numbers of pulses and of points passed are always equal; a pulse begins only when
+//          the farthest position has reached its point, and at once unless another pulse or gap is
+//          running; every pulse has its length and at least its gap after it, whatever the lengths
+//          are and whenever they change: the lengths in force are those at the start of the pulse
+//          and at the start of its gap
 // proof    depth 16
-// proved   pulses and points passed are equal in number for ever; a pulse begins only when the
-//          farthest position has reached its point, and begins at once then unless one is running;
-//          every pulse has its length and at least its gap behind it, whatever the lengths are and
-//          whenever they change: those count that stood as the pulse, or its gap, began
 `default_nettype none
 
 module position_compare (
-    input wire clk,
-    input wire rst,  // disarmed, pulse falls
-    input wire signed [47:0] start,  // Q32.16 periods; taken by arm
-    input  wire signed [47:0]    step,          // Q32.16 periods, its sign is the direction; 0: one point, passed upwards
-    input wire [31:0] count,  // points; 0: no end; taken by arm, as step
-    input wire [23:0] pulse_length,  // clk; 0 acts as 1
-    input wire [23:0] gap_length,  // clk that pulse is low at least; 0 acts as 1
-    input wire arm,  // strobe: begin with the first point
-    input wire disarm,  // strobe: no more points; a pulse under way ends at its time
-    input wire valid,  // strobe: position is new
-    input wire signed [47:0] position,  // Q32.16 periods
-    input wire shift,  // strobe: position grows by shift_periods in the next clk
-    input wire signed [31:0] shift_periods,  // periods
-    output logic armed,  // level: there are points to come
-    output logic pulse,  // level
-    output logic                 late,          // strobe, with the first clk of a pulse that had to wait for the one before it
-    output logic [31:0] passed  // points since arm, wraps
+    input  wire               clk,
+    input  wire               rst,            // level: disarmed, pulse is low
+    input  wire signed [47:0] start,          // Q32.16 periods, the first point; taken by arm
+    input  wire signed [47:0] step,           // Q32.16 periods, signed; taken by arm
+    input  wire        [31:0] count,          // points; 0: no end; taken by arm
+    input  wire        [23:0] pulse_length,   // cycles; 0 acts as 1
+    input  wire        [23:0] gap_length,     // cycles that pulse is low, at least; 0 acts as 1
+    input  wire               arm,            // strobe: begin with the first point
+    input  wire               disarm,         // strobe: no more points after this pulse
+    input  wire               valid,          // strobe: position is new
+    input  wire signed [47:0] position,       // Q32.16 periods
+    input  wire               shift,          // strobe: shift_periods is added in the next cycle
+    input  wire signed [31:0] shift_periods,  // periods
+    output logic              armed,          // level: there are points to come
+    output logic              pulse,          // level: the output pulse
+    output logic              late,           // strobe, with the start of a delayed pulse
+    output logic       [31:0] passed          // points passed since arm, wraps
 );
     logic        [31:0] origin;  // periods that the origin has moved since reset
-    logic               arrived;  // here is new
-    // position from the origin of the reset; as all below mirrored if step is
+    logic               arrived;  // `here` is new
+    // The position relative to the origin at reset. It and all below are mirrored if step is
+    // negative, so that the points always lie upwards.
     logic signed [47:0] here;
-    // negative, so that the way of the points is always
-    // up
-    // reach is a position; it began before the first point
+    // reach is valid: a position before the first point was seen
     logic               ready;
-    logic signed [47:0] reach, point, stride;  // farthest position; the next point; size of step
-    logic down, single;  // step is negative, 0
-    // points to come, less one; wraps from 0, which is no end
+    // farthest position; the next point; magnitude of step
+    logic signed [47:0] reach, point, stride;
+    logic down, single;  // down: step is negative; single: step is 0
+    // points to come, less one; a count of 0 (no end) wraps
     logic [31:0] left;
     logic        endless;
-    // the gap after a pulse; the point was reached before pulse was free
+    // resting: the gap after a pulse; waited: the point had to wait for it
     logic resting, waited;
-    logic [23:0] timer;  // clk left of pulse or gap, less one
+    logic [23:0] timer;  // cycles left of the pulse or gap, less one
 
     /* verilator lint_off UNUSEDSIGNAL */  // of a distance only its sign counts
     wire  [47:0] beyond = reach - point;  // negative: not reached
-    wire  [47:0] ahead = here - point;  // of here
+    wire  [47:0] ahead = here - point;  // the same for the present position
     wire  [47:0] farther = here - reach;
     /* verilator lint_on UNUSEDSIGNAL */
     wire         due = armed && ready && !beyond[47];
@@ -127,11 +127,11 @@ module position_compare (
 
 `ifdef FORMAL
     logic        past = 1'b0;
-    logic        high;  // pulse one clk ago
-    logic [31:0] pulses;  // that began since arm
-    // clk that pulse has stood before this one, low_for stops at its end
+    logic        high;  // pulse in the preceding cycle
+    logic [31:0] pulses;  // pulses begun since arm
+    // cycles that pulse has been high or low before this one; low_for saturates
     logic [23:0] high_for, low_for;
-    // lengths as the pulse, as its gap began; 0 acts as 1
+    // lengths in force at the start of the pulse and of its gap; 0 acts as 1
     logic [23:0] pulse_taken, gap_taken;
     wire        rises = pulse && !high;
     wire [31:0] pulses_now = pulses + 32'(rises);
@@ -151,19 +151,23 @@ module position_compare (
             assert (gap_taken != 0 && (!pulse || pulse_taken != 0));
             if (high && !pulse) assert (high_for == pulse_taken);
             if (rises) assert (low_for >= gap_taken);
-            if (pulse)
-                assert (timer < pulse_taken && high_for == pulse_taken - 1'b1 - timer && high == (high_for != 0));
-                else
-                    assert (resting ? timer < gap_taken && low_for == gap_taken - 1'b1 - timer : low_for >= gap_taken);
+            if (pulse) begin
+                assert (timer < pulse_taken && high_for == pulse_taken - 1'b1 - timer);
+                assert (high == (high_for != 0));
+            end else if (resting) begin
+                assert (timer < gap_taken && low_for == gap_taken - 1'b1 - timer);
+            end else begin
+                assert (low_for >= gap_taken);
+            end
         end
         if (past && !$past(rst)) begin
             if (rises) begin
-                // its point had been reached
+                // the point of the pulse had been reached
                 assert ($past(armed) && $past(ready) && !$past(beyond[47]));
                 assert (point == $past(point) + $past(stride) && passed == $past(passed) + 1);
             end
             if ($past(due) && !$past(busy) && !$past(arm) && !$past(disarm)) assert (rises);
-            // reach never comes back
+            // reach never moves back
             if ($past(ready) && ready && !$past(arm)) begin
                 assert (!(48'(reach - $past(reach)) >> 47));
             end

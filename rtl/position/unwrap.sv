@@ -2,35 +2,34 @@
 // unwrap -- add up steps to a position whose fraction is always the phase; its origin moves by
 // whole periods only.
 //
-// latency  1 clk from valid, shift to position
-// rate     one step and one shift per clk, also both
-//          at once
-// start    position is 0 until the first phase after reset, then that phase; its step is not looked
-//          at
-// source   S0: fringes counted by a reversible counter, the phase between them from the arctan
+// latency  1 cycle from valid or shift to position
+// rate     one step and one shift per cycle, also both at once
+// behaviour The position is 0 until the first phase after reset; then it is that phase, and the
+//          first step is ignored. step must equal the change of phase modulo one period.
+// source   S0: a reversible counter counts the fringes, and the arctangent gives the phase between
+//          them
 // model    tb/position/unwrap.py, equal in every bit of every cycle
 // proved   the fraction is the last phase; a step moves the position by itself and a shift by its
 //          periods, also both at once
 `default_nettype none
 
 module unwrap (
-    input wire clk,
-    input wire rst,  // position becomes 0, the next phase is the first
-    input wire valid,  // strobe: step leads to phase
-    input wire signed [16:0] step,  // 2^-16 period; equal to the change of phase modulo a period
-    input wire [15:0] phase,  // 2^-16 period; the fraction of position from now on
-    input wire shift,  // strobe: move the origin
-    input wire signed [31:0] shift_periods,  // position grows by this many periods
-    output logic done,  // strobe: position is that of a new phase; no strobe for a shift alone
-    output logic signed [47:0] position  // Q32.16 periods, wraps
+    input  wire                clk,
+    input  wire                rst,            // level: position 0, the next phase is the first
+    input  wire                valid,          // strobe: step and phase are new
+    input  wire signed  [16:0] step,           // 2^-16 period; the change of phase
+    input  wire         [15:0] phase,          // 2^-16 period; becomes the fraction of position
+    input  wire                shift,          // strobe: move the origin
+    input  wire signed  [31:0] shift_periods,  // periods that are added to position
+    output logic               done,           // strobe: position belongs to a new phase
+    output logic signed [47:0] position        // Q32.16 periods, wraps
 );
-    logic started;
+    logic               started;
     logic signed [31:0] periods;
-    logic [15:0] fraction;
+    logic        [15:0] fraction;
 
-    wire signed [31:0] carry = started && valid ? (32'(step) + $signed(
-        {16'b0, fraction}
-    )) >>> 16 : 32'sd0;
+    wire signed  [31:0] moved = 32'(step) + $signed({16'b0, fraction});
+    wire signed  [31:0] carry = started && valid ? moved >>> 16 : 32'sd0;
 
     assign position = {periods, fraction};
 
@@ -50,8 +49,12 @@ module unwrap (
     end
 
 `ifdef FORMAL
-    logic        past = 1'b0;
-    logic [15:0] last;  // the phase that came last
+    wire signed [31:0] by = shift ? shift_periods : 32'sd0;
+    wire signed [31:0] shifted_periods = periods + by;
+    wire signed [47:0] stepped_position = position + (valid ? 48'(step) : 48'sd0);
+    wire signed [47:0] moved_position = stepped_position + $signed({by, 16'b0});
+    logic              past = 1'b0;
+    logic       [15:0] last;  // the last phase
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
@@ -61,26 +64,11 @@ module unwrap (
         if (past) assert (position[15:0] == last);
         if (past && !$past(rst)) begin
             assert (done == $past(valid));
-            if ($past(started))
-                assert (position == $past(
-                    position
-                ) + ($past(
-                    valid
-                ) ? 48'($past(
-                    step
-                )) : 48'sd0) + ($past(
-                    shift
-                ) ? $signed(
-                    {$past(shift_periods), 16'b0}
-                ) : 48'sd0));
-                else
-                    assert (position[47:16] == $past(
-                        position[47:16]
-                    ) + ($past(
-                        shift
-                    ) ? $past(
-                        shift_periods
-                    ) : 32'sd0));
+            if ($past(started)) begin
+                assert (position == $past(moved_position));
+            end else begin
+                assert (position[47:16] == $past(shifted_periods));
+            end
             cover (position == 48'sh0003_8000 && done && $past(shift) && $past(step) < 0);
             cover (position < 0 && !$past(shift));
         end

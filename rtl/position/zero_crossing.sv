@@ -1,28 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
-// zero_crossing -- say when the position passes its absolute zero, and which way.
+// zero_crossing -- report when the position passes its zero, and in which direction.
 //
-// latency  1 clk from valid to up, down
-// rate     one position per clk
-// source   S0: the borrow of the last decade interrupts the 8031 at every pass of the absolute zero
-// shift    the position that stands in the clk after a shift is only learnt: moving the origin is
-//          no crossing
+// latency  1 cycle from valid to up, down
+// rate     one position per cycle
+// behaviour The position in the cycle after a shift is only taken as the new reference: moving the
+//          origin is no crossing.
+// source   S0: the borrow of the last decade interrupts the 8031 at every pass of the absolute
+//          zero
 // model    tb/position/zero_crossing.py, equal in every bit of every cycle
-// proved   never up and down at once; without a shift they come by turns; none from a shift, nor
-//          where the position wraps
+// proved   up and down are never reported at once; without a shift they alternate; neither a shift
+//          nor the wrap of the position causes one
 `default_nettype none
 
 module zero_crossing (
-    input wire clk,
-    input wire rst,  // the next position is only learnt
-    input wire valid,  // strobe: position is new
-    /* verilator lint_off UNUSEDSIGNAL */  // the sign and the bit below it tell all; the port is the whole stream
-    input wire signed [47:0] position,  // Q32.16 periods
+    input  wire               clk,
+    input  wire               rst,       // level: the next position is only taken as reference
+    input  wire               valid,     // strobe: position is new
+    /* verilator lint_off UNUSEDSIGNAL */  // only the two top bits matter
+    input  wire signed [47:0] position,  // Q32.16 periods
     /* verilator lint_on UNUSEDSIGNAL */
-    input wire shift,  // strobe: the position will be of another origin in the next clk
-    output logic up,  // strobe: from below 0 to 0 or above
-    output logic down  // strobe: from 0 or above to below 0
+    input  wire               shift,     // strobe: the origin moves in the next cycle
+    output logic              up,        // strobe: position went from below 0 to 0 or above
+    output logic              down       // strobe: position went from 0 or above to below 0
 );
-    // known: below is that of a position; shifted: the clk after a shift
+    // known: below is the sign of a position; shifted: the cycle after a shift
     logic known, below, shifted;
 
     wire near_above = position[47:46] == 2'b00;  // not where the position wraps

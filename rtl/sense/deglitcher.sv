@@ -1,27 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-// deglitcher -- let a level change only after it has stood still for a set time, and report what
-// came back too soon.
+// deglitcher -- let a level change only after it has been stable for a set time, and report shorter
+// pulses.
 //
-// latency  `stable_cycles` clk from level to filtered, 1 clk for stable_cycles = 0; 1 clk while it
-//          settles after reset
-// rate     pulses of `stable_cycles` clk and longer pass, shorter ones never do
+// latency  `stable_cycles` cycles from level to filtered; 1 cycle for stable_cycles = 0 and during
+//          start-up after reset
+// rate     pulses of `stable_cycles` cycles and longer pass, shorter ones never do
 // source   S0: a monostable longer than a noise spike and shorter than a data pulse; S2: N equal
 //          samples in a row
 // model    tb/sense/deglitcher.py, equal in every bit of every cycle
-// proved   a change passes only after `stable_cycles` equal clk, at once then, and never sooner
-//          after the change before it
+// proved   a change passes only after `stable_cycles` equal cycles, then passes at once, and never
+//          sooner than that after the preceding change
 `default_nettype none
 
 module deglitcher #(
-    parameter int W = 16,  // bits of stable_cycles
-    parameter int SETTLE = 4                // clk after reset in which filtered follows level: synchronisers fill meanwhile
+    parameter int W      = 16,  // bits of stable_cycles
+    parameter int SETTLE = 4    // cycles after reset in which filtered follows level
 ) (
-    input wire clk,
-    input wire rst,  // filtered follows level, nothing is reported
-    input  wire  [W-1:0] stable_cycles,            // clk in a row that level must differ; 0 is taken as 1; new values act at once
-    input wire level,  // synchronous to clk
-    output logic filtered,  // level without its short pulses
-    output logic rejected  // strobe: level changed and came back before its time
+    input  wire          clk,
+    input  wire          rst,            // level: filtered follows level, nothing is reported
+    input  wire  [W-1:0] stable_cycles,  // cycles that level must differ; 0 acts as 1; acts at once
+    input  wire          level,          // level, synchronous to clk
+    output logic         filtered,       // level: without pulses that are too short
+    output logic         rejected        // strobe: level changed back too early
 );
     if (W < 1) begin : g_check_w
         W_MUST_BE_AT_LEAST_1 u_error ();
@@ -32,8 +32,8 @@ module deglitcher #(
 
     localparam int S = $clog2(SETTLE + 1);
 
-    logic [S-1:0] settle;  // clk left of settling
-    // clk in a row that level has differed; below stable_cycles, so it cannot overflow
+    logic [S-1:0] settle;  // cycles left of the start-up
+    // cycles in a row that level has differed; below stable_cycles, so it cannot overflow
     logic [W-1:0] age;
 
     wire          differs = level ^ filtered;
@@ -57,7 +57,7 @@ module deglitcher #(
             settle   <= S'(SETTLE);
             age      <= '0;
             rejected <= 1'b0;
-            // who is reset together with this block never sees a made-up edge
+            // a block that is reset together with this one never sees a false edge
             filtered <= level;
         end
     end
@@ -65,25 +65,25 @@ module deglitcher #(
 `ifdef FORMAL
     logic       past = 1'b0;
     logic       level_q;
-    // clk in a row, up to the last one, that level was level_q
+    // cycles in a row, up to the last one, in which level was level_q
     logic [W:0] same;
-    logic [W:0] stood;  // clk since filtered changed
+    logic [W:0] unchanged;  // cycles since filtered changed
     always @(posedge clk) begin
         past    <= 1'b1;
         level_q <= level;
         same    <= !past || level != level_q ? 1 : same + !(&same);
-        stood   <= rst || settle != '0 || (differs && ripe) ? 0 : stood + !(&stood);
+        unchanged   <= rst || settle != '0 || (differs && ripe) ? 0 : unchanged + !(&unchanged);
         if (!past) assume (rst);
         if (past) begin
             assert (same != 0);
             assert (age == 0 || (level_q != filtered && same >= {1'b0, age} && settle == 0));
-            assert (stood >= {1'b0, age});
+            assert (unchanged >= {1'b0, age});
         end
         if (past && !$past(rst) && $past(settle) == 0) begin
             if (filtered != $past(filtered)) begin
                 assert (filtered == level_q);
                 assert (same >= {1'b0, $past(stable_cycles)});
-                assert ({1'b0, $past(stood)} + 1 >= {2'b0, $past(stable_cycles)});
+                assert ({1'b0, $past(unchanged)} + 1 >= {2'b0, $past(stable_cycles)});
                 assert (!rejected);
                 cover ($past(stable_cycles) == 5);
             end

@@ -1,33 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
-// dual_adc_reader -- read both halves of a simultaneously sampling serial converter, and make its
-// straight binary signed.
+// dual_adc_reader -- read both channels of a simultaneously sampling serial ADC, and convert its
+// straight binary codes to signed ones.
 //
-// latency  2 * (LEADING + W) clk from start to valid; cs_n falls, and the converter samples, 1 clk
-//          after start
-// rate     one conversion per 2 * FRAME + 1 clk: 29 for a 14 clock frame, 33 for one of 16
+// latency  2 * (LEADING + W) cycles from start to valid; 1 cycle from start to the falling edge of
+//          cs_n, at which the ADC samples
+// rate     one conversion per 2 * FRAME + 1 cycles: 29 for a frame of 14 clocks, 33 for one of 16
 // source   AD7352, AD7356 (12 bit: LEADING 2, FRAME 14) and AD7357 (14 bit: LEADING 2, FRAME 16),
 //          Analog Devices: cs_n brings the first leading zero, each falling edge of sclk the next
 //          bit; bit n is read at falling edge n
 // model    tb/sense/dual_adc_reader.py, equal in every bit of every cycle
-// proved   sclk rests high outside a frame, a frame has FRAME falling edges, and the first is a clk
-//          after that of cs_n
+// proved   sclk is high outside a frame, a frame has FRAME falling edges, and the first follows
+//          one cycle after the falling edge of cs_n
 `default_nettype none
 
 module dual_adc_reader #(
-    parameter int W       = 8,  // bits of a sample, the top ones of the converter
+    parameter int W       = 8,  // bits of a sample, the top ones of the ADC
     parameter int LEADING = 2,  // bits before the most significant one
-    parameter int FRAME   = 14  // sclk cycles of a conversion
+    parameter int FRAME   = 14  // sclk periods of a conversion
 ) (
-    input  wire                 clk,      // twice sclk: a bit has one whole sclk cycle to arrive
-    input  wire                 rst,      // ends a frame at once
-    input  wire                 start,    // strobe; not heard while a conversion is under way
-    input  wire                 sdata_a,  // serial data of converter A, the sine
-    input  wire                 sdata_b,  // serial data of converter B, the cosine
-    output logic                cs_n,     // falling: the converter samples
+    input  wire                 clk,      // twice sclk: a bit has one sclk period to arrive
+    input  wire                 rst,      // level: ends a frame at once
+    input  wire                 start,    // strobe: convert; ignored during a conversion
+    input  wire                 sdata_a,  // serial data of channel A, the sine
+    input  wire                 sdata_b,  // serial data of channel B, the cosine
+    output logic                cs_n,     // level: the ADC samples at its falling edge
     output logic                sclk,     // half of clk while cs_n is low, else high
     output logic                valid,    // strobe: sin and cos are new
-    output logic signed [W-1:0] sin,      // full scale = 2^(W-1); stands until the next valid
-    output logic signed [W-1:0] cos       // taken at the same moment as sin
+    output logic signed [W-1:0] sin,      // counts, full scale = 2^(W-1); held until the next valid
+    output logic signed [W-1:0] cos       // counts, sampled together with sin
 );
     if (W < 3) begin : g_check_w
         W_MUST_BE_AT_LEAST_3 u_error ();
@@ -42,9 +42,9 @@ module dual_adc_reader #(
     localparam int B = $clog2(FRAME + 1);
 
     logic [B-1:0] bits;  // falling edges of sclk so far
-    logic [W-2:0] word_a, word_b;  // the last bits so far
+    logic [W-2:0] word_a, word_b;  // the last bits received
 
-    wire bit_now = !cs_n && sclk;  // sclk falls with this clk: the bit on the wire is good
+    wire bit_now = !cs_n && sclk;  // sclk falls at the end of this cycle: the bit is valid
     wire last = bits == B'(LEADING + W - 1);
 
     always_ff @(posedge clk) begin

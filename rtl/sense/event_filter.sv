@@ -1,36 +1,38 @@
 // SPDX-License-Identifier: Apache-2.0
 // event_filter -- let levels change only after N samples of the new level with at most M - N of the
-// old one between, and report what died out before.
+// old level in between, and report the disturbances that are removed.
 //
-// latency  N samples from a clean edge to filtered; 1 clk in bypass and while it settles after
-//          reset
-// rate     a sample every skip + 1 clk; pulses of N (skip + 1) clk pass, those of (N - 1) (skip +
-//          1) clk never do
-// source   S2: N-of-M event filter, N equal samples at a chosen sampling rate. A disturbance is
-//          followed from its first sample and forgotten once M - N samples have spoken against it
-//          and one more does: stricter than a sliding window of M, and without its memory. With
-//          tolerated = 0, skip = 0 it is the deglitcher
+// latency  N samples from a clean edge to filtered; 1 cycle in bypass (N of 0 or 1 without skip)
+//          and during start-up after reset
+// rate     one sample per skip + 1 cycles; pulses of N (skip + 1) cycles pass, those of (N - 1)
+//          (skip + 1) cycles never do
+// behaviour A disturbance is followed from its first sample, and forgotten at the sample of the old
+//          level that exceeds M - N. This is stricter than a sliding window of M samples and needs
+//          no memory. With tolerated = 0 and skip = 0 the filter equals the deglitcher. A new
+//          value of skip acts from the next sample on, a new value of required one cycle later;
+//          required and tolerated act on new disturbances only.
+// source   S2: N-of-M event filter, N equal samples at a chosen sampling rate
 // model    tb/sense/event_filter.py, equal in every bit of every cycle
-// proved   a change passes only at a sample, and only if N of the last M samples had the new level,
-//          none of them from before the last change
+// proved   a change passes only at a sample, and only if N of the last M samples had the new
+//          level, none of them from before the preceding change
 // proof    depth 16, W = 3, TOLERATED_W = 2, SKIP_W = 2, SETTLE = 2
 `default_nettype none
 
 module event_filter #(
-    parameter int LEVELS = 1,  // levels filtered side by side, sampled at once
-    parameter int W = 8,  // bits of required
-    parameter int TOLERATED_W = 4,  // bits of tolerated
-    parameter int SKIP_W = 16,  // bits of skip
-    parameter int SETTLE  = 4               // clk after reset in which filtered follows level: synchronisers fill meanwhile
+    parameter int LEVELS      = 1,   // number of levels, sampled together
+    parameter int W           = 8,   // bits of required
+    parameter int TOLERATED_W = 4,   // bits of tolerated
+    parameter int SKIP_W      = 16,  // bits of skip
+    parameter int SETTLE      = 4    // cycles after reset in which filtered follows level
 ) (
-    input wire clk,
-    input wire rst,  // filtered follows level, nothing is reported
-    input  wire  [SKIP_W-1:0]  skip,        // clk left out between two samples; a new value acts from the next sample on
-    input  wire  [W-1:0]       required,      // N; 0 is taken as 1: every sample passes, with skip = 0 a bypass. A new value acts one
-    input  wire  [TOLERATED_W-1:0] tolerated,       // M - N; 0: N samples in a row                 clk later, both on new disturbances only
-    input wire [LEVELS-1:0] level,  // synchronous to clk
-    output logic [LEVELS-1:0] filtered,  // level without its disturbances
-    output logic [LEVELS-1:0] rejected  // strobe: a disturbance has died out
+    input  wire                    clk,
+    input  wire                    rst,        // level: filtered follows level, nothing is reported
+    input  wire  [     SKIP_W-1:0] skip,       // cycles left out between two samples
+    input  wire  [          W-1:0] required,   // samples N; 0 acts as 1: every sample passes
+    input  wire  [TOLERATED_W-1:0] tolerated,  // samples M - N; 0: N samples in a row
+    input  wire  [     LEVELS-1:0] level,      // levels, synchronous to clk
+    output logic [     LEVELS-1:0] filtered,   // levels: without disturbances
+    output logic [     LEVELS-1:0] rejected    // strobes: a disturbance was removed
 );
     if (LEVELS < 1 || W < 1 || TOLERATED_W < 1 || SKIP_W < 1) begin : g_check_w
         WIDTHS_MUST_BE_AT_LEAST_1 u_error ();
@@ -41,11 +43,11 @@ module event_filter #(
 
     localparam int S = $clog2(SETTLE + 1);
 
-    logic [     S-1:0] settle;  // clk left of settling
+    logic [     S-1:0] settle;  // cycles left of the start-up
     logic              settling;
-    logic [SKIP_W-1:0] left;  // clk until the next sample
+    logic [SKIP_W-1:0] left;  // cycles until the next sample
 
-    // samples before the one that passes; registered, so that required is in no long path
+    // required - 1; registered to keep required out of long paths
     logic [     W-1:0] last;
 
     wire               sample = left == '0;
@@ -67,8 +69,8 @@ module event_filter #(
         // samples of the old level since the first of the new
         logic [TOLERATED_W-1:0] against;
 
-        // a number counted up from 0 first has all bits of another when it is the other: no adder,
-        // and never past all ones
+        // A number counted up from 0 contains all bits of another one for the first time when
+        // they are equal. The comparison needs no adder, and the counter never overflows.
         wire                    differs = level[i] ^ filtered[i];
         wire                    ripe = &(seen | ~last);
         wire                    over = &(against | ~tolerated);
@@ -88,7 +90,7 @@ module event_filter #(
                 seen        <= '0;
                 against     <= '0;
                 rejected[i] <= 1'b0;
-                // who is reset together with this block never sees a made-up edge
+                // a block that is reset together with this one never sees a false edge
                 filtered[i] <= level[i];
             end
         end
@@ -98,9 +100,9 @@ module event_filter #(
     localparam int MOST = (1 << W) + (1 << TOLERATED_W);  // samples that a disturbance can last
     logic past = 1'b0;
     logic [W-1:0] needed_q;
-    // of level 0: which samples had the new level, the last lowest
+    // level 0: which samples had the new level; the last one is bit 0
     logic [MOST-1:0] history;
-    logic [W:0] news[0:MOST];  // how many of the last n had
+    logic [W:0] news[0:MOST];  // how many of the last n samples had the new level
     wire [MOST-1:0] now = {history[MOST-2:0], g_level[0].differs};
     wire [W:0] seen = {1'b0, g_level[0].seen};
     wire [W:0] lasted = seen + {1'b0, g_level[0].against};
@@ -114,7 +116,7 @@ module event_filter #(
         if (rst || settling) history <= '0;
         else if (sample) history <= g_level[0].differs && g_level[0].ripe ? '0 : now;
         if (!past) assume (rst);
-        // a new value is for new disturbances
+        // a new value acts on new disturbances only
         if (past && seen != 0) assume (tolerated == $past(tolerated));
         if (past) begin
             assert (seen == 0 || g_level[0].against <= tolerated);
@@ -127,7 +129,7 @@ module event_filter #(
         if (past && !$past(rst) && !$past(settling) && filtered[0] != $past(filtered[0])) begin
             assert ($past(sample) && $past(level[0]) == filtered[0]);
             assert (!rejected[0]);
-            // all among the last `lasted` + 1 samples, by the loop above
+            // by the loop above, they are all among the last `lasted` + 1 samples
             assert ($past(seen) + 1 >= {1'b0, $past(needed_q)});
             assert ($past(lasted) <= $past(seen) + {1'b0, $past(tolerated)});
             cover ($past(needed_q) == 4 && $past(lasted) == 5 && $past(skip) == 1);

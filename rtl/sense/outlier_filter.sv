@@ -1,38 +1,38 @@
 // SPDX-License-Identifier: Apache-2.0
-// outlier_filter -- hold back a sample that jumps further than the signal can, each channel for
-// itself.
+// outlier_filter -- hold back a sample that jumps further than the signal can, each channel
+// separately.
 //
-// latency  1 clk from valid to done
-// rate     one sample per clk
-// source   S0, limit filter 1: |Yn - Yn-1| <= dY takes Yn, else keeps Yn-1. As printed (hold = 255)
-//          a signal that once got away by more than dY never comes back; so after `hold` samples
-//          held back in a row the next one is taken
+// latency  1 cycle from valid to done
+// rate     one sample per cycle
+// source   S0, limit filter 1: |Yn - Yn-1| <= dY takes Yn, else keeps Yn-1. In the form given by
+//          S0 (hold = 255) a signal that once moved by more than dY never returns; therefore the
+//          next sample is taken after `hold` samples held back in a row.
 // model    tb/sense/outlier_filter.py, equal in every bit of every cycle
-// proved   a channel moves by at most `step`, but for the first sample and after `hold` samples
+// proved   a channel moves by at most `step`, except at the first sample and after `hold` samples
 //          held back; never are more held back
 `default_nettype none
 
 module outlier_filter #(
-    parameter int W = 8  // bits of a sample
+    parameter int W = 8  // bits of a sample, at least 8
 ) (
-    input wire clk,
-    input wire rst,  // the next sample is taken whatever it is
-    input wire [7:0] step,  // largest move from sample to sample, in units of sin; 0: all are taken
-    input wire [7:0] hold,  // samples in a row that may be held back; 255: any number
-    input wire valid,  // strobe: sin and cos are new
-    input wire signed [W-1:0] sin,  // full scale = 2^(W-1)
-    input wire signed [W-1:0] cos,
-    output logic done,  // strobe: sin_out and cos_out are new
-    output logic signed [W-1:0] sin_out,  // sin, or what it was before; stands until the next done
-    output logic signed [W-1:0] cos_out,
-    output logic rejected  // strobe, with done: sin or cos or both were held back
+    input  wire                 clk,
+    input  wire                 rst,      // level: the next sample is taken whatever it is
+    input  wire         [  7:0] step,     // counts: largest move per sample; 0: take all
+    input  wire         [  7:0] hold,     // samples held back in a row at most; 255: no limit
+    input  wire                 valid,    // strobe: sin and cos are new
+    input  wire signed  [W-1:0] sin,      // counts, full scale = 2^(W-1)
+    input  wire signed  [W-1:0] cos,      // counts, full scale = 2^(W-1)
+    output logic                done,     // strobe: sin_out and cos_out are new
+    output logic signed [W-1:0] sin_out,  // counts: sin or its last good value; held until done
+    output logic signed [W-1:0] cos_out,  // counts: cos or its last good value; held until done
+    output logic                rejected  // strobe, with done: a sample was held back
 );
     if (W < 8) begin : g_check
         W_MUST_BE_AT_LEAST_8 u_error ();
     end
 
     logic taken;  // there was a sample since reset
-    logic [7:0] sin_held, cos_held;  // samples held back in a row, stops at 255
+    logic [7:0] sin_held, cos_held;  // samples held back in a row, saturates at 255
 
     wire signed [W:0] sin_move = sin - sin_out;
     wire signed [W:0] cos_move = cos - cos_out;
@@ -64,62 +64,30 @@ module outlier_filter #(
     end
 
 `ifdef FORMAL
-    logic past = 1'b0;
+    logic              past = 1'b0;
+    logic signed [W:0] largest;  // step of the preceding cycle
+    wire               sin_exhausted = sin_held >= hold && !no_end;
+    wire               cos_exhausted = cos_held >= hold && !no_end;
     logic signed [W-1:0] sin_before, cos_before;
     wire signed [W:0] sin_jump = sin_out - sin_before;
     wire signed [W:0] cos_jump = cos_out - cos_before;
     always @(posedge clk) begin
         past       <= 1'b1;
+        largest    <= $signed({1'b0, step});
         sin_before <= sin_out;
         cos_before <= cos_out;
         if (!past) assume (rst);
         if (past && !$past(rst)) begin
-            if (sin_jump > $signed({1'b0, $past(step)}) || -sin_jump > $signed({1'b0, $past(step)}))
-                assert (done && (!$past(
-                    taken
-                ) || $past(
-                    step
-                ) == 0 || ($past(
-                    sin_held
-                ) >= $past(
-                    hold
-                ) && !$past(
-                    no_end
-                ))));
-            if (cos_jump > $signed({1'b0, $past(step)}) || -cos_jump > $signed({1'b0, $past(step)}))
-                assert (done && (!$past(
-                    taken
-                ) || $past(
-                    step
-                ) == 0 || ($past(
-                    cos_held
-                ) >= $past(
-                    hold
-                ) && !$past(
-                    no_end
-                ))));
+            if (sin_jump > largest || -sin_jump > largest)
+                assert (done && $past(!active || sin_exhausted));
+            if (cos_jump > largest || -cos_jump > largest)
+                assert (done && $past(!active || cos_exhausted));
             if (rejected) assert (done && $past(taken) && (sin_jump == 0 || cos_jump == 0));
             if (done && !rejected) assert (sin_out == $past(sin) && cos_out == $past(cos));
             if (sin_held != 0 && sin_held != $past(sin_held))
-                assert (rejected && sin_held == $past(
-                    sin_held
-                ) + 1 && ($past(
-                    sin_held
-                ) < $past(
-                    hold
-                ) || $past(
-                    no_end
-                )));
+                assert (rejected && sin_held == $past(sin_held) + 1 && !$past(sin_exhausted));
             if (cos_held != 0 && cos_held != $past(cos_held))
-                assert (rejected && cos_held == $past(
-                    cos_held
-                ) + 1 && ($past(
-                    cos_held
-                ) < $past(
-                    hold
-                ) || $past(
-                    no_end
-                )));
+                assert (rejected && cos_held == $past(cos_held) + 1 && !$past(cos_exhausted));
             cover (rejected && sin_held == 3);
             cover (done && !rejected && $past(sin_held) == 3 && $past(step) != 0);
         end

@@ -1,47 +1,46 @@
 // SPDX-License-Identifier: Apache-2.0
-// peak_offset_tracker -- take the offset off sine and cosine by their last turning points, as S0
-// printed it.
+// peak_offset_tracker -- remove the offset of sine and cosine by their last turning points, as in
+// S0.
 //
-//   fell and now above the sample before: that one is Pmin, it rises;   rose and now below it: that
-//   one is Pmax, it falls
-//   offset = |full - Pmax - Pmin| / 2, rounded down, with the samples counted from 0 to full = 2^W
-//   - 1
+//   fell, and now above the preceding sample: that one is Pmin, and the channel rises
+//   rose, and now below the preceding sample: that one is Pmax, and the channel falls
+//   offset = |full - Pmax - Pmin| / 2, rounded down, with samples from 0 to full = 2^W - 1
 //
-// latency  2 clk from valid to done
-// rate     one sample per clk
-// sign     S0 prints the size of the offset; which way it lies is what full - Pmax - Pmin says
-//          without the bars. Nothing is taken off before both turning points of a channel are
-//          known; a corrected sample stops at full scale
-// limits   of the method, not of the module: it knows a fringe late by a fringe, each noisy sample
-//          makes a turning point of its own, and of gain and phase it knows nothing. Made to be run
-//          beside the learner, not instead of it
+// latency  2 cycles from valid to done
+// rate     one sample per cycle
+// behaviour S0 gives the magnitude of the offset; its sign is the sign of full - Pmax - Pmin.
+//          Nothing is removed before both turning points of a channel are known. A corrected
+//          sample saturates at full scale.
+// limits   The method learns of a change one fringe late, takes every noisy sample for a turning
+//          point, and cannot correct gain and phase. It serves as a comparison for the
+//          auto-calibration and does not replace it.
 // source   S0, chapter 4.4
 // model    tb/sense/peak_offset_tracker.py, equal in every bit of every cycle
+// proved   each sample leaves less its offset, or unchanged with enable = 0; an offset is computed
+//          from two samples that were turning points
 // proof    W = 8
-// proved   each sample leaves less its offset, or unchanged out of use; an offset comes of two
-//          samples that were turning points
 `default_nettype none
 
 module peak_offset_tracker #(
     parameter int W = 8  // bits of a sample
 ) (
     input wire clk,
-    input wire rst,  // forgets the turning points
-    input wire enable,  // level; 0: samples pass as they are, the turning points are still found
+    input wire rst,  // level: the turning points are forgotten
+    input wire enable,  // level: 0: samples pass, peaks are still found
     input wire valid,  // strobe: sin and cos are new
-    input wire signed [W-1:0] sin,  // full scale = 2^(W-1)
-    input wire signed [W-1:0] cos,
+    input wire signed [W-1:0] sin,  // counts, full scale = 2^(W-1)
+    input wire signed [W-1:0] cos,  // counts, full scale = 2^(W-1)
     output logic done,  // strobe: sin_out and cos_out are new
-    output logic signed [W-1:0] sin_out,  // full scale = 2^(W-1)
-    output logic signed [W-1:0] cos_out,
-    output logic signed [W-1:0] sin_offset,  // with done: what was taken off, or would have been
-    output logic signed [W-1:0] cos_offset
+    output logic signed [W-1:0] sin_out,  // counts, full scale = 2^(W-1)
+    output logic signed [W-1:0] cos_out,  // counts, full scale = 2^(W-1)
+    output logic signed [W-1:0] sin_offset,  // counts: offset of the sample of done, removed or not
+    output logic signed [W-1:0] cos_offset  // counts: offset of the sample of done, removed or not
 );
     if (W < 2) begin : g_check
         W_MUST_BE_AT_LEAST_2 u_error ();
     end
 
-    // the channel's sample is a new one; there was one since reset
+    // held: the sample of each channel is new; taken: there was one since reset
     logic held, taken;
 
     always_ff @(posedge clk) begin
@@ -66,6 +65,7 @@ module peak_offset_tracker #(
         wire signed [  W:0] drift = !(high_known && low_known) ? '0 : span[W] ? -size : size;
         wire signed [W+1:0] less = {{2{sample[W-1]}}, sample} - {drift[W], drift};
         wire                fits = less[W+1:W-1] == {3{less[W-1]}};
+        wire        [W-1:0] full = {less[W+1], {(W - 1) {~less[W+1]}}};
 
         always_ff @(posedge clk) begin
             if (valid) begin
@@ -83,7 +83,7 @@ module peak_offset_tracker #(
             end
             if (held) begin
                 offset     <= drift[W-1:0];
-                sample_out <= !enable ? sample : fits ? less[W-1:0] : {less[W+1], {(W-1){~less[W+1]}}};
+                sample_out <= !enable ? sample : fits ? less[W-1:0] : full;
             end
             if (rst) begin
                 rising     <= 1'b0;
@@ -104,7 +104,7 @@ module peak_offset_tracker #(
     logic signed [W-1:0] old_sin, old_2_sin, old_cos;
     logic [1:0] samples;  // since reset, up to 2
     logic       enable_q;
-    logic signed [W-1:0] whole_sin, whole_cos;  // the sample that goes with done
+    logic signed [W-1:0] whole_sin, whole_cos;  // the sample that belongs to done
     wire signed [W+1:0] sin_less = whole_sin - sin_offset;
     wire signed [W+1:0] cos_less = whole_cos - cos_offset;
     wire signed [W+1:0] most = (1 <<< (W - 1)) - 1, least = -(1 <<< (W - 1));
@@ -126,8 +126,10 @@ module peak_offset_tracker #(
             if (samples != 0)
                 assert (g_channel[0].sample == old_sin && g_channel[1].sample == old_cos);
             if (held) assert (taken);
-            if (samples < 2)
-                assert (!g_channel[0].high_known && !g_channel[0].low_known && !g_channel[0].rising);
+            if (samples < 2) begin
+                assert (!g_channel[0].high_known && !g_channel[0].low_known);
+                assert (!g_channel[0].rising);
+            end
         end
         if (past && !$past(rst)) begin
             if (done && enable_q) begin
