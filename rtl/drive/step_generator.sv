@@ -181,12 +181,6 @@ module step_generator #(
     logic [T-1:0] asked, settling, held, set_up;
     logic [1:0] place_q, pulse_q;
     logic [31:0] steps_q;
-    wire signed [31:0] made = steps - steps_q;
-    // pulses that have begun: up, down; active edges of step
-    wire up_began = wire_pulse[1] && !pulse_q[1];
-    wire down_began = wire_pulse[0] && !pulse_q[0];
-    wire in_hold = settling == held && since == gap_ago;
-    wire [T:0] level_left = {1'b0, T'(~level_timer)}, direction_left = {1'b0, T'(~direction_timer)};
 
     function [T:0] later(input [T:0] cycles);
         later = cycles + {{T{1'b0}}, !cycles[T]};
@@ -195,6 +189,12 @@ module step_generator #(
     wire [1:0] wire_pulse = {step, direction} ^ {wire_step_low, wire_direction_low};
     // quadrature: 00 10 11 01 of a, b are 0 1 2 3
     wire [1:0] wire_place = {wire_pulse[0], ^wire_pulse};
+    wire signed [31:0] made = steps - steps_q;
+    // pulses that have begun: up, down; active edges of step
+    wire up_began = wire_pulse[1] && !pulse_q[1];
+    wire down_began = wire_pulse[0] && !pulse_q[0];
+    wire in_hold = settling == held && since == gap_ago;
+    wire [T:0] level_left = {1'b0, T'(~level_timer)}, direction_left = {1'b0, T'(~direction_timer)};
     always @(posedge clk) begin
         past      <= 1'b1;
         place_q   <= wire_place;
