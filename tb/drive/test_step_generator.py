@@ -87,8 +87,7 @@ class Generator:
         return got
 
     async def line(self, target, clks=None):
-        """Tick with this target (in steps) and wait for the next tick; return what the pins showed.
-        """
+        """Tick with this target (in steps), wait for the next tick; return what the pins showed."""
         first = len(self.seen)
         await self.clk(tick=1, target=int(target * ONE))
         if (clks or self.inputs["period"]) > 1:
@@ -416,8 +415,7 @@ def test_step_generator():
 
 
 def test_sigrok_counts_the_same_steps():
-    """The stepper_motor decoder of sigrok, written by others, reports the position at every step.
-    """
+    """The stepper_motor decoder of sigrok, made by others, reports the position at each step."""
     program = shutil.which("sigrok-cli")
     if not program:
         pytest.skip("no sigrok-cli")
