@@ -90,7 +90,7 @@ module step_generator #(
     // rewired: the pins take mode and polarity in this cycle
     logic wire_step_low, wire_direction_low, rewired;
 
-    wire restart = load || !enable || line_cycles == '0;
+    wire restart = rst || load || !enable || line_cycles == '0;
     wire ended = &spent[P-1:1];
     wire start = (tick || waiting) && ended;
     wire steep = slope[47:P+16] != {(32 - P) {slope[47]}};
@@ -168,7 +168,7 @@ module step_generator #(
         if (rst) begin
             line_cycles <= '0;
             {level_timer, direction_timer} <= '1;
-            {pulse, upward, turning, acted, rewired, quarter, steps, overrun} <= '0;
+            {pulse, upward, turning, acted, rewired, quarter, steps} <= '0;
             {wire_mode, wire_step_low, wire_direction_low, step, direction} <= '0;
         end
     end
