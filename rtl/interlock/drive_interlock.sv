@@ -52,6 +52,7 @@ module drive_interlock (
     output logic               block_down         // level: no negative command passes
 );
     // Of several causes in the same cycle, first_fault takes the lowest bit.
+    // Of several causes in the same cycle, first_fault takes the lowest bit.
     localparam [9:0] LATCH_ALWAYS = 10'b00_1100_0100;  // cpu, drive, estop
 
     // the last error that counted was above the limit

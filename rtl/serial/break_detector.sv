@@ -2,7 +2,7 @@
 // break_detector -- report a break: a line that has been low for longer than any character at any
 // baud rate.
 //
-// latency   TIME_US and 1 cycle from the line going low to found
+// latency   CLK_HZ / 1000 * TIME_US / 1000 cycles from the line going low to found
 // rate      found comes once per break.
 // source    The break of a UART line: a master that does not know the baud rate of its nodes can
 //           still send one.
