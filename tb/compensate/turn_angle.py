@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/compensate/turn_angle.sv does, in integers: clk(...) is one clk, the state is what
-stands after it.
+"""Model of rtl/compensate/turn_angle.sv in integers: clk(...) advances one cycle; the attributes
+hold the state after it.
 """
 
 
@@ -8,7 +8,7 @@ class TurnAngle:
     def __init__(self, w=32):
         self.w = w
         self.position = self.place = self.turned = self.turns = 0
-        self.highest = 0  # place, as of the clk before
+        self.highest = 0  # of place, of the cycle before
         self.moved = self.known = self.referenced = self.missing = False
 
     @property
