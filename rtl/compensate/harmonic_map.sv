@@ -17,8 +17,8 @@
 //           them and begins a new round, so that no sum ever mixes them. Before the first swap
 //           nothing is corrected.
 // limits    The sum of all |amplitude| must be below 2^14 counts. The rotations lengthen a vector
-//           by 1.64676; whoever writes an amplitude must divide it by this gain. counts_per_turn
-//           must be 1609 or more.
+//           by 1.64676; an amplitude must be divided by this gain before it is written.
+//           counts_per_turn must be 1609 or more.
 // source    S1: theta_1 = theta - sum C_s sin(t_s theta + phi_s); Volder, IRE Trans. EC-8 (1959)
 //           330
 // model     tb/compensate/harmonic_map.py, equal in every bit of every cycle

@@ -12,7 +12,7 @@
 //           the angle is not known.
 // source    S1: theta of its error model, from A, B and Z
 // model     tb/compensate/turn_angle.py, equal in every bit of every cycle
-// proved    place stays below counts_per_turn. known rises with an index only.
+// proved    from_mark stays below counts_per_turn. known rises with an index only.
 // proof     W = 6
 `default_nettype none
 
@@ -36,17 +36,17 @@ module turn_angle #(
 );
     localparam logic [W-1:0] ONE = W'(1);
 
-    logic        [W-1:0] place;  // counts from the reference mark, or from the start
-    logic        [W-1:0] highest;  // largest value of place
+    logic        [W-1:0] from_mark;  // counts from the reference mark, or from the start
+    logic        [W-1:0] highest;  // largest value of from_mark
     logic        [ 47:0] turned;  // 2^-48 turn
     logic signed [  1:0] turns;  // ends of a turn passed since the last index
 
     wire                 up = step == 2'sd1;
     wire                 down = step[1];
     wire                 used = counts_per_turn != '0;
-    wire                 over = up && (place >= highest || !used);
-    wire                 under = down && place == '0;
-    wire                 to_zero = over || (down && place == ONE);
+    wire                 over = up && (from_mark >= highest || !used);
+    wire                 under = down && from_mark == '0;
+    wire                 to_zero = over || (down && from_mark == ONE);
     wire                 lost = (over && turns == 2'sd0) || (under && turns == -2'sd1);
 
     assign angle = turned[47:16];
@@ -56,29 +56,29 @@ module turn_angle #(
         referenced <= index && used;
         missing    <= lost && !index && used;
         highest    <= counts_per_turn - ONE;
-        if (over) place <= '0;
-        else if (under) place <= used ? highest : '0;
-        else place <= place + {{W - 1{down}}, up || down};
+        if (over) from_mark <= '0;
+        else if (under) from_mark <= used ? highest : '0;
+        else from_mark <= from_mark + {{W - 1{down}}, up || down};
         if (to_zero) turned <= '0;
         else if (up || down) turned <= down ? turned - angle_per_count : turned + angle_per_count;
         if (lost) turns <= '0;
         else if (over) turns <= turns + 2'sd1;
         else if (under) turns <= turns - 2'sd1;
         if (index) begin
-            place  <= '0;
-            turned <= '0;
-            turns  <= '0;
-            known  <= used;
+            from_mark <= '0;
+            turned    <= '0;
+            turns     <= '0;
+            known     <= used;
         end
         moved <= moved || up || down;
         if (!used || rst) known <= 1'b0;
         if (rst) moved <= 1'b0;
         if (rst || !(moved || up || down)) begin
-            position <= {{W-2{1'b0}}, b, a ^ b};
-            place    <= '0;
-            turned   <= '0;
-            turns    <= '0;
-            missing  <= 1'b0;
+            position  <= {{W-2{1'b0}}, b, a ^ b};
+            from_mark <= '0;
+            turned    <= '0;
+            turns     <= '0;
+            missing   <= 1'b0;
         end
         if (rst) referenced <= 1'b0;
     end
@@ -91,11 +91,11 @@ module turn_angle #(
         assume (step != -2'sd2);
         if (past) begin
             assume (counts_per_turn == $past(counts_per_turn));
-            assert (place == '0 || place < counts_per_turn);
+            assert (from_mark == '0 || from_mark < counts_per_turn);
             assert (turns != 2'sd1 && turns != -2'sd2);
             if (known && !$past(known)) assert ($past(index));
             cover (known && missing && step[1]);
-            cover (known && place == 5);
+            cover (known && from_mark == 5);
         end
     end
 `endif

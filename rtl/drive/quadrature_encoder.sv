@@ -58,10 +58,10 @@ module quadrature_encoder #(
     logic [W-1:2] ahead_q, back_q;  // delayed by one cycle, for behind
     logic                    aimed_q;
     logic [SEPARATION_W-1:0] left;  // cycles until an edge is allowed
-    logic [           W-1:0] place;  // counts from the reference mark up
-    logic [           W-1:0] highest;  // largest value of place
-    // place is known; home has come and is not taken yet
-    logic placed, waiting;
+    logic [           W-1:0] from_mark;  // counts from the reference mark up
+    logic [           W-1:0] highest;  // largest value of from_mark
+    // from_mark is known; home has come and is not taken yet
+    logic mark_known, waiting;
     logic [  W-1:0] home_q;
 
     wire  [  W-1:0] ahead = reach_up - position;
@@ -79,7 +79,7 @@ module quadrature_encoder #(
 
     assign b = position[1];
     assign a = position[1] ^ position[0];
-    assign z = placed && place == '0 && counts_per_turn != '0;
+    assign z = mark_known && from_mark == '0 && counts_per_turn != '0;
 
     always_ff @(posedge clk) begin
         reach_up   <= lower;
@@ -97,22 +97,22 @@ module quadrature_encoder #(
         else if (up) position <= position + ONE;
         else if (down) position <= position - ONE;
 
-        if (take) place <= from[W-1] ? from + counts_per_turn : from;
-        else if (up) place <= place == highest ? '0 : place + ONE;
-        else if (down) place <= place == '0 ? highest : place - ONE;
+        if (take) from_mark <= from[W-1] ? from + counts_per_turn : from;
+        else if (up) from_mark <= from_mark == highest ? '0 : from_mark + ONE;
+        else if (down) from_mark <= from_mark == '0 ? highest : from_mark - ONE;
 
-        highest <= counts_per_turn - ONE;
-        placed  <= placed || take;
-        waiting <= home || (waiting && !take);
+        highest    <= counts_per_turn - ONE;
+        mark_known <= mark_known || take;
+        waiting    <= home || (waiting && !take);
         if (home) home_q <= home_position;
         if (rst) begin
-            position <= '0;
-            aimed    <= 1'b0;
-            aimed_q  <= 1'b0;
-            behind   <= 1'b0;
-            left     <= '0;
-            placed   <= 1'b0;
-            waiting  <= 1'b0;
+            position   <= '0;
+            aimed      <= 1'b0;
+            aimed_q    <= 1'b0;
+            behind     <= 1'b0;
+            left       <= '0;
+            mark_known <= 1'b0;
+            waiting    <= 1'b0;
         end
     end
 
@@ -120,14 +120,14 @@ module quadrature_encoder #(
     logic                    past = 1'b0;
     // position was loaded in the cycle before
     logic                    loaded;
-    logic [SEPARATION_W-1:0] stood;  // cycles since the last edge
+    logic [SEPARATION_W-1:0] since_edge;  // cycles since the last edge
     logic [           W-1:0] position_q;
     wire  [           W-1:0] step_made = position - position_q;
     always @(posedge clk) begin
         past       <= 1'b1;
         loaded     <= rst || load;
         position_q <= position;
-        stood      <= rst || load ? '1 : up || down ? '0 : stood + !(&stood);
+        since_edge <= rst || load ? '1 : up || down ? '0 : since_edge + !(&since_edge);
         if (!past) assume (rst);
         if (past) begin
             assert ({b, a ^ b} == position[1:0]);
@@ -136,7 +136,7 @@ module quadrature_encoder #(
             assert (!(a != $past(a) && b != $past(b)));
             assert (step_made == '0 || step_made == ONE || step_made == '1);
             if (step_made != '0) assert ((a != $past(a)) ^ (b != $past(b)));
-            if (z && !$past(z)) assert (place == 0 && placed);
+            if (z && !$past(z)) assert (from_mark == 0 && mark_known);
             cover (z && a != $past(a));
             cover (behind);
         end
@@ -151,8 +151,8 @@ module quadrature_encoder #(
         if (rst) agreed <= minimum_edge_separation;
         if (past && steady) begin
             assert (left <= least);
-            assert (stood == '1 || {1'b0, left} + {1'b0, stood} >= {1'b0, least});
-            if (up || down) assert (stood >= least);
+            assert (since_edge == '1 || {1'b0, left} + {1'b0, since_edge} >= {1'b0, least});
+            if (up || down) assert (since_edge >= least);
         end
     end
 

@@ -322,7 +322,7 @@ async def the_command_is_held_if_its_inputs_were_taken_without_power(dut):
             out = await servo.clk()
             while not out[0]:
                 out = await servo.clk()
-            assert out[1] == (5 if wait == 0 else 0), f"power {wait} clk after the tick"
+            assert out[1] == (5 if wait == 0 else 0), f"power {wait} cycles after the tick"
             assert await servo.tick() == (5, 0)
 
 
@@ -387,7 +387,7 @@ async def a_change_of_gains_within_a_calculation_makes_no_jump(dut):
             elif servo.biquads and len(out) == 1:
                 dut.tick.value = int(dut.g_filters.u_filters.ready.value)
         assert all(abs(command - before) <= 80 for command in out), (
-            f"{out} after {before}, changed {wait} clk after tick"
+            f"{out} after {before}, changed {wait} cycles after tick"
         )
         dut.tick.value = 0
         servo.set(kp=0)

@@ -318,10 +318,10 @@ async def after_a_pause_the_profile_continues_to_its_exact_end(dut):
     player.settings["pause"] = 1
     await player.tick()
     await player.tick()
-    stands = player.target
+    held = player.target
     for _ in range(5):
         await player.tick()
-        assert (player.target, player.velocity, player.moving) == (stands, 0, 1)
+        assert (player.target, player.velocity, player.moving) == (held, 0, 1)
     player.settings["pause"] = 0
     await player.finish()
     assert player.target == (20 * (PERIOD // 3) + LSB // 2) // LSB
@@ -523,28 +523,30 @@ async def a_controlled_stop_ends_at_standstill_within_its_limits_from_any_state(
         else:
             jerk = int(2 ** random.uniform(20, 31.9))
             rate = min((1 << 32) - 1, max(1, int((jerk >> 8) * 2 ** random.uniform(-2, 6))))
-            pace = min(jerk, rate << 8)
-            velocity = random.choice((1, -1)) * int(pace * 2 ** random.uniform(-2, 9))
+            increment = min(jerk, rate << 8)
+            velocity = random.choice((1, -1)) * int(increment * 2 ** random.uniform(-2, 9))
             acceleration = random.choice((1, -1, 0)) * int((rate << 8) * random.uniform(0, 2))
         (before, step), steps = await stop_from(
             player, velocity, acceleration, rate, jerk, random.choice((65536, 65536, 21845))
         )
-        pace = min(jerk, rate << 8)
+        increment = min(jerk, rate << 8)
         all_steps = [step - 0, *steps, 0, 0]
         changes = [b - a for a, b in zip(all_steps, all_steps[1:])]
         assert steps[-1] == 0
         top = abs(before)
         for old, new in zip(changes, changes[1:]):
-            assert abs(new - old) <= pace, f"jerk {abs(new - old)} above {pace} in run {n}"
+            assert abs(new - old) <= increment, (
+                f"jerk {abs(new - old)} above {increment} in run {n}"
+            )
             assert abs(new) <= max(rate << 8, abs(old)), f"acceleration in run {n}"
         limit = min(rate << 8, 1 << 62)
         bound = (
             abs(step) / limit
-            + 2 * (limit + top) / pace
-            + (top + 2 * (top * top / pace)) / limit
+            + 2 * (limit + top) / increment
+            + (top + 2 * (top * top / increment)) / limit
             + 8
         )
-        bound += 2 * (abs(step) / pace) ** 0.5 * 2
+        bound += 2 * (abs(step) / increment) ** 0.5 * 2
         assert len(steps) <= bound, f"{len(steps)} ticks, {bound} in run {n}"
 
 
@@ -559,12 +561,12 @@ async def a_controlled_stop_takes_at_most_three_ticks_more_than_the_best_one(dut
         (-PERIOD >> 5, 1 << 25, 1 << 31),
     ):
         _, steps = await stop_from(player, velocity, 0, rate, jerk)
-        pace, limit = jerk, rate << 8
+        increment, limit = jerk, rate << 8
         size = abs(velocity)
         best = (
-            size / limit + limit / pace
-            if limit * limit <= size * pace
-            else 2 * (size / pace) ** 0.5
+            size / limit + limit / increment
+            if limit * limit <= size * increment
+            else 2 * (size / increment) ** 0.5
         )
         assert len(steps) <= best + 5, (len(steps), best)
 
@@ -586,10 +588,10 @@ async def a_controlled_stop_in_a_pause_ends_the_profile(dut):
     player.settings["pause"] = 1
     for _ in range(3):
         await player.tick()
-    stands = player.target
+    held = player.target
     await player.clk(controlled_stop=1)
     await player.finish(most=6)
-    assert abs(player.target - stands) <= 1
+    assert abs(player.target - held) <= 1
 
 
 @cocotb.test()
@@ -699,9 +701,9 @@ async def every_ramp_of_the_rate_keeps_slope_and_curve_and_ends_at_the_setting(d
     seen += await rates(player, 40)
     setting = 0 if player.settings["pause"] else min(player.settings["feed_fraction"], 65536) << 14
     assert seen[-1] == setting
-    paces = [b - a for a, b in zip(seen, seen[1:])]
-    assert max(map(abs, paces)) <= slope + 4 >> 2 and all(
-        abs(b - a) <= (curve >> 2) + 2 for a, b in zip(paces, paces[1:])
+    increments = [b - a for a, b in zip(seen, seen[1:])]
+    assert max(map(abs, increments)) <= slope + 4 >> 2 and all(
+        abs(b - a) <= (curve >> 2) + 2 for a, b in zip(increments, increments[1:])
     )
 
 
@@ -722,9 +724,9 @@ async def a_setting_that_changes_in_any_cycle_makes_no_jump(dut):
             await RisingEdge(dut.clk)
             await FallingEdge(dut.clk)
         seen.append(dut.target_velocity.value.to_signed())
-    paces = [b - a for a, b in zip(seen, seen[1:])]
-    assert max(map(abs, paces)) <= slope + 4 >> 2 and all(
-        abs(b - a) <= (curve >> 2) + 2 for a, b in zip(paces, paces[1:])
+    increments = [b - a for a, b in zip(seen, seen[1:])]
+    assert max(map(abs, increments)) <= slope + 4 >> 2 and all(
+        abs(b - a) <= (curve >> 2) + 2 for a, b in zip(increments, increments[1:])
     )
 
 

@@ -15,14 +15,14 @@ class QuadratureEncoder:
         self.position = 0  # wraps at 2^w
         self.goal = None  # (target, half a band) of the cycle before
         self.left = 0
-        self.place = None  # counts from the reference mark up
+        self.from_mark = None  # counts from the reference mark up
         self.waiting = None  # home_position that is not taken yet
         self.turn = self.highest = 0  # highest: of place, of the cycle before
         self.far = self.behind = False  # far: value of behind in the next cycle
 
     def pins(self):
         b = self.position >> 1 & 1
-        return b ^ self.position & 1, b, int(self.place == 0 and self.turn != 0)
+        return b ^ self.position & 1, b, int(self.from_mark == 0 and self.turn != 0)
 
     def clk(
         self,
@@ -52,12 +52,12 @@ class QuadratureEncoder:
                 up, down = ahead >= 0, ahead < 0 and back < 0
         if self.waiting is not None and not up and not down:
             distance = signed(self.position - self.waiting, self.w)
-            self.place = (distance + (counts_per_turn if distance < 0 else 0)) % whole
+            self.from_mark = (distance + (counts_per_turn if distance < 0 else 0)) % whole
             self.waiting = None
-        elif self.place is not None and up:
-            self.place = 0 if self.place == self.highest else (self.place + 1) % whole
-        elif self.place is not None and down:
-            self.place = self.place - 1 if self.place else self.highest
+        elif self.from_mark is not None and up:
+            self.from_mark = 0 if self.from_mark == self.highest else (self.from_mark + 1) % whole
+        elif self.from_mark is not None and down:
+            self.from_mark = self.from_mark - 1 if self.from_mark else self.highest
         self.highest = (counts_per_turn - 1) % whole
         if home:
             self.waiting = home_position

@@ -186,7 +186,7 @@ async def home_waits_for_a_cycle_without_an_edge(dut):
     await encoder.clk(3)
     await encoder.clk(home=1, home_position=1)
     await encoder.clk(30)
-    assert encoder.position == 20 and encoder.model.place == 19
+    assert encoder.position == 20 and encoder.model.from_mark == 19
 
 
 @cocotb.test()

@@ -27,7 +27,7 @@ class Bus:
     """The register bus and the RS-485 bus of the design."""
 
     def __init__(self, dut):
-        self.dut, self.trace = dut, []  # (driver_enable, tx) after each clk
+        self.dut, self.trace = dut, []  # (driver_enable, tx) after each cycle
 
     async def begin(self):
         await start(

@@ -37,8 +37,8 @@ async def listen(dut, levels, bit_time, model=None):
             got.append((int(dut.data.value), int(dut.ninth.value)))
         errors, glitches = errors + flags[1], glitches + flags[2]
         if model:
-            valid, data, ninth, *rest = model.step(level, bit_time)
-            want = valid, *rest
+            valid, data, ninth, *others = model.step(level, bit_time)
+            want = valid, *others
             assert flags == want, (
                 f"cycle {n}: (valid, framing_error, start_glitch, busy) is {flags}, "
                 f"the model has {want}"
