@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Make rtl/control/profile_microcode.sv: what profile_player does between two ticks, one addition
-or subtraction a clk.
+or subtraction per cycle.
 
 A line is  TERMS [>> 1] [-> WORD] [; JOB [LABEL]]. TERMS are `acc`, the sum of the line before, and
-one place with + or -, or with
-`along` (+ if upward, else -) or `against` (the reverse). The sum goes to acc, halved with >> 1, and
-unhalved to a word. A condition
-`negative` or `positive` asks for the sign of the sum of the line before.
+one operand with + or -, or with `along` (+ if upward, else -) or `against` (the opposite). The sum
+goes to acc, halved by >> 1, and unhalved to a word. The conditions `negative` and `positive` test
+the sign of the sum of the line before.
 """
 
 import re
@@ -17,8 +16,8 @@ from tables import made_files
 
 MADE = Path(__file__).resolve().parent.parent / "rtl" / "control" / "profile_microcode.sv"
 
-# words of the player's memory; four of them are shared by the profile (or brake) and, from `area`
-# on, chosen by what is at work
+# Words of the player's memory. The names in SHARED mean one of two words: that of a controlled
+# stop, or that of the ramp of the rate.
 WORDS = (
     "velocity",
     "acceleration",
@@ -26,7 +25,7 @@ WORDS = (
     "step",
     "ramp_area",
     "ramp_slope",
-    "ramp_pace",
+    "ramp_increment",
     "distance",
     "change",
     "low",
@@ -37,9 +36,14 @@ WORDS = (
     "part",
     "base",
 )
-SHARED = ("area", "slope", "pace", "value")  # brake: words 0 to 3, ramp of the rate: words 4 to 7
+SHARED = (
+    "area",
+    "slope",
+    "increment",
+    "value",
+)  # controlled stop: words 0 to 3, ramp of the rate: words 4 to 7
 OUTSIDE = ("nothing", "limit", "curve", "setting", "full", "half", "queue_low", "queue_high")
-PLACES = {
+OPERANDS = {
     name: first + n
     for first, names in ((0, WORDS), (16, SHARED), (24, OUTSIDE))
     for n, name in enumerate(names)
@@ -77,29 +81,35 @@ JOBS = (
 )
 
 PROGRAM = """
-wait:   acc                             ; wait begin            # acc is what target grows by: kept
-make:   acc + step                      ; make wait             # not added: velocity is read off the word named here,
-        change                          ; dispatch brake        # and acceleration
+        # acc is the step of target: keep it
+wait:   acc                             ; wait begin
+        # the sum is not used: velocity is read from the word named here, and acceleration from the
+        # word named in the next line
+make:   acc + step                      ; make wait
+        change                          ; dispatch brake
 
-# the rate, a step nearer to its setting
+# the rate comes one step nearer to its setting
         - limit
-        - slope                         ; positive at_once      # no limit
-        rate                            ; negative distance     # in the middle of a ramp
-choose: limit -> pace                                           # the smaller of limit and curve, if curve is not 0
+        # without a limit the rate is the setting at once
+        - slope                         ; positive at_once
+        # a ramp that has begun goes on
+        rate                            ; negative distance
+        # the smaller of limit and curve, unless curve is 0
+choose: limit -> increment
         acc - curve
         - curve                         ; negative chosen
         curve                           ; positive chosen
-        acc -> pace
+        acc -> increment
 chosen: rate                            ; stopping divide
 distance: acc - setting -> value        ; goto law
 
-# a brake: slope becomes the acceleration in whole paces
+# a controlled stop: slope becomes the acceleration in whole increments
 brake:  - limit                         ; later law
         0                               ; positive stop
         0                               ; goto choose
 divide: - change                        ; set_upward
         along change -> part
-        pace -> base                    ; count_31
+        increment -> base               ; count_31
 double: acc + base -> base              ; loop double
 digit:  part
         acc - base
@@ -108,47 +118,53 @@ digit:  part
 smaller: base >> 1
         acc -> base                     ; loop digit
         part
-        acc - pace
+        acc - increment
         along change                    ; positive stop
         acc - part -> slope
         0 -> area
-square: acc + area -> area                                      # slope times quotient, from the highest bit on
+        # slope times quotient, highest bit first
+square: acc + area -> area
         acc + slope -> area             ; multiply square
         acc + slope >> 1                ; wide stop
         acc -> area
         - slope
         - part                          ; negative law
-        0                               ; negative move         # from its other side it would be more than a pace
+        # otherwise it would be more than an increment
+        0                               ; negative move
 
-# bring `value` to zero: area is what the slope still adds while it falls to zero, pace by pace
+# bring `value` to zero: area is what the slope still adds while it falls to zero, one increment
+# per step
 law:    - slope
         value                           ; positive turn
-        against value -> part                                   # what is left for the slope to take away
+        # what the slope still has to remove
+        against value -> part
         acc - area
         limit                           ; negative fall
         acc - slope
         part                            ; negative fall
 try:    acc - area
         acc - slope
-        acc - pace
+        acc - increment
         limit                           ; negative move
         acc - slope
-        acc - pace
+        acc - increment
         slope                           ; negative move
-        acc + pace -> slope
+        acc + increment -> slope
         acc + area -> area              ; goto move
 turn:   value                           ; set_upward
-        against value -> part           ; arrived move          # a rest of one tick before the next ramp
-        acc - pace
+        # one tick without change before the next ramp
+        against value -> part           ; arrived move
+        acc - increment
         part                            ; positive try
         0                               ; first move
         rate                            ; stopping stop
-        acc - value -> rate                                     # the setting as it was: it may have changed since
+        # the old setting: it may have changed since
+        acc - value -> rate
         - part                          ; arrive advance
 fall:   area                            ; first move
         acc - slope -> area
         slope
-        acc - pace -> slope
+        acc - increment -> slope
 move:   along slope -> change           ; stopping set
         acc + rate -> rate
         acc - full                      ; negative below
@@ -166,10 +182,11 @@ at_once: 0 -> slope
         0 -> area
         setting -> rate                 ; arrived advance
 
-# the time goes on; a segment is taken from the queue
+# the time advances; a segment is taken from the queue
 advance: - offset -> base               ; ready go_on
 load:   0                               ; last ended
-        0                               ; starved brake         # counts the first word: two clk from here to queue_low
+        # counts the first word: two cycles from here to queue_low
+        0                               ; starved brake
         0                               ; word
         queue_low                       ; word
         acc + queue_high -> velocity    ; word
@@ -185,7 +202,8 @@ go_on:  fraction
         acc + rate -> fraction
         acc - full
         acc                             ; negative scale
-        acc -> fraction                 ; cross                 # into the next interval
+        # into the next interval
+        acc -> fraction                 ; cross
         base
         acc + velocity -> base
         acceleration
@@ -205,7 +223,7 @@ slope_of: acc + acceleration >> 1       ; multiply slope_of
         acc >> 1
         acc + velocity -> part
         fraction                        ; factor
-way_of: acc + part >> 1                 ; multiply way_of
+mean_of: acc + part >> 1                ; multiply mean_of
         acc -> part
         velocity >> 1
         acc + part
@@ -214,7 +232,8 @@ finish: acc + base
         acc - step -> change
 set:    acc + step -> step
         acc + low -> low
-        acc + half                      ; prepared wait         # half an LSB at the end of the profile, else nothing
+        # half an LSB at the end of the profile
+        acc + half                      ; prepared wait
 
 ended:  0 -> offset                     ; end finish
 stop:   - step -> change                ; end set
@@ -222,7 +241,7 @@ stop:   - step -> change                ; end set
 
 
 def assembled():
-    """(label or "", the words of the line, its code) of each line."""
+    """(label or "", text, code) of each line."""
     lines, labels = [], {}
     for line in PROGRAM.splitlines():
         line = line.split("#")[0].strip()
@@ -237,21 +256,22 @@ def assembled():
 
 
 def code_of(line, labels):
-    """target 7, job 5, halved 1, acc 1, sign 2, place 5, word 5."""
+    """The code of a line: target 7 bits, job 5, halved 1, acc 1, sign 2, operand 5, word 5."""
     found = re.fullmatch(
-        r"(?:(acc)\b ?)?(?:(\+|-|along|against)? ?(\w+))?( >> 1)?(?: -> (\w+))?(?: ; (\w+)(?: (\w+))?)?",
+        r"(?:(acc)\b ?)?(?:(\+|-|along|against)? ?(\w+))?( >> 1)?(?: -> (\w+))?"
+        r"(?: ; (\w+)(?: (\w+))?)?",
         line,
     )
-    acc, sign, place, halved, word, job, label = found.groups()
-    place = "nothing" if place in (None, "0") else place
+    acc, sign, operand, halved, word, job, label = found.groups()
+    operand = "nothing" if operand in (None, "0") else operand
     code = labels[label] if label else 0
     for value, width in (
         (JOBS.index(job or "next"), 5),
         (bool(halved), 1),
         (bool(acc), 1),
         (SIGNS[sign or "+"], 2),
-        (PLACES[place], 5),
-        (PLACES[word or "nothing"], 5),
+        (OPERANDS[operand], 5),
+        (OPERANDS[word or "nothing"], 5),
     ):
         code = code << width | value
     return code
@@ -259,25 +279,29 @@ def code_of(line, labels):
 
 def text():
     rows = [
-        f"        lines[{n:3}] = 26'h{code:07x};   // {label + ':' if label else '':14} {line}"
+        f"        lines[{n}] = 26'h{code:07x};  // {label + ': ' if label else ''}{line}"
         for n, (label, line, code) in enumerate(assembled())
     ]
     return "\n".join(
         [
             """// SPDX-License-Identifier: Apache-2.0
-// profile_microcode -- what profile_player does between two ticks, a line a clk; made by tables/profile_microcode.py, not to be edited.
+// profile_microcode -- the microcode of profile_player: what it does between two ticks, line by
+// line.
 //
-// latency  1 clk from next to code      rate  one line per clk
-// code     target 7 bits, job 5, halved 1, acc 1, sign 2, place 5, word 5
-// model    assembled() of tables/profile_microcode.py
+// latency   1 cycle from next to code
+// rate      one line per cycle
+// method    A code is target 7 bits, job 5, halved 1, acc 1, sign 2, operand 5, word 5.
+// limits    Block memory would answer too late for the adder behind it, so the table is logic.
+// model     assembled() of tables/profile_microcode.py
+// made      by tables/profile_microcode.py, not to be edited
 `default_nettype none
 
 module profile_microcode (
     input  wire         clk,
-    input  wire  [6:0]  next,
-    output logic [25:0] code
+    input  wire  [ 6:0] next,  // number of the line to be read
+    output logic [25:0] code   // code of the line
 );
-    (* rom_style = "logic" *) logic [25:0] lines [0:127];       // block memory would answer too late for the adder behind it
+    (* rom_style = "logic" *) logic [25:0] lines[0:127];
 
     initial begin""",
             *rows,

@@ -1,43 +1,46 @@
 // SPDX-License-Identifier: Apache-2.0
-// segment_table -- take the error that a table of equal segments has for a place off the position.
+// segment_table -- subtract from a position the error that a table of equal segments gives for it.
 //
-// latency  INDEX + 22 clk from valid to done
-// rate     one position in as many clk; one that
-//          comes earlier is not taken
-// table    the measured length, from origin on, in `segments` parts of segment_length; point n is
-//          the error at the border n of them, measured less true, and the same whichever way it is
-//          passed. rectangle: inside a segment the mean of its two borders, a half goes up; linear:
-//          the straight line between them, to 2^-16 of the segment, rounded
-// bounds   before the first border and after the last the error is that of the border, and outside
-//          says so
-// source   S0: the equal-segment rectangle method, (d_i + d_i+1) / 2
-// model    tb/compensate/segment_table.py, equal in every bit of every cycle while the settings
-//          stand still
-// proved   what is read lies within the borders 0..segments
+// latency   INDEX + 22 cycles from valid to done
+// rate      one position per INDEX + 22 cycles; one that comes sooner is ignored.
+// method    The measured length, from origin on, is divided into `segments` parts of
+//           segment_length. Point n is the error at border n of them, measured less true position,
+//           and is the same for both directions of motion. In rectangle mode the error inside a
+//           segment is the mean of its two borders, with a half rounded up. In linear mode it is on
+//           the straight line between them, to 2^-16 of the segment, rounded.
+// behaviour Before the first border and after the last one the error is that of the border, and
+//           outside is high. rst drops the running position.
+// limits    The settings must not change while a position is being processed.
+// source    S0: the equal-segment rectangle method, (d_i + d_i+1) / 2
+// model     tb/compensate/segment_table.py, equal in every bit of every cycle while the settings
+//           are constant
+// proved    Only the borders 0..segments are read.
 `default_nettype none
 
 module segment_table #(
-    parameter int INDEX = 8  // segments < 2^INDEX
+    parameter int INDEX = 8  // bits of a segment number: segments < 2^INDEX
 ) (
-    input wire clk,
-    input wire rst,  // drops the position under way
-    input wire enable,  // 0: the position passes as it is, with the same latency
-    input wire linear,  // 0: rectangle
-    input wire signed [47:0] origin,  // 2^-16 period: the first border
-    input wire [47:0] segment_length,  // 2^-16 period
-    input wire [INDEX-1:0] segments,
-    input wire write,  // strobe: value goes to point
-    input wire [INDEX-1:0] point,  // border
-    input wire signed [23:0] value,  // 2^-16 period: position there less the true one
-    input wire [INDEX-1:0] read_point,  // border whose point is to be read back
-    input wire valid,  // strobe
-    input wire signed [47:0] position,  // 2^-16 period
-    output logic done,  // strobe
-    output logic signed [47:0] corrected,  // 2^-16 period: position less its error
-    output logic outside,  // level, with done: the position is beyond the table
-    output logic signed [23:0] error,  // 2^-16 period, with done: position less corrected
-    output logic signed [23:0]   read_value             // 2^-16 period: the point of read_point one clk before, while no position is under way
+    input  wire                     clk,
+    input  wire                     rst,
+    input  wire                     enable,          // level: correct; 0: the position passes
+    input  wire                     linear,          // level: straight lines; 0: rectangles
+    input  wire signed  [     47:0] origin,          // 2^-16 period: the first border
+    input  wire         [     47:0] segment_length,  // 2^-16 period
+    input  wire         [INDEX-1:0] segments,        // number of segments
+    input  wire                     write,           // strobe: write value to point
+    input  wire         [INDEX-1:0] point,           // number of a border
+    input  wire signed  [     23:0] value,           // 2^-16 period: measured less true position
+    input  wire         [INDEX-1:0] read_point,      // number of the border to be read back
+    input  wire                     valid,           // strobe: position is new
+    input  wire signed  [     47:0] position,        // 2^-16 period
+    output logic                    done,            // strobe: the outputs are new
+    output logic signed [     47:0] corrected,       // 2^-16 period: position less its error
+    output logic                    outside,         // level: the position is off the table
+    output logic signed [     23:0] error,           // 2^-16 period: position less corrected
+    output logic signed [     23:0] read_value       // 2^-16 period: point of read_point
 );
+    // read_value belongs to read_point of one cycle before, and only while no position is being
+    // processed.
     if (INDEX < 2 || INDEX > 12) begin : g_check
         INDEX_MUST_BE_FROM_2_TO_12 u_error ();
     end
@@ -54,28 +57,30 @@ module segment_table #(
         FINISH
     } state_t;
 
-    logic signed [23:0] errors                          [0:(1<<INDEX)-1];
+    logic signed [23:0] errors                        [0:(1<<INDEX)-1];
     logic signed [23:0] first;
     state_t             state;
     logic        [ 3:0] count;
-    logic signed [47:0] here;  // the position under way
-    // distance still to divide; the segment, times a power of two
-    logic [V-1:0] rest, part;
+    logic signed [47:0] here;  // the running position
+    // distance that is still to be divided; segment_length times a power of two
+    logic [V-1:0] remainder, part;
     logic [INDEX-1:0] index;
-    logic below, beyond;  // the first border, the longest table
-    // 2^-32 period: rise of half a segment, a quarter …; error above first
+    // the position is below the first border; beyond the longest table
+    logic below, beyond;
+    // 2^-32 period: rise over half a segment, a quarter …; error above first
     logic signed [40:0] slice, line;
 
-    wire after = beyond || index >= segments;
-    wire away = below || after;
-    wire [INDEX-1:0] border = below ? '0 : after ? segments : index;
-    wire [INDEX-1:0]       read_at  = state == IDLE ? read_point : border + INDEX'(state != FIRST && !away);
-    wire [V-1:0] dividend = state == LINE ? rest << 1 : rest;
-    wire fits = dividend >= part;
-    wire signed [24:0] rise = 25'(read_value) - 25'(first);
-    wire signed [23:0] mean = 24'((25'(read_value) + 25'(first) + 25'sd1) >>> 1);
-    wire signed [41:0] straight = 42'($signed({first, 16'd0})) + 42'(line) + 42'sd32768;
-    wire signed [23:0] answer = !enable ? '0 : linear ? 24'(straight >>> 16) : mean;
+    wire                    after = beyond || index >= segments;
+    wire                    away = below || after;
+    wire        [INDEX-1:0] border = below ? '0 : after ? segments : index;
+    wire                    next_border = state != FIRST && !away;
+    wire        [INDEX-1:0] read_at = state == IDLE ? read_point : border + INDEX'(next_border);
+    wire        [    V-1:0] dividend = state == LINE ? remainder << 1 : remainder;
+    wire                    fits = dividend >= part;
+    wire signed [     24:0] rise = 25'(read_value) - 25'(first);
+    wire signed [     23:0] mean = 24'((25'(read_value) + 25'(first) + 25'sd1) >>> 1);
+    wire signed [     41:0] straight = 42'($signed({first, 16'd0})) + 42'(line) + 42'sd32768;
+    wire signed [     23:0] answer = !enable ? '0 : linear ? 24'(straight >>> 16) : mean;
 
     always_ff @(posedge clk) begin
         if (write) errors[point] <= value;
@@ -88,17 +93,17 @@ module segment_table #(
         case (state)
             IDLE:
             if (valid) begin
-                here   <= position;
-                below  <= position < origin;
-                rest   <= V'(48'(position - origin));
-                part   <= V'(segment_length) << INDEX;
-                state  <= DIVIDE;
+                here      <= position;
+                below     <= position < origin;
+                remainder <= V'(48'(position - origin));
+                part      <= V'(segment_length) << INDEX;
+                state     <= DIVIDE;
             end
             DIVIDE: begin
                 if (count == '0) beyond <= fits;
                 else begin
                     index <= {index[INDEX-2:0], fits};
-                    if (fits) rest <= rest - part;
+                    if (fits) remainder <= remainder - part;
                 end
                 if (count == 4'(INDEX)) begin
                     count <= '0;
@@ -116,8 +121,8 @@ module segment_table #(
                 state <= LINE;
             end
             LINE: begin
-                rest  <= fits ? dividend - part : dividend;
-                slice <= slice >>> 1;
+                remainder <= fits ? dividend - part : dividend;
+                slice     <= slice >>> 1;
                 if (fits) line <= line + slice;
                 if (count == '1) state <= FINISH;
             end

@@ -1,44 +1,45 @@
 // SPDX-License-Identifier: Apache-2.0
-// biquad_cascade -- filters of second order in a row (notch, low-pass), one serial multiplier,
-// rounding errors fed back.
+// biquad_cascade -- second-order filters in series (notch, low-pass), computed by one serial
+// multiplier with error feedback.
 //
-//   y = b0 x + b1 x' + b2 x'' + c1 y' + c2 y'', a prime: one sample earlier; c1, c2 are -a1, -a2 of
-//   the transfer function
+//   y = b0 x + b1 x' + b2 x'' + c1 y' + c2 y''
 //
-// latency  36 * SECTIONS + 1 clk from valid_in to valid: what comes of earlier samples was added up
-//          before
-// rate     a sample per 177 * SECTIONS + 1 clk; ready tells when, and one that comes earlier is
-//          ignored
-// accuracy y is rounded down to its LSB and what was cut off goes into the next sample: the error
-//          of a section is that of
-//          (1 - z^-1) / A(z) fed with 0 to 1 LSB. So none of it is left at standstill, and no limit
-//          cycle: with
-//          b0 + b1 + b2 + c1 + c2 = 1 exactly, y comes to rest within one LSB of x
-// bypass   a section out of use, and all of them in a `track` sample, pass x on and take it for
-//          their past: coming into use they go on from there. In use again after two samples that
-//          passed; the same after reset. Coefficients may change in bypass only
-// source   direct form I with first-order error feedback
-// model    tb/control/biquad_cascade.py, equal in every bit of every cycle
-// proved   a sample is taken only when ready said so, and not before the one taken last has come
-//          out; y changes only with valid
-// proof    depth 10
+// A prime means one sample earlier; c1 and c2 are -a1 and -a2 of the transfer function.
+//
+// latency   36 * SECTIONS + 1 cycles from valid_in to valid. The terms of earlier samples were
+//           added up before.
+// rate      one sample per 177 * SECTIONS + 1 cycles. ready reports when one is taken; one that
+//           comes sooner is ignored.
+// accuracy  y is rounded down to its LSB, and what was cut off is added to the next sample: the
+//           error of a section is the response of (1 - z^-1) / A(z) to an input of 0 to 1 LSB. So
+//           there is no error at standstill and no limit cycle: with b0 + b1 + b2 + c1 + c2 = 1
+//           exactly, y settles within one LSB of x. y saturates at 32 bits.
+// behaviour A section in bypass passes x on and remembers it as its past samples, and so do all
+//           sections in a `track` sample: when the filter is used again, it continues from there. A
+//           section filters again after two samples that it passed; the same holds after reset.
+// limits    Coefficients may change in bypass only.
+// source    direct form I with first-order error feedback
+// model     tb/control/biquad_cascade.py, equal in every bit of every cycle
+// proved    A sample is taken only while ready is high, and not before the output of the last
+//           sample has come. y changes only with valid.
+// proof     depth 10
 `default_nettype none
 
 module biquad_cascade #(
-    parameter int SECTIONS = 2  // 1 to 4
+    parameter int SECTIONS = 2  // number of filters in series, 1 to 4
 ) (
     input wire clk,
     input wire rst,
-    input wire [SECTIONS-1:0] in_use,  // level: 0: the section is in bypass
-    input wire coefficient_write,  // strobe
-    input wire [4:0] coefficient_address,  // section * 8 + 0: b0, 1: b1, 2: b2, 3: c1, 4: c2
+    input wire [SECTIONS-1:0] in_use,  // level: section n filters; 0: bypass
+    input wire coefficient_write,  // strobe: write a coefficient
+    input wire [4:0] coefficient_address,  // section * 8 + number of the term
     input wire signed [31:0] coefficient,  // 2^-30
     input wire valid_in,  // strobe: x is new
-    input wire track,  // with valid_in: pass this sample
-    input wire signed [31:0] x,
+    input wire track,  // level: with valid_in, pass this sample
+    input wire signed [31:0] x,  // LSB, input sample
     output logic ready,  // level: valid_in is taken
     output logic valid,  // strobe: y is new
-    output logic signed [31:0] y  // held inside 32 bits
+    output logic signed [31:0] y  // LSB, output sample
 );
     if (SECTIONS < 1 || SECTIONS > 4) begin : g_check
         SECTIONS_MUST_BE_FROM_1_TO_4 u_error ();
@@ -62,23 +63,23 @@ module biquad_cascade #(
     // which of the two past samples of each stream is the newer
     logic parity;
     logic known;  // the memory holds a sample
-    logic passing;  // this sample passes all sections
-    logic [SECTIONS-1:0] filtering;  // the past of the section is added up
+    logic passing;  // this sample passes all sections unfiltered
+    logic [SECTIONS-1:0] filtering;  // the past terms of the section are added up
 
-    // memories, each with a registered output
+    // memories, each with a registered output; terms are numbered b0, b1, b2, c1, c2
     logic signed [31:0] coefficients[0:31];
-    // {stream, parity}: x of section 0, 1, … and y of the last
+    // address {stream, parity}; the streams are x of section 0, 1, … and y of the last
     logic signed [31:0] history[0:15];
-    // sum of the section's past terms; between samples the remainder
+    // sum of the section's past terms; between samples what was cut off
     logic [66:0] carried[0:3];
     logic signed [31:0] coefficient_read, history_read;
     logic        [66:0] carried_read;
 
-    // the sum {top, low} in 2^-30 y: the product's low bits replace those of the sum, which come in
-    // as carries
+    // the sum {top, low} in 2^-30 LSB of y: the low bits of the product replace those of the sum,
+    // which are added as carries
     logic signed [35:0] top;
     logic        [30:0] low;
-    logic signed [33:0] high;  // of the product that grows
+    logic signed [33:0] high;  // upper bits of the growing product
     logic signed [31:0] multiplicand, sample;
     logic       [31:0] multiplier;
 
@@ -92,6 +93,7 @@ module biquad_cascade #(
     wire signed [31:0] result = works ? filtered : sample;
     wire               last = section == 2'(SECTIONS - 1);
 
+    wire        [66:0] cut_off = works && fits ? {37'd0, low[29:0]} : '0;
     wire        [ 2:0] stream = {1'b0, section} + {2'd0, term >= 3'd3};
     wire               newer = term == 3'd1 || term == 3'd3;
     wire               stores = state == STORE && term == NOW;
@@ -103,8 +105,7 @@ module biquad_cascade #(
         if (starts) history[{3'd0, !parity}] <= x;
         else if (stores) history[{{1'b0, section}+3'd1, !parity}] <= result;
         history_read <= history[{stream, newer?parity : !parity}];
-        if (state == STORE)
-            carried[section] <= term != NOW ? {top, low} : works && fits ? {37'd0, low[29:0]} : '0;
+        if (state == STORE) carried[section] <= term != NOW ? {top, low} : cut_off;
         carried_read <= carried[section];
     end
 
@@ -127,7 +128,7 @@ module biquad_cascade #(
                 multiplier <= multiplier >> 1;
                 if (step == 5'd30) state <= SIGN;
             end
-            // the last bit of the coefficient counts negative
+            // the top bit of the coefficient has a negative weight
             SIGN: begin
                 high  <= high - addend;
                 state <= ADD;
@@ -176,7 +177,7 @@ module biquad_cascade #(
 
 `ifdef FORMAL
     logic past = 1'b0;
-    logic owed;  // a sample was taken, its y has not come yet
+    logic owed;  // a sample was taken and its y has not come yet
     always @(posedge clk) begin
         past <= 1'b1;
         owed <= !rst && (starts || (owed && !(state == STORE && last && term == NOW)));
@@ -185,7 +186,7 @@ module biquad_cascade #(
             assert (state <= STORE && section < SECTIONS && term <= LAST_TERM);
             if (state == STORE) assert (term == NOW || term == LAST_TERM);
             assert (ready == (state == WAIT));
-            // the terms of the past are added up after y
+            // the past terms are added up after y
             assert (owed == (state != WAIT && term == NOW));
             if (valid) assert ($past(owed));
             if (!valid && !$past(rst)) assert (y == $past(y));

@@ -1,72 +1,72 @@
 // SPDX-License-Identifier: Apache-2.0
-// pid_servo -- PID with feed-forward of velocity and acceleration and two filters, once a tick, all
-// in serial arithmetic.
+// pid_servo -- PID controller with feed-forward of velocity and acceleration and two filters,
+// computed once per tick in serial arithmetic.
 //
-//   2^16 command = kp e + integral + kd (target_velocity - velocity) + kv target_velocity + ka
-//   target_acceleration
-//   with e = target - position, integral += ki e, the units of axis_registers, held inside
-//   output_limit, then filtered
-//   (biquad_cascade, 16 fraction bits), rounded down and held inside output_limit again.
+//   2^16 command = kp e + integral + kd (target_velocity - velocity)
+//                  + kv target_velocity + ka target_acceleration
 //
-// latency  11 + 25 * TERMS + 36 * BIQUADS clk from tick to valid, 208 for all of it; the inputs are
-//          taken 8 clk after tick, when target and velocity of this tick stand
-// rate     one command per tick, a tick at most every 10 + 25 * TERMS + 177 * BIQUADS clk, 489 for
-//          all of it, and 136 for five terms without filters (an earlier one is ignored)
-// windup   the integral stays inside integral_limit; it does not grow in a direction in which the
-//          last command stood at its limit or the guard blocks; it rests while |e| <= dead_band and
-//          the profile stands; it is zero in open loop and while the guard blocks both directions
-//          (drive off)
-// bumpless after the loop was closed, the drive came on or a gain changed, the command stands for
-//          one tick as it stood (0
-//          while the drive was off), and the integral takes what makes the next one go on from
-//          there, as far as integral_limit
-//          reaches; with ki = 0 there is nothing to take it, and the command follows the gains at
-//          once. A tick whose inputs
-//          were taken without power does not count: the command stands. Opening the loop gives
-//          open_command at once
-// options  TERMS = 2: PI, 3: PID, 5: with feed-forward; BIQUADS = 0: no filters. Ports of what is
-//          left out are not read
-// model    tb/control/pid_servo.py, equal in every bit of every cycle
-// proved   a command of the closed loop is inside output_limit, whatever the gains, inputs and
-//          filters do, and saturated whenever it stands at a limit that held it; an open command is
-//          passed on as it is; command changes only with valid
-// proof    depth 12, TERMS = 2, BIQUADS = 0
+// Here e = target - position, and integral += ki e. The sum is limited to output_limit, filtered
+// (biquad_cascade, 16 fraction bits), rounded down and limited to output_limit again.
+//
+// latency   11 + 25 * TERMS + 36 * BIQUADS cycles from tick to valid, 208 with all terms and
+//           filters. The inputs are taken 8 cycles after tick, when target and velocity of this
+//           tick are valid.
+// rate      one command per tick, at most one tick per 10 + 25 * TERMS + 177 * BIQUADS cycles: 489
+//           with all terms and filters, 136 for five terms without filters. An earlier tick is
+//           ignored.
+// behaviour Anti-windup: the integral is limited to integral_limit; it does not grow in a direction
+//           in which the last command was at its limit or the interlock blocks; it stays constant
+//           while |e| <= dead_band and no profile is played; it is zero in open loop and while the
+//           interlock blocks both directions (drive off). Bumpless transfer: after the loop was
+//           closed, the drive came on or a gain changed, the command is held for one tick (at 0
+//           while the drive was off), and the integral takes the value from which the next command
+//           continues, as far as integral_limit allows; with ki = 0 no integral can do that, and
+//           the command follows the gains at once. A tick whose inputs were taken without power
+//           does not count: the command is held. Opening the loop gives open_command at once.
+// limits    TERMS = 2: PI, 3: PID, 5: with feed-forward; BIQUADS = 0: no filters. Ports of what is
+//           left out are not read. Filter coefficients are numbered 0: b0, 1: b1, 2: b2, 3: -a1, 4:
+//           -a2.
+// model     tb/control/pid_servo.py, equal in every bit of every cycle
+// proved    A command of the closed loop is within output_limit, whatever gains, inputs and filters
+//           do, and saturated is high whenever the command is held at a limit. An open-loop command
+//           is passed on unchanged. command changes only with valid.
+// proof     depth 12, TERMS = 2, BIQUADS = 0
 `default_nettype none
 
 module pid_servo #(
-    parameter int TERMS   = 5,  // 2 to 5
-    parameter int BIQUADS = 2   // 0 to 4
+    parameter int TERMS   = 5,  // number of terms, 2 to 5
+    parameter int BIQUADS = 2   // number of filters, 0 to 4
 ) (
-    input wire clk,
-    input wire rst,
-    input wire closed_loop,  // 0: command is open_command; error is still measured
-    input wire [23:0] kp,  // 2^-16 command/LSB of position
-    input wire [23:0] ki,  // 2^-24 command/LSB of position, each tick
-    input wire [23:0] kd,  // 2^-16 command/(LSB/tick)
-    input wire [23:0] kv,  // 2^-16 command/(LSB/tick)
-    input wire [23:0] ka,  // 2^-8 command/(LSB/tick2)
-    input wire [14:0] output_limit,  // largest |command|
-    input wire [14:0] integral_limit,  // largest |integral|, of command
-    input wire [15:0] dead_band,  // 2^-16 period
-    input wire gains_changed,  // strobe: kp, kd, kv or ka is new, in this clk or the next or last
-    input wire [3:0] filters_in_use,  // level: of each section, see biquad_cascade
-    input wire coefficient_write,  // strobe
-    input wire [4:0] coefficient_address,  // section * 8 + 0: b0, 1: b1, 2: b2, 3: -a1, 4: -a2
-    input wire signed [31:0] coefficient,  // 2^-30
-    input wire tick,  // strobe: servo tick
-    input wire signed [47:0] target,  // 2^-16 period
-    input wire signed [31:0] target_velocity,  // 2^-16 period/tick
-    input wire signed [31:0] target_acceleration,  // 2^-16 period/tick2
-    input wire moving,  // a profile is being played
-    input wire signed [47:0] position,  // 2^-16 period
-    input wire signed [31:0] velocity,  // 2^-16 period/tick
-    input wire signed [15:0] open_command,  // full scale 2^15; passed on as it is in open loop
-    input wire block_up,  // level: the guard passes no positive command
-    input wire block_down,  // level: the guard passes no negative command
-    output logic valid,  // strobe: command is new, error belongs to it
-    output logic signed [15:0] command,  // full scale 2^15
-    output logic signed [31:0] error,  // 2^-16 period, target - position, held inside 32 bits
-    output logic saturated  // command stands at output_limit
+    input  wire                clk,
+    input  wire                rst,
+    input  wire                closed_loop,          // level: 0: command is open_command
+    input  wire         [23:0] kp,                   // 2^-16 command/LSB of position
+    input  wire         [23:0] ki,                   // 2^-24 command/LSB of position, each tick
+    input  wire         [23:0] kd,                   // 2^-16 command/(LSB/tick)
+    input  wire         [23:0] kv,                   // 2^-16 command/(LSB/tick)
+    input  wire         [23:0] ka,                   // 2^-8 command/(LSB/tick2)
+    input  wire         [14:0] output_limit,         // full scale 2^15, largest |command|
+    input  wire         [14:0] integral_limit,       // full scale 2^15, largest |integral|
+    input  wire         [15:0] dead_band,            // 2^-16 period
+    input  wire                gains_changed,        // strobe: kp, kd, kv or ka is new, +-1 cycle
+    input  wire         [ 3:0] filters_in_use,       // level: filter n is in use
+    input  wire                coefficient_write,    // strobe: write a filter coefficient
+    input  wire         [ 4:0] coefficient_address,  // filter * 8 + number of the coefficient
+    input  wire signed  [31:0] coefficient,          // 2^-30
+    input  wire                tick,                 // strobe: servo tick
+    input  wire signed  [47:0] target,               // 2^-16 period
+    input  wire signed  [31:0] target_velocity,      // 2^-16 period/tick
+    input  wire signed  [31:0] target_acceleration,  // 2^-16 period/tick2
+    input  wire                moving,               // level: a profile is being played
+    input  wire signed  [47:0] position,             // 2^-16 period
+    input  wire signed  [31:0] velocity,             // 2^-16 period/tick
+    input  wire signed  [15:0] open_command,         // full scale 2^15, the open-loop command
+    input  wire                block_up,             // level: no positive command passes
+    input  wire                block_down,           // level: no negative command passes
+    output logic               valid,                // strobe: command and error are new
+    output logic signed [15:0] command,              // full scale 2^15
+    output logic signed [31:0] error,                // 2^-16 period, target - position; saturates
+    output logic               saturated             // level: command is at output_limit
 );
     localparam [2:0] INTEGRAL = 3'd0, PROPORTIONAL = 3'd1, DERIVATIVE = 3'd2, VELOCITY = 3'd3;
     localparam [2:0] LAST_TERM = 3'(TERMS - 1);
@@ -88,47 +88,51 @@ module pid_servo #(
         FILTER
     } state;
 
-    logic [4:0] step;  // clk within a state
+    logic [4:0] step;  // cycle within a state
     logic [2:0] term;
     logic signed [32:0] velocity_error;
     logic signed [31:0] velocity_taken, acceleration_taken;
     logic               standing;  // no profile was being played
-    // power was missing at some clk since the inputs were taken
+    // the drive was off in some cycle since the inputs were taken
     logic               stale;
     logic signed [63:0] operand;  // shifted left
     logic        [23:0] gain;  // shifted right
-    // 2^-16 command; of the integral: 2^-24 command
+    // 2^-16 command; 2^-24 command while it is the integral
     logic signed [65:0] total;
     logic signed [39:0] integral;  // 2^-24 command
-    logic limited_up, limited_down;  // the last command stood at its limit
-    // power was missing since the last command that was worked out
+    logic limited_up, limited_down;  // the last command was at its limit
+    // the drive was off since the last computed command
     logic fresh;
-    // a gain changed since, before the inputs were taken
+    // a gain changed: since the inputs were taken, before they were taken
     logic changed, changed_taken;
-    logic retaking;  // the integral takes the jump
-    // 2^-16 command; inside the limit, before the filters
+    logic retaking;  // the integral absorbs the jump
+    // 2^-16 command, limited, before the filters
     logic signed [31:0] sum;
 
     wire signed [48:0] distance = {target[47], target} - {position[47], position};
     wire distance_fits = distance[48:31] == {18{distance[48]}};
+    wire signed [31:0] nearest_error = {distance[48], {31{~distance[48]}}};
     wire [31:0] magnitude = error[31] ? -error : error;
+    wire in_dead_band = standing && magnitude <= {16'd0, dead_band};
     wire powerless = !closed_loop || (block_up && block_down);
     wire into_limit = error[31] ? block_down || limited_down : block_up || limited_up;
 
     wire signed [65:0] integral_high = {27'd0, integral_limit, 24'd0};
-    wire signed [65:0] new_integral  = total > integral_high ? integral_high : total < -integral_high ? -integral_high : total;
+    wire signed [65:0] integral_from_low = total < -integral_high ? -integral_high : total;
+    wire signed [65:0] new_integral = total > integral_high ? integral_high : integral_from_low;
 
-    // the command before the filters: worked out, or as it stood
+    // the command before the filters: computed, or held
     wire no_power = stale || powerless;
     wire retakes = (fresh || changed || changed_taken || gains_changed) && ki != '0;
-    wire stands = no_power || retakes;
+    wire hold = no_power || retakes;
     // 2^0 command
-    wire signed [49:0] asked = stands ? {{34{sum[31]}}, sum[31:16]} : total[65:16];
+    wire signed [49:0] asked = hold ? {{34{sum[31]}}, sum[31:16]} : total[65:16];
     wire signed [49:0] high = {35'd0, output_limit};
     wire too_high = asked > high;
     wire too_low = asked < -high;
-    wire signed [31:0] held     = too_high ? {1'b0, output_limit, 16'd0} : too_low ? -{1'b0, output_limit, 16'd0} :
-                                  {asked[15:0], stands ? sum[15:0] : total[15:0]};
+    wire signed [31:0] limit = {1'b0, output_limit, 16'd0};
+    wire signed [31:0] computed = {asked[15:0], hold ? sum[15:0] : total[15:0]};
+    wire signed [31:0] held = too_high ? limit : too_low ? -limit : computed;
 
     wire total_fits = total[65:33] == {33{total[65]}};
     wire signed [33:0] total_near = total_fits ? total[33:0] : {total[65], {33{~total[65]}}};
@@ -165,14 +169,15 @@ module pid_servo #(
         end
     end
 
-    wire signed [15:0] wanted = no_power ? sum[31:16] : filtered[31:16];
-    wire wants_high = wanted > $signed({1'b0, output_limit});
-    wire wants_low = wanted < -$signed({1'b0, output_limit});
-    wire signed [15:0] new_command = !closed_loop ? open_command :
-                                     wants_high   ? {1'b0, output_limit} :
-                                     wants_low    ? -{1'b0, output_limit} : wanted;
-    wire gives = state == FILTER && filtered_valid;
-    wire unused_low = &{1'b0, filtered[15:0]};  // rounded down
+    wire signed [15:0] filtered_command = no_power ? sum[31:16] : filtered[31:16];
+    wire               above_limit = filtered_command > $signed({1'b0, output_limit});
+    wire               below_limit = filtered_command < -$signed({1'b0, output_limit});
+    wire signed [15:0] from_low = below_limit ? -{1'b0, output_limit} : filtered_command;
+    wire signed [15:0] closed_command = above_limit ? {1'b0, output_limit} : from_low;
+    wire signed [15:0] new_command = closed_loop ? closed_command : open_command;
+    wire               limited = limited_up || limited_down;
+    wire               gives = state == FILTER && filtered_valid;
+    wire               unused_low = &{1'b0, filtered[15:0]};  // rounded down
 
     always_ff @(posedge clk) begin
         valid <= 1'b0;
@@ -180,21 +185,21 @@ module pid_servo #(
         case (state)
             SETTLE: if (step == 5'd6) state <= TAKE;
             TAKE: begin
-                error              <= distance_fits ? distance[31:0] : {distance[48], {31{~distance[48]}}};
-                velocity_error     <= {target_velocity[31], target_velocity} - {velocity[31], velocity};
-                velocity_taken     <= target_velocity;
+                error <= distance_fits ? distance[31:0] : nearest_error;
+                velocity_error <= {target_velocity[31], target_velocity} - {velocity[31], velocity};
+                velocity_taken <= target_velocity;
                 acceleration_taken <= target_acceleration;
-                standing           <= !moving;
-                changed_taken      <= changed;
-                term               <= INTEGRAL;
-                state              <= LOAD;
+                standing <= !moving;
+                changed_taken <= changed;
+                term <= INTEGRAL;
+                state <= LOAD;
             end
             LOAD: begin
                 case (term)
                     INTEGRAL: begin
                         total   <= powerless ? '0 : {{26{integral[39]}}, integral};
                         operand <= {{32{error[31]}}, error};
-                        gain    <= into_limit || (standing && magnitude <= {16'd0, dead_band}) ? '0 : ki;
+                        gain    <= into_limit || in_dead_band ? '0 : ki;
                     end
                     PROPORTIONAL: begin
                         integral <= new_integral[39:0];
@@ -241,9 +246,9 @@ module pid_servo #(
                 if (gives) begin
                     valid        <= 1'b1;
                     command      <= new_command;
-                    saturated    <= closed_loop && (limited_up || limited_down || wants_high || wants_low);
-                    limited_up   <= closed_loop && (limited_up || wants_high);
-                    limited_down <= closed_loop && (limited_down || wants_low);
+                    saturated    <= closed_loop && (limited || above_limit || below_limit);
+                    limited_up   <= closed_loop && (limited_up || above_limit);
+                    limited_down <= closed_loop && (limited_down || below_limit);
                     state        <= WAIT;
                 end
             end
@@ -252,7 +257,7 @@ module pid_servo #(
                 if (tick && filter_ready) state <= SETTLE;
             end
         endcase
-        stale <= powerless || (stale && state != TAKE);
+        stale   <= powerless || (stale && state != TAKE);
         changed <= gains_changed || (changed && state != TAKE);
         if (powerless) begin
             fresh    <= 1'b1;
@@ -276,18 +281,16 @@ module pid_servo #(
     end
 
 `ifdef FORMAL
-    logic past = 1'b0;
+    logic               past = 1'b0;
+    logic signed [15:0] limit_q;  // output_limit of the cycle before
     always @(posedge clk) begin
-        past <= 1'b1;
+        past    <= 1'b1;
+        limit_q <= {1'b0, output_limit};
         if (!past) assume (rst);
         if (past && !$past(rst)) begin
             if (valid && $past(closed_loop)) begin
-                assert (command <= $signed(
-                    {1'b0, $past(output_limit)}
-                ) && command >= -$signed(
-                    {1'b0, $past(output_limit)}
-                ));
-                assert (saturated || $past(wanted) == command);
+                assert (command <= limit_q && command >= -limit_q);
+                assert (saturated || $past(filtered_command) == command);
             end
             if (valid && !$past(closed_loop)) assert (command == $past(open_command) && !saturated);
             if (!valid) assert (command == $past(command));

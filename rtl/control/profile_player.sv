@@ -1,79 +1,85 @@
 // SPDX-License-Identifier: Apache-2.0
 // profile_player -- play queued segments of constant jerk, at full speed or slower, and stop within
-// limits from anywhere.
+// limits from any state.
 //
-// latency  2 clk from tick to target, target_velocity and moving, 3 to target_acceleration: the
-//          step was prepared after the tick before; a shift delays it by one clk. The first tick
-//          after start only prepares
-// rate     one step per tick; a tick at least 160 clk after the one before, and 12 more for each
-//          segment of 0 ticks in a row; 390 clk after the first of a brake. A tick that comes
-//          before its step is prepared is lost. The six words of a segment stand for 7 clk from
-//          push; a push less than 7 clk after another is lost
-// exact    a segment moves the profile by v n + a n(n-1)/2 + j n(n-1)(n-2)/6 in n ticks, in 2^-40
-//          period. All bits are kept from segment to segment and rounded to the LSB of target (half
-//          up) with the last step of the profile
-// slower   target is the quadratic B-spline of the profile's positions, read at a time that
-//          advances by the rate. So at any rate from 0 to 100 % |velocity|, |acceleration| and
-//          |jerk| stay below those of the segments times rate, rate^2, rate^2; at 100 % each step
-//          is the mean of two of the profile. The lengths are those of the profile. Where the
-//          velocity itself steps between two segments, one step below 100 % may exceed it by half
-//          of that
-// override the rate goes to `feed_fraction`: it changes by `slope` a tick at most, its change by
-//          `curve`, and it ends at the setting exactly,
-//          whatever the setting did on the way; a profile begins at the setting
-// brake    from the step and the acceleration made last: the acceleration changes by stop_jerk a
-//          tick at most, a part of stop_jerk in the first and the last, is brought below
-//          stop_deceleration, and both end at zero
-// law      of both ways to zero: the slope is a whole number of paces; area is what it still adds
-//          while it falls to zero from here. It grows while what is left is enough for the larger
-//          area, falls when that is less than the area, else it stays. Less than a pace is left in
-//          the end, and is the last step
-// source   forward differences of a cubic; Schoenberg, Quart. Appl. Math. 4 (1946) 45; time-optimal
-//          control of two integrators, made discrete so that it ends at zero without chatter
-// built    one adder of 72 bits and 16 words of memory, moved by profile_microcode
-//          (tables/profile_microcode.py)
-// proved   target moves by a step, shift or set_target_to_position only, by the whole of it; what
-//          stops moving has no velocity nor acceleration; queue_free is never above DEPTH; brake
-//          and underrun leave the queue empty
-// proof    depth 8, DEPTH = 2
-// model    tb/control/profile_player.py, equal in every bit of every cycle
+// latency   2 cycles from tick to target, target_velocity and moving, 3 cycles to
+//           target_acceleration. The step was prepared after the tick before; a shift delays it by
+//           one cycle. The first tick after start only prepares.
+// rate      one step per tick. A tick must come at least 160 cycles after the one before, 12 more
+//           for each segment of 0 ticks in a row, and 390 cycles after the first tick of a
+//           controlled stop. A tick that comes before its step is prepared is lost. The six words
+//           of a segment must stay constant for 7 cycles from push; a push less than 7 cycles after
+//           another is lost.
+// accuracy  exact: in n ticks a segment moves the profile by v n + a n(n-1)/2 + j n(n-1)(n-2)/6, in
+//           2^-40 period. All bits are kept from segment to segment; the last step of the profile
+//           rounds to the LSB of target, a half up.
+// method    One adder of 72 bits and 16 words of memory, controlled by profile_microcode. Both
+//           ramps to zero, of the step and of the rate, follow one rule: the slope is a whole
+//           number of increments, and area is what the slope still adds while it falls to zero from
+//           here. The slope grows while what is left is enough for the larger area, falls when what
+//           is left is less than the area, and otherwise stays. Less than an increment is left in
+//           the end, and is the last step.
+// behaviour Slower: target is the quadratic B-spline of the positions of the profile, read at a
+//           time that advances by the rate. So at any rate from 0 to 100 % |velocity|,
+//           |acceleration| and |jerk| stay below those of the segments times rate, rate^2 and
+//           rate^2; at 100 % each step is the mean of two steps of the profile. Distances are those
+//           of the profile. Where the velocity itself jumps between two segments, one step below
+//           100 % may exceed it by half of the jump. Feed override: the rate follows
+//           `feed_fraction`. It changes by `slope` per tick at most, its change changes by `curve`,
+//           and it ends exactly at the setting, whatever the setting did meanwhile; a profile
+//           begins at the setting. Controlled stop: it starts from the step and the acceleration
+//           made last. The acceleration changes by stop_jerk per tick at most, by a part of
+//           stop_jerk in the first and the last tick, is brought below stop_deceleration, and both
+//           end at zero.
+// source    forward differences of a cubic; Schoenberg, Quart. Appl. Math. 4 (1946) 45;
+//           time-optimal control of two integrators, made discrete so that it ends at zero without
+//           chatter
+// model     tb/control/profile_player.py, equal in every bit of every cycle
+// proved    target moves only by a step, a shift or set_target_to_position, and by the whole of it.
+//           After a profile has ended, velocity and acceleration are zero. queue_free is never
+//           above DEPTH. A controlled stop and an underrun leave the queue empty.
+// proof     depth 8, DEPTH = 2
 `default_nettype none
 
 module profile_player #(
     parameter int DEPTH = 16  // segments in the queue, a power of two from 2 to 16
 ) (
-    input wire clk,
-    input wire rst,  // target becomes zero, the queue empty
-    input wire [31:0] stop_deceleration,  // 2^-32 period/tick2; 0: velocity is zero after one step
-    input  wire        [31:0]    stop_jerk,                    // 2^-40 period/tick3; 0, or more than stop_deceleration: not limited
-    input wire [31:0] slope,  // of the rate, 2^-32 per tick; 0: no limit
-    input wire [31:0] curve,  // of the rate, 2^-32 per tick2; 0: no limit but slope
-    input wire [16:0] feed_fraction,  // rate wanted, 2^-16: 65536 is 100 %, more is taken for it
-    input wire pause,  // the rate wanted is 0
-    input wire tick,  // strobe: servo tick
-    input wire push,  // strobe: queue the segment; lost when full or braking
-    input wire signed [63:0] segment_velocity,  // 2^-40 period/tick, at the start of the segment
-    input  wire signed [63:0]    segment_acceleration,          // 2^-40 period/tick2, at the start of the segment
-    input wire signed [31:0] segment_jerk,  // 2^-40 period/tick3
-    input wire [23:0] segment_ticks,  // duration; 0: the segment is skipped
-    input wire segment_last,  // the profile ends with this segment
-    input wire start,  // strobe: play the queue; ignored while moving or when it is empty
-    input  wire                  arm,                           // strobe: start when `now` reaches start_at; a brake or set_target_to_position disarms
-    input wire [31:0] start_at,  // clk
-    input wire [31:0] now,  // clk, wraps
-    input wire controlled_stop,  // strobe: controlled stop, queue emptied
-    input wire set_target_to_position,  // strobe: target := position, queue emptied, standing
-    input wire signed [47:0] position,  // 2^-16 period, measured
-    input wire shift,  // strobe: the origin moves
-    input wire signed [47:0] shift_by,  // 2^-16 period, added to target
-    output logic signed [47:0] target,  // 2^-16 period, rounded down while moving
-    output logic signed [31:0]   target_velocity,               // 2^-16 period/tick: the step just made; held inside 32 bits
-    output logic signed [31:0]   target_acceleration,           // 2^-16 period/tick2: less the step before; held inside 32 bits
-    output logic moving,  // a profile is being played
-    output logic armed,  // waits for start_at
-    output logic [4:0] queue_free,  // segments that may still be queued
-    output logic underrun  // strobe: a segment should have followed and did not
+    input  wire                clk,
+    input  wire                rst,
+    input  wire         [31:0] stop_deceleration,       // 2^-32 period/tick2; 0: stop in one step
+    input  wire         [31:0] stop_jerk,               // 2^-40 period/tick3; 0: not limited
+    input  wire         [31:0] slope,                   // 2^-32 per tick, of the rate; 0: no limit
+    input  wire         [31:0] curve,                   // 2^-32 per tick2; 0: only slope limits
+    input  wire         [16:0] feed_fraction,           // 2^-16; 65536 is 100 %, and the largest
+    input  wire                pause,                   // level: the rate goes to 0
+    input  wire                tick,                    // strobe: servo tick
+    input  wire                push,                    // strobe: queue the segment
+    input  wire signed  [63:0] segment_velocity,        // 2^-40 period/tick, at its start
+    input  wire signed  [63:0] segment_acceleration,    // 2^-40 period/tick2, at its start
+    input  wire signed  [31:0] segment_jerk,            // 2^-40 period/tick3
+    input  wire         [23:0] segment_ticks,           // ticks; 0: the segment is skipped
+    input  wire                segment_last,            // level: the profile ends with this segment
+    input  wire                start,                   // strobe: play the queue
+    input  wire                arm,                     // strobe: start when now reaches start_at
+    input  wire         [31:0] start_at,                // cycles
+    input  wire         [31:0] now,                     // cycles, wraps
+    input  wire                controlled_stop,         // strobe: stop and empty the queue
+    input  wire                set_target_to_position,  // strobe: target := position, standstill
+    input  wire signed  [47:0] position,                // 2^-16 period, measured
+    input  wire                shift,                   // strobe: the origin moves
+    input  wire signed  [47:0] shift_by,                // 2^-16 period, added to target
+    output logic signed [47:0] target,                  // 2^-16 period, rounded down in motion
+    output logic signed [31:0] target_velocity,         // 2^-16 period/tick; saturates
+    output logic signed [31:0] target_acceleration,     // 2^-16 period/tick2; saturates
+    output logic               moving,                  // level: a profile is being played
+    output logic               armed,                   // level: waits for start_at
+    output logic        [ 4:0] queue_free,              // segments that still fit
+    output logic               underrun                 // strobe: a segment was missing
 );
+    // A stop_jerk above stop_deceleration does not limit either. push is ignored while the queue is
+    // full or a controlled stop runs; start is ignored in motion or with an empty queue. Both
+    // controlled_stop and set_target_to_position disarm the start and empty the queue.
+    // target_velocity is the last step, target_acceleration the last step less the one before.
     if (DEPTH < 2 || DEPTH > 16 || (DEPTH & (DEPTH - 1)) != 0) begin : g_check
         DEPTH_MUST_BE_2_4_8_OR_16 u_error ();
     end
@@ -81,25 +87,28 @@ module profile_player #(
     localparam int A = $clog2(DEPTH);
 
     // as in tables/profile_microcode.py
-    localparam [4:0] GOTO = 5'd1, NEGATIVE = 5'd2, POSITIVE = 5'd3, QUOTIENT = 5'd4, LOOP = 5'd5, MULTIPLY = 5'd6, FACTOR = 5'd7,
-                     COUNT_31 = 5'd8, WORD = 5'd9, POP = 5'd10, LAST = 5'd11, STARVED = 5'd12, READY = 5'd13, CROSS = 5'd14,
-                     CROSSED = 5'd15, FIRST = 5'd16, LATER = 5'd17, STOPPING = 5'd18, WIDE = 5'd19, ARRIVED = 5'd20,
-                     SET_UPWARD = 5'd21, END = 5'd22, ARRIVE = 5'd23, PREPARED = 5'd24, WAIT = 5'd25, MAKE = 5'd26, DISPATCH = 5'd27;
-    localparam [2:0] LIMIT = 3'd1, CURVE = 3'd2, SETTING = 3'd3, FULL = 3'd4, HALF = 3'd5, QUEUE_LOW = 3'd6, QUEUE_HIGH = 3'd7;
+    localparam [4:0] GOTO = 5'd1, NEGATIVE = 5'd2, POSITIVE = 5'd3, QUOTIENT = 5'd4, LOOP = 5'd5;
+    localparam [4:0] MULTIPLY = 5'd6, FACTOR = 5'd7, COUNT_31 = 5'd8, WORD = 5'd9, POP = 5'd10;
+    localparam [4:0] LAST = 5'd11, STARVED = 5'd12, READY = 5'd13, CROSS = 5'd14, CROSSED = 5'd15;
+    localparam [4:0] FIRST = 5'd16, LATER = 5'd17, STOPPING = 5'd18, WIDE = 5'd19, ARRIVED = 5'd20;
+    localparam [4:0] SET_UPWARD = 5'd21, END = 5'd22, ARRIVE = 5'd23, PREPARED = 5'd24;
+    localparam [4:0] WAIT = 5'd25, MAKE = 5'd26, DISPATCH = 5'd27;
+    localparam [2:0] LIMIT = 3'd1, CURVE = 3'd2, SETTING = 3'd3, FULL = 3'd4, HALF = 3'd5;
+    localparam [2:0] QUEUE_LOW = 3'd6, QUEUE_HIGH = 3'd7;
     localparam [4:0] LOW = 5'd9;
 
-    // a step is prepared; of the segment; of the prepared step
+    // a step is prepared; the segment is the last; the prepared step is the last
     logic ready, last, final_step;
-    // a brake is wanted; is what the program is at; its first step
+    // a controlled stop is requested; is being computed; is at its first step
     logic braking, stopping, first;
     logic upward, arrived, crossed, wide, negative;
 
-    // the program
+    // the microcode
     logic [6:0] line;
     logic [4:0] count;
     logic       jump;
     wire  [6:0] target_line;
-    wire [4:0] job, place, word;
+    wire [4:0] job, operand, word;
     wire halved, with_acc;
     wire [1:0] sign;
 
@@ -108,7 +117,7 @@ module profile_player #(
     wire       clear = set_target_to_position || rst;
     wire       ticked = job == WAIT && tick && moving;
     wire       make = job == MAKE && !shift;
-    // a brake may have emptied it on the way
+    // a controlled stop may have emptied the queue meanwhile
     wire       pop = job == POP && !empty && !controlled_stop;
     wire       starve = job == STARVED && !braking && empty;
     wire       reached = armed && $signed(now - start_at) >= 0;
@@ -142,10 +151,10 @@ module profile_player #(
     profile_microcode u_microcode (
         .clk,
         .next,
-        .code({target_line, job, halved, with_acc, sign, place, word})
+        .code({target_line, job, halved, with_acc, sign, operand, word})
     );
 
-    // the queue: seven words a segment, written and read one a clk
+    // the queue: seven words per segment, written and read one per cycle
     logic [32:0] queue[0:DEPTH*8-1];
     logic [32:0] queue_in, queue_out, queue_word;
     logic [A-1:0] write_at, read_at;
@@ -173,21 +182,22 @@ module profile_player #(
     end
 
     // the adder and its memory
-    logic [71:0] memory[0:15];
+    logic [71:0] memory                                                                   [0:15];
     logic [71:0] acc;
     logic [31:0] factor;
     logic [39:0] outside;
 
-    wire from_memory = !place[4] || !place[3];
-    wire gate = from_memory && job != MAKE && (job != MULTIPLY || factor[0]);
-    wire [3:0] read_from = place[4] ? {1'b0, !stopping, place[1:0]} : place[3:0];
-    wire [3:0] write_to = word[4] ? {1'b0, !stopping, word[1:0]} : word[3:0];
-    wire [71:0] stored = memory[read_from];
-    wire queue_high = !from_memory && place[2:0] == QUEUE_HIGH;
-    wire         [32:0] setting   = pause ? 33'd0 : feed_fraction[16] ? 33'h1_0000_0000 : {1'b0, feed_fraction[15:0], 16'd0};
+    wire         from_memory = !operand[4] || !operand[3];
+    wire         gate = from_memory && job != MAKE && (job != MULTIPLY || factor[0]);
+    wire  [ 3:0] read_from = operand[4] ? {1'b0, !stopping, operand[1:0]} : operand[3:0];
+    wire  [ 3:0] write_to = word[4] ? {1'b0, !stopping, word[1:0]} : word[3:0];
+    wire  [71:0] stored = memory[read_from];
+    wire         queue_high = !from_memory && operand[2:0] == QUEUE_HIGH;
+    wire  [32:0] fraction = {1'b0, feed_fraction[15:0], 16'd0};
+    wire  [32:0] setting = pause ? 33'd0 : feed_fraction[16] ? 33'h1_0000_0000 : fraction;
 
     always_comb begin
-        case (place[2:0])
+        case (operand[2:0])
             LIMIT:     outside = stopping ? {stop_deceleration, 8'd0} : {8'd0, slope};
             CURVE:     outside = {8'd0, stopping ? stop_jerk : curve};
             SETTING:   outside = {7'd0, setting};
@@ -199,21 +209,23 @@ module profile_player #(
         if (from_memory) outside = '0;
     end
 
-    wire         [71:0] term = (stored & {{48{gate && place != LOW}}, {24{gate}}})
-                               | {queue_high ? {{8{queue_word[31]}}, queue_word[31:0]} : {32'd0, outside[39:32]}, outside[31:0]};
-    wire minus = sign[1] ? sign[0] == upward : sign[0];
-    wire [71:0] sum = (with_acc ? acc : '0) + (term ^ {72{minus}}) + 72'(minus);
+    wire        [71:0] from_word = stored & {{48{gate && operand != LOW}}, {24{gate}}};
+    wire        [39:0] queue_top = {{8{queue_word[31]}}, queue_word[31:0]};
+    wire        [39:0] outside_top = queue_high ? queue_top : {32'd0, outside[39:32]};
+    wire        [71:0] term = from_word | {outside_top, outside[31:0]};
+    wire               minus = sign[1] ? sign[0] == upward : sign[0];
+    wire        [71:0] sum = (with_acc ? acc : '0) + (term ^ {72{minus}}) + 72'(minus);
 
-    // target: moved by a step or a shift, or set
+    // target is moved by a step or by a shift, or is set to position
     wire signed [47:0] from = set_target_to_position ? position : target;
     wire signed [47:0] by = shift ? shift_by : make && !set_target_to_position ? acc[71:24] : '0;
 
-    wire fits = stored[71:55] == {17{stored[71]}};
+    wire               fits = stored[71:55] == {17{stored[71]}};
     wire signed [31:0] held = fits ? stored[55:24] : {stored[71], {31{~stored[71]}}};
 
     always_ff @(posedge clk) begin
-        line     <= next;
-        acc      <= halved ? {sum[71], sum[71:1]} : sum;
+        line <= next;
+        acc  <= halved ? {sum[71], sum[71:1]} : sum;
         if (job == FACTOR) acc <= '0;
         negative <= sum[71];
         if (!word[4] || !word[3]) memory[write_to] <= sum;
@@ -271,6 +283,7 @@ module profile_player #(
 
 `ifdef FORMAL
     logic past = 1'b0;
+    wire  still = target_velocity == '0 && target_acceleration == '0;
     always_ff @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
@@ -284,9 +297,8 @@ module profile_player #(
                 assert (target == $past(target) + $past(shift_by));
             if ($past(set_target_to_position && !shift && !rst)) assert (target == $past(position));
             if ($past(rst || set_target_to_position))
-                assert (!moving && !armed && !ready && target_velocity == '0 && target_acceleration == '0 && line == '0);
-            if ($past(moving) && !moving)
-                assert (target_velocity == '0 && target_acceleration == '0);
+                assert (!moving && !armed && !ready && still && line == '0);
+            if ($past(moving) && !moving) assert (still);
             if ($past(controlled_stop) && !$past(rst)) assert (queue_free == 5'(DEPTH) && !armed);
         end
         cover (past && !rst && moving && armed && queue_free != 5'(DEPTH));

@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// node_memory -- block memory of the soft core, written by bytes, with the firmware in it at
+// node_memory -- block memory of the soft core, written byte by byte, which holds the firmware at
 // power-up.
 //
-// latency  1 clk from address to rdata
-// rate     one access per clk, a read or a write
-// source   one port: rdata keeps the last word read while a write is on
-// model    tb/cpu/node_memory.py, equal in every bit of every cycle
+// latency   1 cycle from address to rdata
+// rate      one access per cycle, a read or a write
+// behaviour There is one port: rdata keeps the last word read during a write.
+// model     tb/cpu/node_memory.py, equal in every bit of every cycle
 `default_nettype none
 
 module node_memory #(
-    parameter int BYTES    = 32768,  // a multiple of 1024
-    parameter     FIRMWARE = ""      // file of 32-bit words, as $readmemh takes them; "": none
+    parameter int BYTES    = 32768,  // bytes, a multiple of 1024
+    parameter     FIRMWARE = ""      // name of a file of 32-bit words for $readmemh; "": none
 ) (
     input  wire                      clk,
-    input  wire                      read,
-    input  wire  [              3:0] write,    // one enable a byte
-    input  wire  [$clog2(BYTES)-3:0] address,  // of a word
-    input  wire  [             31:0] wdata,
-    output logic [             31:0] rdata
+    input  wire                      read,     // strobe: read the word at address
+    input  wire  [              3:0] write,    // strobe: write byte n of the word for each bit n
+    input  wire  [$clog2(BYTES)-3:0] address,  // number of a word
+    input  wire  [             31:0] wdata,    // word to be written
+    output logic [             31:0] rdata     // word read last
 );
     if (BYTES < 1024 || BYTES % 1024 != 0) begin : g_check
         BYTES_MUST_BE_A_MULTIPLE_OF_1024 u_error ();

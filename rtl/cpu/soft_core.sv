@@ -1,33 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
-// soft_core -- RISC-V processor (rv32im) with its memory, and the master of the register bus.
+// soft_core -- RISC-V processor (rv32im) with its memory, the master of the register bus.
 //
-// latency  memory answers without a wait, registers with one of 1 clk
-// rate     an operation takes 3 clk, a memory access 5, a register access or a product 6, a
-//          quotient 40
-// source   PicoRV32, from the package pythondata_cpu_picorv32; its look-ahead address reaches the
-//          memory one clk early
-// model    tb/cpu/soft_core.py, the results of the program tb/cpu/core_test.c
-// proved   whatever the core does: an access that goes nowhere raises trap in the next clk, and
-//          trap stands until rst; select is a strobe, only of an access to a whole word of the
-//          registers, and never of an instruction
-// proof    depth 6, MEMORY_BYTES = 1024
-//
-// map      0000_0000 memory (start address 0, stack from its end), 8000_0000 registers (64 KiB,
-//          whole words only). Anything else, a misaligned access and an illegal instruction stop
-//          the core: trap stands until rst.
+// latency   0 wait cycles for an access to memory, 1 wait cycle for an access to a register.
+// rate      An operation takes 3 cycles, a memory access 5, a register access or a product 6, a
+//           quotient 40.
+// behaviour The memory is at 0000_0000 (start address 0, stack from its end), the registers are at
+//           8000_0000 (64 KiB, whole words only). Any other access, a misaligned access and an
+//           illegal instruction stop the core: trap is high until rst, which starts the core at
+//           address 0 and leaves the memory as it is.
+// source    PicoRV32, from the package pythondata_cpu_picorv32; its look-ahead address reaches the
+//           memory one cycle early
+// model     tb/cpu/soft_core.py, the results of the program tb/cpu/core_test.c
+// proved    Whatever the core does: an access to no valid address raises trap in the next cycle,
+//           and trap stays high until rst. select is a strobe, only for an access to a whole word
+//           of the registers, and never for an instruction.
+// proof     depth 6, MEMORY_BYTES = 1024
 `default_nettype none
 
 module soft_core #(
-    parameter int MEMORY_BYTES = 32768,  // a multiple of 1024
-    parameter     FIRMWARE     = ""      // file of its contents at power-up, see node_memory
+    parameter int MEMORY_BYTES = 32768,  // bytes, a multiple of 1024
+    parameter     FIRMWARE     = ""      // name of a file, see node_memory
 ) (
     input  wire         clk,
-    input  wire         rst,      // starts the core at address 0; memory keeps what it holds
+    input  wire         rst,
     output logic        select,   // strobe: one access to the registers
-    output logic        write,    // with select: wdata is to be written, else read
-    output logic [15:0] address,  // of a register, bytes
-    output logic [31:0] wdata,
-    input  wire  [31:0] rdata,    // stands the clk after select
+    output logic        write,    // level: with select, wdata is to be written
+    output logic [15:0] address,  // byte address of a register
+    output logic [31:0] wdata,    // word to be written
+    input  wire  [31:0] rdata,    // word read, 1 cycle after select
     output logic        trap      // level: the core has stopped
 );
     localparam int A = $clog2(MEMORY_BYTES);
@@ -38,7 +38,7 @@ module soft_core #(
     wire [31:0] mem_la_addr;  // of a word: bits 1:0 are zero
     // verilator lint_on UNUSEDSIGNAL
     wire [3:0] mem_wstrb, mem_la_wstrb;
-    // the registers have answered; an access went nowhere
+    // the registers have answered; an access had no valid address
     logic answered, lost;
 
     wire in_memory = mem_addr < 32'(MEMORY_BYTES);
@@ -125,8 +125,8 @@ module soft_core #(
             if ($past(mem_valid && !in_memory && !in_registers)) assert (trap);
             if ($past(lost)) assert (trap);
             assert (!(select && $past(select)));
-            if (select)
-                assert (mem_valid && !in_memory && !mem_instr && (mem_wstrb == '0 || mem_wstrb == '1));
+            if (select) assert (mem_valid && !in_memory && !mem_instr);
+            if (select) assert (mem_wstrb == '0 || mem_wstrb == '1);
             if (write && select) assert (mem_wstrb == '1);
             // no access is both answered and lost
             assert (!(answered && lost && !$past(lost)));

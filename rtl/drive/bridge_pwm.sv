@@ -1,58 +1,61 @@
 // SPDX-License-Identifier: Apache-2.0
-// bridge_pwm -- edge-aligned sign-magnitude PWM for an H-bridge driver with two inputs: drives,
-// else brakes; off it coasts.
+// bridge_pwm -- edge-aligned sign-magnitude PWM for an H-bridge driver with two inputs.
 //
-// latency  10 clk from valid to the earliest period border that drives it; off 1 clk after enable
-//          falls
-// rate     one command per 9 clk; one that comes earlier replaces the one before it; any period
-// duty     |command| * period / 2^15 clk per period; the fraction goes on into the next period
-//          (first-order noise shaping), so that over n periods the time driven is right to 1 clk in
-//          all
-// decay    slow: between pulses both pins are high and the bridge shorts the motor, so that its
-//          mean voltage is linear in the command. Coasting there would make the current at small
-//          duty go as its square
-// fits     TI DRV8870 (SLVSCY8A table 1: IN1 IN2 = 10 forward, 01 reverse, 11 brake, 00 coast) and
-//          its relatives; the dead time is the driver's own. It sleeps after 1 ms of 00 and wakes
-//          in 50 us
-// model    tb/drive/bridge_pwm.py, equal in every bit of every cycle
-// proved   both low one clk after enable falls or is low; a pulse has one direction, changed only
-//          at a period border
+// latency   10 cycles from valid to the first period border that applies the command. Both pins are
+//           low 1 cycle after enable falls.
+// rate      one command per 9 cycles; a command that comes sooner replaces the one before it. Any
+//           period is allowed.
+// accuracy  A period drives for |command| * period / 2^15 cycles. The fraction of a cycle is
+//           carried into the next period (first-order noise shaping), so that over any number of
+//           periods the driven time is right to 1 cycle in total.
+// behaviour Between pulses both pins are high: the bridge shorts the motor (slow decay), so that
+//           the mean voltage is linear in the command. If the motor coasted between pulses, the
+//           current at a small duty cycle would follow the square of the duty cycle. While enable
+//           is low both pins are low and the motor coasts.
+// limits    The block inserts no dead time; the driver must do that itself.
+// source    TI DRV8870 (SLVSCY8A table 1: IN1 IN2 = 10 forward, 01 reverse, 11 brake, 00 coast) and
+//           its relatives. The driver sleeps after 1 ms of 00 and wakes in 50 us.
+// model     tb/drive/bridge_pwm.py, equal in every bit of every cycle
+// proved    Both pins are low one cycle after enable was low. A pulse has one direction, which
+//           changes only at a period border.
 `default_nettype none
 
 module bridge_pwm (
-    input wire clk,
-    input wire rst,
-    input wire [15:0] period,  // clk; taken with a command; 0: off
-    input wire enable,  // 0: both low (coast), and a command given before is forgotten
-    input wire valid,  // strobe: command is new
-    input wire signed [15:0] command,  // full scale 2^15
-    output logic bridge_a,  // pin: alone high while a positive command drives
-    output logic bridge_b  // pin: alone high while a negative command drives; both: brake
+    input  wire               clk,
+    input  wire               rst,
+    input  wire        [15:0] period,    // cycles; taken with a command; 0: off
+    input  wire               enable,    // level: 0: both pins low, and any command is forgotten
+    input  wire               valid,     // strobe: command is new
+    input  wire signed [15:0] command,   // full scale 2^15
+    output logic              bridge_a,  // level: pin; alone high while a positive command drives
+    output logic              bridge_b   // level: pin; alone high while a negative command drives
 );
-    // the multiplier: |command| * period, in 2^-15 clk
+    // the multiplier: |command| * period, in 2^-15 cycle
     logic busy, asked_reverse;
     logic [2:0] step;
     logic [15:0] asked_period, multiplier;
     logic [30:0] multiplicand, product;
 
-    // what the next border takes
+    // the period that begins at the next border
     logic        next_reverse;
     logic [15:0] next_period;
-    logic [30:0] next_on;  // 2^-15 clk
+    logic [30:0] next_on;  // 2^-15 cycle
 
-    // the period that runs
-    logic powered, reverse;  // powered: there is a period
-    logic [15:0] left, on_left;  // clk after this one
-    logic [14:0] fraction;  // 2^-15 clk that were not driven yet
+    // the running period
+    logic powered, reverse;  // powered: the period is not 0
+    logic [15:0] left, on_left;  // cycles after this one: of the period, of its pulse
+    logic [14:0] fraction;  // 2^-15 cycle that are still to be driven
 
-    wire [30:0] sum    = product + (multiplier[0] ? multiplicand : '0) + (multiplier[1] ? multiplicand << 1 : '0);
-    wire [15:0] shaped = {1'b0, next_on[14:0]} + {1'b0, fraction};
-    wire [15:0] on = next_on[30:15] + {15'd0, shaped[15]};
+    wire  [30:0] single = multiplier[0] ? multiplicand : '0;
+    wire  [30:0] double = multiplier[1] ? multiplicand << 1 : '0;
+    wire  [30:0] sum = product + single + double;
+    wire  [15:0] shaped = {1'b0, next_on[14:0]} + {1'b0, fraction};
+    wire  [15:0] on = next_on[30:15] + {15'd0, shaped[15]};
 
-    wire border = left == 16'd0;
-    wire drives = border ? on != 16'd0 : on_left != 16'd0;
-    wire direction = border ? next_reverse : reverse;
-    wire on_power = border ? next_period != 16'd0 : powered;
+    wire         border = left == 16'd0;
+    wire         drives = border ? on != 16'd0 : on_left != 16'd0;
+    wire         direction = border ? next_reverse : reverse;
+    wire         on_power = border ? next_period != 16'd0 : powered;
 
     always_ff @(posedge clk) begin
         if (valid) begin

@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// step_permission -- may the step generator follow its target? Not without the drive, and not into
-// a side that the guard blocks.
+// step_permission -- decide whether the step generator may follow its target: only with the drive
+// on, and never towards a side that the drive-enable interlock blocks.
 //
-// latency  none: wires and gates
-//          rule     a target that goes up is not followed while block_up stands, one that goes down not
-//          while block_down does; one that stands still may be followed, so that an axis on a
-//          pressed limit switch holds its place and can go away from it
-// model    tb/drive/step_permission.py, equal for all inputs
-// proved   never followed without the drive or for another kind of drive, nor towards a blocked
-//          side; and always otherwise
+// latency   0 cycles: combinational
+// behaviour A target that moves up is not followed while block_up is high, one that moves down is
+//           not followed while block_down is high. A target at standstill may be followed, so that
+//           an axis on a pressed limit switch holds its position and can move away from the switch.
+// model     tb/drive/step_permission.py, equal for all inputs
+// proved    The target is never followed while the drive is off or is of another kind, nor towards
+//           a blocked side; otherwise it is always followed.
 `default_nettype none
 
 module step_permission (
-    input  wire               enable,           // level: the guard allows the drive
+    input  wire               enable,           // level: the interlock enables the drive
     input  wire               by_steps,         // level: the drive is a stepper driver
-    input  wire               block_up,         // level: the guard lets nothing go up
-    input  wire               block_down,       // level: the guard lets nothing go down
+    input  wire               block_up,         // level: the interlock blocks upward motion
+    input  wire               block_down,       // level: the interlock blocks downward motion
     input  wire signed [31:0] target_velocity,  // 2^-16 period/tick
-    output logic              driven,           // level: the drive is on, and it is this one
+    output logic              driven,           // level: the drive is on and is a stepper driver
     output logic              allowed           // level: the target may be followed
 );
     wire goes_down = target_velocity < 0;
@@ -28,11 +28,12 @@ module step_permission (
     assign allowed = driven && !blocked;
 
 `ifdef FORMAL
+    wire into_block = target_velocity != 0 && (target_velocity[31] ? block_down : block_up);
     always_comb begin
         assert (!allowed || (enable && by_steps));
         assert (!(allowed && block_up && !target_velocity[31] && target_velocity != 0));
         assert (!(allowed && block_down && target_velocity[31]));
-        assert (allowed || !enable || !by_steps || (target_velocity != 0 && (target_velocity[31] ? block_down : block_up)));
+        assert (allowed || !enable || !by_steps || into_block);
         assert (driven == (enable && by_steps));
         cover (allowed && block_up && target_velocity == -1);
         cover (!allowed && driven && target_velocity == 1);

@@ -1,72 +1,86 @@
 // SPDX-License-Identifier: Apache-2.0
-// drive_interlock -- permission to drive: latches faults, blocks commands into a pressed limit
-// switch. Firmware can only ask.
+// drive_interlock -- permission to drive: latches faults and blocks commands into a pressed limit
+// switch. Firmware can only request the drive.
 //
-// latency  1 clk from a cause to faults and to enabled low, and from command_in to command_out; the
-//          following error 1 clk more
-// faults   estop, drive and cpu latch always; limit switches (unless homing), encoder, line
-//          watchdog, profile underrun, step overrun and following error latch while enable is
-//          requested. Following error counts from the second error_valid after enabled and
-//          closed_loop stand, so that no error measured before counts
-// reset    reset_faults clears the faults whose cause is gone, and only with enable_request low;
-//          nothing restarts by itself
-// model    tb/interlock/drive_interlock.py, equal in every bit of every cycle
-// proved   whatever the bus writes: enabled never with a latched fault, nor one clk after a cause
-//          or without a request; a fault goes only by reset_faults with enable_request low and its
-//          cause gone; no command into a pressed switch passes, and none without enabled;
-//          first_fault is one of the causes and stands while a fault does
+// latency   1 cycle from a cause to faults and to enabled low, and from command_in to command_out;
+//           2 cycles from a following error to enabled low.
+// behaviour Emergency stop, drive fault and CPU trap always latch. Limit switches (unless homing),
+//           encoder fault, bus watchdog, profile underrun, step overrun and following error latch
+//           while enable is requested. The following error counts from the second error_valid after
+//           enabled and closed_loop are both high, so that no error measured before then counts.
+//           reset_faults clears the faults whose cause is gone, and only while enable_request is
+//           low; nothing restarts by itself. A command that was made zero stays zero until the next
+//           command_in.
+// model     tb/interlock/drive_interlock.py, equal in every bit of every cycle
+// proved    Whatever the bus writes: enabled is never high with a latched fault, nor one cycle
+//           after a cause or without a request. A fault is cleared only by reset_faults with
+//           enable_request low and its cause gone. No command into a pressed switch passes, and
+//           none without enabled. first_fault is one of the causes and stays while a fault is
+//           latched.
 `default_nettype none
 
 module drive_interlock (
-    input wire clk,
-    input wire rst,
-    input wire enable_request,  // level: firmware asks for the drive
-    input wire closed_loop,  // level: the following error counts
-    input wire homing,  // level: a limit switch blocks, but is no fault
-    input wire reset_faults,  // strobe
-    input wire limit_low,  // level: pressed
-    input wire limit_high,  // level: pressed
-    input wire estop,  // level: pressed
-    input wire drive_fault,  // level: the drive reports a fault
-    input wire encoder_fault,  // level: a masked encoder event stands
-    input wire watchdog_expired,  // level: the line is silent
-    input wire cpu_trap,  // level: the soft core stopped
-    input wire profile_underrun,  // strobe: the profile ran out of segments
-    input wire step_overrun,  // level: more steps are owed than may be
-    input wire [31:0] following_limit,  // 2^-16 period, largest |error|; 0: not checked
-    input wire error_valid,  // strobe: error is new
-    input wire signed [31:0] error,  // 2^-16 period, target - position
-    input wire signed [47:0] position,  // 2^-16 period
-    input wire valid_in,  // strobe: command_in is new
-    input wire signed [15:0] command_in,  // full scale 2^15
-    output logic valid_out,  // strobe: command_out is new, or the guard made it zero
-    output logic signed [15:0]   command_out,               // full scale 2^15; once made zero, zero until the next command_in
-    output logic enabled,  // level: the drive may be on
-    output logic [9:0] faults,  // latched; bits as in axis_registers.faults
-    output logic [9:0] causes_now,  // standing now, same bits
-    output logic [9:0] first_fault,  // the one that came first (of several at once the lowest bit)
-    output logic signed [47:0] fault_position,  // 2^-16 period, when first_fault latched
-    output logic block_up,  // level: no positive command passes
-    output logic block_down  // level: no negative command passes
+    input  wire                clk,
+    input  wire                rst,
+    input  wire                enable_request,    // level: firmware requests the drive
+    input  wire                closed_loop,       // level: the following error counts
+    input  wire                homing,            // level: a limit switch blocks but is no fault
+    input  wire                reset_faults,      // strobe: clear the faults
+    input  wire                limit_low,         // level: the lower limit switch is pressed
+    input  wire                limit_high,        // level: the upper limit switch is pressed
+    input  wire                estop,             // level: the emergency stop is pressed
+    input  wire                drive_fault,       // level: the drive reports a fault
+    input  wire                encoder_fault,     // level: an encoder event passed the mask
+    input  wire                watchdog_expired,  // level: the bus has been silent for too long
+    input  wire                cpu_trap,          // level: the soft core has stopped
+    input  wire                profile_underrun,  // strobe: the profile ran out of segments
+    input  wire                step_overrun,      // level: the step generator lags too far
+    input  wire         [31:0] following_limit,   // 2^-16 period, largest |error|; 0: not checked
+    input  wire                error_valid,       // strobe: error is new
+    input  wire signed  [31:0] error,             // 2^-16 period, target - position
+    input  wire signed  [47:0] position,          // 2^-16 period
+    input  wire                valid_in,          // strobe: command_in is new
+    input  wire signed  [15:0] command_in,        // full scale 2^15
+    output logic               valid_out,         // strobe: command_out is new or was made zero
+    output logic signed [15:0] command_out,       // full scale 2^15
+    output logic               enabled,           // level: the drive may be on
+    output logic        [ 9:0] faults,            // latched; bits as in axis_registers.faults
+    output logic        [ 9:0] causes_now,        // present causes, same bits as faults
+    output logic        [ 9:0] first_fault,       // the fault that came first, same bits as faults
+    output logic signed [47:0] fault_position,    // 2^-16 period, when first_fault latched
+    output logic               block_up,          // level: no positive command passes
+    output logic               block_down         // level: no negative command passes
 );
+    // Of several causes in the same cycle, first_fault takes the lowest bit.
+    // Of several causes in the same cycle, first_fault takes the lowest bit.
     localparam [9:0] LATCH_ALWAYS = 10'b00_1100_0100;  // cpu, drive, estop
 
-    // the last error that counted was beyond the limit
-    logic              too_far;
-    // errors are measured with the drive on from here
-    logic              error_counts;
+    // the last error that counted was above the limit
+    logic too_far;
+    // the next error was measured with the drive on
+    logic error_counts;
 
-    wire        [31:0] distance = error[31] ? -error : error;
-    wire        [ 9:0] arrived = causes_now & (enable_request ? '1 : LATCH_ALWAYS);
-    wire        [ 9:0] kept = reset_faults && !enable_request ? faults & causes_now : faults;
-    wire        [ 9:0] latched = kept | arrived;
-    wire               allowed = enable_request && latched == '0;
+    wire [31:0] distance = error[31] ? -error : error;
+    wire [9:0] arrived = causes_now & (enable_request ? '1 : LATCH_ALWAYS);
+    wire [9:0] held = reset_faults && !enable_request ? faults & causes_now : faults;
+    wire [9:0] latched = held | arrived;
+    wire allowed = enable_request && latched == '0;
 
-    wire signed [15:0] asked = valid_in ? command_in : command_out;
-    wire               blocked = !allowed || (limit_high && asked > 0) || (limit_low && asked < 0);
+    wire signed [15:0] command = valid_in ? command_in : command_out;
+    wire blocked = !allowed || (limit_high && command > 0) || (limit_low && command < 0);
 
-    assign causes_now = {step_overrun, profile_underrun, cpu_trap, drive_fault, watchdog_expired, encoder_fault, too_far, estop,
-                         limit_high && !homing, limit_low && !homing};
+    assign causes_now = {
+        step_overrun,
+        profile_underrun,
+        cpu_trap,
+        drive_fault,
+        watchdog_expired,
+        encoder_fault,
+        too_far,
+        estop,
+        limit_high && !homing,
+        limit_low && !homing
+    };
     assign block_up   = limit_high || !enabled;
     assign block_down = limit_low || !enabled;
 
@@ -81,12 +95,12 @@ module drive_interlock (
 
         faults  <= latched;
         enabled <= allowed;
-        if (kept == '0) begin
+        if (held == '0) begin
             first_fault <= arrived & (~arrived + 1'b1);
             if (arrived != '0) fault_position <= position;
         end
 
-        command_out <= blocked ? '0 : asked;
+        command_out <= blocked ? '0 : command;
         valid_out   <= valid_in || (blocked && command_out != '0);
         if (rst) begin
             too_far        <= 1'b0;

@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// heartbeat_watchdog -- tells when a kick of life has been missing for too long while a drive is
-// on.
+// heartbeat_watchdog -- report when no heartbeat has come for too long while a drive is on.
 //
-// latency  expired rises time_ms * (CLK_HZ / 1000) + 1 clk after the last kick, or after armed rose
-//          if that came later; it falls 1 clk after a kick or after armed fell
-// used     for the master on the line (a good frame is the kick) and for the soft core (its
-//          firmware gives one each round)
-// model    tb/interlock/heartbeat_watchdog.py, equal in every bit of every cycle
-// proved   expired only while armed and only without a kick in the clk before; once up it stays
-//          until one of them
+// latency   time_ms * (CLK_HZ / 1000) + 1 cycles to expired, from the end of the last kick or from
+//           armed rising, whichever is later. expired falls 1 cycle after a kick or after armed
+//           fell.
+// behaviour Used for the master on the RS-485 bus, where a good frame is the kick, and for the soft
+//           core, whose firmware kicks once per round of its main loop.
+// model     tb/interlock/heartbeat_watchdog.py, equal in every bit of every cycle
+// proved    expired rises only while armed, and only without a kick in the cycle before. It stays
+//           high until a kick comes or armed falls.
 `default_nettype none
 
 module heartbeat_watchdog #(
-    parameter int CLK_HZ = 4_000_000  // a multiple of 1000
+    parameter int CLK_HZ = 4_000_000  // Hz, frequency of clk; a multiple of 1000
 ) (
     input  wire         clk,
     input  wire         rst,
-    input  wire  [15:0] time_ms,  // longest silence; 0: for ever; a new one counts at once
-    input  wire         kick,     // strobe: of life
+    input  wire  [15:0] time_ms,  // ms, longest silence; 0: no limit; a new value counts at once
+    input  wire         kick,     // strobe: heartbeat
     input  wire         armed,    // level: a drive is enabled
     output logic        expired   // level: no kick for time_ms
 );
@@ -28,8 +28,8 @@ module heartbeat_watchdog #(
     localparam int CLK_MS = CLK_HZ / 1000;
     localparam int P = CLK_MS > 1 ? $clog2(CLK_MS) : 1;
 
-    logic [P-1:0] part;  // clk of the running millisecond
-    logic [ 15:0] silent;  // ms, stops at its end
+    logic [P-1:0] part;  // cycles of the running millisecond
+    logic [ 15:0] silent;  // ms without a kick, stops at its largest value
 
     wire          whole = part == P'(CLK_MS - 1);
     wire          over = silent >= time_ms && time_ms != '0;

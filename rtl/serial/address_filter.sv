@@ -1,29 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
-// address_filter -- pass only what is meant for this node of a multi-drop line.
+// address_filter -- pass only the words of an RS-485 bus that are meant for this node.
 //
-// latency  1 clk
-// rate     one word per clk
-// source   S0: multiprocessor mode of the 8031 (SM2). A word with the 9th bit set is looked at by
-//          all nodes: `00 D5D4 address` with D5D4 01 or 10 and the own address passes and opens the
-//          gate for the words that follow; `00 10 0000` is for all nodes; any other closes it
-// model    tb/serial/address_filter.py, equal in every bit of every cycle
-// proved   nothing passes but own commands, and data words after one with no other command between
+// latency   1 cycle from a word at the input to the word at the output
+// rate      one word per cycle
+// behaviour All nodes examine a word with the 9th bit set. `00 D5D4 address` with D5D4 01 or 10 and
+//           the node's own address passes, and opens the gate for the words that follow. `00 10
+//           0000` is meant for all nodes. Any other word with the 9th bit set closes the gate.
+// source    S0: multiprocessor mode of the 8031 (SM2)
+// model     tb/serial/address_filter.py, equal in every bit of every cycle
+// proved    Nothing passes but commands for this node, and data words after one with no other
+//           command between.
 `default_nettype none
 
 module address_filter (
     input  wire        clk,
-    input  wire        rst,       // closes the gate
-    input  wire  [3:0] address,   // of this node
-    input  wire        valid_in,  // strobe
-    input  wire  [7:0] data_in,
-    input  wire        ninth,     // 1: a command byte, for whomever
-    output logic       valid,     // strobe: a word for this node
-    output logic [7:0] data,
-    output logic       command    // with valid: a command byte of this node
+    input  wire        rst,
+    input  wire  [3:0] address,   // number of this node, 1 to 15
+    input  wire        valid_in,  // strobe: data_in and ninth are a word
+    input  wire  [7:0] data_in,   // 8 data bits of the word
+    input  wire        ninth,     // level: the word is a command byte, for any node
+    output logic       valid,     // strobe: data and command are a word for this node
+    output logic [7:0] data,      // 8 data bits of the word
+    output logic       command    // level: the word is a command byte; with valid
 );
-    logic open;
+    logic open;  // data words pass
 
-    wire own = (data_in[7:6] == 2'b00 && (data_in[5] ^ data_in[4]) && data_in[3:0] == address) || data_in == 8'h20;
+    wire  is_command = data_in[7:6] == 2'b00 && (data_in[5] ^ data_in[4]);
+    wire  own = (is_command && data_in[3:0] == address) || data_in == 8'h20;
 
     always_ff @(posedge clk) begin
         valid   <= valid_in && (ninth ? own : open);
@@ -50,9 +53,8 @@ module address_filter (
             if (valid) begin
                 assert ($past(valid_in) && data == $past(data_in) && command == $past(ninth));
                 if (command) assert (data[7:4] == 4'h1 || data[7:4] == 4'h2);
-                if (command)
-                    assert (data[3:0] == $past(address) || data == 8'h20);
-                    else assert ($past(called));
+                if (command) assert (data[3:0] == $past(address) || data == 8'h20);
+                if (!command) assert ($past(called));
             end
             cover (valid && command);
             cover (valid && !command && data == 8'h55);

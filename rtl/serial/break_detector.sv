@@ -1,22 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// break_detector -- tells when a line has been low for longer than any character at any baud rate.
+// break_detector -- report a break: a line that has been low for longer than any character at any
+// baud rate.
 //
-// latency  found comes TIME_US after the line went low, and 1 clk
-// rate     once a break
-// source   of a UART line: a master that does not know the baud rate of its nodes can still send a
-//          break
-// model    tb/serial/break_detector.py, equal in every bit of every cycle
-// proof    depth 20, CLK_HZ = 1000000, TIME_US = 5
-// proved   found only while the line is low, and once until it is high again
+// latency   CLK_HZ / 1000 * TIME_US / 1000 cycles from the line going low to found
+// rate      found comes once per break.
+// source    The break of a UART line: a master that does not know the baud rate of its nodes can
+//           still send one.
+// model     tb/serial/break_detector.py, equal in every bit of every cycle
+// proved    found comes only while the line is low, and only once until it is high again.
+// proof     depth 20, CLK_HZ = 1000000, TIME_US = 5
 `default_nettype none
 
 module break_detector #(
-    parameter int CLK_HZ  = 4_000_000,
-    parameter int TIME_US = 2000        // nine low bits and a start bit at 9600 baud take 1042 us
+    parameter int CLK_HZ  = 4_000_000,  // Hz, frequency of clk
+    parameter int TIME_US = 2000        // us, shortest break; 9600 baud keep low for 1042 us
 ) (
     input  wire  clk,
     input  wire  rst,
-    input  wire  rx,    // level, synchronous to clk, idles high
+    input  wire  rx,    // level: the line, synchronous to clk; idles high
     output logic found  // strobe: a break
 );
     localparam int LONGEST = CLK_HZ / 1000 * TIME_US / 1000;
@@ -26,7 +27,7 @@ module break_detector #(
         TIME_US_MUST_BE_AT_LEAST_ONE_CLK u_error ();
     end
 
-    logic [W-1:0] low;  // clk that the line has been low, stops at LONGEST
+    logic [W-1:0] low;  // cycles that the line has been low; stops at LONGEST
 
     wire          last = low == W'(LONGEST - 1);
 
@@ -42,15 +43,15 @@ module break_detector #(
 
 `ifdef FORMAL
     logic past = 1'b0;
-    logic told;  // of this break
+    logic reported;  // of this break
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
-        told <= !rst && !rx && (told || (low == W'(LONGEST - 1)));
+        reported <= !rst && !rx && (reported || (low == W'(LONGEST - 1)));
         if (past && !$past(rst)) begin
             assert (low <= W'(LONGEST));
-            assert (told == (low == W'(LONGEST)));
-            if (found) assert (!$past(rx) && !$past(told) && told);
+            assert (reported == (low == W'(LONGEST)));
+            if (found) assert (!$past(rx) && !$past(reported) && reported);
             cover (found);
         end
     end

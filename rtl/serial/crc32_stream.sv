@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// crc32_stream -- CRC-32 of a row of bytes, as they come.
+// crc32_stream -- CRC-32 of a stream of bytes, as they come.
 //
-// latency  1 clk from a byte to crc
-// rate     one byte per clk
-// source   CRC-32/ISO-HDLC (Ethernet, zlib): polynomial 04C11DB7 reflected, starts with all ones,
-//          inverted at the end
-// model    zlib.crc32
+// latency   1 cycle from a byte to crc
+// rate      one byte per cycle
+// source    CRC-32/ISO-HDLC (Ethernet, zlib): polynomial 04C11DB7 reflected, starts with all ones,
+//           inverted at the end
+// model     tb/serial/crc32_stream.py, which uses zlib.crc32; equal in every bit of every cycle
 `default_nettype none
 
 module crc32_stream (
     input  wire         clk,
-    input  wire         rst,    // as start
-    input  wire         start,  // strobe: begin anew; a byte of the same clk is the first
-    input  wire         valid,  // strobe: take data in
-    input  wire  [ 7:0] data,
-    output logic [31:0] crc     // of the bytes since start
+    input  wire         rst,
+    input  wire         start,  // strobe: start again; a byte of the same cycle is the first
+    input  wire         valid,  // strobe: data is the next byte
+    input  wire  [ 7:0] data,   // byte
+    output logic [31:0] crc     // CRC-32 of the bytes since start
 );
     localparam logic [31:0] POLYNOMIAL = 32'hEDB88320;
 

@@ -1,37 +1,39 @@
 // SPDX-License-Identifier: Apache-2.0
-// frame_check -- watch the words for this node and tell whole payloads from broken ones.
+// frame_check -- watch the words for this node and report which frames are good and which are
+// broken.
 //
-// latency  1 clk, `good` comes with the last byte
-// rate     one word per clk
-// source   after a command byte `00 10 address`: length (1..LONGEST), body, CRC-32 over command,
-//          length and body, low byte first. Taking the CRC in as well leaves a constant remainder
-//          behind when all is right
-// model    tb/serial/frame_check.py, equal in every bit of every cycle
-// proved   each frame ends once: good, bad or unfinished; `good` only on the byte where its length
-//          says, and only if all 32 bits of the remainder are right
-//
-// Words pass while a payload is awaited or runs. After its end, after `00 01 address`, which has
-// none, and after a broken
-// one, data words are dropped until the next command byte: a lost command byte of another node must
-// not fill the queue.
+// latency   1 cycle from a word at the input to the word at the output; `good` comes with the last
+//           byte.
+// rate      one word per cycle
+// method    The CRC-32 of a frame together with its own CRC-32 leaves a constant remainder if all
+//           bits are right.
+// behaviour After a command byte `00 10 address` a frame has a length (1..LONGEST), a body, and the
+//           CRC-32 of command, length and body, low byte first. Words pass while a frame is
+//           expected or being received. After its end, after `00 01 address`, which has no frame,
+//           and after a broken frame, data words are dropped until the next command byte: if the
+//           command byte of another node is lost, its data must not fill the queue.
+// source    S0: the frames of the RS-485 bus
+// model     tb/serial/frame_check.py, equal in every bit of every cycle
+// proved    Each frame ends once: as good, as bad, or unfinished. `good` comes only with the byte
+//           that the length names, and only if all 32 bits of the remainder are right.
 `default_nettype none
 
 module frame_check #(
-    parameter int LONGEST = 64  // bytes of a body
+    parameter int LONGEST = 64  // bytes, longest body
 ) (
-    input wire clk,
-    input wire rst,
-    input wire valid_in,  // strobe, after the address filter
-    input wire [7:0] data_in,
-    input wire command_in,  // a command byte of this node
-    input wire framing_error,  // strobe: a character was lost; comes before a word of the same clk
-    output logic valid,  // strobe
-    output logic [7:0] data,
-    output logic command,
-    output logic good,  // with valid: length and CRC-32 of the frame that ends here are right
-    output logic frame_good,  // strobe: the same
-    output logic frame_bad,  // strobe: wrong length, wrong CRC-32, or interrupted
-    output logic sync  // strobe: a good one that is for all nodes
+    input  wire        clk,
+    input  wire        rst,
+    input  wire        valid_in,       // strobe: a word from the address filter
+    input  wire  [7:0] data_in,        // 8 data bits of the word
+    input  wire        command_in,     // level: a command byte of this node; with valid_in
+    input  wire        framing_error,  // strobe: a character was lost before this word
+    output logic       valid,          // strobe: data and command are a word that passed
+    output logic [7:0] data,           // 8 data bits of the word
+    output logic       command,        // level: a command byte of this node; with valid
+    output logic       good,           // level: a good frame ends with this word; with valid
+    output logic       frame_good,     // strobe: length and CRC-32 of a frame are right
+    output logic       frame_bad,      // strobe: wrong length, wrong CRC-32, or interrupted
+    output logic       sync            // strobe: a good frame that is for all nodes
 );
     if (LONGEST < 1 || LONGEST > 124) begin : g_check
         LONGEST_MUST_BE_FROM_1_TO_124 u_error ();
@@ -48,13 +50,14 @@ module frame_check #(
     state_t        state;
     logic   [ 6:0] left;  // bytes of body and CRC-32 still to come, less 1
     logic          ended;  // data is the last byte of a payload
-    logic          broken;
-    logic          to_all;  // the command byte had address 0
+    logic          broken;  // the frame was interrupted or has a wrong length
+    logic          to_all;  // the command byte has address 0
     wire    [31:0] crc;
 
     wire           listening = state != IDLE && !framing_error;
     wire           call = valid_in && command_in;
     wire           word = valid_in && !command_in && listening;
+    wire           interrupted = state != IDLE && (framing_error || call);
     wire           misfit = data_in == 8'd0 || data_in > 8'(LONGEST);
 
     crc32_stream u_crc (
@@ -76,7 +79,7 @@ module frame_check #(
         data    <= data_in;
         command <= command_in;
         ended   <= word && state == PAYLOAD && left == 7'd0;
-        broken  <= (state != IDLE && (framing_error || call)) || (word && state == LENGTH && misfit);
+        broken  <= interrupted || (word && state == LENGTH && misfit);
 
         if (call) to_all <= data_in[3:0] == 4'd0;
         if (call) state <= data_in[5] ? LENGTH : IDLE;
@@ -98,16 +101,17 @@ module frame_check #(
 
 `ifdef FORMAL
     logic       past = 1'b0;
-    logic       running;  // a payload was called for and has not ended
-    logic [7:0] taken;  // data words of it so far
-    logic [7:0] length;
+    logic       running;  // a frame has begun and not ended
+    logic [7:0] taken;  // its data words so far
+    logic [7:0] length;  // of its body
+    wire        last = taken == length + 8'd4;  // of its data words
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
         if (rst) running <= 1'b0;
         else if (call) running <= data_in[5];
         else if (framing_error) running <= 1'b0;
-        else if (word && (taken == 0 ? misfit : taken == length + 8'd4)) running <= 1'b0;
+        else if (word && (taken == 0 ? misfit : last)) running <= 1'b0;
         if (call) taken <= 8'd0;
         else if (word) taken <= taken + 1'b1;
         if (word && taken == 0) length <= data_in;
@@ -119,7 +123,7 @@ module frame_check #(
             if (state == PAYLOAD)
                 assert (taken <= length + 8'd4 && taken + {1'b0, left} == length + 8'd4);
             assert (!(frame_good && frame_bad));
-            assert (frame_good == (ended && crc == 32'h2144DF1C));  // all bits of it
+            assert (frame_good == (ended && crc == 32'h2144DF1C));  // all 32 bits
             if (good) assert (valid && !command && taken == length + 8'd5);
             if (frame_good) assert ($past(running) && !running);
             if (sync) assert (frame_good && to_all);

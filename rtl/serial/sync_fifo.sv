@@ -1,26 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-// sync_fifo -- first in, first out; the oldest word stands at the output until it is popped.
+// sync_fifo -- first in, first out, in one clock domain. The oldest word is at the output until it
+// is popped.
 //
-// latency  2 clk from push to present in an empty queue
-// rate     one push and one pop per clk
-// source   a ring in a memory with one write port and one clocked read port
-// model    tb/serial/sync_fifo.py, equal in every bit of every cycle
-// proved   no word is lost, doubled, invented or overtaken; a word refused is reported
+// latency   2 cycles from push to present when the queue is empty
+// rate      one push and one pop per cycle
+// method    A ring in a memory with one write port and one clocked read port.
+// model     tb/serial/sync_fifo.py, equal in every bit of every cycle
+// proved    No word is lost, doubled, invented or overtaken. A refused word is reported.
 `default_nettype none
 
 module sync_fifo #(
     parameter int W     = 11,  // bits of a word
     parameter int DEPTH = 64   // words, a power of two from 4 up
 ) (
-    input wire clk,
-    input wire rst,  // empties the queue
-    input wire push,  // strobe: take `in`
-    input wire [W-1:0] in,
-    input wire pop,  // strobe: done with `out`; without present it does nothing
-    output logic present,  // level: out is a word
-    output logic [W-1:0] out,
-    output logic [$clog2(DEPTH):0] free,  // words that still fit
-    output logic overrun  // strobe: pushed into the full queue and dropped
+    input  wire                    clk,
+    input  wire                    rst,
+    input  wire                    push,     // strobe: take `in`
+    input  wire  [          W-1:0] in,       // word to be stored
+    input  wire                    pop,      // strobe: drop `out`; ignored without present
+    output logic                   present,  // level: out is valid
+    output logic [          W-1:0] out,      // oldest word
+    output logic [$clog2(DEPTH):0] free,     // words that still fit
+    output logic                   overrun   // strobe: a word met a full queue and was dropped
 );
     localparam int A = $clog2(DEPTH);
 
@@ -29,7 +30,7 @@ module sync_fifo #(
     end
 
     logic [W-1:0] memory[0:DEPTH-1];
-    // words so far; one bit more than an address tells full from empty
+    // counts of words; one bit more than an address distinguishes full from empty
     logic [A:0] written, read;
 
     wire       full = free == '0;
@@ -57,7 +58,7 @@ module sync_fifo #(
     end
 
 `ifdef FORMAL
-    // Any one word, the `chosen`-th, is followed from its push to its pop: it comes out at its turn
+    // Any one word, the `chosen`-th, is followed from its push to its pop: it comes out in its turn
     // and unchanged.
     (* anyconst *)logic [  A:0] chosen;
     logic         past = 1'b0;

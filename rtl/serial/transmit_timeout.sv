@@ -2,23 +2,24 @@
 // transmit_timeout -- switch off the driver of a shared line that has been on for longer than any
 // reply takes.
 //
-// latency  0; expired off after BITS bit times and 1 clk
-// rate     -
-// source   RS-485: one driver that stays on silences the line for everybody
-// model    tb/serial/transmit_timeout.py, equal in every bit of every cycle
-// proved   the driver is on only while it is requested; once expired off it rests until it is no
-//          longer requested
+// latency   0 cycles from requested to driver_enable; expired comes BITS bit times and 1 cycle
+//           after requested rose.
+// behaviour Once expired, the driver stays off until it is no longer requested.
+// source    RS-485: one driver that stays on silences the line for all nodes
+// model     tb/serial/transmit_timeout.py, equal in every bit of every cycle
+// proved    The driver is on only while it is requested. Once expired, it is off until it is no
+//           longer requested.
 `default_nettype none
 
 module transmit_timeout #(
-    parameter int BITS = 1024  // a power of two from 16 up; the longest reply has 770
+    parameter int BITS = 1024  // bit times, a power of two from 16 up; the longest reply takes 770
 ) (
     input  wire         clk,
     input  wire         rst,
-    input  wire  [19:0] bit_time,       // 1/16 clk; less than 8 clk counts as 8
+    input  wire  [19:0] bit_time,       // 1/16 cycle; less than 8 cycles counts as 8
     input  wire         requested,      // level: something is being sent
-    output logic        driver_enable,
-    output logic        expired         // strobe: it has been expired off
+    output logic        driver_enable,  // level: the line driver is on
+    output logic        expired         // strobe: the driver has been switched off
 );
     localparam int E = $clog2(BITS) - 4;
 
@@ -26,10 +27,12 @@ module transmit_timeout #(
         BITS_MUST_BE_A_POWER_OF_2_FROM_16_UP u_error ();
     end
 
-    logic [19+E:0] spent;  // clk that it has been on
+    logic [19+E:0] spent;  // cycles that the driver has been on
     logic          off;
 
     wire  [  19:0] whole = |bit_time[19:7] ? bit_time : 20'd128;
+
+    wire           too_long = spent >= (20 + E)'(whole) << E;
 
     assign driver_enable = requested && !off;
 
@@ -39,14 +42,14 @@ module transmit_timeout #(
             spent <= '0;
             off   <= 1'b0;
         end else if (!off) begin
-            spent <= spent + 1'b1;
-            off   <= spent >= (20+E)'(whole) << E;
-            expired   <= spent >= (20+E)'(whole) << E;
+            spent   <= spent + 1'b1;
+            off     <= too_long;
+            expired <= too_long;
         end
         if (rst) begin
-            spent <= '0;
-            off   <= 1'b0;
-            expired   <= 1'b0;
+            spent   <= '0;
+            off     <= 1'b0;
+            expired <= 1'b0;
         end
     end
 

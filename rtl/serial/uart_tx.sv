@@ -1,30 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
-// uart_tx -- characters of a UART onto a line that is shared: start, 8 data bits LSB first, 9th bit
-// if any, stop.
+// uart_tx -- send the characters of a UART on a shared line: start bit, 8 data bits LSB first, a
+// 9th bit if there is one, stop bit.
 //
-// latency  from idle: 1 clk to driver_enable, one bit more to the start bit
-// rate     characters
-//          without any gap
-// source   S0: the 9th bit syncs command bytes. Bit edges stand at the clk at or before n ·
-//          bit_time: never a sum of roundings
-// model    tb/serial/uart_tx.py, equal in every bit of every cycle
-// proved   the line is high whenever it is not driven
-// bounds   driver_enable leads the first start bit by at least one bit, follows the last stop bit
-//          by at least half a bit; from bit_time = 8 clk up (less counts as 8)
+// latency   1 cycle from valid to driver_enable when idle; the start bit follows one bit time
+//           later.
+// rate      characters without any gap
+// method    Bit n begins in the cycle at or before n * bit_time, so that rounding errors never add
+//           up.
+// behaviour driver_enable leads the first start bit by at least one bit, and follows the last stop
+//           bit by at least half a bit.
+// limits    bit_time from 8 cycles up; less counts as 8.
+// source    S0: the 9th bit marks command bytes
+// model     tb/serial/uart_tx.py, equal in every bit of every cycle
+// proved    The line is high whenever it is not driven.
 `default_nettype none
 
 module uart_tx #(
-    parameter int NINTH = 1  // 0: without the 9th bit, 8N1
+    parameter int NINTH = 1  // bits after the 8 data bits: 1, or 0 for 8N1
 ) (
     input  wire         clk,
-    input  wire         rst,            // lets go of the line
-    input  wire  [19:0] bit_time,       // 1/16 clk
-    input  wire         valid,          // level: data and ninth stand
-    output logic        ready,          // with valid: taken in this clk
-    input  wire  [ 7:0] data,
-    input  wire         ninth,          // the 9th bit, unused without one
-    output logic        tx,             // idles high
-    output logic        driver_enable,  // of the line driver
+    input  wire         rst,
+    input  wire  [19:0] bit_time,       // 1/16 cycle
+    input  wire         valid,          // level: data and ninth are a character to be sent
+    output logic        ready,          // level: with valid, the character is taken in this cycle
+    input  wire  [ 7:0] data,           // 8 data bits of the character
+    input  wire         ninth,          // level: the 9th bit; unused without one
+    output logic        tx,             // level: the line, idles high
+    output logic        driver_enable,  // level: the line driver is on
     output logic        busy            // level: the line is driven
 );
     if (NINTH != 0 && NINTH != 1) begin : g_check
@@ -41,19 +43,22 @@ module uart_tx #(
     } state_t;
 
     state_t        state;
-    logic   [19:0] left;  // 1/16 clk until the next bit
-    logic   [ 3:0] place;  // bits still to come after this one
-    logic   [ 9:0] shifted;  // these bits, the next one lowest
+    logic   [19:0] left;  // 1/16 cycle until the next bit
+    logic   [ 3:0] to_come;  // bits after this one
+    logic   [ 9:0] shifted;  // the bits to come, the next one lowest
 
     wire    [19:0] whole = |bit_time[19:7] ? bit_time : 20'd128;
     wire           now = left < 20'd16;
 
-    assign ready         = (state == LEAD && now) || (state == SEND && now && place == 4'd0) || state == TRAIL;
+    wire           begins = state == LEAD && now;
+    wire           goes_on = state == SEND && now && to_come == 4'd0;
+
+    assign ready         = begins || goes_on || state == TRAIL;
     assign driver_enable = state != IDLE;
     assign busy          = state != IDLE;
 
     always_ff @(posedge clk) begin
-        // rounded up: a whole bit of lead
+        // rounded up, so that the lead is at least one bit
         if (state == IDLE) left <= whole - 20'd1;
         else if (!now) left <= left - 20'd16;
         else if (state == SEND && ready)
@@ -62,12 +67,12 @@ module uart_tx #(
 
         if (valid && ready) begin
             tx      <= 1'b0;
-            place   <= STOP;
+            to_come <= STOP;
             shifted <= {1'b1, NINTH != 0 ? ninth : 1'b1, data};
             if (state == TRAIL) left <= whole - 20'd16;
         end else if (state == SEND && now) begin
-            tx      <= place == 4'd0 || shifted[0];
-            place   <= place - 1'b1;
+            tx      <= to_come == 4'd0 || shifted[0];
+            to_come <= to_come - 1'b1;
             shifted <= {1'b1, shifted[9:1]};
         end
 
@@ -93,7 +98,7 @@ module uart_tx #(
         if (past && !$past(rst)) begin
             if (!driver_enable) assert (tx);
             if (state != SEND) assert (tx);
-            if (state == SEND) assert (place <= STOP);
+            if (state == SEND) assert (to_come <= STOP);
             cover (state == SEND);
         end
     end

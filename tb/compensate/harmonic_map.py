@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/compensate/harmonic_map.sv does, in integers: clk(...) is one clk, the state is what
-stands after it.
+"""Model of rtl/compensate/harmonic_map.sv in integers: clk(...) advances one cycle; the attributes
+hold the state after it.
 
 term_of(amplitude, phase) makes the words of a term from counts and radians; exact(terms, turn) is
-the sum that they stand for.
+the sum that these words represent.
 """
 
 import math
 
 STEPS = 22
-ROTATIONS = [round(math.atan(2.0**-n) * 2**32 / (2 * math.pi)) for n in range(24)]
+ROTATIONS = [round(math.atan(2.0**-n) * 2**32 / (2 * math.pi)) for n in range(24)]  # 2^-32 turn
 GAIN = math.prod(math.sqrt(1 + 4.0**-n) for n in range(STEPS))
-SETTLE = 35  # clk of a round beside its terms
+SETTLE = 35  # cycles of a round in addition to its terms
 
 
 def signed(value, bits):
@@ -20,11 +20,12 @@ def signed(value, bits):
 
 
 def term_of(amplitude, phase):
+    """The words of a term: amplitude in counts, phase in radians."""
     return round(amplitude * 2**16 / GAIN), round(phase / (2 * math.pi) * 2**32) % 2**32
 
 
 def exact(terms, turn):
-    """Counts at an angle in turns, from the words as written; terms by order from 1 up."""
+    """Counts at an angle in turns, from the words of the terms, order 1 first."""
     return sum(
         a / 2**16 * GAIN * math.sin(2 * math.pi * (k * turn + phase / 2**32))
         for k, (a, phase) in enumerate(terms, 1)
@@ -32,21 +33,23 @@ def exact(terms, turn):
 
 
 def rotated(amplitude, angle, steps):
-    """(x, y) of 2^-24 count: the vector of the amplitude turned by 2^-32 turns, longer by the gain."""
-    x, y, rest = amplitude << 8, 0, signed(angle, 32)
+    """(x, y) in 2^-24 count: the vector of the amplitude, rotated by 2^-32 turn times the angle and
+    lengthened by the gain.
+    """
+    x, y, remainder = amplitude << 8, 0, signed(angle, 32)
     if (angle >> 31 ^ angle >> 30) & 1:
-        x, rest = ~x, signed(angle ^ 1 << 31, 32)
+        x, remainder = ~x, signed(angle ^ 1 << 31, 32)
     for n in range(steps):
-        if rest < 0:
-            x, y, rest = x + (y >> n), y + ~(x >> n), rest + ROTATIONS[n]
+        if remainder < 0:
+            x, y, remainder = x + (y >> n), y + ~(x >> n), remainder + ROTATIONS[n]
         else:
-            x, y, rest = x + ~(y >> n), y + (x >> n), rest + ~ROTATIONS[n]
-        rest = signed(rest, 32)
+            x, y, remainder = x + ~(y >> n), y + (x >> n), remainder + ~ROTATIONS[n]
+        remainder = signed(remainder, 32)
     return x, y
 
 
 def round_of(k, steps=STEPS):
-    """clk of a round."""
+    """Cycles of a round."""
     return (steps + 2) * (k + k % 2) + SETTLE
 
 
@@ -73,7 +76,7 @@ class HarmonicMap:
         self.stop()
 
     def stop(self):
-        self.left = None  # clk of the round
+        self.left = None  # cycles of the round that are left
         self.base = self.slope = self.offset = self.since = 0
         self.refreshed = False
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/compensate/segment_map.sv does, in integers: clk(...) is one clk, the state is what
-stands after it.
+"""Model of rtl/compensate/segment_map.sv in integers: clk(...) advances one cycle; the attributes
+hold the state after it.
 """
 
 from tb.compensate.segment_table import segment_table
@@ -12,7 +12,7 @@ def signed(value, bits):
 
 
 def error_at(points, angle):
-    """2^-16 count at an angle in 2^-32 turn; points are those of one turn."""
+    """The error in 2^-16 count at an angle in 2^-32 turn; points are those of one turn."""
     errors = [*points, points[0]]
     return (
         angle
@@ -30,7 +30,7 @@ def error_at(points, angle):
 class SegmentMap:
     def __init__(self, segments=36, w=32):
         self.segments, self.w = segments, w
-        self.round = (2 * segments + 1).bit_length() + 23  # clk
+        self.round = (2 * segments + 1).bit_length() + 23  # cycles
         self.sets = [[0] * segments, [0] * segments]
         self.position_q = self.corrected = 0
         self.reset()

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""harmonic_map: a sine by hand, latency and round, accuracy over the turn, staleness at speed,
-swaps, and any motion against the model.
+"""harmonic_map: a sine by hand, latency and length of a round, accuracy over the turn, lag in
+motion, swaps, and any motion against the model.
 """
 
 import math
@@ -28,11 +28,13 @@ IDLE = dict(
 )
 STROBES = "write", "swap", "step"
 COUNTS = 32768
-ARCSEC = 1_296_000 / COUNTS  # of a count
+ARCSEC = 1_296_000 / COUNTS  # arcseconds per count
 
 
 class Map:
-    """The design with the model beside it in every cycle, and the encoder that makes angle of step."""
+    """The design with the model beside it in every cycle, and an encoder that turns steps into
+    angle and position.
+    """
 
     def __init__(self, dut):
         self.dut, self.inputs, self.place = dut, dict(IDLE), 0
@@ -46,12 +48,12 @@ class Map:
         await start(self.dut, **IDLE)
         await FallingEdge(self.dut.clk)
         await self.clk(rst=1)
-        await self.give(())  # whatever an earlier test left in the other set
+        await self.give(())  # clears what an earlier test left in the other set
         await self.give(terms)
         return self
 
     async def give(self, terms):
-        """Write a set and put it in force."""
+        """Write a set of terms and put it in force."""
         self.terms = [*terms, *[(0, 0)] * (self.k - len(terms))]
         for n, (amplitude, phase) in enumerate(self.terms):
             await self.clk(write=1, term=n, amplitude=amplitude, phase=phase)
@@ -84,52 +86,52 @@ class Map:
             if pause:
                 await self.clk(pause)
 
-    async def rest(self):
+    async def settle(self):
         await self.clk(2 * self.round + 4)
 
     def error(self):
-        """Counts that the correction is off the sum that the terms stand for."""
+        """Correction less the exact sum of the terms, in counts."""
         return self.model.correction / 2**16 - exact(self.terms, self.place / self.counts)
 
 
 @cocotb.test()
-async def by_hand(dut):
-    chart = await Map(dut).reset([term_of(3.0, math.pi / 2)])  # 3 cos
-    await chart.rest()
-    assert abs(chart.model.correction - 3 * 65536) <= 2
-    assert chart.model.corrected == -chart.model.correction
-    chart.place = COUNTS // 2
-    await chart.rest()
-    assert abs(chart.model.correction + 3 * 65536) <= 2
-    assert chart.model.corrected == (COUNTS // 2 << 16) - chart.model.correction
+async def a_cosine_corrects_by_its_amplitude_at_0_and_half_a_turn(dut):
+    design = await Map(dut).reset([term_of(3.0, math.pi / 2)])  # 3 cos
+    await design.settle()
+    assert abs(design.model.correction - 3 * 65536) <= 2
+    assert design.model.corrected == -design.model.correction
+    design.place = COUNTS // 2
+    await design.settle()
+    assert abs(design.model.correction + 3 * 65536) <= 2
+    assert design.model.corrected == (COUNTS // 2 << 16) - design.model.correction
 
 
 @cocotb.test()
 async def latency_is_3(dut):
-    chart = await Map(dut).reset()
-    await chart.rest()
-    await chart.clk(step=1)
+    design = await Map(dut).reset()
+    await design.settle()
+    await design.clk(step=1)
     seen = []
     for _ in range(4):
         seen.append(dut.corrected.value.to_signed() >> 16)
-        await chart.clk()
+        await design.clk()
     assert seen == [0, 0, 1, 1]
 
 
 @cocotb.test()
-async def a_round_is_as_long_as_the_header_says(dut):
-    chart = await Map(dut).reset([term_of(1.0, 0)])
+async def a_round_takes_steps_plus_2_cycles_per_term_and_35(dut):
+    design = await Map(dut).reset([term_of(1.0, 0)])
     times = []
-    for n in range(4 * chart.round):
-        await chart.clk()
-        if chart.model.refreshed:
+    for n in range(4 * design.round):
+        await design.clk()
+        if design.model.refreshed:
             times.append(n)
-    assert {b - a for a, b in zip(times, times[1:])} == {24 * (chart.k + chart.k % 2) + 35}
+    assert {b - a for a, b in zip(times, times[1:])} == {24 * (design.k + design.k % 2) + 35}
 
 
 @cocotb.test()
-async def all_orders_are_right_to_a_hundredth_of_an_arcsecond(dut):
-    chart = await Map(dut).reset(
+async def the_sum_of_all_orders_is_right_to_a_hundredth_of_an_arcsecond(dut):
+    design = await Map(dut).reset(
         [
             term_of(random.uniform(-3, 3) / k, random.uniform(0, 6.3))
             for k in range(1, int(dut.K.value) + 1)
@@ -144,114 +146,114 @@ async def all_orders_are_right_to_a_hundredth_of_an_arcsecond(dut):
         COUNTS - 1,
         *(random.randrange(COUNTS) for _ in range(8)),
     ):
-        chart.place = place
-        await chart.rest()
-        assert abs(chart.error()) * ARCSEC <= 0.01
+        design.place = place
+        await design.settle()
+        assert abs(design.error()) * ARCSEC <= 0.01
 
 
 @cocotb.test()
-async def largest_amplitudes_do_not_overflow(dut):
+async def the_largest_amplitudes_do_not_overflow(dut):
     for sign in (1, -1):
-        chart = await Map(dut).reset(
+        design = await Map(dut).reset(
             [term_of(sign * 16383.0 / int(dut.K.value), math.pi / 2)] * int(dut.K.value),
             counts=32_768_000,
         )
-        for place in (0, chart.counts // 2):
-            chart.place = place
-            await chart.rest()
-            assert abs(chart.error()) < 0.02
+        for place in (0, design.counts // 2):
+            design.place = place
+            await design.settle()
+            assert abs(design.error()) < 0.02
 
 
 @cocotb.test()
-async def at_speed_it_is_behind_by_no_more_than_its_bound(dut):
+async def in_motion_it_lags_by_no_more_than_its_bound(dut):
     amplitudes = (3.4, 0.5, 0.2)[: int(dut.K.value)]
-    chart = await Map(dut).reset([term_of(amplitude, n) for n, amplitude in enumerate(amplitudes)])
-    await chart.rest()
+    design = await Map(dut).reset([term_of(amplitude, n) for n, amplitude in enumerate(amplitudes)])
+    await design.settle()
     curve = sum(k * k * a for k, a in enumerate(amplitudes, 1)) * (2 * math.pi / COUNTS) ** 2
     for pause in (1, 7, 40):
-        moved = chart.round / (1 + pause)
-        await chart.rest()
-        for way in (1, -1, 1):
+        moved = design.round / (1 + pause)
+        await design.settle()
+        for direction in (1, -1, 1):
             for _ in range(int(moved * 3)):
-                await chart.walk(way, pause)
-                assert abs(chart.error()) <= 3 * moved**2 * curve + 0.001
+                await design.walk(direction, pause)
+                assert abs(design.error()) <= 3 * moved**2 * curve + 0.001
 
 
 @cocotb.test()
-async def at_rest_the_way_there_does_not_matter(dut):
-    chart = await Map(dut).reset([term_of(2.0, 1.0)])
-    await chart.rest()
-    await chart.walk(100)
-    await chart.rest()
-    from_below = chart.model.correction
-    await chart.walk(50)
-    await chart.walk(-50)
-    await chart.rest()
-    assert chart.model.correction == from_below
+async def at_standstill_the_correction_does_not_depend_on_the_motion_before(dut):
+    design = await Map(dut).reset([term_of(2.0, 1.0)])
+    await design.settle()
+    await design.walk(100)
+    await design.settle()
+    from_below = design.model.correction
+    await design.walk(50)
+    await design.walk(-50)
+    await design.settle()
+    assert design.model.correction == from_below
 
 
 @cocotb.test()
-async def a_set_comes_into_force_as_a_whole(dut):
+async def swap_replaces_all_terms_at_once(dut):
     first, second = [term_of(2.0, math.pi / 2)], [term_of(-5.0, math.pi / 2)] * int(dut.K.value)
-    chart = await Map(dut).reset(first)
-    await chart.rest()
-    for wait in (0, 1, chart.round // 2, chart.round - 1):
-        was = exact(chart.terms, 0)
-        await chart.clk(wait + 1)
-        await chart.give(second if chart.terms[0] == first[0] else first)
-        for _ in range(2 * chart.round):
-            await chart.clk()
+    design = await Map(dut).reset(first)
+    await design.settle()
+    for wait in (0, 1, design.round // 2, design.round - 1):
+        was = exact(design.terms, 0)
+        await design.clk(wait + 1)
+        await design.give(second if design.terms[0] == first[0] else first)
+        for _ in range(2 * design.round):
+            await design.clk()
             assert (
-                min(abs(chart.model.correction / 65536 - s) for s in (was, exact(chart.terms, 0)))
+                min(abs(design.model.correction / 65536 - s) for s in (was, exact(design.terms, 0)))
                 < 0.001
             )
-        assert abs(chart.error()) < 0.001
+        assert abs(design.error()) < 0.001
 
 
 @cocotb.test()
 async def nothing_is_corrected_before_the_first_set_nor_without_enable(dut):
-    chart = Map(dut)
+    design = Map(dut)
     await start(dut, **IDLE)
     await FallingEdge(dut.clk)
-    chart.counts, chart.terms = COUNTS, []
-    await chart.clk(rst=1)
-    await chart.clk(2 * chart.round, enable=1)
-    assert chart.model.correction == 0
-    await chart.give([term_of(2.0, 1.0)])
-    await chart.rest()
-    assert chart.model.correction != 0
-    await chart.clk(2, enable=0)
-    assert chart.model.correction == 0
+    design.counts, design.terms = COUNTS, []
+    await design.clk(rst=1)
+    await design.clk(2 * design.round, enable=1)
+    assert design.model.correction == 0
+    await design.give([term_of(2.0, 1.0)])
+    await design.settle()
+    assert design.model.correction != 0
+    await design.clk(2, enable=0)
+    assert design.model.correction == 0
 
 
 @cocotb.test()
-async def reset_in_mid_flow(dut):
-    chart = await Map(dut).reset([term_of(2.0, 1.0)])
-    for wait in (1, 5, 30, chart.round - 1):
-        await chart.clk(wait)
-        await chart.clk(rst=1)
-        await chart.clk(2 * chart.round)
-        assert chart.model.correction == 0  # a set must be swapped in anew
-        await chart.give([term_of(2.0, 1.0)])
-        await chart.rest()
-        assert abs(chart.error()) < 0.001
+async def reset_in_a_round_ends_the_correction_until_the_next_swap(dut):
+    design = await Map(dut).reset([term_of(2.0, 1.0)])
+    for wait in (1, 5, 30, design.round - 1):
+        await design.clk(wait)
+        await design.clk(rst=1)
+        await design.clk(2 * design.round)
+        assert design.model.correction == 0  # a set must be swapped in again
+        await design.give([term_of(2.0, 1.0)])
+        await design.settle()
+        assert abs(design.error()) < 0.001
 
 
 @cocotb.test()
 async def any_motion_matches_the_model(dut):
-    chart = await Map(dut).reset(
+    design = await Map(dut).reset(
         [term_of(random.uniform(-9, 9), random.uniform(0, 6)) for _ in range(int(dut.K.value))]
     )
-    way = 1
+    direction = 1
     for _ in range(6000):
         inputs = {}
         kind = random.randrange(400)
         if kind == 0:
-            way = random.choice((-1, 0, 1))
+            direction = random.choice((-1, 0, 1))
         elif kind < 4:
             inputs.update(
                 write=1,
-                term=random.randrange(chart.k),
+                term=random.randrange(design.k),
                 amplitude=random.randrange(-(2**24), 2**24),
                 phase=random.getrandbits(32),
             )
@@ -260,13 +262,13 @@ async def any_motion_matches_the_model(dut):
         elif kind == 5:
             inputs["enable"] = int(random.randrange(4) > 0)
         elif kind == 6:
-            chart.place = random.randrange(COUNTS)
-        await chart.clk(
-            step=random.choice((0, way)), rst=int(random.randrange(3000) == 0), **inputs
+            design.place = random.randrange(COUNTS)
+        await design.clk(
+            step=random.choice((0, direction)), rst=int(random.randrange(3000) == 0), **inputs
         )
 
 
-def test_the_page_of_the_relay_says_how_far_it_lags():
+def test_docs_relay_prints_the_lag_in_motion():
     clk_hz, page = 48e6, (ROOT / "docs" / "relay.md").read_text()
     curve = (
         sum(k * k * arcsec for k, arcsec in enumerate((105, 40, 12), 1))
@@ -278,8 +280,8 @@ def test_the_page_of_the_relay_says_how_far_it_lags():
         ("24 MHz of edges", 24e6),
     ):
         moved = round_of(16) * rate / clk_hz
-        told = re.search(rf"^\| {name}.*\| ([\d.]+)\u2033 \|$", page, re.MULTILINE).group(1)
-        assert float(told) == pytest.approx(3 * moved**2 * curve, rel=0.2)
+        printed = re.search(rf"^\| {name}.*\| ([\d.]+)\u2033 \|$", page, re.MULTILINE).group(1)
+        assert float(printed) == pytest.approx(3 * moved**2 * curve, rel=0.2)
 
 
 @pytest.mark.parametrize("k", [1, 5, 16, 32])

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""segment_correction: by hand in both directions, its steps taken by a target, what it lags at
-speed, shifts, reading back, and any
-motion against the model."""
+"""segment_correction: errors by hand in both directions, a target that takes its steps, the lag in
+motion, shifts, reading back, and any motion against the model.
+"""
 
 import random
 
@@ -35,13 +35,13 @@ FLAGS = "done", "moved", "in_force", "outside", "known"
 
 
 class Scale:
-    """The design with the model beside it in every cycle, and a target that takes every moved_by."""
+    """The design with the model beside it in every cycle, and a target that adds every moved_by."""
 
     def __init__(self, dut):
         self.dut, self.inputs = dut, dict(IDLE)
         self.index = int(dut.INDEX.value)
         self.model = SegmentCorrection(self.index)
-        self.place, self.target = 0, 0  # of the scale, told as position
+        self.target = 0
 
     async def reset(self, points, origin=0, length=65536):
         await start(self.dut, **IDLE)
@@ -70,7 +70,7 @@ class Scale:
             await FallingEdge(dut.clk)
             for name in FLAGS:
                 assert bool(getattr(dut, name).value) == getattr(model, name), (
-                    f"{self.inputs}: {name} is not as the model's"
+                    f"{self.inputs}: {name} differs from the model"
                 )
             names = SIGNED if model.moved else ("corrected", "error")
             for name in (*names, "stored") if model.known else names:
@@ -84,7 +84,7 @@ class Scale:
                 self.inputs[name] = 0
 
     async def at(self, position):
-        """The corrected position of a scale that rests there, new every 5 clk."""
+        """Return the corrected position of a scale that stays there, with valid every 5 cycles."""
         for _ in range(2 * (self.model.round // 5 + 3)):
             await self.clk(valid=1, position=position)
             await self.clk(4)
@@ -120,13 +120,13 @@ async def the_sign_is_right_in_both_directions(dut):
     count = (1 << int(dut.INDEX.value)) - 1
     scale = await Scale(dut).reset(
         [round(65536 * n / 101) for n in range(count + 1)]
-    )  # the scale shows 1 % too much
+    )  # the scale reads 1 % too much
     await scale.clk(enable=1, linear=1)
     longest = 2 * (scale.model.round + 1 + 8) // 8 + 1  # steps of the motion below
-    for way in (1, -1):
-        true = 0 if way > 0 else count * 64000
+    for direction in (1, -1):
+        true = 0 if direction > 0 else count * 64000
         for step in range(600):
-            true += way * 97
+            true += direction * 97
             await scale.clk(valid=1, position=true + true // 100)
             await scale.clk(7)
             if step > longest:
@@ -134,7 +134,7 @@ async def the_sign_is_right_in_both_directions(dut):
 
 
 @cocotb.test()
-async def off_it_is_the_position_one_clk_later(dut):
+async def latency_is_1_and_without_enable_corrected_is_the_position(dut):
     scale = await Scale(dut).reset(any_points(4))
     for _ in range(200):
         position = random.randrange(-1 << 47, 1 << 47)
@@ -144,7 +144,7 @@ async def off_it_is_the_position_one_clk_later(dut):
 
 
 @cocotb.test()
-async def it_comes_into_force_index_plus_23_clk_after_enable(dut):
+async def latency_is_index_plus_23_from_enable_to_moved(dut):
     scale = await Scale(dut).reset([1000] * 4)
     await scale.clk(valid=1, position=70000)
     await scale.clk(5)
@@ -158,8 +158,8 @@ async def it_comes_into_force_index_plus_23_clk_after_enable(dut):
 
 
 @cocotb.test()
-async def a_target_that_takes_its_steps_is_never_thrown(dut):
-    scale = await Scale(dut).reset([4_000_000] * 4, origin=-100_000)  # 61 periods, everywhere
+async def a_target_that_adds_moved_by_never_sees_a_jump(dut):
+    scale = await Scale(dut).reset([4_000_000] * 4, origin=-100_000)  # 61 periods at all borders
     position = 0
     for n in range(40):
         enable = n % 2
@@ -174,30 +174,35 @@ async def a_target_that_takes_its_steps_is_never_thrown(dut):
 
 
 @cocotb.test()
-async def the_error_in_force_is_that_of_a_place_not_longer_ago_than_the_header_says(dut):
-    scale = await Scale(dut).reset([0, 1 << 22], length=1 << 24)  # a quarter of the way
+async def the_error_in_force_belongs_to_a_position_no_older_than_the_header_says(dut):
+    scale = await Scale(dut).reset(
+        [0, 1 << 22], length=1 << 24
+    )  # the error is a quarter of the position
     apart = 7
     await scale.clk(enable=1, linear=1)
-    for way in (300, -300):
-        position = (1 << 22) if way > 0 else 3 << 22
+    for direction in (300, -300):
+        position = (1 << 22) if direction > 0 else 3 << 22
         await scale.at(position)
-        allowed = -(-2 * (scale.index + 23 + apart) // apart) * abs(way) / 4 + 1
+        allowed = -(-2 * (scale.index + 23 + apart) // apart) * abs(direction) / 4 + 1
         for _ in range(400):
-            position += way
+            position += direction
             await scale.clk(valid=1, position=position)
             await scale.clk(apart - 1)
-            behind = (position - scale.model.corrected - position / 4) * (1 if way < 0 else -1)
+            behind = (position - scale.model.corrected - position / 4) * (
+                1 if direction < 0 else -1
+            )
             assert -1 <= behind <= allowed
 
 
 @cocotb.test()
-async def a_shift_moves_the_table_with_the_scale(dut):
+async def a_shift_moves_the_table_with_the_scale_and_latency_is_1_from_shift_to_moved(dut):
     scale = await Scale(dut).reset([0, 7000, -5000, 300], origin=1000, length=65536 + 77)
     await scale.clk(enable=1, linear=1)
     before = await scale.at(80_000)
     for periods in (1, -3, (1 << 31) - 1, -(1 << 31) + 5):
         was = scale.inputs["position"]
         await scale.clk(shift=1, shift_periods=periods)
+        assert dut.moved.value and dut.moved_by.value.to_signed() == wrap(periods << 16)
         await scale.clk(2)
         assert scale.model.corrected == wrap(before + (periods << 16))
         before = await scale.at(wrap(was + (periods << 16)))
@@ -205,7 +210,7 @@ async def a_shift_moves_the_table_with_the_scale(dut):
 
 
 @cocotb.test()
-async def beyond_the_table_the_error_is_that_of_its_border_and_it_says_so(dut):
+async def beyond_the_table_the_error_is_that_of_its_border_and_outside_is_high(dut):
     scale = await Scale(dut).reset([100, 200, -300], length=1000)
     await scale.clk(enable=1)
     for position, error, outside in (
@@ -219,7 +224,7 @@ async def beyond_the_table_the_error_is_that_of_its_border_and_it_says_so(dut):
 
 
 @cocotb.test()
-async def points_are_read_back_at_work_too(dut):
+async def points_are_read_back_with_and_without_enable(dut):
     points = any_points(1 << int(dut.INDEX.value))
     scale = await Scale(dut).reset(points)
     for enable in (0, 1, 0, 1):
@@ -235,7 +240,7 @@ async def points_are_read_back_at_work_too(dut):
 
 
 @cocotb.test()
-async def reset_in_mid_flow(dut):
+async def reset_in_a_calculation_drops_it(dut):
     scale = await Scale(dut).reset(any_points(4))
     for wait in range(1, scale.model.round + 6, 5):
         await scale.clk(enable=1, valid=1, position=5000)

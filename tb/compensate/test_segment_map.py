@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""segment_map: points by hand, latency and round, the last border, staleness at speed, swaps, and
-any motion against the model.
+"""segment_map: points by hand, latency and length of a round, the last border, lag in motion,
+swaps, and any motion against the model.
 """
 
 import math
@@ -32,7 +32,7 @@ class Map:
         await start(self.dut, **IDLE)
         await FallingEdge(self.dut.clk)
         await self.clk(rst=1)
-        await self.give([0] * self.segments)  # whatever an earlier test left in the other set
+        await self.give([0] * self.segments)  # clears what an earlier test left in the other set
         await self.give(points)
         return self
 
@@ -43,7 +43,7 @@ class Map:
             await self.clk(2)
 
     async def give(self, points):
-        """Write a set and put it in force."""
+        """Write a set of points and put it in force."""
         await self.put(points)
         await self.clk(swap=1, enable=1)
 
@@ -64,7 +64,7 @@ class Map:
                 self.inputs[name] = 0
 
     async def at(self, angle):
-        """The correction at rest."""
+        """The correction at standstill at this angle."""
         await self.clk(2 * self.round + 2, angle=angle % TURN)
         return self.model.correction
 
@@ -74,130 +74,130 @@ def any_points(count, reach=LARGEST):
 
 
 @cocotb.test()
-async def by_hand(dut):
+async def points_and_the_middles_between_them_are_as_worked_out_by_hand(dut):
     points = [1000 * n for n in range(int(dut.SEGMENTS.value))]
-    chart = await Map(dut).reset(points)
-    for n in range(chart.segments - 1):
-        assert abs(await chart.at(n * TURN // chart.segments + 1) - points[n]) <= 1
+    design = await Map(dut).reset(points)
+    for n in range(design.segments - 1):
+        assert abs(await design.at(n * TURN // design.segments + 1) - points[n]) <= 1
         assert (
-            abs(await chart.at((2 * n + 1) * TURN // (2 * chart.segments)) - points[n] - 500) <= 1
+            abs(await design.at((2 * n + 1) * TURN // (2 * design.segments)) - points[n] - 500) <= 1
         )
-    await chart.clk(3, position=77)
-    assert chart.model.corrected == (77 << 16) - chart.model.correction
+    await design.clk(3, position=77)
+    assert design.model.corrected == (77 << 16) - design.model.correction
 
 
 @cocotb.test()
 async def the_last_border_is_the_first(dut):
-    chart = await Map(dut).reset([6000] + [0] * (int(dut.SEGMENTS.value) - 1))
-    assert abs(await chart.at(TURN - 1) - 6000) <= 1
-    assert abs(await chart.at(TURN - TURN // (2 * chart.segments)) - 3000) <= 1
-    assert abs(await chart.at(0) - 6000) <= 1
+    design = await Map(dut).reset([6000] + [0] * (int(dut.SEGMENTS.value) - 1))
+    assert abs(await design.at(TURN - 1) - 6000) <= 1
+    assert abs(await design.at(TURN - TURN // (2 * design.segments)) - 3000) <= 1
+    assert abs(await design.at(0) - 6000) <= 1
 
 
 @cocotb.test()
 async def latency_is_3(dut):
-    chart = await Map(dut).reset([0] * int(dut.SEGMENTS.value))
-    await chart.clk(4, position=5)
-    seen = []  # position is one clk younger than step
-    await chart.clk(position=6)
+    design = await Map(dut).reset([0] * int(dut.SEGMENTS.value))
+    await design.clk(4, position=5)
+    seen = []  # position changes one cycle after step
+    await design.clk(position=6)
     for _ in range(3):
-        seen.append(chart.model.corrected >> 16)
-        await chart.clk()
+        seen.append(design.model.corrected >> 16)
+        await design.clk()
     assert seen == [5, 6, 6]
 
 
 @cocotb.test()
-async def a_round_is_as_long_as_the_header_says(dut):
-    chart = await Map(dut).reset(any_points(int(dut.SEGMENTS.value)))
+async def a_round_takes_the_bits_of_a_border_number_and_23_cycles(dut):
+    design = await Map(dut).reset(any_points(int(dut.SEGMENTS.value)))
     times = []
-    for n in range(6 * chart.round):
-        await chart.clk()
-        if chart.model.refreshed:
+    for n in range(6 * design.round):
+        await design.clk()
+        if design.model.refreshed:
             times.append(n)
     assert {b - a for a, b in zip(times, times[1:])} == {
-        math.ceil(math.log2(2 * chart.segments + 2)) + 23
+        math.ceil(math.log2(2 * design.segments + 2)) + 23
     }
 
 
 @cocotb.test()
-async def at_speed_it_is_behind_by_two_rounds_at_most(dut):
+async def in_motion_it_lags_by_two_rounds_at_most(dut):
     count = int(dut.SEGMENTS.value)
     points = [65536 * (n if n < count / 2 else count - n) // count for n in range(count)]
-    chart = await Map(dut).reset(points)
+    design = await Map(dut).reset(points)
     each = TURN // 32768
-    for way in (each, -each):
+    for direction in (each, -each):
         angle = random.randrange(TURN)
-        await chart.at(angle)
-        for _ in range(8 * chart.round):
-            angle = (angle + way) % TURN
-            await chart.clk(angle=angle)
+        await design.at(angle)
+        for _ in range(8 * design.round):
+            angle = (angle + direction) % TURN
+            await design.clk(angle=angle)
             place = angle * count / TURN
             low, high = points[int(place)], [*points, points[0]][int(place) + 1]
             assert (
-                abs(chart.model.correction - low - (high - low) * (place % 1))
-                <= 2 * chart.round * 65536 / 32768 + 2
+                abs(design.model.correction - low - (high - low) * (place % 1))
+                <= 2 * design.round * 65536 / 32768 + 2
             )
 
 
 @cocotb.test()
 async def a_set_comes_into_force_as_a_whole(dut):
     count = int(dut.SEGMENTS.value)
-    chart = await Map(dut).reset([2000] * count)
+    design = await Map(dut).reset([2000] * count)
     was, then = 2000, -5000
-    for wait in (0, 1, chart.round - 1, chart.round, chart.round + 1):
-        await chart.at(12345)
-        await chart.put([then] * count)
-        await chart.clk(chart.round + wait)
-        assert chart.model.correction == was
-        await chart.clk(swap=1)
-        for _ in range(3 * chart.round):
-            await chart.clk(angle=random.getrandbits(32))
-            assert chart.model.correction in (was, then)
-        assert chart.model.correction == then
+    for wait in (0, 1, design.round - 1, design.round, design.round + 1):
+        await design.at(12345)
+        await design.put([then] * count)
+        await design.clk(design.round + wait)
+        assert design.model.correction == was
+        await design.clk(swap=1)
+        for _ in range(3 * design.round):
+            await design.clk(angle=random.getrandbits(32))
+            assert design.model.correction in (was, then)
+        assert design.model.correction == then
         was, then = then, was
 
 
 @cocotb.test()
 async def largest_points_do_not_overflow(dut):
     ends = -LARGEST - 1, LARGEST
-    chart = await Map(dut).reset([ends[n % 2] for n in range(int(dut.SEGMENTS.value))])
+    design = await Map(dut).reset([ends[n % 2] for n in range(int(dut.SEGMENTS.value))])
     for angle in (0, 1, TURN - 1, TURN // 2, *(random.getrandbits(32) for _ in range(5))):
-        assert ends[0] <= await chart.at(angle) <= ends[1]
+        assert ends[0] <= await design.at(angle) <= ends[1]
 
 
 @cocotb.test()
 async def nothing_is_corrected_before_the_first_set_nor_without_enable(dut):
-    chart = Map(dut)
+    design = Map(dut)
     await start(dut, **IDLE)
     await FallingEdge(dut.clk)
-    await chart.clk(rst=1)
-    await chart.clk(3 * chart.round, enable=1)
-    assert chart.model.correction == 0
-    await chart.give([9] * chart.segments)
-    assert await chart.at(5) == 9
-    await chart.clk(1, enable=0)
-    assert chart.model.correction == 0
+    await design.clk(rst=1)
+    await design.clk(3 * design.round, enable=1)
+    assert design.model.correction == 0
+    await design.give([9] * design.segments)
+    assert await design.at(5) == 9
+    await design.clk(1, enable=0)
+    assert design.model.correction == 0
 
 
 @cocotb.test()
-async def reset_in_mid_flow(dut):
-    chart = await Map(dut).reset([9] * int(dut.SEGMENTS.value))
-    for wait in (1, 5, chart.round - 1, chart.round):
-        await chart.clk(wait)
-        await chart.clk(rst=1)
-        await chart.clk(3 * chart.round)
-        assert chart.model.correction == 0  # a set must be swapped in anew
-        await chart.give([9] * chart.segments)
-        assert await chart.at(5) == 9
+async def reset_in_a_round_ends_the_correction_until_the_next_swap(dut):
+    design = await Map(dut).reset([9] * int(dut.SEGMENTS.value))
+    for wait in (1, 5, design.round - 1, design.round):
+        await design.clk(wait)
+        await design.clk(rst=1)
+        await design.clk(3 * design.round)
+        assert design.model.correction == 0  # a set must be swapped in again
+        await design.give([9] * design.segments)
+        assert await design.at(5) == 9
 
 
 @cocotb.test()
 async def any_motion_matches_the_model(dut):
-    chart = await Map(dut).reset(any_points(int(dut.SEGMENTS.value)))
+    design = await Map(dut).reset(any_points(int(dut.SEGMENTS.value)))
     angle = 0
     for _ in range(60):
         if random.randrange(3) == 0:
-            await chart.put(any_points(chart.segments, random.choice((100, LARGEST))))
+            await design.put(any_points(design.segments, random.choice((100, LARGEST))))
         for _ in range(random.randrange(60)):
             angle = random.choice(
                 (
@@ -206,7 +206,7 @@ async def any_motion_matches_the_model(dut):
                     random.getrandbits(32),
                 )
             )
-            await chart.clk(
+            await design.clk(
                 angle=angle,
                 position=random.getrandbits(32),
                 swap=int(random.randrange(40) == 0),

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""segment_table: the printed rectangle by hand, the straight line, bounds, sign in both directions,
-and any table against the model.
+"""segment_table: the rectangle of S0 by hand, the straight line, the borders, the sign in both
+directions, and any table against the model.
 """
 
 import random
@@ -28,7 +28,7 @@ FAR = 1 << 47
 
 
 class Table:
-    """The design with the model beside it in every clk."""
+    """The design with the model beside it in every cycle."""
 
     def __init__(self, dut):
         self.dut, self.model, self.inputs = (
@@ -75,21 +75,22 @@ class Table:
                 )
                 want = model.corrected, model.outside, model.error
                 assert got == want, (
-                    f"{self.inputs} in {self.length} from {self.origin}: {got}, the model has {want}"
+                    f"{self.inputs}, segments of {self.length} from {self.origin}: {got}, "
+                    f"the model has {want}"
                 )
 
     async def at(self, position, linear=0, enable=1):
-        """(corrected, outside); the clk it took in self.clks."""
+        """Return (corrected, outside); self.cycles is how long it took."""
         await self.clk(valid=1, position=position, linear=linear, enable=enable)
-        self.clks = 1
+        self.cycles = 1
         while not self.model.done:
             await self.clk(valid=0)
-            self.clks += 1
+            self.cycles += 1
         return self.model.corrected, self.model.outside
 
 
 @cocotb.test()
-async def the_rectangle_as_printed_by_hand(dut):
+async def the_rectangle_of_s0_by_hand(dut):
     table = await Table(dut).reset([0, 10, 30, -20], origin=500)
     for position, error in ((500, 5), (1499, 5), (1500, 20), (2499, 20), (2500, 5), (3499, 5)):
         assert await table.at(position) == (position - error, False)
@@ -111,16 +112,16 @@ async def the_straight_line_by_hand(dut):
 
 
 @cocotb.test()
-async def latency_is_30(dut):
+async def latency_is_index_plus_22(dut):
     table = await Table(dut).reset([1, 2])
     for position in (0, 500, -1, 5000):
         await table.at(position)
-        assert table.clks == 30
+        assert table.cycles == int(dut.INDEX.value) + 22
 
 
 @cocotb.test()
 async def the_sign_is_right_in_both_directions(dut):
-    errors = [100 * n for n in range(9)]  # the scale shows 100 more with each segment
+    errors = [100 * n for n in range(9)]  # the scale reads 100 more with each segment
     table = await Table(dut).reset(errors, length=10_000)
     for linear in (0, 1):
         for true in [*range(0, 79_000, 3950), *range(79_000, 0, -3950)]:
@@ -129,7 +130,7 @@ async def the_sign_is_right_in_both_directions(dut):
 
 
 @cocotb.test()
-async def beyond_its_borders_the_error_is_that_of_the_border(dut):
+async def beyond_the_table_the_error_is_that_of_its_border(dut):
     table = await Table(dut).reset([7, 0, -9], origin=-1000)
     for linear in (0, 1):
         for position, error in ((-1001, 7), (-FAR, 7), (1000, -9), (FAR - 1, -9)):
@@ -138,13 +139,13 @@ async def beyond_its_borders_the_error_is_that_of_the_border(dut):
 
 
 @cocotb.test()
-async def without_enable_the_position_passes(dut):
+async def without_enable_the_position_passes_unchanged(dut):
     table = await Table(dut).reset([7, 8, -9])
     assert (await table.at(1234, enable=0))[0] == 1234
 
 
 @cocotb.test()
-async def points_are_read_back_while_no_position_is_under_way(dut):
+async def points_are_read_back_while_no_position_is_processed(dut):
     points = [random.randrange(-1 << 23, 1 << 23) for _ in range(256)]
     table = await Table(dut).reset(points)
     for n in (0, 255, *random.sample(range(256), 20)):
@@ -157,7 +158,7 @@ async def points_are_read_back_while_no_position_is_under_way(dut):
 
 
 @cocotb.test()
-async def largest_errors_and_longest_tables(dut):
+async def the_largest_errors_in_the_longest_table_match_the_model(dut):
     ends = -(1 << 23), (1 << 23) - 1
     table = await Table(dut).reset(
         [ends[n % 2] for n in range(256)], origin=-FAR // 2, length=(FAR - 1) // 256
@@ -169,7 +170,7 @@ async def largest_errors_and_longest_tables(dut):
 
 
 @cocotb.test()
-async def a_position_that_comes_too_early_is_not_taken(dut):
+async def a_position_that_comes_too_early_is_ignored(dut):
     table = await Table(dut).reset([3, 4, 5])
     for n in range(200):
         await table.clk(
@@ -178,7 +179,7 @@ async def a_position_that_comes_too_early_is_not_taken(dut):
 
 
 @cocotb.test()
-async def reset_in_mid_flow(dut):
+async def reset_drops_the_running_position(dut):
     table = await Table(dut).reset([3, 4, 5])
     for wait in range(1, 30, 4):
         await table.clk(valid=1, position=100)
@@ -200,7 +201,7 @@ async def any_table_matches_the_model(dut):
             length,
         )
         for _ in range(12):
-            place = random.choice(
+            distance = random.choice(
                 (
                     random.randrange(count * length),
                     random.randrange(count) * length,
@@ -209,7 +210,7 @@ async def any_table_matches_the_model(dut):
                     random.randrange(-length, (count + 1) * length),
                 )
             )
-            await table.at(table.origin + place, random.getrandbits(1))
+            await table.at(table.origin + distance, random.getrandbits(1))
             await table.clk(random.choice((0, 0, 3)))
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""turn_angle: a turn by hand, the angle to its bound, start at every quarter, a missing index, and
-any steps against the model.
+"""turn_angle: a turn by hand, the accuracy of the angle, the start at every quarter, a missing
+reference mark, and any steps against the model.
 """
 
 import random
@@ -44,7 +44,7 @@ class Turn:
 
 
 @cocotb.test()
-async def by_hand(dut):
+async def the_angles_of_a_turn_of_4_counts_are_its_quarters(dut):
     turn = await Turn(dut).reset(counts=4)
     await turn.clk(step=1, index=1)
     assert (turn.model.position, turn.model.angle, turn.model.known) == (1, 0, True)
@@ -81,44 +81,44 @@ async def position_starts_at_the_quarter_that_the_levels_show(dut):
 
 
 @cocotb.test()
-async def the_angle_keeps_its_bound_for_any_counts_per_turn(dut):
+async def the_angle_is_as_accurate_as_the_header_says_for_any_counts_per_turn(dut):
     for counts in (3, 1000, 999_983, 32_768_000, 2**25 - 1):
         turn = await Turn(dut).reset(counts=counts)
         await turn.clk(index=1)
-        for way in (1, -1):
+        for direction in (1, -1):
             for n in range(1, 200):
-                await turn.clk(step=way)
-                away = (n * way if way > 0 else 199 - n) % counts
+                await turn.clk(step=direction)
+                away = (n * direction if direction > 0 else 199 - n) % counts
                 error = (turn.model.turned - round(away * 2**48 / counts) + 2**47) % 2**48 - 2**47
                 assert abs(error) <= counts / 2 + 1
 
 
 @cocotb.test()
-async def a_turn_without_its_index_is_missing_in_both_directions(dut):
-    for way in (1, -1):
+async def a_turn_without_its_index_is_reported_in_both_directions(dut):
+    for direction in (1, -1):
         for counts in (5, 12):
             turn = await Turn(dut).reset(counts=counts)
             await turn.clk(index=1)
             seen = []
             for _ in range(2 * counts + 1):
-                await turn.clk(step=way)
+                await turn.clk(step=direction)
                 seen.append(turn.model.missing)
-            assert seen.index(True) == (counts - 1 if way > 0 else counts)
+            assert seen.index(True) == (counts - 1 if direction > 0 else counts)
             turn = await Turn(dut).reset(counts=counts)
             place = 0
             for _ in range(5 * counts):
-                place = (place + way) % counts
-                await turn.clk(step=way, index=int(place == 0))
+                place = (place + direction) % counts
+                await turn.clk(step=direction, index=int(place == 0))
                 assert not turn.model.missing
 
 
 @cocotb.test()
-async def trembling_over_a_wide_index_misses_nothing(dut):
+async def trembling_over_a_wide_index_reports_no_missing_one(dut):
     turn = await Turn(dut).reset(counts=6)
     await turn.clk(step=1, index=1)
     for _ in range(20):
         await turn.clk(step=-1)
-        await turn.clk(step=1)  # still high: not found again
+        await turn.clk(step=1)  # still high: the index is not found again
         assert not turn.model.missing
 
 
@@ -131,7 +131,7 @@ async def without_counts_per_turn_nothing_is_known(dut):
 
 
 @cocotb.test()
-async def reset_in_mid_flow(dut):
+async def reset_forgets_position_and_angle(dut):
     turn = await Turn(dut).reset(counts=10)
     for n in range(8):
         await turn.clk(step=1, index=1)

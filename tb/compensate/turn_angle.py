@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/compensate/turn_angle.sv does, in integers: clk(...) is one clk, the state is what
-stands after it.
+"""Model of rtl/compensate/turn_angle.sv in integers: clk(...) advances one cycle; the attributes
+hold the state after it.
 """
 
 
 class TurnAngle:
     def __init__(self, w=32):
         self.w = w
-        self.position = self.place = self.turned = self.turns = 0
-        self.highest = 0  # place, as of the clk before
+        self.position = self.from_mark = self.turned = self.turns = 0
+        self.highest = 0  # of from_mark, of the cycle before
         self.moved = self.known = self.referenced = self.missing = False
 
     @property
@@ -30,13 +30,13 @@ class TurnAngle:
         self.referenced, self.missing = bool(index and used), False
         self.known = used and (known or bool(index))
         if index:
-            self.place = self.turned = self.turns = 0
+            self.from_mark = self.turned = self.turns = 0
             return
-        place = self.place + step
-        passed = -1 if place < 0 else step > 0 and (self.place >= highest or not used)
-        self.place = 0 if not used else 0 if passed == 1 else highest if passed else place
+        from_mark = self.from_mark + step
+        passed = -1 if from_mark < 0 else step > 0 and (self.from_mark >= highest or not used)
+        self.from_mark = 0 if not used else 0 if passed == 1 else highest if passed else from_mark
         self.turned = (self.turned + step * angle_per_count) % (1 << 48)
-        if passed == 1 or (step < 0 and self.place == 0 and not passed):
+        if passed == 1 or (step < 0 and self.from_mark == 0 and not passed):
             self.turned = 0
         self.turns += passed
         if self.turns in (1, -2):

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/control/biquad_cascade.sv does, in integers: clk(...) is one clk and returns what is on
-the pins after it.
+"""Model of rtl/control/biquad_cascade.sv in integers: clk(...) advances one cycle and returns the
+outputs after it.
 """
 
 FRACTION = 30  # bits of a coefficient
-STAGE = 36  # clk per section from x to y
-PAST = 4 * 35 + 1  # and then to add up its past
+STAGE = 36  # cycles per section from x to y
+PAST = 4 * 35 + 1  # cycles per section to add up its past terms afterwards
 LOW, HIGH = -1 << 31, (1 << 31) - 1
 
 
@@ -16,12 +16,12 @@ class BiquadCascade:
         self.reset()
 
     def reset(self):
-        self.n = None  # clk since the sample, None: ready
+        self.n = None  # cycles since the sample, None: ready
         self.streams = [(0, 0)] * (
             self.sections + 1
-        )  # two past samples of each, the newer one first
+        )  # two past samples of each stream, the newer one first
         self.remainders = [0] * self.sections
-        self.samples = 0  # in a row that the sections know
+        self.samples = 0  # consecutive samples that the sections know
         self.filtering = 0
         self.y = 0
 
@@ -50,7 +50,9 @@ class BiquadCascade:
         track=0,
         x=0,
     ):
-        """Coefficients must not change in use, nor in_use rise and fall within a sample."""
+        """Advance one cycle. Coefficients must not change while in use, and in_use must not rise
+        and fall within a sample.
+        """
         if coefficient_write:
             self.coefficients[coefficient_address >> 3][coefficient_address & 7] = coefficient
         if rst:
@@ -62,8 +64,8 @@ class BiquadCascade:
                 self.n, self.track, self.values = 0, track, [x]
         else:
             self.n += 1
-            section, rest = divmod(self.n, STAGE)
-            if rest == 0 and section <= self.sections:
+            section, remainder = divmod(self.n, STAGE)
+            if remainder == 0 and section <= self.sections:
                 works = not self.track and self.filtering & in_use & 1 << section - 1
                 self.values.append(self.sample(section - 1, self.values[-1], works))
             if self.n == STAGE * self.sections:

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/control/pid_servo.sv does, in integers: clk(...) is one clk and returns what is on the
-pins after it.
+"""Model of rtl/control/pid_servo.sv in integers: clk(...) advances one cycle and returns the
+outputs after it.
 """
 
 from tb.control.biquad_cascade import STAGE, BiquadCascade
 
-TAKE, LOAD, PRODUCT = 8, 9, 25  # clk after tick: inputs taken, first term loaded; clk per term
-INTEGRATE = LOAD + PRODUCT  # the integral is new
+TAKE, LOAD, PRODUCT = 8, 9, 25  # cycles after tick: inputs taken, first term loaded; per term
+INTEGRATE = LOAD + PRODUCT  # cycles after tick: the integral is new
 
 
 def held(x, low, high):
@@ -16,21 +16,21 @@ def held(x, low, high):
 class PidServo:
     def __init__(self, terms=5, biquads=2):
         self.terms, self.biquads = terms, biquads
-        self.limit = LOAD + PRODUCT * terms  # the sum is complete
+        self.limit = LOAD + PRODUCT * terms  # cycles after tick: the sum is complete
         self.latency = self.limit + 1 + STAGE * biquads
         self.filters = BiquadCascade(biquads)
         self.reset()
 
     def reset(self):
-        self.n = None  # clk since tick, None: at rest
+        self.n = None  # cycles since tick, None: waiting
         self.integral = self.error = self.command = self.saturated = 0
         self.stale = self.fresh = (
-            1  # power was missing at some clk since the inputs were taken; since the last command
+            1  # the drive was off since the inputs were taken; since the last command
         )
         self.changed = self.changed_taken = 0
-        self.retaking = None  # what the integral becomes for a command that goes on
+        self.retaking = None  # the integral from which the command continues
         self.sum = 0  # 2^-16 command, before the filters
-        self.limited = set()  # directions in which the last command stood at its limit
+        self.limited = set()  # directions in which the last command was at its limit
         self.ready, self.filtered = 1, 0
 
     def clk(
@@ -61,7 +61,9 @@ class PidServo:
         block_up=0,
         block_down=0,
     ):
-        """Gains and limits must not change within a calculation, but with gains_changed."""
+        """Advance one cycle. Gains and limits may change within a calculation with gains_changed
+        only.
+        """
         if rst:
             self.filters.clk(
                 rst=1,
@@ -96,8 +98,8 @@ class PidServo:
                 if self.error < 0
                 else block_up or 1 in self.limited
             )
-            rests = blocked or not self.moving and abs(self.error) <= dead_band
-            self.grown = (0 if powerless else self.integral) + (0 if rests else ki * self.error)
+            constant = blocked or not self.moving and abs(self.error) <= dead_band
+            self.grown = (0 if powerless else self.integral) + (0 if constant else ki * self.error)
         elif self.n == INTEGRATE:
             self.integral = held(self.grown, -limit, limit)
             self.total += self.integral >> 8
@@ -125,12 +127,12 @@ class PidServo:
                 self.integral = held(self.retaking, -limit, limit)
             if self.n == self.latency:
                 self.n, valid = None, 1
-                wanted = (self.sum if no_power else self.filtered) >> 16
-                self.limited |= {(wanted > output_limit) - (wanted < -output_limit)} - {0}
+                command = (self.sum if no_power else self.filtered) >> 16
+                self.limited |= {(command > output_limit) - (command < -output_limit)} - {0}
                 self.limited = self.limited if closed_loop else set()
                 self.saturated = int(bool(self.limited))
                 self.command = (
-                    held(wanted, -output_limit, output_limit) if closed_loop else open_command
+                    held(command, -output_limit, output_limit) if closed_loop else open_command
                 )
         if self.biquads:
             self.ready, _, self.filtered = self.filters.clk(

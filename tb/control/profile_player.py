@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/control/profile_player.sv does, in integers: clk(...) is one clk and returns what is on
-the pins after it.
+"""Model of rtl/control/profile_player.sv in integers: clk(...) advances one cycle and returns the
+outputs after it.
 """
 
 from collections import deque
@@ -10,17 +10,17 @@ FULL = 1 << 32
 
 
 def wrap(x, bits=64):
-    """x as a two's complement number of so many bits."""
+    """x as a two's complement number of `bits` bits."""
     return (x + (1 << bits - 1)) % (1 << bits) - (1 << bits - 1)
 
 
 def held(x, bits=32):
-    """x, stopped at the ends of two's complement of so many bits."""
+    """x, limited to the range of a two's complement number of `bits` bits."""
     return max(-(1 << bits - 1), min((1 << bits - 1) - 1, x))
 
 
 def moved(velocity, acceleration, jerk, ticks):
-    """How far a segment goes, in 2^-40 period: the closed form of the recursion."""
+    """The distance of a segment in 2^-40 period: the closed form of the recursion."""
     n = ticks
     return velocity * n + acceleration * (n * (n - 1) // 2) + jerk * (n * (n - 1) * (n - 2) // 6)
 
@@ -30,38 +30,38 @@ def clks(count):
         yield
 
 
-class Way:
-    """A value on its way to zero: its slope in whole paces, and what that still adds while it falls
-    to zero.
+class Ramp:
+    """A ramp of a value to zero: its slope, a whole number of increments, and the area that the
+    slope still adds while it falls to zero.
     """
 
     def __init__(self):
-        self.slope = self.area = self.pace = self.upward = 0
+        self.slope = self.area = self.increment = self.upward = 0
 
     def decide(self, value, limit):
-        """(what to do with the slope, clk that it takes to know)."""
+        """Return (what the slope must do, cycles of this decision)."""
         turn = self.slope == 0
         if turn:
             self.upward = int(value < 0)
         left = -value if self.upward else value
-        if turn and left < self.pace:
+        if turn and left < self.increment:
             return "last", 6
         if not turn and (left < self.area or self.slope > limit):
             return "fall", 5 if left < self.area else 7
         clk = 6 if turn else 7
-        if left < self.area + self.slope + self.pace:
+        if left < self.area + self.slope + self.increment:
             return "stay", clk + 4
-        return ("stay", clk + 7) if self.slope + self.pace > limit else ("grow", clk + 7)
+        return ("stay", clk + 7) if self.slope + self.increment > limit else ("grow", clk + 7)
 
     def change(self, what):
-        """Do it; the clk that it takes."""
+        """Change the slope so; return the cycles that this takes."""
         if what == "grow":
-            self.slope += self.pace
+            self.slope += self.increment
             self.area += self.slope
             return 2
         if what == "fall":
             self.area -= self.slope
-            self.slope -= self.pace
+            self.slope -= self.increment
             return 4
         return 0
 
@@ -69,8 +69,8 @@ class Way:
         return self.slope if self.upward else -self.slope
 
     def choose(self, limit, curve):
-        """The pace of a new way; the clk that it takes."""
-        self.pace = limit if curve == 0 or curve > limit else curve
+        """Choose the increment of a new ramp; return the cycles that this takes."""
+        self.increment = limit if curve == 0 or curve > limit else curve
         return 3 if curve > limit else 4 if curve == 0 else 5
 
 
@@ -84,14 +84,14 @@ class ProfilePlayer:
         self.queue, self.armed, self.writing = deque(), 0, 0
 
     def stand(self):
-        """As at the end of a profile."""
+        """The state at the end of a profile."""
         self.life = self.ticks()
         self.velocity = self.acceleration = self.jerk = self.left = self.last = self.fraction = (
             self.offset
         ) = 0
         self.step = self.change = self.ready = self.final = self.arrived = self.rate = 0
         self.moving = self.braking = self.target_velocity = self.target_acceleration = 0
-        self.ramp, self.controlled_stop = Way(), None
+        self.ramp, self.stop_ramp = Ramp(), None
 
     def pins(self):
         return (
@@ -124,7 +124,9 @@ class ProfilePlayer:
         start_at=0,
         now=0,
     ):
-        """push: (velocity, acceleration, jerk, ticks, last) or None. shift: 2^-16 period or None."""
+        """Advance one cycle. push: (velocity, acceleration, jerk, ticks, last) or None; shift:
+        2^-16 period or None.
+        """
         self.underrun = 0
         if rst or set_target_to_position:
             self.exact = 0 if rst else position << 24
@@ -133,7 +135,7 @@ class ProfilePlayer:
             self.stand()
             self.empty()
             return self.pins()
-        self.tick, self.shifted, self.brake_now, self.stop_deceleration, self.stop_jerk = (
+        self.tick, self.shifted, self.stop_now, self.stop_deceleration, self.stop_jerk = (
             tick,
             shift is not None,
             controlled_stop,
@@ -168,7 +170,9 @@ class ProfilePlayer:
         return self.pins()
 
     def ticks(self):
-        """What goes on, a yield for each clk; True in the clk that ends a profile."""
+        """The work of all ticks, one yield per cycle; it yields True in the cycle that ends a
+        profile.
+        """
         while True:
             while not (self.tick and self.moving):
                 yield
@@ -195,7 +199,7 @@ class ProfilePlayer:
             yield
 
     def rate_step(self):
-        """The rate, a step nearer to its setting."""
+        """Bring the rate one step nearer to its setting."""
         ramp = self.ramp
         if not self.ready or self.slope == 0:
             yield from clks(5 if self.ready else 3)
@@ -208,7 +212,7 @@ class ProfilePlayer:
         distance = self.rate - self.setting
         new = ramp.slope == 0
         what, clk = ramp.decide(distance, self.slope)
-        if new and self.arrived:  # a rest of one tick before the next ramp
+        if new and self.arrived:  # one tick without change before the next ramp
             yield from clks(4 + 2)
             self.arrived = 0
         elif what == "last":
@@ -222,7 +226,7 @@ class ProfilePlayer:
         self.rate = max(0, min(FULL, rate))
 
     def interval(self):
-        """Prepare the next step of the profile; True: it is to be a brake instead."""
+        """Prepare the next step of the profile; True: a controlled stop must begin instead."""
         yield from self.rate_step()
         base = -self.offset
         yield
@@ -255,7 +259,7 @@ class ProfilePlayer:
         return False
 
     def load(self):
-        """The next segment, or the end; True: there is none, or a brake."""
+        """Take the next segment, or the end; True: there is none, or a controlled stop."""
         while True:
             last = self.last and not self.braking
             yield
@@ -268,7 +272,7 @@ class ProfilePlayer:
                 return True
             self.velocity, self.acceleration, self.jerk, self.left, self.last = self.queue[0]
             yield from clks(8)
-            if self.queue and not self.brake_now:
+            if self.queue and not self.stop_now:
                 self.queue.popleft()
             yield from clks(3)
             if self.left:
@@ -276,54 +280,57 @@ class ProfilePlayer:
                 return False
 
     def stop(self):
-        """Prepare the next step of a brake."""
-        limit, first, abrupt = self.stop_deceleration << 8, self.brake is None, False
+        """Prepare the next step of a controlled stop."""
+        limit, first, abrupt = self.stop_deceleration << 8, self.stop_ramp is None, False
         yield
         if first:
-            self.controlled_stop = Way()
+            self.stop_ramp = Ramp()
             yield
             abrupt = limit == 0
             if not abrupt:
-                abrupt, what = yield from self.begin_to_brake(limit)
+                abrupt, what = yield from self.begin_to_stop(limit)
         if abrupt:
             what = "last"
         elif not first or what is None:
-            what, clk = self.brake.decide(self.step, limit)
+            what, clk = self.stop_ramp.decide(self.step, limit)
             yield from clks(clk)
             if first and what in ("last", "fall"):
                 what = "stay"
                 yield
             elif what == "last":
                 yield from clks(2)
-            yield from clks(self.brake.change(what))
+            yield from clks(self.stop_ramp.change(what))
         if what == "last":
             self.change, self.final = -self.step, 1
         else:
-            self.change = self.brake.signed()
+            self.change = self.stop_ramp.signed()
         self.step += self.change
         yield
 
-    def begin_to_brake(self, limit):
-        """A slope of as many whole paces as the acceleration is high: (too fast to stop, "stay" if
-        it must not grow at this step).
+    def begin_to_stop(self, limit):
+        """Start with a slope of as many whole increments as the acceleration has. Return (whether
+        the motion is too fast to stop within limits, "stay" if the slope must not grow at this
+        step).
         """
-        brake = self.brake
-        yield from clks(1 + brake.choose(limit, self.stop_jerk) + 1 + 3 + 31)
-        brake.upward = int(self.change > 0)
-        quotient, rest = divmod(abs(self.change), brake.pace)
+        ramp = self.stop_ramp
+        yield from clks(1 + ramp.choose(limit, self.stop_jerk) + 1 + 3 + 31)
+        ramp.upward = int(self.change > 0)
+        quotient, remainder = divmod(abs(self.change), ramp.increment)
         quotient = min(quotient, (1 << 32) - 1)
         yield from clks(32 * 5 + quotient.bit_count() + 3)
-        brake.slope, brake.area = quotient * brake.pace, quotient * brake.pace * (quotient + 1) // 2
-        if abs(self.change) - brake.slope >= brake.pace:
+        ramp.slope, ramp.area = (
+            quotient * ramp.increment,
+            quotient * ramp.increment * (quotient + 1) // 2,
+        )
+        if abs(self.change) - ramp.slope >= ramp.increment:
             return True, None
         yield from clks(2 + 64 + 1)
-        if brake.slope * (quotient & ~1) >= 1 << 68:
+        if ramp.slope * (quotient & ~1) >= 1 << 68:
             return True, None
         yield from clks(3)
-        if (
-            brake.slope or not rest
-        ):  # of no slope but a rest: from the other side it would be more than a pace
-            if not brake.slope:
+        # with a remainder but no slope, the other side would be more than an increment
+        if ramp.slope or not remainder:
+            if not ramp.slope:
                 yield
             return False, None
         yield

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""biquad_cascade: steps by hand, rest without error, the accuracy bound, bypass, both ends, and
-random filters against the model.
+"""biquad_cascade: steps by hand, standstill without error, accuracy, bypass, both ends of the
+range, and random filters against the model.
 """
 
 import cmath
@@ -20,25 +20,27 @@ IDLE = dict(
 )
 
 
-def settled(b0, b1, b2, a1, a2):
-    """Coefficients as the block takes them, rounded, b1 such that a constant passes unchanged."""
+def with_unity_gain(b0, b1, b2, a1, a2):
+    """Rounded coefficients as the block takes them, with a b1 that passes constants unchanged."""
     b0, b2, c1, c2 = (round(value * ONE) for value in (b0, b2, -a1, -a2))
     return b0, ONE - b0 - b2 - c1 - c2, b2, c1, c2
 
 
 def low_pass(frequency, quality=0.7071):
-    """Of the tick rate; bilinear."""
+    """Coefficients of a low-pass at `frequency` of the tick rate, by the bilinear transform."""
     w = 2 * math.pi * frequency
     alpha = math.sin(w) / 2 / quality
     a0, b = 1 + alpha, (1 - math.cos(w)) / 2
-    return settled(b / a0, 2 * b / a0, b / a0, -2 * math.cos(w) / a0, (1 - alpha) / a0)
+    return with_unity_gain(b / a0, 2 * b / a0, b / a0, -2 * math.cos(w) / a0, (1 - alpha) / a0)
 
 
 def notch(frequency, quality=2.0):
     w = 2 * math.pi * frequency
     alpha = math.sin(w) / 2 / quality
     a0 = 1 + alpha
-    return settled(1 / a0, -2 * math.cos(w) / a0, 1 / a0, -2 * math.cos(w) / a0, (1 - alpha) / a0)
+    return with_unity_gain(
+        1 / a0, -2 * math.cos(w) / a0, 1 / a0, -2 * math.cos(w) / a0, (1 - alpha) / a0
+    )
 
 
 class Cascade:
@@ -73,7 +75,7 @@ class Cascade:
             )
 
     async def sample(self, x, **inputs):
-        """Give a sample, return y once the next one may come."""
+        """Give a sample and return y when the next sample may come."""
         ready, valid, y = await self.clk(valid_in=1, x=x, **inputs)
         out = None
         while not ready:
@@ -87,7 +89,7 @@ class Cascade:
 
 
 @cocotb.test()
-async def by_hand(dut):
+async def an_impulse_response_is_as_worked_out_by_hand(dut):
     cascade = await Cascade(dut).reset()
     await cascade.load(0, (ONE // 2, ONE // 4, ONE // 8, ONE // 2, -ONE // 4))
     await cascade.clk(in_use=1)
@@ -102,7 +104,7 @@ async def by_hand(dut):
 
 
 @cocotb.test()
-async def what_is_cut_off_goes_into_the_next_sample(dut):
+async def what_is_cut_off_is_added_to_the_next_sample(dut):
     cascade = await Cascade(dut).reset()
     await cascade.load(0, (ONE // 4, 0, 0, 0, 0))
     await cascade.clk(in_use=1)
@@ -122,7 +124,7 @@ async def what_is_cut_off_goes_into_the_next_sample(dut):
 
 
 @cocotb.test()
-async def latency_is_36_clk_a_section_and_1(dut):
+async def latency_is_sections_times_36_plus_1(dut):
     cascade = await Cascade(dut).reset()
     _, valid, _ = await cascade.clk(valid_in=1, x=5)
     latency = 1
@@ -133,7 +135,7 @@ async def latency_is_36_clk_a_section_and_1(dut):
 
 
 @cocotb.test()
-async def a_sample_each_177_clk_a_section_and_1(dut):
+async def a_sample_is_taken_every_sections_times_177_plus_1_cycles(dut):
     cascade = await Cascade(dut).reset()
     for _ in range(2):
         ready, _, _ = await cascade.clk(valid_in=1, x=7)
@@ -147,8 +149,8 @@ async def a_sample_each_177_clk_a_section_and_1(dut):
 
 
 @cocotb.test()
-async def it_comes_to_rest_without_error(dut):
-    """Where plain rounding sticks up to 1 / (1 + a1 + a2) LSB away, here up to 30 LSB."""
+async def it_settles_without_error(dut):
+    """Plain rounding would stop up to 1 / (1 + a1 + a2) LSB away, here up to 30 LSB."""
     cascade = await Cascade(dut).reset()
     for section in range(cascade.sections):
         await cascade.load(section, low_pass(0.03 * (section + 1)))
@@ -160,7 +162,7 @@ async def it_comes_to_rest_without_error(dut):
 
 
 @cocotb.test()
-async def the_error_is_within_the_stated_bound(dut):
+async def the_error_is_no_larger_than_the_header_says(dut):
     cascade = await Cascade(dut).reset()
     coefficients = low_pass(0.03, 1.5)
     await cascade.load(0, coefficients)
@@ -188,7 +190,7 @@ async def the_error_is_within_the_stated_bound(dut):
 
 
 @cocotb.test()
-async def a_notch_takes_its_frequency_out_and_leaves_others(dut):
+async def a_notch_removes_its_frequency_and_passes_others(dut):
     cascade = await Cascade(dut).reset()
     await cascade.load(0, notch(0.1))
     await cascade.clk(in_use=1)
@@ -213,7 +215,7 @@ async def a_notch_takes_its_frequency_out_and_leaves_others(dut):
 
 
 @cocotb.test()
-async def in_bypass_and_in_a_track_sample_x_passes_and_filtering_goes_on_from_there(dut):
+async def bypass_and_track_pass_x_and_filtering_continues_from_there(dut):
     cascade = await Cascade(dut).reset()
     for section in range(cascade.sections):
         await cascade.load(section, low_pass(0.01))
@@ -229,7 +231,7 @@ async def in_bypass_and_in_a_track_sample_x_passes_and_filtering_goes_on_from_th
 
 
 @cocotb.test()
-async def both_ends(dut):
+async def extreme_coefficients_and_samples_saturate_at_both_ends(dut):
     cascade = await Cascade(dut).reset()
     for ends in (
         (LOW, LOW, LOW, LOW, LOW),
@@ -247,7 +249,7 @@ async def both_ends(dut):
 
 
 @cocotb.test()
-async def reset_in_mid_flow(dut):
+async def reset_in_a_sample_drops_it_and_the_past(dut):
     cascade = await Cascade(dut).reset()
     await cascade.load(0, low_pass(0.01))
     await cascade.clk(in_use=1)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""pid_servo: each term by hand, wind-up, the dead band, the blocked directions, no jump at a change
-of mode or gain, the filters,
-both ends, and random ticks against the model."""
+"""pid_servo: each term by hand, anti-windup, the dead band, blocked directions, bumpless transfer
+when loop, drive or gains change, filters, both ends of the ranges, and random ticks against the
+model.
+"""
 
 import random
 
@@ -13,7 +14,8 @@ from tb.bench import needs, run, start
 from tb.control.pid_servo import PidServo
 
 INPUTS = (
-    "closed_loop kp ki kd kv ka output_limit integral_limit dead_band target target_velocity target_acceleration moving "
+    "closed_loop kp ki kd kv ka output_limit integral_limit dead_band "
+    "target target_velocity target_acceleration moving "
     "position velocity open_command block_up block_down filters_in_use"
 ).split()
 ONE = 1 << 16  # of kp, kd, kv
@@ -68,7 +70,7 @@ class Servo:
         return out[1], out[3]
 
     async def begin(self, **inputs):
-        """A tick, when one may come."""
+        """Wait until a tick may come, and give it."""
         self.set(**inputs)
         while self.biquads and not self.model.ready:
             await self.clk()
@@ -79,7 +81,7 @@ class Servo:
         return [(await self.tick())[0] for _ in range(count)]
 
     async def gains(self, **gains):
-        """As the bus writes them, one a clk."""
+        """Write the gains as the bus does, one per cycle."""
         for name, value in gains.items():
             self.set(**{name: value})
             await self.clk(gains_changed=1)
@@ -92,7 +94,7 @@ class Servo:
 
 
 @cocotb.test()
-async def each_term_by_hand(dut):
+async def each_term_gives_the_command_worked_out_by_hand(dut):
     servo = await Servo(dut).reset()
     needs(servo.terms == 5, "built with fewer terms")
     none = dict(
@@ -129,13 +131,20 @@ async def each_term_by_hand(dut):
 
 @cocotb.test()
 async def the_integral_grows_by_ki_each_tick(dut):
-    servo = await Servo(dut).reset(ki=1 << 22, target=6)  # 6/4 of a count a tick
-    assert [(await servo.tick())[0] for _ in range(6)] == [0, 1, 3, 4, 6, 7]  # see bumpless
+    servo = await Servo(dut).reset(ki=1 << 22, target=6)  # 6/4 of a count per tick
+    assert [(await servo.tick())[0] for _ in range(6)] == [
+        0,
+        1,
+        3,
+        4,
+        6,
+        7,
+    ]  # the first tick is bumpless
     assert [(await servo.tick(target=-6))[0] for _ in range(6)] == [6, 4, 3, 1, 0, -2]
 
 
 @cocotb.test()
-async def latency_is_11_clk_and_25_a_term_and_36_a_filter(dut):
+async def latency_is_11_plus_terms_times_25_plus_biquads_times_36(dut):
     servo = await Servo(dut).reset()
     latency = 1
     out = await servo.clk(tick=1)
@@ -147,21 +156,21 @@ async def latency_is_11_clk_and_25_a_term_and_36_a_filter(dut):
 
 
 @cocotb.test()
-async def a_tick_each_10_clk_and_25_a_term_and_177_a_filter(dut):
+async def a_tick_is_taken_every_10_plus_terms_times_25_plus_biquads_times_177_cycles(dut):
     servo = await Servo(dut).reset()
     period = 10 + 25 * servo.terms + 177 * servo.biquads + (servo.biquads == 0)
     assert (servo.terms, servo.biquads, period) in ((5, 2, 489), (5, 0, 136), (2, 0, 61))
-    for wanted in (period, period - 1):  # one clk earlier each second tick is ignored
+    for gap in (period, period - 1):  # one cycle sooner, every second tick is ignored
         ticks = 0
-        for n in range(4 * wanted):
-            ticks += (await servo.clk(tick=n % wanted == 0))[0]
-        assert ticks == (4 if wanted == period else 2)
+        for n in range(4 * gap):
+            ticks += (await servo.clk(tick=n % gap == 0))[0]
+        assert ticks == (4 if gap == period else 2)
         for _ in range(period):
             await servo.clk()
 
 
 @cocotb.test()
-async def inputs_are_taken_8_clk_after_tick(dut):
+async def the_inputs_are_taken_8_cycles_after_tick(dut):
     servo = await Servo(dut).reset(kp=ONE)
     for change, want in ((8, 500), (9, 0)):
         out, n = await servo.begin(), 0
@@ -185,7 +194,7 @@ async def a_tick_within_the_calculation_is_ignored(dut):
 
 
 @cocotb.test()
-async def both_ends_of_the_command(dut):
+async def the_command_is_limited_at_both_ends(dut):
     servo = await Servo(dut).reset(kp=ONE)
     for limit in (LIMIT, 1000, 1, 0):
         assert await servo.tick(output_limit=limit, target=limit) == (limit, 0)
@@ -195,7 +204,7 @@ async def both_ends_of_the_command(dut):
 
 
 @cocotb.test()
-async def ends_of_every_range(dut):
+async def the_ends_of_every_range_match_the_model(dut):
     servo = await Servo(dut).reset()
     low32, high32, low48, high48 = -1 << 31, (1 << 31) - 1, -1 << 47, (1 << 47) - 1
     for target, position, error in (
@@ -226,7 +235,7 @@ async def ends_of_every_range(dut):
                     assert (command, saturated) == (
                         LIMIT if rate > 0 else -LIMIT,
                         1,
-                    )  # ka outweighs them all
+                    )  # ka outweighs all others
 
 
 @cocotb.test()
@@ -241,12 +250,12 @@ async def the_integral_stops_at_its_limit(dut):
 
 
 @cocotb.test()
-async def the_integral_does_not_wind_up_while_the_command_stands_at_its_limit(dut):
+async def the_integral_does_not_wind_up_while_the_command_is_at_its_limit(dut):
     servo = await Servo(dut).reset(kp=ONE, ki=HALF, output_limit=1000)
     for sign in (1, -1):
         assert await servo.commands(1, target=0) == [0]
         out = [await servo.tick(target=sign * 900) for _ in range(20)]
-        assert out == [(sign * 1000, 1)] * 20  # 900 + 450, which the first tick could not know
+        assert out == [(sign * 1000, 1)] * 20  # 900 + 450; the first tick is not limited yet
         assert await servo.tick(target=sign * -100) == (sign * 300, 0)  # -100 + 450 - 50
         assert await servo.tick(target=sign * 100) == (sign * 550, 0)
         await servo.tick(closed_loop=0)
@@ -254,7 +263,7 @@ async def the_integral_does_not_wind_up_while_the_command_stands_at_its_limit(du
 
 
 @cocotb.test()
-async def the_integral_rests_in_the_dead_band_only_at_standstill(dut):
+async def the_integral_stays_constant_in_the_dead_band_only_at_standstill(dut):
     servo = await Servo(dut).reset(ki=HALF, dead_band=10)
     for sign in (1, -1):
         assert [(await servo.tick(target=sign * 10))[0] for _ in range(3)] == [0, 0, 0]
@@ -286,9 +295,9 @@ OFF = (
 async def the_integral_is_zero_in_open_loop_and_while_the_drive_is_off(dut):
     servo = await Servo(dut).reset(ki=HALF, target=100)
     for off, on in OFF:
-        assert await servo.commands(3) == [0, 50, 100]  # it stands for the first tick
+        assert await servo.commands(3) == [0, 50, 100]  # it is held for the first tick
         servo.set(**off)
-        await servo.clk()  # one clk is enough
+        await servo.clk()  # one cycle is enough
         servo.set(**on)
         assert await servo.commands(2, open_command=0) == (
             [100, 150] if "closed_loop" in off else [0, 50]
@@ -298,7 +307,7 @@ async def the_integral_is_zero_in_open_loop_and_while_the_drive_is_off(dut):
 
 
 @cocotb.test()
-async def a_command_whose_inputs_were_taken_without_power_stands(dut):
+async def the_command_is_held_if_its_inputs_were_taken_without_power(dut):
     """The firmware holds the target here and closes the loop; a tick that still saw the old target
     must not kick the motor.
     """
@@ -313,20 +322,20 @@ async def a_command_whose_inputs_were_taken_without_power_stands(dut):
             out = await servo.clk()
             while not out[0]:
                 out = await servo.clk()
-            assert out[1] == (5 if wait == 0 else 0), f"power {wait} clk after the tick"
+            assert out[1] == (5 if wait == 0 else 0), f"power {wait} cycles after the tick"
             assert await servo.tick() == (5, 0)
 
 
 @cocotb.test()
-async def closing_the_loop_goes_on_from_the_open_command(dut):
+async def closing_the_loop_continues_from_the_open_command(dut):
     servo = await Servo(dut).reset(kp=ONE, ki=1 << 22, closed_loop=0, open_command=3000, target=400)
     assert await servo.commands(2) == [3000, 3000]
-    assert await servo.commands(3, closed_loop=1) == [3000, 3100, 3200]  # 400 / 4 a tick
+    assert await servo.commands(3, closed_loop=1) == [3000, 3100, 3200]  # 400 / 4 per tick
     assert (await servo.tick(target=410))[0] == 3200 + 10 + 102
 
 
 @cocotb.test()
-async def opening_the_loop_is_continuous_where_open_command_is_what_stood(dut):
+async def opening_the_loop_is_continuous_if_open_command_equals_the_command(dut):
     servo = await Servo(dut).reset(kp=ONE, target=700)
     assert await servo.commands(2) == [700, 700]
     assert await servo.commands(2, closed_loop=0, open_command=700) == [700, 700]
@@ -341,7 +350,7 @@ async def the_drive_comes_on_at_zero_however_large_the_error_is(dut):
 
 
 @cocotb.test()
-async def a_change_of_gains_makes_no_jump(dut):
+async def a_change_of_gains_makes_no_jump_in_the_command(dut):
     servo = await Servo(dut).reset(kp=ONE, ki=1 << 20, target=640)
     await servo.commands(4)
     before = (await servo.tick())[0]
@@ -349,7 +358,7 @@ async def a_change_of_gains_makes_no_jump(dut):
     assert await servo.commands(3, target_velocity=5) == [before, before + 40, before + 80]
     await servo.gains(kp=0)
     assert await servo.commands(2) == [before + 80, before + 120]
-    await servo.gains(kp=100 * ONE)  # more than the integral may take
+    await servo.gains(kp=100 * ONE)  # more than the integral may absorb
     assert await servo.commands(2, integral_limit=1000) == [before + 120, LIMIT]
 
 
@@ -363,7 +372,7 @@ async def a_change_of_gains_within_a_calculation_makes_no_jump(dut):
         for _ in range(wait):
             dut.tick.value = 0
             await RisingEdge(dut.clk)
-            await FallingEdge(dut.clk)  # the model holds no gains that change now
+            await FallingEdge(dut.clk)  # the model does not take gains that change now
         dut.kp.value, dut.gains_changed.value = ONE * (wait % 2), 1
         out = []
         while len(out) < 2:
@@ -378,7 +387,7 @@ async def a_change_of_gains_within_a_calculation_makes_no_jump(dut):
             elif servo.biquads and len(out) == 1:
                 dut.tick.value = int(dut.g_filters.u_filters.ready.value)
         assert all(abs(command - before) <= 80 for command in out), (
-            f"{out} after {before}, changed {wait} clk after tick"
+            f"{out} after {before}, changed {wait} cycles after tick"
         )
         dut.tick.value = 0
         servo.set(kp=0)
@@ -398,13 +407,13 @@ async def with_ki_0_the_command_follows_the_gains_at_once(dut):
 async def a_filter_acts_on_the_command_and_its_limits_hold(dut):
     servo = await Servo(dut).reset(kp=ONE, target=1000)
     needs(servo.biquads, "built without filters")
-    await servo.filter(0, UNITY // 2, 0, 0, UNITY // 2, 0)  # y goes half the way each tick
+    await servo.filter(0, UNITY // 2, 0, 0, UNITY // 2, 0)  # y covers half the distance each tick
     assert await servo.commands(3, filters_in_use=1) == [1000, 1000, 1000]
     assert await servo.commands(4, target=2000) == [1500, 1750, 1875, 1937]
     assert await servo.commands(2, target=-1 << 20, output_limit=3000) == [
         -532,
         -1766,
-    ]  # 1937.5 half the way to -3000, and again
+    ]  # from 1937.5 half the distance to -3000, and again
     servo.set(filters_in_use=0)
     assert await servo.tick(target=100) == (100, 0)
     await servo.filter(0, UNITY, UNITY - 1, 0, 0, 0)  # up to twice the command
@@ -424,7 +433,7 @@ async def the_drive_comes_on_without_a_jump_through_a_filter(dut):
         700,
         1000,
         1350,
-    ]  # half the way to 900, 1300, 1700
+    ]  # half the distance to 900, 1300, 1700
 
 
 @cocotb.test()
@@ -436,7 +445,7 @@ async def open_loop_passes_open_command_and_measures_the_error(dut):
 
 
 @cocotb.test()
-async def reset_in_mid_flow(dut):
+async def reset_clears_command_and_integral(dut):
     servo = await Servo(dut).reset(kp=ONE, ki=HALF, target=100)
     for wait in (0, 1, 8, 9, 33, 34, 35, servo.model.limit, servo.model.latency - 1):
         await servo.tick()
@@ -449,7 +458,7 @@ async def reset_in_mid_flow(dut):
         assert await servo.commands(2) == [
             0,
             50,
-        ]  # from zero, and the integral takes what the gain asks for
+        ]  # from zero, and the integral absorbs the proportional term
 
 
 @cocotb.test()
@@ -488,7 +497,7 @@ async def any_tick_matches_the_model(dut):
         )
         out = await servo.begin()
         while not out[0]:
-            if random.randrange(60) == 0:  # the guard and the firmware act in any clk
+            if random.randrange(60) == 0:  # the interlock and the firmware act in any cycle
                 servo.set(
                     block_up=random.getrandbits(1),
                     block_down=random.getrandbits(1),

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""profile_player: by hand, against the spline of the profile, at the ends of every range, and
-random events against the model.
+"""profile_player: motions by hand, motions against the spline of the profile, the ends of every
+range, controlled stops within their limits, feed override, and random events against the model.
 """
 
 import random
@@ -15,7 +15,7 @@ from tb.control.profile_player import FULL, ProfilePlayer, moved, wrap
 
 PERIOD = 1 << 40  # of velocity, acceleration and jerk
 LSB = 1 << 24  # of target, in the same unit
-GAP, BRAKE_GAP, PUSH_GAP = 160, 350, 7  # clk from tick to tick that the header asks for
+GAP, STOP_GAP, PUSH_GAP = 160, 350, 7  # cycles from tick to tick, as the header requires
 SETTINGS = "slope", "curve", "feed_fraction", "pause", "stop_deceleration", "stop_jerk"
 WORDS = "segment_velocity", "segment_acceleration", "segment_jerk", "segment_ticks", "segment_last"
 EVENTS = (
@@ -62,7 +62,7 @@ class Player:
             slope=0, curve=0, feed_fraction=65536, pause=0, stop_deceleration=0, stop_jerk=0
         )
         self.driven = {}
-        self.stands = -1  # clk that the words of a segment must still stand
+        self.constant = -1  # cycles for which the words of a segment must stay constant
 
     async def reset(self):
         await start(self.dut, **IDLE)
@@ -71,7 +71,9 @@ class Player:
         return self
 
     async def clk(self, **events):
-        """One clk with these events (as ProfilePlayer.clk takes them); returns the pins after it."""
+        """Advance one cycle with these events (as ProfilePlayer.clk takes them); return the outputs
+        after it.
+        """
         dut, push, shift = self.dut, events.get("push"), events.get("shift")
         events = self.settings | events
         pins = (
@@ -84,15 +86,15 @@ class Player:
                 getattr(dut, name).value = value
         self.driven = pins
         if push is not None:
-            self.stands = 7
+            self.constant = 7
             for name, word in zip(WORDS, push):
                 getattr(dut, name).value = word
-        elif self.stands == 0:
+        elif self.constant == 0:
             dut.segment_velocity.value, dut.segment_ticks.value = (
                 random.getrandbits(63),
                 random.getrandbits(24),
             )
-        self.stands -= self.stands >= 0
+        self.constant -= self.constant >= 0
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
         self.clk_count += 1
@@ -119,29 +121,29 @@ class Player:
         return got
 
     async def push(self, segment):
-        """Queue it; its words are written when this returns."""
+        """Queue a segment; its words are written when this returns."""
         await self.clk(push=segment)
         for _ in range(PUSH_GAP - 1):
             await self.clk()
 
     async def play(self, *segments):
-        """Queue them and start; the first tick, which only prepares, is over."""
+        """Queue the segments, start, and give the first tick, which only prepares."""
         for segment in segments:
             await self.push(segment)
         await self.clk(start=1)
         await self.tick()
 
     async def tick(self, gap=None, **events):
-        """One tick and the clk after it; returns the underrun strobes seen."""
+        """Give a tick and the cycles after it; return the number of underrun strobes."""
         strobes = (await self.clk(tick=1, **events))[-1]
         for _ in range(
-            (gap or (BRAKE_GAP if self.model.braking and not self.model.brake else GAP)) - 1
+            (gap or (STOP_GAP if self.model.braking and not self.model.stop_ramp else GAP)) - 1
         ):
             strobes += (await self.clk())[-1]
         return strobes
 
     async def finish(self, most=10_000):
-        """The targets to the end, one a tick."""
+        """The targets to the end of the profile, one per tick."""
         targets = []
         while self.moving:
             await self.tick()
@@ -151,7 +153,9 @@ class Player:
 
 
 def positions(*segments):
-    """Those of the profile, in 2^-40 period, with the first of each segment."""
+    """The positions of the profile in 2^-40 period, and the number of the first one of each
+    segment.
+    """
     exact, place = [0], 0
     for velocity, acceleration, jerk, ticks, _ in segments:
         exact += [place + moved(velocity, acceleration, jerk, n + 1) for n in range(ticks)]
@@ -173,7 +177,7 @@ def spline(exact, time):
 
 
 @cocotb.test()
-async def by_hand(dut):
+async def the_targets_of_a_short_profile_are_as_worked_out_by_hand(dut):
     player = await Player(dut).reset()
     await player.play(
         (PERIOD, 0, 0, 2, 0), (PERIOD, -PERIOD // 2, 0, 2, 1)
@@ -199,9 +203,20 @@ async def latency_is_2(dut):
 
 
 @cocotb.test()
-async def ticks_may_follow_each_other_in_160_clk(dut):
-    """And in 350 from the first of a controlled_stop: with less the step would not be ready, and
-    the tick be lost.
+async def latency_is_3_from_tick_to_target_acceleration(dut):
+    player = await Player(dut).reset()
+    await player.play((PERIOD, 0, 0, 9, 1))
+    await player.clk(tick=1)
+    await player.clk()
+    assert (player.velocity, player.acceleration) != (0, 0) and player.acceleration == 0
+    await player.clk()
+    assert player.acceleration == player.velocity != 0
+
+
+@cocotb.test()
+async def ticks_may_follow_each_other_in_160_cycles(dut):
+    """The first tick of a controlled stop needs 350 cycles here; with less the step would not be
+    ready, and the tick would be lost.
     """
     player = await Player(dut).reset()
     player.settings |= dict(feed_fraction=65535, stop_deceleration=1 << 20, stop_jerk=1 << 25)
@@ -213,7 +228,7 @@ async def ticks_may_follow_each_other_in_160_clk(dut):
     await player.clk(controlled_stop=1)
     for n in range(20):
         before = player.target
-        await player.tick(BRAKE_GAP if n < 2 else GAP)
+        await player.tick(STOP_GAP if n < 2 else GAP)
         assert player.target != before
 
 
@@ -236,12 +251,12 @@ async def n_ticks_move_by_the_closed_form(dut):
         await player.play(*segments)
         assert len(await player.finish()) == sum(s[3] for s in segments)
         exact += sum(moved(*s[:4]) for s in segments)
-        exact = (exact + LSB // 2) // LSB * LSB  # a half goes up
+        exact = (exact + LSB // 2) // LSB * LSB  # a half is rounded up
         assert player.target == exact // LSB
 
 
 @cocotb.test()
-async def slower_it_takes_the_same_way_and_lands_on_the_same_bit(dut):
+async def at_a_lower_rate_it_moves_the_same_distance_and_ends_on_the_same_bit(dut):
     """Against the spline in fractions: nothing of the player's own arithmetic but one rounding of
     each step.
     """
@@ -265,7 +280,7 @@ async def slower_it_takes_the_same_way_and_lands_on_the_same_bit(dut):
 
 
 @cocotb.test()
-async def slower_every_step_keeps_the_limits_of_the_profile(dut):
+async def at_a_lower_rate_every_step_keeps_the_limits_of_the_profile(dut):
     player = await Player(dut).reset()
     jerk = 1 << 30
     segments = (
@@ -286,7 +301,7 @@ async def slower_every_step_keeps_the_limits_of_the_profile(dut):
         await player.play(*segments)
         seen = [0, 0, 0]
         while player.moving:
-            seen.append(player.model.step)  # the one that this tick makes
+            seen.append(player.model.step)  # the step that this tick makes
             await player.tick()
         seen += [0, 0, 0]
         for power, limit in enumerate(limits, start=1):
@@ -295,7 +310,7 @@ async def slower_every_step_keeps_the_limits_of_the_profile(dut):
 
 
 @cocotb.test()
-async def a_pause_stands_and_goes_on_to_the_exact_end(dut):
+async def after_a_pause_the_profile_continues_to_its_exact_end(dut):
     player = await Player(dut).reset()
     await player.play((PERIOD // 3, 0, 0, 20, 1))
     for _ in range(5):
@@ -303,17 +318,17 @@ async def a_pause_stands_and_goes_on_to_the_exact_end(dut):
     player.settings["pause"] = 1
     await player.tick()
     await player.tick()
-    stands = player.target
+    held = player.target
     for _ in range(5):
         await player.tick()
-        assert (player.target, player.velocity, player.moving) == (stands, 0, 1)
+        assert (player.target, player.velocity, player.moving) == (held, 0, 1)
     player.settings["pause"] = 0
     await player.finish()
     assert player.target == (20 * (PERIOD // 3) + LSB // 2) // LSB
 
 
 @cocotb.test()
-async def the_fraction_goes_on_from_segment_to_segment_and_ends_at_the_nearest_lsb(dut):
+async def the_fraction_is_carried_between_segments_and_rounded_at_the_end(dut):
     player = await Player(dut).reset()
     third = LSB // 3
     await player.play((third, 0, 0, 1, 0), (third, 0, 0, 1, 0), (third, 0, 0, 1, 1))
@@ -321,7 +336,7 @@ async def the_fraction_goes_on_from_segment_to_segment_and_ends_at_the_nearest_l
     await player.tick()
     assert player.target == 0
     await player.finish()
-    assert player.target == 1  # 3 * floor(1/3 LSB): just below one, rounded to it
+    assert player.target == 1  # 3 * floor(1/3 LSB) is just below one, and is rounded to it
     await player.play((third, 0, 0, 1, 1))
     await player.finish()
     assert player.target == 1
@@ -331,7 +346,7 @@ async def the_fraction_goes_on_from_segment_to_segment_and_ends_at_the_nearest_l
 
 
 @cocotb.test()
-async def ends_of_the_range(dut):
+async def the_ends_of_the_ranges_wrap_or_saturate(dut):
     player = await Player(dut).reset()
     for feed_fraction in (65536, 65535, 1, 131071):
         player.settings["feed_fraction"] = feed_fraction
@@ -357,7 +372,7 @@ async def ends_of_the_range(dut):
     for velocity, shown in ((-1 << 60, -1 << 31), (1 << 60, (1 << 31) - 1)):
         await player.play((velocity, 0, 0, 3, 1))
         await player.tick()
-        assert player.velocity == player.acceleration == shown  # held
+        assert player.velocity == player.acceleration == shown  # saturated
         await player.finish()
 
 
@@ -371,7 +386,7 @@ async def the_longest_segment_is_counted_in_24_bits(dut):
 
 
 @cocotb.test()
-async def a_full_queue_takes_no_more(dut):
+async def a_full_queue_takes_no_more_segments(dut):
     player = await Player(dut).reset()
     depth = int(dut.DEPTH.value)
     for n in range(depth + 2):
@@ -403,7 +418,7 @@ async def an_armed_player_starts_when_its_time_has_come(dut):
         0x7FFF_FFFF,
         0xFFFF_FFFF,
         0,
-    ):  # also across the wrap, and one that is past
+    ):  # also across the wrap, and a time in the past
         await player.push((PERIOD, 0, 0, 1, 1))
         time = (start_at - 4 if start_at != 2 else 100) % (1 << 32)
         await player.clk(arm=1, start_at=start_at, now=time)
@@ -421,7 +436,7 @@ async def an_armed_player_starts_when_its_time_has_come(dut):
         await player.clk(**{event: 1}, start_at=1000)
         assert not player.armed
     await player.clk(arm=1, start_at=1000)
-    await player.clk(start_at=1000, now=1000)  # nothing to play: neither now nor later
+    await player.clk(start_at=1000, now=1000)  # there is nothing to play, now or later
     await player.clk(push=(PERIOD, 0, 0, 1, 1), start_at=1000, now=1001)
     await player.clk(start_at=1000, now=1002)
     assert not player.moving and not player.armed
@@ -442,7 +457,7 @@ async def segments_of_0_ticks_are_skipped(dut):
 
 
 @cocotb.test()
-async def an_underrun_strobes_once_and_brakes(dut):
+async def an_underrun_is_reported_once_and_stops(dut):
     player = await Player(dut).reset()
     player.settings |= dict(
         stop_deceleration=1 << 30, stop_jerk=0
@@ -450,7 +465,7 @@ async def an_underrun_strobes_once_and_brakes(dut):
     await player.play((PERIOD, 0, 0, 4, 0))
     strobes, targets = 0, []
     while player.moving:
-        strobes += await player.tick(BRAKE_GAP)
+        strobes += await player.tick(STOP_GAP)
         targets.append(player.target / 65536)
     assert strobes == 1 and player.free == int(dut.DEPTH.value)
     steps = [b - a for a, b in zip([0, *targets], targets)]
@@ -470,7 +485,7 @@ async def a_segment_that_comes_before_its_time_is_no_underrun(dut):
 
 
 async def stop_from(player, velocity, acceleration, rate, jerk, feed_fraction=65536):
-    """The steps of a brake from about there, and the limits it had to keep."""
+    """The steps of a controlled stop from about this state, and the limits that it must keep."""
     player.settings |= dict(stop_deceleration=rate, stop_jerk=jerk, feed_fraction=feed_fraction)
     await player.clk(set_target_to_position=1, position=0)
     await player.play((velocity - 3 * acceleration, acceleration, 0, 100, 0), (PERIOD, 0, 0, 1, 1))
@@ -481,17 +496,17 @@ async def stop_from(player, velocity, acceleration, rate, jerk, feed_fraction=65
     assert player.free == int(player.dut.DEPTH.value) and player.moving
     await player.push((PERIOD, 0, 0, 1, 1))
     await player.clk(start=1)
-    assert player.free == int(player.dut.DEPTH.value)  # not while braking
+    assert player.free == int(player.dut.DEPTH.value)  # no segment is taken while stopping
     first = player.model.change, player.model.step - player.model.change
     while player.moving:
-        steps.append(player.model.step)  # the one that this tick makes
+        steps.append(player.model.step)  # the step that this tick makes
         await player.tick()
     assert (player.velocity, player.acceleration) == (0, 0)
     return first, steps
 
 
 @cocotb.test()
-async def brake_ends_at_rest_within_its_limits_from_anywhere(dut):
+async def a_controlled_stop_ends_at_standstill_within_its_limits_from_any_state(dut):
     player = await Player(dut).reset()
     for n in range(15):
         if n == 0:
@@ -504,37 +519,39 @@ async def brake_ends_at_rest_within_its_limits_from_anywhere(dut):
                 -(1 << 34),
                 1 << 27,
                 1 << 31,
-            )  # decelerates too hard: comes back
+            )  # it decelerates too hard and moves back
         else:
             jerk = int(2 ** random.uniform(20, 31.9))
             rate = min((1 << 32) - 1, max(1, int((jerk >> 8) * 2 ** random.uniform(-2, 6))))
-            pace = min(jerk, rate << 8)
-            velocity = random.choice((1, -1)) * int(pace * 2 ** random.uniform(-2, 9))
+            increment = min(jerk, rate << 8)
+            velocity = random.choice((1, -1)) * int(increment * 2 ** random.uniform(-2, 9))
             acceleration = random.choice((1, -1, 0)) * int((rate << 8) * random.uniform(0, 2))
         (before, step), steps = await stop_from(
             player, velocity, acceleration, rate, jerk, random.choice((65536, 65536, 21845))
         )
-        pace = min(jerk, rate << 8)
+        increment = min(jerk, rate << 8)
         all_steps = [step - 0, *steps, 0, 0]
         changes = [b - a for a, b in zip(all_steps, all_steps[1:])]
         assert steps[-1] == 0
         top = abs(before)
         for old, new in zip(changes, changes[1:]):
-            assert abs(new - old) <= pace, f"jerk {abs(new - old)} above {pace} in run {n}"
+            assert abs(new - old) <= increment, (
+                f"jerk {abs(new - old)} above {increment} in run {n}"
+            )
             assert abs(new) <= max(rate << 8, abs(old)), f"acceleration in run {n}"
         limit = min(rate << 8, 1 << 62)
         bound = (
             abs(step) / limit
-            + 2 * (limit + top) / pace
-            + (top + 2 * (top * top / pace)) / limit
+            + 2 * (limit + top) / increment
+            + (top + 2 * (top * top / increment)) / limit
             + 8
         )
-        bound += 2 * (abs(step) / pace) ** 0.5 * 2
+        bound += 2 * (abs(step) / increment) ** 0.5 * 2
         assert len(steps) <= bound, f"{len(steps)} ticks, {bound} in run {n}"
 
 
 @cocotb.test()
-async def brake_takes_no_longer_than_the_best_stop_and_three_ticks(dut):
+async def a_controlled_stop_takes_at_most_three_ticks_more_than_the_best_one(dut):
     """From constant velocity: v/A + A/J, or 2 sqrt(v/J) where A is not reached."""
     player = await Player(dut).reset()
     for velocity, rate, jerk in (
@@ -544,26 +561,26 @@ async def brake_takes_no_longer_than_the_best_stop_and_three_ticks(dut):
         (-PERIOD >> 5, 1 << 25, 1 << 31),
     ):
         _, steps = await stop_from(player, velocity, 0, rate, jerk)
-        pace, limit = jerk, rate << 8
+        increment, limit = jerk, rate << 8
         size = abs(velocity)
         best = (
-            size / limit + limit / pace
-            if limit * limit <= size * pace
-            else 2 * (size / pace) ** 0.5
+            size / limit + limit / increment
+            if limit * limit <= size * increment
+            else 2 * (size / increment) ** 0.5
         )
         assert len(steps) <= best + 5, (len(steps), best)
 
 
 @cocotb.test()
-async def brake_at_rate_0_stops_in_one_step(dut):
+async def with_a_stop_deceleration_of_0_it_stops_in_one_step(dut):
     player = await Player(dut).reset()
     for velocity in (PERIOD, -PERIOD, 1):
         _, steps = await stop_from(player, velocity, 0, 0, 1 << 30)
-        assert len(steps) == 2 and steps[-1] == 0  # the one that was prepared, and the stop
+        assert len(steps) == 2 and steps[-1] == 0  # the prepared step, and the stop
 
 
 @cocotb.test()
-async def brake_while_paused_ends_the_profile(dut):
+async def a_controlled_stop_in_a_pause_ends_the_profile(dut):
     player = await Player(dut).reset()
     player.settings |= dict(stop_deceleration=1 << 30, stop_jerk=1 << 30)
     await player.play((PERIOD, 0, 0, 100, 1))
@@ -571,14 +588,14 @@ async def brake_while_paused_ends_the_profile(dut):
     player.settings["pause"] = 1
     for _ in range(3):
         await player.tick()
-    stands = player.target
+    held = player.target
     await player.clk(controlled_stop=1)
     await player.finish(most=6)
-    assert abs(player.target - stands) <= 1
+    assert abs(player.target - held) <= 1
 
 
 @cocotb.test()
-async def brake_at_rest_only_empties_the_queue(dut):
+async def a_controlled_stop_at_standstill_only_empties_the_queue(dut):
     player = await Player(dut).reset()
     await player.push((PERIOD, 0, 0, 1, 1))
     await player.clk(controlled_stop=1)
@@ -588,13 +605,13 @@ async def brake_at_rest_only_empties_the_queue(dut):
 
 
 @cocotb.test()
-async def set_target_to_position_stands_at_the_position_with_an_empty_queue(dut):
+async def set_target_to_position_ends_the_profile_there_with_an_empty_queue(dut):
     player = await Player(dut).reset()
     for wait in (*range(8), 30, 60, 90):  # in every phase of a tick
         for segment in ((PERIOD + 5, 0, 0, 5, 0), (PERIOD, 0, 0, 1, 1)):
             await player.push(segment)
         await player.clk(start=1, feed_fraction=21845)
-        if wait < 8:  # and in the clk that makes a step
+        if wait < 8:  # and in the cycle that makes a step
             for n in range(GAP):
                 await player.clk(tick=int(n == 0), feed_fraction=21845)
         await player.clk(tick=1, feed_fraction=21845)
@@ -610,7 +627,7 @@ async def set_target_to_position_stands_at_the_position_with_an_empty_queue(dut)
 
 
 @cocotb.test()
-async def a_shift_loses_no_step_in_any_clk(dut):
+async def a_shift_loses_no_step_in_any_cycle(dut):
     player = await Player(dut).reset()
     for wait in range(7):
         await player.clk(set_target_to_position=1, position=0)
@@ -622,7 +639,7 @@ async def a_shift_loses_no_step_in_any_clk(dut):
 
 
 @cocotb.test()
-async def reset_in_mid_flow(dut):
+async def reset_ends_the_profile_at_zero(dut):
     player = await Player(dut).reset()
     for wait in (*range(5), 40, 75):
         await player.play((PERIOD, 0, 0, 5, 0), (PERIOD, 0, 0, 5, 1))
@@ -635,7 +652,7 @@ async def reset_in_mid_flow(dut):
 
 
 async def rates(player, ticks):
-    """So many rates, off the velocity of a segment that shows them in 2^-30."""
+    """The rates of so many ticks, read from the velocity of a segment that shows them in 2^-30."""
     seen = []
     for _ in range(ticks):
         await player.tick()
@@ -647,7 +664,7 @@ ENDLESS = (1 << 54, 0, 0, (1 << 24) - 1, 1)
 
 
 @cocotb.test()
-async def the_rate_goes_to_its_setting_by_hand(dut):
+async def the_rate_ramps_to_its_setting_as_worked_out_by_hand(dut):
     player = await Player(dut).reset()
     await player.play(ENDLESS)
     await rates(player, 3)
@@ -669,13 +686,13 @@ async def the_rate_goes_to_its_setting_by_hand(dut):
 
 
 @cocotb.test()
-async def every_way_of_the_rate_keeps_slope_and_curve_and_ends_at_the_setting(dut):
+async def every_ramp_of_the_rate_keeps_slope_and_curve_and_ends_at_the_setting(dut):
     player = await Player(dut).reset()
     await player.play(ENDLESS)
-    seen = (await rates(player, 3))[-1:]  # the first step is half of one
+    seen = (await rates(player, 3))[-1:]  # the first step is half a step
     slope, curve = 1 << 29, 1 << 27
     player.settings |= dict(slope=slope, curve=curve)
-    for _ in range(25):  # settings that change on the way make no jump
+    for _ in range(25):  # settings that change during a ramp make no jump
         player.settings |= dict(
             feed_fraction=random.choice((0, 1, 65535, 131071, random.randrange(65536))),
             pause=int(random.randrange(4) == 0),
@@ -684,18 +701,18 @@ async def every_way_of_the_rate_keeps_slope_and_curve_and_ends_at_the_setting(du
     seen += await rates(player, 40)
     setting = 0 if player.settings["pause"] else min(player.settings["feed_fraction"], 65536) << 14
     assert seen[-1] == setting
-    paces = [b - a for a, b in zip(seen, seen[1:])]
-    assert max(map(abs, paces)) <= slope + 4 >> 2 and all(
-        abs(b - a) <= (curve >> 2) + 2 for a, b in zip(paces, paces[1:])
+    increments = [b - a for a, b in zip(seen, seen[1:])]
+    assert max(map(abs, increments)) <= slope + 4 >> 2 and all(
+        abs(b - a) <= (curve >> 2) + 2 for a, b in zip(increments, increments[1:])
     )
 
 
 @cocotb.test()
-async def a_setting_that_changes_in_any_clk_makes_no_jump(dut):
-    """Beside the model, which takes the settings at once: the rate is judged off the pins alone."""
+async def a_setting_that_changes_in_any_cycle_makes_no_jump(dut):
+    """Without the model, which takes settings at once: the rate is read from the outputs alone."""
     player = await Player(dut).reset()
     await player.play(ENDLESS)
-    seen = (await rates(player, 3))[-1:]  # the first step is half of one
+    seen = (await rates(player, 3))[-1:]  # the first step is half a step
     slope, curve = 1 << 29, 1 << 27
     dut.slope.value, dut.curve.value = slope, curve
     for _ in range(60):
@@ -707,9 +724,9 @@ async def a_setting_that_changes_in_any_clk_makes_no_jump(dut):
             await RisingEdge(dut.clk)
             await FallingEdge(dut.clk)
         seen.append(dut.target_velocity.value.to_signed())
-    paces = [b - a for a, b in zip(seen, seen[1:])]
-    assert max(map(abs, paces)) <= slope + 4 >> 2 and all(
-        abs(b - a) <= (curve >> 2) + 2 for a, b in zip(paces, paces[1:])
+    increments = [b - a for a, b in zip(seen, seen[1:])]
+    assert max(map(abs, increments)) <= slope + 4 >> 2 and all(
+        abs(b - a) <= (curve >> 2) + 2 for a, b in zip(increments, increments[1:])
     )
 
 
@@ -726,8 +743,10 @@ async def any_events_match_the_model(dut):
             start_at = (now + random.randrange(-20, 100)) % (1 << 32)
         events = dict(now=now, start_at=start_at)
         if wait <= 0 and chance(3):
-            if wait < -BRAKE_GAP or chance(3):  # the settings stand until the step is prepared
-                wait = BRAKE_GAP
+            if wait < -STOP_GAP or chance(
+                3
+            ):  # the settings stay constant until the step is prepared
+                wait = STOP_GAP
                 player.settings |= dict(
                     stop_deceleration=setting(32),
                     stop_jerk=setting(32),
@@ -738,9 +757,9 @@ async def any_events_match_the_model(dut):
                 )
             events["tick"], wait = (
                 1,
-                random.choice((GAP, GAP, BRAKE_GAP)) if chance(4) else BRAKE_GAP,
+                random.choice((GAP, GAP, STOP_GAP)) if chance(4) else STOP_GAP,
             )
-        if chance(30) and player.stands <= 0:  # the words of the last one are written
+        if chance(30) and player.constant <= 0:  # the words of the last segment are written
             events["push"] = (
                 word(64),
                 word(64),

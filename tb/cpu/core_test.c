@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
- * What tb/cpu/test_soft_core.py runs on the soft core. It takes two operands from the registers,
- * works on them with every instruction of rv32im that a compiler uses and with each width of memory
- * access, and writes the results to the registers, one after the other. Then it does what the
- * register ORDER says; the orders above 0 should all trap.
+ * The program that tb/cpu/test_soft_core.py runs on the soft core. It takes two operands from the
+ * registers, applies every instruction of rv32im that a compiler uses and each width of memory
+ * access to them, and writes the results to the registers, one after the other. Then it executes
+ * the wrong access that the register ORDER selects; all orders above 0 must trap.
  */
 typedef unsigned int u32;
 typedef unsigned short u16;
@@ -31,7 +31,7 @@ __asm__(
     "    sw sp, 12(t0)\n"
     "    j main\n");
 
-u32 starts = 0x1000; /* memory outlives a reset */
+u32 starts = 0x1000; /* a reset does not clear the memory */
 volatile u32 here[2];
 
 void main(void) {

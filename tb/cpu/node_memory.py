@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/cpu/node_memory.sv does, in integers: step(…) is one clk and returns rdata after it."""
+"""Model of rtl/cpu/node_memory.sv in integers: step(...) advances one cycle and returns rdata after
+it.
+"""
 
 
 class NodeMemory:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/cpu/register_bus.sv does, in integers."""
+"""Model of rtl/cpu/register_bus.sv in integers."""
 
 
 class RegisterBus:
@@ -7,8 +7,8 @@ class RegisterBus:
         self.axes, self.chosen = axes, None
 
     def selects(self, select, address):
-        """(node, line, links, then axes, gratings and actuators as bit masks) in the clk of the
-        access.
+        """Return the selects of node, bus and peripherals, then of axes, feedback channels and
+        actuators as bit masks, in the cycle of the access.
         """
         block = address >> 8 if select else -1
 
@@ -18,17 +18,18 @@ class RegisterBus:
         return int(block == 0), int(block == 1), int(block == 2), one_of(4), one_of(12), one_of(20)
 
     def step(self, select, address):
-        """One clk: the block whose answer passes from now on."""
+        """Advance one cycle: the answer of the selected block passes from now on."""
         self.chosen = self.selects(select, address)
 
-    def rdata(self, node, line, links, *answers):
-        """What the soft core reads, given the answers of the blocks: node, line, links, and of each
-        axis its three.
+    def rdata(self, node, bus, peripherals, *answers):
+        """What the soft core reads, given the answers of the blocks: node, bus, peripherals, and
+        the three of each axis.
         """
-        of_node, of_line, of_links, *of_axes = self.chosen
+        of_node, of_bus, of_peripherals, *of_axes = self.chosen
         several = [
             words[n] * (mask >> n & 1)
             for words, mask in zip(answers, of_axes, strict=True)
             for n in range(self.axes)
         ]
-        return node * of_node | line * of_line | links * of_links | sum(several)
+        single = node * of_node | bus * of_bus | peripherals * of_peripherals
+        return single | sum(several)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What tb/cpu/core_test.c must find: the results of rv32im for two operands, in the order in which
-the program writes them.
+"""The results that tb/cpu/core_test.c must write: those of rv32im for two operands, in the order in
+which the program writes them.
 """
 
 MASK = (1 << 32) - 1
@@ -11,8 +11,8 @@ def signed(x, w=32):
 
 
 def divide(a, b, w_signed):
-    """Quotient and remainder as RISC-V has them: towards zero, and defined for a divisor of 0 and
-    for overflow.
+    """Quotient and remainder as RISC-V defines them: rounded towards zero, and with fixed results
+    for a divisor of 0 and for overflow.
     """
     if w_signed:
         a, b = signed(a), signed(b)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""node_memory: what the file says at power-up, single bytes, both ends, random accesses; and block
-RAM in synthesis.
+"""node_memory: the contents at power-up, single bytes, both ends, random accesses; and block RAM in
+synthesis.
 """
 
 import random
@@ -45,14 +45,14 @@ async def begin(dut):
 
 
 @cocotb.test()
-async def the_file_stands_in_it_at_power_up_and_latency_is_1(dut):
+async def latency_is_1_and_the_file_is_in_the_memory_at_power_up(dut):
     await begin(dut)
     for n, word in enumerate(CONTENTS):
         assert int(await clk(dut, 1, 0, n)) == word
 
 
 @cocotb.test()
-async def each_byte_enable_writes_its_byte_alone(dut):
+async def each_byte_enable_writes_only_its_byte(dut):
     await begin(dut)
     for address in (0, BYTES // 4 - 1):
         await clk(dut, 0, 15, address, 0x03020100)
@@ -76,7 +76,7 @@ async def any_access_matches_the_model(dut):
             random.randrange(16),
             random.getrandbits(32),
         )
-        assert int(await clk(dut, *word)) == model.step(*word), f"clk {n}"
+        assert int(await clk(dut, *word)) == model.step(*word), f"cycle {n}"
 
 
 def test_node_memory():
@@ -91,14 +91,15 @@ def test_node_memory():
 
 @pytest.mark.skipif(not find_spec("pyosys"), reason="pyosys is not installed")
 def test_32_kib_are_16_block_rams_of_an_ecp5_and_hold_the_file(tmp_path):
-    """In a process of its own: the synthesis library keeps its memory, and one test should not be
-    the next one's load.
+    """Synthesised in a process of its own: the synthesis library never frees its memory, which
+    later tests would then lack.
     """
     file = contents_in(tmp_path / "node_memory.hex")
     script = f"""
 from pyosys import libyosys
 design = libyosys.Design()
-for step in ['read_verilog -sv {source_of("node_memory")}', 'chparam -set FIRMWARE "{file}" node_memory',
+for step in ['read_verilog -sv {source_of("node_memory")}',
+             'chparam -set FIRMWARE "{file}" node_memory',
              'synth_ecp5 -top node_memory', 'write_verilog {tmp_path / "netlist.v"}']:
     design.run_pass('tee -q ' + step)
 """

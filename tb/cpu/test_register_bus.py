@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""register_bus: every block at both ends of its range, nobody's addresses, and random accesses
-against the model.
+"""register_bus: every block at both ends of its range, addresses without a block, and random
+accesses against the model.
 """
 
 import random
@@ -8,22 +8,26 @@ import random
 import cocotb
 import pytest
 from cocotb.clock import Clock
-from cocotb.triggers import FallingEdge
+from cocotb.triggers import FallingEdge, Timer
 
 from tb.bench import run
 from tb.cpu.register_bus import RegisterBus
 
-ALONE = {"node": 0x000, "bus": 0x100, "peripherals": 0x200}  # blocks of which there is one
+ALONE = {
+    "node": 0x000,
+    "bus": 0x100,
+    "peripherals": 0x200,
+}  # address of each block of which there is one
 OF_AXES = {
     "axis": 0x400,
     "feedback": 0xC00,
     "actuator": 0x1400,
-}  # blocks that each axis has, where the first one lies
+}  # address of the first of the blocks that each axis has
 
 
 async def access(dut, model, select, address):
-    """One clk with this access; selects and answer are compared with the model, the answer is
-    returned.
+    """Advance one cycle with this access and compare the selects with the model. Return the answers
+    that the blocks give in the next cycle.
     """
     word = lambda: random.getrandbits(32)
     dut.select.value, dut.address.value = select, address
@@ -42,7 +46,7 @@ async def access(dut, model, select, address):
 
 
 async def check(dut, model, select, address):
-    """An access, then the clk in which its answer passes."""
+    """An access, then the cycle in which its answer passes."""
     blocks = await access(dut, model, select, address)
     dut.select.value = select
     await FallingEdge(dut.clk)
@@ -74,7 +78,32 @@ async def each_block_answers_at_both_ends_of_its_range(dut):
 
 
 @cocotb.test()
-async def nobody_answers_elsewhere(dut):
+async def latency_is_0_from_an_access_to_select(dut):
+    await begin(dut)
+    dut.select.value, dut.address.value = 1, OF_AXES["axis"]
+    await Timer(1, "ns")  # much less than a cycle
+    assert int(dut.axis_select.value) == 1
+    dut.address.value = ALONE["node"]
+    await Timer(1, "ns")
+    assert int(dut.axis_select.value) == 0 and int(dut.node_select.value) == 1
+
+
+@cocotb.test()
+async def latency_is_1_from_an_access_to_its_answer(dut):
+    await begin(dut)
+    dut.node_rdata.value, dut.bus_rdata.value = 11, 22
+    dut.select.value, dut.address.value = 1, ALONE["node"]
+    await FallingEdge(dut.clk)
+    assert int(dut.rdata.value) == 11
+    dut.address.value = ALONE["bus"]
+    await Timer(1, "ns")
+    assert int(dut.rdata.value) == 11
+    await FallingEdge(dut.clk)
+    assert int(dut.rdata.value) == 22
+
+
+@cocotb.test()
+async def no_block_answers_at_other_addresses(dut):
     model = await begin(dut)
     for address in (
         0x300,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""soft_core: a compiled program does every instruction and access width on operands from the
-register bus, then goes wrong
-in every way it can. The program's results are those of tb/cpu/soft_core.py."""
+"""soft_core: a compiled program executes every instruction and access width on operands from the
+register bus, then makes every wrong access. Its results must be those of tb/cpu/soft_core.py.
+"""
 
 import random
 import struct
@@ -18,18 +18,20 @@ from tb.cpu.soft_core import results
 BYTES = 2048
 BUILD = ROOT / "build" / "soft_core"
 OPERANDS = [0, 1, 2, 0xFFFFFFFF, 0x80000000, 0x7FFFFFFF, 0x0000FFFF, 31]
-TRAPS = range(1, 14)  # ORDER in program.c
-A_TURN = len(results(0, 0))
+TRAPS = range(1, 14)  # ORDER in core_test.c
+ROUND = len(results(0, 0))  # results of one round of the program
 
 
 class Registers:
-    """The other side of the register bus: answers one clk after select, and keeps what was written."""
+    """The other side of the register bus: answers one cycle after select, and keeps what was
+    written.
+    """
 
     def __init__(self, dut):
         self.dut, self.words, self.written, self.selects = dut, {0: 0, 4: 0, 8: 0}, [], 0
 
     async def clk(self, rst=0):
-        """One clk; what the bus shows before its edge is what counts."""
+        """Advance one cycle; what the bus shows before its clock edge counts."""
         dut = self.dut
         dut.rst.value = rst
         strobe = not rst and str(dut.select.value) == "1"
@@ -52,7 +54,7 @@ class Registers:
             if done():
                 return n
             await self.clk()
-        raise AssertionError(f"the program did not come so far in {clks} clk")
+        raise AssertionError(f"the program did not get that far in {clks} cycles")
 
     def taken(self, address):
         return [value for where, value in self.written if where == address]
@@ -76,13 +78,14 @@ async def every_instruction_and_access_width_has_the_right_result(dut):
     pairs += [
         (random.getrandbits(32), random.getrandbits(random.choice([5, 16, 32]))) for _ in range(8)
     ]
-    for a, b in pairs:  # each is set just after the last result of the one before
+    for a, b in pairs:  # each pair is set just after the last result of the pair before
         registers.written.clear()
         registers.words[0], registers.words[4] = a, b
-        await registers.until(lambda: len(registers.taken(0xFFFC)) >= A_TURN)
+        await registers.until(lambda: len(registers.taken(0xFFFC)) >= ROUND)
         got, want = registers.taken(0xFFFC), results(a, b)
         assert got == want, (
-            f"operands {a:#x}, {b:#x}: results {[n for n, (g, w) in enumerate(zip(got, want)) if g != w]} are wrong"
+            f"operands {a:#x}, {b:#x}: results "
+            f"{[n for n, (g, w) in enumerate(zip(got, want)) if g != w]} are wrong"
         )
         assert not int(dut.trap.value)
 
@@ -95,7 +98,7 @@ async def it_starts_with_the_stack_at_the_end_of_the_memory(dut):
 
 
 @cocotb.test()
-async def every_wrong_access_traps_and_reset_starts_again(dut):
+async def every_wrong_access_traps_and_reset_starts_the_core_again(dut):
     registers = await begin(dut)
     await registers.until(lambda: registers.taken(0x10))
     starts = registers.taken(0x10)[0]
@@ -104,9 +107,9 @@ async def every_wrong_access_traps_and_reset_starts_again(dut):
         await registers.until(lambda: str(dut.trap.value) == "1")
         written, selects = len(registers.written), registers.selects
         for _ in range(200):
-            assert await registers.clk(), f"order {order}: the trap stands until reset"
+            assert await registers.clk(), f"order {order}: trap must stay high until reset"
         assert (len(registers.written), registers.selects) == (written, selects), (
-            f"order {order}: the bus is quiet in a trap"
+            f"order {order}: no access may follow in a trap"
         )
         assert all(where in (0x0C, 0x10, 0xFFFC) for where, _ in registers.written), (
             f"order {order}: nothing was written elsewhere"
@@ -120,7 +123,7 @@ async def every_wrong_access_traps_and_reset_starts_again(dut):
 
 
 @cocotb.test()
-async def an_operation_takes_3_clk_a_product_6_a_quotient_40_and_a_register_access_6(dut):
+async def an_operation_takes_3_cycles_a_product_6_a_quotient_40_and_a_register_access_6(dut):
     registers = await begin(dut)
     registers.words[0], registers.words[4] = 0x12345678, 0x9ABC
     times = []
@@ -129,7 +132,7 @@ async def an_operation_takes_3_clk_a_product_6_a_quotient_40_and_a_register_acce
         await registers.clk()
         times += [n] * (len(registers.taken(0xFFFC)) - before)
     took = [b - a - 6 for a, b in zip(times, times[1:])]  # an operation and a write to RESULT
-    dut._log.info(f"clk for sub … remu: {took[:17]}")
+    dut._log.info(f"cycles for sub … remu: {took[:17]}")
     assert took[:9] == [3] * 9 and took[9:13] == [6] * 4 and took[13:17] == [40] * 4
 
 
@@ -144,9 +147,24 @@ async def a_register_access_is_one_strobe(dut):
     assert sum(strobes) > 10 and not any(a and b for a, b in zip(strobes, strobes[1:]))
 
 
+@cocotb.test()
+async def latency_is_0_wait_cycles_for_memory_and_1_for_a_register(dut):
+    """`mem_ready` comes in the first cycle of a memory access, the second of a register access."""
+    registers, waited = await begin(dut), {True: set(), False: set()}
+    core, cycles = dut.u_core, 0
+    for _ in range(3000):
+        await registers.clk()
+        if not int(core.mem_valid.value):
+            continue
+        if int(core.mem_ready.value):
+            waited[int(core.mem_addr.value) < BYTES].add(cycles)
+        cycles = 0 if int(core.mem_ready.value) else cycles + 1
+    assert waited == {True: {0}, False: {1}}
+
+
 def compiled():
-    """The program as a file for $readmemh, the whole memory long; by the tools of the firmware's
-    own build.
+    """Compile the program with the firmware's own tools to a file for $readmemh, as long as the
+    whole memory.
     """
     here, command, libraries = Path(__file__).parent, *firmware_build.compiler()
     BUILD.mkdir(parents=True, exist_ok=True)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/drive/bridge_pwm.sv does, in integers: clk(...) is one clk and returns what is on the
-pins after it.
+"""Model of rtl/drive/bridge_pwm.sv in integers: clk(...) advances one cycle and returns the pins
+after it.
 """
 
-MULTIPLY = 8  # clk from taking a command to its product
+MULTIPLY = 8  # cycles from taking a command to its product
 
 
 class BridgePwm:
@@ -11,10 +11,10 @@ class BridgePwm:
         self.off()
 
     def off(self):
-        self.asked = None  # [clk left, command, period]
-        self.command = self.period = 0  # of the next border
+        self.asked = None  # [cycles left, command, period]
+        self.command = self.period = 0  # taken at the next border
         self.left = self.on_left = self.fraction = (
-            0  # of the period that runs; fraction in 2^-15 clk
+            0  # of the running period; fraction in 2^-15 cycle
         )
         self.negative = self.powered = False
         return 0, 0

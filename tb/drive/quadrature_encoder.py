@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/drive/quadrature_encoder.sv does, in integers: clk(...) is one clk; pins() and the state
-are what stands after it.
+"""Model of rtl/drive/quadrature_encoder.sv in integers: clk(...) advances one cycle; pins() and the
+attributes hold the state after it.
 """
 
 
@@ -13,16 +13,16 @@ class QuadratureEncoder:
     def __init__(self, w=32, f=16):
         self.w, self.f = w, f
         self.position = 0  # wraps at 2^w
-        self.aim = None  # (target, half a band) as of the clk before
+        self.goal = None  # (target, half a band) of the cycle before
         self.left = 0
-        self.place = None  # counts from the index up
-        self.waiting = None  # home that is not taken yet
-        self.turn = self.highest = 0  # highest: place, as of the clk before
-        self.far = self.behind = False  # far: behind, of the clk to come
+        self.from_mark = None  # counts from the reference mark up
+        self.waiting = None  # home_position that is not taken yet
+        self.turn = self.highest = 0  # highest: of place, of the cycle before
+        self.far = self.behind = False  # far: value of behind in the next cycle
 
     def pins(self):
         b = self.position >> 1 & 1
-        return b ^ self.position & 1, b, int(self.place == 0 and self.turn != 0)
+        return b ^ self.position & 1, b, int(self.from_mark == 0 and self.turn != 0)
 
     def clk(
         self,
@@ -43,8 +43,8 @@ class QuadratureEncoder:
         whole = 1 << self.w
         self.behind, self.far = self.far, False
         up = down = False
-        if self.aim:
-            aimed_at, band = self.aim
+        if self.goal:
+            aimed_at, band = self.goal
             ahead = signed((aimed_at - band >> self.f) - self.position, self.w)
             back = signed((aimed_at + band >> self.f) - self.position, self.w)
             self.far = ahead >= 4 or back < -4
@@ -52,15 +52,15 @@ class QuadratureEncoder:
                 up, down = ahead >= 0, ahead < 0 and back < 0
         if self.waiting is not None and not up and not down:
             distance = signed(self.position - self.waiting, self.w)
-            self.place = (distance + (counts_per_turn if distance < 0 else 0)) % whole
+            self.from_mark = (distance + (counts_per_turn if distance < 0 else 0)) % whole
             self.waiting = None
-        elif self.place is not None and up:
-            self.place = 0 if self.place == self.highest else (self.place + 1) % whole
-        elif self.place is not None and down:
-            self.place = self.place - 1 if self.place else self.highest
+        elif self.from_mark is not None and up:
+            self.from_mark = 0 if self.from_mark == self.highest else (self.from_mark + 1) % whole
+        elif self.from_mark is not None and down:
+            self.from_mark = self.from_mark - 1 if self.from_mark else self.highest
         self.highest = (counts_per_turn - 1) % whole
         if home:
             self.waiting = home_position
         self.left = max(0, minimum_edge_separation - 1) if up or down else max(0, self.left - 1)
         self.position = home_position if load else (self.position + up - down) % whole
-        self.aim = None if load else (target, (1 << self.f - 1) + hysteresis)
+        self.goal = None if load else (target, (1 << self.f - 1) + hysteresis)

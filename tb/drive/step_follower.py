@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/drive/step_follower.sv does, in integers: clk(…) is one clk and returns what stands
-after it.
+"""Model of rtl/drive/step_follower.sv in integers: clk(...) advances one cycle and returns the
+outputs after it.
 """
 
 from tb.drive.step_scaler import StepScaler
@@ -15,8 +15,8 @@ class StepFollower:
         self.scaler, self.wait, self.rebased, self.pending, self.done = StepScaler(), 0, 1, 1, 0
 
     def clk(self, rst=0, ratio=0, shift=0, enable=0, rebase=0, tick=0, target=0, trim=0):
-        """go, restart and position as they stand after the clk, with the levels of enable and
-        rebase of this clk.
+        """Return go, restart and position after the cycle, for the levels of enable and rebase in
+        this cycle.
         """
         take = self.wait == 1
         moved = int(rebase or not enable)

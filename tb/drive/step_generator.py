@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/drive/step_generator.sv does, in integers: clk(...) is one clk and returns (step,
+"""Model of rtl/drive/step_generator.sv in integers: clk(...) advances one cycle and returns (step,
 direction, steps, overrun) after it.
 """
 
@@ -16,27 +16,27 @@ class StepGenerator:
         self.reset()
 
     def reset(self, target=0):
-        self.line_clk = 0
-        self.stand = self.settle = 0  # clk left, beside the last
+        self.line_cycles = 0
+        self.level_timer = self.direction_timer = 0  # cycles left after the next
         self.pulse = self.upward = self.turning = self.rewired = False
         self.quarter = self.steps = 0
-        self.wiring = (0, 0, 0)  # mode, step_low, direction_low as they are in force
+        self.wiring = (0, 0, 0)  # mode, step_low and direction_low in force
         self.pins = (0, 0)
         self.restart(target)
         return self.shown()
 
     def restart(self, target):
         self.line_end = target >> 16 << 16
-        self.left = 0  # clk left of the line, beside the last
+        self.left = 0  # cycles left of the line, after the next
         self.slope = self.ahead = 0
-        self.waiting = self.strays = self.overrun = False
+        self.waiting = self.reverses = self.overrun = False
         self.acted = self.upward
 
     def shown(self):
         return *self.pins, signed(self.steps, 32), int(self.overrun)
 
     def levels(self):
-        """The pins that these states of the wire give."""
+        """The levels of the pins in this state."""
         mode, step_low, direction_low = self.wiring
         if mode == STEP_DIRECTION:
             pins = self.pulse, self.upward
@@ -64,46 +64,48 @@ class StepGenerator:
     ):
         if rst:
             return self.reset(target)
-        follows_target = enable and not load and self.line_clk > 0
+        follows_target = enable and not load and self.line_cycles > 0
         follows = follows_target and not (self.overrun or self.acted or self.rewired)
-        stood, settled = self.stand <= 0, self.settle <= 0
+        level_over, direction_over = self.level_timer <= 0, self.direction_timer <= 0
         due = (self.ahead >= 0) == self.upward
-        rise = follows and not self.pulse and stood and due and (settled or not self.turning)
-        turns = follows and not self.pulse and settled and self.strays and not due
-        fall = self.pulse and stood
+        may_step = level_over and (direction_over or not self.turning)
+        rise = follows and not self.pulse and due and may_step
+        turns = follows and not self.pulse and direction_over and self.reverses and not due
+        fall = self.pulse and level_over
         wiring = (mode, step_low, direction_low)
-        rewires = not enable and not self.pulse and stood and settled and wiring != self.wiring
+        standstill = not enable and not self.pulse and level_over and direction_over
+        rewires = standstill and wiring != self.wiring
 
         # the line
-        whole = self.line_clk << 16
-        beside = signed(self.ahead + (-whole if self.upward == self.acted else whole), self.bits)
-        self.strays = not self.acted and (beside < 0) == self.upward
+        whole = self.line_cycles << 16
+        moved = signed(self.ahead + (-whole if self.upward == self.acted else whole), self.bits)
+        self.reverses = not self.acted and (moved < 0) == self.upward
         top = 1 << self.bits - 2
-        leaves = not -1 << self.period_w + 16 <= self.slope < 1 << self.period_w + 16
-        self.overrun = self.overrun or leaves or not -top <= self.ahead < top
-        self.ahead = signed((beside if self.acted else self.ahead) + self.slope, self.bits)
+        too_steep = not -1 << self.period_w + 16 <= self.slope < 1 << self.period_w + 16
+        self.overrun = self.overrun or too_steep or not -top <= self.ahead < top
+        self.ahead = signed((moved if self.acted else self.ahead) + self.slope, self.bits)
         self.acted = rise or turns
         if (tick or self.waiting) and self.left <= 0:
             self.slope, self.line_end = signed(target - self.line_end, 48), target
-            self.left, self.waiting = self.line_clk - 1, False
+            self.left, self.waiting = self.line_cycles - 1, False
         else:
             self.slope = 0 if self.left <= 0 else self.slope
             self.left, self.waiting = self.left - 1, bool(tick or self.waiting)
         upward = self.upward
         if not follows_target:
             self.restart(target)
-            self.line_clk = period
+            self.line_cycles = period
 
-        # the wire
-        self.stand = (
+        # the pins
+        self.level_timer = (
             (high_cycles if rise else low_cycles) - 1
             if rise or fall or self.rewired
-            else self.stand - 1
+            else self.level_timer - 1
         )
-        self.settle = (
+        self.direction_timer = (
             (hold_cycles if fall else setup_cycles) - 1
             if fall or turns or self.rewired
-            else self.settle - 1
+            else self.direction_timer - 1
         )
         self.steps += (1 if upward else -1) * rise
         self.quarter += (1 if upward else -1) * rise

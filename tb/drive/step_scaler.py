@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/drive/step_scaler.sv does, in integers: clk(...) is one clk and returns (done, steps)
-after it.
+"""Model of rtl/drive/step_scaler.sv in integers: clk(...) advances one cycle and returns
+(done, steps) after it.
 """
 
-LATENCY = 49
+LATENCY = 49  # cycles from valid to done
 
 
 class StepScaler:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""bridge_pwm: duty by hand and by count, both ends, off within a clk, and random commands against
-the model in every cycle.
+"""bridge_pwm: the duty cycle by hand and by counting, both ends of it, switching off within one
+cycle, and random commands against the model in every cycle.
 """
 
 import random
@@ -13,7 +13,7 @@ from tb.bench import run, start
 from tb.drive.bridge_pwm import BridgePwm
 
 FULL = 1 << 15
-CLK_PS = 10_000  # as start() makes it
+CLK_PS = 10_000  # a cycle of the clock that start() makes
 IDLE = dict(period=0, enable=0, valid=0, command=0)
 
 
@@ -45,7 +45,7 @@ class Bridge:
         return got
 
     async def give(self, command):
-        """Give a command and let the period in which it came run out."""
+        """Give a command and wait until the period in which it came has ended."""
         await self.clk(valid=1, command=command)
         for _ in range(9 + self.inputs["period"]):
             await self.clk()
@@ -53,7 +53,7 @@ class Bridge:
             await self.clk()
 
     async def periods(self, count):
-        """What drives over so many periods: +1 a alone, -1 b alone, 0 brake."""
+        """What each cycle of so many periods drives: +1 a alone, -1 b alone, 0 brake."""
         out = []
         for _ in range(count * self.inputs["period"]):
             a, b = await self.clk()
@@ -62,13 +62,13 @@ class Bridge:
 
 
 @cocotb.test()
-async def by_hand(dut):
+async def a_half_a_quarter_and_an_eighth_of_a_period_drive_as_worked_out_by_hand(dut):
     bridge = await Bridge(dut).reset(period=4)
     await bridge.give(FULL // 2)
     assert await bridge.periods(2) == [1, 1, 0, 0] * 2
     await bridge.give(-FULL // 4)
     assert await bridge.periods(2) == [-1, 0, 0, 0] * 2
-    await bridge.give(FULL // 8)  # half a clk a period: every second period
+    await bridge.give(FULL // 8)  # half a cycle per period: one cycle in every second period
     assert await bridge.periods(4) in (([0] * 4 + [1, 0, 0, 0]) * 2, ([1, 0, 0, 0] + [0] * 4) * 2)
 
 
@@ -83,7 +83,7 @@ async def latency_is_10(dut):
 
 
 @cocotb.test()
-async def a_command_each_9_clk_is_taken_and_an_earlier_one_is_replaced(dut):
+async def a_command_every_9_cycles_is_taken_and_an_earlier_one_is_replaced(dut):
     bridge = await Bridge(dut).reset(period=1)
     seen = []
     for n in range(6):
@@ -98,11 +98,11 @@ async def a_command_each_9_clk_is_taken_and_an_earlier_one_is_replaced(dut):
         await bridge.clk()
     await bridge.clk(valid=1, command=-FULL)
     pins = [await bridge.clk() for _ in range(30)]
-    assert pins == [(0, 1)] * 30  # the zero never came to the pins
+    assert pins == [(0, 1)] * 30  # the zero never reached the pins
 
 
 @cocotb.test()
-async def over_n_periods_the_time_driven_is_right_to_one_clk(dut):
+async def over_any_number_of_periods_the_driven_time_is_right_to_one_cycle(dut):
     bridge = await Bridge(dut).reset(period=20)
     for command in (1, -1, 819, -5000, 12345, -20001, 32767, -32767):
         await bridge.give(command)
@@ -114,8 +114,8 @@ async def over_n_periods_the_time_driven_is_right_to_one_clk(dut):
 
 
 async def two_pulses(dut, pin, clk_between):
-    """Two low pulses on the pin that does not drive, the first one clk long, and so far apart;
-    without a look at every clk.
+    """Await two low pulses on the pin that does not drive: the first is one cycle long, and they
+    are `clk_between` cycles apart. The model does not watch these cycles.
     """
     dut.valid.value = 0
     await FallingEdge(pin)
@@ -127,7 +127,7 @@ async def two_pulses(dut, pin, clk_between):
 
 
 @cocotb.test(timeout_time=2, timeout_unit="ms")
-async def the_smallest_command_drives_one_clk_in_2_15(dut):
+async def the_smallest_command_drives_one_cycle_in_32768(dut):
     bridge = await Bridge(dut).reset(period=1)
     await bridge.give(1)
     await two_pulses(dut, dut.bridge_b, FULL)
@@ -137,12 +137,12 @@ async def the_smallest_command_drives_one_clk_in_2_15(dut):
 async def the_longest_period_is_65535(dut):
     bridge = await Bridge(dut).reset(period=1)
     await bridge.give(0)
-    await bridge.clk(valid=1, command=-1, period=65535)  # 65535/32768 clk a period: 1 clk, then 2
+    await bridge.clk(valid=1, command=-1, period=65535)  # 65535/32768 cycles per period: 1, then 2
     await two_pulses(dut, dut.bridge_a, 65535)
 
 
 @cocotb.test()
-async def both_ends_of_the_duty(dut):
+async def full_scale_drives_always_and_zero_never(dut):
     bridge = await Bridge(dut).reset(period=1)
     for period in (1, 2, 3, 30):
         bridge.inputs["period"] = period
@@ -172,7 +172,7 @@ async def a_new_command_waits_for_the_border(dut):
 
 
 @cocotb.test()
-async def off_one_clk_after_enable_falls_and_on_only_by_a_new_command(dut):
+async def latency_is_1_from_enable_low_to_both_pins_low_and_only_a_new_command_drives_again(dut):
     bridge = await Bridge(dut).reset(period=10)
     for command, pins in ((-FULL, (0, 1)), (FULL - 1, (1, 0))):
         await bridge.give(command)
@@ -184,7 +184,7 @@ async def off_one_clk_after_enable_falls_and_on_only_by_a_new_command(dut):
 
 
 @cocotb.test()
-async def reset_in_mid_flow(dut):
+async def reset_in_a_period_switches_off_until_the_next_command(dut):
     bridge = await Bridge(dut).reset(period=10)
     for wait in range(12):
         await bridge.give(-FULL)

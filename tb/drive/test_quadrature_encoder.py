@@ -61,7 +61,7 @@ class Encoder:
         return got
 
     async def at(self, count, **inputs):
-        """The target at so many counts."""
+        """Set the target to so many counts."""
         return await self.clk(target=signed(int(count * (1 << self.f)), self.w + self.f), **inputs)
 
     @property
@@ -70,7 +70,7 @@ class Encoder:
 
 
 @cocotb.test()
-async def by_hand(dut):
+async def the_edges_up_3_and_down_2_are_as_drawn_by_hand(dut):
     encoder = await Encoder(dut).reset()
     await encoder.at(3)
     assert [(await encoder.clk())[:2] for _ in range(5)] == [(1, 0), (1, 1), (0, 1), (0, 1), (0, 1)]
@@ -89,7 +89,7 @@ async def latency_is_2(dut):
 
 
 @cocotb.test()
-async def a_half_goes_up(dut):
+async def a_half_is_rounded_up(dut):
     encoder = await Encoder(dut).reset()
     least = 1 / (1 << encoder.f)
     for target, settled in (
@@ -106,7 +106,7 @@ async def a_half_goes_up(dut):
 
 
 @cocotb.test()
-async def edges_keep_their_spacing_while_a_jump_is_made_up_and_none_is_lost(dut):
+async def edges_keep_their_separation_while_a_jump_is_caught_up_with_and_none_is_lost(dut):
     encoder = await Encoder(dut).reset()
     for minimum_edge_separation in (0, 1, 2, 5, 17):
         await encoder.at(0, minimum_edge_separation=minimum_edge_separation)
@@ -130,7 +130,7 @@ async def edges_keep_their_spacing_while_a_jump_is_made_up_and_none_is_lost(dut)
 async def a_target_that_trembles_within_the_hysteresis_makes_no_edge_but_the_first(dut):
     encoder = await Encoder(dut).reset()
     quarter = 1 << encoder.f - 2
-    for hysteresis, wanted in ((0, 10), (quarter, 1)):
+    for hysteresis, expected in ((0, 10), (quarter, 1)):
         await encoder.at(0, hysteresis=hysteresis)
         await encoder.clk(10)
         edges = 0
@@ -139,7 +139,7 @@ async def a_target_that_trembles_within_the_hysteresis_makes_no_edge_but_the_fir
             await encoder.at(0.75 if n % 2 == 0 else 0.25)
             await encoder.clk(4)
             edges += encoder.position != was
-        assert edges == wanted
+        assert edges == expected
 
 
 @cocotb.test()
@@ -158,7 +158,7 @@ async def hysteresis_holds_to_its_last_bit_at_both_ends(dut):
 
 
 @cocotb.test()
-async def z_stands_for_one_count_once_a_turn_in_both_directions(dut):
+async def z_is_high_for_one_count_once_a_turn_in_both_directions(dut):
     encoder = await Encoder(dut).reset(counts_per_turn=10)
     for _ in range(14):
         assert (await encoder.clk())[2] == 0  # never before home
@@ -180,13 +180,13 @@ async def z_stays_low_without_counts_per_turn(dut):
 
 
 @cocotb.test()
-async def home_waits_for_a_clk_without_an_edge(dut):
+async def home_waits_for_a_cycle_without_an_edge(dut):
     encoder = await Encoder(dut).reset(counts_per_turn=100)
     await encoder.at(20)
     await encoder.clk(3)
     await encoder.clk(home=1, home_position=1)
     await encoder.clk(30)
-    assert encoder.position == 20 and encoder.model.place == 19
+    assert encoder.position == 20 and encoder.model.from_mark == 19
 
 
 @cocotb.test()
@@ -203,7 +203,7 @@ async def it_follows_across_the_wrap_of_position(dut):
 
 
 @cocotb.test()
-async def behind_means_more_than_4_counts_2_clk_before(dut):
+async def behind_reports_more_than_4_counts_2_cycles_later(dut):
     encoder = await Encoder(dut).reset(minimum_edge_separation=3)
     for goal in (9, -8):
         await encoder.at(goal)
@@ -217,7 +217,7 @@ async def behind_means_more_than_4_counts_2_clk_before(dut):
 
 
 @cocotb.test()
-async def reset_in_mid_flow(dut):
+async def reset_in_motion_clears_the_pins(dut):
     encoder = await Encoder(dut).reset(minimum_edge_separation=3, counts_per_turn=7)
     await encoder.at(50, home=1, home_position=2)
     for wait in range(1, 8):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""spi_dac: frames as a model of the AD5542A takes them, trim, both ends, off at once, refresh, and
-random commands against the model.
+"""spi_dac: frames as a model of the AD5542A takes them, trim, both ends of the range, 0 V as soon
+as the drive is off, refresh, and random commands against the model.
 """
 
 import random
@@ -15,8 +15,8 @@ FULL = 1 << 15
 IDLE = dict(half_period=1, refresh=65535, trim=0, enable=0, valid=0, command=0)
 
 
-class Converter:
-    """AD5542A with LDAC low: what its pins make of it, told by nothing else."""
+class Ad5542a:
+    """An AD5542A with LDAC low: `codes` are those that it took from its pins."""
 
     def __init__(self):
         self.cs_n, self.sclk, self.bits, self.codes = 1, 0, [], []
@@ -33,10 +33,10 @@ class Converter:
 
 
 class Dac:
-    """The design with the model beside it in every cycle, and the converter on its pins."""
+    """The design with the model beside it in every cycle, and the DAC on its pins."""
 
     def __init__(self, dut):
-        self.dut, self.model, self.converter, self.inputs = dut, SpiDac(), Converter(), dict(IDLE)
+        self.dut, self.model, self.chip, self.inputs = dut, SpiDac(), Ad5542a(), dict(IDLE)
 
     async def reset(self, **inputs):
         await start(self.dut, **IDLE)
@@ -54,7 +54,7 @@ class Dac:
         got = tuple(int(getattr(self.dut, pin).value) for pin in ("cs_n", "sclk", "sdi", "sent"))
         assert got == want, f"cs_n, sclk, sdi, sent are {got}, the model has {want}"
         if not rst:
-            self.converter.pins(*got[:3])
+            self.chip.pins(*got[:3])
         self.inputs["valid"] = 0
         return got
 
@@ -64,17 +64,17 @@ class Dac:
             await self.clk()
 
     async def give(self, command, **inputs):
-        """Give a command, and return the code that the converter has then."""
+        """Give a command, and return the code that the DAC has taken then."""
         await self.clk(valid=1, command=command, **inputs)
         await self.run(80 * max(1, self.inputs["half_period"]))
-        return self.converter.codes[-1]
+        return self.chip.codes[-1]
 
 
 @cocotb.test()
-async def codes_by_hand(dut):
+async def the_codes_are_offset_binary(dut):
     dac = await Dac(dut).reset(enable=1)
     await dac.run(80)
-    assert dac.converter.codes == [32768, 32768] or dac.converter.codes == [32768]
+    assert dac.chip.codes == [32768, 32768] or dac.chip.codes == [32768]
     for command, code in (
         (1, 32769),
         (-1, 32767),
@@ -87,7 +87,7 @@ async def codes_by_hand(dut):
 
 
 @cocotb.test()
-async def trim_is_added_and_held_inside_16_bits(dut):
+async def trim_is_added_and_the_sum_limited_to_16_bits(dut):
     dac = await Dac(dut).reset(enable=1)
     for trim, command, code in (
         (5, 0, 32773),
@@ -102,7 +102,7 @@ async def trim_is_added_and_held_inside_16_bits(dut):
 
 
 @cocotb.test()
-async def latency_is_33_halves_and_2(dut):
+async def latency_is_half_period_times_33_plus_2(dut):
     dac = await Dac(dut).reset(enable=1)
     for half_period in (1, 2, 7):
         await dac.run(600, half_period=half_period)
@@ -110,34 +110,34 @@ async def latency_is_33_halves_and_2(dut):
         while not pins[3]:
             pins = await dac.clk()
             latency += 1
-        assert latency == 33 * half_period + 2 and dac.converter.codes[-1] == 32765
+        assert latency == 33 * half_period + 2 and dac.chip.codes[-1] == 32765
 
 
 @cocotb.test()
-async def a_frame_each_36_halves_and_1_and_the_last_command_is_sent(dut):
+async def a_frame_takes_half_period_times_36_plus_1_and_the_last_command_is_sent(dut):
     dac = await Dac(dut).reset(enable=1)
     await dac.run(200)
-    dac.converter.codes.clear()
+    dac.chip.codes.clear()
     for n in range(37 * 8):
         await dac.clk(valid=1, command=n)
-    assert len(dac.converter.codes) == 8
+    assert len(dac.chip.codes) == 8
     await dac.run(100)
-    assert dac.converter.codes[-1] == 32768 + 37 * 8 - 1
+    assert dac.chip.codes[-1] == 32768 + 37 * 8 - 1
 
 
 @cocotb.test()
-async def off_sends_0_v_at_once_after_the_frame_in_hand_and_forgets_the_command(dut):
+async def off_sends_0_v_after_the_running_frame_and_forgets_the_command(dut):
     dac = await Dac(dut).reset(trim=9)
     for wait in (0, 1, 2, 20, 35, 36, 37, 60):
         assert await dac.give(-20000, enable=1) == 12777
         await dac.clk(valid=1, command=20000)
         await dac.run(wait)
-        dac.converter.codes.clear()
+        dac.chip.codes.clear()
         await dac.run(75, enable=0)
-        assert dac.converter.codes[-1] == 32777 and len(dac.converter.codes) <= 2
+        assert dac.chip.codes[-1] == 32777 and len(dac.chip.codes) <= 2
         assert await dac.give(5000) == 32777  # while off
         await dac.run(80, enable=1)
-        assert dac.converter.codes[-1] == 32777  # and on again: until the next command
+        assert dac.chip.codes[-1] == 32777  # and on again: until the next command
         assert await dac.give(1) == 32778
 
 
@@ -147,17 +147,17 @@ async def the_same_code_is_sent_again_after_refresh(dut):
     await dac.give(77)
     for refresh, period in ((0, 37), (1, 38), (200, 237)):
         await dac.run(300, refresh=refresh)
-        dac.converter.codes.clear()
+        dac.chip.codes.clear()
         await dac.run(10 * period)
-        assert dac.converter.codes == [32768 + 77] * 10
+        assert dac.chip.codes == [32768 + 77] * 10
     await dac.run(300, refresh=65535)
-    dac.converter.codes.clear()
+    dac.chip.codes.clear()
     await dac.run(1000, refresh=65535)
-    assert dac.converter.codes == []
+    assert dac.chip.codes == []
 
 
 @cocotb.test()
-async def both_ends_of_half_period(dut):
+async def a_half_period_of_0_counts_as_1_and_255_is_the_longest(dut):
     dac = await Dac(dut).reset(enable=1)
     await dac.run(100)
     for half_period, length in ((0, 1), (1, 1), (255, 255)):
@@ -167,20 +167,20 @@ async def both_ends_of_half_period(dut):
         while not pins[3]:
             pins = await dac.clk(half_period=3)  # taken with the frame
             high += pins[1]
-        assert high == 16 * length and dac.converter.codes[-1] == 0
+        assert high == 16 * length and dac.chip.codes[-1] == 0
         await dac.run(4 * 255)
 
 
 @cocotb.test()
-async def reset_in_mid_flow(dut):
+async def reset_in_a_frame_ends_it_and_sends_0_v(dut):
     dac = await Dac(dut).reset(enable=1, half_period=2)
     for wait in (0, 1, 2, 3, 33, 66, 67, 68, 72):
         await dac.clk(valid=1, command=999)
         await dac.run(wait)
         assert await dac.clk(rst=1) == (1, 0, 0, 0)
-        dac.converter.__init__()
+        dac.chip.__init__()
         await dac.run(160)
-        assert set(dac.converter.codes) == {32768}
+        assert set(dac.chip.codes) == {32768}
 
 
 @cocotb.test()

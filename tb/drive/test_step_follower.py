@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""step_follower: places by hand, when it begins restart, reset in mid-flow, and random inputs
-against the model in every clk.
+"""step_follower: positions by hand, when it restarts the generator, reset in a calculation, and
+random inputs against the model in every cycle.
 """
 
 import random
@@ -29,7 +29,7 @@ class Follower:
         return self
 
     async def clk(self, rst=0, **inputs):
-        """Strobes last for this clk, levels stay."""
+        """Advance one cycle. Strobes last for this cycle, levels stay."""
         self.inputs.update(inputs)
         for name, level in [*self.inputs.items(), ("rst", rst)]:
             getattr(self.dut, name).value = level
@@ -47,8 +47,8 @@ class Follower:
         return got
 
     async def tick(self, at_clk=None, **inputs):
-        """What a tick leads to, and after how many clk; `inputs` come at clk `at_clk` after the
-        tick.
+        """Return the strobe that a tick leads to, its position, and the cycles that it took;
+        `inputs` come in cycle `at_clk` after the tick.
         """
         for clk in range(1, 100):
             now = inputs if clk - 1 == at_clk else {}
@@ -59,7 +59,7 @@ class Follower:
 
 
 @cocotb.test()
-async def latency_is_57_and_the_place_is_target_and_trim_in_steps(dut):
+async def latency_is_57_and_position_is_target_plus_trim_in_steps(dut):
     follower = await Follower(dut).reset(enable=1, ratio=5 * ONE // 2, target=3 << 16)
     assert await follower.tick() == ("restart", 15 << 15, LATENCY)
     assert await follower.tick() == ("go", 15 << 15, LATENCY)
@@ -72,13 +72,13 @@ async def latency_is_57_and_the_place_is_target_and_trim_in_steps(dut):
 
 
 @cocotb.test()
-async def target_is_taken_in_the_8th_clk_after_the_tick(dut):
+async def target_is_taken_in_the_8th_cycle_after_the_tick(dut):
     follower = await Follower(dut).reset(enable=1, ratio=ONE, target=1)
     assert (await follower.tick(8, target=2))[1] == 2 and (await follower.tick(9, target=3))[1] == 2
 
 
 @cocotb.test()
-async def it_begins_anew_after_a_rebase_whenever_it_comes(dut):
+async def it_restarts_after_a_rebase_whenever_it_comes(dut):
     follower = await Follower(dut).reset(enable=1, ratio=ONE)
     for at in [*range(0, LATENCY - 1), None]:
         await follower.tick()
@@ -87,15 +87,13 @@ async def it_begins_anew_after_a_rebase_whenever_it_comes(dut):
             await follower.clk(rebase=1)
         else:
             assert (await follower.tick(at, rebase=1))[0] == "restart"
-        if (
-            at is None or at >= 8
-        ):  # the position was taken before: the next one begins restart again
+        if at is None or at >= 8:  # the position was taken before: the next one restarts again
             assert (await follower.tick())[0] == "restart"
         assert (await follower.tick())[0] == "go"
 
 
 @cocotb.test()
-async def nothing_goes_with_the_drive_off_and_it_begins_anew_with_it_on(dut):
+async def no_go_comes_with_the_drive_off_and_it_restarts_with_the_drive_on(dut):
     follower = await Follower(dut).reset(enable=1, ratio=ONE)
     await follower.tick()
     follower.inputs.update(enable=0, target=9 << 16)
@@ -105,7 +103,7 @@ async def nothing_goes_with_the_drive_off_and_it_begins_anew_with_it_on(dut):
 
 
 @cocotb.test()
-async def a_reset_in_mid_flow_forgets_the_place(dut):
+async def reset_in_a_calculation_drops_the_position(dut):
     follower = await Follower(dut).reset(enable=1, ratio=ONE)
     await follower.tick()
     await follower.clk(tick=1)

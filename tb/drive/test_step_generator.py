@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""step_generator: edges by hand in every mode, timings on the wire, nothing lost, and random lines
+"""step_generator: edges by hand in every mode, timings on the pins, no lost steps, and random lines
 against the model in every cycle.
 """
 
@@ -34,13 +34,13 @@ IDLE = dict(
 )
 WAVEFORM = ROOT / "build" / "step_generator.csv"
 RECORDING = ROOT.parent / "shared" / "captures" / "smoothieware_steps.csv"
-SLOWER = 50  # samples of the recording a clk
-RECORDED = 150  # steps of it that are played
+SLOWER = 50  # samples of the recording per cycle
+RECORDED = 150  # steps of the recording that are played
 
 
 class Generator:
     """The design with the model beside it in every cycle; `seen` has (step, direction) of every
-    clk.
+    cycle.
     """
 
     def __init__(self, dut):
@@ -87,7 +87,7 @@ class Generator:
         return got
 
     async def line(self, target, clks=None):
-        """Tick with this target (in steps), then wait for the next; what was on the pins."""
+        """Tick with this target (in steps), wait for the next tick; return what the pins showed."""
         first = len(self.seen)
         await self.clk(tick=1, target=int(target * ONE))
         if (clks or self.inputs["period"]) > 1:
@@ -96,7 +96,7 @@ class Generator:
 
 
 def rises(levels, before=0):
-    """Clk after the tick in which a level is high and was not."""
+    """Cycles after the tick in which a level is high and was low before."""
     return [
         clk
         for clk, level in enumerate(levels, start=1)
@@ -105,7 +105,7 @@ def rises(levels, before=0):
 
 
 @cocotb.test()
-async def by_hand(dut):
+async def the_edges_of_a_line_are_as_drawn_by_hand(dut):
     generator = await Generator(dut).reset(target=0, period=20)
     await generator.line(1)  # turns upward, one step at its end
     pins = await generator.line(5) + await generator.line(5)
@@ -121,16 +121,16 @@ async def by_hand(dut):
     assert rises([step for step, _ in pins]) == [
         6,
         13,
-    ]  # below 5 at 1 clk, but turns first; below 4 at 11 clk
+    ]  # below 5 after 1 cycle, but it turns first; below 4 after 11
     assert [direction for _, direction in pins].index(0) == 3
     assert (await generator.clk())[2] == 3
 
 
 @cocotb.test()
-async def the_edge_comes_1_clk_after_the_line_has_passed(dut):
+async def latency_is_1_from_the_line_passing_a_step_to_the_edge(dut):
     for target, latency in ((Fraction(1), 20), (Fraction(2), 10), (Fraction(4), 5)):
         generator = await Generator(dut).reset(target=0)
-        await generator.line(Fraction(1, ONE))  # now it heads up, or not yet
+        await generator.line(Fraction(1, ONE))  # it may turn upward here
         await generator.clk(load=1, target=0)
         generator.model.upward or await generator.line(1)
         await generator.wait(5)
@@ -138,11 +138,13 @@ async def the_edge_comes_1_clk_after_the_line_has_passed(dut):
         await generator.wait(5)
         pins = await generator.line(target) + await generator.line(target)
         first = rises([step for step, _ in pins])[0]
-        assert first - 2 == latency, "tick, then `latency` clk of the line, then 1 clk to the pin"
+        assert first - 2 == latency, (
+            "tick, then `latency` cycles of the line, then 1 cycle to the pin"
+        )
 
 
 @cocotb.test()
-async def the_wire_is_at_the_floor_of_the_line_after_every_line(dut):
+async def the_steps_made_are_the_floor_of_the_line_after_every_line(dut):
     generator = await Generator(dut).reset(target=-5 * ONE // 3, period=37)
     place, origin = Fraction(-5, 3), -2
     for _ in range(60):
@@ -154,18 +156,18 @@ async def the_wire_is_at_the_floor_of_the_line_after_every_line(dut):
 
 
 @cocotb.test()
-async def a_step_each_2_clk_at_most_and_the_rest_is_made_up(dut):
+async def at_most_a_step_every_2_cycles_is_made_and_the_others_follow_later(dut):
     generator = await Generator(dut).reset(target=0, period=100, setup_cycles=0, hold_cycles=0)
     await generator.line(49)
     pins = await generator.line(99)
     steps = rises([step for step, _ in pins], before=pins[0][0])
     assert {b - a for a, b in zip(steps, steps[1:])} == {2}
-    await generator.line(157)  # 58 steps in 100 clk: 8 are owed
+    await generator.line(157)  # 58 steps in 100 cycles: 8 are still to be made
     assert (await generator.wait(30))[2:] == (157, 0)
 
 
 @cocotb.test()
-async def timings_are_kept_at_both_ends(dut):
+async def the_timings_are_kept_at_both_ends_of_their_ranges(dut):
     for high, low, setup, hold in (
         (0, 0, 0, 0),
         (1, 1, 1, 1),
@@ -201,25 +203,25 @@ async def timings_are_kept_at_both_ends(dut):
                 else:
                     shortest["setup"] = min(shortest["setup"], since_turn)
                 since_edge = 0
-        assert shortest["high"] == max(high, 1)  # never shorter, and no longer than it must be
+        assert shortest["high"] == max(high, 1)  # neither shorter nor longer
         assert shortest["low"] >= max(low, 1) and shortest["hold"] >= max(hold, 1)
         assert shortest["setup"] == max(setup, 2)
 
 
 @cocotb.test()
-async def quadrature_has_an_edge_a_step_and_a_leads_going_up(dut):
+async def quadrature_has_one_edge_per_step_and_a_leads_going_up(dut):
     generator = await Generator(dut).reset(target=0, mode=1, high_cycles=2, low_cycles=2, period=40)
     gray = [(0, 0), (1, 0), (1, 1), (0, 1)]
     for target in (9, 4, -7, -7):
         await generator.line(target, 80)
     place = 0
-    stood = 100
+    since = 100
     for before, after in zip(generator.seen, generator.seen[1:]):
-        stood += 1
+        since += 1
         if before != after:
             way = (gray.index(after) - gray.index(before)) % 4
-            assert way in (1, 3) and stood >= 4
-            place, stood = place + (1 if way == 1 else -1), 0
+            assert way in (1, 3) and since >= 4
+            place, since = place + (1 if way == 1 else -1), 0
     assert place == -7 == (await generator.clk())[2]
 
 
@@ -235,7 +237,7 @@ async def pulses_going_up_are_on_step_and_those_going_down_on_direction(dut):
 
 
 @cocotb.test()
-async def polarity_turns_the_pins_over(dut):
+async def polarity_inverts_the_pins(dut):
     for mode in (0, 1, 2):
         seen = []
         for low in (0, 1):
@@ -249,13 +251,13 @@ async def polarity_turns_the_pins_over(dut):
 
 
 @cocotb.test()
-async def off_finishes_the_pulse_and_on_again_does_not_jump(dut):
+async def enable_low_finishes_the_pulse_and_enable_high_again_does_not_jump(dut):
     generator = await Generator(dut).reset(target=0, period=40, high_cycles=6)
     await generator.line(4)
     while not generator.seen[-1][0]:
         await generator.clk()
     pins = [await generator.clk(enable=0, target=900 * ONE) for _ in range(60)]
-    assert [pin[0] for pin in pins] == [1] * 5 + [0] * 55  # the pulse was 6 clk long
+    assert [pin[0] for pin in pins] == [1] * 5 + [0] * 55  # the pulse was 6 cycles long
     made = pins[-1][2]
     await generator.clk(enable=1)
     for target in (900, 900, 903, 903):
@@ -277,7 +279,7 @@ async def load_makes_no_step(dut):
 
 
 @cocotb.test()
-async def the_shortest_way_over_the_end_of_the_range(dut):
+async def it_takes_the_shortest_distance_across_the_wrap_of_target(dut):
     generator = await Generator(dut).reset(target=(2**31 - 2) * ONE, period=40)
     await generator.line(2**31 - 1)
     await generator.line(-(2**31))
@@ -286,13 +288,16 @@ async def the_shortest_way_over_the_end_of_the_range(dut):
 
 
 @cocotb.test()
-async def overrun_when_target_runs_away_and_only_load_or_off_ends_it(dut):
+async def overrun_rises_when_target_runs_away_and_only_load_reset_or_enable_low_ends_it(dut):
     for jump in (256, -257, 30000, 2**31 - 1):  # 256: 2^PERIOD_W
         generator = await Generator(dut).reset(target=0, period=40)
         await generator.line(jump)
         got = await generator.line(jump)
         assert (await generator.clk())[3] and len({step for step, _ in got[4:]}) == 1
         assert not (await generator.clk(load=1))[3]
+        await generator.line(jump)
+        await generator.line(-jump // 2)
+        assert (await generator.clk())[3] and not (await generator.clk(rst=1))[3]
     generator = await Generator(dut).reset(
         target=0, period=200, high_cycles=30
     )  # 2^(PERIOD_W + AHEAD_W - 2) / 200 = 5.1 steps
@@ -304,7 +309,7 @@ async def overrun_when_target_runs_away_and_only_load_or_off_ends_it(dut):
 
 
 @cocotb.test()
-async def a_tick_too_soon_waits_and_nothing_is_lost(dut):
+async def a_tick_that_comes_too_soon_waits_and_nothing_is_lost(dut):
     generator = await Generator(dut).reset(target=0, period=60)
     target = 0
     for _ in range(60):
@@ -314,7 +319,7 @@ async def a_tick_too_soon_waits_and_nothing_is_lost(dut):
 
 
 @cocotb.test()
-async def a_period_of_0_stands(dut):
+async def with_a_period_of_0_nothing_moves(dut):
     generator = await Generator(dut).reset(target=0, period=0)
     for target in (0, 5, -5):
         await generator.line(target, 20)
@@ -322,7 +327,7 @@ async def a_period_of_0_stands(dut):
 
 
 @cocotb.test()
-async def reset_in_mid_flow(dut):
+async def reset_in_a_line_clears_pins_and_steps(dut):
     generator = await Generator(dut).reset(target=0, period=20, high_cycles=3)
     for wait in range(20):
         await generator.line(generator.model.line_end // ONE + 4, 3 + wait)
@@ -368,7 +373,7 @@ async def any_lines_match_the_model(dut):
 
 @cocotb.test()
 async def writes_a_waveform_of_23_steps_up_and_9_down(dut):
-    """sigrok judges it below."""
+    """test_sigrok_counts_the_same_steps reads the waveform."""
     generator = await Generator(dut).reset(
         target=0, period=50, high_cycles=2, low_cycles=3, setup_cycles=4, hold_cycles=3
     )
@@ -378,8 +383,8 @@ async def writes_a_waveform_of_23_steps_up_and_9_down(dut):
 
 
 def recorded():
-    """Place of a real machine's axis, as its controller stepped it, once a period: its first steps,
-    and back again.
+    """Positions of a real machine's axis, once per period, as its controller stepped it: the first
+    steps of the recording, and back again.
     """
     with open(RECORDING, newline="") as lines:
         rows = [tuple(map(int, row[:2])) for row in csv.reader(lines) if row[0].isdigit()]
@@ -410,12 +415,12 @@ def test_step_generator():
 
 
 def test_sigrok_counts_the_same_steps():
-    """The stepper_motor decoder of sigrok knows nothing of ours: it tells the place at every step."""
+    """The stepper_motor decoder of sigrok, made by others, reports the position at each step."""
     program = shutil.which("sigrok-cli")
     if not program:
         pytest.skip("no sigrok-cli")
     run("step_generator", __file__, PERIOD_W=PERIOD_W, TIME_W=TIME_W, AHEAD_W=AHEAD_W)
-    told = subprocess.run(
+    result = subprocess.run(
         [
             program,
             "-i",
@@ -430,7 +435,7 @@ def test_sigrok_counts_the_same_steps():
         capture_output=True,
         text=True,
     )
-    places = [int(line.split()[1]) for line in told.stdout.splitlines()]
+    places = [int(line.split()[1]) for line in result.stdout.splitlines()]
     assert places == [*range(1, 24), *range(22, 14, -1)], (
-        told.stderr
-    )  # it tells a place when the next step comes: 14 is not told
+        result.stderr
+    )  # a position is reported when the next step comes: 14 is not reported

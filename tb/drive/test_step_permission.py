@@ -24,7 +24,7 @@ async def answer(dut, levels, velocity):
 
 
 @cocotb.test()
-async def nothing_goes_into_a_blocked_side_and_everything_away_from_it(dut):
+async def nothing_moves_into_a_blocked_side_and_everything_may_move_away_from_it(dut):
     assert await answer(dut, (1, 1, 1, 0), 1) == (1, 0)
     assert await answer(dut, (1, 1, 1, 0), -1) == (1, 1)
     assert await answer(dut, (1, 1, 0, 1), -1) == (1, 0)
@@ -33,10 +33,19 @@ async def nothing_goes_into_a_blocked_side_and_everything_away_from_it(dut):
 
 
 @cocotb.test()
-async def without_the_drive_or_with_another_kind_of_it_nothing_is_followed(dut):
+async def with_the_drive_off_or_of_another_kind_nothing_is_followed(dut):
     for levels in ((0, 1, 0, 0), (1, 0, 0, 0), (0, 0, 0, 0)):
         for velocity in (-1, 0, 1):
             assert await answer(dut, levels, velocity) == (0, 0)
+
+
+@cocotb.test()
+async def latency_is_0(dut):
+    """The answer follows its inputs within 1 ns, without a clock."""
+    assert not hasattr(dut, "clk")
+    assert await answer(dut, (1, 1, 0, 0), 1) == (1, 1)
+    assert await answer(dut, (1, 1, 1, 0), 1) == (1, 0)
+    assert await answer(dut, (0, 1, 0, 0), 1) == (0, 0)
 
 
 @cocotb.test()

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""step_scaler: products by hand, both ends, and random positions against the model in every cycle."""
+"""step_scaler: products by hand, both ends of the ranges, and random positions against the model in
+every cycle.
+"""
 
 import random
 
@@ -38,7 +40,7 @@ class Scaler:
         return got
 
     async def scale(self, position, ratio):
-        """(steps, clk that it took); the inputs change at once."""
+        """(steps, cycles that it took); the other inputs change after the first cycle."""
         done, latency = await self.clk(valid=1, position=position, ratio=ratio), 1
         while not done[0]:
             done = await self.clk(position=random.getrandbits(40), ratio=random.getrandbits(40))
@@ -47,7 +49,7 @@ class Scaler:
 
 
 @cocotb.test()
-async def by_hand(dut):
+async def steps_are_the_floor_of_products_worked_out_by_hand(dut):
     scaler = await Scaler(dut).reset()
     for position, ratio, steps in (
         (3 << 16, ONE, 3 << 16),
@@ -69,7 +71,7 @@ async def latency_is_49(dut):
 
 
 @cocotb.test()
-async def both_ends(dut):
+async def the_ends_of_both_ranges_are_scaled_modulo_2_48(dut):
     scaler = await Scaler(dut).reset()
     ends = (-(2**47), 2**47 - 1, -1, 0, 1)
     for position in ends:
@@ -79,7 +81,7 @@ async def both_ends(dut):
 
 
 @cocotb.test()
-async def a_position_too_soon_is_not_taken(dut):
+async def a_position_that_comes_too_soon_is_ignored(dut):
     scaler = await Scaler(dut).reset()
     for soon in range(1, LATENCY):
         await scaler.clk(valid=1, position=1 << 16, ratio=ONE)
@@ -89,7 +91,7 @@ async def a_position_too_soon_is_not_taken(dut):
 
 
 @cocotb.test()
-async def reset_in_mid_flow(dut):
+async def reset_in_a_product_drops_it(dut):
     scaler = await Scaler(dut).reset()
     for wait in range(0, 52, 3):
         await scaler.clk(valid=1, position=5 << 16, ratio=ONE)

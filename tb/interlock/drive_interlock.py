@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/interlock/drive_interlock.sv does, in integers: clk(...) is one clk and returns what is
-on the pins after it.
+"""Model of rtl/interlock/drive_interlock.sv in integers: clk(...) advances one cycle and returns
+the outputs after it.
 """
 
 (
@@ -18,8 +18,9 @@ on the pins after it.
 LATCH_ALWAYS = ESTOP | DRIVE | CPU
 
 INPUTS = dict.fromkeys(
-    """enable_request closed_loop homing reset_faults limit_low limit_high estop drive_fault encoder_fault
-    watchdog_expired cpu_trap profile_underrun step_overrun following_limit error_valid error position valid_in command_in""".split(),
+    """enable_request closed_loop homing reset_faults limit_low limit_high estop drive_fault
+    encoder_fault watchdog_expired cpu_trap profile_underrun step_overrun following_limit
+    error_valid error position valid_in command_in""".split(),
     0,
 )
 
@@ -33,7 +34,7 @@ class DriveInterlock:
         self.faults = self.first_fault = self.fault_position = 0
 
     def causes(self, i):
-        standing = (
+        present = (
             i["limit_low"] and not i["homing"],
             i["limit_high"] and not i["homing"],
             i["estop"],
@@ -45,11 +46,11 @@ class DriveInterlock:
             i["profile_underrun"],
             i["step_overrun"],
         )
-        return sum(1 << n for n, cause in enumerate(standing) if cause)
+        return sum(1 << n for n, cause in enumerate(present) if cause)
 
     def clk(self, rst=0, **inputs):
-        """Missing inputs are 0. causes_now, block_up and block_down are seen with the inputs of
-        this clk, after it.
+        """Advance one cycle; missing inputs are 0. causes_now, block_up and block_down are those
+        after the cycle, with its inputs.
         """
         i = INPUTS | inputs
         if rst:
@@ -71,14 +72,14 @@ class DriveInterlock:
     def step(self, i):
         causes = self.causes(i)
         arrived = causes if i["enable_request"] else causes & LATCH_ALWAYS
-        kept = (
+        held = (
             self.faults & causes if i["reset_faults"] and not i["enable_request"] else self.faults
         )
-        if not kept:
+        if not held:
             self.first_fault = arrived & -arrived
             if arrived:
                 self.fault_position = i["position"]
-        self.faults = kept | arrived
+        self.faults = held | arrived
 
         if not self.enabled or not i["closed_loop"] or i["following_limit"] == 0:
             self.too_far = self.error_counts = 0
@@ -87,9 +88,11 @@ class DriveInterlock:
             self.error_counts = 1
         self.enabled = int(i["enable_request"] and not self.faults)
 
-        asked = i["command_in"] if i["valid_in"] else self.command
+        command = i["command_in"] if i["valid_in"] else self.command
         blocked = (
-            not self.enabled or (i["limit_high"] and asked > 0) or (i["limit_low"] and asked < 0)
+            not self.enabled
+            or (i["limit_high"] and command > 0)
+            or (i["limit_low"] and command < 0)
         )
         self.valid_out = int(i["valid_in"] or (blocked and self.command != 0))
-        self.command = 0 if blocked else asked
+        self.command = 0 if blocked else command

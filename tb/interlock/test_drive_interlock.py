@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""drive_interlock: every cause, how a fault may and may not go, the limit switches, and random
+"""drive_interlock: every cause, how a fault is and is not cleared, the limit switches, and random
 inputs against the model.
 """
 
@@ -40,8 +40,8 @@ SIGNED = ("command_out", "fault_position")
 HIGH, LOW = (1 << 15) - 1, -1 << 15
 
 
-class Guard:
-    """The design with the model beside it in every cycle; `out` is what is on the pins."""
+class Interlock:
+    """The design with the model beside it in every cycle; `out` holds the outputs."""
 
     def __init__(self, dut):
         self.dut, self.model, self.inputs = dut, DriveInterlock(), dict(INPUTS)
@@ -52,7 +52,7 @@ class Guard:
         return self
 
     async def clk(self, rst=0, **inputs):
-        """One clk; strobes last for it, levels stay."""
+        """Advance one cycle; strobes last for it, levels stay."""
         self.inputs.update(inputs)
         for name, level in self.inputs.items():
             getattr(self.dut, name).value = level
@@ -80,13 +80,13 @@ class Guard:
 
 
 @cocotb.test()
-async def the_drive_is_off_one_clk_after_any_cause(dut):
-    guard = await Guard(dut).reset()
+async def latency_is_1_from_any_cause_to_enabled_low(dut):
+    interlock = await Interlock(dut).reset()
     for name, bit in CAUSES.items():
-        await guard.enable()
-        assert await guard.command(1234) == 1234
+        await interlock.enable()
+        assert await interlock.command(1234) == 1234
         position = random.randrange(-1 << 47, 1 << 47)
-        out = await guard.clk(**{name: 1}, position=position)
+        out = await interlock.clk(**{name: 1}, position=position)
         assert (out["enabled"], out["faults"], out["first_fault"], out["fault_position"]) == (
             0,
             bit,
@@ -99,7 +99,7 @@ async def the_drive_is_off_one_clk_after_any_cause(dut):
             1,
             1,
         )
-        out = await guard.clk(**{name: 0}, position=0)
+        out = await interlock.clk(**{name: 0}, position=0)
         assert (out["enabled"], out["faults"], out["fault_position"]) == (
             0,
             bit,
@@ -108,124 +108,132 @@ async def the_drive_is_off_one_clk_after_any_cause(dut):
 
 
 @cocotb.test()
-async def a_fault_goes_only_by_reset_with_the_request_gone_and_the_cause_gone(dut):
-    guard = await Guard(dut).reset()
+async def a_fault_is_cleared_only_by_reset_with_neither_request_nor_cause(dut):
+    interlock = await Interlock(dut).reset()
     for name, bit in CAUSES.items():
-        await guard.enable()
-        await guard.clk(**{name: 1})
-        strobe = name == "profile_underrun"  # gone by itself
-        assert (await guard.clk(reset_faults=1))["faults"] == bit  # requested, cause stands
-        assert (await guard.clk(enable_request=0))["faults"] == bit
+        await interlock.enable()
+        await interlock.clk(**{name: 1})
+        strobe = name == "profile_underrun"  # this cause ends by itself
+        assert (await interlock.clk(reset_faults=1))[
+            "faults"
+        ] == bit  # requested, and the cause is present
+        assert (await interlock.clk(enable_request=0))["faults"] == bit
         if not strobe:
-            assert (await guard.clk(reset_faults=1))["faults"] == bit  # cause stands
-        assert (await guard.clk(enable_request=1, **{name: 0}))["faults"] == bit
-        assert (await guard.clk(reset_faults=1))["faults"] == bit  # requested
-        assert (await guard.clk(enable_request=0))["faults"] == bit
-        out = await guard.clk(reset_faults=1)
+            assert (await interlock.clk(reset_faults=1))["faults"] == bit  # the cause is present
+        assert (await interlock.clk(enable_request=1, **{name: 0}))["faults"] == bit
+        assert (await interlock.clk(reset_faults=1))["faults"] == bit  # the drive is requested
+        assert (await interlock.clk(enable_request=0))["faults"] == bit
+        out = await interlock.clk(reset_faults=1)
         assert (out["faults"], out["first_fault"], out["enabled"]) == (0, 0, 0)
-        assert (await guard.clk())["enabled"] == 0  # nothing restarts by itself
-        assert (await guard.clk(enable_request=1))["enabled"] == 1
+        assert (await interlock.clk())["enabled"] == 0  # nothing restarts by itself
+        assert (await interlock.clk(enable_request=1))["enabled"] == 1
 
 
 @cocotb.test()
-async def with_the_drive_not_asked_for_only_estop_drive_and_cpu_latch(dut):
-    guard = await Guard(dut).reset()
+async def without_a_request_only_estop_drive_and_cpu_faults_latch(dut):
+    interlock = await Interlock(dut).reset()
     for name, bit in CAUSES.items():
-        out = await guard.clk(**{name: 1})
+        out = await interlock.clk(**{name: 1})
         assert out["faults"] == (bit if name in ALWAYS else 0)
         assert out["causes_now"] == bit
-        await guard.clk(**{name: 0})
-        await guard.clk(reset_faults=1)
+        await interlock.clk(**{name: 0})
+        await interlock.clk(reset_faults=1)
 
 
 @cocotb.test()
-async def a_standing_cause_never_lets_the_drive_on(dut):
-    guard = await Guard(dut).reset()
+async def the_drive_is_never_enabled_while_a_cause_is_present(dut):
+    interlock = await Interlock(dut).reset()
     for name, bit in CAUSES.items():
-        await guard.clk(enable_request=0, **{name: 1})
+        await interlock.clk(enable_request=0, **{name: 1})
         for _ in range(3):
-            out = await guard.clk(enable_request=1, **{name: 1})
+            out = await interlock.clk(enable_request=1, **{name: 1})
             assert (out["enabled"], out["faults"]) == (0, bit)
-        await guard.clk(enable_request=0, **{name: 0})
-        await guard.clk(reset_faults=1)
+        await interlock.clk(enable_request=0, **{name: 0})
+        await interlock.clk(reset_faults=1)
 
 
 @cocotb.test()
-async def the_first_fault_is_kept_and_of_several_at_once_the_lowest(dut):
-    guard = await Guard(dut).reset()
-    await guard.enable()
-    out = await guard.clk(drive_fault=1, encoder_fault=1, position=77)
+async def first_fault_stays_and_is_the_lowest_of_several_at_once(dut):
+    interlock = await Interlock(dut).reset()
+    await interlock.enable()
+    out = await interlock.clk(drive_fault=1, encoder_fault=1, position=77)
     assert (out["faults"], out["first_fault"]) == (ENCODER | DRIVE, ENCODER)
-    out = await guard.clk(limit_low=1, position=88)
+    out = await interlock.clk(limit_low=1, position=88)
     assert (out["faults"], out["first_fault"], out["fault_position"]) == (
         ENCODER | DRIVE | LIMIT_LOW,
         ENCODER,
         77,
     )
-    await guard.clk(enable_request=0, encoder_fault=0)
-    out = await guard.clk(reset_faults=1)  # the others stand
+    await interlock.clk(enable_request=0, encoder_fault=0)
+    out = await interlock.clk(reset_faults=1)  # the other causes are present
     assert (out["faults"], out["first_fault"]) == (DRIVE | LIMIT_LOW, ENCODER)
-    await guard.clk(limit_low=0, drive_fault=0)
-    out = await guard.clk(reset_faults=1, estop=1, position=-5)  # a new one in the clk of the reset
+    await interlock.clk(limit_low=0, drive_fault=0)
+    out = await interlock.clk(
+        reset_faults=1, estop=1, position=-5
+    )  # a new cause in the cycle of the reset
     assert (out["faults"], out["first_fault"], out["fault_position"]) == (ESTOP, ESTOP, -5)
 
 
 @cocotb.test()
 async def no_command_into_a_pressed_switch_passes(dut):
-    guard = await Guard(dut).reset()
-    await guard.clk(homing=1)
+    interlock = await Interlock(dut).reset()
+    await interlock.clk(homing=1)
     for switch, into, away in (
         ("limit_high", HIGH, LOW),
         ("limit_high", 1, -1),
         ("limit_low", LOW, HIGH),
         ("limit_low", -1, 1),
     ):
-        await guard.enable()
+        await interlock.enable()
         for command in (into, away, 0):
-            assert await guard.command(command) == command
-        assert await guard.command(into) == into
-        out = await guard.clk(**{switch: 1})  # pressed on the way: zero in one clk, and told
+            assert await interlock.command(command) == command
+        assert await interlock.command(into) == into
+        out = await interlock.clk(
+            **{switch: 1}
+        )  # pressed in motion: zero after one cycle, and reported
         assert (out["command_out"], out["valid_out"], out["enabled"], out["faults"]) == (0, 1, 1, 0)
         assert (out["block_up"], out["block_down"]) == (
             (1, 0) if switch == "limit_high" else (0, 1)
         )
-        assert (await guard.clk())["valid_out"] == 0
-        assert await guard.command(into) == 0
-        assert await guard.command(away) == away
-        out = await guard.clk(**{switch: 0})
+        assert (await interlock.clk())["valid_out"] == 0
+        assert await interlock.command(into) == 0
+        assert await interlock.command(away) == away
+        out = await interlock.clk(**{switch: 0})
         assert out["command_out"] == away
-        await guard.command(into)
-        await guard.clk(**{switch: 1})
-        assert (await guard.clk(**{switch: 0}))["command_out"] == 0  # zero until the next command
+        await interlock.command(into)
+        await interlock.clk(**{switch: 1})
+        assert (await interlock.clk(**{switch: 0}))[
+            "command_out"
+        ] == 0  # zero until the next command
 
 
 @cocotb.test()
 async def a_limit_switch_is_a_fault_unless_homing(dut):
-    guard = await Guard(dut).reset()
+    interlock = await Interlock(dut).reset()
     for switch, bit in (("limit_low", LIMIT_LOW), ("limit_high", LIMIT_HIGH)):
-        await guard.enable()
-        out = await guard.clk(homing=1, **{switch: 1})
+        await interlock.enable()
+        out = await interlock.clk(homing=1, **{switch: 1})
         assert (out["enabled"], out["faults"], out["causes_now"]) == (1, 0, 0)
-        out = await guard.clk(homing=0)  # still on the switch
+        out = await interlock.clk(homing=0)  # still on the switch
         assert (out["enabled"], out["faults"], out["causes_now"]) == (0, bit, bit)
-        await guard.clk(enable_request=0)
-        assert (await guard.clk(reset_faults=1))["faults"] == bit
-        await guard.clk(homing=1)  # the way off a switch
-        assert (await guard.clk(reset_faults=1))["faults"] == 0
-        assert (await guard.clk(enable_request=1))["enabled"] == 1
-        await guard.clk(homing=0, **{switch: 0})
+        await interlock.clk(enable_request=0)
+        assert (await interlock.clk(reset_faults=1))["faults"] == bit
+        await interlock.clk(homing=1)  # the axis can move off the switch
+        assert (await interlock.clk(reset_faults=1))["faults"] == 0
+        assert (await interlock.clk(enable_request=1))["enabled"] == 1
+        await interlock.clk(homing=0, **{switch: 0})
 
 
-async def measure(guard, error, times=2):
+async def measure(interlock, error, times=2):
     for _ in range(times):
-        await guard.clk(error_valid=1, error=error)
-        await guard.clk()
-    return guard.out["faults"]
+        await interlock.clk(error_valid=1, error=error)
+        await interlock.clk()
+    return interlock.out["faults"]
 
 
 @cocotb.test()
 async def the_following_error_is_checked_against_its_limit(dut):
-    guard = await Guard(dut).reset()
+    interlock = await Interlock(dut).reset()
     top, bottom = (1 << 31) - 1, -1 << 31
     for limit, good, bad in (
         (1, 1, 2),
@@ -234,64 +242,72 @@ async def the_following_error_is_checked_against_its_limit(dut):
         (top, top, bottom),
         (top - 1, 1 - top, top),
     ):
-        await guard.enable()
-        await guard.clk(closed_loop=1, following_limit=limit)
-        assert await measure(guard, good, 5) == 0
-        assert await measure(guard, bad, 1) == FOLLOWING_ERROR
+        await interlock.enable()
+        await interlock.clk(closed_loop=1, following_limit=limit)
+        assert await measure(interlock, good, 5) == 0
+        assert await measure(interlock, bad, 1) == FOLLOWING_ERROR
     for setting in (
         dict(following_limit=0),
         dict(following_limit=1, closed_loop=0),
         dict(closed_loop=1, following_limit=1 << 31),
     ):
-        await guard.enable()
-        await guard.clk(**setting)
-        assert await measure(guard, bottom, 5) == 0  # off; open loop; as large as it gets
+        await interlock.enable()
+        await interlock.clk(**setting)
+        assert await measure(interlock, bottom, 5) == 0  # not checked; open loop; the largest limit
 
 
 @cocotb.test()
 async def an_error_measured_before_the_drive_was_on_does_not_count(dut):
-    guard = await Guard(dut).reset()
-    await guard.clk(closed_loop=1, following_limit=10)
-    await measure(guard, 5000, 3)
-    await guard.enable()
-    assert await measure(guard, 5000, 1) == 0  # may have been taken before
-    assert await measure(guard, 5000, 1) == FOLLOWING_ERROR
-    assert (await guard.clk())[
-        "causes_now"
-    ] == 0  # the drive is off: nothing stands in the way of a reset
+    interlock = await Interlock(dut).reset()
+    await interlock.clk(closed_loop=1, following_limit=10)
+    await measure(interlock, 5000, 3)
+    await interlock.enable()
+    assert await measure(interlock, 5000, 1) == 0  # it may have been measured before
+    assert await measure(interlock, 5000, 1) == FOLLOWING_ERROR
+    assert (await interlock.clk())["causes_now"] == 0  # the drive is off: nothing prevents a reset
 
 
 @cocotb.test()
-async def the_following_error_turns_the_drive_off_2_clk_after_it(dut):
-    guard = await Guard(dut).reset()
-    await guard.enable()
-    await guard.clk(closed_loop=1, following_limit=10)
-    await measure(guard, 0)
-    assert (await guard.clk(error_valid=1, error=11))["enabled"] == 1
-    out = await guard.clk()
+async def latency_is_2_from_a_following_error_to_enabled_low(dut):
+    interlock = await Interlock(dut).reset()
+    await interlock.enable()
+    await interlock.clk(closed_loop=1, following_limit=10)
+    await measure(interlock, 0)
+    assert (await interlock.clk(error_valid=1, error=11))["enabled"] == 1
+    out = await interlock.clk()
     assert (out["enabled"], out["first_fault"]) == (0, FOLLOWING_ERROR)
 
 
 @cocotb.test()
-async def without_the_drive_no_command_passes(dut):
-    guard = await Guard(dut).reset()
+async def latency_is_1_from_command_in_to_command_out(dut):
+    interlock = await Interlock(dut).reset()
+    await interlock.enable()
+    for command in (5, -7):
+        out = await interlock.clk(valid_in=1, command_in=command)
+        assert (out["command_out"], out["valid_out"]) == (command, 1)
+        assert (await interlock.clk())["valid_out"] == 0
+
+
+@cocotb.test()
+async def with_the_drive_off_no_command_passes(dut):
+    interlock = await Interlock(dut).reset()
     for command in (HIGH, 1, 0, -1, LOW):
-        out = await guard.clk(valid_in=1, command_in=command)
+        out = await interlock.clk(valid_in=1, command_in=command)
         assert (out["command_out"], out["valid_out"]) == (0, 1)
-    await guard.enable()
+    await interlock.enable()
     for command in (HIGH, 1, 0, -1, LOW):
-        assert await guard.command(command) == command
-    out = await guard.clk(enable_request=0)
+        assert await interlock.command(command) == command
+    out = await interlock.clk(enable_request=0)
     assert (out["command_out"], out["valid_out"], out["enabled"]) == (0, 1, 0)
 
 
 @cocotb.test()
-async def reset_in_mid_flow(dut):
-    guard = await Guard(dut).reset()
-    await guard.enable()
-    await guard.command(999)
-    await guard.clk(estop=1, position=5)
-    out = await guard.clk(rst=1, estop=0, enable_request=0)
+async def reset_clears_everything_and_a_request_enables_again(dut):
+    interlock = await Interlock(dut).reset()
+    await interlock.enable()
+    await interlock.command(999)
+    await interlock.clk(estop=1, position=5)
+    out = await interlock.clk(rst=1, estop=0, enable_request=0)
     assert not any(
         out[name]
         for name in (
@@ -303,15 +319,15 @@ async def reset_in_mid_flow(dut):
             "valid_out",
         )
     )
-    await guard.enable()
-    out = await guard.clk(rst=1)
+    await interlock.enable()
+    out = await interlock.clk(rst=1)
     assert out["enabled"] == 0
-    assert (await guard.clk())["enabled"] == 1  # the request still stands and no fault was latched
+    assert (await interlock.clk())["enabled"] == 1  # it is still requested and no fault was latched
 
 
 @cocotb.test()
 async def any_inputs_match_the_model(dut):
-    guard = await Guard(dut).reset()
+    interlock = await Interlock(dut).reset()
     rare = lambda one_in: int(random.randrange(one_in) == 0)
     for _ in range(12_000):
         inputs = dict(
@@ -328,7 +344,7 @@ async def any_inputs_match_the_model(dut):
                 inputs[name] = rare(5) if name in CAUSES else random.getrandbits(1)
         if rare(60):
             inputs["following_limit"] = random.choice((0, 2, random.getrandbits(32)))
-        await guard.clk(rst=rare(700), **inputs)
+        await interlock.clk(rst=rare(700), **inputs)
 
 
 def test_drive_interlock():

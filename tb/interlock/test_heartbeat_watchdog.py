@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""heartbeat_watchdog: to the clk, both ends of the time, what clears it, and random events against
-the model.
+"""heartbeat_watchdog: the exact cycle, both ends of the time, what clears it, and random events
+against the model.
 """
 
 import random
@@ -12,7 +12,7 @@ from cocotb.triggers import FallingEdge, RisingEdge, Timer
 from tb.bench import needs, run, start
 from tb.interlock.heartbeat_watchdog import HeartbeatWatchdog
 
-CLK_NS = 10  # as start() makes it
+CLK_NS = 10  # a cycle of the clock that start() makes
 
 
 class Watchdog:
@@ -45,7 +45,7 @@ class Watchdog:
 
 
 @cocotb.test()
-async def expires_to_the_clk_after_the_last_sign(dut):
+async def latency_is_time_ms_in_cycles_plus_1_from_the_last_kick_to_expired(dut):
     watchdog = await Watchdog(dut).reset(time_ms=3, armed=1)
     for _ in range(5):
         await watchdog.clk()
@@ -59,7 +59,7 @@ async def expires_to_the_clk_after_the_last_sign(dut):
 
 
 @cocotb.test()
-async def frames_in_time_keep_it_quiet(dut):
+async def kicks_in_time_keep_it_from_expiring(dut):
     watchdog = await Watchdog(dut).reset(time_ms=3, armed=1)
     for _ in range(5):
         await watchdog.clk(kick=1)
@@ -67,7 +67,7 @@ async def frames_in_time_keep_it_quiet(dut):
 
 
 @cocotb.test()
-async def it_sleeps_while_no_drive_is_on_and_starts_afresh(dut):
+async def it_never_expires_with_all_drives_off_and_starts_from_zero_when_one_comes_on(dut):
     watchdog = await Watchdog(dut).reset(time_ms=1)
     assert sum([await watchdog.clk() for _ in range(10 * watchdog.clk_ms)]) == 0
     for _ in range(2):
@@ -79,19 +79,22 @@ async def it_sleeps_while_no_drive_is_on_and_starts_afresh(dut):
 
 
 @cocotb.test()
-async def a_new_time_counts_at_once(dut):
+async def a_new_time_counts_at_once_and_latency_is_1_from_a_kick_to_not_expired(dut):
     watchdog = await Watchdog(dut).reset(time_ms=1000, armed=1)
     for _ in range(10 * watchdog.clk_ms):
         assert not await watchdog.clk()
     assert await watchdog.clk(time_ms=5)
-    assert await watchdog.clk(time_ms=1000)  # stays until a frame comes
+    assert await watchdog.clk(time_ms=1000)  # stays until a kick comes
     assert not await watchdog.clk(kick=1)
 
 
 @cocotb.test()
-async def time_0_is_for_ever_and_65535_ms_is_the_longest(dut):
+async def time_0_never_expires_and_65535_ms_is_the_longest(dut):
     watchdog = await Watchdog(dut).reset()
-    needs(watchdog.clk_ms == 1, "65535 ms take long, and the build of one clk a ms shows as much")
+    needs(
+        watchdog.clk_ms == 1,
+        "65535 ms take long, and the build with one cycle per ms shows as much",
+    )
     dut.time_ms.value, dut.armed.value, dut.kick.value, dut.rst.value = 65535, 1, 1, 0
     for ends in (1, 0):
         await RisingEdge(dut.clk)
@@ -114,7 +117,7 @@ async def time_0_is_for_ever_and_65535_ms_is_the_longest(dut):
 
 
 @cocotb.test()
-async def reset_in_mid_flow(dut):
+async def reset_starts_the_time_again(dut):
     watchdog = await Watchdog(dut).reset(time_ms=2, armed=1)
     for wait in range(3 * watchdog.clk_ms):
         for _ in range(wait):

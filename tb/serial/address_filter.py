@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/serial/address_filter.sv does, in integers: step(…) is one clk and returns (valid, data,
-command) after it.
+"""Model of rtl/serial/address_filter.sv in integers: step(...) advances one cycle and returns
+(valid, data, command) after it.
 """
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/serial/break_detector.sv does, in integers: step(rx, rst) is one clk and returns found
-after it.
+"""Model of rtl/serial/break_detector.sv in integers: step(rx, rst) advances one cycle and returns
+found after it.
 """
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/serial/crc32_stream.sv does: step(start, valid, data) is one clk and returns crc after
-it. zlib is the judge.
+"""Model of rtl/serial/crc32_stream.sv, made with zlib: step(start, valid, data) advances one cycle
+and returns crc after it.
 """
 
 import zlib

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/serial/frame_check.sv does: step(…) is one clk and returns (valid, data, command, good,
-frame_good, frame_bad, sync)
-after it.
+"""Model of rtl/serial/frame_check.sv: step(...) advances one cycle and returns (valid, data,
+command, good, frame_good, frame_bad, sync) after it.
 
-It keeps the bytes of the frame and asks zlib at its end."""
+It keeps the bytes of the frame and asks zlib at its end.
+"""
 
 import zlib
 
 
 def frame(command, body):
-    """Words of a whole frame as (data, ninth)."""
+    """The words of a whole frame as (data, ninth)."""
     payload = bytes([command, len(body)]) + bytes(body)
     return [(command, 1)] + [
         (b, 0) for b in payload[1:] + zlib.crc32(payload).to_bytes(4, "little")
@@ -21,7 +21,7 @@ class FrameCheck:
         self.longest, self.bytes = (
             longest,
             None,
-        )  # bytes of the frame under way, the command byte first
+        )  # bytes of the running frame, the command byte first
 
     def step(self, valid, data, command, framing_error, rst=0):
         if rst:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/serial/sync_fifo.sv does: step(push, word, pop) is one clk and returns (present, out,
-free, overrun) after it.
+"""Model of rtl/serial/sync_fifo.sv: step(push, word, pop) advances one cycle and returns (present,
+out, free, overrun) after it.
 """
 
 from collections import deque
@@ -20,7 +20,7 @@ class SyncFifo:
             self.words.popleft()
         self.present = int(
             len(self.words) > 0
-        )  # a word pushed in this clk is not at the output yet
+        )  # a word pushed in this cycle is not at the output yet
         if push and not full:
             self.words.append(word)
         return (

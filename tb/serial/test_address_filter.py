@@ -25,19 +25,19 @@ async def begin(dut, address):
 
 
 @cocotb.test()
-async def latency_is_1_and_the_gate_opens_and_shuts(dut):
+async def latency_is_1_and_the_gate_opens_and_closes(dut):
     await begin(dut, 5)
-    assert (await clk(dut, 1, 0x42))[0] == 0  # not called yet
+    assert (await clk(dut, 1, 0x42))[0] == 0  # the gate is closed
     assert await clk(dut, 1, 0x25, 1) == (1, 0x25, 1)
     assert await clk(dut, 1, 0x42) == (1, 0x42, 0)
     assert (await clk(dut, 0, 0x42))[0] == 0
-    assert (await clk(dut, 1, 0x26, 1))[0] == 0  # node 6 is called
+    assert (await clk(dut, 1, 0x26, 1))[0] == 0  # a command for node 6
     assert (await clk(dut, 1, 0x42))[0] == 0
     assert await clk(dut, 1, 0x15, 1) == (1, 0x15, 1)
 
 
 @cocotb.test()
-async def just_two_of_all_commands_and_the_one_for_all_open_the_gate_of_a_node(dut):
+async def only_two_commands_and_the_broadcast_open_the_gate_of_a_node(dut):
     for address in range(16):
         await begin(dut, address)
         passed = []
@@ -45,7 +45,7 @@ async def just_two_of_all_commands_and_the_one_for_all_open_the_gate_of_a_node(d
             command = (await clk(dut, 1, data, 1))[0]
             assert (await clk(dut, 1, ~data & 255))[
                 0
-            ] == command  # the word after it passes or not with it
+            ] == command  # the next word passes if the command did
             passed += [data] * command
         assert passed == sorted({0x10 | address, 0x20 | address, 0x20})
 
@@ -75,7 +75,7 @@ async def any_word_matches_the_model(dut):
             rst = int(random.random() < 0.01)
             got, want = await clk(dut, *word, rst), model.step(address, *word, rst)
             assert got[0] == want[0] and (not got[0] or got == want), (
-                f"clk {n}: (valid, data, command) is {got}, the model has {want}"
+                f"cycle {n}: (valid, data, command) is {got}, the model has {want}"
             )
 
 

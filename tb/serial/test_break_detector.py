@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""break_detector: to the clk, characters that are none, once a break, and noise against the model."""
+"""break_detector: the exact cycle, lows that are too short, one report per break, and noise against
+the model.
+"""
 
 import random
 
@@ -10,10 +12,12 @@ from tb.bench import run, start
 from tb.serial.break_detector import BreakDetector
 
 CLK_HZ, TIME_US = 1_000_000, 40
-LONGEST = 40
+LONGEST = 40  # cycles, TIME_US at CLK_HZ
 
 
 class Detector:
+    """The design with the model beside it in every cycle."""
+
     def __init__(self, dut):
         self.dut, self.model = dut, BreakDetector(CLK_HZ, TIME_US)
 
@@ -31,7 +35,7 @@ class Detector:
 
 
 @cocotb.test()
-async def a_break_is_found_to_the_clk_and_once(dut):
+async def latency_is_time_us_in_cycles_and_a_break_is_reported_once(dut):
     detector = await Detector(dut).begin()
     for _ in range(2):
         found = [await detector.clk(0) for _ in range(5 * LONGEST)]
@@ -40,7 +44,7 @@ async def a_break_is_found_to_the_clk_and_once(dut):
 
 
 @cocotb.test()
-async def a_low_that_is_a_clk_shorter_is_none(dut):
+async def a_low_that_is_one_cycle_shorter_is_no_break(dut):
     detector = await Detector(dut).begin()
     for _ in range(5):
         assert not any(
@@ -49,7 +53,7 @@ async def a_low_that_is_a_clk_shorter_is_none(dut):
 
 
 @cocotb.test()
-async def reset_in_a_break_begins_it_again(dut):
+async def after_a_reset_in_a_break_its_time_counts_from_the_start(dut):
     detector = await Detector(dut).begin()
     for _ in range(LONGEST - 1):
         await detector.clk(0)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """crc32_stream: the check value of the catalogue, start in every position, and random bytes against
-zlib in every clk.
+zlib in every cycle.
 """
 
 import random
@@ -21,13 +21,13 @@ async def clk(dut, start=0, valid=0, data=0, rst=0):
 
 
 @cocotb.test()
-async def the_check_value_is_cbf43926_and_latency_is_1(dut):
+async def latency_is_1_and_the_check_value_is_cbf43926(dut):
     await start(dut, start=0, valid=0, data=0)
     assert [await clk(dut, valid=1, data=c) for c in b"123456789"][-1] == 0xCBF43926
 
 
 @cocotb.test()
-async def start_begins_anew_alone_or_with_the_first_byte(dut):
+async def start_begins_again_alone_or_with_the_first_byte(dut):
     await start(dut, start=0, valid=0, data=0)
     await clk(dut, valid=1, data=0x55)
     assert await clk(dut, start=1) == 0
@@ -37,7 +37,7 @@ async def start_begins_anew_alone_or_with_the_first_byte(dut):
 
 
 @cocotb.test()
-async def every_byte_in_every_clk_is_as_zlib_has_it(dut):
+async def every_byte_in_every_cycle_gives_what_zlib_gives(dut):
     await start(dut, start=0, valid=0, data=0)
     model = Crc32Stream()
     for data in range(256):
@@ -49,7 +49,7 @@ async def every_byte_in_every_clk_is_as_zlib_has_it(dut):
             random.getrandbits(8),
             int(random.random() < 0.01),
         )
-        assert await clk(dut, *word) == model.step(*word), f"clk {n}"
+        assert await clk(dut, *word) == model.step(*word), f"cycle {n}"
 
 
 def test_crc32_stream():

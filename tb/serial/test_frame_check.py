@@ -2,7 +2,8 @@
 """frame_check behind the address filter: whole frames, every flip of one or two bits,
 interruptions, lengths, and noise.
 
-The filter is its model, which test_address_filter holds equal to the design in every clk."""
+The model stands in for the filter; test_address_filter holds it equal to the design in every cycle.
+"""
 
 import random
 import zlib
@@ -19,13 +20,13 @@ NODE = 5
 ERROR = "framing error"
 
 
-class Line:
-    """The words of the line through the filter into the design, with the model beside it in every
-    clk.
+class Bus:
+    """The words of the bus go through the filter into the design, which has its model beside it in
+    every cycle.
     """
 
     def __init__(self, dut):
-        self.dut, self.filter, self.model, self.clks, self.last = (
+        self.dut, self.filter, self.model, self.cycles, self.last = (
             dut,
             AddressFilter(),
             FrameCheck(),
@@ -46,7 +47,7 @@ class Line:
             ) = inputs
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
-        self.clks += 1
+        self.cycles += 1
         got = tuple(
             int(x.value)
             for x in (
@@ -61,43 +62,44 @@ class Line:
         )
         want = self.model.step(*inputs)
         assert got[0] == want[0] and got[3:] == want[3:] and (not got[0] or got == want), (
-            f"clk {self.clks}: (valid, data, command, good, frame_good, frame_bad, sync) is {got}, the model has {want}"
+            f"cycle {self.cycles}: (valid, data, command, good, frame_good, frame_bad, sync) is "
+            f"{got}, the model has {want}"
         )
         return got
 
-    async def hear(self, words):
-        """Returns the words that passed, and how many frames were good and bad."""
-        passed, good, bad = [], 0, 0
+    async def send(self, words):
+        """Send the words; return those that passed, and how many frames were good and bad."""
+        out, good, bad = [], 0, 0
         for word in words:
-            out = await (
+            got = await (
                 self.clk(framing_error=1)
                 if word == ERROR
                 else self.clk(*self.filter.step(NODE, 1, *word))
             )
-            passed += [out[1:4]] * out[0]
-            good, bad = good + out[4], bad + out[5]
-        return passed, good, bad
+            out += [got[1:4]] * got[0]
+            good, bad = good + got[4], bad + got[5]
+        return out, good, bad
 
 
 async def begin(dut):
     await start(dut, valid_in=0, data_in=0, command_in=0, framing_error=0)
-    line = Line(dut)
-    await line.clk(rst=1)
-    return line
+    bus = Bus(dut)
+    await bus.clk(rst=1)
+    return bus
 
 
 @cocotb.test()
-async def just_a_good_frame_for_all_nodes_is_a_mark(dut):
-    line = await begin(dut)
-    for command, spoil, marks in ((0x20, 0, 1), (0x20, 1, 0), (0x20 | NODE, 0, 0), (0x20, 0, 1)):
+async def only_a_good_frame_for_all_nodes_is_a_sync(dut):
+    bus = await begin(dut)
+    for command, spoil, syncs in ((0x20, 0, 1), (0x20, 1, 0), (0x20 | NODE, 0, 0), (0x20, 0, 1)):
         words = frame(command, b"\x07")
         words[-1] = (words[-1][0] ^ spoil, 0)
-        seen = [(await line.clk(*line.filter.step(NODE, 1, *word)))[6] for word in words]
-        assert sum(seen) == marks == seen[-1]
+        seen = [(await bus.clk(*bus.filter.step(NODE, 1, *word)))[6] for word in words]
+        assert sum(seen) == syncs == seen[-1]
 
 
-def marked(words, good=1):
-    """What a frame looks like when it has passed: good on its last word."""
+def passed(words, good=1):
+    """The words of a frame as they leave the design: good comes with the last one."""
     return [
         (data, command, int(good and n == len(words) - 1))
         for n, (data, command) in enumerate(words)
@@ -105,71 +107,71 @@ def marked(words, good=1):
 
 
 @cocotb.test()
-async def a_frame_by_hand(dut):
-    line = await begin(dut)
+async def a_frame_written_by_hand_passes(dut):
+    bus = await begin(dut)
     words = [(0x25, 1), (2, 0), (7, 0), (1, 0)] + [(b, 0) for b in (0x2F, 0xF2, 0x6A, 0x8D)]
     assert frame(0x25, [7, 1]) == words
-    assert await line.hear(words) == (marked(words), 1, 0)
+    assert await bus.send(words) == (passed(words), 1, 0)
 
 
 @cocotb.test()
 async def latency_is_1_and_good_comes_with_the_last_byte(dut):
-    line = await begin(dut)
+    bus = await begin(dut)
     *most, last = frame(0x25, [1, 2, 3])
     for word in most:
-        assert not (await line.clk(1, *word))[3]
-    assert (await line.clk())[0] == 0
-    assert await line.clk(1, *last) == (1, last[0], 0, 1, 1, 0, 0)
-    assert await line.clk() == (0, 0, 0, 0, 0, 0, 0)
+        assert not (await bus.clk(1, *word))[3]
+    assert (await bus.clk())[0] == 0
+    assert await bus.clk(1, *last) == (1, last[0], 0, 1, 1, 0, 0)
+    assert await bus.clk() == (0, 0, 0, 0, 0, 0, 0)
 
 
 @cocotb.test()
 async def every_length_from_1_to_64_is_good_and_any_other_is_bad_at_once(dut):
-    line = await begin(dut)
+    bus = await begin(dut)
     for length in (1, 2, 17, 63, 64):
         words = frame(0x25, random.randbytes(length))
-        assert await line.hear(words) == (marked(words), 1, 0)
+        assert await bus.send(words) == (passed(words), 1, 0)
     for length in (0, 65, 69, 127, 128, 192, 255):
         words = [(0x25, 1), (length, 0)]
-        assert await line.hear(words) == (marked(words, 0), 0, 1)
-        assert await line.hear([(0, 0)] * 4) == ([], 0, 0)
+        assert await bus.send(words) == (passed(words, 0), 0, 1)
+        assert await bus.send([(0, 0)] * 4) == ([], 0, 0)
 
 
 @cocotb.test()
 async def a_wrong_length_byte_is_never_a_good_frame(dut):
-    line = await begin(dut)
+    bus = await begin(dut)
     body = random.randbytes(20)
     words = frame(0x25, body)
     for length in range(1, 65):
         if length != len(body):
             more = [(random.getrandbits(8), 0) for _ in range(max(length - len(body), 0))]
-            assert (await line.hear([words[0], (length, 0), *words[2:], *more]))[1:] == (0, 1)
+            assert (await bus.send([words[0], (length, 0), *words[2:], *more]))[1:] == (0, 1)
 
 
 @cocotb.test()
 async def no_flip_of_one_or_two_bits_is_ever_good_and_the_next_frame_is(dut):
-    """The 9th bits are flipped too."""
-    line = await begin(dut)
+    """Flips of the 9th bits included."""
+    bus = await begin(dut)
     words = frame(0x25, [0x12, 0x00])
-    places = [(n, bit) for n in range(len(words)) for bit in range(9)]
-    flips = [(p,) for p in places] + list(combinations(places, 2))
+    bits = [(n, bit) for n in range(len(words)) for bit in range(9)]
+    flips = [(b,) for b in bits] + list(combinations(bits, 2))
     for k, flip in enumerate(flips):
         bent = [word[0] | word[1] << 8 for word in words]
         for n, bit in flip:
             bent[n] ^= 1 << bit
-        assert (await line.hear([(b & 255, b >> 8) for b in bent]))[1] == 0, (
+        assert (await bus.send([(b & 255, b >> 8) for b in bent]))[1] == 0, (
             f"flipped (word, bit): {flip}"
         )
         if len(flip) == 1 or k % 10 == 0:
-            assert (await line.hear(words))[1] == 1, (
+            assert (await bus.send(words))[1] == 1, (
                 f"the frame after the flipped (word, bit): {flip}"
             )
 
 
 def with_remainder_off(words, bit):
-    """The words with a CRC that leaves a remainder with just this bit wrong. The remainder is
-    linear in the flips of the four CRC
-    bytes, so those flips are found by elimination."""
+    """The words with a CRC that leaves a remainder with only this bit wrong. The remainder is
+    linear in the flips of the four CRC bytes, so those flips are found by elimination.
+    """
     data = bytes(word[0] for word in words)
     remainder = lambda flips: zlib.crc32(
         data[:-4] + (int.from_bytes(data[-4:], "little") ^ flips).to_bytes(4, "little")
@@ -196,71 +198,71 @@ def with_remainder_off(words, bit):
 
 @cocotb.test()
 async def each_of_the_32_bits_of_the_remainder_is_compared(dut):
-    line = await begin(dut)
+    bus = await begin(dut)
     for bit in range(32):
         words = frame(0x25, random.randbytes(random.choice((1, 5, 64))))
-        assert (await line.hear(with_remainder_off(words, bit)))[1:] == (0, 1), f"bit {bit}"
-        assert (await line.hear(words))[1:] == (1, 0)
+        assert (await bus.send(with_remainder_off(words, bit)))[1:] == (0, 1), f"bit {bit}"
+        assert (await bus.send(words))[1:] == (1, 0)
 
 
 @cocotb.test()
-async def an_interrupted_payload_is_bad_once_and_the_next_frame_is_good(dut):
-    line = await begin(dut)
+async def an_interrupted_frame_is_bad_once_and_the_next_frame_is_good(dut):
+    bus = await begin(dut)
     words = frame(0x25, [1, 2, 3, 4])
     for n in range(1, len(words)):
-        assert await line.hear(words[:n]) == (marked(words[:n], 0), 0, 0)
-        assert await line.hear(words) == (marked(words), 1, 1)  # by a command byte
-        assert (await line.hear([*words[:n], ERROR]))[1:] == (0, 1)  # by a lost character
-        assert await line.hear(words[n:]) == ([], 0, 0)  # its rest is dropped
-        assert await line.hear([*words[:n], (0x15, 1)]) == (
-            marked([*words[:n], (0x15, 1)], 0),
+        assert await bus.send(words[:n]) == (passed(words[:n], 0), 0, 0)
+        assert await bus.send(words) == (passed(words), 1, 1)  # by a command byte
+        assert (await bus.send([*words[:n], ERROR]))[1:] == (0, 1)  # by a lost character
+        assert await bus.send(words[n:]) == ([], 0, 0)  # the words that are left are dropped
+        assert await bus.send([*words[:n], (0x15, 1)]) == (
+            passed([*words[:n], (0x15, 1)], 0),
             0,
             1,
         )
-        assert await line.hear(words) == (marked(words), 1, 0)
+        assert await bus.send(words) == (passed(words), 1, 0)
 
 
 @cocotb.test()
-async def a_framing_error_outside_a_payload_is_nobodys_frame(dut):
-    line = await begin(dut)
+async def a_framing_error_outside_a_frame_is_no_bad_frame(dut):
+    bus = await begin(dut)
     words = frame(0x25, [9])
-    assert (await line.hear([ERROR, *words, ERROR, (0x15, 1), ERROR]))[1:] == (1, 0)
+    assert (await bus.send([ERROR, *words, ERROR, (0x15, 1), ERROR]))[1:] == (1, 0)
 
 
 @cocotb.test()
-async def a_read_has_no_payload_and_words_outside_a_payload_are_dropped(dut):
-    line = await begin(dut)
-    assert await line.hear([(0x15, 1), (1, 0), (2, 0)]) == ([(0x15, 1, 0)], 0, 0)
+async def a_read_command_has_no_frame_and_words_outside_a_frame_are_dropped(dut):
+    bus = await begin(dut)
+    assert await bus.send([(0x15, 1), (1, 0), (2, 0)]) == ([(0x15, 1, 0)], 0, 0)
     words = frame(0x25, [1])
-    assert await line.hear([*words, (1, 0), (2, 0)]) == (marked(words), 1, 0)
+    assert await bus.send([*words, (1, 0), (2, 0)]) == (passed(words), 1, 0)
 
 
 @cocotb.test()
-async def frames_for_other_nodes_leave_no_trace(dut):
-    line = await begin(dut)
+async def frames_for_other_nodes_change_nothing(dut):
+    bus = await begin(dut)
     for address in range(1, 16):
         if address != NODE:
-            assert await line.hear([*frame(0x20 | address, [1, 2, 3]), (0x10 | address, 1)]) == (
+            assert await bus.send([*frame(0x20 | address, [1, 2, 3]), (0x10 | address, 1)]) == (
                 [],
                 0,
                 0,
             )
-    assert (await line.hear(frame(0x25, [1, 2, 3])))[1:] == (1, 0)
+    assert (await bus.send(frame(0x25, [1, 2, 3])))[1:] == (1, 0)
 
 
 @cocotb.test()
-async def reset_in_mid_payload_forgets_it(dut):
-    line = await begin(dut)
+async def reset_in_a_frame_drops_it(dut):
+    bus = await begin(dut)
     words = frame(0x25, [1, 2, 3])
-    await line.hear(words[:4])
-    await line.clk(rst=1)
-    assert await line.hear(words[4:]) == ([], 0, 0)
-    assert (await line.hear(words))[1:] == (1, 0)
+    await bus.send(words[:4])
+    await bus.clk(rst=1)
+    assert await bus.send(words[4:]) == ([], 0, 0)
+    assert (await bus.send(words))[1:] == (1, 0)
 
 
 @cocotb.test()
 async def any_word_matches_the_model(dut):
-    line = await begin(dut)
+    bus = await begin(dut)
     for _ in range(150):
         words = frame(
             random.choice([0x25, 0x25, 0x15, 0x24]), random.randbytes(random.choice([1, 2, 5, 64]))
@@ -269,14 +271,14 @@ async def any_word_matches_the_model(dut):
             words[random.randrange(len(words))] = (random.getrandbits(8), random.getrandbits(1))
         for word in words[: random.choice([len(words), random.randrange(len(words) + 1)])]:
             while random.random() < 0.1:
-                await line.clk(
+                await bus.clk(
                     0,
                     random.getrandbits(8),
                     random.getrandbits(1),
                     int(random.random() < 0.1),
                     int(random.random() < 0.02),
                 )
-            await line.clk(*line.filter.step(NODE, 1, *word), int(random.random() < 0.01))
+            await bus.clk(*bus.filter.step(NODE, 1, *word), int(random.random() < 0.01))
 
 
 def test_frame_check():

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""sync_fifo: order, both ends of its range, the latency, overruns, and random traffic against the
-model.
+"""sync_fifo: the order of the words, an empty and a full queue, the latency, overruns, and random
+traffic against the model.
 """
 
 import random
@@ -14,10 +14,12 @@ from tb.serial.sync_fifo import SyncFifo
 
 
 class Queue:
+    """The design with the model beside it in every cycle."""
+
     def __init__(self, dut):
         self.dut, self.w, self.depth = dut, int(dut.W.value), int(dut.DEPTH.value)
         self.model = SyncFifo(self.depth)
-        self.input = getattr(dut, "in")  # a keyword of Python
+        self.input = getattr(dut, "in")  # `in` is a keyword of Python
 
     async def clk(self, push=0, word=0, pop=0, rst=0):
         dut = self.dut
@@ -44,7 +46,7 @@ async def begin(dut):
 
 
 @cocotb.test()
-async def latency_from_push_to_present_is_2(dut):
+async def latency_is_2_from_push_to_present(dut):
     queue = await begin(dut)
     assert (await queue.clk(push=1, word=5))[0] == 0
     assert (await queue.clk())[:2] == (1, 5)
@@ -63,12 +65,15 @@ async def words_come_out_in_the_order_in_which_they_went_in(dut):
 
 
 @cocotb.test()
-async def a_word_too_many_is_dropped_and_reported_and_the_others_stay(dut):
+async def a_word_for_a_full_queue_is_dropped_and_reported_and_the_others_stay(dut):
     queue = await begin(dut)
     for n in range(queue.depth):
         assert (await queue.clk(push=1, word=n % 4))[2:] == (queue.depth - 1 - n, 0)
     assert (await queue.clk(push=1, word=3))[2:] == (0, 1)
-    assert (await queue.clk(push=1, word=3, pop=1))[2:] == (1, 1)  # full when it came
+    assert (await queue.clk(push=1, word=3, pop=1))[2:] == (
+        1,
+        1,
+    )  # the queue was full when the word came
     assert (await queue.clk())[2:] == (1, 0)
     assert [(await queue.clk(pop=1))[1] for _ in range(queue.depth - 1)] == [
         n % 4 for n in range(2, queue.depth)
@@ -85,7 +90,7 @@ async def pop_of_an_empty_queue_does_nothing(dut):
 
 
 @cocotb.test()
-async def one_push_and_one_pop_a_clk(dut):
+async def one_push_and_one_pop_per_cycle_are_possible(dut):
     queue = await begin(dut)
     await queue.clk(push=1, word=0)
     await queue.clk(push=1, word=1)
@@ -97,7 +102,7 @@ async def one_push_and_one_pop_a_clk(dut):
 
 
 @cocotb.test()
-async def reset_empties_it(dut):
+async def reset_empties_the_queue(dut):
     queue = await begin(dut)
     for n in range(5):
         await queue.clk(push=1, word=n % 4)

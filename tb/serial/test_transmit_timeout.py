@@ -1,19 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""transmit_timeout: to the clk, at both ends of the bit time, how long it lasts, and noise against
-the model.
+"""transmit_timeout: the exact cycle at both ends of the bit time, that the driver stays off, and
+noise against the model.
 """
 
 import random
 
 import cocotb
 import pytest
-from cocotb.triggers import FallingEdge
+from cocotb.triggers import FallingEdge, Timer
 
 from tb.bench import run, start
 from tb.serial.transmit_timeout import TransmitTimeout
 
 
 class Bench:
+    """The design with the model beside it in every cycle."""
+
     def __init__(self, dut):
         self.dut, self.bits = dut, int(dut.BITS.value)
         self.model = TransmitTimeout(self.bits)
@@ -36,7 +38,7 @@ class Bench:
 
 
 @cocotb.test()
-async def it_cuts_off_after_its_bit_times_to_the_clk_and_once(dut):
+async def the_driver_is_switched_off_once_after_exactly_bits_bit_times(dut):
     timeout = await Bench(dut).begin()
     for bit_time, clk in ((0, 8), (127, 8), (128, 8), (160, 10)):
         seen = [await timeout.clk(1, bit_time) for _ in range(2 * timeout.bits * clk)]
@@ -53,7 +55,26 @@ async def it_cuts_off_after_its_bit_times_to_the_clk_and_once(dut):
 
 
 @cocotb.test()
-async def a_reply_that_ends_in_time_is_not_touched(dut):
+async def latency_is_0_from_requested_to_driver_enable(dut):
+    await Bench(dut).begin()
+    for requested in (1, 0, 1):
+        dut.requested.value = requested
+        await Timer(1, "ns")  # much less than a cycle
+        assert int(dut.driver_enable.value) == requested
+
+
+@cocotb.test()
+async def latency_is_bits_times_bit_time_plus_1_from_requested_to_expired(dut):
+    timeout = await Bench(dut).begin()
+    for bit_time, clk in ((128, 8), (160, 10)):
+        for cycle in range(timeout.bits * clk):
+            assert await timeout.clk(1, bit_time) == (1, 0), cycle
+        assert await timeout.clk(1, bit_time) == (0, 1)
+        await timeout.clk(0, bit_time)
+
+
+@cocotb.test()
+async def a_reply_that_ends_in_time_is_not_cut_off(dut):
     timeout = await Bench(dut).begin()
     for _ in range(3):
         assert set([await timeout.clk(1, 128) for _ in range(timeout.bits * 8)]) == {(1, 0)}

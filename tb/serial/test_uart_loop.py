@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""uart_tx and uart_rx without the 9th bit (8N1): by hand, every byte, sigrok, noise against both
-models.
+"""uart_tx and uart_rx without the 9th bit (8N1): one character by hand, every byte, sigrok, and
+noise against both models.
 """
 
 import random
@@ -19,9 +19,11 @@ from tb.serial.uart_tx import UartTx
 
 
 class Loop:
+    """Both designs with their models beside them in every cycle."""
+
     def __init__(self, dut):
-        self.dut, self.sender, self.listener = dut, UartTx(0), UartRx(0)
-        self.heard, self.wave, self.errors = [], bytearray(), 0
+        self.dut, self.sender, self.receiver = dut, UartTx(0), UartRx(0)
+        self.received, self.wave, self.errors = [], bytearray(), 0
 
     async def begin(self):
         await start(self.dut, bit_time=128, valid=0, data=0, rx=1)
@@ -32,7 +34,9 @@ class Loop:
         return self
 
     async def clk(self, bit_time, data=None, rx=None):
-        """One clk; rx None: the transmitter's own wire. Returns whether the byte was taken."""
+        """Advance one cycle; with rx None the receiver listens to the transmitter. Return whether
+        the byte was taken.
+        """
         d, taken = self.dut, data is not None and self.sender.ready()
         rx = int(d.tx.value) if rx is None else rx
         d.bit_time.value, d.valid.value, d.data.value, d.rx.value = (
@@ -44,14 +48,14 @@ class Loop:
         await FallingEdge(d.clk)
         got = int(d.ready.value), int(d.tx.value), int(d.driver_enable.value)
         assert got == self.sender.step(data is not None, data or 0, 0, bit_time)
-        valid, byte, ninth, *flags = self.listener.step(rx, bit_time)
+        valid, byte, ninth, *flags = self.receiver.step(rx, bit_time)
         assert [int(p.value) for p in (d.received, d.framing_error, d.start_glitch, d.busy)] == [
             valid,
             *flags,
         ]
         if valid:
             assert (int(d.character.value), int(d.ninth.value)) == (byte, ninth) == (byte, 0)
-            self.heard.append(byte)
+            self.received.append(byte)
         self.errors += flags[0]
         self.wave.append(got[1])
         return taken
@@ -67,20 +71,20 @@ class Loop:
 
 
 @cocotb.test()
-async def one_character_by_hand(dut):
+async def the_waveform_of_one_character_is_as_drawn_by_hand(dut):
     loop = await Loop(dut).begin()
     await loop.send([0xA5], 128)
     first = loop.wave.index(0)
     assert [loop.wave[first + 4 + 8 * n] for n in range(10)] == [0, 1, 0, 1, 0, 0, 1, 0, 1, 1]
-    assert loop.wave.count(0) == 5 * 8 and loop.heard == [0xA5]
+    assert loop.wave.count(0) == 5 * 8 and loop.received == [0xA5]
 
 
 @cocotb.test()
-async def every_byte_without_any_gap_and_with_some(dut):
+async def every_byte_arrives_without_gaps_and_with_gaps(dut):
     for bit_time, gaps in ((128, False), (139, True)):
         loop = await Loop(dut).begin()
         await loop.send(range(256), bit_time, gaps)
-        assert loop.heard == list(range(256)) and loop.errors == 0
+        assert loop.received == list(range(256)) and loop.errors == 0
 
 
 @cocotb.test()
@@ -88,7 +92,7 @@ async def without_a_stop_bit_the_character_is_dropped_and_reported(dut):
     loop = await Loop(dut).begin()
     for level in line([1, *character(0x55, None, stop=0), 1, *character(0x5A, None), 1], 16):
         await loop.clk(256, rx=level)
-    assert loop.heard == [0x5A] and loop.errors == 1
+    assert loop.received == [0x5A] and loop.errors == 1
 
 
 @cocotb.test()
@@ -101,7 +105,7 @@ async def bit_times_may_differ_by_4_percent(dut):
             Fraction(16 * percent, 100),
         ):
             await loop.clk(256, rx=level)
-        assert loop.heard == sent
+        assert loop.received == sent
 
 
 @cocotb.test()
@@ -115,7 +119,7 @@ async def noise_matches_the_models(dut):
 
 @cocotb.test(skip=not shutil.which("sigrok-cli"))
 async def sigrok_reads_8n1(dut):
-    """115 200 baud at 4 MHz."""
+    """At 115 200 baud and 4 MHz."""
     loop = await Loop(dut).begin()
     sent = [0xA5, 0x00, 0xFF, *(random.getrandbits(8) for _ in range(20))]
     await loop.send(sent, 555)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""uart_rx: characters by hand, the tolerance of the bit time both ways, glitches, breaks, and noise
-against the model.
+"""uart_rx: characters by hand, the tolerance of the bit time either way, glitches, breaks, and
+noise against the model.
 """
 
 import random
@@ -12,12 +12,12 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import run, start
 from tb.serial.uart_rx import UartRx, character, line
 
-BIT_TIMES = [128, 133, 256, 256 + 15, 555]  # 1/16 clk: 8 clk, …, 115 200 baud at 4 MHz
+BIT_TIMES = [128, 133, 256, 256 + 15, 555]  # 1/16 cycle: 8 cycles, …, 115 200 baud at 4 MHz
 
 
 async def listen(dut, levels, bit_time, model=None):
-    """Put the levels on rx, one a clk; with the model beside the design. Returns characters,
-    framing errors, glitches.
+    """Put the levels on rx, one per cycle, with the model beside the design if there is one. Return
+    the characters, framing errors and glitches.
     """
     got, errors, glitches = [], 0, 0
     dut.bit_time.value = bit_time
@@ -37,13 +37,14 @@ async def listen(dut, levels, bit_time, model=None):
             got.append((int(dut.data.value), int(dut.ninth.value)))
         errors, glitches = errors + flags[1], glitches + flags[2]
         if model:
-            valid, data, ninth, *rest = model.step(level, bit_time)
-            want = valid, *rest
+            valid, data, ninth, *others = model.step(level, bit_time)
+            want = valid, *others
             assert flags == want, (
-                f"clk {n}: (valid, framing_error, start_glitch, busy) is {flags}, the model has {want}"
+                f"cycle {n}: (valid, framing_error, start_glitch, busy) is {flags}, "
+                f"the model has {want}"
             )
             if valid:
-                assert got[-1] == (data, ninth), f"clk {n}"
+                assert got[-1] == (data, ninth), f"cycle {n}"
     return got, errors, glitches
 
 
@@ -65,7 +66,7 @@ def bits_of(characters):
 
 
 @cocotb.test()
-async def one_character_by_hand(dut):
+async def a_character_drawn_by_hand_is_received(dut):
     await quiet(dut)
     start_bit, data, ninth, stop = (
         [0],
@@ -81,14 +82,14 @@ async def one_character_by_hand(dut):
 
 
 @cocotb.test()
-async def every_character_without_any_gap(dut):
+async def every_character_is_received_without_any_gap(dut):
     await quiet(dut, 128)
     sent = [(data, (data >> 3 ^ data) & 1) for data in range(256)]
     assert await listen(dut, line([*bits_of(sent), 1], 8), 128) == (sent, 0, 0)
 
 
 @cocotb.test()
-async def valid_comes_within_2_clk_of_the_middle_of_the_stop_bit(dut):
+async def latency_is_2_at_most_from_the_middle_of_the_stop_bit(dut):
     for bit_time in BIT_TIMES:
         await quiet(dut, bit_time)
         bit_clk = Fraction(bit_time, 16)
@@ -102,7 +103,7 @@ async def valid_comes_within_2_clk_of_the_middle_of_the_stop_bit(dut):
 
 
 @cocotb.test()
-async def bit_times_may_differ_by_4_percent_from_16_clk_up(dut):
+async def bit_times_may_differ_by_4_percent_from_16_cycles_up(dut):
     for bit_time in (256, 256 + 1, 256 + 15, 555):
         for percent in (-4, 4):
             await quiet(dut, bit_time)
@@ -119,8 +120,8 @@ async def bit_times_may_differ_by_4_percent_from_16_clk_up(dut):
 
 @cocotb.test()
 async def the_tolerance_ends_above_4_percent_either_way(dut):
-    """Measured on the model, which is equal in every bit: the widest mismatch at which nothing was
-    ever misread.
+    """Measured on the model, which is equal in every bit: the smallest mismatch at which a
+    character is misread.
     """
 
     def clean(bit_time, permille):
@@ -137,18 +138,19 @@ async def the_tolerance_ends_above_4_percent_either_way(dut):
         return True
 
     await quiet(dut)
-    for bit_time in (256, 256 + 8, 555):  # 16, 16.5 and 34.7 clk a bit
+    for bit_time in (256, 256 + 8, 555):  # 16, 16.5 and 34.7 cycles per bit
         slow, fast = (
             next(p for p in range(38, 99, 2) if not clean(bit_time, sign * p)) for sign in (1, -1)
         )
         dut._log.info(
-            f"bit_time {bit_time / 16} clk: first error at +{slow / 10} % and -{fast / 10} % of the sender's bit"
+            f"bit_time {bit_time / 16} cycles: first error at +{slow / 10} % and "
+            f"-{fast / 10} % of the sender's bit"
         )
         assert 40 < slow <= 56 and 40 < fast <= 56
 
 
 @cocotb.test()
-async def a_glitch_in_place_of_a_start_bit_is_reported_and_nothing_else(dut):
+async def a_glitch_instead_of_a_start_bit_is_reported_and_gives_no_character(dut):
     for bit_time in BIT_TIMES:
         await quiet(dut, bit_time)
         bit = bit_time // 16
@@ -160,17 +162,15 @@ async def a_glitch_in_place_of_a_start_bit_is_reported_and_nothing_else(dut):
 
 @cocotb.test()
 async def one_wrong_sample_of_three_changes_nothing(dut):
-    """A spike of one clk at any place of a character, up to the samples of its stop bit, is
-    outvoted.
-    """
-    for bit_time, pace in ((128, 1), (256, 3)):
+    """A spike of one cycle anywhere before the samples of the stop bit is outvoted."""
+    for bit_time, increment in ((128, 1), (256, 3)):
         await quiet(dut, bit_time)
         sent = [(0x96, 1)]
         levels = line([*bits_of(sent), 1], Fraction(bit_time, 16))
-        for place in range(1, bit_time // 16 * 21 // 2 - 1, pace):
+        for at in range(1, bit_time // 16 * 21 // 2 - 1, increment):
             bent = list(levels)
-            bent[place] ^= 1
-            assert await listen(dut, bent, bit_time) == (sent, 0, 0), (bit_time, place)
+            bent[at] ^= 1
+            assert await listen(dut, bent, bit_time) == (sent, 0, 0), (bit_time, at)
 
 
 @cocotb.test()
@@ -188,7 +188,7 @@ async def a_break_is_one_framing_error_however_long(dut):
 
 
 @cocotb.test()
-async def reset_drops_the_character_in_flight(dut):
+async def reset_drops_the_running_character(dut):
     await quiet(dut)
     levels = line(character(0x00, 0), 16)
     await listen(dut, levels[:100], 256)
@@ -200,7 +200,7 @@ async def reset_drops_the_character_in_flight(dut):
 
 
 @cocotb.test()
-async def less_than_8_clk_a_bit_counts_as_8(dut):
+async def less_than_8_cycles_per_bit_count_as_8(dut):
     for bit_time in (0, 1, 127):
         await quiet(dut, bit_time)
         sent = some(3)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""uart_tx: the waveform by hand, exact bit edges, the line driver, gaps, our receiver and sigrok as
-listeners.
+"""uart_tx: the waveform by hand, exact bit edges, the line driver, gaps, and our receiver and
+sigrok as listeners.
 """
 
 import random
@@ -16,7 +16,7 @@ from tb.bench import run, start
 from tb.serial.uart_rx import UartRx, character
 from tb.serial.uart_tx import UartTx
 
-BIT_TIMES = [128, 133, 256, 271, 555]  # 1/16 clk: 8 clk, …, 115 200 baud at 4 MHz
+BIT_TIMES = [128, 133, 256, 271, 555]  # 1/16 cycle: 8 cycles, …, 115 200 baud at 4 MHz
 
 
 async def begin(dut, bit_time):
@@ -28,8 +28,8 @@ async def begin(dut, bit_time):
 
 
 async def send(dut, queue, bit_time, clks=None, model=None, gaps=False):
-    """Offer the characters; (tx, driver_enable) of every clk until the line is free again, or for
-    `clks`.
+    """Offer the characters; return (tx, driver_enable) of every cycle until the line is free again,
+    or of `clks` cycles.
     """
     queue, waves, last, wait, taken = list(queue), [], None, 0, 0
     dut.bit_time.value = bit_time
@@ -50,13 +50,13 @@ async def send(dut, queue, bit_time, clks=None, model=None, gaps=False):
         if model:
             got, want = (ready, tx, enable), model.step(*offer, bit_time)
             assert got == want, (
-                f"clk {len(waves)}: (ready, tx, driver_enable) is {got}, the model has {want}"
+                f"cycle {len(waves)}: (ready, tx, driver_enable) is {got}, the model has {want}"
             )
     return waves
 
 
 def lengths(levels):
-    """Runs of equal levels as (level, clk)."""
+    """Runs of equal levels as (level, cycles)."""
     runs = []
     for level in levels:
         runs = (
@@ -68,7 +68,7 @@ def lengths(levels):
 
 
 @cocotb.test()
-async def one_character_by_hand(dut):
+async def the_waveform_of_one_character_is_as_drawn_by_hand(dut):
     await begin(dut, 256)
     waves = await send(dut, [(0x12, 1)], 256)
     bits = (
@@ -89,7 +89,7 @@ async def the_driver_leads_by_a_bit_and_trails_by_half_a_bit(dut):
 
 
 @cocotb.test()
-async def latency_from_idle_is_1_clk_to_driver_enable(dut):
+async def latency_is_1_from_idle_to_driver_enable(dut):
     await begin(dut, 256)
     assert [enable for _, enable in await send(dut, [], 256, clks=3)] == [0, 0, 0]
     assert [enable for _, enable in await send(dut, [(0, 0)], 256, clks=2)] == [1, 1]
@@ -103,7 +103,7 @@ async def characters_follow_without_a_gap_and_edges_never_drift(dut):
         waves = [tx for tx, enable in await send(dut, sent, bit_time) if enable]
         levels = [b for c in sent for b in character(*c)]
         lead = waves.index(0)
-        # the start bit began at a time between lead and lead + 15/16 clk; every later edge must
+        # the start bit began at a time between lead and lead + 15/16 cycle; all later edges must
         # agree with one such time
         assert any(
             all(
@@ -118,7 +118,7 @@ async def characters_follow_without_a_gap_and_edges_never_drift(dut):
 
 
 @cocotb.test()
-async def a_character_that_comes_while_the_driver_trails_needs_no_lead(dut):
+async def a_character_offered_while_the_driver_is_still_on_needs_no_lead(dut):
     await begin(dut, 256)
     first = await send(dut, [(0x00, 0)], 256, clks=1 + 16 * 12 + 4)
     assert first[-1] == (1, 1)
@@ -133,7 +133,7 @@ async def a_withdrawn_offer_sends_nothing(dut):
 
 
 @cocotb.test()
-async def reset_lets_go_of_the_line(dut):
+async def reset_releases_the_line(dut):
     await begin(dut, 256)
     assert (await send(dut, [(0x00, 0)], 256, clks=60))[-1] == (0, 1)
     dut.rst.value, dut.valid.value = 1, 0
@@ -145,7 +145,7 @@ async def reset_lets_go_of_the_line(dut):
 
 
 @cocotb.test()
-async def less_than_8_clk_a_bit_counts_as_8_and_the_longest_bit_is_whole(dut):
+async def less_than_8_cycles_per_bit_count_as_8_and_the_longest_bit_does_not_overflow(dut):
     for bit_time in (0, 127):
         await begin(dut, bit_time)
         assert lengths(tx for tx, _ in await send(dut, [(0x55, 0)], bit_time))[1:9] == [
@@ -156,7 +156,7 @@ async def less_than_8_clk_a_bit_counts_as_8_and_the_longest_bit_is_whole(dut):
 
 
 @cocotb.test()
-async def our_receiver_hears_what_was_sent(dut):
+async def our_receiver_receives_what_was_sent(dut):
     for bit_time in BIT_TIMES:
         await begin(dut, bit_time)
         sent, model = [(random.getrandbits(8), random.getrandbits(1)) for _ in range(6)], UartRx()
@@ -173,7 +173,7 @@ async def any_offer_matches_the_model(dut):
 
 
 def sigrok(waves, baud, options):
-    """What sigrok's UART decoder makes of the samples, as its own lines of text."""
+    """What sigrok's UART decoder reads from the samples, as its own lines of text."""
     with open("transmitter.bin", "wb") as f:
         f.write(bytes(waves))
     rate = 4_000_000
@@ -199,8 +199,8 @@ def sigrok(waves, baud, options):
 
 @cocotb.test(skip=not shutil.which("sigrok-cli"))
 async def sigrok_reads_nine_bits_and_the_ninth_as_odd_parity(dut):
-    """115 200 baud at 4 MHz. Command bytes of S0 are made so that odd parity is 1: a PC without
-    9-bit mode can send them.
+    """At 115 200 baud and 4 MHz. The command bytes of S0 have an odd parity bit of 1, so that a PC
+    without a 9-bit mode can send them.
     """
     await begin(dut, 555)
     sent = [(0x00, 0), (0xFF, 1), (0x55, 1), (0xAA, 0)] + [

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/serial/transmit_timeout.sv does, in integers: step(requested, bit_time, rst) is one clk
-and returns (driver_enable, expired) after it,
-requested unchanged."""
+"""Model of rtl/serial/transmit_timeout.sv in integers: step(requested, bit_time, rst) advances one
+cycle and returns (driver_enable, expired) after it, with requested unchanged.
+"""
 
 
 class TransmitTimeout:

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/serial/uart_rx.sv does, in integers, and the line it listens to.
+"""Model of rtl/serial/uart_rx.sv in integers, and waveforms for it.
 
-UartRx.step(rx, bit_time) is one clk and returns (valid, data, ninth, framing_error, start_glitch,
-busy) after it."""
+UartRx.step(rx, bit_time) advances one cycle and returns (valid, data, ninth, framing_error,
+start_glitch, busy) after it.
+"""
 
 from fractions import Fraction
 
 
 class UartRx:
     def __init__(self, ninth=1):
-        self.last = 9 + ninth  # place of the stop bit
+        self.last = 9 + ninth  # number of the stop bit
         self.state, self.left, self.bits, self.samples = "release", 0, [], []
         self.data = self.ninth = None
 
@@ -53,13 +54,13 @@ class UartRx:
 
 
 def character(data, ninth, stop=1):
-    """Levels of one character, a level a bit; ninth is None for 8N1."""
+    """The levels of one character, one per bit; ninth is None for 8N1."""
     return [0, *(data >> n & 1 for n in range(8)), *([] if ninth is None else [ninth]), stop]
 
 
 def line(bits, bit_clk, phase=0):
-    """Levels at each clk of `bits`, each `bit_clk` clk long (a fraction will do), the first edge at
-    clk `phase` in [0, 1).
+    """The level in each cycle of `bits`, each of which is `bit_clk` cycles long (a fraction will
+    do); the first edge is `phase` cycles, in [0, 1), after the first.
     """
     bit_clk, phase = Fraction(bit_clk), Fraction(phase)
     levels, n = [], 0

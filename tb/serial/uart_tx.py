@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/serial/uart_tx.sv does, in integers.
+"""Model of rtl/serial/uart_tx.sv in integers.
 
-step(valid, data, ninth, bit_time) is one clk and returns (ready, tx, driver_enable) after it;
-`ready` is also the answer to
-the `valid` of the next clk. Times are exact sixteenths of a clk: an edge stands at the clk at or
-before its time."""
+step(valid, data, ninth, bit_time) advances one cycle and returns (ready, tx, driver_enable) after
+it; `ready` is also the answer to `valid` of the next cycle. Times are exact sixteenths of a cycle:
+an edge comes in the cycle at or before its time.
+"""
 
 
 class UartTx:
