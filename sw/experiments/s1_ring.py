@@ -18,7 +18,6 @@ import html
 import subprocess
 import sys
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -35,7 +34,9 @@ from twin.build import simulation
 from twin.machines.ring import ARC_SECOND, RotaryRing
 
 ROOT = Path(__file__).resolve().parents[2]
-DRIVER, RELAY = Path(__file__).with_name("relay_run.cpp"), ROOT / "rtl" / "relay.sv"
+DRIVER, RELAY = Path(__file__).with_name("relay_serve.cpp"), ROOT / "rtl" / "relay.sv"
+HARMONIC_DRIVER = Path(__file__).with_name("harmonic_run.cpp")
+HARMONIC_MAP = ROOT / "rtl" / "compensate" / "harmonic_map.sv"
 ORDERS = 16  # of the relay
 CLK_HZ, BAUD = 48_000_000, 3_000_000
 SUBDIVISION = 200  # of a line, in the read head: 0.2 arcsec a count
@@ -112,37 +113,29 @@ def as_in_the_paper(readings):
 # ------------------------------------------------------------------ the relay
 
 
-@cache
-def harmonic_model():
-    """tb/compensate/harmonic_map.py: integers, equal to the RTL in every bit."""
-    from tb.compensate import harmonic_map
-
-    return harmonic_map
-
-
 def set_of(found, counts_per_turn):
     return make_set(terms_of(found, counts_per_turn), Settings(counts_per_turn), ORDERS)
 
 
 def corrections_of(whole: bytes, counts):
-    """Counts that a relay with this set takes off at these counts, by the integers of its RTL."""
-    model, words = harmonic_model(), np.frombuffer(whole, "<u4").astype(np.int64)
-    terms = [
-        (model.signed(int(words[n]), 32), int(words[n + 1])) for n in range(6, len(words) - 1, 2)
-    ]
-    turn, step = int(words[1]), int(words[2] | (words[3] & 0xFFFF) << 32)
+    """Counts that the Verilated harmonic_map takes off at these counts with this set."""
+    words = np.frombuffer(whole, "<u4").astype(np.int64)
+    terms, turn, step = words[6:-1], int(words[1]), int(words[2] | (words[3] & 0xFFFF) << 32)
     angles = [(int(count) % turn * step >> 16) % 2**32 for count in counts]
-    return np.array(
-        [
-            (model.summed(terms, angle, int(words[4]), model.STEPS)[0] + 128 >> 8) / 65536
-            for angle in angles
-        ]
+    numbers = [words[4], len(terms) // 2, *terms, len(angles), *angles]
+    done = subprocess.run(
+        [simulation(HARMONIC_DRIVER, HARMONIC_MAP, K=ORDERS)],
+        input=" ".join(map(str, numbers)),
+        capture_output=True,
+        text=True,
+        check=True,
     )
+    return np.array(done.stdout.split(), dtype=float) / 65536
 
 
-def each_left_by_model(ring, found, angles):
-    """Error that is left at these true angles, arcsec: the ring's truth less what the RTL's
-    integers take off.
+def each_left_by_map(ring, found, angles):
+    """Error that is left at these true angles, arcsec: the ring's true error less what the RTL of
+    the correction takes off.
     """
     error, turn = error_of(ring, angles), ring.counts_per_turn
     counts = np.round((angles + error / 3600) / 360 * turn)
@@ -150,9 +143,9 @@ def each_left_by_model(ring, found, angles):
     return left - left.mean()
 
 
-def left_by_model(ring, found, angles):
-    """The largest of it."""
-    return np.abs(each_left_by_model(ring, found, angles)).max()
+def left_by_map(ring, found, angles):
+    """The largest error that is left at these true angles, arcsec."""
+    return np.abs(each_left_by_map(ring, found, angles)).max()
 
 
 class VerilatedRelay(Transport):
@@ -166,7 +159,7 @@ class VerilatedRelay(Transport):
     def __init__(self, counts_per_turn: int, place: int):
         program = simulation(DRIVER, RELAY, K=ORDERS, BAUD=BAUD)
         self.process = subprocess.Popen(
-            [program, "serve", str(counts_per_turn), str(place)],
+            [program, str(counts_per_turn), str(place)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

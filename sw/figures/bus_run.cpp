@@ -21,6 +21,7 @@
 #include <string>
 #include <vector>
 
+#include "figures/common.h"
 #include "Vtop.h"
 #include "verilated.h"
 
@@ -33,6 +34,8 @@ void firmware_start(void);
 
 namespace {
 
+using moire::Random;
+
 constexpr unsigned ADDRESS = 1, TO_NODE = 0x20 | ADDRESS, FROM_NODE = 0x10 | ADDRESS, READY = 0x40;
 constexpr unsigned CELLS = 11;   // of a character
 constexpr unsigned ANSWER = 20;  // cells: the ready byte, with the lead and the trail of the driver
@@ -43,24 +46,7 @@ constexpr uint32_t BAUD = 115200;
 using Levels = std::vector<uint8_t>;
 using Bytes = std::vector<uint8_t>;
 
-struct Random {  // xorshift64*
-    uint64_t state;
-    uint64_t operator()() {
-        state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
-        return (state * 2685821657736338717ULL) >> 16;
-    }
-    unsigned below(unsigned n) { return unsigned((*this)() % n); }
-    double between(double a, double b) { return a + (b - a) * below(1 << 20) / (1 << 20); }
-};
-
-uint32_t crc32(const Bytes& bytes) {
-    uint32_t crc = ~0u;
-    for (const uint8_t byte : bytes) {
-        crc ^= byte;
-        for (int n = 0; n < 8; n++) crc = crc >> 1 ^ (crc & 1 ? 0xEDB88320u : 0);
-    }
-    return ~crc;
-}
+uint32_t crc32(const Bytes& bytes) { return moire::crc32(bytes.data(), bytes.size()); }
 
 void add_character(Levels& cells, unsigned word) {  // bit 8: the 9th
     cells.push_back(0);

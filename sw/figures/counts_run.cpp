@@ -17,27 +17,19 @@
 #include <memory>
 
 #include "made/registers.h"
+#include "figures/common.h"
 #include "Vtop.h"
 #include "verilated.h"
 
 namespace {
+
+using moire::Random;
 
 constexpr int AXES = 3, REST_CLK = 64, TICK_CLK = 15000, SAMPLE_CLK = 600;
 constexpr unsigned NEEDED[AXES] = {1, 3,
                                    5};  // equal samples that the edge filter wants; 1: every clk
 constexpr int64_t COUNT = 1 << 14, PERIOD = 1 << 16;  // of the position
 constexpr int64_t POSITIONS = 1LL << 48, COUNTS = POSITIONS / COUNT;
-
-struct Random {  // xorshift64*
-    uint64_t state;
-    uint64_t operator()() {
-        state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
-        return (state * 2685821657736338717ULL) >> 16;
-    }
-    double share() { return double((*this)() >> 16) / 4294967296.0; }
-    int64_t below(int64_t n) { return int64_t((*this)() % uint64_t(n)); }
-    bool one_in(int64_t n) { return below(n) == 0; }
-};
 
 int64_t wrapped(int64_t value, int64_t whole) {  // to -whole/2 .. whole/2 - 1
     value &= whole - 1;

@@ -11,22 +11,16 @@
 #include <cstdlib>
 #include <memory>
 
+#include "figures/common.h"
 #include "Vtop.h"
 #include "verilated.h"
 
 namespace {
 
+using moire::Random;
+
 constexpr unsigned REQUIRED = 4, LATENCY = REQUIRED + 1, HISTORY = 8, PER_REVOLUTION = 1000;
 static_assert(LATENCY < HISTORY);
-
-struct Random {  // xorshift64*
-    uint64_t state;
-    uint32_t operator()() {
-        state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
-        return uint32_t((state * 2685821657736338717ULL) >> 32);
-    }
-    bool one_in(unsigned n) { return (*this)() % n == 0; }
-};
 
 struct Line {
     bool level;            // of the final edges
@@ -97,12 +91,12 @@ int main(int count, char** words) {
                 if (mark != z.level) z.level = mark, z.stood = 0, entries += mark;
                 place = next, edges++;
                 if (random.one_in(6)) way = -way, reversals++;  // often over the edge just made
-                pause = random.one_in(4) ? random() % 24 : random() % 3;
+                pause = random.one_in(4) ? random.bits32() % 24 : random.bits32() % 3;
             }
         }
         for (Line* line : {&a, &b, &z})
             if (line->ready() && line->stood > REQUIRED && random.one_in(8))
-                line->pulse = 1 + random() % (REQUIRED - 1), glitches++;
+                line->pulse = 1 + random.bits32() % (REQUIRED - 1), glitches++;
         show();
         history[slot++ % HISTORY] = place;
         tick();

@@ -18,10 +18,13 @@
 #include <vector>
 
 #include "made/registers.h"
+#include "figures/common.h"
 #include "Vtop.h"
 #include "verilated.h"
 
 namespace {
+
+using moire::Random;
 
 constexpr int64_t COUNT = 1 << 14;  // position, in 2^-16 period
 constexpr int LIMIT_CLK =
@@ -48,17 +51,6 @@ const char* const NAMES[CAUSES] = {"limit_low",        "limit_high",   "estop", 
                                    "profile_underrun", "step_overrun"};
 constexpr Cause LEVELS[] = {LIMIT_LOW, LIMIT_HIGH, ESTOP, WATCHDOG, DRIVE, CPU};
 constexpr unsigned LATCH_ALWAYS = 1 << ESTOP | 1 << DRIVE | 1 << CPU;
-
-struct Random {  // xorshift64*
-    uint64_t state;
-    uint64_t operator()() {
-        state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
-        return (state * 2685821657736338717ULL) >> 16;
-    }
-    int64_t below(int64_t n) { return int64_t((*this)() % uint64_t(n)); }
-    int64_t from(int64_t low, int64_t high) { return low + below(high - low + 1); }
-    bool one_in(unsigned n) { return below(n) == 0; }
-};
 
 struct Window {  // clk in which a cause takes the drive
     int64_t first = NEVER, last = NEVER;

@@ -13,7 +13,7 @@ from twin.build import COMPILE, compiler, digest, made_once, package, rtl_path, 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 RUN = HERE / "interpolate_latency.cpp"
-BENCH = ROOT / "tb" / "interpolate" / "interpolator_bench.sv"
+BENCH = HERE / "interpolator_bench.sv"
 SEED = 1  # of the placement
 W = 8  # bits of S0's converter
 LEADING = 2  # bits that it sends before them

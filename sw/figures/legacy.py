@@ -30,7 +30,7 @@ from figures.common import Figure, console
 from twin.build import run, simulation
 
 ROOT = Path(__file__).resolve().parents[2]
-BENCH = ROOT / "tb" / "sense" / "legacy_bench.sv"
+BENCH = Path(__file__).with_name("legacy_bench.sv")
 DRIVER = Path(__file__).with_name("legacy_run.cpp")
 SEED = 1
 SUBDIVISION = 160

@@ -23,7 +23,7 @@ from twin.build import (
 
 ROOT = Path(__file__).resolve().parents[2]
 DRIVER = Path(__file__).with_name("profile_run.cpp")
-BENCH = ROOT / "tb" / "control" / "profile_player_bench.sv"
+BENCH = Path(__file__).with_name("profile_player_bench.sv")
 FIRMWARE = ROOT / "sw" / "firmware"
 PLANNER = [
     FIRMWARE / name

@@ -13,6 +13,7 @@
 #include <memory>
 #include <utility>
 
+#include "figures/common.h"
 #include "Vplayer.h"
 extern "C" {
 #include "planner/planner.h"
@@ -21,20 +22,14 @@ extern "C" {
 
 namespace {
 
+using moire::Random;
+
 constexpr int64_t ROUNDING =
     8;  // 2^-40 period that the rounding of a step to 2^-40 adds to its third difference
 
-struct Random {  // xorshift64*
-    uint64_t state;
-    uint64_t operator()() {
-        state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
-        return state * 2685821657736338717ULL;
-    }
-    bool one_in(unsigned n) { return (*this)() % n == 0; }
-    double spread(double low, double high) {
-        return low * std::pow(high / low, double((*this)() >> 11) / 9007199254740992.0);
-    }
-};
+double spread(Random& random, double low, double high) {  // evenly in their logarithm
+    return low * std::pow(high / low, random.share());
+}
 
 struct Bench {
     VerilatedContext context;
@@ -78,15 +73,15 @@ int main(int count, char** words) {
     while (moves < wanted) {
         const unsigned kind = random() % 8;  // 0 stepped, 1 trapezoid, else S-curve
         const bool slowed = kind > 0 && random.one_in(4), braked = random.one_in(5);
-        const auto velocity = uint32_t(random.spread(10, 50000)),
-                   acceleration = uint32_t(random.spread(1000, 1e7));
-        const auto jerk = uint32_t(random.spread(1e5, 1e9));
+        const auto velocity = uint32_t(spread(random, 10, 50000)),
+                   acceleration = uint32_t(spread(random, 1000, 1e7));
+        const auto jerk = uint32_t(spread(random, 1e5, 1e9));
         struct planner_limits limits = planner_limits(velocity, acceleration, jerk);
         struct planner_limits planned = limits;
         uint32_t ramp = 0, curve = 0;
         if (kind == 1) planned.jerk = PLANNER_ANY_JERK;
         if (slowed) planner_feed_override(&planned, &ramp, &curve);
-        int64_t distance = int64_t(random.spread(1, 1 << 26)) * (random.one_in(2) ? 1 : -1);
+        int64_t distance = int64_t(spread(random, 1, 1 << 26)) * (random.one_in(2) ? 1 : -1);
         struct plan plan;
         planner_stepped_profile stepped{};
         if (kind == 0) {
@@ -127,9 +122,9 @@ int main(int count, char** words) {
         for (unsigned idle = 0; idle < 400000; idle++) {
             while (!stopped && !end_queued && pins.queue_free && queued < played + 64) {
                 if (retargets_left && queued >= retarget_at) {
-                    int64_t other = random.one_in(2) ? goal + int64_t(random.spread(1, 1 << 20)) *
+                    int64_t other = random.one_in(2) ? goal + int64_t(spread(random, 1, 1 << 20)) *
                                                                   (random.one_in(2) ? 1 : -1)
-                                                     : int64_t(random.spread(1, 1 << 26)) *
+                                                     : int64_t(spread(random, 1, 1 << 26)) *
                                                            (random.one_in(2) ? 1 : -1);
                     retargets_left--, retarget_at += 1 + random() % 200;
                     struct plan made;

@@ -19,10 +19,13 @@
 #include <string>
 #include <vector>
 
+#include "figures/common.h"
 #include "Vtop.h"
 #include "verilated.h"
 
 namespace {
+
+using moire::Random;
 
 constexpr int CLK_HZ = 400'000;
 constexpr double US = CLK_HZ / 1e6;
@@ -30,16 +33,6 @@ const std::vector<uint8_t> START = {
     0x14, 0x1D, 0xF0, 0x1D, 0xF0, 0x14};  // S4: left Ctrl + W; our person never types 14, 1D
 
 int clks(double us) { return std::max(1, int(us * US + 0.5)); }
-
-struct Random {  // xorshift64*
-    uint64_t state;
-    uint64_t operator()() {
-        state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
-        return (state * 2685821657736338717ULL) >> 16;
-    }
-    int below(int n) { return int((*this)() % uint64_t(n)); }
-    double between(double a, double b) { return a + (b - a) * double(below(1 << 20)) / (1 << 20); }
-};
 
 bool parity(uint8_t byte) { return !(__builtin_popcount(byte) & 1); }  // of the frame
 bool bit_of(uint8_t byte, int place) {

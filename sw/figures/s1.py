@@ -41,7 +41,7 @@ def left(angles, way, count=RINGS, each=lambda *_: None):
     for seed, ring, source in rings(count):
         correction = way(s1_ring.measure(ring, angles, source))
         places = s1_ring.off_grid(source, PLACES)
-        found.append(s1_ring.left_by_model(ring, correction, places))
+        found.append(s1_ring.left_by_map(ring, correction, places))
         each(seed, ring, correction, places)
     console.print(f"{count} rings: median {np.median(found):.2f}, worst {max(found):.2f} arcsec")
     return float(np.percentile(found, 95))
@@ -53,7 +53,7 @@ def through_the_rtl(seed, ring, correction, places):
         return
     some = places[:: PLACES // RTL_PLACES]
     by_rtl, _ = s1_ring.left_by_relay(ring, correction, some)
-    apart = np.abs(by_rtl - s1_ring.each_left_by_model(ring, correction, some)).max()
+    apart = np.abs(by_rtl - s1_ring.each_left_by_map(ring, correction, some)).max()
     console.print(
         f"ring {seed}, the Verilated relay: {np.abs(by_rtl).max():.2f} arcsec at {len(some)} places, {apart:.2f} from its model"
     )

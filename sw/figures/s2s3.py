@@ -44,7 +44,7 @@ def s3_zero_um_max(count=1000):
 # ------------------------------------------------------------------ S2
 
 DRIVER = Path(__file__).with_name("counts_run.cpp")
-BENCH = s3_zero.ROOT / "tb" / "system" / "three_axes_bench.sv"
+BENCH = Path(__file__).with_name("three_axes_bench.sv")
 AXES = 3
 PULSES = 10**7
 SHARE = 10**6  # pulses an axis of one run, each run with a seed of its own

@@ -13,22 +13,15 @@
 #include <cmath>
 #include <memory>
 
+#include "figures/common.h"
 #include "Vtop.h"
 #include "verilated.h"
 
 namespace {
 
-constexpr int64_t ONE = 1 << 16;
+using moire::Random;
 
-struct Random {  // xorshift64*
-    uint64_t state;
-    uint64_t operator()() {
-        state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
-        return (state * 2685821657736338717ULL) >> 16;
-    }
-    int64_t below(int64_t n) { return int64_t((*this)() % uint64_t(n)); }
-    bool one_in(unsigned n) { return below(n) == 0; }
-};
+constexpr int64_t ONE = 1 << 16;
 
 struct Driver {  // what a stepper driver sees on its two pins
     int64_t count = 0, now = 0, rose = -1'000'000, fell = -1'000'000, turned = -1'000'000;
