@@ -351,7 +351,8 @@ Levels disturbance(Random& random) {  // a level a clk
         return in_clk(cells, BIT_CLK);
     case 1: {  // a burst
         const unsigned first = place(cells),
-                       last = std::min(unsigned(cells.size()), first + 2 + random.below(15));
+                       last =
+                           std::min(unsigned(cells.size()), first + 2 + unsigned(random.below(15)));
         for (unsigned n = first; n < last; n++) cells[n] = uint8_t(random.below(2));
         return in_clk(cells, BIT_CLK);
     }

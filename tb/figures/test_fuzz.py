@@ -66,7 +66,7 @@ needs_gcc = pytest.mark.skipif(
 @pytest.mark.parametrize("image", images())
 def test_the_firmware_stands_a_short_fuzz(image):
     outcome = fuzz_firmware(5, image)
-    assert outcome.said is None and outcome.runs > 500
+    assert outcome.crash is None and outcome.runs > 500
 
 
 @needs_gcc
@@ -79,5 +79,5 @@ def test_a_missing_bound_in_the_firmware_is_found(tmp_path):
     )
     assert wrong != right
     (copy / "bus" / "bus.c").write_text(wrong)
-    said = fuzz_firmware(60, "axis", firmware=copy).said
+    said = fuzz_firmware(60, "axis", firmware=copy).crash
     assert said is not None and "index 69 out of bounds" in said and "input:" in said, said
