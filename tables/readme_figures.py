@@ -6,6 +6,7 @@ what was measured last, docs/figures.toml.
 import re
 import sys
 from importlib import import_module
+from pathlib import Path
 
 from figures.common import Figure, modules
 from figures.comparison import number
@@ -91,7 +92,7 @@ def table(figures: dict[str, Figure], entries: dict[str, Entry]) -> str:
     return "\n".join([sources(entries), "", *head, *rows, ""])
 
 
-def make() -> dict:
+def make() -> dict[Path, str]:
     text = README.read_text(encoding="utf-8")
     if text.count(BEGIN) != 1 or text.count(END) != 1 or text.index(BEGIN) > text.index(END):
         raise ValueError(f"{README.name}: the marks of the table of figures are missing")

@@ -96,7 +96,7 @@ def words_of(cos, sin):
 
 
 def remaining_nm(values, table, curve, amplitude=AMPLITUDE):
-    """Largest sub-division error left; `curve` is the undisturbed signal as a function of the turn."""
+    """Largest sub-division error left; `curve`: the undisturbed signal over the turn."""
     turn = np.arange(4096) / 4096 * 2 * np.pi
     words = converted(*curve(turn), None, bits=16, noise=0, amplitude=amplitude)
     away = (corrected(phase_of(*words, values), table) / 65536 - turn / (2 * np.pi) + 0.5) % 1 - 0.5
@@ -211,7 +211,8 @@ def sde_nm_max(vibrations_hz=VIBRATIONS_HZ, amplitudes=AMPLITUDES, seed=1):
         here = left[n :: len(amplitudes)]
         console.print(
             f"amplitude {amplitude:.0%}: worst {here.max():.3f} nm, "
-            f"median {np.median(here):.3f}; Cramer-Rao for the noise alone: median {bound_nm(amplitude):.3f}"
+            f"median {np.median(here):.3f}; "
+            f"Cramer-Rao for the noise alone: median {bound_nm(amplitude):.3f}"
         )
     by_hz = ", ".join(
         f"{hz} Hz {here.max():.3f}"

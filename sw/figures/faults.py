@@ -246,7 +246,7 @@ class Monitors:
         )
 
     def judge(self, samples):
-        """Faults 0 to 12 as bits, (samples, lanes), of (sin, cos, a, b) for each sample and lane."""
+        """Faults 0 to 12 as bits, (samples, lanes), of (sin, cos, a, b) of each sample and lane."""
         block = np.array(samples).astype(np.uint8).transpose(2, 0, 1)
         self.process.stdin.write(np.uint32(len(samples)).tobytes() + block.tobytes())
         self.process.stdin.flush()
@@ -394,7 +394,7 @@ def phase_error(channel, degrees):
 
 
 def kinds(channel, up, times):
-    """{name: its seven sizes}; channel 0 or 1, up +1 or -1, times: seven times of decay, in samples."""
+    """{name: its seven sizes}; channel 0, 1; up +1, -1, times: seven decay times in samples."""
     stuck = lambda value: Fault(**of_channel(channel, 0.0, value))
     bit = lambda number, one: Fault(
         **{"ones" if one else "zeros": tuple((1 << number) * (n == channel) for n in (0, 1))}

@@ -44,11 +44,15 @@ class Outcome:
 
 
 def measure(name: str, figure: Figure, quick: bool, seed: int | None) -> Outcome:
+    """Whatever goes wrong is an outcome, too: one figure must not end a run of many."""
     began = time.perf_counter()
     try:
         value = figure.measured(quick, seed)
     except (MoireError, BuildError, SynthesisError) as error:
         return Outcome(name, None, time.perf_counter() - began, str(error) or repr(error))
+    except Exception as error:
+        console.print_exception()
+        return Outcome(name, None, time.perf_counter() - began, repr(error))
     return Outcome(name, value, time.perf_counter() - began)
 
 
@@ -85,6 +89,7 @@ def report(outcome: Outcome, figure: Figure, quick: bool) -> bool:
     whether it passes.
     """
     if outcome.value is None:
+        console.print(outcome.facts, markup=False, highlight=False)
         print(f"{outcome.name}: {outcome.error}", file=sys.stderr, flush=True)
         return False
     bound = figure.quick.bound if quick and figure.quick.bound is not None else figure.wanted

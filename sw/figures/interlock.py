@@ -49,7 +49,7 @@ INSTRUCTIONS = {"hang": 0x0000006F, "trap": 0x00000000}  # jump to itself; none 
 
 
 def axis_faults(count, seed=1, done=lambda n: None):
-    """{name: number} over so many faults of the axis: faults, failures, and how many of each cause."""
+    """{name: number} over so many faults of the axis: faults, failures, and those of each cause."""
     program, totals = build.simulation(DRIVER, ROOT / "rtl" / "axis.sv", CLK_HZ=4_000_000), {}
 
     def run(share):

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// interpolator_bench -- converter word to corrected position, the way feedback_channel.sv strings
-// the blocks together; every input is taken into a register first, so that the chain begins at one,
-// as in the node.
+// interpolator_bench -- ADC word to corrected position, with the blocks in the order of
+// feedback_channel.sv. Every input goes into a register first, so that the chain begins at one, as
+// in the node.
 `default_nettype none
 
 module interpolator_bench #(
@@ -9,7 +9,7 @@ module interpolator_bench #(
 ) (
     input wire clk,
     input wire rst,
-    input wire [7:0] outlier_step,  // settings of limit filter 1
+    input wire [7:0] outlier_step,  // settings of the outlier filter
     input wire [7:0] outlier_hold,
     input wire load,  // strobe: take the four settings of the correction
     input wire signed [15:0] sin_offset,
@@ -20,13 +20,13 @@ module interpolator_bench #(
     input wire write,  // strobe: a point of their table
     input wire [7:0] point,
     input wire signed [17:0] value,
-    input wire swap,  // strobe: their table in force
+    input wire swap,  // strobe: put their table in force
     input wire shift,  // strobe: move the origin
     input wire signed [31:0] shift_periods,
-    input wire valid,  // strobe: sin and cos are a new converter word
+    input wire valid,  // strobe: sin and cos are a new ADC word
     input wire signed [W-1:0] sin,  // full scale = 2^(W-1)
     input wire signed [W-1:0] cos,
-    output logic done,  // strobe: position is that of a new sample
+    output logic done,  // strobe: position of a new sample
     output logic signed [47:0] position,  // Q32.16 periods
     output logic overspeed  // strobe
 );
@@ -34,7 +34,8 @@ module interpolator_bench #(
 
     logic [INPUTS-1:0] held;
     wire [7:0] outlier_step_q, outlier_hold_q, point_q;
-    wire                load_q, enable_q, write_q, swap_q, shift_q, converted, sampled, corrected, phase_valid, harmonics_off, stepped;
+    wire load_q, enable_q, write_q, swap_q, shift_q;
+    wire converted, sampled, corrected, phase_valid, harmonics_off, stepped;
     wire signed [15:0] sin_offset_q, cos_offset_q, corrected_sin, corrected_cos;
     wire [16:0] gain_q;
     wire signed [16:0] quadrature_error_q, step;
@@ -44,8 +45,9 @@ module interpolator_bench #(
     wire [15:0] plain_phase, phase, tracked_phase, amplitude;
     wire rejected;
 
-    assign {outlier_step_q, outlier_hold_q, load_q, sin_offset_q, cos_offset_q, gain_q, quadrature_error_q, enable_q, write_q, point_q, value_q, swap_q,
-            shift_q, shift_periods_q, converted, raw_sin, raw_cos} = held;
+    assign {outlier_step_q, outlier_hold_q, load_q, sin_offset_q, cos_offset_q, gain_q,
+            quadrature_error_q, enable_q, write_q, point_q, value_q, swap_q, shift_q,
+            shift_periods_q, converted, raw_sin, raw_cos} = held;
     always_ff @(posedge clk) begin
         held <= {
             outlier_step,

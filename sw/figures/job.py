@@ -14,7 +14,7 @@ from twin.compiled.station import TURN, Station
 CUTS = 1000
 JOURNAL_SHARE, SETTINGS_SHARE = 0.2, 0.3  # of the cuts; the others come while a job is written
 SPARE = 1.1  # some cuts come when all has been written
-STORE_STOPPED = 6  # a step of the journal that leaves no job open
+JOURNAL_STOPPED = 6  # a step of the journal that leaves no job open
 VALUE_STATIONS = 4  # a saved value takes as long as so many stations: 16 bytes
 SAVED_NUMBERS = [
     PARAMETER[f"filter_{n}_{name}"]["id"] for n in (1, 2) for name in ("b0", "b1", "b2", "a1", "a2")
@@ -59,7 +59,7 @@ def begin_writing(station, source, old, duration):
     job, journal, settings = old
     what = source.random() if job else 1.0  # without a job there is no journal to write
     if what < JOURNAL_SHARE:
-        refused = station.firmware.store_note(source.randrange(len(job)), STORE_STOPPED)
+        refused = station.firmware.journal_write(source.randrange(len(job)), JOURNAL_STOPPED)
         if refused:
             raise RuntimeError(f"the journal was refused with cause {refused}")
         return (job, journal + 1, settings), duration(1) / 2
@@ -81,7 +81,7 @@ def torn(cuts=CUTS, seed=1):
     source, station = random.Random(seed), Station(seed=seed)
     station.ready()
     duration, invalid, found, pages = writing_ms(station), 0, {"old": 0, "new": 0}, 0
-    station.keep()
+    station.save_settings()
     old = state_of(station)
     with bar(f"{cuts} power cuts") as progress:
         for _ in progress.track(range(cuts)):

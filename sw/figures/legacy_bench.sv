@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// legacy_bench -- the same samples through S0's path as its paper printed it, and through the path
-// of feedback_channel.sv.
+// legacy_bench -- the same samples through S0's path as its paper describes it, and through the
+// path of feedback_channel.sv.
 `default_nettype none
 
 module legacy_bench #(
     parameter int W           = 8,   // bits of a sample
-    parameter int SUBDIVISION = 160  // counts of a period, as printed
+    parameter int SUBDIVISION = 160  // counts per period, as in the paper
 ) (
     input wire clk,
     input wire rst,
-    input wire valid,  // strobe: sin and cos are a new sample; 30 clk apart at least
+    input wire valid,  // strobe: sin and cos are a new sample; 30 cycles apart or more
     input wire signed [W-1:0] sin,  // full scale = 2^(W-1)
     input wire signed [W-1:0] cos,
-    input wire [7:0] largest_move,  // limit filter 1; 0: out of use
-    input wire limit_counts,  // limit filter 2
-    input wire load,  // of the learned values
+    input wire [7:0] largest_move,  // outlier filter 1; 0: out of use
+    input wire limit_counts,  // outlier filter 2
+    input wire load,  // of the calibrated values
     input wire signed [15:0] sin_offset,
     input wire signed [15:0] cos_offset,
     input wire [16:0] gain,
@@ -23,8 +23,8 @@ module legacy_bench #(
     input wire [7:0] point,
     input wire signed [17:0] value,
     input wire swap,
-    output logic printed_done,  // strobe
-    output logic signed [31:0] printed_count,  // 1 / SUBDIVISION period
+    output logic legacy_done,  // strobe
+    output logic signed [31:0] legacy_count,  // 1 / SUBDIVISION period
     output logic done,  // strobe
     output logic signed [47:0] position  // Q32.16 periods
 );
@@ -32,8 +32,8 @@ module legacy_bench #(
     wire signed [W-1:0] sin_held, cos_held, sin_centred, cos_centred, sin_drift, cos_drift;
     wire [15:0] phase, tracked;
     wire signed [16:0] step;
-    wire signed [47:0] place;
-    wire signed [55:0] counts = 56'(place) * SUBDIVISION;
+    wire signed [47:0] moved_to;
+    wire signed [55:0] counts = 56'(moved_to) * SUBDIVISION;
 
     outlier_filter #(
         .W(W)
@@ -86,7 +86,7 @@ module legacy_bench #(
         .phase_out(tracked),
         .overspeed
     );
-    unwrap u_place (
+    unwrap u_moved_to (
         .clk,
         .rst,
         .valid        (stepped),
@@ -95,7 +95,7 @@ module legacy_bench #(
         .shift        (1'b0),
         .shift_periods(32'sd0),
         .done         (placed),
-        .position     (place)
+        .position     (moved_to)
     );
     count_outlier_filter #(
         .W(32)
@@ -105,8 +105,8 @@ module legacy_bench #(
         .enable   (limit_counts),
         .valid    (placed),
         .count    (counts[47:16]),
-        .done     (printed_done),
-        .count_out(printed_count)
+        .done     (legacy_done),
+        .count_out(legacy_count)
     );
 
     wire corrected, turned, straight, moved, too_fast;
@@ -179,7 +179,9 @@ module legacy_bench #(
         .position
     );
 
-    wire unused = &{1'b0, rejected, sin_drift, cos_drift, overspeed, counts[55:48], counts[15:0], amplitude, too_fast};
+    wire of_legacy = &{1'b0, rejected, sin_drift, cos_drift, overspeed};
+    wire of_counts = &{1'b0, counts[55:48], counts[15:0]};
+    wire unused = &{of_legacy, of_counts, amplitude, too_fast};
 endmodule
 
 `default_nettype wire

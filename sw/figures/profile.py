@@ -218,10 +218,10 @@ FIGURES = {
     "profile_misses": Figure(
         misses,
         "moves",
-        "of 10^5 random moves of up to 4000 ticks (S-curves, trapezoids, stepped profiles; with new "
-        "targets in flight, feed overrides and controlled stops): refused, not exact, or above a "
-        "limit by more than rounding adds (8 of 2^-40 period); after an override acceleration and "
-        "jerk may be 25 % higher",
+        "of 10^5 random moves of up to 4000 ticks (S-curves, trapezoids, stepped profiles; with "
+        "new targets in flight, feed overrides and controlled stops): refused, not exact, or above "
+        "a limit by more than rounding adds (8 of 2^-40 period); after an override acceleration "
+        "and jerk may be 25 % higher",
         "0",
         Quick({"moves": 1000}, "1000 moves"),
         0,

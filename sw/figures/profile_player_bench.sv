@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// profile_player_bench -- profile_player with its exact target in sight, and whether its next step
-// is prepared: the top of sw/figures/profile_run.cpp.
+// profile_player_bench -- profile_player with its exact target as an output, and whether its next
+// step is prepared: the top module of sw/figures/profile_run.cpp.
 `default_nettype none
 
 module profile_player_bench (
@@ -21,11 +21,11 @@ module profile_player_bench (
     input  wire               segment_last,
     input  wire               start,
     input  wire               controlled_stop,
-    output logic       [71:0] exact,                 // 2^-40 period; while prepared
+    output logic       [71:0] exact,                 // 2^-40 period; valid while prepared
     output logic              moving,
     output logic       [ 4:0] queue_free,
     output logic              underrun,
-    output logic              prepared               // level: a tick is taken
+    output logic              prepared               // level: the next tick may come
 );
     /* verilator lint_off PINCONNECTEMPTY */
     profile_player u_player (
@@ -64,9 +64,10 @@ module profile_player_bench (
     /* verilator lint_on PINCONNECTEMPTY */
     assign prepared = u_player.job == u_player.WAIT;
 
-    // while it waits, acc is the step and the fraction that the target has below its LSB, and half
-    // an LSB at the end
-    wire [23:0] fraction = u_player.acc[23:0] - u_player.memory[3][23:0] - {u_player.final_step, 23'd0};
+    // While the player waits, acc holds the step and the fraction of the target below its LSB, and
+    // half an LSB at the end.
+    wire [23:0] half = {u_player.final_step, 23'd0};
+    wire [23:0] fraction = u_player.acc[23:0] - u_player.memory[3][23:0] - half;
     assign exact = {u_player.target, u_player.ready ? fraction : 24'd0};
 endmodule
 

@@ -68,12 +68,12 @@ async def learned(dut, values, table):
 
 
 async def send(dut, sin, cos):
-    """(count as printed, position) of one sample; each must come once, before the next one."""
+    """(count of the paper's path, position) of one sample; each must come once, before the next one."""
     await strobe(dut, valid=1, sin=sin, cos=cos)
     dut.valid.value, found = 0, ([], [])
     for _ in range(APART - 1):
-        if int(dut.printed_done.value):
-            found[0].append(dut.printed_count.value.to_signed())
+        if int(dut.legacy_done.value):
+            found[0].append(dut.legacy_count.value.to_signed())
         if int(dut.done.value):
             found[1].append(dut.position.value.to_signed())
         await FallingEdge(dut.clk)
@@ -109,5 +109,5 @@ async def both_paths_are_their_models_in_a_row(dut):
     assert max(place) - min(place) < 1.2  # ours has stayed on its fringe
 
 
-def test_printed_bench():
+def test_legacy_bench():
     run("legacy_bench", __file__)
