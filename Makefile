@@ -72,7 +72,7 @@ prove: $(SETUP)   ## the properties in the modules that carry any; K=part of a p
 	$(call say,proofs)
 	@$(PYTHON) tools/prove.py $(if $K,-k '$K') -j $(JOBS)
 
-LATE       := tables/commands.py tables/modules.py    # they read what the others make
+LATE       := tables/commands.py tables/modules.py tables/readme_figures.py # read what others make
 GENERATORS := $(filter-out tables/__init__.py tables/made_files.py $(LATE),$(sort $(wildcard tables/*.py))) $(LATE)
 module      = $(subst /,.,$(basename $(1)))
 tables: $(SETUP)  ## write the made files again: registers, line, tables of numbers, the list of modules
@@ -89,11 +89,13 @@ $(FIRMWARE): $(shell find sw/firmware -type f) | $(SETUP)
 	$(call say,firmware)
 	@$(PYTHON) -m firmware.build --out build/firmware
 
-figure: $(SETUP) $(FIRMWARE)   ## NAME=x measures one figure afresh; the last line is `x VALUE UNIT`
-	@$(PYTHON) -m figures.figure $(or $(NAME),$(error say which: make figure NAME=x))
+FORM = $(if $(QUICK),--quick) $(if $(SEED),--seed $(SEED))
 
-figures: $(SETUP) $(FIRMWARE)  ## all figures, and their page
-	@$(PYTHON) -m figures.figure --all
+figure: $(SETUP) $(FIRMWARE)   ## NAME=x measures one figure: `x VALUE UNIT`; QUICK=1 in short, SEED=n
+	@$(PYTHON) -m figures.figure $(or $(NAME),$(error say which: make figure NAME=x)) $(FORM)
+
+figures: $(SETUP) $(FIRMWARE)  ## all figures, and their page; QUICK=1 in their short forms
+	@$(PYTHON) -m figures.figure --all $(FORM)
 
 soak: $(SETUP) $(FIRMWARE)     ## the long campaigns, for a night: K=name of one
 	@$(PYTHON) -m figures.soak $K

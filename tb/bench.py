@@ -75,15 +75,16 @@ def direct_verilator(runner):
 
 def run(top, test, **parameters):
     """Build module `top` with `parameters` and run the cocotb tests in the file `test`. Files are
-    found by name: a bench top beside
-    the test, every other module under rtl/."""
+    found by name: a bench top beside the test or among the figures, every other module under rtl/.
+    """
     __tracebackhide__ = True
     sim, waves, here = (
         os.environ.get("SIM") or "icarus",
         bool(os.environ.get("WAVES")),
         Path(test).resolve(),
     )
-    source = here.with_name(f"{top}.sv") if here.with_name(f"{top}.sv").exists() else source_of(top)
+    benches = [folder / f"{top}.sv" for folder in (here.parent, ROOT / "sw" / "figures")]
+    source = next((bench for bench in benches if bench.exists()), None) or source_of(top)
     name = os.environ.get("PYTEST_CURRENT_TEST", "run").split("::")[-1].split(" ")[0]
     values = {k: as_sv_literal(v) for k, v in parameters.items()}
     tag = "-".join([top, *(f"{k}{v}" for k, v in values.items()), *(["waves"] if waves else [])])

@@ -1,41 +1,60 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A page in the style of moire.report for experiments whose rows are no moves: tables and pictures,
-one file.
+"""Pages of the experiments and of the figures, one file each, from the templates beside this file.
+
+They have the style of moire.analysis.report, which makes the pages whose rows are moves.
 """
 
 import base64
-import html
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
 
 from moire.analysis import report
 
 ROOT = Path(__file__).resolve().parents[2]
+TEMPLATES = Environment(
+    loader=FileSystemLoader(Path(__file__).with_name("templates")),
+    autoescape=True,
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    keep_trailing_newline=True,
+)
 
 
-def picture(name, caption, image):
-    words, source = (
-        html.escape(caption),
-        "data:image/png;base64," + base64.b64encode(image).decode(),
-    )
-    return f'<figure id="{name}"><img alt="{words}" src="{source}"><figcaption>{words}</figcaption></figure>'
+def render(template: str, **values: Any) -> Markup:
+    """A template of this project, filled in; it escapes all values but those that are Markup."""
+    return Markup(TEMPLATES.get_template(template).render(style=Markup(report.STYLE), **values))
 
 
-def page(path, title, summary, parts, facts):
-    """Writes it; parts are HTML, facts {name: words}. Returns the path."""
-    text = "\n".join(
-        [
-            "<!DOCTYPE html>",
-            '<html lang="en"><head><meta charset="utf-8">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            f"<title>{html.escape(title)}</title>",
-            f"<style>\n{report.STYLE}</style></head>",
-            f"<body><main><h1>{html.escape(title)}</h1>",
-            f'<p class="summary">{html.escape(summary)}</p>',
-            *parts,
-            "<h2>How it was measured</h2>",
-            report.table(("", ""), facts.items(), text_columns=2),
-            "</main></body></html>",
-            "",
-        ]
-    )
-    return report.write_text(Path(path), text)
+def picture(name: str, caption: str, image: bytes) -> Markup:
+    encoded = base64.b64encode(image).decode()
+    return render("picture.html", name=name, caption=caption, image=encoded)
+
+
+def text_of(
+    title: str,
+    summary: str,
+    parts: Sequence[str],
+    facts: Mapping[str, object],
+    numbers: Sequence[tuple[str, str]] = (),
+) -> str:
+    """A report. parts are HTML, facts {name: words}; numbers are (value, name), shown large."""
+    whole = [Markup(part) for part in parts]
+    values = {"title": title, "summary": summary, "numbers": numbers, "parts": whole}
+    return str(render("report.html", **values, facts=facts.items()))
+
+
+def page(
+    path: Path | str,
+    title: str,
+    summary: str,
+    parts: Sequence[str],
+    facts: Mapping[str, object],
+    numbers: Sequence[tuple[str, str]] = (),
+) -> Path:
+    """Writes a report; returns its path."""
+    return report.write_text(Path(path), text_of(title, summary, parts, facts, numbers))

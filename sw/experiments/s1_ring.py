@@ -4,27 +4,23 @@ and its controller.
 
     python -m experiments.s1_ring
 
-Takes 37 readings of the twin's ring, fits what they carry, writes the coefficients over the line
-into the Verilated relay, and
-judges the A/B that it sends on a second pass, at angles between the readings; the paper's way (3
-orders) beside ours. Writes
-build/report/s1_ring.html and the readings as build/report/s1_readings.csv. The paper came from
-134.59 to 12.62 arcsec.
+Takes 37 readings of the twin's ring, fits them, writes the coefficients over the UART into the
+Verilated relay, and judges the A/B that it sends on a second pass, at angles between the readings;
+the paper's method (3 orders) beside ours. Writes build/report/s1_ring.html and the readings as
+build/report/s1_readings.csv. The paper came from 134.59 to 12.62 arcsec.
 """
 
 import argparse
-import base64
-import html
 import subprocess
 import sys
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from experiments import report_page
 from moire.analysis import report
 from moire.analysis.harmonic_fit import Readings, fit, read_readings
 from moire.bus.transport import BITS, Transport
@@ -35,7 +31,9 @@ from twin.build import simulation
 from twin.machines.ring import ARC_SECOND, RotaryRing
 
 ROOT = Path(__file__).resolve().parents[2]
-DRIVER, RELAY = Path(__file__).with_name("relay_run.cpp"), ROOT / "rtl" / "relay.sv"
+DRIVER, RELAY = Path(__file__).with_name("relay_serve.cpp"), ROOT / "rtl" / "relay.sv"
+HARMONIC_DRIVER = Path(__file__).with_name("harmonic_run.cpp")
+HARMONIC_MAP = ROOT / "rtl" / "compensate" / "harmonic_map.sv"
 ORDERS = 16  # of the relay
 CLK_HZ, BAUD = 48_000_000, 3_000_000
 SUBDIVISION = 200  # of a line, in the read head: 0.2 arcsec a count
@@ -112,37 +110,29 @@ def as_in_the_paper(readings):
 # ------------------------------------------------------------------ the relay
 
 
-@cache
-def harmonic_model():
-    """tb/compensate/harmonic_map.py: integers, equal to the RTL in every bit."""
-    from tb.compensate import harmonic_map
-
-    return harmonic_map
-
-
 def set_of(found, counts_per_turn):
     return make_set(terms_of(found, counts_per_turn), Settings(counts_per_turn), ORDERS)
 
 
 def corrections_of(whole: bytes, counts):
-    """Counts that a relay with this set takes off at these counts, by the integers of its RTL."""
-    model, words = harmonic_model(), np.frombuffer(whole, "<u4").astype(np.int64)
-    terms = [
-        (model.signed(int(words[n]), 32), int(words[n + 1])) for n in range(6, len(words) - 1, 2)
-    ]
-    turn, step = int(words[1]), int(words[2] | (words[3] & 0xFFFF) << 32)
+    """Counts that the Verilated harmonic_map takes off at these counts with this set."""
+    words = np.frombuffer(whole, "<u4").astype(np.int64)
+    terms, turn, step = words[6:-1], int(words[1]), int(words[2] | (words[3] & 0xFFFF) << 32)
     angles = [(int(count) % turn * step >> 16) % 2**32 for count in counts]
-    return np.array(
-        [
-            (model.summed(terms, angle, int(words[4]), model.STEPS)[0] + 128 >> 8) / 65536
-            for angle in angles
-        ]
+    numbers = [words[4], len(terms) // 2, *terms, len(angles), *angles]
+    done = subprocess.run(
+        [simulation(HARMONIC_DRIVER, HARMONIC_MAP, K=ORDERS)],
+        input=" ".join(map(str, numbers)),
+        capture_output=True,
+        text=True,
+        check=True,
     )
+    return np.array(done.stdout.split(), dtype=float) / 65536
 
 
-def each_left_by_model(ring, found, angles):
-    """Error that is left at these true angles, arcsec: the ring's truth less what the RTL's
-    integers take off.
+def each_left_by_map(ring, found, angles):
+    """Error that is left at these true angles, arcsec: the ring's true error less what the RTL of
+    the correction takes off.
     """
     error, turn = error_of(ring, angles), ring.counts_per_turn
     counts = np.round((angles + error / 3600) / 360 * turn)
@@ -150,9 +140,9 @@ def each_left_by_model(ring, found, angles):
     return left - left.mean()
 
 
-def left_by_model(ring, found, angles):
-    """The largest of it."""
-    return np.abs(each_left_by_model(ring, found, angles)).max()
+def left_by_map(ring, found, angles):
+    """The largest error that is left at these true angles, arcsec."""
+    return np.abs(each_left_by_map(ring, found, angles)).max()
 
 
 class VerilatedRelay(Transport):
@@ -166,7 +156,7 @@ class VerilatedRelay(Transport):
     def __init__(self, counts_per_turn: int, place: int):
         program = simulation(DRIVER, RELAY, K=ORDERS, BAUD=BAUD)
         self.process = subprocess.Popen(
-            [program, "serve", str(counts_per_turn), str(place)],
+            [program, str(counts_per_turn), str(place)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
@@ -290,95 +280,56 @@ def picture(readings, angles, before, ways) -> bytes:
 
 
 def page(seed, readings, angles, before, ways, status) -> str:
-    best = ways[-1]
-    image = base64.b64encode(picture(readings, angles, before, ways)).decode()
-    tiles = "".join(
-        f"<div><b>{value}</b><span>{name}</span></div>"
-        for value, name in (
-            (f"{np.abs(before).max():.2f}\N{DOUBLE PRIME}", "largest error before"),
-            (f"{best.peak:.2f}\N{DOUBLE PRIME}", "after, our way"),
-            (f"{ways[0].peak:.2f}\N{DOUBLE PRIME}", "after, the paper's way"),
-            (f"{len(angles)}", "places of the second pass"),
-        )
-    )
-    rows = [
+    best, second = ways[-1], "\N{DOUBLE PRIME}"
+    numbers = [
+        (f"{np.abs(before).max():.2f}{second}", "largest error before"),
+        (f"{best.peak:.2f}{second}", "after, our method"),
+        (f"{ways[0].peak:.2f}{second}", "after, the paper's method"),
+        (f"{len(angles)}", "angles of the second pass"),
+    ]
+    compared = [
         (
             "largest error before",
-            f"{PAPER_PEAK}\N{DOUBLE PRIME}",
-            f"{np.abs(before).max():.2f}\N{DOUBLE PRIME}",
+            f"{PAPER_PEAK}{second}",
+            f"{np.abs(before).max():.2f}{second}",
             report.verdict(None),
-        ),
-        *(
-            (
-                way.name,
-                f"{PAPER_AFTER}\N{DOUBLE PRIME}",
-                f"{way.peak:.2f}\N{DOUBLE PRIME}",
-                report.verdict(way.peak < PAPER_AFTER),
-            )
-            for way in ways
-        ),
+        )
     ]
-    rest = [
+    for way in ways:
+        better = report.verdict(way.peak < PAPER_AFTER)
+        compared.append((way.name, f"{PAPER_AFTER}{second}", f"{way.peak:.2f}{second}", better))
+    rows = [
         (f"{angle:.3f}", f"{raw:+.2f}", *(f"{way.left[n]:+.2f}" for way in ways))
         for n, (angle, raw) in enumerate(zip(angles, before, strict=True))
     ]
-    facts = [
-        ("seed", seed),
-        (
-            "ring",
-            f"8192 lines, subdivided {SUBDIVISION} times; both of the paper's numbers for its error",
-        ),
-        (
-            "readings",
-            f"{len(readings.angle)}, every 10 degrees, by an encoder that drifts; one each {DWELL_S:g} s",
-        ),
-        (
-            "second pass",
-            "other angles, other times, the same drift going on; mean error taken off: it is where zero was put",
-        ),
-        (
-            "relay",
-            f"RTL, Verilated, {ORDERS} orders; set {status.identity:08X} written over its UART",
-        ),
-        ("fit", best.found.words()),
+    head = ("true angle / degrees", "before / arcsec", *(f"{way.name} / arcsec" for way in ways))
+    drawn = picture(readings, angles, before, ways)
+    parts = [
+        "<h2>Against the paper</h2>",
+        report.table(("", "paper", "here", ""), compared),
+        "<h2>Before and after</h2>",
+        report_page.picture("error", "Error over the turn: behind the relay minus true", drawn),
+        "<h2>Second pass</h2>",
+        report.table(head, rows, tall=True),
     ]
-    title = "S1: circular grating, corrected on the fly"
-    return "\n".join(
-        [
-            "<!DOCTYPE html>",
-            '<html lang="en"><head><meta charset="utf-8">',
-            f"<title>{title}</title>",
-            f"<style>\n{report.STYLE}pre {{ margin: 0; font-size: .85rem; }}</style></head>",
-            "<body><main>",
-            f"<h1>{title}</h1>",
-            '<p class="summary">37 readings of a simulated ring, fitted by the host, written into the relay; then A/B counted behind it.</p>',
-            f'<div class="numbers">{tiles}</div>',
-            "<h2>Against the paper</h2>",
-            report.table(("", "paper", "here", ""), rows),
-            "<h2>Before and after</h2>",
-            f'<figure><img alt="error over the turn" src="data:image/png;base64,{image}">',
-            "<figcaption>Error over the turn: behind the relay minus true</figcaption></figure>",
-            "<h2>Second pass</h2>",
-            report.table(
-                (
-                    "true angle / degrees",
-                    "before / arcsec",
-                    *(f"{way.name} / arcsec" for way in ways),
-                ),
-                rest,
-                tall=True,
-            ),
-            "<h2>How it was measured</h2>",
-            "<section><table><tbody>",
-            *(
-                f'<tr><td class="text">{name}</td><td class="text"><pre>{html.escape(str(words))}</pre></td></tr>'
-                for name, words in facts
-            ),
-            "</tbody></table></section>",
-            "</main></body></html>",
-            "",
-        ]
+    facts = {
+        "seed": seed,
+        "ring": f"8192 lines, subdivided {SUBDIVISION} times; its error has both numbers of the "
+        "paper",
+        "readings": f"{len(readings.angle)}, every 10 degrees, by an encoder that drifts; one "
+        f"every {DWELL_S:g} s",
+        "second pass": "other angles, other times, the same drift going on; mean error taken off: "
+        "it is where the zero was set",
+        "relay": f"RTL, Verilated, {ORDERS} orders; set {status.identity:08X} written over its "
+        "UART",
+        "fit": best.found.words(),
+    }
+    summary = (
+        "37 readings of a simulated ring, fitted by the host, written into the relay; then A/B "
+        "counted behind it."
     )
+    title = "S1: circular grating, corrected on the fly"
+    return report_page.text_of(title, summary, parts, facts, numbers)
 
 
 def run(seed=1, places=180, folder=ROOT / "build" / "report", console=None):

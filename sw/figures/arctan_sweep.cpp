@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sends every pair of W-bit samples through the Verilated arctan_pipelined, one a clk, and prints,
-// of those from a radius on: how many, the largest error of the phase in LSB, how many are not
-// correctly rounded, the largest error of the amplitude in counts.
+// arctan_sweep -- send every pair of W-bit samples through the Verilated arctan_pipelined, one per
+// cycle.
+//
+//   arctan_sweep W RADIUS    judges the pairs from this radius on, a share of full scale
+//
+// Prints how many were judged, the largest error of the phase in LSB, how many are not correctly
+// rounded, and the largest error of the amplitude in counts.
 #include "Vtop.h"
 #include <cmath>
 #include <cstdio>
@@ -32,13 +36,10 @@ int main(int, char** words) {
         answer++;
         const double length = std::hypot(double(sin), double(cos));
         if (length < radius || length == 0) continue;
-        double away = top.phase - double(std::atan2((long double)sin, (long double)cos) * lsb);
-        away = std::fabs(
-            away -
-            65536 * std::round(
-                        away /
-                        65536));  // a tie is 2e-5 away at least up to 10 bits, a double 1e-11 out
-        judged++, wrong += away > 0.5, worst = std::fmax(worst, away);
+        // up to 10 bits no sample is closer to a tie than 2e-5; a double is wrong by 1e-11
+        const double angle = double(std::atan2((long double)sin, (long double)cos) * lsb);
+        const double error = std::fabs(std::remainder(top.phase - angle, 65536.0));
+        judged++, wrong += error > 0.5, worst = std::fmax(worst, error);
         worst_amplitude = std::fmax(worst_amplitude, std::fabs(top.amplitude - length));
     }
     if (answer != pairs) return 1;

@@ -1,17 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-// bus_run -- drive the Verilated line of a node, its firmware behind the registers, with good,
-// damaged and senseless frames.
+// bus_run -- drive the Verilated RS-485 port of a node, with the firmware behind its registers,
+// with good, damaged and senseless frames.
 //
 //   bus_run flips FRAME          every flip of 1, 2 and 3 bits of one of ten frames, start and stop
-//   bits too bus_run bursts FRAME SEED    bursts of 2 to 16 bits at every place of it: turned over,
-//   stuck at 0, stuck at 1, random bus_run random COUNT SEED    frames of a right command byte and
-//   random bytes, most of them with a length that fits
-//       prints `tried wrong missed`. tried: the words on the line were others than those sent;
-//       wrong: taken for good, or something moved; missed: good ones between them that were not
-//       taken
-//   bus_run disturb COUNT SEED   anything at all, a character of silence, then a good exchange;
-//   prints `tried refused` bus_run baud BIT_CLK SEED    prints the mismatch from which on a frame
-//   is lost, percent: sender too slow, sender too fast
+//                                bits included
+//   bus_run bursts FRAME SEED    bursts of 2 to 16 bits at every position of it: inverted, stuck at
+//                                0, stuck at 1, random
+//   bus_run random COUNT SEED    frames of a right command byte and random bytes, most of them with
+//                                a length that fits
+//
+// These print `tried wrong missed`. tried: the words on the bus differed from those sent; wrong:
+// accepted, or something moved; missed: good ones between them that were not accepted.
+//
+//   bus_run disturb COUNT SEED   any disturbance, a character of silence, then a good exchange;
+//                                prints `tried refused`
+//   bus_run baud CYCLES SEED     so many cycles per bit; prints the mismatch from which on a frame
+//                                is lost, in percent: sender too slow, sender too fast
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -21,6 +25,7 @@
 #include <string>
 #include <vector>
 
+#include "figures/common.h"
 #include "Vtop.h"
 #include "verilated.h"
 
@@ -33,34 +38,19 @@ void firmware_start(void);
 
 namespace {
 
+using moire::Random;
+
 constexpr unsigned ADDRESS = 1, TO_NODE = 0x20 | ADDRESS, FROM_NODE = 0x10 | ADDRESS, READY = 0x40;
 constexpr unsigned CELLS = 11;   // of a character
 constexpr unsigned ANSWER = 20;  // cells: the ready byte, with the lead and the trail of the driver
-constexpr uint64_t POLL_CLK = 64;   // the firmware looks at the line so often
-constexpr unsigned ACCESS_CLK = 4;  // a register access with the instructions around it
+constexpr uint64_t POLL_CYCLES = 64;   // the firmware polls the port so often
+constexpr unsigned ACCESS_CYCLES = 4;  // a register access with the instructions around it
 constexpr uint32_t BAUD = 115200;
 
 using Levels = std::vector<uint8_t>;
 using Bytes = std::vector<uint8_t>;
 
-struct Random {  // xorshift64*
-    uint64_t state;
-    uint64_t operator()() {
-        state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
-        return (state * 2685821657736338717ULL) >> 16;
-    }
-    unsigned below(unsigned n) { return unsigned((*this)() % n); }
-    double between(double a, double b) { return a + (b - a) * below(1 << 20) / (1 << 20); }
-};
-
-uint32_t crc32(const Bytes& bytes) {
-    uint32_t crc = ~0u;
-    for (const uint8_t byte : bytes) {
-        crc ^= byte;
-        for (int n = 0; n < 8; n++) crc = crc >> 1 ^ (crc & 1 ? 0xEDB88320u : 0);
-    }
-    return ~crc;
-}
+uint32_t crc32(const Bytes& bytes) { return moire::crc32(bytes.data(), bytes.size()); }
 
 void add_character(Levels& cells, unsigned word) {  // bit 8: the 9th
     cells.push_back(0);
@@ -96,7 +86,7 @@ Bytes frame_of(unsigned number) {  // the bodies of the ten frames
 
 class Node {
  public:
-    explicit Node(unsigned bit_clk) : bit_clk_(bit_clk) {
+    explicit Node(unsigned bit_cycles) : bit_cycles_(bit_cycles) {
         top_.address = ADDRESS;
         top_.rs485_rx = 1;
         top_.rst = 1;
@@ -104,44 +94,44 @@ class Node {
         top_.rst = 0;
         now = this;
         firmware_start();
-        set_bit_time(16 * bit_clk);
+        set_bit_time(16 * bit_cycles);
         rest(CELLS);
     }
     static inline Node* now;      // whose registers the firmware accesses
-    std::vector<unsigned> heard;  // words that the master hears
+    std::vector<unsigned> heard;  // words that the master receives
 
     uint32_t access(bool write, uint32_t offset, uint32_t value) {
         top_.select = 1, top_.write = write, top_.word = uint8_t(offset / 4), top_.wdata = value;
         clk();
         const uint32_t read = top_.rdata;
         top_.select = 0;
-        for (unsigned n = 1; n < ACCESS_CLK; n++) clk();
+        for (unsigned n = 1; n < ACCESS_CYCLES; n++) clk();
         return read;
     }
-    // One level a cell, or a cell_clk of its own; it begins `phase` of a cell after a clk.
-    void send(const Levels& cells, double cell_clk = 0, double phase = 0) {
-        if (cell_clk == 0) cell_clk = bit_clk_;
+    // One level per cell, whose cycles may be a fraction; they begin `phase` of a cell late.
+    void send(const Levels& cells, double cell_cycles = 0, double phase = 0) {
+        if (cell_cycles == 0) cell_cycles = bit_cycles_;
         Levels levels;
         for (size_t n = 0; n < cells.size(); n++)
-            while (double(levels.size()) < (double(n + 1) + phase) * cell_clk)
-                levels.push_back(n || double(levels.size()) >= phase * cell_clk ? cells[n] : 1);
+            while (double(levels.size()) < (double(n + 1) + phase) * cell_cycles)
+                levels.push_back(n || double(levels.size()) >= phase * cell_cycles ? cells[n] : 1);
         send_levels(levels);
     }
-    void send_levels(const Levels& levels) {  // a level a clk
-        wave_ = &levels, place_ = 0;
-        while (place_ < levels.size()) step();
+    void send_levels(const Levels& levels) {  // a level per cycle
+        wave_ = &levels, at_ = 0;
+        while (at_ < levels.size()) step();
         wave_ = nullptr;
     }
-    void rest(unsigned cells) {  // until the line was silent for so long
-        for (uint64_t silent = 0; silent < uint64_t(cells) * bit_clk_;
+    void rest(unsigned cells) {  // until the bus has been silent for so long
+        for (uint64_t silent = 0; silent < uint64_t(cells) * bit_cycles_;
              silent = top_.rs485_driver_enable ? 0 : silent + 1)
             step();
     }
     uint32_t frames_good() { return access(false, BUS_FRAMES_GOOD, 0); }
     void set_bit_time(uint32_t sixteenths) { access(true, BUS_BIT_TIME, sixteenths); }
 
-    // A master that heard nothing wrong: both halves of an exchange; the reply must be that of this
-    // request.
+    // Both halves of an exchange by a master that receives nothing wrong; the reply must belong to
+    // this request.
     bool exchange(const Bytes& body) {
         heard.clear();
         send(command(TO_NODE));
@@ -163,8 +153,8 @@ class Node {
  private:
     void clk() {
         const bool driven = top_.rs485_driver_enable,
-                   level = !wave_ || place_ >= wave_->size() || (*wave_)[place_];
-        place_++;
+                   level = !wave_ || at_ >= wave_->size() || (*wave_)[at_];
+        at_++;
         top_.rs485_rx = level && (!driven || top_.rs485_tx);  // both at once: low wins
         top_.clk = 1;
         top_.eval();
@@ -174,7 +164,7 @@ class Node {
     }
     void step() {
         clk();
-        if (++since_poll_ >= POLL_CLK) {
+        if (++since_poll_ >= POLL_CYCLES) {
             since_poll_ = 0;
             bus_poll();
         }
@@ -184,8 +174,8 @@ class Node {
             if (!level) age_ = 0, word_ = 0;
             return;
         }
-        if (++age_ % int(bit_clk_) != int(bit_clk_) / 2) return;
-        const unsigned bit = unsigned(age_) / bit_clk_;
+        if (++age_ % int(bit_cycles_) != int(bit_cycles_) / 2) return;
+        const unsigned bit = unsigned(age_) / bit_cycles_;
         word_ |= unsigned(level) << bit;
         if (bit + 1 < CELLS) return;
         if (level) heard.push_back(word_ >> 1 & 0x1FF);
@@ -193,15 +183,15 @@ class Node {
     }
 
     Vtop top_;
-    unsigned bit_clk_;
+    unsigned bit_cycles_;
     const Levels* wave_ = nullptr;
-    size_t place_ = 0;
+    size_t at_ = 0;
     uint64_t since_poll_ = 0;
     int age_ = -1;
     unsigned word_ = 0;
 };
 
-uint32_t held[0x2000 / 4], moved;  // registers outside the line; writes to them
+uint32_t held[0x2000 / 4], moved;  // registers outside the port; writes to them
 uint64_t stamp;
 
 // ------------------------------------------------------------------ damaged frames
@@ -211,7 +201,7 @@ struct Count {
 };
 
 // What a receiver makes of the two halves of an exchange: words with a stop bit. A burst may turn a
-// character into the very same one a bit later: then nothing is damaged.
+// character into the same one a bit later: then nothing is damaged.
 std::vector<unsigned> words_of(const Levels& cells) {
     Levels line(cells.begin(), cells.begin() + CELLS);
     line.insert(line.end(), ANSWER, 1);
@@ -219,23 +209,23 @@ std::vector<unsigned> words_of(const Levels& cells) {
     line.insert(line.end(), CELLS, 1);
     std::vector<unsigned> words;
     bool idle = true;
-    for (size_t place = 0; place + CELLS <= line.size();) {
-        if (line[place] || !idle) {
-            idle = line[place++];
+    for (size_t at = 0; at + CELLS <= line.size();) {
+        if (line[at] || !idle) {
+            idle = line[at++];
             continue;
         }
         unsigned word = 0;
-        for (unsigned n = 0; n < 9; n++) word |= unsigned(line[place + 1 + n]) << n;
-        idle = line[place + CELLS - 1];
+        for (unsigned n = 0; n < 9; n++) word |= unsigned(line[at + 1 + n]) << n;
+        idle = line[at + CELLS - 1];
         if (idle) words.push_back(word);
-        place += CELLS;
+        at += CELLS;
     }
     return words;
 }
 
 class Campaign {
  public:
-    // The master sends the payload whether or not the node said that it is ready.
+    // The master sends the payload whether or not the node has reported that it is ready.
     void damaged(const Levels& cells, const std::vector<unsigned>& sent) {
         if (words_of(cells) == sent) return;
         play(cells);
@@ -339,12 +329,12 @@ void random_frames(uint64_t count, Random random) {
 
 // ------------------------------------------------------------------ disturbances
 
-constexpr unsigned BIT_CLK = 16;
+constexpr unsigned BIT_CYCLES = 16;
 
-Levels in_clk(const Levels& cells, double cell_clk) {
+Levels in_cycles(const Levels& cells, double cell_cycles) {
     Levels levels;
     for (size_t n = 0; n < cells.size(); n++)
-        while (double(levels.size()) < double(n + 1) * cell_clk) levels.push_back(cells[n]);
+        while (double(levels.size()) < double(n + 1) * cell_cycles) levels.push_back(cells[n]);
     return levels;
 }
 
@@ -356,45 +346,47 @@ Levels some_frame(Random& random) {
     return cells;
 }
 
-Levels disturbance(Random& random) {  // a level a clk
-    Levels cells = some_frame(random), levels = in_clk(cells, BIT_CLK), other;
-    const auto place = [&](const Levels& of) { return random.below(unsigned(of.size())); };
+Levels disturbance(Random& random) {  // a level per cycle
+    Levels cells = some_frame(random), levels = in_cycles(cells, BIT_CYCLES), other;
+    const auto somewhere = [&](const Levels& in) { return random.below(int64_t(in.size())); };
     switch (random.below(10)) {
     case 0:  // flips
-        for (unsigned n = 1 + random.below(3); n--;) cells[place(cells)] ^= 1;
-        return in_clk(cells, BIT_CLK);
+        for (unsigned n = 1 + random.below(3); n--;) cells[somewhere(cells)] ^= 1;
+        return in_cycles(cells, BIT_CYCLES);
     case 1: {  // a burst
-        const unsigned first = place(cells),
-                       last = std::min(unsigned(cells.size()), first + 2 + random.below(15));
+        const unsigned first = somewhere(cells),
+                       last =
+                           std::min(unsigned(cells.size()), first + 2 + unsigned(random.below(15)));
         for (unsigned n = first; n < last; n++) cells[n] = uint8_t(random.below(2));
-        return in_clk(cells, BIT_CLK);
+        return in_cycles(cells, BIT_CYCLES);
     }
     case 2:  // a slip of a cell
         if (random.below(2))
-            cells.erase(cells.begin() + place(cells));
+            cells.erase(cells.begin() + somewhere(cells));
         else
-            cells.insert(cells.begin() + place(cells), uint8_t(random.below(2)));
-        return in_clk(cells, BIT_CLK);
-    case 3:  // babble
+            cells.insert(cells.begin() + somewhere(cells), uint8_t(random.below(2)));
+        return in_cycles(cells, BIT_CYCLES);
+    case 3:  // random cells
         cells.resize(1 + random.below(400));
         for (auto& cell : cells) cell = uint8_t(random.below(2));
-        return in_clk(cells, BIT_CLK);
+        return in_cycles(cells, BIT_CYCLES);
     case 4:  // half a frame
-        levels.resize(1 + place(levels));
+        levels.resize(1 + somewhere(levels));
         return levels;
     case 5:  // another baud rate
-        return in_clk(cells, BIT_CLK * random.between(0.2, 4));
+        return in_cycles(cells, BIT_CYCLES * random.between(0.2, 4));
     case 6:  // a second master; a low wins
-        other = in_clk(some_frame(random), BIT_CLK);
-        for (size_t n = 0, from = place(levels); n < other.size() && from + n < levels.size(); n++)
+        other = in_cycles(some_frame(random), BIT_CYCLES);
+        for (size_t n = 0, from = somewhere(levels); n < other.size() && from + n < levels.size();
+             n++)
             levels[from + n] &= other[n];
         return levels;
     case 7:  // a break
-        return Levels(BIT_CLK * (CELLS + random.below(300)), 0);
+        return Levels(BIT_CYCLES * (CELLS + random.below(300)), 0);
     case 8:  // spikes, shorter than a bit
         levels.assign(1 + random.below(4000), 1);
         for (unsigned n = 1 + random.below(20); n--;)
-            for (unsigned at = place(levels), left = 1 + random.below(BIT_CLK);
+            for (unsigned at = somewhere(levels), left = 1 + random.below(BIT_CYCLES);
                  left-- && at < levels.size();)
                 levels[at++] = 0;
         return levels;
@@ -406,7 +398,7 @@ Levels disturbance(Random& random) {  // a level a clk
 }
 
 void disturb(uint64_t count, Random random) {
-    Node node(BIT_CLK);
+    Node node(BIT_CYCLES);
     uint64_t refused = 0;
     for (uint64_t n = 0; n < count; n++) {
         node.send_levels(disturbance(random));
@@ -418,11 +410,11 @@ void disturb(uint64_t count, Random random) {
 
 // ------------------------------------------------------------------ baud rate
 
-// The first frames that the node does not take, as the sender gets slower or faster by 0.1 % of its
-// bit time: characters without any gap, since then the error of one is the beginning of the next.
-double mismatch(Node& node, double bit_clk, int sign, const std::vector<Bytes>& bodies) {
+// The mismatch in percent at which the node does not accept a frame, as the sender gets slower or
+// faster by 0.1 % of its bit time. Characters have no gaps: the error of one adds to the next.
+double mismatch(Node& node, double bit_cycles, int sign, const std::vector<Bytes>& bodies) {
     for (int permille = 0;; permille++) {
-        const double cell = bit_clk * (1 + sign * permille / 1000.0);
+        const double cell = bit_cycles * (1 + sign * permille / 1000.0);
         for (const Bytes& body : bodies)
             for (int phase = 0; phase < 8; phase++) {
                 const uint32_t before = node.frames_good();
@@ -435,17 +427,17 @@ double mismatch(Node& node, double bit_clk, int sign, const std::vector<Bytes>& 
     }
 }
 
-void baud(double bit_clk, Random random) {
-    Node node(unsigned(bit_clk + 0.5));
+void baud(double bit_cycles, Random random) {
+    Node node(unsigned(bit_cycles + 0.5));
     std::vector<Bytes> bodies = {Bytes(16, 0x00), Bytes(16, 0xFF), Bytes(16, 0x55),
                                  Bytes(16, 0xAA), Bytes(16, 0x80), Bytes(16, 0x7F)};
     for (int n = 0; n < 3; n++) {
         bodies.push_back(Bytes(16));
         for (auto& byte : bodies.back()) byte = uint8_t(random.below(256));
     }
-    node.set_bit_time(uint32_t(bit_clk * 16 + 0.5));
-    const double slow = mismatch(node, bit_clk, 1, bodies);
-    std::printf("%.1f %.1f\n", slow, mismatch(node, bit_clk, -1, bodies));
+    node.set_bit_time(uint32_t(bit_cycles * 16 + 0.5));
+    const double slow = mismatch(node, bit_cycles, 1, bodies);
+    std::printf("%.1f %.1f\n", slow, mismatch(node, bit_cycles, -1, bodies));
 }
 
 }  // namespace

@@ -1,48 +1,133 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every figure is made of."""
+"""What a figure is, and how the modules of this directory find and measure theirs.
 
-from dataclasses import dataclass
+A module that measures has a dictionary FIGURES = {name: Figure}; SOAK = {name: function} holds the
+campaigns that take a night. Both are found by name: a new module needs no registration.
+"""
+
+import inspect
+import math
+import operator
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Callable
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 HERE = Path(__file__).parent
-TOOLS = {
+TOOLS = {  # modules here that measure nothing
     "__init__",
     "common",
     "comparison",
     "figure",
+    "record",
     "soak",
     "synthesis",
-}  # modules here that measure nothing
+}
+COMPARISONS = {"<=": operator.le, "<": operator.lt, ">=": operator.ge, ">": operator.gt}
+SEEDS_APART = 10**6  # more than any figure has runs
 
 console = Console(stderr=True)  # facts and progress; the figure itself goes to standard output
 
 
+def within(value: float, bound: str) -> bool:
+    """Whether a value is within a bound: `<= 0.5`, `< 3`, `>= 4`, `> 5`, or the only good value."""
+    found = re.fullmatch(r"(<=|<|>=|>)? ?(-?[\d.]+)", bound)
+    if not found:
+        raise ValueError(f"not a bound: {bound}")
+    compare = COMPARISONS.get(found[1], operator.eq)
+    return bool(compare(value, float(found[2])))
+
+
+@dataclass(frozen=True)
+class Quick:
+    """The short form of a figure, a matter of seconds: `arguments` of its function that make it
+    short, and what it leaves out, in words. Its bound is the figure's own if it is None; an empty
+    one says that the number is not judged, since it means something else or is too uncertain.
+    """
+
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    words: str = "the whole figure"
+    bound: str | None = None
+    unit: str | None = None  # where it is not the figure's
+
+
 @dataclass(frozen=True)
 class Figure:
-    measure: Callable[[], float]
+    """One number, measured by a function that takes `seed` if it draws random numbers.
+
+    `what` states what is measured and under which conditions: it is the row of README's table.
+    `note` is what others have reached, beside the bound.
+    """
+
+    measure: Callable[..., float]
     unit: str
     what: str
-    wanted: str  # in words, with its comparison
-    good: Callable[[float], bool]
+    bound: str
+    quick: Quick
     digits: int = 3
+    note: str = ""
+
+    @property
+    def seeded(self) -> bool:
+        return "seed" in inspect.signature(self.measure).parameters
+
+    @property
+    def wanted(self) -> str:
+        return f"{self.bound} ({self.note})" if self.note else self.bound
+
+    def good(self, value: float) -> bool:
+        return within(value, self.bound)
+
+    def measured(self, quick: bool = False, seed: int | None = None) -> float:
+        arguments = dict(self.quick.arguments) if quick else {}
+        if seed is not None and self.seeded:
+            arguments["seed"] = seed
+        return float(self.measure(**arguments))
+
+    def passes(self, value: float, quick: bool = False) -> bool:
+        """Whether a measured value is a number, and within the bound of the form that was run."""
+        bound = self.quick.bound if quick and self.quick.bound is not None else self.bound
+        return math.isfinite(value) and (not bound or within(value, bound))
 
 
-def bar(text):
+def seeds(seed: int, count: int) -> range:
+    """Seeds of so many runs: 1, 2, 3 … for the seed 1, and others for every other seed."""
+    first = (seed - 1) * SEEDS_APART + 1
+    return range(first, first + count)
+
+
+def shares(total: int, share: int, seed: int) -> Iterator[tuple[int, int]]:
+    """(size, seed) of the runs into which a long run is divided."""
+    sizes = [min(share, total - first) for first in range(0, total, share)]
+    return zip(sizes, seeds(seed, len(sizes)), strict=True)
+
+
+def bar(text: str) -> Progress:
     """A progress bar for long work."""
     return Progress(
         TextColumn(text), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=console
     )
 
 
-def collected(attribute):
+def modules() -> list[str]:
+    """Names of the modules that measure."""
+    return sorted(path.stem for path in HERE.glob("*.py") if path.stem not in TOOLS)
+
+
+def collected(attribute: str) -> dict[str, Any]:
     """The dictionaries of this name in all modules that measure, as one."""
-    found = {}
-    for path in sorted(HERE.glob("*.py")):
-        if path.stem not in TOOLS:
-            found |= getattr(import_module(f"figures.{path.stem}"), attribute, {})
+    found: dict[str, Any] = {}
+    for module in modules():
+        found |= getattr(import_module(f"figures.{module}"), attribute, {})
     return found
+
+
+def soaked(figure: Figure, *arguments: Any) -> tuple[float, bool]:
+    """Result of a campaign that is a figure with more of everything."""
+    value = figure.measure(*arguments)
+    return value, figure.good(value)

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// counts_run -- move three scales in front of three Verilated axes, and hold their position
-// registers against the pulses given.
+// counts_run -- move three scales in front of three Verilated axes, and compare their position
+// registers with the pulses given.
 //
-//   counts_run PULSES SEED [too_fast]     until each axis had so many; too_fast: edges closer than
-//   the edge filter passes
+//   counts_run PULSES SEED [too_fast]    until each axis has had so many; too_fast: the edges are
+//                                        closer than the edge filter passes
 //
-// Each axis goes its own way: runs of random direction, length and speed, from the fastest that its
+// Each axis moves on its own: runs of random direction, length and speed, from the highest that its
 // edge filter passes to a thousandth of it. At the end of each run its registers are read, while
-// the other axes move. Now and then the origin moves, in motion too, so that the next runs cross 0,
-// a multiple of 2^16, +-2^31, +-2^32 or the +-2^33 counts where the register itself wraps.
+// the other axes move. Now and then the origin moves, in motion, too, so that the next runs cross
+// 0, a multiple of 2^16, +-2^31, +-2^32 or the +-2^33 counts where the register itself wraps.
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -17,27 +17,18 @@
 #include <memory>
 
 #include "made/registers.h"
+#include "figures/common.h"
 #include "Vtop.h"
 #include "verilated.h"
 
 namespace {
 
-constexpr int AXES = 3, REST_CLK = 64, TICK_CLK = 15000, SAMPLE_CLK = 600;
-constexpr unsigned NEEDED[AXES] = {1, 3,
-                                   5};  // equal samples that the edge filter wants; 1: every clk
+using moire::Random;
+
+constexpr int AXES = 3, REST_CYCLES = 64, TICK_CYCLES = 15000, SAMPLE_CYCLES = 600;
+constexpr unsigned NEEDED[AXES] = {1, 3, 5};  // equal samples for the edge filter; 1: every cycle
 constexpr int64_t COUNT = 1 << 14, PERIOD = 1 << 16;  // of the position
 constexpr int64_t POSITIONS = 1LL << 48, COUNTS = POSITIONS / COUNT;
-
-struct Random {  // xorshift64*
-    uint64_t state;
-    uint64_t operator()() {
-        state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
-        return (state * 2685821657736338717ULL) >> 16;
-    }
-    double share() { return double((*this)() >> 16) / 4294967296.0; }
-    int64_t below(int64_t n) { return int64_t((*this)() % uint64_t(n)); }
-    bool one_in(int64_t n) { return below(n) == 0; }
-};
 
 int64_t wrapped(int64_t value, int64_t whole) {  // to -whole/2 .. whole/2 - 1
     value &= whole - 1;
@@ -48,13 +39,14 @@ struct Scale {
     int64_t counts = 0;               // since reset
     int64_t origin = 0;               // periods by which the node's origin was moved
     int64_t direction = 1, left = 0;  // pulses of this run
-    double spacing = 1, next = 0;     // clk
+    double spacing = 1, next = 0;     // cycles
     uint64_t pulses = 0, reversals = 0, checks = 0, wrong = 0, zero = 0, word = 0, long_word = 0,
              whole = 0, moved = 0;
 
-    int64_t place() const { return counts + origin * (PERIOD / COUNT); }
+    int64_t position() const { return counts + origin * (PERIOD / COUNT); }
     void step() {
-        const int64_t border = place() + (direction > 0);  // the count whose lower edge is passed
+        const int64_t border =
+            position() + (direction > 0);  // the count whose lower edge is passed
         zero += (border & (COUNTS - 1)) == 0;
         word += (border & 0xFFFF) == 0;
         long_word += (border & 0x7FFFFFFF) == 0;
@@ -78,13 +70,13 @@ struct Bench {
             a |= ((quarter ^ quarter >> 1) & 1) << n, b |= (quarter >> 1) << n;
         }
         pins->a = a, pins->b = b;
-        pins->tick = now % TICK_CLK == 0, pins->sample_tick = now % SAMPLE_CLK == 0;
+        pins->tick = now % TICK_CYCLES == 0, pins->sample_tick = now % SAMPLE_CYCLES == 0;
         pins->clk = 1, pins->eval();
         pins->clk = 0, pins->eval();
         now++;
     }
-    void access(int axis, bool grating, unsigned address, bool write, uint32_t data = 0) {
-        pins->select = grating ? 0 : 1 << axis, pins->feedback_select = grating ? 1 << axis : 0;
+    void access(int axis, bool feedback, unsigned address, bool write, uint32_t data = 0) {
+        pins->select = feedback ? 0 : 1 << axis, pins->feedback_select = feedback ? 1 << axis : 0;
         pins->write = write, pins->word = address / 4, pins->wdata = data;
         clk();
         pins->select = pins->feedback_select = pins->write = 0;
@@ -102,19 +94,20 @@ struct Bench {
             access(n, false, AXIS_SENSING, true, NEEDED[n]);
             access(n, false, AXIS_ENCODER_EVENTS, true, AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_MASK);
         }
-        for (int n = 0; n < 2 * SAMPLE_CLK; n++) clk();
+        for (int n = 0; n < 2 * SAMPLE_CYCLES; n++) clk();
     }
     void check(int axis) {
         Scale& scale = scales[axis];
         const uint64_t low = read(axis, AXIS_POSITION_LOW), high = read(axis, AXIS_POSITION_HIGH);
-        const int64_t apart = wrapped(int64_t(high << 32 | low) - scale.place() * COUNT, POSITIONS);
+        const int64_t error =
+            wrapped(int64_t(high << 32 | low) - scale.position() * COUNT, POSITIONS);
         const int32_t counted = int32_t(read(axis, AXIS_QUADRATURE_COUNT));
         const bool illegal =
             read(axis, AXIS_ENCODER_EVENTS) & AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_MASK;
         scale.checks++;
-        if (apart == 0 && counted == int32_t(scale.counts) && !illegal) return;
-        scale.wrong += apart ? uint64_t(std::llabs(apart) + COUNT - 1) / COUNT : 1;
-        scale.counts += apart / COUNT;  // each wrong count is told once
+        if (error == 0 && counted == int32_t(scale.counts) && !illegal) return;
+        scale.wrong += error ? uint64_t(std::llabs(error) + COUNT - 1) / COUNT : 1;
+        scale.counts += error / COUNT;  // each wrong count is counted once
         access(axis, false, AXIS_ENCODER_EVENTS, true, AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_MASK);
     }
     void move_origin(int axis, Random& random) {  // near one border after the other
@@ -123,7 +116,7 @@ struct Bench {
                                    1LL << 32, -(1LL << 32),
                                    COUNTS / 2};
         const int64_t near = borders[scales[axis].moved++ % 7] + random.below(201) - 100;
-        const int32_t periods = int32_t(uint64_t(near - scales[axis].place()) >> 2);
+        const int32_t periods = int32_t(uint64_t(near - scales[axis].position()) >> 2);
         scales[axis].origin += periods;
         access(axis, false, AXIS_SHIFT_ORIGIN, true, uint32_t(periods));
     }
@@ -131,10 +124,10 @@ struct Bench {
         Scale& scale = scales[axis];
         const double fastest = (NEEDED[axis] + 1) / 2.0;
         const double slower = std::pow(random.one_in(2) ? 4 : 1000, random.share());
-        const double clk = random.one_in(500) ? 60000 : 30 * std::pow(100, random.share());
+        const double cycles = random.one_in(500) ? 60000 : 30 * std::pow(100, random.share());
         const int64_t direction = random.one_in(2) ? 1 : -1;
         scale.spacing = too_fast ? fastest * 0.6 : fastest * slower;
-        scale.left = std::fmax(1, clk / scale.spacing);
+        scale.left = std::fmax(1, cycles / scale.spacing);
         scale.reversals += direction != scale.direction;
         scale.direction = direction;
         scale.next = double(now);
@@ -145,11 +138,11 @@ struct Bench {
 
 int main(int count, char** words) {
     if (count < 3) return 2;
-    const uint64_t wanted = std::strtoull(words[1], nullptr, 10);
+    const uint64_t pulses = std::strtoull(words[1], nullptr, 10);
     const bool too_fast = count > 3 && !std::strcmp(words[3], "too_fast");
     Random random{std::strtoull(words[2], nullptr, 10) * 0x9E3779B97F4A7C15ULL + 1};
     Bench bench;
-    uint64_t resting[AXES] = {};  // until then; 0: not
+    uint64_t resting[AXES] = {};  // until then; 0: not at rest
     int at_work = AXES;
     bench.reset();
     for (int n = 0; n < AXES; n++) bench.begin_run(n, random, too_fast);
@@ -161,8 +154,8 @@ int main(int count, char** words) {
             if (scale.left) {
                 if (random.one_in(100000)) bench.move_origin(n, random);
             } else if (!resting[n]) {
-                resting[n] = bench.now + REST_CLK;
-            } else if (bench.now >= resting[n] && scale.pulses < wanted) {
+                resting[n] = bench.now + REST_CYCLES;
+            } else if (bench.now >= resting[n] && scale.pulses < pulses) {
                 resting[n] = 0;
                 bench.check(n);
                 if (random.one_in(20)) bench.move_origin(n, random);

@@ -1,39 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
-// encoder_run -- drive the Verilated incremental_encoder with a hostile but countable encoder, and
-// hold every clk against it.
+// encoder_run -- drive the Verilated incremental_encoder with the worst encoder whose counts are
+// still known, and compare every cycle.
 //
-// A place moves by single quarters, with random pauses and reversals. An edge is final once its
-// line has stood for `needed` clk; whatever else happens on a line is a pulse shorter than that:
-// glitches in the pauses, jitter before and after edges. So the count of every clk is known: the
-// final edges that are needed + 2 clk old.
+//   encoder_run EDGES SEED
+//
+// A position moves by single quarters, with random pauses and reversals. An edge is final once its
+// wire has been stable for REQUIRED cycles; all else on a wire are pulses shorter than that:
+// glitches in the pauses, jitter before and after edges. So the count of every cycle is known: the
+// final edges that are LATENCY cycles old.
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
 
+#include "figures/common.h"
 #include "Vtop.h"
 #include "verilated.h"
 
 namespace {
 
+using moire::Random;
+
 constexpr unsigned REQUIRED = 4, LATENCY = REQUIRED + 1, HISTORY = 8, PER_REVOLUTION = 1000;
 static_assert(LATENCY < HISTORY);
 
-struct Random {  // xorshift64*
-    uint64_t state;
-    uint32_t operator()() {
-        state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
-        return uint32_t((state * 2685821657736338717ULL) >> 32);
-    }
-    bool one_in(unsigned n) { return (*this)() % n == 0; }
-};
-
-struct Line {
-    bool level;            // of the final edges
-    unsigned stood = 100;  // clk since the last final edge
-    unsigned pulse = 0;    // clk left of a pulse on top
-    unsigned quiet = 100;  // clk since the last pulse
-    bool ready() const { return stood >= REQUIRED && pulse == 0 && quiet > 0; }
+struct Wire {
+    bool level;             // of the final edges
+    unsigned stable = 100;  // cycles since the last final edge
+    unsigned pulse = 0;     // cycles left of a pulse on top
+    unsigned quiet = 100;   // cycles since the last pulse
+    bool ready() const { return stable >= REQUIRED && pulse == 0 && quiet > 0; }
 };
 
 }  // namespace
@@ -42,7 +38,7 @@ double sc_time_stamp() { return 0; }
 
 int main(int count, char** words) {
     if (count != 3) return std::fprintf(stderr, "usage: encoder_run EDGES SEED\n"), 2;
-    const uint64_t wanted = std::strtoull(words[1], nullptr, 10);
+    const uint64_t count_of_edges = std::strtoull(words[1], nullptr, 10);
     Random random{std::strtoull(words[2], nullptr, 10) * 0x9E3779B97F4A7C15ULL + 1};
     auto context = std::make_unique<VerilatedContext>();
     auto pins = std::make_unique<Vtop>(context.get());
@@ -52,13 +48,12 @@ int main(int count, char** words) {
     pins->index_low = pins->index_clears = 0;
     pins->counts_per_revolution = PER_REVOLUTION, pins->illegal_enable = 1;
 
-    Line a{false}, b{false}, z{false};
-    int32_t place = 1,
-            history[HISTORY] = {};  // place of the last clk: the index, at 0, is not under it
-    for (auto& old : history) old = place;
+    Wire a{false}, b{false}, z{false};
+    int32_t position = 1, history[HISTORY] = {};  // of the last cycles; the index is at 0
+    for (auto& old : history) old = position;
     a.level = true;
     unsigned slot = 0, pause = 0;
-    int way = 1;
+    int direction = 1;
     uint64_t edges = 0, wrong = 0, glitches = 0, reversals = 0, clks = 0, entries = 0, found = 0;
     auto tick = [&] {
         pins->now = uint32_t(clks++);
@@ -75,36 +70,36 @@ int main(int count, char** words) {
     pins->rst = 0;
     for (int clk = 0; clk < 40; clk++) tick();
 
-    const int32_t origin = place;
-    for (uint64_t tail = 0; tail < 40; edges >= wanted ? tail++ : tail) {
-        for (Line* line : {&a, &b, &z}) {
-            line->stood++;
-            if (line->pulse && --line->pulse == 0)
-                line->quiet = 0;
-            else if (!line->pulse)
-                line->quiet++;
+    const int32_t origin = position;
+    for (uint64_t tail = 0; tail < 40; edges >= count_of_edges ? tail++ : tail) {
+        for (Wire* wire : {&a, &b, &z}) {
+            wire->stable++;
+            if (wire->pulse && --wire->pulse == 0)
+                wire->quiet = 0;
+            else if (!wire->pulse)
+                wire->quiet++;
         }
         if (pause) {
             pause--;
-        } else if (edges < wanted) {
-            Line& line = ((place & 1) == (way > 0))
-                             ? b
-                             : a;  // quarters 00 10 11 01: a moves out of 0 and 2 going up
-            const int32_t next = place + way;
-            const bool mark = next % int32_t(PER_REVOLUTION) == 0;
-            if (line.ready() && (mark == z.level || z.ready())) {
-                line.level = !line.level, line.stood = 0;
-                if (mark != z.level) z.level = mark, z.stood = 0, entries += mark;
-                place = next, edges++;
-                if (random.one_in(6)) way = -way, reversals++;  // often over the edge just made
-                pause = random.one_in(4) ? random() % 24 : random() % 3;
+        } else if (edges < count_of_edges) {
+            // quarters 00 10 11 01: going up, a changes from 0 and from 2
+            Wire& wire = ((position & 1) == (direction > 0)) ? b : a;
+            const int32_t next = position + direction;
+            const bool index = next % int32_t(PER_REVOLUTION) == 0;
+            if (wire.ready() && (index == z.level || z.ready())) {
+                wire.level = !wire.level, wire.stable = 0;
+                if (index != z.level) z.level = index, z.stable = 0, entries += index;
+                position = next, edges++;
+                if (random.one_in(6))
+                    direction = -direction, reversals++;  // often back over the last edge
+                pause = random.one_in(4) ? random.bits32() % 24 : random.bits32() % 3;
             }
         }
-        for (Line* line : {&a, &b, &z})
-            if (line->ready() && line->stood > REQUIRED && random.one_in(8))
-                line->pulse = 1 + random() % (REQUIRED - 1), glitches++;
+        for (Wire* wire : {&a, &b, &z})
+            if (wire->ready() && wire->stable > REQUIRED && random.one_in(8))
+                wire->pulse = 1 + random.bits32() % (REQUIRED - 1), glitches++;
         show();
-        history[slot++ % HISTORY] = place;
+        history[slot++ % HISTORY] = position;
         tick();
         const int32_t expected = history[(slot - 1 - LATENCY) % HISTORY] - origin;
         wrong += int32_t(pins->count) != expected;

@@ -1,20 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measure a named figure afresh on this machine; the last line printed is `name value unit`.
+"""Measure named figures on this machine; the last line printed of each is `name value unit`.
 
-    python -m figures.figure NAME         (make figure NAME=…)
-    python -m figures.figure NAME NAME …  (these, and build/report/figures.html of them)
-    python -m figures.figure --all        (make figures: all of them, and the page)
+    python -m figures.figure NAME …       (make figure NAME=…)
+    python -m figures.figure --all        (make figures: all of them, and build/report/figures.html)
     python -m figures.figure --list
 
-The exit code is 0 when the figure is what is wanted of it, 1 when it is not.
+Each value goes into docs/figures.toml, unless it was measured with --quick (the short forms, which
+check that each figure yields a number; with --all two modules at a time) or another --seed.
+The exit code is 0 if every value is within its bound.
 """
 
 import argparse
+import io
 import sys
 import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from importlib import import_module
+from multiprocessing import get_context
 from pathlib import Path
 
-from figures.common import collected, console
+from figures import record
+from figures.common import Figure, collected, console, modules
 from figures.comparison import page
 from figures.synthesis import SynthesisError
 from moire.errors import MoireError
@@ -22,53 +30,137 @@ from twin import BuildError
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "build" / "report" / "figures.html"
+PROCESSES = 2
+LONG = ("s4", "s0", "fine", "bus", "calibration", "profile")  # modules that take longest: first
 
 
-def measure(name, figure):
-    """(value, seconds); says on standard error what it means, on standard output the line."""
+@dataclass(frozen=True)
+class Outcome:
+    name: str
+    value: float | None
+    took: float
+    error: str = ""
+    facts: str = ""  # what the figure said beside its value, if it was not shown
+
+
+def measure(name: str, figure: Figure, quick: bool, seed: int | None) -> Outcome:
+    """Whatever goes wrong is an outcome, too: one figure must not end a run of many."""
     began = time.perf_counter()
-    value = figure.measure()
-    took = time.perf_counter() - began
-    verdict = "[green]reached[/]" if figure.good(value) else "[red]not reached[/]"
-    console.print(f"{figure.what}: wanted {figure.wanted}, {verdict}; measured in {took:.0f} s")
-    print(f"{name} {value:.{figure.digits}f} {figure.unit}", flush=True)
-    return value, took
+    try:
+        value = figure.measured(quick, seed)
+    except (MoireError, BuildError, SynthesisError) as error:
+        return Outcome(name, None, time.perf_counter() - began, str(error) or repr(error))
+    except Exception as error:
+        console.print_exception()
+        return Outcome(name, None, time.perf_counter() - began, repr(error))
+    return Outcome(name, value, time.perf_counter() - began)
 
 
-def main(arguments=None):
+def measure_module(module: str, seed: int | None) -> list[Outcome]:
+    """Short forms of all figures of a module, in a process of its own; what they say is kept."""
+    outcomes = []
+    for name, figure in import_module(f"figures.{module}").FIGURES.items():
+        console.file = io.StringIO()
+        done = measure(name, figure, True, seed)
+        facts = console.file.getvalue()
+        outcomes.append(Outcome(name, done.value, done.took, done.error, facts))
+    return outcomes
+
+
+def in_parallel(seed: int | None) -> Iterator[Outcome]:
+    """Short forms of all figures, module by module in two processes."""
+    order = sorted(modules(), key=lambda name: LONG.index(name) if name in LONG else len(LONG))
+    with ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
+        jobs = [pool.submit(measure_module, module, seed) for module in order]
+        for job in as_completed(jobs):
+            yield from job.result()
+
+
+def one_by_one(names: Sequence[str], quick: bool, seed: int | None) -> Iterator[Outcome]:
+    figures = collected("FIGURES")
+    for name in names:
+        if len(names) > 1:
+            console.rule(name)
+        yield measure(name, figures[name], quick, seed)
+
+
+def report(outcome: Outcome, figure: Figure, quick: bool) -> bool:
+    """Prints the outcome: its meaning to standard error, the value to standard output. Returns
+    whether it passes.
+    """
+    if outcome.value is None:
+        console.print(outcome.facts, markup=False, highlight=False)
+        print(f"{outcome.name}: {outcome.error}", file=sys.stderr, flush=True)
+        return False
+    bound = figure.quick.bound if quick and figure.quick.bound is not None else figure.wanted
+    passes = figure.passes(outcome.value, quick)
+    if not passes:
+        console.print(outcome.facts, markup=False, highlight=False)
+    verdict = "[green]reached[/]" if passes else "[red]not reached[/]"
+    judged = f"bound {bound}, {verdict}" if bound else "not judged"
+    form = f"; short form: {figure.quick.words}" if quick else ""
+    console.print(f"{figure.what}{form}: {judged}; measured in {outcome.took:.0f} s")
+    unit = figure.quick.unit if quick and figure.quick.unit is not None else figure.unit
+    print(f"{outcome.name} {outcome.value:.{figure.digits}f} {unit}", flush=True)
+    return passes
+
+
+def conclude(outcomes: Sequence[Outcome], names: Sequence[str], recorded: bool) -> None:
+    """Writes the page of several figures, and the record of those that were measured in full."""
+    figures = collected("FIGURES")
+    if recorded:
+        new = {
+            done.name: record.entry_of(figures[done.name], done.value)
+            for done in outcomes
+            if done.value is not None
+        }
+        record.add(new, figures)
+    if len(names) > 1:
+        results = [
+            (done.name, figures[done.name], done.value, done.error or done.took)
+            for done in outcomes
+        ]
+        PAGE.parent.mkdir(parents=True, exist_ok=True)
+        PAGE.write_text(page(results), encoding="utf-8")
+        console.print(f"page: {PAGE}", soft_wrap=True)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
     figures = collected("FIGURES")
     parser = argparse.ArgumentParser(
-        prog="python -m figures.figure", description="Measure a figure afresh on this machine."
+        prog="python -m figures.figure", description="Measure figures on this machine."
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help="of a figure; see --list")
-    parser.add_argument(
-        "--all", action="store_true", help="measure all, and write build/report/figures.html"
-    )
-    parser.add_argument("--list", action="store_true", help="say which figures there are")
+    parser.add_argument("--all", action="store_true", help="measure all, and write their page")
+    parser.add_argument("--list", action="store_true", help="print which figures there are")
+    parser.add_argument("--quick", action="store_true", help="the short forms, seconds each")
+    parser.add_argument("--seed", type=int, help="of the random numbers, 1 and up (default 1)")
     options = parser.parse_args(arguments)
     if options.list:
         for name, figure in figures.items():
-            print(f"{name:24} {figure.what}; wanted: {figure.wanted}")
+            print(f"{name:24} {figure.what}; bound: {figure.wanted}")
         return 0
     if unknown := [name for name in options.names if name not in figures]:
         parser.error(f"there is no figure {unknown[0]}: there are {', '.join(figures)}")
     names = list(figures) if options.all else options.names
     if not names:
         parser.error(f"which figure? There are {', '.join(figures)}")
-    rows = []
-    for name in names:
-        if len(names) > 1:
-            console.rule(name)
-        try:
-            rows.append((name, figures[name], *measure(name, figures[name])))
-        except (MoireError, BuildError, SynthesisError) as error:
-            print(f"{name}: {error}", file=sys.stderr)
-            rows.append((name, figures[name], None, str(error)))
-    if len(names) > 1:
-        PAGE.parent.mkdir(parents=True, exist_ok=True)
-        PAGE.write_text(page(rows), encoding="utf-8")
-        console.print(f"page: {PAGE}", soft_wrap=True)
-    return 0 if all(value is not None and figure.good(value) for _, figure, value, _ in rows) else 1
+    if options.seed is not None and options.seed < 1:
+        parser.error("--seed takes 1 and up")
+    if options.seed is not None and not options.all:
+        if fixed := [name for name in names if not figures[name].seeded]:
+            parser.error(f"{fixed[0]} draws no random numbers: it takes no seed")
+    quick, seed = options.quick, options.seed
+    together = options.all and quick
+    running = in_parallel(seed) if together else one_by_one(names, quick, seed)
+    outcomes, passed = [], []
+    for outcome in running:
+        outcomes.append(outcome)
+        passed.append(report(outcome, figures[outcome.name], quick))
+    if not quick:
+        conclude(outcomes, names, recorded=seed in (None, 1))
+    console.print(f"{sum(passed)} of {len(passed)} pass" if len(names) > 1 else "")
+    return 0 if all(passed) else 1
 
 
 if __name__ == "__main__":

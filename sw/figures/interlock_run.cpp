@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// interlock_run -- inject faults into the Verilated axis at random clk and judge its drive_enable,
-// its registers and its pins from outside.
+// interlock_run -- inject faults into the Verilated axis in random cycles, and judge its
+// drive_enable, its registers and its pins from outside.
 //
-//   interlock_run COUNT SEED               faults; prints how many of each cause, and what failed
+//   interlock_run COUNT SEED    so many faults; prints how many of each cause, and what failed
 //
-// The axis has a scale that counts (a and b), and a machine that goes wherever the target is until
-// something is wrong with it. Each fault has a window of clk in which it may take the drive: from
-// its first sign on a pin, until the latest that its cause allows. What the guard tells must agree
-// with that: the drive off within one servo tick of the cause, the cause that came first, the
-// position there.
+// The axis has a scale that counts (a and b), and a machine that moves wherever the target is until
+// something is wrong with it. Each fault has a window of cycles in which it may switch the drive
+// off: from its first sign on a pin, until the latest that its cause allows. What the interlock
+// reports must agree: the drive off within one servo tick of the cause, the cause that came first,
+// the position at that time.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -18,15 +18,17 @@
 #include <vector>
 
 #include "made/registers.h"
+#include "figures/common.h"
 #include "Vtop.h"
 #include "verilated.h"
 
 namespace {
 
-constexpr int64_t COUNT = 1 << 14;  // position, in 2^-16 period
-constexpr int LIMIT_CLK =
-    4'000'000 / 10'000;     // the axis wants its limit switches stable for 0.1 ms of 4 MHz
-constexpr int SENSED = 24;  // clk from a and b to position, at most; 3 at least
+using moire::Random;
+
+constexpr int64_t COUNT = 1 << 14;                // position, in 2^-16 period
+constexpr int LIMIT_CYCLES = 4'000'000 / 10'000;  // limit switches must be stable for 0.1 ms
+constexpr int SENSED = 24;  // cycles from a and b to position, at most; 3 at least
 constexpr int HISTORY = 1 << 15;
 constexpr int64_t NEVER = INT64_MAX / 2;
 
@@ -49,18 +51,7 @@ const char* const NAMES[CAUSES] = {"limit_low",        "limit_high",   "estop", 
 constexpr Cause LEVELS[] = {LIMIT_LOW, LIMIT_HIGH, ESTOP, WATCHDOG, DRIVE, CPU};
 constexpr unsigned LATCH_ALWAYS = 1 << ESTOP | 1 << DRIVE | 1 << CPU;
 
-struct Random {  // xorshift64*
-    uint64_t state;
-    uint64_t operator()() {
-        state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
-        return (state * 2685821657736338717ULL) >> 16;
-    }
-    int64_t below(int64_t n) { return int64_t((*this)() % uint64_t(n)); }
-    int64_t from(int64_t low, int64_t high) { return low + below(high - low + 1); }
-    bool one_in(unsigned n) { return below(n) == 0; }
-};
-
-struct Window {  // clk in which a cause takes the drive
+struct Window {  // cycles in which a cause may switch the drive off
     int64_t first = NEVER, last = NEVER;
 };
 
@@ -68,11 +59,11 @@ struct Bench {
     std::unique_ptr<VerilatedContext> context = std::make_unique<VerilatedContext>();
     std::unique_ptr<Vtop> pins = std::make_unique<Vtop>(context.get());
     int64_t now = 0, tick_at = 0, ticks = 0;
-    int period = 1000, sample_period = 40, pace = 10;
-    // the machine: count is what a and b have shown, skew what they jumped by at once
+    int period = 1000, sample_period = 40, count_cycles = 10;
+    // the machine: count is what a and b have shown, skew is a jump of both at once
     int64_t count = 0, wanted = 0, moved_at = 0;
     int skew = 0;
-    bool follows = true, jammed = false;  // goes where the target is; stands
+    bool follows = true, jammed = false;  // moves to the target; cannot move
     std::vector<int64_t> counts = std::vector<int64_t>(HISTORY);
     // what was seen
     int64_t target = 0, target_before = 0;  // of this tick and the last, 2^-16 period
@@ -83,7 +74,7 @@ struct Bench {
         pins->tick = now - tick_at >= period;
         if (pins->tick) tick_at = now, ticks++;
         pins->sample_tick = now % sample_period == 0;
-        if (!jammed && count != wanted && now - moved_at >= pace)
+        if (!jammed && count != wanted && now - moved_at >= count_cycles)
             count += wanted > count ? 1 : -1, moved_at = now;
         const int gray = int(count + skew) & 3;
         pins->encoder_a = gray == 1 || gray == 2, pins->encoder_b = gray >= 2;
@@ -111,16 +102,16 @@ struct Bench {
         put(word, uint32_t(data)), put(word + 4, uint32_t(data >> 32));
     }
     uint32_t get(unsigned word) { return pins->select = 1, access(false, word, 0), pins->rdata; }
-    int64_t get_place(unsigned word) {
+    int64_t get_position(unsigned word) {
         const uint64_t low = get(word), high = get(word + 4);
         return int64_t((high << 32 | low) << 16) >> 16;
     }
-    // One clk; and once a tick the target is looked at, and the machine sent there.
+    // One cycle; and once per tick the target is read, and the machine sent there.
     void step() {
         clk();
         if (now - tick_at == 20) {
-            const int64_t place = get_place(AXIS_TARGET_LOW);
-            target_before = target, target = place;
+            const int64_t position = get_position(AXIS_TARGET_LOW);
+            target_before = target, target = position;
             if (follows) wanted = (target + COUNT / 2) >> 14;
         }
     }
@@ -141,11 +132,11 @@ struct Bench {
         default: break;
         }
     }
-    // What a level may take, pressed at this clk.
+    // When a level may switch the drive off that is pressed in this cycle.
     Window window(Cause cause) const {
         switch (cause) {
         case LIMIT_LOW:
-        case LIMIT_HIGH: return {now + LIMIT_CLK, now + LIMIT_CLK + 6};
+        case LIMIT_HIGH: return {now + LIMIT_CYCLES, now + LIMIT_CYCLES + 6};
         case DRIVE: return {now + 2, now + 6};
         default: return {now + 1, now + 1};
         }
@@ -157,13 +148,13 @@ struct Campaign {
     std::unique_ptr<Bench> bench;
     std::map<Cause, uint64_t> injected;
     uint64_t faults = 0, harmless = 0, failures = 0;
-    int64_t ratio = 0, clk_before = 0;  // ratio: steps a period
+    int64_t ratio = 0, clk_before = 0;  // ratio: steps per period
     Cause cause = ESTOP;                // of this fault
     bool good = true;                   // so far
 
     void fail(const char* what) {
         if (good)
-            std::fprintf(stderr, "%s, clk %lld of its axis: %s\n", NAMES[cause],
+            std::fprintf(stderr, "%s, cycle %lld of its axis: %s\n", NAMES[cause],
                          (long long)bench->now, what);
         good = false;
     }
@@ -174,7 +165,7 @@ struct Campaign {
         Bench& b = *bench;
         b.pins->drive_fault_n = 1, b.pins->rst = 1;
         b.period = int(random.from(600, 1600)), b.sample_period = int(random.from(20, 90)),
-        b.pace = int(random.from(6, 14));
+        b.count_cycles = int(random.from(6, 14));
         b.pins->tick_period = uint32_t(b.period);
         for (int n = 0; n < 8; n++) b.clk();
         b.pins->rst = 0;
@@ -193,7 +184,7 @@ struct Campaign {
                                                     FIELD_PUT(ACTUATOR_STEP_DIRECTION_HOLD, 20));
     }
 
-    // A segment at an even speed, in counts a tick.
+    // A segment at a constant speed, in counts per tick.
     void push(int64_t speed_counts, int64_t ticks, bool last) {
         Bench& b = *bench;
         b.put_wide(AXIS_SEGMENT_VELOCITY_LOW, speed_counts << 38),
@@ -201,20 +192,20 @@ struct Campaign {
         b.put(AXIS_SEGMENT_TICKS, uint32_t(ticks) | (last ? AXIS_SEGMENT_TICKS_LAST_MASK : 0));
     }
     void control(bool on, bool homing = false) {
-        const uint32_t asked = on ? AXIS_CONTROL_ENABLE_MASK | AXIS_CONTROL_CLOSED_LOOP_MASK : 0;
-        bench->put(AXIS_CONTROL, asked | (homing ? AXIS_CONTROL_HOMING_MASK : 0));
+        const uint32_t enable = on ? AXIS_CONTROL_ENABLE_MASK | AXIS_CONTROL_CLOSED_LOOP_MASK : 0;
+        bench->put(AXIS_CONTROL, enable | (homing ? AXIS_CONTROL_HOMING_MASK : 0));
     }
 
     void kind_of_drive(unsigned kind) {
         bench->put_actuator(ACTUATOR_DRIVE, kind);
-        ratio = random.from(400, 8000) * (random.one_in(2) ? 1 : -1);  // steps a period
+        ratio = random.from(400, 8000) * (random.one_in(2) ? 1 : -1);  // steps per period
         if (kind != 1) ratio = 0;
         const int64_t word = ratio * (int64_t(1) << 32);
         bench->put_actuator(ACTUATOR_STEP_RATIO_LOW, uint32_t(word)),
             bench->put_actuator(ACTUATOR_STEP_RATIO_HIGH, uint32_t(word >> 32));
     }
 
-    // At rest with the drive off, nothing latched, the machine sound.
+    // At rest with the drive off, no fault latched, the machine without a fault.
     void calm() {
         Bench& b = *bench;
         for (Cause cause : LEVELS) b.pin(cause, false);
@@ -222,7 +213,7 @@ struct Campaign {
         control(false);
         b.put(AXIS_STROBES, AXIS_STROBES_SET_TARGET_TO_POSITION_MASK);
         b.wanted = b.count;
-        b.run(LIMIT_CLK + 40);
+        b.run(LIMIT_CYCLES + 40);
         b.put(AXIS_STROBES,
               AXIS_STROBES_SET_TARGET_TO_POSITION_MASK | AXIS_STROBES_RESET_FAULTS_MASK);
         b.run_ticks(2);
@@ -236,8 +227,8 @@ struct Campaign {
         return b.get(AXIS_FAULTS) == 0 && b.get(AXIS_FIRST_FAULT) == 0 && !b.pins->drive_enable;
     }
 
-    // The drive on, at rest or under way at `speed` counts a tick for `ticks`.
-    void under_way(int64_t speed, int64_t ticks) {
+    // The drive on, at rest or in motion at `speed` counts per tick for `ticks`.
+    void switch_on(int64_t speed, int64_t ticks) {
         Bench& b = *bench;
         control(true);
         b.run_ticks(3);
@@ -245,36 +236,38 @@ struct Campaign {
         push(speed, ticks, true), b.put(AXIS_STROBES, AXIS_STROBES_START_MASK);
     }
 
-    // Bus writes of a program gone wrong: whatever it does, but for a reset with enable low, no
-    // fault goes and the drive stays off.
-    void nonsense(Cause stands) {
+    // Register writes of firmware that has gone wrong: whatever it does, but for a reset with
+    // enable low, every fault stays and the drive stays off.
+    void nonsense(Cause persistent) {
         Bench& b = *bench;
         const uint32_t before = b.get(AXIS_FAULTS), first = b.get(AXIS_FIRST_FAULT);
-        const int64_t place = b.get_place(AXIS_FAULT_POSITION_LOW), on = b.on_clk;
+        const int64_t position = b.get_position(AXIS_FAULT_POSITION_LOW), on = b.on_clk;
         const bool level =
-            std::find(std::begin(LEVELS), std::end(LEVELS), stands) != std::end(LEVELS);
-        bool asked = true;
+            std::find(std::begin(LEVELS), std::end(LEVELS), persistent) != std::end(LEVELS);
+        bool enable = true;
         for (int n = 0; n < 24; n++) {
             if (random.one_in(2)) {
-                asked = random.one_in(2);
-                b.put(AXIS_CONTROL, (uint32_t(random.below(16)) & ~1u & ~AXIS_CONTROL_HOMING_MASK) |
-                                        asked);  // homing: a switch is no cause
+                enable = random.one_in(2);
+                // not homing: there a switch is no cause
+                const uint32_t others = ~AXIS_CONTROL_ENABLE_MASK & ~AXIS_CONTROL_HOMING_MASK;
+                b.put(AXIS_CONTROL, (uint32_t(random.below(16)) & others) | enable);
             }
-            const bool resets = (level || asked) &&
-                                random.one_in(2);  // with its cause standing no one resets a fault
+            // while its cause persists a level cannot be reset
+            const bool resets = (level || enable) && random.one_in(2);
             b.put(AXIS_STROBES, (uint32_t(random.below(16)) << 1) | resets);
             if (random.one_in(4)) push(random.from(-4, 4), random.from(1, 9), random.one_in(2));
             if (random.one_in(4)) b.run(random.below(200));
         }
-        if (b.on_clk != on) fail("drive on while a fault stands");
+        if (b.on_clk != on) fail("drive on with a fault latched");
         const uint32_t after = b.get(AXIS_FAULTS);
-        if (!(after >> stands & 1)) fail("fault gone without a person, or while its cause stands");
-        if (!level && (before & ~after)) fail("fault gone without a person");
+        if (!(after >> persistent & 1))
+            fail("fault reset without a person, or while its cause persists");
+        if (!level && (before & ~after)) fail("fault reset without a person");
         if (b.get(AXIS_FIRST_FAULT) != first) fail("first cause changed");
-        if (b.get_place(AXIS_FAULT_POSITION_LOW) != place) fail("latched position changed");
+        if (b.get_position(AXIS_FAULT_POSITION_LOW) != position) fail("latched position changed");
     }
 
-    // The drive was on at `since`. What the guard has to tell of these causes.
+    // The drive was on at `since`. Judges what the interlock reports of these causes.
     void judge(const std::map<Cause, Window>& causes, int64_t since) {
         Bench& b = *bench;
         int64_t first = NEVER, last = NEVER;
@@ -284,25 +277,25 @@ struct Campaign {
         if (b.off_at < first) return fail("drive off before the cause");
         if (b.off_at > last) return fail("drive off late");
         unsigned may = 0;
-        bool known = false;  // of several at the very same clk the lowest bit comes first
+        bool known = false;  // of several in the same cycle the lbehindt bit comes first
         for (auto& [cause, window] : causes) {
             const bool exact = window.first == window.last;
             if (window.first <= last && !(exact && known)) may |= 1 << cause, known |= exact;
         }
-        const uint32_t told = b.get(AXIS_FIRST_FAULT);
-        if (!(told & may) || (told & (told - 1))) fail("wrong first cause");
-        if ((b.get(AXIS_FAULTS) & told) != told) fail("first cause not among the faults");
-        const int64_t place = b.get_place(AXIS_FAULT_POSITION_LOW);
+        const uint32_t reported = b.get(AXIS_FIRST_FAULT);
+        if (!(reported & may) || (reported & (reported - 1))) fail("wrong first cause");
+        if ((b.get(AXIS_FAULTS) & reported) != reported) fail("first cause not among the faults");
+        const int64_t position = b.get_position(AXIS_FAULT_POSITION_LOW);
         bool there = false;
         for (int64_t t = b.off_at - SENSED; t <= b.off_at - 3; t++)
-            there |= place == b.count_at(t) * COUNT;
+            there |= position == b.count_at(t) * COUNT;
         if (!there) fail("wrong latched position");
     }
 
-    // Off also at the pins of bridge and step driver.
+    // The pins of bridge and step driver must be off, too.
     void pins_rest() {
         Bench& b = *bench;
-        b.run(2 * 40 + 40);  // the step in hand, and its times
+        b.run(2 * 40 + 40);  // the last step, and its times
         const int64_t steps = b.steps;
         for (int n = 0; n < 200; n++) {
             b.step();
@@ -316,10 +309,10 @@ struct Campaign {
     void level(Cause cause) {
         Bench& b = *bench;
         const bool moves = random.one_in(2);
-        under_way(moves ? random.from(-9, 9) : 0, 40);
+        switch_on(moves ? random.from(-9, 9) : 0, 40);
         b.run(random.below(3 * b.period));
         std::map<Cause, Window> causes;
-        const int64_t since = b.now, end = b.now + LIMIT_CLK + 2 * b.period;
+        const int64_t since = b.now, end = b.now + LIMIT_CYCLES + 2 * b.period;
         if (!b.pins->drive_enable) return fail("drive off without a cause");
         const Cause other = LEVELS[random.below(6)];
         const int64_t later = b.now + (random.one_in(3) ? 0 : random.below(b.period));
@@ -335,41 +328,41 @@ struct Campaign {
         nonsense(cause);
         if (two) b.pin(other, false);
         b.pin(cause, false);
-        b.run(LIMIT_CLK + 20);
+        b.run(LIMIT_CYCLES + 20);
         control(true);
         b.run_ticks(1);
         if (b.pins->drive_enable || !(b.get(AXIS_FAULTS) >> cause & 1))
-            fail("the cause went, and the fault with it");
+            fail("the fault was reset when its cause ended");
     }
 
-    // A level that was there before the drive is asked for.
+    // A level that is there before the drive is enabled.
     void before_enable(Cause cause) {
         Bench& b = *bench;
         b.run(random.below(b.period));
         b.pin(cause, true);
-        b.run(LIMIT_CLK + 20);
+        b.run(LIMIT_CYCLES + 20);
         const bool latched = b.get(AXIS_FAULTS) >> cause & 1;
         if (latched != bool(LATCH_ALWAYS >> cause & 1)) fail("latched wrongly with the drive off");
         const int64_t on = b.on_clk;
         control(true);
         b.run(random.from(10, 2 * b.period));
-        if (b.on_clk != on) fail("drive on with its cause there");
+        if (b.on_clk != on) fail("drive on while the cause is there");
         if (!(b.get(AXIS_FAULTS) >> cause & 1) || b.get(AXIS_FIRST_FAULT) != 1u << cause)
             fail("wrong first cause");
         nonsense(cause);
         b.pin(cause, false);
-        b.run(LIMIT_CLK + 20);
-        if (b.on_clk != on) fail("the cause went, and the fault with it");
+        b.run(LIMIT_CYCLES + 20);
+        if (b.on_clk != on) fail("the fault was reset when its cause ended");
     }
 
-    // Pushed away, or held while the target goes on.
+    // The machine is pushed away, or held while the target moves on.
     void following() {
         Bench& b = *bench;
         const bool moves = random.one_in(2);
         const int64_t limit = COUNT * random.from(moves ? 30 : 2, 60) - COUNT / 2;
         b.put(AXIS_FOLLOWING_LIMIT, uint32_t(limit));
         const int64_t speed = random.from(3, 12) * (random.one_in(2) ? 1 : -1);
-        under_way(moves ? speed : 0, 4000);
+        switch_on(moves ? speed : 0, 4000);
         b.run(random.below(3 * b.period) + b.period);
         const int64_t since = b.now, end = b.now + 60 * b.period;
         if (!b.pins->drive_enable) return fail("drive off without a cause");
@@ -383,7 +376,7 @@ struct Campaign {
             b.step();
             if (std::abs(b.target - b.count * COUNT) > limit)
                 window.first = std::min(window.first, b.now - SENSED);
-            // the target of this tick is known here; the place that the tick measured is one of
+            // the target of this tick is known here; the position that the tick measured is one of
             // these two or between them
             const bool sure = std::abs(b.target - b.count_at(b.tick_at - SENSED) * COUNT) > limit &&
                               std::abs(b.target - b.count_at(b.tick_at + 8) * COUNT) > limit;
@@ -399,9 +392,9 @@ struct Campaign {
     // Both levels at once: the count can no longer be trusted.
     void encoder() {
         Bench& b = *bench;
-        under_way(random.one_in(2) ? random.from(-9, 9) : 0, 40);
+        switch_on(random.one_in(2) ? random.from(-9, 9) : 0, 40);
         b.run(random.below(3 * b.period));
-        while (b.now - b.moved_at < b.pace / 2) b.step();  // between two edges
+        while (b.now - b.moved_at < b.count_cycles / 2) b.step();  // between two edges
         const int64_t since = b.now;
         if (!b.pins->drive_enable) return fail("drive off without a cause");
         b.off_at = NEVER, b.moved_at = b.now, b.skew += 2;
@@ -419,7 +412,7 @@ struct Campaign {
         b.run_ticks(3);
         b.run(random.below(b.period));
         if (b.now - b.tick_at > b.period - 30)
-            b.run(40);  // the segment is there before the next tick
+            b.run(40);  // so that the segment is there before the next tick
         push(random.from(-9, 9), ticks, false), b.put(AXIS_STROBES, AXIS_STROBES_START_MASK);
         const int64_t since = b.now, begun = b.ticks;
         b.off_at = NEVER;
@@ -436,15 +429,16 @@ struct Campaign {
         nonsense(UNDERRUN);
     }
 
-    // More steps than the wire can carry: the generator owes 2^22 / tick_period at most.
+    // More steps than the wire can carry: the generator may be 2^22 / tick_period behind.
     void overrun() {
         Bench& b = *bench;
         kind_of_drive(1);
-        under_way(0, 0);
+        switch_on(0, 0);
         b.run_ticks(2);
-        const int64_t owed_most = (int64_t(1) << 22) / b.period, origin = b.steps, place = b.target;
-        const auto owes = [&](int64_t target) {
-            return std::abs((((target - place) * ratio) >> 16) - (b.steps - origin));
+        const int64_t most_behind = (int64_t(1) << 22) / b.period, origin = b.steps,
+                      position = b.target;
+        const auto behind = [&](int64_t target) {
+            return std::abs((((target - position) * ratio) >> 16) - (b.steps - origin));
         };
         push(random.from(8, 14) * (random.one_in(2) ? 1 : -1), 4000, true),
             b.put(AXIS_STROBES, AXIS_STROBES_START_MASK);
@@ -454,11 +448,11 @@ struct Campaign {
         while (b.now < end && b.off_at == NEVER) {
             b.step();
             if (window.first == NEVER &&
-                std::max(owes(b.target), owes(b.target_before)) > owed_most - 3)
+                std::max(behind(b.target), behind(b.target_before)) > most_behind - 3)
                 window.first = b.now - b.period;
-            // the line to the target of a tick ends in the next, 60 clk after it at the latest
+            // the line to the target of a tick ends in the next one, within 60 cycles
             if (window.last == NEVER && b.now - b.tick_at == 62 &&
-                owes(b.target_before) > owed_most + 3)
+                behind(b.target_before) > most_behind + 3)
                 window.last = b.tick_at + b.period;
         }
         judge({{OVERRUN, window}}, since);
@@ -468,7 +462,7 @@ struct Campaign {
         kind_of_drive(0);
     }
 
-    // What is no fault: a glitch of a switch, and a switch while homing.
+    // These are no faults: a glitch of a switch, and a switch while homing.
     void no_fault() {
         Bench& b = *bench;
         const Cause cause = random.one_in(2) ? LIMIT_LOW : LIMIT_HIGH;
@@ -477,9 +471,9 @@ struct Campaign {
         b.run_ticks(3);
         const int64_t on = b.on_clk, begin = b.now;
         b.pin(cause, true);
-        b.run(homing ? 2 * b.period : random.from(1, LIMIT_CLK - 1));
+        b.run(homing ? 2 * b.period : random.from(1, LIMIT_CYCLES - 1));
         b.pin(cause, false);
-        b.run(LIMIT_CLK + 40);
+        b.run(LIMIT_CYCLES + 40);
         if (b.on_clk - on != b.now - begin || b.get(AXIS_FAULTS)) fail("fault without a cause");
     }
 

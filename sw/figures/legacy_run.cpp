@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sends samples through the Verilated legacy_bench, one in 30 clk. The file named first holds
-// numbers: largest_move limit_counts, sin_offset cos_offset gain quadrature_error, the 256 points
-// of the table, then sin cos of each sample. Prints for each sample the count of the printed path
-// and the position of the corrected one.
+// legacy_run -- send samples through the Verilated legacy_bench, one every 30 cycles.
+//
+//   legacy_run FILE    of numbers: largest_move limit_counts, sin_offset cos_offset gain
+//                      quadrature_error, the 256 points of the table, then sin cos of each sample
+//
+// Prints for each sample the count of the paper's path and the position of ours.
 #include "Vtop.h"
 #include <cstdio>
 

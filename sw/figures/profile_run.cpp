@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// profile_run -- random moves planned by the firmware's planner, played by the Verilated player,
-// every step held against the limits.
+// profile_run -- play random moves, planned by the firmware's planner, on the Verilated player, and
+// compare every step with the limits.
 //
-// A move: S-curve, trapezoid or stepped; then, by chance, retargeted in flight up to three times,
-// slowed down by overrides and pauses, or stopped by a brake. From its first change on an override
-// may add the quarter of acceleration and jerk that planner_feed_override grants it. A refusal is a
-// miss too.
+//   profile_run MOVES SEED
+//
+// A move has an S-curve, trapezoid or stepped profile. By chance it gets up to three new targets in
+// flight, is slowed down by feed overrides and pauses, or is ended by a controlled stop. From its
+// first change on an override may add the quarter of acceleration and jerk that
+// planner_feed_override grants. A refusal counts as a miss, too.
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -13,6 +15,7 @@
 #include <memory>
 #include <utility>
 
+#include "figures/common.h"
 #include "Vplayer.h"
 extern "C" {
 #include "planner/plan.h"
@@ -22,20 +25,13 @@ extern "C" {
 
 namespace {
 
-constexpr int64_t ROUNDING =
-    8;  // 2^-40 period that the rounding of a step to 2^-40 adds to its third difference
+using moire::Random;
 
-struct Random {  // xorshift64*
-    uint64_t state;
-    uint64_t operator()() {
-        state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
-        return state * 2685821657736338717ULL;
-    }
-    bool one_in(unsigned n) { return (*this)() % n == 0; }
-    double spread(double low, double high) {
-        return low * std::pow(high / low, double((*this)() >> 11) / 9007199254740992.0);
-    }
-};
+constexpr int64_t ROUNDING = 8;  // 2^-40 period: what rounding adds to the third difference
+
+double spread(Random& random, double low, double high) {  // evenly in their logarithm
+    return low * std::pow(high / low, random.share());
+}
 
 struct Bench {
     VerilatedContext context;
@@ -67,7 +63,7 @@ double sc_time_stamp() { return 0; }
 
 int main(int count, char** words) {
     if (count != 3) return std::fprintf(stderr, "usage: profile_run MOVES SEED\n"), 2;
-    const uint64_t wanted = std::strtoull(words[1], nullptr, 10),
+    const uint64_t moves_required = std::strtoull(words[1], nullptr, 10),
                    seed = std::strtoull(words[2], nullptr, 10);
     Random random{seed * 0x9E3779B97F4A7C15ULL + 1};
     auto bench = std::make_unique<Bench>();
@@ -75,19 +71,19 @@ int main(int count, char** words) {
     pins.rst = 1, bench->clk(), bench->clk(), pins.rst = 0;
 
     uint64_t moves = 0, misses = 0, ticks = 0, retargets = 0, refused = 0, overridden = 0,
-             brakes = 0, landed_wrong = 0, above = 0;
-    while (moves < wanted) {
+             stops = 0, landed_wrong = 0, above = 0;
+    while (moves < moves_required) {
         const unsigned kind = random() % 8;  // 0 stepped, 1 trapezoid, else S-curve
-        const bool slowed = kind > 0 && random.one_in(4), braked = random.one_in(5);
-        const auto velocity = uint32_t(random.spread(10, 50000)),
-                   acceleration = uint32_t(random.spread(1000, 1e7));
-        const auto jerk = uint32_t(random.spread(1e5, 1e9));
+        const bool slowed = kind > 0 && random.one_in(4), is_stopped = random.one_in(5);
+        const auto velocity = uint32_t(spread(random, 10, 50000)),
+                   acceleration = uint32_t(spread(random, 1000, 1e7));
+        const auto jerk = uint32_t(spread(random, 1e5, 1e9));
         struct planner_limits limits = planner_limits(velocity, acceleration, jerk);
         struct planner_limits planned = limits;
         uint32_t ramp = 0, curve = 0;
         if (kind == 1) planned.jerk = PLANNER_ANY_JERK;
         if (slowed) planner_feed_override(&planned, &ramp, &curve);
-        int64_t distance = int64_t(random.spread(1, 1 << 26)) * (random.one_in(2) ? 1 : -1);
+        int64_t distance = int64_t(spread(random, 1, 1 << 26)) * (random.one_in(2) ? 1 : -1);
         struct plan plan;
         planner_stepped_profile stepped{};
         if (kind == 0) {
@@ -116,8 +112,8 @@ int main(int count, char** words) {
         const __int128 begin = bench->exact();
         const uint64_t underruns = bench->underruns;
         __int128 before = begin, step = 0, slope = 0,
-                 late = 0;  // late: a brake acts one tick after the strobe
-        unsigned brake_at = braked ? 1 + random() % (plan.ticks + 1) : 0,
+                 late = 0;  // late: a stop acts one tick after the strobe
+        unsigned stop_at = is_stopped ? 1 + random() % (plan.ticks + 1) : 0,
                  retargets_left = kind > 0 && !slowed ? random() % 4 : 0;
         unsigned retarget_at = 1 + random() % (plan.ticks + 1), queued = 0, played = 0,
                  override_left = slowed ? 3 : 0;
@@ -128,9 +124,9 @@ int main(int count, char** words) {
         for (unsigned idle = 0; idle < 400000; idle++) {
             while (!stopped && !end_queued && pins.queue_free && queued < played + 64) {
                 if (retargets_left && queued >= retarget_at) {
-                    int64_t other = random.one_in(2) ? goal + int64_t(random.spread(1, 1 << 20)) *
+                    int64_t other = random.one_in(2) ? goal + int64_t(spread(random, 1, 1 << 20)) *
                                                                   (random.one_in(2) ? 1 : -1)
-                                                     : int64_t(random.spread(1, 1 << 26)) *
+                                                     : int64_t(spread(random, 1, 1 << 26)) *
                                                            (random.one_in(2) ? 1 : -1);
                     retargets_left--, retarget_at += 1 + random() % 200;
                     struct plan made;
@@ -157,8 +153,8 @@ int main(int count, char** words) {
                 override_left--, overridden++, changed = true;
             else if (slowed && random.one_in(200))
                 pins.feed_fraction = 65536, pins.pause = 0;
-            if (brake_at && played == brake_at && !stopped) {
-                stopped = true, brakes++, late = slope < 0 ? -slope : slope;
+            if (stop_at && played == stop_at && !stopped) {
+                stopped = true, stops++, late = slope < 0 ? -slope : slope;
                 pins.controlled_stop = 1, bench->clk(), pins.controlled_stop = 0;
             }
             bench->tick(), played++, ticks++;
@@ -167,7 +163,7 @@ int main(int count, char** words) {
             const __int128 roundoff =
                 pins.moving ? ROUNDING : ROUNDING + (1 << 24);  // the end is rounded
             auto size = [](__int128 x) { return x < 0 ? -x : x; };
-            const bool steps = kind == 0;  // stepped have a limit of velocity only
+            const bool steps = kind == 0;  // these have a limit of velocity only
             if (size(step_now) > __int128(limits.velocity) + roundoff + late)
                 over = true, why = "velocity";
             auto granted = [&](uint64_t limit) {
@@ -208,7 +204,7 @@ int main(int count, char** words) {
         {"misses", misses},      {"moves", moves},
         {"ticks", ticks},        {"retargets", retargets},
         {"refused", refused},    {"overrides", overridden},
-        {"brakes", brakes},      {"landed_wrong", landed_wrong},
+        {"stops", stops},        {"landed_wrong", landed_wrong},
         {"above_a_limit", above}};
     for (const auto& [name, total] : totals)
         std::printf("%llu %s ", (unsigned long long)total, name);

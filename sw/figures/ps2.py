@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures of the PS/2 pass-through (S4): does every byte arrive, once and in order, and how late.
 
-The bytes are judged by a keyboard and a host in C++ around the Verilated ps2_pass, and on a part by
-sigrok-cli, which knows nothing
-of ours. The soak of 10^6 sequences is `make soak K=ps2`.
+The bytes are judged by a keyboard and a host in C++ around the Verilated ps2_pass, and in part by
+sigrok-cli, which knows nothing of our code. The campaign of 10^6 sequences is `make soak K=ps2`.
 """
 
 import re
@@ -12,7 +11,7 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-from figures.common import Figure, bar, console
+from figures.common import Figure, Quick, bar, console, seeds, shares
 from twin import BuildError
 from twin.build import run, simulation
 
@@ -20,9 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PASS = ROOT / "rtl" / "peripheral" / "ps2_pass.sv"
 DRIVER = Path(__file__).with_name("ps2_run.cpp")
 RECORDING = ROOT.parent / "shared" / "captures" / "ps2_keyboard_asdfgh.csv"
-TYPED = bytes.fromhex(
-    "1c f0 1c 1b f0 1b 23 f0 23 2b f0 2b 34 f0 34 33 f0 33"
-)  # what the recording holds: a s d f g h
+TYPED = bytes.fromhex("1cf01c 1bf01b 23f023 2bf02b 34f034 33f033")  # the recording: a s d f g h
 CLK_HZ = 400_000
 SEQUENCES = 10**4
 SHARE = 1000  # sequences of one run, each with a seed of its own
@@ -34,34 +31,32 @@ def program():
     return simulation(DRIVER, PASS, CLK_HZ=CLK_HZ)
 
 
-def sequences(count=SEQUENCES):
+def sequences(count=SEQUENCES, seed=1):
     """Totals of random sequences: a person's keys, the host's commands, injections, and frames that
     the host cuts short.
     """
     totals = {}
     with bar(f"{count:.0e} sequences") as progress:
         task = progress.add_task("", total=count)
-        for seed, first in enumerate(range(0, count, SHARE), start=1):
-            words = run(
-                [program(), "sequences", min(SHARE, count - first), seed], "ps2_run"
-            ).split()
+        for size, number in shares(count, SHARE, seed):
+            words = run([program(), "sequences", size, number], "ps2_run").split()
             for name, value in zip(words[1::2], map(float, words[::2])):
                 totals[name] = totals.get(name, 0) + value
-            progress.update(task, completed=min(first + SHARE, count))
+            progress.advance(task, size)
     console.print(", ".join(f"{value:.0f} {name}" for name, value in totals.items()))
     return totals
 
 
-def wrong_by_sigrok():
-    """Bytes that sigrok reads otherwise than they were typed and injected: the recording, then
-    random sequences.
+def wrong_by_sigrok(count, seed):
+    """Bytes that sigrok does not read as they were typed and injected: the recording, then random
+    sequences.
     """
     if not shutil.which("sigrok-cli") or not RECORDING.exists():
         raise BuildError(f"sigrok-cli (apt) and the recording {RECORDING} are needed")
     with tempfile.TemporaryDirectory() as folder:
         samples = Path(folder) / "pass.bin"
         judged, heard = run(
-            [program(), "wave", RECORDING, BY_SIGROK, 1, samples], "ps2_run"
+            [program(), "wave", RECORDING, count, seed, samples], "ps2_run"
         ).splitlines()
         text = run(
             [
@@ -89,35 +84,39 @@ def wrong_by_sigrok():
     )
     wrong += want[: len(TYPED)] != TYPED
     console.print(
-        f"sigrok: {len(read)} bytes read, {wrong} wrong; the first {len(TYPED)} are the recorded keyboard's"
+        f"sigrok: {len(read)} bytes read, {wrong} wrong; "
+        f"the first {len(TYPED)} are the recorded keyboard's"
     )
     return wrong
 
 
-def ps2_bytes_wrong():
-    return wrong_by_sigrok() + sequences()["wrong"]
+def ps2_bytes_wrong(by_sigrok=BY_SIGROK, count=SEQUENCES, seed=1):
+    return wrong_by_sigrok(by_sigrok, seed) + sequences(count, seed)["wrong"]
 
 
-def ps2_delay_us():
-    return max(float(run([program(), "delay", 500, seed], "ps2_run").split()[0]) for seed in (1, 2))
+def ps2_delay_us(bytes_each=500, seed=1):
+    """The longest of two runs."""
+    runs = [run([program(), "delay", bytes_each, one], "ps2_run") for one in seeds(seed, 2)]
+    return max(float(words.split()[0]) for words in runs)
 
 
 FIGURES = {
     "ps2_bytes_wrong": Figure(
         ps2_bytes_wrong,
         "bytes",
-        "pass-through and injection: recording + 10^3 sequences by sigrok, 10^4 with cuts "
-        "and commands by our own host",
+        "bytes wrong in pass-through and injection: a recorded keyboard and 10^3 sequences read by "
+        "sigrok, 10^4 sequences with cut frames and commands read by our own host",
         "0",
-        lambda value: value == 0,
+        Quick({"by_sigrok": 20, "count": 200}, "the recording, 20 and 200 sequences"),
         0,
     ),
     "ps2_delay_us": Figure(
         ps2_delay_us,
         "us",
-        "eleventh edge in to eleventh edge out, less the ten bits of our frame, longest of 1000",
+        "eleventh edge in to eleventh edge out, less the ten bits of our frame, longest of 1000 "
+        "bytes",
         "<= 200",
-        lambda value: value <= 200,
+        Quick({"bytes_each": 50}, "100 bytes"),
         1,
     ),
 }

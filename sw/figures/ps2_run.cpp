@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // ps2_run -- drive the Verilated ps2_pass between a keyboard and a host that know only the
-// interface's description.
+// description of the interface.
 //
-//   ps2_run sequences COUNT SEED             keys of a person, commands, injections, the host
-//   cutting frames at random ps2_run delay COUNT SEED                 keys alone: the longest way
-//   through, us beyond the ten bits of our frame ps2_run wave RECORDING COUNT SEED FILE   a
-//   recorded keyboard, then COUNT sequences, on lines written to FILE for another decoder:
-//                                            one byte a clk, clock | data << 1; prints the bytes
-//                                            that it must find
+//   ps2_run sequences COUNT SEED               keys of a person, commands, injections, frames that
+//                                              the host cuts at random
+//   ps2_run delay COUNT SEED                   keys alone: the longest delay, in us beyond the ten
+//                                              bits of our frame
+//   ps2_run wave RECORDING COUNT SEED FILE     a recorded keyboard, then COUNT sequences, on wires
+//                                              that are written to FILE for another decoder: one
+//                                              byte per cycle, clock | data << 1; prints the bytes
+//                                              that it must find
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -19,27 +21,20 @@
 #include <string>
 #include <vector>
 
+#include "figures/common.h"
 #include "Vtop.h"
 #include "verilated.h"
 
 namespace {
 
+using moire::Random;
+
 constexpr int CLK_HZ = 400'000;
 constexpr double US = CLK_HZ / 1e6;
-const std::vector<uint8_t> START = {
-    0x14, 0x1D, 0xF0, 0x1D, 0xF0, 0x14};  // S4: left Ctrl + W; our person never types 14, 1D
+// S4's shortcut, left Ctrl + W; our person never types 14, 1D
+const std::vector<uint8_t> START = {0x14, 0x1D, 0xF0, 0x1D, 0xF0, 0x14};
 
-int clks(double us) { return std::max(1, int(us * US + 0.5)); }
-
-struct Random {  // xorshift64*
-    uint64_t state;
-    uint64_t operator()() {
-        state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
-        return (state * 2685821657736338717ULL) >> 16;
-    }
-    int below(int n) { return int((*this)() % uint64_t(n)); }
-    double between(double a, double b) { return a + (b - a) * double(below(1 << 20)) / (1 << 20); }
-};
+int cycles(double us) { return std::max(1, int(us * US + 0.5)); }
 
 bool parity(uint8_t byte) { return !(__builtin_popcount(byte) & 1); }  // of the frame
 bool bit_of(uint8_t byte, int place) {
@@ -50,17 +45,17 @@ bool bit_of(uint8_t byte, int place) {
 }
 
 struct Keyboard {
-    double half = 40;  // us of half a bit
+    double half = 40;  // us, half a bit
     bool clock_low = false, data_low = false;
     std::deque<uint8_t> keys, answers;
     std::vector<uint8_t> commands;
-    int64_t eleventh = 0;  // clk of the last eleventh edge
+    int64_t eleventh = 0;  // cycle of the last eleventh edge
     uint64_t aborts = 0;
 
     void step(int64_t now, bool clock, bool data) {
         if (state == FREE) {
             free = clock ? free + 1 : 0;
-            if (free <= clks(50)) return;
+            if (free <= cycles(50)) return;
             if (!data)
                 begin(HEAR);
             else if (!answers.empty() || !keys.empty())
@@ -69,8 +64,8 @@ struct Keyboard {
         }
         if (--left > 0) return;
         phase++;
-        left = clks(phase == 1 ? half : half / 2);
-        if (phase == 1) {  // high is over
+        left = cycles(phase == 1 ? half : half / 2);
+        if (phase == 1) {  // the high half ends
             if (!clock) return stop();
             clock_low = true;
             if (place == 10) eleventh = now;
@@ -90,7 +85,7 @@ struct Keyboard {
     uint8_t byte = 0, last = 0;
 
     void begin(State next) {
-        state = next, phase = 0, place = 0, bits = 0, left = clks(half / 2), set_data();
+        state = next, phase = 0, place = 0, bits = 0, left = cycles(half / 2), set_data();
     }
     void set_data() {
         data_low = state == SAY ? !bit_of(byte, place) : place == 10 && (bits >> 9 & 1);
@@ -117,8 +112,8 @@ struct Keyboard {
 };
 
 struct Host {
-    double cut = 0;   // share of bits after which the clock is pulled
-    double rest = 0;  // us that it is pulled after each byte
+    double cut = 0;   // share of bits after which the clock is held low
+    double rest = 0;  // us that it is held low after each byte
     bool clock_low = false, data_low = false;
     std::deque<uint8_t> orders;
     std::vector<uint8_t> heard;
@@ -137,12 +132,12 @@ struct Host {
                 bits |= int(data) << places++;
                 if (places == 11)
                     eleventh = now, judge();
-                else if (cut > 0 && random.between(0, 1) <
-                                        cut) {  // not just before the last edge: no device can tell
+                else if (cut > 0 && random.between(0, 1) < cut) {
+                    // not just before the last edge: no device can know of it
                     then(BEFORE_PULL, random.between(1, places < 10 ? 75 : 60)),
                         pull_us = random.between(100, 400), cuts++;
                 }
-            } else if (places && still > clks(300))
+            } else if (places && still > cycles(300))
                 places = bits = 0;
             else if (!places && !orders.empty())
                 clock_low = true, then(REQUEST, 110);
@@ -178,7 +173,7 @@ struct Host {
     int places = 0, bits = 0, left = 0, still = 0;
     double pull_us = 0;
 
-    void then(State next, double us) { state = next, left = clks(us); }
+    void then(State next, double us) { state = next, left = cycles(us); }
     void judge() {
         const uint8_t byte = uint8_t(bits >> 1);
         const bool whole = !(bits & 1) && (bits >> 9 & 1) == parity(byte) && (bits >> 10 & 1);
@@ -231,17 +226,17 @@ struct Bench {
         if (taken) injection.pop_front();
     }
     void wait(double us) {
-        for (int n = clks(us); n > 0; n--) clk();
+        for (int n = cycles(us); n > 0; n--) clk();
     }
 };
 
-struct Judge {  // what the host may hear: keys in order, whole injections between whole sequences,
-                // answers
+// What the host may receive: keys in order, whole injections between whole sequences, answers.
+struct Judge {
     std::deque<std::pair<uint8_t, bool>> expected;  // byte, last of its sequence
     size_t seen = 0, place = 0;
     uint64_t wrong = 0, bytes = 0, injections = 0, answers = 0;
     bool border = true;
-    void look(const std::vector<uint8_t>& heard) {
+    void judge(const std::vector<uint8_t>& heard) {
         for (; seen < heard.size(); seen++) {
             const uint8_t byte = heard[seen];
             bytes++;
@@ -296,13 +291,13 @@ int sequences(int count, uint64_t seed) {
             bench.host.orders.push_back(command), ordered.push_back(command), orders++;
         }
         bench.wait(bench.random.between(0, bench.random.below(2) ? 60'000 : 4'000));
-        for (int ms = 0; ms < 200 && judge.answers < orders; ms++)  // a host waits for its answer
-            bench.wait(1'000), judge.look(bench.host.heard);
-        judge.look(bench.host.heard);
+        for (int ms = 0; ms < 200 && judge.answers < orders; ms++)  // the host waits for its answer
+            bench.wait(1'000), judge.judge(bench.host.heard);
+        judge.judge(bench.host.heard);
     }
     bench.host.cut = 0;
     bench.wait(1'500'000);
-    judge.look(bench.host.heard);
+    judge.judge(bench.host.heard);
     uint64_t wrong =
         judge.wrong + judge.expected.size() + bench.host.damaged + bench.host.unanswered;
     wrong += started - judge.injections + (ordered != bench.keyboard.commands) +
@@ -344,7 +339,7 @@ int wave(const char* recording, int count, uint64_t seed, const char* file) {
         int next_clock, next_data;
         if (std::sscanf(line.c_str(), "%lld,%d,%d", &next, &next_clock, &next_data) != 3) continue;
         if (at >= 0)
-            for (int n = clks(std::min(double(next - at) / 24, 5'000.0)); n > 0; n--)
+            for (int n = cycles(std::min(double(next - at) / 24, 5'000.0)); n > 0; n--)
                 bench.clk(!clock, !data, false);
         at = next, clock = next_clock, data = next_data;
     }
@@ -356,10 +351,10 @@ int wave(const char* recording, int count, uint64_t seed, const char* file) {
         if (bench.injection.empty() && bench.random.below(3) == 0)
             bench.injection.assign(START.begin(), START.end());
         bench.wait(bench.random.between(0, 50'000));
-        judge.look(bench.host.heard);
+        judge.judge(bench.host.heard);
     }
     bench.wait(500'000);
-    judge.look(bench.host.heard);
+    judge.judge(bench.host.heard);
     std::ofstream(file, std::ios::binary) << bench.samples;
     std::printf("%llu\n",
                 (unsigned long long)(judge.wrong + judge.expected.size() + bench.host.damaged));

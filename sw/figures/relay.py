@@ -1,27 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of the relay: how exact its harmonics are, how late, how fast and how sure its edges, and
-what it takes of an iCE40 UP5K.
+"""Figures of the relay: how exact its correction is, how late and how reliable its edges are, and
+how much of an iCE40 UP5K it takes.
 
-The soak of 10^9 edges is `make soak K=relay`.
+The campaign of 10^9 edges is `make soak K=relay`.
 """
 
 from functools import cache
 from pathlib import Path
 
-from figures.common import Figure, bar, console
-from figures.synthesis import netlist_of, placed, source_of
+from figures.common import Figure, Quick, bar, console, seeds, shares
+from figures.synthesis import ELABORATED, elaborated, netlist_of, placed, source_of
 from twin.build import run, simulation
 
 RELAY = Path(__file__).resolve().parents[2] / "rtl" / "relay.sv"
 DRIVER = Path(__file__).with_name("relay_run.cpp")
-AS_MEASURED = {"K": 16, "BAUD": 3_000_000}  # a fast line, so that runs need not wait for it
+AS_MEASURED = {"K": 16, "BAUD": 3_000_000}  # a fast UART, so that runs need not wait for it
 CLK_MHZ = 48
 EDGES = 10**7
 SHARE = 10**6  # edges of one run, each with a seed, and so a ring, of its own
 POINTS = 2048
 RINGS = 4
 UP5K = ["--up5k", "--package", "sg48"]
-PLACEMENTS = (1, 2, 3)  # seeds
+PLACEMENTS = 3  # the figure is the worst of them
 RATES_MHZ = (24, 30, 36, 40, 44, 46, 47, 47.5)
 
 
@@ -31,31 +31,29 @@ def relay_run(*words):
     return dict(zip(told[1::2], map(float, told[::2])))
 
 
-def harmonic_arith_arcsec():
-    """Largest difference from float64 at 2048 places of the turn each of four rings, all 16 orders
-    on, 32768 counts a turn.
+def harmonic_arith_arcsec(points=POINTS, rings=RINGS, seed=1):
+    """Largest difference from float64 at so many positions per turn and ring, all 16 orders on,
+    32768 counts per turn.
     """
-    return max(relay_run("accuracy", POINTS, seed)["arcsec"] for seed in range(1, RINGS + 1))
+    return max(relay_run("accuracy", points, one)["arcsec"] for one in seeds(seed, rings))
 
 
-def relay_latency_us():
-    """Longest of 20 000 edges, without filter, from the pin of the read head to the pin of the
-    controller.
+def relay_latency_us(rings=RINGS, seed=1):
+    """Longest of 20 000 edges per ring, without filter, from the pin of the read head to the pin of
+    the controller.
     """
-    return max(relay_run("latency", seed)["clk"] for seed in range(1, RINGS + 1)) / CLK_MHZ
+    return max(relay_run("latency", one)["clk"] for one in seeds(seed, rings)) / CLK_MHZ
 
 
-def count_errors(edges=EDGES, mhz=24):
-    """Places at which the output is not the corrected input, over so many edges at a rate that is
-    no multiple of the clk.
+def count_errors(edges=EDGES, mhz=24, seed=1):
+    """Cycles in which the output is not the corrected input, over so many edges whose rate is
+    independent of the clock.
     """
     totals = {}
     with bar(f"{edges:.0e} edges") as progress:
         task = progress.add_task("", total=edges)
-        for seed, first in enumerate(range(0, edges, SHARE), start=1):
-            for name, value in relay_run(
-                "edges", mhz * 1e6, min(SHARE, edges - first), seed
-            ).items():
+        for size, number in shares(edges, SHARE, seed):
+            for name, value in relay_run("edges", mhz * 1e6, size, number).items():
                 totals[name] = totals.get(name, 0) + value
             progress.update(task, completed=totals["edges"])
     console.print(
@@ -64,26 +62,27 @@ def count_errors(edges=EDGES, mhz=24):
     return totals["wrong"]
 
 
-def relay_count_errors():
-    """10^7 edges at 24 million a second with reversals, ten rings."""
-    return count_errors()
+def relay_count_errors(edges=EDGES, seed=1):
+    """Edges at 24 million per second with reversals, a ring for each million."""
+    return count_errors(edges, seed=seed)
 
 
-def relay_edge_mhz():
-    """The highest of a row of edge rates at which 10^6 edges leave no wrong count."""
+def relay_edge_mhz(edges=SHARE, rates=RATES_MHZ, seed=1):
+    """The highest of a row of edge rates at which so many edges leave no wrong count."""
     best = 0.0
-    for mhz in RATES_MHZ:
-        if count_errors(SHARE, mhz):
+    for mhz in rates:
+        if count_errors(edges, mhz, seed):
             break
         best = mhz
     return best
 
 
 @cache
-def up5k():
+def up5k(first):
     netlist = netlist_of(source_of("relay"), {"K": 16}, "ice40", 1)
     tries = [
-        placed(netlist, "ice40", UP5K, 24, seed, "--pcf-allow-unconstrained") for seed in PLACEMENTS
+        placed(netlist, "ice40", UP5K, 24, seed, "--pcf-allow-unconstrained")
+        for seed in seeds(first, PLACEMENTS)
     ]
     console.print("placements: " + ", ".join(f"{mhz:.1f}" for mhz, _ in tries) + " MHz")
     fmax, used = min(tries, key=lambda one: one[0])
@@ -98,62 +97,71 @@ def up5k():
     return {"lc": part["lc"]["used"], "lc_of": part["lc"]["available"], "fmax_mhz": fmax}
 
 
-def relay_up5k_lc():
-    """Logic cells of the whole relay, K = 16, with line and flash."""
-    return float(up5k()["lc"])
+def on_up5k(name, place, seed):
+    """Of the whole relay, K = 16, with UART and flash; the worst of three placements."""
+    if not place:
+        return elaborated(source_of("relay"), {"K": 16})
+    return float(up5k(seed)[name])
 
 
-def relay_up5k_mhz():
-    """The fastest clk that nextpnr promises for each of three placements."""
-    return up5k()["fmax_mhz"]
+def relay_up5k_lc(place=True, seed=1):
+    return on_up5k("lc", place, seed)
+
+
+def relay_up5k_mhz(place=True, seed=1):
+    return on_up5k("fmax_mhz", place, seed)
 
 
 FIGURES = {
     "harmonic_arith_arcsec": Figure(
         harmonic_arith_arcsec,
         "arcsec",
-        "correction of the relay against float64, all 16 orders on",
+        "largest difference of the relay's correction from float64, all 16 orders on, 2048 "
+        "positions of each of four rings",
         "<= 0.01",
-        lambda value: value <= 0.01,
+        Quick({"points": 64, "rings": 1}, "64 positions of one ring"),
         4,
     ),
     "relay_latency_us": Figure(
         relay_latency_us,
         "us",
-        "edge in to edge out at 48 MHz, K = 16",
-        "<= 1 (the paper polls every 400)",
-        lambda value: value <= 1,
+        "edge in to edge out at 48 MHz, 16 orders, no input filter, longest of 80 000 edges",
+        "<= 1",
+        Quick({"rings": 1}, "one ring"),
+        note="the paper polls every 400",
     ),
     "relay_edge_mhz": Figure(
         relay_edge_mhz,
         "MHz",
-        "input edge rate without a lost count at 48 MHz",
-        ">= 24 (the paper 3)",
-        lambda value: value >= 24,
+        "highest input edge rate at which 10^6 edges leave no wrong count, at 48 MHz",
+        ">= 24",
+        Quick({"edges": 50_000, "rates": (24, 47.5)}, "50 000 edges at 24 and at 47.5 MHz"),
         1,
+        "the paper 3",
     ),
     "relay_count_errors": Figure(
         relay_count_errors,
-        "",
-        "output that is not the corrected input, 10^7 edges with reversals",
+        "cycles",
+        "cycles in which the output is not the corrected input, 10^7 edges at 24 MHz with "
+        "reversals, ten rings",
         "0",
-        lambda value: value == 0,
+        Quick({"edges": 200_000}, "200 000 edges of one ring"),
         0,
     ),
     "relay_up5k_lc": Figure(
         relay_up5k_lc,
         "LC",
-        "whole relay, K = 16, on iCE40 UP5K",
-        "<= 5280, all there are",
-        lambda value: value <= 5280,
+        "logic cells of the whole relay, 16 orders, on an iCE40 UP5K, which has 5280",
+        "<= 5280",
+        ELABORATED,
         0,
     ),
     "relay_up5k_mhz": Figure(
         relay_up5k_mhz,
         "MHz",
-        "the same, highest clk, worst of placement seeds 1 to 3",
+        "highest clock of the same, worst of placement seeds 1 to 3",
         ">= 24",
-        lambda value: value >= 24,
+        ELABORATED,
         1,
     ),
 }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of S0: the X-Y stage, its line, its node, its twin."""
+"""Figures of S0: the X-Y stage, its bus, its node, its twin."""
 
 import itertools
 import random
@@ -7,8 +7,8 @@ import random
 import numpy as np
 
 from experiments import s0_stage
-from figures.common import Figure, bar, console
-from figures.synthesis import synthesise
+from figures.common import Figure, Quick, bar, console, soaked
+from figures.synthesis import ELABORATED, elaborated, source_of, synthesise
 from moire.bus.protocol import (
     TO_NODE,
     Exchange,
@@ -29,17 +29,16 @@ SEED = 1
 SETTLE_TIME = PARAMETERS["settle_time"].id
 ADDRESS = 1
 READY = ready_byte(ADDRESS, TO_NODE)
-CELLS = 11  # of a character on the line
-TURNAROUND = [
-    1
-] * 3  # cells before the master speaks again: the node's driver lets go of the line meanwhile
+CELLS = 11  # of a character on the bus
+TURNAROUND = [1] * 3  # cells before the master sends again, while the node's driver releases
 ANSWER_CELLS = 150  # of silence after which no answer comes any more
 READINGS = 8  # of a zero
-WORK_CELLS = 400  # that a request may take, at the low clk of the bench
+S0_NODE = {"CLK_HZ": 60_000_000, "DRIVES": 0b1101, "FIRMWARE": "build/firmware/firmware.hex"}
+WORK_CELLS = 400  # that a request may take, at the low clock of the bench
 
 
-def homed_stage(progress):
-    stage = s0_stage.Stage.power_up(SEED)
+def homed_stage(progress, seed):
+    stage = s0_stage.Stage.power_up(seed)
     stage.find()
     task = progress.add_task("", total=len(stage.axes))
     for name in stage.axes:
@@ -48,36 +47,37 @@ def homed_stage(progress):
     return stage
 
 
-def s0_coarse_um_max(count=100):
+def s0_coarse_um_max(count=100, seed=SEED):
     with bar("homing") as progress:
-        stage = homed_stage(progress)
+        stage = homed_stage(progress, seed)
     with bar("moves") as progress:
         task = progress.add_task("", total=count)
-        moves = s0_stage.random_moves(stage, count, SEED, done=lambda move: progress.advance(task))
+        moves = s0_stage.random_moves(stage, count, seed, done=lambda move: progress.advance(task))
     errors, times = (
         np.array([getattr(move, name) for move in moves]) for name in ("error_nm", "time_s")
     )
     console.print(
-        f"true position - target: max {np.abs(errors).max():.1f} nm, rms {np.sqrt((errors**2).mean()):.1f} nm, "
-        f"mean {errors.mean():.1f} nm; a move takes {np.median(times):.2f} s (median), {times.max():.2f} s at most"
+        f"true position - target: max {np.abs(errors).max():.1f} nm, "
+        f"rms {np.sqrt((errors**2).mean()):.1f} nm, mean {errors.mean():.1f} nm; "
+        f"a move takes {np.median(times):.2f} s (median), {times.max():.2f} s at most"
     )
     return np.abs(errors).max() / 1000
 
 
 def apart_nm(stage):
-    """True place less position; the place is the mean of those before and after the answer."""
+    """True position, the mean of before and after the answer, less the answer."""
     before = stage.true_nm("X", from_zero=False)
     position = stage.axes["X"].status().position_nm
     return (before + stage.true_nm("X", from_zero=False)) / 2 - float(position)
 
 
-def s0_home_spread_nm():
-    source, readings = random.Random(SEED), []
-    stage = s0_stage.Stage.power_up(SEED)
+def s0_home_spread_nm(count=20, seed=SEED):
+    source, readings = random.Random(seed), []
+    stage = s0_stage.Stage.power_up(seed)
     stage.find()
-    with bar("homings from random places") as progress:
-        task = progress.add_task("", total=20)
-        for _ in range(20):
+    with bar("homings from random positions") as progress:
+        task = progress.add_task("", total=count)
+        for _ in range(count):
             stage.home("X")
             stage.dwell(0.05)
             readings.append([apart_nm(stage) for _ in range(READINGS)])
@@ -85,13 +85,14 @@ def s0_home_spread_nm():
             stage.move("X", source.uniform(-0.5e6, 1.5e6))
     zeros, single = np.mean(readings, axis=1), np.ptp(readings)
     console.print(
-        f"zero at {zeros.mean():.2f} nm, rms {zeros.std():.2f} nm; the switch scatters by +-200 nm. Each zero is the mean of "
-        f"{READINGS} readings, since the axis moves while it holds: single ones spread by {single:.1f} nm"
+        f"zero at {zeros.mean():.2f} nm, rms {zeros.std():.2f} nm; the switch scatters by "
+        f"+-200 nm. Each zero is the mean of {READINGS} readings, since the axis moves while it "
+        f"holds: single ones spread by {single:.1f} nm"
     )
     return np.ptp(zeros)
 
 
-# ------------------------------------------------------------------ the line
+# ------------------------------------------------------------------ the bus
 
 
 def requests(source):
@@ -117,34 +118,32 @@ def requests(source):
 
 
 def damaged(cells, source):
-    """The cells with one, two or three of them turned over, none twice."""
+    """The cells with one, two or three of them inverted."""
     cells = list(cells)
-    for place in source.sample(range(len(cells)), source.randint(1, 3)):
-        cells[place] ^= 1
+    for position in source.sample(range(len(cells)), source.randint(1, 3)):
+        cells[position] ^= 1
     return cells
 
 
 def heard(cells):
-    """Words that a PC's port makes of bit cells: a character begins with a low cell; it counts
-    without a stop bit too, a break does not.
+    """Words that a PC's port makes of bit cells: a character begins with a low cell. It counts
+    without a stop bit, too, but a break does not.
     """
-    words, place, idle = [], 0, True
-    while place <= len(cells) - CELLS:
-        if cells[place] or not idle:
-            idle, place = bool(cells[place]), place + 1
+    words, at, idle = [], 0, True
+    while at <= len(cells) - CELLS:
+        if cells[at] or not idle:
+            idle, at = bool(cells[at]), at + 1
             continue
-        idle, word = (
-            bool(cells[place + CELLS - 1]),
-            sum(bit << n for n, bit in enumerate(cells[place + 1 : place + 10])),
-        )
+        idle = bool(cells[at + CELLS - 1])
+        word = sum(bit << n for n, bit in enumerate(cells[at + 1 : at + 10]))
         if idle or word:
             words.append(word)
-        place += CELLS
+        at += CELLS
     return words
 
 
 def node_answer(bench):
-    """What the node has to say: its last reply, None if it is not whole."""
+    """(last reply of the node, None if it is damaged; its words)"""
     words = bench.exchange(TURNAROUND + cells_of(read_words(ADDRESS)), quiet_cells=ANSWER_CELLS)
     if len(words) < 7 or list(frame(words[0], bytes(words[2:-4]))) != words[1:]:
         return None, words
@@ -152,11 +151,12 @@ def node_answer(bench):
 
 
 class Judge:
-    """Says whether a node has accepted a frame: it repeats its last reply until then. The sequence
-    number of the new reply does not
-    matter, since the damage may lie in that of the frame. Only a frame with the number of the one
-    before would go unseen, which the
-    node takes for a repetition and does not carry out."""
+    """Decides whether a node has accepted a frame: it repeats its last reply until then.
+
+    The sequence number of the new reply does not matter, since the number of the frame itself may
+    be damaged. Only a frame with the number of the frame before would not be noticed; the node
+    takes it for a repetition and does not carry it out.
+    """
 
     def __init__(self, reply):
         self.last = reply
@@ -166,11 +166,11 @@ class Judge:
         return changed
 
 
-def s0_bus_wrong(frames=100_000, make_bench=FrameBench):
-    """Each frame damaged on its way to the node, and the node's reply damaged on its way to the
-    host. Every hundredth frame
-    goes undamaged and must be accepted, so that the count of zero means something."""
-    source, bench = random.Random(SEED), make_bench(ADDRESS)
+def s0_bus_wrong(frames=100_000, make_bench=FrameBench, seed=SEED):
+    """Each frame is damaged on its way to the node, and the reply on its way to the host. After
+    every hundredth an undamaged frame must be accepted, so that a count of zero means something.
+    """
+    source, bench = random.Random(seed), make_bench(ADDRESS)
     wrong = wrong_host = lost = good = 0
     judge, bodies = Judge(node_answer(bench)[0]), requests(source)
     with bar("damaged frames") as progress:
@@ -186,9 +186,7 @@ def s0_bus_wrong(frames=100_000, make_bench=FrameBench):
             ready = bench.exchange(
                 TURNAROUND + sent[: len(command)], enough=1, quiet_cells=ANSWER_CELLS
             )
-            if ready and ready != [
-                READY
-            ]:  # the damage made a command to reply of it: hear the node out
+            if ready and ready != [READY]:  # the damage made it a command to reply
                 bench.exchange(TURNAROUND, quiet_cells=ANSWER_CELLS)
             if bench.exchange(
                 TURNAROUND + sent[len(command) :], enough=1, quiet_cells=ANSWER_CELLS // 2
@@ -208,12 +206,12 @@ def s0_bus_wrong(frames=100_000, make_bench=FrameBench):
                 exchange = Exchange(ADDRESS, bytes([reply.sequence, reply.operation]), tries=1)
                 exchange.feed([READY])
                 exchange.feed(heard(damaged(cells_of(words), source) + [1] * CELLS))
-                wrong_host += (
-                    exchange.state == State.DONE and exchange.reply != reply
-                )  # only the last stop bit hit: it is whole
+                # with the last stop bit alone damaged the reply is whole, and right
+                wrong_host += exchange.state == State.DONE and exchange.reply != reply
     console.print(
-        f"{frames} damaged requests: {wrong} accepted by the node; their replies damaged: {wrong_host} accepted by the host; "
-        f"{good} of {frames // 100} undamaged requests between them accepted; answers missing afterwards: {lost}"
+        f"{frames} damaged requests: {wrong} accepted by the node; their damaged replies: "
+        f"{wrong_host} accepted by the host; {good} of {frames // 100} undamaged requests between "
+        f"them accepted; answers missing afterwards: {lost}"
     )
     if good != frames // 100 or lost:
         raise BusError(
@@ -225,11 +223,11 @@ def s0_bus_wrong(frames=100_000, make_bench=FrameBench):
 # ------------------------------------------------------------------ node and twin
 
 
-def node_ecp5_mhz():
+def node_ecp5_mhz(place=True, seed=1):
     build.firmware()
-    found = synthesise(
-        "node", {"CLK_HZ": 60_000_000, "DRIVES": 0b1101, "FIRMWARE": "build/firmware/firmware.hex"}
-    )
+    if not place:
+        return elaborated(source_of("node"), S0_NODE)
+    found = synthesise("node", S0_NODE, seed=seed)
     used = ", ".join(
         f"{found[name]} of {found[f'{name}_of']} {words}"
         for name, words in (
@@ -239,65 +237,65 @@ def node_ecp5_mhz():
             ("dsp", "DSP"),
         )
     )
-    console.print(f"LFE5U-25F-6, one axis with bridge, converter, fine stage and filters: {used}")
+    console.print(f"LFE5U-25F-6, one axis with bridge, ADC, fine stage and filters: {used}")
     return found["fmax_mhz"]
 
 
-def twin_realtime():
+def twin_realtime(simulated_s=0.5):
     console.print(f"CLK_HZ {CLK_HZ}, two nodes and their machines, one core")
-    return realtime_factor(simulated_s=0.5)
+    return realtime_factor(simulated_s)
 
 
 FIGURES = {
     "s0_coarse_um_max": Figure(
         s0_coarse_um_max,
         "um",
-        "largest |true position - target| of 100 random moves (0.1 um to 2 mm), motor only",
-        "at most 0.05 (paper 0.8)",
-        lambda v: v <= 0.05,
+        "largest |true position - target| of 100 random moves (0.1 um to 2 mm), motor only; a "
+        "perfect scale, no vibration, no drift",
+        "<= 0.05",
+        Quick({"count": 3}, "three moves"),
         4,
+        "the paper 0.8",
     ),
     "s0_home_spread_nm": Figure(
         s0_home_spread_nm,
         "nm",
-        "spread of the zero point over 20 homings from random places",
-        "at most 5",
-        lambda v: v <= 5,
+        "spread of the zero over 20 homings from random positions, each the mean of 8 readings "
+        "(single readings 4.4 to 6.7), the switch scattering by +-200 nm",
+        "<= 5",
+        Quick({"count": 2}, "two homings"),
         2,
     ),
     "s0_bus_wrong": Figure(
         s0_bus_wrong,
         "frames",
-        "frames accepted wrongly in 10^5 with one to three flipped bits, each way",
+        "frames accepted wrongly of 10^5 with one to three flipped bits, each way",
         "0",
-        lambda v: v == 0,
+        Quick({"frames": 400}, "400 frames"),
         0,
     ),
     "node_ecp5_mhz": Figure(
         node_ecp5_mhz,
         "MHz",
-        "S0 node placed and routed for LFE5U-25F-6",
-        "at least 60",
-        lambda v: v >= 60,
+        "highest clock of the S0 node with bridge, ADC, fine stage and filters, placed and routed "
+        "for an LFE5U-25F-6, placement seed 1",
+        ">= 60",
+        ELABORATED,
         1,
     ),
     "twin_realtime": Figure(
         twin_realtime,
         "s/s",
-        "simulated seconds per second of one core, two nodes and their machines",
-        "at least 0.3",
-        lambda v: v >= 0.3,
+        "simulated seconds per second of one core, two nodes and their machines, drives off, "
+        f"CLK_HZ = {CLK_HZ / 1e6:g} MHz, best of five",
+        ">= 0.3",
+        Quick({"simulated_s": 0.05}, "0.05 s each", "> 0.05"),
         2,
     ),
 }
 
 
-def soaked(name, *arguments):
-    value = FIGURES[name].measure(*arguments)
-    return value, FIGURES[name].good(value)
-
-
 SOAK = {
-    "s0_moves": lambda: soaked("s0_coarse_um_max", 5000),
-    "s0_bus": lambda: soaked("s0_bus_wrong", 2_000_000),
+    "s0_moves": lambda: soaked(FIGURES["s0_coarse_um_max"], 5000),
+    "s0_bus": lambda: soaked(FIGURES["s0_bus_wrong"], 2_000_000),
 }

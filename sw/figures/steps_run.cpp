@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // steps_run -- drive the Verilated step_generator and judge its pins from outside, by a driver that
-// knows only data sheet and targets.
+// knows only its data sheet and the targets.
 //
-//   steps_run reversals COUNT SEED     random lines with reversals, random timings and polarity,
-//   switched off and on at random steps_run rate SEED                one random speed, up to a step
-//   each 2 clk, for 4 million clk
+//   steps_run reversals COUNT SEED    random lines with reversals, random timings and polarity,
+//                                     switched off and on at random
+//   steps_run rate SEED               one random speed, up to a step every 2 cycles, for 4 million
+//                                     cycles
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -13,42 +14,35 @@
 #include <cmath>
 #include <memory>
 
+#include "figures/common.h"
 #include "Vtop.h"
 #include "verilated.h"
 
 namespace {
 
-constexpr int64_t ONE = 1 << 16;
+using moire::Random;
 
-struct Random {  // xorshift64*
-    uint64_t state;
-    uint64_t operator()() {
-        state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
-        return (state * 2685821657736338717ULL) >> 16;
-    }
-    int64_t below(int64_t n) { return int64_t((*this)() % uint64_t(n)); }
-    bool one_in(unsigned n) { return below(n) == 0; }
-};
+constexpr int64_t ONE = 1 << 16;
 
 struct Driver {  // what a stepper driver sees on its two pins
     int64_t count = 0, now = 0, rose = -1'000'000, fell = -1'000'000, turned = -1'000'000;
     uint64_t violations = 0, turns = 0;
     bool pulse = false, up = false, edge = false;
-    void look(bool step, bool direction, const Vtop& asked) {
+    void judge(bool step, bool direction, const Vtop& set) {
         now++, edge = false;
         if (direction != up) {
-            if (pulse || step) violations++;  // in a pulse
-            violations += now - fell < std::max<int64_t>(asked.hold_cycles, 1);
+            if (pulse || step) violations++;  // within a pulse
+            violations += now - fell < std::max<int64_t>(set.hold_cycles, 1);
             up = direction, turned = now, turns++;
         }
         if (step == pulse) return;
         pulse = step, edge = step;
         if (step) {
-            violations += now - fell < std::max<int64_t>(asked.low_cycles, 1);
-            violations += now - turned < std::max<int64_t>(asked.setup_cycles, 1);
+            violations += now - fell < std::max<int64_t>(set.low_cycles, 1);
+            violations += now - turned < std::max<int64_t>(set.setup_cycles, 1);
             rose = now, count += up ? 1 : -1;
         } else {
-            violations += now - rose < std::max<int64_t>(asked.high_cycles, 1);
+            violations += now - rose < std::max<int64_t>(set.high_cycles, 1);
             fell = now;
         }
     }
@@ -61,17 +55,17 @@ struct Bench {
     void clk() {
         pins->clk = 1, pins->eval();
         pins->clk = 0, pins->eval();
-        driver.look(pins->step ^ pins->step_low, pins->direction ^ pins->direction_low, *pins);
+        driver.judge(pins->step ^ pins->step_low, pins->direction ^ pins->direction_low, *pins);
     }
     void reset() {
         pins->rst = 1;
         for (int n = 0; n < 4; n++) clk();
         pins->rst = 0;
     }
-    void target(int64_t place) { pins->target = uint64_t(place) & 0xFFFFFFFFFFFFULL; }
+    void target(int64_t position) { pins->target = uint64_t(position) & 0xFFFFFFFFFFFFULL; }
     void settings(Random& random, unsigned longest, unsigned period) {
         pins->enable = 0;
-        for (int n = 0; n < 600; n++) clk();  // comes to rest
+        for (int n = 0; n < 600; n++) clk();  // until it is at rest
         pins->high_cycles = random.below(longest + 1), pins->low_cycles = random.below(longest + 1);
         pins->setup_cycles = random.below(longest + 1),
         pins->hold_cycles = random.below(longest + 1);
@@ -81,7 +75,7 @@ struct Bench {
             pins->clk = 1, pins->eval();
             pins->clk = 0, pins->eval();
         }
-        const int64_t count = driver.count;  // a new polarity is no step
+        const int64_t count = driver.count;  // a new polarity is not a step
         const uint64_t turns = driver.turns, violations = driver.violations;
         driver = Driver{};
         driver.count = count, driver.turns = turns, driver.violations = violations;
@@ -89,32 +83,32 @@ struct Bench {
     }
 };
 
-int64_t whole(int64_t place) { return place >> 16; }
+int64_t whole(int64_t position) { return position >> 16; }
 
-int reversals(uint64_t wanted, uint64_t seed) {
+int reversals(uint64_t required, uint64_t seed) {
     Random random{seed * 0x9E3779B97F4A7C15ULL + 1};
     Bench bench;
     auto& pins = *bench.pins;
     bench.reset();
-    int64_t place = 0, lost = 0, clks = 0;
+    int64_t position = 0, lost = 0, clks = 0;
     uint64_t overruns = 0, lines = 0, offs = 0;
-    while (bench.driver.turns < wanted) {
+    while (bench.driver.turns < required) {
         const unsigned period = 60 + random.below(300), longest = random.one_in(2) ? 6 : 40;
-        bench.target(place);
+        bench.target(position);
         bench.settings(random, longest, period);
         const int64_t per_step =
             std::max<int64_t>(pins.high_cycles, 1) + std::max<int64_t>(pins.low_cycles, 1);
-        const int64_t fastest = std::min<int64_t>(ONE * period / per_step, 200 * ONE);  // of a line
+        const int64_t fastest = std::min<int64_t>(ONE * period / per_step, 200 * ONE);  // per line
         pins.enable = 1;
-        const int64_t origin = whole(place) - int32_t(pins.steps);
+        const int64_t origin = whole(position) - int32_t(pins.steps);
         for (int stretch = 0; stretch < 400; stretch++) {
             const int64_t speed =
                 (random.one_in(3) ? random.below(3 * ONE) : random.below(fastest)) *
                 (random.one_in(2) ? 1 : -1);
             const int length = 1 + random.below(2);
             for (int n = 0; n < length; n++) {
-                place += speed, lines++;
-                bench.target(place), pins.tick = 1;
+                position += speed, lines++;
+                bench.target(position), pins.tick = 1;
                 for (unsigned k = 0; k < period; k++) {
                     bench.clk(), clks++;
                     pins.tick = 0;
@@ -124,8 +118,9 @@ int reversals(uint64_t wanted, uint64_t seed) {
             overruns += pins.overrun;
         }
         for (int n = 0; n < 4000; n++) bench.clk();
-        lost += int32_t(pins.steps) != whole(place) - origin;  // and the target is reached
-        pins.tick = 1, place += random.below(100 * ONE), bench.target(place);  // off in mid-flow
+        lost += int32_t(pins.steps) != whole(position) - origin;  // the target must be reached
+        pins.tick = 1, position += random.below(100 * ONE),
+        bench.target(position);  // off in motion
         for (int n = 0, off = random.below(period); n < off; n++) bench.clk(), pins.tick = 0;
         pins.enable = 0, pins.tick = 0, offs++;
         for (int n = 0; n < 200; n++)
@@ -145,39 +140,38 @@ int rate(uint64_t seed) {
     auto& pins = *bench.pins;
     bench.reset();
     const int64_t period = 1000 + random.below(60000);
-    int64_t place_0 = random.below(ONE * 1000);
+    int64_t start = random.below(ONE * 1000);
     const int64_t top = ONE * period / 2;
     const int64_t span = std::max<int64_t>(top >> random.below(12), 2 * ONE);
     const int64_t speed =
-        seed % 8 == 1 ? top : 1 + span - random.below(span / 2 + 1);  // 2^-16 step a line
+        seed % 8 == 1 ? top : 1 + span - random.below(span / 2 + 1);  // 2^-16 step per line
     const int64_t slope = std::min(speed, top);
-    bench.target(place_0), bench.settings(random, 0, unsigned(period)), pins.enable = 1;
-    place_0 += 2 * ONE, bench.target(place_0),
-        pins.tick = 1;  // heads up; at the top rate a turn is not made up
+    bench.target(start), bench.settings(random, 0, unsigned(period)), pins.enable = 1;
+    start += 2 * ONE, bench.target(start),
+        pins.tick = 1;  // set to up; at the highest rate it cannot catch up after a reversal
     for (int64_t k = 0; k < period + 20; k++) bench.clk(), pins.tick = 0;
-    const int64_t origin = whole(place_0) - bench.driver.count;
-    int64_t place = place_0, clks = 0, edges = 0, first = 0, last = 0;
+    const int64_t origin = whole(start) - bench.driver.count;
+    int64_t position = start, clks = 0, edges = 0, first = 0, last = 0;
     double jitter = 0;
     while (clks < 4'000'000) {
-        place += slope, bench.target(place), pins.tick = 1;
+        position += slope, bench.target(position), pins.tick = 1;
         for (int64_t k = 0; k < period; k++) {
             bench.clk(), clks++;
             pins.tick = 0;
             if (!bench.driver.edge || clks < 2 * period) continue;
             if (!edges) first = clks;
             last = clks, edges++;
-            // the step to `passed` is on the line at this clk, counted from the first tick; tick,
-            // line and pin take 2 clk
+            // the step to `passed` is on the line in this cycle, counted from the first tick; tick,
+            // line and pin take 2 cycles
             const int64_t passed = origin + bench.driver.count;
-            const double ideal =
-                double((__int128(passed * ONE - place_0) * period)) / double(slope);
+            const double ideal = double((__int128(passed * ONE - start) * period)) / double(slope);
             jitter = std::max(jitter, std::fabs(double(clks - 2) - ideal));
         }
     }
-    const double wanted = double(slope) / double(ONE) / double(period),
+    const double required = double(slope) / double(ONE) / double(period),
                  measured = double(edges - 1) / double(last - first);
     std::printf("%.6f ppm %.6f jitter %.9f rate %lld edges\n",
-                std::fabs(measured / wanted - 1) * 1e6, jitter, wanted, (long long)edges);
+                std::fabs(measured / required - 1) * 1e6, jitter, required, (long long)edges);
     return 0;
 }
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// firmware_fuzz -- coverage-guided fuzzing of the whole firmware on this computer: words of the
-// line, registers and time as they come.
+// firmware_fuzz -- coverage-guided fuzzing of the whole firmware on this computer, with random
+// words on the bus, registers and times.
 //
-//     firmware_fuzz SECONDS SEED      prints `runs edges corpus`; a sanitizer or the time limit
-//     ends it with the input on standard error firmware_fuzz INPUT             plays that input
-//     again
+//     firmware_fuzz SECONDS SEED    prints `runs edges corpus`; a sanitizer or the time limit ends
+//                                   it with the input on standard error
+//     firmware_fuzz INPUT           plays that input again
 //
-// An input is a script: what the line receives, what registers hold, how time goes on. The compiler
+// An input is a script: what the bus receives, what registers hold, how time passes. The compiler
 // calls trace_pc at every edge; an input that reaches a new edge, or one a new order of magnitude
 // of times, joins the corpus that the next inputs are made of.
 #include <signal.h>
@@ -25,8 +25,8 @@
 #define MAP_WORDS 2048u  // the register map, up to 0x2000
 #define QUEUE 256u
 #define AXES 2u
-#define CLK 4000000u
-#define SEGMENTS 16u    // that the queue of a profile player takes
+#define CLK_HZ 4000000u
+#define SEGMENTS 16u    // in the queue of a profile player
 #define RUN_SECONDS 30  // of one input: more is a hang
 
 void firmware_start(void);
@@ -46,7 +46,7 @@ static uint32_t map[MAP_WORDS], clk;
 static struct queue {
     uint16_t words[QUEUE];
     unsigned put, taken;
-} line_words, peer_bytes;
+} bus_words, peer_bytes;
 
 void __sanitizer_cov_trace_pc(void);
 void __sanitizer_cov_trace_pc(void) {
@@ -71,18 +71,18 @@ static uint32_t take(struct queue* queue, uint32_t present) {
     return queue->taken < queue->put ? queue->words[queue->taken++ % QUEUE] | present : 0;
 }
 
-// Anything that a register can hold; what the hardware promises of one holds here too.
+// Anything that a register can hold; what the hardware guarantees of one is true here, too.
 uint32_t register_read(uint32_t offset) {
     uint32_t held = map[offset / 4 % MAP_WORDS];
     if (is_axis_register(offset, AXIS_STATE) && FIELD_GET(held, AXIS_STATE_QUEUE_FREE) > SEGMENTS)
         held = (held & ~AXIS_STATE_QUEUE_FREE_MASK) | FIELD_PUT(AXIS_STATE_QUEUE_FREE, SEGMENTS);
     switch (offset) {
     case NODE_MAP_CRC: return MAP_CRC;
-    case NODE_CLK_HZ: return CLK;
+    case NODE_CLK_HZ: return CLK_HZ;
     case NODE_BUILD: return AXES | 1u << 4 | 64u << 8;
     case NODE_TIME_STAMP_LOW: return clk += 10;
-    case BUS_BASE + BUS_RECEIVE: return take(&line_words, BUS_RECEIVE_PRESENT_MASK);
-    case BUS_BASE + BUS_CRC: return 0;  // of anything: so every CRC-32 of zeros is right
+    case BUS_BASE + BUS_RECEIVE: return take(&bus_words, BUS_RECEIVE_PRESENT_MASK);
+    case BUS_BASE + BUS_CRC: return 0;  // so that every CRC-32 of zeros is right
     case PERIPHERALS_BASE + PERIPHERALS_BUILT: return ~0u;
     case PERIPHERALS_BASE + PERIPHERALS_PEER_RECEIVE:
         return take(&peer_bytes, PERIPHERALS_PEER_RECEIVE_PRESENT_MASK);
@@ -92,7 +92,7 @@ uint32_t register_read(uint32_t offset) {
 
 void register_write(uint32_t offset, uint32_t value) { map[offset / 4 % MAP_WORDS] = value; }
 
-static void receive(unsigned word) { put(&line_words, word); }
+static void receive(unsigned word) { put(&bus_words, word); }
 
 static void receive_frame(const uint8_t* body, unsigned length) {
     receive(0x21u | BUS_RECEIVE_COMMAND_MASK);
@@ -112,7 +112,7 @@ static void play(const struct input* input) {
 #define NEXT (at < input->length ? input->bytes[at++] : 0u)
     memset(map, 0, sizeof map);
     clk = 0;
-    line_words = peer_bytes = (struct queue){0};
+    bus_words = peer_bytes = (struct queue){0};
     srand(1);
     firmware_start();
     while (at < input->length) {
@@ -126,8 +126,7 @@ static void play(const struct input* input) {
             break;
         }
         case FRAME: {
-            unsigned length =
-                NEXT % (2u * BUS_LONGEST_BODY);  // the hardware marks none that is too long as good
+            unsigned length = NEXT % (2u * BUS_LONGEST_BODY);  // the hardware refuses long ones
             if (length > input->length - at) length = input->length - at;
             receive_frame(&input->bytes[at], length);
             at += length;
@@ -139,14 +138,14 @@ static void play(const struct input* input) {
             for (unsigned n = 0; n < 16; n++) firmware_poll();
             break;
         case REGISTER: {
-            unsigned place = NEXT, value = 0;
-            place = (place | NEXT << 8) % MAP_WORDS;
+            unsigned word = NEXT, value = 0;
+            word = (word | NEXT << 8) % MAP_WORDS;
             for (unsigned n = 0; n < 4; n++) value = value << 8 | NEXT;
-            map[place] = value;
+            map[word] = value;
             break;
         }
         default:  // up to 1.3 s
-            clk += NEXT * (CLK / 200u);
+            clk += NEXT * (CLK_HZ / 200u);
             firmware_poll();
             break;
         }
@@ -155,7 +154,7 @@ static void play(const struct input* input) {
 #undef NEXT
 }
 
-static void tell(void)  // the input that was being played
+static void print_input(void)  // that was being played
 {
     fprintf(stderr, "input:");
     for (unsigned n = 0; n < trial.length; n++) fprintf(stderr, " %02x", trial.bytes[n]);
@@ -165,7 +164,7 @@ static void tell(void)  // the input that was being played
 static void die(int number)  // by a sanitizer, with abort_on_error=1, or by the alarm
 {
     if (number == SIGALRM) fprintf(stderr, "an input took longer than %d s\n", RUN_SECONDS);
-    tell();
+    print_input();
     _exit(1);
 }
 
@@ -204,9 +203,8 @@ static void insert_request(struct input* input) {
     insert(input, bytes, 2u + bytes[1]);
 }
 
-static void insert_peer_frame(
-    struct input* input)  // COBS of a request and its CRC-32, zeros around it
-{
+// COBS of a request and its CRC-32, zeros around it
+static void insert_peer_frame(struct input* input) {
     uint8_t bytes[4 + BUS_LONGEST_BODY + 5] = {PEER}, content[BUS_LONGEST_BODY + 4] = {0};
     unsigned length = request(content) + 4u, code = 3;
     for (unsigned n = 0; n < length; n++) {
@@ -240,7 +238,7 @@ static void mutate(struct input* input) {
         memmove(&input->bytes[at], &input->bytes[at + length], input->length - at - length);
         input->length = (uint16_t)(input->length - length);
         break;
-    case 5: {  // a piece of another
+    case 5: {  // a piece of another input
         const struct input* other = &corpus[draw(corpus_size)];
         unsigned from = draw(other->length + 1u);
         length = draw(other->length - from + 1u);

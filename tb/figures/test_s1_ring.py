@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""S1 without its Verilated relay: the ring is the paper's, readings tell its error, and the relay's
-integers take off what was fitted.
+"""S1 without its whole relay: the ring is the paper's, readings show its error, and the Verilated
+correction of the relay takes off what was fitted.
 """
 
 import numpy as np
@@ -8,6 +8,7 @@ import pytest
 
 from experiments import s1_ring
 from tb.bench import seed
+from tb.compensate import harmonic_map
 
 ANGLES = np.arange(0, 360, 0.5) + 0.17
 
@@ -41,12 +42,28 @@ def test_what_the_relay_takes_off_is_what_was_fitted():
     assert np.allclose(taken, found.at(counts * 360 / turn), atol=0.002)
 
 
+def test_the_verilated_correction_is_the_models():
+    ring = s1_ring.paper_ring(2, ring_drift=0.0)
+    found = s1_ring.ours(s1_ring.measure(ring, s1_ring.TEN_DEGREES, np.random.default_rng(seed())))
+    whole = s1_ring.set_of(found, ring.counts_per_turn)
+    words = [int(word) for word in np.frombuffer(whole, "<u4")]
+    terms = [(harmonic_map.signed(words[n], 32), words[n + 1]) for n in range(6, len(words) - 1, 2)]
+    step = words[2] | (words[3] & 0xFFFF) << 32
+    counts = [0, 1, 5000, ring.counts_per_turn // 2, ring.counts_per_turn - 1]
+    right = []
+    for count in counts:
+        angle = (count * step >> 16) % 2**32
+        total, _ = harmonic_map.summed(terms, angle, words[4], harmonic_map.STEPS)
+        right.append((total + 128 >> 8) / 65536)
+    assert list(s1_ring.corrections_of(whole, counts)) == right
+
+
 def test_our_fit_leaves_less_than_the_papers():
     ring, source = s1_ring.paper_ring(1, ring_drift=0.0), np.random.default_rng(seed())
     readings = s1_ring.measure(ring, s1_ring.TEN_DEGREES, source)
     places = s1_ring.off_grid(source, 90)
     plain, better = (
-        s1_ring.left_by_model(ring, way(readings), places)
+        s1_ring.left_by_map(ring, way(readings), places)
         for way in (s1_ring.as_in_the_paper, s1_ring.ours)
     )
     assert better < plain < s1_ring.PAPER_AFTER

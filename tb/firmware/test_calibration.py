@@ -70,7 +70,7 @@ def fresh(complete=False):
 
 
 def calibrated():
-    machine, _, _, curve = signals.learn(5, 150)
+    machine, _, _, curve = signals.calibrated(5, 150)
     assert machine.calibration.complete and machine.calibration.reason == model.RUNNING
     return machine, curve
 
@@ -327,7 +327,7 @@ def test_a_burst_of_phases_that_cannot_be_used_is_refused(phases, spoiled, reaso
 @pytest.mark.parametrize("multiple", [1, 2, 3])
 def test_a_vibration_locked_to_the_fringe_at_one_of_two_speeds_is_subtracted(multiple):
     speeds = iter([600, 700] * 100)
-    machine, _, _, curve = signals.learn(3, 600 * multiple, speeds=lambda: next(speeds))
+    machine, _, _, curve = signals.calibrated(3, 600 * multiple, speeds=lambda: next(speeds))
     assert (
         machine.calibration.complete
         and signals.remaining_nm(machine.values, machine.table, curve) <= 0.1
@@ -336,13 +336,13 @@ def test_a_vibration_locked_to_the_fringe_at_one_of_two_speeds_is_subtracted(mul
 
 def test_vibrations_locked_to_the_fringe_at_each_speed_are_refused():
     speeds = iter([600, 700] * 100)
-    machine, *_ = signals.learn(3, (600, 700), speeds=lambda: next(speeds))
+    machine, *_ = signals.calibrated(3, (600, 700), speeds=lambda: next(speeds))
     assert machine.calibration.reason == model.VIBRATION
     assert not machine.calibration.complete and not any(machine.values["cosine"])
 
 
 def test_one_speed_is_refused_since_a_locked_vibration_would_not_show():
-    machine, *_ = signals.learn(3, 0, 0, speeds=lambda: 600)
+    machine, *_ = signals.calibrated(3, 0, 0, speeds=lambda: 600)
     assert machine.calibration.reason == model.ONE_SPEED
     assert not machine.calibration.complete and not any(machine.values["cosine"])
     draw = random.Random(1)

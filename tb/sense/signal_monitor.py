@@ -7,29 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from figures import faults
 from tb.sense.channel_monitor import ChannelMonitor
 from tb.sense.lissajous_monitor import LissajousMonitor
 from tb.sense.vector_length import vector_length
 
 NEVER = 65535
-FAULTS = (
-    "too_low",
-    "too_high",
-    "clipped",
-    "off_circle",
-    "jump",
-    "channel_stuck",
-    "no_noise",
-    "comparator_mismatch",
-    "comparator_stuck",
-    "channel_missing",
-    "offset_drift",
-    "unbalanced",
-    "not_in_quadrature",
-    "phase_jump",
-    "lost_count",
-)
-COUNTS = 16  # samples for which a bad one still counts
+FAULTS = faults.FAULTS
+COUNTS = 16  # samples for which a bad one counts
 
 
 @dataclass
@@ -51,24 +36,7 @@ class Settings:
 
     @classmethod
     def advised(cls, amplitude, width=8, no_noise_samples=0):
-        """The settings that docs/signal_faults.md advises for a signal of this amplitude with at
-        most 0.5 LSB rms of noise.
-        """
-        part = lambda percent: round(amplitude * percent / 100)
-        return cls(
-            low=part(70),
-            high=part(130),
-            clip_level=2 ** (width - 1) - 2,
-            tolerance=part(9),
-            jump=part(13),
-            band=3,
-            span=part(80),
-            no_noise_samples=no_noise_samples,
-            sign_threshold=part(20),
-            offset_limit=part(12),
-            balance_limit=part(16),
-            quadrature_limit=part(16),
-        )
+        return cls(**faults.advised(amplitude, width, no_noise_samples))
 
 
 class Twice:

@@ -30,7 +30,7 @@ def machine_and_axis():
 
 @pytest.fixture(scope="module")
 def learned():
-    machine, *_ = figures_calibration.learn(
+    machine, *_ = figures_calibration.calibrated(
         1,
         0,
         0,

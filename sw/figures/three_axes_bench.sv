@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// three_axes_bench -- the axes of S2 without their soft core: three scales at the pins, registers
-// on the bus.
+// three_axes_bench -- the axes of S2 without their soft core: three scales at the pins, the
+// registers on the bus.
 `default_nettype none
 
 module three_axes_bench (
@@ -9,7 +9,7 @@ module three_axes_bench (
     input  wire         tick,
     input  wire         sample_tick,
     input  wire  [ 2:0] select,           // strobe: access to the block of axis n
-    input  wire  [ 2:0] feedback_select,  // to that of its grating
+    input  wire  [ 2:0] feedback_select,  // to its feedback channel
     input  wire         write,
     input  wire  [ 5:0] word,
     input  wire  [31:0] wdata,
@@ -18,8 +18,8 @@ module three_axes_bench (
     input  wire  [ 2:0] b
 );
     wire [31:0] now_high, now;
-    wire [31:0] answer        [0:2];
-    wire [31:0] grating_answer[0:2];
+    wire [31:0] answer  [0:2];
+    wire [31:0] feedback[0:2];
 
     time_stamp u_time (
         .clk,
@@ -29,7 +29,8 @@ module three_axes_bench (
 
     for (genvar n = 0; n < 3; n++) begin : g_axis
         wire [31:0] actuator_rdata;
-        wire        adc_cs_n, adc_sclk, bridge_a, bridge_b, step, direction, dac_cs_n, dac_sclk, dac_sdi, drive_enable, compare_pulse;
+        wire adc_cs_n, adc_sclk, bridge_a, bridge_b, step, direction, dac_cs_n, dac_sclk, dac_sdi;
+        wire drive_enable, compare_pulse;
 
         axis #(
             .DRIVES (2),
@@ -52,7 +53,7 @@ module three_axes_bench (
             .wdata,
             .rdata           (answer[n]),
             .feedback_select (feedback_select[n]),
-            .feedback_rdata  (grating_answer[n]),
+            .feedback_rdata  (feedback[n]),
             .actuator_select (1'b0),
             .actuator_rdata,
             .now,
@@ -78,11 +79,12 @@ module three_axes_bench (
             .compare_pulse
         );
 
-        wire unused = &{1'b0, actuator_rdata, adc_cs_n, adc_sclk, bridge_a, bridge_b, step, direction, dac_cs_n, dac_sclk, dac_sdi,
-                        drive_enable, compare_pulse};
+        wire pins = &{1'b0, adc_cs_n, adc_sclk, bridge_a, bridge_b, step, direction};
+        wire dac = &{1'b0, dac_cs_n, dac_sclk, dac_sdi};
+        wire unused = &{pins, dac, actuator_rdata, drive_enable, compare_pulse};
     end
 
-    assign rdata = answer[0] | answer[1] | answer[2] | grating_answer[0] | grating_answer[1] | grating_answer[2];
+    assign rdata = answer[0] | answer[1] | answer[2] | feedback[0] | feedback[1] | feedback[2];
 
     wire unused = &{1'b0, now_high};
 endmodule
