@@ -14,6 +14,7 @@ import ast
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -52,10 +53,19 @@ def module_name(path: Path) -> str | None:
     return None
 
 
+def executed(tree: ast.AST) -> Iterator[ast.AST]:
+    """The nodes of a module without what is there for the type checker only."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            continue
+        yield node
+        yield from executed(node)
+
+
 def imports_of(tree: ast.Module, name: str, is_package: bool) -> set[str]:
     """Dotted names that a module imports; `from a import b` gives both a.b and a."""
     found: set[str] = set()
-    for node in ast.walk(tree):
+    for node in executed(tree):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):

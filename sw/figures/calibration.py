@@ -337,9 +337,7 @@ def acquire(count, amplitude, trials, seed=1):
         sums, values = compiled.Ellipse(), compiled.Values.from_buffer_copy(start.values)
         library.ellipse_start(ctypes.byref(sums))
         for word in words_of(*converted(*signal(turn, **setting), draw, amplitude=amplitude)):
-            library.ellipse_take(
-                ctypes.byref(sums), ctypes.byref(start), ctypes.c_uint32(word)
-            )
+            library.ellipse_take(ctypes.byref(sums), ctypes.byref(start), ctypes.c_uint32(word))
         reason = library.ellipse_fit(ctypes.byref(sums), ctypes.byref(values))
         curve = lambda t, setting=setting: signal(t, **setting)
         left.append(

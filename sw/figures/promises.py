@@ -1,15 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures of what the project promises about itself: words, documentation, imports, types, time."""
 
-import shutil
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
 
-from figures.common import Figure, bar, console
-from tools import check_imports, check_latency, check_ports, check_types, docs_commands
+from figures.common import bar, console
+from tools import docs_commands
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -351,7 +351,9 @@ def test_a_fault_is_reported_in_words_until_it_is_reset():
     )
     with pytest.raises(Refused, match=r"remove its cause and reset it first \(emergency stop\)"):
         axis.enable()
-    with pytest.raises(Refused, match=r"the cause of the fault is still present \(emergency stop\)"):
+    with pytest.raises(
+        Refused, match=r"the cause of the fault is still present \(emergency stop\)"
+    ):
         axis.reset()
     node.axes[0].active_faults = 0
     axis.reset()

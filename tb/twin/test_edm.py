@@ -187,9 +187,7 @@ def cut_once(bench, seconds=0.06 + 1.5e-3 * len(START)):
 def test_left_control_and_w_make_a_cut():
     bench = room()
     cut_once(bench)
-    assert (
-        bench.state.edm_cutting and bench.cuts[0].end_s is None and bench.level("edm_cutting")
-    )
+    assert bench.state.edm_cutting and bench.cuts[0].end_s is None and bench.level("edm_cutting")
     bench.cable(CUT_S)
     (cut,) = bench.cuts
     assert (
@@ -246,9 +244,7 @@ def test_an_alarm_ends_a_cut_and_holds_the_next_back():
     with bench.fault("edm_alarm"):
         bench.cable(0.01)
         assert (
-            bench.level("edm_alarm")
-            and not bench.level("edm_cutting")
-            and not bench.cuts[0].whole
+            bench.level("edm_alarm") and not bench.level("edm_cutting") and not bench.cuts[0].whole
         )
         cut_once(bench)
         assert len(bench.cuts) == 1 and bench.state.edm_ignored == 1
