@@ -79,9 +79,9 @@ def test_power_up_finds_both_nodes_with_drives_off_and_no_zero():
         assert stage.true_nm(name, from_zero=False) != pytest.approx(
             status.position_nm, abs=1000
         ), "the place at power-up is unknown"
-        refused("not_enabled", axis.move, 0)
+        refused("not_enabled", axis.move, nm=0)
         axis.enable()
-        refused("not_homed", axis.move, 0)
+        refused("not_homed", axis.move, nm=0)
         assert not axis.status().in_motion
 
 
@@ -239,7 +239,7 @@ def assert_stopped_by(stage, name, cause):
     assert not stage.twin.truth(AXIS[name]).enabled, "the drive is off at the pins"
     status = axis.status()
     assert not status.enabled and status.state == "faulted" and cause in status.first_fault, status
-    refused("faulted", axis.move, 0)
+    refused("faulted", axis.move, nm=0)
     refused("faulted", axis.enable)
     stage.dwell(0.1)
     place = stage.true_nm(name)
@@ -319,7 +319,7 @@ def test_encoder_cut_is_a_fault_and_takes_the_zero_away(stage):
     stage.dwell(0.02)
     axis.reset()
     axis.enable()
-    refused("not_homed", axis.move, 0)
+    refused("not_homed", axis.move, nm=0)
     stage.home("Y")
     assert abs(stage.true_nm("Y")) < BOUND_NM
 
@@ -456,7 +456,7 @@ def test_address_of_nobody_is_said(stage):
 def test_target_outside_the_travel_is_refused_with_the_travel(stage):
     before = rest(stage, "X")
     for target in (-0.9e6, 119.7e6, 1e12):
-        said = refused("out_of_travel", stage.axes["X"].move, target)
+        said = refused("out_of_travel", stage.axes["X"].move, nm=target)
         assert "-800um to 119.6mm" in said, said
     assert rest(stage, "X")[1] == before[1]
 
