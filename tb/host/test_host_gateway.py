@@ -203,6 +203,29 @@ def test_a_reply_that_comes_too_late_is_not_taken_for_the_next(served):
         assert bus.request(1, "read_register", address=0x400) == {"value": 7}
 
 
+def test_a_slow_answer_is_awaited_without_a_request_of_another_client_in_between():
+    far = FakeBus(FakeNode())
+    gateway, node = Gateway(far), far.nodes[0]
+    assert gateway.answer(1, request_body("identify", 1))
+    ready_at = far.now() + 0.125  # the node is planning; its hardware acknowledges requests
+    far.from_node = lambda word: [word] if word == 0x61 or far.now() >= ready_at else []
+    assert gateway.answer(1, request_body("enable", 2, axis=0, on=1))
+    assert node.executed == ["identify", "enable"] and node.counters["repeated"] >= 1
+    gateway.close()
+
+
+def test_a_node_that_is_absent_delays_the_others_by_one_attempt_only():
+    far = FakeBus(FakeNode())
+    gateway = Gateway(far)
+    assert gateway.answer(9, request_body("identify", 1)) == b"" and far.now() < 0.1
+    assert gateway.answer(1, request_body("identify", 1))
+    far.from_node = lambda word: []
+    assert gateway.answer(1, request_body("identify", 2)) == b""
+    absent_at = far.now()
+    assert gateway.answer(1, request_body("identify", 3)) == b"" and far.now() < absent_at + 0.1
+    gateway.close()
+
+
 def test_no_answer_is_reported_through_packets_too(served):
     with opened(served, "tcp") as port:
         with pytest.raises(

@@ -32,7 +32,10 @@ from moire.bus.protocol import CRC_LENGTH, FROM_NODE, NINTH, TO_NODE, Exchange, 
 from moire.bus.transport import BITS, Transport, plain
 from moire.errors import PortError
 
-ANSWER_S = 0.05  # patience with a node; the client asks again
+ANSWER_S = 0.05  # patience with a node in one attempt
+# attempts with a node that has answered before: a new target during a motion takes the firmware
+# 0.125 s, and a repetition is recognised only if no other request came in between
+TRIES = 4
 HOLD_S = 0.1  # of the clock: how long packets wait for a 9-bit client in the middle of an exchange
 # of the time of the bus: within it the words of a 9-bit client are answered, and so long a stopped
 # time may run ahead of the clock
@@ -71,6 +74,7 @@ class Gateway:
         self.reply: list[int] | None = None  # its reply, as far as it has arrived
         self.held_until = self.ahead_until = 0.0
         self.refused = 0
+        self.present: set[int] = set()  # addresses that answered their last request
         self.origin = time.monotonic() - transport.now()
         self.own_baud = self.baud = round(BITS / transport.character_s)
 
@@ -233,8 +237,13 @@ class Gateway:
             answer=ANSWER_S,
             quiet=max(REPLY_S, 3 * self.transport.character_s),
         )
-        exchange = self.exchanges.run(Exchange(address, body, tries=1, timing=timing))
-        return sealed(bytes(exchange.received)) if exchange.reply else b""
+        tries = TRIES if address in self.present else 1  # the client asks again
+        exchange = self.exchanges.run(Exchange(address, body, tries=tries, timing=timing))
+        if exchange.reply is None:
+            self.present.discard(address)
+            return b""
+        self.present.add(address)
+        return sealed(bytes(exchange.received))
 
 
 # ------------------------------------------------------------------ clients

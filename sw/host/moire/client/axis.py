@@ -14,7 +14,15 @@ from moire.client.access import COUNTS, FULL_SCALE
 from moire.client.capture import AxisCapture
 from moire.client.names import CAUSE_CODES, bit_names, code_name, descriptions
 from moire.client.parameters import TRAVEL, AxisParameters
-from moire.client.records import CalibrationState, Drive, Encoder, Progress, Signal, Status
+from moire.client.records import (
+    CalibrationState,
+    Correction,
+    Drive,
+    Encoder,
+    Progress,
+    Signal,
+    Status,
+)
 from moire.client.values import CHOICES, whole
 from moire.errors import (
     BusError,
@@ -333,15 +341,18 @@ class Axis(AxisParameters, AxisCapture):
         """
         return calibration.calibrate(self, progress, distance, timeout)
 
-    def correction(self) -> dict[str, int | list[int]]:
+    def correction(self) -> Correction:
         """The correction in force, in counts, ready for a JSON file."""
         reply = self.request("get_correction")
         harmonics = [self.request("get_harmonic", order=order) for order in range(1, HARMONICS + 1)]
-        return {
-            **reply,
-            "cosine": [harmonic["cosine"] for harmonic in harmonics],
-            "sine": [harmonic["sine"] for harmonic in harmonics],
-        }
+        return Correction(
+            sin_offset=reply["sin_offset"],
+            cos_offset=reply["cos_offset"],
+            gain=reply["gain"],
+            quadrature_error=reply["quadrature_error"],
+            cosine=[harmonic["cosine"] for harmonic in harmonics],
+            sine=[harmonic["sine"] for harmonic in harmonics],
+        )
 
     def set_correction(self, values: Mapping[str, Any]) -> None:
         """Sets a correction as correction() returns it, at once and as a whole.

@@ -196,12 +196,13 @@ class Job:
             raise MotionFailed(
                 ended,
                 CAUSE_CODES[ended],
-                f"node {self.node.address} did not save the station list: {descriptions(CAUSES, [ended])}",
+                f"node {self.node.address} did not save the station list: "
+                f"{descriptions(CAUSES, [ended])}",
             )
         return self.read()
 
     def ready(self) -> str:
-        """Waits until the EEPROM is not being read or written; returns the cause that ended that."""
+        """Waits until the EEPROM is not being read or written; returns how that ended."""
         transport = self.node.bus.transport
         began = transport.now()
         reply = self.node.request("job_stations")

@@ -4,6 +4,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import TypedDict
 
 from moire.client.names import descriptions
 from moire.errors import WrongBuild
@@ -146,6 +147,17 @@ class CalibrationState:
     def words(self) -> str:
         """The reason in words."""
         return descriptions(CALIBRATION_REASONS, [self.reason])
+
+
+class Correction(TypedDict):
+    """The correction of sine and cosine, in counts on the bus."""
+
+    sin_offset: int
+    cos_offset: int
+    gain: int
+    quadrature_error: int
+    cosine: list[int]  # harmonics, by order from 1
+    sine: list[int]
 
 
 @dataclass(frozen=True)
