@@ -3,8 +3,6 @@
 clear.
 """
 
-from typing import Any
-
 import click
 
 from moire.cli.commands.calibrate import calibration_values, calibration_words, save_correction
@@ -30,8 +28,7 @@ moire.add_command(group)
 def show(call: Call) -> None:
     """Offsets, gain, quadrature error and harmonics."""
     axis = call.axis
-    state = axis.calibration()
-    values: dict[str, Any] = dict(axis.correction())
+    state, values = axis.calibration(), axis.correction()
     sin_offset, cos_offset = values["sin_offset"] / 327.68, values["cos_offset"] / 327.68
     period_nm = float(axis.period_nm)
     harmonics = [
