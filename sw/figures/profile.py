@@ -136,7 +136,7 @@ def in_flight(plan):
     events = [
         event
         for event in plan.steps.event[plan.next : plan.count]
-        if event.place < 4 and event.tick < plan.at.tick + event.place
+        if event.slot < 4 and event.tick < plan.at.tick + event.slot
     ]
     for tick in range(3):
         jerk += sum(event.jerk for event in events if event.tick == plan.at.tick + tick)
