@@ -115,6 +115,7 @@ def conclude(outcomes: Sequence[Outcome], names: Sequence[str], recorded: bool) 
             if done.value is not None
         }
         record.add(new, figures)
+        console.print("recorded in docs/figures.toml; `make tables` puts it into README.md")
     if len(names) > 1:
         results = [
             (done.name, figures[done.name], done.value, done.error or done.took)
