@@ -228,7 +228,8 @@ def s0_bus_wrong(frames=100_000, make_bench=FrameBench):
 def node_ecp5_mhz():
     build.firmware()
     found = synthesise(
-        "node", {"CLK_HZ": 60_000_000, "DRIVES": 0b1101, "FIRMWARE": "build/firmware/firmware.hex"}
+        "node",
+        {"CLK_HZ": 60_000_000, "HAS_STEPPER": 0, "FIRMWARE": "build/firmware/firmware.hex"},
     )
     used = ", ".join(
         f"{found[name]} of {found[f'{name}_of']} {words}"

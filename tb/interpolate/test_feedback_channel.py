@@ -17,6 +17,7 @@ SETTINGS = dict(
     amplitude_low=0,
     amplitude_high=65535,
     disagreement_limit=0,
+    encoder_fault_mask=0,
 )
 INPUTS = dict(
     tick=0,
