@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""grating as a whole: the latency of its header, from the converter's pins on. What its blocks do
-is tested block by block; how they
-work together in motion, in tb/system."""
+"""feedback_channel as a whole: the latency of its header, from the pins of the ADC on. What its
+blocks do is tested block by block; how they work together in motion, in tb/system.
+"""
 
 import cocotb
 import pytest
@@ -9,7 +9,7 @@ from cocotb.triggers import FallingEdge
 
 from tb.bench import run, start
 
-LATENCY = 22  # clk from a converter word to its position; 1 more with a segment table
+LATENCY = 22  # cycles from an ADC word to its position; 1 more with a segment table
 SETTINGS = dict(
     deglitch=0,
     outlier_step=0,
@@ -40,7 +40,7 @@ INPUTS = dict(
 
 
 async def converted(dut):
-    """Start a conversion and wait until its word stands in the converter's register."""
+    """Start a conversion and wait until its word is in the register of the reader."""
     dut.sample_tick.value = 1
     await FallingEdge(dut.clk)
     dut.sample_tick.value = 0
@@ -48,11 +48,11 @@ async def converted(dut):
         if int(dut.g_sine.converted.value):
             return
         await FallingEdge(dut.clk)
-    raise AssertionError("no word came from the converter")
+    raise AssertionError("no word came from the ADC")
 
 
 @cocotb.test()
-async def latency_is_22_clk_from_a_converter_word_to_position_and_1_more_with_a_segment_table(dut):
+async def latency_is_22_from_an_adc_word_to_position_and_1_more_with_a_segment_table(dut):
     latency = LATENCY + bool(int(dut.SEGMENTS.value))
     await start(dut, **SETTINGS, **INPUTS)
     await FallingEdge(dut.clk)

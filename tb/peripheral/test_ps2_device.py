@@ -90,7 +90,7 @@ class Side:
 
 
 @cocotb.test()
-async def one_byte_by_hand_at_80_us_a_bit(dut):
+async def latency_is_20_us_with_released_lines_and_a_byte_takes_80_us_a_bit(dut):
     side = await Side(dut).begin()
     await side.clk(n=round(200 * US))
     begun = side.now

@@ -11,6 +11,7 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
+from moire.made import bus_tables
 from moire.made import registers as host
 from tables import registers as tables
 from tb.bench import ROOT, run, start
@@ -275,6 +276,15 @@ def test_all_made_files_carry_the_crc_of_the_source():
             re.search(place, (ROOT / name).read_text(), re.IGNORECASE).group(1).upper()
             == f"{zlib.crc32(source):08X}"
         ), name
+
+
+@pytest.mark.parametrize(
+    "register, protocol",
+    [("faults", bus_tables.FAULTS), ("encoder_events", bus_tables.ENCODER_EVENTS)],
+)
+def test_the_bus_protocol_has_the_bits_of_the_register(register, protocol):
+    fields = [f for f in host.FIELDS if (f.block, f.register) == ("axis", register)]
+    assert {bit: name for bit, (name, _) in protocol.items()} == {f.low: f.field for f in fields}
 
 
 @pytest.mark.parametrize("axes", [1, 2, 4, 8])

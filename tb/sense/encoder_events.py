@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rtl/sense/encoder_events.sv does, in integers."""
 
-ILLEGAL_EDGE, OVERSPEED, AMPLITUDE_LOW, AMPLITUDE_HIGH, DISAGREEMENT, PULSE_TOO_SHORT = (
-    1 << n for n in range(6)
-)
+from moire.made.registers import FIELDS
+
+EVENTS = {
+    f.field: 1 << f.low for f in FIELDS if (f.block, f.register) == ("axis", "encoder_events")
+}
+ILLEGAL_EDGE, OVERSPEED = EVENTS["illegal_edge"], EVENTS["overspeed"]
+AMPLITUDE_LOW, AMPLITUDE_HIGH = EVENTS["amplitude_low"], EVENTS["amplitude_high"]
+DISAGREEMENT, PULSE_TOO_SHORT = EVENTS["disagreement"], EVENTS["pulse_too_short"]
 PULSES = 3  # decoder_mode
 
 
@@ -22,7 +27,8 @@ def collected(
     events = (
         illegal_edge * ILLEGAL_EDGE
         | overspeed * OVERSPEED
-        | (signal_faults & 3) * AMPLITUDE_LOW
+        | (signal_faults & 1) * AMPLITUDE_LOW
+        | (signal_faults >> 1 & 1) * AMPLITUDE_HIGH
         | disagreement * DISAGREEMENT
     )
     if decoder_mode == PULSES and not own_steps and edge_rejected & 1:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""grating with its position from counts of A/B/Z, built with sine and cosine and without: exact at
-an edge every clk, at the index,
-through align, and of the axis' own steps."""
+"""feedback_channel with its position from counts of A/B/Z, built with sine and cosine and without:
+exact at an edge in every cycle, at the index, through align, and of the axis' own steps.
+"""
 
 import random
 
@@ -159,7 +159,7 @@ class Bench:
 
 
 @cocotb.test()
-async def position_is_exact_at_an_edge_every_clk(dut):
+async def latency_is_5_and_position_is_exact_at_an_edge_every_cycle(dut):
     bench, source = await Bench.begin(dut), random.Random(seed())
     steps = [1] * 40 + [-1] * 90 + [source.choice((-1, 0, 1)) for _ in range(4000)] + [1, -1] * 50
     way, place = [], 0
