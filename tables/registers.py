@@ -21,7 +21,6 @@ ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "tables" / "registers.rdl"
 REGISTER_BUS_BASE = 0x8000_0000  # where the soft core sees the map
 SLOT = 0x100  # bytes that a block may fill: a word index inside it has 6 bits
-COLUMNS = 100
 EVENTS = ("counter", "sticky")  # kinds whose port is a strobe that the block counts or holds
 KINDS = {  # what each kind of a field must be: sw, hw, and a further condition
     "counter": lambda get, field: get("incrsaturate") and on_write(get) == "wclr",
@@ -307,7 +306,7 @@ def fitted(found):
     shape = max((len(shape.partition("[")[2]) + 1 for _, shape, _, _ in found), default=0)
     signed = 7 if any(shape.startswith("signed") for _, shape, _, _ in found) else 0
     name = max((len(name) for _, _, name, _ in found), default=0)
-    room = COLUMNS - len("    output logic  ,  // ") - max(shape, 6) - signed - name
+    room = made_files.COLUMNS - len("    output logic  ,  // ") - max(shape, 6) - signed - name
     fit = []
     for kind, shape, name, texts in found:
         text = next((t for t in texts if len(t) <= room), None)
@@ -323,7 +322,7 @@ def sentence(text):
 
 
 def comment(text, indent="// "):
-    return textwrap.fill(text, COLUMNS, initial_indent=indent, subsequent_indent=indent)
+    return textwrap.fill(text, made_files.COLUMNS, initial_indent=indent, subsequent_indent=indent)
 
 
 def files():

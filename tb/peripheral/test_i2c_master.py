@@ -159,7 +159,7 @@ async def latency_is_1_bit_for_start_and_stop_and_9_bits_for_a_byte(dut):
         before = len(bus.samples)
         await bus.do(command, 0xA5)
         took = (len(bus.samples) - before) * bus.bus_hz / CLK_HZ
-        assert bits - 0.6 < took < 1.1 * bits + 0.5, (command, took)
+        assert bits - 1 < took < bits + 1, (command, took)
 
 
 @cocotb.test()
