@@ -39,14 +39,16 @@ IDLE = [  # in the same order
     dict(display_cs_n=1, display_sclk=0, display_data=0),
     {},
 ]
-BUILT, BIT_TIME, TRANSMIT = (
+BUILT, I2C, BIT_TIME, TRANSMIT = (
     BY_NAME["peripherals", register, field].offset // 4
     for register, field in (
         ("built", "i2c"),
+        ("i2c", "command"),
         ("peer_bit_time", "value"),
         ("peer_transmit", "value"),
     )
 )
+RECOVER = 4  # command of the I2C port
 
 
 @cocotb.test()
@@ -56,8 +58,8 @@ async def absent_peripherals_are_idle(dut):
     await FallingEdge(dut.clk)
     await FallingEdge(dut.clk)
     awake = set()
-    # at the beginning, since the random settings below may make the peer port slow
-    for word, value in ((BIT_TIME, 2 << 4), (TRANSMIT, 0)):
+    # at the beginning, since the random settings and levels below may make both ports wait
+    for word, value in ((I2C, RECOVER << 8), (BIT_TIME, 2 << 4), (TRANSMIT, 0)):
         dut.select.value, dut.write.value, dut.word.value, dut.wdata.value = 1, 1, word, value
         await FallingEdge(dut.clk)
     for n in range(6000):
