@@ -1,77 +1,114 @@
 // SPDX-License-Identifier: Apache-2.0
-// actuator -- the driving path of an axis: from its target and its command to the pins of a bridge,
-// a stepper driver or a converter, and a fine stage behind the converter.
+// actuator -- the drive path of an axis: from its target and its command to the pins of a bridge, a
+// stepper driver or a DAC, with a fine stage that uses the DAC.
 //
-// latency  see the room drive; the fine command 61 clk after tick
-// rate     one command per `tick`, a tick at least 61 clk after the one before
-// source   S0: DC motor by PWM, piezo on top; S2: stepper; S3: current amplifier behind a converter
-//          of 16 bits
+// latency  see bridge_pwm, step_generator, spi_dac and fine_stage
+// rate     one command per tick, a tick at least 61 cycles after the one before
+// behaviour  The pins of a drive that is not built are idle.
+// source   S0: DC motor by PWM, piezo on top; S2: stepper; S3: current amplifier behind a DAC of 16
+//          bits
 // model    the models of its blocks; proved in motion by tb/system
 `default_nettype none
 
 module actuator #(
-    parameter int DRIVES = 15                   // what is built: bit 0 bridge, 1 steps, 2 converter, 3 fine stage behind it
+    parameter int HAS_BRIDGE     = 1,  // 1: build the bridge
+    parameter int HAS_STEPPER    = 1,  // 1: build the step generator
+    parameter int HAS_DAC        = 1,  // 1: build the DAC
+    parameter int HAS_FINE_STAGE = 1   // 1: build the fine stage, which needs the DAC
 ) (
-    input wire clk,
-    input wire rst,
-    input wire tick,  // strobe: servo tick
-    input wire [23:0] tick_period,  // clk
-    input wire select,  // register bus, this actuator
-    input wire write,
-    input wire [5:0] word,  // 32-bit word of the block
-    input wire [31:0] wdata,
-    output logic [31:0] rdata,
-    input wire enable,  // level: the guard allows the drive
-    input wire fine,  // level: the fine stage holds the position
-    input wire rebase,  // strobe: target := position, or the origin moves
-    input wire block_up,  // level: the guard lets nothing go up
-    input wire block_down,
-    input wire valid,  // strobe: command is new
-    input wire signed [15:0] command,  // full scale 2^15
-    input wire signed [47:0] target,  // 2^-16 period
-    input wire signed [31:0] target_velocity,  // 2^-16 period/tick
-    input wire moving,  // a profile is being played
-    input wire signed [47:0] position,  // 2^-16 period
-    output logic bridge_a,  // pins from here on; those that were not built are low
-    output logic bridge_b,
-    output logic step,
-    output logic direction,
-    output logic upward,  // level: direction, whatever its polarity
-    output logic dac_cs_n,
-    output logic dac_sclk,
-    output logic dac_sdi,
-    output logic fine_saturated,  // level: the command of the fine stage stands at its limit
-    output logic step_overrun  // level: more steps are owed than may be
+    input  wire               clk,
+    input  wire               rst,
+    // register bus
+    input  wire               select,           // strobe: an access to this actuator
+    input  wire               write,            // level: the access writes
+    input  wire        [ 5:0] word,             // 32-bit word of the block
+    input  wire        [31:0] wdata,            // value to write
+    output logic       [31:0] rdata,            // value read, in the next cycle; else 0
+    // time
+    input  wire               tick,             // strobe: servo tick
+    input  wire        [23:0] tick_period,      // cycles
+    // permission
+    input  wire               enable,           // level: the interlock allows the drive
+    input  wire               fine,             // level: the fine stage holds the position
+    input  wire               rebase,           // strobe: the target jumps, do not follow it
+    input  wire               block_up,         // level: the interlock blocks motion up
+    input  wire               block_down,       // level: the interlock blocks motion down
+    // motion
+    input  wire               valid,            // strobe: command is new
+    input  wire signed [15:0] command,          // full scale 2^15
+    input  wire signed [47:0] target,           // 2^-16 period
+    input  wire signed [31:0] target_velocity,  // 2^-16 period/tick
+    input  wire               moving,           // level: a profile is being played
+    input  wire signed [47:0] position,         // 2^-16 period
+    // pins
+    output logic              bridge_a,         // pin, alone high for a positive command
+    output logic              bridge_b,         // pin, alone high for a negative command
+    output logic              step,             // pin, as step_output_mode says
+    output logic              direction,        // pin, as step_output_mode says
+    output logic              dac_cs_n,         // pin, low during a word
+    output logic              dac_sclk,         // pin, idles low
+    output logic              dac_sdi,          // pin, data of the DAC
+    // state
+    output logic              downward,         // level: the next step goes down
+    output logic              fine_saturated,   // level: the fine stage is at its limit
+    output logic              step_overrun      // level: too many steps are overdue
 );
-    if (DRIVES < 1 || DRIVES > 15) begin : g_check_drives
-        DRIVES_MUST_BE_FROM_1_TO_15 u_error ();
+    if (HAS_BRIDGE + HAS_STEPPER + HAS_DAC == 0) begin : g_check_drives
+        AN_ACTUATOR_NEEDS_A_DRIVE u_error ();
     end
-    if (DRIVES[3] && !DRIVES[2]) begin : g_check_fine
+    if (HAS_FINE_STAGE != 0 && HAS_DAC == 0) begin : g_check_fine
         FINE_STAGE_NEEDS_THE_DAC u_error ();
     end
 
-    // settings from the registers
-    wire [1:0] kind, mode;
-    wire [15:0] pwm_period, refresh;
+    // which drive
+    wire [1:0] kind;
+    wire bridge_enable, stepper_selected, dac_valid;
+    wire signed [15:0] dac_command;
+    // bridge
+    wire        [15:0] pwm_period;
+    // stepper
+    wire        [ 1:0] mode;
     wire [13:0] high_cycles, low_cycles, setup_cycles, hold_cycles;
-    wire step_low, direction_low, fine_kp_written;
+    wire step_low, direction_low;
     wire        [ 3:0] trim_shift;
     wire signed [47:0] step_ratio;
     wire signed [31:0] steps;
+    // DAC
     wire        [ 7:0] half_period;
-    wire signed [15:0] dac_trim, fine_command;
+    wire        [15:0] refresh;
+    wire signed [15:0] dac_trim;
+    // fine stage
     wire [23:0] fine_kp, fine_ki;
     wire [14:0] fine_limit;
+    wire fine_kp_written, fine_valid;
+    wire signed [15:0] fine_command;
 
-    wire        by_bridge = kind == 2'd0, by_steps = kind == 2'd1, by_dac = kind == 2'd2;
+    drive_select u_select (
+        // permission
+        .kind,
+        .enable,
+        // commands
+        .valid,
+        .command,
+        .fine_valid,
+        .fine_command,
+        // bridge and DAC
+        .bridge_enable,
+        .dac_valid,
+        .dac_command,
+        // stepper
+        .direction,
+        .direction_low,
+        .stepper_selected,
+        .downward
+    );
 
-    // bridge
-    if (DRIVES[0]) begin : g_bridge
+    if (HAS_BRIDGE != 0) begin : g_bridge
         bridge_pwm u_bridge (
             .clk,
             .rst,
             .period(pwm_period),
-            .enable(enable && by_bridge),
+            .enable(bridge_enable),
             .valid,
             .command,
             .bridge_a,
@@ -79,17 +116,16 @@ module actuator #(
         );
     end else begin : g_no_bridge
         assign {bridge_a, bridge_b} = 2'b00;
+        wire unused = &{1'b0, pwm_period, bridge_enable};
     end
 
-    // steps
-    if (DRIVES[1]) begin : g_steps
+    if (HAS_STEPPER != 0) begin : g_stepper
         wire go, restart, driven, allowed;
         wire signed [47:0] step_target;
-        assign upward = direction ^ direction_low;
 
         step_permission u_permission (
             .enable,
-            .by_steps,
+            .by_steps(stepper_selected),
             .block_up,
             .block_down,
             .target_velocity,
@@ -99,13 +135,17 @@ module actuator #(
         step_follower u_follower (
             .clk,
             .rst,
+            // settings
             .ratio   (step_ratio),
             .shift   (trim_shift),
+            // permission
             .enable  (driven),
             .rebase,
+            // motion
             .tick,
             .target,
             .trim    (command),
+            // steps
             .go,
             .restart,
             .position(step_target)
@@ -115,6 +155,7 @@ module actuator #(
         ) u_steps (
             .clk,
             .rst,
+            // settings
             .period (tick_period[17:0]),
             .high_cycles,
             .low_cycles,
@@ -123,132 +164,117 @@ module actuator #(
             .mode,
             .step_low,
             .direction_low,
+            // target
             .enable (allowed),
             .load   (restart),
             .tick   (go),
             .target (step_target),
+            // pins and state
             .step,
             .direction,
             .steps,
             .overrun(step_overrun)
         );
-    end else begin : g_no_steps
-        assign {step, direction, upward, step_overrun, steps} = '0;
+
+        wire unused = &{1'b0, tick_period[23:18]};
+    end else begin : g_no_stepper
+        assign {step, direction, step_overrun, steps} = '0;
+        wire unused_motion = &{1'b0, tick_period, rebase, block_up, block_down, target_velocity};
+        wire unused_times = &{1'b0, high_cycles, low_cycles, setup_cycles, hold_cycles};
+        wire unused_settings = &{1'b0, mode, step_low, step_ratio, trim_shift, stepper_selected};
     end
 
-    // fine stage: a PI loop on the same error; while it rests its command goes back to the middle,
-    // slowly enough for the main loop
-    // to follow, and the loop takes over from wherever it is
-    wire fine_valid;
-
-    if (DRIVES[3]) begin : g_fine
-        localparam signed [15:0] RETURN = 16'sd16;  // of the command, in a tick
-
-        wire signed [31:0] fine_error;
-        wire fine_clipped;
-        wire signed [15:0] limit = {1'b0, fine_limit};
-        wire signed [15:0] nearer = fine_command > RETURN ? fine_command - RETURN :
-                                    fine_command < -RETURN ? fine_command + RETURN : 16'sd0;
-
-        pid_servo #(
-            .TERMS  (2),
-            .BIQUADS(0)
-        ) u_fine (
+    if (HAS_FINE_STAGE != 0) begin : g_fine
+        fine_stage u_fine (
             .clk,
             .rst,
-            .closed_loop        (fine && enable),
-            .kp                 (fine_kp),
-            .ki                 (fine_ki),
-            .kd                 (24'd0),
-            .kv                 (24'd0),
-            .ka                 (24'd0),
-            .output_limit       (fine_limit),
-            .integral_limit     (fine_limit),
-            .dead_band          (16'd0),
-            .gains_changed      (fine_kp_written),
-            .filters_in_use     (4'd0),
-            .coefficient_write  (1'b0),
-            .coefficient_address(5'd0),
-            .coefficient        (32'sd0),
+            // permission
+            .enable,
+            .hold         (fine),
+            // settings
+            .kp           (fine_kp),
+            .ki           (fine_ki),
+            .limit        (fine_limit),
+            .gains_changed(fine_kp_written),
+            // motion
             .tick,
             .target,
-            .target_velocity    (32'sd0),
-            .target_acceleration(32'sd0),
             .moving,
             .position,
-            .velocity           (32'sd0),
-            .open_command       (enable ? nearer : 16'sd0),
-            .block_up           (!enable),
-            .block_down         (!enable),
-            .valid              (fine_valid),
-            .command            (fine_command),
-            .error              (fine_error),
-            .saturated          (fine_clipped)
+            // command
+            .valid        (fine_valid),
+            .command      (fine_command),
+            .saturated    (fine_saturated)
         );
-        assign fine_saturated = fine && (fine_command == limit || fine_command == -limit);
-        wire unused_fine = &{1'b0, fine_error, fine_clipped};
     end else begin : g_no_fine
-        assign {fine_valid, fine_saturated, fine_command} = '0;
+        assign {fine_valid, fine_command, fine_saturated} = '0;
+        wire unused_settings = &{1'b0, fine, fine_kp, fine_ki, fine_limit, fine_kp_written};
+        wire unused_motion = &{1'b0, tick, target, moving, position};
     end
 
-    // converter: of the main command, or of the fine stage
-    if (DRIVES[2]) begin : g_dac
+    if (HAS_DAC != 0) begin : g_dac
         wire sent;
 
         spi_dac u_dac (
             .clk,
             .rst,
+            // settings
             .half_period,
             .refresh,
             .trim   (dac_trim),
+            // command
             .enable,
-            .valid  (by_dac ? valid : fine_valid),
-            .command(by_dac ? command : fine_command),
+            .valid  (dac_valid),
+            .command(dac_command),
+            // pins
             .cs_n   (dac_cs_n),
             .sclk   (dac_sclk),
             .sdi    (dac_sdi),
             .sent
         );
-        wire unused_dac = &{1'b0, sent};
+
+        wire unused = &{1'b0, sent};
     end else begin : g_no_dac
         assign {dac_cs_n, dac_sclk, dac_sdi} = 3'b100;
+        wire unused = &{1'b0, half_period, refresh, dac_trim, dac_valid, dac_command};
     end
 
-    // registers
     actuator_registers u_registers (
         .clk,
         .rst,
+        // register bus
         .select,
         .write,
         .word,
         .wdata,
         .rdata,
-        .drive_kind               (kind),
-        .drive_built              (4'(DRIVES)),
+        // which drive
+        .drive_kind(kind),
+        .drive_built({1'(HAS_FINE_STAGE), 1'(HAS_DAC), 1'(HAS_STEPPER), 1'(HAS_BRIDGE)}),
+        // bridge
         .pwm_period,
-        .step_pulse_high          (high_cycles),
-        .step_pulse_low           (low_cycles),
-        .step_direction_setup     (setup_cycles),
-        .step_direction_hold      (hold_cycles),
-        .step_output_mode         (mode),
-        .step_output_step_low     (step_low),
+        // stepper
+        .step_pulse_high(high_cycles),
+        .step_pulse_low(low_cycles),
+        .step_direction_setup(setup_cycles),
+        .step_direction_hold(hold_cycles),
+        .step_output_mode(mode),
+        .step_output_step_low(step_low),
         .step_output_direction_low(direction_low),
-        .step_output_trim         (trim_shift),
+        .step_output_trim(trim_shift),
         .step_ratio,
         .steps,
-        .dac_half_period          (half_period),
-        .dac_refresh              (refresh),
+        // DAC
+        .dac_half_period(half_period),
+        .dac_refresh(refresh),
         .dac_trim,
+        // fine stage
         .fine_kp,
         .fine_kp_written,
         .fine_ki,
         .fine_limit,
         .fine_command
     );
-
-    wire unused = &{1'b0, tick_period, valid, high_cycles, low_cycles, setup_cycles, hold_cycles, mode, step_low, direction_low, trim_shift, step_ratio,
-                    half_period, refresh, dac_trim, fine_kp, fine_kp_written, fine_ki, fine_limit, pwm_period, block_up, block_down, rebase,
-                    fine, moving, position, target, target_velocity, tick, by_bridge, by_steps, by_dac, fine_valid, fine_command};
 endmodule
 
 `default_nettype wire

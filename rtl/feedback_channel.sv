@@ -1,113 +1,161 @@
 // SPDX-License-Identifier: Apache-2.0
-// feedback_channel -- the measuring path of an axis: from the pins of a grating to position and
+// feedback_channel -- the measuring path of an axis: from the pins of a scale to position and
 // velocity.
 //
-// latency  see the rooms; 22 clk from a converter word to position, 2 clk from a count of A/B/Z; 1
-//          clk more with a segment table
+// latency  22 cycles from an ADC word to position, 5 cycles from the pins a and b to position in
+//          the mode of counts; 1 cycle more each with a segment table
 // rate     one sample per `sample_tick`, one velocity per `tick`
 // source   S0: interferometer with sine, cosine and comparator outputs; any A/B/Z scale
 // model    the models of its blocks; proved in motion by tb/system
 `default_nettype none
 
 module feedback_channel #(
-    parameter int W = 8,  // bits of a sample
-    parameter int SEGMENTS = 0,  // most segments of its table; 0: there is none
-    parameter int SINE = 1                      // 0: nothing of sine and cosine is built, the position is made of counts
+    parameter int W        = 8,  // bits of a sample
+    parameter int SEGMENTS = 0,  // most segments of the scale's table, 3 to 255; 0: no table
+    parameter int HAS_SINE = 1   // 0: no sine and cosine, the position is made of counts
 ) (
-    input wire clk,
-    input wire rst,
-    input wire tick,  // strobe: servo tick
-    input wire sample_tick,  // strobe: start a conversion
-    input wire sync,  // strobe: captured as one of software is
-    input wire [31:0] now,  // clk
-    input wire select,  // register bus, this grating
-    input wire write,
-    input wire [5:0] word,  // 32-bit word of the block
-    input wire [31:0] wdata,
-    output logic [31:0] rdata,
-    input wire [15:0] deglitch,  // settings held by axis_registers from here on
-    input wire [7:0] outlier_step,
-    input wire [7:0] outlier_hold,
-    input wire [15:0] amplitude_low,
-    input wire [15:0] amplitude_high,
-    input wire [19:0] disagreement_limit,
-    input wire shift,  // strobe: move the origin
-    input wire signed [31:0] shift_periods,
-    input wire a,  // pins, synchronous to clk, from here on
-    input wire b,
-    input wire z,
-    input wire [1:0] probe,
-    input  wire                  own_step,      // pins of the axis itself, which may be counted in place of a and b; not filtered
-    input wire own_direction,
-    input wire adc_sin,  // serial data, synchronous to adc_sclk
-    input wire adc_cos,
-    output logic adc_cs_n,  // pins
-    output logic adc_sclk,
-    output logic compare_pulse,
-    output logic signed [W-1:0] sin,  // after limit filter 1
-    output logic signed [W-1:0] cos,
-    output logic sample_rejected,  // strobe: limit filter 1 held a sample back
-    output logic [2:0] edge_rejected,  // strobes {z, b, a}: the edge filter held a pulse back
-    output logic [15:0] phase,  // corrected
-    output logic [15:0] amplitude,
-    output logic signed [31:0] quadrature_count,
-    output logic [5:0] events,  // in the order of axis_registers.encoder_events
-    output logic signal_fault,  // level: a masked signal fault stands
-    output logic position_valid,
-    output logic signed [47:0] position,  // Q32.16 periods, less the error of the segment table
-    output logic moved,  // strobe: position grows by moved_by in the next clk, besides its motion
-    output logic signed [47:0] moved_by,  // 2^-16 period
-    output logic signed [31:0] velocity  // 2^-16 period/tick, of the scale itself
+    input  wire                 clk,
+    input  wire                 rst,
+    // register bus
+    input  wire                 select,              // strobe: an access to this channel
+    input  wire                 write,               // level: the access writes
+    input  wire         [  5:0] word,                // 32-bit word of the block
+    input  wire         [ 31:0] wdata,               // value to write
+    output logic        [ 31:0] rdata,               // value read, in the next cycle; else 0
+    // time
+    input  wire                 tick,                // strobe: servo tick
+    input  wire                 sample_tick,         // strobe: take a sample
+    input  wire                 sync,                // strobe: the sync pulse of the bus captures
+    input  wire         [ 31:0] now,                 // cycles, time stamp
+    // settings of axis_registers
+    input  wire         [ 15:0] deglitch,            // cycles that a, b and z must be stable
+    input  wire         [  7:0] outlier_step,        // ADC counts, largest step; 0: off
+    input  wire         [  7:0] outlier_hold,        // samples that may be held in a row
+    input  wire         [ 15:0] amplitude_low,       // ADC counts, smallest amplitude
+    input  wire         [ 15:0] amplitude_high,      // ADC counts, largest amplitude
+    input  wire         [ 19:0] disagreement_limit,  // 2^-16 period; 0: not checked
+    input  wire         [  5:0] encoder_fault_mask,  // which events are a fault, bits as in events
+    // shift of the origin
+    input  wire                 shift,               // strobe: move the origin
+    input  wire signed  [ 31:0] shift_periods,       // period, distance of the shift
+    // pins
+    input  wire                 a,                   // level of pin a, synchronous to clk
+    input  wire                 b,                   // level of pin b, synchronous to clk
+    input  wire                 z,                   // level of the index, synchronous to clk
+    input  wire         [  1:0] probe,               // levels of the probes, synchronous to clk
+    input  wire                 adc_sin,             // serial data, synchronous to adc_sclk
+    input  wire                 adc_cos,             // serial data, synchronous to adc_sclk
+    output logic                adc_cs_n,            // pin, low during a conversion
+    output logic                adc_sclk,            // pin, idles high
+    output logic                compare_pulse,       // pin, high during a compare pulse
+    // the axis' own steps
+    input  wire                 own_step,            // level of the step output
+    input  wire                 own_downward,        // level: the next own step goes down
+    // signals
+    output logic signed [W-1:0] sin,                 // ADC counts, after the outlier filter
+    output logic signed [W-1:0] cos,                 // ADC counts, after the outlier filter
+    output logic        [ 15:0] phase,               // 2^-16 period, corrected
+    output logic        [ 15:0] amplitude,           // ADC counts
+    output logic signed [ 31:0] quadrature_count,    // 1/4 period
+    // events
+    output logic                sample_rejected,     // strobe: an outlier was held back
+    output logic                pulse_rejected,      // strobe: a short pulse was filtered out
+    output logic        [  5:0] events,              // strobes, see axis_registers.encoder_events
+    output logic                encoder_fault,       // level: an enabled event or signal fault
+    // position
+    output logic                position_valid,      // strobe: position is new
+    output logic signed [ 47:0] position,            // 2^-16 period, less the segment error
+    output logic                moved,               // strobe: position will jump by moved_by
+    output logic signed [ 47:0] moved_by,            // 2^-16 period, in the next cycle
+    output logic signed [ 31:0] velocity             // 2^-16 period/tick, of the scale itself
 );
+    localparam int CAPTURE_DELAY = SEGMENTS == 0 ? 2 : 3;  // cycles from an index to its position
+
     if (SEGMENTS != 0 && (SEGMENTS < 3 || SEGMENTS > 255)) begin : g_check_segments
         SEGMENTS_MUST_BE_0_OR_FROM_3_TO_255 u_error ();
     end
 
-    // settings and strobes from the registers
-    wire        [15:0] filter_skip, decimation, clip_level, tolerance, jump, no_noise_samples, span, offset_limit, balance_limit, quadrature_limit, sign_threshold, quantum;
-    wire [3:0] filter_tolerated;
+    // settings of the decoder
+    wire [15:0] filter_skip;
+    wire [ 3:0] filter_tolerated;
     wire [1:0] mode, gate_mask, gate;
-    wire index_low, index_up, index_down, index_each, harmonic_enable, phases, harmonic_write;
-    wire arm_index, load_correction, swap_harmonics, record, clear_signal_faults;
-    wire capture_now, capture_next, capture_clear, compare_arm, compare_disarm, recorder_read;
-    wire [31:0] counts_per_revolution, compare_count;
+    wire index_low, index_up, index_down, index_each, arm_index;
+    wire [31:0] counts_per_revolution;
+    // settings of the signal monitor
+    wire [15:0] clip_level, tolerance, jump, no_noise_samples, span, sign_threshold;
+    wire [15:0] offset_limit, balance_limit, quadrature_limit;
+    wire [ 7:0] band;
+    wire [14:0] signal_fault_mask;
+    wire        clear_signal_faults;
+    // settings of the correction
     wire signed [15:0] sin_offset, cos_offset;
     wire        [16:0] gain;
     wire signed [16:0] quadrature_error;
+    wire load_correction, harmonic_enable, harmonic_write, swap_harmonics;
+    wire        [ 7:0] harmonic_at;
     wire signed [17:0] harmonic_value;
-    wire [7:0] harmonic_at, band;
-    wire [14:0] signal_fault_mask;
-    wire [ 6:0] capture_sources;
-    wire signed [47:0] compare_start, compare_step;
-    wire [23:0] pulse_length, gap_length;
-    wire counts_chosen, by_steps, align_written;
-    wire              by_counts = counts_chosen || SINE == 0;
-    wire signed [2:0] align;
-    wire               segment_enable, segment_linear, segment_origin_written, segment_point_written, segment_read;
+    // settings of the recorder
+    wire        [15:0] decimation;
+    wire phases, record, recorder_read;
+    // settings of the position
+    wire use_counts, own_steps, align_written;
+    wire signed [ 2:0] align;
+    wire        [15:0] quantum;
+    // settings of the segment table
+    wire segment_enable, segment_linear, segment_origin_written, segment_point_written;
+    wire segment_read;
     wire [7:0] segments, segment_border, segment_read_point;
     wire signed [47:0] segment_origin;
     wire        [47:0] segment_length;
     wire signed [23:0] segment_point;
+    // settings of capture and compare
+    wire        [ 6:0] capture_sources;
+    wire capture_now, capture_next, capture_clear, compare_arm, compare_disarm;
+    wire signed [47:0] compare_start, compare_step;
+    wire [31:0] compare_count;
+    wire [23:0] pulse_length, gap_length;
 
-    // decode
-    localparam [1:0] PULSES = 2'd3;  // decoder_mode: pulses and direction
-    wire        [ 2:0] levels;  // {z, b, a}, filtered
+    // decoder
+    wire [2:0] levels, edge_rejected;  // {z, b, a}
+    wire signed [ 1:0] quadrature_step;
     wire signed [31:0] index_count;
     wire        [31:0] edge_time;
-    wire index_found, index_armed, illegal, revolution_wrong;
-    wire signed [1:0] quadrature_step;
-    wire direction, illegal_seen, illegal_fault, revolution_fault;
-    // a step lost, where elsewhere it is a glitch
-    wire too_short = mode == PULSES && !by_steps && edge_rejected[0];
+    wire direction, index_found, index_armed;
+    wire illegal, illegal_seen, illegal_fault, revolution_wrong, revolution_fault;
+    // sine and cosine
+    wire [14:0] signal_faults, first_signal_faults;
+    wire overspeed, disagreement, disturbed, tracked, full, invalid;
+    wire        [15:0] tracked_phase;
+    wire signed [16:0] tracked_step;
+    wire        [31:0] recorded;
+    // position of the scale; its fraction is the phase
+    wire by_counts, convert, counted, stepped, scale_valid;
+    wire signed [16:0] counted_step, step;
+    wire [15:0] counted_phase, step_phase;
+    wire signed [47:0] scale_position;
+    wire signed [39:0] velocity_fine;
+    // segment table
+    wire segment_in_force, segment_outside, segment_known, shifted;
+    wire signed [31:0] shifted_periods;
+    wire signed [23:0] segment_error, segment_stored;
+    // capture and compare
+    wire index, software, present, overrun, armed, late;
+    wire [ 6:0] captured_sources;
+    wire [15:0] captured_age;
+    wire [31:0] captured_time, passed;
+    wire signed [47:0] captured_position;
+    wire        [ 4:0] capture_free;
 
     incremental_encoder #(
         .FILTER_W(16)
     ) u_encoder (
         .clk,
         .rst,
+        // filter
         .filter_skip,
         .filter_required(deglitch),
         .filter_tolerated,
+        // index
         .mode,
         .index_low,
         .index_gate_mask(gate_mask),
@@ -120,13 +168,15 @@ module feedback_channel #(
         .illegal_enable (1'b0),
         .arm_index,
         .clear_flags    (1'b0),
+        // pins and own steps
         .now,
         .a,
         .b,
         .z,
-        .own            (by_steps),
+        .own            (own_steps),
         .own_a          (own_step),
-        .own_b          (!own_direction),
+        .own_b          (own_downward),
+        // counts
         .count          (quadrature_count),
         .step           (quadrature_step),
         .direction,
@@ -134,6 +184,7 @@ module feedback_channel #(
         .index_found,
         .index_armed,
         .index_count,
+        // events
         .filtered       (levels),
         .rejected       (edge_rejected),
         .illegal,
@@ -142,18 +193,26 @@ module feedback_channel #(
         .revolution_wrong,
         .revolution_fault
     );
+    encoder_events u_events (
+        // settings
+        .event_mask  (encoder_fault_mask),
+        .signal_fault_mask,
+        .decoder_mode(mode),
+        .own_steps,
+        // what is reported
+        .illegal_edge(illegal),
+        .overspeed,
+        .disagreement,
+        .signal_faults,
+        .edge_rejected,
+        // what follows
+        .events,
+        .pulse_rejected,
+        .disturbed,
+        .fault       (encoder_fault)
+    );
 
-    // sine and cosine: sense, interpolate, learn
-    wire [14:0] signal_faults, first_signal_faults;
-    wire overspeed, disagreement, stepped, full, invalid;
-    wire        [15:0] tracked_phase;
-    wire signed [16:0] step;
-    wire        [31:0] recorded;
-    wire               placed;
-    // of the scale, its fraction is the phase
-    wire signed [47:0] place;
-
-    if (SINE != 0) begin : g_sine
+    if (HAS_SINE != 0) begin : g_sine
         wire converted, sampled, ready, corrected, phase_valid, harmonics_off;
         wire signed [W-1:0] raw_sin, raw_cos;
         wire signed [15:0] corrected_sin, corrected_cos;
@@ -161,28 +220,33 @@ module feedback_channel #(
 
         dual_adc_reader #(
             .W(W)
-        ) u_converter (
+        ) u_adc (
             .clk,
             .rst,
-            .start  (sample_tick && !by_counts),
+            .start  (convert),
+            // pins
             .sdata_a(adc_sin),
             .sdata_b(adc_cos),
             .cs_n   (adc_cs_n),
             .sclk   (adc_sclk),
+            // sample
             .valid  (converted),
             .sin    (raw_sin),
             .cos    (raw_cos)
         );
         outlier_filter #(
             .W(W)
-        ) u_limiter (
+        ) u_outliers (
             .clk,
             .rst,
+            // settings
             .step    (outlier_step),
             .hold    (outlier_hold),
+            // sample
             .valid   (converted),
             .sin     (raw_sin),
             .cos     (raw_cos),
+            // filtered sample
             .done    (sampled),
             .sin_out (sin),
             .cos_out (cos),
@@ -194,6 +258,7 @@ module feedback_channel #(
             .clk,
             .rst,
             .clear     (clear_signal_faults),
+            // limits
             .low       (amplitude_low),
             .high      (amplitude_high),
             .clip_level,
@@ -206,6 +271,7 @@ module feedback_channel #(
             .offset_limit,
             .balance_limit,
             .quadrature_limit,
+            // signals
             .valid     (sampled),
             .sin,
             .cos,
@@ -213,25 +279,28 @@ module feedback_channel #(
             .b         (levels[1]),
             .phase_jump(overspeed),
             .lost_count(disagreement),
+            // faults
             .amplitude,
             .ready,
             .faults    (signal_faults),
             .first     (first_signal_faults)
         );
-
         signal_correction #(
             .W(W)
         ) u_correction (
             .clk,
             .rst,
+            // settings
             .load   (load_correction),
             .sin_offset,
             .cos_offset,
             .gain,
             .quadrature_error,
+            // sample
             .valid  (sampled),
             .sin,
             .cos,
+            // corrected sample
             .done   (corrected),
             .sin_out(corrected_sin),
             .cos_out(corrected_cos)
@@ -242,9 +311,11 @@ module feedback_channel #(
         ) u_arctan (
             .clk,
             .rst,
+            // corrected sample
             .valid    (corrected),
             .sin      (corrected_sin),
             .cos      (corrected_cos),
+            // phase
             .done     (phase_valid),
             .phase    (plain_phase),
             .amplitude(corrected_amplitude)
@@ -252,33 +323,38 @@ module feedback_channel #(
         harmonic_correction u_harmonics (
             .clk,
             .rst,
+            // table
             .enable   (harmonic_enable),
             .write    (harmonic_write),
             .point    (harmonic_at),
             .value    (harmonic_value),
             .swap     (swap_harmonics),
+            // phase
             .valid    (phase_valid),
             .phase    (plain_phase),
+            // corrected phase
             .done     (harmonics_off),
             .phase_out(phase)
         );
         fringe_tracker u_tracker (
             .clk,
             .rst,
+            // phase
             .valid    (harmonics_off),
             .phase,
-            .done     (stepped),
-            .step,
+            // step
+            .done     (tracked),
+            .step     (tracked_step),
             .phase_out(tracked_phase),
             .overspeed
         );
-
         count_phase_check u_count_phase_check (
             .clk,
             .rst,
             .limit   (disagreement_limit),
-            .valid   (placed),
-            .position(place),
+            // both positions
+            .valid   (scale_valid),
+            .position(scale_position),
             .count   (quadrature_count),
             .shift,
             .shift_periods,
@@ -289,82 +365,106 @@ module feedback_channel #(
         ) u_recorder (
             .clk,
             .rst,
-            .start    (record),
+            // settings
+            .start  (record),
             .phases,
             .decimation,
-            .sampled  (converted),
-            .sin      (raw_sin),
-            .cos      (raw_cos),
+            // signals
+            .sampled(converted),
+            .sin    (raw_sin),
+            .cos    (raw_cos),
             .phase_valid,
-            .phase    (plain_phase),
-            .disturbed(|signal_faults[1:0] || overspeed),
-            .read     (recorder_read),
-            .word     (recorded),
+            .phase  (plain_phase),
+            .disturbed,
+            // burst
+            .read   (recorder_read),
+            .word   (recorded),
             .full,
             .invalid
         );
-        wire unused_sine = &{1'b0, ready, corrected_amplitude};
+
+        wire unused = &{1'b0, ready, corrected_amplitude};
     end else begin : g_no_sine
         assign {adc_cs_n, adc_sclk} = 2'b11;
-        assign {sin, cos, sample_rejected, phase, amplitude, signal_faults, first_signal_faults, overspeed, disagreement, stepped, step,
-                tracked_phase, recorded, full, invalid} = '0;
+        assign {sin, cos, phase, amplitude} = '0;
+        assign {sample_rejected, overspeed, disagreement, signal_faults, first_signal_faults} = '0;
+        assign {tracked, tracked_step, tracked_phase} = '0;
+        assign {recorded, full, invalid} = '0;
+
+        wire unused_pins = &{1'b0, adc_sin, adc_cos, convert, levels[1:0]};
+        wire unused_axis = &{
+            1'b0, outlier_step, outlier_hold, amplitude_low, amplitude_high, disagreement_limit
+        };
+        wire unused_limits = &{
+            1'b0, clip_level, tolerance, jump, band, span, no_noise_samples, sign_threshold,
+            offset_limit, balance_limit, quadrature_limit, clear_signal_faults
+        };
+        wire unused_correction = &{
+            1'b0, load_correction, sin_offset, cos_offset, gain, quadrature_error,
+            harmonic_enable, harmonic_write, harmonic_at, harmonic_value, swap_harmonics
+        };
+        wire unused_recorder = &{1'b0, record, phases, decimation, recorder_read, disturbed};
     end
-
-    // position
-    wire present, overrun, armed, late;
-    wire [ 6:0] captured_sources;
-    wire [15:0] captured_age;
-    wire [31:0] captured_time, passed;
-    wire signed [47:0] captured_position;
-    wire        [ 4:0] capture_free;
-    wire signed [39:0] fine;
-    wire               counted;
-    wire signed [16:0] count_step;
-    wire        [15:0] counted_phase;
-    // found, until the position of its count stands
-    logic       [ 2:0] index_later;
-
-    always_ff @(posedge clk) index_later <= rst ? '0 : {index_later[1:0], index_found};
 
     count_to_phase u_counts (
         .clk,
         .rst,
+        // counts
         .tick        (sample_tick),
         .count_step  (quadrature_step),
         .align       (align_written),
         .align_counts(align),
+        // step
         .valid       (counted),
-        .step        (count_step),
+        .step        (counted_step),
         .phase       (counted_phase)
+    );
+    position_source #(
+        .HAS_SINE(HAS_SINE)
+    ) u_source (
+        .use_counts,
+        .sample_tick,
+        // from sine and cosine
+        .tracked,
+        .tracked_step,
+        .tracked_phase,
+        // from counts
+        .counted,
+        .counted_step,
+        .counted_phase,
+        // selected
+        .by_counts,
+        .convert,
+        .valid(stepped),
+        .step,
+        .phase(step_phase)
     );
     unwrap u_position (
         .clk,
         .rst,
-        .valid   (by_counts ? counted : stepped),
-        .step    (by_counts ? count_step : step),
-        .phase   (by_counts ? counted_phase : tracked_phase),
+        // step
+        .valid   (stepped),
+        .step,
+        .phase   (step_phase),
         .shift,
         .shift_periods,
-        .done    (placed),
-        .position(place)
+        // position of the scale
+        .done    (scale_valid),
+        .position(scale_position)
     );
     velocity_estimator u_velocity (
         .clk,
         .rst,
         .quantum,
         .tick,
-        .position(place),
+        // position of the scale
+        .position(scale_position),
         .shift,
         .shift_periods,
+        // velocity
         .velocity,
-        .fine
+        .fine    (velocity_fine)
     );
-
-    // compensate
-    wire segment_in_force, segment_outside, segment_known;
-    logic               shifted;  // shift, as late as position
-    logic signed [31:0] shifted_periods;
-    wire signed [23:0] segment_error, segment_stored;
 
     if (SEGMENTS != 0) begin : g_segments
         localparam int INDEX = $clog2(SEGMENTS + 1);
@@ -374,67 +474,101 @@ module feedback_channel #(
         ) u_segments (
             .clk,
             .rst,
+            // settings
             .enable        (segment_enable),
             .linear        (segment_linear),
             .origin_written(segment_origin_written),
             .origin        (segment_origin),
             .segment_length,
             .segments      (segments[INDEX-1:0]),
+            // table
             .write         (segment_point_written),
             .point         (segment_border[INDEX-1:0]),
             .value         (segment_point),
             .read          (segment_read),
             .read_point    (segment_read_point[INDEX-1:0]),
-            .valid         (placed),
-            .position      (place),
+            // position of the scale
+            .valid         (scale_valid),
+            .position      (scale_position),
             .shift,
             .shift_periods,
+            // corrected position
             .done          (position_valid),
             .corrected     (position),
             .moved,
             .moved_by,
+            // state
             .in_force      (segment_in_force),
             .outside       (segment_outside),
             .error         (segment_error),
             .known         (segment_known),
             .stored        (segment_stored)
         );
-        always_ff @(posedge clk) begin
-            shifted <= shift && !rst;
-            if (shift) shifted_periods <= shift_periods;
-        end
+        shift_delay u_shift (
+            .clk,
+            .rst,
+            .shift,
+            .shift_periods,
+            .shifted,
+            .shifted_periods
+        );
     end else begin : g_no_segments
-        assign {position_valid, position} = {placed, place};
+        assign {position_valid, position} = {scale_valid, scale_position};
         assign {moved, moved_by} = {shift, shift_periods, 16'd0};
         assign {shifted, shifted_periods} = {shift, shift_periods};
-        assign {segment_in_force, segment_outside, segment_known, segment_error, segment_stored} = '0;
+        assign {segment_in_force, segment_outside, segment_known} = '0;
+        assign {segment_error, segment_stored} = '0;
+
+        wire unused_settings = &{
+            1'b0, segment_enable, segment_linear, segments, segment_origin,
+            segment_origin_written, segment_length
+        };
+        wire unused_table = &{
+            1'b0, segment_point, segment_border, segment_point_written, segment_read,
+            segment_read_point
+        };
     end
 
-    // capture, compare
+    capture_events #(
+        .DELAY(CAPTURE_DELAY)
+    ) u_capture_events (
+        .clk,
+        .rst,
+        .by_counts,
+        .index_found,
+        .capture_now,
+        .sync,
+        .index,
+        .software
+    );
     position_capture u_capture (
         .clk,
         .rst,
-        .enabled (capture_sources),
-        .index   (by_counts ? index_later[SEGMENTS==0?1 : 2] : index_found),
+        // sources
+        .enabled(capture_sources),
+        .index,
         .tick,
-        .software(capture_now || sync),
+        .software,
         .probe,
+        // position
         .now,
-        .valid   (position_valid),
+        .valid  (position_valid),
         .position,
-        .pop     (capture_next),
-        .clear   (capture_clear),
+        // queue
+        .pop    (capture_next),
+        .clear  (capture_clear),
         .present,
         .captured_sources,
         .captured_age,
         .captured_time,
         .captured_position,
-        .free    (capture_free),
+        .free   (capture_free),
         .overrun
     );
     position_compare u_compare (
         .clk,
         .rst,
+        // settings
         .start        (compare_start),
         .step         (compare_step),
         .count        (compare_count),
@@ -442,30 +576,30 @@ module feedback_channel #(
         .gap_length,
         .arm          (compare_arm),
         .disarm       (compare_disarm),
+        // position
         .valid        (position_valid),
         .position,
         .shift        (shifted),
         .shift_periods(shifted_periods),
+        // state
         .armed,
         .pulse        (compare_pulse),
         .late,
         .passed
     );
 
-    // registers
-    assign events       = {too_short, disagreement, signal_faults[1], signal_faults[0], overspeed, illegal};
-    assign signal_fault = |(signal_faults & signal_fault_mask);
-
     feedback_registers #(
-        .SINE(SINE)
+        .HAS_SINE(HAS_SINE)
     ) u_registers (
         .clk,
         .rst,
+        // register bus
         .select,
         .write,
         .word,
         .wdata,
         .rdata,
+        // edges and index
         .edge_filter_skip                  (filter_skip),
         .edge_filter_tolerated             (filter_tolerated),
         .decoder_mode                      (mode),
@@ -476,6 +610,7 @@ module feedback_channel #(
         .index_down,
         .index_each,
         .counts_per_revolution,
+        // strobes
         .strobes_arm_index                 (arm_index),
         .strobes_load_correction           (load_correction),
         .strobes_swap_harmonics            (swap_harmonics),
@@ -486,11 +621,13 @@ module feedback_channel #(
         .strobes_capture_clear             (capture_clear),
         .strobes_compare_arm               (compare_arm),
         .strobes_compare_disarm            (compare_disarm),
+        // index events
         .index_events_found                (index_found),
         .index_events_revolution_wrong     (revolution_wrong),
         .index_events_armed                (index_armed),
         .index_count,
         .edge_time,
+        // correction
         .correction_offset_sin             (sin_offset),
         .correction_offset_cos             (cos_offset),
         .correction_gain                   (gain),
@@ -499,12 +636,14 @@ module feedback_channel #(
         .harmonic_point                    (harmonic_value),
         .harmonic_point_point              (harmonic_at),
         .harmonic_point_written            (harmonic_write),
+        // recorder
         .recorder_decimation               (decimation),
         .recorder_phases                   (phases),
         .recorder_state_full               (full),
         .recorder_state_invalid            (invalid),
         .recorder_word                     (recorded),
         .recorder_word_read                (recorder_read),
+        // signal monitor
         .signal_faults,
         .first_signal_faults,
         .signal_fault_mask,
@@ -518,6 +657,7 @@ module feedback_channel #(
         .drift_limits_balance              (balance_limit),
         .quadrature_limits_quadrature_error(quadrature_limit),
         .quadrature_limits_sign_threshold  (sign_threshold),
+        // capture
         .capture_sources,
         .capture_state_present             (present),
         .capture_state_free                (capture_free),
@@ -526,6 +666,7 @@ module feedback_channel #(
         .captured_age,
         .captured_time,
         .captured_position,
+        // compare
         .compare_start,
         .compare_step,
         .compare_count,
@@ -534,13 +675,15 @@ module feedback_channel #(
         .compare_state_armed               (armed),
         .compare_state_late                (late),
         .compare_passed                    (passed),
+        // velocity and source of the position
         .velocity_quantum                  (quantum),
-        .velocity_fine                     (fine),
-        .position_source_counts            (counts_chosen),
-        .position_source_steps             (by_steps),
-        .position_source_sine              (SINE != 0),
+        .velocity_fine,
+        .position_source_counts            (use_counts),
+        .position_source_steps             (own_steps),
+        .position_source_sine              (1'(HAS_SINE)),
         .align,
         .align_written,
+        // segment table
         .segment_use_enable                (segment_enable),
         .segment_use_linear                (segment_linear),
         .segment_use_segments              (segments),
@@ -560,12 +703,7 @@ module feedback_channel #(
         .segment_error
     );
 
-    wire unused = &{1'b0, direction, illegal_seen, illegal_fault, revolution_fault, levels, adc_sin, adc_cos, outlier_step, outlier_hold,
-                    amplitude_low, amplitude_high, disagreement_limit, clip_level, tolerance, jump, band, span, no_noise_samples, sign_threshold, offset_limit,
-                    balance_limit, quadrature_limit, clear_signal_faults, load_correction, sin_offset, cos_offset, gain, quadrature_error, harmonic_enable,
-                    harmonic_write, harmonic_at, harmonic_value, swap_harmonics, record, phases, decimation, recorder_read, step, tracked_phase,
-                    index_later, segment_enable, segment_linear, segments, segment_origin, segment_origin_written, segment_length,
-                    segment_point, segment_border, segment_point_written, segment_read, segment_read_point};
+    wire unused = &{1'b0, direction, illegal_seen, illegal_fault, revolution_fault, levels[2]};
 endmodule
 
 `default_nettype wire

@@ -1,79 +1,106 @@
 // SPDX-License-Identifier: Apache-2.0
-// node -- a complete motion controller on a multi-drop line: soft core, line, axes, links to other
-// things.
+// node -- a complete motion controller on an RS-485 bus: soft core, bus port, axes and peripherals.
 //
-// latency  see axis and the rooms link and cpu
-// rate     see there
-// source   S0: one slave computer per axis, many on one line; here one node may have several axes
+// latency  see the blocks
+// rate     see the blocks
+// source   S0: one slave computer per axis, many on one bus; here one node may have several axes
 // model    the models of its blocks; proved in motion by tb/system
 `default_nettype none
 
 module node #(
-    parameter int CLK_HZ       = 4_000_000,  // clk frequency
-    parameter int AXES         = 1,          // 1..8
-    parameter int W            = 8,          // bits of a sample
-    parameter int DRIVES       = 15,         // what each axis can drive, see actuator
-    parameter int FILTERS      = 2,          // of each servo, see biquad_cascade
-    parameter int SEGMENTS     = 0,          // most segments of each scale's table, see grating
-    parameter int SINE         = 1,          // of each grating: 0 for A/B/Z only, see grating
-    parameter int PERIPHERALS  = 0,          // what else it speaks to, see links
-    parameter int MEMORY_BYTES = 98304,      // of the soft core, program and data
-    parameter     FIRMWARE     = ""          // file of its contents at power-up
+    parameter int CLK_HZ            = 4_000_000,  // Hz, clk frequency
+    parameter int AXES              = 1,          // axes of the node, 1 to 8
+    parameter int W                 = 8,          // bits of a sample
+    parameter int FILTERS           = 2,          // biquads of each servo, 0 to 4
+    parameter int SEGMENTS          = 0,          // most segments of each scale's table; 0: none
+    parameter int HAS_SINE          = 1,          // 0: no sine and cosine, positions of counts only
+    parameter int HAS_BRIDGE        = 1,          // 1: build the bridge of each axis
+    parameter int HAS_STEPPER       = 1,          // 1: build the step generator of each axis
+    parameter int HAS_DAC           = 1,          // 1: build the DAC of each axis
+    parameter int HAS_FINE_STAGE    = 1,          // 1: build the fine stages, which need the DAC
+    parameter int HAS_I2C           = 0,          // 1: build the I2C master
+    parameter int HAS_PS2           = 0,          // 1: build the PS/2 pass-through
+    parameter int HAS_PEER          = 0,          // 1: build the peer port
+    parameter int HAS_ANGLE_SENSOR  = 0,          // 1: build the receiver of the angle sensor
+    parameter int HAS_DISPLAY       = 0,          // 1: build the numeric display
+    parameter int HAS_STATUS_INPUTS = 0,          // 1: build the status inputs
+    parameter int MEMORY_BYTES      = 98304,      // bytes of the soft core, program and data
+    parameter     FIRMWARE          = ""          // file of its contents at power-up
 ) (
-    input wire clk,
-    input wire rst,
-    input wire [3:0] address,  // on the line
-    input wire estop_open,  // 1: pressed or wire cut
-    input wire rs485_rx,  // idles high
-    output logic rs485_tx,
-    output logic rs485_driver_enable,
-    input wire [AXES-1:0] encoder_a,
-    input wire [AXES-1:0] encoder_b,
-    input wire [AXES-1:0] encoder_z,  // index
-    input wire [2*AXES-1:0] probe,  // two of each axis
-    input wire [AXES-1:0] adc_sin,
-    input wire [AXES-1:0] adc_cos,
-    input wire [AXES-1:0] limit_low_open,  // 1: pressed or wire cut
-    input wire [AXES-1:0] limit_high_open,
-    input wire [AXES-1:0] drive_fault_n,
-    output logic [AXES-1:0] adc_cs_n,
-    output logic [AXES-1:0] adc_sclk,
-    output logic [AXES-1:0] bridge_a,
-    output logic [AXES-1:0] bridge_b,
-    output logic [AXES-1:0] step,
-    output logic [AXES-1:0] direction,
-    output logic [AXES-1:0] dac_cs_n,
-    output logic [AXES-1:0] dac_sclk,
-    output logic [AXES-1:0] dac_sdi,
-    output logic [AXES-1:0] drive_enable,
-    output logic [AXES-1:0] compare_pulse,
-    input wire i2c_scl,  // links from here on: levels of the lines; without links all are idle
-    input wire i2c_sda,
-    output logic i2c_scl_low,  // pull the lines low
-    output logic i2c_sda_low,
-    input wire keyboard_clock,
-    input wire keyboard_data,
-    output logic keyboard_clock_low,
-    output logic keyboard_data_low,
-    input wire edm_clock,  // PS/2, where the node is the keyboard
-    input wire edm_data,
-    output logic edm_clock_low,
-    output logic edm_data_low,
-    input wire peer_rx,  // idles high
-    output logic peer_tx,
-    input wire sensor_rx,
-    output logic display_cs_n,
-    output logic display_sclk,
-    output logic display_data,
-    input wire [1:0] edm_status
+    input  wire               clk,
+    input  wire               rst,
+    // RS-485 bus
+    input  wire  [       3:0] address,              // address of the node on the bus
+    input  wire               rs485_rx,             // pin, idles high
+    output logic              rs485_tx,             // pin, idles high
+    output logic              rs485_driver_enable,  // pin, 1: drive the bus
+    // emergency stop
+    input  wire               estop_open,           // pin, 1: pressed or wire cut
+    // scales, bit n or bits 2 n + 1 .. 2 n: axis n
+    input  wire  [  AXES-1:0] encoder_a,            // pins
+    input  wire  [  AXES-1:0] encoder_b,            // pins
+    input  wire  [  AXES-1:0] encoder_z,            // pins, index
+    input  wire  [2*AXES-1:0] probe,                // pins of the touch probes, two of each axis
+    input  wire  [  AXES-1:0] adc_sin,              // pins, serial data, synchronous to adc_sclk
+    input  wire  [  AXES-1:0] adc_cos,              // pins, serial data, synchronous to adc_sclk
+    output logic [  AXES-1:0] adc_cs_n,             // pins, low during a conversion
+    output logic [  AXES-1:0] adc_sclk,             // pins, idle high
+    output logic [  AXES-1:0] compare_pulse,        // pins, high during a compare pulse
+    // machine
+    input  wire  [  AXES-1:0] limit_low_open,       // pins, 1: pressed or wire cut
+    input  wire  [  AXES-1:0] limit_high_open,      // pins, 1: pressed or wire cut
+    input  wire  [  AXES-1:0] drive_fault_n,        // pins, 0: the drive reports a fault
+    // drives
+    output logic [  AXES-1:0] bridge_a,             // pins, alone high for a positive command
+    output logic [  AXES-1:0] bridge_b,             // pins, alone high for a negative command
+    output logic [  AXES-1:0] step,                 // pins, as step_output_mode says
+    output logic [  AXES-1:0] direction,            // pins, as step_output_mode says
+    output logic [  AXES-1:0] dac_cs_n,             // pins, low during a word
+    output logic [  AXES-1:0] dac_sclk,             // pins, idle low
+    output logic [  AXES-1:0] dac_sdi,              // pins, data of the DAC
+    output logic [  AXES-1:0] drive_enable,         // pins, 1: the drive may be on
+    // peripherals: I2C
+    input  wire               i2c_scl,              // level of the clock line
+    input  wire               i2c_sda,              // level of the data line
+    output logic              i2c_scl_low,          // 1: pull the clock line low
+    output logic              i2c_sda_low,          // 1: pull the data line low
+    // peripherals: PS/2, the keyboard's side
+    input  wire               keyboard_clock,       // level of the clock line
+    input  wire               keyboard_data,        // level of the data line
+    output logic              keyboard_clock_low,   // 1: pull the clock line low
+    output logic              keyboard_data_low,    // 1: pull the data line low
+    // peripherals: PS/2, where the node is the keyboard of the EDM machine
+    input  wire               edm_clock,            // level of the clock line
+    input  wire               edm_data,             // level of the data line
+    output logic              edm_clock_low,        // 1: pull the clock line low
+    output logic              edm_data_low,         // 1: pull the data line low
+    // peripherals: the others
+    input  wire               peer_rx,              // pin, idles high
+    output logic              peer_tx,              // pin, idles high
+    input  wire               sensor_rx,            // pin, idles high
+    output logic              display_cs_n,         // pin, low during a word
+    output logic              display_sclk,         // pin, idles low
+    output logic              display_data,         // pin
+    input  wire  [       1:0] edm_status            // pins, asynchronous
 );
-    // cpu
-    wire select, write, trap, node_select, bus_select, peripherals_select;
+    // register bus
+    wire select, write, node_select, bus_select, peripherals_select;
+    wire [AXES-1:0] axis_select, feedback_select, actuator_select;
     wire [15:0] bus_address;
     wire [31:0] wdata, rdata, node_rdata, bus_rdata, peripherals_rdata;
-    wire [AXES-1:0] axis_select, feedback_select, actuator_select;
     wire [32*AXES-1:0] axis_rdata, feedback_rdata, actuator_rdata;
-    wire [5:0] word = bus_address[7:2];
+    wire [ 5:0] word = bus_address[7:2];
+    // time
+    wire [63:0] now;
+    wire [23:0] tick_period;
+    wire [15:0] sample_period;
+    wire tick, sample_tick, restart_tick;
+    // start of several axes
+    wire start_axes_written, sync;
+    wire [7:0] start_axes, sync_axes;
+    wire [AXES-1:0] start;
+    // interlock
+    wire trap, heartbeat_kick, armed, cpu_stopped, estop, watchdog_expired;
 
     soft_core #(
         .MEMORY_BYTES(MEMORY_BYTES),
@@ -92,33 +119,50 @@ module node #(
         .AXES(AXES)
     ) u_bus (
         .clk,
+        // access of the soft core
         .select,
         .address(bus_address),
+        .rdata,
+        // answers of the blocks
         .node_rdata,
         .bus_rdata,
         .peripherals_rdata,
         .axis_rdata,
         .feedback_rdata,
         .actuator_rdata,
+        // selected block
         .node_select,
         .bus_select,
         .peripherals_select,
         .axis_select,
         .feedback_select,
-        .actuator_select,
-        .rdata
+        .actuator_select
+    );
+    node_registers u_node_registers (
+        .clk,
+        .rst,
+        // register bus
+        .select       (node_select),
+        .write,
+        .word,
+        .wdata,
+        .rdata        (node_rdata),
+        // what is built
+        .clk_hz       (32'(CLK_HZ)),
+        .build_axes   (4'(AXES)),
+        .build_address(address),
+        .build_memory (8'(MEMORY_BYTES / 1024)),
+        // time
+        .time_stamp   (now),
+        .tick_period,
+        .sample_period,
+        // firmware
+        .heartbeat_kick,
+        .start_axes,
+        .start_axes_written
     );
 
-    // time; the watchdog of the soft core gives it as many clk however slow they are. Nodes that
-    // start at a sync tick together from there on
-    localparam int CORE_SILENCE_MS = 20 + 1_200_000_000 / CLK_HZ;
-
-    wire [63:0] now;
-    wire [23:0] tick_period;
-    wire [15:0] sample_period;
-    wire tick, sample_tick, alive, silent, start_axes_written, sync;
-    wire [7:0] start_axes, sync_axes;
-
+    // time
     time_stamp u_time (
         .clk,
         .rst,
@@ -130,7 +174,7 @@ module node #(
         .clk,
         .rst,
         .period (tick_period),
-        .restart(sync && |sync_axes),
+        .restart(restart_tick),
         .tick
     );
     tick_divider #(
@@ -142,39 +186,30 @@ module node #(
         .restart(1'b0),
         .tick   (sample_tick)
     );
-    node_registers u_node_registers (
-        .clk,
-        .rst,
-        .select        (node_select),
-        .write,
-        .word,
-        .wdata,
-        .rdata         (node_rdata),
-        .clk_hz        (32'(CLK_HZ)),
-        .build_axes    (4'(AXES)),
-        .build_address (address),
-        .build_memory  (8'(MEMORY_BYTES / 1024)),
-        .time_stamp    (now),
-        .tick_period,
-        .sample_period,
-        .heartbeat_kick(alive),
-        .start_axes,
-        .start_axes_written
+    common_start #(
+        .AXES(AXES)
+    ) u_start (
+        .request     (start_axes_written),
+        .request_axes(start_axes),
+        .sync,
+        .sync_axes,
+        .start,
+        .restart_tick
     );
-    heartbeat_watchdog #(
-        .CLK_HZ(CLK_HZ)
+
+    // interlock
+    core_watchdog #(
+        .CLK_HZ(CLK_HZ),
+        .AXES  (AXES)
     ) u_core_watchdog (
         .clk,
         .rst,
-        .time_ms(16'(CORE_SILENCE_MS)),
-        .kick   (alive),
-        .armed  (|drive_enable),
-        .expired(silent)
+        .trap,
+        .kick   (heartbeat_kick),
+        .drive_enable,
+        .armed,
+        .stopped(cpu_stopped)
     );
-
-    // line
-    wire estop, watchdog_expired;
-
     synchroniser #(
         .RESET(1)
     ) u_estop (
@@ -183,44 +218,53 @@ module node #(
         .d(estop_open),
         .q(estop)
     );
+
     rs485_port #(
         .CLK_HZ(CLK_HZ)
     ) u_rs485 (
         .clk,
         .rst,
-        .address,
+        // register bus
         .select(bus_select),
         .write,
         .word,
         .wdata,
         .rdata (bus_rdata),
-        .armed (|drive_enable),
+        // node
+        .address,
+        .armed,
         .watchdog_expired,
         .sync,
         .sync_axes,
+        // pins
         .rs485_rx,
         .rs485_tx,
         .rs485_driver_enable
     );
 
-    wire unused = &{1'b0, bus_address[1:0], start_axes, sync_axes};
-
-    // links
     peripherals #(
-        .CLK_HZ     (CLK_HZ),
-        .PERIPHERALS(PERIPHERALS)
+        .CLK_HZ           (CLK_HZ),
+        .HAS_I2C          (HAS_I2C),
+        .HAS_PS2          (HAS_PS2),
+        .HAS_PEER         (HAS_PEER),
+        .HAS_ANGLE_SENSOR (HAS_ANGLE_SENSOR),
+        .HAS_DISPLAY      (HAS_DISPLAY),
+        .HAS_STATUS_INPUTS(HAS_STATUS_INPUTS)
     ) u_peripherals (
         .clk,
         .rst,
+        // register bus
         .select(peripherals_select),
         .write,
         .word,
         .wdata,
         .rdata (peripherals_rdata),
+        // I2C
         .i2c_scl,
         .i2c_sda,
         .i2c_scl_low,
         .i2c_sda_low,
+        // PS/2
         .keyboard_clock,
         .keyboard_data,
         .keyboard_clock_low,
@@ -229,6 +273,7 @@ module node #(
         .edm_data,
         .edm_clock_low,
         .edm_data_low,
+        // the others
         .peer_rx,
         .peer_tx,
         .sensor_rx,
@@ -238,47 +283,56 @@ module node #(
         .edm_status
     );
 
-    // axes
     for (genvar n = 0; n < AXES; n++) begin : g_axis
         axis #(
-            .CLK_HZ  (CLK_HZ),
-            .W       (W),
-            .DRIVES  (DRIVES),
-            .FILTERS (FILTERS),
-            .SINE    (SINE),
-            .SEGMENTS(SEGMENTS)
+            .CLK_HZ        (CLK_HZ),
+            .W             (W),
+            .FILTERS       (FILTERS),
+            .SEGMENTS      (SEGMENTS),
+            .HAS_SINE      (HAS_SINE),
+            .HAS_BRIDGE    (HAS_BRIDGE),
+            .HAS_STEPPER   (HAS_STEPPER),
+            .HAS_DAC       (HAS_DAC),
+            .HAS_FINE_STAGE(HAS_FINE_STAGE)
         ) u_axis (
             .clk,
             .rst,
-            .tick,
-            .tick_period,
-            .sample_tick,
-            .start          ((start_axes_written && start_axes[n]) || (sync && sync_axes[n])),
-            .sync,
-            .estop,
-            .watchdog_expired,
-            .cpu_stopped    (trap || silent),
+            // register bus
             .select         (axis_select[n]),
+            .feedback_select(feedback_select[n]),
+            .actuator_select(actuator_select[n]),
             .write,
             .word,
             .wdata,
             .rdata          (axis_rdata[32*n+:32]),
-            .feedback_select(feedback_select[n]),
             .feedback_rdata (feedback_rdata[32*n+:32]),
-            .actuator_select(actuator_select[n]),
             .actuator_rdata (actuator_rdata[32*n+:32]),
+            // time
+            .tick,
+            .tick_period,
+            .sample_tick,
             .now            (now[31:0]),
+            // node
+            .start          (start[n]),
+            .sync,
+            .estop,
+            .watchdog_expired,
+            .cpu_stopped,
+            // pins of the scale
             .encoder_a      (encoder_a[n]),
             .encoder_b      (encoder_b[n]),
             .encoder_z      (encoder_z[n]),
             .probe          (probe[2*n+:2]),
             .adc_sin        (adc_sin[n]),
             .adc_cos        (adc_cos[n]),
+            .adc_cs_n       (adc_cs_n[n]),
+            .adc_sclk       (adc_sclk[n]),
+            .compare_pulse  (compare_pulse[n]),
+            // pins of the machine
             .limit_low_open (limit_low_open[n]),
             .limit_high_open(limit_high_open[n]),
             .drive_fault_n  (drive_fault_n[n]),
-            .adc_cs_n       (adc_cs_n[n]),
-            .adc_sclk       (adc_sclk[n]),
+            // pins of the drive
             .bridge_a       (bridge_a[n]),
             .bridge_b       (bridge_b[n]),
             .step           (step[n]),
@@ -286,10 +340,11 @@ module node #(
             .dac_cs_n       (dac_cs_n[n]),
             .dac_sclk       (dac_sclk[n]),
             .dac_sdi        (dac_sdi[n]),
-            .drive_enable   (drive_enable[n]),
-            .compare_pulse  (compare_pulse[n])
+            .drive_enable   (drive_enable[n])
         );
     end
+
+    wire unused = &{1'b0, bus_address[1:0]};
 endmodule
 
 `default_nettype wire

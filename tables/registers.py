@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Everything that is made of tables/registers.rdl: the register blocks, the C header, the Python
-table and the page.
+table and the page. The text of each is in a template, tables/registers.*.jinja.
 """
 
+import re
 import sys
 import textwrap
 import zlib
@@ -10,6 +11,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
+import jinja2
 from systemrdl import RDLCompileError, RDLCompiler
 from systemrdl.node import FieldNode, RegNode
 
@@ -18,17 +20,31 @@ from tables import made_files
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "tables" / "registers.rdl"
 REGISTER_BUS_BASE = 0x8000_0000  # where the soft core sees the map
-SLOT = 0x100  # bytes a block may fill: a word index inside it has 6 bits
-MADE = "made by tables/registers.py from tables/registers.rdl; change those"
+SLOT = 0x100  # bytes that a block may fill: a word index inside it has 6 bits
+EVENTS = ("counter", "sticky")  # kinds whose port is a strobe that the block counts or holds
+KINDS = {  # what each kind of a field must be: sw, hw, and a further condition
+    "counter": lambda get, field: get("incrsaturate") and on_write(get) == "wclr",
+    "sticky": lambda get, field: on_write(get) == "woclr" and field.width == 1,
+    "pulse": lambda get, field: field.width == 1 and get("hw").name == "r",
+    "constant": lambda get, field: field.parent.inst_name == "map_crc" and field.width == 32,
+    "input": lambda get, field: get("sw").name == "r",
+    "setting": lambda get, field: get("hw").name == "r" and not on_write(get),
+}
+
+
+class Refused(ValueError):
+    def __init__(self, why):
+        super().__init__(f"tables/registers.rdl: {why}")
 
 
 @dataclass(frozen=True)
 class Field:
     """kind: constant, input (hardware gives it), setting (software gives it), pulse, counter,
-    sticky.
+    sticky. A field has the name of its register alone if it is called `value`.
     """
 
     name: str
+    port: str
     low: int
     width: int
     kind: str
@@ -37,10 +53,37 @@ class Field:
     reset: int
     unit: str
     lsb: str
-    text: str
+    text: str  # its own words, or none
+    meaning: str  # its own words, or those of the register with its name
     on_write: bool  # swmod: a strobe follows a write
     on_read: bool  # swacc: a strobe goes with a read
     needs: str  # parameter of the block without which a setting has no bits and reads 0
+    signal: str  # its port in the block; a bit of the register's port in a vector
+    state: str  # what the block reads: the port itself, or the bits that it holds
+
+    @property
+    def measure(self):
+        return " ".join(x for x in ("" if self.lsb == "1" else self.lsb, self.unit) if x)
+
+    @property
+    def described(self):
+        return f"{self.meaning} [{self.measure}]" if self.unit else self.meaning
+
+    @property
+    def scale(self):
+        """Value of one count, in its unit."""
+        base, power, exponent = (self.lsb or "1").partition("^")
+        return Fraction(base) ** int(exponent) if power else Fraction(base)
+
+    @property
+    def shape(self):
+        return ("signed " if self.signed else "") + span(self.width)
+
+    @property
+    def bits(self):
+        """What a write of the register puts into the field."""
+        one = f"wdata[{self.low}]"
+        return one if self.width == 1 else f"wdata{span(min(self.width, 32), self.low)}"
 
 
 @dataclass(frozen=True)
@@ -48,21 +91,9 @@ class Register:
     name: str
     offset: int
     wide: bool
+    vector: bool
     text: str
     fields: tuple
-
-    def meaning(self, field):
-        """Words for a field: its own, or the register's with the field's name."""
-        return field.text or (
-            self.text if field.name == "value" else f"{self.text}: {field.name.replace('_', ' ')}"
-        )
-
-    def meaning_and_unit(self, field):
-        unit = " ".join(x for x in ("" if field.lsb == "1" else field.lsb, field.unit) if x)
-        return f"{self.meaning(field)} [{unit}]" if field.unit else self.meaning(field)
-
-    def port(self, field):
-        return self.name if field.name == "value" else f"{self.name}_{field.name}"
 
     @property
     def word(self):
@@ -75,6 +106,40 @@ class Register:
     @property
     def on_read(self):
         return any(f.on_read for f in self.fields)
+
+    @property
+    def access(self):
+        return "".join(c for c in "rw" if any(c in f.access for f in self.fields))
+
+    def parts(self, constant):
+        """What is on rdata for this register of 32 bits, most significant bit first."""
+        readable = [f for f in self.fields if "r" in f.access]
+        if self.vector:
+            return [f"{32 - len(readable)}'d0", readable[0].state.partition("[")[0]]
+        parts, at = [], 0
+        for f in readable:
+            if f.low > at:
+                parts.append(f"{f.low - at}'d0")
+            parts.append(f"32'h{constant:08X}" if f.kind == "constant" else f.state)
+            at = f.low + f.width
+        if at < 32:
+            extended = len(self.fields) == 1 and readable[0].signed
+            parts.append(f"{{{32 - at}{{{parts[0]}[{at - 1}]}}}}" if extended else f"{32 - at}'d0")
+        return parts[::-1]
+
+    def shown(self, constant):
+        parts = self.parts(constant)
+        return parts[0] if len(parts) == 1 else "{" + ", ".join(parts) + "}"
+
+    @property
+    def shown_high(self):
+        """What is on rdata for the high word of a register of 64 bits."""
+        f = self.fields[0]
+        held = f.kind == "input"
+        top = f"{f.port}_high" if held else f"{f.port}[{f.width - 1}:32]"
+        sign = f"{f.port}_high[{f.width - 33}]" if held else f"{f.port}[{f.width - 1}]"
+        pad = f"{{{64 - f.width}{{{sign if f.signed else chr(49) + chr(39) + 'b0'}}}}}"
+        return top if f.width == 64 else f"{{{pad}, {top}}}"
 
 
 @dataclass(frozen=True)
@@ -94,120 +159,113 @@ class Block:
     def parameters(self):
         return sorted({f.needs for _, f in self.fields if f.needs})
 
+    @property
+    def unused(self):
+        """The lowest bit of wdata that no register of this block has; all above are unused too."""
+        taken = ("setting", "pulse", "sticky")
+        fields = [(r, f) for r, f in self.fields if f.kind in taken]
+        return max((32 if r.wide else f.low + f.width for r, f in fields), default=0)
 
-class Refused(ValueError):
-    def __init__(self, why):
-        super().__init__(f"tables/registers.rdl: {why}")
+    @property
+    def ports(self):
+        """(direction, shape, name, text) of each port behind the register bus."""
+        return fitted([port for r in self.registers for port in ports(r)])
 
 
-def words(text):
-    return " ".join((text or "").split())
+def span(width, low=0):
+    return f"[{low + width - 1}:{low}]" if width > 1 else ""
+
+
+def literal(width, value):
+    digits = f"{value & (1 << width) - 1:0{(width + 3) // 4}X}"
+    return f"{width}'h{digits}" if width > 1 else f"1'b{value}"
+
+
+def on_write(get):
+    return get("onwrite") and get("onwrite").name
+
+
+def kind_of(get, name):
+    """The kind of a field, from the properties that no other kind has."""
+    found = next((k for k, p in (("counter", "counter"), ("sticky", "hwset")) if get(p)), None)
+    found = found or ("pulse" if get("singlepulse") else None)
+    return found or {"na": "constant", "w": "input"}.get(get("hw").name, "setting")
 
 
 def field_of(node, register):
-    get = node.get_property
-    name = f"{register.get_path()}.{node.inst_name}"
-    sw, hw = get("sw").name, get("hw").name
-    if get("counter"):
-        kind = "counter"
-        good = (
-            get("incrsaturate") and get("onwrite") and get("onwrite").name == "wclr" and sw == "rw"
-        )
-    elif get("hwset"):
-        kind, good = "sticky", get("onwrite") and get("onwrite").name == "woclr" and sw == "rw"
-    elif get("singlepulse"):
-        kind, good = "pulse", node.width == 1 and hw == "r"
-    elif hw == "na":
-        kind, good = "constant", sw == "r" and register.inst_name == "map_crc" and node.width == 32
-    elif hw == "w":
-        kind, good = "input", sw == "r"
-    else:
-        kind, good = "setting", hw == "r" and "w" in sw and not get("onwrite")
-    unknown = [
-        p
-        for p in ("onread", "hwclr", "we", "wel", "sticky", "stickybit", "decr")
-        if node.inst.properties.get(p)
-    ]
-    if not good or unknown or (get("swacc") and "r" not in sw):
-        raise Refused(f"{name}: this mixture of properties is not supported")
-    if kind != "setting" and get("swmod"):
-        raise Refused(f"{name}: swmod is only for what software sets")
-    wide, needs = (
-        register.get_property("regwidth") == 64,
-        get("needs") or register.get_property("needs") or "",
-    )
-    if needs and (kind != "setting" or wide):
-        raise Refused(f"{name}: only a setting of 32 bits or fewer may need a parameter")
-    if (
-        not wide
-        and node.high > 31
-        or wide
-        and (node.inst_name != "value" or node.width <= 32 or kind not in ("input", "setting"))
+    get, name, parent = node.get_property, node.inst_name, register.inst_name
+    kind, sw = kind_of(get, name), get("sw").name
+    wide, vector = register.get_property("regwidth") == 64, bool(register.get_property("vector"))
+    needs = get("needs") or register.get_property("needs") or ""
+    unknown = {"onread", "hwclr", "we", "wel", "sticky", "stickybit", "decr"}
+    text, words = (" ".join((n.get_property("desc") or "").split()) for n in (node, register))
+    port = parent if name == "value" else f"{parent}_{name}"
+    signal = f"{parent}[{node.low}]" if vector else port
+    held = {"counter": "_count", "sticky": "_held"}.get(kind, "")
+    for bad, why in (
+        (not KINDS[kind](get, node), "this mixture of properties is not supported"),
+        (unknown & node.inst.properties.keys(), "one of its properties is not supported"),
+        (kind in EVENTS and sw != "rw", "software must read and write what is counted or held"),
+        (kind == "setting" and "w" not in sw, "software must write a setting"),
+        (get("swacc") and "r" not in sw, "swacc is only for what software reads"),
+        (get("swmod") and kind != "setting", "swmod is only for what software sets"),
+        (needs and (kind != "setting" or wide), "only a setting of 32 bits may need a parameter"),
+        (not wide and node.high > 31, "a field of more than 32 bits needs a register of 64"),
+        (wide and (name != "value" or node.width <= 32), "64 bits are for one long `value`"),
+        (wide and kind not in ("input", "setting"), "64 bits are an input or a setting"),
+        (vector and (node.width > 1 or kind not in ("input", "sticky")), "not for a vector"),
     ):
-        raise Refused(
-            f"{name}: a field of more than 32 bits must be the `value` of a register of 64"
-        )
+        if bad:
+            raise Refused(f"{register.get_path()}.{name}: {why}")
     return Field(
-        node.inst_name,
-        node.low,
-        node.width,
-        kind,
-        bool(get("two_complement")),
-        sw,
-        int(get("reset") or 0),
-        get("unit") or "",
-        get("lsb") or "",
-        words(get("desc")),
-        bool(get("swmod")),
-        bool(get("swacc")),
-        needs,
+        name=name,
+        port=port,
+        low=node.low,
+        width=node.width,
+        kind=kind,
+        signed=bool(get("two_complement")),
+        access=sw,
+        reset=int(get("reset") or 0),
+        unit=get("unit") or "",
+        lsb=get("lsb") or "",
+        text=text,
+        meaning=text or (words if name == "value" else f"{words}: {name.replace('_', ' ')}"),
+        on_write=bool(get("swmod")),
+        on_read=bool(get("swacc")),
+        needs=needs,
+        signal=signal,
+        state=signal.replace(parent, parent + held, 1) if vector else port + held,
     )
+
+
+def register_of(node):
+    if not isinstance(node, RegNode):
+        raise Refused(f"{node.get_path()}: a block holds registers only")
+    width, vector = node.get_property("regwidth"), bool(node.get_property("vector"))
+    if width not in (32, 64) or node.get_property("accesswidth") != 32:
+        raise Refused(f"{node.get_path()}: 32 bits, or 64 with accesswidth 32")
+    fields = tuple(field_of(f, node) for f in node.children() if isinstance(f, FieldNode))
+    whole = [f.low for f in fields] == list(range(len(fields)))
+    if vector and not (whole and len({f.kind for f in fields}) == 1):
+        raise Refused(f"{node.get_path()}: a vector has one kind of bits, from bit 0 on")
+    text = " ".join((node.get_property("desc") or "").split())
+    offset = node.raw_address_offset
+    return Register(node.inst_name, offset, width == 64, vector, text, fields)
 
 
 def read(axes=1, source=SOURCE):
     """The blocks of a node with so many axes, in the order of their addresses."""
     compiler = RDLCompiler()
     compiler.compile_file(str(source))
-    top = compiler.elaborate(parameters={"AXES": axes}).top
     blocks = []
-    for node in top.children():
-        registers = []
-        for register in node.children():
-            if not isinstance(register, RegNode):
-                raise Refused(f"{register.get_path()}: a block holds registers only")
-            width = register.get_property("regwidth")
-            if width not in (32, 64) or register.get_property("accesswidth") != 32:
-                raise Refused(f"{register.get_path()}: 32 bits, or 64 with accesswidth 32")
-            fields = tuple(
-                field_of(f, register) for f in register.children() if isinstance(f, FieldNode)
-            )
-            registers.append(
-                Register(
-                    register.inst_name,
-                    register.raw_address_offset,
-                    width == 64,
-                    words(register.get_property("desc")),
-                    fields,
-                )
-            )
-        if (
-            node.size > SLOT
-            or node.raw_address_offset % SLOT
-            or (node.is_array and node.array_stride % SLOT)
-        ):
-            raise Refused(
-                f"{node.get_path()}: a block starts at a multiple of {SLOT:#x} and is not longer"
-            )
-        blocks.append(
-            Block(
-                node.inst_name,
-                words(node.get_property("name")),
-                node.raw_address_offset,
-                node.array_stride if node.is_array else 0,
-                node.array_dimensions[0] if node.is_array else 1,
-                tuple(registers),
-            )
-        )
+    for node in compiler.elaborate(parameters={"AXES": axes}).top.children():
+        base, stride = node.raw_address_offset, node.array_stride if node.is_array else 0
+        if node.size > SLOT or base % SLOT or stride % SLOT:
+            raise Refused(f"{node.get_path()}: a block starts at a multiple of {SLOT:#x}, one each")
+        count = node.array_dimensions[0] if node.is_array else 1
+        registers = tuple(register_of(r) for r in node.children())
+        text = " ".join(node.get_property("name").split())
+        blocks.append(Block(node.inst_name, text, base, stride, count, registers))
     return blocks
 
 
@@ -215,525 +273,86 @@ def crc(source=SOURCE):
     return zlib.crc32(source.read_bytes().replace(b"\r\n", b"\n"))
 
 
-# ---- SystemVerilog
-# -----------------------------------------------------------------------------------------------
+def ports(r):
+    """(direction, shape, name, texts from long to short) of each port of a register."""
+    fields, found = r.fields, []
+    if r.vector:
+        what = "" if fields[0].kind == "input" else "strobes: "
+        texts = [f"{what}{r.text}", f"{what}{clause(r.text)}"]
+        found.append(("input  wire ", span(len(fields)), r.name, texts))
+        fields = ()
+    for f in fields:
+        strobe = f.kind == "pulse" or f.kind in EVENTS
+        texts = [f.described, f"{clause(f.meaning)}, {f.measure}" if f.unit else clause(f.meaning)]
+        texts = [f"strobe: {t}" for t in texts] + ["strobe"] if strobe else texts
+        texts += [f.measure, clause(f.meaning)] if f.unit else []
+        out = f.kind in ("setting", "pulse")
+        if f.kind != "constant":
+            shape = "" if strobe else f.shape
+            found.append(("output logic" if out else "input  wire ", shape, f.port, texts))
+    strobes = (("written", r.on_write, "new value"), ("read", r.on_read, "read in this cycle"))
+    for strobe, there, text in strobes:
+        if there:
+            found.append(("output logic", "", f"{r.name}_{strobe}", [f"strobe: {text}"]))
+    return found
 
 
-def span(width):
-    return f"[{width - 1}:0]" if width > 1 else ""
+def clause(text):
+    return re.split(r"[;:,.] |\.$| \(", text)[0]
 
 
-def literal(width, value):
-    return (
-        f"{width}'h{value & (1 << width) - 1:0{(width + 3) // 4}X}" if width > 1 else f"1'b{value}"
-    )
+def fitted(found):
+    """The same ports, each with the longest text that fits its line after the formatter's work."""
+    shape = max((len(shape.partition("[")[2]) + 1 for _, shape, _, _ in found), default=0)
+    signed = 7 if any(shape.startswith("signed") for _, shape, _, _ in found) else 0
+    name = max((len(name) for _, _, name, _ in found), default=0)
+    room = made_files.COLUMNS - len("    output logic  ,  // ") - max(shape, 6) - signed - name
+    fit = []
+    for kind, shape, name, texts in found:
+        text = next((t for t in texts if len(t) <= room), None)
+        if text is None:
+            raise Refused(f"{name}: the first clause must have at most {room} characters")
+        fit.append((kind, shape, name, text))
+    return fit
 
 
-def state_of(register, field):
-    """Name of what is read: the port itself, or what stands behind it."""
-    port = register.port(field)
-    return {"counter": f"{port}_count", "sticky": f"{port}_held"}.get(field.kind, port)
+def sentence(text):
+    """A text as a sentence of the page."""
+    return f"{text[0].upper()}{text[1:].rstrip('.')}. " if text else ""
 
 
-def ports(block):
-    lines = []
-    for r in block.registers:
-        for f in r.fields:
-            name, sign = r.port(f), "signed " if f.signed else ""
-            shape = f"{sign}{span(f.width)}"
-            if f.kind == "input":
-                lines.append(("input  wire ", shape, name, r.meaning_and_unit(f)))
-            elif f.kind in ("counter", "sticky"):
-                lines.append(
-                    (
-                        "input  wire ",
-                        "",
-                        name,
-                        f"strobe, {'counted' if f.kind == 'counter' else 'held'}: {r.meaning_and_unit(f)}",
-                    )
-                )
-            elif f.kind == "setting":
-                lines.append(("output logic", shape, name, r.meaning_and_unit(f)))
-            elif f.kind == "pulse":
-                lines.append(("output logic", "", name, f"strobe: {r.meaning_and_unit(f)}"))
-        if r.on_write:
-            lines.append(
-                (
-                    "output logic",
-                    "",
-                    f"{r.name}_written",
-                    f"strobe: {r.name} has just been written, its new value stands",
-                )
-            )
-        if r.on_read:
-            lines.append(
-                (
-                    "output logic",
-                    "",
-                    f"{r.name}_read",
-                    f"strobe: {r.name} is being read in this clk",
-                )
-            )
-    return lines
-
-
-def read_value(r, constant, high=False):
-    """What stands on rdata for this register, most significant bit first."""
-    readable = [f for f in r.fields if "r" in f.access]
-    if r.wide:
-        f = r.fields[0]
-        name = state_of(r, f)
-        if not high:
-            return f"{name}[31:0]"
-        top = f"{name}_high" if f.kind == "input" else f"{name}[{f.width - 1}:32]"
-        pad = 64 - f.width
-        sign = f"{name}_high[{f.width - 33}]" if f.kind == "input" else f"{name}[{f.width - 1}]"
-        return (
-            top
-            if not pad
-            else f"{{{{{pad}{{{sign if f.signed else chr(49) + chr(39) + 'b0'}}}}}, {top}}}"
-        )
-    parts, at = [], 0
-    for f in readable:
-        if f.low > at:
-            parts.append(f"{f.low - at}'d0")
-        parts.append(literal(f.width, constant) if f.kind == "constant" else state_of(r, f))
-        at = f.low + f.width
-    if at < 32:
-        alone = len(r.fields) == 1 and r.fields[0].signed
-        parts.append(
-            f"{{{32 - at}{{{parts[-1]}[{r.fields[0].width - 1}]}}}}" if alone else f"{32 - at}'d0"
-        )
-    return parts[0] if len(parts) == 1 else "{" + ", ".join(reversed(parts)) + "}"
-
-
-def verilog(block, constant):
-    name = f"{block.name}_registers"
-    head = [
-        f"// {name} -- the register block of {block.text}.",
-        "//",
-        "// latency  1 clk from select to rdata, and from a write to the new value        rate  one access per clk",
-        "// source   tables/registers.rdl",
-        "// model    tb/registers/register_block.py, equal in every bit of every cycle; test tb/registers/test_registers.py",
-        f"// made     by tables/registers.py, never by hand{'; map_crc is the CRC-32 of the source' if block.name == 'node' else ''}",
-    ]
-    fixed = [
-        ("input  wire ", "", "clk", ""),
-        (
-            "input  wire ",
-            "",
-            "rst",
-            "every setting takes its first value, what was counted or held is cleared",
-        ),
-        ("input  wire ", "", "select", "an access to this block"),
-        ("input  wire ", "", "write", "with select: wdata goes into the word"),
-        (
-            "input  wire ",
-            "[5:0]",
-            "word",
-            "index of the 32-bit word; a word without a register reads 0",
-        ),
-        ("input  wire ", "[31:0]", "wdata", ""),
-        ("output logic", "[31:0]", "rdata", "what was read, for one clk; 0 in every other"),
-    ]
-    table = fixed + ports(block)
-    shape_width = max(len(s) for _, s, _, _ in table)
-    name_width = max(len(n) for _, _, n, _ in table) + 1
-    chosen = [
-        f"    parameter int {p} = 1{' ' * 16}// 0: the settings that need it have no bits and read 0"
-        for p in block.parameters
-    ]
-    opened = (
-        [f"module {name} #(", *(f"{p}," for p in chosen[:-1]), chosen[-1], ") ("]
-        if chosen
-        else [f"module {name} ("]
-    )
-    lines = ["// SPDX-License-Identifier: Apache-2.0", *head, "`default_nettype none", "", *opened]
-    for i, (kind, shape, port, text) in enumerate(table):
-        declared = f"{port}{',' if i + 1 < len(table) else ''}"
-        lines.append(
-            f"    {kind} {shape:<{shape_width}} {declared:<{name_width}}{'  // ' + text if text else ''}".rstrip()
-        )
-    lines.append(");")
-
-    inner = []
-    for r in block.registers:
-        for f in r.fields:
-            if f.kind == "counter":
-                inner.append(f"    logic {span(f.width):<6} {r.port(f)}_count;")
-            elif f.kind == "sticky":
-                inner.append(f"    logic {span(f.width):<6} {r.port(f)}_held;")
-            elif r.wide and f.kind == "input":
-                inner.append(f"    logic {span(f.width - 32):<6} {r.port(f)}_high;")
-            elif r.wide:
-                inner.append(f"    logic [31:0] {r.port(f)}_low;")
-    lines += inner + ([""] if inner else [])
-
-    writes = any(f.kind != "input" and f.kind != "constant" for _, f in block.fields)
-    lines.append("    wire get = select && !write;")
-    if writes:
-        lines.append("    wire put = select && write;")
-    used = set()
-    for r, f in block.fields:
-        if f.kind == "sticky" or f.kind == "pulse" or f.kind == "setting":
-            used |= set(range(32)) if r.wide else set(range(f.low, f.low + f.width))
-    spare = sorted(set(range(32)) - used)
-    if spare:
-        if spare != list(range(spare[0], 32)):
-            raise Refused(f"{name}: unused bits of wdata in the middle")
-        lines.append(
-            f"    wire unused = &{{1'b0, wdata[31:{spare[0]}]}};         // no register of this block has these bits"
-            if spare[0] < 31
-            else "    wire unused = &{1'b0, wdata[31]};"
-        )
-    lines += [
-        f"    assign {r.name}_read = get && word == 6'h{r.word:02X};"
-        for r in block.registers
-        if r.on_read
-    ]
-    lines += [
-        "",
-        "    always_ff @(posedge clk) begin",
-        "        rdata <= '0;",
-        "        if (get) case (word)",
-    ]
-    for r in block.registers:
-        if any("r" in f.access for f in r.fields):
-            lines += textwrap.wrap(
-                f"6'h{r.word:02X}: rdata <= {read_value(r, constant)};",
-                132,
-                initial_indent=12 * " ",
-                subsequent_indent=28 * " ",
-                break_long_words=False,
-            )
-            if r.wide:
-                lines.append(
-                    f"            6'h{r.word + 1:02X}: rdata <= {read_value(r, constant, high=True)};"
-                )
-    lines += ["            default: rdata <= '0;", "        endcase"]
-    for r in block.registers:
-        if r.wide and r.fields[0].kind == "input":
-            f = r.fields[0]
-            lines.append(
-                f"        if (get && word == 6'h{r.word:02X}) {r.port(f)}_high <= {r.port(f)}[{f.width - 1}:32];"
-            )
-    lines.append("")
-
-    reset = ["            rdata <= '0;"]
-    for r in block.registers:
-        if r.on_write:
-            lines.append(f"        {r.name}_written <= put && word == 6'h{r.word + r.wide:02X};")
-            reset.append(f"            {r.name}_written <= 1'b0;")
-        for f in r.fields:
-            port, state, hit = r.port(f), state_of(r, f), f"put && word == 6'h{r.word:02X}"
-            bits = f"wdata[{f.low + f.width - 1}:{f.low}]" if f.width > 1 else f"wdata[{f.low}]"
-            bits = "wdata" if bits == "wdata[31:0]" else bits
-            if f.kind == "pulse":
-                lines.append(f"        {port} <= {hit} && {bits};")
-                reset.append(f"            {port} <= 1'b0;")
-            elif f.kind == "sticky":
-                lines.append(f"        {state} <= {port} || ({state} && !({hit} && {bits}));")
-                reset.append(f"            {state} <= 1'b0;")
-            elif f.kind == "counter":
-                one = f"{{{f.width - 1}'d0, {port}}}"
-                lines.append(f"        if ({hit}) {state} <= {one};")
-                lines.append(f"        else if (!(&{state})) {state} <= {state} + {one};")
-                reset.append(f"            {state} <= '0;")
-            elif f.kind == "setting" and r.wide:
-                lines.append(f"        if (put && word == 6'h{r.word:02X}) {port}_low <= wdata;")
-                top = "wdata" if f.width == 64 else f"wdata[{f.width - 33}:0]"
-                lines.append(
-                    f"        if (put && word == 6'h{r.word + 1:02X}) {port} <= {{{top}, {port}_low}};"
-                )
-                reset += [
-                    f"            {port}_low <= '0;",
-                    f"            {port} <= {literal(f.width, f.reset)};",
-                ]
-            elif f.kind == "setting":
-                there, first = f"{f.needs} != 0", literal(f.width, f.reset)
-                lines.append(
-                    f"        if ({f'{there} && ' if f.needs else ''}{hit}) {port} <= {bits};"
-                )
-                reset.append(
-                    f"            {port} <= {f'{there} ? {first} : {chr(39)}0' if f.needs and f.reset else first};"
-                )
-            elif f.kind == "input" and r.wide:
-                reset.append(f"            {port}_high <= '0;")
-    if lines[-1] == "":
-        lines.pop()
-    lines += [
-        "        if (rst) begin",
-        *reset,
-        "        end",
-        "    end",
-        "endmodule",
-        "",
-        "`default_nettype wire",
-        "",
-    ]
-    return "\n".join(lines)
-
-
-# ---- C
-# -----------------------------------------------------------------------------------------------------------
-
-C_BEGIN = """\
-// SPDX-License-Identifier: Apache-2.0
-// The register map as the firmware sees it; {made}.
-//
-// NODE_x, BUS_x, AXIS_x are byte offsets inside a block. Fields: FIELD_GET(word, AXIS_STATE_QUEUE_FREE),
-// FIELD_GET_SIGNED, FIELD_PUT(AXIS_CONTROL_ENABLE, 1). A value alone in its register has the register's name.
-#ifndef MOIRE_REGISTERS_H
-#define MOIRE_REGISTERS_H
-
-#include <stdint.h>
-
-#define REGISTERS_BASE {base:#010x}u
-#define MAP_CRC {constant:#010x}u            // CRC-32 of tables/registers.rdl
-
-{places}
-
-#define FIELD_GET(word, field) (((uint32_t)(word) & field##_MASK) >> field##_SHIFT)
-#define FIELD_GET_SIGNED(word, field) \\
-    ((int32_t)((uint32_t)(word) << (32 - field##_SHIFT - field##_WIDTH)) >> (32 - field##_WIDTH))
-#define FIELD_PUT(field, value) (((uint32_t)(value) << field##_SHIFT) & field##_MASK)
-
-#ifndef MOIRE_REGISTER_ACCESS                // a host test may bring its own two functions
-static inline uint32_t register_read(uint32_t offset)
-{{ return *(volatile uint32_t *)(uintptr_t)(REGISTERS_BASE + offset); }}
-static inline void register_write(uint32_t offset, uint32_t value)
-{{ *(volatile uint32_t *)(uintptr_t)(REGISTERS_BASE + offset) = value; }}
-#else
-uint32_t register_read(uint32_t offset);
-void register_write(uint32_t offset, uint32_t value);
-#endif
-
-// 64 bits: reading the low word latches the high one, writing the high word commits both.
-static inline uint64_t register_read_wide(uint32_t offset)
-{{ uint32_t low = register_read(offset); return (uint64_t)register_read(offset + 4) << 32 | low; }}
-static inline void register_write_wide(uint32_t offset, uint64_t value)
-{{ register_write(offset, (uint32_t)value); register_write(offset + 4, (uint32_t)(value >> 32)); }}
-"""
-
-
-def header(blocks, constant):
-    places = []
-    for b in blocks:
-        places.append(f"#define {b.name.upper()}_BASE {b.base:#05x}u")
-        if b.stride:
-            places.append(f"#define {b.name.upper()}_STRIDE {b.stride:#05x}u")
-    out = [
-        C_BEGIN.format(
-            made=MADE, base=REGISTER_BUS_BASE, constant=constant, places="\n".join(places)
-        )
-    ]
-    for b in blocks:
-        up, argument = b.name.upper(), "unsigned axis, " if b.stride else ""
-        place = f"{up}_BASE + axis * {up}_STRIDE" if b.stride else f"{up}_BASE"
-        kinds = [("uint32_t", "read", ""), ("void", "write", ", uint32_t value")]
-        if any(r.wide and "r" in r.fields[0].access for r in b.registers):
-            kinds.append(("uint64_t", "read_wide", ""))
-        if any(r.wide and "w" in r.fields[0].access for r in b.registers):
-            kinds.append(("void", "write_wide", ", uint64_t value"))
-        for kind, name, more in kinds:
-            out += [
-                f"static inline {kind} {b.name}_{name}({argument}uint32_t offset{more})",
-                f"{{ {'' if kind == 'void' else 'return '}register_{name}({place} + offset{', value' if more else ''}); }}",
-            ]
-    out.append("")
-    seen = set()
-
-    def define(name, value, text=""):
-        if name in seen:
-            raise Refused(f"the C name {name} means two things: rename a register or field")
-        seen.add(name)
-        out.append(f"#define {name:<46} {value}{'  // ' + text if text else ''}")
-
-    for b in blocks:
-        out.append(f"// {b.text}")
-        for r in b.registers:
-            name = f"{b.name}_{r.name}".upper()
-            access = "".join(c for c in "rw" if any(c in f.access for f in r.fields))
-            alone = len(r.fields) == 1
-            define(
-                name,
-                f"{r.offset:#05x}u",
-                f"{access}: {r.meaning_and_unit(r.fields[0]) if alone else r.text}",
-            )
-            if r.wide:
-                define(f"{name}_LOW", f"{r.offset:#05x}u")
-                define(f"{name}_HIGH", f"{r.offset + 4:#05x}u")
-                define(f"{name}_WIDTH", r.fields[0].width)
-                continue
-            for f in r.fields:
-                field = f"{b.name}_{r.port(f)}".upper()
-                define(
-                    f"{field}_MASK",
-                    f"{((1 << f.width) - 1) << f.low:#010x}u",
-                    "" if alone or not f.text else r.meaning_and_unit(f),
-                )
-                define(f"{field}_SHIFT", f.low)
-                define(f"{field}_WIDTH", f.width)
-        out.append("")
-    return "\n".join([*out, "#endif", ""])
-
-
-# ---- Python
-# ------------------------------------------------------------------------------------------------------
-
-
-def fraction(text):
-    base, power, exponent = (text or "1").partition("^")
-    return Fraction(base) ** int(exponent) if power else Fraction(base)
-
-
-PYTHON_BEGIN = '''\
-# SPDX-License-Identifier: Apache-2.0
-"""The register map as the host sees it; {made}."""
-from dataclasses import dataclass
-from fractions import Fraction
-
-MAP_CRC = 0x{constant:08X}          # CRC-32 of tables/registers.rdl
-BLOCKS = {{{places}}}          # base, distance to the next one
-
-
-@dataclass(frozen=True)
-class Field:
-    """A field of a register; a value alone in its register is the field `value`. Value in `unit` = count * lsb."""
-
-    block: str
-    register: str
-    field: str
-    offset: int          # byte offset of the register inside its block
-    low: int             # lowest bit
-    width: int           # above 32: the low word comes first
-    signed: bool
-    access: str          # r, w or rw
-    unit: str
-    lsb: Fraction
-    text: str
-
-    def address(self, axis=0):
-        """Byte address of the (low) word in the map."""
-        base, stride = BLOCKS[self.block]
-        return base + axis * stride + self.offset
-
-    def value(self, word):
-        """The count in a register's word (of both words together when wider than 32 bits)."""
-        count = (word >> self.low) & ((1 << self.width) - 1)
-        return count - (1 << self.width) if self.signed and count >> (self.width - 1) else count
-
-
-FIELDS = ('''
-
-
-def python(blocks, constant):
-    places = ", ".join(f'"{b.name}": (0x{b.base:03X}, 0x{b.stride:03X})' for b in blocks)
-    out = [PYTHON_BEGIN.format(made=MADE, constant=constant, places=places)]
-    for b in blocks:
-        for r, f in b.fields:
-            scale = fraction(f.lsb)
-            number = (
-                f"Fraction({scale.numerator}, {scale.denominator})" if scale != 1 else "Fraction(1)"
-            )
-            values = [b.name, r.name, f.name]
-            out.append(
-                "    Field("
-                + ", ".join(f'"{v}"' for v in values)
-                + f", 0x{r.offset:02X}, {f.low}, {f.width}, {f.signed}, "
-                f'"{f.access}", "{f.unit}", {number},\n          "{r.meaning(f)}"),'
-            )
-    out += [")", "BY_NAME = {(f.block, f.register, f.field): f for f in FIELDS}", ""]
-    return "\n".join(out)
-
-
-# ---- page
-# --------------------------------------------------------------------------------------------------------
-
-HOW = {
-    "constant": "",
-    "input": "",
-    "setting": "",
-    "pulse": "Writing 1 gives a strobe of one clk. ",
-    "counter": "Counts up to its largest value; an event in the clk of the write is counted. ",
-    "sticky": "An event in the clk of the write is held. ",
-}
-
-
-PAGE_BEGIN = """\
-<!-- SPDX-License-Identifier: Apache-2.0 -->
-# Registers of a node
-
-<!-- {made} -->
-
-Map CRC-32 `0x{constant:08X}`. The soft core sees the map at `0x{base:08X}`; the line reads it by the byte addresses below
-(`read_register`). Words are 32 bits, little endian, written whole. A word without a register reads 0.
-
-Of a register of 64 bits the low word comes first: reading the low word latches the high one, writing the high word commits
-both. A signed value alone in its register reads sign-extended to the register's full width. The value in the unit is the
-count times the LSB.
-
-What needs `SINE` reads 0 in a node that was built without (`SINE = 0` in `rtl/node.sv`), whatever is written to it; `position_source.sine`
-of a grating tells.
-"""
-COLUMNS = ["offset", "register", "bits", "field", "access", "first value", "unit", "LSB", "meaning"]
-
-
-def page(blocks, constant):
-    out = [PAGE_BEGIN.format(made=MADE, constant=constant, base=REGISTER_BUS_BASE)]
-    for b in blocks:
-        place = f"`0x{b.base:03X}`" + (f" + `0x{b.stride:03X}` · axis" if b.stride else "")
-        title = b.text[0].upper() + b.text[1:]
-        out += [
-            f"## {title}",
-            "",
-            f"From {place}; `rtl/registers/{b.name}_registers.sv`.",
-            "",
-            f"| {' | '.join(COLUMNS)} |",
-            "|" + " --- |" * len(COLUMNS),
-        ]
-        for r in b.registers:
-            for i, f in enumerate(r.fields):
-                bits = f"{f.low + f.width - 1}:{f.low}" if f.width > 1 else f"{f.low}"
-                first = f"{f.reset}" if f.kind in ("setting", "counter", "sticky") else ""
-                name = "" if f.name == "value" else f"`{f.name}`"
-                head = (f"`0x{r.offset:02X}`", f"`{r.name}`") if i == 0 else ("", "")
-                own = f.text or (r.text if len(r.fields) == 1 else "")
-                text = (
-                    (own[0].upper() + own[1:] + ". " if own else "")
-                    + HOW[f.kind]
-                    + (f"Needs `{f.needs}`." if f.needs else "")
-                )
-                if i == 0 and len(r.fields) > 1:
-                    text = f"**{r.text[0].upper() + r.text[1:]}.** {text}"
-                out.append(
-                    "| "
-                    + " | ".join(
-                        [
-                            *head,
-                            bits + (", signed" if f.signed else ""),
-                            name,
-                            f.access,
-                            first,
-                            f.unit,
-                            f.lsb if f.unit else "",
-                            text.strip().replace("|", "\\|"),
-                        ]
-                    )
-                    + " |"
-                )
-        out.append("")
-    return "\n".join(out)
+def comment(text, indent="// "):
+    return textwrap.fill(text, made_files.COLUMNS, initial_indent=indent, subsequent_indent=indent)
 
 
 def files():
     constant, blocks = crc(), read()
+    templates = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(ROOT / "tables"),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    templates.filters |= {"comment": comment, "sentence": sentence, "span": span}
+    templates.globals |= dict(literal=literal, constant=constant, base=REGISTER_BUS_BASE)
+
+    def filled(template, **values):
+        return templates.get_template(f"registers.{template}.jinja").render(**values)
+
     made = {
-        ROOT / "rtl" / "registers" / f"{b.name}_registers.sv": verilog(b, constant) for b in blocks
+        ROOT / "rtl" / "registers" / f"{b.name}_registers.sv": made_files.systemverilog(
+            filled("sv", block=b)
+        )
+        for b in blocks
     }
-    made[ROOT / "sw" / "firmware" / "made" / "registers.h"] = header(blocks, constant)
-    made[ROOT / "sw" / "host" / "moire" / "made" / "registers.py"] = python(blocks, constant)
-    made[ROOT / "docs" / "registers.md"] = page(blocks, constant)
+    made[ROOT / "sw" / "firmware" / "made" / "registers.h"] = filled("h", blocks=blocks)
+    made[ROOT / "sw" / "host" / "moire" / "made" / "registers.py"] = filled("py", blocks=blocks)
+    made[ROOT / "docs" / "registers.md"] = filled("md", blocks=blocks)
+    names = re.findall(r"^#define (\w+)", filled("h", blocks=blocks), re.MULTILINE)
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise Refused(f"the C name {twice[0]} means two things: rename a register or field")
     return made
 
 

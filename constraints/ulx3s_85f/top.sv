@@ -1,43 +1,47 @@
 // SPDX-License-Identifier: Apache-2.0
-// top -- a node with one axis on the ULX3S: clock, reset, pads. The line is on the USB serial
-// converter and on an RS-485 transceiver at once; both idle high. Pins: pins.lpf.
+// top -- a node with one axis on the ULX3S: clock, reset, pins. The RS-485 bus is on the USB serial
+// converter and on an RS-485 transceiver at the same time; both idle high. Pins: pins.lpf.
 `default_nettype none
 
 module top (
-    input  wire        clk_25mhz,
-    input  wire        usb_rx,
-    output logic       usb_tx,
-    input  wire        rs485_rx,
-    output logic       rs485_tx,
-    output logic       rs485_driver_enable,
-    input  wire  [3:0] address,
-    output logic [7:0] led,
-    input  wire        estop_open,
-    input  wire        encoder_a,
-    input  wire        encoder_b,
-    input  wire        encoder_z,
-    input  wire  [1:0] probe,
-    input  wire        adc_sin,
-    input  wire        adc_cos,
-    output logic       adc_cs_n,
-    output logic       adc_sclk,
-    input  wire        limit_low_open,
-    input  wire        limit_high_open,
-    input  wire        drive_fault_n,
-    output logic       drive_enable,
-    output logic       bridge_a,
-    output logic       bridge_b,
-    output logic       step,
-    output logic       direction,
-    output logic       dac_cs_n,
-    output logic       dac_sclk,
-    output logic       dac_sdi,
-    output logic       compare_pulse
+    input  wire        clk_25mhz,            // pin, 25 MHz
+    // bus
+    input  wire        usb_rx,               // pin, idles high
+    output logic       usb_tx,               // pin, idles high
+    input  wire        rs485_rx,             // pin, idles high
+    output logic       rs485_tx,             // pin, idles high
+    output logic       rs485_driver_enable,  // pin, 1: drive the bus
+    input  wire  [3:0] address,              // switches, address of the node on the bus
+    output logic [7:0] led,                  // see the assignment
+    input  wire        estop_open,           // pin, 1: pressed or wire cut
+    // scale
+    input  wire        encoder_a,            // pin
+    input  wire        encoder_b,            // pin
+    input  wire        encoder_z,            // pin, index
+    input  wire  [1:0] probe,                // pins of the touch probes
+    input  wire        adc_sin,              // pin, serial data
+    input  wire        adc_cos,              // pin, serial data
+    output logic       adc_cs_n,             // pin, low during a conversion
+    output logic       adc_sclk,             // pin, idles high
+    // machine
+    input  wire        limit_low_open,       // pin, 1: pressed or wire cut
+    input  wire        limit_high_open,      // pin, 1: pressed or wire cut
+    input  wire        drive_fault_n,        // pin, 0: the drive reports a fault
+    // drive
+    output logic       drive_enable,         // pin, 1: the drive may be on
+    output logic       bridge_a,             // pin, alone high for a positive command
+    output logic       bridge_b,             // pin, alone high for a negative command
+    output logic       step,                 // pin
+    output logic       direction,            // pin
+    output logic       dac_cs_n,             // pin, low during a word
+    output logic       dac_sclk,             // pin, idles low
+    output logic       dac_sdi,              // pin, data of the DAC
+    output logic       compare_pulse         // pin, high during a compare pulse
 );
     localparam int CLK_HZ = 50_000_000;
 
     wire clk, locked;
-    logic [7:0] wait_q = 8'd0;  // clk since the clock is there
+    logic [7:0] wait_q = 8'd0;  // cycles since the PLL has locked
     logic       rst = 1'b1;
 
     (* FREQUENCY_PIN_CLKI = "25", FREQUENCY_PIN_CLKOP = "50" *)
@@ -117,7 +121,10 @@ module top (
     );
 
     assign rs485_tx = usb_tx;
-    assign led      = {locked && !rst, rs485_driver_enable, estop_open, limit_high_open, limit_low_open, !drive_fault_n, step, drive_enable};
+    assign led = {
+        locked && !rst, rs485_driver_enable, estop_open, limit_high_open, limit_low_open,
+        !drive_fault_n, step, drive_enable
+    };
 endmodule
 
 `default_nettype wire

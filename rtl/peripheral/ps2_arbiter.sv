@@ -1,58 +1,58 @@
 // SPDX-License-Identifier: Apache-2.0
-// ps2_arbiter -- who speaks to the PS/2 host: the keyboard, whose bytes pass untouched, or a source
-// that injects sequences of its own.
+// ps2_arbiter -- selects the source of what the PS/2 host receives: the keyboard, whose bytes pass
+// unchanged, or a source that injects sequences.
 //
-// latency  none: a byte that stands is offered, and taken, in the same clk
-// rate     as the
-//          lines
-// source   S4: the controller is a keyboard of the EDM machine. E0 and F0 announce one code more,
-//          E1 two; FF is answered by FA and later AA, F2 by three bytes, F0 00 by two, every other
-//          command by one. FE from the host after an injected byte asks for that byte again and
-//          never reaches the keyboard
+// latency  0 cycles: a waiting byte is offered, and taken, in the same cycle
+// rate     one byte per frame of the lines
+// behaviour  E0 and F0 announce one more code, E1 two. FF is answered by FA and later AA, F2 by
+//          three bytes, F0 00 by two, every other command by one. FE from the host after an
+//          injected byte asks for that byte again, and never reaches the keyboard.
+// limits   An exchange closes 20 ms after its last byte. Whatever is still missing after 1 s (an
+//          answer, or the end of a sequence) is no longer expected.
+// source   S4: the controller is a keyboard of the EDM machine
 // model    tb/peripheral/ps2_arbiter.py, equal in every bit of every cycle
 // proof    depth 32, CLK_HZ = 1000
 // proved   an injection begins only between the keyboard's sequences, with no command open and the
 //          keyboard held; meanwhile the keyboard is heard only in answer to a command; each byte
 //          that is taken is the one that was sent
-// bounds   an exchange closes 20 ms after its last byte; what is still missing after 1 s (an
-//          answer, the rest of a sequence) is given up
 `default_nettype none
 
 module ps2_arbiter #(
-    parameter int CLK_HZ = 50_000_000
+    parameter int CLK_HZ = 50_000_000  // Hz, clk frequency
 ) (
     input wire clk,
     input wire rst,
-    input  wire  [15:0]  idle_ms,           // silence of keyboard and host before an injection; less than 20 counts as 20
-    input  wire          inject_valid,      // level: a byte stands; a sequence holds the keyboard until its last byte
-    output logic inject_ready,  // with inject_valid: sent in this clk
-    input wire [7:0] inject,
-    input wire inject_last,  // of its sequence
-    output logic injecting,  // level: a sequence is under way
-    output logic typed,  // strobe: a byte of the keyboard that answers no command
-
-    input  wire        keyboard_valid,    // ps2_host
-    output logic       keyboard_ready,
-    input  wire  [7:0] keyboard,
-    input  wire        keyboard_damaged,
-    input  wire        keyboard_busy,
-    input  wire        keyboard_held,
-    output logic       keyboard_hold,
-    output logic       command_valid,
-    input  wire        command_ready,
-    output logic [7:0] command,
-    output logic       command_damaged,
-    input  wire        command_sent,
-    input  wire        command_unsent,
-
-    output logic       send_valid,    // ps2_device
-    input  wire        send_ready,
-    output logic [7:0] send,
-    output logic       send_damaged,
-    input  wire        host_valid,
-    output logic       host_ready,
-    input  wire  [7:0] host,
-    input  wire        host_damaged
+    // injection
+    input wire [15:0] idle_ms,  // ms, silence before it; less than 20 acts as 20
+    input wire inject_valid,  // level: a byte waits
+    output logic inject_ready,  // with inject_valid: sent in this cycle
+    input wire [7:0] inject,  // scan code
+    input wire inject_last,  // level: it is the last of its sequence
+    output logic injecting,  // level: a sequence is being injected
+    output logic typed,  // strobe: the keyboard sent a byte that answers no command
+    // keyboard, ps2_host
+    input wire keyboard_valid,  // level: a byte of the keyboard waits
+    output logic keyboard_ready,  // with keyboard_valid: taken in this cycle
+    input wire [7:0] keyboard,  // byte of the keyboard
+    input wire keyboard_damaged,  // level: the byte is damaged
+    input wire keyboard_busy,  // level: a frame is on its way
+    input wire keyboard_held,  // level: the keyboard is held
+    output logic keyboard_hold,  // level: hold the keyboard
+    output logic command_valid,  // level: a command for the keyboard waits
+    input wire command_ready,  // with command_valid: taken in this cycle
+    output logic [7:0] command,  // byte for the keyboard
+    output logic command_damaged,  // level: send it with wrong parity
+    input wire command_sent,  // strobe: the keyboard took the command
+    input wire command_unsent,  // strobe: the keyboard did not take it
+    // host, ps2_device
+    output logic send_valid,  // level: a byte for the host waits
+    input wire send_ready,  // strobe: sent
+    output logic [7:0] send,  // byte for the host
+    output logic send_damaged,  // level: send it with wrong parity
+    input wire host_valid,  // level: a command of the host waits
+    output logic host_ready,  // with host_valid: taken in this cycle
+    input wire [7:0] host,  // command of the host
+    input wire host_damaged  // level: the command is damaged
 );
     if (CLK_HZ < 1000) begin : g_check
         CLK_HZ_MUST_BE_AT_LEAST_1000 u_error ();
@@ -64,7 +64,7 @@ module ps2_arbiter #(
     localparam int W = $clog2(MS + 1);
     localparam logic [7:0] RESEND = 8'hFE;
 
-    logic [W-1:0] part;  // clk of this ms
+    logic [W-1:0] part;  // cycles of this ms
     // ms since the last byte of keyboard or host
     logic [ 15:0] quiet;
     // codes until the keyboard's sequence is complete
@@ -74,8 +74,8 @@ module ps2_arbiter #(
     logic ordered;  // a command is on its way to the keyboard
     logic keyboard_q;
     logic [7:0] injected;  // the last byte
-    logic own;  // the host heard that one last
-    logic again;  // and wants it once more
+    logic own;  // it is the last byte that the host received
+    logic again;  // and requests it once more
 
     wire resend = host_valid && host == RESEND && !host_damaged && own;
     wire arrived = keyboard_valid && !keyboard_q;
@@ -155,17 +155,15 @@ module ps2_arbiter #(
 
 `ifdef FORMAL
     logic past = 1'b0;
+    wire  complete = left == '0 && awaited == '0 && !host_valid && !ordered && !keyboard_valid;
+    wire  silent = quiet >= idle_ms && quiet >= 16'd20;
     always @(posedge clk) begin
         past <= 1'b1;
         if (!past) assume (rst);
         assume (!send_ready || send_valid);  // as ps2_device does
         assume (!(keyboard_held && (keyboard_valid || keyboard_busy)));
         if (past && !$past(rst)) begin
-            if (injecting && !$past(injecting))
-                assert ($past(
-                    left == '0 && awaited == '0 && !host_valid && !ordered && !keyboard_valid && keyboard_held
-                              && quiet >= idle_ms && quiet >= 16'd20
-                ));
+            if (injecting && !$past(injecting)) assert ($past(complete && silent && keyboard_held));
             if (injecting && awaited == '0) assert (keyboard_hold);
             if ($past(inject_ready))
                 assert (own && injected == $past(send) && !$past(send_damaged));

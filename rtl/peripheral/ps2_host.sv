@@ -1,50 +1,51 @@
 // SPDX-License-Identifier: Apache-2.0
-// ps2_host -- towards a PS/2 keyboard: receives its bytes, sends it commands, holds it back by
-// pulling the clock low.
+// ps2_host -- the host's side of a PS/2 line: receives the bytes of a keyboard, sends it commands,
+// and holds it by pulling the clock low.
 //
-// latency  a byte stands 2 clk after the eleventh falling clock edge
-// rate     one byte a frame; a byte that stands holds the keyboard back until it is taken
+// latency  2 cycles from the eleventh falling clock edge to received_valid
+// rate     one byte per frame; a byte that waits holds the keyboard until it is taken
+// limits   The time-outs are 300 us between two edges and 15 ms to the first edge of a command. A
+//          byte that ends in a time-out is damaged.
 // source   IBM PS/2 keyboard interface: 11 bits at 10 to 16.7 kHz, start, 8 data bits LSB first,
 //          odd parity, stop; the keyboard makes the clock. A command: clock low for 100 us, then
-//          data low, clock let go; the keyboard clocks 10 bits in and pulls the 11th low
+//          data low, clock released; the keyboard clocks 10 bits in and pulls the 11th low
 // model    tb/peripheral/ps2_host.py, equal in every bit of every cycle
 // proof    depth 44, CLK_HZ = 40000, CHECKED = 0
-// proved   the clock is pulled for 100 us at least; data only for a command, first with the clock
-//          low; a byte stands until it is taken, and while one does the keyboard is held
-// bounds   time-outs: 300 us between two edges, 15 ms to the first edge of a command. A byte that
-//          ends in one is damaged
+// proved   the clock is pulled low for at least 100 us; data only for a command, first with the
+//          clock low; a byte waits until it is taken, and the keyboard is held meanwhile
 `default_nettype none
 
 module ps2_host #(
-    parameter int CLK_HZ  = 50_000_000,
+    parameter int CLK_HZ  = 50_000_000,  // Hz, clk frequency
     parameter int CHECKED = 1            // 0: any CLK_HZ, for the proof
 ) (
-    input wire clk,
-    input wire rst,  // lets go of both lines, drops what is in flight
-    input wire hold,  // level: no new frame; one in flight still ends
-    input wire clock,  // levels of the lines, synchronous and deglitched
-    input wire data,
-    input wire command_valid,
-    output logic command_ready,  // with command_valid: taken in this clk
-    input wire [7:0] command,
-    input wire command_damaged,  // send it with wrong parity
-    output logic received_valid,  // level: a byte stands
-    input wire received_ready,  // with received_valid: taken in this clk
-    output logic [7:0] received,
-    output logic received_damaged,  // wrong parity, no stop bit, or cut short
-    output logic sent,  // strobe: the command was acknowledged by the keyboard's bit
-    output logic unsent,  // strobe: it was not, or the time ran out
-    output logic held,  // level: the keyboard is held back, nothing stands and nothing moves
-    output logic busy,  // level: a frame is under way, either way
-    output logic clock_low,  // pull the lines low
-    output logic data_low
+    input  wire        clk,
+    input  wire        rst,               // releases both lines, drops the frame
+    input  wire        hold,              // level: no new frame; a frame on its way is completed
+    input  wire        clock,             // level of the clock line, synchronous, filtered
+    input  wire        data,              // level of the data line, synchronous, filtered
+    input  wire        command_valid,     // level: a command waits
+    output logic       command_ready,     // with command_valid: taken in this cycle
+    input  wire  [7:0] command,           // byte for the keyboard
+    input  wire        command_damaged,   // level: send it with wrong parity
+    output logic       received_valid,    // level: a byte waits
+    input  wire        received_ready,    // with received_valid: taken in this cycle
+    output logic [7:0] received,          // byte of the keyboard
+    output logic       received_damaged,  // level: wrong parity, no stop bit, or cut short
+    output logic       sent,              // strobe: the keyboard acknowledged the command
+    output logic       unsent,            // strobe: it did not, or a time-out ended it
+    output logic       held,              // level: the keyboard is held, and no frame is on its way
+    output logic       busy,              // level: a frame is on its way, in either direction
+    output logic       clock_low,         // 1: pull the clock line low
+    output logic       data_low           // 1: pull the data line low
 );
     if (CHECKED != 0 && CLK_HZ < 400_000) begin : g_check
         CLK_HZ_MUST_BE_AT_LEAST_400_000 u_error ();
     end
 
-    localparam int HOLD = CLK_HZ / 10_000;  // clk: 100 us
-    localparam int SETUP = (CLK_HZ / 1_000) / 50 + 1;   // 20 us of data low before the clock is let go
+    // all in cycles
+    localparam int HOLD = CLK_HZ / 10_000;  // 100 us
+    localparam int SETUP = (CLK_HZ / 1_000) / 50 + 1;  // 20 us, data low with the clock
     localparam int GAP = (CLK_HZ / 1_000) * 3 / 10;  // 300 us between two edges
     localparam int FIRST = (CLK_HZ / 1_000) * 15;  // 15 ms to the first edge of a command
     localparam int W = $clog2(FIRST + 1);
@@ -59,19 +60,19 @@ module ps2_host #(
     } state_t;
 
     state_t         state;
-    // clk in this state, or since the last edge of a frame
+    // cycles in this state, or since the last edge of a frame
     logic   [W-1:0] elapsed;
-    logic   [  3:0] place;  // edges of this frame
+    logic   [  3:0] edges;  // of this frame
     logic   [  9:0] shifted;
     logic           clock_q;
 
     wire            fall = clock_q && !clock;
     wire    [  9:0] frame = {data, shifted[9:1]};  // stop, parity, data
     wire            cut = elapsed >= W'(GAP);
-    wire            rested = state == HELD && elapsed >= W'(HOLD) && !received_valid;
+    wire            ready = state == HELD && elapsed >= W'(HOLD) && !received_valid;
 
-    assign command_ready = rested;
-    assign held          = rested && !command_valid;
+    assign command_ready = ready;
+    assign held          = ready && !command_valid;
     assign busy          = state == RECEIVE || state == REQUEST || state == COMMAND;
     assign clock_low     = state == HELD || state == REQUEST;
 
@@ -83,7 +84,7 @@ module ps2_host #(
         if (received_valid && received_ready) received_valid <= 1'b0;
         case (state)
             IDLE: begin
-                place   <= 4'd1;
+                edges   <= 4'd1;
                 elapsed <= '0;
                 if (fall && !data) state <= RECEIVE;
                 else if (hold || command_valid) state <= HELD;
@@ -91,10 +92,10 @@ module ps2_host #(
             RECEIVE: begin
                 if (fall) begin
                     shifted <= frame;
-                    place   <= place + 1'b1;
+                    edges   <= edges + 1'b1;
                     elapsed <= '0;
                 end
-                if (cut || (fall && place == 4'd10)) begin
+                if (cut || (fall && edges == 4'd10)) begin
                     received         <= cut ? 8'd0 : frame[7:0];
                     received_damaged <= cut || !(^frame[8:0]) || !frame[9];
                     received_valid   <= 1'b1;
@@ -104,12 +105,12 @@ module ps2_host #(
             end
             HELD: begin
                 shifted <= {1'b1, ~^command ^ command_damaged, command};
-                place   <= 4'd0;
-                if (rested && command_valid) begin
+                edges   <= 4'd0;
+                if (ready && command_valid) begin
                     elapsed  <= '0;
                     data_low <= 1'b1;
                     state    <= REQUEST;
-                end else if (rested && !hold) state <= RELEASE;
+                end else if (ready && !hold) state <= RELEASE;
             end
             REQUEST:
             if (elapsed >= W'(SETUP)) begin
@@ -118,16 +119,16 @@ module ps2_host #(
             end
             COMMAND:
             if (fall) begin
-                data_low <= place < 4'd10 && !shifted[0];
+                data_low <= edges < 4'd10 && !shifted[0];
                 shifted  <= {1'b1, shifted[9:1]};
-                place    <= place + 1'b1;
+                edges    <= edges + 1'b1;
                 elapsed  <= '0;
-                if (place == 4'd10) begin
+                if (edges == 4'd10) begin
                     sent   <= !data;
                     unsent <= data;
                     state  <= RELEASE;
                 end
-            end else if (elapsed >= (place == 4'd0 ? W'(FIRST) : W'(GAP))) begin
+            end else if (elapsed >= (edges == 4'd0 ? W'(FIRST) : W'(GAP))) begin
                 data_low <= 1'b0;
                 unsent   <= 1'b1;
                 elapsed  <= '0;
@@ -149,7 +150,7 @@ module ps2_host #(
 
 `ifdef FORMAL
     logic       past = 1'b0;
-    logic [7:0] pulled;  // clk that the clock has been pulled
+    logic [7:0] pulled;  // cycles that the clock has been pulled low
     always @(posedge clk) begin
         past   <= 1'b1;
         pulled <= rst || !clock_low ? 8'd0 : pulled + !(&pulled);
@@ -160,7 +161,7 @@ module ps2_host #(
             if (state == HELD) assert (W'(pulled) == elapsed || (&pulled && elapsed > W'(HOLD)));
             if (received_valid) assert (state == HELD);
             assert (!(sent && unsent));
-            if (state == COMMAND || state == RECEIVE) assert (place <= 4'd10);
+            if (state == COMMAND || state == RECEIVE) assert (edges <= 4'd10);
         end
         if (past && !$past(rst) && !rst) begin
             if ($past(clock_low) && !clock_low) assert (32'($past(pulled)) >= HOLD);

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// ps2_inject_queue -- scan codes that wait to be injected, and can be taken back: a sequence that
-// is under way is finished whole.
+// ps2_inject_queue -- queue of scan codes to inject, which can be dropped; a sequence that has
+// begun is completed.
 //
-// latency  2 clk from push to valid in an empty queue
-// rate     one push and one code per clk
-// source   S4: who presses STOP means the keys too that still wait to start a cut
+// latency  2 cycles from push to valid in an empty queue
+// rate     one push and one code per cycle
+// source   S4: the operator who presses STOP also means the keys that still wait to start a cut
 // model    tb/peripheral/ps2_inject_queue.py, equal in every bit of every cycle
 // proof    DEPTH = 4
-// proved   what stood at a drop is offered only as the rest of a sequence that was under way; what
-//          was pushed later is never dropped
+// proved   a code that was in the queue at a drop is offered only as part of a sequence that had
+//          begun; a code that is pushed later is never dropped
 `default_nettype none
 
 module ps2_inject_queue #(
@@ -17,20 +17,20 @@ module ps2_inject_queue #(
     input wire clk,
     input wire rst,  // empties the queue
     input wire push,  // strobe: take `in`
-    input wire [7:0] in,
-    input wire in_last,  // of its sequence
-    input  wire                  drop,          // strobe: what stands now is taken back, but for the rest of a sequence under way
-    output logic valid,  // level: a code stands (ps2_arbiter)
-    input wire ready,  // with valid: sent in this clk
-    output logic [7:0] out,
-    output logic last,
-    input wire injecting,  // level: a sequence is under way, until its last code
+    input wire [7:0] in,  // scan code
+    input wire in_last,  // level: it is the last of its sequence
+    input wire drop,  // strobe: drop all codes but those of a sequence that has begun
+    output logic valid,  // level: a code waits for ps2_arbiter
+    input wire ready,  // with valid: sent in this cycle
+    output logic [7:0] out,  // scan code
+    output logic last,  // level: it is the last of its sequence
+    input wire injecting,  // level: a sequence is being injected, until its last code
     output logic [$clog2(DEPTH):0] free  // codes that still fit
 );
     localparam int C = $clog2(DEPTH) + 1;
 
     logic present, overrun;
-    logic [C-1:0] doomed;  // of the oldest codes, so many stood at a drop
+    logic [C-1:0] doomed;  // of the oldest codes, so many before_drop at a drop
 
     wire          discard = doomed != '0 && !injecting;
     wire          pop = ready || discard;
@@ -68,7 +68,7 @@ module ps2_inject_queue #(
     logic         past = 1'b0;
     logic [C-1:0] written, read;  // codes so far
     // the chosen code is in the queue; since before a drop
-    logic waiting, stood;
+    logic waiting, before_drop;
     wire taken = push && free != '0;
     always @(posedge clk) begin
         past <= 1'b1;
@@ -80,20 +80,20 @@ module ps2_inject_queue #(
         if (past && !$past(injecting) && injecting) assume ($past(valid));
         written <= rst ? '0 : written + C'(taken);
         read    <= rst ? '0 : read + C'(popped);
-        if (rst) {waiting, stood} <= '0;
+        if (rst) {waiting, before_drop} <= '0;
         else begin
-            if (drop && waiting) stood <= 1'b1;
-            if (popped && read == chosen) {waiting, stood} <= '0;
-            if (taken && written == chosen) {waiting, stood} <= 2'b10;
+            if (drop && waiting) before_drop <= 1'b1;
+            if (popped && read == chosen) {waiting, before_drop} <= '0;
+            if (taken && written == chosen) {waiting, before_drop} <= 2'b10;
         end
         if (past && !$past(rst)) begin
             assert (stored == C'(written - read) && doomed <= stored);
-            assert (waiting == (C'(chosen - read) < stored) && (!stood || waiting));
-            if (waiting) assert (stood == (C'(chosen - read) < doomed));
-            if (stood && valid && read == chosen) assert (injecting);
-            if (waiting && !stood && popped && read == chosen) assert (ready);
-            cover (stood && ready && read == chosen);
-            cover (waiting && !stood && discard && present);
+            assert (waiting == (C'(chosen - read) < stored) && (!before_drop || waiting));
+            if (waiting) assert (before_drop == (C'(chosen - read) < doomed));
+            if (before_drop && valid && read == chosen) assert (injecting);
+            if (waiting && !before_drop && popped && read == chosen) assert (ready);
+            cover (before_drop && ready && read == chosen);
+            cover (waiting && !before_drop && discard && present);
         end
     end
 `endif

@@ -1,47 +1,51 @@
 // SPDX-License-Identifier: Apache-2.0
-// ps2_pass -- between a PS/2 keyboard and its host: everything passes both ways untouched, and
-// sequences can be injected.
+// ps2_pass -- passes everything between a PS/2 keyboard and its host unchanged in both directions,
+// and injects sequences.
 //
-// latency  less than 200 us from a byte's eleventh edge to our eleventh edge, beyond the ten bits
-//          of our frame
-// rate     one byte each way at a time; a keyboard waits, held by its clock, until its last byte
-//          has been passed on
+// latency  less than 200 us from the eleventh edge of a byte to the eleventh edge of its copy,
+//          beyond the ten bits of the copy
+// rate     one byte each way at a time; the clock holds the keyboard until its last byte has been
+//          passed on
+// limits   A damaged byte is passed on damaged (wrong parity), so its receiver asks for it again. A
+//          command that the keyboard does not take has no answer, as without a keyboard.
 // source   S4: the main controller is a keyboard of the EDM machine; 14 1D F0 1D F0 14 starts the
 //          cut
 // model    tb/peripheral/ps2_pass.py, equal in every bit of every cycle
-// bounds   what comes damaged leaves damaged (wrong parity), so that its receiver asks for it
-//          again; a command that the keyboard does not take has no answer, as without a keyboard
 `default_nettype none
 
 module ps2_pass #(
-    parameter int CLK_HZ = 50_000_000,
-    parameter int STAGES = 2            // of the synchronisers
+    parameter int CLK_HZ = 50_000_000,  // Hz, clk frequency
+    parameter int STAGES = 2            // stages of the synchronisers
 ) (
     input wire clk,
     input wire rst,
-    input wire [15:0] idle_ms,  // silence of keyboard and host before an injection
-    input wire keyboard_clock,  // levels of the lines, asynchronous
-    input wire keyboard_data,
-    output logic keyboard_clock_low,  // pull the lines low
-    output logic keyboard_data_low,
-    input wire host_clock,
-    input wire host_data,
-    output logic host_clock_low,
-    output logic host_data_low,
-    input wire inject_valid,  // level: a byte stands
-    output logic inject_ready,  // with inject_valid: sent in this clk
-    input wire [7:0] inject,
-    input wire inject_last,  // of its sequence
-    output logic injecting,  // level: a sequence is under way, the keyboard is held
-    output logic typed,  // strobe: a byte of the keyboard that answers no command
-    output logic keyboard_damaged,  // strobe: a byte of the keyboard came damaged
-    output logic command_damaged,  // strobe: a command of the host came damaged
+    input wire [15:0] idle_ms,  // ms, silence of keyboard and host before an injection
+    // keyboard
+    input wire keyboard_clock,  // level of the clock line, asynchronous
+    input wire keyboard_data,  // level of the data line, asynchronous
+    output logic keyboard_clock_low,  // 1: pull the clock line low
+    output logic keyboard_data_low,  // 1: pull the data line low
+    // host
+    input wire host_clock,  // level of the clock line, asynchronous
+    input wire host_data,  // level of the data line, asynchronous
+    output logic host_clock_low,  // 1: pull the clock line low
+    output logic host_data_low,  // 1: pull the data line low
+    // injection
+    input wire inject_valid,  // level: a byte waits
+    output logic inject_ready,  // with inject_valid: sent in this cycle
+    input wire [7:0] inject,  // scan code
+    input wire inject_last,  // level: it is the last of its sequence
+    output logic injecting,  // level: a sequence is being injected, the keyboard is held
+    // events
+    output logic typed,  // strobe: the keyboard sent a byte that answers no command
+    output logic keyboard_damaged,  // strobe: a byte of the keyboard was damaged
+    output logic command_damaged,  // strobe: a command of the host was damaged
     output logic command_unsent,  // strobe: the keyboard did not take a command
     output logic aborted,  // strobe: the host cut a frame short
     output logic glitch,  // strobe: a pulse of less than 1 us on a line
-    output logic busy  // level: a frame is under way on either side
+    output logic busy  // level: a frame is on its way on either side
 );
-    localparam int FILTER = CLK_HZ / 1_000_000;  // clk: 1 us
+    localparam int FILTER = CLK_HZ / 1_000_000;  // cycles: 1 us
 
     logic [3:0] level, line, rejected;
     logic

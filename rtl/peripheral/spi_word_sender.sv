@@ -1,39 +1,40 @@
 // SPDX-License-Identifier: Apache-2.0
-// spi_word_sender -- words of 16 bits to a device that takes them at the rising edge of its chip
-// select: a converter, a display driver.
+// spi_word_sender -- sends words of 16 bits to a device that takes them at the rising edge of its
+// chip select, such as a DAC or a display driver.
 //
-// latency  33 * half_period + 1 clk from valid and ready to the rising edge of cs_n; cs_n falls 1
-//          clk after them
-// rate     a word per 36 * half_period + 1 clk; 3 half_period of it cs_n is high
+// latency  33 * half_period + 1 cycles from valid and ready to the rising edge of cs_n; cs_n falls
+//          1 cycle after them
+// rate     one word per 36 * half_period + 1 cycles; cs_n is high for 3 half_period of them
 // source   AD5542A, Analog Devices, and MAX7219, Maxim: most significant bit first, taken at rising
-//          edges of sclk while cs_n is low, the word at that of cs_n; sclk up to 50 and 10 MHz,
-//          cs_n high for 50 ns
+//          edges of sclk while cs_n is low, the word at the rising edge of cs_n; sclk up to 50 and
+//          10 MHz, cs_n high for 50 ns
 // model    tb/peripheral/spi_word_sender.py, equal in every bit of every cycle
 // proof    depth 40
-// proved   sclk is low while cs_n is high or changes; a word has 16 rising edges of sclk; sdi
-//          stands from one clk before each of them to the falling edge
+// proved   sclk is low while cs_n is high or changes; a word has 16 rising edges of sclk; sdi is
+//          stable from one cycle before each of them to the falling edge
 `default_nettype none
 
 module spi_word_sender (
     input wire clk,
-    input wire rst,  // drops the word in flight
-    input  wire        [7:0]     half_period,      // clk that sclk is high, and low; 0 counts as 1; taken with a word
-    input wire valid,  // level: a word stands
-    output logic ready,  // with valid: taken in this clk
-    input wire [15:0] word,
-    output logic cs_n,  // pin
-    output logic sclk,  // pin
-    output logic sdi,  // pin
+    input wire rst,  // drops the word being sent
+    input wire [7:0] half_period,  // cycles of half a sclk period, taken with a word; 0 acts as 1
+    input wire valid,  // level: a word waits
+    output logic ready,  // with valid: taken in this cycle
+    input wire [15:0] word,  // word to send
+    output logic cs_n,  // pin, low during a word
+    output logic sclk,  // pin, idles low
+    output logic sdi,  // pin, data of the device
     output logic sent  // strobe: the device has taken a word
 );
-    localparam [5:0] RAISE = 6'd33, LAST = 6'd35;           // halves of sclk in a word: 0 set-up, 16 bits, 32 hold, 3 with cs_n high
+    // halves of sclk in a word: 0 set-up, 16 bits, 32 hold, 3 with cs_n high
+    localparam [5:0] RAISE = 6'd33, LAST = 6'd35;
 
     logic [5:0] half;
-    // clk of a half, less one; after this one
+    // cycles of a half, less one; cycles left after this one
     logic [7:0] length, left;
-    logic [15:0] shifted;  // the bit on the wire highest
+    logic [15:0] shifted;  // the highest bit is on sdi
 
-    wire  [ 7:0] wanted_length = half_period == 8'd0 ? 8'd0 : half_period - 1'b1;
+    wire  [ 7:0] new_length = half_period == 8'd0 ? 8'd0 : half_period - 1'b1;
     wire  [ 5:0] next = half + 1'b1;
 
     assign sdi = shifted[15];
@@ -43,8 +44,8 @@ module spi_word_sender (
         left <= left - 1'b1;
         if (ready) begin
             half   <= '0;
-            length <= wanted_length;
-            left   <= wanted_length;
+            length <= new_length;
+            left   <= new_length;
             if (valid) begin
                 ready   <= 1'b0;
                 cs_n    <= 1'b0;

@@ -1,66 +1,71 @@
 // SPDX-License-Identifier: Apache-2.0
-// actuator_registers -- the register block of actuator: what the command goes to, bridge, steps or converter, and the fine stage.
+// actuator_registers -- the register block of actuator: bridge, stepper driver or DAC, and the fine
+// stage.
 //
-// latency  1 clk from select to rdata, and from a write to the new value        rate  one access per clk
+// latency  1 cycle from select to rdata, and from a write to the new value
+// rate     one access per cycle
 // source   tables/registers.rdl
-// model    tb/registers/register_block.py, equal in every bit of every cycle; test tb/registers/test_registers.py
+// model    tb/registers/register_block.py, equal in every bit of every cycle
 // made     by tables/registers.py, never by hand
 `default_nettype none
 
 module actuator_registers (
     input  wire                clk,
-    input  wire                rst,                        // every setting takes its first value, what was counted or held is cleared
-    input  wire                select,                     // an access to this block
-    input  wire                write,                      // with select: wdata goes into the word
-    input  wire  [5:0]         word,                       // index of the 32-bit word; a word without a register reads 0
-    input  wire  [31:0]        wdata,
-    output logic [31:0]        rdata,                      // what was read, for one clk; 0 in every other
-    output logic [1:0]         drive_kind,                 // 0: bridge, 1: steps, 2: converter
-    input  wire  [3:0]         drive_built,                // what was built: bit 0 bridge, 1 steps, 2 converter, 3 fine stage
-    output logic [15:0]        pwm_period,                 // PWM period of the bridge [clk]
-    output logic [13:0]        step_pulse_high,            // shortest times of a step pulse: high [clk]
-    output logic [13:0]        step_pulse_low,             // shortest times of a step pulse: low [clk]
-    output logic [13:0]        step_direction_setup,       // shortest times of the direction before and after a step pulse: setup [clk]
-    output logic [13:0]        step_direction_hold,        // shortest times of the direction before and after a step pulse: hold [clk]
-    output logic [1:0]         step_output_mode,           // 0: step and direction, 1: quadrature, 2: pulses up and pulses down
+    input  wire                rst,                        // settings take their first values
+    input  wire                select,                     // strobe: access to this block
+    input  wire                write,                      // level: it writes wdata
+    input  wire         [ 5:0] word,                       // index of the word
+    input  wire         [31:0] wdata,                      // value to write
+    output logic        [31:0] rdata,                      // value read; else 0
+    output logic        [ 1:0] drive_kind,                 // 0 bridge, 1 stepper, 2 DAC
+    input  wire         [ 3:0] drive_built,                // what is built
+    output logic        [15:0] pwm_period,                 // PWM period of the bridge [cycle]
+    output logic        [13:0] step_pulse_high,            // shortest times of a step pulse, cycle
+    output logic        [13:0] step_pulse_low,             // shortest times of a step pulse, cycle
+    output logic        [13:0] step_direction_setup,       // cycle
+    output logic        [13:0] step_direction_hold,        // cycle
+    output logic        [ 1:0] step_output_mode,           // 0 step and direction
     output logic               step_output_step_low,       // 1: step is active low
     output logic               step_output_direction_low,  // 1: direction is low going up
-    output logic [3:0]         step_output_trim,           // the command moves the target by command * 2^trim LSB of position
-    output logic signed [47:0] step_ratio,                 // steps in one period; the sign turns the direction [2^-32 step/period]
-    input  wire  signed [31:0] steps,                      // steps on the wire since reset [step]
-    output logic [7:0]         dac_half_period,            // half a period of its clock; 0 counts as 1 [clk]
-    output logic [15:0]        dac_refresh,                // after so long without one the last is sent again [clk]
-    output logic signed [15:0] dac_trim,                   // added to each word
-    output logic [23:0]        fine_kp,                    // proportional gain of the fine stage [1/65536 command/(period/65536)]
-    output logic               fine_kp_written,            // strobe: fine_kp has just been written, its new value stands
-    output logic [23:0]        fine_ki,                    // its integral gain, each tick [1/16777216 command/(period/65536)]
-    output logic [14:0]        fine_limit,                 // its largest |command|
-    input  wire  signed [15:0] fine_command                // its command
+    output logic        [ 3:0] step_output_trim,           // shift of the command
+    output logic signed [47:0] step_ratio,                 // steps in one period, 2^-32 step/period
+    input  wire signed  [31:0] steps,                      // steps sent since reset [step]
+    output logic        [ 7:0] dac_half_period,            // half a period of its clock, cycle
+    output logic        [15:0] dac_refresh,                // cycle
+    output logic signed [15:0] dac_trim,                   // offset added to each word
+    output logic        [23:0] fine_kp,                    // 1/65536 command/(period/65536)
+    output logic               fine_kp_written,            // strobe: new value
+    output logic        [23:0] fine_ki,                    // 1/16777216 command/(period/65536)
+    output logic        [14:0] fine_limit,                 // largest |command| of the fine stage
+    input  wire signed  [15:0] fine_command                // command of the fine stage
 );
     logic [31:0] step_ratio_low;
 
-    wire get = select && !write;
-    wire put = select && write;
+    wire         get = select && !write;
+    wire         put = select && write;
 
     always_ff @(posedge clk) begin
         rdata <= '0;
-        if (get) case (word)
-            6'h00: rdata <= {26'd0, drive_built, drive_kind};
-            6'h01: rdata <= {16'd0, pwm_period};
-            6'h02: rdata <= {4'd0, step_pulse_low, step_pulse_high};
-            6'h03: rdata <= {4'd0, step_direction_hold, step_direction_setup};
-            6'h04: rdata <= {24'd0, step_output_trim, step_output_direction_low, step_output_step_low, step_output_mode};
-            6'h06: rdata <= step_ratio[31:0];
-            6'h07: rdata <= {{16{step_ratio[47]}}, step_ratio[47:32]};
-            6'h08: rdata <= steps;
-            6'h09: rdata <= {8'd0, dac_refresh, dac_half_period};
-            6'h0A: rdata <= {{16{dac_trim[15]}}, dac_trim};
-            6'h0C: rdata <= {8'd0, fine_kp};
-            6'h0D: rdata <= {8'd0, fine_ki};
-            6'h0E: rdata <= {17'd0, fine_limit};
-            6'h0F: rdata <= {{16{fine_command[15]}}, fine_command};
-            default: rdata <= '0;
-        endcase
+        if (get) begin
+            case (word)
+                6'h00: rdata <= {26'd0, drive_built, drive_kind};
+                6'h01: rdata <= {16'd0, pwm_period};
+                6'h02: rdata <= {4'd0, step_pulse_low, step_pulse_high};
+                6'h03: rdata <= {4'd0, step_direction_hold, step_direction_setup};
+                6'h04: rdata <= {24'd0, step_output_trim, step_output_direction_low,
+                    step_output_step_low, step_output_mode};
+                6'h06: rdata <= step_ratio[31:0];
+                6'h07: rdata <= {{16{step_ratio[47]}}, step_ratio[47:32]};
+                6'h08: rdata <= steps;
+                6'h09: rdata <= {8'd0, dac_refresh, dac_half_period};
+                6'h0A: rdata <= {{16{dac_trim[15]}}, dac_trim};
+                6'h0C: rdata <= {8'd0, fine_kp};
+                6'h0D: rdata <= {8'd0, fine_ki};
+                6'h0E: rdata <= {17'd0, fine_limit};
+                6'h0F: rdata <= {{16{fine_command[15]}}, fine_command};
+                default: rdata <= '0;
+            endcase
+        end
 
         if (put && word == 6'h00) drive_kind <= wdata[1:0];
         if (put && word == 6'h01) pwm_period <= wdata[15:0];
@@ -81,6 +86,7 @@ module actuator_registers (
         if (put && word == 6'h0C) fine_kp <= wdata[23:0];
         if (put && word == 6'h0D) fine_ki <= wdata[23:0];
         if (put && word == 6'h0E) fine_limit <= wdata[14:0];
+
         if (rst) begin
             rdata <= '0;
             drive_kind <= 2'h0;

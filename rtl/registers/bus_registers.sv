@@ -1,45 +1,47 @@
 // SPDX-License-Identifier: Apache-2.0
-// bus_registers -- the register block of RS-485 bus: 9-bit UART, address filter, frame check, watchdog.
+// bus_registers -- the register block of RS-485 bus: 9-bit UART, address filter, frame check,
+// watchdog.
 //
-// latency  1 clk from select to rdata, and from a write to the new value        rate  one access per clk
+// latency  1 cycle from select to rdata, and from a write to the new value
+// rate     one access per cycle
 // source   tables/registers.rdl
-// model    tb/registers/register_block.py, equal in every bit of every cycle; test tb/registers/test_registers.py
+// model    tb/registers/register_block.py, equal in every bit of every cycle
 // made     by tables/registers.py, never by hand
 `default_nettype none
 
 module bus_registers (
     input  wire         clk,
-    input  wire         rst,                  // every setting takes its first value, what was counted or held is cleared
-    input  wire         select,               // an access to this block
-    input  wire         write,                // with select: wdata goes into the word
-    input  wire  [5:0]  word,                 // index of the 32-bit word; a word without a register reads 0
-    input  wire  [31:0] wdata,
-    output logic [31:0] rdata,                // what was read, for one clk; 0 in every other
-    output logic [19:0] bit_time,             // duration of one bit [1/16 clk]
-    input  wire  [7:0]  receive_data,         // one received word; reading takes it from the queue: data
-    input  wire         receive_command,      // the 9th bit: a command byte for this node
-    input  wire         receive_good,         // last byte of a frame whose length and CRC-32 are right
-    input  wire         receive_present,      // 0: the queue was empty, nothing was taken
-    output logic        receive_read,         // strobe: receive is being read in this clk
-    output logic [7:0]  transmit_data,        // one word to send: data
-    output logic        transmit_command,     // one word to send: command
-    output logic        transmit_written,     // strobe: transmit has just been written, its new value stands
-    input  wire  [7:0]  state_transmit_free,  // state of the queues: transmit free
+    input  wire         rst,                  // settings take their first values
+    input  wire         select,               // strobe: access to this block
+    input  wire         write,                // level: it writes wdata
+    input  wire  [ 5:0] word,                 // index of the word
+    input  wire  [31:0] wdata,                // value to write
+    output logic [31:0] rdata,                // value read; else 0
+    output logic [19:0] bit_time,             // duration of one bit [1/16 cycle]
+    input  wire  [ 7:0] receive_data,         // oldest received word
+    input  wire         receive_command,      // 9th bit: the byte is a command for this node
+    input  wire         receive_good,         // last byte of a good frame
+    input  wire         receive_present,      // 1: a word was read; 0: the queue was empty
+    output logic        receive_read,         // strobe: read in this cycle
+    output logic [ 7:0] transmit_data,        // word to send; writing puts it into the queue: data
+    output logic        transmit_command,     // word to send
+    output logic        transmit_written,     // strobe: new value
+    input  wire  [ 7:0] state_transmit_free,  // state of the queues: transmit free
     input  wire         state_sending,        // state of the queues: sending
-    input  wire         frames_good,          // strobe, counted: frames received whole; writing clears
-    input  wire         frames_bad,           // strobe, counted: frames for this node with a wrong CRC-32 or length; writing clears
-    input  wire         framing_errors,       // strobe, counted: characters without a stop bit; writing clears
-    input  wire         start_glitches,       // strobe, counted: start bits that were only glitches; writing clears
-    input  wire         overruns,             // strobe, counted: words lost because the receive queue was full; writing clears
-    output logic [7:0]  crc_byte_data,        // CRC-32 of what is to be sent: writing a byte takes it in: data
-    output logic        crc_byte_written,     // strobe: crc_byte has just been written, its new value stands
-    output logic        crc_start_start,      // strobe: start the CRC-32 afresh: start
-    input  wire  [31:0] crc,                  // the CRC-32 so far, final inversion done
-    output logic [15:0] watchdog_time,        // longest silence of the master while a drive is enabled; 0: for ever [0.001 s]
-    input  wire         breaks,               // strobe, counted: breaks: the line was low for 2 ms; writing clears
-    input  wire         transmit_timeouts,    // strobe, counted: the own driver was on for 1024 bits and has been cut off; writing clears
-    input  wire         syncs,                // strobe, counted: marks: good frames for all nodes; writing clears
-    output logic [7:0]  sync_axes             // play the queued segments of these axes from the next mark on; bit n: axis n
+    input  wire         frames_good,          // strobe: good frames; writing clears the count
+    input  wire         frames_bad,           // strobe: bad frames
+    input  wire         framing_errors,       // strobe: characters without a stop bit
+    input  wire         start_glitches,       // strobe: start bits that were only glitches
+    input  wire         overruns,             // strobe
+    output logic [ 7:0] crc_byte_data,        // byte for the CRC-32 of a frame to send
+    output logic        crc_byte_written,     // strobe: new value
+    output logic        crc_start_start,      // strobe: starts the CRC-32 again: start
+    input  wire  [31:0] crc,                  // CRC-32 of the bytes so far
+    output logic [15:0] watchdog_time,        // 0.001 s
+    input  wire         breaks,               // strobe: breaks
+    input  wire         transmit_timeouts,    // strobe: transmit time-outs
+    input  wire         syncs,                // strobe: sync pulses
+    output logic [ 7:0] sync_axes             // axes that start with sync
 );
     logic [31:0] frames_good_count;
     logic [31:0] frames_bad_count;
@@ -50,56 +52,66 @@ module bus_registers (
     logic [31:0] transmit_timeouts_count;
     logic [31:0] syncs_count;
 
-    wire get = select && !write;
-    wire put = select && write;
-    wire unused = &{1'b0, wdata[31:20]};         // no register of this block has these bits
+    wire         get = select && !write;
+    wire         put = select && write;
+
+    // no register of this block has these bits
+    wire         unused = &{1'b0, wdata[31:20]};
+
     assign receive_read = get && word == 6'h01;
 
     always_ff @(posedge clk) begin
         rdata <= '0;
-        if (get) case (word)
-            6'h00: rdata <= {12'd0, bit_time};
-            6'h01: rdata <= {21'd0, receive_present, receive_good, receive_command, receive_data};
-            6'h03: rdata <= {23'd0, state_sending, state_transmit_free};
-            6'h04: rdata <= frames_good_count;
-            6'h05: rdata <= frames_bad_count;
-            6'h06: rdata <= framing_errors_count;
-            6'h07: rdata <= start_glitches_count;
-            6'h08: rdata <= overruns_count;
-            6'h0B: rdata <= crc;
-            6'h0C: rdata <= {16'd0, watchdog_time};
-            6'h0D: rdata <= breaks_count;
-            6'h0E: rdata <= transmit_timeouts_count;
-            6'h0F: rdata <= syncs_count;
-            6'h10: rdata <= {24'd0, sync_axes};
-            default: rdata <= '0;
-        endcase
+        if (get) begin
+            case (word)
+                6'h00: rdata <= {12'd0, bit_time};
+                6'h01: rdata <= {21'd0, receive_present, receive_good, receive_command,
+                    receive_data};
+                6'h03: rdata <= {23'd0, state_sending, state_transmit_free};
+                6'h04: rdata <= frames_good_count;
+                6'h05: rdata <= frames_bad_count;
+                6'h06: rdata <= framing_errors_count;
+                6'h07: rdata <= start_glitches_count;
+                6'h08: rdata <= overruns_count;
+                6'h0B: rdata <= crc;
+                6'h0C: rdata <= {16'd0, watchdog_time};
+                6'h0D: rdata <= breaks_count;
+                6'h0E: rdata <= transmit_timeouts_count;
+                6'h0F: rdata <= syncs_count;
+                6'h10: rdata <= {24'd0, sync_axes};
+                default: rdata <= '0;
+            endcase
+        end
 
         if (put && word == 6'h00) bit_time <= wdata[19:0];
         transmit_written <= put && word == 6'h02;
         if (put && word == 6'h02) transmit_data <= wdata[7:0];
         if (put && word == 6'h02) transmit_command <= wdata[8];
-        if (put && word == 6'h04) frames_good_count <= {31'd0, frames_good};
-        else if (!(&frames_good_count)) frames_good_count <= frames_good_count + {31'd0, frames_good};
-        if (put && word == 6'h05) frames_bad_count <= {31'd0, frames_bad};
-        else if (!(&frames_bad_count)) frames_bad_count <= frames_bad_count + {31'd0, frames_bad};
-        if (put && word == 6'h06) framing_errors_count <= {31'd0, framing_errors};
-        else if (!(&framing_errors_count)) framing_errors_count <= framing_errors_count + {31'd0, framing_errors};
-        if (put && word == 6'h07) start_glitches_count <= {31'd0, start_glitches};
-        else if (!(&start_glitches_count)) start_glitches_count <= start_glitches_count + {31'd0, start_glitches};
-        if (put && word == 6'h08) overruns_count <= {31'd0, overruns};
-        else if (!(&overruns_count)) overruns_count <= overruns_count + {31'd0, overruns};
+        if (put && word == 6'h04) frames_good_count <= 32'(frames_good);
+        else if (!(&frames_good_count)) frames_good_count <= frames_good_count + 32'(frames_good);
+        if (put && word == 6'h05) frames_bad_count <= 32'(frames_bad);
+        else if (!(&frames_bad_count)) frames_bad_count <= frames_bad_count + 32'(frames_bad);
+        if (put && word == 6'h06) framing_errors_count <= 32'(framing_errors);
+        else if (!(&framing_errors_count))
+            framing_errors_count <= framing_errors_count + 32'(framing_errors);
+        if (put && word == 6'h07) start_glitches_count <= 32'(start_glitches);
+        else if (!(&start_glitches_count))
+            start_glitches_count <= start_glitches_count + 32'(start_glitches);
+        if (put && word == 6'h08) overruns_count <= 32'(overruns);
+        else if (!(&overruns_count)) overruns_count <= overruns_count + 32'(overruns);
         crc_byte_written <= put && word == 6'h09;
         if (put && word == 6'h09) crc_byte_data <= wdata[7:0];
         crc_start_start <= put && word == 6'h0A && wdata[0];
         if (put && word == 6'h0C) watchdog_time <= wdata[15:0];
-        if (put && word == 6'h0D) breaks_count <= {31'd0, breaks};
-        else if (!(&breaks_count)) breaks_count <= breaks_count + {31'd0, breaks};
-        if (put && word == 6'h0E) transmit_timeouts_count <= {31'd0, transmit_timeouts};
-        else if (!(&transmit_timeouts_count)) transmit_timeouts_count <= transmit_timeouts_count + {31'd0, transmit_timeouts};
-        if (put && word == 6'h0F) syncs_count <= {31'd0, syncs};
-        else if (!(&syncs_count)) syncs_count <= syncs_count + {31'd0, syncs};
+        if (put && word == 6'h0D) breaks_count <= 32'(breaks);
+        else if (!(&breaks_count)) breaks_count <= breaks_count + 32'(breaks);
+        if (put && word == 6'h0E) transmit_timeouts_count <= 32'(transmit_timeouts);
+        else if (!(&transmit_timeouts_count))
+            transmit_timeouts_count <= transmit_timeouts_count + 32'(transmit_timeouts);
+        if (put && word == 6'h0F) syncs_count <= 32'(syncs);
+        else if (!(&syncs_count)) syncs_count <= syncs_count + 32'(syncs);
         if (put && word == 6'h10) sync_axes <= wdata[7:0];
+
         if (rst) begin
             rdata <= '0;
             bit_time <= 20'h0022B;

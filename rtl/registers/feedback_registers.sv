@@ -1,114 +1,116 @@
 // SPDX-License-Identifier: Apache-2.0
-// feedback_registers -- the register block of grating: edge filter, index, signal correction and its learner, signal faults, capture, compare.
+// feedback_registers -- the register block of feedback channel: edge filter, index, signal
+// correction, calibration, signal faults, capture, compare.
 //
-// latency  1 clk from select to rdata, and from a write to the new value        rate  one access per clk
+// latency  1 cycle from select to rdata, and from a write to the new value
+// rate     one access per cycle
 // source   tables/registers.rdl
-// model    tb/registers/register_block.py, equal in every bit of every cycle; test tb/registers/test_registers.py
+// model    tb/registers/register_block.py, equal in every bit of every cycle
 // made     by tables/registers.py, never by hand
 `default_nettype none
 
 module feedback_registers #(
-    parameter int SINE = 1                // 0: the settings that need it have no bits and read 0
+    parameter int HAS_SINE = 1  // 0: settings that need it read 0
 ) (
-    input  wire                clk,
-    input  wire                rst,                                 // every setting takes its first value, what was counted or held is cleared
-    input  wire                select,                              // an access to this block
-    input  wire                write,                               // with select: wdata goes into the word
-    input  wire  [5:0]         word,                                // index of the 32-bit word; a word without a register reads 0
-    input  wire  [31:0]        wdata,
-    output logic [31:0]        rdata,                               // what was read, for one clk; 0 in every other
-    output logic [15:0]        edge_filter_skip,                    // left out between two samples [clk]
-    output logic [3:0]         edge_filter_tolerated,               // samples of the old level that may lie between: N of N + tolerated
-    output logic [1:0]         decoder_mode,                        // 0 x4: every edge, 1 x2, 2 x1, 3 pulses and direction. Other than x4 needs disagreement_limit = 0
-    output logic               index_active_low,                    // 1: the index is a low level
-    output logic [1:0]         index_gate_mask,                     // {b, a}: 1: needs the level in gate
-    output logic [1:0]         index_gate,                          // {b, a}
-    output logic               index_up,                            // met going up
-    output logic               index_down,                          // met going down
-    output logic               index_each,                          // 1: every index, 0: one for each arm
-    output logic [31:0]        counts_per_revolution,               // edges between two indices; 0: not checked
-    output logic               strobes_arm_index,                   // strobe: take the next index
-    output logic               strobes_load_correction,             // strobe: take the four correction values, for all samples from here on
-    output logic               strobes_swap_harmonics,              // strobe: the harmonic table just written comes into force
-    output logic               strobes_record,                      // strobe: record a new burst
-    output logic               strobes_clear_signal_faults,         // strobe: forget the first signal fault
-    output logic               strobes_capture_now,                 // strobe: capture now
-    output logic               strobes_capture_next,                // strobe: done with the oldest capture
-    output logic               strobes_capture_clear,               // strobe: forget all captures
-    output logic               strobes_compare_arm,                 // strobe: begin with the first compare point
-    output logic               strobes_compare_disarm,              // strobe: no more compare points
-    input  wire                index_events_found,                  // strobe, held: what the index did; write 1 to clear: found
-    input  wire                index_events_revolution_wrong,       // strobe, held: neither 0 nor counts_per_revolution since the index before
-    input  wire                index_events_armed,                  // what the index did; write 1 to clear: armed
-    input  wire  signed [31:0] index_count,                         // quadrature count at the last index [1/4 period]
-    input  wire  [31:0]        edge_time,                           // time of the last counted edge [clk]
-    output logic signed [15:0] correction_offset_sin,               // offsets; full scale 2^15: sin
-    output logic signed [15:0] correction_offset_cos,               // offsets; full scale 2^15: cos
-    output logic [16:0]        correction_gain,                     // gain of the sine
-    output logic signed [16:0] correction_quadrature_error,         // cosine in the sine
-    output logic               harmonic_enable,                     // 1: the harmonic table is subtracted
-    output logic signed [17:0] harmonic_point,                      // one point of the harmonic table that is not in force; writing puts it there [2^-20 period]
-    output logic [7:0]         harmonic_point_point,                // one point of the harmonic table that is not in force; writing puts it there: point [1/256 period]
-    output logic               harmonic_point_written,              // strobe: harmonic_point has just been written, its new value stands
-    output logic [15:0]        recorder_decimation,                 // one of so many
-    output logic               recorder_phases,                     // 1: phases, 0: samples
-    input  wire                recorder_state_full,                 // complete
-    input  wire                recorder_state_invalid,              // the amplitude left its window meanwhile
-    input  wire  [31:0]        recorder_word,                       // one word of the burst; reading goes on to the next
-    output logic               recorder_word_read,                  // strobe: recorder_word is being read in this clk
-    input  wire  [14:0]        signal_faults,                       // signal faults that stand now
-    input  wire  [14:0]        first_signal_faults,                 // those that came first
-    output logic [14:0]        signal_fault_mask,                   // which signal faults take the drive
-    output logic [15:0]        lissajous_limits_clip_level,         // codes and circle: clip level
-    output logic [15:0]        lissajous_limits_tolerance,          // codes and circle: tolerance
-    output logic [15:0]        jump_limits_jump,                    // steps and stillness: jump
-    output logic [15:0]        jump_limits_no_noise_samples,        // samples with one code; 0: any number
-    output logic [15:0]        channel_limits_span,                 // a leg that does not move: span
-    output logic [7:0]         channel_limits_band,                 // a leg that does not move: band
-    output logic [15:0]        drift_limits_offset,                 // drifts: offset
-    output logic [15:0]        drift_limits_balance,                // drifts: balance
-    output logic [15:0]        quadrature_limits_quadrature_error,  // phase error and comparators: quadrature error
-    output logic [15:0]        quadrature_limits_sign_threshold,    // phase error and comparators: sign threshold
-    output logic [6:0]         capture_sources,                     // sources: index, tick, software or a mark of the line, rising probe 0, 1, falling probe 0, 1
-    input  wire                capture_state_present,               // captured_* are the oldest
-    input  wire  [4:0]         capture_state_free,                  // captures that still fit
-    input  wire                capture_state_overrun,               // strobe, held: an event was dropped; write 1 to clear
-    input  wire  [6:0]         captured_sources,                    // the oldest capture: sources
-    input  wire  [15:0]        captured_age,                        // since its position came [clk]
-    input  wire  [31:0]        captured_time,                       // its time [clk]
-    input  wire  signed [47:0] captured_position,                   // its position [1/65536 period]
-    output logic signed [47:0] compare_start,                       // first point [1/65536 period]
-    output logic signed [47:0] compare_step,                        // distance of the points; its sign is the direction [1/65536 period]
-    output logic [31:0]        compare_count,                       // points; 0: no end
-    output logic [23:0]        compare_pulse,                       // pulse [clk]
-    output logic [23:0]        compare_gap,                         // shortest gap [clk]
-    input  wire                compare_state_armed,                 // compare: armed
-    input  wire                compare_state_late,                  // strobe, held: a pulse had to wait for the one before it; write 1 to clear
-    input  wire  [31:0]        compare_passed,                      // points passed since arm
-    output logic [15:0]        velocity_quantum,                    // what the position moves by at once; 0: velocity is the way of the tick [1/65536 period]
-    input  wire  signed [39:0] velocity_fine,                       // velocity with all its bits [2^-24 period/tick]
-    output logic               position_source_counts,              // 0: phases of sine and cosine, 1: counts of a and b, a quarter period each
-    output logic               position_source_steps,               // 1: the axis' own step and direction take the place of the pins a and b
-    input  wire                position_source_sine,                // 1: sine and cosine were built, 0: the position is made of counts whatever `counts` says
-    output logic signed [2:0]  align,                               // with counts: move position and phase by this, -2 to 2; the target does not follow [1/4 period]
-    output logic               align_written,                       // strobe: align has just been written, its new value stands
-    output logic               segment_use_enable,                  // 1: positions are corrected
-    output logic               segment_use_linear,                  // 0: a segment has the mean of its borders, 1: the straight line between them
-    output logic [7:0]         segment_use_segments,                // use of the segment table; position and target take its steps together: segments
-    input  wire  [7:0]         segment_state_built,                 // most segments; 0: it was not built
-    input  wire                segment_state_in_force,              // positions are corrected
-    input  wire                segment_state_outside,               // the position is beyond the table, the error that of its border
-    input  wire                segment_state_known,                 // segment_stored is the point that was asked for
-    output logic signed [47:0] segment_origin,                      // position of the first border; moves with the origin from when it is written [1/65536 period]
-    output logic               segment_origin_written,              // strobe: segment_origin has just been written, its new value stands
-    output logic [47:0]        segment_length,                      // length of a segment [1/65536 period]
-    output logic signed [23:0] segment_point,                       // position at a border less the true one; writing puts it there [1/65536 period]
-    output logic [7:0]         segment_point_border,                // position at a border less the true one; writing puts it there: border
-    output logic               segment_point_written,               // strobe: segment_point has just been written, its new value stands
-    output logic [7:0]         segment_read_border,                 // border whose point is wanted back: border
-    output logic               segment_read_written,                // strobe: segment_read has just been written, its new value stands
-    input  wire  signed [23:0] segment_stored,                      // that point, once segment_state.known stands [1/65536 period]
-    input  wire  signed [23:0] segment_error                        // what is taken off the position now [1/65536 period]
+    input wire clk,
+    input wire rst,  // settings take their first values
+    input wire select,  // strobe: access to this block
+    input wire write,  // level: it writes wdata
+    input wire [5:0] word,  // index of the word
+    input wire [31:0] wdata,  // value to write
+    output logic [31:0] rdata,  // value read; else 0
+    output logic [15:0] edge_filter_skip,  // cycle
+    output logic [3:0] edge_filter_tolerated,  // tolerated samples
+    output logic [1:0] decoder_mode,  // 0 x4
+    output logic index_active_low,  // 1: the index is active low
+    output logic [1:0] index_gate_mask,  // {b, a}, 1: it must equal gate
+    output logic [1:0] index_gate,  // {b, a}, levels at the index
+    output logic index_up,  // 1: use an index going up
+    output logic index_down,  // 1: use an index going down
+    output logic index_each,  // 1
+    output logic [31:0] counts_per_revolution,  // edges between two indexes
+    output logic strobes_arm_index,  // strobe: arms the index
+    output logic strobes_load_correction,  // strobe: loads the correction
+    output logic strobes_swap_harmonics,  // strobe
+    output logic strobes_record,  // strobe: records a new burst
+    output logic strobes_clear_signal_faults,  // strobe
+    output logic strobes_capture_now,  // strobe: captures now
+    output logic strobes_capture_next,  // strobe
+    output logic strobes_capture_clear,  // strobe: drops all captures
+    output logic strobes_compare_arm,  // strobe
+    output logic strobes_compare_disarm,  // strobe: disarms compare
+    input wire index_events_found,  // strobe: index events
+    input wire index_events_revolution_wrong,  // strobe
+    input wire index_events_armed,  // index events
+    input wire signed [31:0] index_count,  // 1/4 period
+    input wire [31:0] edge_time,  // cycle
+    output logic signed [15:0] correction_offset_sin,  // offsets, full scale 2^15: sin
+    output logic signed [15:0] correction_offset_cos,  // offsets, full scale 2^15: cos
+    output logic [16:0] correction_gain,  // gain of the sine
+    output logic signed [16:0] correction_quadrature_error,  // quadrature error
+    output logic harmonic_enable,  // 1
+    output logic signed [17:0] harmonic_point,  // 2^-20 period
+    output logic [7:0] harmonic_point_point,  // 1/256 period
+    output logic harmonic_point_written,  // strobe: new value
+    output logic [15:0] recorder_decimation,  // one sample out of so many
+    output logic recorder_phases,  // 1: phases, 0: samples
+    input wire recorder_state_full,  // the burst is complete
+    input wire recorder_state_invalid,  // the signal was disturbed
+    input wire [31:0] recorder_word,  // word of the burst
+    output logic recorder_word_read,  // strobe: read in this cycle
+    input wire [14:0] signal_faults,  // signal faults present now
+    input wire [14:0] first_signal_faults,  // signal faults that came first
+    output logic [14:0] signal_fault_mask,  // faults that stop the drive
+    output logic [15:0] lissajous_limits_clip_level,  // ADC counts
+    output logic [15:0] lissajous_limits_tolerance,  // ADC counts
+    output logic [15:0] jump_limits_jump,  // ADC counts
+    output logic [15:0] jump_limits_no_noise_samples,  // samples with one code
+    output logic [15:0] channel_limits_span,  // ADC counts
+    output logic [7:0] channel_limits_band,  // ADC counts
+    output logic [15:0] drift_limits_offset,  // ADC counts
+    output logic [15:0] drift_limits_balance,  // ADC counts
+    output logic [15:0] quadrature_limits_quadrature_error,  // ADC counts
+    output logic [15:0] quadrature_limits_sign_threshold,  // ADC counts
+    output logic [6:0] capture_sources,  // sources that capture
+    input wire capture_state_present,  // a capture waits in captured_*
+    input wire [4:0] capture_state_free,  // captures that still fit
+    input wire capture_state_overrun,  // strobe: an event was dropped
+    input wire [6:0] captured_sources,  // oldest capture: sources
+    input wire [15:0] captured_age,  // cycle
+    input wire [31:0] captured_time,  // cycle
+    input wire signed [47:0] captured_position,  // 1/65536 period
+    output logic signed [47:0] compare_start,  // 1/65536 period
+    output logic signed [47:0] compare_step,  // 1/65536 period
+    output logic [31:0] compare_count,  // number of points; 0: no end
+    output logic [23:0] compare_pulse,  // length of a pulse [cycle]
+    output logic [23:0] compare_gap,  // cycle
+    input wire compare_state_armed,  // state of compare: armed
+    input wire compare_state_late,  // strobe
+    input wire [31:0] compare_passed,  // points passed
+    output logic [15:0] velocity_quantum,  // 1/65536 period
+    input wire signed [39:0] velocity_fine,  // 2^-24 period/tick
+    output logic position_source_counts,  // 1
+    output logic position_source_steps,  // 1
+    input wire position_source_sine,  // 1
+    output logic signed [2:0] align,  // 1/4 period
+    output logic align_written,  // strobe: new value
+    output logic segment_use_enable,  // 1: positions are corrected
+    output logic segment_use_linear,  // 1
+    output logic [7:0] segment_use_segments,  // use of the segment table
+    input wire [7:0] segment_state_built,  // most segments; 0: not built
+    input wire segment_state_in_force,  // positions are corrected
+    input wire segment_state_outside,  // beyond the table
+    input wire segment_state_known,  // 1
+    output logic signed [47:0] segment_origin,  // 1/65536 period
+    output logic segment_origin_written,  // strobe: new value
+    output logic [47:0] segment_length,  // 1/65536 period
+    output logic signed [23:0] segment_point,  // 1/65536 period
+    output logic [7:0] segment_point_border,  // border of the point
+    output logic segment_point_written,  // strobe: new value
+    output logic [7:0] segment_read_border,  // border to read back: border
+    output logic segment_read_written,  // strobe: new value
+    input wire signed [23:0] segment_stored,  // 1/65536 period
+    input wire signed [23:0] segment_error  // 1/65536 period
 );
     logic        index_events_found_held;
     logic        index_events_revolution_wrong_held;
@@ -117,65 +119,75 @@ module feedback_registers #(
     logic [31:0] compare_start_low;
     logic [31:0] compare_step_low;
     logic        compare_state_late_held;
-    logic [7:0]  velocity_fine_high;
+    logic [ 7:0] velocity_fine_high;
     logic [31:0] segment_origin_low;
     logic [31:0] segment_length_low;
 
-    wire get = select && !write;
-    wire put = select && write;
+    wire         get = select && !write;
+    wire         put = select && write;
+
     assign recorder_word_read = get && word == 6'h0F;
 
     always_ff @(posedge clk) begin
         rdata <= '0;
-        if (get) case (word)
-            6'h00: rdata <= {12'd0, edge_filter_tolerated, edge_filter_skip};
-            6'h01: rdata <= {30'd0, decoder_mode};
-            6'h02: rdata <= {24'd0, index_each, index_down, index_up, index_gate, index_gate_mask, index_active_low};
-            6'h03: rdata <= counts_per_revolution;
-            6'h05: rdata <= {29'd0, index_events_armed, index_events_revolution_wrong_held, index_events_found_held};
-            6'h06: rdata <= index_count;
-            6'h07: rdata <= edge_time;
-            6'h08: rdata <= {correction_offset_cos, correction_offset_sin};
-            6'h09: rdata <= {15'd0, correction_gain};
-            6'h0A: rdata <= {{15{correction_quadrature_error[16]}}, correction_quadrature_error};
-            6'h0B: rdata <= {31'd0, harmonic_enable};
-            6'h0C: rdata <= {6'd0, harmonic_point_point, harmonic_point};
-            6'h0D: rdata <= {15'd0, recorder_phases, recorder_decimation};
-            6'h0E: rdata <= {30'd0, recorder_state_invalid, recorder_state_full};
-            6'h0F: rdata <= recorder_word;
-            6'h10: rdata <= {17'd0, signal_faults};
-            6'h11: rdata <= {17'd0, first_signal_faults};
-            6'h12: rdata <= {17'd0, signal_fault_mask};
-            6'h13: rdata <= {lissajous_limits_tolerance, lissajous_limits_clip_level};
-            6'h14: rdata <= {jump_limits_no_noise_samples, jump_limits_jump};
-            6'h15: rdata <= {8'd0, channel_limits_band, channel_limits_span};
-            6'h16: rdata <= {drift_limits_balance, drift_limits_offset};
-            6'h17: rdata <= {quadrature_limits_sign_threshold, quadrature_limits_quadrature_error};
-            6'h18: rdata <= {25'd0, capture_sources};
-            6'h19: rdata <= {25'd0, capture_state_overrun_held, capture_state_free, capture_state_present};
-            6'h1A: rdata <= {9'd0, captured_age, captured_sources};
-            6'h1B: rdata <= captured_time;
-            6'h1C: rdata <= captured_position[31:0];
-            6'h1D: rdata <= {{16{captured_position_high[15]}}, captured_position_high};
-            6'h1E: rdata <= compare_start[31:0];
-            6'h1F: rdata <= {{16{compare_start[47]}}, compare_start[47:32]};
-            6'h20: rdata <= compare_step[31:0];
-            6'h21: rdata <= {{16{compare_step[47]}}, compare_step[47:32]};
-            6'h22: rdata <= compare_count;
-            6'h23: rdata <= {8'd0, compare_pulse};
-            6'h24: rdata <= {8'd0, compare_gap};
-            6'h25: rdata <= {30'd0, compare_state_late_held, compare_state_armed};
-            6'h26: rdata <= compare_passed;
-            6'h27: rdata <= {16'd0, velocity_quantum};
-            6'h28: rdata <= velocity_fine[31:0];
-            6'h29: rdata <= {{24{velocity_fine_high[7]}}, velocity_fine_high};
-            6'h2A: rdata <= {29'd0, position_source_sine, position_source_steps, position_source_counts};
-            6'h2B: rdata <= {{29{align[2]}}, align};
-            6'h2D: rdata <= {21'd0, segment_state_known, segment_state_outside, segment_state_in_force, segment_state_built};
-            6'h34: rdata <= {{8{segment_stored[23]}}, segment_stored};
-            6'h35: rdata <= {{8{segment_error[23]}}, segment_error};
-            default: rdata <= '0;
-        endcase
+        if (get) begin
+            case (word)
+                6'h00: rdata <= {12'd0, edge_filter_tolerated, edge_filter_skip};
+                6'h01: rdata <= {30'd0, decoder_mode};
+                6'h02: rdata <= {24'd0, index_each, index_down, index_up, index_gate,
+                    index_gate_mask, index_active_low};
+                6'h03: rdata <= counts_per_revolution;
+                6'h05: rdata <= {29'd0, index_events_armed, index_events_revolution_wrong_held,
+                    index_events_found_held};
+                6'h06: rdata <= index_count;
+                6'h07: rdata <= edge_time;
+                6'h08: rdata <= {correction_offset_cos, correction_offset_sin};
+                6'h09: rdata <= {15'd0, correction_gain};
+                6'h0A: rdata <= {{15{correction_quadrature_error[16]}},
+                    correction_quadrature_error};
+                6'h0B: rdata <= {31'd0, harmonic_enable};
+                6'h0C: rdata <= {6'd0, harmonic_point_point, harmonic_point};
+                6'h0D: rdata <= {15'd0, recorder_phases, recorder_decimation};
+                6'h0E: rdata <= {30'd0, recorder_state_invalid, recorder_state_full};
+                6'h0F: rdata <= recorder_word;
+                6'h10: rdata <= {17'd0, signal_faults};
+                6'h11: rdata <= {17'd0, first_signal_faults};
+                6'h12: rdata <= {17'd0, signal_fault_mask};
+                6'h13: rdata <= {lissajous_limits_tolerance, lissajous_limits_clip_level};
+                6'h14: rdata <= {jump_limits_no_noise_samples, jump_limits_jump};
+                6'h15: rdata <= {8'd0, channel_limits_band, channel_limits_span};
+                6'h16: rdata <= {drift_limits_balance, drift_limits_offset};
+                6'h17: rdata <= {quadrature_limits_sign_threshold,
+                    quadrature_limits_quadrature_error};
+                6'h18: rdata <= {25'd0, capture_sources};
+                6'h19: rdata <= {25'd0, capture_state_overrun_held, capture_state_free,
+                    capture_state_present};
+                6'h1A: rdata <= {9'd0, captured_age, captured_sources};
+                6'h1B: rdata <= captured_time;
+                6'h1C: rdata <= captured_position[31:0];
+                6'h1D: rdata <= {{16{captured_position_high[15]}}, captured_position_high};
+                6'h1E: rdata <= compare_start[31:0];
+                6'h1F: rdata <= {{16{compare_start[47]}}, compare_start[47:32]};
+                6'h20: rdata <= compare_step[31:0];
+                6'h21: rdata <= {{16{compare_step[47]}}, compare_step[47:32]};
+                6'h22: rdata <= compare_count;
+                6'h23: rdata <= {8'd0, compare_pulse};
+                6'h24: rdata <= {8'd0, compare_gap};
+                6'h25: rdata <= {30'd0, compare_state_late_held, compare_state_armed};
+                6'h26: rdata <= compare_passed;
+                6'h27: rdata <= {16'd0, velocity_quantum};
+                6'h28: rdata <= velocity_fine[31:0];
+                6'h29: rdata <= {{24{velocity_fine_high[7]}}, velocity_fine_high};
+                6'h2A: rdata <= {29'd0, position_source_sine, position_source_steps,
+                    position_source_counts};
+                6'h2B: rdata <= {{29{align[2]}}, align};
+                6'h2D: rdata <= {21'd0, segment_state_known, segment_state_outside,
+                    segment_state_in_force, segment_state_built};
+                6'h34: rdata <= {{8{segment_stored[23]}}, segment_stored};
+                6'h35: rdata <= {{8{segment_error[23]}}, segment_error};
+                default: rdata <= '0;
+            endcase
+        end
         if (get && word == 6'h1C) captured_position_high <= captured_position[47:32];
         if (get && word == 6'h28) velocity_fine_high <= velocity_fine[39:32];
 
@@ -188,7 +200,7 @@ module feedback_registers #(
         if (put && word == 6'h02) index_up <= wdata[5];
         if (put && word == 6'h02) index_down <= wdata[6];
         if (put && word == 6'h02) index_each <= wdata[7];
-        if (put && word == 6'h03) counts_per_revolution <= wdata;
+        if (put && word == 6'h03) counts_per_revolution <= wdata[31:0];
         strobes_arm_index <= put && word == 6'h04 && wdata[0];
         strobes_load_correction <= put && word == 6'h04 && wdata[1];
         strobes_swap_harmonics <= put && word == 6'h04 && wdata[2];
@@ -199,39 +211,44 @@ module feedback_registers #(
         strobes_capture_clear <= put && word == 6'h04 && wdata[7];
         strobes_compare_arm <= put && word == 6'h04 && wdata[8];
         strobes_compare_disarm <= put && word == 6'h04 && wdata[9];
-        index_events_found_held <= index_events_found || (index_events_found_held && !(put && word == 6'h05 && wdata[0]));
-        index_events_revolution_wrong_held <= index_events_revolution_wrong || (index_events_revolution_wrong_held && !(put && word == 6'h05 && wdata[1]));
-        if (SINE != 0 && put && word == 6'h08) correction_offset_sin <= wdata[15:0];
-        if (SINE != 0 && put && word == 6'h08) correction_offset_cos <= wdata[31:16];
-        if (SINE != 0 && put && word == 6'h09) correction_gain <= wdata[16:0];
-        if (SINE != 0 && put && word == 6'h0A) correction_quadrature_error <= wdata[16:0];
-        if (SINE != 0 && put && word == 6'h0B) harmonic_enable <= wdata[0];
+        if (put && word == 6'h05 && wdata[0]) index_events_found_held <= 1'b0;
+        if (index_events_found) index_events_found_held <= 1'b1;
+        if (put && word == 6'h05 && wdata[1]) index_events_revolution_wrong_held <= 1'b0;
+        if (index_events_revolution_wrong) index_events_revolution_wrong_held <= 1'b1;
+        if (HAS_SINE != 0 && put && word == 6'h08) correction_offset_sin <= wdata[15:0];
+        if (HAS_SINE != 0 && put && word == 6'h08) correction_offset_cos <= wdata[31:16];
+        if (HAS_SINE != 0 && put && word == 6'h09) correction_gain <= wdata[16:0];
+        if (HAS_SINE != 0 && put && word == 6'h0A) correction_quadrature_error <= wdata[16:0];
+        if (HAS_SINE != 0 && put && word == 6'h0B) harmonic_enable <= wdata[0];
         harmonic_point_written <= put && word == 6'h0C;
-        if (SINE != 0 && put && word == 6'h0C) harmonic_point <= wdata[17:0];
-        if (SINE != 0 && put && word == 6'h0C) harmonic_point_point <= wdata[25:18];
-        if (SINE != 0 && put && word == 6'h0D) recorder_decimation <= wdata[15:0];
-        if (SINE != 0 && put && word == 6'h0D) recorder_phases <= wdata[16];
-        if (SINE != 0 && put && word == 6'h12) signal_fault_mask <= wdata[14:0];
-        if (SINE != 0 && put && word == 6'h13) lissajous_limits_clip_level <= wdata[15:0];
-        if (SINE != 0 && put && word == 6'h13) lissajous_limits_tolerance <= wdata[31:16];
-        if (SINE != 0 && put && word == 6'h14) jump_limits_jump <= wdata[15:0];
-        if (SINE != 0 && put && word == 6'h14) jump_limits_no_noise_samples <= wdata[31:16];
-        if (SINE != 0 && put && word == 6'h15) channel_limits_span <= wdata[15:0];
-        if (SINE != 0 && put && word == 6'h15) channel_limits_band <= wdata[23:16];
-        if (SINE != 0 && put && word == 6'h16) drift_limits_offset <= wdata[15:0];
-        if (SINE != 0 && put && word == 6'h16) drift_limits_balance <= wdata[31:16];
-        if (SINE != 0 && put && word == 6'h17) quadrature_limits_quadrature_error <= wdata[15:0];
-        if (SINE != 0 && put && word == 6'h17) quadrature_limits_sign_threshold <= wdata[31:16];
+        if (HAS_SINE != 0 && put && word == 6'h0C) harmonic_point <= wdata[17:0];
+        if (HAS_SINE != 0 && put && word == 6'h0C) harmonic_point_point <= wdata[25:18];
+        if (HAS_SINE != 0 && put && word == 6'h0D) recorder_decimation <= wdata[15:0];
+        if (HAS_SINE != 0 && put && word == 6'h0D) recorder_phases <= wdata[16];
+        if (HAS_SINE != 0 && put && word == 6'h12) signal_fault_mask <= wdata[14:0];
+        if (HAS_SINE != 0 && put && word == 6'h13) lissajous_limits_clip_level <= wdata[15:0];
+        if (HAS_SINE != 0 && put && word == 6'h13) lissajous_limits_tolerance <= wdata[31:16];
+        if (HAS_SINE != 0 && put && word == 6'h14) jump_limits_jump <= wdata[15:0];
+        if (HAS_SINE != 0 && put && word == 6'h14) jump_limits_no_noise_samples <= wdata[31:16];
+        if (HAS_SINE != 0 && put && word == 6'h15) channel_limits_span <= wdata[15:0];
+        if (HAS_SINE != 0 && put && word == 6'h15) channel_limits_band <= wdata[23:16];
+        if (HAS_SINE != 0 && put && word == 6'h16) drift_limits_offset <= wdata[15:0];
+        if (HAS_SINE != 0 && put && word == 6'h16) drift_limits_balance <= wdata[31:16];
+        if (HAS_SINE != 0 && put && word == 6'h17)
+            quadrature_limits_quadrature_error <= wdata[15:0];
+        if (HAS_SINE != 0 && put && word == 6'h17) quadrature_limits_sign_threshold <= wdata[31:16];
         if (put && word == 6'h18) capture_sources <= wdata[6:0];
-        capture_state_overrun_held <= capture_state_overrun || (capture_state_overrun_held && !(put && word == 6'h19 && wdata[6]));
+        if (put && word == 6'h19 && wdata[6]) capture_state_overrun_held <= 1'b0;
+        if (capture_state_overrun) capture_state_overrun_held <= 1'b1;
         if (put && word == 6'h1E) compare_start_low <= wdata;
         if (put && word == 6'h1F) compare_start <= {wdata[15:0], compare_start_low};
         if (put && word == 6'h20) compare_step_low <= wdata;
         if (put && word == 6'h21) compare_step <= {wdata[15:0], compare_step_low};
-        if (put && word == 6'h22) compare_count <= wdata;
+        if (put && word == 6'h22) compare_count <= wdata[31:0];
         if (put && word == 6'h23) compare_pulse <= wdata[23:0];
         if (put && word == 6'h24) compare_gap <= wdata[23:0];
-        compare_state_late_held <= compare_state_late || (compare_state_late_held && !(put && word == 6'h25 && wdata[1]));
+        if (put && word == 6'h25 && wdata[1]) compare_state_late_held <= 1'b0;
+        if (compare_state_late) compare_state_late_held <= 1'b1;
         if (put && word == 6'h27) velocity_quantum <= wdata[15:0];
         if (put && word == 6'h2A) position_source_counts <= wdata[0];
         if (put && word == 6'h2A) position_source_steps <= wdata[1];
@@ -250,6 +267,7 @@ module feedback_registers #(
         if (put && word == 6'h32) segment_point_border <= wdata[31:24];
         segment_read_written <= put && word == 6'h33;
         if (put && word == 6'h33) segment_read_border <= wdata[7:0];
+
         if (rst) begin
             rdata <= '0;
             edge_filter_skip <= 16'h0000;
@@ -272,31 +290,31 @@ module feedback_registers #(
             strobes_capture_clear <= 1'b0;
             strobes_compare_arm <= 1'b0;
             strobes_compare_disarm <= 1'b0;
-            index_events_found_held <= 1'b0;
-            index_events_revolution_wrong_held <= 1'b0;
+            index_events_found_held <= '0;
+            index_events_revolution_wrong_held <= '0;
             correction_offset_sin <= 16'h0000;
             correction_offset_cos <= 16'h0000;
-            correction_gain <= SINE != 0 ? 17'h10000 : '0;
+            correction_gain <= HAS_SINE == 0 ? '0 : 17'h10000;
             correction_quadrature_error <= 17'h00000;
-            harmonic_enable <= SINE != 0 ? 1'b1 : '0;
+            harmonic_enable <= HAS_SINE == 0 ? '0 : 1'b1;
             harmonic_point_written <= 1'b0;
             harmonic_point <= 18'h00000;
             harmonic_point_point <= 8'h00;
-            recorder_decimation <= SINE != 0 ? 16'h0001 : '0;
+            recorder_decimation <= HAS_SINE == 0 ? '0 : 16'h0001;
             recorder_phases <= 1'b0;
             signal_fault_mask <= 15'h0000;
-            lissajous_limits_clip_level <= SINE != 0 ? 16'hFFFF : '0;
-            lissajous_limits_tolerance <= SINE != 0 ? 16'hFFFF : '0;
-            jump_limits_jump <= SINE != 0 ? 16'hFFFF : '0;
+            lissajous_limits_clip_level <= HAS_SINE == 0 ? '0 : 16'hFFFF;
+            lissajous_limits_tolerance <= HAS_SINE == 0 ? '0 : 16'hFFFF;
+            jump_limits_jump <= HAS_SINE == 0 ? '0 : 16'hFFFF;
             jump_limits_no_noise_samples <= 16'h0000;
-            channel_limits_span <= SINE != 0 ? 16'hFFFF : '0;
+            channel_limits_span <= HAS_SINE == 0 ? '0 : 16'hFFFF;
             channel_limits_band <= 8'h00;
-            drift_limits_offset <= SINE != 0 ? 16'hFFFF : '0;
-            drift_limits_balance <= SINE != 0 ? 16'hFFFF : '0;
-            quadrature_limits_quadrature_error <= SINE != 0 ? 16'hFFFF : '0;
-            quadrature_limits_sign_threshold <= SINE != 0 ? 16'hFFFF : '0;
+            drift_limits_offset <= HAS_SINE == 0 ? '0 : 16'hFFFF;
+            drift_limits_balance <= HAS_SINE == 0 ? '0 : 16'hFFFF;
+            quadrature_limits_quadrature_error <= HAS_SINE == 0 ? '0 : 16'hFFFF;
+            quadrature_limits_sign_threshold <= HAS_SINE == 0 ? '0 : 16'hFFFF;
             capture_sources <= 7'h00;
-            capture_state_overrun_held <= 1'b0;
+            capture_state_overrun_held <= '0;
             captured_position_high <= '0;
             compare_start_low <= '0;
             compare_start <= 48'h000000000000;
@@ -305,7 +323,7 @@ module feedback_registers #(
             compare_count <= 32'h00000000;
             compare_pulse <= 24'h000001;
             compare_gap <= 24'h000001;
-            compare_state_late_held <= 1'b0;
+            compare_state_late_held <= '0;
             velocity_quantum <= 16'h0000;
             velocity_fine_high <= '0;
             position_source_counts <= 1'b0;

@@ -1,93 +1,95 @@
 // SPDX-License-Identifier: Apache-2.0
-// peripherals_registers -- the register block of peripherals: I2C, PS/2 pass-through, peer port, angle sensor, numeric display, status inputs.
+// peripherals_registers -- the register block of peripherals: I2C, PS/2 pass-through, peer port,
+// angle sensor, numeric display, status inputs.
 //
-// latency  1 clk from select to rdata, and from a write to the new value        rate  one access per clk
+// latency  1 cycle from select to rdata, and from a write to the new value
+// rate     one access per cycle
 // source   tables/registers.rdl
-// model    tb/registers/register_block.py, equal in every bit of every cycle; test tb/registers/test_registers.py
+// model    tb/registers/register_block.py, equal in every bit of every cycle
 // made     by tables/registers.py, never by hand
 `default_nettype none
 
 module peripherals_registers (
     input  wire         clk,
-    input  wire         rst,                           // every setting takes its first value, what was counted or held is cleared
-    input  wire         select,                        // an access to this block
-    input  wire         write,                         // with select: wdata goes into the word
-    input  wire  [5:0]  word,                          // index of the 32-bit word; a word without a register reads 0
-    input  wire  [31:0] wdata,
-    output logic [31:0] rdata,                         // what was read, for one clk; 0 in every other
-    input  wire         built_i2c,                     // 1: it was built, 0: its pins are idle, its registers do nothing: i2c
-    input  wire         built_ps2,                     // 1: it was built, 0: its pins are idle, its registers do nothing: ps2
-    input  wire         built_peer,                    // 1: it was built, 0: its pins are idle, its registers do nothing: peer
-    input  wire         built_sensor,                  // 1: it was built, 0: its pins are idle, its registers do nothing: sensor
-    input  wire         built_display,                 // 1: it was built, 0: its pins are idle, its registers do nothing: display
-    input  wire         built_edm,                     // 1: it was built, 0: its pins are idle, its registers do nothing: edm
-    output logic [7:0]  i2c_data,                      // of a write
-    output logic [2:0]  i2c_command,                   // 0 start, also repeated; 1 stop, 2 write, 3 read, 4 recover: clock a stuck device free
-    output logic        i2c_acknowledge,               // of a read: more is wanted
-    output logic        i2c_written,                   // strobe: i2c has just been written, its new value stands
-    input  wire  [7:0]  i2c_answer_data,               // of a read
-    input  wire  [1:0]  i2c_answer_result,             // 0 ok, 1 not acknowledged, 2 bus lost or not ours, 3 no bus: a line stays low
-    input  wire         i2c_answer_present,            // 0: the queue was empty, nothing was taken
-    output logic        i2c_answer_read,               // strobe: i2c_answer is being read in this clk
-    input  wire  [7:0]  i2c_state_free,                // commands that may still be queued, 128 at most; as many results wait, more are lost
-    input  wire         i2c_state_busy,                // a command is under way or waits
-    input  wire         i2c_state_owned,               // the bus is ours, from start to stop
+    input  wire         rst,                           // settings take their first values
+    input  wire         select,                        // strobe: access to this block
+    input  wire         write,                         // level: it writes wdata
+    input  wire  [ 5:0] word,                          // index of the word
+    input  wire  [31:0] wdata,                         // value to write
+    output logic [31:0] rdata,                         // value read; else 0
+    input  wire         built_i2c,                     // which peripherals are built
+    input  wire         built_ps2,                     // which peripherals are built
+    input  wire         built_peer,                    // which peripherals are built
+    input  wire         built_sensor,                  // which peripherals are built
+    input  wire         built_display,                 // which peripherals are built
+    input  wire         built_edm,                     // which peripherals are built
+    output logic [ 7:0] i2c_data,                      // byte of a write
+    output logic [ 2:0] i2c_command,                   // 0 start
+    output logic        i2c_acknowledge,               // of a read: more bytes follow
+    output logic        i2c_written,                   // strobe: new value
+    input  wire  [ 7:0] i2c_answer_data,               // byte of a read
+    input  wire  [ 1:0] i2c_answer_result,             // 0 ok
+    input  wire         i2c_answer_present,            // 1: a word was read; 0: the queue was empty
+    output logic        i2c_answer_read,               // strobe: read in this cycle
+    input  wire  [ 7:0] i2c_state_free,                // commands that can be queued
+    input  wire         i2c_state_busy,                // a command is in work or waits
+    input  wire         i2c_state_owned,               // the master owns the bus
     input  wire         i2c_state_scl,                 // level of the line
     input  wire         i2c_state_sda,                 // level of the line
-    output logic [15:0] ps2_idle,                      // silence of keyboard and machine before an injection; less than 20 counts as 20 [0.001 s]
-    output logic [7:0]  ps2_inject_data,               // a scan code to inject
-    output logic        ps2_inject_last,               // of its sequence
-    output logic        ps2_inject_written,            // strobe: ps2_inject has just been written, its new value stands
-    input  wire  [5:0]  ps2_state_free,                // scan codes that may still be queued, 32 at most
-    input  wire         ps2_state_injecting,           // a sequence is under way
-    input  wire         ps2_state_busy,                // a frame is under way on either side
-    output logic        ps2_state_drop,                // strobe: take back what is queued; a sequence that is under way is finished whole
-    input  wire         ps2_typed,                     // strobe, counted: bytes of the keyboard that answer no command: a person types; writing clears
-    input  wire         ps2_errors_keyboard_damaged,   // strobe, counted: bytes of the keyboard that came damaged
-    input  wire         ps2_errors_command_damaged,    // strobe, counted: commands of the machine that came damaged
-    input  wire         ps2_errors_unsent,             // strobe, counted: commands that the keyboard did not take
-    input  wire         ps2_errors_aborted,            // strobe, counted: frames that the machine cut short
-    input  wire         ps2_glitches,                  // strobe, counted: pulses of less than 1 us on the lines; writing clears
-    output logic [19:0] peer_bit_time,                 // duration of one bit of the peer port [1/16 clk]
-    input  wire  [7:0]  peer_receive_data,             // one received byte; reading takes it from the queue of 64: data
-    input  wire         peer_receive_present,          // 0: the queue was empty, nothing was taken
-    output logic        peer_receive_read,             // strobe: peer_receive is being read in this clk
-    output logic [7:0]  peer_transmit,                 // one byte to send
-    output logic        peer_transmit_written,         // strobe: peer_transmit has just been written, its new value stands
-    input  wire  [6:0]  peer_state_transmit_free,      // bytes that may still be queued, 64 at most
+    output logic [15:0] ps2_idle,                      // 0.001 s
+    output logic [ 7:0] ps2_inject_data,               // scan code
+    output logic        ps2_inject_last,               // 1: last one of its sequence
+    output logic        ps2_inject_written,            // strobe: new value
+    input  wire  [ 5:0] ps2_state_free,                // scan codes that can be queued, 32 at most
+    input  wire         ps2_state_injecting,           // a sequence is being injected
+    input  wire         ps2_state_busy,                // a frame is on its way on either side
+    output logic        ps2_state_drop,                // strobe: removes what is queued
+    input  wire         ps2_typed,                     // strobe: typed bytes
+    input  wire         ps2_errors_keyboard_damaged,   // strobe: damaged bytes of the keyboard
+    input  wire         ps2_errors_command_damaged,    // strobe: damaged commands of the machine
+    input  wire         ps2_errors_unsent,             // strobe
+    input  wire         ps2_errors_aborted,            // strobe: frames that the machine cut short
+    input  wire         ps2_glitches,                  // strobe
+    output logic [19:0] peer_bit_time,                 // 1/16 cycle
+    input  wire  [ 7:0] peer_receive_data,             // oldest received byte
+    input  wire         peer_receive_present,          // 1: a word was read; 0: the queue was empty
+    output logic        peer_receive_read,             // strobe: read in this cycle
+    output logic [ 7:0] peer_transmit,                 // byte to send
+    output logic        peer_transmit_written,         // strobe: new value
+    input  wire  [ 6:0] peer_state_transmit_free,      // bytes that can be queued, 64 at most
     input  wire         peer_state_sending,            // state of the peer port: sending
-    input  wire         peer_errors_framing,           // strobe, counted: characters without a stop bit
-    input  wire         peer_errors_overruns,          // strobe, counted: bytes lost because the receive queue was full
-    output logic [19:0] sensor_bit_time,               // duration of one bit of the sensor [1/16 clk]
-    output logic [23:0] sensor_gap,                    // longest pause between the ends of two bytes of a frame [clk]
-    output logic [31:0] sensor_stale_after,            // time without a good frame after which the sensor is stale; 0: never [clk]
-    input  wire  [63:0] sensor_reading,                // of the last good frame. Low word: angle, 2^32 a turn. High word: its age then, in clk; stops at its end
-    input  wire  [7:0]  sensor_state_sequence_number,  // its number, each frame one more; read it before sensor_reading
-    input  wire         sensor_state_stale,            // none yet, or older than sensor_stale_after
-    input  wire  [7:0]  sensor_errors_crc,             // with a wrong CRC-16
-    input  wire  [7:0]  sensor_errors_broken,          // with a pause or a framing error within
-    input  wire  [7:0]  sensor_errors_missed,          // by the gaps of the numbers, damaged ones with them
-    output logic        sensor_errors_clear,           // strobe: clear the three
-    input  wire         sensor_frames,                 // strobe, counted: good frames; writing clears
-    output logic [15:0] display,                       // queue a word for the display driver: register in the high byte, value in the low one
-    output logic        display_written,               // strobe: display has just been written, its new value stands
-    input  wire  [4:0]  display_state_free,            // words that may still be queued, 16 at most
+    input  wire         peer_errors_framing,           // strobe: characters without a stop bit
+    input  wire         peer_errors_overruns,          // strobe
+    output logic [19:0] sensor_bit_time,               // 1/16 cycle
+    output logic [23:0] sensor_gap,                    // cycle
+    output logic [31:0] sensor_stale_after,            // cycle
+    input  wire  [63:0] sensor_reading,                // last good frame
+    input  wire  [ 7:0] sensor_state_sequence_number,  // its sequence number
+    input  wire         sensor_state_stale,            // stale
+    input  wire  [ 7:0] sensor_errors_crc,             // frames with a wrong CRC-16
+    input  wire  [ 7:0] sensor_errors_broken,          // broken frames
+    input  wire  [ 7:0] sensor_errors_missed,          // missed frames
+    output logic        sensor_errors_clear,           // strobe: clears the three counts
+    input  wire         sensor_frames,                 // strobe: good frames
+    output logic [15:0] display,                       // word to the display
+    output logic        display_written,               // strobe: new value
+    input  wire  [ 4:0] display_state_free,            // words that can be queued, 16 at most
     input  wire         display_state_sending,         // state of the display: sending
-    output logic [15:0] edm_filter,                    // a status input must stand this long without a break; the change passes at most 1 ms later [0.001 s]
-    input  wire  [1:0]  edm_status_inputs,             // bit n: level of input n
-    input  wire         edm_status_rose_0,             // strobe, held: input 0 went up
-    input  wire         edm_status_rose_1,             // strobe, held: input 1 went up
-    input  wire         edm_status_fell_0,             // strobe, held: input 0 went down
-    input  wire         edm_status_fell_1              // strobe, held: input 1 went down
+    output logic [15:0] edm_filter,                    // 0.001 s
+    input  wire  [ 1:0] edm_status_inputs,             // bit n: level of input n
+    input  wire         edm_status_rose_0,             // strobe: input 0 went high
+    input  wire         edm_status_rose_1,             // strobe: input 1 went high
+    input  wire         edm_status_fell_0,             // strobe: input 0 went low
+    input  wire         edm_status_fell_1              // strobe: input 1 went low
 );
     logic [15:0] ps2_typed_count;
-    logic [7:0]  ps2_errors_keyboard_damaged_count;
-    logic [7:0]  ps2_errors_command_damaged_count;
-    logic [7:0]  ps2_errors_unsent_count;
-    logic [7:0]  ps2_errors_aborted_count;
-    logic [7:0]  ps2_glitches_count;
-    logic [7:0]  peer_errors_framing_count;
-    logic [7:0]  peer_errors_overruns_count;
+    logic [ 7:0] ps2_errors_keyboard_damaged_count;
+    logic [ 7:0] ps2_errors_command_damaged_count;
+    logic [ 7:0] ps2_errors_unsent_count;
+    logic [ 7:0] ps2_errors_aborted_count;
+    logic [ 7:0] ps2_glitches_count;
+    logic [ 7:0] peer_errors_framing_count;
+    logic [ 7:0] peer_errors_overruns_count;
     logic [31:0] sensor_reading_high;
     logic [15:0] sensor_frames_count;
     logic        edm_status_rose_0_held;
@@ -95,41 +97,47 @@ module peripherals_registers (
     logic        edm_status_fell_0_held;
     logic        edm_status_fell_1_held;
 
-    wire get = select && !write;
-    wire put = select && write;
+    wire         get = select && !write;
+    wire         put = select && write;
+
     assign i2c_answer_read = get && word == 6'h02;
     assign peer_receive_read = get && word == 6'h0B;
 
     always_ff @(posedge clk) begin
         rdata <= '0;
-        if (get) case (word)
-            6'h00: rdata <= {26'd0, built_edm, built_display, built_sensor, built_peer, built_ps2, built_i2c};
-            6'h02: rdata <= {21'd0, i2c_answer_present, i2c_answer_result, i2c_answer_data};
-            6'h03: rdata <= {20'd0, i2c_state_sda, i2c_state_scl, i2c_state_owned, i2c_state_busy, i2c_state_free};
-            6'h04: rdata <= {16'd0, ps2_idle};
-            6'h06: rdata <= {24'd0, ps2_state_busy, ps2_state_injecting, ps2_state_free};
-            6'h07: rdata <= {16'd0, ps2_typed_count};
-            6'h08: rdata <= {ps2_errors_aborted_count, ps2_errors_unsent_count, ps2_errors_command_damaged_count,
-                            ps2_errors_keyboard_damaged_count};
-            6'h09: rdata <= {24'd0, ps2_glitches_count};
-            6'h0A: rdata <= {12'd0, peer_bit_time};
-            6'h0B: rdata <= {23'd0, peer_receive_present, peer_receive_data};
-            6'h0D: rdata <= {24'd0, peer_state_sending, peer_state_transmit_free};
-            6'h0E: rdata <= {16'd0, peer_errors_overruns_count, peer_errors_framing_count};
-            6'h0F: rdata <= {12'd0, sensor_bit_time};
-            6'h10: rdata <= {8'd0, sensor_gap};
-            6'h11: rdata <= sensor_stale_after;
-            6'h12: rdata <= sensor_reading[31:0];
-            6'h13: rdata <= sensor_reading_high;
-            6'h14: rdata <= {23'd0, sensor_state_stale, sensor_state_sequence_number};
-            6'h15: rdata <= {8'd0, sensor_errors_missed, sensor_errors_broken, sensor_errors_crc};
-            6'h16: rdata <= {16'd0, sensor_frames_count};
-            6'h18: rdata <= {26'd0, display_state_sending, display_state_free};
-            6'h19: rdata <= {16'd0, edm_filter};
-            6'h1A: rdata <= {26'd0, edm_status_fell_1_held, edm_status_fell_0_held, edm_status_rose_1_held, edm_status_rose_0_held,
-                            edm_status_inputs};
-            default: rdata <= '0;
-        endcase
+        if (get) begin
+            case (word)
+                6'h00: rdata <= {26'd0, built_edm, built_display, built_sensor, built_peer,
+                    built_ps2, built_i2c};
+                6'h02: rdata <= {21'd0, i2c_answer_present, i2c_answer_result, i2c_answer_data};
+                6'h03: rdata <= {20'd0, i2c_state_sda, i2c_state_scl, i2c_state_owned,
+                    i2c_state_busy, i2c_state_free};
+                6'h04: rdata <= {16'd0, ps2_idle};
+                6'h06: rdata <= {24'd0, ps2_state_busy, ps2_state_injecting, ps2_state_free};
+                6'h07: rdata <= {16'd0, ps2_typed_count};
+                6'h08: rdata <= {ps2_errors_aborted_count, ps2_errors_unsent_count,
+                    ps2_errors_command_damaged_count, ps2_errors_keyboard_damaged_count};
+                6'h09: rdata <= {24'd0, ps2_glitches_count};
+                6'h0A: rdata <= {12'd0, peer_bit_time};
+                6'h0B: rdata <= {23'd0, peer_receive_present, peer_receive_data};
+                6'h0D: rdata <= {24'd0, peer_state_sending, peer_state_transmit_free};
+                6'h0E: rdata <= {16'd0, peer_errors_overruns_count, peer_errors_framing_count};
+                6'h0F: rdata <= {12'd0, sensor_bit_time};
+                6'h10: rdata <= {8'd0, sensor_gap};
+                6'h11: rdata <= sensor_stale_after;
+                6'h12: rdata <= sensor_reading[31:0];
+                6'h13: rdata <= sensor_reading_high;
+                6'h14: rdata <= {23'd0, sensor_state_stale, sensor_state_sequence_number};
+                6'h15: rdata <= {8'd0, sensor_errors_missed, sensor_errors_broken,
+                    sensor_errors_crc};
+                6'h16: rdata <= {16'd0, sensor_frames_count};
+                6'h18: rdata <= {26'd0, display_state_sending, display_state_free};
+                6'h19: rdata <= {16'd0, edm_filter};
+                6'h1A: rdata <= {26'd0, edm_status_fell_1_held, edm_status_fell_0_held,
+                    edm_status_rose_1_held, edm_status_rose_0_held, edm_status_inputs};
+                default: rdata <= '0;
+            endcase
+        end
         if (get && word == 6'h12) sensor_reading_high <= sensor_reading[63:32];
 
         i2c_written <= put && word == 6'h01;
@@ -141,38 +149,55 @@ module peripherals_registers (
         if (put && word == 6'h05) ps2_inject_data <= wdata[7:0];
         if (put && word == 6'h05) ps2_inject_last <= wdata[8];
         ps2_state_drop <= put && word == 6'h06 && wdata[8];
-        if (put && word == 6'h07) ps2_typed_count <= {15'd0, ps2_typed};
-        else if (!(&ps2_typed_count)) ps2_typed_count <= ps2_typed_count + {15'd0, ps2_typed};
-        if (put && word == 6'h08) ps2_errors_keyboard_damaged_count <= {7'd0, ps2_errors_keyboard_damaged};
-        else if (!(&ps2_errors_keyboard_damaged_count)) ps2_errors_keyboard_damaged_count <= ps2_errors_keyboard_damaged_count + {7'd0, ps2_errors_keyboard_damaged};
-        if (put && word == 6'h08) ps2_errors_command_damaged_count <= {7'd0, ps2_errors_command_damaged};
-        else if (!(&ps2_errors_command_damaged_count)) ps2_errors_command_damaged_count <= ps2_errors_command_damaged_count + {7'd0, ps2_errors_command_damaged};
-        if (put && word == 6'h08) ps2_errors_unsent_count <= {7'd0, ps2_errors_unsent};
-        else if (!(&ps2_errors_unsent_count)) ps2_errors_unsent_count <= ps2_errors_unsent_count + {7'd0, ps2_errors_unsent};
-        if (put && word == 6'h08) ps2_errors_aborted_count <= {7'd0, ps2_errors_aborted};
-        else if (!(&ps2_errors_aborted_count)) ps2_errors_aborted_count <= ps2_errors_aborted_count + {7'd0, ps2_errors_aborted};
-        if (put && word == 6'h09) ps2_glitches_count <= {7'd0, ps2_glitches};
-        else if (!(&ps2_glitches_count)) ps2_glitches_count <= ps2_glitches_count + {7'd0, ps2_glitches};
+        if (put && word == 6'h07) ps2_typed_count <= 16'(ps2_typed);
+        else if (!(&ps2_typed_count)) ps2_typed_count <= ps2_typed_count + 16'(ps2_typed);
+        if (put && word == 6'h08)
+            ps2_errors_keyboard_damaged_count <= 8'(ps2_errors_keyboard_damaged);
+        else if (!(&ps2_errors_keyboard_damaged_count))
+            ps2_errors_keyboard_damaged_count <= ps2_errors_keyboard_damaged_count +
+                8'(ps2_errors_keyboard_damaged);
+        if (put && word == 6'h08)
+            ps2_errors_command_damaged_count <= 8'(ps2_errors_command_damaged);
+        else if (!(&ps2_errors_command_damaged_count))
+            ps2_errors_command_damaged_count <= ps2_errors_command_damaged_count +
+                8'(ps2_errors_command_damaged);
+        if (put && word == 6'h08) ps2_errors_unsent_count <= 8'(ps2_errors_unsent);
+        else if (!(&ps2_errors_unsent_count))
+            ps2_errors_unsent_count <= ps2_errors_unsent_count + 8'(ps2_errors_unsent);
+        if (put && word == 6'h08) ps2_errors_aborted_count <= 8'(ps2_errors_aborted);
+        else if (!(&ps2_errors_aborted_count))
+            ps2_errors_aborted_count <= ps2_errors_aborted_count + 8'(ps2_errors_aborted);
+        if (put && word == 6'h09) ps2_glitches_count <= 8'(ps2_glitches);
+        else if (!(&ps2_glitches_count))
+            ps2_glitches_count <= ps2_glitches_count + 8'(ps2_glitches);
         if (put && word == 6'h0A) peer_bit_time <= wdata[19:0];
         peer_transmit_written <= put && word == 6'h0C;
         if (put && word == 6'h0C) peer_transmit <= wdata[7:0];
-        if (put && word == 6'h0E) peer_errors_framing_count <= {7'd0, peer_errors_framing};
-        else if (!(&peer_errors_framing_count)) peer_errors_framing_count <= peer_errors_framing_count + {7'd0, peer_errors_framing};
-        if (put && word == 6'h0E) peer_errors_overruns_count <= {7'd0, peer_errors_overruns};
-        else if (!(&peer_errors_overruns_count)) peer_errors_overruns_count <= peer_errors_overruns_count + {7'd0, peer_errors_overruns};
+        if (put && word == 6'h0E) peer_errors_framing_count <= 8'(peer_errors_framing);
+        else if (!(&peer_errors_framing_count))
+            peer_errors_framing_count <= peer_errors_framing_count + 8'(peer_errors_framing);
+        if (put && word == 6'h0E) peer_errors_overruns_count <= 8'(peer_errors_overruns);
+        else if (!(&peer_errors_overruns_count))
+            peer_errors_overruns_count <= peer_errors_overruns_count + 8'(peer_errors_overruns);
         if (put && word == 6'h0F) sensor_bit_time <= wdata[19:0];
         if (put && word == 6'h10) sensor_gap <= wdata[23:0];
-        if (put && word == 6'h11) sensor_stale_after <= wdata;
+        if (put && word == 6'h11) sensor_stale_after <= wdata[31:0];
         sensor_errors_clear <= put && word == 6'h15 && wdata[24];
-        if (put && word == 6'h16) sensor_frames_count <= {15'd0, sensor_frames};
-        else if (!(&sensor_frames_count)) sensor_frames_count <= sensor_frames_count + {15'd0, sensor_frames};
+        if (put && word == 6'h16) sensor_frames_count <= 16'(sensor_frames);
+        else if (!(&sensor_frames_count))
+            sensor_frames_count <= sensor_frames_count + 16'(sensor_frames);
         display_written <= put && word == 6'h17;
         if (put && word == 6'h17) display <= wdata[15:0];
         if (put && word == 6'h19) edm_filter <= wdata[15:0];
-        edm_status_rose_0_held <= edm_status_rose_0 || (edm_status_rose_0_held && !(put && word == 6'h1A && wdata[2]));
-        edm_status_rose_1_held <= edm_status_rose_1 || (edm_status_rose_1_held && !(put && word == 6'h1A && wdata[3]));
-        edm_status_fell_0_held <= edm_status_fell_0 || (edm_status_fell_0_held && !(put && word == 6'h1A && wdata[4]));
-        edm_status_fell_1_held <= edm_status_fell_1 || (edm_status_fell_1_held && !(put && word == 6'h1A && wdata[5]));
+        if (put && word == 6'h1A && wdata[2]) edm_status_rose_0_held <= 1'b0;
+        if (edm_status_rose_0) edm_status_rose_0_held <= 1'b1;
+        if (put && word == 6'h1A && wdata[3]) edm_status_rose_1_held <= 1'b0;
+        if (edm_status_rose_1) edm_status_rose_1_held <= 1'b1;
+        if (put && word == 6'h1A && wdata[4]) edm_status_fell_0_held <= 1'b0;
+        if (edm_status_fell_0) edm_status_fell_0_held <= 1'b1;
+        if (put && word == 6'h1A && wdata[5]) edm_status_fell_1_held <= 1'b0;
+        if (edm_status_fell_1) edm_status_fell_1_held <= 1'b1;
+
         if (rst) begin
             rdata <= '0;
             i2c_written <= 1'b0;
@@ -204,10 +229,10 @@ module peripherals_registers (
             display_written <= 1'b0;
             display <= 16'h0000;
             edm_filter <= 16'h000A;
-            edm_status_rose_0_held <= 1'b0;
-            edm_status_rose_1_held <= 1'b0;
-            edm_status_fell_0_held <= 1'b0;
-            edm_status_fell_1_held <= 1'b0;
+            edm_status_rose_0_held <= '0;
+            edm_status_rose_1_held <= '0;
+            edm_status_fell_0_held <= '0;
+            edm_status_fell_1_held <= '0;
         end
     end
 endmodule

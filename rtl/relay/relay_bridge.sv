@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// relay_bridge -- the line of a relay: a 9-bit UART, whole frames to address 1 out of it, and the
-// answers into it.
+// relay_bridge -- connects a relay to the bus of its host: a 9-bit UART, the frame check for
+// address 1, and the requests.
 //
-// latency  the answer begins one bit after a request is done; SPI takes 66 clk a byte
+// latency  see relay_requests; the answer begins one bit after a request is done
 // rate     one request at a time
-// request  `00 10 0001` with the 9th bit, length 1..LONGEST, body, CRC-32 of all before, as on the
-//          house's line
-// answer   `01 10 0001`, length, body, CRC-32; the bodies are those of relay_requests; no answer to
-//          what is broken
+// behaviour  A request is `00 10 0001` with the 9th bit, length 1..LONGEST, body, CRC-32 of all
+//          before, as on the RS-485 bus of the nodes. An answer is `01 10 0001`, length, body,
+//          CRC-32. The bodies are those of relay_requests. A damaged frame has no answer.
 // model    the models of its blocks; proved in motion by tb/system/test_relay.py
 `default_nettype none
 
@@ -16,31 +15,35 @@ module relay_bridge #(
 ) (
     input  wire               clk,
     input  wire               rst,
-    input  wire        [19:0] bit_time,       // 1/16 clk
+    // bus
+    input  wire        [19:0] bit_time,       // 1/16 cycle
     input  wire               rx,             // level, synchronous to clk
     output logic              tx,             // pin
-    output logic              driver_enable,  // pin: of the line driver
+    output logic              driver_enable,  // pin, 1: drive the bus
+    // status
     input  wire        [ 7:0] events,         // strobes or levels: each sets its flag
-    input  wire        [ 7:0] levels,
-    input  wire        [ 1:0] source,         // of relay_store
-    input  wire        [ 5:0] orders,         // of harmonic_map
-    input  wire        [31:0] identity,       // of relay_set
+    input  wire        [ 7:0] levels,         // as in the header of relay
+    input  wire        [ 1:0] source,         // as in relay_store
+    input  wire        [ 5:0] orders,         // orders of harmonic_map; 0: a table
+    input  wire        [31:0] identity,       // CRC-32 of the set in use
     input  wire        [31:0] position,       // counts
     input  wire signed [31:0] correction,     // 2^-16 count
-    output logic       [ 7:0] flags,          // sticky
-    output logic              set_start,      // strobe
-    output logic              set_valid,      // strobe
-    output logic       [ 7:0] set_data,
-    output logic              pass_select,    // level: to relay_store
-    input  wire               pass_ready,     // level
-    output logic              pass_valid,     // strobe
-    input  wire               pass_done,      // strobe
-    input  wire        [ 7:0] pass_data
+    output logic       [ 7:0] flags,          // sticky events
+    // set
+    output logic              set_start,      // strobe: a set begins
+    output logic              set_valid,      // strobe: set_data is new
+    output logic       [ 7:0] set_data,       // byte of the set
+    // flash, through relay_store
+    output logic              pass_select,    // level: select the chip
+    input  wire               pass_ready,     // level: the chip waits for a byte
+    output logic              pass_valid,     // strobe: send set_data to the chip
+    input  wire               pass_done,      // strobe: pass_data is new
+    input  wire        [ 7:0] pass_data       // byte of the chip
 );
-    wire         received, ninth, framing_error, own, own_command, passed, command, good, answer_valid, answer_ready;
+    wire received, ninth, framing_error, own, own_command, passed, command, good;
+    wire answer_valid, answer_ready;
     wire [7:0] character, own_data, data, answer;
     wire unused_glitch, unused_receiving, unused_good, unused_bad, unused_sync, unused_sending;
-    wire         unused = &{1'b0, unused_glitch, unused_receiving, unused_good, unused_bad, unused_sync, unused_sending};
 
     uart_rx u_receiver (
         .clk,
@@ -123,6 +126,10 @@ module relay_bridge #(
         .driver_enable,
         .busy (unused_sending)
     );
+
+    wire unused = &{
+        1'b0, unused_glitch, unused_receiving, unused_good, unused_bad, unused_sync, unused_sending
+    };
 endmodule
 
 `default_nettype wire

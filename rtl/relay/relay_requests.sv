@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// relay_requests -- do what the host of a relay asks in whole frames, and answer: status, flags,
-// set of coefficients, flash.
+// relay_requests -- executes the requests of a relay's host and answers them: status, flags, set of
+// coefficients, flash.
 //
-// latency  2 clk a byte of the request, then the first byte of the answer 3 clk later; what goes to
-//          the flash as long as that takes
-// rate     one request at a time; what comes before its answer is out is dropped whole
-// body     sequence, kind, the rest. 0: status. 1: the flags fall that are set in the next byte. 2:
-//          a set begins with the bytes that follow, 3: it goes on with them. 4: a row of bytes to
-//          the flash under one select. Another kind has no answer
-// again    a sequence equal to that of the request before is answered and not acted on. Flash bytes
-//          go through again: a chip writes only after a write enable, which the first time used up
-// answer   `01 10 0001`, length, sequence, kind, then flags, levels, source with orders above,
-//          identity, position, correction as they stand when the answer begins, low byte first, or
-//          the bytes from the flash; CRC-32 of all before
+// latency  2 cycles per byte of the request, then 3 cycles to the first byte of the answer; a
+//          request for the flash takes as long as the flash
+// rate     one request at a time; a frame that comes before the answer is sent is dropped
+// behaviour  The body is sequence number, kind, data. Kind 0: status. 1: clears the flags that are
+//          set in the next byte. 2: a set begins with the bytes that follow. 3: the set continues.
+//          4: bytes to the flash under one select. Another kind has no answer. A request with the
+//          sequence number of the one before is answered but not executed again; bytes to the flash
+//          are sent again, since a chip writes only after a write enable, which the first time used
+//          up.
+//          The answer is `01 10 0001`, length, sequence number, kind, then flags, levels, source
+//          with orders above, identity, position, correction as they are when the answer begins,
+//          low byte first, or the bytes from the flash; CRC-32 of all before.
 // model    tb/relay/relay_requests.py, equal in every bit of every cycle
-// proved   the set and the flash get nothing but by a good frame, never while an answer goes out; a
-//          flag falls only by a request; a repeated request moves neither set nor flags
+// proved   the set and the flash receive bytes only from a good frame, and never while an answer is
+//          sent; only a request clears a flag; a repeated request changes neither set nor flags
 `default_nettype none
 
 module relay_requests #(
@@ -23,29 +24,34 @@ module relay_requests #(
 ) (
     input  wire               clk,
     input  wire               rst,
-    input  wire               valid,         // strobe, from frame_check as the three below
-    input  wire        [ 7:0] data,
-    input  wire               command,
-    input  wire               good,
+    // frames, from frame_check
+    input  wire               valid,         // strobe: data is new
+    input  wire        [ 7:0] data,          // byte of a frame
+    input  wire               command,       // level: data is a command byte
+    input  wire               good,          // level: data is the last byte of a good frame
+    // status
     input  wire        [ 7:0] events,        // strobes or levels: each sets its flag
-    input  wire        [ 7:0] levels,
-    input  wire        [ 1:0] source,        // of relay_store
-    input  wire        [ 5:0] orders,        // of harmonic_map
-    input  wire        [31:0] identity,      // of relay_set
+    input  wire        [ 7:0] levels,        // as in the header of relay
+    input  wire        [ 1:0] source,        // as in relay_store
+    input  wire        [ 5:0] orders,        // orders of harmonic_map; 0: a table
+    input  wire        [31:0] identity,      // CRC-32 of the set in use
     input  wire        [31:0] position,      // counts
     input  wire signed [31:0] correction,    // 2^-16 count
-    output logic       [ 7:0] flags,         // sticky
-    output logic              set_start,     // strobe
-    output logic              set_valid,     // strobe
-    output logic       [ 7:0] set_data,
-    output logic              pass_select,   // level: to relay_store
-    input  wire               pass_ready,    // level
-    output logic              pass_valid,    // strobe
-    input  wire               pass_done,     // strobe
-    input  wire        [ 7:0] pass_data,
-    output logic              answer_valid,  // level
-    input  wire               answer_ready,  // with answer_valid: taken in this clk
-    output logic       [ 7:0] answer
+    output logic       [ 7:0] flags,         // sticky events
+    // set
+    output logic              set_start,     // strobe: a set begins
+    output logic              set_valid,     // strobe: set_data is new
+    output logic       [ 7:0] set_data,      // byte of the set
+    // flash, through relay_store
+    output logic              pass_select,   // level: select the chip
+    input  wire               pass_ready,    // level: the chip waits for a byte
+    output logic              pass_valid,    // strobe: send set_data to the chip
+    input  wire               pass_done,     // strobe: pass_data is new
+    input  wire        [ 7:0] pass_data,     // byte of the chip
+    // answer
+    output logic              answer_valid,  // level: a byte of the answer waits
+    input  wire               answer_ready,  // with answer_valid: taken in this cycle
+    output logic       [ 7:0] answer         // byte of the answer
 );
     if (LONGEST < 17 || LONGEST > 124) begin : g_check
         LONGEST_MUST_BE_FROM_17_TO_124 u_error ();
@@ -54,7 +60,7 @@ module relay_requests #(
     localparam int P = $clog2(LONGEST + 6);
     localparam logic [7:0] CLEAR = 8'd1, BEGIN_SET = 8'd2, SET = 8'd3, FLASH = 8'd4;
     localparam logic [7:0] REPLY = 8'h61;
-    localparam int TOLD = 17;  // bytes of a status
+    localparam int STATUS = 17;  // bytes of a status
 
     typedef enum logic [2:0] {
         LISTEN,
@@ -70,27 +76,27 @@ module relay_requests #(
     logic [7:0] read, sequence_q, kind;
     // byte of the body, or of the answer; bytes taken in; of the request
     logic [P-1:0] at, taken, length;
-    logic [           1:0] tail;  // byte of the CRC-32
-    logic [8*(TOLD-2)-1:0] told;
-    // a frame runs since its command byte; there was a request; this one repeats it
+    logic [             1:0] tail;  // byte of the CRC-32
+    logic [8*(STATUS-2)-1:0] status;
+    // a frame has begun; there was a request; this one repeats it
     logic open, heard, again;
-    logic closing;  // the CRC-32 goes out
-    logic sum_start, sum_valid;  // of the CRC-32, one clk behind the answer
+    logic closing;  // the CRC-32 is being sent
+    logic sum_start, sum_valid;  // of the CRC-32, one cycle behind the answer
     logic [  7:0] answer_q;
 
     wire          keep = valid && !command && open;
     wire          flash = kind == FLASH;
-    wire  [P-1:0] words = flash ? length : P'(TOLD);  // bytes of the answer's body
+    wire  [P-1:0] words = flash ? length : P'(STATUS);  // bytes of the answer's body
     wire          first = at == '0;
     wire          second = at == P'(1);
-    wire          early = at < P'(4);  // of the answer: before flags
+    wire          early = at < P'(4);  // in the answer, before flags
     wire          last = at + 1'b1 == length;
     wire          known = second ? read <= FLASH : kind <= FLASH;
     wire          sent = answer_valid && answer_ready;
     wire          passes = flash && !first && !second;
     wire  [ 31:0] crc;
     wire  [  7:0] crc_byte = crc[8*tail+:8];
-    wire  [  7:0] body = flash || early ? read : told[7:0];
+    wire  [  7:0] body = flash || early ? read : status[7:0];
 
     assign answer_valid = state == SPEAK;
     assign answer       = first ? REPLY : second ? 8'(words) : closing ? crc_byte : body;
@@ -166,10 +172,11 @@ module relay_requests #(
             end
             SPEAK:
                 if (sent) begin
-                    if (first)              told <= {correction, position, identity, orders, source, levels, flags};
-                    else if (!early)        told <= told >> 8;
-                    if (!closing)           at   <= at + 1'b1;
-                    else                    tail <= tail + 1'b1;
+                    if (first)
+                        status <= {correction, position, identity, orders, source, levels, flags};
+                    else if (!early) status <= status >> 8;
+                    if (!closing) at <= at + 1'b1;
+                    else tail <= tail + 1'b1;
                     if (at == words + P'(1)) closing <= 1'b1;
                     state <= closing && tail == 2'd3 ? LISTEN : FETCH;
                 end
@@ -189,10 +196,11 @@ module relay_requests #(
 
 `ifdef FORMAL
     logic past = 1'b0;
-    logic asked;  // a good frame came, its answer is not out yet
+    logic asked;  // a good frame came, its answer is not sent yet
+    wire  ends = state == SPEAK && sent && closing && tail == 2'd3;
     always @(posedge clk) begin
         past  <= 1'b1;
-        asked <= !rst && (state == LISTEN ? good && open : state != SPEAK || !sent || !closing || tail != 2'd3);
+        asked <= !rst && (state == LISTEN ? good && open : !ends);
         if (!past) assume (rst);
         assume (!good || (valid && !command && taken != '0));  // so does frame_check
         if (keep && taken == '0) assume (data != 8'd0 && data <= 8'(LONGEST));

@@ -1,52 +1,54 @@
 // SPDX-License-Identifier: Apache-2.0
-// relay_set -- take the settings and coefficients of a relay as a row of bytes, and put them in
-// force only as a whole.
+// relay_set -- receives the settings and coefficients of a relay as bytes, and puts them into use
+// only as a whole.
 //
-// latency  2 clk from the last byte to good or bad, swap and settings
-// rate     one byte per
-//          clk
-// set      32-bit words, low byte first: marker 4D4F49 and K in its low byte; counts_per_turn;
-//          angle_per_count, low word; its high half and minimum_edge_separation above;
-//          radians_per_count; hysteresis, filter_required from bit 16, {index_low, gate_mask, gate}
-//          from bit 24; amplitude and phase of each order from 1 up; CRC-32 of all before
-// segments with SEGMENTS the map is a table: the low byte of the marker is 128 + SEGMENTS, and K =
-//          (SEGMENTS + 1) / 2 terms hold two
-//          of its points each
-// safety   what a broken row leaves behind is never in force: settings change in one clk, together
-//          with swap. A whole row is refused too if its counts_per_turn are not 1609 to 2^25, or if
-//          its amplitudes, without sign, are 2^29 or more together, or a point 2^23 or more
+// latency  2 cycles from the last byte to good or bad, swap and settings
+// rate     one byte per cycle
+// behaviour  The set is 32-bit words, low byte first: marker 4D4F49 and K in its low byte;
+//          counts_per_turn; angle_per_count, low word; its high half and minimum_edge_separation
+//          above; radians_per_count; hysteresis, filter_required from bit 16, {index_low,
+//          gate_mask, gate} from bit 24; amplitude and phase of each order from 1 up; CRC-32 of all
+//          before. With SEGMENTS the map is a table: the low byte of the marker is 128 + SEGMENTS,
+//          and K = (SEGMENTS + 1) / 2 terms hold two of its points each.
+// limits   An incomplete set is never in use: settings change in one cycle, together with swap. A
+//          complete set is refused too if its counts_per_turn are not 1609 to 2^25, or if its
+//          amplitudes, without sign, add up to 2^29 or more, or a point is 2^23 or more.
 // model    tb/relay/relay_set.py, equal in every bit of every cycle
 // proved   swap comes with good only, and settings change with it only
 // proof    K = 1
 `default_nettype none
 
 module relay_set #(
-    parameter int K        = 16,  // orders
-    parameter int SEGMENTS = 0    // of a table instead of them
+    parameter int K        = 16,  // orders, or terms of the table
+    parameter int SEGMENTS = 0    // segments of a table instead of the orders; 0: orders
 ) (
     input wire clk,
-    input wire rst,  // no set is in force: settings are zero
-    input wire start,  // strobe: the row begins anew, after what comes in this clk
-    input wire valid,  // strobe
-    input wire [7:0] data,
-    output logic write,  // strobe: to the set not in force of harmonic_map
-    output logic [4:0] term,
-    output logic signed [31:0] amplitude,
-    output logic [31:0] phase,
-    output logic swap,  // strobe
-    output logic good,  // strobe: the row was whole and is in force now
-    output logic bad,  // strobe: it was not
-    output logic loaded,  // level: there is a set in force
-    output logic [31:0] identity,  // CRC-32 of the set in force
-    output logic [31:0] counts_per_turn,
+    input wire rst,  // no set is in use: settings are zero
+    // bytes
+    input wire start,  // strobe: a set begins, after the byte of this cycle
+    input wire valid,  // strobe: data is new
+    input wire [7:0] data,  // byte of the set
+    // terms of the map
+    output logic write,  // strobe: store a term in the set that is not in use
+    output logic [4:0] term,  // number of the term
+    output logic signed [31:0] amplitude,  // 2^-16 count, or the even point of a table
+    output logic [31:0] phase,  // 2^-32 turn, or the odd point of a table
+    output logic swap,  // strobe: use the set that was written
+    // result
+    output logic good,  // strobe: the set was complete and is in use now
+    output logic bad,  // strobe: the set was refused
+    output logic loaded,  // level: a set is in use
+    output logic [31:0] identity,  // CRC-32 of the set in use
+    // settings
+    output logic [31:0] counts_per_turn,  // counts
     output logic [47:0] angle_per_count,  // 2^-48 turn
-    output logic [15:0] minimum_edge_separation,  // clk
+    output logic [15:0] minimum_edge_separation,  // cycles
     output logic [31:0] radians_per_count,  // 2^-40
     output logic [15:0] hysteresis,  // 2^-16 count
     output logic [7:0] filter_required,  // samples
-    output logic index_low,  // the index is 0
-    output logic [1:0] index_gate_mask,
-    output logic [1:0] index_gate
+    output logic index_low,  // level: the index is active low
+    output logic [1:0] index_gate_mask,  // {b, a}, 1: it must equal index_gate
+    output logic [1:0] index_gate  // {b, a}, levels at the index
 );
     if (K < 1 || K > 32) begin : g_check
         K_MUST_BE_FROM_1_TO_32 u_error ();
@@ -64,9 +66,9 @@ module relay_set #(
     logic [ 6:0] at;  // word
     logic [ 1:0] part;  // byte of it
     logic [31:0] word;
-    // a row runs; what it says is sensible; it has just ended
+    // a set has begun; its values are allowed; it has just ended
     logic open, fits, ended;
-    logic [28:0] reach;  // of the amplitudes together
+    logic [28:0] reach;  // sum of the amplitudes
     logic [32*SETTINGS-1:0] shadow, settings;
     wire [31:0] crc;
 
@@ -90,8 +92,8 @@ module relay_set #(
         .crc
     );
 
-    assign {index_low, index_gate_mask, index_gate, filter_required, hysteresis, radians_per_count, minimum_edge_separation, angle_per_count, counts_per_turn}
-        = settings[156:0];
+    assign {index_low, index_gate_mask, index_gate, filter_required, hysteresis, radians_per_count,
+        minimum_edge_separation, angle_per_count, counts_per_turn} = settings[156:0];
 
     wire unused = &{1'b0, settings[159:157]};
 

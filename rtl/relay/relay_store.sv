@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// relay_store -- read the set of a relay from SPI flash at power-up: the first copy, and if that is
-// broken the second.
+// relay_store -- reads the set of a relay from an SPI flash at power-up: the first copy, or the
+// second one if the first is damaged.
 //
-// latency  2048 + 66 (LENGTH + 5) clk from reset to the last byte of the first copy; 2048 + 66
-//          (LENGTH + 4) clk from `bad` to that of the second
-// rate     one bit per 8 clk, one byte per 66 clk
-// fits     any serial flash with command 03 (read, 24-bit address) and AB (wake), SPI mode 0: the
-//          chip that an iCE40 boots from
-// copies   who saves writes the second copy first, looks whether it stands, then the first:
-//          whenever power fails, one of the two is whole, and what is read is all old or all new
-// through  afterwards bytes go to the flash and back for whoever holds pass_select: that is how it
-//          is written
+// latency  2048 + 66 (LENGTH + 5) cycles from reset to the last byte of the first copy; 2048 + 66
+//          (LENGTH + 4) cycles from `bad` to the last byte of the second copy
+// rate     one bit per 8 cycles, one byte per 66 cycles
+// behaviour  Afterwards bytes pass to the flash and back while pass_select is high, so the host
+//          can write it. The host writes the second copy first, reads it back, then writes the
+//          first one: whenever the power fails, one of the two is complete, and the set that is
+//          read is either the old one or the new one.
+// limits   The flash must have command 03 (read, 24-bit address) and AB (wake) in SPI mode 0, like
+//          the chip that an iCE40 boots from.
 // model    tb/relay/flash.py is the chip; the bytes are those that it holds
 // proved   chip_n rises and falls only while sclk is low; sclk rises only while the chip is
 //          selected
@@ -18,26 +18,30 @@
 
 module relay_store #(
     parameter int LENGTH = 156,      // bytes of a set
-    parameter int FIRST  = 1048576,  // address of the first copy
-    parameter int SECOND = 1052672   // address of the second: another sector
+    parameter int FIRST  = 1048576,  // byte address of the first copy
+    parameter int SECOND = 1052672   // byte address of the second copy, in another sector
 ) (
     input  wire        clk,
     input  wire        rst,          // reads again
-    input  wire        good,         // strobe: the set was whole
-    input  wire        bad,          // strobe: it was not
-    input  wire        pass_select,  // level: the chip is wanted
+    // result of a copy
+    input  wire        good,         // strobe: the set was complete
+    input  wire        bad,          // strobe: the set was refused
+    // host's access
+    input  wire        pass_select,  // level: select the chip
     output logic       pass_ready,   // level: the chip is selected and waits for a byte
     input  wire        pass_valid,   // strobe: send pass_data; only while ready
-    input  wire  [7:0] pass_data,
+    input  wire  [7:0] pass_data,    // byte to send
+    // bytes
     output logic       start,        // strobe: a copy begins
-    output logic       valid,        // strobe
-    output logic [7:0] data,         // of the copy, or the answer to pass_data
+    output logic       valid,        // strobe: data is new
+    output logic [7:0] data,         // byte of the copy, or the answer to pass_data
     output logic       pass_done,    // strobe: data is the answer
-    output logic       busy,         // level: reading a copy
-    output logic [1:0] source,       // 0 no copy was whole, 1 the first, 2 the second
-    output logic       chip_n,       // pins
-    output logic       sclk,
-    output logic       sdo,
+    output logic       busy,         // level: a copy is being read
+    output logic [1:0] source,       // 0 no copy was complete, 1 the first, 2 the second
+    // pins
+    output logic       chip_n,       // pin, low during an access
+    output logic       sclk,         // pin
+    output logic       sdo,          // pin, data to the flash
     input  wire        sdi           // level, synchronous to clk
 );
     typedef enum logic [2:0] {
@@ -55,16 +59,18 @@ module relay_store #(
     state_t state;
     logic second;  // the copy
     logic shifting;
-    logic [5:0] bit_clk;  // 1/8 bit
+    logic [5:0] bit_clk;  // 1/8 of a bit
     logic [7:0] shifted;
-    logic [10:0] left;  // bytes, or clk of the pause
+    logic [10:0] left;  // bytes, or cycles of the pause
     logic byte_done;
 
     wire [31:0] call = {READ_FROM, second ? 24'(SECOND) : 24'(FIRST)};
-    wire [1:0] place = left[1:0];
-    wire [7:0]  called = place == 2'd3 ? call[31:24] : place == 2'd2 ? call[23:16] : place == 2'd1 ? call[15:8] : call[7:0];
+    wire [7:0] called = call[8*left[1:0]+:8];
     wire idle = !shifting && !byte_done;
-    wire        send   = idle && (state == WAKE || state == ADDRESS || state == READ || (pass_ready && pass_valid));
+    wire reads = state == WAKE || state == ADDRESS || state == READ;
+    wire send = idle && (reads || (pass_ready && pass_valid));
+    wire [7:0] to_send =
+        state == WAKE ? WAKE_UP : state == ADDRESS ? called : state == READ ? 8'd0 : pass_data;
 
     assign busy       = state != DONE;
     assign pass_ready = state == DONE && idle && pass_select && !chip_n;
@@ -80,7 +86,7 @@ module relay_store #(
         if (send) begin
             shifting <= 1'b1;
             bit_clk  <= '0;
-            shifted  <= state == WAKE ? WAKE_UP : state == ADDRESS ? called : state == READ ? 8'd0 : pass_data;
+            shifted  <= to_send;
         end else if (shifting) begin
             bit_clk <= bit_clk + 1'b1;
             if (bit_clk[2:0] == '1) shifted <= {shifted[6:0], sdi};

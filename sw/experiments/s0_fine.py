@@ -31,9 +31,10 @@ from moire.analysis import report
 from moire.client.bus import Bus
 from moire.errors import MoireError
 from twin import START_S, BuildError, Twin, TwinTransport
+from twin.nodes.twin import drives
 
 REQUIRED_NM = 10.0  # of the paper
-NODE = {"DRIVES": 0b1101, "FILTERS": 0}  # bridge, converter and fine stage
+NODE = {**drives("HAS_BRIDGE", "HAS_DAC", "HAS_FINE_STAGE"), "FILTERS": 0}
 FINE = {
     "fine_ki": 20000
     / 2**24,  # 9 Hz: with twice as much the flexure's mode of 500 Hz, 25 times its own, would ring

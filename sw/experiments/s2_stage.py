@@ -29,10 +29,10 @@ from moire.analysis import report
 from moire.client.bus import Bus
 from moire.errors import MoireError
 from twin import START_S, BuildError, Twin, TwinTransport
-from twin.nodes.twin import Axis, Node
+from twin.nodes.twin import Axis, Node, drives
 
 CLK_HZ = 3_000_000
-NODE = {"DRIVES": 2, "FILTERS": 0, "SINE": 0}
+NODE = {**drives("HAS_STEPPER"), "FILTERS": 0, "HAS_SINE": 0}
 POLL_S = 0.02
 SLOW_MM_S = 0.5  # the paper's top speed, 30 mm/min
 WORD = 1 << 16  # counts of the paper's counter

@@ -26,11 +26,11 @@ from moire.analysis import report
 from moire.client.bus import Bus
 from moire.errors import MoireError
 from twin import START_S, BuildError, Twin, TwinTransport
-from twin.nodes.twin import Axis, Node
+from twin.nodes.twin import Axis, Node, drives
 from twin.parameters import tables as parameters
 
 CLK_HZ = 1_600_000  # enough for a count in 20 clk at the top speed
-NODE = {"DRIVES": 4, "FILTERS": 0, "SINE": 0}
+NODE = {**drives("HAS_DAC"), "FILTERS": 0, "HAS_SINE": 0}
 POLL_S = 0.01  # between two looks at a search
 SEARCHES = 10  # of the paper's table 1
 RANGE_M = 1e-3  # the mover rests this near to the mark

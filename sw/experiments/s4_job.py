@@ -34,12 +34,13 @@ from moire.client.nonvolatile import SavedSettings
 from moire.client.settings import Settings
 from moire.errors import MoireError
 from twin import START_S, Axis, BuildError, Devices, Node, Twin, TwinTransport, build
+from twin.nodes.twin import drives
 
 MAIN, SUB = 0, 1  # places of the nodes
 ADDRESSES = (1, 2)
 CLK_HZ = 1_840_000
 PEER_BAUD = 115200
-NODE = {"DRIVES": 2, "FILTERS": 0, "SINE": 0}
+NODE = {**drives("HAS_STEPPER"), "FILTERS": 0, "HAS_SINE": 0}
 AXIS = {
     "drive": "steps",
     "position_source": "own_steps",

@@ -32,19 +32,22 @@ constexpr int SENSED = 24;  // cycles from a and b to position, at most; 3 at le
 constexpr int HISTORY = 1 << 15;
 constexpr int64_t NEVER = INT64_MAX / 2;
 
-enum Cause {
-    LIMIT_LOW,
-    LIMIT_HIGH,
-    ESTOP,
-    FOLLOWING,
-    ENCODER,
-    WATCHDOG,
-    DRIVE,
-    CPU,
-    UNDERRUN,
-    OVERRUN,
+enum Cause {  // the bits of axis.faults
+    LIMIT_LOW = AXIS_FAULTS_LIMIT_LOW_SHIFT,
+    LIMIT_HIGH = AXIS_FAULTS_LIMIT_HIGH_SHIFT,
+    ESTOP = AXIS_FAULTS_ESTOP_SHIFT,
+    FOLLOWING = AXIS_FAULTS_FOLLOWING_ERROR_SHIFT,
+    ENCODER = AXIS_FAULTS_ENCODER_SHIFT,
+    WATCHDOG = AXIS_FAULTS_BUS_WATCHDOG_SHIFT,
+    DRIVE = AXIS_FAULTS_DRIVE_SHIFT,
+    CPU = AXIS_FAULTS_CPU_SHIFT,
+    UNDERRUN = AXIS_FAULTS_PROFILE_UNDERRUN_SHIFT,
+    OVERRUN = AXIS_FAULTS_STEP_OVERRUN_SHIFT,
     CAUSES
 };
+static_assert(LIMIT_LOW == 0 && LIMIT_HIGH == 1 && ESTOP == 2 && FOLLOWING == 3 && ENCODER == 4 &&
+                  WATCHDOG == 5 && DRIVE == 6 && CPU == 7 && UNDERRUN == 8 && OVERRUN == 9,
+              "NAMES has the order of axis.faults");
 const char* const NAMES[CAUSES] = {"limit_low",        "limit_high",   "estop", "following_error",
                                    "encoder",          "bus_watchdog", "drive", "cpu",
                                    "profile_underrun", "step_overrun"};

@@ -33,7 +33,7 @@ CELLS = 11  # of a character on the bus
 TURNAROUND = [1] * 3  # cells before the master sends again, while the node's driver releases
 ANSWER_CELLS = 150  # of silence after which no answer comes any more
 READINGS = 8  # of a zero
-S0_NODE = {"CLK_HZ": 60_000_000, "DRIVES": 0b1101, "FIRMWARE": "build/firmware/firmware.hex"}
+S0_NODE = {"CLK_HZ": 60_000_000, "HAS_STEPPER": 0, "FIRMWARE": "build/firmware/firmware.hex"}
 WORK_CELLS = 400  # that a request may take, at the low clock of the bench
 
 

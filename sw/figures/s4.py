@@ -19,7 +19,7 @@ from twin import START_S, Axis, Node, Twin, TwinTransport, build
 PROCESSES = 2
 JOBS = 20
 STATIONS = 36
-SENSOR = 8  # of PERIPHERALS: the angle sensor only
+SUB_NODE = {**s4_job.NODE, "HAS_ANGLE_SENSOR": 1}  # no other peripheral
 TROUBLED_STATIONS, TROUBLED_PART = 8, 0.06  # of a turn
 TROUBLED_STATION_S = 3  # that one takes, about; the power cut comes within the job
 
@@ -37,7 +37,7 @@ def indexed(seed, stations=STATIONS):
         seed=seed,
         clk_hz=s4_job.CLK_HZ,
         firmware=build.firmware("station"),
-        node_parameters={**s4_job.NODE, "PERIPHERALS": SENSOR},
+        node_parameters=SUB_NODE,
     ) as twin:
         node = Bus(
             TwinTransport(twin), random_source=random.Random(seed), poll_s=s4_job.POLL_S
@@ -98,7 +98,7 @@ def jobs(job, count, seed=1):
 
 def s4_index_arcsec_max(count=JOBS, stations=STATIONS, seed=1):
     """The host sends the stations to the table's node, as the main node does in a job."""
-    build.twin_library(s4_job.CLK_HZ, 1, {**s4_job.NODE, "PERIPHERALS": SENSOR})
+    build.twin_library(s4_job.CLK_HZ, 1, SUB_NODE)
     with bar("tables") as progress, ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
         worst = []
         errors = pool.map(indexed, seeds(seed, count), [stations] * count)

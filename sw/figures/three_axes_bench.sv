@@ -33,9 +33,11 @@ module three_axes_bench (
         wire drive_enable, compare_pulse;
 
         axis #(
-            .DRIVES (2),
-            .FILTERS(0),
-            .SINE   (0)
+            .HAS_BRIDGE    (0),
+            .HAS_DAC       (0),
+            .HAS_FINE_STAGE(0),
+            .FILTERS       (0),
+            .HAS_SINE      (0)
         ) u_axis (
             .clk,
             .rst,

@@ -10,19 +10,13 @@ import pytest
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge, Timer
 
+from moire.made.registers import BLOCKS
 from tb.bench import run
 from tb.cpu.register_bus import RegisterBus
 
-ALONE = {
-    "node": 0x000,
-    "bus": 0x100,
-    "peripherals": 0x200,
-}  # address of each block of which there is one
-OF_AXES = {
-    "axis": 0x400,
-    "feedback": 0xC00,
-    "actuator": 0x1400,
-}  # address of the first of the blocks that each axis has
+# addresses of the blocks of which there is one, and of the first one of those that each axis has
+ALONE = {name: base for name, (base, stride) in BLOCKS.items() if not stride}
+OF_AXES = {name: base for name, (base, stride) in BLOCKS.items() if stride}
 
 
 async def access(dut, model, select, address):

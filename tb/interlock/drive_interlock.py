@@ -3,18 +3,13 @@
 the outputs after it.
 """
 
-(
-    LIMIT_LOW,
-    LIMIT_HIGH,
-    ESTOP,
-    FOLLOWING_ERROR,
-    ENCODER,
-    BUS_WATCHDOG,
-    DRIVE,
-    CPU,
-    PROFILE_UNDERRUN,
-    STEP_OVERRUN,
-) = (1 << n for n in range(10))
+from moire.made.registers import FIELDS
+
+FAULTS = {f.field: 1 << f.low for f in FIELDS if (f.block, f.register) == ("axis", "faults")}
+LIMIT_LOW, LIMIT_HIGH, ESTOP = (FAULTS[name] for name in ("limit_low", "limit_high", "estop"))
+FOLLOWING_ERROR, ENCODER = FAULTS["following_error"], FAULTS["encoder"]
+BUS_WATCHDOG, DRIVE, CPU = (FAULTS[name] for name in ("bus_watchdog", "drive", "cpu"))
+PROFILE_UNDERRUN, STEP_OVERRUN = FAULTS["profile_underrun"], FAULTS["step_overrun"]
 LATCH_ALWAYS = ESTOP | DRIVE | CPU
 
 INPUTS = dict.fromkeys(

@@ -17,6 +17,7 @@ SETTINGS = dict(
     amplitude_low=0,
     amplitude_high=65535,
     disagreement_limit=0,
+    encoder_fault_mask=0,
 )
 INPUTS = dict(
     tick=0,
@@ -47,7 +48,7 @@ async def converted(dut):
         if int(dut.g_sine.converted.value):
             return
         await FallingEdge(dut.clk)
-    raise AssertionError("no word came from the converter")
+    raise AssertionError("no word came from the ADC")
 
 
 @cocotb.test()

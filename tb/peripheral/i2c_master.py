@@ -39,7 +39,7 @@ class I2cMaster:
         self.go("idle")
 
     def pins(self):
-        """(command_ready, done, result, read_data, owned, scl_low, sda_low); result with done only."""
+        """(command_ready, done, result, read_data, owned, scl_low, sda_low); result is for done."""
         result = self.result if self.done else None
         return (
             int(self.state == "idle"),

@@ -153,6 +153,16 @@ async def one_byte_by_hand(dut):
 
 
 @cocotb.test()
+async def latency_is_1_bit_for_start_and_stop_and_9_bits_for_a_byte(dut):
+    bus = await Bus(dut).begin()
+    for command, bits in ((START, 1), (WRITE, 9), (STOP, 1)):
+        before = len(bus.samples)
+        await bus.do(command, 0xA5)
+        took = (len(bus.samples) - before) * bus.bus_hz / CLK_HZ
+        assert bits - 1 < took < bits + 1, (command, took)
+
+
+@cocotb.test()
 async def the_times_of_the_bus_are_kept(dut):
     """UM10204, table 10, in us: low, high, set-up and hold of a start, set-up of a stop, free
     before a start, set-up of data.

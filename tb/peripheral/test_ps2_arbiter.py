@@ -114,6 +114,13 @@ class Side:
 
 
 @cocotb.test()
+async def latency_is_0_and_a_byte_is_taken_in_the_cycle_in_which_it_is_offered(dut):
+    side = await Side(dut).begin()
+    await side.typed(0x1C, 0xF0, 0x1C)
+    await side.order(0xED)
+
+
+@cocotb.test()
 async def the_shortcut_of_s4_goes_out_byte_by_byte(dut):
     side = await Side(dut).begin()
     assert await side.wait_for_injection(30) in (20, 21)

@@ -37,7 +37,7 @@ class Side:
         return self
 
     async def clk(self, pull_clock=0, pull_data=0, send=None, damaged=0, ready=1, rst=0, n=1):
-        """n clk; edges holds (clk, data) of each falling edge of the wire that is not the host's."""
+        """n cycles; edges gets (cycle, data) of each falling edge that the host does not make."""
         d, pins = self.dut, None
         d.send_valid.value, d.send.value, d.send_damaged.value = (
             send is not None,
@@ -90,7 +90,7 @@ class Side:
 
 
 @cocotb.test()
-async def one_byte_by_hand_at_80_us_a_bit(dut):
+async def latency_is_20_us_with_released_lines_and_a_byte_takes_80_us_a_bit(dut):
     side = await Side(dut).begin()
     await side.clk(n=round(200 * US))
     begun = side.now

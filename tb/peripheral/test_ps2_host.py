@@ -140,14 +140,14 @@ async def every_byte_passes_and_wrong_parity_is_told(dut):
 
 
 @cocotb.test()
-async def a_byte_stands_2_clk_after_the_eleventh_edge_and_holds_the_keyboard_until_it_is_taken(dut):
+async def latency_is_2_and_a_byte_holds_the_keyboard_until_it_is_taken(dut):
     side = await Side(dut).begin()
     for bit in frame(0x5A)[:10]:
         await side.clk(data=bit, n=BIT // 2)
         await side.clk(data=bit, clock=0, n=BIT // 2)
     await side.clk(n=BIT // 2, ready=0)
     assert (await side.clk(clock=0, ready=0))[1] == 0
-    assert (await side.clk(clock=0, ready=0))[1] == 1  # the edge was seen in the clk before
+    assert (await side.clk(clock=0, ready=0))[1] == 1  # the edge was seen one cycle before
     for _ in range(3):
         assert (await side.clk(n=200, ready=0))[8] == 1
     assert side.bytes == []

@@ -81,7 +81,7 @@ async def begin(dut):
 
 
 @cocotb.test()
-async def latency_from_push_to_valid_is_2(dut):
+async def latency_is_2_from_push_to_valid(dut):
     queue = await begin(dut)
     await queue.clk((5, 1))
     assert [(await queue.clk())[0] for _ in range(3)] == [0, 1, 1]

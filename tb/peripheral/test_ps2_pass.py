@@ -123,7 +123,7 @@ def without(heard, sequence):
 
 
 @cocotb.test()
-async def what_is_typed_arrives_untouched_within_200_us(dut):
+async def latency_is_at_most_200_us_and_what_is_typed_arrives_unchanged(dut):
     wires = await Wires(dut).begin()
     keys = [
         0x1C,

@@ -23,11 +23,11 @@ class RegisterBlock:
 
     def reset(self):
         self.value = {
-            r.port(f): 0 if f.needs in self.without else f.reset & ((1 << f.width) - 1)
+            f.port: 0 if f.needs in self.without else f.reset & ((1 << f.width) - 1)
             for r, f in self.block.fields
             if f.kind in ("setting", "counter", "sticky")
         }
-        self.pulse = {r.port(f): 0 for r, f in self.block.fields if f.kind == "pulse"} | {
+        self.pulse = {f.port: 0 for r, f in self.block.fields if f.kind == "pulse"} | {
             f"{r.name}_written": 0 for r in self.block.registers if r.on_write
         }
         self.upper = {
@@ -42,7 +42,7 @@ class RegisterBlock:
         """The register as software sees it, all its words in one number."""
         whole, size = 0, 64 if register.wide else 32
         for f in register.fields:
-            port = register.port(f)
+            port = f.port
             source = {"constant": {port: self.constant}, "input": inputs}.get(f.kind, self.value)
             if "r" in f.access:
                 whole |= (
@@ -64,9 +64,7 @@ class RegisterBlock:
         else:
             self.get(word, inputs) if select and not write else setattr(self, "rdata", 0)
             self.put(word if select and write else None, wdata, inputs)
-        outputs = {
-            r.port(f): self.value[r.port(f)] for r, f in self.block.fields if f.kind == "setting"
-        }
+        outputs = {f.port: self.value[f.port] for r, f in self.block.fields if f.kind == "setting"}
         return {"rdata": self.rdata, **outputs, **self.pulse, **read}
 
     def get(self, word, inputs):
@@ -85,7 +83,7 @@ class RegisterBlock:
             if r.on_write:
                 self.pulse[f"{r.name}_written"] = int(commit)
             for f in r.fields:
-                port, bits = r.port(f), wdata >> f.low & ((1 << f.width) - 1)
+                port, bits = f.port, wdata >> f.low & ((1 << f.width) - 1)
                 if f.kind == "pulse":
                     self.pulse[port] = int(hit and bits)
                 elif f.kind == "counter":

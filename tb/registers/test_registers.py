@@ -11,6 +11,7 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
+from moire.made import bus_tables
 from moire.made import registers as host
 from tables import registers as tables
 from tb.bench import ROOT, run, start
@@ -31,13 +32,20 @@ class Bus:
         self.model = RegisterBlock(self.block, tables.crc(), without)
         self.there = {f: f.needs not in without for _, f in self.block.fields}
         self.inputs = {
-            r.port(f): 0 for r, f in self.block.fields if f.kind in ("input", "counter", "sticky")
+            f.port: 0 for r, f in self.block.fields if f.kind in ("input", "counter", "sticky")
         }
-        self.width = {r.port(f): f.width if f.kind == "input" else 1 for r, f in self.block.fields}
+        self.width = {f.port: f.width if f.kind == "input" else 1 for r, f in self.block.fields}
 
     async def begin(self):
-        await start(self.dut, select=0, write=0, word=0, wdata=0, **self.inputs)
+        await start(self.dut, select=0, write=0, word=0, wdata=0, **self.pins(self.inputs))
         return self
+
+    def pins(self, inputs):
+        """The levels of the ports; the bits of a vector are one port."""
+        pins = dict(inputs)
+        for r in (r for r in self.block.registers if r.vector):
+            pins[r.name] = sum(pins.pop(f.port) << f.low for f in r.fields)
+        return pins
 
     def of(self, *kinds):
         return [(r, f) for r, f in self.block.fields if f.kind in kinds and self.there[f]]
@@ -46,7 +54,7 @@ class Bus:
         """Inputs named here stand for this clk only."""
         now = self.inputs | inputs
         for name, level in [
-            *now.items(),
+            *self.pins(now).items(),
             ("select", select),
             ("write", write),
             ("word", word),
@@ -63,9 +71,8 @@ class Bus:
         wrong = [
             f"{n} is {got[n]:#x}, the model has {want[n]:#x}" for n in want if got[n] != want[n]
         ]
-        assert not wrong, (
-            f"word {word:#x} {'write' if write else 'read' if select else 'idle'}: {'; '.join(wrong)}"
-        )
+        access = "write" if write else "read" if select else "idle"
+        assert not wrong, f"word {word:#x} {access}: {'; '.join(wrong)}"
         return got
 
     async def read(self, word, **inputs):
@@ -83,7 +90,7 @@ async def latency_is_1(dut):
     """clk() looks at the outputs right after the edge that took the access."""
     bus = await Bus(dut).begin()
     r, f = next((r, f) for r, f in bus.of("setting") if not r.wide and "r" in f.access)
-    assert (await bus.write(r.word, 1 << f.low))[r.port(f)] == 1
+    assert (await bus.write(r.word, 1 << f.low))[f.port] == 1
     assert await bus.read(r.word) >> f.low & 1 == 1
     assert (await bus.clk())["rdata"] == 0
 
@@ -120,7 +127,7 @@ async def every_bit_of_every_register_is_its_own(dut):
 async def every_input_reads_back_at_both_ends_of_its_range(dut):
     bus = await Bus(dut).begin()
     for r, f in bus.of("input"):
-        port = r.port(f)
+        port = f.port
         for value in (1, (1 << f.width) - 1, 1 << f.width - 1, (1 << f.width - 1) - 1):
             bus.inputs[port] = value
             low, high = await bus.read(r.word), (await bus.read(r.word + 1) if r.wide else 0)
@@ -137,8 +144,8 @@ async def a_word_without_a_register_reads_zero(dut):
     bus.inputs = {
         name: (1 << bus.width[name]) - 1
         for name in bus.inputs
-        if name not in [r.port(f) for r, f in bus.of("counter")]
-    } | {r.port(f): 0 for r, f in bus.of("counter")}
+        if name not in [f.port for r, f in bus.of("counter")]
+    } | {f.port: 0 for r, f in bus.of("counter")}
     known = {
         word
         for r in bus.block.registers
@@ -155,7 +162,7 @@ async def a_wide_value_is_read_and_written_whole(dut):
     bus = await Bus(dut).begin()
     for r in (r for r in bus.block.registers if r.wide):
         f = r.fields[0]
-        ones, port = (1 << f.width) - 1, r.port(f)
+        ones, port = (1 << f.width) - 1, f.port
         if f.kind == "input":
             bus.inputs[port] = 0xFFFF_FFFF
             assert await bus.read(r.word) == WORD
@@ -170,14 +177,14 @@ async def a_wide_value_is_read_and_written_whole(dut):
 async def strobes_last_one_clk(dut):
     bus = await Bus(dut).begin()
     for r, f in bus.of("pulse"):
-        assert (await bus.write(r.word, 1 << f.low))[r.port(f)] == 1
-        assert (await bus.clk())[r.port(f)] == 0
-        assert (await bus.write(r.word, WORD ^ 1 << f.low))[r.port(f)] == 0
+        assert (await bus.write(r.word, 1 << f.low))[f.port] == 1
+        assert (await bus.clk())[f.port] == 0
+        assert (await bus.write(r.word, WORD ^ 1 << f.low))[f.port] == 0
     for r in (r for r in bus.block.registers if r.on_write):
         out = await bus.write(r.word + r.wide, 5 << min(f.low for f in r.fields))
         assert (
             out[f"{r.name}_written"] == 1
-            and out[r.port(r.fields[0])] == (5 << 32 * r.wide) * bus.there[r.fields[0]]
+            and out[r.fields[0].port] == (5 << 32 * r.wide) * bus.there[r.fields[0]]
         )
         assert (await bus.clk())[f"{r.name}_written"] == 0
     for r in (r for r in bus.block.registers if r.on_read):
@@ -193,7 +200,7 @@ async def strobes_last_one_clk(dut):
 async def counters_count_clear_and_stop_at_the_end(dut):
     bus = await Bus(dut).begin()
     for r, f in bus.of("counter"):
-        port = r.port(f)
+        port = f.port
         for _ in range(3):
             await bus.clk(**{port: 1})
         assert await bus.read(r.word) == 3 << f.low
@@ -212,7 +219,7 @@ async def counters_count_clear_and_stop_at_the_end(dut):
 async def a_sticky_bit_stands_until_one_is_written_to_it(dut):
     bus = await Bus(dut).begin()
     for r, f in bus.of("sticky"):
-        port = r.port(f)
+        port = f.port
         await bus.clk(**{port: 1})
         await bus.write(r.word, WORD ^ 1 << f.low)
         assert await bus.read(r.word) == 1 << f.low
@@ -243,7 +250,7 @@ async def a_setting_whose_need_was_not_built_reads_zero_whatever_is_written(dut)
     bus = await Bus(dut).begin()
     for r, f in ((r, f) for r, f in bus.block.fields if not bus.there[f]):
         got = await bus.write(r.word, WORD)
-        assert got[r.port(f)] == 0 and await bus.read(r.word) >> f.low & (1 << f.width) - 1 == 0
+        assert got[f.port] == 0 and await bus.read(r.word) >> f.low & (1 << f.width) - 1 == 0
 
 
 @pytest.mark.parametrize("block", ["node", "bus", "peripherals", "axis", "feedback", "actuator"])
@@ -253,7 +260,7 @@ def test_registers(block):
 
 @pytest.mark.parametrize("block", ["axis", "feedback"])
 def test_registers_without_sine(block):
-    run(f"{block}_registers", __file__, SINE=0)
+    run(f"{block}_registers", __file__, HAS_SINE=0)
 
 
 def test_all_made_files_carry_the_crc_of_the_source():
@@ -269,6 +276,15 @@ def test_all_made_files_carry_the_crc_of_the_source():
             re.search(place, (ROOT / name).read_text(), re.IGNORECASE).group(1).upper()
             == f"{zlib.crc32(source):08X}"
         ), name
+
+
+@pytest.mark.parametrize(
+    "register, protocol",
+    [("faults", bus_tables.FAULTS), ("encoder_events", bus_tables.ENCODER_EVENTS)],
+)
+def test_the_bus_protocol_has_the_bits_of_the_register(register, protocol):
+    fields = [f for f in host.FIELDS if (f.block, f.register) == ("axis", register)]
+    assert {bit: name for bit, (name, _) in protocol.items()} == {f.low: f.field for f in fields}
 
 
 @pytest.mark.parametrize("axes", [1, 2, 4, 8])

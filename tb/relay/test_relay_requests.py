@@ -142,7 +142,7 @@ async def status_by_hand(dut):
 
 
 @cocotb.test()
-async def the_answer_comes_as_soon_as_the_header_says(dut):
+async def latency_is_2_for_each_byte_and_3_more_to_the_answer(dut):
     host = await Requests(dut).reset()
     for length in (2, 3, 10):
         await host.hear(frame(0x21, [length, STATUS, *[0] * (length - 2)]), answer_ready=0)

@@ -103,10 +103,11 @@ async def the_first_whole_copy_is_taken(dut):
 
 
 @cocotb.test()
-async def a_copy_takes_the_time_that_the_header_says(dut):
-    """A byte takes 66 clk: one to begin it, 8 bits of 8 clk, one to hand it on. Before a copy come
-    a pause of 2048 clk and the four
-    bytes of the command and its address; before the first one the byte that wakes the chip."""
+async def latency_is_2048_and_66_for_each_byte(dut):
+    """A byte takes 66 cycles: one to begin it, 8 bits of 8 cycles, one to pass it on. Before a
+    copy come a pause of 2048 cycles and the four bytes of the command and its address; before the
+    first copy, also the byte that wakes the chip.
+    """
     store = await Store(dut, some(0), some(1)).reset()
     whole = []  # clk from reset, or from the verdict, to the last byte of each copy
     for bytes_before in (5, 4):

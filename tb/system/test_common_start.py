@@ -43,7 +43,7 @@ def axes():
         [Node(address, [SCALE.machine()]) for address in ADDRESSES],
         clk_hz=CLK_HZ,
         seed=seed() % 1000,
-        node_parameters={"PERIPHERALS": ALL_PERIPHERALS, **NODE},
+        node_parameters=ALL_PERIPHERALS | NODE,
     ) as twin:
         bus = Bus(TwinTransport(twin), random_source=random.Random(seed()))
         twin.run(START_S)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""grating with its position from counts of A/B/Z, built with sine and cosine and without: exact at
-an edge every clk, at the index,
-through align, and of the axis' own steps."""
+"""feedback_channel with its position from counts of A/B/Z, built with sine and cosine and without:
+exact at an edge in every cycle, at the index, through align, and of the axis' own steps.
+"""
 
 import random
 
@@ -22,6 +22,7 @@ SETTINGS = dict(
     amplitude_low=0,
     amplitude_high=65535,
     disagreement_limit=0,
+    encoder_fault_mask=0,
 )
 INPUTS = dict(
     tick=0,
@@ -39,7 +40,7 @@ INPUTS = dict(
     z=0,
     probe=0,
     own_step=0,
-    own_direction=0,
+    own_downward=1,
     adc_sin=1,
     adc_cos=1,
 )
@@ -158,7 +159,7 @@ class Bench:
 
 
 @cocotb.test()
-async def position_is_exact_at_an_edge_every_clk(dut):
+async def latency_is_5_and_position_is_exact_at_an_edge_every_cycle(dut):
     bench, source = await Bench.begin(dut), random.Random(seed())
     steps = [1] * 40 + [-1] * 90 + [source.choice((-1, 0, 1)) for _ in range(4000)] + [1, -1] * 50
     way, place = [], 0
@@ -247,14 +248,12 @@ async def shift_moves_the_origin_by_whole_periods_also_together_with_an_edge(dut
 
 
 @cocotb.test()
-async def own_steps_come_back_as_counts_up_while_the_direction_is_high_whatever_the_edge_filter_is_set_to(
-    dut,
-):
+async def own_steps_are_counted_in_their_direction_whatever_the_edge_filter_is_set_to(dut):
     bench = await Bench.begin(dut, mode=3, steps=1)
     dut.deglitch.value = 1000
     place = 0
     for direction in (1, 0, 0, 1):
-        dut.own_direction.value = direction
+        dut.own_downward.value = 1 - direction
         await FallingEdge(dut.clk)  # set-up
         for _ in range(5):
             for level in (1, 0):
@@ -393,12 +392,12 @@ async def a_shift_moves_the_segment_table_with_the_scale(dut):
 @cocotb.test()
 async def the_register_tells_whether_sine_and_cosine_were_built(dut):
     bench = await Bench.begin(dut)
-    assert await bench.read("position_source") >> 2 == int(dut.SINE.value)
+    assert await bench.read("position_source") >> 2 == int(dut.HAS_SINE.value)
 
 
 @cocotb.test()
 async def without_sine_and_cosine_the_converter_rests_and_all_that_comes_of_it_is_zero(dut):
-    needs(not int(dut.SINE.value), "built with sine and cosine")
+    needs(not int(dut.HAS_SINE.value), "built with sine and cosine")
     bench, source = await Bench.begin(dut), random.Random(seed())
     settings = (
         "correction_offset",
@@ -440,7 +439,7 @@ async def without_sine_and_cosine_the_converter_rests_and_all_that_comes_of_it_i
             dut.sample_rejected,
             dut.phase,
             dut.amplitude,
-            dut.signal_fault,
+            dut.encoder_fault,
             dut.events,
         ):
             assert int(idle.value) == 0
@@ -460,4 +459,4 @@ async def without_sine_and_cosine_the_converter_rests_and_all_that_comes_of_it_i
 
 @pytest.mark.parametrize("sine, segments", [(0, 0), (0, 255), (1, 255)])
 def test_feedback_counts(sine, segments):
-    run("feedback_channel", __file__, SINE=sine, SEGMENTS=segments)
+    run("feedback_channel", __file__, HAS_SINE=sine, SEGMENTS=segments)

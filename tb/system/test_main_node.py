@@ -13,10 +13,10 @@ from moire.client.settings import Settings
 from tb.bench import seed
 from twin import Twin, TwinTransport, build
 from twin.devices.devices import Devices
-from twin.nodes.twin import Axis, Node
+from twin.nodes.twin import Axis, Node, drives
 
 MAIN, SUB = 0, 1  # places
-NODE = {"DRIVES": 2, "FILTERS": 0, "SINE": 0}
+NODE = {**drives("HAS_STEPPER"), "FILTERS": 0, "HAS_SINE": 0}
 AXIS = {
     "period": "1um",
     "drive": "steps",

@@ -20,12 +20,12 @@ from moire.made.bus_tables import CAUSES, FAULTS
 from tb.bench import seed
 from tb.firmware.test_firmware_peer import OPERATION, bodies, frame, poll, turn_to
 from twin import Devices, Twin, TwinTransport, build
-from twin.nodes.twin import Axis, Node
+from twin.nodes.twin import Axis, Node, drives
 
 RECIPE = Path(__file__).resolve().parents[2] / "docs" / "indexing.md"
 SUB, MAIN = 0, 1  # places
 ESTOP = next(bit for bit, (name, _) in FAULTS.items() if name == "estop")
-NODE = {"DRIVES": 2, "FILTERS": 0, "SINE": 0}
+NODE = {**drives("HAS_STEPPER"), "FILTERS": 0, "HAS_SINE": 0}
 AXIS = {
     "period": "1um",
     "drive": "steps",

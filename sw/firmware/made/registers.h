@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// The register map as the firmware sees it; made by tables/registers.py from tables/registers.rdl; change those.
+// The register map as the firmware sees it; made by tables/registers.py from tables/registers.rdl,
+// change those.
 //
-// NODE_x, BUS_x, AXIS_x are byte offsets inside a block. Fields: FIELD_GET(word, AXIS_STATE_QUEUE_FREE),
-// FIELD_GET_SIGNED, FIELD_PUT(AXIS_CONTROL_ENABLE, 1). A value alone in its register has the register's name.
+// NODE_x, BUS_x, AXIS_x are byte offsets inside a block. A field is read with
+// FIELD_GET(word, AXIS_STATE_QUEUE_FREE) or FIELD_GET_SIGNED, and written with
+// FIELD_PUT(AXIS_CONTROL_ENABLE, 1). A value alone in its register has the register's name.
 #ifndef MOIRE_REGISTERS_H
 #define MOIRE_REGISTERS_H
 
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0x45b847bau            // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xeb9dcc5cu  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -26,1073 +28,1393 @@
     ((int32_t)((uint32_t)(word) << (32 - field##_SHIFT - field##_WIDTH)) >> (32 - field##_WIDTH))
 #define FIELD_PUT(field, value) (((uint32_t)(value) << field##_SHIFT) & field##_MASK)
 
-#ifndef MOIRE_REGISTER_ACCESS                // a host test may bring its own two functions
-static inline uint32_t register_read(uint32_t offset)
-{ return *(volatile uint32_t *)(uintptr_t)(REGISTERS_BASE + offset); }
-static inline void register_write(uint32_t offset, uint32_t value)
-{ *(volatile uint32_t *)(uintptr_t)(REGISTERS_BASE + offset) = value; }
+#ifndef MOIRE_REGISTER_ACCESS  // a host test may bring its own two functions
+static inline uint32_t register_read(uint32_t offset) {
+    return *(volatile uint32_t *)(uintptr_t)(REGISTERS_BASE + offset);
+}
+static inline void register_write(uint32_t offset, uint32_t value) {
+    *(volatile uint32_t *)(uintptr_t)(REGISTERS_BASE + offset) = value;
+}
 #else
 uint32_t register_read(uint32_t offset);
 void register_write(uint32_t offset, uint32_t value);
 #endif
 
 // 64 bits: reading the low word latches the high one, writing the high word commits both.
-static inline uint64_t register_read_wide(uint32_t offset)
-{ uint32_t low = register_read(offset); return (uint64_t)register_read(offset + 4) << 32 | low; }
-static inline void register_write_wide(uint32_t offset, uint64_t value)
-{ register_write(offset, (uint32_t)value); register_write(offset + 4, (uint32_t)(value >> 32)); }
+static inline uint64_t register_read_wide(uint32_t offset) {
+    uint32_t low = register_read(offset);
+    return (uint64_t)register_read(offset + 4) << 32 | low;
+}
+static inline void register_write_wide(uint32_t offset, uint64_t value) {
+    register_write(offset, (uint32_t)value);
+    register_write(offset + 4, (uint32_t)(value >> 32));
+}
 
-static inline uint32_t node_read(uint32_t offset)
-{ return register_read(NODE_BASE + offset); }
-static inline void node_write(uint32_t offset, uint32_t value)
-{ register_write(NODE_BASE + offset, value); }
-static inline uint64_t node_read_wide(uint32_t offset)
-{ return register_read_wide(NODE_BASE + offset); }
-static inline uint32_t bus_read(uint32_t offset)
-{ return register_read(BUS_BASE + offset); }
-static inline void bus_write(uint32_t offset, uint32_t value)
-{ register_write(BUS_BASE + offset, value); }
-static inline uint32_t peripherals_read(uint32_t offset)
-{ return register_read(PERIPHERALS_BASE + offset); }
-static inline void peripherals_write(uint32_t offset, uint32_t value)
-{ register_write(PERIPHERALS_BASE + offset, value); }
-static inline uint64_t peripherals_read_wide(uint32_t offset)
-{ return register_read_wide(PERIPHERALS_BASE + offset); }
-static inline uint32_t axis_read(unsigned axis, uint32_t offset)
-{ return register_read(AXIS_BASE + axis * AXIS_STRIDE + offset); }
-static inline void axis_write(unsigned axis, uint32_t offset, uint32_t value)
-{ register_write(AXIS_BASE + axis * AXIS_STRIDE + offset, value); }
-static inline uint64_t axis_read_wide(unsigned axis, uint32_t offset)
-{ return register_read_wide(AXIS_BASE + axis * AXIS_STRIDE + offset); }
-static inline void axis_write_wide(unsigned axis, uint32_t offset, uint64_t value)
-{ register_write_wide(AXIS_BASE + axis * AXIS_STRIDE + offset, value); }
-static inline uint32_t feedback_read(unsigned axis, uint32_t offset)
-{ return register_read(FEEDBACK_BASE + axis * FEEDBACK_STRIDE + offset); }
-static inline void feedback_write(unsigned axis, uint32_t offset, uint32_t value)
-{ register_write(FEEDBACK_BASE + axis * FEEDBACK_STRIDE + offset, value); }
-static inline uint64_t feedback_read_wide(unsigned axis, uint32_t offset)
-{ return register_read_wide(FEEDBACK_BASE + axis * FEEDBACK_STRIDE + offset); }
-static inline void feedback_write_wide(unsigned axis, uint32_t offset, uint64_t value)
-{ register_write_wide(FEEDBACK_BASE + axis * FEEDBACK_STRIDE + offset, value); }
-static inline uint32_t actuator_read(unsigned axis, uint32_t offset)
-{ return register_read(ACTUATOR_BASE + axis * ACTUATOR_STRIDE + offset); }
-static inline void actuator_write(unsigned axis, uint32_t offset, uint32_t value)
-{ register_write(ACTUATOR_BASE + axis * ACTUATOR_STRIDE + offset, value); }
-static inline uint64_t actuator_read_wide(unsigned axis, uint32_t offset)
-{ return register_read_wide(ACTUATOR_BASE + axis * ACTUATOR_STRIDE + offset); }
-static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t value)
-{ register_write_wide(ACTUATOR_BASE + axis * ACTUATOR_STRIDE + offset, value); }
+static inline uint32_t node_read(uint32_t offset) {
+    return register_read(NODE_BASE + offset);
+}
+static inline void node_write(uint32_t offset, uint32_t value) {
+    register_write(NODE_BASE + offset, value);
+}
+static inline uint64_t node_read_wide(uint32_t offset) {
+    return register_read_wide(NODE_BASE + offset);
+}
+static inline uint32_t bus_read(uint32_t offset) {
+    return register_read(BUS_BASE + offset);
+}
+static inline void bus_write(uint32_t offset, uint32_t value) {
+    register_write(BUS_BASE + offset, value);
+}
+static inline uint32_t peripherals_read(uint32_t offset) {
+    return register_read(PERIPHERALS_BASE + offset);
+}
+static inline void peripherals_write(uint32_t offset, uint32_t value) {
+    register_write(PERIPHERALS_BASE + offset, value);
+}
+static inline uint64_t peripherals_read_wide(uint32_t offset) {
+    return register_read_wide(PERIPHERALS_BASE + offset);
+}
+static inline uint32_t axis_read(unsigned axis, uint32_t offset) {
+    return register_read(AXIS_BASE + axis * AXIS_STRIDE + offset);
+}
+static inline void axis_write(unsigned axis, uint32_t offset, uint32_t value) {
+    register_write(AXIS_BASE + axis * AXIS_STRIDE + offset, value);
+}
+static inline uint64_t axis_read_wide(unsigned axis, uint32_t offset) {
+    return register_read_wide(AXIS_BASE + axis * AXIS_STRIDE + offset);
+}
+static inline void axis_write_wide(unsigned axis, uint32_t offset, uint64_t value) {
+    register_write_wide(AXIS_BASE + axis * AXIS_STRIDE + offset, value);
+}
+static inline uint32_t feedback_read(unsigned axis, uint32_t offset) {
+    return register_read(FEEDBACK_BASE + axis * FEEDBACK_STRIDE + offset);
+}
+static inline void feedback_write(unsigned axis, uint32_t offset, uint32_t value) {
+    register_write(FEEDBACK_BASE + axis * FEEDBACK_STRIDE + offset, value);
+}
+static inline uint64_t feedback_read_wide(unsigned axis, uint32_t offset) {
+    return register_read_wide(FEEDBACK_BASE + axis * FEEDBACK_STRIDE + offset);
+}
+static inline void feedback_write_wide(unsigned axis, uint32_t offset, uint64_t value) {
+    register_write_wide(FEEDBACK_BASE + axis * FEEDBACK_STRIDE + offset, value);
+}
+static inline uint32_t actuator_read(unsigned axis, uint32_t offset) {
+    return register_read(ACTUATOR_BASE + axis * ACTUATOR_STRIDE + offset);
+}
+static inline void actuator_write(unsigned axis, uint32_t offset, uint32_t value) {
+    register_write(ACTUATOR_BASE + axis * ACTUATOR_STRIDE + offset, value);
+}
+static inline uint64_t actuator_read_wide(unsigned axis, uint32_t offset) {
+    return register_read_wide(ACTUATOR_BASE + axis * ACTUATOR_STRIDE + offset);
+}
+static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t value) {
+    register_write_wide(ACTUATOR_BASE + axis * ACTUATOR_STRIDE + offset, value);
+}
 
-// node: identity, clock, health of the soft core
-#define NODE_MAP_CRC                                   0x000u  // r: CRC-32 of the register source
-#define NODE_MAP_CRC_MASK                              0xffffffffu
-#define NODE_MAP_CRC_SHIFT                             0
-#define NODE_MAP_CRC_WIDTH                             32
-#define NODE_CLK_HZ                                    0x004u  // r: clk frequency [Hz]
-#define NODE_CLK_HZ_MASK                               0xffffffffu
-#define NODE_CLK_HZ_SHIFT                              0
-#define NODE_CLK_HZ_WIDTH                              32
-#define NODE_BUILD                                     0x008u  // r: what was built
-#define NODE_BUILD_AXES_MASK                           0x0000000fu
-#define NODE_BUILD_AXES_SHIFT                          0
-#define NODE_BUILD_AXES_WIDTH                          4
-#define NODE_BUILD_ADDRESS_MASK                        0x000000f0u
-#define NODE_BUILD_ADDRESS_SHIFT                       4
-#define NODE_BUILD_ADDRESS_WIDTH                       4
-#define NODE_BUILD_MEMORY_MASK                         0x0000ff00u
-#define NODE_BUILD_MEMORY_SHIFT                        8
-#define NODE_BUILD_MEMORY_WIDTH                        8
-#define NODE_TIME_STAMP                                0x010u  // r: clk since reset, wraps; the time stamp of everything [clk]
-#define NODE_TIME_STAMP_LOW                            0x010u
-#define NODE_TIME_STAMP_HIGH                           0x014u
-#define NODE_TIME_STAMP_WIDTH                          64
-#define NODE_TICK_PERIOD                               0x018u  // rw: servo tick of all axes [clk]
-#define NODE_TICK_PERIOD_MASK                          0x00ffffffu
-#define NODE_TICK_PERIOD_SHIFT                         0
-#define NODE_TICK_PERIOD_WIDTH                         24
-#define NODE_SAMPLE_PERIOD                             0x01cu  // rw: sample rate of all converters [clk]
-#define NODE_SAMPLE_PERIOD_MASK                        0x0000ffffu
-#define NODE_SAMPLE_PERIOD_SHIFT                       0
-#define NODE_SAMPLE_PERIOD_WIDTH                       16
-#define NODE_HEARTBEAT                                 0x020u  // w: sign of life of the firmware; while a drive is on it is wanted within 1 200 000 clk and 20 ms: kick
-#define NODE_HEARTBEAT_KICK_MASK                       0x00000001u
-#define NODE_HEARTBEAT_KICK_SHIFT                      0
-#define NODE_HEARTBEAT_KICK_WIDTH                      1
-#define NODE_START_AXES                                0x024u  // w: bit n: axis n
-#define NODE_START_AXES_MASK                           0x000000ffu
-#define NODE_START_AXES_SHIFT                          0
-#define NODE_START_AXES_WIDTH                          8
+// node: identity, time, heartbeat of the soft core
+// r: CRC-32 of the register source
+#define NODE_MAP_CRC 0x000u
+#define NODE_MAP_CRC_MASK 0xffffffffu
+#define NODE_MAP_CRC_SHIFT 0
+#define NODE_MAP_CRC_WIDTH 32
+// r: frequency of clk [Hz]
+#define NODE_CLK_HZ 0x004u
+#define NODE_CLK_HZ_MASK 0xffffffffu
+#define NODE_CLK_HZ_SHIFT 0
+#define NODE_CLK_HZ_WIDTH 32
+// r: what is built
+#define NODE_BUILD 0x008u
+#define NODE_BUILD_AXES_MASK 0x0000000fu
+#define NODE_BUILD_AXES_SHIFT 0
+#define NODE_BUILD_AXES_WIDTH 4
+#define NODE_BUILD_ADDRESS_MASK 0x000000f0u
+#define NODE_BUILD_ADDRESS_SHIFT 4
+#define NODE_BUILD_ADDRESS_WIDTH 4
+#define NODE_BUILD_MEMORY_MASK 0x0000ff00u
+#define NODE_BUILD_MEMORY_SHIFT 8
+#define NODE_BUILD_MEMORY_WIDTH 8
+// r: cycles since reset; every time stamp is a part of it [cycle]
+#define NODE_TIME_STAMP 0x010u
+#define NODE_TIME_STAMP_LOW 0x010u
+#define NODE_TIME_STAMP_HIGH 0x014u
+#define NODE_TIME_STAMP_WIDTH 64
+// rw: period of the servo tick; it is the same for all axes [cycle]
+#define NODE_TICK_PERIOD 0x018u
+#define NODE_TICK_PERIOD_MASK 0x00ffffffu
+#define NODE_TICK_PERIOD_SHIFT 0
+#define NODE_TICK_PERIOD_WIDTH 24
+// rw: period of the samples; it is the same for all ADCs [cycle]
+#define NODE_SAMPLE_PERIOD 0x01cu
+#define NODE_SAMPLE_PERIOD_MASK 0x0000ffffu
+#define NODE_SAMPLE_PERIOD_SHIFT 0
+#define NODE_SAMPLE_PERIOD_WIDTH 16
+// w: heartbeat of the firmware; while a drive is on, the longest time between two is 20 ms and 1
+// 200 000 cycles: kick
+#define NODE_HEARTBEAT 0x020u
+#define NODE_HEARTBEAT_KICK_MASK 0x00000001u
+#define NODE_HEARTBEAT_KICK_SHIFT 0
+#define NODE_HEARTBEAT_KICK_WIDTH 1
+// w: axes that start, bit n: axis n; they play their queued segments from the same tick on
+#define NODE_START_AXES 0x024u
+#define NODE_START_AXES_MASK 0x000000ffu
+#define NODE_START_AXES_SHIFT 0
+#define NODE_START_AXES_WIDTH 8
 
 // RS-485 bus: 9-bit UART, address filter, frame check, watchdog
-#define BUS_BIT_TIME                                   0x000u  // rw: duration of one bit [1/16 clk]
-#define BUS_BIT_TIME_MASK                              0x000fffffu
-#define BUS_BIT_TIME_SHIFT                             0
-#define BUS_BIT_TIME_WIDTH                             20
-#define BUS_RECEIVE                                    0x004u  // r: one received word; reading takes it from the queue
-#define BUS_RECEIVE_DATA_MASK                          0x000000ffu
-#define BUS_RECEIVE_DATA_SHIFT                         0
-#define BUS_RECEIVE_DATA_WIDTH                         8
-#define BUS_RECEIVE_COMMAND_MASK                       0x00000100u  // the 9th bit: a command byte for this node
-#define BUS_RECEIVE_COMMAND_SHIFT                      8
-#define BUS_RECEIVE_COMMAND_WIDTH                      1
-#define BUS_RECEIVE_GOOD_MASK                          0x00000200u  // last byte of a frame whose length and CRC-32 are right
-#define BUS_RECEIVE_GOOD_SHIFT                         9
-#define BUS_RECEIVE_GOOD_WIDTH                         1
-#define BUS_RECEIVE_PRESENT_MASK                       0x00000400u  // 0: the queue was empty, nothing was taken
-#define BUS_RECEIVE_PRESENT_SHIFT                      10
-#define BUS_RECEIVE_PRESENT_WIDTH                      1
-#define BUS_TRANSMIT                                   0x008u  // w: one word to send
-#define BUS_TRANSMIT_DATA_MASK                         0x000000ffu
-#define BUS_TRANSMIT_DATA_SHIFT                        0
-#define BUS_TRANSMIT_DATA_WIDTH                        8
-#define BUS_TRANSMIT_COMMAND_MASK                      0x00000100u
-#define BUS_TRANSMIT_COMMAND_SHIFT                     8
-#define BUS_TRANSMIT_COMMAND_WIDTH                     1
-#define BUS_STATE                                      0x00cu  // r: state of the queues
-#define BUS_STATE_TRANSMIT_FREE_MASK                   0x000000ffu
-#define BUS_STATE_TRANSMIT_FREE_SHIFT                  0
-#define BUS_STATE_TRANSMIT_FREE_WIDTH                  8
-#define BUS_STATE_SENDING_MASK                         0x00000100u
-#define BUS_STATE_SENDING_SHIFT                        8
-#define BUS_STATE_SENDING_WIDTH                        1
-#define BUS_FRAMES_GOOD                                0x010u  // rw: frames received whole; writing clears
-#define BUS_FRAMES_GOOD_MASK                           0xffffffffu
-#define BUS_FRAMES_GOOD_SHIFT                          0
-#define BUS_FRAMES_GOOD_WIDTH                          32
-#define BUS_FRAMES_BAD                                 0x014u  // rw: frames for this node with a wrong CRC-32 or length; writing clears
-#define BUS_FRAMES_BAD_MASK                            0xffffffffu
-#define BUS_FRAMES_BAD_SHIFT                           0
-#define BUS_FRAMES_BAD_WIDTH                           32
-#define BUS_FRAMING_ERRORS                             0x018u  // rw: characters without a stop bit; writing clears
-#define BUS_FRAMING_ERRORS_MASK                        0xffffffffu
-#define BUS_FRAMING_ERRORS_SHIFT                       0
-#define BUS_FRAMING_ERRORS_WIDTH                       32
-#define BUS_START_GLITCHES                             0x01cu  // rw: start bits that were only glitches; writing clears
-#define BUS_START_GLITCHES_MASK                        0xffffffffu
-#define BUS_START_GLITCHES_SHIFT                       0
-#define BUS_START_GLITCHES_WIDTH                       32
-#define BUS_OVERRUNS                                   0x020u  // rw: words lost because the receive queue was full; writing clears
-#define BUS_OVERRUNS_MASK                              0xffffffffu
-#define BUS_OVERRUNS_SHIFT                             0
-#define BUS_OVERRUNS_WIDTH                             32
-#define BUS_CRC_BYTE                                   0x024u  // w: CRC-32 of what is to be sent: writing a byte takes it in: data
-#define BUS_CRC_BYTE_DATA_MASK                         0x000000ffu
-#define BUS_CRC_BYTE_DATA_SHIFT                        0
-#define BUS_CRC_BYTE_DATA_WIDTH                        8
-#define BUS_CRC_START                                  0x028u  // w: start the CRC-32 afresh: start
-#define BUS_CRC_START_START_MASK                       0x00000001u
-#define BUS_CRC_START_START_SHIFT                      0
-#define BUS_CRC_START_START_WIDTH                      1
-#define BUS_CRC                                        0x02cu  // r: the CRC-32 so far, final inversion done
-#define BUS_CRC_MASK                                   0xffffffffu
-#define BUS_CRC_SHIFT                                  0
-#define BUS_CRC_WIDTH                                  32
-#define BUS_WATCHDOG_TIME                              0x030u  // rw: longest silence of the master while a drive is enabled; 0: for ever [0.001 s]
-#define BUS_WATCHDOG_TIME_MASK                         0x0000ffffu
-#define BUS_WATCHDOG_TIME_SHIFT                        0
-#define BUS_WATCHDOG_TIME_WIDTH                        16
-#define BUS_BREAKS                                     0x034u  // rw: breaks: the line was low for 2 ms; writing clears
-#define BUS_BREAKS_MASK                                0xffffffffu
-#define BUS_BREAKS_SHIFT                               0
-#define BUS_BREAKS_WIDTH                               32
-#define BUS_TRANSMIT_TIMEOUTS                          0x038u  // rw: the own driver was on for 1024 bits and has been cut off; writing clears
-#define BUS_TRANSMIT_TIMEOUTS_MASK                     0xffffffffu
-#define BUS_TRANSMIT_TIMEOUTS_SHIFT                    0
-#define BUS_TRANSMIT_TIMEOUTS_WIDTH                    32
-#define BUS_SYNCS                                      0x03cu  // rw: marks: good frames for all nodes; writing clears
-#define BUS_SYNCS_MASK                                 0xffffffffu
-#define BUS_SYNCS_SHIFT                                0
-#define BUS_SYNCS_WIDTH                                32
-#define BUS_SYNC_AXES                                  0x040u  // rw: play the queued segments of these axes from the next mark on; bit n: axis n
-#define BUS_SYNC_AXES_MASK                             0x000000ffu
-#define BUS_SYNC_AXES_SHIFT                            0
-#define BUS_SYNC_AXES_WIDTH                            8
+// rw: duration of one bit [1/16 cycle]
+#define BUS_BIT_TIME 0x000u
+#define BUS_BIT_TIME_MASK 0x000fffffu
+#define BUS_BIT_TIME_SHIFT 0
+#define BUS_BIT_TIME_WIDTH 20
+// r: oldest received word; reading removes it from the queue
+#define BUS_RECEIVE 0x004u
+#define BUS_RECEIVE_DATA_MASK 0x000000ffu
+#define BUS_RECEIVE_DATA_SHIFT 0
+#define BUS_RECEIVE_DATA_WIDTH 8
+// 9th bit: the byte is a command for this node
+#define BUS_RECEIVE_COMMAND_MASK 0x00000100u
+#define BUS_RECEIVE_COMMAND_SHIFT 8
+#define BUS_RECEIVE_COMMAND_WIDTH 1
+// last byte of a good frame, whose length and CRC-32 are right
+#define BUS_RECEIVE_GOOD_MASK 0x00000200u
+#define BUS_RECEIVE_GOOD_SHIFT 9
+#define BUS_RECEIVE_GOOD_WIDTH 1
+// 1: a word was read; 0: the queue was empty
+#define BUS_RECEIVE_PRESENT_MASK 0x00000400u
+#define BUS_RECEIVE_PRESENT_SHIFT 10
+#define BUS_RECEIVE_PRESENT_WIDTH 1
+// w: word to send; writing puts it into the queue
+#define BUS_TRANSMIT 0x008u
+#define BUS_TRANSMIT_DATA_MASK 0x000000ffu
+#define BUS_TRANSMIT_DATA_SHIFT 0
+#define BUS_TRANSMIT_DATA_WIDTH 8
+#define BUS_TRANSMIT_COMMAND_MASK 0x00000100u
+#define BUS_TRANSMIT_COMMAND_SHIFT 8
+#define BUS_TRANSMIT_COMMAND_WIDTH 1
+// r: state of the queues
+#define BUS_STATE 0x00cu
+#define BUS_STATE_TRANSMIT_FREE_MASK 0x000000ffu
+#define BUS_STATE_TRANSMIT_FREE_SHIFT 0
+#define BUS_STATE_TRANSMIT_FREE_WIDTH 8
+#define BUS_STATE_SENDING_MASK 0x00000100u
+#define BUS_STATE_SENDING_SHIFT 8
+#define BUS_STATE_SENDING_WIDTH 1
+// rw: good frames; writing clears the count
+#define BUS_FRAMES_GOOD 0x010u
+#define BUS_FRAMES_GOOD_MASK 0xffffffffu
+#define BUS_FRAMES_GOOD_SHIFT 0
+#define BUS_FRAMES_GOOD_WIDTH 32
+// rw: bad frames, for this node with a wrong CRC-32 or length; writing clears the count
+#define BUS_FRAMES_BAD 0x014u
+#define BUS_FRAMES_BAD_MASK 0xffffffffu
+#define BUS_FRAMES_BAD_SHIFT 0
+#define BUS_FRAMES_BAD_WIDTH 32
+// rw: characters without a stop bit; writing clears the count
+#define BUS_FRAMING_ERRORS 0x018u
+#define BUS_FRAMING_ERRORS_MASK 0xffffffffu
+#define BUS_FRAMING_ERRORS_SHIFT 0
+#define BUS_FRAMING_ERRORS_WIDTH 32
+// rw: start bits that were only glitches; writing clears the count
+#define BUS_START_GLITCHES 0x01cu
+#define BUS_START_GLITCHES_MASK 0xffffffffu
+#define BUS_START_GLITCHES_SHIFT 0
+#define BUS_START_GLITCHES_WIDTH 32
+// rw: words lost because the receive queue was full; writing clears the count
+#define BUS_OVERRUNS 0x020u
+#define BUS_OVERRUNS_MASK 0xffffffffu
+#define BUS_OVERRUNS_SHIFT 0
+#define BUS_OVERRUNS_WIDTH 32
+// w: byte for the CRC-32 of a frame to send; writing adds it to the CRC-32: data
+#define BUS_CRC_BYTE 0x024u
+#define BUS_CRC_BYTE_DATA_MASK 0x000000ffu
+#define BUS_CRC_BYTE_DATA_SHIFT 0
+#define BUS_CRC_BYTE_DATA_WIDTH 8
+// w: starts the CRC-32 again: start
+#define BUS_CRC_START 0x028u
+#define BUS_CRC_START_START_MASK 0x00000001u
+#define BUS_CRC_START_START_SHIFT 0
+#define BUS_CRC_START_START_WIDTH 1
+// r: CRC-32 of the bytes so far, after the final inversion
+#define BUS_CRC 0x02cu
+#define BUS_CRC_MASK 0xffffffffu
+#define BUS_CRC_SHIFT 0
+#define BUS_CRC_WIDTH 32
+// rw: longest silence of the master while a drive is enabled; 0: no limit [0.001 s]
+#define BUS_WATCHDOG_TIME 0x030u
+#define BUS_WATCHDOG_TIME_MASK 0x0000ffffu
+#define BUS_WATCHDOG_TIME_SHIFT 0
+#define BUS_WATCHDOG_TIME_WIDTH 16
+// rw: breaks: the bus was low for 2 ms; writing clears the count
+#define BUS_BREAKS 0x034u
+#define BUS_BREAKS_MASK 0xffffffffu
+#define BUS_BREAKS_SHIFT 0
+#define BUS_BREAKS_WIDTH 32
+// rw: transmit time-outs: the bus driver was on for 1024 bits and has been cut off; writing clears
+// the count
+#define BUS_TRANSMIT_TIMEOUTS 0x038u
+#define BUS_TRANSMIT_TIMEOUTS_MASK 0xffffffffu
+#define BUS_TRANSMIT_TIMEOUTS_SHIFT 0
+#define BUS_TRANSMIT_TIMEOUTS_WIDTH 32
+// rw: sync pulses: good frames for all nodes; writing clears the count
+#define BUS_SYNCS 0x03cu
+#define BUS_SYNCS_MASK 0xffffffffu
+#define BUS_SYNCS_SHIFT 0
+#define BUS_SYNCS_WIDTH 32
+// rw: axes that start with sync, bit n: axis n; they play their queued segments from the next sync
+// pulse on
+#define BUS_SYNC_AXES 0x040u
+#define BUS_SYNC_AXES_MASK 0x000000ffu
+#define BUS_SYNC_AXES_SHIFT 0
+#define BUS_SYNC_AXES_WIDTH 8
 
 // peripherals: I2C, PS/2 pass-through, peer port, angle sensor, numeric display, status inputs
-#define PERIPHERALS_BUILT                              0x000u  // r: 1: it was built, 0: its pins are idle, its registers do nothing
-#define PERIPHERALS_BUILT_I2C_MASK                     0x00000001u
-#define PERIPHERALS_BUILT_I2C_SHIFT                    0
-#define PERIPHERALS_BUILT_I2C_WIDTH                    1
-#define PERIPHERALS_BUILT_PS2_MASK                     0x00000002u
-#define PERIPHERALS_BUILT_PS2_SHIFT                    1
-#define PERIPHERALS_BUILT_PS2_WIDTH                    1
-#define PERIPHERALS_BUILT_PEER_MASK                    0x00000004u
-#define PERIPHERALS_BUILT_PEER_SHIFT                   2
-#define PERIPHERALS_BUILT_PEER_WIDTH                   1
-#define PERIPHERALS_BUILT_SENSOR_MASK                  0x00000008u
-#define PERIPHERALS_BUILT_SENSOR_SHIFT                 3
-#define PERIPHERALS_BUILT_SENSOR_WIDTH                 1
-#define PERIPHERALS_BUILT_DISPLAY_MASK                 0x00000010u
-#define PERIPHERALS_BUILT_DISPLAY_SHIFT                4
-#define PERIPHERALS_BUILT_DISPLAY_WIDTH                1
-#define PERIPHERALS_BUILT_EDM_MASK                     0x00000020u
-#define PERIPHERALS_BUILT_EDM_SHIFT                    5
-#define PERIPHERALS_BUILT_EDM_WIDTH                    1
-#define PERIPHERALS_I2C                                0x004u  // w: queue a command
-#define PERIPHERALS_I2C_DATA_MASK                      0x000000ffu  // of a write
-#define PERIPHERALS_I2C_DATA_SHIFT                     0
-#define PERIPHERALS_I2C_DATA_WIDTH                     8
-#define PERIPHERALS_I2C_COMMAND_MASK                   0x00000700u  // 0 start, also repeated; 1 stop, 2 write, 3 read, 4 recover: clock a stuck device free
-#define PERIPHERALS_I2C_COMMAND_SHIFT                  8
-#define PERIPHERALS_I2C_COMMAND_WIDTH                  3
-#define PERIPHERALS_I2C_ACKNOWLEDGE_MASK               0x00000800u  // of a read: more is wanted
-#define PERIPHERALS_I2C_ACKNOWLEDGE_SHIFT              11
-#define PERIPHERALS_I2C_ACKNOWLEDGE_WIDTH              1
-#define PERIPHERALS_I2C_ANSWER                         0x008u  // r: the oldest result; reading takes it from the queue
-#define PERIPHERALS_I2C_ANSWER_DATA_MASK               0x000000ffu  // of a read
-#define PERIPHERALS_I2C_ANSWER_DATA_SHIFT              0
-#define PERIPHERALS_I2C_ANSWER_DATA_WIDTH              8
-#define PERIPHERALS_I2C_ANSWER_RESULT_MASK             0x00000300u  // 0 ok, 1 not acknowledged, 2 bus lost or not ours, 3 no bus: a line stays low
-#define PERIPHERALS_I2C_ANSWER_RESULT_SHIFT            8
-#define PERIPHERALS_I2C_ANSWER_RESULT_WIDTH            2
-#define PERIPHERALS_I2C_ANSWER_PRESENT_MASK            0x00000400u  // 0: the queue was empty, nothing was taken
-#define PERIPHERALS_I2C_ANSWER_PRESENT_SHIFT           10
-#define PERIPHERALS_I2C_ANSWER_PRESENT_WIDTH           1
-#define PERIPHERALS_I2C_STATE                          0x00cu  // r: state of the bus
-#define PERIPHERALS_I2C_STATE_FREE_MASK                0x000000ffu  // commands that may still be queued, 128 at most; as many results wait, more are lost
-#define PERIPHERALS_I2C_STATE_FREE_SHIFT               0
-#define PERIPHERALS_I2C_STATE_FREE_WIDTH               8
-#define PERIPHERALS_I2C_STATE_BUSY_MASK                0x00000100u  // a command is under way or waits
-#define PERIPHERALS_I2C_STATE_BUSY_SHIFT               8
-#define PERIPHERALS_I2C_STATE_BUSY_WIDTH               1
-#define PERIPHERALS_I2C_STATE_OWNED_MASK               0x00000200u  // the bus is ours, from start to stop
-#define PERIPHERALS_I2C_STATE_OWNED_SHIFT              9
-#define PERIPHERALS_I2C_STATE_OWNED_WIDTH              1
-#define PERIPHERALS_I2C_STATE_SCL_MASK                 0x00000400u  // level of the line
-#define PERIPHERALS_I2C_STATE_SCL_SHIFT                10
-#define PERIPHERALS_I2C_STATE_SCL_WIDTH                1
-#define PERIPHERALS_I2C_STATE_SDA_MASK                 0x00000800u  // level of the line
-#define PERIPHERALS_I2C_STATE_SDA_SHIFT                11
-#define PERIPHERALS_I2C_STATE_SDA_WIDTH                1
-#define PERIPHERALS_PS2_IDLE                           0x010u  // rw: silence of keyboard and machine before an injection; less than 20 counts as 20 [0.001 s]
-#define PERIPHERALS_PS2_IDLE_MASK                      0x0000ffffu
-#define PERIPHERALS_PS2_IDLE_SHIFT                     0
-#define PERIPHERALS_PS2_IDLE_WIDTH                     16
-#define PERIPHERALS_PS2_INJECT                         0x014u  // w: queue a scan code to inject; a sequence holds the keyboard from its first byte to its last: queue it whole
-#define PERIPHERALS_PS2_INJECT_DATA_MASK               0x000000ffu  // a scan code to inject
-#define PERIPHERALS_PS2_INJECT_DATA_SHIFT              0
-#define PERIPHERALS_PS2_INJECT_DATA_WIDTH              8
-#define PERIPHERALS_PS2_INJECT_LAST_MASK               0x00000100u  // of its sequence
-#define PERIPHERALS_PS2_INJECT_LAST_SHIFT              8
-#define PERIPHERALS_PS2_INJECT_LAST_WIDTH              1
-#define PERIPHERALS_PS2_STATE                          0x018u  // rw: state of PS/2; all that was queued has been sent when free is 32 and neither injecting nor busy stands
-#define PERIPHERALS_PS2_STATE_FREE_MASK                0x0000003fu  // scan codes that may still be queued, 32 at most
-#define PERIPHERALS_PS2_STATE_FREE_SHIFT               0
-#define PERIPHERALS_PS2_STATE_FREE_WIDTH               6
-#define PERIPHERALS_PS2_STATE_INJECTING_MASK           0x00000040u  // a sequence is under way
-#define PERIPHERALS_PS2_STATE_INJECTING_SHIFT          6
-#define PERIPHERALS_PS2_STATE_INJECTING_WIDTH          1
-#define PERIPHERALS_PS2_STATE_BUSY_MASK                0x00000080u  // a frame is under way on either side
-#define PERIPHERALS_PS2_STATE_BUSY_SHIFT               7
-#define PERIPHERALS_PS2_STATE_BUSY_WIDTH               1
-#define PERIPHERALS_PS2_STATE_DROP_MASK                0x00000100u  // take back what is queued; a sequence that is under way is finished whole
-#define PERIPHERALS_PS2_STATE_DROP_SHIFT               8
-#define PERIPHERALS_PS2_STATE_DROP_WIDTH               1
-#define PERIPHERALS_PS2_TYPED                          0x01cu  // rw: bytes of the keyboard that answer no command: a person types; writing clears
-#define PERIPHERALS_PS2_TYPED_MASK                     0x0000ffffu
-#define PERIPHERALS_PS2_TYPED_SHIFT                    0
-#define PERIPHERALS_PS2_TYPED_WIDTH                    16
-#define PERIPHERALS_PS2_ERRORS                         0x020u  // rw: errors of PS/2; writing clears them all
-#define PERIPHERALS_PS2_ERRORS_KEYBOARD_DAMAGED_MASK   0x000000ffu  // bytes of the keyboard that came damaged
-#define PERIPHERALS_PS2_ERRORS_KEYBOARD_DAMAGED_SHIFT  0
-#define PERIPHERALS_PS2_ERRORS_KEYBOARD_DAMAGED_WIDTH  8
-#define PERIPHERALS_PS2_ERRORS_COMMAND_DAMAGED_MASK    0x0000ff00u  // commands of the machine that came damaged
-#define PERIPHERALS_PS2_ERRORS_COMMAND_DAMAGED_SHIFT   8
-#define PERIPHERALS_PS2_ERRORS_COMMAND_DAMAGED_WIDTH   8
-#define PERIPHERALS_PS2_ERRORS_UNSENT_MASK             0x00ff0000u  // commands that the keyboard did not take
-#define PERIPHERALS_PS2_ERRORS_UNSENT_SHIFT            16
-#define PERIPHERALS_PS2_ERRORS_UNSENT_WIDTH            8
-#define PERIPHERALS_PS2_ERRORS_ABORTED_MASK            0xff000000u  // frames that the machine cut short
-#define PERIPHERALS_PS2_ERRORS_ABORTED_SHIFT           24
-#define PERIPHERALS_PS2_ERRORS_ABORTED_WIDTH           8
-#define PERIPHERALS_PS2_GLITCHES                       0x024u  // rw: pulses of less than 1 us on the lines; writing clears
-#define PERIPHERALS_PS2_GLITCHES_MASK                  0x000000ffu
-#define PERIPHERALS_PS2_GLITCHES_SHIFT                 0
-#define PERIPHERALS_PS2_GLITCHES_WIDTH                 8
-#define PERIPHERALS_PEER_BIT_TIME                      0x028u  // rw: duration of one bit of the peer port [1/16 clk]
-#define PERIPHERALS_PEER_BIT_TIME_MASK                 0x000fffffu
-#define PERIPHERALS_PEER_BIT_TIME_SHIFT                0
-#define PERIPHERALS_PEER_BIT_TIME_WIDTH                20
-#define PERIPHERALS_PEER_RECEIVE                       0x02cu  // r: one received byte; reading takes it from the queue of 64
-#define PERIPHERALS_PEER_RECEIVE_DATA_MASK             0x000000ffu
-#define PERIPHERALS_PEER_RECEIVE_DATA_SHIFT            0
-#define PERIPHERALS_PEER_RECEIVE_DATA_WIDTH            8
-#define PERIPHERALS_PEER_RECEIVE_PRESENT_MASK          0x00000100u  // 0: the queue was empty, nothing was taken
-#define PERIPHERALS_PEER_RECEIVE_PRESENT_SHIFT         8
-#define PERIPHERALS_PEER_RECEIVE_PRESENT_WIDTH         1
-#define PERIPHERALS_PEER_TRANSMIT                      0x030u  // w: one byte to send
-#define PERIPHERALS_PEER_TRANSMIT_MASK                 0x000000ffu
-#define PERIPHERALS_PEER_TRANSMIT_SHIFT                0
-#define PERIPHERALS_PEER_TRANSMIT_WIDTH                8
-#define PERIPHERALS_PEER_STATE                         0x034u  // r: state of the peer port
-#define PERIPHERALS_PEER_STATE_TRANSMIT_FREE_MASK      0x0000007fu  // bytes that may still be queued, 64 at most
-#define PERIPHERALS_PEER_STATE_TRANSMIT_FREE_SHIFT     0
-#define PERIPHERALS_PEER_STATE_TRANSMIT_FREE_WIDTH     7
-#define PERIPHERALS_PEER_STATE_SENDING_MASK            0x00000080u
-#define PERIPHERALS_PEER_STATE_SENDING_SHIFT           7
-#define PERIPHERALS_PEER_STATE_SENDING_WIDTH           1
-#define PERIPHERALS_PEER_ERRORS                        0x038u  // rw: errors of the peer port; writing clears them all
-#define PERIPHERALS_PEER_ERRORS_FRAMING_MASK           0x000000ffu  // characters without a stop bit
-#define PERIPHERALS_PEER_ERRORS_FRAMING_SHIFT          0
-#define PERIPHERALS_PEER_ERRORS_FRAMING_WIDTH          8
-#define PERIPHERALS_PEER_ERRORS_OVERRUNS_MASK          0x0000ff00u  // bytes lost because the receive queue was full
-#define PERIPHERALS_PEER_ERRORS_OVERRUNS_SHIFT         8
-#define PERIPHERALS_PEER_ERRORS_OVERRUNS_WIDTH         8
-#define PERIPHERALS_SENSOR_BIT_TIME                    0x03cu  // rw: duration of one bit of the sensor [1/16 clk]
-#define PERIPHERALS_SENSOR_BIT_TIME_MASK               0x000fffffu
-#define PERIPHERALS_SENSOR_BIT_TIME_SHIFT              0
-#define PERIPHERALS_SENSOR_BIT_TIME_WIDTH              20
-#define PERIPHERALS_SENSOR_GAP                         0x040u  // rw: longest pause between the ends of two bytes of a frame [clk]
-#define PERIPHERALS_SENSOR_GAP_MASK                    0x00ffffffu
-#define PERIPHERALS_SENSOR_GAP_SHIFT                   0
-#define PERIPHERALS_SENSOR_GAP_WIDTH                   24
-#define PERIPHERALS_SENSOR_STALE_AFTER                 0x044u  // rw: time without a good frame after which the sensor is stale; 0: never [clk]
-#define PERIPHERALS_SENSOR_STALE_AFTER_MASK            0xffffffffu
-#define PERIPHERALS_SENSOR_STALE_AFTER_SHIFT           0
-#define PERIPHERALS_SENSOR_STALE_AFTER_WIDTH           32
-#define PERIPHERALS_SENSOR_READING                     0x048u  // r: of the last good frame. Low word: angle, 2^32 a turn. High word: its age then, in clk; stops at its end
-#define PERIPHERALS_SENSOR_READING_LOW                 0x048u
-#define PERIPHERALS_SENSOR_READING_HIGH                0x04cu
-#define PERIPHERALS_SENSOR_READING_WIDTH               64
-#define PERIPHERALS_SENSOR_STATE                       0x050u  // r: the last good frame
-#define PERIPHERALS_SENSOR_STATE_SEQUENCE_NUMBER_MASK  0x000000ffu  // its number, each frame one more; read it before sensor_reading
+// r: which peripherals are built; 0: its pins are idle and its registers do nothing
+#define PERIPHERALS_BUILT 0x000u
+#define PERIPHERALS_BUILT_I2C_MASK 0x00000001u
+#define PERIPHERALS_BUILT_I2C_SHIFT 0
+#define PERIPHERALS_BUILT_I2C_WIDTH 1
+#define PERIPHERALS_BUILT_PS2_MASK 0x00000002u
+#define PERIPHERALS_BUILT_PS2_SHIFT 1
+#define PERIPHERALS_BUILT_PS2_WIDTH 1
+#define PERIPHERALS_BUILT_PEER_MASK 0x00000004u
+#define PERIPHERALS_BUILT_PEER_SHIFT 2
+#define PERIPHERALS_BUILT_PEER_WIDTH 1
+#define PERIPHERALS_BUILT_SENSOR_MASK 0x00000008u
+#define PERIPHERALS_BUILT_SENSOR_SHIFT 3
+#define PERIPHERALS_BUILT_SENSOR_WIDTH 1
+#define PERIPHERALS_BUILT_DISPLAY_MASK 0x00000010u
+#define PERIPHERALS_BUILT_DISPLAY_SHIFT 4
+#define PERIPHERALS_BUILT_DISPLAY_WIDTH 1
+#define PERIPHERALS_BUILT_EDM_MASK 0x00000020u
+#define PERIPHERALS_BUILT_EDM_SHIFT 5
+#define PERIPHERALS_BUILT_EDM_WIDTH 1
+// w: command to queue
+#define PERIPHERALS_I2C 0x004u
+// byte of a write
+#define PERIPHERALS_I2C_DATA_MASK 0x000000ffu
+#define PERIPHERALS_I2C_DATA_SHIFT 0
+#define PERIPHERALS_I2C_DATA_WIDTH 8
+// 0 start, 1 stop, 2 write, 3 read, 4 recover; a start may be repeated, recover clocks a stuck
+// device free
+#define PERIPHERALS_I2C_COMMAND_MASK 0x00000700u
+#define PERIPHERALS_I2C_COMMAND_SHIFT 8
+#define PERIPHERALS_I2C_COMMAND_WIDTH 3
+// of a read: more bytes follow
+#define PERIPHERALS_I2C_ACKNOWLEDGE_MASK 0x00000800u
+#define PERIPHERALS_I2C_ACKNOWLEDGE_SHIFT 11
+#define PERIPHERALS_I2C_ACKNOWLEDGE_WIDTH 1
+// r: oldest result; reading removes it from the queue
+#define PERIPHERALS_I2C_ANSWER 0x008u
+// byte of a read
+#define PERIPHERALS_I2C_ANSWER_DATA_MASK 0x000000ffu
+#define PERIPHERALS_I2C_ANSWER_DATA_SHIFT 0
+#define PERIPHERALS_I2C_ANSWER_DATA_WIDTH 8
+// 0 ok, 1 not acknowledged, 2 bus lost or not owned, 3 no bus; without a bus a line stays low
+#define PERIPHERALS_I2C_ANSWER_RESULT_MASK 0x00000300u
+#define PERIPHERALS_I2C_ANSWER_RESULT_SHIFT 8
+#define PERIPHERALS_I2C_ANSWER_RESULT_WIDTH 2
+// 1: a word was read; 0: the queue was empty
+#define PERIPHERALS_I2C_ANSWER_PRESENT_MASK 0x00000400u
+#define PERIPHERALS_I2C_ANSWER_PRESENT_SHIFT 10
+#define PERIPHERALS_I2C_ANSWER_PRESENT_WIDTH 1
+// r: state of the I2C bus
+#define PERIPHERALS_I2C_STATE 0x00cu
+// commands that can be queued, 128 at most; the queue of results holds as many, more are lost
+#define PERIPHERALS_I2C_STATE_FREE_MASK 0x000000ffu
+#define PERIPHERALS_I2C_STATE_FREE_SHIFT 0
+#define PERIPHERALS_I2C_STATE_FREE_WIDTH 8
+// a command is in work or waits
+#define PERIPHERALS_I2C_STATE_BUSY_MASK 0x00000100u
+#define PERIPHERALS_I2C_STATE_BUSY_SHIFT 8
+#define PERIPHERALS_I2C_STATE_BUSY_WIDTH 1
+// the master owns the bus, from start to stop
+#define PERIPHERALS_I2C_STATE_OWNED_MASK 0x00000200u
+#define PERIPHERALS_I2C_STATE_OWNED_SHIFT 9
+#define PERIPHERALS_I2C_STATE_OWNED_WIDTH 1
+// level of the line
+#define PERIPHERALS_I2C_STATE_SCL_MASK 0x00000400u
+#define PERIPHERALS_I2C_STATE_SCL_SHIFT 10
+#define PERIPHERALS_I2C_STATE_SCL_WIDTH 1
+// level of the line
+#define PERIPHERALS_I2C_STATE_SDA_MASK 0x00000800u
+#define PERIPHERALS_I2C_STATE_SDA_SHIFT 11
+#define PERIPHERALS_I2C_STATE_SDA_WIDTH 1
+// rw: silence of keyboard and machine before an injection; less than 20 acts as 20 [0.001 s]
+#define PERIPHERALS_PS2_IDLE 0x010u
+#define PERIPHERALS_PS2_IDLE_MASK 0x0000ffffu
+#define PERIPHERALS_PS2_IDLE_SHIFT 0
+#define PERIPHERALS_PS2_IDLE_WIDTH 16
+// w: scan code to inject; a sequence holds the keyboard from its first byte to its last, so queue
+// it completely
+#define PERIPHERALS_PS2_INJECT 0x014u
+// scan code
+#define PERIPHERALS_PS2_INJECT_DATA_MASK 0x000000ffu
+#define PERIPHERALS_PS2_INJECT_DATA_SHIFT 0
+#define PERIPHERALS_PS2_INJECT_DATA_WIDTH 8
+// 1: last one of its sequence
+#define PERIPHERALS_PS2_INJECT_LAST_MASK 0x00000100u
+#define PERIPHERALS_PS2_INJECT_LAST_SHIFT 8
+#define PERIPHERALS_PS2_INJECT_LAST_WIDTH 1
+// rw: state of PS/2; everything queued has been sent when free is 32, and injecting and busy are 0
+#define PERIPHERALS_PS2_STATE 0x018u
+// scan codes that can be queued, 32 at most
+#define PERIPHERALS_PS2_STATE_FREE_MASK 0x0000003fu
+#define PERIPHERALS_PS2_STATE_FREE_SHIFT 0
+#define PERIPHERALS_PS2_STATE_FREE_WIDTH 6
+// a sequence is being injected
+#define PERIPHERALS_PS2_STATE_INJECTING_MASK 0x00000040u
+#define PERIPHERALS_PS2_STATE_INJECTING_SHIFT 6
+#define PERIPHERALS_PS2_STATE_INJECTING_WIDTH 1
+// a frame is on its way on either side
+#define PERIPHERALS_PS2_STATE_BUSY_MASK 0x00000080u
+#define PERIPHERALS_PS2_STATE_BUSY_SHIFT 7
+#define PERIPHERALS_PS2_STATE_BUSY_WIDTH 1
+// removes what is queued; a sequence that has begun is completed
+#define PERIPHERALS_PS2_STATE_DROP_MASK 0x00000100u
+#define PERIPHERALS_PS2_STATE_DROP_SHIFT 8
+#define PERIPHERALS_PS2_STATE_DROP_WIDTH 1
+// rw: typed bytes: they answer no command; writing clears the count
+#define PERIPHERALS_PS2_TYPED 0x01cu
+#define PERIPHERALS_PS2_TYPED_MASK 0x0000ffffu
+#define PERIPHERALS_PS2_TYPED_SHIFT 0
+#define PERIPHERALS_PS2_TYPED_WIDTH 16
+// rw: errors of PS/2; writing clears all counts
+#define PERIPHERALS_PS2_ERRORS 0x020u
+// damaged bytes of the keyboard
+#define PERIPHERALS_PS2_ERRORS_KEYBOARD_DAMAGED_MASK 0x000000ffu
+#define PERIPHERALS_PS2_ERRORS_KEYBOARD_DAMAGED_SHIFT 0
+#define PERIPHERALS_PS2_ERRORS_KEYBOARD_DAMAGED_WIDTH 8
+// damaged commands of the machine
+#define PERIPHERALS_PS2_ERRORS_COMMAND_DAMAGED_MASK 0x0000ff00u
+#define PERIPHERALS_PS2_ERRORS_COMMAND_DAMAGED_SHIFT 8
+#define PERIPHERALS_PS2_ERRORS_COMMAND_DAMAGED_WIDTH 8
+// commands that the keyboard did not take
+#define PERIPHERALS_PS2_ERRORS_UNSENT_MASK 0x00ff0000u
+#define PERIPHERALS_PS2_ERRORS_UNSENT_SHIFT 16
+#define PERIPHERALS_PS2_ERRORS_UNSENT_WIDTH 8
+// frames that the machine cut short
+#define PERIPHERALS_PS2_ERRORS_ABORTED_MASK 0xff000000u
+#define PERIPHERALS_PS2_ERRORS_ABORTED_SHIFT 24
+#define PERIPHERALS_PS2_ERRORS_ABORTED_WIDTH 8
+// rw: pulses of less than 1 us on the lines; writing clears the count
+#define PERIPHERALS_PS2_GLITCHES 0x024u
+#define PERIPHERALS_PS2_GLITCHES_MASK 0x000000ffu
+#define PERIPHERALS_PS2_GLITCHES_SHIFT 0
+#define PERIPHERALS_PS2_GLITCHES_WIDTH 8
+// rw: duration of one bit of the peer port [1/16 cycle]
+#define PERIPHERALS_PEER_BIT_TIME 0x028u
+#define PERIPHERALS_PEER_BIT_TIME_MASK 0x000fffffu
+#define PERIPHERALS_PEER_BIT_TIME_SHIFT 0
+#define PERIPHERALS_PEER_BIT_TIME_WIDTH 20
+// r: oldest received byte; reading removes it from the queue of 64
+#define PERIPHERALS_PEER_RECEIVE 0x02cu
+#define PERIPHERALS_PEER_RECEIVE_DATA_MASK 0x000000ffu
+#define PERIPHERALS_PEER_RECEIVE_DATA_SHIFT 0
+#define PERIPHERALS_PEER_RECEIVE_DATA_WIDTH 8
+// 1: a word was read; 0: the queue was empty
+#define PERIPHERALS_PEER_RECEIVE_PRESENT_MASK 0x00000100u
+#define PERIPHERALS_PEER_RECEIVE_PRESENT_SHIFT 8
+#define PERIPHERALS_PEER_RECEIVE_PRESENT_WIDTH 1
+// w: byte to send; writing puts it into the queue
+#define PERIPHERALS_PEER_TRANSMIT 0x030u
+#define PERIPHERALS_PEER_TRANSMIT_MASK 0x000000ffu
+#define PERIPHERALS_PEER_TRANSMIT_SHIFT 0
+#define PERIPHERALS_PEER_TRANSMIT_WIDTH 8
+// r: state of the peer port
+#define PERIPHERALS_PEER_STATE 0x034u
+// bytes that can be queued, 64 at most
+#define PERIPHERALS_PEER_STATE_TRANSMIT_FREE_MASK 0x0000007fu
+#define PERIPHERALS_PEER_STATE_TRANSMIT_FREE_SHIFT 0
+#define PERIPHERALS_PEER_STATE_TRANSMIT_FREE_WIDTH 7
+#define PERIPHERALS_PEER_STATE_SENDING_MASK 0x00000080u
+#define PERIPHERALS_PEER_STATE_SENDING_SHIFT 7
+#define PERIPHERALS_PEER_STATE_SENDING_WIDTH 1
+// rw: errors of the peer port; writing clears all counts
+#define PERIPHERALS_PEER_ERRORS 0x038u
+// characters without a stop bit
+#define PERIPHERALS_PEER_ERRORS_FRAMING_MASK 0x000000ffu
+#define PERIPHERALS_PEER_ERRORS_FRAMING_SHIFT 0
+#define PERIPHERALS_PEER_ERRORS_FRAMING_WIDTH 8
+// bytes lost because the receive queue was full
+#define PERIPHERALS_PEER_ERRORS_OVERRUNS_MASK 0x0000ff00u
+#define PERIPHERALS_PEER_ERRORS_OVERRUNS_SHIFT 8
+#define PERIPHERALS_PEER_ERRORS_OVERRUNS_WIDTH 8
+// rw: duration of one bit of the sensor [1/16 cycle]
+#define PERIPHERALS_SENSOR_BIT_TIME 0x03cu
+#define PERIPHERALS_SENSOR_BIT_TIME_MASK 0x000fffffu
+#define PERIPHERALS_SENSOR_BIT_TIME_SHIFT 0
+#define PERIPHERALS_SENSOR_BIT_TIME_WIDTH 20
+// rw: longest pause between the ends of two bytes of a frame [cycle]
+#define PERIPHERALS_SENSOR_GAP 0x040u
+#define PERIPHERALS_SENSOR_GAP_MASK 0x00ffffffu
+#define PERIPHERALS_SENSOR_GAP_SHIFT 0
+#define PERIPHERALS_SENSOR_GAP_WIDTH 24
+// rw: time without a good frame after which the sensor is stale; 0: never [cycle]
+#define PERIPHERALS_SENSOR_STALE_AFTER 0x044u
+#define PERIPHERALS_SENSOR_STALE_AFTER_MASK 0xffffffffu
+#define PERIPHERALS_SENSOR_STALE_AFTER_SHIFT 0
+#define PERIPHERALS_SENSOR_STALE_AFTER_WIDTH 32
+// r: last good frame; low word: angle, 2^32 per turn; high word: its age at the read in cycles,
+// which stops at its largest value
+#define PERIPHERALS_SENSOR_READING 0x048u
+#define PERIPHERALS_SENSOR_READING_LOW 0x048u
+#define PERIPHERALS_SENSOR_READING_HIGH 0x04cu
+#define PERIPHERALS_SENSOR_READING_WIDTH 64
+// r: the last good frame
+#define PERIPHERALS_SENSOR_STATE 0x050u
+// its sequence number; read it before sensor_reading
+#define PERIPHERALS_SENSOR_STATE_SEQUENCE_NUMBER_MASK 0x000000ffu
 #define PERIPHERALS_SENSOR_STATE_SEQUENCE_NUMBER_SHIFT 0
 #define PERIPHERALS_SENSOR_STATE_SEQUENCE_NUMBER_WIDTH 8
-#define PERIPHERALS_SENSOR_STATE_STALE_MASK            0x00000100u  // none yet, or older than sensor_stale_after
-#define PERIPHERALS_SENSOR_STATE_STALE_SHIFT           8
-#define PERIPHERALS_SENSOR_STATE_STALE_WIDTH           1
-#define PERIPHERALS_SENSOR_ERRORS                      0x054u  // rw: frames that did not come; each count stops at its end
-#define PERIPHERALS_SENSOR_ERRORS_CRC_MASK             0x000000ffu  // with a wrong CRC-16
-#define PERIPHERALS_SENSOR_ERRORS_CRC_SHIFT            0
-#define PERIPHERALS_SENSOR_ERRORS_CRC_WIDTH            8
-#define PERIPHERALS_SENSOR_ERRORS_BROKEN_MASK          0x0000ff00u  // with a pause or a framing error within
-#define PERIPHERALS_SENSOR_ERRORS_BROKEN_SHIFT         8
-#define PERIPHERALS_SENSOR_ERRORS_BROKEN_WIDTH         8
-#define PERIPHERALS_SENSOR_ERRORS_MISSED_MASK          0x00ff0000u  // by the gaps of the numbers, damaged ones with them
-#define PERIPHERALS_SENSOR_ERRORS_MISSED_SHIFT         16
-#define PERIPHERALS_SENSOR_ERRORS_MISSED_WIDTH         8
-#define PERIPHERALS_SENSOR_ERRORS_CLEAR_MASK           0x01000000u  // clear the three
-#define PERIPHERALS_SENSOR_ERRORS_CLEAR_SHIFT          24
-#define PERIPHERALS_SENSOR_ERRORS_CLEAR_WIDTH          1
-#define PERIPHERALS_SENSOR_FRAMES                      0x058u  // rw: good frames; writing clears
-#define PERIPHERALS_SENSOR_FRAMES_MASK                 0x0000ffffu
-#define PERIPHERALS_SENSOR_FRAMES_SHIFT                0
-#define PERIPHERALS_SENSOR_FRAMES_WIDTH                16
-#define PERIPHERALS_DISPLAY                            0x05cu  // w: queue a word for the display driver: register in the high byte, value in the low one
-#define PERIPHERALS_DISPLAY_MASK                       0x0000ffffu
-#define PERIPHERALS_DISPLAY_SHIFT                      0
-#define PERIPHERALS_DISPLAY_WIDTH                      16
-#define PERIPHERALS_DISPLAY_STATE                      0x060u  // r: state of the display
-#define PERIPHERALS_DISPLAY_STATE_FREE_MASK            0x0000001fu  // words that may still be queued, 16 at most
-#define PERIPHERALS_DISPLAY_STATE_FREE_SHIFT           0
-#define PERIPHERALS_DISPLAY_STATE_FREE_WIDTH           5
-#define PERIPHERALS_DISPLAY_STATE_SENDING_MASK         0x00000020u
-#define PERIPHERALS_DISPLAY_STATE_SENDING_SHIFT        5
-#define PERIPHERALS_DISPLAY_STATE_SENDING_WIDTH        1
-#define PERIPHERALS_EDM_FILTER                         0x064u  // rw: a status input must stand this long without a break; the change passes at most 1 ms later [0.001 s]
-#define PERIPHERALS_EDM_FILTER_MASK                    0x0000ffffu
-#define PERIPHERALS_EDM_FILTER_SHIFT                   0
-#define PERIPHERALS_EDM_FILTER_WIDTH                   16
-#define PERIPHERALS_EDM_STATUS                         0x068u  // rw: status inputs, filtered; a change since they were last cleared: write 1 to clear
-#define PERIPHERALS_EDM_STATUS_INPUTS_MASK             0x00000003u  // bit n: level of input n
-#define PERIPHERALS_EDM_STATUS_INPUTS_SHIFT            0
-#define PERIPHERALS_EDM_STATUS_INPUTS_WIDTH            2
-#define PERIPHERALS_EDM_STATUS_ROSE_0_MASK             0x00000004u  // input 0 went up
-#define PERIPHERALS_EDM_STATUS_ROSE_0_SHIFT            2
-#define PERIPHERALS_EDM_STATUS_ROSE_0_WIDTH            1
-#define PERIPHERALS_EDM_STATUS_ROSE_1_MASK             0x00000008u  // input 1 went up
-#define PERIPHERALS_EDM_STATUS_ROSE_1_SHIFT            3
-#define PERIPHERALS_EDM_STATUS_ROSE_1_WIDTH            1
-#define PERIPHERALS_EDM_STATUS_FELL_0_MASK             0x00000010u  // input 0 went down
-#define PERIPHERALS_EDM_STATUS_FELL_0_SHIFT            4
-#define PERIPHERALS_EDM_STATUS_FELL_0_WIDTH            1
-#define PERIPHERALS_EDM_STATUS_FELL_1_MASK             0x00000020u  // input 1 went down
-#define PERIPHERALS_EDM_STATUS_FELL_1_SHIFT            5
-#define PERIPHERALS_EDM_STATUS_FELL_1_WIDTH            1
+// stale: no frame yet, or older than sensor_stale_after
+#define PERIPHERALS_SENSOR_STATE_STALE_MASK 0x00000100u
+#define PERIPHERALS_SENSOR_STATE_STALE_SHIFT 8
+#define PERIPHERALS_SENSOR_STATE_STALE_WIDTH 1
+// rw: missing frames; each count stops at its largest value
+#define PERIPHERALS_SENSOR_ERRORS 0x054u
+// frames with a wrong CRC-16
+#define PERIPHERALS_SENSOR_ERRORS_CRC_MASK 0x000000ffu
+#define PERIPHERALS_SENSOR_ERRORS_CRC_SHIFT 0
+#define PERIPHERALS_SENSOR_ERRORS_CRC_WIDTH 8
+// broken frames, with a pause or a framing error inside
+#define PERIPHERALS_SENSOR_ERRORS_BROKEN_MASK 0x0000ff00u
+#define PERIPHERALS_SENSOR_ERRORS_BROKEN_SHIFT 8
+#define PERIPHERALS_SENSOR_ERRORS_BROKEN_WIDTH 8
+// missed frames, by the gaps in the sequence numbers; damaged frames are included
+#define PERIPHERALS_SENSOR_ERRORS_MISSED_MASK 0x00ff0000u
+#define PERIPHERALS_SENSOR_ERRORS_MISSED_SHIFT 16
+#define PERIPHERALS_SENSOR_ERRORS_MISSED_WIDTH 8
+// clears the three counts
+#define PERIPHERALS_SENSOR_ERRORS_CLEAR_MASK 0x01000000u
+#define PERIPHERALS_SENSOR_ERRORS_CLEAR_SHIFT 24
+#define PERIPHERALS_SENSOR_ERRORS_CLEAR_WIDTH 1
+// rw: good frames; writing clears the count
+#define PERIPHERALS_SENSOR_FRAMES 0x058u
+#define PERIPHERALS_SENSOR_FRAMES_MASK 0x0000ffffu
+#define PERIPHERALS_SENSOR_FRAMES_SHIFT 0
+#define PERIPHERALS_SENSOR_FRAMES_WIDTH 16
+// w: word to the display: register in the high byte, value in the low one
+#define PERIPHERALS_DISPLAY 0x05cu
+#define PERIPHERALS_DISPLAY_MASK 0x0000ffffu
+#define PERIPHERALS_DISPLAY_SHIFT 0
+#define PERIPHERALS_DISPLAY_WIDTH 16
+// r: state of the display
+#define PERIPHERALS_DISPLAY_STATE 0x060u
+// words that can be queued, 16 at most
+#define PERIPHERALS_DISPLAY_STATE_FREE_MASK 0x0000001fu
+#define PERIPHERALS_DISPLAY_STATE_FREE_SHIFT 0
+#define PERIPHERALS_DISPLAY_STATE_FREE_WIDTH 5
+#define PERIPHERALS_DISPLAY_STATE_SENDING_MASK 0x00000020u
+#define PERIPHERALS_DISPLAY_STATE_SENDING_SHIFT 5
+#define PERIPHERALS_DISPLAY_STATE_SENDING_WIDTH 1
+// rw: time that a status input must be stable; the change passes at most 1 ms later [0.001 s]
+#define PERIPHERALS_EDM_FILTER 0x064u
+#define PERIPHERALS_EDM_FILTER_MASK 0x0000ffffu
+#define PERIPHERALS_EDM_FILTER_SHIFT 0
+#define PERIPHERALS_EDM_FILTER_WIDTH 16
+// rw: status inputs, filtered, and changes since they were cleared; write 1 to clear
+#define PERIPHERALS_EDM_STATUS 0x068u
+// bit n: level of input n
+#define PERIPHERALS_EDM_STATUS_INPUTS_MASK 0x00000003u
+#define PERIPHERALS_EDM_STATUS_INPUTS_SHIFT 0
+#define PERIPHERALS_EDM_STATUS_INPUTS_WIDTH 2
+// input 0 went high
+#define PERIPHERALS_EDM_STATUS_ROSE_0_MASK 0x00000004u
+#define PERIPHERALS_EDM_STATUS_ROSE_0_SHIFT 2
+#define PERIPHERALS_EDM_STATUS_ROSE_0_WIDTH 1
+// input 1 went high
+#define PERIPHERALS_EDM_STATUS_ROSE_1_MASK 0x00000008u
+#define PERIPHERALS_EDM_STATUS_ROSE_1_SHIFT 3
+#define PERIPHERALS_EDM_STATUS_ROSE_1_WIDTH 1
+// input 0 went low
+#define PERIPHERALS_EDM_STATUS_FELL_0_MASK 0x00000010u
+#define PERIPHERALS_EDM_STATUS_FELL_0_SHIFT 4
+#define PERIPHERALS_EDM_STATUS_FELL_0_WIDTH 1
+// input 1 went low
+#define PERIPHERALS_EDM_STATUS_FELL_1_MASK 0x00000020u
+#define PERIPHERALS_EDM_STATUS_FELL_1_SHIFT 5
+#define PERIPHERALS_EDM_STATUS_FELL_1_WIDTH 1
 
-// axis: sensor, position, servo, profile, drive, guard
-#define AXIS_CONTROL                                   0x000u  // rw: requests; the guard decides
-#define AXIS_CONTROL_ENABLE_MASK                       0x00000001u  // ask for the drive; the guard grants it only without a latched fault
-#define AXIS_CONTROL_ENABLE_SHIFT                      0
-#define AXIS_CONTROL_ENABLE_WIDTH                      1
-#define AXIS_CONTROL_CLOSED_LOOP_MASK                  0x00000002u  // 1: servo commands the drive, 0: open_command does
-#define AXIS_CONTROL_CLOSED_LOOP_SHIFT                 1
-#define AXIS_CONTROL_CLOSED_LOOP_WIDTH                 1
-#define AXIS_CONTROL_HOMING_MASK                       0x00000004u  // 1: a limit switch only blocks the way into it, 0: it is a fault
-#define AXIS_CONTROL_HOMING_SHIFT                      2
-#define AXIS_CONTROL_HOMING_WIDTH                      1
-#define AXIS_CONTROL_FINE_MASK                         0x00000008u  // 1: the fine stage holds the position and the main command rests, 0: the fine stage rests in its middle
-#define AXIS_CONTROL_FINE_SHIFT                        3
-#define AXIS_CONTROL_FINE_WIDTH                        1
-#define AXIS_STROBES                                   0x004u  // w: strobes
-#define AXIS_STROBES_RESET_FAULTS_MASK                 0x00000001u  // clear latched faults whose cause is gone; needs enable = 0
-#define AXIS_STROBES_RESET_FAULTS_SHIFT                0
-#define AXIS_STROBES_RESET_FAULTS_WIDTH                1
-#define AXIS_STROBES_SET_TARGET_TO_POSITION_MASK       0x00000002u  // target := position, profile queue emptied
-#define AXIS_STROBES_SET_TARGET_TO_POSITION_SHIFT      1
-#define AXIS_STROBES_SET_TARGET_TO_POSITION_WIDTH      1
-#define AXIS_STROBES_START_MASK                        0x00000004u  // play the queued segments
-#define AXIS_STROBES_START_SHIFT                       2
-#define AXIS_STROBES_START_WIDTH                       1
-#define AXIS_STROBES_CONTROLLED_STOP_MASK              0x00000008u  // controlled stop: queue emptied, the target comes to rest within stop_deceleration and stop_jerk
-#define AXIS_STROBES_CONTROLLED_STOP_SHIFT             3
-#define AXIS_STROBES_CONTROLLED_STOP_WIDTH             1
-#define AXIS_STROBES_ARM_MASK                          0x00000010u  // play the queued segments when the time stamp reaches start_at
-#define AXIS_STROBES_ARM_SHIFT                         4
-#define AXIS_STROBES_ARM_WIDTH                         1
-#define AXIS_STATE                                     0x008u  // r: state of the axis
-#define AXIS_STATE_ENABLED_MASK                        0x00000001u  // the drive is on
-#define AXIS_STATE_ENABLED_SHIFT                       0
-#define AXIS_STATE_ENABLED_WIDTH                       1
-#define AXIS_STATE_LIMIT_LOW_MASK                      0x00000002u  // level of the switch at the low end, deglitched; 1: pressed
-#define AXIS_STATE_LIMIT_LOW_SHIFT                     1
-#define AXIS_STATE_LIMIT_LOW_WIDTH                     1
-#define AXIS_STATE_LIMIT_HIGH_MASK                     0x00000004u  // level of the switch at the high end, deglitched; 1: pressed
-#define AXIS_STATE_LIMIT_HIGH_SHIFT                    2
-#define AXIS_STATE_LIMIT_HIGH_WIDTH                    1
-#define AXIS_STATE_ESTOP_MASK                          0x00000008u  // 1: emergency stop is pressed
-#define AXIS_STATE_ESTOP_SHIFT                         3
-#define AXIS_STATE_ESTOP_WIDTH                         1
-#define AXIS_STATE_DRIVE_FAULT_MASK                    0x00000010u  // 1: the drive reports a fault
-#define AXIS_STATE_DRIVE_FAULT_SHIFT                   4
-#define AXIS_STATE_DRIVE_FAULT_WIDTH                   1
-#define AXIS_STATE_MOVING_MASK                         0x00000020u  // a profile is being played
-#define AXIS_STATE_MOVING_SHIFT                        5
-#define AXIS_STATE_MOVING_WIDTH                        1
-#define AXIS_STATE_SATURATED_MASK                      0x00000040u  // the command stands at its limit
-#define AXIS_STATE_SATURATED_SHIFT                     6
-#define AXIS_STATE_SATURATED_WIDTH                     1
-#define AXIS_STATE_QUEUE_FREE_MASK                     0x00000f80u  // segments that may still be queued
-#define AXIS_STATE_QUEUE_FREE_SHIFT                    7
-#define AXIS_STATE_QUEUE_FREE_WIDTH                    5
-#define AXIS_STATE_ARMED_MASK                          0x00001000u  // a profile waits for start_at
-#define AXIS_STATE_ARMED_SHIFT                         12
-#define AXIS_STATE_ARMED_WIDTH                         1
-#define AXIS_STATE_FINE_SATURATED_MASK                 0x00002000u  // the command of the fine stage stands at its limit
-#define AXIS_STATE_FINE_SATURATED_SHIFT                13
-#define AXIS_STATE_FINE_SATURATED_WIDTH                1
-#define AXIS_FAULTS                                    0x00cu  // r: latched causes
-#define AXIS_FAULTS_LIMIT_LOW_MASK                     0x00000001u
-#define AXIS_FAULTS_LIMIT_LOW_SHIFT                    0
-#define AXIS_FAULTS_LIMIT_LOW_WIDTH                    1
-#define AXIS_FAULTS_LIMIT_HIGH_MASK                    0x00000002u
-#define AXIS_FAULTS_LIMIT_HIGH_SHIFT                   1
-#define AXIS_FAULTS_LIMIT_HIGH_WIDTH                   1
-#define AXIS_FAULTS_ESTOP_MASK                         0x00000004u
-#define AXIS_FAULTS_ESTOP_SHIFT                        2
-#define AXIS_FAULTS_ESTOP_WIDTH                        1
-#define AXIS_FAULTS_FOLLOWING_ERROR_MASK               0x00000008u
-#define AXIS_FAULTS_FOLLOWING_ERROR_SHIFT              3
-#define AXIS_FAULTS_FOLLOWING_ERROR_WIDTH              1
-#define AXIS_FAULTS_ENCODER_MASK                       0x00000010u
-#define AXIS_FAULTS_ENCODER_SHIFT                      4
-#define AXIS_FAULTS_ENCODER_WIDTH                      1
-#define AXIS_FAULTS_BUS_WATCHDOG_MASK                  0x00000020u
-#define AXIS_FAULTS_BUS_WATCHDOG_SHIFT                 5
-#define AXIS_FAULTS_BUS_WATCHDOG_WIDTH                 1
-#define AXIS_FAULTS_DRIVE_MASK                         0x00000040u
-#define AXIS_FAULTS_DRIVE_SHIFT                        6
-#define AXIS_FAULTS_DRIVE_WIDTH                        1
-#define AXIS_FAULTS_CPU_MASK                           0x00000080u
-#define AXIS_FAULTS_CPU_SHIFT                          7
-#define AXIS_FAULTS_CPU_WIDTH                          1
-#define AXIS_FAULTS_PROFILE_UNDERRUN_MASK              0x00000100u
-#define AXIS_FAULTS_PROFILE_UNDERRUN_SHIFT             8
-#define AXIS_FAULTS_PROFILE_UNDERRUN_WIDTH             1
-#define AXIS_FAULTS_STEP_OVERRUN_MASK                  0x00000200u
-#define AXIS_FAULTS_STEP_OVERRUN_SHIFT                 9
-#define AXIS_FAULTS_STEP_OVERRUN_WIDTH                 1
-#define AXIS_CAUSES_NOW                                0x010u  // r: causes that stand now, same order as faults
-#define AXIS_CAUSES_NOW_MASK                           0x000003ffu
-#define AXIS_CAUSES_NOW_SHIFT                          0
-#define AXIS_CAUSES_NOW_WIDTH                          10
-#define AXIS_FIRST_FAULT                               0x014u  // r: the cause that came first, same order as faults; one bit
-#define AXIS_FIRST_FAULT_MASK                          0x000003ffu
-#define AXIS_FIRST_FAULT_SHIFT                         0
-#define AXIS_FIRST_FAULT_WIDTH                         10
-#define AXIS_FAULT_POSITION                            0x018u  // r: position when the first fault latched [1/65536 period]
-#define AXIS_FAULT_POSITION_LOW                        0x018u
-#define AXIS_FAULT_POSITION_HIGH                       0x01cu
-#define AXIS_FAULT_POSITION_WIDTH                      48
-#define AXIS_FOLLOWING_LIMIT                           0x020u  // rw: largest |target - position| while closed_loop; 0 switches the check off [1/65536 period]
-#define AXIS_FOLLOWING_LIMIT_MASK                      0xffffffffu
-#define AXIS_FOLLOWING_LIMIT_SHIFT                     0
-#define AXIS_FOLLOWING_LIMIT_WIDTH                     32
-#define AXIS_POSITION                                  0x028u  // r: position [1/65536 period]
-#define AXIS_POSITION_LOW                              0x028u
-#define AXIS_POSITION_HIGH                             0x02cu
-#define AXIS_POSITION_WIDTH                            48
-#define AXIS_TARGET                                    0x030u  // r: target of the servo [1/65536 period]
-#define AXIS_TARGET_LOW                                0x030u
-#define AXIS_TARGET_HIGH                               0x034u
-#define AXIS_TARGET_WIDTH                              48
-#define AXIS_VELOCITY                                  0x038u  // r: velocity [1/65536 period/tick]
-#define AXIS_VELOCITY_MASK                             0xffffffffu
-#define AXIS_VELOCITY_SHIFT                            0
-#define AXIS_VELOCITY_WIDTH                            32
-#define AXIS_SHIFT_ORIGIN                              0x03cu  // rw: move the origin: position and target both grow by this many whole periods, in one clk [period]
-#define AXIS_SHIFT_ORIGIN_MASK                         0xffffffffu
-#define AXIS_SHIFT_ORIGIN_SHIFT                        0
-#define AXIS_SHIFT_ORIGIN_WIDTH                        32
-#define AXIS_ZERO_CROSSING                             0x040u  // rw: the absolute zero was passed
-#define AXIS_ZERO_CROSSING_UP_MASK                     0x00000001u  // going up; write 1 to clear
-#define AXIS_ZERO_CROSSING_UP_SHIFT                    0
-#define AXIS_ZERO_CROSSING_UP_WIDTH                    1
-#define AXIS_ZERO_CROSSING_DOWN_MASK                   0x00000002u  // going down; write 1 to clear
-#define AXIS_ZERO_CROSSING_DOWN_SHIFT                  1
-#define AXIS_ZERO_CROSSING_DOWN_WIDTH                  1
-#define AXIS_SENSING                                   0x044u  // rw: settings of the sensor path
-#define AXIS_SENSING_DEGLITCH_MASK                     0x0000ffffu  // a level must be stable this long [clk]
-#define AXIS_SENSING_DEGLITCH_SHIFT                    0
-#define AXIS_SENSING_DEGLITCH_WIDTH                    16
-#define AXIS_SENSING_OUTLIER_STEP_MASK                 0x00ff0000u  // limit filter 1: largest step between samples, full scale 2^(W-1); 0: off
-#define AXIS_SENSING_OUTLIER_STEP_SHIFT                16
-#define AXIS_SENSING_OUTLIER_STEP_WIDTH                8
-#define AXIS_SENSING_OUTLIER_HOLD_MASK                 0xff000000u  // samples in a row that limit filter 1 may hold back
-#define AXIS_SENSING_OUTLIER_HOLD_SHIFT                24
-#define AXIS_SENSING_OUTLIER_HOLD_WIDTH                8
-#define AXIS_AMPLITUDE_WINDOW                          0x048u  // rw: amplitude window; full scale 2^(W-1)
-#define AXIS_AMPLITUDE_WINDOW_LOW_MASK                 0x0000ffffu
-#define AXIS_AMPLITUDE_WINDOW_LOW_SHIFT                0
-#define AXIS_AMPLITUDE_WINDOW_LOW_WIDTH                16
-#define AXIS_AMPLITUDE_WINDOW_HIGH_MASK                0xffff0000u
-#define AXIS_AMPLITUDE_WINDOW_HIGH_SHIFT               16
-#define AXIS_AMPLITUDE_WINDOW_HIGH_WIDTH               16
-#define AXIS_DISAGREEMENT_LIMIT                        0x04cu  // rw: largest difference of interpolated position and quadrature count; 0: not checked [1/65536 period]
-#define AXIS_DISAGREEMENT_LIMIT_MASK                   0x000fffffu
-#define AXIS_DISAGREEMENT_LIMIT_SHIFT                  0
-#define AXIS_DISAGREEMENT_LIMIT_WIDTH                  20
-#define AXIS_SAMPLE                                    0x050u  // r: last sample after limit filter 1
-#define AXIS_SAMPLE_SIN_MASK                           0x0000ffffu
-#define AXIS_SAMPLE_SIN_SHIFT                          0
-#define AXIS_SAMPLE_SIN_WIDTH                          16
-#define AXIS_SAMPLE_COS_MASK                           0xffff0000u
-#define AXIS_SAMPLE_COS_SHIFT                          16
-#define AXIS_SAMPLE_COS_WIDTH                          16
-#define AXIS_PHASE                                     0x054u  // r: phase and amplitude of the last sample
-#define AXIS_PHASE_PHASE_MASK                          0x0000ffffu
-#define AXIS_PHASE_PHASE_SHIFT                         0
-#define AXIS_PHASE_PHASE_WIDTH                         16
-#define AXIS_PHASE_AMPLITUDE_MASK                      0xffff0000u
-#define AXIS_PHASE_AMPLITUDE_SHIFT                     16
-#define AXIS_PHASE_AMPLITUDE_WIDTH                     16
-#define AXIS_QUADRATURE_COUNT                          0x058u  // r: count of the quadrature decoder [1/4 period]
-#define AXIS_QUADRATURE_COUNT_MASK                     0xffffffffu
-#define AXIS_QUADRATURE_COUNT_SHIFT                    0
-#define AXIS_QUADRATURE_COUNT_WIDTH                    32
-#define AXIS_ENCODER_EVENTS                            0x05cu  // rw: what was wrong with the sensor since it was last cleared; write 1 to clear
-#define AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_MASK          0x00000001u  // both levels changed at once
-#define AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_SHIFT         0
-#define AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_WIDTH         1
-#define AXIS_ENCODER_EVENTS_OVERSPEED_MASK             0x00000002u  // phase moved more than a quarter period from where it was expected
-#define AXIS_ENCODER_EVENTS_OVERSPEED_SHIFT            1
-#define AXIS_ENCODER_EVENTS_OVERSPEED_WIDTH            1
-#define AXIS_ENCODER_EVENTS_AMPLITUDE_LOW_MASK         0x00000004u
-#define AXIS_ENCODER_EVENTS_AMPLITUDE_LOW_SHIFT        2
-#define AXIS_ENCODER_EVENTS_AMPLITUDE_LOW_WIDTH        1
-#define AXIS_ENCODER_EVENTS_AMPLITUDE_HIGH_MASK        0x00000008u
-#define AXIS_ENCODER_EVENTS_AMPLITUDE_HIGH_SHIFT       3
-#define AXIS_ENCODER_EVENTS_AMPLITUDE_HIGH_WIDTH       1
-#define AXIS_ENCODER_EVENTS_DISAGREEMENT_MASK          0x00000010u  // interpolated position and quadrature count differ
-#define AXIS_ENCODER_EVENTS_DISAGREEMENT_SHIFT         4
-#define AXIS_ENCODER_EVENTS_DISAGREEMENT_WIDTH         1
-#define AXIS_ENCODER_EVENTS_PULSE_TOO_SHORT_MASK       0x00000020u  // decoder_mode 3: a pulse of a, or the gap between two, was too short for the deglitcher: not counted
-#define AXIS_ENCODER_EVENTS_PULSE_TOO_SHORT_SHIFT      5
-#define AXIS_ENCODER_EVENTS_PULSE_TOO_SHORT_WIDTH      1
-#define AXIS_ENCODER_FAULT_MASK                        0x060u  // rw: which encoder events are a fault; same order as encoder_events
-#define AXIS_ENCODER_FAULT_MASK_MASK                   0x0000003fu
-#define AXIS_ENCODER_FAULT_MASK_SHIFT                  0
-#define AXIS_ENCODER_FAULT_MASK_WIDTH                  6
-#define AXIS_REJECTED_PULSES                           0x064u  // rw: pulses that the deglitcher of a or b held back; writing clears
-#define AXIS_REJECTED_PULSES_MASK                      0xffffffffu
-#define AXIS_REJECTED_PULSES_SHIFT                     0
-#define AXIS_REJECTED_PULSES_WIDTH                     32
-#define AXIS_REJECTED_SAMPLES                          0x068u  // rw: samples that limit filter 1 held back; writing clears
-#define AXIS_REJECTED_SAMPLES_MASK                     0xffffffffu
-#define AXIS_REJECTED_SAMPLES_SHIFT                    0
-#define AXIS_REJECTED_SAMPLES_WIDTH                    32
-#define AXIS_KP                                        0x080u  // rw: proportional gain on the error [1/65536 command/(period/65536)]
-#define AXIS_KP_MASK                                   0x00ffffffu
-#define AXIS_KP_SHIFT                                  0
-#define AXIS_KP_WIDTH                                  24
-#define AXIS_KI                                        0x084u  // rw: integral gain, each tick [1/16777216 command/(period/65536)]
-#define AXIS_KI_MASK                                   0x00ffffffu
-#define AXIS_KI_SHIFT                                  0
-#define AXIS_KI_WIDTH                                  24
-#define AXIS_KD                                        0x088u  // rw: derivative gain on the velocity error [1/65536 command/(period/65536/tick)]
-#define AXIS_KD_MASK                                   0x00ffffffu
-#define AXIS_KD_SHIFT                                  0
-#define AXIS_KD_WIDTH                                  24
-#define AXIS_KV                                        0x08cu  // rw: feed-forward of the target velocity [1/65536 command/(period/65536/tick)]
-#define AXIS_KV_MASK                                   0x00ffffffu
-#define AXIS_KV_SHIFT                                  0
-#define AXIS_KV_WIDTH                                  24
-#define AXIS_KA                                        0x090u  // rw: feed-forward of the target acceleration [1/256 command/(period/65536/tick2)]
-#define AXIS_KA_MASK                                   0x00ffffffu
-#define AXIS_KA_SHIFT                                  0
-#define AXIS_KA_WIDTH                                  24
-#define AXIS_SERVO_LIMITS                              0x094u  // rw: limits of the servo; full scale 2^15
-#define AXIS_SERVO_LIMITS_OUTPUT_MASK                  0x00007fffu  // largest |command|
-#define AXIS_SERVO_LIMITS_OUTPUT_SHIFT                 0
-#define AXIS_SERVO_LIMITS_OUTPUT_WIDTH                 15
-#define AXIS_SERVO_LIMITS_INTEGRAL_MASK                0x3fff8000u  // largest |integral term|
-#define AXIS_SERVO_LIMITS_INTEGRAL_SHIFT               15
-#define AXIS_SERVO_LIMITS_INTEGRAL_WIDTH               15
-#define AXIS_DEAD_BAND                                 0x098u  // rw: the integrator rests while |error| is not above this and the profile stands [1/65536 period]
-#define AXIS_DEAD_BAND_MASK                            0x0000ffffu
-#define AXIS_DEAD_BAND_SHIFT                           0
-#define AXIS_DEAD_BAND_WIDTH                           16
-#define AXIS_FOLLOWING_ERROR                           0x09cu  // r: target - position, held inside 32 bits [1/65536 period]
-#define AXIS_FOLLOWING_ERROR_MASK                      0xffffffffu
-#define AXIS_FOLLOWING_ERROR_SHIFT                     0
-#define AXIS_FOLLOWING_ERROR_WIDTH                     32
-#define AXIS_COMMAND                                   0x0a0u  // r: command to the drive as the guard lets it pass
-#define AXIS_COMMAND_MASK                              0x0000ffffu
-#define AXIS_COMMAND_SHIFT                             0
-#define AXIS_COMMAND_WIDTH                             16
-#define AXIS_OPEN_COMMAND                              0x0a4u  // rw: command while closed_loop = 0
-#define AXIS_OPEN_COMMAND_MASK                         0x0000ffffu
-#define AXIS_OPEN_COMMAND_SHIFT                        0
-#define AXIS_OPEN_COMMAND_WIDTH                        16
-#define AXIS_FILTERS                                   0x0a8u  // rw: filters of the servo; a section takes new coefficients only while it is out of use
-#define AXIS_FILTERS_IN_USE_MASK                       0x0000000fu  // bit n: section n filters, else it passes
-#define AXIS_FILTERS_IN_USE_SHIFT                      0
-#define AXIS_FILTERS_IN_USE_WIDTH                      4
-#define AXIS_FILTERS_ADDRESS_MASK                      0x000001f0u  // of the next coefficient: section * 8 + 0: b0, 1: b1, 2: b2, 3: -a1, 4: -a2
-#define AXIS_FILTERS_ADDRESS_SHIFT                     4
-#define AXIS_FILTERS_ADDRESS_WIDTH                     5
-#define AXIS_FILTER_COEFFICIENT                        0x0acu  // rw: coefficient; writing puts it at filters.address
-#define AXIS_FILTER_COEFFICIENT_MASK                   0xffffffffu
-#define AXIS_FILTER_COEFFICIENT_SHIFT                  0
-#define AXIS_FILTER_COEFFICIENT_WIDTH                  32
-#define AXIS_SEGMENT_VELOCITY                          0x0b0u  // rw: velocity at the start of the segment [2^-40 period/tick]
-#define AXIS_SEGMENT_VELOCITY_LOW                      0x0b0u
-#define AXIS_SEGMENT_VELOCITY_HIGH                     0x0b4u
-#define AXIS_SEGMENT_VELOCITY_WIDTH                    64
-#define AXIS_SEGMENT_ACCELERATION                      0x0b8u  // rw: acceleration at the start of the segment [2^-40 period/tick2]
-#define AXIS_SEGMENT_ACCELERATION_LOW                  0x0b8u
-#define AXIS_SEGMENT_ACCELERATION_HIGH                 0x0bcu
-#define AXIS_SEGMENT_ACCELERATION_WIDTH                64
-#define AXIS_SEGMENT_JERK                              0x0c0u  // rw: jerk of the segment [2^-40 period/tick3]
-#define AXIS_SEGMENT_JERK_MASK                         0xffffffffu
-#define AXIS_SEGMENT_JERK_SHIFT                        0
-#define AXIS_SEGMENT_JERK_WIDTH                        32
-#define AXIS_SEGMENT_TICKS                             0x0c4u  // rw: duration of the segment; writing queues it
-#define AXIS_SEGMENT_TICKS_MASK                        0x00ffffffu
-#define AXIS_SEGMENT_TICKS_SHIFT                       0
-#define AXIS_SEGMENT_TICKS_WIDTH                       24
-#define AXIS_SEGMENT_TICKS_LAST_MASK                   0x01000000u  // 1: the profile ends with this segment, 0: another must follow or it is an underrun
-#define AXIS_SEGMENT_TICKS_LAST_SHIFT                  24
-#define AXIS_SEGMENT_TICKS_LAST_WIDTH                  1
-#define AXIS_STOP_DECELERATION                         0x0c8u  // rw: largest acceleration after the strobe brake [2^-32 period/tick2]
-#define AXIS_STOP_DECELERATION_MASK                    0xffffffffu
-#define AXIS_STOP_DECELERATION_SHIFT                   0
-#define AXIS_STOP_DECELERATION_WIDTH                   32
-#define AXIS_STOP_JERK                                 0x0ccu  // rw: largest change of the acceleration then; 0: not limited [2^-40 period/tick3]
-#define AXIS_STOP_JERK_MASK                            0xffffffffu
-#define AXIS_STOP_JERK_SHIFT                           0
-#define AXIS_STOP_JERK_WIDTH                           32
-#define AXIS_FEED_OVERRIDE                             0x0d0u  // rw: how fast profiles are played
-#define AXIS_FEED_OVERRIDE_FRACTION_MASK               0x0001ffffu  // of full speed, 65536 at most
-#define AXIS_FEED_OVERRIDE_FRACTION_SHIFT              0
-#define AXIS_FEED_OVERRIDE_FRACTION_WIDTH              17
-#define AXIS_FEED_OVERRIDE_PAUSE_MASK                  0x00020000u  // 1: stand still in the middle of it
-#define AXIS_FEED_OVERRIDE_PAUSE_SHIFT                 17
-#define AXIS_FEED_OVERRIDE_PAUSE_WIDTH                 1
-#define AXIS_FEED_OVERRIDE_SLOPE                       0x0d4u  // rw: largest change of the override; 0: at once [2^-32 1/tick]
-#define AXIS_FEED_OVERRIDE_SLOPE_MASK                  0xffffffffu
-#define AXIS_FEED_OVERRIDE_SLOPE_SHIFT                 0
-#define AXIS_FEED_OVERRIDE_SLOPE_WIDTH                 32
-#define AXIS_FEED_OVERRIDE_CURVE                       0x0d8u  // rw: largest change of that; 0: not limited [2^-32 1/tick2]
-#define AXIS_FEED_OVERRIDE_CURVE_MASK                  0xffffffffu
-#define AXIS_FEED_OVERRIDE_CURVE_SHIFT                 0
-#define AXIS_FEED_OVERRIDE_CURVE_WIDTH                 32
-#define AXIS_START_AT                                  0x0dcu  // rw: time stamp at which an armed profile starts [clk]
-#define AXIS_START_AT_MASK                             0xffffffffu
-#define AXIS_START_AT_SHIFT                            0
-#define AXIS_START_AT_WIDTH                            32
+// axis: position, servo, profile, drive-enable interlock
+// rw: requests; the interlock decides
+#define AXIS_CONTROL 0x000u
+// requests the drive; the interlock grants it only without a latched fault
+#define AXIS_CONTROL_ENABLE_MASK 0x00000001u
+#define AXIS_CONTROL_ENABLE_SHIFT 0
+#define AXIS_CONTROL_ENABLE_WIDTH 1
+// 1: the servo commands the drive, 0: open_command does
+#define AXIS_CONTROL_CLOSED_LOOP_MASK 0x00000002u
+#define AXIS_CONTROL_CLOSED_LOOP_SHIFT 1
+#define AXIS_CONTROL_CLOSED_LOOP_WIDTH 1
+// homing; 1: a limit switch only blocks motion towards it, 0: it is a fault
+#define AXIS_CONTROL_HOMING_MASK 0x00000004u
+#define AXIS_CONTROL_HOMING_SHIFT 2
+#define AXIS_CONTROL_HOMING_WIDTH 1
+// 1: the fine stage holds; the main command keeps its value. 0: the fine stage returns to its
+// middle
+#define AXIS_CONTROL_FINE_MASK 0x00000008u
+#define AXIS_CONTROL_FINE_SHIFT 3
+#define AXIS_CONTROL_FINE_WIDTH 1
+// w: strobes
+#define AXIS_STROBES 0x004u
+// clears latched faults whose cause is gone; needs enable = 0
+#define AXIS_STROBES_RESET_FAULTS_MASK 0x00000001u
+#define AXIS_STROBES_RESET_FAULTS_SHIFT 0
+#define AXIS_STROBES_RESET_FAULTS_WIDTH 1
+// sets the target to the position, and empties the profile queue
+#define AXIS_STROBES_SET_TARGET_TO_POSITION_MASK 0x00000002u
+#define AXIS_STROBES_SET_TARGET_TO_POSITION_SHIFT 1
+#define AXIS_STROBES_SET_TARGET_TO_POSITION_WIDTH 1
+// plays the queued segments
+#define AXIS_STROBES_START_MASK 0x00000004u
+#define AXIS_STROBES_START_SHIFT 2
+#define AXIS_STROBES_START_WIDTH 1
+// controlled stop: empties the queue, and stops the target within stop_deceleration and stop_jerk
+#define AXIS_STROBES_CONTROLLED_STOP_MASK 0x00000008u
+#define AXIS_STROBES_CONTROLLED_STOP_SHIFT 3
+#define AXIS_STROBES_CONTROLLED_STOP_WIDTH 1
+// plays the queued segments when the time stamp reaches start_at
+#define AXIS_STROBES_ARM_MASK 0x00000010u
+#define AXIS_STROBES_ARM_SHIFT 4
+#define AXIS_STROBES_ARM_WIDTH 1
+// r: state of the axis
+#define AXIS_STATE 0x008u
+// the drive is on
+#define AXIS_STATE_ENABLED_MASK 0x00000001u
+#define AXIS_STATE_ENABLED_SHIFT 0
+#define AXIS_STATE_ENABLED_WIDTH 1
+// switch at the low end, 1: pressed; filtered
+#define AXIS_STATE_LIMIT_LOW_MASK 0x00000002u
+#define AXIS_STATE_LIMIT_LOW_SHIFT 1
+#define AXIS_STATE_LIMIT_LOW_WIDTH 1
+// switch at the high end, 1: pressed; filtered
+#define AXIS_STATE_LIMIT_HIGH_MASK 0x00000004u
+#define AXIS_STATE_LIMIT_HIGH_SHIFT 2
+#define AXIS_STATE_LIMIT_HIGH_WIDTH 1
+// emergency stop, 1: pressed
+#define AXIS_STATE_ESTOP_MASK 0x00000008u
+#define AXIS_STATE_ESTOP_SHIFT 3
+#define AXIS_STATE_ESTOP_WIDTH 1
+// drive fault, 1: the drive reports a fault
+#define AXIS_STATE_DRIVE_FAULT_MASK 0x00000010u
+#define AXIS_STATE_DRIVE_FAULT_SHIFT 4
+#define AXIS_STATE_DRIVE_FAULT_WIDTH 1
+// a profile is being played
+#define AXIS_STATE_MOVING_MASK 0x00000020u
+#define AXIS_STATE_MOVING_SHIFT 5
+#define AXIS_STATE_MOVING_WIDTH 1
+// the command is at its limit
+#define AXIS_STATE_SATURATED_MASK 0x00000040u
+#define AXIS_STATE_SATURATED_SHIFT 6
+#define AXIS_STATE_SATURATED_WIDTH 1
+// segments that can be queued
+#define AXIS_STATE_QUEUE_FREE_MASK 0x00000f80u
+#define AXIS_STATE_QUEUE_FREE_SHIFT 7
+#define AXIS_STATE_QUEUE_FREE_WIDTH 5
+// a profile waits for start_at
+#define AXIS_STATE_ARMED_MASK 0x00001000u
+#define AXIS_STATE_ARMED_SHIFT 12
+#define AXIS_STATE_ARMED_WIDTH 1
+// fine stage at its limit
+#define AXIS_STATE_FINE_SATURATED_MASK 0x00002000u
+#define AXIS_STATE_FINE_SATURATED_SHIFT 13
+#define AXIS_STATE_FINE_SATURATED_WIDTH 1
+// r: latched faults
+#define AXIS_FAULTS 0x00cu
+#define AXIS_FAULTS_LIMIT_LOW_MASK 0x00000001u
+#define AXIS_FAULTS_LIMIT_LOW_SHIFT 0
+#define AXIS_FAULTS_LIMIT_LOW_WIDTH 1
+#define AXIS_FAULTS_LIMIT_HIGH_MASK 0x00000002u
+#define AXIS_FAULTS_LIMIT_HIGH_SHIFT 1
+#define AXIS_FAULTS_LIMIT_HIGH_WIDTH 1
+#define AXIS_FAULTS_ESTOP_MASK 0x00000004u
+#define AXIS_FAULTS_ESTOP_SHIFT 2
+#define AXIS_FAULTS_ESTOP_WIDTH 1
+#define AXIS_FAULTS_FOLLOWING_ERROR_MASK 0x00000008u
+#define AXIS_FAULTS_FOLLOWING_ERROR_SHIFT 3
+#define AXIS_FAULTS_FOLLOWING_ERROR_WIDTH 1
+#define AXIS_FAULTS_ENCODER_MASK 0x00000010u
+#define AXIS_FAULTS_ENCODER_SHIFT 4
+#define AXIS_FAULTS_ENCODER_WIDTH 1
+#define AXIS_FAULTS_BUS_WATCHDOG_MASK 0x00000020u
+#define AXIS_FAULTS_BUS_WATCHDOG_SHIFT 5
+#define AXIS_FAULTS_BUS_WATCHDOG_WIDTH 1
+#define AXIS_FAULTS_DRIVE_MASK 0x00000040u
+#define AXIS_FAULTS_DRIVE_SHIFT 6
+#define AXIS_FAULTS_DRIVE_WIDTH 1
+#define AXIS_FAULTS_CPU_MASK 0x00000080u
+#define AXIS_FAULTS_CPU_SHIFT 7
+#define AXIS_FAULTS_CPU_WIDTH 1
+#define AXIS_FAULTS_PROFILE_UNDERRUN_MASK 0x00000100u
+#define AXIS_FAULTS_PROFILE_UNDERRUN_SHIFT 8
+#define AXIS_FAULTS_PROFILE_UNDERRUN_WIDTH 1
+#define AXIS_FAULTS_STEP_OVERRUN_MASK 0x00000200u
+#define AXIS_FAULTS_STEP_OVERRUN_SHIFT 9
+#define AXIS_FAULTS_STEP_OVERRUN_WIDTH 1
+// r: causes present now, same bits as faults
+#define AXIS_CAUSES_NOW 0x010u
+#define AXIS_CAUSES_NOW_MASK 0x000003ffu
+#define AXIS_CAUSES_NOW_SHIFT 0
+#define AXIS_CAUSES_NOW_WIDTH 10
+// r: cause that came first, same bits as faults; one bit
+#define AXIS_FIRST_FAULT 0x014u
+#define AXIS_FIRST_FAULT_MASK 0x000003ffu
+#define AXIS_FIRST_FAULT_SHIFT 0
+#define AXIS_FIRST_FAULT_WIDTH 10
+// r: position when the first fault was latched [1/65536 period]
+#define AXIS_FAULT_POSITION 0x018u
+#define AXIS_FAULT_POSITION_LOW 0x018u
+#define AXIS_FAULT_POSITION_HIGH 0x01cu
+#define AXIS_FAULT_POSITION_WIDTH 48
+// rw: largest |target - position| in closed loop; 0: not checked [1/65536 period]
+#define AXIS_FOLLOWING_LIMIT 0x020u
+#define AXIS_FOLLOWING_LIMIT_MASK 0xffffffffu
+#define AXIS_FOLLOWING_LIMIT_SHIFT 0
+#define AXIS_FOLLOWING_LIMIT_WIDTH 32
+// r: position [1/65536 period]
+#define AXIS_POSITION 0x028u
+#define AXIS_POSITION_LOW 0x028u
+#define AXIS_POSITION_HIGH 0x02cu
+#define AXIS_POSITION_WIDTH 48
+// r: target of the servo [1/65536 period]
+#define AXIS_TARGET 0x030u
+#define AXIS_TARGET_LOW 0x030u
+#define AXIS_TARGET_HIGH 0x034u
+#define AXIS_TARGET_WIDTH 48
+// r: velocity [1/65536 period/tick]
+#define AXIS_VELOCITY 0x038u
+#define AXIS_VELOCITY_MASK 0xffffffffu
+#define AXIS_VELOCITY_SHIFT 0
+#define AXIS_VELOCITY_WIDTH 32
+// rw: shift of the origin: position and target both grow by this many whole periods, in one cycle
+// [period]
+#define AXIS_SHIFT_ORIGIN 0x03cu
+#define AXIS_SHIFT_ORIGIN_MASK 0xffffffffu
+#define AXIS_SHIFT_ORIGIN_SHIFT 0
+#define AXIS_SHIFT_ORIGIN_WIDTH 32
+// rw: crossing of the absolute zero
+#define AXIS_ZERO_CROSSING 0x040u
+// crossed going up; write 1 to clear
+#define AXIS_ZERO_CROSSING_UP_MASK 0x00000001u
+#define AXIS_ZERO_CROSSING_UP_SHIFT 0
+#define AXIS_ZERO_CROSSING_UP_WIDTH 1
+// crossed going down; write 1 to clear
+#define AXIS_ZERO_CROSSING_DOWN_MASK 0x00000002u
+#define AXIS_ZERO_CROSSING_DOWN_SHIFT 1
+#define AXIS_ZERO_CROSSING_DOWN_WIDTH 1
+// rw: settings of the input filters
+#define AXIS_SENSING 0x044u
+// time that a, b and z must be stable [cycle]
+#define AXIS_SENSING_DEGLITCH_MASK 0x0000ffffu
+#define AXIS_SENSING_DEGLITCH_SHIFT 0
+#define AXIS_SENSING_DEGLITCH_WIDTH 16
+// outlier filter: largest step between two samples, full scale 2^(W-1); 0: off
+#define AXIS_SENSING_OUTLIER_STEP_MASK 0x00ff0000u
+#define AXIS_SENSING_OUTLIER_STEP_SHIFT 16
+#define AXIS_SENSING_OUTLIER_STEP_WIDTH 8
+// most samples held in a row, by the outlier filter
+#define AXIS_SENSING_OUTLIER_HOLD_MASK 0xff000000u
+#define AXIS_SENSING_OUTLIER_HOLD_SHIFT 24
+#define AXIS_SENSING_OUTLIER_HOLD_WIDTH 8
+// rw: amplitude window; full scale 2^(W-1)
+#define AXIS_AMPLITUDE_WINDOW 0x048u
+#define AXIS_AMPLITUDE_WINDOW_LOW_MASK 0x0000ffffu
+#define AXIS_AMPLITUDE_WINDOW_LOW_SHIFT 0
+#define AXIS_AMPLITUDE_WINDOW_LOW_WIDTH 16
+#define AXIS_AMPLITUDE_WINDOW_HIGH_MASK 0xffff0000u
+#define AXIS_AMPLITUDE_WINDOW_HIGH_SHIFT 16
+#define AXIS_AMPLITUDE_WINDOW_HIGH_WIDTH 16
+// rw: largest difference between interpolated position and quadrature count; 0: not checked
+// [1/65536 period]
+#define AXIS_DISAGREEMENT_LIMIT 0x04cu
+#define AXIS_DISAGREEMENT_LIMIT_MASK 0x000fffffu
+#define AXIS_DISAGREEMENT_LIMIT_SHIFT 0
+#define AXIS_DISAGREEMENT_LIMIT_WIDTH 20
+// r: last sample, after the outlier filter; full scale 2^(W-1)
+#define AXIS_SAMPLE 0x050u
+#define AXIS_SAMPLE_SIN_MASK 0x0000ffffu
+#define AXIS_SAMPLE_SIN_SHIFT 0
+#define AXIS_SAMPLE_SIN_WIDTH 16
+#define AXIS_SAMPLE_COS_MASK 0xffff0000u
+#define AXIS_SAMPLE_COS_SHIFT 16
+#define AXIS_SAMPLE_COS_WIDTH 16
+// r: phase and amplitude of the last sample
+#define AXIS_PHASE 0x054u
+#define AXIS_PHASE_PHASE_MASK 0x0000ffffu
+#define AXIS_PHASE_PHASE_SHIFT 0
+#define AXIS_PHASE_PHASE_WIDTH 16
+// amplitude, full scale 2^(W-1)
+#define AXIS_PHASE_AMPLITUDE_MASK 0xffff0000u
+#define AXIS_PHASE_AMPLITUDE_SHIFT 16
+#define AXIS_PHASE_AMPLITUDE_WIDTH 16
+// r: count of the quadrature decoder [1/4 period]
+#define AXIS_QUADRATURE_COUNT 0x058u
+#define AXIS_QUADRATURE_COUNT_MASK 0xffffffffu
+#define AXIS_QUADRATURE_COUNT_SHIFT 0
+#define AXIS_QUADRATURE_COUNT_WIDTH 32
+// rw: encoder events; each one stays until 1 is written to it
+#define AXIS_ENCODER_EVENTS 0x05cu
+// a and b changed at once
+#define AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_MASK 0x00000001u
+#define AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_SHIFT 0
+#define AXIS_ENCODER_EVENTS_ILLEGAL_EDGE_WIDTH 1
+// phase jump: the phase is more than a quarter period away from the predicted one
+#define AXIS_ENCODER_EVENTS_OVERSPEED_MASK 0x00000002u
+#define AXIS_ENCODER_EVENTS_OVERSPEED_SHIFT 1
+#define AXIS_ENCODER_EVENTS_OVERSPEED_WIDTH 1
+#define AXIS_ENCODER_EVENTS_AMPLITUDE_LOW_MASK 0x00000004u
+#define AXIS_ENCODER_EVENTS_AMPLITUDE_LOW_SHIFT 2
+#define AXIS_ENCODER_EVENTS_AMPLITUDE_LOW_WIDTH 1
+#define AXIS_ENCODER_EVENTS_AMPLITUDE_HIGH_MASK 0x00000008u
+#define AXIS_ENCODER_EVENTS_AMPLITUDE_HIGH_SHIFT 3
+#define AXIS_ENCODER_EVENTS_AMPLITUDE_HIGH_WIDTH 1
+// interpolated position and quadrature count differ
+#define AXIS_ENCODER_EVENTS_DISAGREEMENT_MASK 0x00000010u
+#define AXIS_ENCODER_EVENTS_DISAGREEMENT_SHIFT 4
+#define AXIS_ENCODER_EVENTS_DISAGREEMENT_WIDTH 1
+// lost step: in decoder_mode 3 a pulse of a, or the gap between two, was too short for the filter
+// and was not counted
+#define AXIS_ENCODER_EVENTS_PULSE_TOO_SHORT_MASK 0x00000020u
+#define AXIS_ENCODER_EVENTS_PULSE_TOO_SHORT_SHIFT 5
+#define AXIS_ENCODER_EVENTS_PULSE_TOO_SHORT_WIDTH 1
+// rw: encoder events that are a fault; same bits as encoder_events
+#define AXIS_ENCODER_FAULT_MASK 0x060u
+#define AXIS_ENCODER_FAULT_MASK_MASK 0x0000003fu
+#define AXIS_ENCODER_FAULT_MASK_SHIFT 0
+#define AXIS_ENCODER_FAULT_MASK_WIDTH 6
+// rw: pulses of a, b or z that the filter rejected; writing clears the count
+#define AXIS_REJECTED_PULSES 0x064u
+#define AXIS_REJECTED_PULSES_MASK 0xffffffffu
+#define AXIS_REJECTED_PULSES_SHIFT 0
+#define AXIS_REJECTED_PULSES_WIDTH 32
+// rw: samples that the outlier filter rejected; writing clears the count
+#define AXIS_REJECTED_SAMPLES 0x068u
+#define AXIS_REJECTED_SAMPLES_MASK 0xffffffffu
+#define AXIS_REJECTED_SAMPLES_SHIFT 0
+#define AXIS_REJECTED_SAMPLES_WIDTH 32
+// rw: proportional gain on the error [1/65536 command/(period/65536)]
+#define AXIS_KP 0x080u
+#define AXIS_KP_MASK 0x00ffffffu
+#define AXIS_KP_SHIFT 0
+#define AXIS_KP_WIDTH 24
+// rw: integral gain, each tick [1/16777216 command/(period/65536)]
+#define AXIS_KI 0x084u
+#define AXIS_KI_MASK 0x00ffffffu
+#define AXIS_KI_SHIFT 0
+#define AXIS_KI_WIDTH 24
+// rw: derivative gain, on the velocity error [1/65536 command/(period/65536/tick)]
+#define AXIS_KD 0x088u
+#define AXIS_KD_MASK 0x00ffffffu
+#define AXIS_KD_SHIFT 0
+#define AXIS_KD_WIDTH 24
+// rw: velocity feed-forward, on the target velocity [1/65536 command/(period/65536/tick)]
+#define AXIS_KV 0x08cu
+#define AXIS_KV_MASK 0x00ffffffu
+#define AXIS_KV_SHIFT 0
+#define AXIS_KV_WIDTH 24
+// rw: acceleration feed-forward, on the target acceleration [1/256 command/(period/65536/tick2)]
+#define AXIS_KA 0x090u
+#define AXIS_KA_MASK 0x00ffffffu
+#define AXIS_KA_SHIFT 0
+#define AXIS_KA_WIDTH 24
+// rw: limits of the servo; full scale 2^15
+#define AXIS_SERVO_LIMITS 0x094u
+// largest |command|
+#define AXIS_SERVO_LIMITS_OUTPUT_MASK 0x00007fffu
+#define AXIS_SERVO_LIMITS_OUTPUT_SHIFT 0
+#define AXIS_SERVO_LIMITS_OUTPUT_WIDTH 15
+// largest |integral term|
+#define AXIS_SERVO_LIMITS_INTEGRAL_MASK 0x3fff8000u
+#define AXIS_SERVO_LIMITS_INTEGRAL_SHIFT 15
+#define AXIS_SERVO_LIMITS_INTEGRAL_WIDTH 15
+// rw: dead band: the integrator holds while |error| is not above this and no profile is played
+// [1/65536 period]
+#define AXIS_DEAD_BAND 0x098u
+#define AXIS_DEAD_BAND_MASK 0x0000ffffu
+#define AXIS_DEAD_BAND_SHIFT 0
+#define AXIS_DEAD_BAND_WIDTH 16
+// r: target - position, limited to 32 bits [1/65536 period]
+#define AXIS_FOLLOWING_ERROR 0x09cu
+#define AXIS_FOLLOWING_ERROR_MASK 0xffffffffu
+#define AXIS_FOLLOWING_ERROR_SHIFT 0
+#define AXIS_FOLLOWING_ERROR_WIDTH 32
+// r: command to the drive, full scale 2^15, after the interlock
+#define AXIS_COMMAND 0x0a0u
+#define AXIS_COMMAND_MASK 0x0000ffffu
+#define AXIS_COMMAND_SHIFT 0
+#define AXIS_COMMAND_WIDTH 16
+// rw: command while closed_loop = 0
+#define AXIS_OPEN_COMMAND 0x0a4u
+#define AXIS_OPEN_COMMAND_MASK 0x0000ffffu
+#define AXIS_OPEN_COMMAND_SHIFT 0
+#define AXIS_OPEN_COMMAND_WIDTH 16
+// rw: filters of the servo; a section takes new coefficients only while it is not in use
+#define AXIS_FILTERS 0x0a8u
+// bit n: section n filters; else it passes its input
+#define AXIS_FILTERS_IN_USE_MASK 0x0000000fu
+#define AXIS_FILTERS_IN_USE_SHIFT 0
+#define AXIS_FILTERS_IN_USE_WIDTH 4
+// section * 8 + coefficient; 0: b0, 1: b1, 2: b2, 3: -a1, 4: -a2
+#define AXIS_FILTERS_ADDRESS_MASK 0x000001f0u
+#define AXIS_FILTERS_ADDRESS_SHIFT 4
+#define AXIS_FILTERS_ADDRESS_WIDTH 5
+// rw: coefficient; writing stores it at filters.address
+#define AXIS_FILTER_COEFFICIENT 0x0acu
+#define AXIS_FILTER_COEFFICIENT_MASK 0xffffffffu
+#define AXIS_FILTER_COEFFICIENT_SHIFT 0
+#define AXIS_FILTER_COEFFICIENT_WIDTH 32
+// rw: velocity at the start of the segment [2^-40 period/tick]
+#define AXIS_SEGMENT_VELOCITY 0x0b0u
+#define AXIS_SEGMENT_VELOCITY_LOW 0x0b0u
+#define AXIS_SEGMENT_VELOCITY_HIGH 0x0b4u
+#define AXIS_SEGMENT_VELOCITY_WIDTH 64
+// rw: acceleration at the start of the segment [2^-40 period/tick2]
+#define AXIS_SEGMENT_ACCELERATION 0x0b8u
+#define AXIS_SEGMENT_ACCELERATION_LOW 0x0b8u
+#define AXIS_SEGMENT_ACCELERATION_HIGH 0x0bcu
+#define AXIS_SEGMENT_ACCELERATION_WIDTH 64
+// rw: jerk of the segment [2^-40 period/tick3]
+#define AXIS_SEGMENT_JERK 0x0c0u
+#define AXIS_SEGMENT_JERK_MASK 0xffffffffu
+#define AXIS_SEGMENT_JERK_SHIFT 0
+#define AXIS_SEGMENT_JERK_WIDTH 32
+// rw: duration of the segment; writing queues it
+#define AXIS_SEGMENT_TICKS 0x0c4u
+#define AXIS_SEGMENT_TICKS_MASK 0x00ffffffu
+#define AXIS_SEGMENT_TICKS_SHIFT 0
+#define AXIS_SEGMENT_TICKS_WIDTH 24
+// 1: last segment of the profile; 0: another must follow, else it is an underrun
+#define AXIS_SEGMENT_TICKS_LAST_MASK 0x01000000u
+#define AXIS_SEGMENT_TICKS_LAST_SHIFT 24
+#define AXIS_SEGMENT_TICKS_LAST_WIDTH 1
+// rw: largest deceleration of a controlled stop [2^-32 period/tick2]
+#define AXIS_STOP_DECELERATION 0x0c8u
+#define AXIS_STOP_DECELERATION_MASK 0xffffffffu
+#define AXIS_STOP_DECELERATION_SHIFT 0
+#define AXIS_STOP_DECELERATION_WIDTH 32
+// rw: largest jerk of a controlled stop; 0: not limited [2^-40 period/tick3]
+#define AXIS_STOP_JERK 0x0ccu
+#define AXIS_STOP_JERK_MASK 0xffffffffu
+#define AXIS_STOP_JERK_SHIFT 0
+#define AXIS_STOP_JERK_WIDTH 32
+// rw: feed override: the speed at which profiles are played
+#define AXIS_FEED_OVERRIDE 0x0d0u
+// fraction of full speed, 65536 at most
+#define AXIS_FEED_OVERRIDE_FRACTION_MASK 0x0001ffffu
+#define AXIS_FEED_OVERRIDE_FRACTION_SHIFT 0
+#define AXIS_FEED_OVERRIDE_FRACTION_WIDTH 17
+// 1: pause inside the profile
+#define AXIS_FEED_OVERRIDE_PAUSE_MASK 0x00020000u
+#define AXIS_FEED_OVERRIDE_PAUSE_SHIFT 17
+#define AXIS_FEED_OVERRIDE_PAUSE_WIDTH 1
+// rw: largest change of the override; 0: not limited [2^-32 1/tick]
+#define AXIS_FEED_OVERRIDE_SLOPE 0x0d4u
+#define AXIS_FEED_OVERRIDE_SLOPE_MASK 0xffffffffu
+#define AXIS_FEED_OVERRIDE_SLOPE_SHIFT 0
+#define AXIS_FEED_OVERRIDE_SLOPE_WIDTH 32
+// rw: largest change of that slope; 0: not limited [2^-32 1/tick2]
+#define AXIS_FEED_OVERRIDE_CURVE 0x0d8u
+#define AXIS_FEED_OVERRIDE_CURVE_MASK 0xffffffffu
+#define AXIS_FEED_OVERRIDE_CURVE_SHIFT 0
+#define AXIS_FEED_OVERRIDE_CURVE_WIDTH 32
+// rw: time stamp of an armed start [cycle]
+#define AXIS_START_AT 0x0dcu
+#define AXIS_START_AT_MASK 0xffffffffu
+#define AXIS_START_AT_SHIFT 0
+#define AXIS_START_AT_WIDTH 32
 
-// grating: edge filter, index, signal correction and its learner, signal faults, capture, compare
-#define FEEDBACK_EDGE_FILTER                           0x000u  // rw: filter of a, b and index; how many equal samples it wants is axis.sensing.deglitch
-#define FEEDBACK_EDGE_FILTER_SKIP_MASK                 0x0000ffffu  // left out between two samples [clk]
-#define FEEDBACK_EDGE_FILTER_SKIP_SHIFT                0
-#define FEEDBACK_EDGE_FILTER_SKIP_WIDTH                16
-#define FEEDBACK_EDGE_FILTER_TOLERATED_MASK            0x000f0000u  // samples of the old level that may lie between: N of N + tolerated
-#define FEEDBACK_EDGE_FILTER_TOLERATED_SHIFT           16
-#define FEEDBACK_EDGE_FILTER_TOLERATED_WIDTH           4
-#define FEEDBACK_DECODER_MODE                          0x004u  // rw: 0 x4: every edge, 1 x2, 2 x1, 3 pulses and direction. Other than x4 needs disagreement_limit = 0
-#define FEEDBACK_DECODER_MODE_MASK                     0x00000003u
-#define FEEDBACK_DECODER_MODE_SHIFT                    0
-#define FEEDBACK_DECODER_MODE_WIDTH                    2
-#define FEEDBACK_INDEX                                 0x008u  // rw: which index counts
-#define FEEDBACK_INDEX_ACTIVE_LOW_MASK                 0x00000001u  // 1: the index is a low level
-#define FEEDBACK_INDEX_ACTIVE_LOW_SHIFT                0
-#define FEEDBACK_INDEX_ACTIVE_LOW_WIDTH                1
-#define FEEDBACK_INDEX_GATE_MASK_MASK                  0x00000006u  // {b, a}: 1: needs the level in gate
-#define FEEDBACK_INDEX_GATE_MASK_SHIFT                 1
-#define FEEDBACK_INDEX_GATE_MASK_WIDTH                 2
-#define FEEDBACK_INDEX_GATE_MASK                       0x00000018u  // {b, a}
-#define FEEDBACK_INDEX_GATE_SHIFT                      3
-#define FEEDBACK_INDEX_GATE_WIDTH                      2
-#define FEEDBACK_INDEX_UP_MASK                         0x00000020u  // met going up
-#define FEEDBACK_INDEX_UP_SHIFT                        5
-#define FEEDBACK_INDEX_UP_WIDTH                        1
-#define FEEDBACK_INDEX_DOWN_MASK                       0x00000040u  // met going down
-#define FEEDBACK_INDEX_DOWN_SHIFT                      6
-#define FEEDBACK_INDEX_DOWN_WIDTH                      1
-#define FEEDBACK_INDEX_EACH_MASK                       0x00000080u  // 1: every index, 0: one for each arm
-#define FEEDBACK_INDEX_EACH_SHIFT                      7
-#define FEEDBACK_INDEX_EACH_WIDTH                      1
-#define FEEDBACK_COUNTS_PER_REVOLUTION                 0x00cu  // rw: edges between two indices; 0: not checked
-#define FEEDBACK_COUNTS_PER_REVOLUTION_MASK            0xffffffffu
-#define FEEDBACK_COUNTS_PER_REVOLUTION_SHIFT           0
-#define FEEDBACK_COUNTS_PER_REVOLUTION_WIDTH           32
-#define FEEDBACK_STROBES                               0x010u  // w: strobes
-#define FEEDBACK_STROBES_ARM_INDEX_MASK                0x00000001u  // take the next index
-#define FEEDBACK_STROBES_ARM_INDEX_SHIFT               0
-#define FEEDBACK_STROBES_ARM_INDEX_WIDTH               1
-#define FEEDBACK_STROBES_LOAD_CORRECTION_MASK          0x00000002u  // take the four correction values, for all samples from here on
-#define FEEDBACK_STROBES_LOAD_CORRECTION_SHIFT         1
-#define FEEDBACK_STROBES_LOAD_CORRECTION_WIDTH         1
-#define FEEDBACK_STROBES_SWAP_HARMONICS_MASK           0x00000004u  // the harmonic table just written comes into force
-#define FEEDBACK_STROBES_SWAP_HARMONICS_SHIFT          2
-#define FEEDBACK_STROBES_SWAP_HARMONICS_WIDTH          1
-#define FEEDBACK_STROBES_RECORD_MASK                   0x00000008u  // record a new burst
-#define FEEDBACK_STROBES_RECORD_SHIFT                  3
-#define FEEDBACK_STROBES_RECORD_WIDTH                  1
-#define FEEDBACK_STROBES_CLEAR_SIGNAL_FAULTS_MASK      0x00000010u  // forget the first signal fault
-#define FEEDBACK_STROBES_CLEAR_SIGNAL_FAULTS_SHIFT     4
-#define FEEDBACK_STROBES_CLEAR_SIGNAL_FAULTS_WIDTH     1
-#define FEEDBACK_STROBES_CAPTURE_NOW_MASK              0x00000020u  // capture now
-#define FEEDBACK_STROBES_CAPTURE_NOW_SHIFT             5
-#define FEEDBACK_STROBES_CAPTURE_NOW_WIDTH             1
-#define FEEDBACK_STROBES_CAPTURE_NEXT_MASK             0x00000040u  // done with the oldest capture
-#define FEEDBACK_STROBES_CAPTURE_NEXT_SHIFT            6
-#define FEEDBACK_STROBES_CAPTURE_NEXT_WIDTH            1
-#define FEEDBACK_STROBES_CAPTURE_CLEAR_MASK            0x00000080u  // forget all captures
-#define FEEDBACK_STROBES_CAPTURE_CLEAR_SHIFT           7
-#define FEEDBACK_STROBES_CAPTURE_CLEAR_WIDTH           1
-#define FEEDBACK_STROBES_COMPARE_ARM_MASK              0x00000100u  // begin with the first compare point
-#define FEEDBACK_STROBES_COMPARE_ARM_SHIFT             8
-#define FEEDBACK_STROBES_COMPARE_ARM_WIDTH             1
-#define FEEDBACK_STROBES_COMPARE_DISARM_MASK           0x00000200u  // no more compare points
-#define FEEDBACK_STROBES_COMPARE_DISARM_SHIFT          9
-#define FEEDBACK_STROBES_COMPARE_DISARM_WIDTH          1
-#define FEEDBACK_INDEX_EVENTS                          0x014u  // rw: what the index did; write 1 to clear
-#define FEEDBACK_INDEX_EVENTS_FOUND_MASK               0x00000001u
-#define FEEDBACK_INDEX_EVENTS_FOUND_SHIFT              0
-#define FEEDBACK_INDEX_EVENTS_FOUND_WIDTH              1
-#define FEEDBACK_INDEX_EVENTS_REVOLUTION_WRONG_MASK    0x00000002u  // neither 0 nor counts_per_revolution since the index before
-#define FEEDBACK_INDEX_EVENTS_REVOLUTION_WRONG_SHIFT   1
-#define FEEDBACK_INDEX_EVENTS_REVOLUTION_WRONG_WIDTH   1
-#define FEEDBACK_INDEX_EVENTS_ARMED_MASK               0x00000004u
-#define FEEDBACK_INDEX_EVENTS_ARMED_SHIFT              2
-#define FEEDBACK_INDEX_EVENTS_ARMED_WIDTH              1
-#define FEEDBACK_INDEX_COUNT                           0x018u  // r: quadrature count at the last index [1/4 period]
-#define FEEDBACK_INDEX_COUNT_MASK                      0xffffffffu
-#define FEEDBACK_INDEX_COUNT_SHIFT                     0
-#define FEEDBACK_INDEX_COUNT_WIDTH                     32
-#define FEEDBACK_EDGE_TIME                             0x01cu  // r: time of the last counted edge [clk]
-#define FEEDBACK_EDGE_TIME_MASK                        0xffffffffu
-#define FEEDBACK_EDGE_TIME_SHIFT                       0
-#define FEEDBACK_EDGE_TIME_WIDTH                       32
-#define FEEDBACK_CORRECTION_OFFSET                     0x020u  // rw: offsets; full scale 2^15
-#define FEEDBACK_CORRECTION_OFFSET_SIN_MASK            0x0000ffffu
-#define FEEDBACK_CORRECTION_OFFSET_SIN_SHIFT           0
-#define FEEDBACK_CORRECTION_OFFSET_SIN_WIDTH           16
-#define FEEDBACK_CORRECTION_OFFSET_COS_MASK            0xffff0000u
-#define FEEDBACK_CORRECTION_OFFSET_COS_SHIFT           16
-#define FEEDBACK_CORRECTION_OFFSET_COS_WIDTH           16
-#define FEEDBACK_CORRECTION_GAIN                       0x024u  // rw: gain of the sine
-#define FEEDBACK_CORRECTION_GAIN_MASK                  0x0001ffffu
-#define FEEDBACK_CORRECTION_GAIN_SHIFT                 0
-#define FEEDBACK_CORRECTION_GAIN_WIDTH                 17
-#define FEEDBACK_CORRECTION_QUADRATURE_ERROR           0x028u  // rw: cosine in the sine
-#define FEEDBACK_CORRECTION_QUADRATURE_ERROR_MASK      0x0001ffffu
-#define FEEDBACK_CORRECTION_QUADRATURE_ERROR_SHIFT     0
-#define FEEDBACK_CORRECTION_QUADRATURE_ERROR_WIDTH     17
-#define FEEDBACK_HARMONIC_ENABLE                       0x02cu  // rw: 1: the harmonic table is subtracted
-#define FEEDBACK_HARMONIC_ENABLE_MASK                  0x00000001u
-#define FEEDBACK_HARMONIC_ENABLE_SHIFT                 0
-#define FEEDBACK_HARMONIC_ENABLE_WIDTH                 1
-#define FEEDBACK_HARMONIC_POINT                        0x030u  // rw: one point of the harmonic table that is not in force; writing puts it there
-#define FEEDBACK_HARMONIC_POINT_MASK                   0x0003ffffu
-#define FEEDBACK_HARMONIC_POINT_SHIFT                  0
-#define FEEDBACK_HARMONIC_POINT_WIDTH                  18
-#define FEEDBACK_HARMONIC_POINT_POINT_MASK             0x03fc0000u
-#define FEEDBACK_HARMONIC_POINT_POINT_SHIFT            18
-#define FEEDBACK_HARMONIC_POINT_POINT_WIDTH            8
-#define FEEDBACK_RECORDER                              0x034u  // rw: what the recorder keeps
-#define FEEDBACK_RECORDER_DECIMATION_MASK              0x0000ffffu  // one of so many
-#define FEEDBACK_RECORDER_DECIMATION_SHIFT             0
-#define FEEDBACK_RECORDER_DECIMATION_WIDTH             16
-#define FEEDBACK_RECORDER_PHASES_MASK                  0x00010000u  // 1: phases, 0: samples
-#define FEEDBACK_RECORDER_PHASES_SHIFT                 16
-#define FEEDBACK_RECORDER_PHASES_WIDTH                 1
-#define FEEDBACK_RECORDER_STATE                        0x038u  // r: the burst
-#define FEEDBACK_RECORDER_STATE_FULL_MASK              0x00000001u  // complete
-#define FEEDBACK_RECORDER_STATE_FULL_SHIFT             0
-#define FEEDBACK_RECORDER_STATE_FULL_WIDTH             1
-#define FEEDBACK_RECORDER_STATE_INVALID_MASK           0x00000002u  // the amplitude left its window meanwhile
-#define FEEDBACK_RECORDER_STATE_INVALID_SHIFT          1
-#define FEEDBACK_RECORDER_STATE_INVALID_WIDTH          1
-#define FEEDBACK_RECORDER_WORD                         0x03cu  // r: one word of the burst; reading goes on to the next
-#define FEEDBACK_RECORDER_WORD_MASK                    0xffffffffu
-#define FEEDBACK_RECORDER_WORD_SHIFT                   0
-#define FEEDBACK_RECORDER_WORD_WIDTH                   32
-#define FEEDBACK_SIGNAL_FAULTS                         0x040u  // r: signal faults that stand now
-#define FEEDBACK_SIGNAL_FAULTS_MASK                    0x00007fffu
-#define FEEDBACK_SIGNAL_FAULTS_SHIFT                   0
-#define FEEDBACK_SIGNAL_FAULTS_WIDTH                   15
-#define FEEDBACK_FIRST_SIGNAL_FAULTS                   0x044u  // r: those that came first
-#define FEEDBACK_FIRST_SIGNAL_FAULTS_MASK              0x00007fffu
-#define FEEDBACK_FIRST_SIGNAL_FAULTS_SHIFT             0
-#define FEEDBACK_FIRST_SIGNAL_FAULTS_WIDTH             15
-#define FEEDBACK_SIGNAL_FAULT_MASK                     0x048u  // rw: which signal faults take the drive
-#define FEEDBACK_SIGNAL_FAULT_MASK_MASK                0x00007fffu
-#define FEEDBACK_SIGNAL_FAULT_MASK_SHIFT               0
-#define FEEDBACK_SIGNAL_FAULT_MASK_WIDTH               15
-#define FEEDBACK_LISSAJOUS_LIMITS                      0x04cu  // rw: codes and circle
-#define FEEDBACK_LISSAJOUS_LIMITS_CLIP_LEVEL_MASK      0x0000ffffu
-#define FEEDBACK_LISSAJOUS_LIMITS_CLIP_LEVEL_SHIFT     0
-#define FEEDBACK_LISSAJOUS_LIMITS_CLIP_LEVEL_WIDTH     16
-#define FEEDBACK_LISSAJOUS_LIMITS_TOLERANCE_MASK       0xffff0000u
-#define FEEDBACK_LISSAJOUS_LIMITS_TOLERANCE_SHIFT      16
-#define FEEDBACK_LISSAJOUS_LIMITS_TOLERANCE_WIDTH      16
-#define FEEDBACK_JUMP_LIMITS                           0x050u  // rw: steps and stillness
-#define FEEDBACK_JUMP_LIMITS_JUMP_MASK                 0x0000ffffu
-#define FEEDBACK_JUMP_LIMITS_JUMP_SHIFT                0
-#define FEEDBACK_JUMP_LIMITS_JUMP_WIDTH                16
-#define FEEDBACK_JUMP_LIMITS_NO_NOISE_SAMPLES_MASK     0xffff0000u  // samples with one code; 0: any number
-#define FEEDBACK_JUMP_LIMITS_NO_NOISE_SAMPLES_SHIFT    16
-#define FEEDBACK_JUMP_LIMITS_NO_NOISE_SAMPLES_WIDTH    16
-#define FEEDBACK_CHANNEL_LIMITS                        0x054u  // rw: a leg that does not move
-#define FEEDBACK_CHANNEL_LIMITS_SPAN_MASK              0x0000ffffu
-#define FEEDBACK_CHANNEL_LIMITS_SPAN_SHIFT             0
-#define FEEDBACK_CHANNEL_LIMITS_SPAN_WIDTH             16
-#define FEEDBACK_CHANNEL_LIMITS_BAND_MASK              0x00ff0000u
-#define FEEDBACK_CHANNEL_LIMITS_BAND_SHIFT             16
-#define FEEDBACK_CHANNEL_LIMITS_BAND_WIDTH             8
-#define FEEDBACK_DRIFT_LIMITS                          0x058u  // rw: drifts
-#define FEEDBACK_DRIFT_LIMITS_OFFSET_MASK              0x0000ffffu
-#define FEEDBACK_DRIFT_LIMITS_OFFSET_SHIFT             0
-#define FEEDBACK_DRIFT_LIMITS_OFFSET_WIDTH             16
-#define FEEDBACK_DRIFT_LIMITS_BALANCE_MASK             0xffff0000u
-#define FEEDBACK_DRIFT_LIMITS_BALANCE_SHIFT            16
-#define FEEDBACK_DRIFT_LIMITS_BALANCE_WIDTH            16
-#define FEEDBACK_QUADRATURE_LIMITS                     0x05cu  // rw: phase error and comparators
+// feedback channel: edge filter, index, signal correction, calibration, signal faults, capture,
+// compare
+// rw: filter of a, b and z; axis.sensing.deglitch is the number of equal samples that it requires
+#define FEEDBACK_EDGE_FILTER 0x000u
+// cycles left out between two samples [cycle]
+#define FEEDBACK_EDGE_FILTER_SKIP_MASK 0x0000ffffu
+#define FEEDBACK_EDGE_FILTER_SKIP_SHIFT 0
+#define FEEDBACK_EDGE_FILTER_SKIP_WIDTH 16
+// tolerated samples, of the old level: N of N + tolerated must agree
+#define FEEDBACK_EDGE_FILTER_TOLERATED_MASK 0x000f0000u
+#define FEEDBACK_EDGE_FILTER_TOLERATED_SHIFT 16
+#define FEEDBACK_EDGE_FILTER_TOLERATED_WIDTH 4
+// rw: 0 x4, 1 x2, 2 x1, 3 step and direction; all but x4 need disagreement_limit = 0
+#define FEEDBACK_DECODER_MODE 0x004u
+#define FEEDBACK_DECODER_MODE_MASK 0x00000003u
+#define FEEDBACK_DECODER_MODE_SHIFT 0
+#define FEEDBACK_DECODER_MODE_WIDTH 2
+// rw: which index is used
+#define FEEDBACK_INDEX 0x008u
+// 1: the index is active low
+#define FEEDBACK_INDEX_ACTIVE_LOW_MASK 0x00000001u
+#define FEEDBACK_INDEX_ACTIVE_LOW_SHIFT 0
+#define FEEDBACK_INDEX_ACTIVE_LOW_WIDTH 1
+// {b, a}, 1: it must equal gate
+#define FEEDBACK_INDEX_GATE_MASK_MASK 0x00000006u
+#define FEEDBACK_INDEX_GATE_MASK_SHIFT 1
+#define FEEDBACK_INDEX_GATE_MASK_WIDTH 2
+// {b, a}, levels at the index
+#define FEEDBACK_INDEX_GATE_MASK 0x00000018u
+#define FEEDBACK_INDEX_GATE_SHIFT 3
+#define FEEDBACK_INDEX_GATE_WIDTH 2
+// 1: use an index going up
+#define FEEDBACK_INDEX_UP_MASK 0x00000020u
+#define FEEDBACK_INDEX_UP_SHIFT 5
+#define FEEDBACK_INDEX_UP_WIDTH 1
+// 1: use an index going down
+#define FEEDBACK_INDEX_DOWN_MASK 0x00000040u
+#define FEEDBACK_INDEX_DOWN_SHIFT 6
+#define FEEDBACK_INDEX_DOWN_WIDTH 1
+// 1: every index; 0: one for each arm_index
+#define FEEDBACK_INDEX_EACH_MASK 0x00000080u
+#define FEEDBACK_INDEX_EACH_SHIFT 7
+#define FEEDBACK_INDEX_EACH_WIDTH 1
+// rw: edges between two indexes; 0: not checked
+#define FEEDBACK_COUNTS_PER_REVOLUTION 0x00cu
+#define FEEDBACK_COUNTS_PER_REVOLUTION_MASK 0xffffffffu
+#define FEEDBACK_COUNTS_PER_REVOLUTION_SHIFT 0
+#define FEEDBACK_COUNTS_PER_REVOLUTION_WIDTH 32
+// w: strobes
+#define FEEDBACK_STROBES 0x010u
+// arms the index, so that the next one is used
+#define FEEDBACK_STROBES_ARM_INDEX_MASK 0x00000001u
+#define FEEDBACK_STROBES_ARM_INDEX_SHIFT 0
+#define FEEDBACK_STROBES_ARM_INDEX_WIDTH 1
+// loads the correction, that is the four values, for all samples from here on
+#define FEEDBACK_STROBES_LOAD_CORRECTION_MASK 0x00000002u
+#define FEEDBACK_STROBES_LOAD_CORRECTION_SHIFT 1
+#define FEEDBACK_STROBES_LOAD_CORRECTION_WIDTH 1
+// uses the new harmonic table, which was written before
+#define FEEDBACK_STROBES_SWAP_HARMONICS_MASK 0x00000004u
+#define FEEDBACK_STROBES_SWAP_HARMONICS_SHIFT 2
+#define FEEDBACK_STROBES_SWAP_HARMONICS_WIDTH 1
+// records a new burst
+#define FEEDBACK_STROBES_RECORD_MASK 0x00000008u
+#define FEEDBACK_STROBES_RECORD_SHIFT 3
+#define FEEDBACK_STROBES_RECORD_WIDTH 1
+// clears the first signal fault
+#define FEEDBACK_STROBES_CLEAR_SIGNAL_FAULTS_MASK 0x00000010u
+#define FEEDBACK_STROBES_CLEAR_SIGNAL_FAULTS_SHIFT 4
+#define FEEDBACK_STROBES_CLEAR_SIGNAL_FAULTS_WIDTH 1
+// captures now
+#define FEEDBACK_STROBES_CAPTURE_NOW_MASK 0x00000020u
+#define FEEDBACK_STROBES_CAPTURE_NOW_SHIFT 5
+#define FEEDBACK_STROBES_CAPTURE_NOW_WIDTH 1
+// drops the oldest capture
+#define FEEDBACK_STROBES_CAPTURE_NEXT_MASK 0x00000040u
+#define FEEDBACK_STROBES_CAPTURE_NEXT_SHIFT 6
+#define FEEDBACK_STROBES_CAPTURE_NEXT_WIDTH 1
+// drops all captures
+#define FEEDBACK_STROBES_CAPTURE_CLEAR_MASK 0x00000080u
+#define FEEDBACK_STROBES_CAPTURE_CLEAR_SHIFT 7
+#define FEEDBACK_STROBES_CAPTURE_CLEAR_WIDTH 1
+// arms compare at its first point
+#define FEEDBACK_STROBES_COMPARE_ARM_MASK 0x00000100u
+#define FEEDBACK_STROBES_COMPARE_ARM_SHIFT 8
+#define FEEDBACK_STROBES_COMPARE_ARM_WIDTH 1
+// disarms compare
+#define FEEDBACK_STROBES_COMPARE_DISARM_MASK 0x00000200u
+#define FEEDBACK_STROBES_COMPARE_DISARM_SHIFT 9
+#define FEEDBACK_STROBES_COMPARE_DISARM_WIDTH 1
+// rw: index events; write 1 to clear
+#define FEEDBACK_INDEX_EVENTS 0x014u
+#define FEEDBACK_INDEX_EVENTS_FOUND_MASK 0x00000001u
+#define FEEDBACK_INDEX_EVENTS_FOUND_SHIFT 0
+#define FEEDBACK_INDEX_EVENTS_FOUND_WIDTH 1
+// wrong count since the index before, neither 0 nor counts_per_revolution
+#define FEEDBACK_INDEX_EVENTS_REVOLUTION_WRONG_MASK 0x00000002u
+#define FEEDBACK_INDEX_EVENTS_REVOLUTION_WRONG_SHIFT 1
+#define FEEDBACK_INDEX_EVENTS_REVOLUTION_WRONG_WIDTH 1
+#define FEEDBACK_INDEX_EVENTS_ARMED_MASK 0x00000004u
+#define FEEDBACK_INDEX_EVENTS_ARMED_SHIFT 2
+#define FEEDBACK_INDEX_EVENTS_ARMED_WIDTH 1
+// r: quadrature count at the last index [1/4 period]
+#define FEEDBACK_INDEX_COUNT 0x018u
+#define FEEDBACK_INDEX_COUNT_MASK 0xffffffffu
+#define FEEDBACK_INDEX_COUNT_SHIFT 0
+#define FEEDBACK_INDEX_COUNT_WIDTH 32
+// r: time of the last counted edge [cycle]
+#define FEEDBACK_EDGE_TIME 0x01cu
+#define FEEDBACK_EDGE_TIME_MASK 0xffffffffu
+#define FEEDBACK_EDGE_TIME_SHIFT 0
+#define FEEDBACK_EDGE_TIME_WIDTH 32
+// rw: offsets, full scale 2^15
+#define FEEDBACK_CORRECTION_OFFSET 0x020u
+#define FEEDBACK_CORRECTION_OFFSET_SIN_MASK 0x0000ffffu
+#define FEEDBACK_CORRECTION_OFFSET_SIN_SHIFT 0
+#define FEEDBACK_CORRECTION_OFFSET_SIN_WIDTH 16
+#define FEEDBACK_CORRECTION_OFFSET_COS_MASK 0xffff0000u
+#define FEEDBACK_CORRECTION_OFFSET_COS_SHIFT 16
+#define FEEDBACK_CORRECTION_OFFSET_COS_WIDTH 16
+// rw: gain of the sine
+#define FEEDBACK_CORRECTION_GAIN 0x024u
+#define FEEDBACK_CORRECTION_GAIN_MASK 0x0001ffffu
+#define FEEDBACK_CORRECTION_GAIN_SHIFT 0
+#define FEEDBACK_CORRECTION_GAIN_WIDTH 17
+// rw: quadrature error: part of the cosine in the sine
+#define FEEDBACK_CORRECTION_QUADRATURE_ERROR 0x028u
+#define FEEDBACK_CORRECTION_QUADRATURE_ERROR_MASK 0x0001ffffu
+#define FEEDBACK_CORRECTION_QUADRATURE_ERROR_SHIFT 0
+#define FEEDBACK_CORRECTION_QUADRATURE_ERROR_WIDTH 17
+// rw: 1: the harmonic table is subtracted
+#define FEEDBACK_HARMONIC_ENABLE 0x02cu
+#define FEEDBACK_HARMONIC_ENABLE_MASK 0x00000001u
+#define FEEDBACK_HARMONIC_ENABLE_SHIFT 0
+#define FEEDBACK_HARMONIC_ENABLE_WIDTH 1
+// rw: point of the harmonic table that is not in use; writing stores it
+#define FEEDBACK_HARMONIC_POINT 0x030u
+#define FEEDBACK_HARMONIC_POINT_MASK 0x0003ffffu
+#define FEEDBACK_HARMONIC_POINT_SHIFT 0
+#define FEEDBACK_HARMONIC_POINT_WIDTH 18
+#define FEEDBACK_HARMONIC_POINT_POINT_MASK 0x03fc0000u
+#define FEEDBACK_HARMONIC_POINT_POINT_SHIFT 18
+#define FEEDBACK_HARMONIC_POINT_POINT_WIDTH 8
+// rw: what the recorder stores
+#define FEEDBACK_RECORDER 0x034u
+// one sample out of so many
+#define FEEDBACK_RECORDER_DECIMATION_MASK 0x0000ffffu
+#define FEEDBACK_RECORDER_DECIMATION_SHIFT 0
+#define FEEDBACK_RECORDER_DECIMATION_WIDTH 16
+// 1: phases, 0: samples
+#define FEEDBACK_RECORDER_PHASES_MASK 0x00010000u
+#define FEEDBACK_RECORDER_PHASES_SHIFT 16
+#define FEEDBACK_RECORDER_PHASES_WIDTH 1
+// r: state of the burst
+#define FEEDBACK_RECORDER_STATE 0x038u
+// the burst is complete
+#define FEEDBACK_RECORDER_STATE_FULL_MASK 0x00000001u
+#define FEEDBACK_RECORDER_STATE_FULL_SHIFT 0
+#define FEEDBACK_RECORDER_STATE_FULL_WIDTH 1
+// the signal was disturbed, out of its amplitude window or too fast
+#define FEEDBACK_RECORDER_STATE_INVALID_MASK 0x00000002u
+#define FEEDBACK_RECORDER_STATE_INVALID_SHIFT 1
+#define FEEDBACK_RECORDER_STATE_INVALID_WIDTH 1
+// r: word of the burst; reading advances to the next one
+#define FEEDBACK_RECORDER_WORD 0x03cu
+#define FEEDBACK_RECORDER_WORD_MASK 0xffffffffu
+#define FEEDBACK_RECORDER_WORD_SHIFT 0
+#define FEEDBACK_RECORDER_WORD_WIDTH 32
+// r: signal faults present now
+#define FEEDBACK_SIGNAL_FAULTS 0x040u
+#define FEEDBACK_SIGNAL_FAULTS_MASK 0x00007fffu
+#define FEEDBACK_SIGNAL_FAULTS_SHIFT 0
+#define FEEDBACK_SIGNAL_FAULTS_WIDTH 15
+// r: signal faults that came first
+#define FEEDBACK_FIRST_SIGNAL_FAULTS 0x044u
+#define FEEDBACK_FIRST_SIGNAL_FAULTS_MASK 0x00007fffu
+#define FEEDBACK_FIRST_SIGNAL_FAULTS_SHIFT 0
+#define FEEDBACK_FIRST_SIGNAL_FAULTS_WIDTH 15
+// rw: faults that stop the drive; bits as in signal_faults
+#define FEEDBACK_SIGNAL_FAULT_MASK 0x048u
+#define FEEDBACK_SIGNAL_FAULT_MASK_MASK 0x00007fffu
+#define FEEDBACK_SIGNAL_FAULT_MASK_SHIFT 0
+#define FEEDBACK_SIGNAL_FAULT_MASK_WIDTH 15
+// rw: ADC counts; clipping and the circle of the signals
+#define FEEDBACK_LISSAJOUS_LIMITS 0x04cu
+#define FEEDBACK_LISSAJOUS_LIMITS_CLIP_LEVEL_MASK 0x0000ffffu
+#define FEEDBACK_LISSAJOUS_LIMITS_CLIP_LEVEL_SHIFT 0
+#define FEEDBACK_LISSAJOUS_LIMITS_CLIP_LEVEL_WIDTH 16
+#define FEEDBACK_LISSAJOUS_LIMITS_TOLERANCE_MASK 0xffff0000u
+#define FEEDBACK_LISSAJOUS_LIMITS_TOLERANCE_SHIFT 16
+#define FEEDBACK_LISSAJOUS_LIMITS_TOLERANCE_WIDTH 16
+// rw: ADC counts; jumps and missing noise
+#define FEEDBACK_JUMP_LIMITS 0x050u
+#define FEEDBACK_JUMP_LIMITS_JUMP_MASK 0x0000ffffu
+#define FEEDBACK_JUMP_LIMITS_JUMP_SHIFT 0
+#define FEEDBACK_JUMP_LIMITS_JUMP_WIDTH 16
+// samples with one code; 0: any number
+#define FEEDBACK_JUMP_LIMITS_NO_NOISE_SAMPLES_MASK 0xffff0000u
+#define FEEDBACK_JUMP_LIMITS_NO_NOISE_SAMPLES_SHIFT 16
+#define FEEDBACK_JUMP_LIMITS_NO_NOISE_SAMPLES_WIDTH 16
+// rw: ADC counts; a channel that does not change
+#define FEEDBACK_CHANNEL_LIMITS 0x054u
+#define FEEDBACK_CHANNEL_LIMITS_SPAN_MASK 0x0000ffffu
+#define FEEDBACK_CHANNEL_LIMITS_SPAN_SHIFT 0
+#define FEEDBACK_CHANNEL_LIMITS_SPAN_WIDTH 16
+#define FEEDBACK_CHANNEL_LIMITS_BAND_MASK 0x00ff0000u
+#define FEEDBACK_CHANNEL_LIMITS_BAND_SHIFT 16
+#define FEEDBACK_CHANNEL_LIMITS_BAND_WIDTH 8
+// rw: ADC counts; drift of offset and balance
+#define FEEDBACK_DRIFT_LIMITS 0x058u
+#define FEEDBACK_DRIFT_LIMITS_OFFSET_MASK 0x0000ffffu
+#define FEEDBACK_DRIFT_LIMITS_OFFSET_SHIFT 0
+#define FEEDBACK_DRIFT_LIMITS_OFFSET_WIDTH 16
+#define FEEDBACK_DRIFT_LIMITS_BALANCE_MASK 0xffff0000u
+#define FEEDBACK_DRIFT_LIMITS_BALANCE_SHIFT 16
+#define FEEDBACK_DRIFT_LIMITS_BALANCE_WIDTH 16
+// rw: ADC counts; phase error and comparators
+#define FEEDBACK_QUADRATURE_LIMITS 0x05cu
 #define FEEDBACK_QUADRATURE_LIMITS_QUADRATURE_ERROR_MASK 0x0000ffffu
 #define FEEDBACK_QUADRATURE_LIMITS_QUADRATURE_ERROR_SHIFT 0
 #define FEEDBACK_QUADRATURE_LIMITS_QUADRATURE_ERROR_WIDTH 16
 #define FEEDBACK_QUADRATURE_LIMITS_SIGN_THRESHOLD_MASK 0xffff0000u
 #define FEEDBACK_QUADRATURE_LIMITS_SIGN_THRESHOLD_SHIFT 16
 #define FEEDBACK_QUADRATURE_LIMITS_SIGN_THRESHOLD_WIDTH 16
-#define FEEDBACK_CAPTURE_SOURCES                       0x060u  // rw: sources: index, tick, software or a mark of the line, rising probe 0, 1, falling probe 0, 1
-#define FEEDBACK_CAPTURE_SOURCES_MASK                  0x0000007fu
-#define FEEDBACK_CAPTURE_SOURCES_SHIFT                 0
-#define FEEDBACK_CAPTURE_SOURCES_WIDTH                 7
-#define FEEDBACK_CAPTURE_STATE                         0x064u  // rw: captures
-#define FEEDBACK_CAPTURE_STATE_PRESENT_MASK            0x00000001u  // captured_* are the oldest
-#define FEEDBACK_CAPTURE_STATE_PRESENT_SHIFT           0
-#define FEEDBACK_CAPTURE_STATE_PRESENT_WIDTH           1
-#define FEEDBACK_CAPTURE_STATE_FREE_MASK               0x0000003eu  // captures that still fit
-#define FEEDBACK_CAPTURE_STATE_FREE_SHIFT              1
-#define FEEDBACK_CAPTURE_STATE_FREE_WIDTH              5
-#define FEEDBACK_CAPTURE_STATE_OVERRUN_MASK            0x00000040u  // an event was dropped; write 1 to clear
-#define FEEDBACK_CAPTURE_STATE_OVERRUN_SHIFT           6
-#define FEEDBACK_CAPTURE_STATE_OVERRUN_WIDTH           1
-#define FEEDBACK_CAPTURED                              0x068u  // r: the oldest capture
-#define FEEDBACK_CAPTURED_SOURCES_MASK                 0x0000007fu
-#define FEEDBACK_CAPTURED_SOURCES_SHIFT                0
-#define FEEDBACK_CAPTURED_SOURCES_WIDTH                7
-#define FEEDBACK_CAPTURED_AGE_MASK                     0x007fff80u  // since its position came [clk]
-#define FEEDBACK_CAPTURED_AGE_SHIFT                    7
-#define FEEDBACK_CAPTURED_AGE_WIDTH                    16
-#define FEEDBACK_CAPTURED_TIME                         0x06cu  // r: its time [clk]
-#define FEEDBACK_CAPTURED_TIME_MASK                    0xffffffffu
-#define FEEDBACK_CAPTURED_TIME_SHIFT                   0
-#define FEEDBACK_CAPTURED_TIME_WIDTH                   32
-#define FEEDBACK_CAPTURED_POSITION                     0x070u  // r: its position [1/65536 period]
-#define FEEDBACK_CAPTURED_POSITION_LOW                 0x070u
-#define FEEDBACK_CAPTURED_POSITION_HIGH                0x074u
-#define FEEDBACK_CAPTURED_POSITION_WIDTH               48
-#define FEEDBACK_COMPARE_START                         0x078u  // rw: first point [1/65536 period]
-#define FEEDBACK_COMPARE_START_LOW                     0x078u
-#define FEEDBACK_COMPARE_START_HIGH                    0x07cu
-#define FEEDBACK_COMPARE_START_WIDTH                   48
-#define FEEDBACK_COMPARE_STEP                          0x080u  // rw: distance of the points; its sign is the direction [1/65536 period]
-#define FEEDBACK_COMPARE_STEP_LOW                      0x080u
-#define FEEDBACK_COMPARE_STEP_HIGH                     0x084u
-#define FEEDBACK_COMPARE_STEP_WIDTH                    48
-#define FEEDBACK_COMPARE_COUNT                         0x088u  // rw: points; 0: no end
-#define FEEDBACK_COMPARE_COUNT_MASK                    0xffffffffu
-#define FEEDBACK_COMPARE_COUNT_SHIFT                   0
-#define FEEDBACK_COMPARE_COUNT_WIDTH                   32
-#define FEEDBACK_COMPARE_PULSE                         0x08cu  // rw: pulse [clk]
-#define FEEDBACK_COMPARE_PULSE_MASK                    0x00ffffffu
-#define FEEDBACK_COMPARE_PULSE_SHIFT                   0
-#define FEEDBACK_COMPARE_PULSE_WIDTH                   24
-#define FEEDBACK_COMPARE_GAP                           0x090u  // rw: shortest gap [clk]
-#define FEEDBACK_COMPARE_GAP_MASK                      0x00ffffffu
-#define FEEDBACK_COMPARE_GAP_SHIFT                     0
-#define FEEDBACK_COMPARE_GAP_WIDTH                     24
-#define FEEDBACK_COMPARE_STATE                         0x094u  // rw: compare
-#define FEEDBACK_COMPARE_STATE_ARMED_MASK              0x00000001u
-#define FEEDBACK_COMPARE_STATE_ARMED_SHIFT             0
-#define FEEDBACK_COMPARE_STATE_ARMED_WIDTH             1
-#define FEEDBACK_COMPARE_STATE_LATE_MASK               0x00000002u  // a pulse had to wait for the one before it; write 1 to clear
-#define FEEDBACK_COMPARE_STATE_LATE_SHIFT              1
-#define FEEDBACK_COMPARE_STATE_LATE_WIDTH              1
-#define FEEDBACK_COMPARE_PASSED                        0x098u  // r: points passed since arm
-#define FEEDBACK_COMPARE_PASSED_MASK                   0xffffffffu
-#define FEEDBACK_COMPARE_PASSED_SHIFT                  0
-#define FEEDBACK_COMPARE_PASSED_WIDTH                  32
-#define FEEDBACK_VELOCITY_QUANTUM                      0x09cu  // rw: what the position moves by at once; 0: velocity is the way of the tick [1/65536 period]
-#define FEEDBACK_VELOCITY_QUANTUM_MASK                 0x0000ffffu
-#define FEEDBACK_VELOCITY_QUANTUM_SHIFT                0
-#define FEEDBACK_VELOCITY_QUANTUM_WIDTH                16
-#define FEEDBACK_VELOCITY_FINE                         0x0a0u  // r: velocity with all its bits [2^-24 period/tick]
-#define FEEDBACK_VELOCITY_FINE_LOW                     0x0a0u
-#define FEEDBACK_VELOCITY_FINE_HIGH                    0x0a4u
-#define FEEDBACK_VELOCITY_FINE_WIDTH                   40
-#define FEEDBACK_POSITION_SOURCE                       0x0a8u  // rw: what the position is made of
-#define FEEDBACK_POSITION_SOURCE_COUNTS_MASK           0x00000001u  // 0: phases of sine and cosine, 1: counts of a and b, a quarter period each
-#define FEEDBACK_POSITION_SOURCE_COUNTS_SHIFT          0
-#define FEEDBACK_POSITION_SOURCE_COUNTS_WIDTH          1
-#define FEEDBACK_POSITION_SOURCE_STEPS_MASK            0x00000002u  // 1: the axis' own step and direction take the place of the pins a and b
-#define FEEDBACK_POSITION_SOURCE_STEPS_SHIFT           1
-#define FEEDBACK_POSITION_SOURCE_STEPS_WIDTH           1
-#define FEEDBACK_POSITION_SOURCE_SINE_MASK             0x00000004u  // 1: sine and cosine were built, 0: the position is made of counts whatever `counts` says
-#define FEEDBACK_POSITION_SOURCE_SINE_SHIFT            2
-#define FEEDBACK_POSITION_SOURCE_SINE_WIDTH            1
-#define FEEDBACK_ALIGN                                 0x0acu  // rw: with counts: move position and phase by this, -2 to 2; the target does not follow [1/4 period]
-#define FEEDBACK_ALIGN_MASK                            0x00000007u
-#define FEEDBACK_ALIGN_SHIFT                           0
-#define FEEDBACK_ALIGN_WIDTH                           3
-#define FEEDBACK_SEGMENT_USE                           0x0b0u  // w: use of the segment table; position and target take its steps together
-#define FEEDBACK_SEGMENT_USE_ENABLE_MASK               0x00000001u  // 1: positions are corrected
-#define FEEDBACK_SEGMENT_USE_ENABLE_SHIFT              0
-#define FEEDBACK_SEGMENT_USE_ENABLE_WIDTH              1
-#define FEEDBACK_SEGMENT_USE_LINEAR_MASK               0x00000002u  // 0: a segment has the mean of its borders, 1: the straight line between them
-#define FEEDBACK_SEGMENT_USE_LINEAR_SHIFT              1
-#define FEEDBACK_SEGMENT_USE_LINEAR_WIDTH              1
-#define FEEDBACK_SEGMENT_USE_SEGMENTS_MASK             0x000003fcu
-#define FEEDBACK_SEGMENT_USE_SEGMENTS_SHIFT            2
-#define FEEDBACK_SEGMENT_USE_SEGMENTS_WIDTH            8
-#define FEEDBACK_SEGMENT_STATE                         0x0b4u  // r: what the segment table does
-#define FEEDBACK_SEGMENT_STATE_BUILT_MASK              0x000000ffu  // most segments; 0: it was not built
-#define FEEDBACK_SEGMENT_STATE_BUILT_SHIFT             0
-#define FEEDBACK_SEGMENT_STATE_BUILT_WIDTH             8
-#define FEEDBACK_SEGMENT_STATE_IN_FORCE_MASK           0x00000100u  // positions are corrected
-#define FEEDBACK_SEGMENT_STATE_IN_FORCE_SHIFT          8
-#define FEEDBACK_SEGMENT_STATE_IN_FORCE_WIDTH          1
-#define FEEDBACK_SEGMENT_STATE_OUTSIDE_MASK            0x00000200u  // the position is beyond the table, the error that of its border
-#define FEEDBACK_SEGMENT_STATE_OUTSIDE_SHIFT           9
-#define FEEDBACK_SEGMENT_STATE_OUTSIDE_WIDTH           1
-#define FEEDBACK_SEGMENT_STATE_KNOWN_MASK              0x00000400u  // segment_stored is the point that was asked for
-#define FEEDBACK_SEGMENT_STATE_KNOWN_SHIFT             10
-#define FEEDBACK_SEGMENT_STATE_KNOWN_WIDTH             1
-#define FEEDBACK_SEGMENT_ORIGIN                        0x0b8u  // w: position of the first border; moves with the origin from when it is written [1/65536 period]
-#define FEEDBACK_SEGMENT_ORIGIN_LOW                    0x0b8u
-#define FEEDBACK_SEGMENT_ORIGIN_HIGH                   0x0bcu
-#define FEEDBACK_SEGMENT_ORIGIN_WIDTH                  48
-#define FEEDBACK_SEGMENT_LENGTH                        0x0c0u  // w: length of a segment [1/65536 period]
-#define FEEDBACK_SEGMENT_LENGTH_LOW                    0x0c0u
-#define FEEDBACK_SEGMENT_LENGTH_HIGH                   0x0c4u
-#define FEEDBACK_SEGMENT_LENGTH_WIDTH                  48
-#define FEEDBACK_SEGMENT_POINT                         0x0c8u  // w: position at a border less the true one; writing puts it there
-#define FEEDBACK_SEGMENT_POINT_MASK                    0x00ffffffu
-#define FEEDBACK_SEGMENT_POINT_SHIFT                   0
-#define FEEDBACK_SEGMENT_POINT_WIDTH                   24
-#define FEEDBACK_SEGMENT_POINT_BORDER_MASK             0xff000000u
-#define FEEDBACK_SEGMENT_POINT_BORDER_SHIFT            24
-#define FEEDBACK_SEGMENT_POINT_BORDER_WIDTH            8
-#define FEEDBACK_SEGMENT_READ                          0x0ccu  // w: border whose point is wanted back: border
-#define FEEDBACK_SEGMENT_READ_BORDER_MASK              0x000000ffu
-#define FEEDBACK_SEGMENT_READ_BORDER_SHIFT             0
-#define FEEDBACK_SEGMENT_READ_BORDER_WIDTH             8
-#define FEEDBACK_SEGMENT_STORED                        0x0d0u  // r: that point, once segment_state.known stands [1/65536 period]
-#define FEEDBACK_SEGMENT_STORED_MASK                   0x00ffffffu
-#define FEEDBACK_SEGMENT_STORED_SHIFT                  0
-#define FEEDBACK_SEGMENT_STORED_WIDTH                  24
-#define FEEDBACK_SEGMENT_ERROR                         0x0d4u  // r: what is taken off the position now [1/65536 period]
-#define FEEDBACK_SEGMENT_ERROR_MASK                    0x00ffffffu
-#define FEEDBACK_SEGMENT_ERROR_SHIFT                   0
-#define FEEDBACK_SEGMENT_ERROR_WIDTH                   24
+// rw: sources that capture; bit 0 index, 1 tick, 2 software or sync pulse, 3 and 4 rising probe 0
+// and 1, 5 and 6 falling probe 0 and 1
+#define FEEDBACK_CAPTURE_SOURCES 0x060u
+#define FEEDBACK_CAPTURE_SOURCES_MASK 0x0000007fu
+#define FEEDBACK_CAPTURE_SOURCES_SHIFT 0
+#define FEEDBACK_CAPTURE_SOURCES_WIDTH 7
+// rw: state of the captures
+#define FEEDBACK_CAPTURE_STATE 0x064u
+// a capture waits in captured_*
+#define FEEDBACK_CAPTURE_STATE_PRESENT_MASK 0x00000001u
+#define FEEDBACK_CAPTURE_STATE_PRESENT_SHIFT 0
+#define FEEDBACK_CAPTURE_STATE_PRESENT_WIDTH 1
+// captures that still fit
+#define FEEDBACK_CAPTURE_STATE_FREE_MASK 0x0000003eu
+#define FEEDBACK_CAPTURE_STATE_FREE_SHIFT 1
+#define FEEDBACK_CAPTURE_STATE_FREE_WIDTH 5
+// an event was dropped; write 1 to clear
+#define FEEDBACK_CAPTURE_STATE_OVERRUN_MASK 0x00000040u
+#define FEEDBACK_CAPTURE_STATE_OVERRUN_SHIFT 6
+#define FEEDBACK_CAPTURE_STATE_OVERRUN_WIDTH 1
+// r: oldest capture
+#define FEEDBACK_CAPTURED 0x068u
+#define FEEDBACK_CAPTURED_SOURCES_MASK 0x0000007fu
+#define FEEDBACK_CAPTURED_SOURCES_SHIFT 0
+#define FEEDBACK_CAPTURED_SOURCES_WIDTH 7
+// time since its position was new [cycle]
+#define FEEDBACK_CAPTURED_AGE_MASK 0x007fff80u
+#define FEEDBACK_CAPTURED_AGE_SHIFT 7
+#define FEEDBACK_CAPTURED_AGE_WIDTH 16
+// r: time of the oldest capture [cycle]
+#define FEEDBACK_CAPTURED_TIME 0x06cu
+#define FEEDBACK_CAPTURED_TIME_MASK 0xffffffffu
+#define FEEDBACK_CAPTURED_TIME_SHIFT 0
+#define FEEDBACK_CAPTURED_TIME_WIDTH 32
+// r: position of the oldest capture [1/65536 period]
+#define FEEDBACK_CAPTURED_POSITION 0x070u
+#define FEEDBACK_CAPTURED_POSITION_LOW 0x070u
+#define FEEDBACK_CAPTURED_POSITION_HIGH 0x074u
+#define FEEDBACK_CAPTURED_POSITION_WIDTH 48
+// rw: first compare point [1/65536 period]
+#define FEEDBACK_COMPARE_START 0x078u
+#define FEEDBACK_COMPARE_START_LOW 0x078u
+#define FEEDBACK_COMPARE_START_HIGH 0x07cu
+#define FEEDBACK_COMPARE_START_WIDTH 48
+// rw: distance between two points; its sign is the direction [1/65536 period]
+#define FEEDBACK_COMPARE_STEP 0x080u
+#define FEEDBACK_COMPARE_STEP_LOW 0x080u
+#define FEEDBACK_COMPARE_STEP_HIGH 0x084u
+#define FEEDBACK_COMPARE_STEP_WIDTH 48
+// rw: number of points; 0: no end
+#define FEEDBACK_COMPARE_COUNT 0x088u
+#define FEEDBACK_COMPARE_COUNT_MASK 0xffffffffu
+#define FEEDBACK_COMPARE_COUNT_SHIFT 0
+#define FEEDBACK_COMPARE_COUNT_WIDTH 32
+// rw: length of a pulse [cycle]
+#define FEEDBACK_COMPARE_PULSE 0x08cu
+#define FEEDBACK_COMPARE_PULSE_MASK 0x00ffffffu
+#define FEEDBACK_COMPARE_PULSE_SHIFT 0
+#define FEEDBACK_COMPARE_PULSE_WIDTH 24
+// rw: shortest gap between two pulses [cycle]
+#define FEEDBACK_COMPARE_GAP 0x090u
+#define FEEDBACK_COMPARE_GAP_MASK 0x00ffffffu
+#define FEEDBACK_COMPARE_GAP_SHIFT 0
+#define FEEDBACK_COMPARE_GAP_WIDTH 24
+// rw: state of compare
+#define FEEDBACK_COMPARE_STATE 0x094u
+#define FEEDBACK_COMPARE_STATE_ARMED_MASK 0x00000001u
+#define FEEDBACK_COMPARE_STATE_ARMED_SHIFT 0
+#define FEEDBACK_COMPARE_STATE_ARMED_WIDTH 1
+// a pulse had to wait for the one before it; write 1 to clear
+#define FEEDBACK_COMPARE_STATE_LATE_MASK 0x00000002u
+#define FEEDBACK_COMPARE_STATE_LATE_SHIFT 1
+#define FEEDBACK_COMPARE_STATE_LATE_WIDTH 1
+// r: points passed, since compare_arm
+#define FEEDBACK_COMPARE_PASSED 0x098u
+#define FEEDBACK_COMPARE_PASSED_MASK 0xffffffffu
+#define FEEDBACK_COMPARE_PASSED_SHIFT 0
+#define FEEDBACK_COMPARE_PASSED_WIDTH 32
+// rw: smallest step of the position; 0: the velocity is the distance of one tick [1/65536 period]
+#define FEEDBACK_VELOCITY_QUANTUM 0x09cu
+#define FEEDBACK_VELOCITY_QUANTUM_MASK 0x0000ffffu
+#define FEEDBACK_VELOCITY_QUANTUM_SHIFT 0
+#define FEEDBACK_VELOCITY_QUANTUM_WIDTH 16
+// r: velocity with all its bits [2^-24 period/tick]
+#define FEEDBACK_VELOCITY_FINE 0x0a0u
+#define FEEDBACK_VELOCITY_FINE_LOW 0x0a0u
+#define FEEDBACK_VELOCITY_FINE_HIGH 0x0a4u
+#define FEEDBACK_VELOCITY_FINE_WIDTH 40
+// rw: what the position is made of
+#define FEEDBACK_POSITION_SOURCE 0x0a8u
+// 1: counts of a and b, 0: phases; a count is a quarter period
+#define FEEDBACK_POSITION_SOURCE_COUNTS_MASK 0x00000001u
+#define FEEDBACK_POSITION_SOURCE_COUNTS_SHIFT 0
+#define FEEDBACK_POSITION_SOURCE_COUNTS_WIDTH 1
+// 1: own steps of the axis replace the pins a and b
+#define FEEDBACK_POSITION_SOURCE_STEPS_MASK 0x00000002u
+#define FEEDBACK_POSITION_SOURCE_STEPS_SHIFT 1
+#define FEEDBACK_POSITION_SOURCE_STEPS_WIDTH 1
+// 1: sine and cosine are built; 0: the position is made of counts, whatever `counts` says
+#define FEEDBACK_POSITION_SOURCE_SINE_MASK 0x00000004u
+#define FEEDBACK_POSITION_SOURCE_SINE_SHIFT 2
+#define FEEDBACK_POSITION_SOURCE_SINE_WIDTH 1
+// rw: shift of position and phase, -2 to 2 counts, in the mode of counts; the target does not
+// follow [1/4 period]
+#define FEEDBACK_ALIGN 0x0acu
+#define FEEDBACK_ALIGN_MASK 0x00000007u
+#define FEEDBACK_ALIGN_SHIFT 0
+#define FEEDBACK_ALIGN_WIDTH 3
+// w: use of the segment table; a change moves position and target together
+#define FEEDBACK_SEGMENT_USE 0x0b0u
+// 1: positions are corrected
+#define FEEDBACK_SEGMENT_USE_ENABLE_MASK 0x00000001u
+#define FEEDBACK_SEGMENT_USE_ENABLE_SHIFT 0
+#define FEEDBACK_SEGMENT_USE_ENABLE_WIDTH 1
+// 1: straight lines between borders; 0: a segment has the mean of its borders
+#define FEEDBACK_SEGMENT_USE_LINEAR_MASK 0x00000002u
+#define FEEDBACK_SEGMENT_USE_LINEAR_SHIFT 1
+#define FEEDBACK_SEGMENT_USE_LINEAR_WIDTH 1
+#define FEEDBACK_SEGMENT_USE_SEGMENTS_MASK 0x000003fcu
+#define FEEDBACK_SEGMENT_USE_SEGMENTS_SHIFT 2
+#define FEEDBACK_SEGMENT_USE_SEGMENTS_WIDTH 8
+// r: state of the segment table
+#define FEEDBACK_SEGMENT_STATE 0x0b4u
+// most segments; 0: not built
+#define FEEDBACK_SEGMENT_STATE_BUILT_MASK 0x000000ffu
+#define FEEDBACK_SEGMENT_STATE_BUILT_SHIFT 0
+#define FEEDBACK_SEGMENT_STATE_BUILT_WIDTH 8
+// positions are corrected
+#define FEEDBACK_SEGMENT_STATE_IN_FORCE_MASK 0x00000100u
+#define FEEDBACK_SEGMENT_STATE_IN_FORCE_SHIFT 8
+#define FEEDBACK_SEGMENT_STATE_IN_FORCE_WIDTH 1
+// beyond the table, where the error of its border is used
+#define FEEDBACK_SEGMENT_STATE_OUTSIDE_MASK 0x00000200u
+#define FEEDBACK_SEGMENT_STATE_OUTSIDE_SHIFT 9
+#define FEEDBACK_SEGMENT_STATE_OUTSIDE_WIDTH 1
+// 1: segment_stored is valid, for the border in segment_read
+#define FEEDBACK_SEGMENT_STATE_KNOWN_MASK 0x00000400u
+#define FEEDBACK_SEGMENT_STATE_KNOWN_SHIFT 10
+#define FEEDBACK_SEGMENT_STATE_KNOWN_WIDTH 1
+// w: position of the first border; it moves with the origin after it is written [1/65536 period]
+#define FEEDBACK_SEGMENT_ORIGIN 0x0b8u
+#define FEEDBACK_SEGMENT_ORIGIN_LOW 0x0b8u
+#define FEEDBACK_SEGMENT_ORIGIN_HIGH 0x0bcu
+#define FEEDBACK_SEGMENT_ORIGIN_WIDTH 48
+// w: length of a segment [1/65536 period]
+#define FEEDBACK_SEGMENT_LENGTH 0x0c0u
+#define FEEDBACK_SEGMENT_LENGTH_LOW 0x0c0u
+#define FEEDBACK_SEGMENT_LENGTH_HIGH 0x0c4u
+#define FEEDBACK_SEGMENT_LENGTH_WIDTH 48
+// w: position at a border less the true position, that is its error; writing stores it
+#define FEEDBACK_SEGMENT_POINT 0x0c8u
+#define FEEDBACK_SEGMENT_POINT_MASK 0x00ffffffu
+#define FEEDBACK_SEGMENT_POINT_SHIFT 0
+#define FEEDBACK_SEGMENT_POINT_WIDTH 24
+// border of the point
+#define FEEDBACK_SEGMENT_POINT_BORDER_MASK 0xff000000u
+#define FEEDBACK_SEGMENT_POINT_BORDER_SHIFT 24
+#define FEEDBACK_SEGMENT_POINT_BORDER_WIDTH 8
+// w: border to read back: border
+#define FEEDBACK_SEGMENT_READ 0x0ccu
+#define FEEDBACK_SEGMENT_READ_BORDER_MASK 0x000000ffu
+#define FEEDBACK_SEGMENT_READ_BORDER_SHIFT 0
+#define FEEDBACK_SEGMENT_READ_BORDER_WIDTH 8
+// r: error at that border, valid while segment_state.known is 1 [1/65536 period]
+#define FEEDBACK_SEGMENT_STORED 0x0d0u
+#define FEEDBACK_SEGMENT_STORED_MASK 0x00ffffffu
+#define FEEDBACK_SEGMENT_STORED_SHIFT 0
+#define FEEDBACK_SEGMENT_STORED_WIDTH 24
+// r: error subtracted from the position now [1/65536 period]
+#define FEEDBACK_SEGMENT_ERROR 0x0d4u
+#define FEEDBACK_SEGMENT_ERROR_MASK 0x00ffffffu
+#define FEEDBACK_SEGMENT_ERROR_SHIFT 0
+#define FEEDBACK_SEGMENT_ERROR_WIDTH 24
 
-// actuator: what the command goes to, bridge, steps or converter, and the fine stage
-#define ACTUATOR_DRIVE                                 0x000u  // rw: the drive
-#define ACTUATOR_DRIVE_KIND_MASK                       0x00000003u  // 0: bridge, 1: steps, 2: converter
-#define ACTUATOR_DRIVE_KIND_SHIFT                      0
-#define ACTUATOR_DRIVE_KIND_WIDTH                      2
-#define ACTUATOR_DRIVE_BUILT_MASK                      0x0000003cu  // what was built: bit 0 bridge, 1 steps, 2 converter, 3 fine stage
-#define ACTUATOR_DRIVE_BUILT_SHIFT                     2
-#define ACTUATOR_DRIVE_BUILT_WIDTH                     4
-#define ACTUATOR_PWM_PERIOD                            0x004u  // rw: PWM period of the bridge [clk]
-#define ACTUATOR_PWM_PERIOD_MASK                       0x0000ffffu
-#define ACTUATOR_PWM_PERIOD_SHIFT                      0
-#define ACTUATOR_PWM_PERIOD_WIDTH                      16
-#define ACTUATOR_STEP_PULSE                            0x008u  // rw: shortest times of a step pulse
-#define ACTUATOR_STEP_PULSE_HIGH_MASK                  0x00003fffu
-#define ACTUATOR_STEP_PULSE_HIGH_SHIFT                 0
-#define ACTUATOR_STEP_PULSE_HIGH_WIDTH                 14
-#define ACTUATOR_STEP_PULSE_LOW_MASK                   0x0fffc000u
-#define ACTUATOR_STEP_PULSE_LOW_SHIFT                  14
-#define ACTUATOR_STEP_PULSE_LOW_WIDTH                  14
-#define ACTUATOR_STEP_DIRECTION                        0x00cu  // rw: shortest times of the direction before and after a step pulse
-#define ACTUATOR_STEP_DIRECTION_SETUP_MASK             0x00003fffu
-#define ACTUATOR_STEP_DIRECTION_SETUP_SHIFT            0
-#define ACTUATOR_STEP_DIRECTION_SETUP_WIDTH            14
-#define ACTUATOR_STEP_DIRECTION_HOLD_MASK              0x0fffc000u
-#define ACTUATOR_STEP_DIRECTION_HOLD_SHIFT             14
-#define ACTUATOR_STEP_DIRECTION_HOLD_WIDTH             14
-#define ACTUATOR_STEP_OUTPUT                           0x010u  // rw: how steps are put out; taken while the drive is off
-#define ACTUATOR_STEP_OUTPUT_MODE_MASK                 0x00000003u  // 0: step and direction, 1: quadrature, 2: pulses up and pulses down
-#define ACTUATOR_STEP_OUTPUT_MODE_SHIFT                0
-#define ACTUATOR_STEP_OUTPUT_MODE_WIDTH                2
-#define ACTUATOR_STEP_OUTPUT_STEP_LOW_MASK             0x00000004u  // 1: step is active low
-#define ACTUATOR_STEP_OUTPUT_STEP_LOW_SHIFT            2
-#define ACTUATOR_STEP_OUTPUT_STEP_LOW_WIDTH            1
-#define ACTUATOR_STEP_OUTPUT_DIRECTION_LOW_MASK        0x00000008u  // 1: direction is low going up
-#define ACTUATOR_STEP_OUTPUT_DIRECTION_LOW_SHIFT       3
-#define ACTUATOR_STEP_OUTPUT_DIRECTION_LOW_WIDTH       1
-#define ACTUATOR_STEP_OUTPUT_TRIM_MASK                 0x000000f0u  // the command moves the target by command * 2^trim LSB of position
-#define ACTUATOR_STEP_OUTPUT_TRIM_SHIFT                4
-#define ACTUATOR_STEP_OUTPUT_TRIM_WIDTH                4
-#define ACTUATOR_STEP_RATIO                            0x018u  // rw: steps in one period; the sign turns the direction [2^-32 step/period]
-#define ACTUATOR_STEP_RATIO_LOW                        0x018u
-#define ACTUATOR_STEP_RATIO_HIGH                       0x01cu
-#define ACTUATOR_STEP_RATIO_WIDTH                      48
-#define ACTUATOR_STEPS                                 0x020u  // r: steps on the wire since reset [step]
-#define ACTUATOR_STEPS_MASK                            0xffffffffu
-#define ACTUATOR_STEPS_SHIFT                           0
-#define ACTUATOR_STEPS_WIDTH                           32
-#define ACTUATOR_DAC                                   0x024u  // rw: frames to the converter
-#define ACTUATOR_DAC_HALF_PERIOD_MASK                  0x000000ffu  // half a period of its clock; 0 counts as 1 [clk]
-#define ACTUATOR_DAC_HALF_PERIOD_SHIFT                 0
-#define ACTUATOR_DAC_HALF_PERIOD_WIDTH                 8
-#define ACTUATOR_DAC_REFRESH_MASK                      0x00ffff00u  // after so long without one the last is sent again [clk]
-#define ACTUATOR_DAC_REFRESH_SHIFT                     8
-#define ACTUATOR_DAC_REFRESH_WIDTH                     16
-#define ACTUATOR_DAC_TRIM                              0x028u  // rw: added to each word
-#define ACTUATOR_DAC_TRIM_MASK                         0x0000ffffu
-#define ACTUATOR_DAC_TRIM_SHIFT                        0
-#define ACTUATOR_DAC_TRIM_WIDTH                        16
-#define ACTUATOR_FINE_KP                               0x030u  // rw: proportional gain of the fine stage [1/65536 command/(period/65536)]
-#define ACTUATOR_FINE_KP_MASK                          0x00ffffffu
-#define ACTUATOR_FINE_KP_SHIFT                         0
-#define ACTUATOR_FINE_KP_WIDTH                         24
-#define ACTUATOR_FINE_KI                               0x034u  // rw: its integral gain, each tick [1/16777216 command/(period/65536)]
-#define ACTUATOR_FINE_KI_MASK                          0x00ffffffu
-#define ACTUATOR_FINE_KI_SHIFT                         0
-#define ACTUATOR_FINE_KI_WIDTH                         24
-#define ACTUATOR_FINE_LIMIT                            0x038u  // rw: its largest |command|
-#define ACTUATOR_FINE_LIMIT_MASK                       0x00007fffu
-#define ACTUATOR_FINE_LIMIT_SHIFT                      0
-#define ACTUATOR_FINE_LIMIT_WIDTH                      15
-#define ACTUATOR_FINE_COMMAND                          0x03cu  // r: its command
-#define ACTUATOR_FINE_COMMAND_MASK                     0x0000ffffu
-#define ACTUATOR_FINE_COMMAND_SHIFT                    0
-#define ACTUATOR_FINE_COMMAND_WIDTH                    16
+// actuator: bridge, stepper driver or DAC, and the fine stage
+// rw: kind of drive
+#define ACTUATOR_DRIVE 0x000u
+// 0 bridge, 1 stepper, 2 DAC
+#define ACTUATOR_DRIVE_KIND_MASK 0x00000003u
+#define ACTUATOR_DRIVE_KIND_SHIFT 0
+#define ACTUATOR_DRIVE_KIND_WIDTH 2
+// what is built: bit 0 bridge, 1 stepper, 2 DAC, 3 fine stage
+#define ACTUATOR_DRIVE_BUILT_MASK 0x0000003cu
+#define ACTUATOR_DRIVE_BUILT_SHIFT 2
+#define ACTUATOR_DRIVE_BUILT_WIDTH 4
+// rw: PWM period of the bridge [cycle]
+#define ACTUATOR_PWM_PERIOD 0x004u
+#define ACTUATOR_PWM_PERIOD_MASK 0x0000ffffu
+#define ACTUATOR_PWM_PERIOD_SHIFT 0
+#define ACTUATOR_PWM_PERIOD_WIDTH 16
+// rw: shortest times of a step pulse
+#define ACTUATOR_STEP_PULSE 0x008u
+#define ACTUATOR_STEP_PULSE_HIGH_MASK 0x00003fffu
+#define ACTUATOR_STEP_PULSE_HIGH_SHIFT 0
+#define ACTUATOR_STEP_PULSE_HIGH_WIDTH 14
+#define ACTUATOR_STEP_PULSE_LOW_MASK 0x0fffc000u
+#define ACTUATOR_STEP_PULSE_LOW_SHIFT 14
+#define ACTUATOR_STEP_PULSE_LOW_WIDTH 14
+// rw: shortest times of the direction before and after a step pulse
+#define ACTUATOR_STEP_DIRECTION 0x00cu
+#define ACTUATOR_STEP_DIRECTION_SETUP_MASK 0x00003fffu
+#define ACTUATOR_STEP_DIRECTION_SETUP_SHIFT 0
+#define ACTUATOR_STEP_DIRECTION_SETUP_WIDTH 14
+#define ACTUATOR_STEP_DIRECTION_HOLD_MASK 0x0fffc000u
+#define ACTUATOR_STEP_DIRECTION_HOLD_SHIFT 14
+#define ACTUATOR_STEP_DIRECTION_HOLD_WIDTH 14
+// rw: how steps are output; a change acts while the drive is off
+#define ACTUATOR_STEP_OUTPUT 0x010u
+// 0 step and direction, 1 quadrature, 2 pulses up and pulses down
+#define ACTUATOR_STEP_OUTPUT_MODE_MASK 0x00000003u
+#define ACTUATOR_STEP_OUTPUT_MODE_SHIFT 0
+#define ACTUATOR_STEP_OUTPUT_MODE_WIDTH 2
+// 1: step is active low
+#define ACTUATOR_STEP_OUTPUT_STEP_LOW_MASK 0x00000004u
+#define ACTUATOR_STEP_OUTPUT_STEP_LOW_SHIFT 2
+#define ACTUATOR_STEP_OUTPUT_STEP_LOW_WIDTH 1
+// 1: direction is low going up
+#define ACTUATOR_STEP_OUTPUT_DIRECTION_LOW_MASK 0x00000008u
+#define ACTUATOR_STEP_OUTPUT_DIRECTION_LOW_SHIFT 3
+#define ACTUATOR_STEP_OUTPUT_DIRECTION_LOW_WIDTH 1
+// shift of the command: it moves the target by command * 2^trim LSB of position
+#define ACTUATOR_STEP_OUTPUT_TRIM_MASK 0x000000f0u
+#define ACTUATOR_STEP_OUTPUT_TRIM_SHIFT 4
+#define ACTUATOR_STEP_OUTPUT_TRIM_WIDTH 4
+// rw: steps in one period; a negative sign reverses the direction [2^-32 step/period]
+#define ACTUATOR_STEP_RATIO 0x018u
+#define ACTUATOR_STEP_RATIO_LOW 0x018u
+#define ACTUATOR_STEP_RATIO_HIGH 0x01cu
+#define ACTUATOR_STEP_RATIO_WIDTH 48
+// r: steps sent since reset [step]
+#define ACTUATOR_STEPS 0x020u
+#define ACTUATOR_STEPS_MASK 0xffffffffu
+#define ACTUATOR_STEPS_SHIFT 0
+#define ACTUATOR_STEPS_WIDTH 32
+// rw: words to the DAC
+#define ACTUATOR_DAC 0x024u
+// half a period of its clock; 0 acts as 1 [cycle]
+#define ACTUATOR_DAC_HALF_PERIOD_MASK 0x000000ffu
+#define ACTUATOR_DAC_HALF_PERIOD_SHIFT 0
+#define ACTUATOR_DAC_HALF_PERIOD_WIDTH 8
+// time after which the last word is sent again [cycle]
+#define ACTUATOR_DAC_REFRESH_MASK 0x00ffff00u
+#define ACTUATOR_DAC_REFRESH_SHIFT 8
+#define ACTUATOR_DAC_REFRESH_WIDTH 16
+// rw: offset added to each word
+#define ACTUATOR_DAC_TRIM 0x028u
+#define ACTUATOR_DAC_TRIM_MASK 0x0000ffffu
+#define ACTUATOR_DAC_TRIM_SHIFT 0
+#define ACTUATOR_DAC_TRIM_WIDTH 16
+// rw: proportional gain of the fine stage [1/65536 command/(period/65536)]
+#define ACTUATOR_FINE_KP 0x030u
+#define ACTUATOR_FINE_KP_MASK 0x00ffffffu
+#define ACTUATOR_FINE_KP_SHIFT 0
+#define ACTUATOR_FINE_KP_WIDTH 24
+// rw: integral gain of the fine stage, each tick [1/16777216 command/(period/65536)]
+#define ACTUATOR_FINE_KI 0x034u
+#define ACTUATOR_FINE_KI_MASK 0x00ffffffu
+#define ACTUATOR_FINE_KI_SHIFT 0
+#define ACTUATOR_FINE_KI_WIDTH 24
+// rw: largest |command| of the fine stage
+#define ACTUATOR_FINE_LIMIT 0x038u
+#define ACTUATOR_FINE_LIMIT_MASK 0x00007fffu
+#define ACTUATOR_FINE_LIMIT_SHIFT 0
+#define ACTUATOR_FINE_LIMIT_WIDTH 15
+// r: command of the fine stage
+#define ACTUATOR_FINE_COMMAND 0x03cu
+#define ACTUATOR_FINE_COMMAND_MASK 0x0000ffffu
+#define ACTUATOR_FINE_COMMAND_SHIFT 0
+#define ACTUATOR_FINE_COMMAND_WIDTH 16
 
 #endif

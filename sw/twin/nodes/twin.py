@@ -46,7 +46,23 @@ from twin.machines.machine import (
 
 CLK_HZ = 2_400_000
 START_S = 0.15  # until the soft core of a node with one axis listens
-NODE = {"DRIVES": 1, "FILTERS": 0}  # what the stage of S0 needs of rtl/node.sv
+DRIVES = ("HAS_BRIDGE", "HAS_STEPPER", "HAS_DAC", "HAS_FINE_STAGE")  # of rtl/node.sv
+PERIPHERALS = (
+    "HAS_I2C",
+    "HAS_PS2",
+    "HAS_PEER",
+    "HAS_ANGLE_SENSOR",
+    "HAS_DISPLAY",
+    "HAS_STATUS_INPUTS",
+)
+
+
+def drives(*built):
+    """Parameters of rtl/node.sv that build these drives of each axis and no other."""
+    return {name: int(name in built) for name in DRIVES}
+
+
+NODE = {**drives("HAS_BRIDGE"), "FILTERS": 0}  # what the stage of S0 needs of rtl/node.sv
 WITH_SEGMENTS = {
     **NODE,
     "SEGMENTS": 255,
@@ -57,7 +73,7 @@ BREAK_S = 0.003  # the line low; nodes want 2 ms
 TURNAROUND_CELLS = 2
 CELLS = 11  # of a character: start, eight data, 9th, stop
 PEER_BAUD = 9600  # between nodes
-ALL_PERIPHERALS = 63  # of rtl/peripherals.sv
+ALL_PERIPHERALS = dict.fromkeys(PERIPHERALS, 1)
 CUTS = {"none": 0, "idle": 1, "break": 2}
 
 FUNCTIONS: Functions = {
@@ -150,9 +166,9 @@ class Twin:
     node with fewer axes than another has unconnected ones. `plant` overrides parameters of all
     machines, `plant_of` {axis: {…}} those of one. `firmware` is a list of words, or None for the
     one in sw/firmware. `host_baud_error` 0.02 makes the host 2 % fast. `node_parameters` {"W": 12}
-    are parameters of rtl/node.sv; WITH_SEGMENTS builds a segment table. All nodes have all
-    peripherals if one of them has devices or peers; `peers` are the numbers of two nodes that a
-    serial line connects.
+    are parameters of rtl/node.sv, drives(*DRIVES) builds all actuators, WITH_SEGMENTS a segment
+    table. All nodes have all peripherals if one of them has devices or peers; `peers` are the
+    numbers of two nodes that a serial line connects.
     """
 
     def __init__(
@@ -178,7 +194,7 @@ class Twin:
         if any(n not in range(self.axes) for n in plant_of or {}):
             raise IndexError(f"plant_of names an axis that is not there: there are {self.axes}")
         if peers or any(node.devices for node in built):
-            node_parameters = {"PERIPHERALS": ALL_PERIPHERALS, **node_parameters}
+            node_parameters = ALL_PERIPHERALS | dict(node_parameters)
         fitted = [
             axis
             for node in built
@@ -221,7 +237,7 @@ class Twin:
         self.around = [
             self._attach_devices(n, node.devices or Devices(), seed, now)
             for n, node in enumerate(built)
-            if node_parameters.get("PERIPHERALS")
+            if any(node_parameters.get(name) for name in PERIPHERALS)
         ]
         pairs = (
             [(self.check_node(peers[0]), self.check_node(peers[1])), (peers[1], peers[0])]

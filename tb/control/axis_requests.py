@@ -1,0 +1,14 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What rtl/control/axis_requests.sv does, in integers."""
+
+REQUESTS = dict(
+    check_following=("closed_loop", "fine"),
+    play=("start", "common_start"),
+    rebase=("set_target_to_position", "moved"),
+    gains_changed=("kp_written", "kd_written", "kv_written", "ka_written"),
+)
+
+
+def joined(**inputs):
+    """Every output by its port name: high if one of its requests is."""
+    return {out: max(inputs[name] for name in names) for out, names in REQUESTS.items()}

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What rtl/sense/axis_inputs.sv does, in integers: clk(...) is one cycle and returns every output
+after it, by port name.
+"""
+
+from tb.common.synchroniser import Synchroniser
+from tb.sense.deglitcher import Deglitcher
+
+PINS = dict(
+    encoder_a="a",
+    encoder_b="b",
+    encoder_z="z",
+    probe="probe_level",
+    limit_low_open="limit_low",
+    limit_high_open="limit_high",
+    drive_fault_n="drive_fault",
+)  # the output of each pin
+
+
+class AxisInputs:
+    def __init__(self, limit_cycles):
+        self.limit_cycles = limit_cycles
+        self.pins = {pin: Synchroniser() for pin in PINS}
+        self.limits = {pin: Deglitcher() for pin in PINS if pin.startswith("limit")}
+
+    def clk(self, rst=0, **pins):
+        out = {}
+        for pin, output in PINS.items():
+            before = self.pins[pin].stages[-1]
+            level = self.pins[pin].step(pins[pin], rst)
+            if pin in self.limits:
+                level, _ = self.limits[pin].step(self.limit_cycles, before, rst)
+            out[output] = int(not level) if pin == "drive_fault_n" else level
+        return out
