@@ -48,7 +48,7 @@ def default(table):
 
 
 def rewrite(station, change, copy=0):
-    """Writes the saved values of a copy as `change(list of bytearrays)` makes them, and their CRC."""
+    """Writes saved values of a copy as `change(list of bytearrays)` makes them, and their CRC."""
     at = COPIES[copy]
     memory = bytes(station.eeprom.memory)
     values = []
