@@ -86,7 +86,7 @@ def compiler():
     return [sys.executable, "-m", "ziglang", "cc", *ZIG], []
 
 
-def read_elf(path):
+def read_elf(path: Path) -> tuple[list[tuple[int, bytes]], dict[str, int]]:
     """What is to be loaded, as (address, bytes), and the value of each symbol, of an ELF file."""
     with open(path, "rb") as file:
         elf = ELFFile(file)
@@ -100,7 +100,7 @@ def read_elf(path):
     return segments, symbols
 
 
-def image(segments, memory):
+def image(segments: list[tuple[int, bytes]], memory: int) -> tuple[bytes, int]:
     """The contents of a memory of so many bytes, and how many of them are used."""
     words = bytearray(memory)
     used = 0

@@ -214,8 +214,8 @@ def test_values_of_another_build_are_not_restored_and_the_panel_shows_that():
     assert restarted(station) == "saved_other_build" and parameters(station) == default(PARAMETER)
     assert station.run(2500) is False and station.shown()[:3] == [
         "ready        001/001",
-        "the kept values are",
-        "of another build",
+        "the saved values are",
+        "from another build",
     ]
 
 

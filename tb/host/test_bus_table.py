@@ -131,7 +131,8 @@ def test_a_compiler_reads_the_header_and_gets_the_same_numbers(tmp_path):
         '#include <stdio.h>\n#include <stdint.h>\n#include "made/bus_protocol.h"\n'
         '#define P(name, id, min, max, default) printf("%s %d %lld %lld %lld\\n", #name, id, '
         "(long long)min, (long long)max, (long long)default);\n"
-        '#define O(name, code, request, reply, of_axis) printf("%s %d %d %d %d\\n", #name, code, (int)request, (int)reply, of_axis);\n'
+        "#define O(name, code, request, reply, of_axis) "
+        'printf("%s %d %d %d %d\\n", #name, code, (int)request, (int)reply, of_axis);\n'
         "int main(void) { BUS_PARAMETERS(P) BUS_SETTINGS(P) BUS_OPERATIONS(O) "
         "return BUS_CAUSE_NO_MOTION_YET - 20 + BUS_FAULT_PROFILE_UNDERRUN - 256; }\n"
     )
@@ -159,7 +160,8 @@ def test_a_compiler_reads_the_header_and_gets_the_same_numbers(tmp_path):
     ]
     size = {"8": 1, "16": 2, "32": 4, "64": 8}
     wanted += [
-        f"{o.name} {o.code} {2 + sum(size[kind[1:]] for _, kind in o.request)} {3 + sum(size[kind[1:]] for _, kind in o.reply)} "
+        f"{o.name} {o.code} {2 + sum(size[kind[1:]] for _, kind in o.request)} "
+        f"{3 + sum(size[kind[1:]] for _, kind in o.reply)} "
         f"{int(('axis', 'u8') in o.request)}"
         for o in bus_tables.OPERATIONS.values()
     ]
