@@ -59,7 +59,3 @@ def close_output(out: TextIO) -> None:
     end.
     """
     os.dup2(os.open(os.devnull, os.O_WRONLY), out.fileno())
-
-
-if __name__ == "__main__":
-    sys.exit(main())
