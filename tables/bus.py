@@ -94,7 +94,7 @@ class Target(NamedTuple):
 
     @property
     def row(self):
-        register, field = self.register.name, self.register.port(self.field)
+        register, field = self.register.name, self.field.port
         return f"    X({self.parameter}, {self.block.name}, {register}, {field})".upper()
 
 
