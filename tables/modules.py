@@ -98,10 +98,7 @@ def check_of(path):
             (path.relative_to(ROOT) for path in own + tests), None
         )
     if name.endswith("_microcode"):  # a made table too, of what its user does
-        user = name.removesuffix("_microcode")
-        return Path("tables") / f"{name}.py", next(
-            (p.relative_to(ROOT) for p in (ROOT / "tb" / room).glob(f"test_{user}*.py")), None
-        )
+        return Path("tables") / f"{name}.py", Path("tb") / room / f"test_{name}.py"
     return Path("tb") / room / f"{name}.py", Path("tb") / room / f"test_{name}.py"
 
 

@@ -43,7 +43,8 @@ def search_path():
 def source_of(top):
     found = list((ROOT / "rtl").rglob(f"{top}.sv"))
     assert len(found) == 1, (
-        f"there must be exactly one {top}.sv under rtl/, found {[str(p.relative_to(ROOT)) for p in found]}"
+        f"there must be exactly one {top}.sv under rtl/, "
+        f"found {[str(p.relative_to(ROOT)) for p in found]}"
     )
     return found[0]
 

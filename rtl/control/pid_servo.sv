@@ -8,21 +8,21 @@
 // Here e = target - position, and integral += ki e. The sum is limited to output_limit, filtered
 // (biquad_cascade, 16 fraction bits), rounded down and limited to output_limit again.
 //
-// latency   11 + 25 * TERMS + 36 * BIQUADS cycles from tick to valid, 208 with all terms and
-//           filters. The inputs are taken 8 cycles after tick, when target and velocity of this
-//           tick are valid.
+// latency   11 + 25 * TERMS + 36 * BIQUADS cycles from tick to valid
 // rate      one command per tick, at most one tick per 10 + 25 * TERMS + 177 * BIQUADS cycles: 489
 //           with all terms and filters, 136 for five terms without filters. An earlier tick is
 //           ignored.
-// behaviour Anti-windup: the integral is limited to integral_limit; it does not grow in a direction
-//           in which the last command was at its limit or the interlock blocks; it stays constant
-//           while |e| <= dead_band and no profile is played; it is zero in open loop and while the
-//           interlock blocks both directions (drive off). Bumpless transfer: after the loop was
-//           closed, the drive came on or a gain changed, the command is held for one tick (at 0
-//           while the drive was off), and the integral takes the value from which the next command
-//           continues, as far as integral_limit allows; with ki = 0 no integral can do that, and
-//           the command follows the gains at once. A tick whose inputs were taken without power
-//           does not count: the command is held. Opening the loop gives open_command at once.
+// behaviour The inputs are sampled 8 cycles after tick, when target and velocity of this tick are
+//           valid. With all terms and filters the command follows after 208 cycles. Anti-windup:
+//           the integral is limited to integral_limit; it does not grow in a direction in which the
+//           last command was at its limit or the interlock blocks; it stays constant while |e| <=
+//           dead_band and no profile is played; it is zero in open loop and while the interlock
+//           blocks both directions (drive off). Bumpless transfer: after the loop was closed, the
+//           drive came on or a gain changed, the command is held for one tick (at 0 while the drive
+//           was off), and the integral takes the value from which the next command continues, as
+//           far as integral_limit allows; with ki = 0 no integral can do that, and the command
+//           follows the gains at once. A tick whose inputs were taken without power does not count:
+//           the command is held. Opening the loop gives open_command at once.
 // limits    TERMS = 2: PI, 3: PID, 5: with feed-forward; BIQUADS = 0: no filters. Ports of what is
 //           left out are not read. Filter coefficients are numbered 0: b0, 1: b1, 2: b2, 3: -a1, 4:
 //           -a2.

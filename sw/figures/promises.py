@@ -54,8 +54,8 @@ FIGURES = {
     "docs_commands_failed": Figure(
         docs_commands_failed,
         "commands",
-        "command lines of README, tutorial and docs that do not do what is printed, each run; those "
-        "for hardware against the served twin",
+        "command lines of README, tutorial and docs that do not do what is printed, each run; "
+        "those for hardware against the served twin",
         "0",
         Quick({"whole": False, "pages": 1}, "the first page"),
         0,
@@ -79,7 +79,8 @@ FIGURES = {
     "import_cycles": Figure(
         lambda: listed(check_imports.problems()),
         "cycles",
-        "cycles among C files and Python modules, imports from tb outside tb, patches of sys.path",
+        "cycles among C files and Python modules, imports from tb outside tb, patches of "
+        "sys.path",
         "0",
         Quick(),
         0,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/drive/fine_stage.sv does, in integers: clk(...) is one cycle and returns (valid, command,
+"""Model of rtl/drive/fine_stage.sv in integers: clk(...) is one cycle and returns (valid, command,
 saturated) after it.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""shift_delay: both ends of the range, reset, and random shifts against the model in every cycle."""
+"""shift_delay: both ends of the range, reset, and random shifts against the model, every cycle."""
 
 import random
 

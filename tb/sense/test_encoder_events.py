@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""encoder_events: each event and each signal fault alone, the short pulse, and random inputs against
+"""encoder_events: each event and signal fault alone, the short pulse, and random inputs against
 the model.
 """
 
