@@ -2,8 +2,8 @@
 // i2c_master -- I2C master, one byte per command: start, write and read with their acknowledge,
 // stop, and the recovery of a stuck bus.
 //
-// latency  1 bit for start and stop, 9 bits for a byte, less than 1 bit more or less; at most 10
-//          bits for a recovery; a device may stretch each of them
+// latency  about 1 bit for start and stop, 9 bits for a byte, less than 1.25 times as long and 1
+//          bit more; at most 10 bits for a recovery; a device may stretch each of them
 // rate     BUS_HZ or a little less: the clock is low for 11/20 of a bit, high for 9/20, and the
 //          rise time of the lines adds to that
 // limits   A device may stretch the clock for STRETCH_US. Then the command ends with NO_BUS and

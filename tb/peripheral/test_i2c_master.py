@@ -153,13 +153,13 @@ async def one_byte_by_hand(dut):
 
 
 @cocotb.test()
-async def latency_is_1_bit_for_start_and_stop_and_9_bits_for_a_byte(dut):
+async def latency_is_about_1_bit_for_start_and_stop_and_9_bits_for_a_byte(dut):
     bus = await Bus(dut).begin()
     for command, bits in ((START, 1), (WRITE, 9), (STOP, 1)):
         before = len(bus.samples)
         await bus.do(command, 0xA5)
         took = (len(bus.samples) - before) * bus.bus_hz / CLK_HZ
-        assert bits - 1 < took < bits + 1, (command, took)
+        assert bits - 0.7 < took < 1.25 * bits + 1, (command, took)
 
 
 @cocotb.test()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""links: each link end to end, from its registers to what stands at its pins: an EEPROM, a keyboard
-and its machine, a peer, an angle
-sensor, a numeric display, two lamps."""
+"""peripherals: each one end to end, from its registers to the devices at its pins: an EEPROM, a
+keyboard and its machine, a peer, an angle sensor, a numeric display, two lamps.
+"""
 
 import random
 
@@ -56,8 +56,8 @@ class SerialBus:
                 self.place = None
 
 
-class Links:
-    """The block with everything around it, one clk at a time; registers by their names."""
+class Peripherals:
+    """The block with everything around it, one cycle at a time; registers by their names."""
 
     def __init__(self, dut):
         self.dut, self.eeprom, self.keyboard, self.machine = (
@@ -200,202 +200,211 @@ class Links:
 
 @cocotb.test()
 async def the_build_register_names_them_all(dut):
-    links = await Links(dut).begin()
-    assert await links.read("built") == dict(i2c=1, ps2=1, peer=1, sensor=1, display=1, machine=1)
+    peripherals = await Peripherals(dut).begin()
+    assert await peripherals.read("built") == dict(i2c=1, ps2=1, peer=1, sensor=1, display=1, edm=1)
 
 
 @cocotb.test()
 async def a_page_goes_into_the_eeprom_with_one_queue_of_commands_and_comes_back(dut):
-    links = await Links(dut).begin()
+    peripherals = await Peripherals(dut).begin()
     data = [random.getrandbits(8) for _ in range(64)]
     head = [(START, 0), (WRITE, 0xA0), (WRITE, 0x12), (WRITE, 0x40)]
-    assert (await links.read("i2c_state"))["free"] == 128
-    answers = await links.i2c(*head, *((WRITE, byte) for byte in data), (STOP, 0))
-    assert [result for result, _ in answers] == [OK] * 69 and links.eeprom.memory[
+    assert (await peripherals.read("i2c_state"))["free"] == 128
+    answers = await peripherals.i2c(*head, *((WRITE, byte) for byte in data), (STOP, 0))
+    assert [result for result, _ in answers] == [OK] * 69 and peripherals.eeprom.memory[
         0x1240:0x1280
     ] == bytes(data)
     tries = 0
-    while (await links.i2c((START, 0), (WRITE, 0xA0), (STOP, 0)))[1][0] == NOT_ACKNOWLEDGED:
+    while (await peripherals.i2c((START, 0), (WRITE, 0xA0), (STOP, 0)))[1][0] == NOT_ACKNOWLEDGED:
         tries += 1
     assert tries > 0  # it writes for 5 ms
-    answers = await links.i2c(
+    answers = await peripherals.i2c(
         *head, (START, 0), (WRITE, 0xA1), *((READ, int(n < 63)) for n in range(64)), (STOP, 0)
     )
     assert {result for result, _ in answers} == {OK} and [byte for _, byte in answers[6:70]] == data
-    assert await links.read("i2c_state") == dict(free=128, busy=0, owned=0, scl=1, sda=1)
-    assert edges(links.wires).count("S") == edges(links.wires).count("P") + 1  # a repeated start
+    assert await peripherals.read("i2c_state") == dict(free=128, busy=0, owned=0, scl=1, sda=1)
+    assert (
+        edges(peripherals.wires).count("S") == edges(peripherals.wires).count("P") + 1
+    )  # a repeated start
 
 
 @cocotb.test()
-async def a_stuck_i2c_bus_is_told(dut):
-    links = await Links(dut).begin()
-    links.stuck = (0, 1)
-    await links.clk(10)
-    assert (await links.read("i2c_state"))["sda"] == 0
-    assert [result for result, _ in await links.i2c((START, 0))] == [NO_BUS]
-    links.stuck = (0, 0)
-    await links.clk(10)
-    assert [result for result, _ in await links.i2c((START, 0), (STOP, 0))] == [OK, OK]
+async def a_stuck_i2c_bus_is_reported(dut):
+    peripherals = await Peripherals(dut).begin()
+    peripherals.stuck = (0, 1)
+    await peripherals.clk(10)
+    assert (await peripherals.read("i2c_state"))["sda"] == 0
+    assert [result for result, _ in await peripherals.i2c((START, 0))] == [NO_BUS]
+    peripherals.stuck = (0, 0)
+    await peripherals.clk(10)
+    assert [result for result, _ in await peripherals.i2c((START, 0), (STOP, 0))] == [OK, OK]
 
 
 @cocotb.test()
 async def a_person_types_and_a_cut_is_started_after_it(dut):
-    links = await Links(dut).begin()
-    await links.write("ps2_idle", value=25)
-    links.keyboard.outbox = [0x1C, 0xF0, 0x1C]
+    peripherals = await Peripherals(dut).begin()
+    await peripherals.write("ps2_idle", value=25)
+    peripherals.keyboard.outbox = [0x1C, 0xF0, 0x1C]
     for n, byte in enumerate(CUT):
-        await links.write("ps2_inject", data=byte, last=int(n == len(CUT) - 1))
-    await links.clk(MS)
-    assert (await links.read("ps2_state"))["free"] == 32 - len(CUT)
-    await links.until(lambda: len(links.machine.heard) == 4)
-    assert (await links.read("ps2_state"))["injecting"] == 1
-    await links.until(lambda: len(links.machine.heard) == 9)
-    await links.clk(MS)
-    assert links.machine.heard == [0x1C, 0xF0, 0x1C, *CUT]
-    assert await links.read("ps2_state") == dict(free=32, injecting=0, busy=0)
-    assert await links.read("ps2_typed") == 3
+        await peripherals.write("ps2_inject", data=byte, last=int(n == len(CUT) - 1))
+    await peripherals.clk(MS)
+    assert (await peripherals.read("ps2_state"))["free"] == 32 - len(CUT)
+    await peripherals.until(lambda: len(peripherals.machine.heard) == 4)
+    assert (await peripherals.read("ps2_state"))["injecting"] == 1
+    await peripherals.until(lambda: len(peripherals.machine.heard) == 9)
+    await peripherals.clk(MS)
+    assert peripherals.machine.heard == [0x1C, 0xF0, 0x1C, *CUT]
+    assert await peripherals.read("ps2_state") == dict(free=32, injecting=0, busy=0)
+    assert await peripherals.read("ps2_typed") == 3
     assert (
-        not any((await links.read("ps2_errors")).values()) and await links.read("ps2_glitches") == 0
+        not any((await peripherals.read("ps2_errors")).values())
+        and await peripherals.read("ps2_glitches") == 0
     )
 
 
 @cocotb.test()
 async def keys_are_taken_back_but_for_the_sequence_that_is_under_way(dut):
-    links = await Links(dut).begin()
-    await links.write("ps2_idle", value=25)
+    peripherals = await Peripherals(dut).begin()
+    await peripherals.write("ps2_idle", value=25)
     for _ in range(3):
         for n, byte in enumerate(CUT):
-            await links.write("ps2_inject", data=byte, last=int(n == len(CUT) - 1))
-    await links.until(lambda: len(links.machine.heard) == 2)
-    await links.write("ps2_state", drop=1)
-    await links.clk(4)
-    assert (await links.read("ps2_state"))["free"] <= 32 - 3 * len(CUT) + 3
-    await links.until(lambda: len(links.machine.heard) == len(CUT))
-    await links.clk(60 * MS)
-    assert links.machine.heard == CUT and await links.read("ps2_state") == dict(
+            await peripherals.write("ps2_inject", data=byte, last=int(n == len(CUT) - 1))
+    await peripherals.until(lambda: len(peripherals.machine.heard) == 2)
+    await peripherals.write("ps2_state", drop=1)
+    await peripherals.clk(4)
+    assert (await peripherals.read("ps2_state"))["free"] <= 32 - 3 * len(CUT) + 3
+    await peripherals.until(lambda: len(peripherals.machine.heard) == len(CUT))
+    await peripherals.clk(60 * MS)
+    assert peripherals.machine.heard == CUT and await peripherals.read("ps2_state") == dict(
         free=32, injecting=0, busy=0
     )
 
 
 @cocotb.test()
 async def errors_of_the_keyboard_are_counted_and_cleared(dut):
-    links = Links(dut)
-    links.keyboard = Keyboard(CLK_HZ, damage=1.0)
-    await links.begin()
-    links.keyboard.outbox = [0x1C]
-    await links.until(lambda: links.machine.damaged == 2)
-    assert (await links.read("ps2_errors"))["keyboard_damaged"] >= 2 and await links.read(
-        "ps2_typed"
-    ) == 0
-    links.keyboard.damage = 0.0
-    await links.until(lambda: links.machine.heard == [0x1C])
-    await links.write("ps2_errors")
-    assert not any((await links.read("ps2_errors")).values())
+    peripherals = Peripherals(dut)
+    peripherals.keyboard = Keyboard(CLK_HZ, damage=1.0)
+    await peripherals.begin()
+    peripherals.keyboard.outbox = [0x1C]
+    await peripherals.until(lambda: peripherals.machine.damaged == 2)
+    assert (await peripherals.read("ps2_errors"))[
+        "keyboard_damaged"
+    ] >= 2 and await peripherals.read("ps2_typed") == 0
+    peripherals.keyboard.damage = 0.0
+    await peripherals.until(lambda: peripherals.machine.heard == [0x1C])
+    await peripherals.write("ps2_errors")
+    assert not any((await peripherals.read("ps2_errors")).values())
 
 
 @cocotb.test()
 async def bytes_pass_to_and_from_the_peer(dut):
-    links = await Links(dut).begin()
+    peripherals = await Peripherals(dut).begin()
     there, back = [bytes(random.getrandbits(8) for _ in range(n)) for n in (64, 40)]
     for byte in there:
-        await links.write("peer_transmit", value=byte)
-    assert (await links.read("peer_state"))["sending"] == 1
-    links.peer.send(back)
-    await links.until(lambda: len(links.peer.heard) == 64)
-    await links.clk(2 * BIT)
-    assert bytes(links.peer.heard) == there and await links.read("peer_state") == dict(
+        await peripherals.write("peer_transmit", value=byte)
+    assert (await peripherals.read("peer_state"))["sending"] == 1
+    peripherals.peer.send(back)
+    await peripherals.until(lambda: len(peripherals.peer.heard) == 64)
+    await peripherals.clk(2 * BIT)
+    assert bytes(peripherals.peer.heard) == there and await peripherals.read("peer_state") == dict(
         transmit_free=64, sending=0
     )
     heard = []
-    while (word := await links.read("peer_receive"))["present"]:
+    while (word := await peripherals.read("peer_receive"))["present"]:
         heard.append(word["data"])
-        await links.clk(2)
+        await peripherals.clk(2)
     assert bytes(heard) == back
-    assert await links.read("peer_errors") == dict(framing=0, overruns=0)
+    assert await peripherals.read("peer_errors") == dict(framing=0, overruns=0)
 
 
 @cocotb.test()
 async def the_peer_port_counts_what_it_lost(dut):
-    links = await Links(dut).begin()
-    links.peer.send(range(67))
-    links.peer.send([0x00], stop=0)
-    await links.until(lambda: not links.peer.levels)
-    await links.clk(3 * BIT)
-    assert await links.read("peer_errors") == dict(framing=1, overruns=3)
+    peripherals = await Peripherals(dut).begin()
+    peripherals.peer.send(range(67))
+    peripherals.peer.send([0x00], stop=0)
+    await peripherals.until(lambda: not peripherals.peer.levels)
+    await peripherals.clk(3 * BIT)
+    assert await peripherals.read("peer_errors") == dict(framing=1, overruns=3)
     for n in range(64):
-        assert await links.read("peer_receive") == dict(data=n, present=1)
-        await links.clk(2)
-    assert (await links.read("peer_receive"))["present"] == 0
-    await links.write("peer_errors")
-    assert await links.read("peer_errors") == dict(framing=0, overruns=0)
+        assert await peripherals.read("peer_receive") == dict(data=n, present=1)
+        await peripherals.clk(2)
+    assert (await peripherals.read("peer_receive"))["present"] == 0
+    await peripherals.write("peer_errors")
+    assert await peripherals.read("peer_errors") == dict(framing=0, overruns=0)
 
 
 @cocotb.test()
 async def an_angle_its_age_and_its_number_are_read(dut):
-    links = await Links(dut).begin()
-    await links.write("sensor_stale_after", value=20 * MS)
-    assert (await links.read("sensor_state"))["stale"] == 1
-    links.sensor.send(frame(7, 0x89ABCDEF))
-    await links.until(lambda: not links.sensor.levels)
-    await links.clk(5)
-    assert await links.read("sensor_state") == dict(sequence_number=7, stale=0)
-    reading = await links.read("sensor_reading")
+    peripherals = await Peripherals(dut).begin()
+    await peripherals.write("sensor_stale_after", value=20 * MS)
+    assert (await peripherals.read("sensor_state"))["stale"] == 1
+    peripherals.sensor.send(frame(7, 0x89ABCDEF))
+    await peripherals.until(lambda: not peripherals.sensor.levels)
+    await peripherals.clk(5)
+    assert await peripherals.read("sensor_state") == dict(sequence_number=7, stale=0)
+    reading = await peripherals.read("sensor_reading")
     assert reading & 0xFFFFFFFF == 0x89ABCDEF
     assert (
         70 * BIT <= reading >> 32 <= 70 * BIT + 4 * BIT
     )  # seven characters since the first had come
-    links.sensor.send(frame(8, 1))
-    low = await links.access(0, REGISTERS["sensor_reading"]["value"].offset)
-    await links.until(lambda: not links.sensor.levels)
-    await links.clk(5)
-    high = await links.access(0, REGISTERS["sensor_reading"]["value"].offset + 4)
+    peripherals.sensor.send(frame(8, 1))
+    low = await peripherals.access(0, REGISTERS["sensor_reading"]["value"].offset)
+    await peripherals.until(lambda: not peripherals.sensor.levels)
+    await peripherals.clk(5)
+    high = await peripherals.access(0, REGISTERS["sensor_reading"]["value"].offset + 4)
     assert low == 0x89ABCDEF and reading >> 32 <= high <= (reading >> 32) + 20, (
         "the age is that of the angle read"
     )
-    links.sensor.send(frame(11, 2))
-    links.sensor.send(frame(12, 3)[:7] + b"\x00")
-    await links.until(lambda: not links.sensor.levels)
-    await links.clk(5)
-    assert await links.read("sensor_errors") == dict(crc=1, broken=0, missed=2)
-    assert await links.read("sensor_frames") == 3
-    await links.write("sensor_errors", clear=1)
-    await links.clk(2)
-    assert not any((await links.read("sensor_errors")).values())
-    await links.clk(21 * MS)
-    assert (await links.read("sensor_state"))["stale"] == 1
+    peripherals.sensor.send(frame(11, 2))
+    peripherals.sensor.send(frame(12, 3)[:7] + b"\x00")
+    await peripherals.until(lambda: not peripherals.sensor.levels)
+    await peripherals.clk(5)
+    assert await peripherals.read("sensor_errors") == dict(crc=1, broken=0, missed=2)
+    assert await peripherals.read("sensor_frames") == 3
+    await peripherals.write("sensor_errors", clear=1)
+    await peripherals.clk(2)
+    assert not any((await peripherals.read("sensor_errors")).values())
+    await peripherals.clk(21 * MS)
+    assert (await peripherals.read("sensor_state"))["stale"] == 1
 
 
 @cocotb.test()
 async def words_reach_the_display_in_order(dut):
-    links = await Links(dut).begin()
+    peripherals = await Peripherals(dut).begin()
     words = [0x0C01, 0x0900, *(random.getrandbits(16) for _ in range(14))]
     for word in words:
-        await links.write("display", value=word)
-    state = await links.read("display_state")
+        await peripherals.write("display", value=word)
+    state = await peripherals.read("display_state")
     assert state["sending"] == 1 and state["free"] < 8
-    await links.until(lambda: len(links.shown) == 16)
-    await links.clk(10)
-    assert [int("".join(map(str, bits)), 2) for bits in links.shown] == words
-    assert await links.read("display_state") == dict(free=16, sending=0)
+    await peripherals.until(lambda: len(peripherals.shown) == 16)
+    await peripherals.clk(10)
+    assert [int("".join(map(str, bits)), 2) for bits in peripherals.shown] == words
+    assert await peripherals.read("display_state") == dict(free=16, sending=0)
 
 
 @cocotb.test()
 async def no_change_of_a_lamp_is_missed(dut):
-    links = await Links(dut).begin()
-    await links.write("edm_filter", value=2)
+    peripherals = await Peripherals(dut).begin()
+    await peripherals.write("edm_filter", value=2)
     for _ in range(20):
-        links.lamps ^= 1
-        await links.clk(random.randrange(1, MS))
-    links.lamps = 1
-    await links.clk(4 * MS)
-    assert await links.read("edm_status") == dict(inputs=1, rose_0=1, rose_1=0, fell_0=0, fell_1=0)
-    links.lamps = 2
-    await links.clk(4 * MS)
-    links.lamps = 0
-    await links.clk(4 * MS)
-    assert await links.read("edm_status") == dict(inputs=0, rose_0=1, rose_1=1, fell_0=1, fell_1=1)
-    await links.write("edm_status", rose_0=1, fell_1=1)
-    assert await links.read("edm_status") == dict(inputs=0, rose_0=0, rose_1=1, fell_0=1, fell_1=0)
+        peripherals.lamps ^= 1
+        await peripherals.clk(random.randrange(1, MS))
+    peripherals.lamps = 1
+    await peripherals.clk(4 * MS)
+    assert await peripherals.read("edm_status") == dict(
+        inputs=1, rose_0=1, rose_1=0, fell_0=0, fell_1=0
+    )
+    peripherals.lamps = 2
+    await peripherals.clk(4 * MS)
+    peripherals.lamps = 0
+    await peripherals.clk(4 * MS)
+    assert await peripherals.read("edm_status") == dict(
+        inputs=0, rose_0=1, rose_1=1, fell_0=1, fell_1=1
+    )
+    await peripherals.write("edm_status", rose_0=1, fell_1=1)
+    assert await peripherals.read("edm_status") == dict(
+        inputs=0, rose_0=0, rose_1=1, fell_0=1, fell_1=0
+    )
 
 
 def test_peripherals():
