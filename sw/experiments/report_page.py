@@ -57,4 +57,6 @@ def page(
     numbers: Sequence[tuple[str, str]] = (),
 ) -> Path:
     """Writes a report; returns its path."""
-    return report.write_text(Path(path), text_of(title, summary, parts, facts, numbers))
+    text = text_of(title, summary, parts, facts, numbers)
+    written: Path = report.write_text(Path(path), text)
+    return written

@@ -337,7 +337,8 @@ def run(seed=1, places=180, folder=ROOT / "build" / "report", console=None):
     console = console or Console()
     source, ring = np.random.default_rng(seed), paper_ring(seed)
     console.print(
-        f"[bold]S1: ring of 8192 lines, {ring.counts_per_turn} counts a turn, relay of {ORDERS} orders[/] (seed {seed})"
+        f"[bold]S1: ring of 8192 lines, {ring.counts_per_turn} counts per turn, "
+        f"relay of {ORDERS} orders[/] (seed {seed})"
     )
     taken = measure(ring, TEN_DEGREES, source, scatter=0.0)
     save_readings(taken, folder / "s1_readings.csv")

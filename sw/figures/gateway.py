@@ -59,7 +59,7 @@ def rfc2217_reads_per_s(seconds=READ_S, start_s=START_S):
         if not answer.startswith('{"command": "twin"'):
             raise NotMeasured(f"the twin is not served: {answer.strip()}")
         try:
-            with serial.serial_for_url(json.loads(answer)["rfc2217"], timeout=1) as port:
+            with serial.serial_for_url(json.loads(answer)["rfc2217"], timeout=10) as port:
                 read_positions(port, start_s)
                 return read_positions(port, seconds)
         finally:
