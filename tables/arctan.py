@@ -42,7 +42,7 @@ BEGIN = "    // made by tables/arctan.py, not to be edited"
 END = "    // end of the made constants"
 
 
-def constants():
+def constants() -> list[str]:
     return [
         f"    localparam int RATIO = {RATIO};  // fraction bits of the ratio",
         f"    localparam int FRACTION = {FRACTION};  // bits of the ratio along the chord",
@@ -50,7 +50,7 @@ def constants():
     ]
 
 
-def text():
+def text() -> str:
     word = BASE_BITS + SLOPE_BITS
     lines = []
     for i, (base, slope) in enumerate(zip(BASE[:SEGMENTS], SLOPE)):
@@ -91,12 +91,12 @@ endmodule
 """
 
 
-def made():
+def made() -> dict[Path, str]:
     table = FOLDER / "arctan_table.sv"
     return {MADE: text(), table: made_files.filled(table, BEGIN, END, constants())}
 
 
-def main(arguments=None) -> int:
+def main(arguments: list[str] | None = None) -> int:
     return made_files.main(__doc__, made, arguments, lambda: f"{BOUND:.4f}")
 
 

@@ -12,6 +12,7 @@ h = 2^-TURNS, the longer component stays as it is, and digit i stands for 2^-i o
 
 import math
 import sys
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from pathlib import Path
 
@@ -21,25 +22,26 @@ PHASE = 16  # bits of a phase; 2^PHASE = one turn
 UNIT = 48  # the made angles are in 2^-UNIT turn
 LONGEST = 10  # digits that have an angle of their own
 
+Plan = tuple[int, int, int, int]
 # width of a sample: TURNS, DIGITS, HEAD (fraction bits of the shorter component + digits found
 # + 1), GUARD bits below the LSB
-PIPELINED = {8: (8, 23, 19, 12), 9: (9, 27, 22, 15), 10: (10, 28, 24, 16)} | {
+PIPELINED: dict[int, Plan] = {8: (8, 23, 19, 12), 9: (9, 27, 22, 15), 10: (10, 28, 24, 16)} | {
     w: (6, 22, 26 - w, 9) for w in range(11, 17)
 }
 # width of a sample: TURNS, DIGITS, F fraction bits of both components, GUARD
-ITERATIVE = {8: (7, 23, 12, 14), 9: (9, 27, 14, 16), 10: (9, 29, 16, 17)} | {
+ITERATIVE: dict[int, Plan] = {8: (7, 23, 12, 14), 9: (9, 27, 14, 16), 10: (9, 29, 16, 17)} | {
     w: (7, 22, 10, 11) for w in range(11, 17)
 }
 
 
-def angles_by_hand():
+def angles_by_hand() -> tuple[list[int], int]:
     """The angles in whole 2^-UNIT turns, with pi by Machin's formula and arctan by its series: the
     made numbers do not depend on floating-point arithmetic.
     """
     one = 1 << UNIT + 32
 
-    def arctan(inverse):
-        total, term, k = 0, Fraction(1, inverse), 0
+    def arctan(inverse: int) -> Fraction:
+        total, term, k = Fraction(0), Fraction(1, inverse), 0
         while term * one > Fraction(1, 16):
             total += (-1) ** k * term / (2 * k + 1)
             term /= inverse * inverse
@@ -59,12 +61,12 @@ BEGIN = "    // made by tables/arctan_rotation.py, not to be edited"
 END = "    // end of the made constants"
 
 
-def angle(digit, turns):
+def angle(digit: int, turns: int) -> int:
     """The angle of digit 1, 2, …, in 2^-UNIT turn."""
     return ANGLE[digit - 1] if digit <= turns else (RADIAN - (RADIAN >> 2 * turns + 2)) >> digit
 
 
-def entry(turns, first, negative, count, guard):
+def entry(turns: int, first: int, negative: int, count: int, guard: int) -> int:
     """Sum of `count` digits from `first` on, in 2^-guard LSB; a set bit of `negative` makes its
     digit negative. The sum is rounded, but the sum of the first digits is truncated and includes
     half an LSB for rounding the phase.
@@ -77,7 +79,7 @@ def entry(turns, first, negative, count, guard):
     return total + (1 << UNIT - PHASE - 1 if first == 1 else 1 << cut - 1) >> cut
 
 
-def groups(digits):
+def groups(digits: int) -> list[tuple[int, int]]:
     """(first, count) of each sum: the last two have five digits, those before them four, and the
     first one has the digits that remain.
     """
@@ -90,7 +92,7 @@ def groups(digits):
     ]
 
 
-def bound(plan, w, radius, iterative=False):
+def bound(plan: Plan, w: int, radius: float, iterative: bool = False) -> float:
     """Largest error of the phase, in LSB, for a sample of this radius in counts: the sum of the
     largest error of each cause.
     """
@@ -108,17 +110,17 @@ def bound(plan, w, radius, iterative=False):
     return 0.5 + remainder + cubic + table + unit * cut / (1.16 * radius)
 
 
-def amplitude_bound(radius):
+def amplitude_bound(radius: float) -> float:
     """Largest error of the amplitude in counts: by truncation, and by the residual gain."""
     return 1.5 + 0.00015 * radius
 
 
-def quarter_bound(plans, w):
+def quarter_bound(plans: Mapping[int, Plan], w: int) -> float:
     """The bound of the phase error from a quarter of full scale on, in LSB."""
     return bound(plans[w], w, (1 << w - 1) / 4, plans is ITERATIVE)
 
 
-def fraction_bits(plan):
+def fraction_bits(plan: Plan) -> list[tuple[int, int]]:
     """Per step of arctan_pipelined from 0 on: the fraction bits of (longer, shorter) after it; a
     negative number counts integer bits that are dropped. Step 1 folds the sample, step t finds
     digit t - 1.
@@ -134,7 +136,7 @@ def fraction_bits(plan):
     return found
 
 
-def summed(plan):
+def summed(plan: Plan) -> list[int]:
     """Per step of arctan_pipelined from 0 on: the digits whose angles are in the sum after it. A
     step adds only digits that an earlier step has found.
     """
@@ -142,7 +144,7 @@ def summed(plan):
     return [max(end for end in ends if end <= max(step - 2, 0)) for step in range(plan[1] + 1)]
 
 
-def chosen(number, plans, name):
+def chosen(number: int, plans: Mapping[int, Plan], name: str) -> str:
     """A parameter of the plan as a constant that depends on W; the last width stands for the wider
     ones.
     """
@@ -151,7 +153,7 @@ def chosen(number, plans, name):
     return f"    localparam int {name} = {cases}{value[16]};"
 
 
-def rows(name, steps_of):
+def rows(name: str, steps_of: Callable[[Plan], list[int]]) -> tuple[list[str], int]:
     """A table of one row per width, one signed byte per step, step 0 at the right."""
     length = max(plan[1] for plan in PIPELINED.values()) + 1
     lines = []
@@ -163,7 +165,7 @@ def rows(name, steps_of):
     return [f"    localparam [{size}:0] {name} = {{", *lines, "    };"], 8 * length
 
 
-def pipelined_constants():
+def pipelined_constants() -> list[str]:
     longer, row = rows("LONGER", lambda plan: [bits for bits, _ in fraction_bits(plan)])
     shorter, _ = rows("SHORTER", lambda plan: [bits for _, bits in fraction_bits(plan)])
     sums, _ = rows("SUMMED", summed)
@@ -184,12 +186,12 @@ def pipelined_constants():
     ]
 
 
-def iterative_constants():
+def iterative_constants() -> list[str]:
     names = ("TURNS", "DIGITS", "F", "GUARD")
     return [chosen(number, ITERATIVE, name) for number, name in enumerate(names)]
 
 
-def made():
+def made() -> dict[Path, str]:
     modules = {"arctan_pipelined": pipelined_constants(), "arctan_iterative": iterative_constants()}
     return {MADE: text()} | {
         path: made_files.filled(path, BEGIN, END, lines)
@@ -197,7 +199,8 @@ def made():
     }
 
 
-def text():
+def text() -> str:
+    top = LONGEST
     cases = "\n".join(
         f"                {f'{i}:':<8} angle = 64'd{ANGLE[i - 1]};" for i in range(1, LONGEST + 1)
     )
@@ -216,7 +219,7 @@ def text():
 `default_nettype none
 
 module arctan_rotation_rom #(
-    parameter  int TURNS = 6,                  // digits that rotate by an arctangent, to {LONGEST}
+    parameter  int TURNS = 6,                  // digits that rotate by an arctangent, up to {top}
     parameter  int FIRST = 1,                  // the first digit of the sum
     parameter  int COUNT = 4,                  // digits in the sum, 1 to 5
     parameter  int GUARD = 9,                  // bits below the LSB of a {PHASE}-bit phase
@@ -268,7 +271,7 @@ endmodule
 """
 
 
-def bounds():
+def bounds() -> str:
     return "\n".join(
         f"{w} bits: pipelined {quarter_bound(PIPELINED, w):.3f}, "
         f"iterative {quarter_bound(ITERATIVE, w):.3f} LSB"
@@ -276,7 +279,7 @@ def bounds():
     )
 
 
-def main(arguments=None) -> int:
+def main(arguments: list[str] | None = None) -> int:
     return made_files.main(__doc__, made, arguments, bounds)
 
 

@@ -8,10 +8,11 @@ import sys
 import textwrap
 import tomllib
 import zlib
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from tables import made_files, registers
 
@@ -21,6 +22,10 @@ HEADER = ROOT / "sw" / "firmware" / "made" / "bus_protocol.h"
 HOST = ROOT / "sw" / "host" / "moire" / "made" / "bus_tables.py"
 PAGE = ROOT / "docs" / "protocol.md"
 COLUMNS = 100  # of the made C and Python
+
+Entry = Mapping[str, Any]  # a table of bus.toml
+Entries = Mapping[str, Entry]
+Laid = list[tuple[str, str, int]]  # fields of a body: name, type, offset
 
 SIZES = {"u8": 1, "i8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "u64": 8, "i64": 8}
 REQUEST_HEAD = ["sequence u8", "operation u8"]
@@ -62,9 +67,10 @@ WORDS = ("cause", "fault", "job_state")  # lists whose words the firmware shows 
 LEFT_AT_ZERO = ("axis.feed_override.pause",)
 
 
-def fields(head, declared):
+def fields(head: list[str], declared: list[str]) -> tuple[Laid, int]:
     """[(name, type, offset)] of a body, and its length."""
-    laid, offset = [], 0
+    laid: Laid = []
+    offset = 0
     for declaration in head + declared:
         name, kind = declaration.split()
         if kind not in SIZES:
@@ -83,23 +89,23 @@ class Target(NamedTuple):
     field: registers.Field
 
     @property
-    def path(self):
+    def path(self) -> str:
         return f"{self.block.name}.{self.register.name}.{self.field.name}"
 
     @property
-    def limits(self):
+    def limits(self) -> tuple[int, int]:
         if self.field.signed:
             return -(1 << (self.field.width - 1)), (1 << (self.field.width - 1)) - 1
         return 0, (1 << self.field.width) - 1
 
     @property
-    def row(self):
+    def row(self) -> str:
         register, field = self.register.name, self.field.port
         return f"    X({self.parameter}, {self.block.name}, {register}, {field})".upper()
 
 
 @cache
-def register_fields():
+def register_fields() -> dict[str, tuple[registers.Block, registers.Register, registers.Field]]:
     """{block.register.field: (block, register, field)} of registers.rdl."""
     return {
         f"{block.name}.{register.name}.{field.name}": (block, register, field)
@@ -108,7 +114,7 @@ def register_fields():
     }
 
 
-def targets_of(parameters):
+def targets_of(parameters: Entries) -> list[Target]:
     """The targets of all parameters that name a register, in the order of the addresses."""
     targets = []
     for name, parameter in parameters.items():
@@ -131,13 +137,14 @@ class Bus:
         text = text.replace(b"\r\n", b"\n")
         table = tomllib.loads(text.decode())
         self.crc = zlib.crc32(text)
-        self.version = table["version"]
-        self.longest_body = table["longest_body"]
-        self.lists = {
+        self.version: int = table["version"]
+        self.longest_body: int = table["longest_body"]
+        self.lists: dict[str, dict[str, tuple[int, str]]] = {
             name: {key: tuple(value) for key, value in table[name].items()} for name in LISTS
         }
-        self.operations = table["operation"]
-        self.parameters, self.settings = table["parameter"], table["setting"]
+        self.operations: Entries = table["operation"]
+        self.parameters: Entries = table["parameter"]
+        self.settings: Entries = table["setting"]
         self.values_crc = zlib.crc32(
             repr(
                 [
@@ -146,7 +153,7 @@ class Bus:
                 ]
             ).encode()
         )
-        self.layouts = {}
+        self.layouts: dict[str, tuple[tuple[Laid, int], tuple[Laid, int]]] = {}
         for name, operation in self.operations.items():
             self.layouts[name] = (
                 fields(REQUEST_HEAD, operation["request"]),
@@ -156,7 +163,7 @@ class Bus:
         self.check()
         self.check_targets()
 
-    def check_targets(self):
+    def check_targets(self) -> None:
         """A register must take every value of its parameters, and hold nothing else."""
         named = [target.path for target in self.targets]
         once("registers of parameters", named)
@@ -176,7 +183,7 @@ class Bus:
                 if field.kind == "setting" and path not in (*named, *LEFT_AT_ZERO):
                     raise ValueError(f"bus.toml: {path} has no parameter, {target.path} has")
 
-    def check(self):
+    def check(self) -> None:
         for name, entries in self.lists.items():
             once(f"{name} codes", [code for code, _ in entries.values()])
         once("operation codes", [operation["code"] for operation in self.operations.values()])
@@ -195,7 +202,7 @@ class Bus:
             Fraction(parameter["lsb"])
 
 
-def once(what, numbers):
+def once(what: str, numbers: Sequence[object]) -> None:
     if len(set(numbers)) != len(numbers):
         raise ValueError(f"bus.toml: {what} repeat")
 
@@ -203,7 +210,7 @@ def once(what, numbers):
 # ------------------------------------------------------------------ firmware
 
 
-def commented(code, text):
+def commented(code: str, text: str) -> list[str]:
     """A line of C with its comment, which goes above it if the line gets too long."""
     line = f"{code}    // {text}"
     if len(line) <= COLUMNS:
@@ -211,7 +218,7 @@ def commented(code, text):
     return [*comment(text, len(code) - len(code.lstrip())), code]
 
 
-def comment(text, indent=0):
+def comment(text: str, indent: int = 0) -> list[str]:
     start = " " * indent + "// "
     return textwrap.wrap(
         text, COLUMNS, initial_indent=start, subsequent_indent=start, break_on_hyphens=False
@@ -283,7 +290,7 @@ def header(bus: Bus) -> str:
     return "\n".join(out)
 
 
-def values(kind, parameters):
+def values(kind: str, parameters: Entries) -> list[str]:
     """Numbers and ranges of the parameters of an axis, or of the settings of a station."""
     out = [f"enum bus_{kind} {{"]
     for name, parameter in parameters.items():
@@ -309,7 +316,7 @@ def values(kind, parameters):
     return out
 
 
-def register_rows(bus):
+def register_rows(bus: Bus) -> list[str]:
     """The parameters whose value goes into a field of a register as it is."""
     return [
         "// X(parameter, block, register, field), in the order of the addresses",
@@ -317,7 +324,7 @@ def register_rows(bus):
     ]
 
 
-def function_rows(bus):
+def function_rows(bus: Bus) -> list[str]:
     """The parameters that a function of the firmware computes registers from."""
     applied = [(name, p["apply"]) for name, p in bus.parameters.items() if "apply" in p]
     functions = list(dict.fromkeys(function for _, function in applied))
@@ -328,13 +335,13 @@ def function_rows(bus):
     ]
 
 
-def of_one_count(parameter):
+def of_one_count(parameter: Entry) -> str:
     if not parameter["unit"] and parameter["lsb"] == "1":
         return ""
     return f"[{parameter['lsb']} {parameter['unit']}".rstrip() + "] "
 
 
-def macro(name, rows):
+def macro(name: str, rows: list[str]) -> list[str]:
     return [f"#define {name}(X) \\"] + [row + " \\" for row in rows[:-1]] + [rows[-1], ""]
 
 
@@ -406,11 +413,11 @@ def host(bus: Bus) -> str:
     return "\n".join(out)
 
 
-def quoted(text):
+def quoted(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
-def string(before, text, after):
+def string(before: str, text: str, after: str) -> list[str]:
     """A line of Python with this text, or several of which each holds a part of it."""
     line = before + quoted(text) + after
     if len(line) <= COLUMNS:
@@ -423,7 +430,7 @@ def string(before, text, after):
     return [*lines, " " * indent + quoted(parts[-1]) + after]
 
 
-def pairs(declared):
+def pairs(declared: Iterable[tuple[str, ...]]) -> str:
     """A tuple of pairs, three on a line."""
     each = [f"({quoted(name)}, {quoted(kind)})," for name, kind in declared]
     rows = [" ".join(each[at : at + 3]) for at in range(0, len(each), 3)]
@@ -433,15 +440,16 @@ def pairs(declared):
 # ------------------------------------------------------------------ page
 
 
-def diagram(laid):
+def diagram(laid: Laid) -> list[str]:
     """A body as one row of boxes: name above, first byte and type below."""
     boxes = []
     for name, kind, offset in laid:
         below = f"{offset} {kind}"
         width = max(len(name), len(below)) + 2
         boxes.append((name.center(width), below.center(width), width))
-    lines, row, used = ["```"], [], 0
-    for box in boxes + [None]:
+    row: list[tuple[str, str, int]] = []
+    lines, used = ["```"], 0
+    for box in [*boxes, None]:
         if box is None or (row and used + box[2] + 1 > 110):
             edge = "+" + "+".join("-" * width for _, _, width in row) + "+"
             lines += [
@@ -457,13 +465,13 @@ def diagram(laid):
     return lines + ["```"]
 
 
-def table(head, rows):
+def table(head: Sequence[str], rows: Iterable[Iterable[object]]) -> list[str]:
     out = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
     return out + ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
 
 
-def page_parts(bus: Bus) -> dict:
-    parts = {}
+def page_parts(bus: Bus) -> dict[str, list[str]]:
+    parts: dict[str, list[str]] = {}
     parts["identity"] = [
         f"Version {bus.version}, CRC-32 of `tables/bus.toml` `{bus.crc:08X}`, "
         f"longest body {bus.longest_body} bytes."
@@ -489,6 +497,7 @@ def page_parts(bus: Bus) -> dict:
             + diagram(reply)
         )
     parts["operations"] = body
+    rows: list[tuple[object, ...]]
     for name, entries in bus.lists.items():
         rows = [(code, f"`{key}`", words) for key, (code, words) in entries.items()]
         parts[name + "s"] = table(("code" if name in CODES else "bit", "name", "words"), rows)
@@ -515,18 +524,18 @@ def page_parts(bus: Bus) -> dict:
     return parts
 
 
-def enable_frames(bus: Bus) -> tuple:
+def enable_frames(bus: Bus) -> tuple[bytes, bytes]:
     """Payloads of `enable` of axis 0 at address 1 and of its reply."""
     code, ok = bus.operations["enable"]["code"], bus.lists["cause"]["ok"][0]
 
-    def frame(first, *body):
+    def frame(first: int, *body: int) -> bytes:
         inside = bytes([first, len(body), *body])
         return inside[1:] + zlib.crc32(inside).to_bytes(4, "little")
 
     return frame(0x21, 7, code, 0, 1), frame(0x51, 7, code, ok)
 
 
-def example(bus: Bus) -> list:
+def example(bus: Bus) -> list[str]:
     """`enable`, byte by byte."""
     request, reply = (payload.hex(" ").upper() for payload in enable_frames(bus))
     return [
@@ -544,10 +553,10 @@ def example(bus: Bus) -> list:
     ]
 
 
-def packets(bus: Bus) -> list:
+def packets(bus: Bus) -> list[str]:
     """The same exchange as packets; none of them is long enough for a run of 254."""
 
-    def packet(content):
+    def packet(content: bytes) -> bytes:
         return b"".join(bytes([len(part) + 1]) + part for part in content.split(b"\0")) + b"\0"
 
     request, reply = enable_frames(bus)
@@ -581,12 +590,12 @@ def page(bus: Bus, text: str) -> str:
 # ------------------------------------------------------------------ command line
 
 
-def made() -> dict:
+def made() -> dict[Path, str]:
     bus = Bus(SOURCE.read_bytes())
     return {HEADER: header(bus), HOST: host(bus), PAGE: page(bus, PAGE.read_text(encoding="utf-8"))}
 
 
-def main(arguments=None) -> int:
+def main(arguments: list[str] | None = None) -> int:
     return made_files.main(__doc__, made, arguments)
 
 

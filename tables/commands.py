@@ -2,17 +2,21 @@
 """Makes docs/commands, one page per command of `moire`, from the commands themselves."""
 
 import sys
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import cast
 
 import click
 
 from moire.cli.command_line import moire
 from moire.cli.options import COMMON, Common
-from moire.cli.parser import EXAMPLES, SECTIONS, Several
+from moire.cli.parser import EXAMPLES, SECTIONS, Command, Group, Several
 from tables import made_files
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ROOT / "docs" / "commands"
+
+Shown = Command | Group
 
 HEAD = [
     "<!-- SPDX-License-Identifier: Apache-2.0 -->",
@@ -20,9 +24,14 @@ HEAD = [
 ]
 
 
-def below(command: click.Command) -> dict:
+def below(command: Shown) -> Mapping[str, Shown]:
     """The commands of a group by name; none if the command is no group."""
-    return command.commands if isinstance(command, click.Group) else {}
+    return cast(Mapping[str, Shown], command.commands) if isinstance(command, Group) else {}
+
+
+def help_of(one: click.Command | click.Parameter) -> str:
+    """Its help, which every command and every parameter has."""
+    return cast(str, one.help)
 
 
 def words(text: str) -> str:
@@ -38,21 +47,21 @@ def name_of(parameter: click.Parameter) -> str:
     return value + more if parameter.required else f"[{value}{more}]"
 
 
-def table(parameters) -> list:
-    rows = [f"| `{name_of(each)}` | {words(each.help)} |" for each in parameters]
+def table(parameters: Iterable[click.Parameter]) -> list[str]:
+    rows = [f"| `{name_of(each)}` | {words(help_of(each))} |" for each in parameters]
     return ["", "| argument | |", "| --- | --- |", *rows] if rows else []
 
 
-def own(command: click.Command) -> list:
+def own(command: Shown) -> list[click.Parameter]:
     """The parameters of a command without the options of every command."""
     return [each for each in command.params if not isinstance(each, Common)]
 
 
-def section(command: click.Command) -> list:
-    return [command.help, "", f"    {command.example}", *table(own(command))]
+def section(command: Shown) -> list[str]:
+    return [help_of(command), "", f"    {command.example}", *table(own(command))]
 
 
-def page(name: str, command: click.Command) -> str:
+def page(name: str, command: Shown) -> str:
     out = [*HEAD, f"# moire {name}", "", *section(command)]
     for action, part in below(command).items():
         out += ["", f"## {name} {action}", "", *section(part)]
@@ -60,29 +69,31 @@ def page(name: str, command: click.Command) -> str:
 
 
 def first_page() -> str:
-    out = [*HEAD, "# The commands of moire", "", moire.help]
+    out = [*HEAD, "# The commands of moire", "", help_of(moire)]
     for title, names in SECTIONS.items():
         out += ["", f"## {title}", "", "| command | |", "| --- | --- |"]
-        out += [f"| [`{name}`]({name}.md) | {words(moire.commands[name].help)} |" for name in names]
+        out += [
+            f"| [`{name}`]({name}.md) | {words(help_of(moire.commands[name]))} |" for name in names
+        ]
     out += ["", "## Options of every command", *table(COMMON)]
     out += ["", "## How they go together", "", "```", EXAMPLES.strip(), "```", ""]
     return "\n".join(out)
 
 
-def pages() -> dict:
+def pages() -> dict[Path, str]:
     return {
         PAGES / "README.md": first_page(),
         **{PAGES / f"{name}.md": page(name, command) for name, command in below(moire).items()},
     }
 
 
-def made() -> dict:
+def made() -> dict[Path, str | None]:
     """{path: text}; the text is None for the page of a command that no longer exists."""
     fresh = pages()
     return fresh | dict.fromkeys(set(PAGES.glob("*.md")) - set(fresh))
 
 
-def main(arguments=None) -> int:
+def main(arguments: list[str] | None = None) -> int:
     return made_files.main(__doc__, made, arguments)
 
 

@@ -16,7 +16,7 @@ COUNT = 24  # rotations
 MADE = Path(__file__).resolve().parent.parent / "rtl" / "compensate" / "harmonic_rotation_rom.sv"
 
 
-def arctan(inverse):
+def arctan(inverse: int) -> Fraction:
     """atan(1 / inverse) for an inverse from 2 up, by its series, right to far below 2^-UNIT."""
     total, term, k = Fraction(0), Fraction(1, inverse), 0
     while term > Fraction(1, 1 << UNIT + 40):
@@ -26,14 +26,14 @@ def arctan(inverse):
     return total
 
 
-def angles():
+def angles() -> list[int]:
     """The angles of all rotations in whole 2^-UNIT turn, without floating point."""
     eighth = 4 * arctan(5) - arctan(239)  # a quarter of pi, by Machin's formula
     radians = [eighth] + [arctan(1 << n) for n in range(1, COUNT)]
     return [round(angle / (8 * eighth) * (1 << UNIT)) for angle in radians]
 
 
-def text():
+def text() -> str:
     *most, last = angles()
     cases = "\n".join(f"            5'd{n}: angle = 32'd{a};" for n, a in enumerate(most))
     return f"""\
@@ -62,7 +62,7 @@ endmodule
 """
 
 
-def main(arguments=None) -> int:
+def main(arguments: list[str] | None = None) -> int:
     return made_files.main(__doc__, lambda: {MADE: text()}, arguments)
 
 

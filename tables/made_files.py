@@ -8,13 +8,16 @@ import os
 import subprocess
 import sys
 import textwrap
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 COLUMNS = 100
 
+Texts = Mapping[Path, str | None]  # None: the file should not be there
 
-def stale(made: dict) -> dict:
+
+def stale(made: Texts) -> dict[Path, str | None]:
     """{path: text} of files that do not hold their text; a text of None: the file should not be
     there.
     """
@@ -25,7 +28,7 @@ def stale(made: dict) -> dict:
     }
 
 
-def filled(path, begin: str, end: str, lines: list) -> str:
+def filled(path: Path, begin: str, end: str, lines: Sequence[str]) -> str:
     """The text of a file with these lines between its two marks."""
     before, found, inside = path.read_text(encoding="utf-8").partition(begin)
     _, closed, after = inside.partition(end)
@@ -34,7 +37,12 @@ def filled(path, begin: str, end: str, lines: list) -> str:
     return before + "\n".join([begin, *lines, end]) + after
 
 
-def main(about: str, make, arguments=None, figures=None) -> int:
+def main(
+    about: str,
+    make: Callable[[], Texts],
+    arguments: Sequence[str] | None = None,
+    figures: Callable[[], str] | None = None,
+) -> int:
     """Exit code of a generator: make() returns {path: text}, figures() what `--bound` prints. A
     ValueError says what is wrong with
     the table, and nothing is written."""

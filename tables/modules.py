@@ -29,13 +29,16 @@ OLD_KEYS = set(
 REQUIRED = ("purpose", "latency", "model")
 
 
-def header(text, where="header"):
+def header(text: str, where: str | Path = "header") -> tuple[str | None, dict[str, str]]:
     """Name, purpose and facts from the comment at the head of a module: `name -- purpose`, then
     lines of `key text`; a fact may continue in indented lines. Formulae are indented after an empty
     line; a free paragraph begins with a capital letter. A ValueError names each line that is none
     of these.
     """
-    lines, wrong = [], []
+    lines: list[tuple[int, str]] = []
+    wrong: list[str] = []
+    facts: dict[str, str]
+    key: str | None
     for number, line in enumerate(text.splitlines()[1:], 2):
         if not line.startswith("//"):
             break
@@ -72,7 +75,7 @@ def header(text, where="header"):
     return first.group(1) if first else None, facts
 
 
-def brief(text):
+def brief(text: str) -> str:
     """The first sentence of a fact; if it is too long, without the details after a semicolon or a
     colon.
     """
@@ -83,7 +86,7 @@ def brief(text):
     return sentence
 
 
-def check_of(path):
+def check_of(path: Path) -> tuple[Path | None, Path | None]:
     """(model, test) of a module as paths from ROOT, derived from its own path."""
     room, name = path.parent.relative_to(ROOT / "rtl"), path.stem
     if not room.name:  # axis, node: block diagrams; whole-system tests are theirs
@@ -102,7 +105,7 @@ def check_of(path):
     return Path("tb") / room / f"{name}.py", Path("tb") / room / f"test_{name}.py"
 
 
-def row(path, wrong):
+def row(path: Path, wrong: list[str]) -> list[str]:
     """The cells of a module; each broken rule is added to `wrong`."""
     text, here = path.read_text(), path.relative_to(ROOT)
     try:
@@ -139,18 +142,17 @@ def row(path, wrong):
                 f"it has {len(text)}"
             )
     room = path.parent.name if path.parent != ROOT / "rtl" else ""
-    link = lambda p: f"[{p.name}](../{p.as_posix()})" if p else ""
     place = path.relative_to(ROOT / "rtl").as_posix()
     return [
         room,
         f"[{path.stem}]({place})",
         purpose,
         latency,
-        ", ".join(filter(None, (link(model), link(test)))),
+        ", ".join(f"[{p.name}](../{p.as_posix()})" for p in (model, test) if p),
     ]
 
 
-def bare_ports(path):
+def bare_ports(path: Path) -> list[str]:
     """The parameters and ports, except clk and rst, whose lines state no unit and no meaning."""
     text = path.read_text()
     head = text[text.index(f"\nmodule {path.stem}") : text.index("\n);")]
@@ -161,10 +163,11 @@ def bare_ports(path):
     return [name for name, comment in names if not comment and name not in ("clk", "rst")]
 
 
-def untested_latencies(path):
+def untested_latencies(path: Path) -> list[str]:
     """The numbers of cycles in the latency of a header that no test named latency_is_… states."""
     latency = header(path.read_text(), path)[1]["latency"]
     test = check_of(path)[1]
+    assert test is not None
     names = re.findall(r"def (?:test_)?latency_is_(\w+)", (ROOT / test).read_text())
     stated = re.findall(r"((?:\d+(?:, | or | and | to ))*\d+) cycles?\b", latency)
     numbers = {number for figure in stated for number in re.findall(r"\d+", figure)}
@@ -172,8 +175,8 @@ def untested_latencies(path):
     return sorted(numbers - known) if names else [latency]
 
 
-def made() -> dict:
-    wrong = []
+def made() -> dict[Path, str]:
+    wrong: list[str] = []
     rows = [
         row(p, wrong)
         for p in sorted((ROOT / "rtl").rglob("*.sv"), key=lambda p: (p.parent != ROOT / "rtl", p))
@@ -191,7 +194,7 @@ def made() -> dict:
     return {PAGE: f"{before}{BEGIN}\n" + "\n".join(table) + f"\n{END}{after}"}
 
 
-def main(arguments=None) -> int:
+def main(arguments: list[str] | None = None) -> int:
     return made_files.main(__doc__, made, arguments)
 
 

@@ -240,9 +240,10 @@ stop:   - step -> change                ; end set
 """
 
 
-def assembled():
+def assembled() -> list[tuple[str, str, int]]:
     """(label or "", text, code) of each line."""
-    lines, labels = [], {}
+    lines: list[str] = []
+    labels: dict[str, int] = {}
     for line in PROGRAM.splitlines():
         line = line.split("#")[0].strip()
         if found := re.match(r"(\w+):\s*(.*)", line):
@@ -255,13 +256,14 @@ def assembled():
     ]
 
 
-def code_of(line, labels):
+def code_of(line: str, labels: dict[str, int]) -> int:
     """The code of a line: target 7 bits, job 5, halved 1, acc 1, sign 2, operand 5, word 5."""
     found = re.fullmatch(
         r"(?:(acc)\b ?)?(?:(\+|-|along|against)? ?(\w+))?( >> 1)?(?: -> (\w+))?"
         r"(?: ; (\w+)(?: (\w+))?)?",
         line,
     )
+    assert found, line
     acc, sign, operand, halved, word, job, label = found.groups()
     operand = "nothing" if operand in (None, "0") else operand
     code = labels[label] if label else 0
@@ -277,7 +279,7 @@ def code_of(line, labels):
     return code
 
 
-def text():
+def text() -> str:
     rows = [
         f"        lines[{n}] = 26'h{code:07x};  // {label + ': ' if label else ''}{line}"
         for n, (label, line, code) in enumerate(assembled())
@@ -317,7 +319,7 @@ endmodule
     )
 
 
-def main(arguments=None) -> int:
+def main(arguments: list[str] | None = None) -> int:
     return made_files.main(__doc__, lambda: {MADE: text()}, arguments)
 
 

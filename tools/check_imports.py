@@ -31,7 +31,7 @@ PACKAGES = {
     "tb": "tb",
 }
 C_ROOTS = ("sw/firmware", "sw/twin")
-HIDDEN = re.compile(r"\bsys\.path\b|\bspec_from_file_location\b")
+HIDDEN = re.compile(r"\bsys\.path(\[|\.| *\+?=)|\bspec_from_file_location\b")
 
 Graph = dict[str, set[str]]
 

@@ -79,8 +79,7 @@ FIGURES = {
     "import_cycles": Figure(
         lambda: listed(check_imports.problems()),
         "cycles",
-        "cycles among C files and Python modules, imports from tb outside tb, patches of "
-        "sys.path",
+        "cycles among C files and Python modules, imports from tb outside tb, patches of sys.path",
         "0",
         Quick(),
         0,

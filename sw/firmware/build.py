@@ -22,10 +22,13 @@ import struct
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import cast
 
 from elftools.elf.elffile import ELFFile
+from elftools.elf.sections import SymbolTableSection
 
 HERE = Path(__file__).resolve().parent
 OUT = HERE.parents[1] / "build" / "firmware"
@@ -73,7 +76,7 @@ class BuildError(Exception):
     """One line that says what is wrong."""
 
 
-def compiler():
+def compiler() -> tuple[list[str], list[str]]:
     """The command with its flags, and the libraries that end the link command."""
     cross = os.environ.get("CROSS")
     if cross:
@@ -95,7 +98,7 @@ def read_elf(path: Path) -> tuple[list[tuple[int, bytes]], dict[str, int]]:
             for segment in elf.iter_segments("PT_LOAD")
             if segment["p_filesz"]
         ]
-        table = elf.get_section_by_name(".symtab")
+        table = cast(SymbolTableSection, elf.get_section_by_name(".symtab"))
         symbols = {symbol.name: symbol["st_value"] for symbol in table.iter_symbols()}
     return segments, symbols
 
@@ -133,20 +136,20 @@ def defines_of(name: str) -> list[str]:
     return [f"-DHARDWARE_AXES={AXES[name]}u"] if name in AXES else []
 
 
-def flags_of(path):
+def flags_of(path: Path) -> list[str]:
     if path.name in HOT:
         return [FAST]
     return [SMALL] if os.environ.get("CROSS") else [SMALL, *OUTLINE]
 
 
-def fingerprint(sources, command, memory):
+def fingerprint(sources: Iterable[Path], command: list[str], memory: int) -> str:
     state = hashlib.sha256(repr((command, memory)).encode())
     for source in sources:
         state.update(source.relative_to(HERE).as_posix().encode() + source.read_bytes())
     return state.hexdigest()
 
 
-def run(command):
+def run(command: Sequence[str]) -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         lines = done.stderr.splitlines() or ["the compiler failed without a message"]
@@ -158,7 +161,7 @@ def run(command):
         raise BuildError((errors or lines)[0].strip())
 
 
-def build(memory, out, force, name="axis"):
+def build(memory: int, out: Path, force: bool, name: str = "axis") -> str:
     command, libraries = compiler()
     command += defines_of(name)
     sources = [*sources_of(name), LINK, HERE / "build.py"]
@@ -209,7 +212,7 @@ def build(memory, out, force, name="axis"):
     return report
 
 
-def main():
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     parser.add_argument(
         "--image", choices=IMAGES, default="axis", help="kind of node (default axis)"

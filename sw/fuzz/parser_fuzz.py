@@ -15,10 +15,13 @@ import random
 import signal
 import sys
 import time
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
+from types import CodeType, FrameType
+from typing import Any, NoReturn
 
 import moire
 from moire import units
@@ -32,17 +35,21 @@ from moire.cli.options import Options
 from moire.client import relay
 from moire.client.axis import Axis
 from moire.errors import MoireError
-from moire.made.bus_tables import OPERATIONS, PARAMETERS
+from moire.made.bus_tables import OPERATIONS, PARAMETERS, PROTOCOL_CRC
 
 PACKAGE = str(Path(moire.__file__).parent)
 LONGEST = 600
 HANG_S = 10
 
+Parser = Callable[[bytes], object]
+Line = tuple[CodeType, int]
+Tracer = Callable[[FrameType, str, Any], "Tracer | None"]
+
 
 # ------------------------------------------------------------------ what is fuzzed
 
 
-def packets(data):
+def packets(data: bytes) -> None:
     reader = cobs.PacketReader()
     for content in reader.feed(data[: len(data) // 2]) + reader.feed(data[len(data) // 2 :]):
         cobs.address_of(content, protocol.TO_NODE), cobs.address_of(content, protocol.FROM_NODE)
@@ -51,18 +58,18 @@ def packets(data):
     protocol.parse_reply(data)
 
 
-def telnet(data):
+def telnet(data: bytes) -> None:
     server = rfc2217.Server(115200)
     for character in server.feed(data):
         assert character.ninth in (0, 1)
     server.take_answers()
 
 
-def words_of(data):
+def words_of(data: bytes) -> list[int]:
     return [data[n] | (data[n + 1] & 1) << 8 for n in range(0, len(data) - 1, 2)]
 
 
-def fed(exchange, data):
+def fed(exchange: protocol.Exchange | relay.Exchange, data: bytes) -> None:
     """An exchange that receives these words, with a silence after each that has bit 1 of its second
     byte set.
     """
@@ -78,41 +85,41 @@ def fed(exchange, data):
     exchange.result()
 
 
-def exchange(data):
+def exchange(data: bytes) -> None:
     fed(protocol.Exchange(1, protocol.request_body("status", 7, axis=0), tries=3), data)
 
 
-def relay_exchange(data):
+def relay_exchange(data: bytes) -> None:
     fed(relay.Exchange(bytes([7, relay.STATUS]), tries=3), data)
 
 
 class Silent(Transport):
     time_is_stopped = True
 
-    def send(self, words):
+    def send(self, words: Sequence[int]) -> None:
         assert all(0 <= word < 512 for word in words)
 
-    def receive(self, count, timeout_s):
+    def receive(self, count: int, timeout_s: float) -> list[int]:
         return []
 
-    def now(self):
+    def now(self) -> float:
         return 0.0
 
-    def wait(self, seconds):
+    def wait(self, seconds: float) -> None:
         pass
 
 
-def text_of(data):
+def text_of(data: bytes) -> str:
     return data.decode("latin-1")
 
 
-def record(data):
+def record(data: bytes) -> None:
     calls = recording.read(text_of(data))
     recording.listing(calls)
     recording.replay(calls, Silent())
 
 
-def quantities(data):
+def quantities(data: bytes) -> None:
     for parse in (units.parse_length, units.parse_speed, units.parse_time, units.parse_share):
         try:
             parse(text_of(data))
@@ -120,7 +127,7 @@ def quantities(data):
             pass
 
 
-def command(data):
+def command(data: bytes) -> None:
     try:
         command_line.parse_line(text_of(data), Options())
     except SystemExit as end:
@@ -128,7 +135,7 @@ def command(data):
 
 
 @contextmanager
-def standard_input(data):
+def standard_input(data: bytes) -> Iterator[str]:
     before, sys.stdin = sys.stdin, io.StringIO(text_of(data))
     try:
         yield "-"
@@ -136,7 +143,7 @@ def standard_input(data):
         sys.stdin = before
 
 
-def parameters(data):
+def parameters(data: bytes) -> None:
     axis = object.__new__(Axis)
     axis.period_nm = Fraction(800)
     with standard_input(data) as file:
@@ -145,12 +152,12 @@ def parameters(data):
         axis.parameter_counts(name, text)
 
 
-def tuning_record(data):
+def tuning_record(data: bytes) -> None:
     with standard_input(data) as file:
         read_record(file)
 
 
-def readings(data):
+def readings(data: bytes) -> None:
     memory = Path("/dev/shm")
     path = memory / f"moire_{os.getpid()}.csv" if memory.is_dir() else Path("build/readings.csv")
     path.write_bytes(data)
@@ -160,14 +167,14 @@ def readings(data):
         path.unlink()
 
 
-def good_reply():
+def good_reply() -> bytes:
     body = bytes([7, OPERATIONS["status"].code, 11])
     words = [0x61, 0x51, *protocol.frame(0x51, body)]
     return bytes(byte for word in words for byte in (word, 0))
 
 
-HEAD = '{"record": "moire bus", "version": 2, "protocol_crc": %d}\n' % recording.PROTOCOL_CRC
-SEEDS = {
+HEAD = '{"record": "moire bus", "version": 2, "protocol_crc": %d}\n' % PROTOCOL_CRC
+SEEDS: dict[Parser, list[bytes]] = {
     packets: [
         cobs.packet(0x51, bytes([7, 2, 3])),
         cobs.packet(0x21, protocol.request_body("identify", 1)),
@@ -223,31 +230,32 @@ WORDS = [
 
 @dataclass
 class Target:
-    parse: object
-    corpus: list
-    seen: set = field(default_factory=set)
+    parse: Parser
+    corpus: list[bytes]
+    seen: set[tuple[Line | None, Line]] = field(default_factory=set)
     runs: int = 0
     seconds: float = 0.0
-    crashes: dict = field(default_factory=dict)  # where: input
+    crashes: dict[str, bytes] = field(default_factory=dict)  # where: input
 
 
 class Pairs:
     """Pairs of lines of the package that run one after the other, while tracing is on."""
 
-    def __init__(self):
-        self.found, self.last = set(), None
+    def __init__(self) -> None:
+        self.found: set[tuple[Line | None, Line]] = set()
+        self.last: Line | None = None
 
-    def call(self, frame, event, _):
+    def call(self, frame: FrameType, event: str, _: Any) -> Tracer | None:
         return self.line if frame.f_code.co_filename.startswith(PACKAGE) else None
 
-    def line(self, frame, event, _):
+    def line(self, frame: FrameType, event: str, _: Any) -> Tracer:
         here = frame.f_code, frame.f_lineno
         self.found.add((self.last, here))
         self.last = here
         return self.line
 
 
-def mutated(draw, target):
+def mutated(draw: random.Random, target: Target) -> bytes:
     data = bytearray(draw.choice(target.corpus))
     for _ in range(draw.randrange(1, 6)):
         at, kind = draw.randrange(len(data) + 1), draw.randrange(6)
@@ -272,13 +280,14 @@ class Hang(Exception):
     pass
 
 
-def hang(*_):
+def hang(*_: object) -> NoReturn:
     raise Hang
 
 
-def attempt(target, data):
+def attempt(target: Target, data: bytes) -> bool:
     """Runs one input; returns whether it reached anything new."""
-    pairs, where, began = Pairs(), None, time.perf_counter()
+    where: str | None = None
+    pairs, began = Pairs(), time.perf_counter()
     signal.setitimer(signal.ITIMER_REAL, HANG_S)
     sys.settrace(pairs.call)
     try:
@@ -288,6 +297,7 @@ def attempt(target, data):
     except (Exception, SystemExit) as error:
         sys.settrace(None)
         at = error.__traceback__
+        assert at is not None
         while at.tb_next:
             at = at.tb_next
         file = Path(at.tb_frame.f_code.co_filename).name
@@ -303,7 +313,9 @@ def attempt(target, data):
     return bool(new)
 
 
-def fuzz(seconds, seed=1, parsers=tuple(SEEDS), first=False):
+def fuzz(
+    seconds: float, seed: int = 1, parsers: Sequence[Parser] = tuple(SEEDS), first: bool = False
+) -> list[Target]:
     """The targets after so many seconds for all of them; with `first` the first crash ends it."""
     draw = random.Random(seed)
     targets = [Target(parse, list(SEEDS.get(parse, [b""]))) for parse in parsers]
@@ -329,7 +341,7 @@ def fuzz(seconds, seed=1, parsers=tuple(SEEDS), first=False):
     return targets
 
 
-def main():
+def main() -> int:
     targets = fuzz(float(sys.argv[1]), int((sys.argv[2:] or ["1"])[0]))
     for target in targets:
         print(
