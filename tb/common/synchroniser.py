@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/common/synchroniser.sv does, in integers: step(d) is one clk and returns q after it."""
+"""Model of rtl/common/synchroniser.sv: step(d) advances one cycle and returns q after it."""
 
 
 class Synchroniser:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""synchroniser: its latency, its state at reset, and random levels against the model."""
+"""Tests of synchroniser: its latency, its state at reset, and random levels against the model."""
 
 import random
 
@@ -15,7 +15,7 @@ def model_of(dut):
     return Synchroniser(int(dut.W.value), int(dut.STAGES.value), dut.RESET.value.to_signed())
 
 
-async def clk(dut, d, rst=0):
+async def cycle(dut, d, rst=0):
     dut.d.value, dut.rst.value = d, rst
     await RisingEdge(dut.clk)
     await FallingEdge(dut.clk)
@@ -23,12 +23,12 @@ async def clk(dut, d, rst=0):
 
 
 @cocotb.test()
-async def latency_is_the_number_of_stages(dut):
+async def latency_is_stages(dut):
     await start(dut, d=0)
     stages = int(dut.STAGES.value)
     for _ in range(stages):
-        await clk(dut, 0)
-    assert [await clk(dut, 1) for _ in range(stages)] == [0] * (stages - 1) + [1]
+        await cycle(dut, 0)
+    assert [await cycle(dut, 1) for _ in range(stages)] == [0] * (stages - 1) + [1]
 
 
 @cocotb.test()
@@ -37,9 +37,9 @@ async def q_is_the_reset_level_from_reset_until_the_first_level_arrives(dut):
     level, stages = model_of(dut).reset, int(dut.STAGES.value)
     other = ~level % (1 << int(dut.W.value))
     for _ in range(stages + 1):
-        await clk(dut, other)
-    assert await clk(dut, other, rst=1) == level
-    assert [await clk(dut, other) for _ in range(stages)] == [level] * (stages - 1) + [other]
+        await cycle(dut, other)
+    assert await cycle(dut, other, rst=1) == level
+    assert [await cycle(dut, other) for _ in range(stages)] == [level] * (stages - 1) + [other]
 
 
 @cocotb.test()
@@ -48,7 +48,7 @@ async def any_level_matches_the_model(dut):
     model = model_of(dut)
     for n in range(1000):
         d, rst = random.getrandbits(int(dut.W.value)), int(random.random() < 0.02 or n == 0)
-        assert await clk(dut, d, rst) == model.step(d, rst), f"clk {n}"
+        assert await cycle(dut, d, rst) == model.step(d, rst), f"cycle {n}"
 
 
 @pytest.mark.parametrize("w, stages, reset", [(1, 2, 0), (5, 3, -1), (2, 2, 3)])

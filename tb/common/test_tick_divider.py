@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tick_divider: exact periods at both ends of the range, a period changed under way, and starting
-anew, and random
-settings against the model."""
+"""Tests of tick_divider: exact periods at both ends of the range, a period changed while it runs, a
+restart, and random settings against the model.
+"""
 
 import random
 
@@ -13,7 +13,7 @@ from tb.bench import needs, run, start
 from tb.common.tick_divider import TickDivider
 
 
-async def clk(dut, period, restart=0, rst=0):
+async def cycle(dut, period, restart=0, rst=0):
     dut.period.value, dut.restart.value, dut.rst.value = period, restart, rst
     await RisingEdge(dut.clk)
     await FallingEdge(dut.clk)
@@ -21,16 +21,16 @@ async def clk(dut, period, restart=0, rst=0):
 
 
 async def ticks(dut, period, n):
-    """The clk, counted from 1, in which ticks came."""
-    return [k for k in range(1, n + 1) if await clk(dut, period)]
+    """The numbers of the cycles, counted from 1, in which a tick came."""
+    return [k for k in range(1, n + 1) if await cycle(dut, period)]
 
 
 @cocotb.test()
-async def a_tick_comes_each_period_and_the_first_a_period_after_reset(dut):
+async def latency_is_period_to_the_first_tick_and_between_ticks(dut):
     longest = (1 << int(dut.W.value)) - 1
     await start(dut, period=0, restart=0)
     for period in (1, 2, 3, 10, min(longest, 1000)):
-        await clk(dut, period, rst=1)
+        await cycle(dut, period, rst=1)
         assert await ticks(dut, period, 3 * period) == [period, 2 * period, 3 * period]
 
 
@@ -51,7 +51,7 @@ async def period_0_never_ticks_and_the_next_period_begins_whole(dut):
 
 
 @cocotb.test()
-async def a_shorter_period_counts_at_once(dut):
+async def a_shorter_period_takes_effect_at_once(dut):
     await start(dut, period=0, restart=0)
     assert await ticks(dut, 200, 50) == []
     assert await ticks(dut, 20, 41) == [1, 21, 41]
@@ -59,12 +59,12 @@ async def a_shorter_period_counts_at_once(dut):
 
 
 @cocotb.test()
-async def a_period_begins_at_restart_wherever_the_one_before_was(dut):
+async def latency_is_period_from_a_restart_at_any_time(dut):
     await start(dut, period=0, restart=0)
     for before in range(13):
-        await clk(dut, 10, rst=1)
+        await cycle(dut, 10, rst=1)
         await ticks(dut, 10, before)
-        assert await clk(dut, 10, restart=1) == 0  # not even where a tick was due
+        assert await cycle(dut, 10, restart=1) == 0  # even if a tick was due
         assert await ticks(dut, 10, 20) == [10, 20]
 
 
@@ -76,7 +76,9 @@ async def any_setting_matches_the_model(dut):
         if random.random() < 0.05:
             period = random.choice([0, 1, 2, random.randrange(40)])
         restart, rst = int(random.random() < 0.05), int(random.random() < 0.01 or n == 0)
-        assert await clk(dut, period, restart, rst) == model.step(period, restart, rst), f"clk {n}"
+        assert await cycle(dut, period, restart, rst) == model.step(period, restart, rst), (
+            f"cycle {n}"
+        )
 
 
 @pytest.mark.parametrize("w", [8, 24])

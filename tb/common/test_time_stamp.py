@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""time_stamp: counts every clk, wraps, and begins again after a reset in mid-flow."""
+"""Tests of time_stamp: it counts every cycle, wraps, and starts again after a reset."""
 
 import cocotb
 import pytest
@@ -10,17 +10,17 @@ from tb.common.time_stamp import time_stamp
 
 
 @cocotb.test()
-async def every_clk_counts_and_the_end_wraps(dut):
+async def every_cycle_counts_and_the_end_wraps(dut):
     w = int(dut.W.value)
     await start(dut)
-    for clk in range(1, min(3 << w, 2000)):
+    for cycle in range(1, min(3 << w, 2000)):
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
-        assert int(dut.now.value) == time_stamp(clk, w), f"clk {clk}"
+        assert int(dut.now.value) == time_stamp(cycle, w), f"cycle {cycle}"
 
 
 @cocotb.test()
-async def reset_in_mid_flow_starts_again(dut):
+async def latency_is_0_in_the_first_cycle_after_a_reset_in_mid_flow(dut):
     await start(dut)
     for _ in range(7):
         await RisingEdge(dut.clk)

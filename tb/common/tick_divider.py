@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/common/tick_divider.sv does, in integers: step(period, restart) is one clk and returns
-tick after it.
+"""Model of rtl/common/tick_divider.sv: step(period, restart) advances one cycle and returns tick
+after it.
 """
 
 

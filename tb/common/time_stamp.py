@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/common/time_stamp.sv does, in integers."""
+"""Model of rtl/common/time_stamp.sv."""
 
 
-def time_stamp(clks, w=64):
-    """The count after `clks` clk without reset."""
-    return clks % (1 << w)
+def time_stamp(cycles, w=64):
+    """The count after this many cycles without reset."""
+    return cycles % (1 << w)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/decode/encoder_counter.sv does: step(...) is one clk, and returns rdata after it."""
+"""Model of rtl/decode/encoder_counter.sv: step(...) advances one cycle and returns rdata."""
 
 from tb.decode.index_latch import IndexLatch, Settings
 from tb.decode.quadrature_decoder import QuadratureDecoder
@@ -31,7 +31,7 @@ class EncoderCounter:
         return self.settings >> n & (1 << width) - 1
 
     def read(self, word):
-        """What a word reads as now; None where it means nothing yet."""
+        """The word as it reads now; None while it is undefined."""
         if word == 0:
             return (
                 None
@@ -50,7 +50,7 @@ class EncoderCounter:
 
     def step(self, a, b, z, probe=0, now=0, select=0, write=0, word=0, wdata=0, rst=0):
         rdata = self.read(word) if select and not rst else 0
-        told = wdata if select and write and word == 1 else 0
+        written = wdata if select and write and word == 1 else 0
         index = Settings(
             active_low=self.bit(6),
             gate_mask=3 * self.bit(7),
@@ -67,7 +67,10 @@ class EncoderCounter:
             self.edge_time = now
         ready, count = decoder.ready, decoder.count
         self.seen = (
-            self.seen & ~told | self.found * FOUND | self.probing * PROBED | self.illegal * ILLEGAL
+            self.seen & ~written
+            | self.found * FOUND
+            | self.probing * PROBED
+            | self.illegal * ILLEGAL
         )
         _, _, self.illegal = decoder.step(later[0], later[1], mode, clear, rst)
         _, self.found, _, _ = self.index.step(
@@ -77,7 +80,7 @@ class EncoderCounter:
             direction,
             moves if ready else 0,
             count,
-            int(bool(told & ARM)),
+            int(bool(written & ARM)),
             rst,
             self.probing,
         )

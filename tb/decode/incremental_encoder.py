@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/decode/incremental_encoder.sv does: its three blocks in a row, flags, and the time of
-the last edge.
+"""Model of rtl/decode/incremental_encoder.sv: the models of its three blocks in series, the flags,
+and the time of the last edge.
 """
 
 from dataclasses import dataclass, field
@@ -38,7 +38,9 @@ class IncrementalEncoder:
         self.seen = self.fault = self.revolution = 0
 
     def step(self, setup, a, b, z, now, arm=0, clear_flags=0, rst=0, own_a=0, own_b=0):
-        """One clk; the pins after it by name. edge_time is None while it means nothing."""
+        """Advance one cycle; return the outputs after it by name. edge_time is None while it is
+        undefined.
+        """
         later, decoder = self.index.later, self.decoder
         direction, moves, _ = decoder.look(later[0], later[1], setup.mode)
         clear = self.index.clear(setup.index, direction)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/decode/index_latch.sv does: clear() tells what goes to the decoder in this clk, step()
-ends the clk.
+"""Model of rtl/decode/index_latch.sv: clear() returns the signal to the decoder in this cycle,
+step() completes the cycle.
 """
 
 from dataclasses import dataclass, replace
@@ -21,14 +21,14 @@ class Settings:
         return replace(self, **changes)
 
     def holds(self, a, b, z):
-        """Levels stand on the gated index."""
+        """The levels are within the gated index."""
         return bool((z ^ self.active_low) and not ((self.gate ^ (a | b << 1)) & self.gate_mask))
 
 
 class IndexLatch:
     def __init__(self, w=32, check=1):
         self.w, self.check = w, check
-        self.later, self.wanted, self.zeroed, self.reference = (0, 0, 0), 0, 0, 0
+        self.later, self.enabled, self.zeroed, self.reference = (0, 0, 0), 0, 0, 0
         self.reset()
 
     def reset(self):
@@ -42,14 +42,14 @@ class IndexLatch:
         return self.up if direction else self.down
 
     def clear(self, settings, direction):
-        return int(self.met(direction) and self.wanted and settings.clears)
+        return int(self.met(direction) and self.enabled and settings.clears)
 
     def step(self, settings, levels, ready, direction, stepped, count, arm=0, rst=0, probe=0):
-        """levels (a, b, z); stepped is -1, 0, +1 of the decoder in this clk. Returns (armed, found,
-        index_count, revolution_wrong).
+        """Complete a cycle with levels (a, b, z); stepped is the step of the decoder in this cycle:
+        -1, 0, +1. Returns (armed, found, index_count, revolution_wrong).
         """
         met = self.met(direction)
-        take = int(met and self.wanted)
+        take = int(met and self.enabled)
         entering = (
             ready and settings.holds(*levels) and not settings.holds(*self.later) and not self.used
         )
@@ -76,7 +76,7 @@ class IndexLatch:
             int(entering and settings.take_up),
             int(entering and settings.take_down),
         )
-        self.wanted = int(settings.each or self.armed)
+        self.enabled = int(settings.each or self.armed)
         self.armed, self.found = int(arm or (self.armed and not take)), take
         self.later = tuple(levels)
         if rst:

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/decode/quadrature_decoder.sv does: step(a, b, mode, clear, rst) is one clk, and returns
-what is on the pins after it.
+"""Model of rtl/decode/quadrature_decoder.sv: step(a, b, mode, clear, rst) advances one cycle and
+returns the outputs after it.
 """
 
-PLACE = {(0, 0): 0, (1, 0): 1, (1, 1): 2, (0, 1): 3}  # quarter of the period
+QUARTER = {(0, 0): 0, (1, 0): 1, (1, 1): 2, (0, 1): 3}  # quarter of the period
 X4, X2, X1, PULSES = range(4)
-BORDERS = {X4: {0, 1, 2, 3}, X2: {0, 2}, X1: {0}}  # quarters behind which a border counts
+# a count border lies after each of these quarters
+BORDERS = {X4: {0, 1, 2, 3}, X2: {0, 2}, X1: {0}}
 
 
 class QuadratureDecoder:
@@ -25,13 +26,11 @@ class QuadratureDecoder:
         return int(self.settle == 0)
 
     def look(self, a, b, mode=X4):
-        """(direction, what count would move by, illegal) with these levels in this clk, ready or
-        not.
-        """
+        """(direction, step of count, illegal) of these levels, whether ready or not."""
         if mode == PULSES:
             rise, change = a and not self.a, b != self.b
             return 1 - b, 0 if change or not rise else 1 - 2 * b, int(rise and change)
-        before, moved = PLACE[self.a, self.b], (PLACE[a, b] - PLACE[self.a, self.b]) % 4
+        before, moved = QUARTER[self.a, self.b], (QUARTER[a, b] - QUARTER[self.a, self.b]) % 4
         if moved == 1:
             return 1, int(before in BORDERS[mode]), 0
         if moved == 3:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""encoder_counter: its words by hand, latencies, flags, probe and index, and random pins and
-accesses against the model.
+"""Tests of encoder_counter: its words by hand, latencies, flags, probe and index, and random pins
+and accesses against the model.
 """
 
 import random
@@ -9,7 +9,7 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge
 
-from tb.bench import run, start
+from tb.bench import needs, run, start
 from tb.decode.encoder_counter import ARM, FOUND, ILLEGAL, PROBED, EncoderCounter
 
 TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]  # a leads b: up
@@ -17,12 +17,12 @@ UP, DOWN, EACH, CLEARS, PROBE, PROBE_LOW = (1 << n for n in range(10, 16))
 
 
 class Bench:
-    """Design and model side by side, the pins of a scale at `place`."""
+    """The design and its model side by side, with the pins of a scale at `position`."""
 
     @classmethod
     async def begin(cls, dut, settings=0):
         bench = cls()
-        bench.dut, bench.now, bench.z, bench.probe, bench.place = dut, 0, 0, 0, 0
+        bench.dut, bench.now, bench.z, bench.probe, bench.position = dut, 0, 0, 0, 0
         bench.model = EncoderCounter(
             *(int(getattr(dut, name).value) for name in ("FILTER_W", "TOLERATED_W", "SKIP_W"))
         )
@@ -30,13 +30,13 @@ class Bench:
         await FallingEdge(dut.clk)
         for _ in range(3):
             bench.model.step(0, 0, 0, rst=1)
-        await bench.clk(rst=1)
+        await bench.cycle(rst=1)
         await bench.wait(12)
         await bench.write(2, settings)
         return bench
 
-    async def clk(self, levels=None, rst=0, **access):
-        a, b = levels or TURN[self.place % 4]
+    async def cycle(self, levels=None, rst=0, **access):
+        a, b = levels or TURN[self.position % 4]
         self.now = (self.now + 1) % 65536
         pins = dict(
             a=a,
@@ -56,20 +56,20 @@ class Bench:
         )
         return want
 
-    async def wait(self, clk, **more):
-        for _ in range(clk):
-            await self.clk(**more)
+    async def wait(self, cycle, **more):
+        for _ in range(cycle):
+            await self.cycle(**more)
 
     async def write(self, word, wdata):
-        await self.clk(select=1, write=1, word=word, wdata=wdata)
+        await self.cycle(select=1, write=1, word=word, wdata=wdata)
 
     async def read(self, word):
-        return await self.clk(select=1, word=word)
+        return await self.cycle(select=1, word=word)
 
-    async def go(self, places, clk=1):
-        for place in places:
-            self.place = place
-            await self.wait(clk)
+    async def go(self, positions, cycle=1):
+        for position in positions:
+            self.position = position
+            await self.wait(cycle)
 
     async def count(self):
         return await self.read(0) & 0xFFFF
@@ -82,24 +82,39 @@ class Bench:
 
 
 @cocotb.test()
-async def count_and_the_time_of_its_last_edge_are_one_word(dut):
+async def count_and_the_time_of_its_last_edge_are_read_together(dut):
     bench = await Bench.begin(dut)
-    await bench.go(range(1, 8), clk=5)
-    moved = bench.now - 4  # the clk in which the last edge came to the pins
+    await bench.go(range(1, 8), cycle=5)
+    moved = bench.now - 4  # the cycle in which the last edge reached the pins
     assert (
         await bench.read(0) == moved + 3 - 1 << 16 | 7
-    )  # 3 clk to count; the time is that of the clk before
-    await bench.go(range(6, -4, -1), clk=5)
+    )  # 3 cycles to count; the time is that of the preceding cycle
+    await bench.go(range(6, -4, -1), cycle=5)
     assert await bench.count() == 0xFFFD
 
 
 @cocotb.test()
-async def latency_is_3_clk_from_the_pins_without_filter_and_1_clk_to_rdata(dut):
-    bench = await Bench.begin(dut)
-    await bench.go(range(1, 5))  # the time means nothing before the first step
+async def latency_is_n_samples_and_2_cycles_from_the_pins_and_1_to_rdata(dut):
+    for required in (0, 1):
+        bench = await Bench.begin(dut, required)
+        await bench.go(range(1, 5), cycle=5)  # the time is undefined before the first step
+        await bench.wait(4)
+        bench.position = 5
+        assert [await bench.count() for _ in range(4)] == [4, 4, 4, 5]
+    needs(int(dut.FILTER_W.value) > 1, "built without longer filters")
+    bench = await Bench.begin(dut, 3)
+    await bench.go(range(1, 5), cycle=5)
     await bench.wait(4)
-    bench.place = 5
-    assert [await bench.count() for _ in range(4)] == [4, 4, 4, 5]
+    bench.position = 5
+    assert [await bench.count() for _ in range(6)] == [4] * 5 + [5]
+
+
+@cocotb.test()
+async def latency_is_1_from_select_to_rdata_and_from_a_write_to_the_new_setting(dut):
+    bench = await Bench.begin(dut)
+    await bench.write(2, UP)
+    dut.write.value, dut.wdata.value = 0, 0
+    assert int(dut.rdata.value) == 0 and await bench.read(2) == UP == int(dut.rdata.value)
 
 
 @cocotb.test()
@@ -107,14 +122,14 @@ async def rdata_is_0_when_nothing_is_read_and_word_3_does_not_exist(dut):
     bench = await Bench.begin(dut, UP | EACH)
     await bench.go(range(1, 4))
     assert (
-        await bench.clk(word=2) == 0
+        await bench.cycle(word=2) == 0
         and await bench.read(3) == 0
         and await bench.read(2) == UP | EACH
     )
 
 
 @cocotb.test()
-async def settings_that_are_left_out_read_0(dut):
+async def settings_that_do_not_exist_read_0(dut):
     bench = await Bench.begin(dut)
     filter_w, tolerated_w, skip_w = (
         int(getattr(dut, name).value) for name in ("FILTER_W", "TOLERATED_W", "SKIP_W")
@@ -134,9 +149,9 @@ async def settings_that_are_left_out_read_0(dut):
 async def an_index_clears_and_latches_exactly_on_a_count_edge(dut):
     for clears, count in ((0, 9), (CLEARS, 3)):
         bench = await Bench.begin(dut, UP | EACH | clears)
-        for place in range(1, 10):
-            bench.z = int(place == 6)
-            await bench.go([place], clk=2)
+        for position in range(1, 10):
+            bench.z = int(position == 6)
+            await bench.go([position], cycle=2)
         bench.z = 0
         await bench.wait(6)
         assert (
@@ -157,7 +172,7 @@ async def once_takes_one_index_for_each_arm(dut):
             assert await bench.flags() == ARM
         before = await bench.flags()
         bench.z = 1
-        await bench.go([bench.place + 1], clk=6)
+        await bench.go([bench.position + 1], cycle=6)
         bench.z = 0
         await bench.wait(6)
         assert await bench.flags() == (FOUND if armed else before & ~ARM)
@@ -165,12 +180,13 @@ async def once_takes_one_index_for_each_arm(dut):
 
 
 @cocotb.test()
-async def a_probe_latches_the_count_of_its_own_pins_at_its_wanted_edge(dut):
+async def a_probe_latches_the_count_of_its_own_cycle_at_the_chosen_edge(dut):
     for low in (0, 1):
         bench = await Bench.begin(dut, PROBE | low * PROBE_LOW)
-        for place in range(1, 13):  # one edge a clk: latched is that of the very clk
-            bench.probe = int(4 <= place < 9)
-            await bench.go([place])
+        # one edge per cycle: the count of exactly this cycle is latched
+        for position in range(1, 13):
+            bench.probe = int(4 <= position < 9)
+            await bench.go([position])
         await bench.wait(4)
         assert await bench.latched() == (9 if low else 4) and await bench.flags() == PROBED
         bench.probe = 0
@@ -180,7 +196,7 @@ async def a_probe_latches_the_count_of_its_own_pins_at_its_wanted_edge(dut):
 
 
 @cocotb.test()
-async def probe_is_3_clk_to_latched(dut):
+async def latency_is_3_from_probe_to_the_latched_count(dut):
     bench = await Bench.begin(dut, PROBE)
     await bench.go(range(1, 6))
     await bench.wait(4)
@@ -189,7 +205,7 @@ async def probe_is_3_clk_to_latched(dut):
 
 
 @cocotb.test()
-async def a_probe_that_is_not_wanted_and_new_settings_latch_nothing(dut):
+async def a_disabled_probe_and_new_settings_latch_nothing(dut):
     bench = await Bench.begin(dut)
     await bench.go(range(1, 4))
     bench.probe = 1
@@ -201,11 +217,11 @@ async def a_probe_that_is_not_wanted_and_new_settings_latch_nothing(dut):
 
 
 @cocotb.test()
-async def an_illegal_edge_is_not_counted_and_stands_until_told(dut):
+async def an_illegal_edge_is_not_counted_and_its_flag_stays_until_it_is_cleared(dut):
     bench = await Bench.begin(dut)
     await bench.go(range(1, 3))
     await bench.wait(4)
-    await bench.go([4], clk=5)  # from (1, 1) to (0, 0)
+    await bench.go([4], cycle=5)  # from (1, 1) to (0, 0)
     assert await bench.count() == 2 and await bench.flags() == ILLEGAL
     await bench.write(1, FOUND | PROBED)
     assert await bench.flags() == ILLEGAL
@@ -214,12 +230,12 @@ async def an_illegal_edge_is_not_counted_and_stands_until_told(dut):
 
 
 @cocotb.test()
-async def a_flag_that_comes_again_in_the_clk_in_which_it_is_forgotten_stays(dut):
+async def an_event_in_the_cycle_that_clears_its_flag_sets_it_again(dut):
     bench = await Bench.begin(dut)
     await bench.go([2])
-    for _ in range(6):  # one of these meets it
+    for _ in range(6):  # one of these cycles coincides with the edge
         await bench.write(1, ILLEGAL)
-        bench.place += 2
+        bench.position += 2
     await bench.wait(4)
     assert await bench.flags() == ILLEGAL
 
@@ -228,12 +244,12 @@ async def a_flag_that_comes_again_in_the_clk_in_which_it_is_forgotten_stays(dut)
 async def pulses_shorter_than_the_filter_never_count(dut):
     required = (1 << int(dut.FILTER_W.value)) - 1
     bench = await Bench.begin(dut, required)
-    await bench.go(range(1, 3), clk=required + 4)
+    await bench.go(range(1, 3), cycle=required + 4)
     for _ in range(5):
         await bench.wait(required - 1, levels=(0, 1))
         await bench.wait(required + 2)
     assert await bench.count() == 2
-    bench.place = 3
+    bench.position = 3
     assert [await bench.count() for _ in range(required + 3)].index(3) == max(required, 1) + 2
 
 
@@ -241,8 +257,8 @@ async def pulses_shorter_than_the_filter_never_count(dut):
 async def reset_in_mid_flow_forgets_all_but_the_pins(dut):
     bench = await Bench.begin(dut, UP | EACH | PROBE)
     bench.z = 1
-    await bench.go(range(1, 6), clk=2)
-    await bench.clk(rst=1)
+    await bench.go(range(1, 6), cycle=2)
+    await bench.cycle(rst=1)
     await bench.wait(20)
     assert (
         await bench.count() == 0
@@ -253,26 +269,26 @@ async def reset_in_mid_flow_forgets_all_but_the_pins(dut):
 
 
 @cocotb.test()
-async def any_pins_and_accesses_match_the_model_in_every_clk(dut):
+async def any_pins_and_accesses_match_the_model_in_every_cycle(dut):
     bench, bits = await Bench.begin(dut), random.getrandbits
     for _ in range(100):
         mask = 0xFFF3FFF3 if random.random() < 0.2 else 0x0011FFF3  # short filters, or any
         await bench.write(2, bits(32) & mask)
-        way, clk = random.choice([-1, 1]), random.choice([1, 1, 2, 6])
+        direction, cycle = random.choice([-1, 1]), random.choice([1, 1, 2, 6])
         for n in range(60):
-            if n % clk == 0:
-                way = -way if random.random() < 0.1 else way
-                bench.place += way * random.choice([0, 1, 1, 1, 1, 1, 1, 2])
+            if n % cycle == 0:
+                direction = -direction if random.random() < 0.1 else direction
+                bench.position += direction * random.choice([0, 1, 1, 1, 1, 1, 1, 2])
                 bench.z, bench.probe = (
-                    int(bench.place % 12 in (0, 1)),
+                    int(bench.position % 12 in (0, 1)),
                     bench.probe ^ (random.random() < 0.1),
                 )
-            told = (
+            access = (
                 dict(select=bits(1), write=bits(1), word=1, wdata=bits(8) & bits(8))
                 if random.random() < 0.2
                 else dict(select=bits(1), write=0, word=bits(2), wdata=bits(32))
             )
-            await bench.clk(rst=int(random.random() < 0.002), **told)
+            await bench.cycle(rst=int(random.random() < 0.002), **access)
 
 
 @pytest.mark.parametrize("filter_w, tolerated_w, skip_w", [(4, 0, 0), (1, 0, 0), (3, 2, 4)])

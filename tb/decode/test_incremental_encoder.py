@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""incremental_encoder: latencies, its flags, every index fault known from the field, time stamps,
-and random pins against the model.
+"""Tests of incremental_encoder: latencies, flags, every index fault known from the field, time
+stamps, and random pins against the model.
 """
 
 import random
@@ -19,14 +19,14 @@ CLEARS = Settings(each=1, clears=1)
 
 
 class Bench:
-    """Design and model side by side. An encoder with its index where `at_index(place)` holds is
-    moved over them.
+    """The design and its model side by side. An encoder whose index is active where
+    `at_index(position)` holds is moved over them.
     """
 
     @classmethod
     async def begin(cls, dut, setup=None, levels=(0, 0, 0), ready=True):
         bench = cls()
-        bench.dut, bench.setup, bench.now, bench.place = dut, setup or Setup(), 0, 0
+        bench.dut, bench.setup, bench.now, bench.position = dut, setup or Setup(), 0, 0
         bench.model = IncrementalEncoder(int(dut.W.value), int(dut.CHECK.value))
         bench.put(levels)
         await start(dut, a=levels[0], b=levels[1], z=levels[2], own_a=0, own_b=0, now=0)
@@ -67,14 +67,15 @@ class Bench:
             getattr(dut, name).value = value
 
     async def play(self, rows, rst=0, arm=0, clear_flags=0, own=None):
-        """Levels (a, b, z), one row a clk; the strobes stand in the first of them. `own` are the
-        node's own levels (a, b) in each
-        clk. Returns the pins of each clk by name."""
+        """Apply levels (a, b, z), one row per cycle; the strobes are applied in the first row.
+        `own` holds the levels (a, b) made by the node, one per cycle. Returns the outputs of each
+        cycle by name.
+        """
         out = []
-        for clk, levels in enumerate(rows):
+        for cycle, levels in enumerate(rows):
             self.now = (self.now + 1) % (1 << int(self.dut.TIME_W.value))
-            strobes = {"arm": arm, "clear_flags": clear_flags} if clk == 0 else {}
-            own_now = own[clk] if own else (0, 0)
+            strobes = {"arm": arm, "clear_flags": clear_flags} if cycle == 0 else {}
+            own_now = own[cycle] if own else (0, 0)
             self.put(levels, rst, **strobes, own=own_now)
             await RisingEdge(self.dut.clk)
             await FallingEdge(self.dut.clk)
@@ -91,7 +92,7 @@ class Bench:
             wrong = {
                 name: (value, want[name]) for name, value in got.items() if value != want[name]
             }
-            assert not wrong, f"clk {clk}, {self.setup}: (design, model) {wrong}"
+            assert not wrong, f"cycle {cycle}, {self.setup}: (design, model) {wrong}"
             out.append(want | {"now": self.now})
         return out
 
@@ -99,21 +100,25 @@ class Bench:
         value = getattr(self.dut, name).value
         return value.to_signed() if name in ("count", "step", "index_count") else int(value)
 
-    async def go(self, places, at_index=lambda place: 0, clk=1, **strobes):
-        """Visit these places, clk each, then wait for what is on its way; the pins of each clk."""
+    async def go(self, positions, at_index=lambda position: 0, cycle=1, **strobes):
+        """Visit these positions, `cycle` cycles each, then wait for the pipeline; the outputs of
+        each cycle.
+        """
         rows = [
-            (*TURN[place % 4], int(bool(at_index(place)))) for place in places for _ in range(clk)
+            (*TURN[position % 4], int(bool(at_index(position))))
+            for position in positions
+            for _ in range(cycle)
         ]
         return await self.play(rows + rows[-1:] * 6, **strobes)
 
 
 def found(out):
-    """index_count at each index found."""
+    """The index_count at each index found."""
     return [row["index_count"] for row in out if row["index_found"]]
 
 
 def there_and_back(*turns):
-    """Places from the first of the turning points to each next one."""
+    """The positions from the first turning point to each next one."""
     path = [turns[0]]
     for turn in turns[1:]:
         step = 1 if turn > path[-1] else -1
@@ -122,7 +127,7 @@ def there_and_back(*turns):
 
 
 @cocotb.test()
-async def latency_is_needed_samples_and_2_clk(dut):
+async def latency_is_n_samples_and_2_cycles_from_the_pins(dut):
     for required in (0, 1, 3):
         bench = await Bench.begin(dut, Setup(required=required))
         out = await bench.play([(1, 0, 0)] * 12)
@@ -139,22 +144,22 @@ async def index_and_count_arrive_together(dut):
 
 @cocotb.test()
 async def an_index_that_coincides_with_a_count_edge_clears_and_latches_exactly(dut):
-    for clk in (1, 2, 5):  # riocore acknowledges it and does not clear
+    for cycle in (1, 2, 5):  # riocore acknowledges the index and does not clear
         bench = await Bench.begin(dut, Setup(index=CLEARS))
-        out = await bench.go(there_and_back(0, 9), lambda place: place == 6, clk)
+        out = await bench.go(there_and_back(0, 9), lambda position: position == 6, cycle)
         assert found(out) == [6] and out[-1]["count"] == 3
         bench = await Bench.begin(dut, Setup(index=EACH))
-        out = await bench.go(there_and_back(0, 9, 2), lambda place: place == 6, clk)
+        out = await bench.go(there_and_back(0, 9, 2), lambda position: position == 6, cycle)
         assert found(out) == [6, 6] and out[-1]["count"] == 2
         bench = await Bench.begin(dut, Setup(index=CLEARS))
-        out = await bench.go(there_and_back(0, -9), lambda place: place == -6, clk)
+        out = await bench.go(there_and_back(0, -9), lambda position: position == -6, cycle)
         assert found(out) == [-6] and out[-1]["count"] == -3
 
 
 @cocotb.test()
 async def a_cleared_count_never_shows_the_old_number_at_the_index(dut):
     bench = await Bench.begin(dut, Setup(index=CLEARS))
-    out = await bench.go(there_and_back(0, 9), lambda place: place == 6)
+    out = await bench.go(there_and_back(0, 9), lambda position: position == 6)
     assert [row["count"] for row in out][:11] == [0, 0, 0, 1, 2, 3, 4, 5, 0, 1, 2]
 
 
@@ -162,48 +167,48 @@ async def a_cleared_count_never_shows_the_old_number_at_the_index(dut):
 async def a_wide_index_clears_once(dut):
     bench = await Bench.begin(
         dut, Setup(index=CLEARS)
-    )  # PandABlocks clears for as long as it stands
-    out = await bench.go(there_and_back(0, 12, 8), lambda place: 3 <= place <= 11)
+    )  # PandABlocks clears for as long as the index is present
+    out = await bench.go(there_and_back(0, 12, 8), lambda position: 3 <= position <= 11)
     assert (
         found(out) == [3, 8] and out[-1]["count"] == -3
-    )  # the far side is another edge: gate it or take one direction
+    )  # the far side is another edge: gate the index or take one direction
 
 
 @cocotb.test()
 async def a_gated_index_wider_than_a_period_is_found_once_a_pass(dut):
     bench = await Bench.begin(dut, Setup(index=EACH.but(gate_mask=3, gate=3)))
-    out = await bench.go(there_and_back(0, 20), lambda place: 3 <= place <= 15)
+    out = await bench.go(there_and_back(0, 20), lambda position: 3 <= position <= 15)
     assert found(out) == [6]
 
 
 @cocotb.test()
 async def a_gated_index_lies_at_the_same_count_in_both_directions(dut):
-    for gate, place in ((0, 8), (1, 9), (3, 6), (2, 7)):  # {b, a}
+    for gate, position in ((0, 8), (1, 9), (3, 6), (2, 7)):  # {b, a}
         bench = await Bench.begin(dut, Setup(index=EACH.but(gate_mask=3, gate=gate)))
         out = await bench.go(
-            there_and_back(0, 14, 0, 14), lambda at, place=place: abs(at - place) <= 1
+            there_and_back(0, 14, 0, 14), lambda at, position=position: abs(at - position) <= 1
         )
-        assert found(out) == [place] * 3
+        assert found(out) == [position] * 3
 
 
 @cocotb.test()
-async def the_index_is_taken_in_the_wanted_direction_only(dut):
+async def the_index_is_taken_in_the_enabled_direction_only(dut):
     for up, down, want in ((1, 0, [5, 5]), (0, 1, [7]), (1, 1, [5, 7, 5]), (0, 0, [])):
         bench = await Bench.begin(dut, Setup(index=EACH.but(take_up=up, take_down=down)))
-        out = await bench.go(there_and_back(0, 12, 0, 12), lambda place: 5 <= place <= 7)
+        out = await bench.go(there_and_back(0, 12, 0, 12), lambda position: 5 <= position <= 7)
         assert found(out) == want
 
 
 @cocotb.test()
 async def a_low_index_is_found_where_it_falls(dut):
     bench = await Bench.begin(dut, Setup(index=EACH.but(active_low=1)), levels=(0, 0, 1))
-    assert found(await bench.go(there_and_back(0, 12), lambda place: place != 7)) == [7]
+    assert found(await bench.go(there_and_back(0, 12), lambda position: position != 7)) == [7]
 
 
 @cocotb.test()
 async def once_takes_one_index_for_each_arm(dut):
     bench = await Bench.begin(dut, Setup(index=Settings()))
-    index = lambda place: place % 10 == 5
+    index = lambda position: position % 10 == 5
     assert found(await bench.go(there_and_back(0, 20), index)) == []
     out = await bench.go(there_and_back(21, 50), index, arm=1)
     assert found(out) == [25] and out[0]["index_armed"] and not out[-1]["index_armed"]
@@ -213,14 +218,14 @@ async def once_takes_one_index_for_each_arm(dut):
 @cocotb.test()
 async def arming_inside_an_index_waits_for_the_next(dut):
     bench = await Bench.begin(dut, Setup(index=Settings()))
-    index = lambda place: 3 <= place <= 11 or place == 16
+    index = lambda position: 3 <= position <= 11 or position == 16
     await bench.go(there_and_back(0, 6), index)
     out = await bench.go(there_and_back(6, 20), index, arm=1)
     assert found(out) == [16]
 
 
 @cocotb.test()
-async def an_index_that_stands_at_power_up_and_new_settings_make_no_event(dut):
+async def an_index_present_at_power_up_and_new_settings_make_no_event(dut):
     bench = await Bench.begin(dut, Setup(index=CLEARS), levels=(1, 0, 1), ready=False)
     assert found(await bench.play([(1, 0, 1)] * 30)) == []
     for index in (
@@ -242,17 +247,17 @@ async def counts_per_revolution_are_checked_at_any_number(dut):
         (10, 1),
         (7, 0),
         (16, 1),
-    ):  # not a power of two, not even a whole period
+    ):  # not a power of two, and not a multiple of the period
         setup = Setup(index=EACH.but(counts_per_revolution=per, clears=clears))
         bench = await Bench.begin(dut, setup)
         out = await bench.go(
             there_and_back(0, 3 * per + 2, -per - 2, per + 2),
-            lambda place, per=per: place % per == 3,
+            lambda position, per=per: position % per == 3,
         )
         assert len(found(out)) > 7 and not any(row["revolution_wrong"] for row in out)
         out = await bench.go(
-            there_and_back(per + 2, 4 * per), lambda place, per=per: place % per == 4
-        )  # it has slipped
+            there_and_back(per + 2, 4 * per), lambda position, per=per: position % per == 4
+        )  # the scale has slipped
         assert sum(row["revolution_wrong"] for row in out) == 1 and out[-1]["revolution_fault"]
         out = await bench.go([4 * per], clear_flags=1)
         assert not out[-1]["revolution_fault"]
@@ -261,11 +266,11 @@ async def counts_per_revolution_are_checked_at_any_number(dut):
 @cocotb.test()
 async def the_check_forgets_when_it_is_switched_off(dut):
     bench = await Bench.begin(dut, Setup(index=EACH.but(counts_per_revolution=10)))
-    await bench.go(there_and_back(0, 5), lambda place: place == 3)
+    await bench.go(there_and_back(0, 5), lambda position: position == 3)
     bench.setup = Setup(index=EACH)
     await bench.go(there_and_back(5, 9))
     bench.setup = Setup(index=EACH.but(counts_per_revolution=10))
-    out = await bench.go(there_and_back(9, 30), lambda place: place in (14, 24))
+    out = await bench.go(there_and_back(9, 30), lambda position: position in (14, 24))
     assert len(found(out)) == 2 and not any(row["revolution_fault"] for row in out)
 
 
@@ -294,7 +299,7 @@ async def a_stale_illegal_edge_fires_nothing_when_it_is_enabled(dut):
 
 
 @cocotb.test()
-async def an_illegal_edge_in_the_clk_of_clear_flags_is_kept(dut):
+async def an_illegal_edge_in_the_cycle_of_clear_flags_sets_the_flag_again(dut):
     bench = await Bench.begin(dut)
     await bench.play([(1, 1, 0)] * 3)
     assert (await bench.play([(1, 1, 0)] * 3, clear_flags=1))[-1]["illegal_seen"]
@@ -303,7 +308,7 @@ async def an_illegal_edge_in_the_clk_of_clear_flags_is_kept(dut):
 @cocotb.test()
 async def edge_time_is_that_of_the_last_counted_edge_and_changes_with_count(dut):
     bench = await Bench.begin(dut)
-    out = await bench.go(there_and_back(0, 9, 3), clk=3)
+    out = await bench.go(there_and_back(0, 9, 3), cycle=3)
     for before, row in zip(out, out[1:]):
         assert (row["count"] != before["count"]) == (row["edge_time"] != before["edge_time"])
         if row["step"]:
@@ -312,9 +317,9 @@ async def edge_time_is_that_of_the_last_counted_edge_and_changes_with_count(dut)
 
 
 @cocotb.test()
-async def reset_in_mid_flow_makes_zero_of_where_it_is(dut):
+async def reset_in_mid_flow_makes_the_present_position_zero(dut):
     bench = await Bench.begin(dut, Setup(illegal_enable=1, index=EACH))
-    await bench.go(there_and_back(0, 7), lambda place: place == 3)
+    await bench.go(there_and_back(0, 7), lambda position: position == 3)
     await bench.play([(1, 1, 0)] * 4)
     out = await bench.play([(1, 1, 1)], rst=1)
     assert not any(
@@ -326,7 +331,7 @@ async def reset_in_mid_flow_makes_zero_of_where_it_is(dut):
 
 
 @cocotb.test()
-async def own_steps_of_one_clk_are_all_counted_whatever_the_filter_is_set_to(dut):
+async def own_steps_of_one_cycle_are_all_counted_whatever_the_filter_settings_are(dut):
     for required, skip in ((0, 0), (255, 0), (3, 200)):
         bench = await Bench.begin(
             dut, Setup(skip=skip, required=required, tolerated=2, mode=3, own=1)
@@ -338,7 +343,7 @@ async def own_steps_of_one_clk_are_all_counted_whatever_the_filter_is_set_to(dut
 
 
 @cocotb.test()
-async def latency_is_3_clk_from_own_a_to_count(dut):
+async def latency_is_3_from_own_a_to_count(dut):
     bench = await Bench.begin(dut, Setup(required=200, own=1))
     out = await bench.play([(0, 0, 0)] * 8, own=[(1, 0)] * 8)
     assert [row["count"] for row in out].index(1) + 1 == 3
@@ -381,12 +386,12 @@ async def any_pins_settings_and_strobes_match_the_model(dut):
         if random.random() < 0.3:
             rows = [(bits(1), bits(1), bits(1)) for _ in range(60)]
         else:
-            place, rows, clk = bits(4), [], random.choice([1, 2, 6])
-            way = random.choice([-1, 1])
-            for _ in range(60 // clk):
-                way = -way if random.random() < 0.1 else way
-                place += way
-                rows += [(*TURN[place % 4], int(place % 12 in (0, 1)))] * clk
+            position, rows, cycle = bits(4), [], random.choice([1, 2, 6])
+            direction = random.choice([-1, 1])
+            for _ in range(60 // cycle):
+                direction = -direction if random.random() < 0.1 else direction
+                position += direction
+                rows += [(*TURN[position % 4], int(position % 12 in (0, 1)))] * cycle
         for first in range(0, len(rows), 15):
             await bench.play(
                 rows[first : first + 15],

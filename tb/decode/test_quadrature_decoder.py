@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""quadrature_decoder: a known turn in each mode, the jitter of S0, the wrap, the illegal edge,
-clearing, its start, and random levels
-against the model."""
+"""Tests of quadrature_decoder: a known turn in each mode, the jitter of S0, the wrap, the illegal
+edge, clearing, start-up, and random levels against the model.
+"""
 
 import random
 
@@ -16,7 +16,7 @@ TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]  # a leads b: up
 
 
 async def begin(dut, a=0, b=0, mode=X4, ready=True):
-    """Reset with the pins at these levels; the model has seen the same clk."""
+    """Reset with the pins at these levels; the model has seen the same cycle."""
     await start(dut, a=a, b=b, mode=mode, clear=0)
     model = QuadratureDecoder(int(dut.W.value), int(dut.SETTLE.value))
     model.mode = mode
@@ -27,12 +27,12 @@ async def begin(dut, a=0, b=0, mode=X4, ready=True):
 
 
 async def drive(dut, model, levels, rst=0, clear=0):
-    """Put each (a, b) on the pins for one clk and hold the model beside the design; return (count,
-    step, illegal) of each clk.
+    """Apply each (a, b) for one cycle and compare design and model; return (count, step, illegal)
+    of each cycle.
     """
     out = []
     dut.rst.value, dut.clear.value, dut.mode.value = rst, clear, model.mode
-    for clk, (a, b) in enumerate(levels):
+    for cycle, (a, b) in enumerate(levels):
         dut.a.value, dut.b.value = a, b
         await ReadOnly()
         direction, moves, _ = model.look(a, b, model.mode)
@@ -46,16 +46,20 @@ async def drive(dut, model, levels, rst=0, clear=0):
         want = model.step(a, b, model.mode, clear, rst)
         got = dut.count.value.to_signed(), dut.step.value.to_signed(), int(dut.illegal.value)
         assert got == want, (
-            f"clk {clk}, mode {model.mode}: (count, step, illegal) is {got}, the model has {want}"
+            f"cycle {cycle}, mode {model.mode}: (count, step, illegal) is {got}, "
+            f"the model has {want}"
         )
         out.append(got)
     dut.rst.value, dut.clear.value = 0, 0
     return out
 
 
-async def turn(dut, model, places):
+async def turn(dut, model, positions):
     """Visit these quarters of the period; the count after each."""
-    return [count for count, _, _ in await drive(dut, model, [TURN[place % 4] for place in places])]
+    return [
+        count
+        for count, _, _ in await drive(dut, model, [TURN[position % 4] for position in positions])
+    ]
 
 
 @cocotb.test()
@@ -110,7 +114,7 @@ async def x2_counts_the_edges_of_a_and_x1_those_with_b_low(dut):
 @cocotb.test()
 async def s0_jitter_over_any_edge_leaves_no_trace_in_x4_x2_and_x1(dut):
     for mode in (X4, X2, X1):
-        for before in range(4):  # S0's edge B lies behind quarter 0, its edge C behind quarter 2
+        for before in range(4):  # S0's edge B follows quarter 0, its edge C follows quarter 2
             model = await begin(dut, *TURN[before], mode=mode)
             (there,) = await turn(dut, model, [before + 1])
             for _ in range(3):
@@ -148,7 +152,7 @@ async def a_pulse_whose_direction_changes_with_it_is_illegal_and_not_counted(dut
 
 
 @cocotb.test()
-async def clear_makes_zero_of_the_state_in_which_its_clk_ends(dut):
+async def clear_makes_the_state_at_the_end_of_its_cycle_zero(dut):
     for here, then in ((1, 2), (2, 1), (1, 1)):
         model = await begin(dut)
         await turn(dut, model, [1, 2] if here == 2 else [1])
@@ -175,7 +179,7 @@ async def power_up_at_any_levels_makes_no_count(dut):
 @cocotb.test()
 async def levels_that_arrive_late_after_reset_make_no_count(dut):
     model = await begin(dut, 0, 0, ready=False)
-    late = int(dut.SETTLE.value) - 1  # what is in front fills meanwhile
+    late = int(dut.SETTLE.value) - 1  # the blocks before the decoder start up meanwhile
     assert await drive(dut, model, [(0, 0)] * late + [(1, 1)] * 9) == [(0, 0, 0)] * (late + 9)
     assert (await drive(dut, model, [(0, 1)]))[-1] == (1, 1, 0)
 
@@ -193,7 +197,7 @@ async def illegal_edges_are_reported_and_never_count(dut):
         2,
         1,
         0,
-    )  # the new levels are the state from here on
+    )  # the new levels become the present state
 
 
 @cocotb.test()
@@ -221,10 +225,10 @@ async def any_levels_match_the_model(dut):
         await drive(
             dut, model, [(random.getrandbits(1), random.getrandbits(1)) for _ in range(150)]
         )
-        place, path = 0, []
+        position, path = 0, []
         for _ in range(150):  # legal edges only, with pauses
-            place += random.choice([-1, 0, 0, 1])
-            path.append(TURN[place % 4])
+            position += random.choice([-1, 0, 0, 1])
+            path.append(TURN[position % 4])
         await drive(dut, model, path)
         await drive(dut, model, path[:1], clear=1)
         if random.random() < 0.3:

@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Levels recorded from a real optical mouse sensor (HDNS-2000), and step and direction of a real
-Smoothieware controller, go through
-deglitcher and decoder, clean and with spikes, and must count what a plain offline decoder counts,
-at every recorded edge.
+"""Recorded levels of a real optical mouse sensor (HDNS-2000), and step and direction of a real
+Smoothieware controller, pass through deglitcher and decoder, clean and with spikes. The counts must
+equal those of a plain offline decoder at every recorded edge.
 
-A recording is millions of samples, mostly still. One sample is one clk, but a stretch without any
-edge is cut to STILL clk,
-eight times what the deglitcher waits; the order of the edges and every shorter distance stay as
-recorded.
+A recording has millions of samples, mostly without a change. One sample is one cycle, but a stretch
+without any edge is cut to STILL cycles, eight times the setting of the deglitcher; the order of the
+edges and every shorter distance are kept.
 """
 
 import csv
@@ -24,14 +22,14 @@ from tb.decode.quadrature_decoder import PULSES, X4
 
 CAPTURES = bench.ROOT.parent / "shared" / "captures"
 RECORDINGS = [("hdns2000_fast", X4), ("hdns2000_left_right", X4), ("smoothieware_steps", PULSES)]
-ROWS = 5000  # of a recording, at most
-STABLE = 5  # setting of the deglitchers, clk
-STILL = 40  # longest stretch without an edge, clk
+ROWS = 5000  # longest part of a recording that is used
+STABLE = 5  # setting of the deglitchers, cycles
+STILL = 40  # longest stretch without an edge, cycles
 NAMES = ["x clean", "y clean", "x with spikes", "y with spikes"]
 
 
 def recording(name):
-    """Rows of (duration in clk, xa, xb, ya, yb); a is step, b is direction where these are
+    """Rows of (duration in cycles, xa, xb, ya, yb); a is step, b is direction where these are
     recorded.
     """
     with open(CAPTURES / f"{name}.csv", newline="") as lines:
@@ -44,9 +42,9 @@ def recording(name):
 
 
 def offline(levels, mode):
-    """Count after each (a, b) of a list, and how much was counted: edges by the side that leads, or
-    pulses by their direction;
-    nothing is filtered."""
+    """The count after each (a, b) of a list, and the number of counted events: edges by the leading
+    channel, or pulses by their direction; nothing is filtered.
+    """
     moves = []
     for (a, b), (a_now, b_now) in pairwise(levels):
         assert (a, b) == (a_now, b_now) or (a == a_now) != (b == b_now), (
@@ -64,8 +62,8 @@ def offline(levels, mode):
 
 
 def spikes(duration):
-    """A pulse too short to pass, somewhere in a stretch: (clk at which it starts, clk at which it
-    ends), clear of both ends.
+    """A pulse too short to pass, somewhere in a stretch and clear of both ends: (first cycle, cycle
+    after the last).
     """
     width = random.randrange(1, STABLE)
     first = random.randrange(1, duration - width)
@@ -73,8 +71,8 @@ def spikes(duration):
 
 
 async def play(dut, rows):
-    """Play the rows, with spikes on pairs 2 and 3; return what stands on counts at the end of each
-    row, and the spikes sent to x, y.
+    """Play the rows, with spikes on pairs 2 and 3; return the counts at the end of each row, and
+    the numbers of spikes on x, y.
     """
     counts, sent = [], [0, 0]
     for duration, xa, xb, ya, yb in rows:
@@ -83,17 +81,17 @@ async def play(dut, rows):
         changes = {
             0: (0, 0),
             duration: (0, 0),
-        }  # clk of the row -> lines turned over from there on, a and b
+        }  # cycle within the row -> levels inverted from there on, a and b
         if duration > 2 * STABLE:
             for line in range(4):  # xa, xb, ya, yb
                 if random.random() < 0.5:
                     begin, end = spikes(duration)
                     mask = 4 << line // 2
                     sent[line // 2] += 1
-                    for clk in (begin, end):
-                        turned = list(changes.get(clk, (0, 0)))
+                    for cycle in (begin, end):
+                        turned = list(changes.get(cycle, (0, 0)))
                         turned[line % 2] ^= mask
-                        changes[clk] = tuple(turned)
+                        changes[cycle] = tuple(turned)
         turned_a = turned_b = 0
         for now, then in pairwise(sorted(changes)):
             turned_a, turned_b = turned_a ^ changes[now][0], turned_b ^ changes[now][1]
@@ -131,7 +129,7 @@ async def every_count_is_that_of_the_offline_decoder_with_and_without_spikes(dut
         assert total == edges, f"{NAMES[pair]}: {total} edges counted, {edges} offline"
         assert held == ([0, 0] + sent)[pair], f"{NAMES[pair]}: {held} pulses held back"
         for number, (row, value) in enumerate(zip(rows, seen)):
-            if row[0] == STILL:  # long enough for every edge before to have passed
+            if row[0] == STILL:  # long enough for every earlier edge to have passed
                 got = words(value)[pair]
                 assert got == counts[number] & 0xFFFFFFFF, (
                     f"{NAMES[pair]}, row {number}: {got} counted, {counts[number]} offline"

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/interpolate/arctan_pipelined.sv does, in integers: sample() is one sample,
-ArctanPipelined.step() one clk.
+"""Model of rtl/interpolate/arctan_pipelined.sv: sample() computes one sample,
+ArctanPipelined.step() advances one cycle.
 """
 
 from collections import deque
@@ -13,9 +13,9 @@ def latency(w, steps=1):
     return -(-(arctan_rotation.PIPELINED[w][1] + 1) // steps)
 
 
-def moved(value, places):
-    """Up by so many bits, or down, cut off."""
-    return value << places if places >= 0 else value >> -places
+def moved(value, bits):
+    """Shift left by this many bits, or right with truncation if negative."""
+    return value << bits if bits >= 0 else value >> -bits
 
 
 @cache
@@ -33,7 +33,7 @@ def sums(w):
 
 
 def sample(w, sin, cos):
-    """(phase, amplitude)"""
+    """Returns (phase, amplitude)."""
     if not sin and not cos:
         return 0, 0
     turns, digits, head, guard = arctan_rotation.PIPELINED[w]
@@ -45,25 +45,25 @@ def sample(w, sin, cos):
         2 * y - x - 1,
         1,
         0,
-    )  # bits behind the point; shorter is less by 1 than it is
+    )  # fraction bits; shorter is stored as its value less 1
     for digit in range(2, digits):
         negative = shorter < 0
-        rest, one = (
+        magnitude, one = (
             ~shorter if negative else shorter,
             int(not negative),
-        )  # rest + one is the shorter leg without its sign
+        )  # magnitude + one is the magnitude of the shorter component
         found.append(found[-1] ^ negative)
         new_y_bits = min(head - digit - 1, max(y_bits - 1, x_bits))
         up = new_y_bits - y_bits + 1
-        doubled, taken = (rest << up) + ((one << up) - one), moved(longer, new_y_bits - x_bits)
+        doubled, taken = (magnitude << up) + ((one << up) - one), moved(longer, new_y_bits - x_bits)
         less = negative if digit <= turns + 2 else moved(longer, new_y_bits - x_bits + 1) & 1
         if digit <= turns:
             new_x_bits = min(head - digit - 2, max(x_bits, y_bits + 2 * digit - 1))
             down = y_bits + 2 * digit - 1 - new_x_bits
             longer = (
                 moved(longer, new_x_bits - x_bits)
-                + (rest >> down)
-                + (rest >> down - 1 & 1 if down else one)
+                + (magnitude >> down)
+                + (magnitude >> down - 1 & 1 if down else one)
             )
             x_bits = new_x_bits
         shorter, y_bits = doubled - taken - less, new_y_bits
@@ -84,7 +84,7 @@ class ArctanPipelined:
         self.w, self.coming, self.out = w, deque([None] * latency(w, steps)), (0, 0)
 
     def step(self, valid, sin, cos):
-        """(done, phase, amplitude)"""
+        """Returns (done, phase, amplitude)."""
         self.coming.popleft()
         self.coming.append(sample(self.w, sin, cos) if valid else None)
         self.out = self.coming[0] or self.out

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/interpolate/arctan_table.sv does, in integers: phase_of() is one sample,
-ArctanTable.step() one clk.
+"""Model of rtl/interpolate/arctan_table.sv: phase_of() computes one sample, ArctanTable.step()
+advances one cycle.
 """
 
 from tables import arctan

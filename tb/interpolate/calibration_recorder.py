@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/interpolate/calibration_recorder.sv does; step() is one clk."""
+"""Model of rtl/interpolate/calibration_recorder.sv: step() advances one cycle."""
 
 
 class CalibrationRecorder:
-    """step() returns (word, full, invalid) as they are after the clk; word is None until that place
-    has been written.
+    """step() returns (word, full, invalid) after the cycle; word is None until that address has
+    been written.
     """
 
     def __init__(self, w=8, depth=1024):

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/interpolate/fringe_tracker.sv does, in integers: step(valid, phase) is one clk."""
+"""Model of rtl/interpolate/fringe_tracker.sv: step(valid, phase) advances one cycle."""
 
 PERIOD, QUARTER = 1 << 16, 1 << 14
 
 
 def wrapped(phase):
-    """The same phase from -half a period to one LSB below half a period."""
+    """The same phase, from minus half a period to one LSB below half a period."""
     return (phase + PERIOD // 2) % PERIOD - PERIOD // 2
 
 
@@ -14,7 +14,7 @@ class FringeTracker:
         self.last, self.speed, self.predicted_step, self.outlier, self.moved = None, 0, 0, False, 0
 
     def follow(self, phase):
-        """One phase; returns step, overspeed."""
+        """Process one phase; returns step, overspeed."""
         if self.last is None:
             self.last = phase
             return 0, 0

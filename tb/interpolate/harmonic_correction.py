@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/interpolate/harmonic_correction.sv does: corrected(phase, table) is a phase,
-HarmonicCorrection.step one clk.
+"""Model of rtl/interpolate/harmonic_correction.sv: corrected(phase, table) computes one phase,
+HarmonicCorrection.step() advances one cycle.
 """
 
 LATENCY = 4
@@ -15,7 +15,7 @@ def corrected(phase, table):
 
 
 class HarmonicCorrection:
-    """step() returns (done, phase_out) as they are after the clk."""
+    """step() returns (done, phase_out) after the cycle."""
 
     def __init__(self):
         self.tables = [[0] * POINTS, [0] * POINTS]

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/interpolate/signal_correction.sv does: corrected(sin, cos, ...) is a sample,
-SignalCorrection.step one clk.
+"""Model of rtl/interpolate/signal_correction.sv: corrected(sin, cos, ...) computes one sample,
+SignalCorrection.step() advances one cycle.
 """
 
 from typing import NamedTuple
@@ -20,7 +20,7 @@ def held(channel):
 
 
 def corrected(sin, cos, settings, w=8):
-    """(sin_out, cos_out) of a sample of w bits."""
+    """Returns (sin_out, cos_out) of a sample of w bits."""
     sin_channel, cos_channel = (
         (sin << 16 - w) - settings.sin_offset,
         (cos << 16 - w) - settings.cos_offset,
@@ -31,7 +31,7 @@ def corrected(sin, cos, settings, w=8):
 
 
 class SignalCorrection:
-    """step() returns (done, sin_out, cos_out) as they are after the clk."""
+    """step() returns (done, sin_out, cos_out) after the cycle."""
 
     def __init__(self, w=8):
         self.w = w
@@ -41,12 +41,12 @@ class SignalCorrection:
         self.settings, self.flow, self.out = Settings(), [None] * (LATENCY - 1), (0, 0)
 
     def step(self, valid, sin, cos, load=None, rst=0):
-        """`load` is None or the Settings to take."""
+        """`load` is None or the Settings to load."""
         if rst:
             self.reset()
             return 0, 0, 0
-        # an offset acts on the sample of its clk; the factors multiply one clk later, so they too
-        # act from that sample on
+        # An offset acts on the sample of its cycle. The factors multiply one cycle later, so they
+        # act from that sample on, too.
         self.settings = load or self.settings
         self.flow.append(corrected(sin, cos, self.settings, self.w) if valid else None)
         ready = self.flow.pop(0)

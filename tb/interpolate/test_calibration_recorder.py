@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""calibration_recorder: a burst by hand, thinning, what spoils it, its reading, and random use
-against the model in decimation clk.
+"""Tests of calibration_recorder: a burst by hand, decimation, disturbed bursts, read-out, and
+random use against the model in every cycle.
 """
 
 import random
@@ -32,8 +32,8 @@ async def begin(dut):
     return CalibrationRecorder(int(dut.W.value), int(dut.DEPTH.value))
 
 
-async def clk(dut, model, **inputs):
-    """One clk; returns (word or None, full, invalid)."""
+async def cycle(dut, model, **inputs):
+    """Advance one cycle; returns (word or None, full, invalid)."""
     for name, value in (IDLE | dict(rst=0) | inputs).items():
         getattr(dut, name).value = value
     await FallingEdge(dut.clk)
@@ -49,34 +49,51 @@ async def words(dut, model):
     assert dut.full.value == 1
     out = []
     for _ in range(int(dut.DEPTH.value)):
-        await clk(dut, model)
-        out.append((await clk(dut, model))[0])
-        await clk(dut, model, read=1)
+        await cycle(dut, model)
+        out.append((await cycle(dut, model))[0])
+        await cycle(dut, model, read=1)
     return out
+
+
+@cocotb.test()
+async def latency_is_1_to_full_and_2_to_the_first_and_each_next_word(dut):
+    model, depth, shift = await begin(dut), int(dut.DEPTH.value), 16 - int(dut.W.value)
+    await cycle(dut, model, start=1)
+    for n in range(depth):
+        assert not int(dut.full.value)
+        await cycle(dut, model, sampled=1, sin=n % 100)
+    assert int(dut.full.value)
+    await cycle(dut, model)
+    assert (await cycle(dut, model))[0] == 0
+    for n in (1, 2, 3):
+        await cycle(dut, model, read=1)
+        assert int(dut.word.value) == (n - 1) % depth % 100 << shift
+        assert (await cycle(dut, model))[0] == n % depth % 100 << shift
 
 
 @cocotb.test()
 async def a_burst_of_samples_is_read_back_left_aligned(dut):
     model, depth, shift = await begin(dut), int(dut.DEPTH.value), 16 - int(dut.W.value)
-    await clk(dut, model, start=1)
+    await cycle(dut, model, start=1)
     for n in range(depth):
-        assert not (await clk(dut, model, sampled=0))[1]
-        assert (await clk(dut, model, sampled=1, sin=-n % 100, cos=-(n % 100)))[1] == (
+        assert not (await cycle(dut, model, sampled=0))[1]
+        assert (await cycle(dut, model, sampled=1, sin=-n % 100, cos=-(n % 100)))[1] == (
             n == depth - 1
         )
-    await clk(dut, model, sampled=1, sin=1, cos=1)  # one too many
+    await cycle(dut, model, sampled=1, sin=1, cos=1)  # one strobe too many
     want = [
         ((-(n % 100) << shift) & 65535) << 16 | (-n % 100 << shift) & 65535 for n in range(depth)
     ]
-    assert await words(dut, model) == want == await words(dut, model)  # reading goes round
+    # the read-out starts again at the first word
+    assert await words(dut, model) == want == await words(dut, model)
 
 
 @cocotb.test()
 async def phases_lie_two_in_a_word_the_earlier_one_low(dut):
     model, depth = await begin(dut), int(dut.DEPTH.value)
-    await clk(dut, model, start=1, phases=1)
+    await cycle(dut, model, start=1, phases=1)
     for n in range(2 * depth):
-        await clk(dut, model, phases=1, sampled=1, sin=7, phase_valid=1, phase=65535 - n)
+        await cycle(dut, model, phases=1, sampled=1, sin=7, phase_valid=1, phase=65535 - n)
     assert await words(dut, model) == [(65534 - 2 * n) << 16 | 65535 - 2 * n for n in range(depth)]
 
 
@@ -84,10 +101,10 @@ async def phases_lie_two_in_a_word_the_earlier_one_low(dut):
 async def only_every_so_many_are_kept_and_0_is_1(dut):
     model, depth = await begin(dut), int(dut.DEPTH.value)
     for decimation in (0, 1, 2, 5):
-        await clk(dut, model, start=1, phases=1)
+        await cycle(dut, model, start=1, phases=1)
         n = 0
         while not int(dut.full.value):
-            await clk(dut, model, phases=1, decimation=decimation, phase_valid=1, phase=n)
+            await cycle(dut, model, phases=1, decimation=decimation, phase_valid=1, phase=n)
             n += 1
         step = max(decimation, 1)
         assert n == (2 * depth - 1) * step + 1
@@ -99,36 +116,36 @@ async def only_every_so_many_are_kept_and_0_is_1(dut):
 @cocotb.test()
 async def a_disturbance_spoils_the_burst_it_falls_into_and_no_other(dut):
     model, depth = await begin(dut), int(dut.DEPTH.value)
-    await clk(dut, model, disturbed=1)
+    await cycle(dut, model, disturbed=1)
     for n in (-1, 0, depth - 1):
-        await clk(dut, model, start=1)
+        await cycle(dut, model, start=1)
         for k in range(depth):
-            await clk(dut, model, sampled=1, disturbed=int(k == n))
-        assert (await clk(dut, model, disturbed=1))[1:] == (1, int(n >= 0))
+            await cycle(dut, model, sampled=1, disturbed=int(k == n))
+        assert (await cycle(dut, model, disturbed=1))[1:] == (1, int(n >= 0))
 
 
 @cocotb.test()
 async def start_or_reset_in_the_middle_forgets_the_burst(dut):
     model, depth = await begin(dut), int(dut.DEPTH.value)
     for how in ("start", "rst"):
-        await clk(dut, model, start=1, phases=1)
+        await cycle(dut, model, start=1, phases=1)
         for _ in range(depth + 1):
-            await clk(dut, model, phases=1, phase_valid=1, phase=99, disturbed=1)
-        assert (await clk(dut, model, **{how: 1}))[1:] == (0, 0)
+            await cycle(dut, model, phases=1, phase_valid=1, phase=99, disturbed=1)
+        assert (await cycle(dut, model, **{how: 1}))[1:] == (0, 0)
         for k in range(depth):
             assert not int(dut.full.value)
-            await clk(dut, model, sampled=1, sin=k % 100)
+            await cycle(dut, model, sampled=1, sin=k % 100)
         assert int(dut.full.value) == (how == "start")
 
 
 @cocotb.test()
-async def any_use_matches_the_model_in_every_clk(dut):
+async def any_use_matches_the_model_in_every_cycle(dut):
     model, full = await begin(dut), 1 << int(dut.W.value) - 1
     for _ in range(60):
         phases, decimation = random.getrandbits(1), random.choice((0, 1, 1, 2, 3))
-        await clk(dut, model, start=1, phases=phases, decimation=decimation)
+        await cycle(dut, model, start=1, phases=phases, decimation=decimation)
         for _ in range(random.choice((10, 100))):
-            await clk(
+            await cycle(
                 dut,
                 model,
                 phases=phases,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""grating as a whole: the latency of its header, from the converter's pins on. What its blocks do
-is tested block by block; how they
-work together in motion, in tb/system."""
+"""Tests of feedback_channel as a whole: the latency of its header, from the ADC pins on. Its blocks
+are tested one by one, their work together in motion in tb/system.
+"""
 
 import cocotb
 import pytest
@@ -9,7 +9,7 @@ from cocotb.triggers import FallingEdge
 
 from tb.bench import run, start
 
-LATENCY = 22  # clk from a converter word to its position; 1 more with a segment table
+LATENCY = 22  # cycles from an ADC word to its position; 1 more with a segment table
 SETTINGS = dict(
     deglitch=0,
     outlier_step=0,
@@ -39,7 +39,7 @@ INPUTS = dict(
 
 
 async def converted(dut):
-    """Start a conversion and wait until its word stands in the converter's register."""
+    """Start a conversion and wait until its word is in the register of the ADC reader."""
     dut.sample_tick.value = 1
     await FallingEdge(dut.clk)
     dut.sample_tick.value = 0
@@ -51,16 +51,18 @@ async def converted(dut):
 
 
 @cocotb.test()
-async def latency_is_22_clk_from_a_converter_word_to_position_and_1_more_with_a_segment_table(dut):
+async def latency_is_22_from_an_adc_word_to_position_and_23_with_a_segment_table(
+    dut,
+):
     latency = LATENCY + bool(int(dut.SEGMENTS.value))
     await start(dut, **SETTINGS, **INPUTS)
     await FallingEdge(dut.clk)
-    for adc_cos, eighths in ((1, 1), (0, 3), (1, 1)):  # sin stands at its upper end
+    for adc_cos, eighths in ((1, 1), (0, 3), (1, 1)):  # sin is at its upper end
         dut.adc_cos.value = adc_cos
         await converted(dut)
-        for clk in range(1, latency + 4):
+        for cycle in range(1, latency + 4):
             await FallingEdge(dut.clk)
-            assert int(dut.position_valid.value) == (clk == latency)
+            assert int(dut.position_valid.value) == (cycle == latency)
         assert (
             abs(dut.position.value.to_signed() - eighths * 8192) < 50
         )  # the ends of 8 bits are 127 and -128
@@ -72,8 +74,8 @@ async def reset_in_mid_flow_drops_the_word(dut):
     await start(dut, **SETTINGS, **INPUTS)
     await FallingEdge(dut.clk)
     await converted(dut)
-    for clk in range(LATENCY + 4):
-        dut.rst.value = int(clk == 9)
+    for cycle in range(LATENCY + 4):
+        dut.rst.value = int(cycle == 9)
         await FallingEdge(dut.clk)
         assert not int(dut.position_valid.value)
     assert dut.position.value == 0

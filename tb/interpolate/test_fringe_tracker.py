@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fringe_tracker: steps by hand, speeds up to a period a sample, bad samples, and every clk against
-the model.
+"""Tests of fringe_tracker: steps by hand, speeds up to a period per sample, bad samples, and every
+cycle against the model.
 """
 
 import random
@@ -20,14 +20,14 @@ async def begin(dut):
 
 
 async def again(dut):
-    """Reset in mid-flow, the clock runs on."""
+    """Reset while the clock runs."""
     dut.rst.value, dut.valid.value = 1, 0
     await FallingEdge(dut.clk)
     dut.rst.value = 0
 
 
 async def clock(dut, valid, phase):
-    """One clk; returns done, step, overspeed."""
+    """Advance one cycle; returns done, step, overspeed."""
     dut.valid.value, dut.phase.value = valid, phase % 65536
     await FallingEdge(dut.clk)
     assert not int(dut.done.value) or dut.phase_out.value == phase % 65536
@@ -85,7 +85,7 @@ async def a_change_of_speed_below_a_quarter_period_is_followed_up_to_a_period_a_
 
 
 @cocotb.test()
-async def a_quarter_period_from_the_foreseen_phase_is_an_overspeed(dut):
+async def a_quarter_period_from_the_predicted_phase_is_an_overspeed(dut):
     await begin(dut)
     for jump, strobe in ((QUARTER - 1, 0), (QUARTER, 1), (1 - QUARTER, 0), (-QUARTER, 1)):
         await again(dut)
@@ -120,7 +120,7 @@ async def one_bad_sample_costs_only_itself(dut):
 
 
 @cocotb.test()
-async def after_noise_a_slow_scale_is_caught_again(dut):
+async def after_noise_a_slow_scale_is_tracked_again(dut):
     await begin(dut)
     await feed(dut, [random.getrandbits(16) for _ in range(50)])
     slow = await feed(dut, [n * 4000 for n in range(20)])
@@ -128,10 +128,10 @@ async def after_noise_a_slow_scale_is_caught_again(dut):
 
 
 @cocotb.test()
-async def any_input_matches_the_model_in_every_clk(dut):
+async def any_input_matches_the_model_in_every_cycle(dut):
     await begin(dut)
     model, phase, speed = FringeTracker(), 0, 0
-    for clk in range(20_000):
+    for cycle in range(20_000):
         rst, valid = int(random.random() < 0.003), random.getrandbits(1)
         speed = (
             max(-70_000, min(70_000, speed + random.randrange(-3000, 3000)))
@@ -146,7 +146,7 @@ async def any_input_matches_the_model_in_every_clk(dut):
         want = model.step(valid, phase % 65536)
         if rst:
             model, want = FringeTracker(), (0, 0, 0)
-        assert got == want, f"clk {clk}"
+        assert got == want, f"cycle {cycle}"
 
 
 def test_fringe_tracker():

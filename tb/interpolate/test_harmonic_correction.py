@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""harmonic_correction: by hand, the ends of table and phase, its two tables, and random use against
-the model in every clk.
+"""Tests of harmonic_correction: by hand, the ends of table and phase, its two tables, and random
+use against the model in every cycle.
 """
 
 import math
@@ -19,13 +19,13 @@ async def begin(dut):
     await start(dut, **IDLE)
     await FallingEdge(dut.clk)
     model = HarmonicCorrection()
-    for _ in range(2):  # both tables known to both
+    for _ in range(2):  # both tables are known to design and model
         await load(dut, model, [0] * POINTS)
-    await clk(dut, model, rst=1)
+    await cycle(dut, model, rst=1)
     return model
 
 
-async def clk(dut, model, valid=0, phase=0, enable=1, write=None, swap=0, rst=0):
+async def cycle(dut, model, valid=0, phase=0, enable=1, write=None, swap=0, rst=0):
     dut.valid.value, dut.phase.value, dut.enable.value, dut.swap.value, dut.rst.value = (
         valid,
         phase,
@@ -47,23 +47,23 @@ async def clk(dut, model, valid=0, phase=0, enable=1, write=None, swap=0, rst=0)
 
 async def load(dut, model, table):
     for entry in enumerate(table):
-        await clk(dut, model, write=entry)
-    await clk(dut, model, swap=1)
+        await cycle(dut, model, write=entry)
+    await cycle(dut, model, swap=1)
 
 
 async def ask(dut, model, phase, **inputs):
-    await clk(dut, model, 1, phase, **inputs)
+    await cycle(dut, model, 1, phase, **inputs)
     for _ in range(LATENCY - 2):
-        await clk(dut, model)
-    done, out = await clk(dut, model)
+        await cycle(dut, model)
+    done, out = await cycle(dut, model)
     assert done
     return out
 
 
 @cocotb.test()
-async def latency_is_4_and_phases_may_come_every_clk(dut):
+async def latency_is_4_and_phases_may_come_every_cycle(dut):
     model = await begin(dut)
-    done = [(await clk(dut, model, n in (2, 3, 4, 7), n))[0] for n in range(13)]
+    done = [(await cycle(dut, model, n in (2, 3, 4, 7), n))[0] for n in range(13)]
     assert [n for n, d in enumerate(done) if d] == [5, 6, 7, 10]
 
 
@@ -91,13 +91,13 @@ async def the_line_closes_over_the_period_and_the_phase_wraps(dut):
 
 
 @cocotb.test()
-async def nothing_is_corrected_before_the_first_swap_nor_by_a_table_half_written(dut):
+async def nothing_is_corrected_before_the_first_swap_or_by_a_partially_written_table(dut):
     model = await begin(dut)
     for entry in enumerate([1600] * POINTS):
-        assert await clk(dut, model, 1, 777, write=entry) in ((0, 0), (1, 777))
+        assert await cycle(dut, model, 1, 777, write=entry) in ((0, 0), (1, 777))
     assert await ask(dut, model, 777, swap=1) == 677
     for entry in enumerate([3200] * POINTS):
-        assert (await clk(dut, model, 1, 777, write=entry))[1] in (677,)
+        assert (await cycle(dut, model, 1, 777, write=entry))[1] in (677,)
     assert await ask(dut, model, 777, swap=1) == 577
 
 
@@ -105,15 +105,15 @@ async def nothing_is_corrected_before_the_first_swap_nor_by_a_table_half_written
 async def reset_in_mid_flow_drops_the_phase_and_the_correction(dut):
     model = await begin(dut)
     await load(dut, model, [1600] * POINTS)
-    await clk(dut, model, 1, 5)
-    await clk(dut, model, rst=1)
+    await cycle(dut, model, 1, 5)
+    await cycle(dut, model, rst=1)
     for _ in range(6):
-        assert (await clk(dut, model))[0] == 0
+        assert (await cycle(dut, model))[0] == 0
     assert await ask(dut, model, 500) == 500
 
 
 @cocotb.test()
-async def any_input_matches_the_model_in_every_clk(dut):
+async def any_input_matches_the_model_in_every_cycle(dut):
     model = await begin(dut)
     for _ in range(4000):
         write = (
@@ -121,7 +121,7 @@ async def any_input_matches_the_model_in_every_clk(dut):
             if random.getrandbits(1)
             else None
         )
-        await clk(
+        await cycle(
             dut,
             model,
             random.getrandbits(1),

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""signal_correction: by hand, both ends of every range, its load, and random samples against the
-model in every clk.
+"""Tests of signal_correction: by hand, both ends of every range, load, and random samples against
+the model in every cycle.
 """
 
 import math
@@ -23,8 +23,8 @@ async def begin(dut):
     return SignalCorrection(int(dut.W.value))
 
 
-async def clk(dut, model, valid=0, sin=0, cos=0, load=None, rst=0):
-    """One clk of design and model; returns (done, sin_out, cos_out)."""
+async def cycle(dut, model, valid=0, sin=0, cos=0, load=None, rst=0):
+    """Advance design and model by one cycle; returns (done, sin_out, cos_out)."""
     dut.rst.value, dut.valid.value, dut.sin.value, dut.cos.value, dut.load.value = (
         rst,
         valid,
@@ -43,10 +43,10 @@ async def clk(dut, model, valid=0, sin=0, cos=0, load=None, rst=0):
 
 
 async def ask(dut, model, sin, cos):
-    await clk(dut, model, 1, sin, cos)
+    await cycle(dut, model, 1, sin, cos)
     for _ in range(LATENCY - 2):
-        await clk(dut, model)
-    done, *out = await clk(dut, model)
+        await cycle(dut, model)
+    done, *out = await cycle(dut, model)
     assert done
     return tuple(out)
 
@@ -59,9 +59,9 @@ def anything(w, draw):
 
 
 @cocotb.test()
-async def latency_is_3_and_samples_may_come_every_clk(dut):
+async def latency_is_3_and_samples_may_come_every_cycle(dut):
     model = await begin(dut)
-    done = [(await clk(dut, model, n in (2, 3, 4, 7), n, -n))[0] for n in range(12)]
+    done = [(await cycle(dut, model, n in (2, 3, 4, 7), n, -n))[0] for n in range(12)]
     assert [n for n, d in enumerate(done) if d] == [4, 5, 6, 9]
 
 
@@ -69,20 +69,20 @@ async def latency_is_3_and_samples_may_come_every_clk(dut):
 async def by_hand(dut):
     model, scale = await begin(dut), 1 << 16 - int(dut.W.value)
     assert await ask(dut, model, 100, -50) == (50 * scale, -25 * scale)  # half the size
-    await clk(dut, model, load=Settings(256, -512, 65536 * 3 // 2, -32768))
+    await cycle(dut, model, load=Settings(256, -512, 65536 * 3 // 2, -32768))
     u, v = 40 * scale + 512, 60 * scale - 256
     assert await ask(dut, model, 60, 40) == ((3 * v - u + 2) // 4, (u + 1) // 2)
 
 
 @cocotb.test()
-async def what_is_too_large_is_held(dut):
+async def a_value_that_is_too_large_saturates(dut):
     model, full = await begin(dut), 1 << int(dut.W.value) - 1
-    await clk(dut, model, load=Settings(-32768, -32768, 131071, 65535))
+    await cycle(dut, model, load=Settings(-32768, -32768, 131071, 65535))
     assert await ask(dut, model, full - 1, full - 1) == (
         32767,
         min(32767, 32768 - (1 << 16 - int(dut.W.value)) // 2),
     )
-    await clk(dut, model, load=Settings(32767, 32767, 131071, 65535))
+    await cycle(dut, model, load=Settings(32767, 32767, 131071, 65535))
     assert (await ask(dut, model, -full, -full)) == (-32768, -32767)
 
 
@@ -91,35 +91,35 @@ async def both_ends_of_every_range_match_the_model(dut):
     model, full = await begin(dut), 1 << int(dut.W.value) - 1
     for settings in product((-32768, 32767), (-32768, 32767), (0, 131071), (-65536, 65535)):
         for n, (sin, cos) in enumerate(product((-full, full - 1), repeat=2)):
-            await clk(dut, model, 1, sin, cos, Settings(*settings) if n == 0 else None)
+            await cycle(dut, model, 1, sin, cos, Settings(*settings) if n == 0 else None)
     for _ in range(LATENCY):
-        await clk(dut, model)
+        await cycle(dut, model)
 
 
 @cocotb.test()
 async def the_settings_change_between_two_samples(dut):
     model = await begin(dut)
     first, second = Settings(100, 200, 65536, 0), Settings(-3000, 5000, 80000, 9000)
-    await clk(dut, model, load=first)
-    await clk(dut, model, 1, 50, 20)
-    await clk(dut, model, 1, 50, 20, load=second)
+    await cycle(dut, model, load=first)
+    await cycle(dut, model, 1, 50, 20)
+    await cycle(dut, model, 1, 50, 20, load=second)
     w = int(dut.W.value)
     for settings in (first, second):
-        assert await clk(dut, model) == (1, *corrected(50, 20, settings, w))
+        assert await cycle(dut, model) == (1, *corrected(50, 20, settings, w))
 
 
 @cocotb.test()
 async def reset_in_mid_flow_drops_samples_and_settings(dut):
     model = await begin(dut)
-    await clk(dut, model, 1, 5, 5, load=Settings(1, 2, 3, 4))
-    await clk(dut, model, 1, 5, 5, rst=1)
+    await cycle(dut, model, 1, 5, 5, load=Settings(1, 2, 3, 4))
+    await cycle(dut, model, 1, 5, 5, rst=1)
     for _ in range(5):
-        assert (await clk(dut, model))[0] == 0
+        assert (await cycle(dut, model))[0] == 0
     assert await ask(dut, model, 0, 0) == (0, 0)
 
 
 @cocotb.test()
-async def any_input_matches_the_model_in_every_clk(dut):
+async def any_input_matches_the_model_in_every_cycle(dut):
     model, w = await begin(dut), int(dut.W.value)
     for _ in range(3000):
         load = (
@@ -132,7 +132,7 @@ async def any_input_matches_the_model_in_every_clk(dut):
             if random.random() < 0.1
             else None
         )
-        await clk(
+        await cycle(
             dut,
             model,
             random.getrandbits(1),

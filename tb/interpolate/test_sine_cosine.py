@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From converter words to position: the chain of feedback_channel.sv, nothing learned yet, driven
-with what a grating gives.
+"""Tests of the chain of feedback_channel.sv from ADC words to position, without any calibration,
+with the signals of a grating.
 
-Every disturbance has a bound on the position error from theory, and every motion is held against
-it: the RTL on short
-motions, the models on long ones. One period is 0.8 um, as in S0.
+Theory gives a bound on the position error for every disturbance, and every motion is checked
+against it: the RTL on short motions, the models on long ones. One period is 0.8 um, as in S0.
 """
 
 import math
@@ -21,10 +20,10 @@ from tb.interpolate.fringe_tracker import FringeTracker
 from tb.position.unwrap import Unwrap
 
 PERIOD_NM = 800
-LATENCY = 22  # clk from a converter word to its position
+LATENCY = 22  # cycles from an ADC word to its position
 ARCTAN = arctan_rotation.quarter_bound(
     arctan_rotation.PIPELINED, 16
-)  # LSB of phase; a corrected leg is half of 16 bits large
+)  # LSB of phase; a corrected channel has half of the size of 16 bits
 SETTINGS = dict(
     outlier_step=0,
     outlier_hold=0,
@@ -41,7 +40,7 @@ SETTINGS = dict(
     shift=0,
     shift_periods=0,
 )
-AMPLITUDE = 0.84  # of full scale: room for what is added
+AMPLITUDE = 0.84  # of full scale: leaves room for the disturbances
 CLEAN = dict(offset=0.0, gain=0.0, phase=0.0, noise=0.0)
 DISTURBED = {  # offset, gain: of the amplitude; phase: degrees; noise: of full scale
     "clean": CLEAN,
@@ -60,23 +59,23 @@ def nm(radians):
 
 
 def offset_bound(offset, amplitude=1.0):
-    """A vector of this length, added to one of this amplitude, turns it by no more."""
+    """The largest rotation by a vector of this length added to one of this amplitude."""
     return math.asin(abs(offset) / amplitude)
 
 
 def gain_bound(gain):
-    """One leg is longer by `gain`: at worst, near 45 degrees."""
+    """One channel is larger by `gain`: the error is largest near 45 degrees."""
     return math.asin(abs(gain) / (2 + gain))
 
 
 def phase_bound(degrees):
-    """The legs are off by half of it each, one forward, one back."""
+    """Each channel is off by half of the phase error, one forward, one back."""
     return math.radians(abs(degrees)) / 2
 
 
 def bound(w, offset, gain, phase, noise):
-    """LSB of position. The disturbances act one after the other, so their bounds add; each shortens
-    the vector for the next.
+    """The bound in LSB of position. The disturbances act one after the other, so their bounds add;
+    each one shortens the vector for the next.
     """
     full = 1 << w - 1
     length = AMPLITUDE * full * math.sqrt(1 - math.sin(math.radians(abs(phase)))) * min(1, 1 + gain)
@@ -94,34 +93,36 @@ def bound(w, offset, gain, phase, noise):
 
 
 def samples(where, w, draw, offset, gain, phase, noise):
-    """Converter words at the places `where`, in periods."""
+    """ADC words at the positions `where`, in periods."""
     full = 1 << w - 1
     angle, half = math.tau * np.asarray(where), math.radians(phase) / 2
     sin = AMPLITUDE * full * (
         (1 + gain) * np.sin(angle + half) + offset
     ) + noise * full * draw.uniform(-1, 1, len(angle))
     cos = AMPLITUDE * full * np.cos(angle - half) + noise * full * draw.uniform(-1, 1, len(angle))
-    words = [np.rint(leg).astype(int) for leg in (sin, cos)]
-    assert all(-full <= leg.min() and leg.max() < full for leg in words)
-    return list(zip(*(leg.tolist() for leg in words)))
+    words = [np.rint(channel).astype(int) for channel in (sin, cos)]
+    assert all(-full <= channel.min() and channel.max() < full for channel in words)
+    return list(zip(*(channel.tolist() for channel in words)))
 
 
 def top_acceleration(error):
-    """Largest change of speed, in periods a sample, if every phase may be wrong by `error` LSB:
-    four of them meet.
+    """Largest change of speed, in periods per sample, if every phase may be wrong by `error` LSB:
+    four such errors add up.
     """
     return (16384 - 4 * error - 1) / 65536
 
 
 def ramp(change, most=0.99):
-    """Speed up from standstill to `most` periods a sample, brake, and the same way back."""
+    """Accelerate from standstill to `most` periods per sample, brake, and return in the same
+    manner.
+    """
     up = np.arange(0, most, change)
     speeds = np.concatenate([up, up[::-1], -up, -up[::-1]])
     return 0.3 + np.concatenate([[0], np.cumsum(speeds)])
 
 
 def motions(n, error):
-    """Places in periods, at about n samples each; the first lies inside the period 0."""
+    """Positions in periods, of about n samples per motion; the first lies inside period 0."""
     time = np.arange(n)
     return {
         "creep through all phases": 0.5 + time * 1.37 / n,
@@ -134,17 +135,19 @@ def motions(n, error):
 
 
 def counts(position, subdivision):
-    """The read-out of S0, any subdivision."""
+    """The readout of S0 with any subdivision."""
     return position * subdivision >> 16
 
 
 def phase_of(w, sin, cos):
-    """Of a word that the correction leaves as it is: both legs come out of it at half the size."""
-    return sample(16, *((leg << 16 - w) + 1 >> 1 for leg in (sin, cos)))[0]
+    """The phase of a word that the correction does not change: both channels leave it at half the
+    size.
+    """
+    return sample(16, *((channel << 16 - w) + 1 >> 1 for channel in (sin, cos)))[0]
 
 
 class Chain:
-    """The models in a row; follow() is one sample and returns position, overspeed."""
+    """The models in series; follow() processes one sample and returns position, overspeed."""
 
     def __init__(self, w):
         self.w, self.tracker, self.unwrap = w, FringeTracker(), Unwrap()
@@ -167,30 +170,30 @@ async def again(dut):
 
 
 async def follow(dut, sin, cos):
-    """One sample through the RTL; returns the position."""
+    """Send one sample through the RTL; returns the position."""
     dut.valid.value, dut.sin.value, dut.cos.value = 1, sin, cos
     await FallingEdge(dut.clk)
     dut.valid.value = 0
     await ClockCycles(
         dut.clk, LATENCY, FallingEdge
-    )  # the first clk brought it into the bench's register
+    )  # the first cycle loads it into the register of the bench
     assert dut.done.value == 1
     return dut.position.value.to_signed()
 
 
 @cocotb.test()
-async def latency_is_22_clk_from_converter_word_to_position(dut):
+async def latency_is_22_from_an_adc_word_to_position(dut):
     await begin(dut)
     dut.valid.value, dut.sin.value, dut.cos.value = 1, 50, 0
-    for clk in range(LATENCY + 4):  # after clk 0 the word stands in the bench's register
+    for cycle in range(LATENCY + 4):  # after cycle 0 the word is in the register of the bench
         await FallingEdge(dut.clk)
         dut.valid.value = 0
-        assert int(dut.done.value) == (clk == LATENCY)
+        assert int(dut.done.value) == (cycle == LATENCY)
     assert dut.position.value == 16384
 
 
 @cocotb.test()
-async def a_learned_correction_and_harmonics_act_within_the_same_latency(dut):
+async def latency_is_22_with_a_correction_and_harmonics_too(dut):
     await begin(dut)
     w = int(dut.W.value)
     dut.load.value, dut.sin_offset.value, dut.gain.value, dut.enable.value = (
@@ -214,7 +217,7 @@ async def a_learned_correction_and_harmonics_act_within_the_same_latency(dut):
 
 
 @cocotb.test()
-async def a_sample_every_clk_comes_out_every_clk(dut):
+async def a_sample_every_cycle_comes_out_every_cycle(dut):
     await begin(dut)
     w, draw = int(dut.W.value), np.random.default_rng(seed())
     words, chain, positions = samples(0.4 + np.arange(80) * 0.037, w, draw, **CLEAN), Chain(w), []
@@ -247,10 +250,10 @@ async def every_motion_stays_within_the_bound_of_every_disturbance(dut):
         for motion, where in motions(60, limit).items():
             await again(dut)
             chain, worst = Chain(w), 0
-            for place, (sin, cos) in zip(where, samples(where, w, draw, **amounts)):
+            for true, (sin, cos) in zip(where, samples(where, w, draw, **amounts)):
                 position = await follow(dut, sin, cos)
                 assert (position, 0) == chain.follow(sin, cos), (disturbance, motion)
-                worst = max(worst, abs(position - place * 65536))
+                worst = max(worst, abs(position - true * 65536))
             assert worst <= limit, f"{disturbance}, {motion}: {worst:.1f} LSB of {limit:.1f}"
 
 
@@ -260,18 +263,18 @@ async def the_centre_of_every_count_reads_exactly(dut):
     w, draw = int(dut.W.value), np.random.default_rng(seed())
     for subdivision in (1, 7, 160):
         await again(dut)
-        steps = max(subdivision, 16)  # a sample a count, or enough for the tracker
+        steps = max(subdivision, 16)  # one sample per count, or enough for the tracker
         where = (
             np.concatenate([np.arange(steps), np.arange(steps)[::-1], -1 - np.arange(steps)]) + 0.5
         ) / steps
-        for place, (sin, cos) in zip(where, samples(where, w, draw, **CLEAN)):
+        for true, (sin, cos) in zip(where, samples(where, w, draw, **CLEAN)):
             assert counts(await follow(dut, sin, cos), subdivision) == math.floor(
-                place * subdivision
+                true * subdivision
             )
 
 
 @cocotb.test()
-async def too_hard_a_jerk_is_an_overspeed(dut):
+async def a_jerk_above_the_limit_is_an_overspeed(dut):
     await begin(dut)
     w, draw = int(dut.W.value), np.random.default_rng(seed())
     limit = bound(w, **CLEAN)
@@ -312,24 +315,24 @@ def test_long_motions_stay_within_the_bound_and_come_near_to_it(disturbance):
     limit, worst = bound(8, **amounts), 0
     for motion, where in motions(4000, limit).items():
         chain = Chain(8)
-        for place, (sin, cos) in zip(where, samples(where, 8, draw, **amounts)):
+        for true, (sin, cos) in zip(where, samples(where, 8, draw, **amounts)):
             position, overspeed = chain.follow(sin, cos)
-            worst = max(worst, abs(position - place * 65536))
+            worst = max(worst, abs(position - true * 65536))
             assert not overspeed and worst <= limit, f"{motion}: {worst:.1f} LSB of {limit:.1f}"
     assert worst > 0.6 * limit
 
 
 @pytest.mark.parametrize("subdivision", [1, 7, 160, 1000, 65536])
-def test_the_read_out_is_the_floor_of_the_place(subdivision):
+def test_the_readout_is_the_floor_of_the_true_position(subdivision):
     draw, chain, w = np.random.default_rng(1), Chain(16), 16
     where = np.concatenate([np.linspace(0.5, 3, 1500), np.linspace(3, -3, 3500)])
     away = bound(w, **CLEAN) / 65536
-    for place, (sin, cos) in zip(where, samples(where, w, draw, **CLEAN)):
+    for true, (sin, cos) in zip(where, samples(where, w, draw, **CLEAN)):
         read = counts(chain.follow(sin, cos)[0], subdivision)
         assert (
-            math.floor((place - away) * subdivision)
+            math.floor((true - away) * subdivision)
             <= read
-            <= math.floor((place + away) * subdivision)
+            <= math.floor((true + away) * subdivision)
         )
 
 
@@ -337,5 +340,5 @@ def test_the_read_out_is_the_floor_of_the_place(subdivision):
 def test_sine_cosine(w, monkeypatch):
     monkeypatch.setattr(
         "tb.bench.source_of", lambda top: Path(__file__).with_name(f"{top}.sv")
-    )  # a bench top is no part of rtl/
+    )  # a bench top is not under rtl/
     run("interpolator_bench", __file__, W=w)

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/position/count_phase_check.sv does, in integers: step() is one clk and returns the
-disagreement.
+"""Model of rtl/position/count_phase_check.sv: step() advances one cycle and returns disagreement
+after it.
 """
 
 
 def wrapped(difference):
-    """46 bits with a sign: the count wraps at 2^32 / 4 periods."""
+    """Wrap to 46 bits with a sign: the count wraps at 2^32 / 4 periods."""
     return (difference + (1 << 45)) % (1 << 46) - (1 << 45)
 
 
 class CountPhaseCheck:
-    """Two stages behind the inputs: `between` of the position before, then its `difference` from
-    the constant.
+    """Two pipeline stages: `between` of the preceding position, then its `difference` from the
+    constant.
     """
 
     def __init__(self):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/position/count_to_phase.sv does, in integers: clk(…) is one clk and returns what stands
-after it.
+"""Model of rtl/position/count_to_phase.sv: step() advances one cycle and returns the outputs after
+it.
 """
 
 QUARTER = 1 << 14
@@ -10,7 +10,7 @@ class CountToPhase:
     def __init__(self):
         self.phase = 0
 
-    def clk(self, rst=0, tick=0, count_step=0, align=0, align_counts=0):
+    def step(self, rst=0, tick=0, count_step=0, align=0, align_counts=0):
         counts = count_step + (align_counts if align else 0)
         self.phase = 0 if rst else (self.phase + counts * QUARTER) % 65536
         return dict(

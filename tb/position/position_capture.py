@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/position/position_capture.sv does: step() is one clk and returns (present, entry, free,
-overrun) after it.
+"""Model of rtl/position/position_capture.sv: step() advances one cycle and returns (present, entry,
+free, overrun) after it.
 """
 
 from collections import deque
@@ -54,7 +54,7 @@ class PositionCapture:
         full = len(self.entries) == self.depth
         if pop and self.present:
             self.entries.popleft()
-        self.present = int(len(self.entries) > 0)  # what comes in this clk is not at the output yet
+        self.present = int(len(self.entries) > 0)  # an event of this cycle is not at the output yet
         if sources and not full:
             self.entries.append((sources, age, now, position))
         self.probe, self.since = probe, min(age + 1, NEVER)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/position/position_compare.sv does, in integers: step() is one clk and returns armed,
-pulse, late, passed.
+"""Model of rtl/position/position_compare.sv: step() advances one cycle and returns armed, pulse,
+late, passed.
 """
 
 
@@ -10,15 +10,17 @@ def wrapped(value):
 
 class PositionCompare:
     def __init__(self):
-        self.origin, self.here = 0, None  # here: of the position one clk ago, if it was new
+        self.origin, self.here = 0, None  # here: the position of the preceding cycle, if it was new
         self.armed = self.ready = False
         self.reach = self.point = self.stride = self.passed = self.count = 0
-        self.pulse = self.resting = self.timer = 0  # timer: clk left of pulse or gap, with this one
+        self.pulse = self.resting = self.timer = (
+            0  # timer: cycles left of pulse or gap, including this one
+        )
         self.waited = False
 
-    def past(self, place, mark):
-        """How far place has come beyond mark in the direction of the points."""
-        return wrapped(mark - place if self.stride < 0 else place - mark)
+    def past(self, position, point):
+        """The distance of position beyond point, in the direction of the points."""
+        return wrapped(point - position if self.stride < 0 else position - point)
 
     def step(
         self,

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""position_capture: every source, order, age, both ends of the queue, and every clk against the
-model.
+"""Tests of position_capture: every source, order, age, both ends of the queue, and every cycle
+against the model.
 """
 
 import random
@@ -31,8 +31,8 @@ class Capture:
         self.all = (1 << 2 * self.probes + 3) - 1
         self.model, self.time = PositionCapture(self.probes, self.depth), 0
 
-    async def clk(self, rst=0, **inputs):
-        """One clk with the model beside it; (present, entry, free, overrun)."""
+    async def cycle(self, rst=0, **inputs):
+        """Advance design and model by one cycle; returns (present, entry, free, overrun)."""
         dut, self.time = self.dut, (self.time + 1) % (1 << len(self.dut.now))
         values = INPUTS | dict(enabled=self.all, now=self.time) | inputs
         dut.rst.value = rst
@@ -59,32 +59,32 @@ class Capture:
         return got
 
     async def read(self):
-        """All entries, one after the other; nothing captures meanwhile."""
+        """Read all entries in order; nothing captures meanwhile."""
         entries = []
-        while (await self.clk(enabled=0))[0]:
+        while (await self.cycle(enabled=0))[0]:
             entries.append(self.model.entries[0])
-            await self.clk(enabled=0, pop=1)
+            await self.cycle(enabled=0, pop=1)
         return entries
 
 
 async def begin(dut, probe=0):
     await start(dut, **INPUTS | dict(probe=probe))
     capture = Capture(dut)
-    await capture.clk(rst=1, probe=probe)
+    await capture.cycle(rst=1, probe=probe)
     return capture
 
 
 @cocotb.test()
-async def latency_from_event_to_present_is_2(dut):
+async def latency_is_2_from_event_to_present(dut):
     capture = await begin(dut)
-    assert (await capture.clk(index=1, valid=1, position=5))[0] == 0
-    assert (await capture.clk())[1] == (INDEX, 0, 2, 5)
+    assert (await capture.cycle(index=1, valid=1, position=5))[0] == 0
+    assert (await capture.cycle())[1] == (INDEX, 0, 2, 5)
 
 
 @cocotb.test()
 async def each_source_makes_an_entry_with_its_own_bit(dut):
     capture = await begin(dut)
-    await capture.clk(valid=1, position=-70_000)
+    await capture.cycle(valid=1, position=-70_000)
     events = [(INDEX, dict(index=1)), (TICK, dict(tick=1)), (SOFTWARE, dict(software=1))]
     for n in range(capture.probes):
         events += [
@@ -92,7 +92,9 @@ async def each_source_makes_an_entry_with_its_own_bit(dut):
             (falling(n, capture.probes), dict(probe=0)),
         ]
     for age, (_, inputs) in enumerate(events, 1):
-        assert (await capture.clk(position=-70_000 - age, **inputs))[3] == int(age > capture.depth)
+        assert (await capture.cycle(position=-70_000 - age, **inputs))[3] == int(
+            age > capture.depth
+        )
     assert (
         await capture.read()
         == [(bit, age, age + 2, -70_000 - age) for age, (bit, _) in enumerate(events, 1)][
@@ -102,10 +104,10 @@ async def each_source_makes_an_entry_with_its_own_bit(dut):
 
 
 @cocotb.test()
-async def events_of_one_clk_make_one_entry(dut):
+async def events_of_one_cycle_make_one_entry(dut):
     capture = await begin(dut)
-    await capture.clk()
-    await capture.clk(probe=1, index=1, tick=1, software=1, valid=1, position=9)
+    await capture.cycle()
+    await capture.cycle(probe=1, index=1, tick=1, software=1, valid=1, position=9)
     ((sources, age, _, position),) = await capture.read()
     assert (
         sources & 7 == INDEX | TICK | SOFTWARE and sources & rising(0) and (age, position) == (0, 9)
@@ -117,54 +119,54 @@ async def only_enabled_sources_capture(dut):
     capture = await begin(dut)
     for bit in range(2 * capture.probes + 3):
         for probe in (capture.all, 0):
-            await capture.clk(
+            await capture.cycle(
                 enabled=1 << bit, index=1, tick=1, software=1, probe=probe % (1 << capture.probes)
             )
         found = await capture.read()
         assert {entry[0] for entry in found} == {1 << bit} and len(found) == (2 if bit < 3 else 1)
-    await capture.clk(enabled=0, index=1, tick=1, software=1, probe=1)
+    await capture.cycle(enabled=0, index=1, tick=1, software=1, probe=1)
     assert await capture.read() == []
 
 
 @cocotb.test()
-async def a_probe_that_stands_at_reset_or_when_it_is_enabled_is_no_edge(dut):
+async def a_probe_that_is_high_at_reset_or_when_it_is_enabled_is_no_edge(dut):
     capture = await begin(dut, probe=1)
     for enabled in (capture.all, capture.all, 0, capture.all, capture.all):
-        assert (await capture.clk(enabled=enabled, probe=1))[2] == capture.depth
-    await capture.clk(probe=0)
+        assert (await capture.cycle(enabled=enabled, probe=1))[2] == capture.depth
+    await capture.cycle(probe=0)
     assert [entry[0] for entry in await capture.read()] == [falling(0, capture.probes)]
 
 
 @cocotb.test()
-async def the_age_is_the_clk_since_the_position_came_and_stops_at_its_end(dut):
+async def the_age_counts_the_cycles_since_the_position_came_and_saturates(dut):
     capture = await begin(dut)
-    await capture.clk(software=1)
-    await capture.clk(valid=1)
+    await capture.cycle(software=1)
+    await capture.cycle(valid=1)
     for _ in range(6):
-        await capture.clk()
-    await capture.clk(software=1)
+        await capture.cycle()
+    await capture.cycle(software=1)
     assert [entry[1] for entry in await capture.read()] == [NEVER, 7]
 
 
 @cocotb.test()
-async def a_full_queue_tells_what_it_drops_and_keeps_the_rest(dut):
+async def a_full_queue_reports_what_it_drops_and_keeps_its_entries(dut):
     capture = await begin(dut)
     for n in range(capture.depth):
-        assert (await capture.clk(index=1, position=n))[2:] == (capture.depth - 1 - n, 0)
+        assert (await capture.cycle(index=1, position=n))[2:] == (capture.depth - 1 - n, 0)
     for _ in range(3):
-        assert (await capture.clk(tick=1, position=-1))[3] == 1
-    assert (await capture.clk(index=1, position=-1, pop=1))[3] == 1  # full when it came
-    assert (await capture.clk(index=1, position=77))[3] == 0
+        assert (await capture.cycle(tick=1, position=-1))[3] == 1
+    assert (await capture.cycle(index=1, position=-1, pop=1))[3] == 1  # full when it came
+    assert (await capture.cycle(index=1, position=77))[3] == 0
     assert [entry[3] for entry in await capture.read()] == [*range(1, capture.depth), 77]
 
 
 @cocotb.test()
-async def the_head_stands_until_it_is_popped(dut):
+async def the_head_is_constant_until_it_is_popped(dut):
     capture = await begin(dut)
-    await capture.clk(index=1, position=-1 << 47)
-    await capture.clk()
+    await capture.cycle(index=1, position=-1 << 47)
+    await capture.cycle()
     for n in range(40):
-        assert (await capture.clk(index=1, valid=1, position=n))[1] == (INDEX, NEVER, 2, -1 << 47)
+        assert (await capture.cycle(index=1, valid=1, position=n))[1] == (INDEX, NEVER, 2, -1 << 47)
 
 
 @cocotb.test()
@@ -172,8 +174,8 @@ async def clear_and_reset_empty_the_queue(dut):
     capture = await begin(dut)
     for last in (dict(clear=1), dict(rst=1)):
         for n in range(5):
-            await capture.clk(index=1, position=n)
-        assert (await capture.clk(software=1, **last))[:3] == (0, None, capture.depth)
+            await capture.cycle(index=1, position=n)
+        assert (await capture.cycle(software=1, **last))[:3] == (0, None, capture.depth)
         assert await capture.read() == []
 
 
@@ -181,18 +183,18 @@ async def clear_and_reset_empty_the_queue(dut):
 async def a_pop_of_an_empty_queue_does_nothing(dut):
     capture = await begin(dut)
     for _ in range(3):
-        assert await capture.clk(pop=1) == (0, None, capture.depth, 0)
-    await capture.clk(index=1, pop=1)
+        assert await capture.cycle(pop=1) == (0, None, capture.depth, 0)
+    await capture.cycle(index=1, pop=1)
     assert len(await capture.read()) == 1
 
 
 @cocotb.test()
-async def any_events_match_the_model_in_every_clk(dut):
+async def any_events_match_the_model_in_every_cycle(dut):
     capture, probe = await begin(dut), 0
-    for clk in range(8000):
-        busy = (0.05, 0.5, 0.9)[clk // 500 % 3]
+    for cycle in range(8000):
+        busy = (0.05, 0.5, 0.9)[cycle // 500 % 3]
         probe ^= random.getrandbits(capture.probes) if random.random() < busy else 0
-        await capture.clk(
+        await capture.cycle(
             enabled=random.getrandbits(2 * capture.probes + 3),
             probe=probe,
             position=random.randrange(-1 << 47, 1 << 47),

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""position_compare: a pulse a point in both directions, jitter, jumps, both ends of the settings,
-and every clk against the model.
+"""Tests of position_compare: one pulse per point in both directions, jitter, jumps, both ends of
+the settings, and every cycle against the model.
 """
 
 import random
@@ -38,8 +38,8 @@ class Compare:
             0,
         )
 
-    async def clk(self, rst=0, **inputs):
-        """One clk with the model beside it; (armed, pulse, late, passed)."""
+    async def cycle(self, rst=0, **inputs):
+        """Advance design and model by one cycle; returns (armed, pulse, late, passed)."""
         dut, values = self.dut, INPUTS | self.settings | inputs
         dut.rst.value = rst
         for name, value in values.items():
@@ -67,23 +67,23 @@ class Compare:
 
     async def arm(self, **settings):
         self.settings, self.pulses, self.late = settings, 0, 0
-        await self.clk(arm=1)
+        await self.cycle(arm=1)
 
     async def ride(self, positions, gap=0):
-        """Each position for one sample, `gap` clk between samples."""
+        """Apply each position for one sample, with `gap` cycles between samples."""
         for position in positions:
-            await self.clk(valid=1, position=position)
+            await self.cycle(valid=1, position=position)
             for _ in range(gap):
-                await self.clk(position=position)
+                await self.cycle(position=position)
 
-    async def rest(self, clk):
-        return [(await self.clk())[1] for _ in range(clk)]
+    async def idle(self, cycle):
+        return [(await self.cycle())[1] for _ in range(cycle)]
 
 
 async def begin(dut):
     await start(dut, **INPUTS)
     compare = Compare(dut)
-    await compare.clk(rst=1)
+    await compare.cycle(rst=1)
     return compare
 
 
@@ -92,9 +92,9 @@ async def latency_is_3(dut):
     compare = await begin(dut)
     await compare.arm(start=100, step=10)
     await compare.ride([0])
-    await compare.rest(5)
-    await compare.clk(valid=1, position=100)
-    assert await compare.rest(2) == [0, 1]  # the third clk edge after valid raises it
+    await compare.idle(5)
+    await compare.cycle(valid=1, position=100)
+    assert await compare.idle(2) == [0, 1]  # the third clock edge after valid raises it
 
 
 @cocotb.test()
@@ -103,12 +103,14 @@ async def a_pulse_at_each_point_in_both_directions(dut):
     for sign in (1, -1):
         await compare.arm(start=sign * 1000, step=sign * 300, count=5)
         seen = []
-        for place in range(900, 3000, 7):
+        for position in range(900, 3000, 7):
             before = compare.pulses
-            await compare.ride([sign * place], 4)
-            seen += [place] * (compare.pulses - before)
-        assert [0 <= place - (1000 + 300 * k) < 7 for k, place in enumerate(seen)] == [True] * 5
-        assert await compare.clk() == (0, 0, 0, 5)
+            await compare.ride([sign * position], 4)
+            seen += [position] * (compare.pulses - before)
+        assert [0 <= position - (1000 + 300 * k) < 7 for k, position in enumerate(seen)] == [
+            True
+        ] * 5
+        assert await compare.cycle() == (0, 0, 0, 5)
 
 
 @cocotb.test()
@@ -134,7 +136,7 @@ async def jitter_on_a_point_makes_one_pulse(dut):
 
 
 @cocotb.test()
-async def the_way_back_makes_no_pulse(dut):
+async def moving_back_makes_no_pulse(dut):
     compare = await begin(dut)
     await compare.arm(start=0, step=100)
     await compare.ride([*range(-10, 1000, 13), *range(990, -2000, -13), *range(-2000, 900, 13)], 2)
@@ -149,15 +151,16 @@ async def a_jump_over_many_points_makes_all_their_pulses_in_a_row(dut):
     await compare.arm(start=100, step=10, pulse_length=3, gap_length=2)
     await compare.ride([0], 5)
     await compare.ride([199])
-    assert await compare.rest(70) == [0] + [1, 1, 1, 0, 0] * 10 + [0] * 19  # 100, 110 … 190
+    assert await compare.idle(70) == [0] + [1, 1, 1, 0, 0] * 10 + [0] * 19  # 100, 110 … 190
     assert (compare.pulses, compare.late) == (10, 9)
-    await compare.ride([200, 50, 400, 60], 1)  # what was reached counts, also if it is left at once
-    await compare.rest(200)
+    # a point that was reached counts, even if it is left at once
+    await compare.ride([200, 50, 400, 60], 1)
+    await compare.idle(200)
     assert compare.pulses == 31
 
 
 @cocotb.test()
-async def what_lies_behind_at_the_start_makes_no_burst(dut):
+async def points_behind_the_start_make_no_burst(dut):
     compare = await begin(dut)
     await compare.arm(start=100, step=10)
     await compare.ride([500, 600, 700], 5)
@@ -172,18 +175,18 @@ async def pulse_and_gap_have_their_lengths_and_0_acts_as_1(dut):
     for length, gap in ((0, 0), (1, 1), (0, 5), (7, 0), (40, 3)):
         await compare.arm(start=1, step=1, count=3, pulse_length=length, gap_length=gap)
         await compare.ride([0, 100])
-        seen = "".join(map(str, await compare.rest(4 * (length + gap) + 20))).strip("0")
+        seen = "".join(map(str, await compare.idle(4 * (length + gap) + 20))).strip("0")
         high, low = max(length, 1), max(gap, 1)
         assert seen == "0".join(["1" * high + "0" * (low - 1)] * 3).strip("0")
 
 
 @cocotb.test()
-async def the_count_ends_it_and_0_has_no_end(dut):
+async def the_count_ends_the_points_and_count_0_has_no_end(dut):
     compare = await begin(dut)
     for count, want in ((1, 1), (7, 7), (0, 200)):
         await compare.arm(start=1, step=5, count=count)
         await compare.ride([0, 1000], 600)
-        assert compare.pulses == want and (await compare.clk())[0] == (count == 0)
+        assert compare.pulses == want and (await compare.cycle())[0] == (count == 0)
 
 
 @cocotb.test()
@@ -195,12 +198,12 @@ async def step_0_is_one_point_passed_upwards(dut):
 
 
 @cocotb.test()
-async def disarm_ends_it_and_lets_the_pulse_end_at_its_time(dut):
+async def disarm_ends_the_points_and_the_running_pulse_keeps_its_length(dut):
     compare = await begin(dut)
     await compare.arm(start=10, step=1, pulse_length=9)
     await compare.ride([0, 50], 4)
-    await compare.clk(disarm=1)
-    assert sum(await compare.rest(40)) == 5 and compare.pulses == 1
+    await compare.cycle(disarm=1)
+    assert sum(await compare.idle(40)) == 5 and compare.pulses == 1
 
 
 @cocotb.test()
@@ -216,13 +219,13 @@ async def arming_again_starts_with_the_first_point(dut):
 @cocotb.test()
 async def a_shift_leaves_the_points_on_the_scale(dut):
     compare = await begin(dut)
-    await compare.clk(shift=1, shift_periods=-12)
+    await compare.cycle(shift=1, shift_periods=-12)
     await compare.arm(start=1000, step=1000)
     await compare.ride([0, 999], 5)
-    await compare.clk(shift=1, shift_periods=7)
+    await compare.cycle(shift=1, shift_periods=7)
     await compare.ride([999 + 7 * PERIOD], 5)
     assert compare.pulses == 0
-    await compare.clk(valid=1, position=999 + 7 * PERIOD, shift=1, shift_periods=-1 << 31)
+    await compare.cycle(valid=1, position=999 + 7 * PERIOD, shift=1, shift_periods=-1 << 31)
     far = wrapped(7 * PERIOD - (1 << 47))
     await compare.ride([999 + far, 1000 + far, 2000 + far], 5)
     assert compare.pulses == 2
@@ -247,22 +250,22 @@ async def pulses_are_the_points_passed_at_any_speed(dut):
             random.randrange(-1000, 1000),
         )
         await compare.arm(start=first, step=sign * step)
-        place, farthest = first - sign, first - sign
+        position, farthest = first - sign, first - sign
         for _ in range(60):
-            await compare.ride([place], random.randrange(3))
-            place += sign * random.randrange(-3 * step, 4 * step + 2) // 3
-            farthest = place if sign * (place - farthest) > 0 else farthest
-        await compare.ride([place])
+            await compare.ride([position], random.randrange(3))
+            position += sign * random.randrange(-3 * step, 4 * step + 2) // 3
+            farthest = position if sign * (position - farthest) > 0 else farthest
+        await compare.ride([position])
         points = sign * (farthest - first) // step + 1
-        await compare.rest(2 * points + 10)
+        await compare.idle(2 * points + 10)
         assert compare.pulses == points
 
 
 @cocotb.test()
-async def any_input_matches_the_model_in_every_clk(dut):
+async def any_input_matches_the_model_in_every_cycle(dut):
     compare, position = await begin(dut), 0
-    for clk in range(12_000):
-        if clk % 400 == 0:
+    for cycle in range(12_000):
+        if cycle % 400 == 0:
             compare.settings = dict(
                 start=position + random.randrange(-300, 300),
                 step=random.randrange(-50, 50),
@@ -273,7 +276,7 @@ async def any_input_matches_the_model_in_every_clk(dut):
         arm, shift, rst = (int(random.random() < share) for share in (0.01, 0.01, 0.002))
         position = wrapped(position + random.randrange(-20, 22))
         periods = random.choice((1, -3, random.randrange(-1 << 31, 1 << 31)))
-        await compare.clk(
+        await compare.cycle(
             rst,
             arm=arm,
             disarm=int(random.random() < 0.002),

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fringe_tracker, unwrap and count_phase_check in a row: full resolution without lag up to a
-quarter period a sample, and whatever makes
-the position wrong is told within two samples, or the position is right again."""
+"""Tests of fringe_tracker, unwrap and count_phase_check in series: full resolution without lag up
+to a quarter period per sample, and whatever makes the position wrong is reported within two
+samples, or the position is right again.
+"""
 
 import random
 from pathlib import Path
@@ -15,14 +16,15 @@ from tb.position.count_phase_check import CountPhaseCheck
 from tb.position.unwrap import Unwrap
 
 PERIOD, QUARTER = 1 << 16, 1 << 14
-LIMIT = PERIOD // 2  # the quarter period between two counts, and as much for comparators and lag
-PACE = 6  # clk from sample to sample, as close as the check can tell them apart
-LATENCY = 5  # clk from phase to disagreement
+# the quarter period between two counts, and as much again for comparators and lag
+LIMIT = PERIOD // 2
+SPACING = 6  # cycles from sample to sample, the fewest that the check can distinguish
+LATENCY = 5  # cycles from phase to disagreement
 
 
 class Scale:
-    """The bench with the models beside it; sample() puts the scale at a place and returns
-    (position, alarm of this sample).
+    """The bench and its models; sample() moves the scale to a position and returns (position, alarm
+    of this sample).
     """
 
     def __init__(self, dut):
@@ -35,26 +37,26 @@ class Scale:
         dut.rst.value = 0
         self.tracker, self.unwrap, self.coarse = FringeTracker(), Unwrap(), CountPhaseCheck()
 
-    async def sample(self, place, phase=None, count=None):
+    async def sample(self, true_position, phase=None, count=None):
         dut = self.dut
-        phase = place % PERIOD if phase is None else phase
+        phase = true_position % PERIOD if phase is None else phase
         dut.phase.value, dut.count.value, overspeed = (
             phase,
-            place // QUARTER if count is None else count,
+            true_position // QUARTER if count is None else count,
             0,
         )
-        for clk in range(PACE):
-            dut.valid.value = int(clk == 0)
+        for cycle in range(SPACING):
+            dut.valid.value = int(cycle == 0)
             await FallingEdge(dut.clk)
             overspeed |= int(dut.overspeed.value)
-        step, strayed = self.tracker.follow(phase)
+        step, expected_overspeed = self.tracker.follow(phase)
         position = self.unwrap.step(1, step, phase, 0, 0)[1]
-        for clk in range(4):
+        for cycle in range(4):
             disagreement = self.coarse.step(
-                LIMIT, int(clk == 0), position, int(dut.count.value.to_signed()), 0, 0
+                LIMIT, int(cycle == 0), position, int(dut.count.value.to_signed()), 0, 0
             )
         got = dut.position.value.to_signed(), overspeed, int(dut.disagreement.value)
-        assert got == (position, strayed, disagreement)
+        assert got == (position, expected_overspeed, disagreement)
         return got[0], bool(overspeed or got[2])
 
 
@@ -64,15 +66,15 @@ async def begin(dut):
 
 
 @cocotb.test()
-async def latency_from_phase_to_disagreement_is_5(dut):
+async def latency_is_5_from_phase_to_disagreement(dut):
     scale = await begin(dut)
     await scale.begin()
     await scale.sample(100)
     dut.count.value, dut.valid.value = 40, 1
-    for clk in range(1, LATENCY + 1):
+    for cycle in range(1, LATENCY + 1):
         await FallingEdge(dut.clk)
         dut.valid.value = 0
-        assert int(dut.disagreement.value) == (clk == LATENCY)
+        assert int(dut.disagreement.value) == (cycle == LATENCY)
 
 
 @cocotb.test()
@@ -81,27 +83,27 @@ async def every_bit_comes_through_without_lag_up_to_a_quarter_period_a_sample(du
     for speed in (1, -1, 77, -4095, 10_007, QUARTER - 1, 1 - QUARTER):
         await scale.begin()
         first = random.getrandbits(16)
-        for n in range(40):  # from standstill to full speed at once, and on
-            place = first + n * speed
-            assert await scale.sample(place) == (place, False)
+        for n in range(40):  # from standstill to full speed at once, then constant
+            true_position = first + n * speed
+            assert await scale.sample(true_position) == (true_position, False)
 
 
 @cocotb.test()
 async def no_false_alarm_while_the_speed_changes_by_less_than_a_quarter_period_a_sample(dut):
     scale = await begin(dut)
     await scale.begin()
-    place = random.getrandbits(16)
+    true_position = random.getrandbits(16)
     speed, first = 0, None
     for _ in range(1500):
         speed = max(-PERIOD, min(PERIOD - 1, speed + random.randrange(1 - QUARTER, QUARTER)))
-        place += speed
-        position, alarm = await scale.sample(place)
-        first = position - place if first is None else first
-        assert (position - place, alarm) == (first, False)
+        true_position += speed
+        position, alarm = await scale.sample(true_position)
+        first = position - true_position if first is None else first
+        assert (position - true_position, alarm) == (first, False)
 
 
 @cocotb.test()
-async def a_jump_that_the_phase_cannot_tell_is_told_by_the_count_at_once(dut):
+async def a_jump_by_whole_periods_is_reported_by_the_count_at_once(dut):
     scale = await begin(dut)
     for periods in (1, -1, 2, -5, 1000):
         await scale.begin()
@@ -112,29 +114,29 @@ async def a_jump_that_the_phase_cannot_tell_is_told_by_the_count_at_once(dut):
 
 
 @cocotb.test()
-async def any_jump_that_makes_the_position_wrong_is_told_within_two_samples(dut):
+async def any_jump_that_makes_the_position_wrong_is_reported_within_two_samples(dut):
     scale = await begin(dut)
     for trial in range(300):
         await scale.begin()
-        place, speed = random.getrandbits(16), random.randrange(1 - QUARTER, QUARTER)
+        true_position, speed = random.getrandbits(16), random.randrange(1 - QUARTER, QUARTER)
         for _ in range(4):
-            place += speed
-            position, alarm = await scale.sample(place)
+            true_position += speed
+            position, alarm = await scale.sample(true_position)
             assert not alarm
-        wrong = position - place
-        place += random.choice(
+        wrong = position - true_position
+        true_position += random.choice(
             (QUARTER, -QUARTER, PERIOD, random.randrange(-8 * PERIOD, 8 * PERIOD))
         )
-        told = []
+        alarms = []
         for _ in range(2):
-            place += speed
-            position, alarm = await scale.sample(place)
-            told.append(alarm)
-        assert any(told) or position - place == wrong, f"trial {trial}"
+            true_position += speed
+            position, alarm = await scale.sample(true_position)
+            alarms.append(alarm)
+        assert any(alarms) or position - true_position == wrong, f"trial {trial}"
 
 
 @cocotb.test()
-async def a_speed_above_the_limit_is_told_within_two_samples(dut):
+async def a_speed_above_the_limit_is_reported_within_two_samples(dut):
     scale = await begin(dut)
     for speed in (*range(QUARTER, 4 * PERIOD, 7001), PERIOD, 2 * PERIOD):
         for sign in (1, -1):
@@ -145,32 +147,34 @@ async def a_speed_above_the_limit_is_told_within_two_samples(dut):
 
 
 @cocotb.test()
-async def a_phase_that_stands_while_the_count_goes_on_is_told_within_two_samples(dut):
+async def a_phase_that_is_stuck_while_the_count_continues_is_reported_within_two_samples(dut):
     scale = await begin(dut)
     for speed in (
         QUARTER,
         PERIOD // 2,
         -QUARTER,
         -PERIOD,
-    ):  # a converter that hangs: slower, it takes 3/4 period of way
+    ):  # an ADC that hangs: at a lower speed it takes 3/4 period
         await scale.begin()
-        place = 20_000
-        while abs(place - 20_000) < 3 * PERIOD:  # up to speed in steps that are followed
-            pace = min(abs(speed), abs(place - 20_000) // 4 + QUARTER // 2)
-            place += pace if speed > 0 else -pace
-            _, alarm = await scale.sample(place)
+        true_position = 20_000
+        # accelerate in steps that the tracker follows
+        while abs(true_position - 20_000) < 3 * PERIOD:
+            increment = min(abs(speed), abs(true_position - 20_000) // 4 + QUARTER // 2)
+            true_position += increment if speed > 0 else -increment
+            _, alarm = await scale.sample(true_position)
             assert not alarm
-        stuck, alarms = place % PERIOD, []
+        stuck, alarms = true_position % PERIOD, []
         for _ in range(2):
-            place += speed
-            alarms.append((await scale.sample(place, phase=stuck))[1])
+            true_position += speed
+            alarms.append((await scale.sample(true_position, phase=stuck))[1])
         assert any(alarms), speed
 
 
 @cocotb.test()
-async def a_count_that_stands_or_loses_is_told_when_it_is_half_a_period_off(dut):
+async def a_count_that_is_stuck_or_loses_edges_is_reported_when_it_is_half_a_period_off(dut):
     scale = await begin(dut)
-    for lost in (3, -3, 4, 100):  # counts; with a quarter period between counts, 3 are always seen
+    # counts; with a quarter period between counts, 3 are always detected
+    for lost in (3, -3, 4, 100):
         await scale.begin()
         for n in range(4):
             assert not (await scale.sample(1000 + 99 * n))[1]
@@ -180,5 +184,5 @@ async def a_count_that_stands_or_loses_is_told_when_it_is_half_a_period_off(dut)
 def test_tracking(monkeypatch):
     monkeypatch.setattr(
         "tb.bench.source_of", lambda top: Path(__file__).with_name(f"{top}.sv")
-    )  # a bench top is no part of rtl/
+    )  # a bench top is not under rtl/
     run("tracking_bench", __file__)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""unwrap: by hand, the ends of the range, shifts with and without a step, and every clk against the
-model.
+"""Tests of unwrap: by hand, the ends of the range, shifts with and without a step, and every cycle
+against the model.
 """
 
 import random
@@ -33,12 +33,13 @@ async def latency_is_1(dut):
     await RisingEdge(dut.clk)
     await FallingEdge(dut.clk)
     assert dut.done.value == 1 and dut.position.value == 77
+    assert await clock(dut, shift=1, shift_periods=2) == (0, (2 << 16) + 77)
 
 
 @cocotb.test()
 async def by_hand(dut):
     await begin(dut)
-    assert await clock(dut, 1, 12345, 60000) == (1, 60000)  # the first step is not looked at
+    assert await clock(dut, 1, 12345, 60000) == (1, 60000)  # the first step is ignored
     assert await clock(dut, 1, 10000, 4464) == (1, 70000)
     assert await clock(dut, 1, -65536, 4464) == (1, 4464)
     assert await clock(dut, 1, -4465, 65535) == (1, -1)
@@ -66,10 +67,10 @@ async def the_ends_of_the_range_wrap(dut):
 
 
 @cocotb.test()
-async def any_input_matches_the_model_in_every_clk(dut):
+async def any_input_matches_the_model_in_every_cycle(dut):
     await begin(dut)
     model = Unwrap()
-    for clk in range(10_000):
+    for cycle in range(10_000):
         rst, valid, shift = (
             int(random.random() < 0.003),
             random.getrandbits(1),
@@ -89,7 +90,7 @@ async def any_input_matches_the_model_in_every_clk(dut):
         )
         if rst:
             model, want = Unwrap(), (0, 0)
-        assert got == want, f"clk {clk}"
+        assert got == want, f"cycle {cycle}"
 
 
 def test_unwrap():

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""zero_crossing: every pass and its direction, none from a shift or a wrap, and every clk against
-the model.
+"""Tests of zero_crossing: every pass and its direction, none from a shift or a wrap, and every
+cycle against the model.
 """
 
 import random
@@ -20,7 +20,7 @@ async def begin(dut):
 
 
 async def again(dut):
-    """Reset in mid-flow, the clock runs on."""
+    """Reset while the clock runs."""
     dut.rst.value, dut.valid.value = 1, 0
     await FallingEdge(dut.clk)
     dut.rst.value = 0
@@ -49,7 +49,7 @@ async def latency_is_1(dut):
 
 
 @cocotb.test()
-async def every_pass_is_told_with_its_direction(dut):
+async def every_pass_is_reported_with_its_direction(dut):
     await begin(dut)
     assert await ride(dut, [5, 0, -1, -2, 0, -1, 65535, 3, -65536, -1]) == "..d.udu.d."
 
@@ -69,7 +69,7 @@ async def a_shift_is_no_crossing(dut):
     assert await clock(dut, 6, 0, 1) == (0, 0)
     assert await clock(dut, 6 - 131072, 0) == (0, 0)
     assert await ride(dut, [7 - 131072, -1, 0]) == "..u"
-    assert await clock(dut, -1, 1, 1) == (0, 1)  # the clk of the strobe still has the old origin
+    assert await clock(dut, -1, 1, 1) == (0, 1)  # the cycle of the strobe still uses the old origin
     assert await ride(dut, [131071, 131072, -1]) == "..d"
 
 
@@ -81,17 +81,17 @@ async def the_ends_of_the_range_are_no_crossing(dut):
 
 
 @cocotb.test()
-async def any_input_matches_the_model_in_every_clk(dut):
+async def any_input_matches_the_model_in_every_cycle(dut):
     await begin(dut)
     model = ZeroCrossing()
-    for clk in range(10_000):
+    for cycle in range(10_000):
         rst, valid, shift = (int(random.random() < share) for share in (0.003, 0.5, 0.1))
         position = random.choice((random.randrange(-3, 3), random.randrange(-1 << 47, 1 << 47)))
         dut.rst.value = rst
         got, want = await clock(dut, position, valid, shift), model.step(valid, position, shift)
         if rst:
             model, want = ZeroCrossing(), (0, 0)
-        assert got == want, f"clk {clk}"
+        assert got == want, f"cycle {cycle}"
 
 
 def test_zero_crossing():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/position/unwrap.sv does, in integers: step() is one clk and returns done, position."""
+"""Model of rtl/position/unwrap.sv: step() advances one cycle and returns done, position."""
 
 
 class Unwrap:
@@ -9,9 +9,7 @@ class Unwrap:
     def step(self, valid, step, phase, shift, shift_periods):
         if valid:
             self.position += step if self.started else 0
-            self.position += (
-                phase - self.position % 65536
-            )  # nothing where the step leads to the phase
+            self.position += phase - self.position % 65536  # 0 where the step leads to the phase
             self.started = True
         if shift:
             self.position += shift_periods << 16

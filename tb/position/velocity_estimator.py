@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/position/velocity_estimator.sv does, in integers: step() is one clk and returns
-velocity, fine.
+"""Model of rtl/position/velocity_estimator.sv: step() advances one cycle and returns velocity,
+fine.
 """
 
-K = 20  # bits of tick / time between two steps
-BUSY = K + 3  # clk from the choice of a division to its last
-P = 33  # bits of a place
+K = 20  # fraction bits of tick / time between two steps
+BUSY = K + 3  # cycles from the start of a division to its end
+P = 33  # bits of a position
 
 
 def wrapped(value, bits):
@@ -16,15 +16,15 @@ def between(value, low, high):
     return max(low, min(high, value))
 
 
-def quotient(way, period, span):
-    """2^-24 period/tick: way * period / span, the quotient of the times cut off behind K bits; at
-    most twice the way.
+def quotient(distance, period, span):
+    """2^-24 period/tick: distance * period / span, with the quotient of the times truncated after K
+    bits; at most twice the distance.
     """
     divisor = max(2 * span, period)
     ratio = (
         (period << K) // divisor if divisor else (1 << K + 1) - 1
-    )  # the divider's answer to a division by 0
-    return wrapped((way * ratio) >> K - 9, P + 10)
+    )  # the result of the divider for a division by 0
+    return wrapped((distance * ratio) >> K - 9, P + 10)
 
 
 class VelocityEstimator:
@@ -33,9 +33,9 @@ class VelocityEstimator:
         self.velocity = self.fine = self.speed = 0
         self.origin = self.now = self.quiet = self.since_tick = self.period = self.age = 0
         self.here = self.here_q = self.last = None
-        self.stepped = None  # the place just stepped from is known: True upwards, False downwards
-        self.ticks = [None] * 5  # what each tick still carries, the youngest first
-        self.latest = self.run = self.base = None  # (place, time) of steps
+        self.stepped = None  # here_q has just moved: True upwards, False downwards
+        self.ticks = [None] * 5  # pipeline of each tick, the youngest first
+        self.latest = self.run = self.base = None  # (edge, time) of steps
         self.fresh, self.busy, self.task = False, 0, None
 
     def step(self, quantum, tick, position, shift, shift_periods):
@@ -47,43 +47,46 @@ class VelocityEstimator:
             self.quiet,
         )
         run, speed, now, base = self.run, self.speed, self.now, self.base
-        # the tick on its way to the velocity
+        # the pipeline from tick to velocity
         self.ticks = [True if tick else None, None, None, None, None]
         ticked = before[0]
         if ticked:
             self.ticks[1] = wrapped(here - self.last, P) if self.last is not None else 0
             self.last = here
         if before[1] is not None:
-            way = between(before[1], -1 << 31, (1 << 31) - 1)
-            self.ticks[2] = max(way - quantum, -1 << 31), min(way + quantum, (1 << 31) - 1)
+            distance = between(before[1], -1 << 31, (1 << 31) - 1)
+            self.ticks[2] = (
+                max(distance - quantum, -1 << 31),
+                min(distance + quantum, (1 << 31) - 1),
+            )
         if before[2] is not None:
             self.ticks[3], low_high = True, before[2]
         if before[3]:
             self.velocity = (self.fine + 128) >> 8
         if before[2] is not None:
             self.fine = between(speed, low_high[0] << 8, low_high[1] << 8)
-        # the divisions, one after the other
+        # the divisions in turn
         if self.busy:
             self.busy -= 1
             if not self.busy:
-                way, span, period, bounding = self.task
-                found = quotient(way, period, span)
+                distance, span, period, bounding = self.task
+                found = quotient(distance, period, span)
                 if not bounding:
                     self.speed = found
                 elif quiet == self.longest:
                     self.speed = 0
-                elif 2 * span <= period:  # half a tick and less says nothing about a limit
+                elif 2 * span <= period:  # half a tick or less gives no limit
                     pass
                 elif speed < found if speed < 0 else speed > found:
                     self.speed = found
-            elif self.busy == BUSY - 1:  # the length of the tick is taken with the times
-                way, span, _, bounding = self.task
-                self.task = way, span, self.period, bounding
+            elif self.busy == BUSY - 1:  # the length of the tick is latched together with the times
+                distance, span, _, bounding = self.task
+                self.task = distance, span, self.period, bounding
         elif self.latest is not None:
             self.busy = BUSY
             if self.fresh:
-                place, time = self.latest
-                self.task = wrapped(place - base[0], P), time - base[1], 0, False
+                edge, time = self.latest
+                self.task = wrapped(edge - base[0], P), time - base[1], 0, False
                 self.run = self.latest
             else:
                 self.task = -quantum if speed < 0 else quantum, quiet, 0, True
@@ -95,13 +98,13 @@ class VelocityEstimator:
         # a step
         self.quiet = 0 if stepped is not None else min(quiet + 1, self.longest)
         if stepped is not None:
-            place = here_q + (0 if stepped else quantum)
+            edge = here_q + (0 if stepped else quantum)
             if self.latest is None or quiet == self.longest:
-                self.run = self.base = place, now
+                self.run = self.base = edge, now
                 self.fresh, self.busy, self.speed = False, 0, 0
             else:
                 self.fresh = True
-            self.latest = place, now
+            self.latest = edge, now
         self.stepped = None
         if here_q is not None and wrapped(here - here_q, P):
             self.stepped = wrapped(here - here_q, P) > 0

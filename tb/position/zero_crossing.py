@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/position/zero_crossing.sv does, in integers: step() is one clk and returns up, down."""
+"""Model of rtl/position/zero_crossing.sv: step() advances one cycle and returns up, down."""
 
 
 class ZeroCrossing:

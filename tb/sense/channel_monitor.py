@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/channel_monitor.sv does, in integers, for many signals side by side: sample() is
-one sample of each of them.
+"""Model of rtl/sense/channel_monitor.sv for many signals side by side: sample() processes one
+sample of each.
 """
 
 import numpy as np
@@ -14,14 +14,14 @@ class ChannelMonitor:
         self.started = False
         (
             self.last,
-            self.home,
-            self.other_home,
-            self.stood,
+            self.rest,
+            self.other_rest,
+            self.stayed,
             self.same,
             self.channel_stuck,
             self.recent,
         ) = (zeros() for _ in range(7))
-        self.sign, self.sign_before, self.side, self.changes, self.turns = (
+        self.sign, self.sign_before, self.side, self.changes, self.half_periods_seen = (
             zeros() for _ in range(5)
         )
         self.level, self.edge_other = zeros(), zeros()
@@ -38,20 +38,22 @@ class ChannelMonitor:
         no_noise_samples,
         sign_threshold,
     ):
-        """clipped, channel_stuck, no_noise, comparator_mismatch, comparator_stuck, channel_missing"""
+        """Returns clipped, channel_stuck, no_noise, comparator_mismatch, comparator_stuck,
+        channel_missing.
+        """
         size = abs(channel)
         clipped = (clip_level != NEVER) & (size > clip_level)
 
-        homely = self.started & (abs(channel - self.home) <= band)
-        far = (span != NEVER) & (abs(other - self.other_home) > span)
-        self.channel_stuck = homely & (
-            self.channel_stuck | (self.stood >= 2) & far & (self.recent > 0)
+        at_rest = self.started & (abs(channel - self.rest) <= band)
+        far = (span != NEVER) & (abs(other - self.other_rest) > span)
+        self.channel_stuck = at_rest & (
+            self.channel_stuck | (self.stayed >= 2) & far & (self.recent > 0)
         )
-        self.recent = np.where(homely, np.where(far, 3, np.maximum(self.recent - 1, 0)), 0)
-        self.stood = np.where(homely, np.minimum(self.stood + 1, 3), 0)
-        self.home, self.other_home = (
-            np.where(homely, self.home, channel),
-            np.where(homely, self.other_home, other),
+        self.recent = np.where(at_rest, np.where(far, 3, np.maximum(self.recent - 1, 0)), 0)
+        self.stayed = np.where(at_rest, np.minimum(self.stayed + 1, 3), 0)
+        self.rest, self.other_rest = (
+            np.where(at_rest, self.rest, channel),
+            np.where(at_rest, self.other_rest, other),
         )
 
         self.same = np.where(
@@ -69,8 +71,12 @@ class ChannelMonitor:
         crossing = (sign != 0) & (self.side != 0) & (sign != self.side)
         toggled = (level != self.level) & self.started
         self.changes = np.where(toggled, 0, np.minimum(self.changes + crossing, 3))
-        turned = np.where(other_level == self.edge_other, 0, np.minimum(self.turns + 1, 3))
-        self.turns = np.where(crossing, 0, np.where(toggled, turned, self.turns))
+        half_periods = np.where(
+            other_level == self.edge_other, 0, np.minimum(self.half_periods_seen + 1, 3)
+        )
+        self.half_periods_seen = np.where(
+            crossing, 0, np.where(toggled, half_periods, self.half_periods_seen)
+        )
         self.edge_other = np.where(toggled, other_level, self.edge_other)
         self.side = np.where(sign != 0, sign, self.side)
         self.sign, self.sign_before, self.level, self.last, self.started = (
@@ -86,5 +92,5 @@ class ChannelMonitor:
             no_noise,
             comparator_mismatch,
             self.changes == 3,
-            (self.turns == 3) & (self.side != 0),
+            (self.half_periods_seen == 3) & (self.side != 0),
         )

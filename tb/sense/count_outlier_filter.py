@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/count_outlier_filter.sv does to the counts since reset: follow(enable, count)
-returns what comes out.
+"""Model of rtl/sense/count_outlier_filter.sv for the counts since reset: follow(enable, count)
+returns the filtered count.
 """
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/deglitcher.sv does: step(stable_cycles, level, rst) is one clk, and returns what
-is on the pins after it.
+"""Model of rtl/sense/deglitcher.sv: step(stable_cycles, level, rst) advances one cycle and returns
+the outputs after it.
 """
 
 

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/event_filter.sv does: step(skip, required, tolerated, levels, rst) is one clk, and
-returns the pins after it.
+"""Model of rtl/sense/event_filter.sv: step(skip, required, tolerated, levels, rst) advances one
+cycle and returns the outputs after it.
 """
 
 
 class Level:
-    """One level. A disturbance has `seen` samples of the new level, and `against` it since the
-    first of them.
+    """One level. A disturbance has had `seen` samples of the new level, and `against` samples of
+    the old level since the first of them.
     """
 
     def __init__(self):
@@ -42,7 +42,7 @@ class EventFilter:
         self.last = 0
 
     def step(self, skip, required, tolerated, levels, rst=0):
-        """levels as a list, the lowest bit first; returns the lists filtered, rejected."""
+        """`levels` is a list, the lowest bit first; returns the lists filtered, rejected."""
         rejected = [0] * len(self.levels)
         if rst or self.settle:
             for own, level in zip(self.levels, levels):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/lissajous_monitor.sv does, in integers, for many signals side by side: sample() is
-one sample of each of them.
+"""Model of rtl/sense/lissajous_monitor.sv for many signals side by side: sample() processes one
+sample of each.
 """
 
 import numpy as np
@@ -19,8 +19,8 @@ class LissajousMonitor:
     def sample(
         self, length, axis, quadrant, tilt, tolerance, offset_limit, balance_limit, quadrature_limit
     ):
-        """ready after this sample; off_circle, offset_drift, unbalanced, not_in_quadrature: judged
-        by what was ready before it
+        """Returns ready after this sample, then off_circle, offset_drift, unbalanced,
+        not_in_quadrature, judged by the circle that was known before it.
         """
         ready = self.known.all(axis=(0, 1))
         at_axis, at_diagonal = (
@@ -46,10 +46,10 @@ class LissajousMonitor:
                 (onward % 2 == 1) & (self.side[kind] == onward) & self.met[kind]
             )
             if crossed.size:
-                place = kind, self.sector[kind, crossed], crossed
-                before, middle = self.lengths[place], self.middle[kind, crossed]
-                self.lengths[place] = np.where(self.known[place], before + middle + 1 >> 1, middle)
-                self.known[place] = True
+                entry = kind, self.sector[kind, crossed], crossed
+                before, middle = self.lengths[entry], self.middle[kind, crossed]
+                self.lengths[entry] = np.where(self.known[entry], before + middle + 1 >> 1, middle)
+                self.known[entry] = True
             self.met[kind] = close | self.met[kind] & (onward == 0)
             self.middle[kind] = np.where(close, length, self.middle[kind])
             self.side[kind] = np.where(

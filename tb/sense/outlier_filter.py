@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/outlier_filter.sv does to the samples since reset: sample(sin, cos, step, hold)
-returns what passes.
+"""Model of rtl/sense/outlier_filter.sv for the samples since reset: sample(sin, cos, step, hold)
+returns the filtered sample.
 """
 
 
@@ -9,7 +9,7 @@ class OutlierFilter:
         self.channels, self.held = None, [0, 0]
 
     def sample(self, sin, cos, step, hold):
-        """(sin_out, cos_out, rejected)"""
+        """Returns (sin_out, cos_out, rejected)."""
         new = [sin, cos]
         if self.channels is None:
             self.channels = list(new)

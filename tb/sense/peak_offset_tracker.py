@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/peak_offset_tracker.sv does to the samples since reset: sample(sin, cos, enable)
-returns what comes out.
+"""Model of rtl/sense/peak_offset_tracker.sv for the samples since reset: sample(sin, cos, enable)
+returns the corrected sample.
 """
 
 
 class Channel:
-    """S0, chapter 4.4, with samples from 0 to full; f1, p_max, p_min, s1 as printed."""
+    """S0, chapter 4.4, with samples from 0 to full; f1, p_max, p_min, s1 have the names of S0."""
 
     def __init__(self, w):
         self.full, self.f1 = (1 << w) - 1, 0
@@ -28,7 +28,7 @@ class PeakOffsetTracker:
         self.zero, self.channels = 1 << w - 1, (Channel(w), Channel(w))
 
     def sample(self, sin, cos, enable):
-        """(sin_out, cos_out, sin_offset, cos_offset)"""
+        """Returns (sin_out, cos_out, sin_offset, cos_offset)."""
         offsets = [channel.offset(s + self.zero) for channel, s in zip(self.channels, (sin, cos))]
         out = [
             max(-self.zero, min(self.zero - 1, s - offset if enable else s))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/signal_monitor.sv does, in integers, for many signals side by side: sample() is
-one sample of each of them.
+"""Model of rtl/sense/signal_monitor.sv for many signals side by side: sample() processes one sample
+of each.
 """
 
 from dataclasses import dataclass
@@ -29,12 +29,12 @@ FAULTS = (
     "phase_jump",
     "lost_count",
 )
-COUNTS = 16  # samples for which a bad one counts
+COUNTS = 16  # samples for which a bad one still counts
 
 
 @dataclass
 class Settings:
-    """As after reset of the settings: nothing is judged."""
+    """The defaults are the settings after reset: nothing is judged."""
 
     low: int = 0
     high: int = NEVER
@@ -72,7 +72,7 @@ class Settings:
 
 
 class Twice:
-    """A fault that rises at the second bad sample within COUNTS, and falls after COUNTS good ones."""
+    """A fault that rises at the second bad sample within COUNTS, falls after COUNTS good ones."""
 
     def __init__(self, lanes):
         self.left, self.fault = np.zeros(lanes, np.int64), np.zeros(lanes, bool)
@@ -98,13 +98,13 @@ class SignalMonitor:
         self.seen, self.amplitude, self.ready = 0, np.zeros(lanes, np.int64), np.zeros(lanes, bool)
 
     def sample(self, sin, cos, a, b, settings):
-        """The faults 0 … 12 of this sample as bits; sin, cos, a, b: integer arrays, one element a
-        lane.
+        """Returns the faults 0 … 12 of this sample as bits; sin, cos, a, b are integer arrays with
+        one element per signal.
         """
         s = settings
-        way = np.maximum(abs(sin - self.last_sin), abs(cos - self.last_cos))
-        jumped = (self.seen >= 2) & (s.jump != NEVER) & (way > 2 * self.step + s.jump)
-        self.last_sin, self.last_cos, self.step, self.seen = sin, cos, way, self.seen + 1
+        distance = np.maximum(abs(sin - self.last_sin), abs(cos - self.last_cos))
+        jumped = (self.seen >= 2) & (s.jump != NEVER) & (distance > 2 * self.step + s.jump)
+        self.last_sin, self.last_cos, self.step, self.seen = sin, cos, distance, self.seen + 1
 
         channels = zip(
             self.cos.sample(

@@ -1,32 +1,32 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/status_inputs.sv does, in integers: step(...) is one clk and returns the pins
-after it, lists of level, rose, fell.
+"""Model of rtl/sense/status_inputs.sv: step(...) advances one cycle and returns the lists level,
+rose, fell after it.
 """
 
 from tb.common.synchroniser import Synchroniser
 
-SETTLE = 4  # clk after reset in which the level follows
+SETTLE = 4  # cycles after reset in which the level follows the input
 
 
 class StatusInputs:
     def __init__(self, clk_hz, w=2):
-        self.ms, self.w, self.age = clk_hz // 1000, w, 0  # age: clk since reset
+        self.ms, self.w, self.age = clk_hz // 1000, w, 0  # age: cycles since reset
         self.synchronisers = [Synchroniser() for _ in range(w)]
-        self.now, self.level, self.stood = [0] * w, [0] * w, [0] * w
+        self.now, self.level, self.stable = [0] * w, [0] * w, [0] * w
 
     def step(self, time_ms, inputs, rst=0):
-        before, told = self.level, not rst and self.age >= SETTLE
+        before, running = self.level, not rst and self.age >= SETTLE
         end = self.age % self.ms == self.ms - 1
-        if not told:
-            self.level, self.stood = list(self.now), [0] * self.w
+        if not running:
+            self.level, self.stable = list(self.now), [0] * self.w
         else:
             ripe = [
-                now != level and end and stood >= time_ms
-                for now, level, stood in zip(self.now, self.level, self.stood)
+                now != level and end and stable >= time_ms
+                for now, level, stable in zip(self.now, self.level, self.stable)
             ]
-            self.stood = [
-                stood + end if now != level and not passes else 0
-                for now, level, stood, passes in zip(self.now, self.level, self.stood, ripe)
+            self.stable = [
+                stable + end if now != level and not passes else 0
+                for now, level, stable, passes in zip(self.now, self.level, self.stable, ripe)
             ]
             self.level = [
                 now if passes else level for now, level, passes in zip(self.now, self.level, ripe)
@@ -35,6 +35,6 @@ class StatusInputs:
         self.now = [s.step(level, rst) for s, level in zip(self.synchronisers, inputs)]
         return (
             self.level,
-            [int(told and level > old) for level, old in zip(self.level, before)],
-            [int(told and level < old) for level, old in zip(self.level, before)],
+            [int(running and level > old) for level, old in zip(self.level, before)],
+            [int(running and level < old) for level, old in zip(self.level, before)],
         )

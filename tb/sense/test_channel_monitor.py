@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""channel_monitor: each verdict at its limit and one short of it, both ends of every range, and the
-model sample by sample.
+"""Tests of channel_monitor: each flag at its limit and one count below it, both ends of every
+range, and random samples against the model.
 """
 
 import random
@@ -39,8 +39,8 @@ async def begin(dut, **settings):
 
 
 async def sample(dut, model, channel, other=0, level=0, other_level=0, gap=0):
-    """One sample, 1 clk later its flags as the model has them; then some clk without one. Returns
-    the names that stand.
+    """Send one sample and compare the flags one cycle later with the model, then wait some cycles.
+    Returns the names of the flags that are high.
     """
     dut.valid.value, dut.channel.value, dut.other.value, dut.level.value, dut.other_level.value = (
         1,
@@ -65,9 +65,10 @@ async def sample(dut, model, channel, other=0, level=0, other_level=0, gap=0):
         )
         got = tuple(int(getattr(dut, name).value) for name in OUTPUTS)
         assert got == want, (
-            f"clk {n} after channel {channel}, other {other}, levels {level}{other_level}: {OUTPUTS} are {got}, not {want}"
+            f"cycle {n} after channel {channel}, other {other}, levels {level}{other_level}: "
+            f"{OUTPUTS} are {got}, not {want}"
         )
-    return [name for name, stands in zip(OUTPUTS, want) if stands]
+    return [name for name, flag in zip(OUTPUTS, want) if flag]
 
 
 async def rows(dut, model, *samples):
@@ -75,17 +76,17 @@ async def rows(dut, model, *samples):
 
 
 @cocotb.test()
-async def a_code_beyond_the_rail_is_told_at_once_latency_is_1(dut):
+async def latency_is_1_and_a_code_beyond_the_limit_is_reported_at_once(dut):
     low = -(1 << int(dut.W.value) - 1)
     model = await begin(dut, clip_level=-low - 2)
-    told = await rows(dut, model, (-low - 2,), (-low - 1,), (low + 2,), (low + 1,), (low,), (0,))
-    assert told == [[], ["clipped"], [], ["clipped"], ["clipped"], []]
+    flags = await rows(dut, model, (-low - 2,), (-low - 1,), (low + 2,), (low + 1,), (low,), (0,))
+    assert flags == [[], ["clipped"], [], ["clipped"], ["clipped"], []]
 
 
 @cocotb.test()
-async def a_channel_that_stands_while_the_other_moves_is_frozen_from_the_fourth_sample(dut):
+async def a_channel_at_rest_while_the_other_moves_is_stuck_from_the_fourth_sample(dut):
     model = await begin(dut, band=2, span=50)
-    told = await rows(
+    flags = await rows(
         dut,
         model,
         (10, 0),
@@ -99,7 +100,7 @@ async def a_channel_that_stands_while_the_other_moves_is_frozen_from_the_fourth_
         (13, 51),
         (13, 51),
     )
-    assert told == [
+    assert flags == [
         [],
         [],
         [],
@@ -116,14 +117,14 @@ async def a_channel_that_stands_while_the_other_moves_is_frozen_from_the_fourth_
 @cocotb.test()
 async def the_other_channel_must_be_far_away_twice_within_four_samples(dut):
     model = await begin(dut, band=2, span=50)
-    told = await rows(
+    flags = await rows(
         dut, model, *[(10, 0)] * 5, (10, 60), *[(10, 0)] * 3, (10, 60), *[(10, 0)] * 2, (10, 60)
     )
-    assert told == [[]] * 12 + [["channel_stuck"]]
+    assert flags == [[]] * 12 + [["channel_stuck"]]
 
 
 @cocotb.test()
-async def a_channel_at_its_turning_point_is_not_frozen(dut):
+async def a_channel_at_its_turning_point_is_not_stuck(dut):
     model = await begin(dut, band=3, span=80)
     for degrees in np.arange(0, 720, 0.5):
         cos, sin = 100 * np.cos(np.radians(degrees)), 100 * np.sin(np.radians(degrees))
@@ -131,14 +132,14 @@ async def a_channel_at_its_turning_point_is_not_frozen(dut):
 
 
 @cocotb.test()
-async def the_same_code_for_quiet_samples_is_silent_until_it_changes(dut):
+async def the_same_code_for_no_noise_samples_is_no_noise_until_it_changes(dut):
     model = await begin(dut, no_noise_samples=5)
-    told = await rows(dut, model, *[(7,)] * 7, (8,), *[(8,)] * 4, (7,))
-    assert told == [[]] * 5 + [["no_noise"]] * 2 + [[]] * 6
+    flags = await rows(dut, model, *[(7,)] * 7, (8,), *[(8,)] * 4, (7,))
+    assert flags == [[]] * 5 + [["no_noise"]] * 2 + [[]] * 6
 
 
 @cocotb.test()
-async def a_signal_without_noise_is_good_while_quiet_is_0(dut):
+async def a_signal_without_noise_is_good_while_no_noise_samples_is_0(dut):
     model = await begin(dut, clip_level=100, band=2, span=50, sign_threshold=20)
     for _ in range(300):
         assert not await sample(dut, model, 71, 71, 1, 1)
@@ -163,9 +164,9 @@ async def a_comparator_a_sample_early_or_late_is_good(dut):
 
 
 @cocotb.test()
-async def three_sure_samples_against_the_comparator_are_opposed(dut):
+async def three_sure_samples_against_the_comparator_are_a_mismatch(dut):
     model = await begin(dut, sign_threshold=20)
-    told = await rows(
+    flags = await rows(
         dut,
         model,
         (21, 0, 0),
@@ -179,7 +180,7 @@ async def three_sure_samples_against_the_comparator_are_opposed(dut):
         (-21, 0, 1),
         (-21, 0, 1),
     )
-    assert told == [
+    assert flags == [
         [],
         [],
         ["comparator_mismatch"],
@@ -194,25 +195,25 @@ async def three_sure_samples_against_the_comparator_are_opposed(dut):
 
 
 @cocotb.test()
-async def a_comparator_that_stands_through_three_changes_of_sign_is_stuck(dut):
+async def a_comparator_that_is_constant_over_three_sign_changes_is_stuck(dut):
     model = await begin(dut, sign_threshold=20)
-    told = await rows(dut, model, (50,), (-50,), (50,), (0,), (10,), (-21,), (0, 0, 1), (50, 0, 1))
-    assert told == [[], [], [], [], [], ["comparator_stuck"], [], []]
+    flags = await rows(dut, model, (50,), (-50,), (50,), (0,), (10,), (-21,), (0, 0, 1), (50, 0, 1))
+    assert flags == [[], [], [], [], [], ["comparator_stuck"], [], []]
 
 
 @cocotb.test()
-async def comparators_that_go_on_without_the_channel_tell_it_missing(dut):
+async def comparators_that_move_without_the_channel_show_that_it_is_missing(dut):
     model = await begin(dut, sign_threshold=20)
     turn = [(0, 1), (1, 1), (1, 0), (0, 0)]  # (other level, level), a quarter period each
-    told = await rows(
+    flags = await rows(
         dut, model, (50, 0, 1, 0), *[(50, 0, level, other) for other, level in turn * 3]
     )
-    assert "channel_missing" in told[-1] and "channel_missing" not in sum(told[:7], [])
+    assert "channel_missing" in flags[-1] and "channel_missing" not in sum(flags[:7], [])
     assert "channel_missing" not in (await rows(dut, model, (-50, 0, 0, 0)))[0]
 
 
 @cocotb.test()
-async def a_comparator_that_chatters_about_zero_tells_nothing(dut):
+async def a_comparator_that_chatters_around_zero_is_no_fault(dut):
     model = await begin(dut, sign_threshold=20)
     assert not any(
         await rows(
@@ -225,11 +226,11 @@ async def a_comparator_that_chatters_about_zero_tells_nothing(dut):
 
 
 @cocotb.test()
-async def reset_forgets_all(dut):
+async def reset_clears_the_flags_and_the_history(dut):
     settings = {"clip_level": 10, "band": 2, "span": 10, "no_noise_samples": 2, "sign_threshold": 5}
     model = await begin(dut, **settings)
-    told = await rows(dut, model, *[(11, 30 * n, 0) for n in range(5)])
-    assert told[-1] == ["clipped", "channel_stuck", "no_noise", "comparator_mismatch"]
+    flags = await rows(dut, model, *[(11, 30 * n, 0) for n in range(5)])
+    assert flags[-1] == ["clipped", "channel_stuck", "no_noise", "comparator_mismatch"]
     model = await begin(dut, **settings)
     assert await rows(dut, model, (11, 150, 0), (11, 180, 0)) == [["clipped"]] * 2
 

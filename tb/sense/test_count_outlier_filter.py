@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""count_outlier_filter: the three lines of S0's equation, its lag and its rest, both ends of the
-range, and every clk against the model.
+"""Tests of count_outlier_filter: the three cases of S0's equation, its lag, its behaviour at rest,
+both ends of the range, and every cycle against the model.
 """
 
 import random
@@ -19,7 +19,7 @@ async def begin(dut):
 
 
 async def again(dut):
-    """Reset in mid-flow, the clock runs on."""
+    """Reset while the clock runs."""
     dut.rst.value, dut.valid.value = 1, 0
     await FallingEdge(dut.clk)
     dut.rst.value = 0
@@ -45,20 +45,20 @@ async def latency_is_1(dut):
 
 
 @cocotb.test()
-async def by_hand_the_three_lines_of_the_equation(dut):
+async def the_three_cases_of_the_equation_are_right_by_hand(dut):
     await begin(dut)
-    assert await feed(dut, [100, 100]) == [100, 100]  # difference 0: it stays
-    assert await feed(dut, [101, 99, 101]) == [100, 100, 100]  # difference 1: the count before
+    assert await feed(dut, [100, 100]) == [100, 100]  # difference 0: unchanged
+    assert await feed(dut, [101, 99, 101]) == [100, 100, 100]  # difference 1: the preceding count
     assert await feed(dut, [102, 104, 110]) == [101, 102, 106]  # more: the mean of both
     assert await feed(dut, [103, 100, 97]) == [104, 102, 99]  # rounded down
 
 
 @cocotb.test()
-async def out_of_use_every_count_passes(dut):
+async def with_enable_0_every_count_passes(dut):
     await begin(dut)
     counts = [0, 1, 5, 90, -90, 7]
     assert await feed(dut, counts, enable=0) == counts
-    assert await feed(dut, [8, 17]) == [7, 12]  # and it goes on from there
+    assert await feed(dut, [8, 17]) == [7, 12]  # the filter continues from there
 
 
 @cocotb.test()
@@ -81,7 +81,7 @@ async def it_lags_v_counts_going_up_and_one_less_going_down(dut):
 
 
 @cocotb.test()
-async def at_rest_it_may_stay_one_count_off_for_ever(dut):
+async def at_rest_the_output_may_stay_one_count_off(dut):
     await begin(dut)
     assert (await feed(dut, [0] + [50] * 20))[-1] == 49
     assert (await feed(dut, [0] * 20))[-1] == 1
@@ -105,7 +105,7 @@ async def any_counts_match_the_model(dut):
     await begin(dut)
     w = int(dut.W.value)
     model, count, last = CountOutlierFilter(w), 0, None
-    for clk in range(6000):
+    for cycle in range(6000):
         rst, valid, enable = (
             int(random.random() < 0.005),
             random.getrandbits(1),
@@ -123,7 +123,7 @@ async def any_counts_match_the_model(dut):
             last = model.follow(enable, count)
         if rst:
             model = CountOutlierFilter(w)
-        assert done == (valid and not rst) and (last is None or out == last), f"clk {clk}"
+        assert done == (valid and not rst) and (last is None or out == last), f"cycle {cycle}"
 
 
 @pytest.mark.parametrize("w", [8, 32])

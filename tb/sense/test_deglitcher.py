@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""deglitcher: pulses just too short and just long enough, both ends of the setting, its start, and
-random levels against the model.
+"""Tests of deglitcher: pulses just too short and just long enough, both ends of the setting, start-
+up, and random levels against the model.
 """
 
 import random
@@ -14,7 +14,7 @@ from tb.sense.deglitcher import Deglitcher
 
 
 async def begin(dut, level=0, stable_cycles=0):
-    """Reset with the pins at these levels; the model has seen the same clk."""
+    """Reset with the input at this level; the model has seen the same cycle."""
     await start(dut, level=level, stable_cycles=stable_cycles)
     model = Deglitcher(int(dut.SETTLE.value))
     model.step(stable_cycles, level, 1)
@@ -22,11 +22,11 @@ async def begin(dut, level=0, stable_cycles=0):
 
 
 async def drive(dut, model, stable_cycles, levels, rst=0):
-    """Put each level on the pin for one clk and hold the model beside the design; return (filtered,
-    rejected) of each clk.
+    """Apply each level for one cycle and compare design and model; return (filtered, rejected) of
+    each cycle.
     """
     dut.stable_cycles.value, dut.rst.value, out = stable_cycles, rst, []
-    for clk, level in enumerate(levels):
+    for cycle, level in enumerate(levels):
         dut.level.value = level
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
@@ -35,7 +35,8 @@ async def drive(dut, model, stable_cycles, levels, rst=0):
             model.step(stable_cycles, level, rst),
         )
         assert got == want, (
-            f"clk {clk}, stable_cycles {stable_cycles}: (filtered, rejected) is {got}, the model has {want}"
+            f"cycle {cycle}, stable_cycles {stable_cycles}: "
+            f"(filtered, rejected) is {got}, the model has {want}"
         )
         out.append(got)
     dut.rst.value = 0
@@ -43,7 +44,7 @@ async def drive(dut, model, stable_cycles, levels, rst=0):
 
 
 @cocotb.test()
-async def latency_is_stable(dut):
+async def latency_is_stable_cycles(dut):
     model = await begin(dut)
     await drive(dut, model, 1, [0] * 10)
     for stable_cycles in (0, 1, 2, 3, 7):
@@ -54,7 +55,7 @@ async def latency_is_stable(dut):
 
 
 @cocotb.test()
-async def a_pulse_shorter_by_one_clk_is_rejected_and_reported_once(dut):
+async def a_pulse_shorter_by_one_cycle_is_rejected_and_reported_once(dut):
     model = await begin(dut)
     await drive(dut, model, 5, [0] * 10)
     out = await drive(dut, model, 5, [1] * 4 + [0] * 8)
@@ -72,14 +73,14 @@ async def a_train_of_short_pulses_never_passes(dut):
 
 
 @cocotb.test()
-async def a_level_that_stands_from_power_up_makes_no_edge(dut):
+async def a_level_that_is_constant_from_power_up_makes_no_edge(dut):
     for level in (1, 0):
         model = await begin(dut, level=level, stable_cycles=15)
         assert await drive(dut, model, 15, [level] * 40) == [(level, 0)] * 40
 
 
 @cocotb.test()
-async def synchronisers_that_fill_after_reset_make_no_edge_later(dut):
+async def latency_is_1_during_start_up_so_filling_synchronisers_make_no_edge(dut):
     model = await begin(dut, level=0, stable_cycles=15)
     filling = int(dut.SETTLE.value) - 1
     out = await drive(dut, model, 15, [0] * filling + [1] * 40)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""event_filter: N samples in a row and N of M, the sampling divider, the bypass, both ends, random
-levels against the model.
+"""Tests of event_filter: N samples in a row and N of M, the sampling divider, the bypass, both ends
+of the settings, and random levels against the model.
 """
 
 import random
@@ -15,12 +15,12 @@ from tb.sense.event_filter import EventFilter
 
 
 class Bench:
-    """Design and model side by side; play() gives the same levels to every line and returns
-    (filtered, rejected) of line 0.
+    """The design and its model side by side; play() applies the same levels to every input and
+    returns (filtered, rejected) of input 0.
     """
 
     @classmethod
-    async def begin(cls, dut, level=0, skip=0, required=0, tolerated=0, settled=True):
+    async def begin(cls, dut, level=0, skip=0, required=0, tolerated=0, started=True):
         bench = cls()
         bench.dut, bench.lines = dut, int(dut.LEVELS.value)
         bench.model = EventFilter(bench.lines, int(dut.SETTLE.value))
@@ -33,7 +33,7 @@ class Bench:
             tolerated=tolerated,
         )
         bench.model.step(skip, required, tolerated, [level] * bench.lines, 1)
-        if settled:
+        if started:
             await bench.play([level] * int(dut.SETTLE.value))
         return bench
 
@@ -42,7 +42,7 @@ class Bench:
         return sum(level << n for n, level in enumerate(levels))
 
     async def set(self, skip=0, required=0, tolerated=0):
-        """New settings, and the clk that they take, in which the levels stand still."""
+        """Apply new settings, and wait until they are in force, with constant levels."""
         self.settings = skip, required, tolerated
         await self.rows([[own.filtered for own in self.model.levels]])
 
@@ -50,7 +50,7 @@ class Bench:
         dut, out = self.dut, []
         dut.skip.value, dut.required.value, dut.tolerated.value = self.settings
         dut.rst.value = rst
-        for clk, levels in enumerate(rows):
+        for cycle, levels in enumerate(rows):
             dut.level.value = self.word(levels)
             await RisingEdge(dut.clk)
             await FallingEdge(dut.clk)
@@ -60,7 +60,8 @@ class Bench:
                 (self.word(filtered), self.word(rejected)),
             )
             assert got == want, (
-                f"clk {clk}, (skip, required, tolerated) {self.settings}: (filtered, rejected) is {got}, the model has {want}"
+                f"cycle {cycle}, (skip, required, tolerated) {self.settings}: "
+                f"(filtered, rejected) is {got}, the model has {want}"
             )
             out.append((filtered[0], rejected[0]))
         dut.rst.value = 0
@@ -71,7 +72,14 @@ class Bench:
 
 
 @cocotb.test()
-async def latency_of_a_clean_edge_is_needed_samples(dut):
+async def latency_is_1_during_start_up(dut):
+    bench = await Bench.begin(dut, skip=9, required=7, started=False)
+    for level in [1, 0] * (int(dut.SETTLE.value) // 2):
+        assert await bench.play([level]) == [(level, 0)]
+
+
+@cocotb.test()
+async def latency_is_n_samples_from_a_clean_edge(dut):
     bench = await Bench.begin(dut)
     for required in (0, 1, 2, 3, 7):
         for tolerated in (0, 1, 3):
@@ -82,7 +90,7 @@ async def latency_of_a_clean_edge_is_needed_samples(dut):
 
 
 @cocotb.test()
-async def with_spare_0_and_skip_0_it_is_the_deglitcher(dut):
+async def with_tolerated_0_and_skip_0_it_equals_the_deglitcher(dut):
     for required in (0, 1, 2, 5, 8):
         bench, other = await Bench.begin(dut, required=required), Deglitcher(int(dut.SETTLE.value))
         other.step(required, 0, 1)
@@ -93,7 +101,7 @@ async def with_spare_0_and_skip_0_it_is_the_deglitcher(dut):
 
 
 @cocotb.test()
-async def bypass_passes_every_clk(dut):
+async def latency_is_1_in_bypass(dut):
     bench = await Bench.begin(dut)
     levels = [random.getrandbits(1) for _ in range(60)]
     assert await bench.play(levels) == [(level, 0) for level in levels]
@@ -118,14 +126,14 @@ async def a_pulse_of_too_few_samples_never_passes_at_any_setting(dut):
                 await bench.set(skip, required, tolerated)
                 await bench.play([0] * 30)
                 width = (required - 1) * (skip + 1)
-                quiet = (tolerated + 2) * (skip + 1)
-                out = await bench.play(([1] * width + [0] * quiet) * 4)
+                pause = (tolerated + 2) * (skip + 1)
+                out = await bench.play(([1] * width + [0] * pause) * 4)
                 assert not any(filtered for filtered, _ in out)
                 assert sum(rejected for _, rejected in out) == 4
 
 
 @cocotb.test()
-async def a_pulse_of_needed_sample_periods_passes_wherever_it_begins(dut):
+async def a_pulse_of_n_sample_periods_passes_wherever_it_begins(dut):
     for skip in (1, 2, 3):
         for phase in range(skip + 1):
             bench = await Bench.begin(dut, skip=skip, required=4)
@@ -135,9 +143,9 @@ async def a_pulse_of_needed_sample_periods_passes_wherever_it_begins(dut):
 
 
 @cocotb.test()
-async def a_level_that_stands_from_power_up_makes_no_edge(dut):
+async def a_level_that_is_constant_from_power_up_makes_no_edge(dut):
     for level in (1, 0):
-        bench = await Bench.begin(dut, level, 3, 7, 1, settled=False)
+        bench = await Bench.begin(dut, level, 3, 7, 1, started=False)
         assert await bench.play([level] * 40) == [(level, 0)] * 40
 
 
@@ -151,7 +159,7 @@ async def the_longest_setting_passes_after_exactly_that_many_samples(dut):
 
 
 @cocotb.test()
-async def lines_do_not_disturb_each_other(dut):
+async def levels_do_not_disturb_each_other(dut):
     bench = await Bench.begin(dut)
     await bench.set(0, 3, 0)
     for line in range(bench.lines):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""legacy_bench: both of its paths, sample by sample, against their models in a row; what the
-comparison of sw/figures/legacy.py rests on.
+"""Tests of legacy_bench: both of its paths, sample by sample, against their models in series; the
+comparison of sw/figures/legacy.py depends on it.
 """
 
 import math
@@ -22,7 +22,7 @@ APART, LARGEST_MOVE, SUBDIVISION = (
     30,
     40,
     160,
-)  # clk from sample to sample; counts; counts of a period
+)  # cycles from sample to sample; counts; counts per period
 IDLE = dict(
     valid=0,
     sin=0,
@@ -42,7 +42,7 @@ IDLE = dict(
 
 
 class Follower:
-    """Phases to position."""
+    """Model of the path from phases to position."""
 
     def __init__(self):
         self.tracker, self.unwrap = FringeTracker(), Unwrap()
@@ -58,7 +58,7 @@ async def strobe(dut, **levels):
     await FallingEdge(dut.clk)
 
 
-async def learned(dut, values, table):
+async def load_calibration(dut, values, table):
     await strobe(dut, load=1, **values._asdict())
     dut.load.value = 0
     for point, value in enumerate(table):
@@ -68,7 +68,7 @@ async def learned(dut, values, table):
 
 
 async def send(dut, sin, cos):
-    """(count as printed, position) of one sample; each must come once, before the next one."""
+    """(count of S0, position) of one sample; each must appear exactly once before the next."""
     await strobe(dut, valid=1, sin=sin, cos=cos)
     dut.valid.value, found = 0, ([], [])
     for _ in range(APART - 1):
@@ -81,14 +81,14 @@ async def send(dut, sin, cos):
 
 
 @cocotb.test()
-async def both_paths_are_their_models_in_a_row(dut):
+async def both_paths_equal_their_models_in_series(dut):
     await start(dut, **IDLE)
     await FallingEdge(dut.clk)
     values = signal_correction.Settings(300, -500, 63000, -2000)
     table = [round(3000 * math.sin(2 * math.tau * n / 256)) for n in range(256)]
-    await learned(dut, values, table)
+    await load_calibration(dut, values, table)
     spikes, offset, counts = OutlierFilter(), PeakOffsetTracker(8), CountOutlierFilter(32)
-    printed, ours, where, place = Follower(), Follower(), random.random(), []
+    printed, ours, where, errors = Follower(), Follower(), random.random(), []
     for n in range(600):
         where += 0.06 if n < 400 else -0.06
         sin, cos = (
@@ -105,9 +105,9 @@ async def both_paths_are_their_models_in_a_row(dut):
         phase = sample(16, *signal_correction.corrected(sin, cos, values, 8))[0]
         position = ours.follow(harmonic_correction.corrected(phase, table))
         assert await send(dut, sin, cos) == ([count], [position]), f"sample {n}: {sin}, {cos}"
-        place.append(position / 65536 - where)
-    assert max(place) - min(place) < 1.2  # ours has stayed on its fringe
+        errors.append(position / 65536 - where)
+    assert max(errors) - min(errors) < 1.2  # our path has stayed on its fringe
 
 
-def test_printed_bench():
+def test_legacy_bench():
     run("legacy_bench", __file__)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""lissajous_monitor: what teaches it and what does not, each verdict at its limit, and the model
-sample by sample.
+"""Tests of lissajous_monitor: which samples teach it and which do not, each result at its limit,
+and random samples against the model.
 """
 
 import random
@@ -18,7 +18,7 @@ LIMITS = ("tolerance", "offset_limit", "balance_limit", "quadrature_limit")
 OUTPUTS = ("ready", "off_circle", "offset_drift", "unbalanced", "not_in_quadrature")
 TURN = [
     ((k + 1) // 2 % 4, k // 2, 4 * (k % 2)) for k in range(8)
-]  # (axis, quadrant, tilt) each 45 degrees
+]  # (axis, quadrant, tilt) at each 45 degrees
 
 
 async def begin(dut, **limits):
@@ -32,15 +32,15 @@ async def begin(dut, **limits):
         **{name: limits.get(name, NEVER) for name in LIMITS},
     )
     model = LissajousMonitor()
-    model.limits, model.stands = [limits.get(name, NEVER) for name in LIMITS], (0,) * len(OUTPUTS)
+    model.limits, model.flags = [limits.get(name, NEVER) for name in LIMITS], (0,) * len(OUTPUTS)
     return model
 
 
-async def sample(dut, model, length, place, gap=0):
-    """One sample, 1 clk later its verdict as the model has it; then some clk without one. Returns
-    the verdict.
+async def sample(dut, model, length, direction, gap=0):
+    """Send one sample and compare the result 5 cycles later with the model, then wait some cycles.
+    Returns the result.
     """
-    axis, quadrant, tilt = place
+    axis, quadrant, tilt = direction
     dut.valid.value, dut.length.value = 1, length
     dut.axis.value, dut.quadrant.value, dut.tilt.value = axis, quadrant, tilt
     want = tuple(
@@ -54,18 +54,18 @@ async def sample(dut, model, length, place, gap=0):
         await FallingEdge(dut.clk)
         dut.valid.value, dut.length.value = 0, random.getrandbits(8)
         got = tuple(int(getattr(dut, name).value) for name in OUTPUTS)
-        stands = want if n >= LATENCY - 1 else (want[0], *model.stands[1:])
-        assert got == stands, (
-            f"clk {n} after {length} at {place}: {OUTPUTS} are {got}, the model has {stands}"
+        flags = want if n >= LATENCY - 1 else (want[0], *model.flags[1:])
+        assert got == flags, (
+            f"cycle {n} after {length} at {direction}: {OUTPUTS} are {got}, the model has {flags}"
         )
         assert int(dut.done.value) == (n == LATENCY - 1)
-    model.stands = want
+    model.flags = want
     return want
 
 
 async def turn(dut, model, lengths, times=1, back=False):
-    """Whole turns in steps of 45 degrees; lengths of the eight directions from +cos on. Returns the
-    last verdict.
+    """Whole turns in steps of 45 degrees with the lengths of the eight directions from +cos on.
+    Returns the last result.
     """
     for _ in range(times):
         for k in reversed(range(8)) if back else range(8):
@@ -74,7 +74,31 @@ async def turn(dut, model, lengths, times=1, back=False):
 
 
 @cocotb.test()
-async def a_turn_and_a_bit_teaches_all_directions_either_way(dut):
+async def latency_is_5_to_done_and_the_results_and_1_to_ready(dut):
+    model = await begin(dut, tolerance=5)
+    await turn(dut, model, [100] * 8)
+    for k in range(4):
+        dut.valid.value, dut.length.value = 1, 100
+        dut.axis.value, dut.quadrant.value, dut.tilt.value = TURN[k]
+        before = int(dut.ready.value)
+        await FallingEdge(dut.clk)
+        dut.valid.value = 0
+        if int(dut.ready.value) and not before:
+            break
+    assert int(dut.ready.value) and not before
+    for _ in range(8):
+        await FallingEdge(dut.clk)
+    dut.valid.value, dut.length.value = 1, 120
+    seen = []
+    for _ in range(7):
+        await FallingEdge(dut.clk)
+        dut.valid.value = 0
+        seen.append((int(dut.done.value), int(dut.off_circle.value)))
+    assert seen == [(0, 0)] * 4 + [(1, 1)] + [(0, 1)] * 2
+
+
+@cocotb.test()
+async def one_turn_and_an_eighth_teaches_all_directions_in_both_senses(dut):
     for back in (False, True):
         model = await begin(dut)
         assert (await turn(dut, model, [100] * 8, back=back))[0] == 0
@@ -83,7 +107,7 @@ async def a_turn_and_a_bit_teaches_all_directions_either_way(dut):
 
 
 @cocotb.test()
-async def standing_and_trembling_teach_nothing(dut):
+async def rest_and_trembling_teach_nothing(dut):
     model = await begin(dut)
     for k in [0] * 20 + [0, 1] * 20 + [0, 1, 2, 1] * 20 + [0, 1, 2, 3, 4, 5, 4, 3, 2, 1] * 20:
         assert (await sample(dut, model, 100, TURN[k]))[0] == 0
@@ -100,8 +124,8 @@ async def a_sample_far_from_the_middle_teaches_nothing(dut):
 
 
 @cocotb.test()
-async def off_circle_stands_beyond_the_tolerance_only_and_between_the_directions_too(dut):
-    for place, expected in [
+async def off_circle_is_high_only_beyond_the_tolerance_also_between_the_directions(dut):
+    for direction, expected in [
         (TURN[0], 100),
         (TURN[1], 120),
         ((0, 0, 2), 110),
@@ -110,7 +134,9 @@ async def off_circle_stands_beyond_the_tolerance_only_and_between_the_directions
     ]:
         model = await begin(dut, tolerance=5)
         await turn(dut, model, [100, 120] * 4, times=3)
-        assert [(await sample(dut, model, expected + d, place))[1] for d in (-6, -5, 0, 5, 6)] == [
+        assert [
+            (await sample(dut, model, expected + d, direction))[1] for d in (-6, -5, 0, 5, 6)
+        ] == [
             1,
             0,
             0,
@@ -120,7 +146,7 @@ async def off_circle_stands_beyond_the_tolerance_only_and_between_the_directions
 
 
 @cocotb.test()
-async def offset_balance_and_square_stand_beyond_their_limits_only(dut):
+async def offset_balance_and_quadrature_faults_are_high_only_beyond_their_limits(dut):
     for name, output, good, bad in [
         (
             "offset_limit",
@@ -142,7 +168,7 @@ async def offset_balance_and_square_stand_beyond_their_limits_only(dut):
 
 
 @cocotb.test()
-async def a_circle_that_changes_is_learnt_within_four_turns(dut):
+async def a_circle_that_changes_is_learned_within_four_turns(dut):
     model = await begin(dut, tolerance=5)
     await turn(dut, model, [100] * 8, times=2)
     assert (await turn(dut, model, [140] * 8))[1] == 1
@@ -167,26 +193,28 @@ async def any_walk_matches_the_model(dut):
         model = await begin(
             dut, **{name: random.choice([0, top // 10, top // 5, top, NEVER]) for name in LIMITS}
         )
-        middle, play, k, way = (
+        middle, play, k, sense = (
             random.randrange(top // 2, top),
             random.choice([2, 20]),
             random.randrange(32),
             1,
         )
         for _ in range(250):
-            way = random.choice([-1, 1]) if random.random() < 0.05 else way
+            sense = random.choice([-1, 1]) if random.random() < 0.05 else sense
             k = (
-                (k + way * random.choice([0, 1, 1, 1, 2, 4])) % 32
+                (k + sense * random.choice([0, 1, 1, 1, 2, 4])) % 32
                 if random.random() < 0.99
                 else random.randrange(32)
             )
-            place = (k + 4) // 8 % 4, k // 8, abs((k + 4) % 8 - 4)
+            direction = (k + 4) // 8 % 4, k // 8, abs((k + 4) % 8 - 4)
             length = min(top, max(0, middle + random.randrange(-play, play + 1)))
-            await sample(dut, model, length, place, gap=random.choice([0, 0, 0, 1]))
+            await sample(dut, model, length, direction, gap=random.choice([0, 0, 0, 1]))
 
 
 def test_the_circle_between_its_directions_is_expected_within_5_percent():
-    """The header's claim: 5 % offsets, 6 % gain, 4 degrees, the harmonics of the test signal."""
+    """The claim of the header, with 5 % offset, 6 % gain error, 4 degrees and the harmonics of the
+    test signal.
+    """
     from tb.sense.vector_length import vector_length
 
     source = np.random.default_rng(1)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""outlier_filter: a spike by hand, both ends of both settings, S0's filter as printed, and random
-samples with gaps against the model.
+"""Tests of outlier_filter: a spike by hand, both ends of both settings, the filter of S0, and
+random samples with gaps against the model.
 """
 
 import random
@@ -19,7 +19,7 @@ async def begin(dut):
 
 
 async def stream(dut, model, samples, step, hold, gaps=False):
-    """Send the samples, each checked against the model 1 clk later; return (sin_out, cos_out,
+    """Send the samples and compare each with the model one cycle later; return (sin_out, cos_out,
     rejected) of each.
     """
     dut.step.value, dut.hold.value, out = step, hold, []
@@ -49,7 +49,7 @@ async def stream(dut, model, samples, step, hold, gaps=False):
 
 @cocotb.test()
 async def latency_is_1_and_a_spike_is_held_back_on_its_own_channel(dut):
-    model = await begin(dut)  # stream() sees done 1 clk after valid
+    model = await begin(dut)  # stream() checks done 1 cycle after valid
     out = await stream(
         dut, model, [(0, 100), (5, 99), (90, 98), (10, 97), (15, -100), (20, 95)], 10, 3
     )
@@ -57,14 +57,14 @@ async def latency_is_1_and_a_spike_is_held_back_on_its_own_channel(dut):
 
 
 @cocotb.test()
-async def a_step_of_just_the_setting_is_taken_and_one_more_is_not(dut):
+async def a_step_equal_to_the_setting_is_taken_and_one_count_more_is_not(dut):
     model = await begin(dut)
     out = await stream(dut, model, [(0, 0), (7, -7), (15, -15), (14, -14)], 7, 3)
     assert out == [(0, 0, 0), (7, -7, 0), (7, -7, 1), (14, -14, 0)]
 
 
 @cocotb.test()
-async def step_0_takes_everything(dut):
+async def step_0_takes_every_sample(dut):
     model = await begin(dut)
     low, high = -(1 << int(dut.W.value) - 1), (1 << int(dut.W.value) - 1) - 1
     samples = [(low, high), (high, low)] * 10
@@ -90,7 +90,7 @@ async def after_hold_samples_the_next_is_taken(dut):
 
 
 @cocotb.test()
-async def hold_255_is_s0_as_printed_and_never_lets_go(dut):
+async def hold_255_is_the_filter_of_s0_and_never_returns(dut):
     model = await begin(dut)
     out = await stream(dut, model, [(0, 0)] + [(100, 0)] * 600, 10, 255)
     assert out == [(0, 0, 0)] + [(0, 0, 1)] * 600
@@ -98,7 +98,7 @@ async def hold_255_is_s0_as_printed_and_never_lets_go(dut):
 
 
 @cocotb.test()
-async def a_good_sample_starts_the_patience_afresh(dut):
+async def a_good_sample_restarts_the_count_of_held_samples(dut):
     model = await begin(dut)
     out = await stream(
         dut, model, [(0, 0), (99, 0), (99, 0), (1, 0), (99, 0), (99, 0), (99, 0)], 10, 2

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""peak_offset_tracker: by hand as S0 printed it, what it can and what it cannot, and every sample
-against the model.
+"""Tests of peak_offset_tracker: the example of S0 by hand, what the method can and cannot correct,
+and every sample against the model.
 """
 
 import math
@@ -19,9 +19,9 @@ class Remover:
         self.dut, self.w = dut, int(dut.W.value)
         self.model, self.top, self.expected = PeakOffsetTracker(self.w), (1 << self.w - 1) - 1, []
 
-    async def clk(self, sin=0, cos=0, valid=1, enable=1, rst=0):
-        """One clk with the model beside it; (sin_out, cos_out, sin_offset, cos_offset) with done,
-        else None.
+    async def cycle(self, sin=0, cos=0, valid=1, enable=1, rst=0):
+        """Advance design and model by one cycle; return (sin_out, cos_out, sin_offset, cos_offset)
+        with done, else None.
         """
         dut = self.dut
         dut.sin.value, dut.cos.value, dut.valid.value, dut.enable.value, dut.rst.value = (
@@ -53,14 +53,14 @@ class Remover:
         return got
 
     async def feed(self, samples, **settings):
-        out = [await self.clk(sin, cos, **settings) for sin, cos in samples]
-        return [o for o in [*out, await self.clk(valid=0, **settings)] if o]
+        out = [await self.cycle(sin, cos, **settings) for sin, cos in samples]
+        return [o for o in [*out, await self.cycle(valid=0, **settings)] if o]
 
 
 async def begin(dut):
     await start(dut, enable=1, valid=0, sin=0, cos=0)
     remover = Remover(dut)
-    await remover.clk(valid=0, rst=1)
+    await remover.cycle(valid=0, rst=1)
     return remover
 
 
@@ -79,12 +79,12 @@ def circle(top, turns, amplitude=0.8, sin_offset=0, cos_offset=0, per_turn=100, 
 @cocotb.test()
 async def latency_is_2(dut):
     remover = await begin(dut)
-    assert await remover.clk(5, 6) is None
-    assert await remover.clk(valid=0) == (5, 6, 0, 0)
+    assert await remover.cycle(5, 6) is None
+    assert await remover.cycle(valid=0) == (5, 6, 0, 0)
 
 
 @cocotb.test()
-async def by_hand_as_printed(dut):
+async def the_offset_is_that_of_s0_by_hand(dut):
     remover = await begin(dut)
     needs(remover.w == 8, "the paper has 8 bits")
     sin = [
@@ -105,7 +105,7 @@ async def equal_samples_are_no_turning_point(dut):
 async def an_offset_is_gone_after_one_fringe_and_a_quarter(dut):
     remover = await begin(dut)
     for share in (0.1, -0.1, 0.02):
-        await remover.clk(valid=0, rst=1)
+        await remover.cycle(valid=0, rst=1)
         offset = round(share * remover.top)
         out = await remover.feed(circle(remover.top, 4, sin_offset=offset, cos_offset=-offset))
         for sin_out, cos_out, sin_offset, cos_offset in out[125:]:
@@ -114,7 +114,7 @@ async def an_offset_is_gone_after_one_fringe_and_a_quarter(dut):
 
 
 @cocotb.test()
-async def noise_makes_turning_points_that_are_none(dut):
+async def noise_makes_false_turning_points(dut):
     remover = await begin(dut)
     out = await remover.feed(circle(remover.top, 6, noise=0.03 * remover.top))
     assert (
@@ -123,7 +123,7 @@ async def noise_makes_turning_points_that_are_none(dut):
 
 
 @cocotb.test()
-async def out_of_use_samples_pass_and_the_offset_is_still_known(dut):
+async def with_enable_0_samples_pass_and_the_offset_is_still_known(dut):
     remover = await begin(dut)
     samples = circle(remover.top, 2, sin_offset=9)
     out = await remover.feed(samples, enable=0)
@@ -131,7 +131,7 @@ async def out_of_use_samples_pass_and_the_offset_is_still_known(dut):
 
 
 @cocotb.test()
-async def a_corrected_sample_stops_at_full_scale(dut):
+async def a_corrected_sample_saturates_at_full_scale(dut):
     remover = await begin(dut)
     top = remover.top
     out = await remover.feed(
@@ -145,20 +145,20 @@ async def a_corrected_sample_stops_at_full_scale(dut):
 async def reset_in_mid_flow_forgets_the_turning_points(dut):
     remover = await begin(dut)
     await remover.feed(circle(remover.top, 2, sin_offset=9))
-    await remover.clk(valid=0, rst=1)
+    await remover.cycle(valid=0, rst=1)
     assert (await remover.feed([(50, 50), (40, 60)])) == [(50, 50, 0, 0), (40, 60, 0, 0)]
 
 
 @cocotb.test()
-async def any_samples_match_the_model_in_every_clk(dut):
+async def any_samples_match_the_model_in_every_cycle(dut):
     remover = await begin(dut)
-    for clk in range(6000):
-        span = remover.top if clk // 300 % 2 else 3
-        await remover.clk(
+    for cycle in range(6000):
+        span = remover.top if cycle // 300 % 2 else 3
+        await remover.cycle(
             random.randrange(-span - 1, span + 1),
             random.randrange(-span - 1, span + 1),
             valid=int(random.random() < 0.7),
-            enable=int(clk // 40 % 5 > 0),
+            enable=int(cycle // 40 % 5 > 0),
             rst=int(random.random() < 0.003),
         )
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""signal_monitor: each fault by its name and in its time, what must not alarm, and the model in
-every clk.
+"""Tests of signal_monitor: each fault by its name and at its time, signals that must not cause a
+fault, and every cycle against the model.
 """
 
 import random
@@ -14,7 +14,8 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from tb.bench import run, start
 from tb.sense.signal_monitor import FAULTS, Settings, SignalMonitor
 
-CLKS = dict(enumerate([10, 10, 2, 14, 5, 2, 2, 2, 2, 2, 14, 14, 14]))  # from valid to each fault
+# latency from valid to each fault
+CLKS = dict(enumerate([10, 10, 2, 14, 5, 2, 2, 2, 2, 2, 14, 14, 14]))
 LATEST = max(CLKS.values())
 ALL = (1 << 13) - 1
 
@@ -24,16 +25,16 @@ def names(bits):
 
 
 class Watch:
-    """The design beside its model; `seen` are all the faults since it was made, `rose` when each
-    rose first.
+    """The design and its model; `seen` holds all faults since the start, `rose` the cycle in which
+    each rose first.
     """
 
     def __init__(self, dut, settings):
         self.dut, self.settings, self.model = dut, settings, SignalMonitor()
-        self.due, self.now, self.first, self.clks, self.seen, self.rose = {}, 0, 0, 0, 0, {}
+        self.due, self.now, self.first, self.elapsed, self.seen, self.rose = {}, 0, 0, 0, 0, {}
         self.full = 1 << int(dut.W.value) - 1
 
-    async def clk(self, sample=None, phase_jump=0, lost_count=0, clear=0):
+    async def cycle(self, sample=None, phase_jump=0, lost_count=0, clear=0):
         dut, bits = self.dut, 0
         dut.valid.value, dut.clear.value = int(sample is not None), clear
         dut.phase_jump.value, dut.lost_count.value = phase_jump, lost_count
@@ -41,29 +42,29 @@ class Watch:
             dut.sin.value, dut.cos.value, dut.a.value, dut.b.value = sample
             bits = int(self.model.sample(*(np.array([x]) for x in sample), self.settings)[0])
             for n, lag in CLKS.items():
-                self.due.setdefault(self.clks + lag, []).append((1 << n, bits))
+                self.due.setdefault(self.elapsed + lag, []).append((1 << n, bits))
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
-        self.clks += 1
+        self.elapsed += 1
         self.first = self.now if clear or not self.first else self.first
-        for mask, value in self.due.pop(self.clks, []):
+        for mask, value in self.due.pop(self.elapsed, []):
             self.now = self.now & ~mask | value & mask
         self.now = self.now & ALL | phase_jump << 13 | lost_count << 14
-        self.rose |= {name: self.clks for name in names(self.now & ~self.seen)}
+        self.rose |= {name: self.elapsed for name in names(self.now & ~self.seen)}
         self.seen |= self.now
         got = int(dut.faults.value), int(dut.first.value)
         assert got == (self.now, self.first), (
-            f"clk {self.clks}: {names(got[0])}, first {names(got[1])}, the model has "
+            f"cycle {self.elapsed}: {names(got[0])}, first {names(got[1])}, the model has "
             f"{names(self.now)}, first {names(self.first)}"
         )
 
     async def sample(self, cos, sin, a=None, b=None, gap=0):
         cos, sin = (round(min(self.full - 1, max(-self.full, channel))) for channel in (cos, sin))
-        await self.clk(
+        await self.cycle(
             (sin, cos, int(cos > 0) if a is None else a, int(sin > 0) if b is None else b)
         )
         for _ in range(gap):
-            await self.clk()
+            await self.cycle()
 
     async def turn(
         self, size, fringes=1.0, begin=0.0, steps=60, gap=0, distort=lambda cos, sin: (cos, sin)
@@ -72,9 +73,9 @@ class Watch:
             angle = 2 * np.pi * (begin + np.sign(fringes) * n / steps)
             await self.sample(*distort(size * np.cos(angle), size * np.sin(angle)), gap=gap)
 
-    async def rest(self, clks=LATEST):
-        for _ in range(clks):
-            await self.clk()
+    async def idle(self, cycles=LATEST):
+        for _ in range(cycles):
+            await self.cycle()
 
 
 async def begin(dut, settings=None):
@@ -100,42 +101,47 @@ def advised(dut, **more):
 
 
 async def ready(dut, **more):
-    """A monitor that has seen a good signal, and its amplitude."""
+    """Returns a monitor that has seen a good signal, and the amplitude of that signal."""
     watch = await begin(dut, advised(dut, **more))
     size = 0.78 * watch.full
     await watch.turn(size, 2.25, steps=24)
     await watch.turn(size, -0.25, begin=0.25)
-    await watch.rest()
+    await watch.idle()
     assert int(dut.ready.value) and not watch.seen
     return watch, size
 
 
 @cocotb.test()
-async def latency_is_2_5_10_and_14(dut):
+async def latency_is_2_5_10_or_14_by_fault(dut):
     for name, lag in [("clipped", 2), ("jump", 5), ("too_high", 10), ("off_circle", 14)]:
         watch = await begin(dut, Settings(clip_level=110, jump=10, high=120, tolerance=20))
         await watch.turn(90, 2.25, steps=80)
-        await watch.rest()
+        await watch.idle()
         assert not watch.seen
-        decides = watch.clks + (
-            name != "jump"
-        )  # the first sample of a jump, the second one of the others
+        # the first sample of a jump, the second sample of the others
+        decides = watch.elapsed + (name != "jump")
         await watch.sample(0, 126)
         await watch.sample(0, 126)
-        await watch.rest()
+        await watch.idle()
         assert watch.rose[name] == decides + lag
+
+
+@cocotb.test()
+async def latency_is_1_from_phase_jump_and_lost_count(dut):
     watch = await begin(dut)
-    await watch.clk(phase_jump=1, lost_count=1)
+    await watch.cycle()
+    assert int(dut.faults.value) == 0
+    await watch.cycle(phase_jump=1, lost_count=1)
     assert names(int(dut.faults.value)) == ["phase_jump", "lost_count"]
 
 
 @cocotb.test()
-async def amplitude_comes_9_clk_after_its_sample(dut):
+async def latency_is_9_to_amplitude(dut):
     watch = await begin(dut)
     await watch.sample(30, 40)
     for n in range(1, 12):
         assert int(dut.amplitude.value) == (50 if n >= 9 else 0)
-        await watch.clk()
+        await watch.cycle()
 
 
 @cocotb.test()
@@ -155,13 +161,13 @@ async def a_good_signal_without_noise_raises_nothing_moving_or_at_rest(dut):
     watch, size = await ready(dut)
     for steps in (200, 60, 13, 7, 5, 4.1):
         await watch.turn(size, 2.0, steps=steps)
-    for place in (0, 3, 10):
-        await watch.turn(size, -place / 16, steps=90)
+    for fringe in (0, 3, 10):
+        await watch.turn(size, -fringe / 16, steps=90)
         for _ in range(30):
             await watch.sample(
-                size * np.cos(place / 16 * 2 * np.pi), -size * np.sin(place / 16 * 2 * np.pi)
+                size * np.cos(fringe / 16 * 2 * np.pi), -size * np.sin(fringe / 16 * 2 * np.pi)
             )
-        await watch.turn(size, place / 16, begin=-place / 16, steps=90)
+        await watch.turn(size, fringe / 16, begin=-fringe / 16, steps=90)
     assert not watch.seen & ~(1 << FAULTS.index("jump"))
 
 
@@ -170,7 +176,7 @@ async def a_single_spike_is_only_a_jump(dut):
     watch, size = await ready(dut)
     for n in range(60):
         await watch.sample(size if n != 30 else 0, 0)
-    await watch.rest()
+    await watch.idle()
     assert names(watch.seen) == ["jump"]
 
 
@@ -188,7 +194,7 @@ async def each_fault_of_a_moving_signal_has_its_name(dut):
     ]:
         watch, size = await ready(dut)
         await watch.turn(size, 4.0, distort=distort)
-        await watch.rest()
+        await watch.idle()
         assert name in names(watch.seen), f"{name} is not among {names(watch.seen)}"
 
 
@@ -202,13 +208,13 @@ async def each_fault_of_a_comparator_or_channel_has_its_name(dut):
         for n in range(120):
             angle = 2 * np.pi * n / 60
             await watch.sample(size * np.cos(angle), size * np.sin(angle), a=a(n))
-        await watch.rest()
+        await watch.idle()
         assert name in names(watch.seen)
     watch, size = await ready(dut)
     for n in range(180):
         angle = 2 * np.pi * (n + 0.5) / 60
         await watch.sample(size, 0, a=int(np.cos(angle) > 0), b=int(np.sin(angle) > 0))
-    await watch.rest()
+    await watch.idle()
     assert "channel_missing" in names(watch.seen)
     watch, size = await ready(dut, no_noise_samples=50)
     for _ in range(52):
@@ -218,34 +224,34 @@ async def each_fault_of_a_comparator_or_channel_has_its_name(dut):
 
 @cocotb.test()
 async def a_channel_that_opens_at_rest_is_found_at_the_second_sample(dut):
-    for place in (0.08, 0.1, 0.2, 0.4):  # fringe; the sine goes to zero
+    for fringe in (0.08, 0.1, 0.2, 0.4):  # in periods; the sine goes to zero
         watch, size = await ready(dut)
-        await watch.turn(size, place, steps=400)
-        angle = 2 * np.pi * place
+        await watch.turn(size, fringe, steps=400)
+        angle = 2 * np.pi * fringe
         for _ in range(50):
             await watch.sample(size * np.cos(angle), size * np.sin(angle))
         assert not watch.seen
         for _ in range(2):
             await watch.sample(size * np.cos(angle), 0)
-        await watch.rest()
+        await watch.idle()
         assert "jump" in names(watch.seen) and "off_circle" in names(watch.seen)
 
 
 @cocotb.test()
-async def a_signal_lost_in_both_channels_is_told_at_the_second_sample_moving_or_at_rest(dut):
-    for steps in (4.1, 60, None):  # samples a fringe; None: at rest
-        for place in (0.125, 0.77):
+async def a_signal_lost_in_both_channels_is_reported_at_the_second_sample_moving_or_at_rest(dut):
+    for steps in (4.1, 60, None):  # samples per period; None: at rest
+        for fringe in (0.125, 0.77):
             watch, size = await ready(dut)
-            await watch.turn(size, place, steps=200)
+            await watch.turn(size, fringe, steps=200)
             for n in range(20):
-                angle = 2 * np.pi * (place + (n / steps if steps else 0))
+                angle = 2 * np.pi * (fringe + (n / steps if steps else 0))
                 await watch.sample(size * np.cos(angle), size * np.sin(angle))
-            await watch.rest()
+            await watch.idle()
             assert "too_low" not in names(watch.seen)
-            second = watch.clks + 1
+            second = watch.elapsed + 1
             for _ in range(2):
                 await watch.sample(0, 0)
-            await watch.rest()
+            await watch.idle()
             assert watch.rose["too_low"] == second + CLKS[FAULTS.index("too_low")]
 
 
@@ -254,18 +260,18 @@ async def the_first_fault_persists_until_it_is_cleared(dut):
     watch = await begin(dut, Settings(clip_level=10, high=10))
     for _ in range(3):
         await watch.sample(0, 50)
-    await watch.rest()
+    await watch.idle()
     assert names(int(dut.first.value)) == ["clipped"] and names(int(dut.faults.value)) == [
         "too_high",
         "clipped",
     ]
-    await watch.clk(clear=1)
+    await watch.cycle(clear=1)
     assert names(int(dut.first.value)) == ["too_high", "clipped"]
     for _ in range(17):
         await watch.sample(0, 5)
-    await watch.rest()
+    await watch.idle()
     assert not int(dut.faults.value) and int(dut.first.value)
-    await watch.clk(clear=1)
+    await watch.cycle(clear=1)
     assert not int(dut.first.value)
 
 
@@ -276,12 +282,12 @@ async def reset_in_mid_flow_drops_faults_and_samples(dut):
         await watch.sample(0, 50)
     assert int(dut.faults.value)
     watch = await begin(dut, Settings(clip_level=10, high=10))
-    await watch.rest(20)
+    await watch.idle(20)
     assert not watch.seen
 
 
 @cocotb.test()
-async def any_signal_in_any_settings_matches_the_model_in_every_clk(dut):
+async def any_signal_in_any_settings_matches_the_model_in_every_cycle(dut):
     for _ in range(8):
         top = (1 << int(dut.W.value) - 1) - 1
         level = lambda top=top: random.choice([0, top // 10, top // 4, top, 65535])
@@ -317,14 +323,14 @@ async def any_signal_in_any_settings_matches_the_model_in_every_clk(dut):
             upset = {"a": random.getrandbits(1)} if random.random() < 0.05 else {}
             await watch.sample(size * np.cos(angle), channel * size * np.sin(angle), **upset)
             for _ in range(random.choice([0, 0, 0, 1, 5])):
-                await watch.clk(
+                await watch.cycle(
                     phase_jump=int(random.random() < 0.02),
                     lost_count=int(random.random() < 0.02),
                     clear=int(random.random() < 0.05),
                 )
 
 
-def test_the_campaigns_tracker_is_that_of_the_house():
+def test_the_tracker_of_the_campaign_equals_the_model_of_the_module():
     from figures.faults import LOST, Tracker
     from tb.interpolate.fringe_tracker import FringeTracker
     from tb.position.count_phase_check import CountPhaseCheck
@@ -339,8 +345,8 @@ def test_the_campaigns_tracker_is_that_of_the_house():
     phase, count = np.zeros(lanes, np.int64), np.zeros(lanes, np.int64)
     speed = source.integers(-16000, 16000, lanes)
     for _ in range(300):
-        stray = (source.random(lanes) < 0.05) * source.integers(0, 65536, lanes)
-        phase = (phase + speed + source.integers(-300, 300, lanes) + stray) % 65536
+        outlier = (source.random(lanes) < 0.05) * source.integers(0, 65536, lanes)
+        phase = (phase + speed + source.integers(-300, 300, lanes) + outlier) % 65536
         count = count + source.integers(-1, 2, lanes)
         jump, lost = many.follow(phase, count)
         for n in range(lanes):
@@ -348,8 +354,8 @@ def test_the_campaigns_tracker_is_that_of_the_house():
             step, overspeed = each[n].follow(int(phase[n]))
             position[n] = int(phase[n]) if first else position[n] + step
             for valid in (1, 0, 0):
-                told = checks[n].step(LOST, valid, position[n], int(count[n]), 0, 0)
-            assert (overspeed, told) == (int(jump[n]), int(lost[n]))
+                disagrees = checks[n].step(LOST, valid, position[n], int(count[n]), 0, 0)
+            assert (overspeed, disagrees) == (int(jump[n]), int(lost[n]))
 
 
 @pytest.mark.parametrize("w", [8, 16])

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""status_inputs: bounce, both ends of the filter's time, what stands at reset, and random levels
-against the model.
+"""Tests of status_inputs: bounce, both ends of the filter time, levels present at reset, and random
+levels against the model.
 """
 
 import random
@@ -24,33 +24,35 @@ class Contacts:
     def __init__(self, dut):
         self.dut, self.w = dut, int(dut.W.value)
         self.model, self.time_ms = StatusInputs(CLK_HZ, self.w), 3
-        self.told = []  # (input, "rose" or "fell")
+        self.changes = []  # (input, "rose" or "fell")
 
     async def begin(self, *levels):
         await bench.start(self.dut, time_ms=self.time_ms, inputs=word(levels))
-        await self.clk(*levels, rst=1, n=3)
-        await self.clk(*levels, n=10)
+        await self.cycle(*levels, rst=1, n=3)
+        await self.cycle(*levels, n=10)
         return self
 
-    async def clk(self, *levels, n=1, rst=0):
-        """n clk with these levels; the clk of them after which the filtered level was there."""
+    async def cycle(self, *levels, n=1, rst=0):
+        """Apply these levels for n cycles; returns the numbers of the cycles after which the
+        filtered level had changed.
+        """
         levels = (*levels, *[0] * (self.w - len(levels)))
         d, there = self.dut, None
         d.inputs.value, d.time_ms.value, d.rst.value = word(levels), self.time_ms, rst
-        for clk in range(n):
+        for cycle in range(n):
             await FallingEdge(d.clk)
             level, rose, fell = self.model.step(self.time_ms, levels, rst)
             got = int(d.level.value), int(d.rose.value), int(d.fell.value)
             assert got == (word(level), word(rose), word(fell)), (
                 f"{got} where the model has {level, rose, fell}"
             )
-            self.told += [
+            self.changes += [
                 (i, name)
                 for name, strobes in (("rose", rose), ("fell", fell))
                 for i, s in enumerate(strobes)
                 if s
             ]
-            there = clk + 1 if there is None and tuple(level) == levels else there
+            there = cycle + 1 if there is None and tuple(level) == levels else there
         return there
 
 
@@ -59,57 +61,57 @@ async def a_contact_that_bounces_changes_once(dut):
     contacts = await Contacts(dut).begin(0)
     for level in (1, 0):
         for _ in range(6):
-            await contacts.clk(level, n=random.randrange(1, MS))
-            await contacts.clk(1 - level, n=random.randrange(1, MS))
-        await contacts.clk(level, n=5 * MS)
-    assert contacts.told == [(0, "rose"), (0, "fell")]
+            await contacts.cycle(level, n=random.randrange(1, MS))
+            await contacts.cycle(1 - level, n=random.randrange(1, MS))
+        await contacts.cycle(level, n=5 * MS)
+    assert contacts.changes == [(0, "rose"), (0, "fell")]
 
 
 @cocotb.test()
-async def shorter_pulses_than_the_filters_time_never_pass_and_those_of_1_ms_more_do(dut):
+async def pulses_shorter_than_time_ms_never_pass_and_those_of_1_ms_more_do(dut):
     for contacts_time in (0, 1, 2, 10):
         contacts = Contacts(dut)
         contacts.time_ms = contacts_time
         await contacts.begin(0)
         for offset in range(MS if contacts_time else 0):
-            await contacts.clk(1, n=contacts_time * MS)
-            await contacts.clk(0, n=2 * MS + offset + 1)
-            assert not contacts.told
+            await contacts.cycle(1, n=contacts_time * MS)
+            await contacts.cycle(0, n=2 * MS + offset + 1)
+            assert not contacts.changes
         for offset in range(MS):
-            await contacts.clk(1, n=(contacts_time + 1) * MS)
-            await contacts.clk(0, n=(contacts_time + 2) * MS + offset + 1)
-            assert contacts.told == [(0, "rose"), (0, "fell")] * (offset + 1)
+            await contacts.cycle(1, n=(contacts_time + 1) * MS)
+            await contacts.cycle(0, n=(contacts_time + 2) * MS + offset + 1)
+            assert contacts.changes == [(0, "rose"), (0, "fell")] * (offset + 1)
 
 
 @cocotb.test()
-async def latency_is_the_filters_time_to_1_ms_more_and_2_clk(dut):
+async def latency_is_time_ms_to_1_ms_more_and_2_cycles(dut):
     contacts = await Contacts(dut).begin(0)
     seen = set()
     for n in range(2 * MS):
-        seen.add(await contacts.clk(1, n=5 * MS))
-        await contacts.clk(0, n=5 * MS + n)
+        seen.add(await contacts.cycle(1, n=5 * MS))
+        await contacts.cycle(0, n=5 * MS + n)
     assert min(seen) == 3 * MS + 3 and max(seen) == 4 * MS + 2
 
 
 @cocotb.test()
-async def the_longest_time_can_be_waited_for(dut):
+async def the_longest_time_is_filtered_exactly(dut):
     contacts = Contacts(dut)
     contacts.time_ms = 0xFFFF
     await contacts.begin(0)
-    await contacts.clk(1, n=2 * MS)
-    contacts.model.stood[0] = 0xFFFD
-    dut.g_input[0].stood.value = 0xFFFD
-    assert await contacts.clk(1, n=5 * MS) in range(2 * MS, 3 * MS + 1)
+    await contacts.cycle(1, n=2 * MS)
+    contacts.model.stable[0] = 0xFFFD
+    dut.g_input[0].stable.value = 0xFFFD
+    assert await contacts.cycle(1, n=5 * MS) in range(2 * MS, 3 * MS + 1)
 
 
 @cocotb.test()
-async def what_stands_at_reset_is_no_change(dut):
+async def a_level_present_at_reset_is_no_change(dut):
     contacts = await Contacts(dut).begin(*[1] * int(dut.W.value))
-    assert int(dut.level.value) == (1 << contacts.w) - 1 and not contacts.told
-    await contacts.clk(0, n=2 * MS)
-    await contacts.clk(0, rst=1)
-    await contacts.clk(0, n=5 * MS)
-    assert int(dut.level.value) == 0 and not contacts.told
+    assert int(dut.level.value) == (1 << contacts.w) - 1 and not contacts.changes
+    await contacts.cycle(0, n=2 * MS)
+    await contacts.cycle(0, rst=1)
+    await contacts.cycle(0, n=5 * MS)
+    assert int(dut.level.value) == 0 and not contacts.changes
 
 
 @cocotb.test()
@@ -118,10 +120,10 @@ async def any_levels_match_the_model(dut):
     for _ in range(600):
         contacts.time_ms = random.choice([0, 1, 2, 5, contacts.time_ms, contacts.time_ms])
         levels = [random.getrandbits(1) for _ in range(contacts.w)]
-        await contacts.clk(
+        await contacts.cycle(
             *levels, n=random.choice([1, 3, MS, 6 * MS]), rst=int(random.random() < 0.01)
         )
-    assert {name for _, name in contacts.told} == {"rose", "fell"}
+    assert {name for _, name in contacts.changes} == {"rose", "fell"}
 
 
 @pytest.mark.parametrize("w", [1, 2])

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""vector_length: known vectors, the stated bound over every 8-bit pair, the sectors, and the model
-clk by clk.
+"""Tests of vector_length: known vectors, the stated bound over every 8-bit pair, the sectors, and
+every cycle against the model.
 """
 
 import random
@@ -20,8 +20,8 @@ def model(sin, cos):
     return tuple(int(x) for x in vector_length(sin, cos))
 
 
-async def clk(dut, sample=None, rst=0):
-    """One clk with this sample or none; what stands at the outputs, None without done."""
+async def cycle(dut, sample=None, rst=0):
+    """Advance one cycle with this sample or none; returns the outputs, None without done."""
     dut.valid.value, dut.rst.value = int(sample is not None), rst
     dut.sin.value, dut.cos.value = sample or (random.getrandbits(6), random.getrandbits(6))
     await RisingEdge(dut.clk)
@@ -32,16 +32,16 @@ async def clk(dut, sample=None, rst=0):
 
 
 async def drive(dut, samples):
-    """Hold the outputs against the model in every clk; samples may have None for a gap."""
+    """Compare the outputs with the model in every cycle; None in `samples` is a gap."""
     want = [None] * (LATENCY - 1) + [sample and model(*sample) for sample in samples]
     for n, sample in enumerate([*samples, *[None] * (LATENCY - 1)]):
-        got = await clk(dut, sample)
-        assert got == want[n], f"clk {n}: {got}, the model has {want[n]}"
+        got = await cycle(dut, sample)
+        assert got == want[n], f"cycle {n}: {got}, the model has {want[n]}"
     return [w for w in want if w]
 
 
 @cocotb.test()
-async def known_vectors_by_hand_latency_is_8(dut):
+async def latency_is_8_and_known_vectors_are_right_by_hand(dut):
     await start(dut, valid=0, sin=0, cos=0)
     got = await drive(dut, [(0, 100), (100, 0), (0, -100), (-100, 0), (60, 80), (-60, -80), (0, 0)])
     assert got == [
@@ -56,7 +56,7 @@ async def known_vectors_by_hand_latency_is_8(dut):
 
 
 @cocotb.test()
-async def ends_of_the_range(dut):
+async def the_ends_of_the_range_are_right(dut):
     await start(dut, valid=0, sin=0, cos=0)
     low, high = -(1 << int(dut.W.value) - 1), (1 << int(dut.W.value) - 1) - 1
     ends = (low, low + 1, -1, 0, 1, high)
@@ -64,11 +64,11 @@ async def ends_of_the_range(dut):
 
 
 @cocotb.test()
-async def reset_drops_the_samples_in_flight(dut):
+async def reset_drops_the_samples_in_progress(dut):
     await start(dut, valid=0, sin=0, cos=0)
     for _ in range(5):
-        await clk(dut, (50, 60))
-    assert [await clk(dut, rst=int(n == 0)) for n in range(12)] == [None] * 12
+        await cycle(dut, (50, 60))
+    assert [await cycle(dut, rst=int(n == 0)) for n in range(12)] == [None] * 12
     await drive(dut, [(3, 4)])
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/sense/vector_length.sv makes of samples, in integers; of one or of arrays of them."""
+"""Model of rtl/sense/vector_length.sv for one sample or for arrays of samples."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ F = 4  # fraction bits
 
 
 def vector_length(sin, cos):
-    """(length, axis, quadrant, tilt)"""
+    """Returns (length, axis, quadrant, tilt)."""
     sin, cos = np.asarray(sin, dtype=np.int64), np.asarray(cos, dtype=np.int64)
     sin_size, cos_size = abs(sin), abs(cos)
     sin_low, cos_low, steep = sin < 0, cos < 0, sin_size > cos_size
