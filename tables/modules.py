@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of modules in rtl/README.md, made of the modules' own headers; and the rules that every
-module keeps.
+"""Make the table of modules in rtl/README.md from the headers of the modules, and check the rules
+that every module must keep.
 """
 
 import re
@@ -15,13 +15,15 @@ BEGIN, END = "<!-- modules -->", "<!-- /modules -->"
 COLUMNS = ["directory", "module", "purpose", "latency", "model and test"]
 LONGEST_CELL = 160  # characters of a cell without its links; details stay in the headers
 # A line of the facts begins with one of these keys; its further lines are indented.
-KEYS = set(
+KEYS = set("latency rate accuracy method behaviour limits source model proved proof made".split())
+# Keys of headers that are not rewritten yet; new headers do not use them.
+OLD_KEYS = set(
     """
-    latency rate accuracy exact source method model proved proof made built
-    again align anew angle answer armed body bound bounds brake bumpless bypass code copies crowded decay duty enable entry
-    expects faults finest fits flags frozen index joint jump law learns limit limits map modes moved off opposed options
-    overrun override passed place points quiet reading refresh request reset rounding safety scale segments set shift sign
-    slower sources spikes start strays table terms through timings used windup
+    again align anew angle answer armed body bound bounds brake built bumpless bypass code copies
+    crowded decay duty enable entry exact expects faults finest fits flags frozen index joint jump
+    law learns limit map modes moved off opposed options overrun override passed place points quiet
+    reading refresh request reset rounding safety scale segments set shift sign slower sources
+    spikes start strays table terms through timings used windup
     """.split()
 )
 REQUIRED = ("purpose", "latency", "model")
@@ -29,10 +31,10 @@ REQUIRED = ("purpose", "latency", "model")
 
 def header(text, where="header"):
     """Name, purpose and facts from the comment at the head of a module: `name -- purpose`, then
-    lines of `key text`, of which a
-    fact may go on in indented lines. Formulae are indented behind an empty line; a free sentence
-    begins with a capital letter.
-    A ValueError names each line that is none of these."""
+    lines of `key text`; a fact may continue in indented lines. Formulae are indented after an empty
+    line; a free paragraph begins with a capital letter. A ValueError names each line that is none
+    of these.
+    """
     lines, wrong = [], []
     for number, line in enumerate(text.splitlines()[1:], 2):
         if not line.startswith("//"):
@@ -51,16 +53,17 @@ def header(text, where="header"):
             facts[key] += " " + line
         elif key == "sentence" or (key is None and re.match(r"[A-Z`]", line)):
             key = "sentence"
-        elif new and new.group(1) in KEYS:
+        elif new and new.group(1) in KEYS | OLD_KEYS:
             key = new.group(1)
             if key in facts:
-                wrong.append(f"{where}:{number}: the key `{key}` stands twice")
+                wrong.append(f"{where}:{number}: the key `{key}` is there twice")
             facts[key] = new.group(2)
         else:
             wrong.append(
-                f"{where}:{number}: `{line.split()[0]}` is no known key of a header; tables/modules.py has the list"
+                f"{where}:{number}: `{line.split()[0]}` is no known key of a header; "
+                "tables/modules.py has the list"
             )
-        if key == "latency":  # the rate may stand in the same line
+        if key == "latency":  # the rate may follow on the same line
             latency, both, rate = facts[key].partition(" rate  ")
             if both:
                 facts["latency"], facts["rate"], key = latency.rstrip(), rate.strip(), "rate"
@@ -70,8 +73,8 @@ def header(text, where="header"):
 
 
 def brief(text):
-    """The first sentence of a fact, without what goes into detail behind a semicolon or a colon, if
-    it is too long with that.
+    """The first sentence of a fact; if it is too long, without the details after a semicolon or a
+    colon.
     """
     sentence = re.split(r"(?<=\.) (?=[A-Z`])", text)[0].rstrip(".")
     for border in (";", ":"):
@@ -81,7 +84,7 @@ def brief(text):
 
 
 def check_of(path):
-    """(model, test) of a module as paths from ROOT, made of its place."""
+    """(model, test) of a module as paths from ROOT, derived from its own path."""
     room, name = path.parent.relative_to(ROOT / "rtl"), path.stem
     if not room.name:  # axis, node: block diagrams; whole-system tests are theirs
         return None, Path("tb/system")
@@ -89,8 +92,10 @@ def check_of(path):
         return Path("tb/registers/register_block.py"), Path("tb/registers/test_registers.py")
     if name.endswith("_rom"):  # a made table: its generator is the model
         user = name.removesuffix("_rom")
+        tests = sorted((ROOT / "tb" / room).glob(f"test_{user}*.py"))
+        own = [path for path in tests if path.stem == f"test_{name}"]
         return Path("tables") / f"{user}.py", next(
-            (p.relative_to(ROOT) for p in (ROOT / "tb" / room).glob(f"test_{user}*.py")), None
+            (path.relative_to(ROOT) for path in own + tests), None
         )
     if name.endswith("_microcode"):  # a made table too, of what its user does
         user = name.removesuffix("_microcode")
@@ -101,7 +106,7 @@ def check_of(path):
 
 
 def row(path, wrong):
-    """The cells of a module; what breaks a rule goes into `wrong`."""
+    """The cells of a module; each broken rule is added to `wrong`."""
     text, here = path.read_text(), path.relative_to(ROOT)
     try:
         name, facts = header(text, here)
@@ -128,12 +133,13 @@ def row(path, wrong):
         wrong.append(f"{here}: `proved` in the header and properties in the module go together")
     for key in REQUIRED:
         if key not in facts:
-            wrong.append(f"{here}: the header must tell its `{key}`")
+            wrong.append(f"{here}: the header must state its `{key}`")
     purpose, latency = (brief(facts.get(key, "")) for key in ("purpose", "latency"))
     for key, text in (("purpose", purpose), ("latency", latency)):
         if len(text) > LONGEST_CELL:
             wrong.append(
-                f"{here}: `{key}` must begin with a sentence of at most {LONGEST_CELL} characters, it has {len(text)}"
+                f"{here}: `{key}` must begin with a sentence of at most {LONGEST_CELL} characters, "
+                f"it has {len(text)}"
             )
     room = path.parent.name if path.parent != ROOT / "rtl" else ""
     link = lambda p: f"[{p.name}](../{p.as_posix()})" if p else ""
@@ -145,6 +151,28 @@ def row(path, wrong):
         latency,
         ", ".join(filter(None, (link(model), link(test)))),
     ]
+
+
+def bare_ports(path):
+    """The parameters and ports, except clk and rst, whose lines state no unit and no meaning."""
+    text = path.read_text()
+    head = text[text.index(f"\nmodule {path.stem}") : text.index("\n);")]
+    declared = re.findall(
+        r"^ *(?:parameter|input|output|inout)\b([^/\n=]*)([^/\n]*)(//.*)?$", head, re.MULTILINE
+    )
+    names = [(re.findall(r"\w+", before)[-1], comment) for before, _, comment in declared]
+    return [name for name, comment in names if not comment and name not in ("clk", "rst")]
+
+
+def untested_latencies(path):
+    """The numbers of cycles in the latency of a header that no test named latency_is_… states."""
+    latency = header(path.read_text(), path)[1]["latency"]
+    test = check_of(path)[1]
+    names = re.findall(r"def (?:test_)?latency_is_(\w+)", (ROOT / test).read_text())
+    stated = re.findall(r"((?:\d+(?:, | or | and | to ))*\d+) cycles?\b", latency)
+    numbers = {number for figure in stated for number in re.findall(r"\d+", figure)}
+    known = {part for name in names for part in name.split("_")}
+    return sorted(numbers - known) if names else [latency]
 
 
 def made() -> dict:

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // register_bus -- send each access of the soft core to the register block that holds the address.
 //
-// latency  select and write reach a block in the same clk; its answer passes in the next     rate
-//          one access per clk
+// latency  select and write reach a block in the same clk; its answer passes in the next
+// rate     one access per clk
 // source   the addresses of tables/registers.rdl: node at 0x000, line at 0x100, links at 0x200,
 //          axis n at 0x400 + n * 0x100, its grating at 0xC00 + n * 0x100, its actuator at 0x1400 +
 //          n * 0x100

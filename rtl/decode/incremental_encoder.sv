@@ -17,9 +17,10 @@
 //          changes with a step of count and at no other time
 // proof    W = 4, TIME_W = 4, FILTER_W = 2, TOLERATED_W = 1, SKIP_W = 1
 //
-// mode is that of quadrature_decoder, clear_flags keeps the flag of an event in the same cycle, and
-// edge_time is `now` of the cycle before the step. The index settings have the meaning of the same
-// settings of index_latch (gate_mask and gate as {b, a}), the filter settings that of event_filter.
+// The settings have the meaning of the same settings of the blocks: filter_… of event_filter,
+// `mode` of quadrature_decoder, index_… and counts_per_revolution of index_latch (gate_mask and
+// gate as {b, a}). An event in the cycle of clear_flags sets its flag again. edge_time is `now` of
+// the cycle before the step.
 `default_nettype none
 
 module incremental_encoder #(

@@ -2,7 +2,7 @@
 // arctan_iterative -- compute phase and amplitude of a sine and a cosine sample, one digit per
 // cycle, in a small area.
 //
-// latency  24, 28, 30 cycles from valid to done for W = 8, 9, 10 and 23 cycles for wider samples
+// latency  24, 28 or 30 cycles from valid to done for W of 8, 9 or 10; 23 cycles for wider samples
 // rate     one sample per latency; a sample that arrives sooner is ignored
 // accuracy phase: every sample of 8, 9 and 10 bits is correctly rounded; wider ones are within
 //          0.517 LSB of the true phase from a quarter of full scale on. amplitude: within 1.5

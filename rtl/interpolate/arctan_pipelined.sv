@@ -2,7 +2,7 @@
 // arctan_pipelined -- compute phase and amplitude of a sine and a cosine sample: 2^16 atan2(sin,
 // cos) / 2 pi, and their length.
 //
-// latency  24, 28, 29 cycles from valid to done for W = 8, 9, 10 and 23 cycles for wider samples;
+// latency  24, 28 or 29 cycles from valid to done for W of 8, 9 or 10; 23 cycles for wider samples;
 //          divided by STEPS and rounded up
 // rate     one sample per cycle
 // accuracy phase: every sample of 8, 9 and 10 bits is correctly rounded; wider ones are within

@@ -2,8 +2,8 @@
 // relay_bridge -- the line of a relay: a 9-bit UART, whole frames to address 1 out of it, and the
 // answers into it.
 //
-// latency  the answer begins one bit after a request is done; SPI takes 66 clk a byte       rate
-//          one request at a time
+// latency  the answer begins one bit after a request is done; SPI takes 66 clk a byte
+// rate     one request at a time
 // request  `00 10 0001` with the 9th bit, length 1..LONGEST, body, CRC-32 of all before, as on the
 //          house's line
 // answer   `01 10 0001`, length, body, CRC-32; the bodies are those of relay_requests; no answer to

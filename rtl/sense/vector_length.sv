@@ -10,9 +10,9 @@
 // source   Volder, IRE Trans. EC-8 (1959) 330
 // model    tb/sense/vector_length.py, equal in every bit of every cycle
 //
-// axis is 0 for +cos, 1 for +sin, 2 for -cos, 3 for -sin, and on a diagonal the axis of cos.
-// quadrant is 0 for sin, cos >= 0 and counts in the same sense as axis. tilt is the smaller over
-// the larger channel in quarters, rounded: 0 on an axis, 4 on a diagonal.
+// The output `axis` is 0 for +cos, 1 for +sin, 2 for -cos, 3 for -sin, and on a diagonal the axis
+// of cos. `quadrant` is 0 for sin, cos >= 0 and counts in the same sense as `axis`. `tilt` is the
+// smaller over the larger channel in quarters, rounded: 0 on an axis, 4 on a diagonal.
 `default_nettype none
 
 module vector_length #(

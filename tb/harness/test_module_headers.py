@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tables/modules.py: each line of a header is understood or refused with its file and line, and the
-table can be read.
+"""Tests of tables/modules.py: each line of a header is understood or refused with its file and
+line, the table is readable, and ports and latencies keep their rules.
 """
 
 import re
@@ -15,10 +15,10 @@ HEADER = """// SPDX-License-Identifier: Apache-2.0
 //
 //   y = b0 x
 //
-// latency  2 clk from valid to done, and then
-//          2 more           rate  one level per clk
+// latency  2 cycles from valid to done, and then
+//          2 more           rate  one level per cycle
 // accuracy within 1 LSB
-// rounding half up; and
+// behaviour rounds half up; and
 //          never down
 // model    tb/thing.py
 //
@@ -28,15 +28,15 @@ module thing;
 """
 
 
-def test_keys_of_eight_letters_are_keys_and_formulae_and_sentences_belong_to_none():
+def test_long_keys_are_keys_and_formulae_and_sentences_belong_to_none():
     assert modules.header(HEADER) == (
         "thing",
         {
             "purpose": "do something with levels, and report what was done.",
-            "latency": "2 clk from valid to done, and then 2 more",
-            "rate": "one level per clk",
+            "latency": "2 cycles from valid to done, and then 2 more",
+            "rate": "one level per cycle",
             "accuracy": "within 1 LSB",
-            "rounding": "half up; and never down",
+            "behaviour": "rounds half up; and never down",
             "model": "tb/thing.py",
         },
     )
@@ -48,7 +48,7 @@ def test_keys_of_eight_letters_are_keys_and_formulae_and_sentences_belong_to_non
         ("// acuracy  within 1 LSB", "thing.sv:9: `acuracy` is no known key"),
         ("// Accuracy within 1 LSB", "thing.sv:9: `Accuracy` is no known key"),
         ("// one LSB at most", "thing.sv:9: `one` is no known key"),
-        ("// latency  3 clk", "thing.sv:9: the key `latency` stands twice"),
+        ("// latency  3 cycles", "thing.sv:9: the key `latency` is there twice"),
     ],
 )
 def test_another_key_is_refused_with_file_and_line(line, complaint):
@@ -71,22 +71,63 @@ def test_every_module_is_in_the_table_and_no_cell_is_long():
         ), row
 
 
-def test_the_rows_that_were_garbled_say_their_latency_alone():
-    made = modules.made()[modules.PAGE]
-    for name, latency in (
-        ("quadrature_encoder", "2 clk from target to the edge, if `spacing` allows it"),
-        (
-            "arctan_iterative",
-            "24, 28, 30 clk from valid to done for W = 8, 9, 10, 23 clk for wider samples",
-        ),
-        (
-            "signal_monitor",
-            "from valid to bits 2, 5..9 2 clk, bit 4 5 clk, bits 0, 1 10 clk, bits 3, 10..12 14 clk, "
-            "amplitude 9 clk; 1 clk from phase_jump, lost_count",
-        ),
-    ):
-        row = next(line for line in made.splitlines() if f"| [{name}](" in line)
-        assert f" | {latency} | " in row
+MODULES = sorted((modules.ROOT / "rtl").rglob("*.sv"))
+REWRITTEN = [
+    path
+    for path in MODULES
+    if path.parent.name in ("common", "decode", "interpolate", "position", "sense")
+]
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.stem)
+def test_no_fact_holds_another_key(path):
+    facts = modules.header(path.read_text(), path)[1]
+    keys = "|".join(modules.KEYS)
+    held = {key: re.findall(rf"  +({keys}) ", text) for key, text in facts.items()}
+    assert not any(held.values()), held
+
+
+@pytest.mark.parametrize("path", REWRITTEN, ids=lambda path: path.stem)
+def test_a_header_uses_the_short_vocabulary(path):
+    facts = modules.header(path.read_text(), path)[1]
+    assert facts.keys() <= modules.KEYS | {"purpose"}
+
+
+@pytest.mark.parametrize("path", REWRITTEN, ids=lambda path: path.stem)
+def test_every_port_and_parameter_states_its_unit_or_meaning(path):
+    assert modules.bare_ports(path) == []
+
+
+@pytest.mark.parametrize("path", REWRITTEN, ids=lambda path: path.stem)
+def test_every_latency_has_a_test_of_its_name(path):
+    assert modules.untested_latencies(path) == []
+
+
+def test_bare_ports_and_untested_latencies_are_found(tmp_path, monkeypatch):
+    path = tmp_path / "rtl" / "room" / "thing.sv"
+    test = tmp_path / "tb" / "room" / "test_thing.py"
+    path.parent.mkdir(parents=True)
+    test.parent.mkdir(parents=True)
+    path.write_text(
+        f"""{HEADER.partition("module")[0]}
+module thing #(
+    parameter int W = 8  // bits
+) (
+    input wire clk,
+    input wire [W-1:0] level,
+    output logic done  // strobe: done
+);
+endmodule
+"""
+    )
+    monkeypatch.setattr(modules, "ROOT", tmp_path)
+    assert modules.bare_ports(path) == ["level"]
+    test.write_text("async def latency_is_3(dut):\n    pass\n")
+    assert modules.untested_latencies(path) == ["2"]
+    test.write_text("async def other(dut):\n    pass\n")
+    assert modules.untested_latencies(path) == ["2 cycles from valid to done, and then 2 more"]
+    test.write_text("async def latency_is_2_and_2_more(dut):\n    pass\n")
+    assert modules.untested_latencies(path) == []
 
 
 def test_the_page_is_fresh():
@@ -106,14 +147,14 @@ def test_a_cell_is_the_first_sentence_without_its_details(text, short):
     assert modules.brief(text) == short
 
 
-STAND_ALONE = {  # instantiated by no other module, and why they are there
+STAND_ALONE = {  # instantiated by no other module, and the reason why they exist
     "node": "a product",
     "relay": "a product",
-    "encoder_counter": "a product: a counter on somebody else's bus",
-    "arctan_iterative": "the small one beside arctan_pipelined",
-    "arctan_table": "as S0 prints it",
-    "count_outlier_filter": "as S0 prints it",
-    "peak_offset_tracker": "as S0 prints it",
+    "encoder_counter": "a product: a counter on the bus of another design",
+    "arctan_iterative": "the small alternative to arctan_pipelined",
+    "arctan_table": "the method of S0",
+    "count_outlier_filter": "the method of S0",
+    "peak_offset_tracker": "the method of S0",
 }
 
 
