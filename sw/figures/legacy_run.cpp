@@ -36,7 +36,7 @@ int main(int, char** words) {
         top.sin = sin, top.cos = cos, top.valid = 1;
         for (int n = 0; n < LAST && (n < APART || counts != positions); n++) {
             clk(), top.valid = 0;
-            if (top.printed_done) count = int32_t(top.printed_count), counts++;
+            if (top.legacy_done) count = int32_t(top.legacy_count), counts++;
             if (top.done) position = int64_t(top.position << 16) >> 16, positions++;
         }
         std::printf("%ld %ld\n", count, position);

@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// recorded_encoder -- test top: pairs of recorded levels, each through two deglitchers into a
+// recorded_encoder -- test bench: pairs of recorded levels, each through two deglitchers into a
 // decoder, as in an axis.
+//
 `default_nettype none
 
 module recorded_encoder #(
-    parameter int PAIRS = 4
+    parameter int PAIRS = 4  // number of pairs
 ) (
-    input wire clk,
-    input wire rst,
-    input wire [15:0] stable,
-    input wire [1:0] mode,  // as in quadrature_decoder
-    input wire [PAIRS-1:0] a,
-    input wire [PAIRS-1:0] b,
-    output wire [32*PAIRS-1:0] counts,  // pair 0 lowest
-    output logic [32*PAIRS-1:0] edges,      // counted edges or pulses since reset, both directions added
-    output logic [32*PAIRS-1:0] rejections,  // pulses held back on a and on b
-    output logic [PAIRS-1:0] illegal  // an illegal edge was seen since reset
+    input  wire                 clk,
+    input  wire                 rst,            // level: all counts become 0
+    input  wire  [        15:0] stable_cycles,  // cycles, setting of the deglitchers
+    input  wire  [         1:0] mode,           // as in quadrature_decoder
+    input  wire  [   PAIRS-1:0] a,              // levels, one per pair
+    input  wire  [   PAIRS-1:0] b,              // levels, one per pair
+    output wire  [32*PAIRS-1:0] counts,         // counts, 32 bits per pair, pair 0 lowest
+    output logic [32*PAIRS-1:0] edges,          // counted edges or pulses of both directions
+    output logic [32*PAIRS-1:0] rejections,     // pulses rejected on a and on b
+    output logic [   PAIRS-1:0] illegal         // levels: an illegal edge since reset
 );
     for (genvar i = 0; i < PAIRS; i++) begin : g_pair
         wire a_filtered, b_filtered, a_rejected, b_rejected, skipped;
@@ -25,7 +26,7 @@ module recorded_encoder #(
         deglitcher u_deglitcher_a (
             .clk,
             .rst,
-            .stable,
+            .stable_cycles,
             .level   (a[i]),
             .filtered(a_filtered),
             .rejected(a_rejected)
@@ -33,7 +34,7 @@ module recorded_encoder #(
         deglitcher u_deglitcher_b (
             .clk,
             .rst,
-            .stable,
+            .stable_cycles,
             .level   (b[i]),
             .filtered(b_filtered),
             .rejected(b_rejected)

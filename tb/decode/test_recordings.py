@@ -112,7 +112,7 @@ async def every_count_is_that_of_the_offline_decoder_with_and_without_spikes(dut
     rows, mode = recording(os.environ["RECORDING"]), int(os.environ["MODE"])
     first = rows[0]
     a, b = first[1] | first[3] << 1, first[2] | first[4] << 1
-    await bench.start(dut, stable=STABLE, mode=mode, a=a | a << 2, b=b | b << 2)
+    await bench.start(dut, stable_cycles=STABLE, mode=mode, a=a | a << 2, b=b | b << 2)
     await ClockCycles(
         dut.clk, STILL, FallingEdge
     )  # filters and decoders have taken the first levels

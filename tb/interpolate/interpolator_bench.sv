@@ -1,40 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
-// interpolator_bench -- converter word to corrected position, the way feedback_channel.sv strings
-// the blocks together; every input is taken into a register first, so that the chain begins at one,
-// as in the node.
+// interpolator_bench -- test bench: ADC word to corrected position, with the blocks connected as in
+// feedback_channel.sv.
+//
+// Every input is registered first, so that the chain begins at a register, as in the node.
 `default_nettype none
 
 module interpolator_bench #(
     parameter int W = 8  // bits of a sample
 ) (
-    input wire clk,
-    input wire rst,
-    input wire [7:0] outlier_step,  // settings of limit filter 1
-    input wire [7:0] outlier_hold,
-    input wire load,  // strobe: take the four settings of the correction
-    input wire signed [15:0] sin_offset,
-    input wire signed [15:0] cos_offset,
-    input wire [16:0] gain,
-    input wire signed [16:0] quadrature_error,
-    input wire enable,  // harmonics
-    input wire write,  // strobe: a point of their table
-    input wire [7:0] point,
-    input wire signed [17:0] value,
-    input wire swap,  // strobe: their table in force
-    input wire shift,  // strobe: move the origin
-    input wire signed [31:0] shift_periods,
-    input wire valid,  // strobe: sin and cos are a new converter word
-    input wire signed [W-1:0] sin,  // full scale = 2^(W-1)
-    input wire signed [W-1:0] cos,
-    output logic done,  // strobe: position is that of a new sample
-    output logic signed [47:0] position,  // Q32.16 periods
-    output logic overspeed  // strobe
+    input  wire                 clk,
+    input  wire                 rst,               // level: the chain starts again
+    input  wire         [  7:0] outlier_step,      // counts: setting of limit filter 1
+    input  wire         [  7:0] outlier_hold,      // samples: setting of limit filter 1
+    input  wire                 load,              // strobe: load the settings of the correction
+    input  wire signed  [ 15:0] sin_offset,        // full scale = 2^15
+    input  wire signed  [ 15:0] cos_offset,        // full scale = 2^15
+    input  wire         [ 16:0] gain,              // factor, 1.0 = 2^16
+    input  wire signed  [ 16:0] quadrature_error,  // factor, 1.0 = 2^16
+    input  wire                 enable,            // level: correct the harmonics
+    input  wire                 write,             // strobe: write a point of the table
+    input  wire         [  7:0] point,             // 2^-8 period
+    input  wire signed  [ 17:0] value,             // 2^-20 period
+    input  wire                 swap,              // strobe: use the written table
+    input  wire                 shift,             // strobe: move the origin
+    input  wire signed  [ 31:0] shift_periods,     // periods
+    input  wire                 valid,             // strobe: sin and cos are a new ADC word
+    input  wire signed  [W-1:0] sin,               // counts, full scale = 2^(W-1)
+    input  wire signed  [W-1:0] cos,               // counts, full scale = 2^(W-1)
+    output logic                done,              // strobe: position belongs to a new sample
+    output logic signed [ 47:0] position,          // Q32.16 periods
+    output logic                overspeed          // strobe: the speed is too high
 );
     localparam int INPUTS = 8 + 8 + 1 + 16 + 16 + 17 + 17 + 1 + 1 + 8 + 18 + 1 + 1 + 32 + 1 + 2 * W;
 
     logic [INPUTS-1:0] held;
     wire [7:0] outlier_step_q, outlier_hold_q, point_q;
-    wire                load_q, enable_q, write_q, swap_q, shift_q, converted, sampled, corrected, phase_valid, harmonics_off, stepped;
+    wire load_q, enable_q, write_q, swap_q, shift_q, converted;
+    wire sampled, corrected, phase_valid, harmonics_off, stepped;
     wire signed [15:0] sin_offset_q, cos_offset_q, corrected_sin, corrected_cos;
     wire [16:0] gain_q;
     wire signed [16:0] quadrature_error_q, step;
@@ -44,8 +46,11 @@ module interpolator_bench #(
     wire [15:0] plain_phase, phase, tracked_phase, amplitude;
     wire rejected;
 
-    assign {outlier_step_q, outlier_hold_q, load_q, sin_offset_q, cos_offset_q, gain_q, quadrature_error_q, enable_q, write_q, point_q, value_q, swap_q,
-            shift_q, shift_periods_q, converted, raw_sin, raw_cos} = held;
+    assign {
+        outlier_step_q, outlier_hold_q, load_q, sin_offset_q, cos_offset_q, gain_q,
+        quadrature_error_q, enable_q, write_q, point_q, value_q, swap_q, shift_q,
+        shift_periods_q, converted, raw_sin, raw_cos
+    } = held;
     always_ff @(posedge clk) begin
         held <= {
             outlier_step,

@@ -1,32 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
-// legacy_bench -- the same samples through S0's path as its paper printed it, and through the path
-// of feedback_channel.sv.
+// legacy_bench -- test bench: the same samples through the path of S0 as its paper describes it,
+// and through the path of feedback_channel.sv.
+//
 `default_nettype none
 
 module legacy_bench #(
     parameter int W           = 8,   // bits of a sample
-    parameter int SUBDIVISION = 160  // counts of a period, as printed
+    parameter int SUBDIVISION = 160  // counts of S0 per period
 ) (
-    input wire clk,
-    input wire rst,
-    input wire valid,  // strobe: sin and cos are a new sample; 30 clk apart at least
-    input wire signed [W-1:0] sin,  // full scale = 2^(W-1)
-    input wire signed [W-1:0] cos,
-    input wire [7:0] largest_move,  // limit filter 1; 0: out of use
-    input wire limit_counts,  // limit filter 2
-    input wire load,  // of the learned values
-    input wire signed [15:0] sin_offset,
-    input wire signed [15:0] cos_offset,
-    input wire [16:0] gain,
-    input wire signed [16:0] quadrature_error,
-    input wire write,
-    input wire [7:0] point,
-    input wire signed [17:0] value,
-    input wire swap,
-    output logic printed_done,  // strobe
-    output logic signed [31:0] printed_count,  // 1 / SUBDIVISION period
-    output logic done,  // strobe
-    output logic signed [47:0] position  // Q32.16 periods
+    input  wire                 clk,
+    input  wire                 rst,               // level: both paths start again
+    input  wire                 valid,             // strobe: a sample, once in 30 cycles at most
+    input  wire signed  [W-1:0] sin,               // counts, full scale = 2^(W-1)
+    input  wire signed  [W-1:0] cos,               // counts, full scale = 2^(W-1)
+    input  wire         [  7:0] largest_move,      // counts: limit filter 1; 0: off
+    input  wire                 limit_counts,      // level: use limit filter 2
+    input  wire                 load,              // strobe: load the settings of the correction
+    input  wire signed  [ 15:0] sin_offset,        // full scale = 2^15
+    input  wire signed  [ 15:0] cos_offset,        // full scale = 2^15
+    input  wire         [ 16:0] gain,              // factor, 1.0 = 2^16
+    input  wire signed  [ 16:0] quadrature_error,  // factor, 1.0 = 2^16
+    input  wire                 write,             // strobe: write a point of the table
+    input  wire         [  7:0] point,             // 2^-8 period
+    input  wire signed  [ 17:0] value,             // 2^-20 period
+    input  wire                 swap,              // strobe: use the written table
+    output logic                legacy_done,       // strobe: legacy_count is new
+    output logic signed [ 31:0] legacy_count,      // 1 / SUBDIVISION period
+    output logic                done,              // strobe: position is new
+    output logic signed [ 47:0] position           // Q32.16 periods
 );
     wire held, rejected, centred, found, stepped, placed, overspeed;
     wire signed [W-1:0] sin_held, cos_held, sin_centred, cos_centred, sin_drift, cos_drift;
@@ -105,8 +106,8 @@ module legacy_bench #(
         .enable   (limit_counts),
         .valid    (placed),
         .count    (counts[47:16]),
-        .done     (printed_done),
-        .count_out(printed_count)
+        .done     (legacy_done),
+        .count_out(legacy_count)
     );
 
     wire corrected, turned, straight, moved, too_fast;
@@ -179,7 +180,10 @@ module legacy_bench #(
         .position
     );
 
-    wire unused = &{1'b0, rejected, sin_drift, cos_drift, overspeed, counts[55:48], counts[15:0], amplitude, too_fast};
+    wire unused = &{
+        1'b0, rejected, sin_drift, cos_drift, overspeed, counts[55:48], counts[15:0],
+        amplitude, too_fast
+    };
 endmodule
 
 `default_nettype wire

@@ -72,8 +72,8 @@ async def send(dut, sin, cos):
     await strobe(dut, valid=1, sin=sin, cos=cos)
     dut.valid.value, found = 0, ([], [])
     for _ in range(APART - 1):
-        if int(dut.printed_done.value):
-            found[0].append(dut.printed_count.value.to_signed())
+        if int(dut.legacy_done.value):
+            found[0].append(dut.legacy_count.value.to_signed())
         if int(dut.done.value):
             found[1].append(dut.position.value.to_signed())
         await FallingEdge(dut.clk)
@@ -88,7 +88,7 @@ async def both_paths_equal_their_models_in_series(dut):
     table = [round(3000 * math.sin(2 * math.tau * n / 256)) for n in range(256)]
     await load_calibration(dut, values, table)
     spikes, offset, counts = OutlierFilter(), PeakOffsetTracker(8), CountOutlierFilter(32)
-    printed, ours, where, errors = Follower(), Follower(), random.random(), []
+    legacy, ours, where, errors = Follower(), Follower(), random.random(), []
     for n in range(600):
         where += 0.06 if n < 400 else -0.06
         sin, cos = (
@@ -100,7 +100,7 @@ async def both_paths_equal_their_models_in_series(dut):
         held = spikes.sample(sin, cos, LARGEST_MOVE, 255)[:2]
         centred = offset.sample(*held, 1)[:2]
         count = counts.follow(
-            1, printed.follow(arctan_table.phase_of(*centred)) * SUBDIVISION >> 16
+            1, legacy.follow(arctan_table.phase_of(*centred)) * SUBDIVISION >> 16
         )
         phase = sample(16, *signal_correction.corrected(sin, cos, values, 8))[0]
         position = ours.follow(harmonic_correction.corrected(phase, table))
