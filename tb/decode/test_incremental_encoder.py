@@ -350,7 +350,7 @@ async def latency_is_3_from_own_a_to_count(dut):
 
 
 @cocotb.test()
-async def the_pins_are_filtered_and_not_counted_while_own_steps_are(dut):
+async def the_pins_are_filtered_and_not_counted_while_own_steps_are_counted(dut):
     bench = await Bench.begin(dut, Setup(required=3, own=1))
     out = await bench.play([(1, 0, 0)] * 2 + [(0, 0, 0)] * 6 + [(1, 0, 0)] * 8)
     assert (

@@ -209,7 +209,7 @@ async def count_wraps_and_comes_back(dut):
 
 
 @cocotb.test()
-async def reset_in_the_middle_of_a_motion_makes_zero_of_where_it_is(dut):
+async def reset_in_mid_flow_makes_the_present_position_zero(dut):
     model = await begin(dut)
     await drive(dut, model, TURN * 2 + TURN[:3])
     assert await drive(dut, model, [TURN[3]], rst=1) == [(0, 0, 0)]

@@ -55,7 +55,7 @@ async def the_octant_borders_are_exact(dut):
 
 
 @cocotb.test()
-async def by_hand(dut):
+async def known_angles_are_right(dut):
     unit = 1 << await begin(dut) - 8
     for sin, cos, phase in (
         (48, 64, 6712),

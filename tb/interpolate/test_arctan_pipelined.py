@@ -66,7 +66,7 @@ async def the_octant_borders_are_exact(dut):
 
 
 @cocotb.test()
-async def by_hand(dut):
+async def known_angles_are_right(dut):
     w, model = await begin(dut)
     unit = 1 << w - 8
     results = await ask(

@@ -57,7 +57,7 @@ async def the_octant_borders_are_exact(dut):
 
 
 @cocotb.test()
-async def by_hand(dut):
+async def known_angles_are_right(dut):
     await begin(dut)
     assert await ask(dut, 3, 4) == 6712  # atan 0.75 = 36.8699 deg = 6711.96 of 65 536
     assert await ask(dut, 4, 3) == 16384 - 6712

@@ -89,7 +89,7 @@ async def a_burst_of_samples_is_read_back_left_aligned(dut):
 
 
 @cocotb.test()
-async def phases_lie_two_in_a_word_the_earlier_one_low(dut):
+async def a_word_holds_two_phases_the_earlier_one_low(dut):
     model, depth = await begin(dut), int(dut.DEPTH.value)
     await cycle(dut, model, start=1, phases=1)
     for n in range(2 * depth):
@@ -98,7 +98,7 @@ async def phases_lie_two_in_a_word_the_earlier_one_low(dut):
 
 
 @cocotb.test()
-async def only_every_so_many_are_kept_and_0_is_1(dut):
+async def one_in_decimation_is_kept_and_0_acts_as_1(dut):
     model, depth = await begin(dut), int(dut.DEPTH.value)
     for decimation in (0, 1, 2, 5):
         await cycle(dut, model, start=1, phases=1)

@@ -48,7 +48,7 @@ async def latency_is_1(dut):
 
 
 @cocotb.test()
-async def by_hand(dut):
+async def known_phases_give_the_right_steps(dut):
     await begin(dut)
     assert await feed(dut, [65000, 65000, 65500, 500, 500, 65000]) == [
         (0, 0),

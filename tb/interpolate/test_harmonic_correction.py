@@ -68,7 +68,7 @@ async def latency_is_4_and_phases_may_come_every_cycle(dut):
 
 
 @cocotb.test()
-async def by_hand(dut):
+async def known_corrections_are_right(dut):
     model = await begin(dut)
     table = [0] * POINTS
     table[3], table[4] = 160, -320  # 10 and -20 LSB of phase

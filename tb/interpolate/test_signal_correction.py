@@ -66,7 +66,7 @@ async def latency_is_3_and_samples_may_come_every_cycle(dut):
 
 
 @cocotb.test()
-async def by_hand(dut):
+async def known_corrections_are_right(dut):
     model, scale = await begin(dut), 1 << 16 - int(dut.W.value)
     assert await ask(dut, model, 100, -50) == (50 * scale, -25 * scale)  # half the size
     await cycle(dut, model, load=Settings(256, -512, 65536 * 3 // 2, -32768))

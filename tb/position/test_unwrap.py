@@ -37,7 +37,7 @@ async def latency_is_1(dut):
 
 
 @cocotb.test()
-async def by_hand(dut):
+async def known_steps_add_up_to_the_right_position(dut):
     await begin(dut)
     assert await clock(dut, 1, 12345, 60000) == (1, 60000)  # the first step is ignored
     assert await clock(dut, 1, 10000, 4464) == (1, 70000)

@@ -95,7 +95,7 @@ async def convert(dut, model, adc, codes):
 
 
 @cocotb.test()
-async def known_codes_by_hand(dut):
+async def known_codes_are_read_right(dut):
     model, adc = await begin(dut)
     w, leading, frame = sizes(dut)
     bits = frame - leading  # resolution of this ADC

@@ -99,9 +99,7 @@ async def both_paths_equal_their_models_in_series(dut):
             sin = random.randrange(-128, 128)  # a spike
         held = spikes.sample(sin, cos, LARGEST_MOVE, 255)[:2]
         centred = offset.sample(*held, 1)[:2]
-        count = counts.follow(
-            1, legacy.follow(arctan_table.phase_of(*centred)) * SUBDIVISION >> 16
-        )
+        count = counts.follow(1, legacy.follow(arctan_table.phase_of(*centred)) * SUBDIVISION >> 16)
         phase = sample(16, *signal_correction.corrected(sin, cos, values, 8))[0]
         position = ours.follow(harmonic_correction.corrected(phase, table))
         assert await send(dut, sin, cos) == ([count], [position]), f"sample {n}: {sin}, {cos}"

@@ -145,7 +145,7 @@ async def latency_is_9_to_amplitude(dut):
 
 
 @cocotb.test()
-async def with_everything_switched_off_nothing_alarms(dut):
+async def with_all_checks_off_there_is_no_fault(dut):
     watch = await begin(dut)
     for _ in range(300):
         await watch.sample(
