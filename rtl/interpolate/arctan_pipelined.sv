@@ -89,9 +89,12 @@ module arctan_pipelined #(
     wire  [  LATENCY:0] strobes = {coming, valid};
 
     for (genvar t = 1; t < LAST; t++) begin : g_step
-        localparam int L = $signed(LONGER[ROW+8*t+:8]), L_IN = $signed(LONGER[ROW+8*(t-1)+:8]);
-        localparam int S = $signed(SHORTER[ROW+8*t+:8]), S_IN = $signed(SHORTER[ROW+8*(t-1)+:8]);
-        localparam int SUM = $signed(SUMMED[ROW+8*t+:8]), SUM_IN = $signed(SUMMED[ROW+8*(t-1)+:8]);
+        localparam int L = 32'($signed(LONGER[ROW+8*t+:8]));
+        localparam int L_IN = 32'($signed(LONGER[ROW+8*(t-1)+:8]));
+        localparam int S = 32'($signed(SHORTER[ROW+8*t+:8]));
+        localparam int S_IN = 32'($signed(SHORTER[ROW+8*(t-1)+:8]));
+        localparam int SUM = 32'(SUMMED[ROW+8*t+:8]);
+        localparam int SUM_IN = 32'(SUMMED[ROW+8*(t-1)+:8]);
         /* verilator lint_off UNUSEDSIGNAL */  // the synthesis removes what no later step needs
         // rotated to the axis it becomes the amplitude
         logic [W+L-1:0] longer, longer_q;
@@ -216,7 +219,7 @@ module arctan_pipelined #(
     end
 
     wire signed [Z-DIGITS+3:0] last_sum;
-    localparam int S_LAST = $signed(SHORTER[ROW+8*(LAST-1)+:8]);
+    localparam int S_LAST = 32'($signed(SHORTER[ROW+8*(LAST-1)+:8]));
     wire negative = g_step[LAST-1].shorter_q[W+S_LAST];
     arctan_rotation_rom #(
         .TURNS(TURNS),
