@@ -41,8 +41,8 @@ module angle_frame #(
     logic [ 3:0] bytes_taken;  // bytes of this frame; 0: waits for A5, 8: complete
     logic [47:0] shifted;  // the last six of them, the newest highest
     logic [15:0] crc;  // over the first six bytes
-    logic [23:0] silent;  // clk since the last byte
-    logic [31:0] elapsed;  // clk since the first byte
+    logic [23:0] silent;  // cycles since the last byte
+    logic [31:0] elapsed;  // cycles since the first byte
     logic [ 7:0] number;  // sequence of this frame
     logic        known;  // there was a good frame
 
