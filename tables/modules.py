@@ -16,16 +16,6 @@ COLUMNS = ["directory", "module", "purpose", "latency", "model and test"]
 LONGEST_CELL = 160  # characters of a cell without its links; details stay in the headers
 # A line of the facts begins with one of these keys; its further lines are indented.
 KEYS = set("latency rate accuracy method behaviour limits source model proved proof made".split())
-# Keys of headers that are not rewritten yet; new headers do not use them.
-OLD_KEYS = set(
-    """
-    again align anew angle answer armed body bound bounds brake built bumpless bypass code copies
-    crowded decay duty enable entry exact expects faults finest fits flags frozen index joint jump
-    law learns limit map modes moved off opposed options overrun override passed place points quiet
-    reading refresh request reset rounding safety scale segments set shift sign slower sources
-    spikes start strays table terms through timings used windup
-    """.split()
-)
 REQUIRED = ("purpose", "latency", "model")
 
 
@@ -56,7 +46,7 @@ def header(text: str, where: str | Path = "header") -> tuple[str | None, dict[st
             facts[key] += " " + line
         elif key == "sentence" or (key is None and re.match(r"[A-Z`]", line)):
             key = "sentence"
-        elif new and new.group(1) in KEYS | OLD_KEYS:
+        elif new and new.group(1) in KEYS:
             key = new.group(1)
             if key in facts:
                 wrong.append(f"{where}:{number}: the key `{key}` is there twice")
@@ -66,10 +56,6 @@ def header(text: str, where: str | Path = "header") -> tuple[str | None, dict[st
                 f"{where}:{number}: `{line.split()[0]}` is no known key of a header; "
                 "tables/modules.py has the list"
             )
-        if key == "latency":  # the rate may follow on the same line
-            latency, both, rate = facts[key].partition(" rate  ")
-            if both:
-                facts["latency"], facts["rate"], key = latency.rstrip(), rate.strip(), "rate"
     if wrong:
         raise ValueError("\n".join(wrong))
     return first.group(1) if first else None, facts
@@ -150,29 +136,6 @@ def row(path: Path, wrong: list[str]) -> list[str]:
         latency,
         ", ".join(f"[{p.name}](../{p.as_posix()})" for p in (model, test) if p),
     ]
-
-
-def bare_ports(path: Path) -> list[str]:
-    """The parameters and ports, except clk and rst, whose lines state no unit and no meaning."""
-    text = path.read_text()
-    head = text[text.index(f"\nmodule {path.stem}") : text.index("\n);")]
-    declared = re.findall(
-        r"^ *(?:parameter|input|output|inout)\b([^/\n=]*)([^/\n]*)(//.*)?$", head, re.MULTILINE
-    )
-    names = [(re.findall(r"\w+", before)[-1], comment) for before, _, comment in declared]
-    return [name for name, comment in names if not comment and name not in ("clk", "rst")]
-
-
-def untested_latencies(path: Path) -> list[str]:
-    """The numbers of cycles in the latency of a header that no test named latency_is_… states."""
-    latency = header(path.read_text(), path)[1]["latency"]
-    test = check_of(path)[1]
-    assert test is not None
-    names = re.findall(r"def (?:test_)?latency_is_(\w+)", (ROOT / test).read_text())
-    stated = re.findall(r"((?:\d+(?:, | or | and | to ))*\d+) cycles?\b", latency)
-    numbers = {number for figure in stated for number in re.findall(r"\d+", figure)}
-    known = {part for name in names for part in name.split("_")}
-    return sorted(numbers - known) if names else [latency]
 
 
 def made() -> dict[Path, str]:

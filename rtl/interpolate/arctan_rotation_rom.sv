@@ -12,7 +12,7 @@
 `default_nettype none
 
 module arctan_rotation_rom #(
-    parameter  int TURNS = 6,                  // digits that rotate by an arctan, up to 10
+    parameter  int TURNS = 6,                  // digits that rotate by an arctangent, up to 10
     parameter  int FIRST = 1,                  // the first digit of the sum
     parameter  int COUNT = 4,                  // digits in the sum, 1 to 5
     parameter  int GUARD = 9,                  // bits below the LSB of a 16-bit phase

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The checks of tools/: each finds what is planted, and nothing in the project."""
+
+import ast
+
+import pytest
+
+from tables import modules
+from tools import check_imports, check_latency, check_ports
+
+MODULE = """// SPDX-License-Identifier: Apache-2.0
+// thing -- adds.
+//
+// latency  2 cycles from valid to done, and 3 cycles to the sum
+// model    tb/room/thing.py
+`default_nettype none
+
+module thing #(
+    parameter int W = 8,  // bits of a number
+    parameter int N = 1
+) (
+    input  wire          clk,
+    input  wire          rst,
+    input  wire  [W-1:0] level,
+    // counts
+    input  wire  [W-1:0] sum,
+    output logic         done   // strobe: the sum is valid
+);
+endmodule
+"""
+
+
+@pytest.fixture
+def module(tmp_path, monkeypatch):
+    """A module with bare ports and latencies to be tested, in a project of its own."""
+    for part in (modules, check_latency, check_ports):
+        monkeypatch.setattr(part, "ROOT", tmp_path)
+    path = tmp_path / "rtl" / "room" / "thing.sv"
+    (tmp_path / "tb" / "room").mkdir(parents=True)
+    path.parent.mkdir(parents=True)
+    path.write_text(MODULE)
+    return path
+
+
+def test_a_port_and_a_parameter_without_a_comment_are_found(module):
+    assert check_ports.problems() == ["rtl/room/thing.sv:10: N", "rtl/room/thing.sv:14: level"]
+
+
+@pytest.mark.parametrize(
+    "names, missing",
+    [
+        ([], ["rtl/room/thing.sv: no test latency_is_…"]),
+        (["latency_is_2_to_done"], ["rtl/room/thing.sv: no test latency_is_3"]),
+        (["latency_is_2_to_done", "latency_is_3_to_the_sum"], []),
+        (["latency_is_2_to_done_and_3_to_the_sum"], []),
+        (["latency_is_23"], ["no test latency_is_2", "no test latency_is_3"]),
+    ],
+)
+def test_a_latency_without_a_test_of_its_name_is_found(module, names, missing):
+    test = module.parents[2] / "tb" / "room" / "test_thing.py"
+    test.write_text("".join(f"async def {name}(dut):\n    pass\n" for name in names))
+    found = check_latency.problems()
+    assert len(found) == len(missing) and all(m in f for m, f in zip(missing, found, strict=True))
+
+
+def test_a_cycle_and_its_way_are_found():
+    graph = {"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}
+    (found,) = check_imports.cycles(graph)
+    assert found.startswith("cycle: ") and {"a", "b", "c"} <= set(found.split())
+    assert check_imports.cycles({"a": {"b"}, "b": {"c"}, "c": set()}) == []
+
+
+def test_an_import_in_the_wrong_direction_is_found():
+    graph = {"figures.s0": {"tb.bench", "moire"}, "moire.cli": {"twin"}, "tb.bench": {"tb.x"}}
+    assert check_imports.wrong_ways(graph) == [
+        "figures.s0 must not import tb.bench",
+        "moire.cli must not import twin",
+    ]
+
+
+def test_relative_deferred_and_typed_imports_are_told_apart():
+    tree = ast.parse(
+        "from . import x\nimport a.b\nif TYPE_CHECKING:\n    import hidden\n"
+        "def f():\n    from late import y\n"
+    )
+    found = check_imports.imports_of(tree, "p.q", is_package=False)
+    assert {"p.x", "a.b", "late", "late.y"} <= found and "hidden" not in found
+
+
+@pytest.mark.parametrize("check", [check_imports, check_latency, check_ports])
+def test_the_project_has_none(check):
+    assert check.problems() == []
