@@ -16,7 +16,8 @@ HEADER = """// SPDX-License-Identifier: Apache-2.0
 //   y = b0 x
 //
 // latency  2 cycles from valid to done, and then
-//          2 more           rate  one level per cycle
+//          2 more
+// rate     one level per cycle
 // accuracy within 1 LSB
 // behaviour rounds half up; and
 //          never down
