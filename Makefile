@@ -42,7 +42,7 @@ lint: $(SETUP)   ## verilator -Wall over every module, ruff over the Python, the
 	@$(PYTHON) -m ruff check -q --output-format concise .
 	@$(PYTHON) -m ruff format -q --check .
 	@$(CLANG_FORMAT) --dry-run -Werror $(C_SOURCES)
-	@$(VERIBLE) --verify $(SV_SOURCES)
+	@$(VERIBLE) --verify --inplace $(SV_SOURCES)
 
 types: $(SETUP)  ## mypy --strict over all Python that ships or measures
 	$(call say,types: mypy)

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // heartbeat_watchdog -- report when no heartbeat has come for too long while a drive is on.
 //
-// latency   time_ms * (CLK_HZ / 1000) + 1 cycles from the last kick or, if later, the rise of armed to
-//           expired; expired falls 1 cycle after a kick or after the fall of armed.
+// latency   time_ms * (CLK_HZ / 1000) + 1 cycles from the last kick, or the rise of armed if later,
+//           to expired; expired falls 1 cycle after a kick or after the fall of armed.
 // behaviour Used for the master on the RS-485 bus, where a good frame is the kick, and for the soft
 //           core, whose firmware kicks once per round of its main loop.
 // model     tb/interlock/heartbeat_watchdog.py, equal in every bit of every cycle
