@@ -404,7 +404,7 @@ def test_no_value_of_an_answer_overwrites_the_name_of_the_command():
         ("move 1", "'1' has no unit: write a number with pm nm um mm cm m"),
         ("move fast", "'fast' is no length"),
         ("move", "LENGTH is missing"),
-        ("wait 5mm", "'5mm' is no time: write a number with ns us ms s min, such as 20ms"),
+        ("wait 5mm", "'5mm' is no time: write a number with ns us ms s min h, such as 20ms"),
         ("wait -1s", "in the past"),
         ("status --address 16", "'16' is no address: allowed are 1 to 15"),
         ("status --address x", "allowed are 1 to 15"),

@@ -157,3 +157,8 @@ def test_a_share_is_a_percentage_or_a_fraction(text, share):
 def test_what_is_no_share_is_refused(text):
     with pytest.raises(UnitError):
         units.parse_share(text)
+
+
+def test_long_times_are_read_in_minutes_and_hours_and_printed_in_seconds():
+    assert units.parse_time("4h") == 14400 and units.parse_time("90min") == 5400
+    assert units.format_time(14400) == "14400s"

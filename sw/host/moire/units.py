@@ -35,6 +35,7 @@ TIMES = {
     "ms": Fraction(1, 1000),
     "s": Fraction(1),
     "min": Fraction(60),
+    "h": Fraction(3600),
 }
 ANGLES = {"arcsec": Fraction(1), "arcmin": Fraction(60), "deg": Fraction(3600)}
 FREQUENCIES = {"Hz": Fraction(1), "kHz": Fraction(1000), "MHz": Fraction(10**6)}
@@ -159,14 +160,14 @@ def rounded(value: Number, digits: int) -> str:
 def with_unit(quantity: Quantity, value: Number, digits: int | None = None) -> str:
     """A value in the base unit as text, exact unless `digits` are given.
 
-    The unit is the largest one that leaves a digit before the point; cm, m and min are not used.
+    The unit is the largest one that leaves a digit before the point; cm, m, min and h are not used.
     """
     value = Fraction(value)
     unit, worth = quantity.base, Fraction(1)
     candidates = [
         item
         for item in quantity.worth.items()
-        if not item[0].startswith(("cm", "min")) and not re.match(r"m(/|$)", item[0])
+        if not item[0].startswith(("cm", "min", "h")) and not re.match(r"m(/|$)", item[0])
     ]
     if value and candidates:
         fitting = [item for item in candidates if abs(value) >= item[1]]
