@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pages of the experiments and of the figures, one file each, from the templates beside this file.
+"""Pages of the experiments and of the figures, made from files in `templates`.
 
-They have the style of moire.analysis.report, which makes the pages whose rows are moves.
+Each page is one file. The pages have the style of moire.analysis.report, which makes the pages
+whose rows are moves.
 """
 
 import base64
@@ -26,11 +27,12 @@ TEMPLATES = Environment(
 
 
 def render(template: str, **values: Any) -> Markup:
-    """A template of this project, filled in; it escapes all values but those that are Markup."""
+    """A template of this project, filled in. All values are escaped unless they are Markup."""
     return Markup(TEMPLATES.get_template(template).render(style=Markup(report.STYLE), **values))
 
 
 def picture(name: str, caption: str, image: bytes) -> Markup:
+    """A picture (PNG) with its caption, as HTML."""
     encoded = base64.b64encode(image).decode()
     return render("picture.html", name=name, caption=caption, image=encoded)
 
@@ -42,7 +44,9 @@ def text_of(
     facts: Mapping[str, object],
     numbers: Sequence[tuple[str, str]] = (),
 ) -> str:
-    """A report. parts are HTML, facts {name: words}; numbers are (value, name), shown large."""
+    """The text of a report. `parts` are HTML, `facts` are rows {name: words} of the last table, and
+    `numbers` are pairs (value, name), which are displayed large.
+    """
     whole = [Markup(part) for part in parts]
     values = {"title": title, "summary": summary, "numbers": numbers, "parts": whole}
     return str(render("report.html", **values, facts=facts.items()))
@@ -56,5 +60,5 @@ def page(
     facts: Mapping[str, object],
     numbers: Sequence[tuple[str, str]] = (),
 ) -> Path:
-    """Writes a report; returns its path."""
+    """Writes a report and returns its path."""
     return report.write_text(Path(path), text_of(title, summary, parts, facts, numbers))
