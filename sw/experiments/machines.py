@@ -2,9 +2,12 @@
 """The machines of the experiments for any client: `moire twin --machine s2`, `moire --port
 twin:s2`.
 
-Each is powered up, with the parameters of its experiment in force; the names are those of
+Each machine is powered up and has the parameters of its experiment. The names are the same as in
 moire.bus.twin_port.
 """
+
+from collections.abc import Callable
+from typing import Any
 
 from experiments import s0_fine, s2_stage, s3_zero, s4_job
 from experiments.s0_stage import ADDRESSES
@@ -12,13 +15,14 @@ from moire.errors import TwinNotBuilt
 from twin import WITH_SEGMENTS, BuildError, Twin, TwinTransport
 
 
-def fine_stage(seed):
+def fine_stage(seed: int) -> Twin:
+    """The X axis with its piezo, the fine stage switched on."""
     stage = s0_fine.FineStage.power_up(seed)
     stage.switch_fine_on("X")
     return stage.twin
 
 
-MACHINES = {
+MACHINES: dict[str, Callable[..., Twin]] = {
     "s0": lambda seed, nodes=tuple(ADDRESSES.values()): Twin(
         nodes=nodes, seed=seed, node_parameters=WITH_SEGMENTS
     ),
@@ -29,9 +33,10 @@ MACHINES = {
 }
 
 
-def open_port(machine: str, seed: int, **settings) -> TwinTransport:
-    """The port `twin:MACHINE` of the host package (entry point of the group moire.ports);
-    TwinNotBuilt where it cannot be built.
+def open_port(machine: str, seed: int, **settings: Any) -> TwinTransport:
+    """The port `twin:MACHINE` of the host package (entry point of the group moire.ports).
+
+    Raises TwinNotBuilt if the machine cannot be built.
     """
     try:
         return TwinTransport(MACHINES[machine](seed, **settings))

@@ -1,26 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""S0 with its fine stage: the motor brings the table within reach, a piezo on the table takes the
-rest.
+"""S0 with its fine stage: the motor moves the table into the range of a piezo on the table, and
+the piezo corrects the remaining error.
 
     python -m experiments.s0_fine
 
-Powers the X axis up with a piezo on its table, homes, learns the ellipse of sine and cosine in
-motion, homes again with the correction
-in force, switches the fine stage on, sends random moves and writes build/report/s0_fine/index.html.
-The paper aims at 0.01 um.
+The experiment powers up the X axis with a piezo on its table, homes it, calibrates the correction
+of sine and cosine in motion, homes it again with this correction, switches the fine stage on, makes
+random moves and writes build/report/s0_fine/index.html. The paper aims at 0.01 um.
 
-The zero of an axis is the place where it stands when it is told to go to 0. That is 4.4 nm beside a
-zero of the sine of this stage:
-the correction turns the sine until it is square to the cosine, which is off by 2 degrees. It is the
-same at every homing.
+The zero of an axis is its true position after a move to 0. On this stage it is 4.4 nm from a zero
+of the sine signal, because the correction removes a quadrature error of 2 degrees by rotating the
+sine. This distance is the same at every homing.
 """
 
 import argparse
 import random
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 from rich.console import Console
@@ -29,36 +29,39 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from experiments.s0_stage import ADDRESSES, POLL_S, ROOT, Stage, random_moves, table
 from moire.analysis import report
 from moire.client.bus import Bus
+from moire.client.records import CalibrationState
 from moire.errors import MoireError
 from twin import START_S, BuildError, Twin, TwinTransport
+from twin.machines.machine import MachineHandle, Trace
 from twin.nodes.twin import drives
 
-REQUIRED_NM = 10.0  # of the paper
+REQUIRED_NM = 10.0  # the aim of the paper
 NODE = {**drives("HAS_BRIDGE", "HAS_DAC", "HAS_FINE_STAGE"), "FILTERS": 0}
-FINE = {
-    "fine_ki": 20000
-    / 2**24,  # 9 Hz: with twice as much the flexure's mode of 500 Hz, 25 times its own, would ring
+FINE: dict[str, str | float] = {
+    # 9 Hz; with twice this gain the mode of the flexure at 500 Hz (Q = 25) would oscillate
+    "fine_ki": 20000 / 2**24,
     "fine_reach": "100nm",
     "settle_window": "3nm",
 }
-STROKES = ("0.7mm", "0.3mm")  # to and fro, while the ellipse is learned
+STROKES = ("0.7mm", "0.3mm")  # targets of the strokes during the calibration
 MOST_STROKES = 30
-ZERO_S = 0.2  # over which the place of the zero is averaged
-HOLD_S = 1.0  # over which the jitter is
+ZERO_S = 0.2  # the position of the zero is averaged over this time
+HOLD_S = 1.0  # the jitter is measured over this time
 TRACE_HZ = 10_000
 FOLDER = ROOT / "build" / "report" / "s0_fine"
 
 
 @dataclass
 class FineStage(Stage):
-    """The stage of S0 with a piezo on the table of each axis; `sine_zero_nm` is the zero of the
-    sine nearest to zero_nm.
+    """The stage of S0 with a piezo on the table of each axis. `sine_zero_nm` is the zero of the
+    sine signal that is nearest to `zero_nm`.
     """
 
-    sine_zero_nm: dict = field(default_factory=dict)
+    sine_zero_nm: dict[str, float] = field(default_factory=dict)
 
     @classmethod
-    def power_up(cls, seed=1, names=("X",), **plant):
+    def power_up(cls, seed: int = 1, names: Sequence[str] = ("X",), **plant: Any) -> Self:
+        """The machine with these axes after power-up; `plant` overrides parameters of its model."""
         twin = Twin(
             seed=seed,
             nodes=tuple(ADDRESSES[name] for name in names),
@@ -69,52 +72,56 @@ class FineStage(Stage):
         bus.transport.wait(START_S)
         return cls(twin, bus, {name: bus.axis(ADDRESSES[name]) for name in names})
 
-    def calibrate_ellipse(self, name):
-        """To and fro until an ellipse is accepted, which then stays in force; returns what the
-        learner says.
+    def calibrate_ellipse(self, name: str) -> CalibrationState:
+        """Moves an axis back and forth until the calibration accepts a measurement, and freezes the
+        correction; returns the state of the calibration.
         """
         axis = self.axes[name]
         axis.calibration("calibrate")
-        for way in range(MOST_STROKES):
-            axis.move(STROKES[way % len(STROKES)], progress=self.record_while_moving(name))
+        for stroke in range(MOST_STROKES):
+            axis.move(STROKES[stroke % len(STROKES)], progress=self.record_while_moving(name))
             if axis.calibration().accepted:
                 break
         return axis.calibration("freeze")
 
-    def prepare(self, name):
-        """Home, learn, home again, fine stage on; then the zero is where the axis stands."""
+    def prepare(self, name: str) -> CalibrationState:
+        """Homes and calibrates an axis, homes it again and switches its fine stage on. The zero is
+        the true position after a move to 0.
+        """
         axis = self.axes[name]
         self.home(name)
-        learned = self.calibrate_ellipse(name)
+        calibrated = self.calibrate_ellipse(name)
         self.home(name)
         self.switch_fine_on(name)
         axis.move(nm=0, progress=self.record_while_moving(name))
         self.sine_zero_nm[name] = self.zero_nm[name]
         self.zero_nm[name] += float(np.mean(self.watch(name, ZERO_S)["true_nm"]))
-        return learned
+        return calibrated
 
-    def switch_fine_on(self, name):
+    def switch_fine_on(self, name: str) -> None:
+        """Sets the parameters of the fine stage."""
         for parameter, value in FINE.items():
             self.axes[name].set_parameter(parameter, value)
 
-    def machine(self, name):
+    def machine(self, name: str) -> MachineHandle:
+        """The model of this axis."""
         return self.twin.machine(list(self.axes).index(name))
 
-    def watch(self, name, seconds):
-        """Let time pass; what the machine truly did, true_nm from the zero."""
+    def watch(self, name: str, seconds: float) -> Trace:
+        """Lets time pass and returns the trace of the machine, see traced()."""
         self.machine(name).trace(TRACE_HZ)
         self.dwell(seconds)
         return self.traced(name)
 
-    def traced(self, name):
-        """The trace that ends here, with the true position from the zero in nm."""
+    def traced(self, name: str) -> Trace:
+        """The trace until now; `true_nm` is the true position from the zero in nm."""
         machine = self.machine(name)
         trace = machine.take_trace()
         machine.trace(0)
         return {**trace, "true_nm": trace["position_m"] * 1e9 - self.zero_nm[name]}
 
-    def watch_move(self, name, target_nm):
-        """The move, and what the machine truly did in it."""
+    def watch_move(self, name: str, target_nm: float) -> tuple[report.Move, Trace]:
+        """Moves an axis; returns the move and the trace of the machine."""
         self.machine(name).trace(TRACE_HZ)
         move = self.move(name, target_nm)
         return move, self.traced(name)
@@ -123,8 +130,10 @@ class FineStage(Stage):
 # ------------------------------------------------------------------ the experiment
 
 
-def hand_over_picture(stage, name, target_nm):
-    """One more move, drawn from where it is 2 um off: what is left, and what the piezo adds."""
+def hand_over_picture(stage: FineStage, name: str, target_nm: float) -> bytes:
+    """A picture (PNG) of the end of one more move, from an error of 2 um on: the error and the
+    stroke of the piezo.
+    """
     _, trace = stage.watch_move(name, target_nm)
     error = trace["true_nm"] - target_nm
     near = max(0, int(np.flatnonzero(np.abs(error) > 2000)[-1]))
@@ -143,7 +152,7 @@ def hand_over_picture(stage, name, target_nm):
             trace["piezo_m"][near:] * 1e9,
             color=report.colour(1),
             linewidth=1.2,
-            label="of it the piezo's way",
+            label="stroke of the piezo",
         )
         panel.set_xlabel("time / ms")
     whole.set_ylabel("nm")
@@ -152,8 +161,10 @@ def hand_over_picture(stage, name, target_nm):
     return report.png(figure)
 
 
-def run(seed=1, count=24, folder=FOLDER, console=None):
-    """The whole experiment; returns the moves and the path of the report."""
+def run(
+    seed: int = 1, count: int = 24, folder: Path = FOLDER, console: Console | None = None
+) -> tuple[list[report.Move], Path]:
+    """Runs the whole experiment and returns the moves and the path of the report."""
     console = console or Console()
     console.print(f"[bold]S0: one axis, motor and piezo[/] (seed {seed})")
     with console.status("building the twin: nodes, firmware, machine"):
@@ -166,7 +177,7 @@ def run(seed=1, count=24, folder=FOLDER, console=None):
         TimeElapsedColumn(),
         console=console,
     ) as progress:
-        task = progress.add_task("homing, learning", total=1)
+        task = progress.add_task("homing, calibration", total=1)
         stage.prepare("X")
         progress.advance(task)
         task = progress.add_task("moves", total=count)
@@ -181,8 +192,9 @@ def run(seed=1, count=24, folder=FOLDER, console=None):
         moves=moves,
         paper_error_nm=REQUIRED_NM,
         drawn={"hand_over": ("The end of a move: the motor hands over to the piezo", picture)},
-        summary="The X axis, simulated from the very RTL and firmware that go into the FPGA, closed around a model of the stage with a "
-        "piezo on its table: hysteresis, creep, a mode at 500 Hz. The true position is the model's; no controller sees it.",
+        summary="The simulation of the X axis runs the same RTL and firmware as the FPGA, with a "
+        "model of the stage and of the piezo on its table (hysteresis, creep, a mode at 500 Hz). "
+        "The true position is the position of the model; no controller can see it.",
         compared=[
             report.Compared(
                 "positioning error, motor and piezo",
@@ -194,7 +206,9 @@ def run(seed=1, count=24, folder=FOLDER, console=None):
             report.Compared("standstill jitter over 1 s", "not given", f"{jitter:.2f} nm rms"),
         ],
         facts={
-            "zero beside a zero of the sine": f"{stage.zero_nm['X'] - stage.sine_zero_nm['X']:+.1f} nm",
+            "zero, from a zero of the sine": (
+                f"{stage.zero_nm['X'] - stage.sine_zero_nm['X']:+.1f} nm"
+            ),
             "simulated time": f"{stage.bus.transport.now():.2f} s",
             "wall time": f"{time.perf_counter() - began:.1f} s",
             "again": f"build/venv/bin/python -m experiments.s0_fine --seed {seed} --moves {count}",
@@ -203,19 +217,21 @@ def run(seed=1, count=24, folder=FOLDER, console=None):
     path = report.write(result, folder)
     stage.axes["X"].disable()
     console.print(
-        f"largest error {errors.largest:.1f} nm, rms {errors.rms:.2f} nm (paper's aim: 10 nm); jitter {jitter:.2f} nm rms"
+        f"largest error {errors.largest:.1f} nm, rms {errors.rms:.2f} nm (paper's aim: 10 nm); "
+        f"jitter {jitter:.2f} nm rms"
     )
     console.print(f"report with pictures: {path}", soft_wrap=True)
     return moves, path
 
 
-def main(arguments=None):
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the experiment from the command line and returns the exit code."""
     parser = argparse.ArgumentParser(
         prog="python -m experiments.s0_fine",
-        description="S0 with its fine stage: home, learn, move, report.",
+        description="S0 with its fine stage: it homes, calibrates, moves and writes a report.",
     )
     parser.add_argument(
-        "--seed", type=int, default=1, help="of the machine and of the targets (default 1)"
+        "--seed", type=int, default=1, help="seed of the machine and of the targets (default 1)"
     )
     parser.add_argument(
         "--moves", type=int, default=24, help="number of moves, 2 to 10000 (default 24)"
@@ -224,7 +240,7 @@ def main(arguments=None):
         "--report",
         type=Path,
         default=FOLDER,
-        help="folder of the page (default build/report/s0_fine)",
+        help="directory of the page (default build/report/s0_fine)",
     )
     options = parser.parse_args(arguments)
     if not 2 <= options.moves <= 10000:
@@ -233,7 +249,7 @@ def main(arguments=None):
         run(options.seed, options.moves, options.report)
     except (MoireError, BuildError) as error:
         print(f"s0_fine: {error}", file=sys.stderr)
-        return getattr(error, "exit_code", 1)
+        return int(getattr(error, "exit_code", 1))
     except KeyboardInterrupt:
         print("s0_fine: interrupted", file=sys.stderr)
         return 130

@@ -1,58 +1,65 @@
 # SPDX-License-Identifier: Apache-2.0
-"""S0: the X-Y precision stage with a grating interferometer, one node an axis, both on one
-multi-drop line.
+"""S0: the X-Y precision stage with a grating interferometer; each axis has a node, and both nodes
+are on one RS-485 bus.
 
     python -m experiments.s0_stage            (make demo)
 
-Powers two nodes up with their stages at unknown places, finds and checks them, homes both, sends a
-list of moves, X to its
-accuracy and then Y, and writes build/report/index.html. The paper reached 0.8 um with the motors
-alone.
+The experiment powers up two nodes with their stages at unknown positions, finds and checks the
+nodes, homes both axes, makes a list of moves, in turn of X and of Y, and writes
+build/report/index.html. The paper reached 0.8 um with the motors alone.
 """
 
 import argparse
 import random
 import sys
 import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, Self
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from moire.analysis import report
+from moire.client.axis import Axis
 from moire.client.bus import Bus
+from moire.client.records import Identity, Status
 from moire.errors import MoireError
 from twin import START_S, BuildError, Twin, TwinTransport
 
 ROOT = Path(__file__).resolve().parents[2]
-ADDRESSES = {"X": 1, "Y": 2}  # on the line; the order is that of the axes in the twin
+ADDRESSES = {"X": 1, "Y": 2}  # on the bus; the axes of the twin have the same order
 PERIOD_NM = 800.0
-POLL_S = 0.005  # between two looks at a motion
+POLL_S = 0.005  # between two polls of a motion
 MOVES = 24
+
+Statuses = Mapping[str, Status]  # the status of each axis, by its name
 
 
 @dataclass
 class Stage:
-    """The simulated machine and the host that talks to it. `zero_nm` is the true place of each
-    axis' zero.
+    """The simulated machine and its host.
+
+    `zero_nm` is the true position of the zero of each axis.
     """
 
-    twin: object
+    twin: Twin
     bus: Bus
-    axes: dict
-    zero_nm: dict = field(default_factory=dict)
+    axes: dict[str, Axis]
+    zero_nm: dict[str, float] = field(default_factory=dict)
 
     @classmethod
-    def power_up(cls, seed=1, **plant):
+    def power_up(cls, seed: int = 1, **plant: Any) -> Self:
+        """The machine after power-up; `plant` overrides parameters of its model."""
         twin = Twin(seed=seed, nodes=tuple(ADDRESSES.values()), plant=plant)
         bus = Bus(TwinTransport(twin), random_source=random.Random(seed), poll_s=POLL_S)
         bus.transport.wait(START_S)
         return cls(twin, bus, {})
 
-    def find(self):
-        """Both nodes, checked against the tables that this host was made with."""
+    def find(self) -> list[Identity]:
+        """Finds both nodes and checks that their register maps fit this host."""
         found = [identity.address for identity in self.bus.find()]
         missing = [name for name, address in ADDRESSES.items() if address not in found]
         if missing:
@@ -62,28 +69,31 @@ class Stage:
         self.axes = {name: self.bus.axis(address) for name, address in ADDRESSES.items()}
         return [axis.node.identity for axis in self.axes.values()]
 
-    def record_while_moving(self, name, progress=None):
-        """A progress callback that also talks to the other axes, so that no drive hears silence."""
+    def record_while_moving(
+        self, name: str, progress: Callable[[Statuses], object] | None = None
+    ) -> Callable[[Status], None]:
+        """A progress callback that also polls the other axes, so that no watchdog expires."""
 
-        def look(status):
-            told = {
+        def poll(status: Status) -> None:
+            statuses = {
                 other: status if other == name else axis.status()
                 for other, axis in self.axes.items()
             }
             if progress is not None:
-                progress(told)
+                progress(statuses)
 
-        return look
+        return poll
 
-    def dwell(self, seconds):
-        """Let time pass, talking to all axes often enough for their watchdogs."""
+    def dwell(self, seconds: float) -> None:
+        """Lets time pass and polls all axes often enough for their watchdogs."""
         end = self.bus.transport.now() + seconds
         while self.bus.transport.now() < end:
             for axis in self.axes.values():
                 axis.status()
             self.bus.transport.wait(max(0.0, min(0.05, end - self.bus.transport.now())))
 
-    def home(self, name, progress=None):
+    def home(self, name: str, progress: Callable[[Statuses], object] | None = None) -> Status:
+        """Enables and homes an axis, and determines the true position of its zero."""
         axis = self.axes[name]
         axis.enable()
         status = axis.home(progress=self.record_while_moving(name, progress))
@@ -93,14 +103,16 @@ class Stage:
         )
         return status
 
-    def true_nm(self, name, from_zero=True):
-        """Where the table of this axis truly is: what no controller can see."""
+    def true_nm(self, name: str, from_zero: bool = True) -> float:
+        """The true position of the table of this axis, which no controller can see."""
         return self.twin.true_position_nm(list(ADDRESSES).index(name)) - (
             self.zero_nm[name] if from_zero else 0.0
         )
 
-    def move(self, name, target_nm, progress=None):
-        """Go there, wait until the node says that it arrived, and judge it by the true position."""
+    def move(
+        self, name: str, target_nm: float, progress: Callable[[Statuses], object] | None = None
+    ) -> report.Move:
+        """Moves an axis, waits for the end of the motion, and measures the true error."""
         began = self.bus.transport.now()
         status = self.axes[name].move(
             nm=target_nm, progress=self.record_while_moving(name, progress)
@@ -110,20 +122,34 @@ class Stage:
         return report.Move(name, target_nm, status.position_nm, true, true - target_nm, took)
 
 
-def random_target(here_nm, source, shortest_nm=100.0, longest_nm=2e6, low_nm=0.0, high_nm=20e6):
-    """A place whose distance from here is drawn log-uniformly between the shortest and the longest
-    move.
+def random_target(
+    here_nm: float,
+    source: random.Random,
+    shortest_nm: float = 100.0,
+    longest_nm: float = 2e6,
+    low_nm: float = 0.0,
+    high_nm: float = 20e6,
+) -> float:
+    """A random target. Its distance from here is distributed log-uniformly between the shortest and
+    the longest move.
     """
     while True:
-        distance = shortest_nm * (longest_nm / shortest_nm) ** source.random()
+        distance: float = shortest_nm * (longest_nm / shortest_nm) ** source.random()
         target = here_nm + source.choice((-1, 1)) * distance
         if low_nm <= target <= high_nm:
             return target
 
 
-def random_moves(stage, count, seed, progress=None, done=None):
-    """`count` moves, X and Y in turn; the targets are drawn from the seed."""
-    source, here, moves = random.Random(seed), {name: 0.0 for name in stage.axes}, []
+def random_moves(
+    stage: Stage,
+    count: int,
+    seed: int,
+    progress: Callable[[Statuses], object] | None = None,
+    done: Callable[[report.Move], object] | None = None,
+) -> list[report.Move]:
+    """Makes `count` moves of the axes in turn; the seed determines the targets."""
+    source, here = random.Random(seed), {name: 0.0 for name in stage.axes}
+    moves: list[report.Move] = []
     for number in range(count):
         name = list(stage.axes)[number % len(stage.axes)]
         here[name] = random_target(here[name], source)
@@ -137,25 +163,30 @@ def random_moves(stage, count, seed, progress=None, done=None):
 
 
 class Recorder:
-    """What the host saw while it watched."""
+    """Records what the host polls from the nodes."""
 
-    def __init__(self, stage):
+    def __init__(self, stage: Stage) -> None:
         self.stage = stage
-        self.seen = {name: [] for name in stage.axes}  # (time, target, position) in s and nm
-        self.samples = {name: [] for name in stage.axes}  # (sin, cos)
+        # (time, target, position) in s and nm
+        self.seen: dict[str, list[tuple[float, float, float]]] = {name: [] for name in stage.axes}
+        # (sin, cos)
+        self.samples: dict[str, list[tuple[float, float]]] = {name: [] for name in stage.axes}
 
-    def look(self, told):
+    def record(self, statuses: Statuses) -> None:
+        """Adds these statuses, and a sample of sine and cosine of each axis that moves."""
         now = self.stage.bus.transport.now()
-        for name, status in told.items():
+        for name, status in statuses.items():
             self.seen[name].append((now, status.target_nm, status.position_nm))
             if status.in_motion:
                 encoder = self.stage.axes[name].encoder()
                 self.samples[name].append((encoder.sin, encoder.cos))
 
-    def traces(self):
+    def traces(self) -> list[report.Trace]:
+        """The recorded motion of each axis."""
         return [report.Trace(name, *map(list, zip(*rows))) for name, rows in self.seen.items()]
 
-    def lissajous(self):
+    def lissajous(self) -> list[report.Lissajous]:
+        """The recorded samples of each axis that moved."""
         return [
             report.Lissajous(name, *map(list, zip(*pairs)))
             for name, pairs in self.samples.items()
@@ -163,23 +194,30 @@ class Recorder:
         ]
 
 
-def position_words(told):
+def position_words(statuses: Statuses) -> str:
+    """The positions of all axes in one line."""
     return "   ".join(
-        f"{name} {status.position_nm / 1e6:+11.6f} mm" for name, status in told.items()
+        f"{name} {status.position_nm / 1e6:+11.6f} mm" for name, status in statuses.items()
     )
 
 
-def run(seed=1, count=MOVES, folder=ROOT / "build" / "report", console=None):
-    """The whole experiment; returns the moves and the path of the report."""
+def run(
+    seed: int = 1,
+    count: int = MOVES,
+    folder: Path = ROOT / "build" / "report",
+    console: Console | None = None,
+) -> tuple[list[report.Move], Path]:
+    """Runs the whole experiment and returns the moves and the path of the report."""
     console = console or Console()
-    console.print(f"[bold]S0: X-Y stage, two nodes on one line[/] (seed {seed})")
+    console.print(f"[bold]S0: X-Y stage, two nodes on one bus[/] (seed {seed})")
     with console.status("building the twin: nodes, firmware, machine"):
         stage = Stage.power_up(seed)
     began = time.perf_counter()
     for name, identity in zip(ADDRESSES, stage.find()):
         console.print(
             f"  node {identity.address} is axis {name}: register map {identity.map_crc:08X} fits, "
-            f"clk {identity.clk_hz / 1e6:g} MHz, servo {identity.tick_hz / 1e3:g} kHz, {identity.sample_hz / 1e3:g} kS/s"
+            f"clk {identity.clk_hz / 1e6:g} MHz, servo {identity.tick_hz / 1e3:g} kHz, "
+            f"{identity.sample_hz / 1e3:g} kS/s"
         )
     with Progress(
         TextColumn("{task.description}"),
@@ -191,16 +229,16 @@ def run(seed=1, count=MOVES, folder=ROOT / "build" / "report", console=None):
     ) as progress:
         task = progress.add_task("homing", total=len(stage.axes), words="")
         for name in stage.axes:
-            stage.home(name, lambda told: progress.update(task, words=position_words(told)))
+            stage.home(name, lambda statuses: progress.update(task, words=position_words(statuses)))
             progress.advance(task)
         recorder = Recorder(stage)
         task = progress.add_task("moves ", total=count, words="")
 
-        def look(told):
-            recorder.look(told)
-            progress.update(task, words=position_words(told))
+        def record(statuses: Statuses) -> None:
+            recorder.record(statuses)
+            progress.update(task, words=position_words(statuses))
 
-        moves = random_moves(stage, count, seed, look, lambda move: progress.advance(task))
+        moves = random_moves(stage, count, seed, record, lambda move: progress.advance(task))
     margins = ", ".join(
         f"{name} {axis.encoder().home_margin:.2f}" for name, axis in stage.axes.items()
     )
@@ -215,8 +253,9 @@ def run(seed=1, count=MOVES, folder=ROOT / "build" / "report", console=None):
         moves=moves,
         traces=recorder.traces(),
         lissajous=recorder.lissajous(),
-        summary="Two axis nodes on one multi-drop line, simulated from the very RTL and firmware that go into the FPGA, closed around a "
-        "model of the stage. Motors alone, no piezo. The true position is the model's; no controller sees it.",
+        summary="Two axis nodes are on one RS-485 bus. The simulation runs the same RTL and "
+        "firmware as the FPGA, with a model of the stage. The motors position the stage without "
+        "a piezo. The true position is the position of the model; no controller can see it.",
         compared=[
             report.Compared(
                 "coarse positioning error, motor only",
@@ -241,8 +280,9 @@ def run(seed=1, count=MOVES, folder=ROOT / "build" / "report", console=None):
         facts={
             "simulated time": f"{simulated:.2f} s",
             "wall time": f"{wall:.1f} s",
-            "margin of the phase zero at homing (1: sure, 0: ambiguous)": margins,
-            "line": f"{stage.bus.statistics.exchanges} exchanges, {stage.bus.statistics.repeats} repeated",
+            "margin of the phase zero at homing (1: certain, 0: ambiguous)": margins,
+            "bus": f"{stage.bus.statistics.exchanges} exchanges, "
+            f"{stage.bus.statistics.repeats} repeated",
             "again": f"build/venv/bin/python -m experiments.s0_stage --seed {seed} --moves {count}",
         },
     )
@@ -255,7 +295,8 @@ def run(seed=1, count=MOVES, folder=ROOT / "build" / "report", console=None):
     return moves, path
 
 
-def table(moves):
+def table(moves: Sequence[report.Move]) -> Table:
+    """The moves as a table for the terminal."""
     made = Table(
         "axis",
         *(
@@ -276,13 +317,14 @@ def table(moves):
     return made
 
 
-def main(arguments=None):
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the experiment from the command line and returns the exit code."""
     parser = argparse.ArgumentParser(
         prog="python -m experiments.s0_stage",
-        description="The S0 X-Y stage in the twin: home, move, report.",
+        description="The X-Y stage of S0 in the twin: it homes, moves and writes a report.",
     )
     parser.add_argument(
-        "--seed", type=int, default=1, help="of the machine and of the targets (default 1)"
+        "--seed", type=int, default=1, help="seed of the machine and of the targets (default 1)"
     )
     parser.add_argument(
         "--moves", type=int, default=MOVES, help=f"number of moves, 1 to 10000 (default {MOVES})"
@@ -291,7 +333,7 @@ def main(arguments=None):
         "--report",
         type=Path,
         default=ROOT / "build" / "report",
-        help="folder of the page (default build/report)",
+        help="directory of the page (default build/report)",
     )
     options = parser.parse_args(arguments)
     if not 1 <= options.moves <= 10000:
@@ -300,7 +342,7 @@ def main(arguments=None):
         run(options.seed, options.moves, options.report)
     except (MoireError, BuildError) as error:
         print(f"s0_stage: {error}", file=sys.stderr)
-        return getattr(error, "exit_code", 1)
+        return int(getattr(error, "exit_code", 1))
     except KeyboardInterrupt:
         print("s0_stage: interrupted", file=sys.stderr)
         return 130

@@ -1,33 +1,38 @@
 # SPDX-License-Identifier: Apache-2.0
-"""S2: three axes with direct grating-scale input in one node, steppers on 5 mm screws.
+"""S2: three axes in one node, with grating scales as feedback and steppers on 5 mm screws.
 
     python -m experiments.s2_stage
 
-Homes all three at the switch and the index (method 1), puts the origin in the middle of each
-travel, moves at 30 mm/min and faster, to
-both sides of the origin and over the borders of a 16-bit and a 32-bit counter, and holds every move
-against the pulses that the scale
-gave. Writes build/report/s2.html.
+The experiment homes all three axes with the switch and the index (method 1) and sets the origin to
+the middle of each travel. It moves at 30 mm/min and faster, to both sides of the origin and beyond
+the range of a 16-bit and of a 32-bit counter, and compares the counts of every move with the pulses
+of the scale. It writes build/report/s2.html.
 
-The scale speeds that the node takes are a matter of its clk: one count a clk. The twin runs at 1.5
-MHz, so X and Y go 100 mm/s and Z
-25 mm/s here; 500 mm/s, 1000 times the paper's top speed, is 1 and 5 million counts a second: figure
-s2_count_errors.
+The clock frequency of the node limits the speed of the scale: the node counts one count per cycle.
+The twin runs at 3 MHz, and here X and Y move at 100 mm/s and Z at 25 mm/s. The figure
+s2_count_errors measures 500 mm/s, which is 1000 times the top speed of the paper and 1 or 5 million
+counts per second.
 """
 
 import argparse
 import random
 import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from pathlib import Path
+from typing import Self
 
 from rich.console import Console
 from rich.table import Table
 
 from experiments.report_page import ROOT, page, picture
 from moire.analysis import report
+from moire.client.axis import Axis as ClientAxis
 from moire.client.bus import Bus
+from moire.client.records import Status
 from moire.errors import MoireError
+from moire.units import Value
 from twin import START_S, BuildError, Twin, TwinTransport
 from twin.nodes.twin import Axis, Node, drives
 
@@ -35,33 +40,36 @@ CLK_HZ = 3_000_000
 NODE = {**drives("HAS_STEPPER"), "FILTERS": 0, "HAS_SINE": 0}
 POLL_S = 0.02
 SLOW_MM_S = 0.5  # the paper's top speed, 30 mm/min
-WORD = 1 << 16  # counts of the paper's counter
-PAPER_SHARE = 1e-4  # against a digital read-out
+WORD = 1 << 16  # range of the counter of the paper
+PAPER_SHARE = 1e-4  # relative error, compared with a digital read-out
 
 
 @dataclass(frozen=True)
 class Scale:
-    """One axis: its scale, its travel, its stepper."""
+    """The scale, the travel and the stepper of an axis."""
 
     count_um: Fraction
     travel_mm: int
-    step_um: Fraction  # of the driver's microsteps on the 5 mm screw
+    step_um: Fraction  # one microstep of the driver on the 5 mm screw
     top_mm_s: int
 
     @property
-    def period_um(self):
+    def period_um(self) -> Fraction:
+        """The signal period of the scale."""
         return 4 * self.count_um
 
     @property
-    def middle(self):
-        """Of the travel, in periods from the index at its low end."""
+    def middle(self) -> int:
+        """The middle of the travel, in periods from the index at its low end."""
         return round(Fraction(self.travel_mm * 1000, 2) / self.period_um)
 
     @property
-    def word_mm(self):
+    def word_mm(self) -> float:
+        """The distance after which a 16-bit counter overflows."""
         return float(WORD * self.count_um) / 1000
 
-    def machine(self):
+    def machine(self) -> Axis:
+        """The model of this axis."""
         count = float(self.count_um) * 1e-6
         return Axis(
             "stepper_stage",
@@ -76,7 +84,8 @@ class Scale:
             },
         )
 
-    def settings(self):
+    def settings(self) -> dict[str, Value]:
+        """The parameters of the node for this axis."""
         edge = Fraction(self.travel_mm, 2) + 1
         return {
             "period": f"{float(self.period_um)}um",
@@ -121,32 +130,38 @@ SCALES = {
 
 @dataclass(frozen=True)
 class Move:
+    """One move of an axis, and its counts."""
+
     axis: str
     what: str
     speed_mm_s: float
     target_um: float
-    counts: int  # of the node, where it ended
-    given: int  # counts that the scale went in this move
-    counted: int  # counts that the node went
-    apart_um: float  # way of the table by the model less way by the node
+    counts: int  # of the node, after the move
+    given: int  # pulses of the scale in this move
+    counted: int  # counts of the node in this move
+    apart_um: float  # distance of the table by the model minus distance by the node
     heading: str
 
     @property
-    def wrong(self):
+    def wrong(self) -> int:
+        """The number of pulses that were counted wrongly."""
         return abs(self.given - self.counted)
 
 
 @dataclass
 class Stage:
-    """The simulated machine, its node, and the host that talks to it."""
+    """The simulated machine, its node and its host."""
 
-    twin: object
+    twin: Twin
     bus: Bus
-    axes: dict
-    seen: dict = field(default_factory=lambda: {name: [] for name in SCALES})  # (time, counts)
+    axes: dict[str, ClientAxis]
+    seen: dict[str, list[tuple[float, int]]] = field(  # (time, counts)
+        default_factory=lambda: {name: [] for name in SCALES}
+    )
 
     @classmethod
-    def power_up(cls, seed=1):
+    def power_up(cls, seed: int = 1) -> Self:
+        """The machine after power-up, with the parameters of this experiment."""
         twin = Twin(
             [Node(1, [scale.machine() for scale in SCALES.values()])],
             seed=seed,
@@ -164,14 +179,17 @@ class Stage:
             )
         return stage
 
-    def number(self, name):
+    def number(self, name: str) -> int:
+        """The number of this axis."""
         return list(SCALES).index(name)
 
-    def together(self, begin, names):
-        """Begin a motion of several axes and wait for all of them."""
+    def together(
+        self, begin: Callable[[str, ClientAxis], object], names: Iterable[str]
+    ) -> dict[str, Status]:
+        """Begins a motion of several axes and waits until all have ended."""
         for name in names:
             begin(name, self.axes[name])
-        waiting, ended = set(names), {}
+        waiting, ended = set(names), dict[str, Status]()
         while waiting:
             self.bus.transport.wait(POLL_S)
             for name in sorted(waiting):
@@ -180,29 +198,35 @@ class Stage:
                 if status.ended != "running":
                     waiting.discard(name)
         for name in names:
-            ended[name] = self.axes[name].wait()  # raises unless it ended well
+            # raises an error unless the motion ended as commanded
+            ended[name] = self.axes[name].wait()
         return ended
 
-    def home(self):
+    def home(self) -> dict[str, Status]:
+        """Enables and homes all axes."""
         for axis in self.axes.values():
             axis.enable()
         return self.together(lambda name, axis: axis.request("home"), self.axes)
 
-    def both(self, name):
-        """(counts of the scale, counts of the node, true place in um), once the table has stopped:
-        the same twice in a row.
+    def both(self, name: str) -> tuple[int, int, float]:
+        """(counts of the scale, counts of the node, true position in um) after the table has
+        stopped, which is when two successive polls give the same counts.
         """
-        number, seen = self.number(name), None
+        number = self.number(name)
+        seen: tuple[int, int] | None = None
         while True:
             counts = self.axes[name].status().counts
             truth = self.twin.truth(number)
-            if seen == (truth.scale_counts, counts):
+            if seen is not None and seen == (truth.scale_counts, counts):
                 return *seen, truth.position_m * 1e6
             seen = truth.scale_counts, counts
 
-    def move(self, what, targets_um, speed_mm_s=None):
-        """All named axes at once; speed None: the top speed of each."""
-        before, made = {name: self.both(name) for name in targets_um}, []
+    def move(
+        self, what: str, targets_um: Mapping[str, float], speed_mm_s: float | None = None
+    ) -> list[Move]:
+        """Moves all named axes at once. Without a speed, each axis moves at its top speed."""
+        before = {name: self.both(name) for name in targets_um}
+        made: list[Move] = []
         for name in targets_um:
             self.axes[name].set_parameter("velocity", f"{speed_mm_s or SCALES[name].top_mm_s}mm/s")
         self.together(
@@ -211,8 +235,8 @@ class Stage:
         )
         for name, target in targets_um.items():
             now = self.both(name)
-            given, counted, went = (b - a for a, b in zip(before[name], now))
-            apart = went - counted * float(SCALES[name].count_um)
+            given, counted = now[0] - before[name][0], now[1] - before[name][1]
+            apart = now[2] - before[name][2] - counted * float(SCALES[name].count_um)
             made.append(
                 Move(
                     name,
@@ -228,9 +252,9 @@ class Stage:
             )
         return made
 
-    def call_here(self, name, periods):
-        """Home by method 35: the place where the axis stands gets this name; the travel goes with
-        it.
+    def call_here(self, name: str, periods: int) -> None:
+        """Sets the present position of an axis to this value (homing method 35). The limits of the
+        travel are shifted with it.
         """
         axis, scale = self.axes[name], SCALES[name]
         for end, side in (("travel_low", -1), ("travel_high", 1)):
@@ -240,11 +264,11 @@ class Stage:
         axis.home()
 
 
-def moves(stage, done=None):
-    """What the experiment does after homing; every move is one of all three axes."""
-    made = []
+def moves(stage: Stage, done: Callable[[], object] | None = None) -> list[Move]:
+    """The moves of the experiment after homing; all three axes make each of them."""
+    made: list[Move] = []
 
-    def go(what, share, speed=None, by_um=0.0):
+    def go(what: str, share: float, speed: float | None = None, by_um: float = 0.0) -> None:
         made.extend(
             stage.move(
                 what,
@@ -256,15 +280,15 @@ def moves(stage, done=None):
             done()
 
     go("to point A, half a 16-bit counter above the origin", 0.5)
-    go("through the origin to point B, as far below it", -0.5)
+    go("through the origin to point B, as many counts below it", -0.5)
     go("30 mm/min", -0.5, SLOW_MM_S, 200.0)
     go("ten times that", -0.5, 10 * SLOW_MM_S, 2000.0)
-    go("over a border of 16 bits", 0.75)
+    go("over the limit of a 16-bit counter", 0.75)
     go("back to the origin", 0.0)
     for name in SCALES:
-        stage.call_here(name, 1 << 29)  # 2^31 counts: the border of a signed 32-bit counter
+        stage.call_here(name, 1 << 29)  # 2^31 counts: the limit of a signed 32-bit counter
     border = {name: (1 << 31) * float(scale.count_um) for name, scale in SCALES.items()}
-    for what, side in (("below 2^31 counts", -1), ("over 2^31 counts", 1)):
+    for what, side in (("below 2^31 counts", -1), ("above 2^31 counts", 1)):
         made.extend(stage.move(what, {name: border[name] + side * 1000 for name in SCALES}))
         if done is not None:
             done()
@@ -277,17 +301,18 @@ HEAD = (
     "axis",
     "move",
     "speed / mm/s",
-    "pulses given",
+    "pulses of the scale",
     "counted",
     "wrong",
-    "table less node / um",
+    "table minus node / um",
     "counts",
     "16-bit counter",
-    "came",
+    "direction",
 )
 
 
-def rows(made):
+def rows(made: Sequence[Move]) -> list[Sequence[report.Cell]]:
+    """The rows of the table of moves."""
     return [
         (
             move.axis,
@@ -305,15 +330,17 @@ def rows(made):
     ]
 
 
-def pictures(stage):
-    figure, (places, words) = report.drawing(height=4.2, ncols=2)
+def pictures(stage: Stage) -> str:
+    """The picture of the positions, as HTML."""
+    figure, (positions_panel, words) = report.drawing(height=4.2, ncols=2)
     for number, (name, seen) in enumerate(stage.seen.items()):
-        seen = [
-            (time, counts) for time, counts in seen if abs(counts) < 1 << 20
-        ]  # before the place is called 2^31
+        # until the position is set to 2^31 counts
+        seen = [(time, counts) for time, counts in seen if abs(counts) < 1 << 20]
         times, counts = zip(*seen)
         positions = [count * float(SCALES[name].count_um) / 1000 for count in counts]
-        places.plot(times, positions, color=report.colour(number), linewidth=0.9, label=name)
+        positions_panel.plot(
+            times, positions, color=report.colour(number), linewidth=0.9, label=name
+        )
         if name == "X":
             words.plot(
                 times,
@@ -321,20 +348,26 @@ def pictures(stage):
                 color=report.colour(number),
                 linewidth=0.9,
             )
-    places.set(
+    positions_panel.set(
         xlabel="time / s",
         ylabel="position / mm",
         title="homing, and moves on both sides of the origin",
     )
-    places.legend(frameon=False, fontsize="small")
-    words.set(
-        xlabel="time / s", ylabel="16-bit counter", title="what the paper's counter would read of X"
+    positions_panel.legend(frameon=False, fontsize="small")
+    words.set(xlabel="time / s", ylabel="16-bit counter", title="the counter of the paper for X")
+    caption = (
+        "Positions of the three axes, and a 16-bit reading, which is the same on both sides of the "
+        "origin"
     )
-    caption = "Positions of the three axes, and the reading that cannot tell the sides of the origin apart"
     return picture("moves", caption, report.png(figure))
 
 
-def run(seed=1, path=ROOT / "build" / "report" / "s2.html", console=None):
+def run(
+    seed: int = 1,
+    path: Path = ROOT / "build" / "report" / "s2.html",
+    console: Console | None = None,
+) -> tuple[list[Move], Path]:
+    """Runs the whole experiment and returns the moves and the path of the report."""
     console = console or Console()
     console.print(f"[bold]S2: three axes with scales in one node[/] (seed {seed})")
     with console.status("building the twin; homing and moving"):
@@ -352,21 +385,21 @@ def run(seed=1, path=ROOT / "build" / "report" / "s2.html", console=None):
         abs(move.apart_um) / (abs(move.counted) * float(SCALES[move.axis].count_um))
         for move in long
     )
-    compared = [
+    compared: list[Sequence[report.Cell]] = [
         (
-            "pulses given less pulses counted",
+            "pulses of the scale minus pulses counted",
             "0",
             f"{wrong} of {pulses}",
             report.verdict(wrong == 0),
         ),
         (
-            "against a digital read-out, share of the way",
+            "difference from a digital read-out, relative to the distance",
             "within 1/10 000",
             f"1/{1 / share:,.0f}".replace(",", " "),
             report.verdict(share < PAPER_SHARE),
         ),
         (
-            "largest difference of table and node",
+            "largest difference between table and node",
             "not given",
             f"{widest:.2f} counts",
             report.verdict(None),
@@ -381,9 +414,11 @@ def run(seed=1, path=ROOT / "build" / "report" / "s2.html", console=None):
     path = page(
         path,
         "S2: three axes with direct scale input",
-        "Three stepper axes in one node, simulated from the very RTL and firmware that go into the FPGA. Points A and B lie half a "
-        "16-bit counter above and below the origin: the paper's counter reads the same at both, and its direction bit only tells "
-        "the way of the last pulse. The node's position has 48 bits and a sign.",
+        "The simulation of three stepper axes in one node runs the same RTL and firmware as the "
+        "FPGA. Points A and B are half the range of a 16-bit counter above and below the origin. "
+        "The counter of the paper reads the same value at both points, and its direction bit "
+        "indicates only the direction of the last pulse. The position of the node has 48 bits and "
+        "a sign.",
         [
             report.table(("", "paper", "here", ""), compared),
             pictures(stage),
@@ -395,24 +430,26 @@ def run(seed=1, path=ROOT / "build" / "report" / "s2.html", console=None):
         },
     )
     console.print(
-        f"{wrong} of {pulses} pulses counted wrongly; table and node differ by {widest:.2f} counts at most"
+        f"{wrong} of {pulses} pulses counted wrongly; "
+        f"table and node differ by {widest:.2f} counts at most"
     )
     console.print(f"report with pictures: {path}", soft_wrap=True)
     return made, path
 
 
-def main(arguments=None):
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the experiment from the command line and returns the exit code."""
     parser = argparse.ArgumentParser(
         prog="python -m experiments.s2_stage",
-        description="S2 in the twin: home, move, count, report.",
+        description="S2 in the twin: it homes, moves, counts and writes a report.",
     )
-    parser.add_argument("--seed", type=int, default=1, help="of the machine (default 1)")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the machine (default 1)")
     options = parser.parse_args(arguments)
     try:
         run(options.seed)
     except (MoireError, BuildError) as error:
         print(f"s2_stage: {error}", file=sys.stderr)
-        return getattr(error, "exit_code", 1)
+        return int(getattr(error, "exit_code", 1))
     except KeyboardInterrupt:
         print("s2_stage: interrupted", file=sys.stderr)
         return 130

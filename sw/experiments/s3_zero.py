@@ -1,22 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""S3: the zero point of a linear motor, searched from wherever it rests.
+"""S3: the zero point of a linear motor, searched from any position of rest.
 
     python -m experiments.s3_zero
 
-Powers one node up with a voice coil on a current amplifier behind a 16-bit converter, a 1 um scale
-and its reference mark. Ten times the
-drive is off, the mover left anywhere within 1 mm of the mark, and the zero searched (home_method
--2): up, and if the mark is not there
-down; the count at its rising edge is captured in hardware, always going up. Writes
-build/report/s3.html. The paper's zero lay
-within +-2 um.
+The experiment powers up one node with a voice coil, a current amplifier, a 16-bit DAC, a 1 um scale
+and its reference mark. Ten times the drive is switched off, the mover is left anywhere within 1 mm
+of the mark, and the zero is searched (home_method -2): first in the positive direction and, if the
+mark is not found, in the negative direction. The hardware latches the count at the rising edge of
+the mark, always in the positive direction. The result is build/report/s3.html. The zero of the
+paper was within +-2 um.
 """
 
 import argparse
 import math
 import random
 import sys
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
@@ -24,30 +25,33 @@ from rich.table import Table
 from experiments.report_page import ROOT, page, picture
 from moire.analysis import report
 from moire.client.bus import Bus
+from moire.client.records import Status
 from moire.errors import MoireError
+from moire.units import Value
 from twin import START_S, BuildError, Twin, TwinTransport
+from twin.machines.machine import Trace
 from twin.nodes.twin import Axis, Node, drives
 from twin.parameters import tables as parameters
 
-CLK_HZ = 1_600_000  # enough for a count in 20 clk at the top speed
+CLK_HZ = 1_600_000  # at the top speed a count takes more than 20 cycles
 NODE = {**drives("HAS_DAC"), "FILTERS": 0, "HAS_SINE": 0}
-POLL_S = 0.01  # between two looks at a search
-SEARCHES = 10  # of the paper's table 1
-RANGE_M = 1e-3  # the mover rests this near to the mark
+POLL_S = 0.01  # between two polls of a search
+SEARCHES = 10  # as in table 1 of the paper
+RANGE_M = 1e-3  # the mover is at rest within this distance of the mark
 COUNT_M = 1e-6
 COUNTS_PER_PERIOD = 4
 PAPER_UM = 2.0
 TICK_HZ = 4000
 POSITION_LSB_M = COUNTS_PER_PERIOD * COUNT_M / 65536
-FULL_SCALE = 32768  # of a command, and of kp, kd, kv; ki and ka have their own
+FULL_SCALE = 32768  # of a command, and of kp, kd and kv; ki and ka have other scales
 
-SETTINGS = {
+SETTINGS: dict[str, Value] = {
     "period": "4um",
     "counts_per_period": COUNTS_PER_PERIOD,
     "position_source": 1,
     "drive": 2,
     "disagreement_limit": 0,
-    "encoder_fault_mask": 1,  # an illegal edge of A/B is a fault: counts would be lost
+    "encoder_fault_mask": 1,  # an illegal transition of A/B is a fault, because counts are lost
     "deglitch": "1us",
     "velocity_quantum": "1um",
     "travel_low": "-6mm",
@@ -68,14 +72,15 @@ SETTINGS = {
 }
 
 
-def servo(bandwidth_hz=60.0, damping=0.9, integral_share=1 / 3):
-    """Gains for a mass on a current amplifier: poles of the position loop at the bandwidth,
-    feed-forward of mass and drag.
+def servo(
+    bandwidth_hz: float = 60.0, damping: float = 0.9, integral_share: float = 1 / 3
+) -> dict[str, float]:
+    """Gains for a mass on a current amplifier: the poles of the position loop are at the bandwidth,
+    and mass and drag have a feed-forward.
     """
     p = parameters.values(machine="linear_motor")
-    newton = (
-        p["motor_constant"] * p["amplifier_gain"] * p["amplifier_reference"] / FULL_SCALE
-    )  # a count of command
+    # force of one count of the command
+    newton = p["motor_constant"] * p["amplifier_gain"] * p["amplifier_reference"] / FULL_SCALE
     inertia = p["mover_mass"] * POSITION_LSB_M * TICK_HZ**2 / newton  # command / (LSB/tick2)
     drag = p["guide_viscous"] * POSITION_LSB_M * TICK_HZ / newton  # command / (LSB/tick)
     omega = 2 * math.pi * bandwidth_hz / TICK_HZ
@@ -91,18 +96,22 @@ def servo(bandwidth_hz=60.0, damping=0.9, integral_share=1 / 3):
 
 @dataclass(frozen=True)
 class Search:
+    """One search of the zero."""
+
     start_um: float
-    ways: str  # directions in which it went
+    directions: str  # of the motion, in their order
     time_s: float
-    zero_counts: int  # count of the scale at which the node's zero lies
-    remaining_um: float  # where the mover ended
-    trace: dict  # time_s, position_m
+    zero_counts: int  # count of the scale at the zero of the node
+    remaining_um: float  # position of the mover after the search
+    trace: Trace  # time_s, position_m
 
 
 class Motor:
-    """The simulated machine, its node, and the host that talks to it."""
+    """The simulated machine, its node and its host."""
 
-    def __init__(self, seed=1, settings=None, **machine):
+    def __init__(
+        self, seed: int = 1, settings: Mapping[str, Value] | None = None, **machine: float
+    ) -> None:
         self.twin = Twin(
             [Node(1, [Axis("linear_motor", machine)])],
             seed=seed,
@@ -116,56 +125,62 @@ class Motor:
             self.axis.set_parameter(name, value)
 
     @property
-    def position_um(self):
-        return self.twin.truth().position_m * 1e6
+    def position_um(self) -> float:
+        """The true position of the mover."""
+        return float(self.twin.truth().position_m * 1e6)
 
-    def carry(self, place_m):
-        """A hand moves the mover while the drive is off, and lets go."""
+    def carry(self, position_m: float) -> None:
+        """Switches the drive off and moves the mover to this position by an external force."""
         self.axis.disable()
         for _ in range(100):
             now = self.twin.truth()
-            way = place_m - now.position_m
-            if abs(way) < 20e-6:
+            distance = position_m - now.position_m
+            if abs(distance) < 20e-6:
                 break
-            self.twin.push(0, 4000 * way + math.copysign(1.1, way) - 140 * now.velocity_m_s)
+            force = 4000 * distance + math.copysign(1.1, distance) - 140 * now.velocity_m_s
+            self.twin.push(0, force)
             self.twin.run(2e-3)
         self.twin.push(0, 0.0)
         self.twin.run(0.05)
 
-    def zero_counts(self):
-        """Judged with the drive off, when nothing moves any more: the machine's count less the
-        node's.
+    def zero_counts(self) -> int:
+        """The count of the scale at the zero of the node: the true count minus the count of the
+        node, both read at rest with the drive off.
         """
         self.axis.disable()
         self.twin.run(0.02)
-        return self.twin.truth().scale_counts - self.axis.status().counts
+        return int(self.twin.truth().scale_counts) - self.axis.status().counts
 
-    def search(self, rate_hz=0):
+    def search(self, rate_hz: float = 0) -> Search:
+        """Searches the zero; with a rate, the search has a trace of the machine."""
         start_um, began = self.position_um, self.bus.transport.now()
         self.twin.trace(0, rate_hz)
         self.axis.enable()
-        headings = []
+        headings: list[str] = []
 
-        def look(status):
+        def record(status: Status) -> None:
             if abs(status.velocity_mm_s) > 1:
                 heading = "up" if status.velocity_mm_s > 0 else "down"
                 if heading not in headings[-1:]:
                     headings.append(heading)
 
-        self.axis.home(progress=look)
-        took, remaining_um, trace = (
-            self.bus.transport.now() - began,
-            self.position_um,
-            self.twin.take_trace() if rate_hz else {},
-        )
+        self.axis.home(progress=record)
+        took, remaining_um = self.bus.transport.now() - began, self.position_um
+        trace = self.twin.take_trace() if rate_hz else {}
         return Search(start_um, ", ".join(headings), took, self.zero_counts(), remaining_um, trace)
 
 
-def searches(count, seed=1, rate_hz=0, done=None):
-    """The first from where the mover was at power-up, each next one from a random place within
-    RANGE_M of the mark.
+def searches(
+    count: int,
+    seed: int = 1,
+    rate_hz: float = 0,
+    done: Callable[[Search], object] | None = None,
+) -> list[Search]:
+    """Makes several searches: the first from the position at power-up, the others from random
+    positions within RANGE_M of the mark.
     """
-    motor, source, made = Motor(seed), random.Random(seed), []
+    motor, source = Motor(seed), random.Random(seed)
+    made: list[Search] = []
     for number in range(count):
         if number:
             motor.carry(source.uniform(-RANGE_M, RANGE_M))
@@ -175,7 +190,8 @@ def searches(count, seed=1, rate_hz=0, done=None):
     return made
 
 
-def zero_spread(made):
+def zero_spread(made: Sequence[Search]) -> int:
+    """The largest difference between the zeros of these searches, in counts."""
     zeros = [search.zero_counts for search in made]
     return max(zeros) - min(zeros)
 
@@ -186,20 +202,21 @@ HEAD = (
     "search",
     "started at / um",
     "side of the mark",
-    "went",
+    "directions",
     "time / s",
     "zero, count of the scale",
     "mover at / um",
 )
 
 
-def rows(made):
+def rows(made: Sequence[Search]) -> list[tuple[str, ...]]:
+    """The rows of the table of searches."""
     return [
         (
             str(number),
             f"{search.start_um:+.1f}",
             "above" if search.start_um > 0 else "below",
-            search.ways,
+            search.directions,
             f"{search.time_s:.2f}",
             str(search.zero_counts),
             f"{search.remaining_um:+.2f}",
@@ -208,17 +225,20 @@ def rows(made):
     ]
 
 
-def pictures(made):
-    figure, (ways, zeros) = report.drawing(height=4.2, ncols=2)
+def pictures(made: Sequence[Search]) -> str:
+    """The picture of the searches, as HTML."""
+    figure, (motions, zeros) = report.drawing(height=4.2, ncols=2)
     for number, search in enumerate(made):
-        ways.plot(
+        motions.plot(
             search.trace["time_s"] - search.trace["time_s"][0],
             search.trace["position_m"] * 1e3,
             linewidth=0.9,
             color=report.colour(number),
         )
-    ways.axhline(0, color="#999999", linewidth=0.8)
-    ways.set(xlabel="time / s", ylabel="true position / mm", title="ten searches; the mark is at 0")
+    motions.axhline(0, color="#999999", linewidth=0.8)
+    motions.set(
+        xlabel="time / s", ylabel="true position / mm", title="ten searches; the mark is at 0"
+    )
     first = made[0].zero_counts
     zeros.plot(
         range(1, len(made) + 1),
@@ -226,7 +246,7 @@ def pictures(made):
         linestyle="",
         marker="o",
         color=report.colour(0),
-        label="zero, of the first",
+        label="zero, relative to the first",
     )
     for side in (-1, 1):
         zeros.axhline(
@@ -239,21 +259,29 @@ def pictures(made):
     zeros.set(xlabel="search", ylabel="zero / um", ylim=(-3, 3), title="the zero point")
     zeros.legend(frameon=False, fontsize="small")
     return picture(
-        "searches", "Searches from random rest, and where each found its zero", report.png(figure)
+        "searches",
+        "Searches from random positions, and the zero that each found",
+        report.png(figure),
     )
 
 
-def run(seed=1, count=SEARCHES, path=ROOT / "build" / "report" / "s3.html", console=None):
+def run(
+    seed: int = 1,
+    count: int = SEARCHES,
+    path: Path = ROOT / "build" / "report" / "s3.html",
+    console: Console | None = None,
+) -> tuple[list[Search], Path]:
+    """Runs the whole experiment and returns the searches and the path of the report."""
     console = console or Console()
     console.print(f"[bold]S3: zero point of a linear motor[/] (seed {seed})")
     with console.status("building the twin; searching"):
         made = searches(count, seed, rate_hz=2000)
-    shown = Table(*HEAD, title=f"{count} searches from free rest")
+    shown = Table(*HEAD, title=f"{count} searches from positions of rest")
     for row in rows(made):
         shown.add_row(*row)
     console.print(shown)
     spread = zero_spread(made)
-    compared = [
+    compared: list[Sequence[report.Cell]] = [
         (
             "spread of the zero point",
             "\N{PLUS-MINUS SIGN}2 um",
@@ -270,9 +298,10 @@ def run(seed=1, count=SEARCHES, path=ROOT / "build" / "report" / "s3.html", cons
     path = page(
         path,
         "S3: zero point of a linear motor",
-        "A voice coil on a current amplifier, set by a 16-bit converter; a scale of 1 um with a reference mark. Simulated from the "
-        "very RTL and firmware that go into the FPGA, closed around a model of the machine. The zero is judged by the count of the "
-        "model's scale, which no controller sees.",
+        "The machine has a voice coil, a current amplifier with a 16-bit DAC, and a scale of 1 um "
+        "with a reference mark. The simulation runs the same RTL and firmware as the FPGA, with a "
+        "model of the machine. The zero is measured by the count of the scale of the model, which "
+        "no controller can see.",
         [
             report.table(("", "paper", "here", ""), compared),
             pictures(made),
@@ -285,15 +314,20 @@ def run(seed=1, count=SEARCHES, path=ROOT / "build" / "report" / "s3.html", cons
     return made, path
 
 
-def main(arguments=None):
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the experiment from the command line and returns the exit code."""
     parser = argparse.ArgumentParser(
-        prog="python -m experiments.s3_zero", description="S3 in the twin: search the zero, report."
+        prog="python -m experiments.s3_zero",
+        description="S3 in the twin: it searches the zero and writes a report.",
     )
     parser.add_argument(
-        "--seed", type=int, default=1, help="of the machine and of the places (default 1)"
+        "--seed", type=int, default=1, help="seed of the machine and of the positions (default 1)"
     )
     parser.add_argument(
-        "--searches", type=int, default=SEARCHES, help=f"1 to 10000 (default {SEARCHES})"
+        "--searches",
+        type=int,
+        default=SEARCHES,
+        help=f"number of searches, 1 to 10000 (default {SEARCHES})",
     )
     options = parser.parse_args(arguments)
     if not 1 <= options.searches <= 10000:
@@ -302,7 +336,7 @@ def main(arguments=None):
         run(options.seed, options.searches)
     except (MoireError, BuildError) as error:
         print(f"s3_zero: {error}", file=sys.stderr)
-        return getattr(error, "exit_code", 1)
+        return int(getattr(error, "exit_code", 1))
     except KeyboardInterrupt:
         print("s3_zero: interrupted", file=sys.stderr)
         return 130

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""S4: an indexing table and a wire-EDM machine cut all stations of a program, unattended.
+"""S4: an indexing table and a wire-EDM machine cut all stations of a list without an operator.
 
     python -m experiments.s4_job
 
-Two nodes with the firmware image `station`: the main node with EEPROM, key-pad, display, PS/2
-keyboard and the EDM machine, the sub-node
-with the worm table and its angle sensor. A person divides the turn on the panel and presses START;
-then nobody touches it. Each cut is
-judged by the EDM machine's log, which has the true angle of the table. Writes build/report/s4.html.
+Two nodes run the firmware image `station`: the main node has the EEPROM, key-pad, display, PS/2
+keyboard and the EDM machine, and the sub-node has the worm table and its angle sensor. An operator
+divides the turn on the panel and presses START; then the job runs unattended. Each cut is checked
+against the log of the EDM machine, which has the true angle of the table. The result is
+build/report/s4.html.
 
-`--trouble` adds damaged sensor frames, garbage between the nodes, a person who types, and a power
-cut, after which a person answers.
+`--trouble` adds damaged sensor frames, garbage between the nodes, an operator who types, and a
+power failure, after which the operator answers.
 
-Times are shortened: a cut takes 0.3 s, the table goes 10 degrees a second.
+The times are shortened: a cut takes 0.3 s, and the table turns 10 degrees per second.
 """
 
 import argparse
@@ -20,7 +20,11 @@ import html
 import math
 import random
 import sys
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Self
 
 from rich.console import Console
 from rich.table import Table as Rows
@@ -29,19 +33,21 @@ from experiments.report_page import ROOT, page, picture
 from moire.analysis import report
 from moire.client.bus import Bus
 from moire.client.indexing_table import TURN, IndexingTable
-from moire.client.job import Job, equal_parts
+from moire.client.job import Job, JobState, equal_parts
+from moire.client.node import Node as ClientNode
 from moire.client.nonvolatile import SavedSettings
 from moire.client.settings import Settings
 from moire.errors import MoireError
+from moire.units import Value
 from twin import START_S, Axis, BuildError, Devices, Node, Twin, TwinTransport, build
 from twin.nodes.twin import drives
 
-MAIN, SUB = 0, 1  # places of the nodes
+MAIN, SUB = 0, 1  # numbers of the nodes in the twin
 ADDRESSES = (1, 2)
 CLK_HZ = 1_840_000
 PEER_BAUD = 115200
 NODE = {**drives("HAS_STEPPER"), "FILTERS": 0, "HAS_SINE": 0}
-AXIS = {
+AXIS: dict[str, Value] = {
     "drive": "steps",
     "position_source": "own_steps",
     "steps_per_period": 4,
@@ -73,40 +79,35 @@ WORM = {
 }  # arcsec
 CUT_S = 0.3
 POLL_S = 0.1
-KEY_S = 0.06  # a key is down, and up again, so long
-SHOWN_S = 0.6  # until the display tells it
-ANSWER_S = 1.0  # a person looks before answering
-DARK_S = 0.5  # a power cut
-STATION_S, MORE_S = 12, 90  # a job takes no longer: a station, and all ways, trouble and answers
-ABOUT = 5  # degrees: the table stands anywhere from 0 on to this before the job
-NEAR = 60  # arcsec: a cut farther away from every station is a stray
-TABLE = {"turn_settle": "40ms"}
-TOLERANCE = 2.0  # arcsec, the paper's
+KEY_S = 0.06  # a key is pressed, and released, for this time
+SHOWN_S = 0.6  # until the display shows a new state
+ANSWER_S = 1.0  # the operator reads the display before answering
+DARK_S = 0.5  # duration of a power failure
+# a job takes at most STATION_S per station, and MORE_S for motion, faults and answers
+STATION_S, MORE_S = 12, 90
+ABOUT = 5  # degrees: before the job the table is anywhere from 0 to this angle
+NEAR = 60  # arcsec: a cut farther away from every station belongs to none
+TABLE: dict[str, Value] = {"turn_settle": "40ms"}
+TOLERANCE = 2.0  # arcsec, as in the paper
 MODES = ("frames", "printed")
 
 PAD = """7 8 9 START PAUSE RESUME STOP
          4 5 6 AGAIN NEXT UP DOWN
          1 2 3 DIVIDE LIST LIMIT SPEED
          0 . ENTER CLEAR""".split()
-LETTERS = (
-    0x1C,
-    0x32,
-    0x21,
-    0x23,
-    0x24,
-    0x2B,
-    0x1D,
-    0x14,
-)  # scan codes of a person's keys, those of the start among them
+# scan codes of the keys that the operator types, including those of the start
+LETTERS = (0x1C, 0x32, 0x21, 0x23, 0x24, 0x2B, 0x1D, 0x14)
 
 
 @dataclass(frozen=True)
 class Trouble:
-    corrupt: float = 0.0  # of the sensor's frames
-    garbage_hz: float = 0.0  # bursts of it, each way between the nodes
+    """The disturbances of a job."""
+
+    corrupt: float = 0.0  # share of the sensor frames
+    garbage_hz: float = 0.0  # rate of the bursts in each direction between the nodes
     typing: bool = False
     power_cut_s: float | None = None  # after the start
-    dark: tuple = ()  # places of the nodes that lose their power
+    dark: tuple[int, ...] = ()  # the nodes that lose their power
 
 
 CALM = Trouble()
@@ -114,85 +115,100 @@ CALM = Trouble()
 
 @dataclass(frozen=True)
 class Cut:
-    station: int | None  # from 0 on; None is none
-    wanted: float  # arcsec, as the next two
-    # true, the farther one of begin and end; at its begin if the table lost its power meanwhile
+    """One cut of the EDM machine."""
+
+    station: int | None  # from 0 on; None: the cut belongs to no station
+    target: float  # arcsec
+    # the true angle in arcsec at the beginning or at the end, whichever has the larger error; at
+    # the beginning if the table lost its power during the cut
     angle: float
-    error: float
+    error: float  # arcsec
     start_s: float
     whole: bool
 
 
 @dataclass
 class Outcome:
-    """What the EDM machine's log says of a job, and how it went."""
+    """The result of a job: the cuts in the log of the EDM machine, and the course of the job."""
 
-    stations: list  # arcsec
-    cuts: list
-    state: object  # the last JobState
+    stations: list[float]  # arcsec
+    cuts: list[Cut]
+    state: JobState  # the last one
     seconds: float
-    tries: dict = field(default_factory=dict)  # of each station
-    answers: list = field(default_factory=list)  # (seconds, what the node asked for, key)
-    displays: dict = field(default_factory=dict)  # what the panel showed last in each state
+    tries: dict[int, int] = field(default_factory=dict)  # of each station
+    # (seconds, state and cause, key)
+    answers: list[tuple[float, str, str]] = field(default_factory=list)
+    # the last text on the panel in each state
+    displays: dict[str, list[str]] = field(default_factory=dict)
 
     @property
-    def uncut(self):
+    def uncut(self) -> list[int]:
+        """The stations without a complete cut."""
         return sorted(
             set(range(len(self.stations))) - {cut.station for cut in self.cuts if cut.whole}
         )
 
     @property
-    def twice(self):
+    def twice(self) -> list[int]:
+        """The stations with more than one cut."""
         begun = [cut.station for cut in self.cuts]
         return sorted(
             {station for station in begun if station is not None and begun.count(station) > 1}
         )
 
     @property
-    def outside_tolerance(self):
+    def outside_tolerance(self) -> list[Cut]:
+        """The cuts that belong to no station."""
         return [cut for cut in self.cuts if cut.station is None]
 
     @property
-    def whole(self):
-        """Each station cut once, nothing else, and it ended."""
+    def whole(self) -> bool:
+        """Whether each station was cut once, nothing else was cut, and the job has finished."""
         return (
             not (self.uncut or self.twice or self.outside_tolerance)
             and self.state.state == "finished"
         )
 
     @property
-    def worst(self):
+    def worst(self) -> float:
+        """The largest error of a cut, in arcsec."""
         return max((abs(cut.error) for cut in self.cuts), default=math.inf)
 
     @property
-    def failed(self):
+    def failed(self) -> bool:
+        """Whether the job is not whole, or a cut is outside the tolerance."""
         return not self.whole or self.worst > TOLERANCE
 
     @property
-    def words(self):
+    def words(self) -> str:
+        """The result in one line."""
         return (
-            f"{len(self.cuts)} cuts for {len(self.stations)} stations, {len(self.uncut)} uncut, {len(self.twice)} cut twice, "
-            f"{len(self.outside_tolerance)} elsewhere; worst {self.worst:.2f} arcsec; {self.seconds:.0f} s"
+            f"{len(self.cuts)} cuts for {len(self.stations)} stations, {len(self.uncut)} uncut, "
+            f"{len(self.twice)} cut twice, {len(self.outside_tolerance)} elsewhere; "
+            f"largest error {self.worst:.2f} arcsec; {self.seconds:.0f} s"
         )
 
 
-def apart(angle, wanted):
-    return (angle - wanted + TURN / 2) % TURN - TURN / 2
+def apart(angle: float, target: float) -> float:
+    """The difference of two angles in arcsec, within half a turn."""
+    return (angle - target + TURN / 2) % TURN - TURN / 2
 
 
-def random_worm(source):
+def random_worm(source: random.Random) -> dict[str, float]:
+    """Random errors of a worm table."""
     return {name: source.uniform(*limits) for name, limits in WORM.items()}
 
 
-def random_stations(count, source, share=1.0):
-    """One in each of so many equal parts of this share of a turn, in arcsec; so the worm stands
-    differently at each.
+def random_stations(count: int, source: random.Random, share: float = 1.0) -> list[float]:
+    """Random stations in arcsec: one in each of `count` equal parts of this share of a turn. The
+    angle of the worm is different at each station.
     """
     part = share * TURN / count
     return [round((n + source.uniform(0.1, 0.9)) * part, 2) for n in range(count)]
 
 
-def set_up_table(node, **settings):
+def set_up_table(node: ClientNode, **settings: Value) -> None:
+    """Writes the settings of the table and the parameters of its axis into a node."""
     for name, value in {**TABLE, **settings}.items():
         Settings(node).set(name, value)
     for name, value in AXIS.items():
@@ -200,9 +216,11 @@ def set_up_table(node, **settings):
 
 
 class IndexingMachine:
-    """The simulated machine with its two nodes, the host on their line, and a person at the panel."""
+    """The simulated machine: its two nodes, the host on their bus, and an operator at the panel."""
 
-    def __init__(self, seed=1, mode=MODES[0], worm=None):
+    def __init__(
+        self, seed: int = 1, mode: str = MODES[0], worm: dict[str, float] | None = None
+    ) -> None:
         around = Devices(
             eeprom=True,
             keypad=True,
@@ -225,13 +243,9 @@ class IndexingMachine:
         self.bus = Bus(TwinTransport(self.twin), random_source=random.Random(seed), poll_s=POLL_S)
         self.nodes = [self.bus.node(address) for address in ADDRESSES]
         self.job, self.table = Job(self.nodes[MAIN]), IndexingTable(self.nodes[SUB])
-        self.panel, self.mode, self.source, self.stations = (
-            self.twin.devices(MAIN),
-            mode,
-            random.Random(seed),
-            [],
-        )
-        self.table_dark_s = []
+        self.panel, self.mode = self.twin.devices(MAIN), mode
+        self.source, self.stations = random.Random(seed), list[float]()
+        self.table_dark_s: list[float] = []
         self.twin.set_position(SUB, math.radians(self.source.uniform(0, ABOUT)))
         self.twin.run(START_S)
         for name, value in {
@@ -240,22 +254,21 @@ class IndexingMachine:
             "job_cut_limit": "20s",
             "job_start_limit": "5s",
         }.items():
-            Settings(self.nodes[MAIN]).set(
-                name, value
-            )  # the next program takes them into the EEPROM
+            # the main node saves them to the EEPROM with the next station list
+            Settings(self.nodes[MAIN]).set(name, value)
         set_up_table(self.nodes[SUB], peer_mode=mode, peer_role="sub")
-        SavedSettings(self.nodes[SUB]).save()  # from here on they are there after a power cut
+        SavedSettings(self.nodes[SUB]).save()  # they remain valid after a power failure
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self.twin.close()
 
-    # a person
+    # the operator
 
-    def wait_for_panel(self):
-        """As a person does, who looks at the display before typing."""
+    def wait_for_panel(self) -> None:
+        """Waits until the panel is ready and the display shows something."""
         while (
             not {"keypad", "display"} <= set((state := self.job.state()).flags)
             or state.state == "loading"
@@ -264,26 +277,28 @@ class IndexingMachine:
             self.twin.run(POLL_S)
 
     @property
-    def shown(self):
+    def shown(self) -> str:
+        """The text on the display."""
         return "".join(self.panel.lines).strip()
 
-    def press(self, *keys):
+    def press(self, *keys: str) -> None:
+        """Presses keys of the panel one after the other."""
         for key in keys:
             self.panel.press(PAD.index(key))
             self.twin.run(KEY_S)
             self.panel.release(PAD.index(key))
             self.twin.run(KEY_S)
 
-    def divide(self, count):
-        """The program, by the panel."""
+    def divide(self, count: int) -> None:
+        """Divides the turn into equal parts, on the panel."""
         self.wait_for_panel()
         self.press("DIVIDE", *str(count), "ENTER")
         self.twin.run(POLL_S)
         self.job.ready()
         self._load_stations(equal_parts(count))
 
-    def enter(self, degrees):
-        """The program, by the panel, angle by angle as they are written."""
+    def enter(self, degrees: Sequence[str]) -> None:
+        """Enters the station list on the panel, angle by angle."""
         self.wait_for_panel()
         self.press("LIST")
         for angle in degrees:
@@ -293,18 +308,18 @@ class IndexingMachine:
         self.job.ready()
         self._load_stations([float(angle) * 3600 for angle in degrees])
 
-    def load(self, angles):
-        """The program, by the host."""
+    def load(self, angles: Sequence[float]) -> None:
+        """Loads the station list (arcsec) from the host."""
         self.job.load(angles)
         self._load_stations(angles)
 
-    def _load_stations(self, angles):
+    def _load_stations(self, angles: Iterable[float | Fraction]) -> None:
         self.stations = [float(angle) for angle in angles]
         if self.mode == "printed":
             Job(self.nodes[SUB]).load(self.stations)
 
-    def answer(self, state):
-        """What a person does who sees the display and the work piece."""
+    def answer(self, state: JobState) -> str:
+        """The key that an operator presses who sees the display and the workpiece."""
         if state.state == "paused":
             return "RESUME" if "resume" in state.answers else "STOP"
         if self.panel.state.edm_cutting:
@@ -315,8 +330,8 @@ class IndexingMachine:
             else "AGAIN"
         )
 
-    def type(self):
-        """A word on the PC's keyboard."""
+    def type(self) -> None:
+        """Types a word on the keyboard of the PC."""
         after = 0.0
         for _ in range(self.source.randint(2, 6)):
             letter = self.source.choice(LETTERS)
@@ -326,8 +341,8 @@ class IndexingMachine:
 
     # a job
 
-    def cuts(self):
-        """From the EDM machine's log."""
+    def cuts(self) -> list[Cut]:
+        """The cuts in the log of the EDM machine."""
         found = []
         for cut in self.panel.cuts:
             angles = [
@@ -338,17 +353,16 @@ class IndexingMachine:
             station = min(
                 range(len(self.stations)), key=lambda n: abs(apart(angles[0], self.stations[n]))
             )
-            wanted = self.stations[station]
-            if any(
-                0 <= dark - cut.start_s <= CUT_S for dark in self.table_dark_s
-            ):  # what its springs hold back is let go
+            target = self.stations[station]
+            # without power the drive of the table loses its elastic tension, and the table turns
+            if any(0 <= dark - cut.start_s <= CUT_S for dark in self.table_dark_s):
                 angles = angles[:1]
-            angle = max(angles, key=lambda angle: abs(apart(angle, wanted)))
-            error = apart(angle, wanted)
+            angle = max(angles, key=lambda angle: abs(apart(angle, target)))
+            error = apart(angle, target)
             found.append(
                 Cut(
                     station if abs(error) < NEAR else None,
-                    wanted,
+                    target,
                     angle,
                     error,
                     cut.start_s,
@@ -357,7 +371,8 @@ class IndexingMachine:
             )
         return found
 
-    def power_cut(self, dark):
+    def power_cut(self, dark: Sequence[int]) -> None:
+        """Switches these nodes off for DARK_S."""
         if SUB in dark:
             self.table_dark_s.append(self.twin.time())
         for node in dark:
@@ -367,11 +382,13 @@ class IndexingMachine:
             self.twin.power_on(node)
         self.twin.run(START_S)
 
-    def run(self, trouble=CALM, watch=None):
-        """The job of the program, from START to its end."""
+    def run(
+        self, trouble: Trouble = CALM, watch: Callable[[JobState], object] | None = None
+    ) -> Outcome:
+        """Runs the job from START to its end."""
         self.twin.set_plant(SUB, sensor_corrupt=trouble.corrupt)
-        for way in ((MAIN, SUB), (SUB, MAIN)):
-            self.twin.peer_line(*way).garbage(trouble.garbage_hz)
+        for sender, receiver in ((MAIN, SUB), (SUB, MAIN)):
+            self.twin.peer_line(sender, receiver).garbage(trouble.garbage_hz)
         begun, dark, types_at = self.twin.time(), trouble.power_cut_s, self.twin.time()
         self.press("START")
         outcome = Outcome(self.stations, [], self.job.state(), 0.0)
@@ -387,7 +404,7 @@ class IndexingMachine:
             state, outcome.seconds = self.job.state(), self.twin.time() - begun
             if watch and state.station != outcome.state.station:
                 watch(state)
-            if state.state == outcome.state.state:  # then the display has had time to tell it
+            if state.state == outcome.state.state:  # now the display shows this state
                 outcome.displays[state.state] = self.panel.lines
             outcome.state = state
             table = self.table.state()
@@ -408,9 +425,9 @@ class IndexingMachine:
         return outcome
 
 
-def some_trouble(seconds, source):
-    """1 % of the sensor's frames damaged, garbage, a person who types, and a power cut at some
-    moment of so many seconds.
+def some_trouble(seconds: float, source: random.Random) -> Trouble:
+    """1 % damaged sensor frames, garbage, an operator who types, and a power failure at a random
+    time within these seconds.
     """
     return Trouble(
         0.01, 2.0, True, source.uniform(0, seconds), source.choice([(MAIN,), (SUB,), (MAIN, SUB)])
@@ -421,7 +438,7 @@ def some_trouble(seconds, source):
 
 HEAD = (
     "station",
-    "wanted / deg",
+    "target / deg",
     "true angle at the cut / deg",
     "error / arcsec",
     "tries",
@@ -429,25 +446,27 @@ HEAD = (
 )
 
 
-def rows(outcome):
+def rows(outcome: Outcome) -> list[Sequence[report.Cell]]:
+    """The rows of the table of cuts."""
     return [
         (
             "-" if cut.station is None else str(cut.station + 1),
-            f"{cut.wanted / 3600:.5f}",
+            f"{cut.target / 3600:.5f}",
             f"{cut.angle / 3600:.5f}",
             (f"{cut.error:+.2f}", "good" if abs(cut.error) <= TOLERANCE else "bad"),
-            str(outcome.tries.get(cut.station, "-")),
+            "-" if cut.station is None else str(outcome.tries.get(cut.station, "-")),
             f"{cut.start_s:.1f}",
         )
         for cut in outcome.cuts
     ]
 
 
-def errors_picture(outcome):
+def errors_picture(outcome: Outcome) -> str:
+    """The picture of the errors and tries, as HTML."""
     figure, (errors, tries) = report.drawing(height=3.8, ncols=2)
     errors.axhspan(-TOLERANCE, TOLERANCE, color="#eef4ee")
     errors.plot(
-        [cut.wanted / 3600 for cut in outcome.cuts],
+        [cut.target / 3600 for cut in outcome.cuts],
         [cut.error for cut in outcome.cuts],
         "o",
         color=report.colour(0),
@@ -455,7 +474,7 @@ def errors_picture(outcome):
     )
     errors.set(
         xlabel="station / deg",
-        ylabel="true angle - wanted / arcsec",
+        ylabel="true angle - target / arcsec",
         title="error at the cut, and the tolerance",
         ylim=(-3, 3),
     )
@@ -465,32 +484,38 @@ def errors_picture(outcome):
         color=report.colour(1),
     )
     tries.set(
-        xlabel="station", ylabel="tries", title="bisection: half of what is left, read, again"
+        xlabel="station",
+        ylabel="tries",
+        title="bisection: each try turns by half the remaining angle",
     )
     return picture(
-        "errors", "Error of each station by the model, and the tries it took", report.png(figure)
+        "errors", "Error of each station by the model, and the number of tries", report.png(figure)
     )
 
 
-def displays(outcome):
+def displays(outcome: Outcome) -> str:
+    """The texts of the panel, as HTML."""
     blocks = [
-        f"<figure><pre>{html.escape(chr(10).join(lines))}</pre><figcaption>{html.escape(state)}</figcaption></figure>"
+        f"<figure><pre>{html.escape(chr(10).join(lines))}</pre>"
+        f"<figcaption>{html.escape(state)}</figcaption></figure>"
         for state, lines in outcome.displays.items()
     ]
-    return "<h2>What the panel showed</h2>" + "".join(blocks)
+    return "<h2>Texts on the panel</h2>" + "".join(blocks)
 
 
 def run(
-    count=36,
-    mode=MODES[0],
-    seed=1,
-    trouble=False,
-    path=ROOT / "build" / "report" / "s4.html",
-    console=None,
-):
+    count: int = 36,
+    mode: str = MODES[0],
+    seed: int = 1,
+    trouble: bool = False,
+    path: Path = ROOT / "build" / "report" / "s4.html",
+    console: Console | None = None,
+) -> tuple[Outcome, Path]:
+    """Runs the whole experiment and returns its outcome and the path of the report."""
     console, source = console or Console(), random.Random(seed)
     console.print(
-        f"[bold]S4: a job of {count} stations, nobody touching it[/] (seed {seed}, {mode} between the nodes)"
+        f"[bold]S4: an unattended job of {count} stations[/] "
+        f"(seed {seed}, {mode} between the nodes)"
     )
     with (
         console.status("building the twin") as status,
@@ -503,17 +528,17 @@ def run(
         )
         lost = machine.twin.truth(SUB).lost_steps
         peer, sensor = machine.table.peer(), machine.table.sensor()
-    shown = Rows(*HEAD, title="judged by the log of the EDM machine")
+    shown = Rows(*HEAD, title="cuts in the log of the EDM machine")
     for row in rows(outcome):
         shown.add_row(*(cell[0] if isinstance(cell, tuple) else cell for cell in row))
     console.print(shown)
     for line in outcome.displays[outcome.state.state]:
         console.print(f"    [reverse]{line}[/]", highlight=False)
     for seconds, why, key in outcome.answers:
-        console.print(f"after {seconds:.1f} s the panel said '{why}'; a person pressed {key}")
-    compared = [
+        console.print(f"after {seconds:.1f} s the panel showed '{why}'; the operator pressed {key}")
+    compared: list[Sequence[report.Cell]] = [
         (
-            "stations cut, each once",
+            "stations that were cut once",
             "unattended production",
             f"{count - len(outcome.uncut)} of {count}, {len(outcome.twice)} twice",
             report.verdict(not outcome.uncut and not outcome.twice),
@@ -530,7 +555,7 @@ def run(
             f"{max(outcome.tries.values(), default=0)} at most",
             report.verdict(None),
         ),
-        ("answers of a person", "not given", str(len(outcome.answers)), report.verdict(None)),
+        ("answers of the operator", "not given", str(len(outcome.answers)), report.verdict(None)),
     ]
     parts = [
         report.table(("", "paper", "here", ""), compared),
@@ -542,24 +567,26 @@ def run(
         parts.insert(
             1,
             report.table(
-                ("after / s", "what the panel said", "a person pressed"),
+                ("after / s", "text on the panel", "key that the operator pressed"),
                 [(f"{seconds:.1f}", why, key) for seconds, why, key in outcome.answers],
             ),
         )
     path = page(
         path,
         "S4: the unattended indexing machine",
-        "Two nodes, simulated from the very RTL and firmware that go into the FPGA: one has the panel, the EEPROM and the keyboard "
-        "of the wire-EDM machine, the other turns the table by its angle sensor. The true angle is that of the model at each cut.",
+        "The simulation of two nodes runs the same RTL and firmware as the FPGA. One node has the "
+        "panel, the EEPROM and the keyboard of the wire-EDM machine; the other turns the table "
+        "with an angle sensor as feedback. The true angle is the angle of the model at each cut.",
         parts,
         {
             "simulated time": f"{outcome.seconds:.0f} s",
-            "worm": "errors, backlash and sensor error at random by the seed",
+            "worm": "random errors, backlash and sensor error, determined by the seed",
             "steps lost": str(lost),
             "sensor frames": f"{sensor.frames}, {sensor.wrong_crc + sensor.broken} damaged",
-            "between the nodes": f"{peer.heard} heard, {peer.garbage} not understood, {peer.repeated} answered again",
-            "again": f"build/venv/bin/python -m experiments.s4_job --seed {seed} --stations {count} --peers {mode}"
-            + (" --trouble" if trouble else ""),
+            "between the nodes": f"{peer.heard} received, {peer.garbage} invalid, "
+            f"{peer.repeated} answered again",
+            "again": f"build/venv/bin/python -m experiments.s4_job --seed {seed} "
+            f"--stations {count} --peers {mode}" + (" --trouble" if trouble else ""),
         },
     )
     console.print(f"{outcome.words}; ended {outcome.state.state}")
@@ -567,32 +594,35 @@ def run(
     return outcome, path
 
 
-def main(arguments=None):
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the experiment from the command line and returns the exit code."""
     parser = argparse.ArgumentParser(
         prog="python -m experiments.s4_job",
-        description="S4 in the twin: a whole job, judged by its cuts.",
+        description="S4 in the twin: it runs a whole job and checks its cuts.",
     )
-    parser.add_argument("--stations", type=int, default=36, help="parts of the turn (default 36)")
+    parser.add_argument(
+        "--stations", type=int, default=36, help="number of equal parts of the turn (default 36)"
+    )
     parser.add_argument(
         "--peers",
         choices=MODES,
         default=MODES[0],
-        help="what the nodes speak to each other (default frames)",
+        help="protocol between the nodes (default frames)",
     )
     parser.add_argument(
         "--trouble",
         action="store_true",
-        help="damaged sensor frames, garbage, a person who types, a power cut",
+        help="adds damaged sensor frames, garbage, an operator who types, and a power failure",
     )
     parser.add_argument(
-        "--seed", type=int, default=1, help="of the machine and of the trouble (default 1)"
+        "--seed", type=int, default=1, help="seed of the machine and of the trouble (default 1)"
     )
     options = parser.parse_args(arguments)
     try:
         outcome, _ = run(options.stations, options.peers, options.seed, options.trouble)
     except (MoireError, BuildError) as error:
         print(f"s4_job: {error}", file=sys.stderr)
-        return getattr(error, "exit_code", 1)
+        return int(getattr(error, "exit_code", 1))
     except KeyboardInterrupt:
         print("s4_job: interrupted", file=sys.stderr)
         return 130

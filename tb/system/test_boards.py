@@ -40,11 +40,14 @@ def test_each_port_has_a_pin_of_its_own(board):
 @pytest.mark.parametrize("board", BOARDS, ids=lambda board: board.name)
 def test_the_top_fits_the_node(board):
     core = Path(find_spec("pythondata_cpu_picorv32").submodule_search_locations[0]) / "verilog"
-    rooms = " ".join(
-        f"-libdir {room}"
-        for room in sorted({path.parent for path in (ROOT / "rtl").rglob("*.sv")}) + [core]
+    directories = " ".join(
+        f"-libdir {directory}"
+        for directory in sorted({path.parent for path in (ROOT / "rtl").rglob("*.sv")}) + [core]
     )
-    passes = f"read_verilog -lib +/ecp5/cells_bb.v; read_verilog -sv {board / 'top.sv'}; hierarchy -check -top top {rooms}"
+    passes = (
+        f"read_verilog -lib +/ecp5/cells_bb.v; read_verilog -sv {board / 'top.sv'}; "
+        f"hierarchy -check -top top {directories}"
+    )
     done = subprocess.run(
         [sys.executable, ROOT / "tools" / "yosys.py", passes],
         cwd=ROOT,

@@ -37,7 +37,7 @@ def some_terms(largest=3.0):
 
 
 class Relay:
-    """The pins of the relay: a ring before it, a counter behind it, a host and a flash beside it."""
+    """The relay with a ring at its input, a counter at its output, a host and a flash."""
 
     def __init__(self, dut, chip=None):
         self.dut, self.chip = dut, chip or Flash(1 << 14)

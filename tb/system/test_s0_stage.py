@@ -101,7 +101,8 @@ def test_homing_takes_the_zero_at_a_phase_zero(homed):
             f"{name}: the zero is {from_phase_zero:.2f} nm from a phase zero of the interferometer"
         )
         assert abs(from_phase_zero) < 20, (
-            "the zero is a phase zero, but for the error of a signal that is not learned and of one reading"
+            "the zero is a phase zero, except for the error of one reading and of a signal without "
+            "calibration"
         )
         assert abs(homed.true_nm(name)) < BOUND_NM
         apart = (
@@ -109,7 +110,7 @@ def test_homing_takes_the_zero_at_a_phase_zero(homed):
         ) % PERIOD_NM - PERIOD_NM / 2
         assert abs(apart) < 10, "the position's fraction is the phase"
         assert encoder.home_margin > 0.2, (
-            f"the switch stands too near the middle between two phase zeros: {encoder.home_phase_nm} nm"
+            f"the switch is too near the middle between two phase zeros: {encoder.home_phase_nm} nm"
         )
 
 

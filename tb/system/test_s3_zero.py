@@ -47,7 +47,7 @@ def test_searches_from_both_sides_of_the_mark_and_from_on_it_find_the_same_count
     made += [motor.search() for _ in range(3)]  # from where the one before ended: on the mark
     assert {search.zero_counts for search in made} == {0}
     assert {search.start_um > 0 for search in made} == {True, False}
-    assert {len(search.ways.split(", ")) for search in made} >= {
+    assert {len(search.directions.split(", ")) for search in made} >= {
         2,
         4,
     }  # met at once, and only on the other side

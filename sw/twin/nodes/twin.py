@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy
 import numpy.typing
@@ -44,6 +44,11 @@ from twin.machines.machine import (
     pack,
 )
 
+if TYPE_CHECKING:
+    from moire.bus.transport import Transport
+else:
+    Transport = object  # the twin runs without the host package
+
 CLK_HZ = 2_400_000
 START_S = 0.15  # until the soft core of a node with one axis listens
 DRIVES = ("HAS_BRIDGE", "HAS_STEPPER", "HAS_DAC", "HAS_FINE_STAGE")  # of rtl/node.sv
@@ -57,7 +62,7 @@ PERIPHERALS = (
 )
 
 
-def drives(*built):
+def drives(*built: str) -> dict[str, int]:
     """Parameters of rtl/node.sv that build these drives of each axis and no other."""
     return {name: int(name in built) for name in DRIVES}
 
@@ -495,7 +500,7 @@ class Twin:
         return self.machine(axis).take_trace()
 
 
-class TwinTransport:
+class TwinTransport(Transport):
     """The transport of the host package over a twin; time passes only as far as needed."""
 
     time_is_stopped = handshake = True
@@ -540,7 +545,7 @@ class TwinTransport:
         """Free the twin."""
         self.twin.close()
 
-    def __enter__(self) -> "TwinTransport":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
