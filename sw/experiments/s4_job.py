@@ -89,7 +89,7 @@ ABOUT = 5  # degrees: before the job the table is anywhere from 0 to this angle
 NEAR = 60  # arcsec: a cut farther away from every station belongs to none
 TABLE: dict[str, Value] = {"turn_settle": "40ms"}
 TOLERANCE = 2.0  # arcsec, as in the paper
-MODES = ("frames", "printed")
+MODES = ("frames", "legacy")
 
 PAD = """7 8 9 START PAUSE RESUME STOP
          4 5 6 AGAIN NEXT UP DOWN
@@ -315,7 +315,7 @@ class IndexingMachine:
 
     def _load_stations(self, angles: Iterable[float | Fraction]) -> None:
         self.stations = [float(angle) for angle in angles]
-        if self.mode == "printed":
+        if self.mode == "legacy":
             Job(self.nodes[SUB]).load(self.stations)
 
     def answer(self, state: JobState) -> str:

@@ -156,7 +156,7 @@ def sub_node():
             peripherals=FakePeripherals(Sensor(source, Worm(source)), PeerPort(), I2c()),
         )
     )
-    panel.settings.load({"peer_role": "sub", "peer_mode": "printed"})
+    panel.settings.load({"peer_role": "sub", "peer_mode": "legacy"})
     return panel
 
 
@@ -181,7 +181,7 @@ def test_the_commands_turn_the_table_and_say_where_it_is(tmp_path):
     code, out, err = panel.call("turn to 400deg")
     assert code == 2 and out == "" and err.count("\n") == 1 and "below 360deg" in err
     code, out, _ = panel.call(f"settings set peer_mode printed -- settings save {file} --json")
-    assert code == 0 and json.loads(file.read_text())["peer_mode"] == "printed"
+    assert code == 0 and json.loads(file.read_text())["peer_mode"] == "legacy"
     code, out, _ = panel.call(f"settings load {file} -- settings get turn_tolerance")
     assert code == 0 and "0.5arcsec" in out
     file.write_text("[]")

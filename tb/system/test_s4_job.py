@@ -37,7 +37,7 @@ def test_amid_trouble_and_through_a_power_cut_of_both_nodes_each_station_is_cut_
 
 
 def test_a_list_entered_on_the_panel_is_cut_by_the_bytes_as_printed_after_a_sub_node_power_cut():
-    with IndexingMachine(SEED, "printed") as machine:
+    with IndexingMachine(SEED, "legacy") as machine:
         machine.enter(["0.25", "1"])
         machine.power_cut((SUB,))  # it comes back with its values and the list
         outcome = machine.run()

@@ -150,7 +150,7 @@ def test_an_emergency_stop_is_told_to_the_peer_and_reset_by_it_when_it_is_over(s
 
 def test_the_bytes_as_printed_turn_the_table_to_its_next_station(station):
     station.settings.set("peer_role", "sub")
-    station.settings.set("peer_mode", "printed")
+    station.settings.set("peer_mode", "legacy")
     target = station.beside(200)
     station.job.load([target])
     station.from_sub.take_heard()

@@ -24,7 +24,7 @@ CHOICES = {
     "filters": ("none", "first", "second", "both"),
     "segments": ("off", "rectangle", "linear"),
     "turn_direction": ("direct", "shorter", "up"),
-    "peer_mode": ("off", "printed", "frames"),
+    "peer_mode": ("off", "legacy", "frames"),
     "peer_role": ("main", "sub"),
 }
 HOME_METHODS = {"s0": -1, "s3": -2}  # beside the numbers of CiA 402
