@@ -34,11 +34,6 @@ ELLIPSE_AMPLITUDES = (0.6, 0.75)  # shown beside it
 HARMONICS = {3: 0.01, -3: 0.006, 2: 0.004, -5: 0.003}
 VIBRATION_NM = 20
 # without vibration, and from 20 to 2000 Hz
-VIBRATIONS_HZ = (0, 20, 35, 50, 87, 120, 190, 230, 310, 450, 530, 600, 700, 900, 1200, 1500, 1800)
-VIBRATIONS_HZ += (2000,)
-AMPLITUDES = (0.6, 0.75)  # shown beside it
-HARMONICS = {3: 0.01, -3: 0.006, 2: 0.004, -5: 0.003}
-VIBRATION_NM = 20
 VIBRATIONS_HZ = (
     0,
     20,
@@ -58,7 +53,7 @@ VIBRATIONS_HZ = (
     1500,
     1800,
     2000,
-)  # 0: none
+)
 AMPLITUDES = (0.6, 0.75, 0.88)  # of full scale
 
 Array = NDArray[Any]
@@ -104,18 +99,21 @@ def phase_of(cos: Array, sin: Array, values: Mapping[str, Any]) -> Array:
     u, v = cos - values["cos_offset"], sin - values["sin_offset"]
     v = np.clip(v * values["gain"] + u * values["quadrature_error"] + 65536 >> 17, -32768, 32767)
     u = np.clip(u + 1 >> 1, -32768, 32767)
-    return np.rint(np.arctan2(v, u) * 65536 / (2 * np.pi)).astype(np.int64) & 65535
+    phase: Array = np.rint(np.arctan2(v, u) * 65536 / (2 * np.pi)).astype(np.int64) & 65535
+    return phase
 
 
 def corrected(phase: Array, table: ArrayLike) -> Array:
     """harmonic_correction."""
     table = np.asarray(table, dtype=np.int64)
     here, following = table[phase >> 8], table[(phase >> 8) + 1 & 255]
-    return phase - (here * 256 + (following - here) * (phase & 255) + 2048 >> 12) & 65535
+    better: Array = phase - (here * 256 + (following - here) * (phase & 255) + 2048 >> 12) & 65535
+    return better
 
 
 def words_of(cos: Array, sin: Array) -> list[int]:
-    return ((cos & 65535) << 16 | sin & 65535).tolist()
+    words: list[int] = ((cos & 65535) << 16 | sin & 65535).tolist()
+    return words
 
 
 def remaining_nm(
@@ -126,7 +124,7 @@ def remaining_nm(
     words = converted(*curve(turn), None, bits=16, noise=0, amplitude=amplitude)
     away = (corrected(phase_of(*words, values), table) / 65536 - turn / (2 * np.pi) + 0.5) % 1 - 0.5
     away = away - np.angle(np.exp(2j * np.pi * away).mean()) / (2 * np.pi)
-    return np.abs((away + 0.5) % 1 - 0.5).max() * PERIOD_NM
+    return float(np.abs((away + 0.5) % 1 - 0.5).max() * PERIOD_NM)
 
 
 def calibrated(
@@ -173,7 +171,8 @@ def calibrated(
 
 def vector_noise_nm(bits: int, amplitude: float, noise: float = 0.5) -> float:
     """Noise of one phase: noise and quantisation of a channel, against the size of the circle."""
-    return np.sqrt(noise**2 + 1 / 12) / (amplitude * (1 << bits - 1)) / (2 * np.pi) * PERIOD_NM
+    sigma = np.sqrt(noise**2 + 1 / 12) / (amplitude * (1 << bits - 1)) / (2 * np.pi)
+    return float(sigma * PERIOD_NM)
 
 
 def largest_of_orders(
@@ -187,7 +186,7 @@ def largest_of_orders(
     sizes = draw.normal(0, sigma_nm, (trials, len(orders))) + 1j * draw.normal(
         0, sigma_nm, (trials, len(orders))
     )
-    return np.percentile(np.abs((sizes @ waves).real).max(axis=1), share)
+    return float(np.percentile(np.abs((sizes @ waves).real).max(axis=1), share))
 
 
 def bound_nm(amplitude: float) -> float:
@@ -252,7 +251,7 @@ def sde_nm_max(
         for hz, here in zip(vibrations_hz, left.reshape(-1, len(amplitudes)))
     )
     console.print(f"worst by vibration: {by_hz}")
-    return left.max()
+    return float(left.max())
 
 
 def sde_soak() -> tuple[str, bool]:

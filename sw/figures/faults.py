@@ -75,7 +75,7 @@ def advised(amplitude: float, width: int = 8, no_noise_samples: int = 0) -> dict
     """Settings that docs/signal_faults.md advises for a signal of this amplitude with at most 0.5
     LSB rms of noise.
     """
-    part = lambda percent: round(amplitude * percent / 100)
+    part: Callable[[float], int] = lambda percent: round(amplitude * percent / 100)
     return {
         "low": part(70),
         "high": part(130),
@@ -98,7 +98,7 @@ class Signals:
     HARMONICS = ((3, 0.010), (-3, 0.006), (2, 0.004), (-5, 0.003))
 
     def __init__(self, lanes: int, source: Generator, share: float = 1.0) -> None:
-        spread = lambda size: source.uniform(-size, size, lanes) * share
+        spread: Callable[[float], Array] = lambda size: source.uniform(-size, size, lanes) * share
         self.amplitude = AMPLITUDE * (1 + spread(0.03))
         self.offset = AMPLITUDE * (spread(0.05) + 1j * spread(0.05))
         self.gain, self.skew = 1 + spread(0.06), spread(np.radians(4))
@@ -127,7 +127,8 @@ class Signals:
         v = z + sum(size * powers[order] for order, size in self.harmonics)
         sin = self.gain * (v.imag * np.cos(self.skew) + v.real * np.sin(self.skew))
         swell = 1 + self.swell * np.sin(2 * np.pi * fringe / 50 + self.swell_phase)
-        return self.amplitude * swell * (v.real + 1j * sin) + self.offset
+        shown: Array = self.amplitude * swell * (v.real + 1j * sin) + self.offset
+        return shown
 
 
 @dataclass
@@ -160,7 +161,8 @@ def transformed(v: Array, matrix: Values, shift: Values, share: Values) -> Array
     """v through a matrix and a shift that are there to a share of one."""
     cos = matrix[0] * v.real + matrix[1] * v.imag + shift.real
     sin = matrix[2] * v.real + matrix[3] * v.imag + shift.imag
-    return v + share * (cos + 1j * sin - v)
+    through: Array = v + share * (cos + 1j * sin - v)
+    return through
 
 
 def words(v: Array, noise: Values, fault: Fault, active: bool, last: Values) -> list[Array]:
@@ -305,7 +307,8 @@ class Lanes:
 
     def fringe(self, n: Values) -> Array:
         amount, rate = self.course.vibration
-        return self.course.at(n) + amount * np.sin(2 * np.pi * (rate * n + self.beat))
+        vibration: Array = amount * np.sin(2 * np.pi * (rate * n + self.beat))
+        return self.course.at(n) + vibration
 
     def share(self, n: int) -> Array:
         """How much of the fault is there at sample n."""
@@ -413,8 +416,8 @@ def phase_error(channel: int, degrees: float) -> Fault:
 
 def kinds(channel: int, up: int, times: Sequence[float]) -> dict[str, list[Fault]]:
     """{name: its seven sizes}; channel 0, 1; up +1, -1, times: seven decay times in samples."""
-    stuck = lambda value: Fault(**of_channel(channel, 0.0, value))
-    bit = lambda number, one: Fault(
+    stuck: Callable[[float], Fault] = lambda value: Fault(**of_channel(channel, 0.0, value))
+    bit: Callable[[int, int], Fault] = lambda number, one: Fault(
         **{"ones" if one else "zeros": tuple((1 << number) * (n == channel) for n in (0, 1))}
     )
     return {
@@ -584,7 +587,7 @@ def percent_found(rows: Sequence[tuple[Array, ...]], title: str, unit: str) -> f
 
 def drawn_kinds(source: Generator, times: Sequence[float]) -> dict[str, list[Fault]]:
     """{name: its seven sizes} of a drawn channel and sign."""
-    choice = source.integers(4)
+    choice: Any = source.integers(4)
     return kinds(choice % 2, choice // 2 * 2 - 1, times)
 
 
@@ -595,7 +598,8 @@ def fault_detect_moving_pct(
     settings = advised(AMPLITUDE, no_noise_samples=NO_NOISE_SAMPLES)
     with bar("faults while moving, speed by speed") as progress:
         for speed in progress.track(speeds):
-            faults, names, goal = [], [], []
+            faults: list[Fault] = []
+            names, goal = [], []
             times = [share / speed for share in (0, 0.02, 0.05, 0.1, 0.3, 0.6, 1.0)]
             for size in range(7):
                 for position in range(positions):
@@ -624,7 +628,8 @@ def fault_detect_still_pct(seed: int = SEED, signals: int = 7, positions: int = 
     source, rows = np.random.default_rng(seed), []
     settings = advised(AMPLITUDE, no_noise_samples=NO_NOISE_SAMPLES)
     times = (0, 1, 3, 10, 30, 100, 300)
-    faults, names, goal = [], [], []
+    faults: list[Fault] = []
+    names, goal = [], []
     drawn = Signals(len(kinds(0, 1, times)) * 7 * signals * positions, source)
     for size in range(7):
         for _ in range(signals):
@@ -682,7 +687,8 @@ def fault_false_alarms(seed: int = SEED, lanes: int = 2000, length: int = 5000) 
         swing = np.minimum(size, 0.2 * turn / (2 * np.pi)) * np.sin(
             2 * np.pi * np.asarray(n) / turn
         )
-        return begin + np.select([kind == 0, kind == 1, kind == 2], [still, constant, sweep], swing)
+        moved: Array = np.select([kind == 0, kind == 1, kind == 2], [still, constant, sweep], swing)
+        return begin + moved
 
     vibration = (1 / 40) * source.random(lanes), 10 ** source.uniform(-4, -2, lanes)
     settings = advised(AMPLITUDE, no_noise_samples=NO_NOISE_SAMPLES)

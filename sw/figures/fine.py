@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures of S0's fine stage: motor and piezo together."""
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np

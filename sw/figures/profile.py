@@ -202,7 +202,7 @@ def time_ratio(moves: int = TIMED, seed: int = SEED) -> float:
     """
     worst = 0.0
     for name, pairs in zip(("from rest", "in flight"), timed_moves(moves, seed), strict=True):
-        known = [pair for pair in pairs if pair[1]]
+        known = [(ticks, best) for ticks, best in pairs if best]
         short = sorted(ticks / (ceil(best) + WHOLE_TICKS) for ticks, best in known if best <= LONG)
         long = sorted(ticks / best for ticks, best in known if best > LONG)
         for what, ratios in (

@@ -68,7 +68,7 @@ def s0_coarse_um_max(count: int = 100, seed: int = SEED) -> float:
         f"rms {np.sqrt((errors**2).mean()):.1f} nm, mean {errors.mean():.1f} nm; "
         f"a move takes {np.median(times):.2f} s (median), {times.max():.2f} s at most"
     )
-    return np.abs(errors).max() / 1000
+    return float(np.abs(errors).max() / 1000)
 
 
 def apart_nm(stage: s0_stage.Stage) -> float:
@@ -96,7 +96,7 @@ def s0_home_spread_nm(count: int = 20, seed: int = SEED) -> float:
         f"+-200 nm. Each zero is the mean of {READINGS} readings, since the axis moves while it "
         f"holds: single ones spread by {single:.1f} nm"
     )
-    return np.ptp(zeros)
+    return float(np.ptp(zeros))
 
 
 # ------------------------------------------------------------------ the bus
