@@ -19,6 +19,8 @@ from rich.progress import Progress
 from figures.common import SEEDS_APART, Figure, Quick, bar, console
 from moire.client.axis import CORRECTION
 from moire.client.bus import Bus
+from moire.client.records import CalibrationState
+from moire.made.bus_tables import CALIBRATION_REASONS
 from twin import START_S, Twin, TwinTransport
 from twin.compiled import calibration as compiled
 from twin.compiled.calibration import PHASES, SAMPLES, CalibrationRun
@@ -79,7 +81,7 @@ def signal(
 def converted(
     cos: Array,
     sin: Array,
-    draw: Any,
+    draw: np.random.Generator | None,
     bits: int = 8,
     noise: float = 0.5,
     amplitude: float = AMPLITUDE,
@@ -87,7 +89,7 @@ def converted(
     """16-bit left-aligned words of an ADC, its noise in its own LSB."""
     full = 1 << bits - 1
     exact = [
-        wave * amplitude * full + (draw.normal(0, noise, len(wave)) if noise else 0)
+        wave * amplitude * full + (draw.normal(0, noise, len(wave)) if draw and noise else 0)
         for wave in (cos, sin)
     ]
     u, v = (np.clip(np.rint(wave), -full, full - 1).astype(np.int64) << 16 - bits for wave in exact)
@@ -142,9 +144,9 @@ def calibrated(
     (calibration, nm left after the ellipse, fringes, the signal).
     """
     draw = np.random.default_rng(seed)
-    curve = curve or (
-        lambda turn, twist=draw.uniform(0, 2 * np.pi, len(HARMONICS)): signal(turn, twist=twist)
-    )
+    if curve is None:
+        twist = draw.uniform(0, 2 * np.pi, len(HARMONICS))
+        curve = lambda turn: signal(turn, twist=twist)
     speeds = speeds or (lambda: SPEED_HZ * draw.uniform(0.7, 1.3) * draw.choice([-1, 1]))
     machine, gone, ellipse_nm = CalibrationRun(), 0.0, None
     machine.idle()
@@ -167,6 +169,11 @@ def calibrated(
             machine.phases(phase_of(cos, sin, machine.values).tolist(), spoiled, every)
         if ellipse_nm is None and machine.calibration.harmonics:
             ellipse_nm = remaining_nm(machine.values, machine.table, curve, amplitude)
+
+
+def reason_of(machine: CalibrationRun) -> str:
+    """Why a calibration does not go on, in words."""
+    return CALIBRATION_REASONS[machine.calibration.reason][1]
 
 
 def vector_noise_nm(bits: int, amplitude: float, noise: float = 0.5) -> float:
@@ -212,7 +219,7 @@ def sde(
             1000 * hz + seed, hz, VIBRATION_NM if hz else 0, amplitude=amplitude
         )
         if not machine.calibration.complete:
-            words = machine.words()
+            words = reason_of(machine)
             console.print(f"{hz} Hz, {amplitude:.0%}, seed {seed}: not complete, {words}")
         left.append(remaining_nm(machine.values, machine.table, curve, amplitude))
         ellipse.append(ellipse_nm)
@@ -326,7 +333,7 @@ def twin_sde_nm(complete: bool = True, seed: int = 1) -> float:
         axis.home()
         began = bus.transport.now()
 
-        def look(state: Any) -> None:
+        def look(state: CalibrationState) -> None:
             if state.accepted in left:
                 return
             left[state.accepted] = left_in_twin_nm(axis.correction())

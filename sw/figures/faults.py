@@ -545,6 +545,11 @@ def slow_down(n: Values, speed: float, end: int) -> Values:
     return WARM_UP_SPEED * n + (speed - WARM_UP_SPEED) * (change + np.maximum(n - begin - 100, 0))
 
 
+def slowing(begin: Array, direction: Values, speed: float) -> Callable[[Values], Array]:
+    """The course of lanes that begin there and slow down to `speed` by the onset."""
+    return lambda n: begin + direction * slow_down(n, speed, ONSET)
+
+
 def report(
     title: str, unit: str, table: Mapping[str, tuple[int, int, float, list[tuple[str, int]]]]
 ) -> None:
@@ -611,9 +616,7 @@ def fault_detect_moving_pct(
             signals, direction = Signals(lanes, source), source.choice([-1, 1], lanes)
             begin = np.array(goal) - direction * slow_down(ONSET, speed, ONSET)
             course = Course(
-                lambda n, begin=begin, direction=direction, speed=speed: (
-                    begin + direction * slow_down(n, speed, ONSET)
-                ),
+                slowing(begin, direction, speed),
                 ONSET,
                 np.full(lanes, max(2 / speed, 16.0)),
                 ((1 / 40) * source.random(lanes), 10 ** source.uniform(-4, -2, lanes)),
@@ -647,7 +650,7 @@ def fault_detect_still_pct(seed: int = SEED, signals: int = 7, positions: int = 
             begin = np.array(goal)[chosen] - slow_down(ONSET, 0.0, ONSET)
             shaken = (1 / 40) * source.random(chosen.size) * (source.random(chosen.size) < 0.5)
             course = Course(
-                lambda n, begin=begin: begin + slow_down(n, 0.0, ONSET),
+                slowing(begin, 1, 0.0),
                 ONSET,
                 np.where(frozen[chosen], 2.0 * NO_NOISE_SAMPLES, 64.0),
                 (shaken, 10 ** source.uniform(-3, -2, chosen.size)),

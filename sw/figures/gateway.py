@@ -13,7 +13,7 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import serial
 
@@ -68,7 +68,7 @@ def rfc2217_reads_per_s(seconds: float = READ_S, start_s: float = START_S) -> fl
             twin.terminate()
 
 
-def read_positions(port: Any, seconds: float) -> float:
+def read_positions(port: serial.Serial, seconds: float) -> float:
     count, reader, began = 0, cobs.PacketReader(), time.perf_counter()
     while time.perf_counter() - began < seconds:
         port.write(cobs.packet(0x21, request_body("position", count, axis=0)))

@@ -25,6 +25,7 @@ from figures.calibration import (
     Array,
     calibrated,
     converted,
+    reason_of,
     signal,
 )
 from figures.common import Figure, Quick, console
@@ -110,7 +111,7 @@ def compared(periods: int = PERIODS, seed: int = SEED) -> tuple[float, ...]:
         show(what, "the paper's", errors(readings(words, IDENTITY, filters)[0], position))
     machine, _, _, curve = calibrated(seed, VIBRATION_HZ)
     if not machine.calibration.complete:
-        console.print(f"not calibrated: {machine.words()}")
+        console.print(f"not calibrated: {reason_of(machine)}")
     found = []
     for what, course in (
         ("the test signal, vibration, there and back", dict(there_and_back=True)),

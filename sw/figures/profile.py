@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from ctypes import byref, c_bool
 from math import ceil
 from pathlib import Path
-from typing import Any
 
 import ruckig  # type: ignore[import-not-found]
 
@@ -24,7 +23,7 @@ from twin.build import (
     runtime,
     verilate,
 )
-from twin.compiled.firmware import Plan, Segment, library
+from twin.compiled.firmware import Limits, Plan, Segment, library
 
 ROOT = Path(__file__).resolve().parents[2]
 DRIVER = Path(__file__).with_name("profile_run.cpp")
@@ -104,7 +103,7 @@ def misses(moves: int = MOVES, seed: int = SEED) -> float:
     return float(totals["misses"])
 
 
-def shortest(limits: Any, state: Sequence[float], goal: int, ticks: int) -> float | None:
+def shortest(limits: Limits, state: Sequence[float], goal: int, ticks: int) -> float | None:
     """Ticks of the time-optimal jerk-limited motion to rest at goal (2^-16 period); None where
     ruckig finds none.
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from experiments import s1_ring
 from figures.common import Figure, Quick, bar, console, seeds
-from moire.analysis.harmonic_fit import fit
+from moire.analysis.harmonic_fit import Harmonics, Readings, fit
 from moire.errors import MoireError
 from twin.machines.ring import RotaryRing as Ring
 
@@ -29,6 +29,7 @@ FOUR_TURNS = np.arange(0.0, 1441.0, 10.0)
 DENSE = np.arange(36_000) * 360 / 36_000
 
 Array = NDArray[Any]
+Method = Callable[[Readings], Harmonics]
 
 
 def rings(count: int, seed: int) -> Iterator[tuple[int, Ring, np.random.Generator]]:
@@ -42,10 +43,10 @@ def rings(count: int, seed: int) -> Iterator[tuple[int, Ring, np.random.Generato
 
 def left(
     angles: Array,
-    method: Callable[..., Any],
+    method: Method,
     count: int,
     seed: int,
-    each: Callable[..., None] = lambda *_: None,
+    each: Callable[[int, Ring, Harmonics, Array], object] = lambda *_: None,
 ) -> float:
     """95th percentile over the rings of the largest error left; each(number, ring, correction,
     angles) is called for every ring.
@@ -60,7 +61,7 @@ def left(
     return float(np.percentile(found, 95))
 
 
-def through_the_relay(number: int, ring: Ring, correction: Any, angles: Array) -> None:
+def through_the_relay(number: int, ring: Ring, correction: Harmonics, angles: Array) -> None:
     """The whole Verilated relay beside its harmonic_map, at the same angles."""
     if number >= RTL_RINGS:
         return
@@ -88,7 +89,7 @@ def s1_peak4_arcsec(count: int = RINGS, seed: int = 1) -> float:
 
 
 def s1_dense_arcsec(count: int = DENSE_RINGS, seed: int = 1) -> float:
-    method = lambda readings: fit(readings, orders=s1_ring.ORDERS)
+    method: Method = lambda readings: fit(readings, orders=s1_ring.ORDERS)
     return left(DENSE, method, count, seed)
 
 
