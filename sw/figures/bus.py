@@ -8,6 +8,7 @@ marks it as good, whatever the firmware would do with it then.
 """
 
 import os
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
@@ -33,18 +34,21 @@ READS = 300
 REPLY_WORDS = 17  # ready byte, length, 11 of the body, CRC-32
 
 
+Run = tuple[str | float, ...]  # arguments of bus_run
+
+
 @cache
-def program():
+def program() -> Path:
     return simulation(DRIVER, RTL, firmware="axis", CLK_HZ=1_843_000)
 
 
-def together(runs):
+def together(runs: Sequence[Run]) -> list[list[float]]:
     """What each run of bus_run prints, as numbers; as many at once as there are processors."""
     program()
     with ThreadPoolExecutor(os.cpu_count()) as pool, bar("runs") as progress:
         task = progress.add_task("", total=len(runs))
 
-        def measure(arguments):
+        def measure(arguments: Run) -> list[float]:
             printed = run([program(), *arguments], "bus_run").split()
             progress.advance(task)
             return [float(word) for word in printed]
@@ -52,12 +56,12 @@ def together(runs):
         return list(pool.map(measure, runs))
 
 
-def random_runs(count, seed=1):
+def random_runs(count: int, seed: int = 1) -> list[Run]:
     return [("random", size, number) for size, number in shares(count, SHARE, seed)]
 
 
-def wrong_of(runs):
-    totals = {}
+def wrong_of(runs: Sequence[Run]) -> float:
+    totals: dict[str | float, list[float]] = {}
     for (kind, *_), (tried, wrong, missed) in zip(runs, together(runs), strict=True):
         sums = totals.setdefault(kind, [0, 0, 0])
         totals[kind] = [a + b for a, b in zip(sums, (tried, wrong, missed), strict=True)]
@@ -73,14 +77,16 @@ def wrong_of(runs):
     return sum(wrong for _, wrong, _ in totals.values())
 
 
-def line_wrong_accepted(flipped=FRAMES, frames=FRAMES, count=RANDOM, seed=1):
+def line_wrong_accepted(
+    flipped: int = FRAMES, frames: int = FRAMES, count: int = RANDOM, seed: int = 1
+) -> float:
     """Of all flips of some frames, the bursts of some frames, and random frames."""
     flips = [("flips", n) for n in range(flipped)]
     bursts = [("bursts", n, n + seed) for n in range(frames)]
     return wrong_of(flips + bursts + random_runs(count, seed))
 
 
-def line_resync_failures(count=DISTURBANCES, seed=1):
+def line_resync_failures(count: int = DISTURBANCES, seed: int = 1) -> float:
     runs = [("disturb", size, number) for size, number in shares(count, SHARE, seed)]
     tried, refused = map(sum, zip(*together(runs)))
     console.print(
@@ -89,7 +95,7 @@ def line_resync_failures(count=DISTURBANCES, seed=1):
     return refused
 
 
-def line_baud_pct(bit_times=BIT_CYCLES, seed=1):
+def line_baud_pct(bit_times: Sequence[float] = BIT_CYCLES, seed: int = 1) -> float:
     limits = together([("baud", cycles, seed) for cycles in bit_times])
     for cycles, (slow, fast) in zip(bit_times, limits, strict=True):
         console.print(
@@ -99,7 +105,7 @@ def line_baud_pct(bit_times=BIT_CYCLES, seed=1):
     return min(value for pair in limits for value in pair) - 0.1  # the steps are 0.1 %
 
 
-def line_roundtrip_us(reads=READS):
+def line_roundtrip_us(reads: int = READS) -> float:
     with Twin(nodes=[Node(1)], clk_hz=CLK_HZ) as twin:
         port = TwinTransport(twin)
         bus = Bus(port)
@@ -122,7 +128,7 @@ def line_roundtrip_us(reads=READS):
     return max(took)
 
 
-def read_us(twin):
+def read_us(twin: Twin) -> float:
     """From the start bit of the master's command byte to the last stop bit, with the turn-round
     before the next command.
     """

@@ -9,12 +9,18 @@ the arc tangent and harmonic_correction.
 
 import ctypes
 import random
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from rich.progress import Progress
 
 from figures.common import SEEDS_APART, Figure, Quick, bar, console
 from moire.client.axis import CORRECTION
 from moire.client.bus import Bus
+from moire.client.records import CalibrationState
+from moire.made.bus_tables import CALIBRATION_REASONS
 from twin import START_S, Twin, TwinTransport
 from twin.compiled import calibration as compiled
 from twin.compiled.calibration import PHASES, SAMPLES, CalibrationRun
@@ -30,11 +36,6 @@ ELLIPSE_AMPLITUDES = (0.6, 0.75)  # shown beside it
 HARMONICS = {3: 0.01, -3: 0.006, 2: 0.004, -5: 0.003}
 VIBRATION_NM = 20
 # without vibration, and from 20 to 2000 Hz
-VIBRATIONS_HZ = (0, 20, 35, 50, 87, 120, 190, 230, 310, 450, 530, 600, 700, 900, 1200, 1500, 1800)
-VIBRATIONS_HZ += (2000,)
-AMPLITUDES = (0.6, 0.75)  # shown beside it
-HARMONICS = {3: 0.01, -3: 0.006, 2: 0.004, -5: 0.003}
-VIBRATION_NM = 20
 VIBRATIONS_HZ = (
     0,
     20,
@@ -54,11 +55,21 @@ VIBRATIONS_HZ = (
     1500,
     1800,
     2000,
-)  # 0: none
+)
 AMPLITUDES = (0.6, 0.75, 0.88)  # of full scale
 
+Array = NDArray[Any]
+Curve = Callable[[Array], tuple[Array, Array]]  # (cos, sin) at so many radians
 
-def signal(turn, harmonics=None, offset=(-0.04, 0.05), gain=1.06, phase=np.radians(4), twist=None):
+
+def signal(
+    turn: Array,
+    harmonics: Mapping[int, float] | None = None,
+    offset: Sequence[float] = (-0.04, 0.05),
+    gain: float = 1.06,
+    phase: float = np.radians(4),
+    twist: Array | None = None,
+) -> tuple[Array, Array]:
     """(cos, sin) of an amplitude of 1 at `turn` radians; offset of sin and of cos."""
     wave = np.exp(1j * turn)
     for n, (k, size) in enumerate((HARMONICS if harmonics is None else harmonics).items()):
@@ -67,62 +78,75 @@ def signal(turn, harmonics=None, offset=(-0.04, 0.05), gain=1.06, phase=np.radia
     return cos + offset[1], gain * (sin * np.cos(phase) + cos * np.sin(phase)) + offset[0]
 
 
-def converted(cos, sin, draw, bits=8, noise=0.5, amplitude=AMPLITUDE):
+def converted(
+    cos: Array,
+    sin: Array,
+    draw: np.random.Generator | None,
+    bits: int = 8,
+    noise: float = 0.5,
+    amplitude: float = AMPLITUDE,
+) -> tuple[Array, Array]:
     """16-bit left-aligned words of an ADC, its noise in its own LSB."""
     full = 1 << bits - 1
     exact = [
-        wave * amplitude * full + (draw.normal(0, noise, len(wave)) if noise else 0)
+        wave * amplitude * full + (draw.normal(0, noise, len(wave)) if draw and noise else 0)
         for wave in (cos, sin)
     ]
-    return [np.clip(np.rint(wave), -full, full - 1).astype(np.int64) << 16 - bits for wave in exact]
+    u, v = (np.clip(np.rint(wave), -full, full - 1).astype(np.int64) << 16 - bits for wave in exact)
+    return u, v
 
 
-def phase_of(cos, sin, values):
+def phase_of(cos: Array, sin: Array, values: Mapping[str, Any]) -> Array:
     """signal_correction and a correctly rounded arc tangent, as integers."""
     u, v = cos - values["cos_offset"], sin - values["sin_offset"]
     v = np.clip(v * values["gain"] + u * values["quadrature_error"] + 65536 >> 17, -32768, 32767)
     u = np.clip(u + 1 >> 1, -32768, 32767)
-    return np.rint(np.arctan2(v, u) * 65536 / (2 * np.pi)).astype(np.int64) & 65535
+    phase: Array = np.rint(np.arctan2(v, u) * 65536 / (2 * np.pi)).astype(np.int64) & 65535
+    return phase
 
 
-def corrected(phase, table):
+def corrected(phase: Array, table: ArrayLike) -> Array:
     """harmonic_correction."""
     table = np.asarray(table, dtype=np.int64)
     here, following = table[phase >> 8], table[(phase >> 8) + 1 & 255]
-    return phase - (here * 256 + (following - here) * (phase & 255) + 2048 >> 12) & 65535
+    better: Array = phase - (here * 256 + (following - here) * (phase & 255) + 2048 >> 12) & 65535
+    return better
 
 
-def words_of(cos, sin):
-    return ((cos & 65535) << 16 | sin & 65535).tolist()
+def words_of(cos: Array, sin: Array) -> list[int]:
+    words: list[int] = ((cos & 65535) << 16 | sin & 65535).tolist()
+    return words
 
 
-def remaining_nm(values, table, curve, amplitude=AMPLITUDE):
+def remaining_nm(
+    values: Mapping[str, Any], table: ArrayLike, curve: Curve, amplitude: float = AMPLITUDE
+) -> float:
     """Largest sub-division error left; `curve`: the undisturbed signal over the turn."""
     turn = np.arange(4096) / 4096 * 2 * np.pi
     words = converted(*curve(turn), None, bits=16, noise=0, amplitude=amplitude)
     away = (corrected(phase_of(*words, values), table) / 65536 - turn / (2 * np.pi) + 0.5) % 1 - 0.5
     away = away - np.angle(np.exp(2j * np.pi * away).mean()) / (2 * np.pi)
-    return np.abs((away + 0.5) % 1 - 0.5).max() * PERIOD_NM
+    return float(np.abs((away + 0.5) % 1 - 0.5).max() * PERIOD_NM)
 
 
 def calibrated(
-    seed,
-    vibration_hz,
-    vibration_nm=VIBRATION_NM,
-    speeds=None,
-    fringes=FRINGES,
-    curve=None,
-    spoiled=False,
-    bits=8,
-    amplitude=AMPLITUDE,
-):
+    seed: int,
+    vibration_hz: ArrayLike,
+    vibration_nm: float = VIBRATION_NM,
+    speeds: Callable[[], float] | None = None,
+    fringes: float = FRINGES,
+    curve: Curve | None = None,
+    spoiled: bool = False,
+    bits: int = 8,
+    amplitude: float = AMPLITUDE,
+) -> tuple[CalibrationRun, float | None, float, Curve]:
     """A calibration from reset, its axis driven back and forth until `fringes` have been recorded;
     (calibration, nm left after the ellipse, fringes, the signal).
     """
     draw = np.random.default_rng(seed)
-    curve = curve or (
-        lambda turn, twist=draw.uniform(0, 2 * np.pi, len(HARMONICS)): signal(turn, twist=twist)
-    )
+    if curve is None:
+        twist = draw.uniform(0, 2 * np.pi, len(HARMONICS))
+        curve = lambda turn: signal(turn, twist=twist)
     speeds = speeds or (lambda: SPEED_HZ * draw.uniform(0.7, 1.3) * draw.choice([-1, 1]))
     machine, gone, ellipse_nm = CalibrationRun(), 0.0, None
     machine.idle()
@@ -147,12 +171,20 @@ def calibrated(
             ellipse_nm = remaining_nm(machine.values, machine.table, curve, amplitude)
 
 
-def vector_noise_nm(bits, amplitude, noise=0.5):
+def reason_of(machine: CalibrationRun) -> str:
+    """Why a calibration does not go on, in words."""
+    return CALIBRATION_REASONS[machine.calibration.reason][1]
+
+
+def vector_noise_nm(bits: int, amplitude: float, noise: float = 0.5) -> float:
     """Noise of one phase: noise and quantisation of a channel, against the size of the circle."""
-    return np.sqrt(noise**2 + 1 / 12) / (amplitude * (1 << bits - 1)) / (2 * np.pi) * PERIOD_NM
+    sigma = np.sqrt(noise**2 + 1 / 12) / (amplitude * (1 << bits - 1)) / (2 * np.pi)
+    return float(sigma * PERIOD_NM)
 
 
-def largest_of_orders(sigma_nm, orders, share=50, trials=4000):
+def largest_of_orders(
+    sigma_nm: float, orders: Array, share: float = 50, trials: int = 4000
+) -> float:
     """That percentile of the largest value on the circle if the cosine and sine of each order
     scatter by so much.
     """
@@ -161,10 +193,10 @@ def largest_of_orders(sigma_nm, orders, share=50, trials=4000):
     sizes = draw.normal(0, sigma_nm, (trials, len(orders))) + 1j * draw.normal(
         0, sigma_nm, (trials, len(orders))
     )
-    return np.percentile(np.abs((sizes @ waves).real).max(axis=1), share)
+    return float(np.percentile(np.abs((sizes @ waves).real).max(axis=1), share))
 
 
-def bound_nm(amplitude):
+def bound_nm(amplitude: float) -> float:
     """Median of what the noise of the phases of a pass leaves at least (Cramer-Rao, ten orders, all
     phases of equal weight).
     """
@@ -174,7 +206,9 @@ def bound_nm(amplitude):
     )
 
 
-def sde(settings, progress):
+def sde(
+    settings: Sequence[tuple[int, float, int]], progress: Progress
+) -> tuple[Array, Array, Array]:
     """nm left by (vibration in Hz, amplitude, seed); a signal whose calibration did not complete
     counts with what the ellipse left.
     """
@@ -185,7 +219,7 @@ def sde(settings, progress):
             1000 * hz + seed, hz, VIBRATION_NM if hz else 0, amplitude=amplitude
         )
         if not machine.calibration.complete:
-            words = machine.words()
+            words = reason_of(machine)
             console.print(f"{hz} Hz, {amplitude:.0%}, seed {seed}: not complete, {words}")
         left.append(remaining_nm(machine.values, machine.table, curve, amplitude))
         ellipse.append(ellipse_nm)
@@ -193,7 +227,11 @@ def sde(settings, progress):
     return np.array(left), np.array(ellipse), np.array(raw)
 
 
-def sde_nm_max(vibrations_hz=VIBRATIONS_HZ, amplitudes=AMPLITUDES, seed=1):
+def sde_nm_max(
+    vibrations_hz: Sequence[int] = VIBRATIONS_HZ,
+    amplitudes: Sequence[float] = AMPLITUDES,
+    seed: int = 1,
+) -> float:
     """From reset, 610 fringes: without vibration and with 20 nm at each frequency, three signals
     and amplitudes each.
     """
@@ -220,10 +258,10 @@ def sde_nm_max(vibrations_hz=VIBRATIONS_HZ, amplitudes=AMPLITUDES, seed=1):
         for hz, here in zip(vibrations_hz, left.reshape(-1, len(amplitudes)))
     )
     console.print(f"worst by vibration: {by_hz}")
-    return left.max()
+    return float(left.max())
 
 
-def sde_soak():
+def sde_soak() -> tuple[str, bool]:
     """Every 20 Hz from 20 to 2000 Hz, each amplitude."""
     settings = [
         (hz, amplitude, 100 + n)
@@ -245,14 +283,14 @@ HARMONICS_OF_TWIN = {
 }
 
 
-def curve_of_twin():
+def curve_of_twin() -> Curve:
     """(cos, sin) of an amplitude of 1 of the twin's interferometer, harmonics and all, as a
     function of the turn.
     """
     plant = parameters.values()
     skew = np.radians(plant["signal_phase_error"])
 
-    def curve(turn):
+    def curve(turn: Array) -> tuple[Array, Array]:
         wave = np.exp(1j * turn) + sum(
             size * np.exp(1j * k * turn) for k, size in HARMONICS.items()
         )
@@ -265,7 +303,7 @@ def curve_of_twin():
     return curve
 
 
-def left_in_twin_nm(correction):
+def left_in_twin_nm(correction: Mapping[str, Any]) -> float:
     """Sub-division error of the interferometer of the twin with these values in force."""
     values = compiled.Values(**{name: correction[name] for name in CORRECTION})
     machine = CalibrationRun()
@@ -282,11 +320,11 @@ class Enough(Exception):
     """The calibration has got as far as it was to get."""
 
 
-def twin_sde_nm(complete=True, seed=1):
+def twin_sde_nm(complete: bool = True, seed: int = 1) -> float:
     """The firmware on its soft core calibrates the interferometer of the twin in motion to and fro,
     from nothing to the harmonics; or, if not complete, to the first correction that it accepts.
     """
-    left = {}  # nm by how much was accepted: nothing, the ellipse, the harmonics
+    left: dict[int, float] = {}  # nm by how much was accepted: nothing, the ellipse, the harmonics
     with Twin(nodes=(1,), plant=HARMONICS_OF_TWIN) as twin:
         bus = Bus(TwinTransport(twin), random_source=random.Random(seed))
         bus.transport.wait(START_S)
@@ -295,7 +333,7 @@ def twin_sde_nm(complete=True, seed=1):
         axis.home()
         began = bus.transport.now()
 
-        def look(state):
+        def look(state: CalibrationState) -> None:
             if state.accepted in left:
                 return
             left[state.accepted] = left_in_twin_nm(axis.correction())
@@ -318,7 +356,7 @@ def twin_sde_nm(complete=True, seed=1):
     return left[final.accepted]
 
 
-def acquire(count, amplitude, trials, seed=1):
+def acquire(count: int, amplitude: float, trials: int, seed: int = 1) -> Array:
     """nm left by an ellipse of `count` samples in each of many trials; random start, 1 to 5 turns,
     random errors.
     """
@@ -327,7 +365,7 @@ def acquire(count, amplitude, trials, seed=1):
     start = CalibrationRun().calibration
     identity = [0] * 256
     for _ in range(trials):
-        setting = dict(
+        setting: dict[str, Any] = dict(
             harmonics={},
             offset=draw.uniform(-0.05, 0.05, 2),
             gain=1 + draw.uniform(-0.06, 0.06),
@@ -346,11 +384,11 @@ def acquire(count, amplitude, trials, seed=1):
     return np.array(left)
 
 
-def acquired_nm_p95(count, trials, others, seed):
+def acquired_nm_p95(count: int, trials: int, others: int, seed: int) -> float:
     """At the amplitude of the figure; and, with `others` trials each, at others, to show that the
     error goes as the noise does.
     """
-    p95 = []
+    p95: list[float] = []
     for amplitude in (ELLIPSE_AMPLITUDE, *(ELLIPSE_AMPLITUDES if others else ())):
         left = acquire(count, amplitude, others if p95 else trials, seed)
         noise = vector_noise_nm(8, amplitude) * np.sqrt(2 / count)
@@ -363,11 +401,11 @@ def acquired_nm_p95(count, trials, others, seed):
     return p95[0]
 
 
-def acquire_nm_p95_64(trials=1000, others=300, seed=1):
+def acquire_nm_p95_64(trials: int = 1000, others: int = 300, seed: int = 1) -> float:
     return acquired_nm_p95(64, trials, others, seed)
 
 
-def acquire_nm_p95_1024(trials=1000, others=300, seed=1):
+def acquire_nm_p95_1024(trials: int = 1000, others: int = 300, seed: int = 1) -> float:
     return acquired_nm_p95(1024, trials, others, seed)
 
 

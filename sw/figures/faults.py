@@ -20,12 +20,17 @@ phase_jump and lost_count, which the monitor receives from fringe_tracker and co
 come from `Tracker`, a copy of both in numpy that tb/sense compares with their models.
 """
 
+from __future__ import annotations
+
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
 
 from figures.common import Figure, Quick, bar, console
 from moire.made.bus_tables import SIGNAL_FAULTS
@@ -61,12 +66,16 @@ ONSET = 620  # samples of good signal before a fault
 WARM_UP_SPEED = 0.011
 BLOCK = 64  # samples that the monitors take at once
 
+Array = NDArray[Any]
+Values = Any  # numbers, or arrays with one for each lane or fault
+Sample = tuple[Array, Array, Array, Array]  # sin, cos, a, b of each lane
 
-def advised(amplitude, width=8, no_noise_samples=0):
+
+def advised(amplitude: float, width: int = 8, no_noise_samples: int = 0) -> dict[str, int]:
     """Settings that docs/signal_faults.md advises for a signal of this amplitude with at most 0.5
     LSB rms of noise.
     """
-    part = lambda percent: round(amplitude * percent / 100)
+    part: Callable[[float], int] = lambda percent: round(amplitude * percent / 100)
     return {
         "low": part(70),
         "high": part(130),
@@ -88,8 +97,8 @@ class Signals:
 
     HARMONICS = ((3, 0.010), (-3, 0.006), (2, 0.004), (-5, 0.003))
 
-    def __init__(self, lanes, source, share=1.0):
-        spread = lambda size: source.uniform(-size, size, lanes) * share
+    def __init__(self, lanes: int, source: Generator, share: float = 1.0) -> None:
+        spread: Callable[[float], Array] = lambda size: source.uniform(-size, size, lanes) * share
         self.amplitude = AMPLITUDE * (1 + spread(0.03))
         self.offset = AMPLITUDE * (spread(0.05) + 1j * spread(0.05))
         self.gain, self.skew = 1 + spread(0.06), spread(np.radians(4))
@@ -99,7 +108,7 @@ class Signals:
         ]
         self.swell, self.swell_phase = 0.02 * share, 2 * np.pi * source.random(lanes)
 
-    def of(self, lanes):
+    def of(self, lanes: Any) -> Signals:
         """These lanes of it; of one lane, what can be shown at many phases."""
         part = object.__new__(Signals)
         part.amplitude, part.offset, part.gain, part.skew = (
@@ -109,7 +118,7 @@ class Signals:
         part.swell, part.swell_phase = self.swell, self.swell_phase[lanes]
         return part
 
-    def at(self, fringe):
+    def at(self, fringe: Array) -> Array:
         """cos + i sin, in LSB"""
         z = np.exp(2j * np.pi * fringe)
         w = z.conj()
@@ -118,7 +127,8 @@ class Signals:
         v = z + sum(size * powers[order] for order, size in self.harmonics)
         sin = self.gain * (v.imag * np.cos(self.skew) + v.real * np.sin(self.skew))
         swell = 1 + self.swell * np.sin(2 * np.pi * fringe / 50 + self.swell_phase)
-        return self.amplitude * swell * (v.real + 1j * sin) + self.offset
+        shown: Array = self.amplitude * swell * (v.real + 1j * sin) + self.offset
+        return shown
 
 
 @dataclass
@@ -128,33 +138,34 @@ class Fault:
     """
 
     # at the sensor: cos from cos, cos from sin, sin from cos, sin from sin; LSB, added to them
-    channel: tuple = (1.0, 0.0, 0.0, 1.0)
-    shift: complex = 0
-    word: tuple = (1.0, 0.0, 0.0, 1.0)  # the same between comparators and ADC
-    word_shift: complex = 0
-    time: float = 0.0  # samples
-    noise: float = 0.0  # LSB rms more, on both channels
-    a: int = -1  # comparator: -1 right, 0, 1 stuck, 2 inverted
-    b: int = -1
-    ones: tuple = (0, 0)  # bits of the straight binary word that are 1: of cos, of sin
-    zeros: tuple = (0, 0)
-    frozen: tuple = (0, 0)  # the last good word again and again: of cos, of sin
+    channel: Values = (1.0, 0.0, 0.0, 1.0)
+    shift: Values = 0
+    word: Values = (1.0, 0.0, 0.0, 1.0)  # the same between comparators and ADC
+    word_shift: Values = 0
+    time: Values = 0.0  # samples
+    noise: Values = 0.0  # LSB rms more, on both channels
+    a: Values = -1  # comparator: -1 right, 0, 1 stuck, 2 inverted
+    b: Values = -1
+    ones: Values = (0, 0)  # bits of the straight binary word that are 1: of cos, of sin
+    zeros: Values = (0, 0)
+    frozen: Values = (0, 0)  # the last good word again and again: of cos, of sin
 
 
-def stack(faults):
+def stack(faults: Sequence[Fault]) -> Fault:
     return Fault(
         **{f.name: np.array([getattr(fault, f.name) for fault in faults]).T for f in fields(Fault)}
     )
 
 
-def transformed(v, matrix, shift, share):
+def transformed(v: Array, matrix: Values, shift: Values, share: Values) -> Array:
     """v through a matrix and a shift that are there to a share of one."""
     cos = matrix[0] * v.real + matrix[1] * v.imag + shift.real
     sin = matrix[2] * v.real + matrix[3] * v.imag + shift.imag
-    return v + share * (cos + 1j * sin - v)
+    through: Array = v + share * (cos + 1j * sin - v)
+    return through
 
 
-def words(v, noise, fault, active, last):
+def words(v: Array, noise: Values, fault: Fault, active: bool, last: Values) -> list[Array]:
     """Two's complement codes of the ADC: cos, sin."""
     out = []
     for n, channel in enumerate((v.real + noise[0], v.imag + noise[1])):
@@ -170,20 +181,20 @@ class Comparators:
 
     HYSTERESIS = 3  # LSB
 
-    def __init__(self, v):
+    def __init__(self, v: Array) -> None:
         self.levels, self.count = np.array([v.real > 0, v.imag > 0]), np.zeros(v.shape, np.int64)
         self.number = self.quarter(self.levels)
 
     @staticmethod
-    def quarter(levels):
+    def quarter(levels: Values) -> Array:
         a, b = levels
         return np.where(b, np.where(a, 0, 1), np.where(a, 3, 2))
 
-    def see(self, v):
+    def see(self, v: Array) -> None:
         channels = np.array([v.real, v.imag])
         self.levels = np.where(self.levels, channels > -self.HYSTERESIS, channels > self.HYSTERESIS)
 
-    def decode(self, levels):
+    def decode(self, levels: Values) -> None:
         """quadrature_decoder; an illegal edge counts nothing."""
         number = self.quarter(levels)
         step = (number - self.number) % 4
@@ -194,7 +205,7 @@ class Comparators:
 class Tracker:
     """fringe_tracker, unwrap and count_phase_check, many side by side."""
 
-    def __init__(self, lanes):
+    def __init__(self, lanes: int) -> None:
         self.last, self.started = np.zeros(lanes, np.int64), False
         self.speed, self.predicted, self.position, self.constant = (
             np.zeros(lanes, np.int64) for _ in range(4)
@@ -202,10 +213,10 @@ class Tracker:
         self.was_outlier = np.zeros(lanes, bool)
 
     @staticmethod
-    def wrapped(phase):
+    def wrapped(phase: Array) -> Array:
         return (phase + PERIOD // 2) % PERIOD - PERIOD // 2
 
-    def follow(self, phase, count):
+    def follow(self, phase: Array, count: Array) -> tuple[Array, Array]:
         """phase_jump, lost_count"""
         if not self.started:
             self.started, self.last, self.position, self.constant = (
@@ -236,7 +247,7 @@ class Tracker:
 class Monitors:
     """The Verilated signal_monitor, one per lane."""
 
-    def __init__(self, lanes, settings):
+    def __init__(self, lanes: int, settings: Mapping[str, int]) -> None:
         self.lanes = lanes
         values = [lanes, *(settings[name] for name in SETTINGS)]
         self.process = subprocess.Popen(
@@ -244,25 +255,27 @@ class Monitors:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
         )
+        assert self.process.stdin is not None and self.process.stdout is not None
+        self.samples, self.judged = self.process.stdin, self.process.stdout
 
-    def judge(self, samples):
+    def judge(self, samples: Sequence[Sample]) -> Array:
         """Faults 0 to 12 as bits, (samples, lanes), of (sin, cos, a, b) of each sample and lane."""
         block = np.array(samples).astype(np.uint8).transpose(2, 0, 1)
-        self.process.stdin.write(np.uint32(len(samples)).tobytes() + block.tobytes())
-        self.process.stdin.flush()
+        self.samples.write(np.uint32(len(samples)).tobytes() + block.tobytes())
+        self.samples.flush()
         size = 2 * self.lanes * len(samples)
-        answer = self.process.stdout.read(size)
+        answer = self.judged.read(size)
         if len(answer) != size:
             raise BuildError("faults_run has ended early")
         return np.frombuffer(answer, np.uint16).reshape(self.lanes, -1).T.astype(np.int64)
 
-    def __enter__(self):
+    def __enter__(self) -> Monitors:
         return self
 
-    def __exit__(self, *_):
-        self.process.stdin.close()
+    def __exit__(self, *_: object) -> None:
+        self.samples.close()
         self.process.wait()
-        self.process.stdout.close()
+        self.judged.close()
 
 
 @dataclass
@@ -272,17 +285,17 @@ class Course:
     of its detection time, which is the onset itself where at_once.
     """
 
-    at: Callable
+    at: Callable[[Values], Array]
     onset: int
-    wait: np.ndarray
-    vibration: tuple
-    at_once: object = False
+    wait: Array
+    vibration: tuple[Array, Array]
+    at_once: bool | Array = False
 
 
 class Lanes:
     """Signals with faults, sample by sample: what the monitor sees of them, and what is true."""
 
-    def __init__(self, signals, fault, course, source):
+    def __init__(self, signals: Signals, fault: Fault, course: Course, source: Generator) -> None:
         self.signals, self.fault, self.course, self.source = signals, fault, course, source
         lanes = signals.amplitude.size
         self.tracker = Tracker(lanes)
@@ -292,17 +305,18 @@ class Lanes:
         self.comparators, self.healthy = Comparators(start), Comparators(start)
         self.last = [np.zeros(lanes, np.int64)] * 2
 
-    def fringe(self, n):
+    def fringe(self, n: Values) -> Array:
         amount, rate = self.course.vibration
-        return self.course.at(n) + amount * np.sin(2 * np.pi * (rate * n + self.beat))
+        vibration: Array = amount * np.sin(2 * np.pi * (rate * n + self.beat))
+        return self.course.at(n) + vibration
 
-    def share(self, n):
+    def share(self, n: int) -> Array:
         """How much of the fault is there at sample n."""
         time, since = self.fault.time, n - self.course.onset
         decayed = 1 - np.exp(-max(since, 0) / np.maximum(time, 1e-9))
         return np.where(time > 0, decayed, float(since >= 0))
 
-    def levels(self, n, active, share):
+    def levels(self, n: int, active: bool, share: Array) -> list[Array]:
         """Levels of the comparators with their faults, after both looks of a sample: the decoder
         sees every edge.
         """
@@ -318,7 +332,7 @@ class Lanes:
             self.comparators.decode(forced)
         return forced
 
-    def sample(self, n):
+    def sample(self, n: int) -> tuple[Sample, Array, Array]:
         """(sin, cos, a, b) of sample n, its phase_jump and lost_count as bits, and whether it
         starts the detection time.
         """
@@ -342,7 +356,14 @@ class Lanes:
         return (sin, cos, a, b), jump << PHASE_JUMP | lost << LOST_COUNT, starts
 
 
-def watch(signals, fault, course, settings, source, done=lambda: None):
+def watch(
+    signals: Signals,
+    fault: Fault,
+    course: Course,
+    settings: Mapping[str, int],
+    source: Generator,
+    done: Callable[[], None] = lambda: None,
+) -> tuple[Array, Array, Array]:
     """Run the lanes until all are decided. Returns the sample at which the detection time of each
     starts and the sample of its first alarm, -1 for none, and the faults seen up to its deadline.
 
@@ -378,25 +399,25 @@ def watch(signals, fault, course, settings, source, done=lambda: None):
 # ------------------------------------------------------------------ the campaign
 
 
-def of_channel(channel, gain, value=0.0):
+def of_channel(channel: int, gain: float, value: float = 0.0) -> dict[str, Any]:
     """A sensor fault of one channel (0 cos, 1 sin): its gain, and what is added."""
     matrix = (gain, 0.0, 0.0, 1.0) if channel == 0 else (1.0, 0.0, 0.0, gain)
     return {"channel": matrix, "shift": value if channel == 0 else 1j * value}
 
 
-def word_of(*matrix):
+def word_of(*matrix: float) -> Fault:
     return Fault(word=tuple(map(float, matrix)))
 
 
-def phase_error(channel, degrees):
+def phase_error(channel: int, degrees: float) -> Fault:
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return Fault(channel=(c, s, 0.0, 1.0) if channel == 0 else (1.0, 0.0, s, c))
 
 
-def kinds(channel, up, times):
+def kinds(channel: int, up: int, times: Sequence[float]) -> dict[str, list[Fault]]:
     """{name: its seven sizes}; channel 0, 1; up +1, -1, times: seven decay times in samples."""
-    stuck = lambda value: Fault(**of_channel(channel, 0.0, value))
-    bit = lambda number, one: Fault(
+    stuck: Callable[[float], Fault] = lambda value: Fault(**of_channel(channel, 0.0, value))
+    bit: Callable[[int, int], Fault] = lambda number, one: Fault(
         **{"ones" if one else "zeros": tuple((1 << number) * (n == channel) for n in (0, 1))}
     )
     return {
@@ -488,7 +509,7 @@ def kinds(channel, up, times):
     }
 
 
-def settled_shows(fault, signals):
+def settled_shows(fault: Fault, signals: Signals) -> Array:
     """Those of 1440 phases at which a fault that is fully there counts, with a signal at rest and
     without noise.
     """
@@ -514,7 +535,7 @@ def settled_shows(fault, signals):
     return fringe[shows]
 
 
-def slow_down(n, speed, end):
+def slow_down(n: Values, speed: float, end: int) -> Values:
     """Fringes covered since sample 0: WARM_UP_SPEED at first, `speed` from sample end - 20 on, an
     even change within 100 samples.
     """
@@ -524,7 +545,14 @@ def slow_down(n, speed, end):
     return WARM_UP_SPEED * n + (speed - WARM_UP_SPEED) * (change + np.maximum(n - begin - 100, 0))
 
 
-def report(title, unit, table):
+def slowing(begin: Array, direction: Values, speed: float) -> Callable[[Values], Array]:
+    """The course of lanes that begin there and slow down to `speed` by the onset."""
+    return lambda n: begin + direction * slow_down(n, speed, ONSET)
+
+
+def report(
+    title: str, unit: str, table: Mapping[str, tuple[int, int, float, list[tuple[str, int]]]]
+) -> None:
     console.print(
         f"{title}: faults found in time, of those that count; the slowest detection, in {unit}; "
         "the alarms that found most of them"
@@ -538,7 +566,7 @@ def report(title, unit, table):
         )
 
 
-def percent_found(rows, title, unit):
+def percent_found(rows: Sequence[tuple[Array, ...]], title: str, unit: str) -> float:
     """Percent found of all; rows: kind, started, alarm, wait, onset, names, lateness in unit."""
     table, found_all, counted_all = {}, 0, 0
     kind, started, alarm, wait, onset, names, scale = (
@@ -562,18 +590,21 @@ def percent_found(rows, title, unit):
     return 100 * float(found_all) / (counted_all + uncounted)
 
 
-def drawn_kinds(source, times):
+def drawn_kinds(source: Generator, times: Sequence[float]) -> dict[str, list[Fault]]:
     """{name: its seven sizes} of a drawn channel and sign."""
-    choice = source.integers(4)
+    choice: Any = source.integers(4)
     return kinds(choice % 2, choice // 2 * 2 - 1, times)
 
 
-def fault_detect_moving_pct(seed=SEED, speeds=SPEEDS, positions=POSITIONS):
+def fault_detect_moving_pct(
+    seed: int = SEED, speeds: Sequence[float] = SPEEDS, positions: int = POSITIONS
+) -> float:
     source, rows = np.random.default_rng(seed), []
     settings = advised(AMPLITUDE, no_noise_samples=NO_NOISE_SAMPLES)
     with bar("faults while moving, speed by speed") as progress:
         for speed in progress.track(speeds):
-            faults, names, goal = [], [], []
+            faults: list[Fault] = []
+            names, goal = [], []
             times = [share / speed for share in (0, 0.02, 0.05, 0.1, 0.3, 0.6, 1.0)]
             for size in range(7):
                 for position in range(positions):
@@ -585,9 +616,7 @@ def fault_detect_moving_pct(seed=SEED, speeds=SPEEDS, positions=POSITIONS):
             signals, direction = Signals(lanes, source), source.choice([-1, 1], lanes)
             begin = np.array(goal) - direction * slow_down(ONSET, speed, ONSET)
             course = Course(
-                lambda n, begin=begin, direction=direction, speed=speed: (
-                    begin + direction * slow_down(n, speed, ONSET)
-                ),
+                slowing(begin, direction, speed),
                 ONSET,
                 np.full(lanes, max(2 / speed, 16.0)),
                 ((1 / 40) * source.random(lanes), 10 ** source.uniform(-4, -2, lanes)),
@@ -598,11 +627,12 @@ def fault_detect_moving_pct(seed=SEED, speeds=SPEEDS, positions=POSITIONS):
     return percent_found(rows, "moving", "fringes after the start of the detection time")
 
 
-def fault_detect_still_pct(seed=SEED, signals=7, positions=POSITIONS):
+def fault_detect_still_pct(seed: int = SEED, signals: int = 7, positions: int = POSITIONS) -> float:
     source, rows = np.random.default_rng(seed), []
     settings = advised(AMPLITUDE, no_noise_samples=NO_NOISE_SAMPLES)
     times = (0, 1, 3, 10, 30, 100, 300)
-    faults, names, goal = [], [], []
+    faults: list[Fault] = []
+    names, goal = [], []
     drawn = Signals(len(kinds(0, 1, times)) * 7 * signals * positions, source)
     for size in range(7):
         for _ in range(signals):
@@ -620,7 +650,7 @@ def fault_detect_still_pct(seed=SEED, signals=7, positions=POSITIONS):
             begin = np.array(goal)[chosen] - slow_down(ONSET, 0.0, ONSET)
             shaken = (1 / 40) * source.random(chosen.size) * (source.random(chosen.size) < 0.5)
             course = Course(
-                lambda n, begin=begin: begin + slow_down(n, 0.0, ONSET),
+                slowing(begin, 1, 0.0),
                 ONSET,
                 np.where(frozen[chosen], 2.0 * NO_NOISE_SAMPLES, 64.0),
                 (shaken, 10 ** source.uniform(-3, -2, chosen.size)),
@@ -634,7 +664,7 @@ def fault_detect_still_pct(seed=SEED, signals=7, positions=POSITIONS):
     return percent_found(rows, "still", "samples after the start of the detection time")
 
 
-def fault_false_alarms(seed=SEED, lanes=2000, length=5000):
+def fault_false_alarms(seed: int = SEED, lanes: int = 2000, length: int = 5000) -> float:
     """Alarms in lanes x length samples without a fault: at rest anywhere, at any speed up to
     f_sample / 4, sweeps to it and back, small reversals.
     """
@@ -648,7 +678,7 @@ def fault_false_alarms(seed=SEED, lanes=2000, length=5000):
     size = 10 ** source.uniform(-1.5, 1.5, lanes)  # fringes of a reversal
     sweep_length = source.uniform(1500, 4000, lanes)
 
-    def at(n):
+    def at(n: Values) -> Array:
         still = slow_down(n, 0.0, ONSET)
         constant = np.where(
             abs(speed) <= WARM_UP_SPEED,
@@ -660,7 +690,8 @@ def fault_false_alarms(seed=SEED, lanes=2000, length=5000):
         swing = np.minimum(size, 0.2 * turn / (2 * np.pi)) * np.sin(
             2 * np.pi * np.asarray(n) / turn
         )
-        return begin + np.select([kind == 0, kind == 1, kind == 2], [still, constant, sweep], swing)
+        moved: Array = np.select([kind == 0, kind == 1, kind == 2], [still, constant, sweep], swing)
+        return begin + moved
 
     vibration = (1 / 40) * source.random(lanes), 10 ** source.uniform(-4, -2, lanes)
     settings = advised(AMPLITUDE, no_noise_samples=NO_NOISE_SAMPLES)

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures of S0's fine stage: motor and piezo together."""
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments.s0_fine import HOLD_S, FineStage
 from experiments.s0_stage import random_moves
@@ -15,7 +17,7 @@ POSITIONS_NM = (0.0, 250_100.0, 1_000_300.0)  # of the standstills: different ph
 
 
 @cache
-def prepared_stage(seed):
+def prepared_stage(seed: int) -> FineStage:
     stage = FineStage.power_up(seed)
     with bar("homing, calibration") as progress:
         task = progress.add_task("", total=len(stage.axes))
@@ -33,7 +35,7 @@ def prepared_stage(seed):
 
 
 @cache
-def errors_nm(count, seed):
+def errors_nm(count: int, seed: int) -> NDArray[np.float64]:
     """True position - target at the time when the node reports that it has arrived."""
     stage = prepared_stage(seed)
     with bar("moves") as progress:
@@ -50,15 +52,17 @@ def errors_nm(count, seed):
     return errors
 
 
-def s0_fine_nm_max(count=MOVES, seed=SEED):
+def s0_fine_nm_max(count: int = MOVES, seed: int = SEED) -> float:
     return float(np.abs(errors_nm(count, seed)).max())
 
 
-def s0_fine_nm_rms(count=MOVES, seed=SEED):
+def s0_fine_nm_rms(count: int = MOVES, seed: int = SEED) -> float:
     return float(np.sqrt((errors_nm(count, seed) ** 2).mean()))
 
 
-def s0_hold_nm_rms(positions=POSITIONS_NM, hold_s=HOLD_S, seed=SEED):
+def s0_hold_nm_rms(
+    positions: Sequence[float] = POSITIONS_NM, hold_s: float = HOLD_S, seed: int = SEED
+) -> float:
     stage, found = prepared_stage(seed), []
     with bar("standstills") as progress:
         task = progress.add_task("", total=len(positions) * len(stage.axes))

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
@@ -48,13 +49,14 @@ class NotMeasured(MoireError):
 # ------------------------------------------------------------------ reads
 
 
-def rfc2217_reads_per_s(seconds=READ_S, start_s=START_S):
+def rfc2217_reads_per_s(seconds: float = READ_S, start_s: float = START_S) -> float:
     """Positions of a node of the twin, read one after the other by pyserial alone over RFC 2217 in
     8N1.
     """
     served = "twin --nodes 1 --rfc2217 0 --tcp 0 --json".split()
     command = [sys.executable, "-m", "moire", *served]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as twin:
+        assert twin.stdout is not None
         answer = twin.stdout.readline()
         if not answer.startswith('{"command": "twin"'):
             raise NotMeasured(f"the twin is not served: {answer.strip()}")
@@ -66,11 +68,11 @@ def rfc2217_reads_per_s(seconds=READ_S, start_s=START_S):
             twin.terminate()
 
 
-def read_positions(port, seconds):
+def read_positions(port: serial.Serial, seconds: float) -> float:
     count, reader, began = 0, cobs.PacketReader(), time.perf_counter()
     while time.perf_counter() - began < seconds:
         port.write(cobs.packet(0x21, request_body("position", count, axis=0)))
-        contents = []
+        contents: list[bytes] = []
         while not contents:
             byte = port.read(1)
             if not byte:
@@ -86,7 +88,7 @@ def read_positions(port, seconds):
 # ------------------------------------------------------------------ fuzzing
 
 
-def build_firmware_fuzz(folder: Path, image, firmware=FIRMWARE) -> Path:
+def build_firmware_fuzz(folder: Path, image: str, firmware: Path = FIRMWARE) -> Path:
     """An image of the firmware of this folder and its fuzzer as a program of this computer, by gcc
     with its sanitizers.
     """
@@ -105,14 +107,14 @@ def build_firmware_fuzz(folder: Path, image, firmware=FIRMWARE) -> Path:
     return folder / "fuzz"
 
 
-def run(command):
+def run(command: Sequence[object]) -> None:
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
     if done.returncode:
         first = (done.stderr.splitlines() or ["without a word"])[0]
         raise NotMeasured(f"the fuzzer does not build: {first}")
 
 
-def images(firmware=FIRMWARE):
+def images(firmware: Path = FIRMWARE) -> list[str]:
     return sorted(
         path.stem.removeprefix("image_") for path in (Path(firmware) / "images").glob("image_*.c")
     )
@@ -126,7 +128,7 @@ class Outcome(NamedTuple):
     crash: str | None  # words of a sanitizer, or about an input that took too long
 
 
-def fuzz_firmware(seconds, image, seed=1, firmware=FIRMWARE) -> Outcome:
+def fuzz_firmware(seconds: float, image: str, seed: int = 1, firmware: Path = FIRMWARE) -> Outcome:
     with tempfile.TemporaryDirectory() as folder:
         program = build_firmware_fuzz(Path(folder), image, firmware)
         done = subprocess.run(
@@ -142,10 +144,11 @@ def fuzz_firmware(seconds, image, seed=1, firmware=FIRMWARE) -> Outcome:
         )
     if done.returncode:
         return Outcome(image, 0, 0, 0, done.stderr)
-    return Outcome(image, *map(int, done.stdout.split()), None)
+    runs, edges, corpus = map(int, done.stdout.split())
+    return Outcome(image, runs, edges, corpus, None)
 
 
-def host_parser_crashes(seconds=FUZZ_S, seed=1):
+def host_parser_crashes(seconds: float = FUZZ_S, seed: int = 1) -> int:
     """Both at once, each on a processor of its own."""
     with ThreadPoolExecutor(1) as beside:
         names = images()

@@ -9,12 +9,15 @@ host resets them; and some stop the soft core itself. The campaign of 10^6 fault
 """
 
 import random
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 from figures.common import Figure, Quick, bar, console, shares
 from firmware import build as firmware_build
 from moire import Bus
+from moire.client.axis import Axis as BusAxis
 from moire.errors import BusError, Refused
 from twin import START_S, Axis, Node, Twin, TwinTransport, build
 
@@ -48,11 +51,14 @@ INSTRUCTIONS = {"hang": 0x0000006F, "trap": 0x00000000}  # jump to itself; none 
 # ------------------------------------------------------------------ the axis
 
 
-def axis_faults(count, seed=1, done=lambda n: None):
+def axis_faults(
+    count: int, seed: int = 1, done: Callable[[int], None] = lambda n: None
+) -> dict[str, int]:
     """{name: number} over so many faults of the axis: faults, failures, and those of each cause."""
-    program, totals = build.simulation(DRIVER, ROOT / "rtl" / "axis.sv", CLK_HZ=4_000_000), {}
+    program = build.simulation(DRIVER, ROOT / "rtl" / "axis.sv", CLK_HZ=4_000_000)
+    totals: dict[str, int] = {}
 
-    def run(share):
+    def run(share: tuple[int, int]) -> Iterator[tuple[str, int]]:
         words = build.run([program, *share], "interlock_run").split()
         done(share[0])
         return zip(words[1::2], map(int, words[::2]))
@@ -67,7 +73,9 @@ def axis_faults(count, seed=1, done=lambda n: None):
 # ------------------------------------------------------------------ the node
 
 
-def powered_up(source, firmware=None):
+def powered_up(
+    source: random.Random, firmware: Sequence[int] | None = None
+) -> tuple[Twin, BusAxis]:
     """A twin of one node and its axis with the drive on."""
     twin = Twin(
         [Node(1, [Axis("stage")])],
@@ -82,7 +90,7 @@ def powered_up(source, firmware=None):
     return twin, axis
 
 
-def refused(request, cause):
+def refused(request: Callable[[], object], cause: str) -> bool:
     try:
         request()
     except Refused as error:
@@ -90,7 +98,7 @@ def refused(request, cause):
     return False
 
 
-def node_fault(twin, axis, fault, source):
+def node_fault(twin: Twin, axis: BusAxis, fault: str, source: random.Random) -> str | None:
     """What was wrong with one fault, None if nothing was: the drive must be off in time, cause and
     position must be right, and only a person may enable the drive again.
     """
@@ -131,7 +139,7 @@ def node_fault(twin, axis, fault, source):
     return None
 
 
-def node_faults(count, seed, done):
+def node_faults(count: int, seed: int, done: Callable[[int], None]) -> list[str]:
     """Sentences about faults of the node that went wrong."""
     source, wrong = random.Random(seed), []
     twin, axis = powered_up(source)
@@ -146,7 +154,7 @@ def node_faults(count, seed, done):
     return wrong
 
 
-def spoilt_firmware(instruction):
+def spoilt_firmware(instruction: int) -> list[int]:
     """The firmware's words, with this instruction where the request to reset faults begins."""
     words = list(build.firmware())
     _, symbols = firmware_build.read_elf(ROOT / "build" / "firmware" / "firmware.elf")
@@ -154,7 +162,7 @@ def spoilt_firmware(instruction):
     return words
 
 
-def core_fault(twin, axis, kind):
+def core_fault(twin: Twin, axis: BusAxis, kind: str) -> str | None:
     """What was wrong with a soft core that stops, None if nothing was."""
     later = f"{2 * CORE_SILENCE_S:.1f}s"  # the bus watchdog is not to be the first
     axis.set_parameter("watchdog_time", later)
@@ -175,7 +183,7 @@ def core_fault(twin, axis, kind):
     return "on again" if twin.truth().enabled else None
 
 
-def answers(axis, operation, **fields):
+def answers(axis: BusAxis, operation: str, **fields: Any) -> bool:
     try:
         axis.node.bus.exchange(1, operation, tries=1, answer_s=ROUND_S, axis=0, **fields)
     except BusError:
@@ -183,7 +191,7 @@ def answers(axis, operation, **fields):
     return True
 
 
-def core_faults(count, seed, done):
+def core_faults(count: int, seed: int, done: Callable[[int], None]) -> list[str]:
     source, wrong = random.Random(seed), []
     images = {kind: spoilt_firmware(instruction) for kind, instruction in INSTRUCTIONS.items()}
     for n in range(count):
@@ -197,11 +205,13 @@ def core_faults(count, seed, done):
     return wrong
 
 
-def guard_failures(faults=FAULTS, in_node=NODE_FAULTS, in_core=CORE_FAULTS, seed=1):
+def guard_failures(
+    faults: int = FAULTS, in_node: int = NODE_FAULTS, in_core: int = CORE_FAULTS, seed: int = 1
+) -> float:
     with bar(f"{faults} faults") as progress:
         task = progress.add_task("", total=faults)
 
-        def done(n):
+        def done(n: int) -> None:
             progress.advance(task, n)
 
         wrong = node_faults(in_node, 2 * seed - 1, done) + core_faults(in_core, 2 * seed, done)
@@ -213,7 +223,7 @@ def guard_failures(faults=FAULTS, in_node=NODE_FAULTS, in_core=CORE_FAULTS, seed
     return float(totals["failures"] + len(wrong))
 
 
-def soak():
+def soak() -> tuple[dict[str, int], bool]:
     totals = axis_faults(10**6)
     return totals, totals["failures"] == 0
 

@@ -6,6 +6,8 @@ the power goes holds a mixture of its old contents, its new contents and noise.
 """
 
 import random
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from figures.common import Figure, Quick, bar, console
 from twin.compiled.node import PARAMETER
@@ -20,8 +22,10 @@ SAVED_NUMBERS = [
     PARAMETER[f"filter_{n}_{name}"]["id"] for n in (1, 2) for name in ("b0", "b1", "b2", "a1", "a2")
 ]
 
+State = tuple[list[int], int, list[Any]]  # job, length of its journal, settings
 
-def begin(station, angles):
+
+def begin(station: Station, angles: Sequence[int]) -> None:
     """Begins to write a job."""
     station.ask("job_begin")
     for n, angle in enumerate(angles):
@@ -29,7 +33,7 @@ def begin(station, angles):
     station.ask("job_save")
 
 
-def writing_ms(station):
+def writing_ms(station: Station) -> Callable[[int], float]:
     """A function of the number of stations: how many ms it takes to write a job."""
     took = []
     for count in (1, 361 // 2):
@@ -41,18 +45,20 @@ def writing_ms(station):
     return lambda count: short + (long - short) * (count - low) / (high - low)
 
 
-def values_of(station):
+def values_of(station: Station) -> list[Any]:
     return [
         station.ask("get_parameter", axis=0, parameter=number)["value"] for number in SAVED_NUMBERS
     ]
 
 
-def state_of(station):
+def state_of(station: Station) -> State:
     """(job, length of its journal, settings)"""
     return station.station_list(), station.ask("job_stations")["journal"], values_of(station)
 
 
-def begin_writing(station, source, old, duration):
+def begin_writing(
+    station: Station, source: random.Random, old: State, duration: Callable[[int], float]
+) -> tuple[State, float]:
     """Begins to write the journal, the settings or a job; (what is to be there then, ms that it
     takes).
     """
@@ -74,7 +80,7 @@ def begin_writing(station, source, old, duration):
     return (job, journal, settings), duration(len(job))
 
 
-def torn(cuts=CUTS, seed=1):
+def torn(cuts: int = CUTS, seed: int = 1) -> float:
     """Power cuts, of so many, after which job, journal or settings were neither the old ones nor
     the new ones.
     """

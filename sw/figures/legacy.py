@@ -10,8 +10,10 @@ reading is compared with the true position, the mean of the difference taken off
 """
 
 import tempfile
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,8 +22,10 @@ from figures.calibration import (
     PERIOD_NM,
     SAMPLE_HZ,
     VIBRATION_NM,
+    Array,
     calibrated,
     converted,
+    reason_of,
     signal,
 )
 from figures.common import Figure, Quick, console
@@ -40,14 +44,21 @@ VIBRATION_HZ = 87
 IDENTITY = ({"sin_offset": 0, "cos_offset": 0, "gain": 65536, "quadrature_error": 0}, [0] * 256)
 
 
-def motion(speed_hz=FAST_HZ, there_and_back=False, vibration_nm=VIBRATION_NM, periods=PERIODS):
+def motion(
+    speed_hz: float = FAST_HZ,
+    there_and_back: bool = False,
+    vibration_nm: float = VIBRATION_NM,
+    periods: int = PERIODS,
+) -> Array:
     """True position in periods at each sample; there and back takes half of the distance each."""
     time = np.arange(int(periods / speed_hz * SAMPLE_HZ)) / SAMPLE_HZ
     moved = time[-1] / 2 - np.abs(time - time[-1] / 2) if there_and_back else time
     return speed_hz * moved + vibration_nm / PERIOD_NM * np.sin(2 * np.pi * VIBRATION_HZ * time)
 
 
-def readings(words, learned, filters=True):
+def readings(
+    words: Sequence[Array], learned: tuple[Mapping[str, int], Sequence[int]], filters: bool = True
+) -> tuple[Array, Array]:
     """nm of the paper's path and of ours at each sample; words (cos, sin) of 16 bits, left-aligned,
     of an 8-bit ADC.
     """
@@ -62,24 +73,24 @@ def readings(words, learned, filters=True):
         file.write(" ".join(map(str, head)) + "\n")
         np.savetxt(file, np.column_stack([words[1] >> 8, words[0] >> 8]), fmt="%d")
         file.flush()
-        words = run([simulation(DRIVER, BENCH), file.name], "legacy_run").split()
-    counts, positions = np.array(words, dtype=np.int64).reshape(-1, 2).T
+        printed = run([simulation(DRIVER, BENCH), file.name], "legacy_run").split()
+    counts, positions = np.array(printed, dtype=np.int64).reshape(-1, 2).T
     return (counts + 0.5) / SUBDIVISION * PERIOD_NM, positions / 65536 * PERIOD_NM
 
 
-def errors(reading, position):
+def errors(reading: Array, position: Array) -> tuple[float, float]:
     """nm, the mean taken off: largest and rms."""
     away = (reading - position * PERIOD_NM)[int(SETTLE / SLOW_HZ * SAMPLE_HZ) :]
     away = away - away.mean()
     return np.abs(away).max(), np.sqrt((away**2).mean())
 
 
-def show(what, path, error):
+def show(what: str, path: str, error: tuple[float, float]) -> None:
     console.print(f"{what:44} {path:10} largest {error[0]:6.2f} nm, rms {error[1]:5.2f} nm")
 
 
 @cache
-def compared(periods=PERIODS, seed=SEED):
+def compared(periods: int = PERIODS, seed: int = SEED) -> tuple[float, ...]:
     """(the paper's, ours): largest error in nm on the test signal. Prints what the paper's path
     reaches on easier signals, too.
     """
@@ -90,7 +101,7 @@ def compared(periods=PERIODS, seed=SEED):
         ("and both outlier filters", 0.5, 4, True),
     ):
         position = motion(vibration_nm=0, periods=periods)
-        pure = dict(harmonics={}, offset=(0, 0), gain=1, phase=np.radians(phase))
+        pure: dict[str, Any] = dict(harmonics={}, offset=(0, 0), gain=1, phase=np.radians(phase))
         words = converted(
             *signal(2 * np.pi * position, **pure),
             np.random.default_rng(seed),
@@ -100,7 +111,7 @@ def compared(periods=PERIODS, seed=SEED):
         show(what, "the paper's", errors(readings(words, IDENTITY, filters)[0], position))
     machine, _, _, curve = calibrated(seed, VIBRATION_HZ)
     if not machine.calibration.complete:
-        console.print(f"not calibrated: {machine.words()}")
+        console.print(f"not calibrated: {reason_of(machine)}")
     found = []
     for what, course in (
         ("the test signal, vibration, there and back", dict(there_and_back=True)),
@@ -118,11 +129,11 @@ def compared(periods=PERIODS, seed=SEED):
     return tuple(float(error[0]) for error in found)
 
 
-def printed_nm_max(periods=PERIODS, seed=SEED):
+def printed_nm_max(periods: int = PERIODS, seed: int = SEED) -> float:
     return compared(periods, seed)[0]
 
 
-def corrected_nm_max(periods=PERIODS, seed=SEED):
+def corrected_nm_max(periods: int = PERIODS, seed: int = SEED) -> float:
     return compared(periods, seed)[1]
 
 

@@ -4,11 +4,12 @@ close is it to the shortest time.
 """
 
 import random
+from collections.abc import Sequence
 from ctypes import byref, c_bool
 from math import ceil
 from pathlib import Path
 
-import ruckig
+import ruckig  # type: ignore[import-not-found]
 
 from figures.common import Figure, Quick, bar, console, shares
 from twin.build import (
@@ -22,7 +23,7 @@ from twin.build import (
     runtime,
     verilate,
 )
-from twin.compiled.firmware import Plan, Segment, library
+from twin.compiled.firmware import Limits, Plan, Segment, library
 
 ROOT = Path(__file__).resolve().parents[2]
 DRIVER = Path(__file__).with_name("profile_run.cpp")
@@ -37,8 +38,10 @@ TIMED, SEED = 20_000, 1
 WHOLE_TICKS = 4  # a move is made of whole ticks, and takes a few more to bend smoothly
 LONG = 400  # ticks, 0.1 s: of moves above it these ticks count
 
+Timed = tuple[int, float | None]  # ticks of a move, the shortest if it is known
 
-def profile_run():
+
+def profile_run() -> Path:
     """The program that plays random moves: the driver, the firmware's planner and the Verilated
     player.
     """
@@ -53,7 +56,7 @@ def profile_run():
     ]
     support = runtime(tool, verilator)
 
-    def make(folder):
+    def make(folder: Path) -> None:
         verilate(folder, verilator, BENCH, "Vplayer", {})
         objects = [folder / f"{source.stem}.o" for source in PLANNER]
         for source, made in zip(PLANNER, objects, strict=True):
@@ -85,9 +88,10 @@ def profile_run():
     )
 
 
-def misses(moves=MOVES, seed=SEED):
+def misses(moves: int = MOVES, seed: int = SEED) -> float:
     """Moves of so many that did not end exactly or exceeded a limit."""
-    program, totals = profile_run(), {}
+    program = profile_run()
+    totals: dict[str, int] = {}
     with bar(f"{moves} moves") as progress:
         task = progress.add_task("", total=moves)
         for size, number in shares(moves, SHARE, seed):
@@ -99,7 +103,7 @@ def misses(moves=MOVES, seed=SEED):
     return float(totals["misses"])
 
 
-def shortest(limits, state, goal, ticks):
+def shortest(limits: Limits, state: Sequence[float], goal: int, ticks: int) -> float | None:
     """Ticks of the time-optimal jerk-limited motion to rest at goal (2^-16 period); None where
     ruckig finds none.
 
@@ -124,7 +128,7 @@ def shortest(limits, state, goal, ticks):
     return trajectory.duration * time if found else None
 
 
-def in_flight(plan):
+def in_flight(plan: Plan) -> tuple[float, float, float]:
     """Position, velocity and acceleration of the motion two ticks ahead, where another can join:
     what would begin by then is left out.
 
@@ -153,14 +157,14 @@ def in_flight(plan):
     )
 
 
-def timed_moves(moves, seed):
+def timed_moves(moves: int, seed: int) -> tuple[list[Timed], list[Timed]]:
     """(ticks, shortest) of random moves from rest, and of another target for each in flight."""
     planner, draw, rest, flight = library(), random.Random(seed), [], []
 
-    def spread(low, high):
+    def spread(low: int, high: int) -> int:
         return int(low * (high / low) ** draw.random())
 
-    def signed(value):
+    def signed(value: int) -> int:
         return value * draw.choice((1, -1))
 
     for _ in range(moves):
@@ -191,13 +195,13 @@ def timed_moves(moves, seed):
     return rest, flight
 
 
-def time_ratio(moves=TIMED, seed=SEED):
+def time_ratio(moves: int = TIMED, seed: int = SEED) -> float:
     """The worst time over the shortest. Of moves shorter than 0.1 s the shortest counts with
     WHOLE_TICKS more.
     """
     worst = 0.0
     for name, pairs in zip(("from rest", "in flight"), timed_moves(moves, seed), strict=True):
-        known = [pair for pair in pairs if pair[1]]
+        known = [(ticks, best) for ticks, best in pairs if best]
         short = sorted(ticks / (ceil(best) + WHOLE_TICKS) for ticks, best in known if best <= LONG)
         long = sorted(ticks / best for ticks, best in known if best > LONG)
         for what, ratios in (

@@ -27,15 +27,15 @@ BY_SIGROK = 1000
 
 
 @cache
-def program():
+def program() -> Path:
     return simulation(DRIVER, PASS, CLK_HZ=CLK_HZ)
 
 
-def sequences(count=SEQUENCES, seed=1):
+def sequences(count: int = SEQUENCES, seed: int = 1) -> dict[str, float]:
     """Totals of random sequences: a person's keys, the host's commands, injections, and frames that
     the host cuts short.
     """
-    totals = {}
+    totals: dict[str, float] = {}
     with bar(f"{count:.0e} sequences") as progress:
         task = progress.add_task("", total=count)
         for size, number in shares(count, SHARE, seed):
@@ -47,7 +47,7 @@ def sequences(count=SEQUENCES, seed=1):
     return totals
 
 
-def wrong_by_sigrok(count, seed):
+def wrong_by_sigrok(count: int, seed: int) -> int:
     """Bytes that sigrok does not read as they were typed and injected: the recording, then random
     sequences.
     """
@@ -90,13 +90,13 @@ def wrong_by_sigrok(count, seed):
     return wrong
 
 
-def ps2_bytes_wrong(by_sigrok=BY_SIGROK, count=SEQUENCES, seed=1):
+def ps2_bytes_wrong(by_sigrok: int = BY_SIGROK, count: int = SEQUENCES, seed: int = 1) -> float:
     """Without sequences for sigrok, sigrok and the recording are not required."""
     wrong = wrong_by_sigrok(by_sigrok, seed) if by_sigrok else 0
     return wrong + sequences(count, seed)["wrong"]
 
 
-def ps2_delay_us(bytes_each=500, seed=1):
+def ps2_delay_us(bytes_each: int = 500, seed: int = 1) -> float:
     """The longest of two runs."""
     runs = [run([program(), "delay", bytes_each, one], "ps2_run") for one in seeds(seed, 2)]
     return max(float(words.split()[0]) for words in runs)

@@ -5,8 +5,10 @@ how much of an iCE40 UP5K it takes.
 The campaign of 10^9 edges is `make soak K=relay`.
 """
 
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from figures.common import Figure, Quick, bar, console, seeds, shares
 from figures.synthesis import ELABORATED, elaborated, netlist_of, placed, source_of
@@ -14,7 +16,10 @@ from twin.build import run, simulation
 
 RELAY = Path(__file__).resolve().parents[2] / "rtl" / "relay.sv"
 DRIVER = Path(__file__).with_name("relay_run.cpp")
-AS_MEASURED = {"K": 16, "BAUD": 3_000_000}  # a fast UART, so that runs need not wait for it
+AS_MEASURED: dict[str, Any] = {
+    "K": 16,
+    "BAUD": 3_000_000,
+}  # a fast UART, so that runs need not wait for it
 CLK_MHZ = 48
 EDGES = 10**7
 SHARE = 10**6  # edges of one run, each with a seed, and so a ring, of its own
@@ -25,31 +30,31 @@ PLACEMENTS = 3  # the figure is the worst of them
 RATES_MHZ = (24, 30, 36, 40, 44, 46, 47, 47.5)
 
 
-def relay_run(*words):
+def relay_run(*words: object) -> dict[str, float]:
     """What the program prints, {name: number}."""
     told = run([simulation(DRIVER, RELAY, **AS_MEASURED), *words], "relay_run").split()
     return dict(zip(told[1::2], map(float, told[::2])))
 
 
-def harmonic_arith_arcsec(points=POINTS, rings=RINGS, seed=1):
+def harmonic_arith_arcsec(points: int = POINTS, rings: int = RINGS, seed: int = 1) -> float:
     """Largest difference from float64 at so many positions per turn and ring, all 16 orders on,
     32768 counts per turn.
     """
     return max(relay_run("accuracy", points, one)["arcsec"] for one in seeds(seed, rings))
 
 
-def relay_latency_us(rings=RINGS, seed=1):
+def relay_latency_us(rings: int = RINGS, seed: int = 1) -> float:
     """Longest of 20 000 edges per ring, without filter, from the pin of the read head to the pin of
     the controller.
     """
     return max(relay_run("latency", one)["clk"] for one in seeds(seed, rings)) / CLK_MHZ
 
 
-def count_errors(edges=EDGES, mhz=24, seed=1):
+def count_errors(edges: int = EDGES, mhz: float = 24, seed: int = 1) -> float:
     """Cycles in which the output is not the corrected input, over so many edges whose rate is
     independent of the clock.
     """
-    totals = {}
+    totals: dict[str, float] = {}
     with bar(f"{edges:.0e} edges") as progress:
         task = progress.add_task("", total=edges)
         for size, number in shares(edges, SHARE, seed):
@@ -62,12 +67,12 @@ def count_errors(edges=EDGES, mhz=24, seed=1):
     return totals["wrong"]
 
 
-def relay_count_errors(edges=EDGES, seed=1):
+def relay_count_errors(edges: int = EDGES, seed: int = 1) -> float:
     """Edges at 24 million per second with reversals, a ring for each million."""
     return count_errors(edges, seed=seed)
 
 
-def relay_edge_mhz(edges=SHARE, rates=RATES_MHZ, seed=1):
+def relay_edge_mhz(edges: int = SHARE, rates: Sequence[float] = RATES_MHZ, seed: int = 1) -> float:
     """The highest of a row of edge rates at which so many edges leave no wrong count."""
     best = 0.0
     for mhz in rates:
@@ -78,7 +83,7 @@ def relay_edge_mhz(edges=SHARE, rates=RATES_MHZ, seed=1):
 
 
 @cache
-def up5k(first):
+def up5k(first: int) -> dict[str, float]:
     netlist = netlist_of(source_of("relay"), {"K": 16}, "ice40", 1)
     tries = [
         placed(netlist, "ice40", UP5K, 24, seed, "--pcf-allow-unconstrained")
@@ -97,18 +102,18 @@ def up5k(first):
     return {"lc": part["lc"]["used"], "lc_of": part["lc"]["available"], "fmax_mhz": fmax}
 
 
-def on_up5k(name, place, seed):
+def on_up5k(name: str, place: bool, seed: int) -> float:
     """Of the whole relay, K = 16, with UART and flash; the worst of three placements."""
     if not place:
         return elaborated(source_of("relay"), {"K": 16})
     return float(up5k(seed)[name])
 
 
-def relay_up5k_lc(place=True, seed=1):
+def relay_up5k_lc(place: bool = True, seed: int = 1) -> float:
     return on_up5k("lc", place, seed)
 
 
-def relay_up5k_mhz(place=True, seed=1):
+def relay_up5k_mhz(place: bool = True, seed: int = 1) -> float:
     return on_up5k("fmax_mhz", place, seed)
 
 

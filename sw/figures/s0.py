@@ -3,8 +3,10 @@
 
 import itertools
 import random
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
+from rich.progress import Progress
 
 from experiments import s0_stage
 from figures.common import Figure, Quick, bar, console, soaked
@@ -12,6 +14,7 @@ from figures.synthesis import ELABORATED, elaborated, source_of, synthesise
 from moire.bus.protocol import (
     TO_NODE,
     Exchange,
+    Reply,
     State,
     frame,
     parse_reply,
@@ -33,11 +36,15 @@ CELLS = 11  # of a character on the bus
 TURNAROUND = [1] * 3  # cells before the master sends again, while the node's driver releases
 ANSWER_CELLS = 150  # of silence after which no answer comes any more
 READINGS = 8  # of a zero
-S0_NODE = {"CLK_HZ": 60_000_000, "HAS_STEPPER": 0, "FIRMWARE": "build/firmware/firmware.hex"}
+S0_NODE: Mapping[str, int | str] = {
+    "CLK_HZ": 60_000_000,
+    "HAS_STEPPER": 0,
+    "FIRMWARE": "build/firmware/firmware.hex",
+}
 WORK_CELLS = 400  # that a request may take, at the low clock of the bench
 
 
-def homed_stage(progress, seed):
+def homed_stage(progress: Progress, seed: int) -> s0_stage.Stage:
     stage = s0_stage.Stage.power_up(seed)
     stage.find()
     task = progress.add_task("", total=len(stage.axes))
@@ -47,7 +54,7 @@ def homed_stage(progress, seed):
     return stage
 
 
-def s0_coarse_um_max(count=100, seed=SEED):
+def s0_coarse_um_max(count: int = 100, seed: int = SEED) -> float:
     with bar("homing") as progress:
         stage = homed_stage(progress, seed)
     with bar("moves") as progress:
@@ -61,17 +68,17 @@ def s0_coarse_um_max(count=100, seed=SEED):
         f"rms {np.sqrt((errors**2).mean()):.1f} nm, mean {errors.mean():.1f} nm; "
         f"a move takes {np.median(times):.2f} s (median), {times.max():.2f} s at most"
     )
-    return np.abs(errors).max() / 1000
+    return float(np.abs(errors).max() / 1000)
 
 
-def apart_nm(stage):
+def apart_nm(stage: s0_stage.Stage) -> float:
     """True position, the mean of before and after the answer, less the answer."""
     before = stage.true_nm("X", from_zero=False)
     position = stage.axes["X"].status().position_nm
     return (before + stage.true_nm("X", from_zero=False)) / 2 - float(position)
 
 
-def s0_home_spread_nm(count=20, seed=SEED):
+def s0_home_spread_nm(count: int = 20, seed: int = SEED) -> float:
     source, readings = random.Random(seed), []
     stage = s0_stage.Stage.power_up(seed)
     stage.find()
@@ -89,13 +96,13 @@ def s0_home_spread_nm(count=20, seed=SEED):
         f"+-200 nm. Each zero is the mean of {READINGS} readings, since the axis moves while it "
         f"holds: single ones spread by {single:.1f} nm"
     )
-    return np.ptp(zeros)
+    return float(np.ptp(zeros))
 
 
 # ------------------------------------------------------------------ the bus
 
 
-def requests(source):
+def requests(source: random.Random) -> Iterator[bytes]:
     """Bodies of every length that a host sends, with a sequence number that differs from the one
     before.
     """
@@ -117,7 +124,7 @@ def requests(source):
         yield request_body(operation, number % 256, **fields)
 
 
-def damaged(cells, source):
+def damaged(cells: Sequence[int], source: random.Random) -> list[int]:
     """The cells with one, two or three of them inverted."""
     cells = list(cells)
     for position in source.sample(range(len(cells)), source.randint(1, 3)):
@@ -125,7 +132,7 @@ def damaged(cells, source):
     return cells
 
 
-def heard(cells):
+def heard(cells: Sequence[int]) -> list[int]:
     """Words that a PC's port makes of bit cells: a character begins with a low cell. It counts
     without a stop bit, too, but a break does not.
     """
@@ -142,7 +149,7 @@ def heard(cells):
     return words
 
 
-def node_answer(bench):
+def node_answer(bench: FrameBench) -> tuple[Reply | None, list[int]]:
     """(last reply of the node, None if it is damaged; its words)"""
     words = bench.exchange(TURNAROUND + cells_of(read_words(ADDRESS)), quiet_cells=ANSWER_CELLS)
     if len(words) < 7 or list(frame(words[0], bytes(words[2:-4]))) != words[1:]:
@@ -158,15 +165,17 @@ class Judge:
     takes it for a repetition and does not carry it out.
     """
 
-    def __init__(self, reply):
+    def __init__(self, reply: Reply | None) -> None:
         self.last = reply
 
-    def accepted(self, reply):
+    def accepted(self, reply: Reply | None) -> bool:
         changed, self.last = reply != self.last, reply
         return changed
 
 
-def s0_bus_wrong(frames=100_000, make_bench=FrameBench, seed=SEED):
+def s0_bus_wrong(
+    frames: int = 100_000, make_bench: Callable[[int], FrameBench] = FrameBench, seed: int = SEED
+) -> int:
     """Each frame is damaged on its way to the node, and the reply on its way to the host. After
     every hundredth an undamaged frame must be accepted, so that a count of zero means something.
     """
@@ -223,7 +232,7 @@ def s0_bus_wrong(frames=100_000, make_bench=FrameBench, seed=SEED):
 # ------------------------------------------------------------------ node and twin
 
 
-def node_ecp5_mhz(place=True, seed=1):
+def node_ecp5_mhz(place: bool = True, seed: int = 1) -> float:
     build.firmware()
     if not place:
         return elaborated(source_of("node"), S0_NODE)
@@ -241,7 +250,7 @@ def node_ecp5_mhz(place=True, seed=1):
     return found["fmax_mhz"]
 
 
-def twin_realtime(simulated_s=0.5):
+def twin_realtime(simulated_s: float = 0.5) -> float:
     console.print(f"CLK_HZ {CLK_HZ}, two nodes and their machines, one core")
     return realtime_factor(simulated_s)
 

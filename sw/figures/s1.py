@@ -10,11 +10,17 @@ gives the corrections; the whole Verilated relay runs for the first RTL_RINGS ri
 s1_peak_arcsec.
 """
 
+from collections.abc import Callable, Iterator
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments import s1_ring
 from figures.common import Figure, Quick, bar, console, seeds
+from moire.analysis.harmonic_fit import Harmonics, Readings, fit
 from moire.errors import MoireError
+from twin.machines.ring import RotaryRing as Ring
 
 RINGS, DENSE_RINGS, RTL_RINGS = 200, 20, 2
 ANGLES, RTL_ANGLES = 360, 45
@@ -22,8 +28,11 @@ RTL_AGREES = 0.6  # arcsec: error within a line, half a count and its hysteresis
 FOUR_TURNS = np.arange(0.0, 1441.0, 10.0)
 DENSE = np.arange(36_000) * 360 / 36_000
 
+Array = NDArray[Any]
+Method = Callable[[Readings], Harmonics]
 
-def rings(count, seed):
+
+def rings(count: int, seed: int) -> Iterator[tuple[int, Ring, np.random.Generator]]:
     """(number, ring, random source), with a bar."""
     with bar("rings") as progress:
         task = progress.add_task("", total=count)
@@ -32,7 +41,13 @@ def rings(count, seed):
             progress.advance(task)
 
 
-def left(angles, method, count, seed, each=lambda *_: None):
+def left(
+    angles: Array,
+    method: Method,
+    count: int,
+    seed: int,
+    each: Callable[[int, Ring, Harmonics, Array], object] = lambda *_: None,
+) -> float:
     """95th percentile over the rings of the largest error left; each(number, ring, correction,
     angles) is called for every ring.
     """
@@ -46,7 +61,7 @@ def left(angles, method, count, seed, each=lambda *_: None):
     return float(np.percentile(found, 95))
 
 
-def through_the_relay(number, ring, correction, angles):
+def through_the_relay(number: int, ring: Ring, correction: Harmonics, angles: Array) -> None:
     """The whole Verilated relay beside its harmonic_map, at the same angles."""
     if number >= RTL_RINGS:
         return
@@ -61,20 +76,20 @@ def through_the_relay(number, ring, correction, angles):
         raise MoireError(f"the Verilated relay is {apart:.2f} arcsec from its harmonic_map")
 
 
-def s1_k3_arcsec(count=RINGS, seed=1):
+def s1_k3_arcsec(count: int = RINGS, seed: int = 1) -> float:
     return left(s1_ring.TEN_DEGREES, s1_ring.as_in_the_paper, count, seed)
 
 
-def s1_peak_arcsec(count=RINGS, seed=1):
+def s1_peak_arcsec(count: int = RINGS, seed: int = 1) -> float:
     return left(s1_ring.TEN_DEGREES, s1_ring.ours, count, seed, through_the_relay)
 
 
-def s1_peak4_arcsec(count=RINGS, seed=1):
+def s1_peak4_arcsec(count: int = RINGS, seed: int = 1) -> float:
     return left(FOUR_TURNS, s1_ring.ours, count, seed)
 
 
-def s1_dense_arcsec(count=DENSE_RINGS, seed=1):
-    method = lambda readings: s1_ring.fit(readings, orders=s1_ring.ORDERS)
+def s1_dense_arcsec(count: int = DENSE_RINGS, seed: int = 1) -> float:
+    method: Method = lambda readings: fit(readings, orders=s1_ring.ORDERS)
     return left(DENSE, method, count, seed)
 
 

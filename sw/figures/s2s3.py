@@ -14,11 +14,15 @@ SEARCHES_A_POWER_UP = 10
 PROCESSES = 2
 
 
-def searched(seed):  # in a process of its own: a fork would inherit the progress bar's thread
+def searched(
+    seed: int,
+) -> list[
+    s3_zero.Search
+]:  # in a process of its own: a fork would inherit the progress bar's thread
     return s3_zero.searches(SEARCHES_A_POWER_UP, seed)
 
 
-def s3_zero_um_max(count=1000, seed=1):
+def s3_zero_um_max(count: int = 1000, seed: int = 1) -> float:
     """A power-up every ten searches, with another start, other noise, and counts from anywhere."""
     s3_zero.Motor(1)  # builds the twin once
     made = []
@@ -55,16 +59,16 @@ CROSSED = {
 }
 
 
-def counted(seed, pulses=SHARE, *more):
+def counted(seed: int, pulses: int = SHARE, *more: object) -> list[dict[str, int]]:
     """What counts_run prints of each axis: [{name: number}]."""
     command = [build.simulation(DRIVER, BENCH), pulses, seed, *more]
     lines = build.run(command, "counts_run").splitlines()
     return [dict(zip(words[1::2], map(int, words[::2]))) for words in map(str.split, lines[:AXES])]
 
 
-def s2_count_errors(pulses=PULSES, seed=1):
+def s2_count_errors(pulses: int = PULSES, seed: int = 1) -> int:
     build.simulation(DRIVER, BENCH)
-    total = [Counter() for _ in range(AXES)]
+    total: list[Counter[str]] = [Counter() for _ in range(AXES)]
     with bar("pulses") as progress, ThreadPoolExecutor(PROCESSES) as pool:
         task = progress.add_task("", total=pulses)
         sizes, numbers = zip(*shares(pulses, SHARE, seed))

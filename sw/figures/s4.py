@@ -7,6 +7,7 @@ The campaign of 20 whole jobs of 36 stations is `make soak K=s4_jobs`.
 
 import math
 import random
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
@@ -23,11 +24,13 @@ SUB_NODE = {**s4_job.NODE, "HAS_ANGLE_SENSOR": 1}  # no other peripheral
 TROUBLED_STATIONS, TROUBLED_PART = 8, 0.06  # of a turn
 TROUBLED_STATION_S = 3  # that one takes, about; the power cut comes within the job
 
+Job = Callable[[int], s4_job.Outcome]  # of its seed
+
 
 # Tables and jobs run in processes of their own: a fork would inherit the thread of the bar.
 
 
-def indexed(seed, stations=STATIONS):
+def indexed(seed: int, stations: int = STATIONS) -> float:
     """arcsec: the largest true error of a table that turns to the stations of a job, from its
     standstill until a cut would have ended.
     """
@@ -56,21 +59,21 @@ def indexed(seed, stations=STATIONS):
         return max(map(abs, errors))
 
 
-def calm_job(seed):
+def calm_job(seed: int) -> s4_job.Outcome:
     source = random.Random(seed)
     with s4_job.IndexingMachine(seed, worm=s4_job.random_worm(source)) as machine:
         machine.load(s4_job.random_stations(STATIONS, source))
         return machine.run(s4_job.CALM)
 
 
-def troubled_job(seed):
+def troubled_job(seed: int) -> s4_job.Outcome:
     source = random.Random(seed)
     with s4_job.IndexingMachine(seed, worm=s4_job.random_worm(source)) as machine:
         machine.load(s4_job.random_stations(TROUBLED_STATIONS, source, TROUBLED_PART))
         return machine.run(s4_job.some_trouble(TROUBLED_STATION_S * TROUBLED_STATIONS, source))
 
 
-def short_job(seed):
+def short_job(seed: int) -> s4_job.Outcome:
     """Two stations, without trouble."""
     source = random.Random(seed)
     with s4_job.IndexingMachine(seed, worm=s4_job.random_worm(source)) as machine:
@@ -78,7 +81,7 @@ def short_job(seed):
         return machine.run(s4_job.CALM)
 
 
-def jobs(job, count, seed=1):
+def jobs(job: Job, count: int, seed: int = 1) -> list[s4_job.Outcome]:
     s4_job.IndexingMachine().twin.close()  # builds the twin once
     made = []
     with bar("jobs") as progress, ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
@@ -96,7 +99,7 @@ def jobs(job, count, seed=1):
     return made
 
 
-def s4_index_arcsec_max(count=JOBS, stations=STATIONS, seed=1):
+def s4_index_arcsec_max(count: int = JOBS, stations: int = STATIONS, seed: int = 1) -> float:
     """The host sends the stations to the table's node, as the main node does in a job."""
     build.twin_library(s4_job.CLK_HZ, 1, SUB_NODE)
     with bar("tables") as progress, ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
@@ -110,7 +113,7 @@ def s4_index_arcsec_max(count=JOBS, stations=STATIONS, seed=1):
     return max(worst)
 
 
-def s4_jobs_failed(count=JOBS, job=troubled_job, seed=1):
+def s4_jobs_failed(count: int = JOBS, job: Job = troubled_job, seed: int = 1) -> int:
     """A job fails if a station is not cut or cut twice, if a cut is elsewhere or beyond the
     tolerance, or if the job does not end.
     """
@@ -141,7 +144,7 @@ FIGURES = {
 }
 
 
-def whole_jobs():
+def whole_jobs() -> tuple[float, bool]:
     outcomes = jobs(calm_job, JOBS)
     return max(outcome.worst for outcome in outcomes), not any(
         outcome.failed for outcome in outcomes
