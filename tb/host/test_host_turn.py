@@ -180,7 +180,7 @@ def test_the_commands_turn_the_table_and_say_where_it_is(tmp_path):
     assert abs(panel.machine.error(1800)) <= 2
     code, out, err = panel.call("turn to 400deg")
     assert code == 2 and out == "" and err.count("\n") == 1 and "below 360deg" in err
-    code, out, _ = panel.call(f"settings set peer_mode printed -- settings save {file} --json")
+    code, out, _ = panel.call(f"settings set peer_mode legacy -- settings save {file} --json")
     assert code == 0 and json.loads(file.read_text())["peer_mode"] == "legacy"
     code, out, _ = panel.call(f"settings load {file} -- settings get turn_tolerance")
     assert code == 0 and "0.5arcsec" in out
