@@ -7,13 +7,16 @@ import re
 import sys
 import textwrap
 import zlib
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import jinja2
-from systemrdl import RDLCompileError, RDLCompiler
-from systemrdl.node import FieldNode, RegNode
+from systemrdl.compiler import RDLCompiler
+from systemrdl.messages import RDLCompileError
+from systemrdl.node import AddressableNode, FieldNode, Node, RegNode
 
 from tables import made_files
 
@@ -22,7 +25,11 @@ SOURCE = ROOT / "tables" / "registers.rdl"
 REGISTER_BUS_BASE = 0x8000_0000  # where the soft core sees the map
 SLOT = 0x100  # bytes that a block may fill: a word index inside it has 6 bits
 EVENTS = ("counter", "sticky")  # kinds whose port is a strobe that the block counts or holds
-KINDS = {  # what each kind of a field must be: sw, hw, and a further condition
+Property = Callable[[str], Any]  # of a field, by its name in SystemRDL
+Fitted = tuple[str, str, str, str]  # direction, shape, name, text
+KINDS: dict[
+    str, Callable[[Property, FieldNode], Any]
+] = {  # what each kind of a field must be: sw, hw, and a further condition
     "counter": lambda get, field: get("incrsaturate") and on_write(get) == "wclr",
     "sticky": lambda get, field: on_write(get) == "woclr" and field.width == 1,
     "pulse": lambda get, field: field.width == 1 and get("hw").name == "r",
@@ -33,7 +40,7 @@ KINDS = {  # what each kind of a field must be: sw, hw, and a further condition
 
 
 class Refused(ValueError):
-    def __init__(self, why):
+    def __init__(self, why: str) -> None:
         super().__init__(f"tables/registers.rdl: {why}")
 
 
@@ -62,25 +69,25 @@ class Field:
     state: str  # what the block reads: the port itself, or the bits that it holds
 
     @property
-    def measure(self):
+    def measure(self) -> str:
         return " ".join(x for x in ("" if self.lsb == "1" else self.lsb, self.unit) if x)
 
     @property
-    def described(self):
+    def described(self) -> str:
         return f"{self.meaning} [{self.measure}]" if self.unit else self.meaning
 
     @property
-    def scale(self):
+    def scale(self) -> Fraction:
         """Value of one count, in its unit."""
         base, power, exponent = (self.lsb or "1").partition("^")
         return Fraction(base) ** int(exponent) if power else Fraction(base)
 
     @property
-    def shape(self):
+    def shape(self) -> str:
         return ("signed " if self.signed else "") + span(self.width)
 
     @property
-    def bits(self):
+    def bits(self) -> str:
         """What a write of the register puts into the field."""
         one = f"wdata[{self.low}]"
         return one if self.width == 1 else f"wdata{span(min(self.width, 32), self.low)}"
@@ -93,30 +100,31 @@ class Register:
     wide: bool
     vector: bool
     text: str
-    fields: tuple
+    fields: tuple[Field, ...]
 
     @property
-    def word(self):
+    def word(self) -> int:
         return self.offset // 4
 
     @property
-    def on_write(self):
+    def on_write(self) -> bool:
         return any(f.on_write for f in self.fields)
 
     @property
-    def on_read(self):
+    def on_read(self) -> bool:
         return any(f.on_read for f in self.fields)
 
     @property
-    def access(self):
+    def access(self) -> str:
         return "".join(c for c in "rw" if any(c in f.access for f in self.fields))
 
-    def parts(self, constant):
+    def parts(self, constant: int) -> list[str]:
         """What is on rdata for this register of 32 bits, most significant bit first."""
         readable = [f for f in self.fields if "r" in f.access]
         if self.vector:
             return [f"{32 - len(readable)}'d0", readable[0].state.partition("[")[0]]
-        parts, at = [], 0
+        parts: list[str] = []
+        at = 0
         for f in readable:
             if f.low > at:
                 parts.append(f"{f.low - at}'d0")
@@ -127,12 +135,12 @@ class Register:
             parts.append(f"{{{32 - at}{{{parts[0]}[{at - 1}]}}}}" if extended else f"{32 - at}'d0")
         return parts[::-1]
 
-    def shown(self, constant):
+    def shown(self, constant: int) -> str:
         parts = self.parts(constant)
         return parts[0] if len(parts) == 1 else "{" + ", ".join(parts) + "}"
 
     @property
-    def shown_high(self):
+    def shown_high(self) -> str:
         """What is on rdata for the high word of a register of 64 bits."""
         f = self.fields[0]
         held = f.kind == "input"
@@ -149,56 +157,58 @@ class Block:
     base: int
     stride: int  # 0: there is one of it
     count: int
-    registers: tuple
+    registers: tuple[Register, ...]
 
     @property
-    def fields(self):
+    def fields(self) -> list[tuple[Register, Field]]:
         return [(r, f) for r in self.registers for f in r.fields]
 
     @property
-    def parameters(self):
+    def parameters(self) -> list[str]:
         return sorted({f.needs for _, f in self.fields if f.needs})
 
     @property
-    def unused(self):
+    def unused(self) -> int:
         """The lowest bit of wdata that no register of this block has; all above are unused too."""
         taken = ("setting", "pulse", "sticky")
         fields = [(r, f) for r, f in self.fields if f.kind in taken]
         return max((32 if r.wide else f.low + f.width for r, f in fields), default=0)
 
     @property
-    def ports(self):
+    def ports(self) -> list[Fitted]:
         """(direction, shape, name, text) of each port behind the register bus."""
         return fitted([port for r in self.registers for port in ports(r)])
 
 
-def span(width, low=0):
+def span(width: int, low: int = 0) -> str:
     return f"[{low + width - 1}:{low}]" if width > 1 else ""
 
 
-def literal(width, value):
+def literal(width: int, value: int) -> str:
     digits = f"{value & (1 << width) - 1:0{(width + 3) // 4}X}"
     return f"{width}'h{digits}" if width > 1 else f"1'b{value}"
 
 
-def on_write(get):
-    return get("onwrite") and get("onwrite").name
+def on_write(get: Property) -> str | None:
+    kind = get("onwrite")
+    return str(kind.name) if kind else None
 
 
-def kind_of(get, name):
+def kind_of(get: Property, name: str) -> str:
     """The kind of a field, from the properties that no other kind has."""
     found = next((k for k, p in (("counter", "counter"), ("sticky", "hwset")) if get(p)), None)
     found = found or ("pulse" if get("singlepulse") else None)
     return found or {"na": "constant", "w": "input"}.get(get("hw").name, "setting")
 
 
-def field_of(node, register):
-    get, name, parent = node.get_property, node.inst_name, register.inst_name
+def field_of(node: FieldNode, register: RegNode) -> Field:
+    get: Property = node.get_property
+    name, parent = node.inst_name, register.inst_name
     kind, sw = kind_of(get, name), get("sw").name
     wide, vector = register.get_property("regwidth") == 64, bool(register.get_property("vector"))
     needs = get("needs") or register.get_property("needs") or ""
     unknown = {"onread", "hwclr", "we", "wel", "sticky", "stickybit", "decr"}
-    text, words = (" ".join((n.get_property("desc") or "").split()) for n in (node, register))
+    text, words = described(node), described(register)
     port = parent if name == "value" else f"{parent}_{name}"
     signal = f"{parent}[{node.low}]" if vector else port
     held = {"counter": "_count", "sticky": "_held"}.get(kind, "")
@@ -238,7 +248,12 @@ def field_of(node, register):
     )
 
 
-def register_of(node):
+def described(node: Node) -> str:
+    """The description of a node on one line, or nothing."""
+    return " ".join((node.get_property("desc") or "").split())
+
+
+def register_of(node: Node) -> Register:
     if not isinstance(node, RegNode):
         raise Refused(f"{node.get_path()}: a block holds registers only")
     width, vector = node.get_property("regwidth"), bool(node.get_property("vector"))
@@ -248,34 +263,36 @@ def register_of(node):
     whole = [f.low for f in fields] == list(range(len(fields)))
     if vector and not (whole and len({f.kind for f in fields}) == 1):
         raise Refused(f"{node.get_path()}: a vector has one kind of bits, from bit 0 on")
-    text = " ".join((node.get_property("desc") or "").split())
     offset = node.raw_address_offset
-    return Register(node.inst_name, offset, width == 64, vector, text, fields)
+    return Register(node.inst_name, offset, width == 64, vector, described(node), fields)
 
 
-def read(axes=1, source=SOURCE):
+def read(axes: int = 1, source: Path = SOURCE) -> list[Block]:
     """The blocks of a node with so many axes, in the order of their addresses."""
     compiler = RDLCompiler()
     compiler.compile_file(str(source))
     blocks = []
     for node in compiler.elaborate(parameters={"AXES": axes}).top.children():
-        base, stride = node.raw_address_offset, node.array_stride if node.is_array else 0
+        if not isinstance(node, AddressableNode):
+            raise Refused(f"{node.get_path()}: the map holds blocks only")
+        base, stride = node.raw_address_offset, (node.array_stride or 0) if node.is_array else 0
         if node.size > SLOT or base % SLOT or stride % SLOT:
             raise Refused(f"{node.get_path()}: a block starts at a multiple of {SLOT:#x}, one each")
-        count = node.array_dimensions[0] if node.is_array else 1
+        count = (node.array_dimensions or [1])[0] if node.is_array else 1
         registers = tuple(register_of(r) for r in node.children())
-        text = " ".join(node.get_property("name").split())
+        text = " ".join(str(node.get_property("name")).split())
         blocks.append(Block(node.inst_name, text, base, stride, count, registers))
     return blocks
 
 
-def crc(source=SOURCE):
+def crc(source: Path = SOURCE) -> int:
     return zlib.crc32(source.read_bytes().replace(b"\r\n", b"\n"))
 
 
-def ports(r):
+def ports(r: Register) -> list[tuple[str, str, str, list[str]]]:
     """(direction, shape, name, texts from long to short) of each port of a register."""
-    fields, found = r.fields, []
+    fields = r.fields
+    found: list[tuple[str, str, str, list[str]]] = []
     if r.vector:
         what = "" if fields[0].kind == "input" else "strobes: "
         texts = [f"{what}{r.text}", f"{what}{clause(r.text)}"]
@@ -291,22 +308,23 @@ def ports(r):
             shape = "" if strobe else f.shape
             found.append(("output logic" if out else "input  wire ", shape, f.port, texts))
     strobes = (("written", r.on_write, "new value"), ("read", r.on_read, "read in this cycle"))
-    for strobe, there, text in strobes:
+    for event, there, text in strobes:
         if there:
-            found.append(("output logic", "", f"{r.name}_{strobe}", [f"strobe: {text}"]))
+            found.append(("output logic", "", f"{r.name}_{event}", [f"strobe: {text}"]))
     return found
 
 
-def clause(text):
+def clause(text: str) -> str:
     return re.split(r"[;:,.] |\.$| \(", text)[0]
 
 
-def fitted(found):
+def fitted(found: Sequence[tuple[str, str, str, list[str]]]) -> list[Fitted]:
     """The same ports, each with the longest text that fits its line after the formatter's work."""
-    shape = max((len(shape.partition("[")[2]) + 1 for _, shape, _, _ in found), default=0)
+    widest = max((len(shape.partition("[")[2]) + 1 for _, shape, _, _ in found), default=0)
     signed = 7 if any(shape.startswith("signed") for _, shape, _, _ in found) else 0
-    name = max((len(name) for _, _, name, _ in found), default=0)
-    room = made_files.COLUMNS - len("    output logic  ,  // ") - max(shape, 6) - signed - name
+    longest = max((len(name) for _, _, name, _ in found), default=0)
+    taken = len("    output logic  ,  // ") + max(widest, 6) + signed + longest
+    room = made_files.COLUMNS - taken
     fit = []
     for kind, shape, name, texts in found:
         text = next((t for t in texts if len(t) <= room), None)
@@ -316,16 +334,16 @@ def fitted(found):
     return fit
 
 
-def sentence(text):
+def sentence(text: str) -> str:
     """A text as a sentence of the page."""
     return f"{text[0].upper()}{text[1:].rstrip('.')}. " if text else ""
 
 
-def comment(text, indent="// "):
+def comment(text: str, indent: str = "// ") -> str:
     return textwrap.fill(text, made_files.COLUMNS, initial_indent=indent, subsequent_indent=indent)
 
 
-def files():
+def files() -> dict[Path, str]:
     constant, blocks = crc(), read()
     templates = jinja2.Environment(
         loader=jinja2.FileSystemLoader(ROOT / "tables"),
@@ -337,7 +355,7 @@ def files():
     templates.filters |= {"comment": comment, "sentence": sentence, "span": span}
     templates.globals |= dict(literal=literal, constant=constant, base=REGISTER_BUS_BASE)
 
-    def filled(template, **values):
+    def filled(template: str, **values: object) -> str:
         return templates.get_template(f"registers.{template}.jinja").render(**values)
 
     made = {
@@ -356,7 +374,7 @@ def files():
     return made
 
 
-def main(arguments=None) -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return made_files.main(__doc__, files, arguments)
     except RDLCompileError:  # the compiler has said where and why
