@@ -28,7 +28,7 @@ test: $(SETUP) $(FIRMWARE)   ## all tests; K=part of a name, SIM=icarus|verilato
 	$(call say,tests$(if $K, of $K)$(if $(SIM), under $(SIM))$(if $(SEED), with SEED=$(SEED)))
 	@SIM='$(SIM)' SEED='$(SEED)' WAVES='$(WAVES)' $(PYTHON) -m pytest -q -n $(JOBS) $(if $K,-k '$K') tb
 
-check: fresh lint promises test prove  ## what every change must pass
+check: fresh lint promises test prove quick  ## what every change must pass
 	@echo 'check: all passed'
 
 promises: $(SETUP)  ## what the project promises of its code: units, latencies, imports, tests, types
@@ -94,6 +94,10 @@ FORM = $(if $(QUICK),--quick) $(if $(SEED),--seed $(SEED))
 figure: $(SETUP) $(FIRMWARE)   ## NAME=x measures one figure: `x VALUE UNIT`; QUICK=1 in short, SEED=n
 	@$(PYTHON) -m figures.figure $(or $(NAME),$(error say which: make figure NAME=x)) $(FORM)
 
+quick: $(SETUP) $(FIRMWARE)    ## every figure in its short form
+	$(call say,figures in their short forms)
+	@$(PYTHON) -m figures.figure --all --quick
+
 figures: $(SETUP) $(FIRMWARE)  ## all figures, and their page; QUICK=1 in their short forms
 	@$(PYTHON) -m figures.figure --all $(FORM)
 
@@ -116,4 +120,4 @@ clean:            ## remove what was built; the tools in build/venv stay (rm -rf
 $(SETUP): requirements.lock pyproject.toml sw/host/pyproject.toml tools/setup.sh
 	@tools/setup.sh
 
-.PHONY: help demo test check lint types promises format prove tables fresh firmware figure figures soak board clean
+.PHONY: help demo test check lint types promises format prove tables fresh firmware figure quick figures soak board clean

@@ -46,10 +46,10 @@ def test_long_keys_are_keys_and_formulae_and_sentences_belong_to_none():
 @pytest.mark.parametrize(
     "line, complaint",
     [
-        ("// acuracy  within 1 LSB", "thing.sv:9: `acuracy` is no known key"),
-        ("// Accuracy within 1 LSB", "thing.sv:9: `Accuracy` is no known key"),
-        ("// one LSB at most", "thing.sv:9: `one` is no known key"),
-        ("// latency  3 cycles", "thing.sv:9: the key `latency` is there twice"),
+        ("// acuracy  within 1 LSB", "thing.sv:10: `acuracy` is no known key"),
+        ("// Accuracy within 1 LSB", "thing.sv:10: `Accuracy` is no known key"),
+        ("// one LSB at most", "thing.sv:10: `one` is no known key"),
+        ("// latency  3 cycles", "thing.sv:10: the key `latency` is there twice"),
     ],
 )
 def test_another_key_is_refused_with_file_and_line(line, complaint):

@@ -114,7 +114,7 @@ def test_a_bad_line_of_a_file_is_named(tmp_path, text, words):
 def test_answers_that_the_job_does_not_wait_for_are_refused_in_words():
     workshop = Workshop()
     workshop.job.load(["0deg"])
-    with pytest.raises(Refused, match="the job does not wait for that now"):
+    with pytest.raises(Refused, match="the job does not expect this now"):
         workshop.job.do("next")
 
 
@@ -155,7 +155,7 @@ def test_a_question_is_printed_and_answered():
         and "takes    stop, again, next" in reported
     )
     assert errors == "moire: the job waits: the cut did not start in time\n"
-    assert workshop.call("job resume")[2].endswith("the job does not wait for that now\n")
+    assert workshop.call("job resume")[2].endswith("the job does not expect this now\n")
     workshop.station.edm.deaf = False
     assert workshop.call("job answer again")[0] == 0
     assert workshop.call("job wait")[0] == 0 and len(workshop.station.edm.cuts) == 2
