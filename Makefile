@@ -32,7 +32,7 @@ check: fresh lint promises test prove quick  ## what every change must pass
 	@echo 'check: all passed'
 
 promises: $(SETUP)  ## what the project promises of its code: units, latencies, imports, tests, types
-	$(call say,promises: ports, latencies, imports, tests that can fail, strict types)
+	$(call say,promises: units of ports; latencies; imports; tests that can fail; strict types)
 	@failed=0; for check in $(PROMISES); do $(PYTHON) -m tools.check_$$check || failed=1; done; exit $$failed
 PROMISES := ports latency imports tests types
 

@@ -105,7 +105,12 @@ class Session:
         self.close()
         command = [str(PROGRAMS / "moire"), *shlex.split(arguments), "--json"]
         self.server = subprocess.Popen(
-            command, cwd=self.folder, env=self.environment, stdout=subprocess.PIPE, text=True
+            command,
+            cwd=self.folder,
+            env=self.environment,
+            stdout=subprocess.PIPE,
+            text=True,
+            preexec_fn=obey_ctrl_c,
         )
         assert self.server.stdout
         line = self.server.stdout.readline()
@@ -158,8 +163,17 @@ class Session:
         """End the served twin as a person would."""
         if self.server:
             self.server.send_signal(signal.SIGINT)
-            self.server.communicate(timeout=30)
+            try:
+                self.server.communicate(timeout=30)
+            except subprocess.TimeoutExpired:
+                self.server.kill()
+                self.server.communicate()
             self.server = None
+
+
+def obey_ctrl_c() -> None:
+    """In a new process: a shell lets its background jobs ignore Ctrl-C, which they inherit."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def execute(
@@ -175,6 +189,7 @@ def execute(
         stderr=subprocess.STDOUT,
         text=True,
         start_new_session=True,
+        preexec_fn=obey_ctrl_c,
     ) as process:
         try:
             output, _ = process.communicate(timeout=limit_s)
