@@ -17,6 +17,7 @@ A command is a line of an indented or `sh` code block that begins with `moire`, 
 """
 
 import argparse
+import fcntl
 import json
 import os
 import re
@@ -96,6 +97,7 @@ class Session:
         self.environment = os.environ | {"PATH": f"{PROGRAMS}{os.pathsep}{os.environ['PATH']}"}
         self.environment.pop("MOIRE_PORT", None)
         self.server: subprocess.Popen[str] | None = None
+        self.usual_ports = open(ROOT / "build" / "docs_commands.lock", "w")
         self.port = ""
         for name, text in page.files.items():
             (folder / name).write_text(text, encoding="utf-8")
@@ -103,6 +105,8 @@ class Session:
     def serve(self, arguments: str) -> None:
         """Start the served twin; its TCP port becomes the port of the page."""
         self.close()
+        if "--tcp" not in arguments:  # the usual ports: one page at a time may have them
+            fcntl.flock(self.usual_ports, fcntl.LOCK_EX)
         command = [str(PROGRAMS / "moire"), *shlex.split(arguments), "--json"]
         self.server = subprocess.Popen(
             command,
@@ -113,10 +117,10 @@ class Session:
             preexec_fn=obey_ctrl_c,
         )
         assert self.server.stdout
-        line = self.server.stdout.readline()
-        if not line:
-            raise RuntimeError(f"`moire {arguments}` ended with {self.server.wait()}")
-        self.port = json.loads(line)["tcp"]
+        answer = json.loads(self.server.stdout.readline() or "{}")
+        if "tcp" not in answer:
+            raise RuntimeError(f"`moire {arguments}` serves nothing: {answer.get('message', '')}")
+        self.port = answer["tcp"]
         self.environment["MOIRE_PORT"] = self.port
 
     def run(self, command: str) -> str | None:
@@ -169,6 +173,7 @@ class Session:
                 self.server.kill()
                 self.server.communicate()
             self.server = None
+            fcntl.flock(self.usual_ports, fcntl.LOCK_UN)
 
 
 def obey_ctrl_c() -> None:
@@ -218,7 +223,10 @@ def failures(page: Page, whole: bool = False) -> list[str]:
         session = Session(page, Path(folder), whole)
         try:
             for command in page.commands:
-                reason = session.run(command)
+                try:
+                    reason = session.run(command)
+                except RuntimeError as error:
+                    reason = str(error)
                 if reason:
                     found.append(f"{page.path.relative_to(ROOT)}: `{command}`: {reason}")
             for program in page.programs:
