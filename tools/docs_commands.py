@@ -125,14 +125,14 @@ class Session:
 
     def run(self, command: str) -> str | None:
         """None when the command did what is printed, else why not in one line."""
-        if command.startswith("moire twin"):
-            self.serve(command.removeprefix("moire "))
+        words = command.removeprefix("build/venv/bin/")
+        if words.startswith("moire twin"):
+            self.serve(words.removeprefix("moire "))
             return None
         if command.startswith("export "):
             name, _, value = command.removeprefix("export ").partition("=")
             self.environment[name] = HARDWARE.sub(self.port, value) if self.port else value
             return None
-        words = command.removeprefix("build/venv/bin/")
         if words.startswith("moire ") and not re.search(r"--port twin|--help", words):
             self.need_port()
         if words.startswith("pip install"):
