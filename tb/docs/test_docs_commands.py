@@ -6,7 +6,7 @@ import pytest
 
 from tools import docs_commands
 
-# README calls the tests themselves: `make figure NAME=docs_commands_failed` runs it with the others.
+# README calls the tests themselves: only `make figure NAME=docs_commands_failed` runs it.
 PAGES = [page for page in docs_commands.pages() if page.path != docs_commands.ROOT / "README.md"]
 
 
