@@ -12,7 +12,7 @@ from typing import Any
 from experiments import s0_fine, s2_stage, s3_zero, s4_job
 from experiments.s0_stage import ADDRESSES
 from moire.errors import TwinNotBuilt
-from twin import WITH_SEGMENTS, BuildError, Twin, TwinTransport
+from twin import START_S, WITH_SEGMENTS, BuildError, Twin, TwinTransport
 
 
 def fine_stage(seed: int) -> Twin:
@@ -22,10 +22,15 @@ def fine_stage(seed: int) -> Twin:
     return stage.twin
 
 
+def stage(seed: int, nodes: tuple[int, ...] = tuple(ADDRESSES.values())) -> Twin:
+    """The stage of S0 with its segment table; its nodes listen."""
+    twin = Twin(nodes=nodes, seed=seed, node_parameters=WITH_SEGMENTS)
+    twin.run(START_S)
+    return twin
+
+
 MACHINES: dict[str, Callable[..., Twin]] = {
-    "s0": lambda seed, nodes=tuple(ADDRESSES.values()): Twin(
-        nodes=nodes, seed=seed, node_parameters=WITH_SEGMENTS
-    ),
+    "s0": stage,
     "s0_fine": fine_stage,
     "s2": lambda seed: s2_stage.Stage.power_up(seed).twin,
     "s3": lambda seed: s3_zero.Motor(seed).twin,
