@@ -239,7 +239,12 @@ module actuator #(
         wire unused = &{1'b0, half_period, refresh, dac_trim, dac_valid, dac_command};
     end
 
-    actuator_registers u_registers (
+    actuator_registers #(
+        .HAS_BRIDGE    (HAS_BRIDGE),
+        .HAS_STEPPER   (HAS_STEPPER),
+        .HAS_DAC       (HAS_DAC),
+        .HAS_FINE_STAGE(HAS_FINE_STAGE)
+    ) u_registers (
         .clk,
         .rst,
         // register bus
@@ -249,24 +254,23 @@ module actuator #(
         .wdata,
         .rdata,
         // which drive
-        .drive_kind(kind),
-        .drive_built({1'(HAS_FINE_STAGE), 1'(HAS_DAC), 1'(HAS_STEPPER), 1'(HAS_BRIDGE)}),
+        .drive                    (kind),
         // bridge
         .pwm_period,
         // stepper
-        .step_pulse_high(high_cycles),
-        .step_pulse_low(low_cycles),
-        .step_direction_setup(setup_cycles),
-        .step_direction_hold(hold_cycles),
-        .step_output_mode(mode),
-        .step_output_step_low(step_low),
+        .step_pulse_high          (high_cycles),
+        .step_pulse_low           (low_cycles),
+        .step_direction_setup     (setup_cycles),
+        .step_direction_hold      (hold_cycles),
+        .step_output_mode         (mode),
+        .step_output_step_low     (step_low),
         .step_output_direction_low(direction_low),
-        .step_output_trim(trim_shift),
+        .step_output_trim         (trim_shift),
         .step_ratio,
         .steps,
         // DAC
-        .dac_half_period(half_period),
-        .dac_refresh(refresh),
+        .dac_half_period          (half_period),
+        .dac_refresh              (refresh),
         .dac_trim,
         // fine stage
         .fine_kp,

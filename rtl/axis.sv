@@ -5,21 +5,31 @@
 // latency  22 cycles from an ADC word to position, 23 with a segment table; from position to
 //          command within one servo tick
 // rate     one sample per `sample_tick`, one command per `tick`
+// behaviour  Each HAS_... parameter builds one feature. What is not built has no logic, its pins
+//          are idle, and the registers of its settings and its state read 0. `built` shows what
+//          there is. An axis without a drive (HAS_DRIVE = 0) only measures: it has no profile,
+//          servo, interlock and actuator, and drive_enable is low.
 // source   S0: interferometer with sine, cosine and comparator outputs, limit switches, DC motor;
 //          S2, S3: A/B/Z scales, stepper, linear motor
 // model    the models of its blocks; proved in motion by tb/system
 `default_nettype none
 
 module axis #(
-    parameter int CLK_HZ         = 4_000_000,  // Hz, clk frequency
-    parameter int W              = 8,          // bits of a sample
-    parameter int FILTERS        = 2,          // biquads of the servo, 0 to 4
-    parameter int SEGMENTS       = 0,          // most segments of the scale's table; 0: no table
-    parameter int HAS_SINE       = 1,          // 0: no sine and cosine, positions of counts only
-    parameter int HAS_BRIDGE     = 1,          // 1: build the bridge
-    parameter int HAS_STEPPER    = 1,          // 1: build the step generator
-    parameter int HAS_DAC        = 1,          // 1: build the DAC
-    parameter int HAS_FINE_STAGE = 1           // 1: build the fine stage, which needs the DAC
+    parameter int CLK_HZ = 4_000_000,  // Hz, clk frequency
+    parameter int W = 8,  // bits of a sample
+    parameter int SEGMENTS = 0,  // most segments of the scale's table; 0: no table
+    parameter int HAS_SINE = 1,  // 0: no sine and cosine, positions of counts only
+    parameter int HAS_MONITOR = HAS_SINE,  // 1: build the signal monitor; needs the sine
+    parameter int HAS_HARMONICS = HAS_SINE,  // 1: build the harmonic correction, likewise
+    parameter int HAS_RECORDER = HAS_SINE,  // 1: build the recorder of bursts, likewise
+    parameter int HAS_CAPTURE = 1,  // 1: build the queue of captures
+    parameter int HAS_COMPARE = 1,  // 1: build compare
+    parameter int HAS_DRIVE = 1,  // 1: build profile, servo, interlock and actuator
+    parameter int FILTERS = 2 * HAS_DRIVE,  // biquads of the servo, 0 to 4
+    parameter int HAS_BRIDGE = HAS_DRIVE,  // 1: build the bridge
+    parameter int HAS_STEPPER = HAS_DRIVE,  // 1: build the step generator
+    parameter int HAS_DAC = HAS_DRIVE,  // 1: build the DAC
+    parameter int HAS_FINE_STAGE = HAS_DAC  // 1: build the fine stage; needs the DAC
 ) (
     input  wire         clk,
     input  wire         rst,
@@ -68,11 +78,17 @@ module axis #(
     output logic        dac_sdi,           // pin, data of the DAC
     output logic        drive_enable       // pin, 1: the drive may be on
 );
+    if (HAS_DRIVE == 0 && HAS_BRIDGE + HAS_STEPPER + HAS_DAC + HAS_FINE_STAGE != 0) begin : g_check
+        ACTUATORS_NEED_HAS_DRIVE u_error ();
+    end
+    if (HAS_DRIVE == 0 && FILTERS != 0) begin : g_check_filters
+        FILTERS_NEED_HAS_DRIVE u_error ();
+    end
+
     // requests
     wire control_enable, control_closed_loop, control_homing, control_fine;
     wire strobes_reset_faults, strobes_set_target_to_position, strobes_start;
     wire strobes_controlled_stop, strobes_arm;
-    wire check_following, play, rebase, gains_changed;
     // settings of the feedback channel
     wire [15:0] deglitch, amplitude_low, amplitude_high;
     wire [7:0] outlier_step, outlier_hold;
@@ -112,15 +128,15 @@ module axis #(
     wire sample_rejected, pulse_rejected, encoder_fault, position_valid, moved, zero_up, zero_down;
     // target and command
     wire signed [47:0] target;
-    wire signed [31:0] target_velocity, target_acceleration, error;
-    wire signed [15:0] servo_command, command;
-    wire [4:0] queue_free;
-    wire moving, armed, underrun, commanded, saturated, passed;
+    wire signed [31:0] error;
+    wire signed [15:0] command;
+    wire        [ 4:0] queue_free;
+    wire moving, armed, saturated;
     // interlock and drive
     wire [31:0] following_limit;
     wire [9:0] faults, causes_now, first_fault;
     wire signed [47:0] fault_position;
-    wire block_up, block_down, downward, fine_saturated, step_overrun;
+    wire downward, fine_saturated;
 
     axis_inputs #(
         .CLK_HZ(CLK_HZ)
@@ -144,30 +160,15 @@ module axis #(
         .limit_high,
         .drive_fault
     );
-    axis_requests u_requests (
-        // levels
-        .closed_loop           (control_closed_loop),
-        .fine                  (control_fine),
-        // strobes
-        .start                 (strobes_start),
-        .common_start          (start),
-        .set_target_to_position(strobes_set_target_to_position),
-        .moved,
-        .kp_written,
-        .kd_written,
-        .kv_written,
-        .ka_written,
-        // joined
-        .check_following,
-        .play,
-        .rebase,
-        .gains_changed
-    );
-
     feedback_channel #(
-        .W       (W),
-        .HAS_SINE(HAS_SINE),
-        .SEGMENTS(SEGMENTS)
+        .W            (W),
+        .SEGMENTS     (SEGMENTS),
+        .HAS_SINE     (HAS_SINE),
+        .HAS_MONITOR  (HAS_MONITOR),
+        .HAS_HARMONICS(HAS_HARMONICS),
+        .HAS_RECORDER (HAS_RECORDER),
+        .HAS_CAPTURE  (HAS_CAPTURE),
+        .HAS_COMPARE  (HAS_COMPARE)
     ) u_feedback (
         .clk,
         .rst,
@@ -233,169 +234,228 @@ module axis #(
         .down (zero_down)
     );
 
-    profile_player u_profile (
-        .clk,
-        .rst,
-        // settings
-        .stop_deceleration,
-        .stop_jerk,
-        .slope                 (feed_override_slope),
-        .curve                 (feed_override_curve),
-        .feed_fraction         (feed_override_fraction),
-        .pause                 (feed_override_pause),
-        // segments
-        .tick,
-        .push                  (segment_ticks_written),
-        .segment_velocity,
-        .segment_acceleration,
-        .segment_jerk,
-        .segment_ticks,
-        .segment_last,
-        // requests
-        .start                 (play),
-        .arm                   (strobes_arm),
-        .start_at,
-        .now,
-        .controlled_stop       (strobes_controlled_stop),
-        .set_target_to_position(strobes_set_target_to_position),
-        // position
-        .position,
-        .shift                 (moved),
-        .shift_by              (moved_by),
-        // target
-        .target,
-        .target_velocity,
-        .target_acceleration,
-        // state
-        .moving,
-        .armed,
-        .queue_free,
-        .underrun
-    );
-    pid_servo #(
-        .BIQUADS(FILTERS)
-    ) u_servo (
-        .clk,
-        .rst,
-        // settings
-        .closed_loop        (control_closed_loop),
-        .kp,
-        .ki,
-        .kd,
-        .kv,
-        .ka,
-        .output_limit,
-        .integral_limit,
-        .dead_band,
-        .gains_changed,
-        // filters
-        .filters_in_use,
-        .coefficient_write  (filter_coefficient_written),
-        .coefficient_address(filters_address),
-        .coefficient        (filter_coefficient),
-        // target
-        .tick,
-        .target,
-        .target_velocity,
-        .target_acceleration,
-        .moving,
-        // position
-        .position,
-        .velocity,
-        // command
-        .open_command,
-        .block_up,
-        .block_down,
-        .valid              (commanded),
-        .command            (servo_command),
-        .error,
-        .saturated
-    );
+    if (HAS_DRIVE != 0) begin : g_drive
+        wire check_following, play, rebase, gains_changed;
+        wire signed [31:0] target_velocity, target_acceleration;
+        wire signed [15:0] servo_command;
+        wire underrun, commanded, passed, block_up, block_down, step_overrun;
 
-    drive_interlock u_interlock (
-        .clk,
-        .rst,
-        // requests
-        .enable_request  (control_enable),
-        .closed_loop     (check_following),
-        .homing          (control_homing),
-        .reset_faults    (strobes_reset_faults),
-        // causes
-        .limit_low,
-        .limit_high,
-        .estop,
-        .drive_fault,
-        .encoder_fault,
-        .following_limit,
-        .error,
-        .error_valid     (commanded),
-        .watchdog_expired,
-        .cpu_trap        (cpu_stopped),
-        .profile_underrun(underrun),
-        .step_overrun,
-        // command
-        .position,
-        .valid_in        (commanded),
-        .command_in      (servo_command),
-        .valid_out       (passed),
-        .command_out     (command),
-        // permission
-        .enabled         (drive_enable),
-        .block_up,
-        .block_down,
-        // faults
-        .faults,
-        .causes_now,
-        .first_fault,
-        .fault_position
-    );
+        axis_requests u_requests (
+            // levels
+            .closed_loop           (control_closed_loop),
+            .fine                  (control_fine),
+            // strobes
+            .start                 (strobes_start),
+            .common_start          (start),
+            .set_target_to_position(strobes_set_target_to_position),
+            .moved,
+            .kp_written,
+            .kd_written,
+            .kv_written,
+            .ka_written,
+            // joined
+            .check_following,
+            .play,
+            .rebase,
+            .gains_changed
+        );
 
-    actuator #(
-        .HAS_BRIDGE    (HAS_BRIDGE),
-        .HAS_STEPPER   (HAS_STEPPER),
-        .HAS_DAC       (HAS_DAC),
-        .HAS_FINE_STAGE(HAS_FINE_STAGE)
-    ) u_actuator (
-        .clk,
-        .rst,
-        // register bus
-        .select(actuator_select),
-        .write,
-        .word,
-        .wdata,
-        .rdata (actuator_rdata),
-        // time
-        .tick,
-        .tick_period,
-        // permission
-        .enable(drive_enable),
-        .fine  (control_fine),
-        .rebase,
-        .block_up,
-        .block_down,
-        // motion
-        .valid (passed),
-        .command,
-        .target,
-        .target_velocity,
-        .moving,
-        .position,
-        // pins
-        .bridge_a,
-        .bridge_b,
-        .step,
-        .direction,
-        .dac_cs_n,
-        .dac_sclk,
-        .dac_sdi,
-        // state
-        .downward,
-        .fine_saturated,
-        .step_overrun
-    );
+        profile_player u_profile (
+            .clk,
+            .rst,
+            // settings
+            .stop_deceleration,
+            .stop_jerk,
+            .slope                 (feed_override_slope),
+            .curve                 (feed_override_curve),
+            .feed_fraction         (feed_override_fraction),
+            .pause                 (feed_override_pause),
+            // segments
+            .tick,
+            .push                  (segment_ticks_written),
+            .segment_velocity,
+            .segment_acceleration,
+            .segment_jerk,
+            .segment_ticks,
+            .segment_last,
+            // requests
+            .start                 (play),
+            .arm                   (strobes_arm),
+            .start_at,
+            .now,
+            .controlled_stop       (strobes_controlled_stop),
+            .set_target_to_position(strobes_set_target_to_position),
+            // position
+            .position,
+            .shift                 (moved),
+            .shift_by              (moved_by),
+            // target
+            .target,
+            .target_velocity,
+            .target_acceleration,
+            // state
+            .moving,
+            .armed,
+            .queue_free,
+            .underrun
+        );
+        pid_servo #(
+            .BIQUADS(FILTERS)
+        ) u_servo (
+            .clk,
+            .rst,
+            // settings
+            .closed_loop        (control_closed_loop),
+            .kp,
+            .ki,
+            .kd,
+            .kv,
+            .ka,
+            .output_limit,
+            .integral_limit,
+            .dead_band,
+            .gains_changed,
+            // filters
+            .filters_in_use,
+            .coefficient_write  (filter_coefficient_written),
+            .coefficient_address(filters_address),
+            .coefficient        (filter_coefficient),
+            // target
+            .tick,
+            .target,
+            .target_velocity,
+            .target_acceleration,
+            .moving,
+            // position
+            .position,
+            .velocity,
+            // command
+            .open_command,
+            .block_up,
+            .block_down,
+            .valid              (commanded),
+            .command            (servo_command),
+            .error,
+            .saturated
+        );
+
+        drive_interlock u_interlock (
+            .clk,
+            .rst,
+            // requests
+            .enable_request  (control_enable),
+            .closed_loop     (check_following),
+            .homing          (control_homing),
+            .reset_faults    (strobes_reset_faults),
+            // causes
+            .limit_low,
+            .limit_high,
+            .estop,
+            .drive_fault,
+            .encoder_fault,
+            .following_limit,
+            .error,
+            .error_valid     (commanded),
+            .watchdog_expired,
+            .cpu_trap        (cpu_stopped),
+            .profile_underrun(underrun),
+            .step_overrun,
+            // command
+            .position,
+            .valid_in        (commanded),
+            .command_in      (servo_command),
+            .valid_out       (passed),
+            .command_out     (command),
+            // permission
+            .enabled         (drive_enable),
+            .block_up,
+            .block_down,
+            // faults
+            .faults,
+            .causes_now,
+            .first_fault,
+            .fault_position
+        );
+
+        actuator #(
+            .HAS_BRIDGE    (HAS_BRIDGE),
+            .HAS_STEPPER   (HAS_STEPPER),
+            .HAS_DAC       (HAS_DAC),
+            .HAS_FINE_STAGE(HAS_FINE_STAGE)
+        ) u_actuator (
+            .clk,
+            .rst,
+            // register bus
+            .select(actuator_select),
+            .write,
+            .word,
+            .wdata,
+            .rdata (actuator_rdata),
+            // time
+            .tick,
+            .tick_period,
+            // permission
+            .enable(drive_enable),
+            .fine  (control_fine),
+            .rebase,
+            .block_up,
+            .block_down,
+            // motion
+            .valid (passed),
+            .command,
+            .target,
+            .target_velocity,
+            .moving,
+            .position,
+            // pins
+            .bridge_a,
+            .bridge_b,
+            .step,
+            .direction,
+            .dac_cs_n,
+            .dac_sclk,
+            .dac_sdi,
+            // state
+            .downward,
+            .fine_saturated,
+            .step_overrun
+        );
+    end else begin : g_no_drive
+        assign {target, moving, armed, queue_free} = '0;
+        assign {command, error, saturated} = '0;
+        assign {drive_enable, faults, causes_now, first_fault, fault_position} = '0;
+        assign {bridge_a, bridge_b, step, direction} = '0;
+        assign {dac_cs_n, dac_sclk, dac_sdi} = 3'b100;
+        assign {actuator_rdata, downward, fine_saturated} = '0;
+
+        wire unused_bus = &{1'b0, actuator_select, tick_period, start};
+        wire unused_requests = &{
+            1'b0, control_enable, control_closed_loop, control_homing, control_fine,
+            strobes_reset_faults, strobes_set_target_to_position, strobes_start,
+            strobes_controlled_stop, strobes_arm
+        };
+        wire unused_causes = &{
+            1'b0, estop, watchdog_expired, cpu_stopped, limit_low, limit_high, drive_fault,
+            encoder_fault, following_limit
+        };
+        wire unused_profile = &{
+            1'b0, segment_velocity, segment_acceleration, segment_jerk, segment_ticks,
+            segment_ticks_written, segment_last, stop_deceleration, stop_jerk, start_at,
+            feed_override_slope, feed_override_curve, feed_override_fraction, feed_override_pause
+        };
+        wire unused_servo = &{
+            1'b0, kp, ki, kd, kv, ka, kp_written, kd_written, kv_written, ka_written,
+            output_limit, integral_limit, dead_band, open_command, filters_in_use,
+            filters_address, filter_coefficient, filter_coefficient_written
+        };
+        wire unused_motion = &{1'b0, moved_by};
+    end
 
     axis_registers #(
-        .HAS_SINE(HAS_SINE)
+        .HAS_SINE   (HAS_SINE),
+        .HAS_MONITOR(HAS_MONITOR),
+        .HAS_DRIVE  (HAS_DRIVE),
+        .FILTERS    (FILTERS)
     ) u_registers (
         .clk,
         .rst,
@@ -426,6 +486,20 @@ module axis #(
         .state_queue_free     (queue_free),
         .state_armed          (armed),
         .state_fine_saturated (fine_saturated),
+        // what is built
+        .built_sine           (1'(HAS_SINE)),
+        .built_monitor        (1'(HAS_MONITOR)),
+        .built_harmonics      (1'(HAS_HARMONICS)),
+        .built_recorder       (1'(HAS_RECORDER)),
+        .built_capture        (1'(HAS_CAPTURE)),
+        .built_compare        (1'(HAS_COMPARE)),
+        .built_drive          (1'(HAS_DRIVE)),
+        .built_bridge         (1'(HAS_BRIDGE)),
+        .built_stepper        (1'(HAS_STEPPER)),
+        .built_dac            (1'(HAS_DAC)),
+        .built_fine_stage     (1'(HAS_FINE_STAGE)),
+        .built_filters        (3'(FILTERS)),
+        .built_segments       (8'(SEGMENTS)),
         // interlock
         .faults,
         .causes_now,

@@ -5,14 +5,22 @@
 // latency  22 cycles from an ADC word to position, 5 cycles from the pins a and b to position in
 //          the mode of counts; 1 cycle more each with a segment table
 // rate     one sample per `sample_tick`, one velocity per `tick`
+// behaviour  A feature that is not built has no logic, and the registers of its settings and its
+//          state read 0. Without HAS_CAPTURE only the index captures, one at a time, with its
+//          position alone: that is what homing needs.
 // source   S0: interferometer with sine, cosine and comparator outputs; any A/B/Z scale
 // model    the models of its blocks; proved in motion by tb/system
 `default_nettype none
 
 module feedback_channel #(
-    parameter int W        = 8,  // bits of a sample
-    parameter int SEGMENTS = 0,  // most segments of the scale's table, 3 to 255; 0: no table
-    parameter int HAS_SINE = 1   // 0: no sine and cosine, the position is made of counts
+    parameter int W = 8,  // bits of a sample
+    parameter int SEGMENTS = 0,  // most segments of the table, 3 to 255; 0: no table
+    parameter int HAS_SINE = 1,  // 0: no sine and cosine, the position is made of counts
+    parameter int HAS_MONITOR = HAS_SINE,  // 1: build the signal monitor; needs the sine
+    parameter int HAS_HARMONICS = HAS_SINE,  // 1: build the harmonic correction, likewise
+    parameter int HAS_RECORDER = HAS_SINE,  // 1: build the recorder, likewise
+    parameter int HAS_CAPTURE = 1,  // 1: build the queue of captures
+    parameter int HAS_COMPARE = 1  // 1: build compare
 ) (
     input  wire                 clk,
     input  wire                 rst,
@@ -73,6 +81,15 @@ module feedback_channel #(
 
     if (SEGMENTS != 0 && (SEGMENTS < 3 || SEGMENTS > 255)) begin : g_check_segments
         SEGMENTS_MUST_BE_0_OR_FROM_3_TO_255 u_error ();
+    end
+    if (HAS_MONITOR != 0 && HAS_SINE == 0) begin : g_check_monitor
+        SIGNAL_MONITOR_NEEDS_SINE u_error ();
+    end
+    if (HAS_HARMONICS != 0 && HAS_SINE == 0) begin : g_check_harmonics
+        HARMONICS_NEED_SINE u_error ();
+    end
+    if (HAS_RECORDER != 0 && HAS_SINE == 0) begin : g_check_recorder
+        RECORDER_NEEDS_SINE u_error ();
     end
 
     // settings of the decoder
@@ -213,7 +230,7 @@ module feedback_channel #(
     );
 
     if (HAS_SINE != 0) begin : g_sine
-        wire converted, sampled, ready, corrected, phase_valid, harmonics_off;
+        wire converted, sampled, corrected, phase_valid, harmonics_off;
         wire signed [W-1:0] raw_sin, raw_cos;
         wire signed [15:0] corrected_sin, corrected_cos;
         wire [15:0] plain_phase, corrected_amplitude;
@@ -252,39 +269,6 @@ module feedback_channel #(
             .cos_out (cos),
             .rejected(sample_rejected)
         );
-        signal_monitor #(
-            .W(W)
-        ) u_monitor (
-            .clk,
-            .rst,
-            .clear     (clear_signal_faults),
-            // limits
-            .low       (amplitude_low),
-            .high      (amplitude_high),
-            .clip_level,
-            .tolerance,
-            .jump,
-            .band,
-            .span,
-            .no_noise_samples,
-            .sign_threshold,
-            .offset_limit,
-            .balance_limit,
-            .quadrature_limit,
-            // signals
-            .valid     (sampled),
-            .sin,
-            .cos,
-            .a         (levels[0]),
-            .b         (levels[1]),
-            .phase_jump(overspeed),
-            .lost_count(disagreement),
-            // faults
-            .amplitude,
-            .ready,
-            .faults    (signal_faults),
-            .first     (first_signal_faults)
-        );
         signal_correction #(
             .W(W)
         ) u_correction (
@@ -320,22 +304,29 @@ module feedback_channel #(
             .phase    (plain_phase),
             .amplitude(corrected_amplitude)
         );
-        harmonic_correction u_harmonics (
-            .clk,
-            .rst,
-            // table
-            .enable   (harmonic_enable),
-            .write    (harmonic_write),
-            .point    (harmonic_at),
-            .value    (harmonic_value),
-            .swap     (swap_harmonics),
-            // phase
-            .valid    (phase_valid),
-            .phase    (plain_phase),
-            // corrected phase
-            .done     (harmonics_off),
-            .phase_out(phase)
-        );
+        if (HAS_HARMONICS != 0) begin : g_harmonics
+            harmonic_correction u_harmonics (
+                .clk,
+                .rst,
+                // table
+                .enable   (harmonic_enable),
+                .write    (harmonic_write),
+                .point    (harmonic_at),
+                .value    (harmonic_value),
+                .swap     (swap_harmonics),
+                // phase
+                .valid    (phase_valid),
+                .phase    (plain_phase),
+                // corrected phase
+                .done     (harmonics_off),
+                .phase_out(phase)
+            );
+        end else begin : g_no_harmonics
+            assign {harmonics_off, phase} = {phase_valid, plain_phase};
+            wire unused = &{
+                1'b0, harmonic_enable, harmonic_write, harmonic_at, harmonic_value, swap_harmonics
+            };
+        end
         fringe_tracker u_tracker (
             .clk,
             .rst,
@@ -360,30 +351,82 @@ module feedback_channel #(
             .shift_periods,
             .disagreement
         );
-        calibration_recorder #(
-            .W(W)
-        ) u_recorder (
-            .clk,
-            .rst,
-            // settings
-            .start  (record),
-            .phases,
-            .decimation,
-            // signals
-            .sampled(converted),
-            .sin    (raw_sin),
-            .cos    (raw_cos),
-            .phase_valid,
-            .phase  (plain_phase),
-            .disturbed,
-            // burst
-            .read   (recorder_read),
-            .word   (recorded),
-            .full,
-            .invalid
-        );
+        if (HAS_MONITOR != 0) begin : g_monitor
+            wire ready;
 
-        wire unused = &{1'b0, ready, corrected_amplitude};
+            signal_monitor #(
+                .W(W)
+            ) u_monitor (
+                .clk,
+                .rst,
+                .clear     (clear_signal_faults),
+                // limits
+                .low       (amplitude_low),
+                .high      (amplitude_high),
+                .clip_level,
+                .tolerance,
+                .jump,
+                .band,
+                .span,
+                .no_noise_samples,
+                .sign_threshold,
+                .offset_limit,
+                .balance_limit,
+                .quadrature_limit,
+                // signals
+                .valid     (sampled),
+                .sin,
+                .cos,
+                .a         (levels[0]),
+                .b         (levels[1]),
+                .phase_jump(overspeed),
+                .lost_count(disagreement),
+                // faults
+                .amplitude,
+                .ready,
+                .faults    (signal_faults),
+                .first     (first_signal_faults)
+            );
+
+            wire unused = &{1'b0, ready};
+        end else begin : g_no_monitor
+            assign {amplitude, signal_faults, first_signal_faults} = '0;
+
+            wire unused_axis = &{1'b0, amplitude_low, amplitude_high};
+            wire unused_limits = &{
+                1'b0, clip_level, tolerance, jump, band, span, no_noise_samples, sign_threshold,
+                offset_limit, balance_limit, quadrature_limit, clear_signal_faults, levels[1:0]
+            };
+        end
+        if (HAS_RECORDER != 0) begin : g_recorder
+            calibration_recorder #(
+                .W(W)
+            ) u_recorder (
+                .clk,
+                .rst,
+                // settings
+                .start  (record),
+                .phases,
+                .decimation,
+                // signals
+                .sampled(converted),
+                .sin    (raw_sin),
+                .cos    (raw_cos),
+                .phase_valid,
+                .phase  (plain_phase),
+                .disturbed,
+                // burst
+                .read   (recorder_read),
+                .word   (recorded),
+                .full,
+                .invalid
+            );
+        end else begin : g_no_recorder
+            assign {recorded, full, invalid} = '0;
+            wire unused = &{1'b0, record, phases, decimation, recorder_read, disturbed};
+        end
+
+        wire unused = &{1'b0, corrected_amplitude};
     end else begin : g_no_sine
         assign {adc_cs_n, adc_sclk} = 2'b11;
         assign {sin, cos, phase, amplitude} = '0;
@@ -541,55 +584,90 @@ module feedback_channel #(
         .index,
         .software
     );
-    position_capture u_capture (
-        .clk,
-        .rst,
-        // sources
-        .enabled(capture_sources),
-        .index,
-        .tick,
-        .software,
-        .probe,
-        // position
-        .now,
-        .valid  (position_valid),
-        .position,
-        // queue
-        .pop    (capture_next),
-        .clear  (capture_clear),
-        .present,
-        .captured_sources,
-        .captured_age,
-        .captured_time,
-        .captured_position,
-        .free   (capture_free),
-        .overrun
-    );
-    position_compare u_compare (
-        .clk,
-        .rst,
-        // settings
-        .start        (compare_start),
-        .step         (compare_step),
-        .count        (compare_count),
-        .pulse_length,
-        .gap_length,
-        .arm          (compare_arm),
-        .disarm       (compare_disarm),
-        // position
-        .valid        (position_valid),
-        .position,
-        .shift        (shifted),
-        .shift_periods(shifted_periods),
-        // state
-        .armed,
-        .pulse        (compare_pulse),
-        .late,
-        .passed
-    );
+    if (HAS_CAPTURE != 0) begin : g_capture
+        position_capture u_capture (
+            .clk,
+            .rst,
+            // sources
+            .enabled(capture_sources),
+            .index,
+            .tick,
+            .software,
+            .probe,
+            // position
+            .now,
+            .valid  (position_valid),
+            .position,
+            // queue
+            .pop    (capture_next),
+            .clear  (capture_clear),
+            .present,
+            .captured_sources,
+            .captured_age,
+            .captured_time,
+            .captured_position,
+            .free   (capture_free),
+            .overrun
+        );
+    end else begin : g_no_capture
+        index_capture u_capture (
+            .clk,
+            .rst,
+            // source
+            .enabled(capture_sources[0]),
+            .index,
+            .position,
+            // capture
+            .pop    (capture_next),
+            .clear  (capture_clear),
+            .present,
+            .captured_position,
+            .overrun
+        );
+        assign captured_sources = {6'd0, present};
+        assign {captured_age, captured_time} = '0;
+        assign capture_free = {4'd0, !present};
+
+        wire unused = &{1'b0, capture_sources[6:1], tick, software, probe, now};
+    end
+    if (HAS_COMPARE != 0) begin : g_compare
+        position_compare u_compare (
+            .clk,
+            .rst,
+            // settings
+            .start        (compare_start),
+            .step         (compare_step),
+            .count        (compare_count),
+            .pulse_length,
+            .gap_length,
+            .arm          (compare_arm),
+            .disarm       (compare_disarm),
+            // position
+            .valid        (position_valid),
+            .position,
+            .shift        (shifted),
+            .shift_periods(shifted_periods),
+            // state
+            .armed,
+            .pulse        (compare_pulse),
+            .late,
+            .passed
+        );
+    end else begin : g_no_compare
+        assign {armed, compare_pulse, late, passed} = '0;
+
+        wire unused_settings = &{1'b0, compare_start, compare_step, compare_count};
+        wire unused_pulses = &{
+            1'b0, pulse_length, gap_length, compare_arm, compare_disarm, shifted, shifted_periods
+        };
+    end
 
     feedback_registers #(
-        .HAS_SINE(HAS_SINE)
+        .HAS_SINE     (HAS_SINE),
+        .HAS_MONITOR  (HAS_MONITOR),
+        .HAS_HARMONICS(HAS_HARMONICS),
+        .HAS_RECORDER (HAS_RECORDER),
+        .HAS_COMPARE  (HAS_COMPARE)
     ) u_registers (
         .clk,
         .rst,
@@ -680,14 +758,12 @@ module feedback_channel #(
         .velocity_fine,
         .position_source_counts            (use_counts),
         .position_source_steps             (own_steps),
-        .position_source_sine              (1'(HAS_SINE)),
         .align,
         .align_written,
         // segment table
         .segment_use_enable                (segment_enable),
         .segment_use_linear                (segment_linear),
         .segment_use_segments              (segments),
-        .segment_state_built               (8'(SEGMENTS)),
         .segment_state_in_force            (segment_in_force),
         .segment_state_outside             (segment_outside),
         .segment_state_known               (segment_known),

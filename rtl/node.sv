@@ -3,6 +3,11 @@
 //
 // latency  see the blocks
 // rate     see the blocks
+// behaviour  The HAS_... parameters of axes are masks: bit n builds the feature in axis n, and bits
+//          from AXES up are ignored, so 255 means all axes and 0 none. FILTERS and SEGMENTS are
+//          sizes, for the axes whose bit is set in HAS_FILTERS or HAS_SEGMENTS. A mask that is not
+//          given equals the mask that it needs. A feature without what it needs stops the build,
+//          with the rule as the message.
 // source   S0: one slave computer per axis, many on one bus; here one node may have several axes
 // model    the models of its blocks; proved in motion by tb/system
 `default_nettype none
@@ -11,13 +16,21 @@ module node #(
     parameter int CLK_HZ            = 4_000_000,  // Hz, clk frequency
     parameter int AXES              = 1,          // axes of the node, 1 to 8
     parameter int W                 = 8,          // bits of a sample
-    parameter int FILTERS           = 2,          // biquads of each servo, 0 to 4
-    parameter int SEGMENTS          = 0,          // most segments of each scale's table; 0: none
-    parameter int HAS_SINE          = 1,          // 0: no sine and cosine, positions of counts only
-    parameter int HAS_BRIDGE        = 1,          // 1: build the bridge of each axis
-    parameter int HAS_STEPPER       = 1,          // 1: build the step generator of each axis
-    parameter int HAS_DAC           = 1,          // 1: build the DAC of each axis
-    parameter int HAS_FINE_STAGE    = 1,          // 1: build the fine stages, which need the DAC
+    parameter int FILTERS           = 2,          // biquads of a servo, 0 to 4
+    parameter int SEGMENTS          = 0,          // most segments of a scale's table; 0: none
+    parameter int HAS_SINE          = 255,        // axes with sine and cosine; else counts only
+    parameter int HAS_MONITOR       = HAS_SINE,   // axes with a signal monitor, needs the sine
+    parameter int HAS_HARMONICS     = HAS_SINE,   // axes with harmonic correction, needs the sine
+    parameter int HAS_RECORDER      = HAS_SINE,   // axes with a recorder of bursts, needs the sine
+    parameter int HAS_SEGMENTS      = 255,        // axes with a table of SEGMENTS segments
+    parameter int HAS_CAPTURE       = 255,        // axes with a queue of captures
+    parameter int HAS_COMPARE       = 255,        // axes with compare
+    parameter int HAS_DRIVE         = 255,        // axes with a drive; the others only measure
+    parameter int HAS_FILTERS       = HAS_DRIVE,  // axes with FILTERS biquads, needs the drive
+    parameter int HAS_BRIDGE        = HAS_DRIVE,  // axes with a bridge, needs the drive
+    parameter int HAS_STEPPER       = HAS_DRIVE,  // axes with a step generator, needs the drive
+    parameter int HAS_DAC           = HAS_DRIVE,  // axes with a DAC, needs the drive
+    parameter int HAS_FINE_STAGE    = HAS_DAC,    // axes with a fine stage, needs the DAC
     parameter int HAS_I2C           = 0,          // 1: build the I2C master
     parameter int HAS_PS2           = 0,          // 1: build the PS/2 pass-through
     parameter int HAS_PEER          = 0,          // 1: build the peer port
@@ -287,13 +300,19 @@ module node #(
         axis #(
             .CLK_HZ        (CLK_HZ),
             .W             (W),
-            .FILTERS       (FILTERS),
-            .SEGMENTS      (SEGMENTS),
-            .HAS_SINE      (HAS_SINE),
-            .HAS_BRIDGE    (HAS_BRIDGE),
-            .HAS_STEPPER   (HAS_STEPPER),
-            .HAS_DAC       (HAS_DAC),
-            .HAS_FINE_STAGE(HAS_FINE_STAGE)
+            .HAS_SINE      (HAS_SINE >> n & 1),
+            .HAS_MONITOR   (HAS_MONITOR >> n & 1),
+            .HAS_HARMONICS (HAS_HARMONICS >> n & 1),
+            .HAS_RECORDER  (HAS_RECORDER >> n & 1),
+            .SEGMENTS      ((HAS_SEGMENTS >> n & 1) * SEGMENTS),
+            .HAS_CAPTURE   (HAS_CAPTURE >> n & 1),
+            .HAS_COMPARE   (HAS_COMPARE >> n & 1),
+            .HAS_DRIVE     (HAS_DRIVE >> n & 1),
+            .FILTERS       ((HAS_FILTERS >> n & 1) * FILTERS),
+            .HAS_BRIDGE    (HAS_BRIDGE >> n & 1),
+            .HAS_STEPPER   (HAS_STEPPER >> n & 1),
+            .HAS_DAC       (HAS_DAC >> n & 1),
+            .HAS_FINE_STAGE(HAS_FINE_STAGE >> n & 1)
         ) u_axis (
             .clk,
             .rst,

@@ -197,8 +197,9 @@ class Bus:
         for name, parameter in {**self.parameters, **self.settings}.items():
             if not parameter["min"] <= parameter["default"] <= parameter["max"]:
                 raise ValueError(f"bus.toml: the default of {name} is outside its range")
-            if parameter.get("needs", "SINE") != "SINE":
-                raise ValueError(f"bus.toml: {name} can need nothing but SINE")
+            feature = parameter.get("needs", "")
+            if feature and f"axis.built.{feature.lower()}" not in register_fields():
+                raise ValueError(f"bus.toml: {name} needs {feature}, which axis.built does not have")
             Fraction(parameter["lsb"])
 
 
@@ -307,12 +308,10 @@ def values(kind: str, parameters: Entries) -> list[str]:
         for name, parameter in parameters.items()
     ]
     out += macro(f"BUS_{kind.upper()}S", rows)
-    if needy := [parameter["id"] for parameter in parameters.values() if "needs" in parameter]:
-        out += [
-            f"// {kind}s of which a node without sine and cosine accepts only 0 and the default",
-            f"#define BUS_{kind.upper()}S_OF_SINE {', '.join(map(str, needy))}",
-            "",
-        ]
+    if needy := [(name, p["needs"]) for name, p in parameters.items() if "needs" in p]:
+        out.append(f"// X({kind}, field of axis.built without which it accepts only 0 and its default)")
+        rows = [f"    X({name}, {feature})".upper() for name, feature in needy]
+        out += macro(f"BUS_{kind.upper()}_NEEDS", rows)
     return out
 
 

@@ -219,7 +219,7 @@ def field_of(node: FieldNode, register: RegNode) -> Field:
         (kind == "setting" and "w" not in sw, "software must write a setting"),
         (get("swacc") and "r" not in sw, "swacc is only for what software reads"),
         (get("swmod") and kind != "setting", "swmod is only for what software sets"),
-        (needs and (kind != "setting" or wide), "only a setting of 32 bits may need a parameter"),
+        (needs and kind != "setting", "only a setting may need a parameter"),
         (not wide and node.high > 31, "a field of more than 32 bits needs a register of 64"),
         (wide and (name != "value" or node.width <= 32), "64 bits are for one long `value`"),
         (wide and kind not in ("input", "setting"), "64 bits are an input or a setting"),

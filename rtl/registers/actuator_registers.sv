@@ -9,7 +9,12 @@
 // made     by tables/registers.py, never by hand
 `default_nettype none
 
-module actuator_registers (
+module actuator_registers #(
+    parameter int HAS_BRIDGE     = 1,  // 0: settings that need it read 0
+    parameter int HAS_DAC        = 1,  // 0: settings that need it read 0
+    parameter int HAS_FINE_STAGE = 1,  // 0: settings that need it read 0
+    parameter int HAS_STEPPER    = 1   // 0: settings that need it read 0
+) (
     input  wire                clk,
     input  wire                rst,                        // settings take their first values
     input  wire                select,                     // strobe: access to this block
@@ -17,8 +22,7 @@ module actuator_registers (
     input  wire         [ 5:0] word,                       // index of the word
     input  wire         [31:0] wdata,                      // value to write
     output logic        [31:0] rdata,                      // value read; else 0
-    output logic        [ 1:0] drive_kind,                 // 0 bridge, 1 stepper, 2 DAC
-    input  wire         [ 3:0] drive_built,                // what is built
+    output logic        [ 1:0] drive,                      // kind of drive
     output logic        [15:0] pwm_period,                 // PWM period of the bridge [cycle]
     output logic        [13:0] step_pulse_high,            // shortest times of a step pulse, cycle
     output logic        [13:0] step_pulse_low,             // shortest times of a step pulse, cycle
@@ -48,7 +52,7 @@ module actuator_registers (
         rdata <= '0;
         if (get) begin
             case (word)
-                6'h00: rdata <= {26'd0, drive_built, drive_kind};
+                6'h00: rdata <= {30'd0, drive};
                 6'h01: rdata <= {16'd0, pwm_period};
                 6'h02: rdata <= {4'd0, step_pulse_low, step_pulse_high};
                 6'h03: rdata <= {4'd0, step_direction_hold, step_direction_setup};
@@ -67,42 +71,42 @@ module actuator_registers (
             endcase
         end
 
-        if (put && word == 6'h00) drive_kind <= wdata[1:0];
-        if (put && word == 6'h01) pwm_period <= wdata[15:0];
-        if (put && word == 6'h02) step_pulse_high <= wdata[13:0];
-        if (put && word == 6'h02) step_pulse_low <= wdata[27:14];
-        if (put && word == 6'h03) step_direction_setup <= wdata[13:0];
-        if (put && word == 6'h03) step_direction_hold <= wdata[27:14];
-        if (put && word == 6'h04) step_output_mode <= wdata[1:0];
-        if (put && word == 6'h04) step_output_step_low <= wdata[2];
-        if (put && word == 6'h04) step_output_direction_low <= wdata[3];
-        if (put && word == 6'h04) step_output_trim <= wdata[7:4];
-        if (put && word == 6'h06) step_ratio_low <= wdata;
-        if (put && word == 6'h07) step_ratio <= {wdata[15:0], step_ratio_low};
-        if (put && word == 6'h09) dac_half_period <= wdata[7:0];
-        if (put && word == 6'h09) dac_refresh <= wdata[23:8];
-        if (put && word == 6'h0A) dac_trim <= wdata[15:0];
+        if (put && word == 6'h00) drive <= wdata[1:0];
+        if (HAS_BRIDGE != 0 && put && word == 6'h01) pwm_period <= wdata[15:0];
+        if (HAS_STEPPER != 0 && put && word == 6'h02) step_pulse_high <= wdata[13:0];
+        if (HAS_STEPPER != 0 && put && word == 6'h02) step_pulse_low <= wdata[27:14];
+        if (HAS_STEPPER != 0 && put && word == 6'h03) step_direction_setup <= wdata[13:0];
+        if (HAS_STEPPER != 0 && put && word == 6'h03) step_direction_hold <= wdata[27:14];
+        if (HAS_STEPPER != 0 && put && word == 6'h04) step_output_mode <= wdata[1:0];
+        if (HAS_STEPPER != 0 && put && word == 6'h04) step_output_step_low <= wdata[2];
+        if (HAS_STEPPER != 0 && put && word == 6'h04) step_output_direction_low <= wdata[3];
+        if (HAS_STEPPER != 0 && put && word == 6'h04) step_output_trim <= wdata[7:4];
+        if (HAS_STEPPER != 0 && put && word == 6'h06) step_ratio_low <= wdata;
+        if (HAS_STEPPER != 0 && put && word == 6'h07) step_ratio <= {wdata[15:0], step_ratio_low};
+        if (HAS_DAC != 0 && put && word == 6'h09) dac_half_period <= wdata[7:0];
+        if (HAS_DAC != 0 && put && word == 6'h09) dac_refresh <= wdata[23:8];
+        if (HAS_DAC != 0 && put && word == 6'h0A) dac_trim <= wdata[15:0];
         fine_kp_written <= put && word == 6'h0C;
-        if (put && word == 6'h0C) fine_kp <= wdata[23:0];
-        if (put && word == 6'h0D) fine_ki <= wdata[23:0];
-        if (put && word == 6'h0E) fine_limit <= wdata[14:0];
+        if (HAS_FINE_STAGE != 0 && put && word == 6'h0C) fine_kp <= wdata[23:0];
+        if (HAS_FINE_STAGE != 0 && put && word == 6'h0D) fine_ki <= wdata[23:0];
+        if (HAS_FINE_STAGE != 0 && put && word == 6'h0E) fine_limit <= wdata[14:0];
 
         if (rst) begin
             rdata <= '0;
-            drive_kind <= 2'h0;
+            drive <= 2'h0;
             pwm_period <= 16'h0000;
-            step_pulse_high <= 14'h0001;
-            step_pulse_low <= 14'h0001;
-            step_direction_setup <= 14'h0001;
-            step_direction_hold <= 14'h0001;
+            step_pulse_high <= HAS_STEPPER == 0 ? '0 : 14'h0001;
+            step_pulse_low <= HAS_STEPPER == 0 ? '0 : 14'h0001;
+            step_direction_setup <= HAS_STEPPER == 0 ? '0 : 14'h0001;
+            step_direction_hold <= HAS_STEPPER == 0 ? '0 : 14'h0001;
             step_output_mode <= 2'h0;
             step_output_step_low <= 1'b0;
             step_output_direction_low <= 1'b0;
             step_output_trim <= 4'h0;
             step_ratio_low <= '0;
             step_ratio <= 48'h000000000000;
-            dac_half_period <= 8'h01;
-            dac_refresh <= 16'hFFFF;
+            dac_half_period <= HAS_DAC == 0 ? '0 : 8'h01;
+            dac_refresh <= HAS_DAC == 0 ? '0 : 16'hFFFF;
             dac_trim <= 16'h0000;
             fine_kp_written <= 1'b0;
             fine_kp <= 24'h000000;

@@ -9,7 +9,10 @@
 `default_nettype none
 
 module axis_registers #(
-    parameter int HAS_SINE = 1  // 0: settings that need it read 0
+    parameter int FILTERS     = 1,  // 0: settings that need it read 0
+    parameter int HAS_DRIVE   = 1,  // 0: settings that need it read 0
+    parameter int HAS_MONITOR = 1,  // 0: settings that need it read 0
+    parameter int HAS_SINE    = 1   // 0: settings that need it read 0
 ) (
     input  wire                clk,
     input  wire                rst,                             // settings take their first values
@@ -64,6 +67,19 @@ module axis_registers #(
     output logic        [ 5:0] encoder_fault_mask,              // encoder events that are a fault
     input  wire                rejected_pulses,                 // strobe: pulses of a
     input  wire                rejected_samples,                // strobe
+    input  wire                built_sine,                      // HAS_SINE
+    input  wire                built_monitor,                   // HAS_MONITOR
+    input  wire                built_harmonics,                 // HAS_HARMONICS
+    input  wire                built_recorder,                  // HAS_RECORDER
+    input  wire                built_capture,                   // HAS_CAPTURE
+    input  wire                built_compare,                   // HAS_COMPARE: compare pulses
+    input  wire                built_drive,                     // HAS_DRIVE
+    input  wire                built_bridge,                    // HAS_BRIDGE: bridge
+    input  wire                built_stepper,                   // HAS_STEPPER: step generator
+    input  wire                built_dac,                       // HAS_DAC: DAC
+    input  wire                built_fine_stage,                // HAS_FINE_STAGE: fine stage
+    input  wire         [ 2:0] built_filters,                   // FILTERS
+    input  wire         [ 7:0] built_segments,                  // SEGMENTS
     output logic        [23:0] kp,                              // 1/65536 command/(period/65536)
     output logic               kp_written,                      // strobe: new value
     output logic        [23:0] ki,                              // 1/16777216 command/(period/65536)
@@ -143,6 +159,9 @@ module axis_registers #(
                 6'h18: rdata <= {26'd0, encoder_fault_mask};
                 6'h19: rdata <= rejected_pulses_count;
                 6'h1A: rdata <= rejected_samples_count;
+                6'h1B: rdata <= {10'd0, built_segments, built_filters, built_fine_stage, built_dac,
+                    built_stepper, built_bridge, built_drive, built_compare, built_capture,
+                    built_recorder, built_harmonics, built_monitor, built_sine};
                 6'h20: rdata <= {8'd0, kp};
                 6'h21: rdata <= {8'd0, ki};
                 6'h22: rdata <= {8'd0, kd};
@@ -174,16 +193,16 @@ module axis_registers #(
         if (get && word == 6'h0A) position_high <= position[47:32];
         if (get && word == 6'h0C) target_high <= target[47:32];
 
-        if (put && word == 6'h00) control_enable <= wdata[0];
-        if (put && word == 6'h00) control_closed_loop <= wdata[1];
-        if (put && word == 6'h00) control_homing <= wdata[2];
-        if (put && word == 6'h00) control_fine <= wdata[3];
+        if (HAS_DRIVE != 0 && put && word == 6'h00) control_enable <= wdata[0];
+        if (HAS_DRIVE != 0 && put && word == 6'h00) control_closed_loop <= wdata[1];
+        if (HAS_DRIVE != 0 && put && word == 6'h00) control_homing <= wdata[2];
+        if (HAS_DRIVE != 0 && put && word == 6'h00) control_fine <= wdata[3];
         strobes_reset_faults <= put && word == 6'h01 && wdata[0];
         strobes_set_target_to_position <= put && word == 6'h01 && wdata[1];
         strobes_start <= put && word == 6'h01 && wdata[2];
         strobes_controlled_stop <= put && word == 6'h01 && wdata[3];
         strobes_arm <= put && word == 6'h01 && wdata[4];
-        if (put && word == 6'h08) following_limit <= wdata[31:0];
+        if (HAS_DRIVE != 0 && put && word == 6'h08) following_limit <= wdata[31:0];
         shift_origin_written <= put && word == 6'h0F;
         if (put && word == 6'h0F) shift_origin <= wdata[31:0];
         if (put && word == 6'h10 && wdata[0]) zero_crossing_up_held <= 1'b0;
@@ -193,8 +212,8 @@ module axis_registers #(
         if (put && word == 6'h11) sensing_deglitch <= wdata[15:0];
         if (HAS_SINE != 0 && put && word == 6'h11) sensing_outlier_step <= wdata[23:16];
         if (HAS_SINE != 0 && put && word == 6'h11) sensing_outlier_hold <= wdata[31:24];
-        if (HAS_SINE != 0 && put && word == 6'h12) amplitude_window_low <= wdata[15:0];
-        if (HAS_SINE != 0 && put && word == 6'h12) amplitude_window_high <= wdata[31:16];
+        if (HAS_MONITOR != 0 && put && word == 6'h12) amplitude_window_low <= wdata[15:0];
+        if (HAS_MONITOR != 0 && put && word == 6'h12) amplitude_window_high <= wdata[31:16];
         if (HAS_SINE != 0 && put && word == 6'h13) disagreement_limit <= wdata[19:0];
         if (put && word == 6'h17 && wdata[0]) encoder_events_held[0] <= 1'b0;
         if (encoder_events[0]) encoder_events_held[0] <= 1'b1;
@@ -216,37 +235,39 @@ module axis_registers #(
         else if (!(&rejected_samples_count))
             rejected_samples_count <= rejected_samples_count + 32'(rejected_samples);
         kp_written <= put && word == 6'h20;
-        if (put && word == 6'h20) kp <= wdata[23:0];
-        if (put && word == 6'h21) ki <= wdata[23:0];
+        if (HAS_DRIVE != 0 && put && word == 6'h20) kp <= wdata[23:0];
+        if (HAS_DRIVE != 0 && put && word == 6'h21) ki <= wdata[23:0];
         kd_written <= put && word == 6'h22;
-        if (put && word == 6'h22) kd <= wdata[23:0];
+        if (HAS_DRIVE != 0 && put && word == 6'h22) kd <= wdata[23:0];
         kv_written <= put && word == 6'h23;
-        if (put && word == 6'h23) kv <= wdata[23:0];
+        if (HAS_DRIVE != 0 && put && word == 6'h23) kv <= wdata[23:0];
         ka_written <= put && word == 6'h24;
-        if (put && word == 6'h24) ka <= wdata[23:0];
-        if (put && word == 6'h25) servo_limits_output <= wdata[14:0];
-        if (put && word == 6'h25) servo_limits_integral <= wdata[29:15];
-        if (put && word == 6'h26) dead_band <= wdata[15:0];
-        if (put && word == 6'h29) open_command <= wdata[15:0];
-        if (put && word == 6'h2A) filters_in_use <= wdata[3:0];
-        if (put && word == 6'h2A) filters_address <= wdata[8:4];
+        if (HAS_DRIVE != 0 && put && word == 6'h24) ka <= wdata[23:0];
+        if (HAS_DRIVE != 0 && put && word == 6'h25) servo_limits_output <= wdata[14:0];
+        if (HAS_DRIVE != 0 && put && word == 6'h25) servo_limits_integral <= wdata[29:15];
+        if (HAS_DRIVE != 0 && put && word == 6'h26) dead_band <= wdata[15:0];
+        if (HAS_DRIVE != 0 && put && word == 6'h29) open_command <= wdata[15:0];
+        if (FILTERS != 0 && put && word == 6'h2A) filters_in_use <= wdata[3:0];
+        if (FILTERS != 0 && put && word == 6'h2A) filters_address <= wdata[8:4];
         filter_coefficient_written <= put && word == 6'h2B;
-        if (put && word == 6'h2B) filter_coefficient <= wdata[31:0];
-        if (put && word == 6'h2C) segment_velocity_low <= wdata;
-        if (put && word == 6'h2D) segment_velocity <= {wdata, segment_velocity_low};
-        if (put && word == 6'h2E) segment_acceleration_low <= wdata;
-        if (put && word == 6'h2F) segment_acceleration <= {wdata, segment_acceleration_low};
-        if (put && word == 6'h30) segment_jerk <= wdata[31:0];
+        if (FILTERS != 0 && put && word == 6'h2B) filter_coefficient <= wdata[31:0];
+        if (HAS_DRIVE != 0 && put && word == 6'h2C) segment_velocity_low <= wdata;
+        if (HAS_DRIVE != 0 && put && word == 6'h2D)
+            segment_velocity <= {wdata, segment_velocity_low};
+        if (HAS_DRIVE != 0 && put && word == 6'h2E) segment_acceleration_low <= wdata;
+        if (HAS_DRIVE != 0 && put && word == 6'h2F)
+            segment_acceleration <= {wdata, segment_acceleration_low};
+        if (HAS_DRIVE != 0 && put && word == 6'h30) segment_jerk <= wdata[31:0];
         segment_ticks_written <= put && word == 6'h31;
-        if (put && word == 6'h31) segment_ticks <= wdata[23:0];
-        if (put && word == 6'h31) segment_ticks_last <= wdata[24];
-        if (put && word == 6'h32) stop_deceleration <= wdata[31:0];
-        if (put && word == 6'h33) stop_jerk <= wdata[31:0];
-        if (put && word == 6'h34) feed_override_fraction <= wdata[16:0];
-        if (put && word == 6'h34) feed_override_pause <= wdata[17];
-        if (put && word == 6'h35) feed_override_slope <= wdata[31:0];
-        if (put && word == 6'h36) feed_override_curve <= wdata[31:0];
-        if (put && word == 6'h37) start_at <= wdata[31:0];
+        if (HAS_DRIVE != 0 && put && word == 6'h31) segment_ticks <= wdata[23:0];
+        if (HAS_DRIVE != 0 && put && word == 6'h31) segment_ticks_last <= wdata[24];
+        if (HAS_DRIVE != 0 && put && word == 6'h32) stop_deceleration <= wdata[31:0];
+        if (HAS_DRIVE != 0 && put && word == 6'h33) stop_jerk <= wdata[31:0];
+        if (HAS_DRIVE != 0 && put && word == 6'h34) feed_override_fraction <= wdata[16:0];
+        if (HAS_DRIVE != 0 && put && word == 6'h34) feed_override_pause <= wdata[17];
+        if (HAS_DRIVE != 0 && put && word == 6'h35) feed_override_slope <= wdata[31:0];
+        if (HAS_DRIVE != 0 && put && word == 6'h36) feed_override_curve <= wdata[31:0];
+        if (HAS_DRIVE != 0 && put && word == 6'h37) start_at <= wdata[31:0];
 
         if (rst) begin
             rdata <= '0;
@@ -271,7 +292,7 @@ module axis_registers #(
             sensing_outlier_step <= 8'h00;
             sensing_outlier_hold <= HAS_SINE == 0 ? '0 : 8'h03;
             amplitude_window_low <= 16'h0000;
-            amplitude_window_high <= HAS_SINE == 0 ? '0 : 16'hFFFF;
+            amplitude_window_high <= HAS_MONITOR == 0 ? '0 : 16'hFFFF;
             disagreement_limit <= 20'h00000;
             encoder_events_held[0] <= '0;
             encoder_events_held[1] <= '0;
@@ -307,9 +328,9 @@ module axis_registers #(
             segment_ticks_written <= 1'b0;
             segment_ticks <= 24'h000000;
             segment_ticks_last <= 1'b0;
-            stop_deceleration <= 32'hFFFFFFFF;
+            stop_deceleration <= HAS_DRIVE == 0 ? '0 : 32'hFFFFFFFF;
             stop_jerk <= 32'h00000000;
-            feed_override_fraction <= 17'h10000;
+            feed_override_fraction <= HAS_DRIVE == 0 ? '0 : 17'h10000;
             feed_override_pause <= 1'b0;
             feed_override_slope <= 32'h00000000;
             feed_override_curve <= 32'h00000000;

@@ -10,7 +10,11 @@
 `default_nettype none
 
 module feedback_registers #(
-    parameter int HAS_SINE = 1  // 0: settings that need it read 0
+    parameter int HAS_COMPARE   = 1,  // 0: settings that need it read 0
+    parameter int HAS_HARMONICS = 1,  // 0: settings that need it read 0
+    parameter int HAS_MONITOR   = 1,  // 0: settings that need it read 0
+    parameter int HAS_RECORDER  = 1,  // 0: settings that need it read 0
+    parameter int HAS_SINE      = 1   // 0: settings that need it read 0
 ) (
     input wire clk,
     input wire rst,  // settings take their first values
@@ -91,13 +95,11 @@ module feedback_registers #(
     input wire signed [39:0] velocity_fine,  // 2^-24 period/tick
     output logic position_source_counts,  // 1
     output logic position_source_steps,  // 1
-    input wire position_source_sine,  // 1
     output logic signed [2:0] align,  // 1/4 period
     output logic align_written,  // strobe: new value
     output logic segment_use_enable,  // 1: positions are corrected
     output logic segment_use_linear,  // 1
     output logic [7:0] segment_use_segments,  // use of the segment table
-    input wire [7:0] segment_state_built,  // most segments; 0: not built
     input wire segment_state_in_force,  // positions are corrected
     input wire segment_state_outside,  // beyond the table
     input wire segment_state_known,  // 1
@@ -178,11 +180,10 @@ module feedback_registers #(
                 6'h27: rdata <= {16'd0, velocity_quantum};
                 6'h28: rdata <= velocity_fine[31:0];
                 6'h29: rdata <= {{24{velocity_fine_high[7]}}, velocity_fine_high};
-                6'h2A: rdata <= {29'd0, position_source_sine, position_source_steps,
-                    position_source_counts};
+                6'h2A: rdata <= {30'd0, position_source_steps, position_source_counts};
                 6'h2B: rdata <= {{29{align[2]}}, align};
-                6'h2D: rdata <= {21'd0, segment_state_known, segment_state_outside,
-                    segment_state_in_force, segment_state_built};
+                6'h2D: rdata <= {29'd0, segment_state_known, segment_state_outside,
+                    segment_state_in_force};
                 6'h34: rdata <= {{8{segment_stored[23]}}, segment_stored};
                 6'h35: rdata <= {{8{segment_error[23]}}, segment_error};
                 default: rdata <= '0;
@@ -219,34 +220,37 @@ module feedback_registers #(
         if (HAS_SINE != 0 && put && word == 6'h08) correction_offset_cos <= wdata[31:16];
         if (HAS_SINE != 0 && put && word == 6'h09) correction_gain <= wdata[16:0];
         if (HAS_SINE != 0 && put && word == 6'h0A) correction_quadrature_error <= wdata[16:0];
-        if (HAS_SINE != 0 && put && word == 6'h0B) harmonic_enable <= wdata[0];
+        if (HAS_HARMONICS != 0 && put && word == 6'h0B) harmonic_enable <= wdata[0];
         harmonic_point_written <= put && word == 6'h0C;
-        if (HAS_SINE != 0 && put && word == 6'h0C) harmonic_point <= wdata[17:0];
-        if (HAS_SINE != 0 && put && word == 6'h0C) harmonic_point_point <= wdata[25:18];
-        if (HAS_SINE != 0 && put && word == 6'h0D) recorder_decimation <= wdata[15:0];
-        if (HAS_SINE != 0 && put && word == 6'h0D) recorder_phases <= wdata[16];
-        if (HAS_SINE != 0 && put && word == 6'h12) signal_fault_mask <= wdata[14:0];
-        if (HAS_SINE != 0 && put && word == 6'h13) lissajous_limits_clip_level <= wdata[15:0];
-        if (HAS_SINE != 0 && put && word == 6'h13) lissajous_limits_tolerance <= wdata[31:16];
-        if (HAS_SINE != 0 && put && word == 6'h14) jump_limits_jump <= wdata[15:0];
-        if (HAS_SINE != 0 && put && word == 6'h14) jump_limits_no_noise_samples <= wdata[31:16];
-        if (HAS_SINE != 0 && put && word == 6'h15) channel_limits_span <= wdata[15:0];
-        if (HAS_SINE != 0 && put && word == 6'h15) channel_limits_band <= wdata[23:16];
-        if (HAS_SINE != 0 && put && word == 6'h16) drift_limits_offset <= wdata[15:0];
-        if (HAS_SINE != 0 && put && word == 6'h16) drift_limits_balance <= wdata[31:16];
-        if (HAS_SINE != 0 && put && word == 6'h17)
+        if (HAS_HARMONICS != 0 && put && word == 6'h0C) harmonic_point <= wdata[17:0];
+        if (HAS_HARMONICS != 0 && put && word == 6'h0C) harmonic_point_point <= wdata[25:18];
+        if (HAS_RECORDER != 0 && put && word == 6'h0D) recorder_decimation <= wdata[15:0];
+        if (HAS_RECORDER != 0 && put && word == 6'h0D) recorder_phases <= wdata[16];
+        if (HAS_MONITOR != 0 && put && word == 6'h12) signal_fault_mask <= wdata[14:0];
+        if (HAS_MONITOR != 0 && put && word == 6'h13) lissajous_limits_clip_level <= wdata[15:0];
+        if (HAS_MONITOR != 0 && put && word == 6'h13) lissajous_limits_tolerance <= wdata[31:16];
+        if (HAS_MONITOR != 0 && put && word == 6'h14) jump_limits_jump <= wdata[15:0];
+        if (HAS_MONITOR != 0 && put && word == 6'h14) jump_limits_no_noise_samples <= wdata[31:16];
+        if (HAS_MONITOR != 0 && put && word == 6'h15) channel_limits_span <= wdata[15:0];
+        if (HAS_MONITOR != 0 && put && word == 6'h15) channel_limits_band <= wdata[23:16];
+        if (HAS_MONITOR != 0 && put && word == 6'h16) drift_limits_offset <= wdata[15:0];
+        if (HAS_MONITOR != 0 && put && word == 6'h16) drift_limits_balance <= wdata[31:16];
+        if (HAS_MONITOR != 0 && put && word == 6'h17)
             quadrature_limits_quadrature_error <= wdata[15:0];
-        if (HAS_SINE != 0 && put && word == 6'h17) quadrature_limits_sign_threshold <= wdata[31:16];
+        if (HAS_MONITOR != 0 && put && word == 6'h17)
+            quadrature_limits_sign_threshold <= wdata[31:16];
         if (put && word == 6'h18) capture_sources <= wdata[6:0];
         if (put && word == 6'h19 && wdata[6]) capture_state_overrun_held <= 1'b0;
         if (capture_state_overrun) capture_state_overrun_held <= 1'b1;
-        if (put && word == 6'h1E) compare_start_low <= wdata;
-        if (put && word == 6'h1F) compare_start <= {wdata[15:0], compare_start_low};
-        if (put && word == 6'h20) compare_step_low <= wdata;
-        if (put && word == 6'h21) compare_step <= {wdata[15:0], compare_step_low};
-        if (put && word == 6'h22) compare_count <= wdata[31:0];
-        if (put && word == 6'h23) compare_pulse <= wdata[23:0];
-        if (put && word == 6'h24) compare_gap <= wdata[23:0];
+        if (HAS_COMPARE != 0 && put && word == 6'h1E) compare_start_low <= wdata;
+        if (HAS_COMPARE != 0 && put && word == 6'h1F)
+            compare_start <= {wdata[15:0], compare_start_low};
+        if (HAS_COMPARE != 0 && put && word == 6'h20) compare_step_low <= wdata;
+        if (HAS_COMPARE != 0 && put && word == 6'h21)
+            compare_step <= {wdata[15:0], compare_step_low};
+        if (HAS_COMPARE != 0 && put && word == 6'h22) compare_count <= wdata[31:0];
+        if (HAS_COMPARE != 0 && put && word == 6'h23) compare_pulse <= wdata[23:0];
+        if (HAS_COMPARE != 0 && put && word == 6'h24) compare_gap <= wdata[23:0];
         if (put && word == 6'h25 && wdata[1]) compare_state_late_held <= 1'b0;
         if (compare_state_late) compare_state_late_held <= 1'b1;
         if (put && word == 6'h27) velocity_quantum <= wdata[15:0];
@@ -296,23 +300,23 @@ module feedback_registers #(
             correction_offset_cos <= 16'h0000;
             correction_gain <= HAS_SINE == 0 ? '0 : 17'h10000;
             correction_quadrature_error <= 17'h00000;
-            harmonic_enable <= HAS_SINE == 0 ? '0 : 1'b1;
+            harmonic_enable <= HAS_HARMONICS == 0 ? '0 : 1'b1;
             harmonic_point_written <= 1'b0;
             harmonic_point <= 18'h00000;
             harmonic_point_point <= 8'h00;
-            recorder_decimation <= HAS_SINE == 0 ? '0 : 16'h0001;
+            recorder_decimation <= HAS_RECORDER == 0 ? '0 : 16'h0001;
             recorder_phases <= 1'b0;
             signal_fault_mask <= 15'h0000;
-            lissajous_limits_clip_level <= HAS_SINE == 0 ? '0 : 16'hFFFF;
-            lissajous_limits_tolerance <= HAS_SINE == 0 ? '0 : 16'hFFFF;
-            jump_limits_jump <= HAS_SINE == 0 ? '0 : 16'hFFFF;
+            lissajous_limits_clip_level <= HAS_MONITOR == 0 ? '0 : 16'hFFFF;
+            lissajous_limits_tolerance <= HAS_MONITOR == 0 ? '0 : 16'hFFFF;
+            jump_limits_jump <= HAS_MONITOR == 0 ? '0 : 16'hFFFF;
             jump_limits_no_noise_samples <= 16'h0000;
-            channel_limits_span <= HAS_SINE == 0 ? '0 : 16'hFFFF;
+            channel_limits_span <= HAS_MONITOR == 0 ? '0 : 16'hFFFF;
             channel_limits_band <= 8'h00;
-            drift_limits_offset <= HAS_SINE == 0 ? '0 : 16'hFFFF;
-            drift_limits_balance <= HAS_SINE == 0 ? '0 : 16'hFFFF;
-            quadrature_limits_quadrature_error <= HAS_SINE == 0 ? '0 : 16'hFFFF;
-            quadrature_limits_sign_threshold <= HAS_SINE == 0 ? '0 : 16'hFFFF;
+            drift_limits_offset <= HAS_MONITOR == 0 ? '0 : 16'hFFFF;
+            drift_limits_balance <= HAS_MONITOR == 0 ? '0 : 16'hFFFF;
+            quadrature_limits_quadrature_error <= HAS_MONITOR == 0 ? '0 : 16'hFFFF;
+            quadrature_limits_sign_threshold <= HAS_MONITOR == 0 ? '0 : 16'hFFFF;
             capture_sources <= 7'h00;
             capture_state_overrun_held <= '0;
             captured_position_high <= '0;
@@ -321,8 +325,8 @@ module feedback_registers #(
             compare_step_low <= '0;
             compare_step <= 48'h000000000000;
             compare_count <= 32'h00000000;
-            compare_pulse <= 24'h000001;
-            compare_gap <= 24'h000001;
+            compare_pulse <= HAS_COMPARE == 0 ? '0 : 24'h000001;
+            compare_gap <= HAS_COMPARE == 0 ? '0 : 24'h000001;
             compare_state_late_held <= '0;
             velocity_quantum <= 16'h0000;
             velocity_fine_high <= '0;

@@ -17,7 +17,6 @@
 #include "axis/motion.h"
 #include "axis/parameters.h"
 
-#define FINE_BUILT 8u      // bit of actuator.drive.built
 #define FINE_HYSTERESIS 4  // the fine stage releases the axis at this multiple of its reach
 #define FINE_MS 10u        // the axis must be within the reach for this time
 #define EASE 8             // decrease of the motor command per millisecond in the fine stage
@@ -161,6 +160,7 @@ void axis_start(unsigned n) {
 uint8_t axis_enable(unsigned n, bool on) {
     struct axis* a = &axes[n];
     a->command_count += !on;
+    if (on && !hardware_built(n, AXIS_BUILT_DRIVE_MASK)) return BUS_CAUSE_NOT_BUILT;
     axis_poll(n);
     if (!on) {
         if (is_busy(a)) a->ended = BUS_CAUSE_STOPPED;
@@ -183,6 +183,7 @@ uint8_t axis_enable(unsigned n, bool on) {
 // The checks before any motion.
 static uint8_t check_ready(unsigned n) {
     const struct axis* a = &axes[n];
+    if (!hardware_built(n, AXIS_BUILT_DRIVE_MASK)) return BUS_CAUSE_NOT_BUILT;
     axis_poll(n);
     if (a->state == BUS_STATE_FAULTED) return BUS_CAUSE_FAULTED;
     if (a->state == BUS_STATE_OFF) return BUS_CAUSE_NOT_ENABLED;
@@ -345,8 +346,6 @@ static uint8_t check_parameter(unsigned n, uint8_t id, int64_t value) {
     if (is_busy(a)) return BUS_CAUSE_BUSY;
     switch (id) {
     case BUS_PARAMETER_DRIVE:
-        if (!(FIELD_GET(actuator_read(n, ACTUATOR_DRIVE), ACTUATOR_DRIVE_BUILT) >> value & 1))
-            return BUS_CAUSE_NOT_BUILT;
         if (value == DAC_OUTPUT && parameters_get(n, BUS_PARAMETER_FINE_REACH))
             return BUS_CAUSE_OUT_OF_RANGE;
         return on ? BUS_CAUSE_BUSY : BUS_CAUSE_OK;
@@ -359,11 +358,6 @@ static uint8_t check_parameter(unsigned n, uint8_t id, int64_t value) {
             return BUS_CAUSE_OUT_OF_RANGE;
         return on ? BUS_CAUSE_BUSY : BUS_CAUSE_OK;
     case BUS_PARAMETER_STEP_INVERT: return on ? BUS_CAUSE_BUSY : BUS_CAUSE_OK;
-    case BUS_PARAMETER_SEGMENTS:
-        return value && !FIELD_GET(feedback_read(n, FEEDBACK_SEGMENT_STATE),
-                                   FEEDBACK_SEGMENT_STATE_BUILT)
-                   ? BUS_CAUSE_NOT_BUILT
-                   : BUS_CAUSE_OK;
     case BUS_PARAMETER_SEGMENT_COUNT:
     case BUS_PARAMETER_SEGMENT_LENGTH:
     case BUS_PARAMETER_SEGMENT_FIRST:
@@ -371,9 +365,6 @@ static uint8_t check_parameter(unsigned n, uint8_t id, int64_t value) {
                    ? BUS_CAUSE_SEGMENTS_IN_USE
                    : BUS_CAUSE_OK;
     case BUS_PARAMETER_FINE_REACH:
-        if (value &&
-            !(FIELD_GET(actuator_read(n, ACTUATOR_DRIVE), ACTUATOR_DRIVE_BUILT) & FINE_BUILT))
-            return BUS_CAUSE_NOT_BUILT;
         return value && parameters_get(n, BUS_PARAMETER_DRIVE) == DAC_OUTPUT
                    ? BUS_CAUSE_OUT_OF_RANGE
                    : BUS_CAUSE_OK;

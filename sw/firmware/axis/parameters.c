@@ -17,7 +17,13 @@ static const struct {
     int64_t low, high, value;
 } table[BUS_PARAMETER_COUNT + 1] = {BUS_PARAMETERS(LIMITS)};
 
-static const uint8_t sine_parameters[] = {BUS_PARAMETERS_OF_SINE};
+#define NEED(parameter, feature)                              \
+    {BUS_PARAMETER_##parameter, AXIS_BUILT_##feature##_SHIFT, \
+     AXIS_BUILT_##feature##_MASK >> AXIS_BUILT_##feature##_SHIFT},
+
+static const struct {
+    uint8_t id, shift, mask;  // of the field of axis.built
+} needs[] = {BUS_PARAMETER_NEEDS(NEED)};
 
 static int64_t parameters[HARDWARE_AXES][BUS_PARAMETER_COUNT + 1];
 static struct planner_limits limits[HARDWARE_AXES];  // of a move
@@ -189,16 +195,23 @@ static void apply(unsigned axis, uint8_t id) {
 
 void parameters_start(unsigned axis) {
     for (uint8_t id = 1; id <= BUS_PARAMETER_COUNT; id++) parameters[axis][id] = table[id].value;
-    if (!hardware_has_sine(axis)) parameters[axis][BUS_PARAMETER_POSITION_SOURCE] = COUNTS;
+    if (!hardware_built(axis, AXIS_BUILT_SINE_MASK))
+        parameters[axis][BUS_PARAMETER_POSITION_SOURCE] = COUNTS;
     for (uint8_t id = 1; id <= BUS_PARAMETER_COUNT; id++) apply(axis, id);
 }
 
-static bool needs_sine(uint8_t id, int64_t value) {
-    if (id == BUS_PARAMETER_POSITION_SOURCE) return value == PHASES;
-    if (value == 0 || value == table[id].value) return false;
-    for (unsigned n = 0; n < sizeof sine_parameters; n++)
-        if (sine_parameters[n] == id) return true;
-    return false;
+// Whether the axis was built with what this value of a parameter requests.
+static bool is_built(unsigned axis, uint8_t id, int64_t value) {
+    if (id == BUS_PARAMETER_POSITION_SOURCE)
+        return value == COUNTS || hardware_built(axis, value == PHASES ? AXIS_BUILT_SINE_MASK
+                                                                       : AXIS_BUILT_STEPPER_MASK);
+    if (id == BUS_PARAMETER_DRIVE)
+        return hardware_built(axis, 1u << (AXIS_BUILT_BRIDGE_SHIFT + (unsigned)value));
+    if (value == 0 || value == table[id].value) return true;
+    for (unsigned n = 0; n < sizeof needs / sizeof *needs; n++)
+        if (needs[n].id == id)
+            return hardware_built(axis, (uint32_t)needs[n].mask << needs[n].shift);
+    return true;
 }
 
 static bool home_method_exists(int64_t method) {
@@ -211,7 +224,7 @@ uint8_t parameters_check(unsigned axis, uint8_t id, int64_t value) {
     if (id == BUS_PARAMETER_HOME_METHOD && !home_method_exists(value))
         return BUS_CAUSE_OUT_OF_RANGE;
     if (value < table[id].low || value > table[id].high) return BUS_CAUSE_OUT_OF_RANGE;
-    return needs_sine(id, value) && !hardware_has_sine(axis) ? BUS_CAUSE_NOT_BUILT : BUS_CAUSE_OK;
+    return is_built(axis, id, value) ? BUS_CAUSE_OK : BUS_CAUSE_NOT_BUILT;
 }
 
 void parameters_set(unsigned axis, uint8_t id, int64_t value) {

@@ -201,7 +201,7 @@ static uint8_t reset_faults(unsigned axis) {
 }
 
 static uint8_t signal(unsigned axis) {
-    if (!hardware_has_sine(axis)) return BUS_CAUSE_NOT_BUILT;
+    if (!hardware_built(axis, AXIS_BUILT_MONITOR_MASK)) return BUS_CAUSE_NOT_BUILT;
     put(BUS_SIGNAL_REPLY_FAULTS, feedback_read(axis, FEEDBACK_SIGNAL_FAULTS), 2);
     put(BUS_SIGNAL_REPLY_FIRST, feedback_read(axis, FEEDBACK_FIRST_SIGNAL_FAULTS), 2);
     return BUS_CAUSE_OK;

@@ -98,8 +98,7 @@ static uint8_t segments(unsigned n) {
 static uint8_t set_segments(unsigned n) {
     uint32_t border = (uint32_t)bus_request_field(BUS_SET_SEGMENTS_REQUEST_BORDER, 1),
              points = (uint32_t)bus_request_field(BUS_SET_SEGMENTS_REQUEST_POINTS, 1);
-    uint32_t most =
-        FIELD_GET(feedback_read(n, FEEDBACK_SEGMENT_STATE), FEEDBACK_SEGMENT_STATE_BUILT);
+    uint32_t most = FIELD_GET(axis_read(n, AXIS_BUILT), AXIS_BUILT_SEGMENTS);
     if (most == 0) return BUS_CAUSE_NOT_BUILT;
     if (required_use(n) != OFF || in_force(n) != OFF) return BUS_CAUSE_SEGMENTS_IN_USE;
     if ((border && border != tables[n].loaded) || points > POINTS || border + points > most + 1)

@@ -79,7 +79,10 @@ static uint8_t set_harmonic(unsigned axis) {
 
 uint8_t calibration_axes_operation(uint8_t operation) {
     unsigned axis = (unsigned)bus_request_field(BUS_REQUEST_HEAD, 1);
-    if (axis < axes && !hardware_has_sine(axis)) return BUS_CAUSE_NOT_BUILT;
+    uint32_t feature = operation == BUS_OPERATION_CALIBRATION    ? AXIS_BUILT_RECORDER_MASK
+                       : operation == BUS_OPERATION_SET_HARMONIC ? AXIS_BUILT_HARMONICS_MASK
+                                                                 : AXIS_BUILT_SINE_MASK;
+    if (axis < axes && !hardware_built(axis, feature)) return BUS_CAUSE_NOT_BUILT;
     switch (operation) {
     case BUS_OPERATION_CALIBRATION: return calibration(axis);
     case BUS_OPERATION_GET_CORRECTION: return get_correction(axis);

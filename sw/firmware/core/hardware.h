@@ -21,8 +21,9 @@ static inline int64_t axis_read_position(unsigned axis, uint32_t offset) {
     return (int64_t)(axis_read_wide(axis, offset) << 16) >> 16;
 }
 
-static inline bool hardware_has_sine(unsigned axis) {
-    return feedback_read(axis, FEEDBACK_POSITION_SOURCE) & FEEDBACK_POSITION_SOURCE_SINE_MASK;
+// Whether an axis was built with this feature: a mask AXIS_BUILT_..._MASK.
+static inline bool hardware_built(unsigned axis, uint32_t feature) {
+    return axis_read(axis, AXIS_BUILT) & feature;
 }
 
 static inline bool hardware_map_fits(void) { return node_read(NODE_MAP_CRC) == MAP_CRC; }

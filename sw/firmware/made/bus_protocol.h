@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0x21544602u    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0xA6F982BDu    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -33,7 +33,7 @@ enum bus_cause {
     BUS_CAUSE_NO_MOTION_YET = 20,    // no motion was requested yet
     BUS_CAUSE_NO_INDEX = 21,    // no index was found within the home distance
     BUS_CAUSE_NOT_PREPARED = 22,    // the axis has no motion prepared
-    BUS_CAUSE_NOT_BUILT = 23,    // this node was built without this function
+    BUS_CAUSE_NOT_BUILT = 23,    // this axis or node was built without this function
     BUS_CAUSE_TOO_LONG = 24,    // the motion would take days, or is too long for a change of target
     // the steps of the stepped profile are not in order, or too many
     BUS_CAUSE_STEPPED_PROFILE_INVALID = 25,
@@ -286,7 +286,7 @@ enum bus_job_flag {    // bits
     X(20, "no motion was requested yet") \
     X(21, "no index was found within the home distance") \
     X(22, "the axis has no motion prepared") \
-    X(23, "this node was built without this function") \
+    X(23, "this axis or node was built without this function") \
     X(24, "the motion would take days, or is too long for a change of target") \
     X(25, "the steps of the stepped profile are not in order, or too many") \
     X(26, "no complete segment table is loaded") \
@@ -1063,8 +1063,61 @@ enum bus_parameter {
     X(segment_first, 89, -70368744177664LL, 70368744177664LL, 0LL) \
     X(segments, 90, 0LL, 2LL, 0LL)
 
-// parameters of which a node without sine and cosine accepts only 0 and the default
-#define BUS_PARAMETERS_OF_SINE 25, 26, 27, 28, 29, 33, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48
+// X(parameter, field of axis.built without which it accepts only 0 and its default)
+#define BUS_PARAMETER_NEEDS(X) \
+    X(KP, DRIVE) \
+    X(KI, DRIVE) \
+    X(KD, DRIVE) \
+    X(KV, DRIVE) \
+    X(KA, DRIVE) \
+    X(OUTPUT_LIMIT, DRIVE) \
+    X(INTEGRAL_LIMIT, DRIVE) \
+    X(DEAD_BAND, DRIVE) \
+    X(FOLLOWING_LIMIT, DRIVE) \
+    X(OUTLIER_STEP, SINE) \
+    X(OUTLIER_HOLD, SINE) \
+    X(AMPLITUDE_LOW, MONITOR) \
+    X(AMPLITUDE_HIGH, MONITOR) \
+    X(DISAGREEMENT_LIMIT, SINE) \
+    X(PWM_FREQUENCY, BRIDGE) \
+    X(AUTO_CALIBRATION, RECORDER) \
+    X(SIGNAL_FAULT_MASK, MONITOR) \
+    X(SIGNAL_CLIP_LEVEL, MONITOR) \
+    X(SIGNAL_TOLERANCE, MONITOR) \
+    X(SIGNAL_JUMP, MONITOR) \
+    X(SIGNAL_NO_NOISE_SAMPLES, MONITOR) \
+    X(SIGNAL_SPAN, MONITOR) \
+    X(SIGNAL_BAND, MONITOR) \
+    X(SIGNAL_SIGN_THRESHOLD, MONITOR) \
+    X(SIGNAL_OFFSET, MONITOR) \
+    X(SIGNAL_BALANCE, MONITOR) \
+    X(SIGNAL_QUADRATURE_ERROR, MONITOR) \
+    X(STEPS_PER_PERIOD, STEPPER) \
+    X(STEP_HIGH, STEPPER) \
+    X(STEP_LOW, STEPPER) \
+    X(STEP_SETUP, STEPPER) \
+    X(STEP_HOLD, STEPPER) \
+    X(STEP_OUTPUT, STEPPER) \
+    X(STEP_INVERT, STEPPER) \
+    X(STEP_TRIM, STEPPER) \
+    X(DAC_CLOCK, DAC) \
+    X(DAC_TRIM, DAC) \
+    X(FINE_KP, FINE_STAGE) \
+    X(FINE_KI, FINE_STAGE) \
+    X(FINE_LIMIT, FINE_STAGE) \
+    X(FINE_REACH, FINE_STAGE) \
+    X(FILTERS, FILTERS) \
+    X(FILTER_1_B0, FILTERS) \
+    X(FILTER_1_B1, FILTERS) \
+    X(FILTER_1_B2, FILTERS) \
+    X(FILTER_1_A1, FILTERS) \
+    X(FILTER_1_A2, FILTERS) \
+    X(FILTER_2_B0, FILTERS) \
+    X(FILTER_2_B1, FILTERS) \
+    X(FILTER_2_B2, FILTERS) \
+    X(FILTER_2_A1, FILTERS) \
+    X(FILTER_2_A2, FILTERS) \
+    X(SEGMENTS, SEGMENTS)
 
 // X(parameter, block, register, field), in the order of the addresses
 #define BUS_PARAMETER_REGISTERS(X) \
@@ -1094,7 +1147,7 @@ enum bus_parameter {
     X(SIGNAL_QUADRATURE_ERROR, FEEDBACK, QUADRATURE_LIMITS, QUADRATURE_LIMITS_QUADRATURE_ERROR) \
     X(SIGNAL_SIGN_THRESHOLD, FEEDBACK, QUADRATURE_LIMITS, QUADRATURE_LIMITS_SIGN_THRESHOLD) \
     X(VELOCITY_QUANTUM, FEEDBACK, VELOCITY_QUANTUM, VELOCITY_QUANTUM) \
-    X(DRIVE, ACTUATOR, DRIVE, DRIVE_KIND) \
+    X(DRIVE, ACTUATOR, DRIVE, DRIVE) \
     X(DAC_TRIM, ACTUATOR, DAC_TRIM, DAC_TRIM) \
     X(FINE_KP, ACTUATOR, FINE_KP, FINE_KP) \
     X(FINE_KI, ACTUATOR, FINE_KI, FINE_KI) \

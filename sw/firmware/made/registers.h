@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #define REGISTERS_BASE 0x80000000u
-#define MAP_CRC 0xeb9dcc5cu  // CRC-32 of tables/registers.rdl
+#define MAP_CRC 0xabdf6a83u  // CRC-32 of tables/registers.rdl
 
 #define NODE_BASE 0x000u
 #define BUS_BASE 0x100u
@@ -792,6 +792,60 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define AXIS_REJECTED_SAMPLES_MASK 0xffffffffu
 #define AXIS_REJECTED_SAMPLES_SHIFT 0
 #define AXIS_REJECTED_SAMPLES_WIDTH 32
+// r: what is built; 1: the axis has it
+#define AXIS_BUILT 0x06cu
+// HAS_SINE: sine and cosine; 0: the position is made of counts
+#define AXIS_BUILT_SINE_MASK 0x00000001u
+#define AXIS_BUILT_SINE_SHIFT 0
+#define AXIS_BUILT_SINE_WIDTH 1
+// HAS_MONITOR: signal monitor, amplitude
+#define AXIS_BUILT_MONITOR_MASK 0x00000002u
+#define AXIS_BUILT_MONITOR_SHIFT 1
+#define AXIS_BUILT_MONITOR_WIDTH 1
+// HAS_HARMONICS: harmonic correction
+#define AXIS_BUILT_HARMONICS_MASK 0x00000004u
+#define AXIS_BUILT_HARMONICS_SHIFT 2
+#define AXIS_BUILT_HARMONICS_WIDTH 1
+// HAS_RECORDER: recorder of bursts, for the auto-calibration
+#define AXIS_BUILT_RECORDER_MASK 0x00000008u
+#define AXIS_BUILT_RECORDER_SHIFT 3
+#define AXIS_BUILT_RECORDER_WIDTH 1
+// HAS_CAPTURE: queue of captures; 0: one index at a time
+#define AXIS_BUILT_CAPTURE_MASK 0x00000010u
+#define AXIS_BUILT_CAPTURE_SHIFT 4
+#define AXIS_BUILT_CAPTURE_WIDTH 1
+// HAS_COMPARE: compare pulses
+#define AXIS_BUILT_COMPARE_MASK 0x00000020u
+#define AXIS_BUILT_COMPARE_SHIFT 5
+#define AXIS_BUILT_COMPARE_WIDTH 1
+// HAS_DRIVE: profile, servo, interlock; 0: the axis only measures
+#define AXIS_BUILT_DRIVE_MASK 0x00000040u
+#define AXIS_BUILT_DRIVE_SHIFT 6
+#define AXIS_BUILT_DRIVE_WIDTH 1
+// HAS_BRIDGE: bridge
+#define AXIS_BUILT_BRIDGE_MASK 0x00000080u
+#define AXIS_BUILT_BRIDGE_SHIFT 7
+#define AXIS_BUILT_BRIDGE_WIDTH 1
+// HAS_STEPPER: step generator
+#define AXIS_BUILT_STEPPER_MASK 0x00000100u
+#define AXIS_BUILT_STEPPER_SHIFT 8
+#define AXIS_BUILT_STEPPER_WIDTH 1
+// HAS_DAC: DAC
+#define AXIS_BUILT_DAC_MASK 0x00000200u
+#define AXIS_BUILT_DAC_SHIFT 9
+#define AXIS_BUILT_DAC_WIDTH 1
+// HAS_FINE_STAGE: fine stage
+#define AXIS_BUILT_FINE_STAGE_MASK 0x00000400u
+#define AXIS_BUILT_FINE_STAGE_SHIFT 10
+#define AXIS_BUILT_FINE_STAGE_WIDTH 1
+// FILTERS: biquads of the servo; 0: none
+#define AXIS_BUILT_FILTERS_MASK 0x00003800u
+#define AXIS_BUILT_FILTERS_SHIFT 11
+#define AXIS_BUILT_FILTERS_WIDTH 3
+// SEGMENTS: most segments of the table; 0: none
+#define AXIS_BUILT_SEGMENTS_MASK 0x003fc000u
+#define AXIS_BUILT_SEGMENTS_SHIFT 14
+#define AXIS_BUILT_SEGMENTS_WIDTH 8
 // rw: proportional gain on the error [1/65536 command/(period/65536)]
 #define AXIS_KP 0x080u
 #define AXIS_KP_MASK 0x00ffffffu
@@ -1153,7 +1207,7 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define FEEDBACK_CAPTURE_SOURCES_MASK 0x0000007fu
 #define FEEDBACK_CAPTURE_SOURCES_SHIFT 0
 #define FEEDBACK_CAPTURE_SOURCES_WIDTH 7
-// rw: state of the captures
+// rw: state of the captures; without HAS_CAPTURE there is one, of the index
 #define FEEDBACK_CAPTURE_STATE 0x064u
 // a capture waits in captured_*
 #define FEEDBACK_CAPTURE_STATE_PRESENT_MASK 0x00000001u
@@ -1237,7 +1291,7 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define FEEDBACK_VELOCITY_FINE_WIDTH 40
 // rw: what the position is made of
 #define FEEDBACK_POSITION_SOURCE 0x0a8u
-// 1: counts of a and b, 0: phases; a count is a quarter period
+// 1: counts of a and b, 0: phases, if sine and cosine are built; a count is a quarter period
 #define FEEDBACK_POSITION_SOURCE_COUNTS_MASK 0x00000001u
 #define FEEDBACK_POSITION_SOURCE_COUNTS_SHIFT 0
 #define FEEDBACK_POSITION_SOURCE_COUNTS_WIDTH 1
@@ -1245,10 +1299,6 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define FEEDBACK_POSITION_SOURCE_STEPS_MASK 0x00000002u
 #define FEEDBACK_POSITION_SOURCE_STEPS_SHIFT 1
 #define FEEDBACK_POSITION_SOURCE_STEPS_WIDTH 1
-// 1: sine and cosine are built; 0: the position is made of counts, whatever `counts` says
-#define FEEDBACK_POSITION_SOURCE_SINE_MASK 0x00000004u
-#define FEEDBACK_POSITION_SOURCE_SINE_SHIFT 2
-#define FEEDBACK_POSITION_SOURCE_SINE_WIDTH 1
 // rw: shift of position and phase, -2 to 2 counts, in the mode of counts; the target does not
 // follow [1/4 period]
 #define FEEDBACK_ALIGN 0x0acu
@@ -1270,21 +1320,17 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define FEEDBACK_SEGMENT_USE_SEGMENTS_WIDTH 8
 // r: state of the segment table
 #define FEEDBACK_SEGMENT_STATE 0x0b4u
-// most segments; 0: not built
-#define FEEDBACK_SEGMENT_STATE_BUILT_MASK 0x000000ffu
-#define FEEDBACK_SEGMENT_STATE_BUILT_SHIFT 0
-#define FEEDBACK_SEGMENT_STATE_BUILT_WIDTH 8
 // positions are corrected
-#define FEEDBACK_SEGMENT_STATE_IN_FORCE_MASK 0x00000100u
-#define FEEDBACK_SEGMENT_STATE_IN_FORCE_SHIFT 8
+#define FEEDBACK_SEGMENT_STATE_IN_FORCE_MASK 0x00000001u
+#define FEEDBACK_SEGMENT_STATE_IN_FORCE_SHIFT 0
 #define FEEDBACK_SEGMENT_STATE_IN_FORCE_WIDTH 1
 // beyond the table, where the error of its border is used
-#define FEEDBACK_SEGMENT_STATE_OUTSIDE_MASK 0x00000200u
-#define FEEDBACK_SEGMENT_STATE_OUTSIDE_SHIFT 9
+#define FEEDBACK_SEGMENT_STATE_OUTSIDE_MASK 0x00000002u
+#define FEEDBACK_SEGMENT_STATE_OUTSIDE_SHIFT 1
 #define FEEDBACK_SEGMENT_STATE_OUTSIDE_WIDTH 1
 // 1: segment_stored is valid, for the border in segment_read
-#define FEEDBACK_SEGMENT_STATE_KNOWN_MASK 0x00000400u
-#define FEEDBACK_SEGMENT_STATE_KNOWN_SHIFT 10
+#define FEEDBACK_SEGMENT_STATE_KNOWN_MASK 0x00000004u
+#define FEEDBACK_SEGMENT_STATE_KNOWN_SHIFT 2
 #define FEEDBACK_SEGMENT_STATE_KNOWN_WIDTH 1
 // w: position of the first border; it moves with the origin after it is written [1/65536 period]
 #define FEEDBACK_SEGMENT_ORIGIN 0x0b8u
@@ -1322,16 +1368,11 @@ static inline void actuator_write_wide(unsigned axis, uint32_t offset, uint64_t 
 #define FEEDBACK_SEGMENT_ERROR_WIDTH 24
 
 // actuator: bridge, stepper driver or DAC, and the fine stage
-// rw: kind of drive
+// rw: kind of drive: 0 bridge, 1 stepper, 2 DAC
 #define ACTUATOR_DRIVE 0x000u
-// 0 bridge, 1 stepper, 2 DAC
-#define ACTUATOR_DRIVE_KIND_MASK 0x00000003u
-#define ACTUATOR_DRIVE_KIND_SHIFT 0
-#define ACTUATOR_DRIVE_KIND_WIDTH 2
-// what is built: bit 0 bridge, 1 stepper, 2 DAC, 3 fine stage
-#define ACTUATOR_DRIVE_BUILT_MASK 0x0000003cu
-#define ACTUATOR_DRIVE_BUILT_SHIFT 2
-#define ACTUATOR_DRIVE_BUILT_WIDTH 4
+#define ACTUATOR_DRIVE_MASK 0x00000003u
+#define ACTUATOR_DRIVE_SHIFT 0
+#define ACTUATOR_DRIVE_WIDTH 2
 // rw: PWM period of the bridge [cycle]
 #define ACTUATOR_PWM_PERIOD 0x004u
 #define ACTUATOR_PWM_PERIOD_MASK 0x0000ffffu

@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     text: str
 
 
-PROTOCOL_CRC = 0x21544602
+PROTOCOL_CRC = 0xA6F982BD
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -52,7 +52,7 @@ CAUSES = {
     20: ("no_motion_yet", "no motion was requested yet"),
     21: ("no_index", "no index was found within the home distance"),
     22: ("not_prepared", "the axis has no motion prepared"),
-    23: ("not_built", "this node was built without this function"),
+    23: ("not_built", "this axis or node was built without this function"),
     24: ("too_long", "the motion would take days, or is too long for a change of target"),
     25: ("stepped_profile_invalid",
          "the steps of the stepped profile are not in order, or too many"),

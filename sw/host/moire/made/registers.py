@@ -6,7 +6,7 @@ change those.
 from dataclasses import dataclass
 from fractions import Fraction
 
-MAP_CRC = 0xEB9DCC5C  # CRC-32 of tables/registers.rdl
+MAP_CRC = 0xABDF6A83  # CRC-32 of tables/registers.rdl
 BLOCKS = {  # base, distance to the next one
     "node": (0x000, 0x000),
     "bus": (0x100, 0x000),
@@ -956,6 +956,84 @@ FIELDS = (
         "samples that the outlier filter rejected; writing clears the count",
     ),
     Field(
+        "axis", "built", "sine",
+        0x6C, 0, 1, False, "r", "",
+        Fraction(1, 1),
+        "HAS_SINE: sine and cosine; 0: the position is made of counts",
+    ),
+    Field(
+        "axis", "built", "monitor",
+        0x6C, 1, 1, False, "r", "",
+        Fraction(1, 1),
+        "HAS_MONITOR: signal monitor, amplitude",
+    ),
+    Field(
+        "axis", "built", "harmonics",
+        0x6C, 2, 1, False, "r", "",
+        Fraction(1, 1),
+        "HAS_HARMONICS: harmonic correction",
+    ),
+    Field(
+        "axis", "built", "recorder",
+        0x6C, 3, 1, False, "r", "",
+        Fraction(1, 1),
+        "HAS_RECORDER: recorder of bursts, for the auto-calibration",
+    ),
+    Field(
+        "axis", "built", "capture",
+        0x6C, 4, 1, False, "r", "",
+        Fraction(1, 1),
+        "HAS_CAPTURE: queue of captures; 0: one index at a time",
+    ),
+    Field(
+        "axis", "built", "compare",
+        0x6C, 5, 1, False, "r", "",
+        Fraction(1, 1),
+        "HAS_COMPARE: compare pulses",
+    ),
+    Field(
+        "axis", "built", "drive",
+        0x6C, 6, 1, False, "r", "",
+        Fraction(1, 1),
+        "HAS_DRIVE: profile, servo, interlock; 0: the axis only measures",
+    ),
+    Field(
+        "axis", "built", "bridge",
+        0x6C, 7, 1, False, "r", "",
+        Fraction(1, 1),
+        "HAS_BRIDGE: bridge",
+    ),
+    Field(
+        "axis", "built", "stepper",
+        0x6C, 8, 1, False, "r", "",
+        Fraction(1, 1),
+        "HAS_STEPPER: step generator",
+    ),
+    Field(
+        "axis", "built", "dac",
+        0x6C, 9, 1, False, "r", "",
+        Fraction(1, 1),
+        "HAS_DAC: DAC",
+    ),
+    Field(
+        "axis", "built", "fine_stage",
+        0x6C, 10, 1, False, "r", "",
+        Fraction(1, 1),
+        "HAS_FINE_STAGE: fine stage",
+    ),
+    Field(
+        "axis", "built", "filters",
+        0x6C, 11, 3, False, "r", "",
+        Fraction(1, 1),
+        "FILTERS: biquads of the servo; 0: none",
+    ),
+    Field(
+        "axis", "built", "segments",
+        0x6C, 14, 8, False, "r", "",
+        Fraction(1, 1),
+        "SEGMENTS: most segments of the table; 0: none",
+    ),
+    Field(
         "axis", "kp", "value",
         0x80, 0, 24, False, "rw", "command/(period/65536)",
         Fraction(1, 65536),
@@ -1525,20 +1603,14 @@ FIELDS = (
         "feedback", "position_source", "counts",
         0xA8, 0, 1, False, "rw", "",
         Fraction(1, 1),
-        "1: counts of a and b, 0: phases; a count is a quarter period",
+        "1: counts of a and b, 0: phases, if sine and cosine are built; a count is a quarter "
+        "period",
     ),
     Field(
         "feedback", "position_source", "steps",
         0xA8, 1, 1, False, "rw", "",
         Fraction(1, 1),
         "1: own steps of the axis replace the pins a and b",
-    ),
-    Field(
-        "feedback", "position_source", "sine",
-        0xA8, 2, 1, False, "r", "",
-        Fraction(1, 1),
-        "1: sine and cosine are built; 0: the position is made of counts, whatever `counts` "
-        "says",
     ),
     Field(
         "feedback", "align", "value",
@@ -1566,26 +1638,20 @@ FIELDS = (
         "use of the segment table; a change moves position and target together: segments",
     ),
     Field(
-        "feedback", "segment_state", "built",
-        0xB4, 0, 8, False, "r", "",
-        Fraction(1, 1),
-        "most segments; 0: not built",
-    ),
-    Field(
         "feedback", "segment_state", "in_force",
-        0xB4, 8, 1, False, "r", "",
+        0xB4, 0, 1, False, "r", "",
         Fraction(1, 1),
         "positions are corrected",
     ),
     Field(
         "feedback", "segment_state", "outside",
-        0xB4, 9, 1, False, "r", "",
+        0xB4, 1, 1, False, "r", "",
         Fraction(1, 1),
         "beyond the table, where the error of its border is used",
     ),
     Field(
         "feedback", "segment_state", "known",
-        0xB4, 10, 1, False, "r", "",
+        0xB4, 2, 1, False, "r", "",
         Fraction(1, 1),
         "1: segment_stored is valid, for the border in segment_read",
     ),
@@ -1632,16 +1698,10 @@ FIELDS = (
         "error subtracted from the position now",
     ),
     Field(
-        "actuator", "drive", "kind",
+        "actuator", "drive", "value",
         0x00, 0, 2, False, "rw", "",
         Fraction(1, 1),
-        "0 bridge, 1 stepper, 2 DAC",
-    ),
-    Field(
-        "actuator", "drive", "built",
-        0x00, 2, 4, False, "r", "",
-        Fraction(1, 1),
-        "what is built: bit 0 bridge, 1 stepper, 2 DAC, 3 fine stage",
+        "kind of drive: 0 bridge, 1 stepper, 2 DAC",
     ),
     Field(
         "actuator", "pwm_period", "value",
