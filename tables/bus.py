@@ -199,7 +199,9 @@ class Bus:
                 raise ValueError(f"bus.toml: the default of {name} is outside its range")
             feature = parameter.get("needs", "")
             if feature and f"axis.built.{feature.lower()}" not in register_fields():
-                raise ValueError(f"bus.toml: {name} needs {feature}, which axis.built does not have")
+                raise ValueError(
+                    f"bus.toml: {name} needs {feature}, which axis.built does not have"
+                )
             Fraction(parameter["lsb"])
 
 
@@ -309,7 +311,9 @@ def values(kind: str, parameters: Entries) -> list[str]:
     ]
     out += macro(f"BUS_{kind.upper()}S", rows)
     if needy := [(name, p["needs"]) for name, p in parameters.items() if "needs" in p]:
-        out.append(f"// X({kind}, field of axis.built without which it accepts only 0 and its default)")
+        out.append(
+            f"// X({kind}, field of axis.built without which it accepts only 0 and its default)"
+        )
         rows = [f"    X({name}, {feature})".upper() for name, feature in needy]
         out += macro(f"BUS_{kind.upper()}_NEEDS", rows)
     return out
@@ -372,6 +376,7 @@ def host(bus: Bus) -> str:
         "    max: int",
         "    default: int",
         "    text: str",
+        '    needs: str = ""         # field of axis.built that any value but 0 and default needs',
         "",
         "",
         f"PROTOCOL_CRC = 0x{bus.crc:08X}",
@@ -407,7 +412,8 @@ def host(bus: Bus) -> str:
             out.append(
                 f"              {parameter['min']}, {parameter['max']}, {parameter['default']},"
             )
-            out += string(" " * 14, parameter["text"], "),")
+            needs = f", {quoted(parameter['needs'])}" if "needs" in parameter else ""
+            out += string(" " * 14, parameter["text"], f"{needs}),")
         out += [")}", ""]
     return "\n".join(out)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from figures.common import Figure, Quick, bar, console, seeds, shares
-from figures.synthesis import ELABORATED, elaborated, netlist_of, placed, source_of
+from figures.synthesis import ELABORATED, UP5K, elaborated, netlist_of, placed, source_of
 from twin.build import run, simulation
 
 RELAY = Path(__file__).resolve().parents[2] / "rtl" / "relay.sv"
@@ -25,7 +25,6 @@ EDGES = 10**7
 SHARE = 10**6  # edges of one run, each with a seed, and so a ring, of its own
 POINTS = 2048
 RINGS = 4
-UP5K = ["--up5k", "--package", "sg48"]
 PLACEMENTS = 3  # the figure is the worst of them
 RATES_MHZ = (24, 30, 36, 40, 44, 46, 47, 47.5)
 

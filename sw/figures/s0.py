@@ -3,14 +3,13 @@
 
 import itertools
 import random
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from rich.progress import Progress
 
 from experiments import s0_stage
 from figures.common import Figure, Quick, bar, console, soaked
-from figures.synthesis import ELABORATED, elaborated, source_of, synthesise
 from moire.bus.protocol import (
     TO_NODE,
     Exchange,
@@ -25,7 +24,7 @@ from moire.bus.protocol import (
 )
 from moire.errors import BusError
 from moire.made.bus_tables import PARAMETERS
-from twin import FrameBench, build, cells_of, realtime_factor
+from twin import FrameBench, cells_of, realtime_factor
 from twin.nodes.twin import CLK_HZ
 
 SEED = 1
@@ -36,11 +35,6 @@ CELLS = 11  # of a character on the bus
 TURNAROUND = [1] * 3  # cells before the master sends again, while the node's driver releases
 ANSWER_CELLS = 150  # of silence after which no answer comes any more
 READINGS = 8  # of a zero
-S0_NODE: Mapping[str, int | str] = {
-    "CLK_HZ": 60_000_000,
-    "HAS_STEPPER": 0,
-    "FIRMWARE": "build/firmware/firmware.hex",
-}
 WORK_CELLS = 400  # that a request may take, at the low clock of the bench
 
 
@@ -229,25 +223,7 @@ def s0_bus_wrong(
     return wrong + wrong_host
 
 
-# ------------------------------------------------------------------ node and twin
-
-
-def node_ecp5_mhz(place: bool = True, seed: int = 1) -> float:
-    build.firmware()
-    if not place:
-        return elaborated(source_of("node"), S0_NODE)
-    found = synthesise("node", S0_NODE, seed=seed)
-    used = ", ".join(
-        f"{found[name]} of {found[f'{name}_of']} {words}"
-        for name, words in (
-            ("lut", "LUT"),
-            ("ff", "FF"),
-            ("block_ram", "block RAM"),
-            ("dsp", "DSP"),
-        )
-    )
-    console.print(f"LFE5U-25F-6, one axis with bridge, ADC, fine stage and filters: {used}")
-    return found["fmax_mhz"]
+# ------------------------------------------------------------------ twin
 
 
 def twin_realtime(simulated_s: float = 0.5) -> float:
@@ -282,15 +258,6 @@ FIGURES = {
         "0",
         Quick({"frames": 400}, "400 frames"),
         0,
-    ),
-    "node_ecp5_mhz": Figure(
-        node_ecp5_mhz,
-        "MHz",
-        "highest clock of the S0 node with bridge, ADC, fine stage and filters, placed and routed "
-        "for an LFE5U-25F-6, placement seed 1",
-        ">= 60",
-        ELABORATED,
-        1,
     ),
     "twin_realtime": Figure(
         twin_realtime,

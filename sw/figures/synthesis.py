@@ -22,7 +22,9 @@ BUILD = ROOT / "build" / "synthesis"
 PADS = 150  # an inner block has more ports than the ECP5 has pads: it is placed without any
 ECP5 = ["--25k", "--package", "CABGA256", "--speed", "6"]  # LFE5U-25F-6
 ECP5_CELLS = {"lut": "TRELLIS_COMB", "ff": "TRELLIS_FF", "block_ram": "DP16KD", "dsp": "MULT18X18D"}
+LUT4S = {"LUT4": 1, "CCU2C": 2, "TRELLIS_DPR16X4": 6}  # that a cell of a netlist takes
 ICE40 = ["--hx8k", "--package", "ct256"]
+UP5K = ["--up5k", "--package", "sg48"]
 ELABORATED = Quick(
     {"place": False},
     "Yosys elaborates the module; its word-level cells are counted, nothing is placed",
@@ -90,10 +92,26 @@ def yosys(source: Path, parameters: Parameters, last: str, tag: str) -> Path:
     return netlist
 
 
-def netlist_of(source: Path, parameters: Parameters, family: str, seed: int) -> Path:
-    """The netlist of a source file's module for a family (ecp5, ice40)."""
-    last = f"synth_{family} -top {{top}} -json {{netlist}}"
-    return yosys(source, parameters, last, f"{family}-seed{seed}")
+def netlist_of(
+    source: Path, parameters: Parameters, family: str, seed: int, options: str = ""
+) -> Path:
+    """The netlist of a source file's module for a family (ecp5, ice40), with options of its
+    synthesis.
+    """
+    last = f"synth_{family} {options} -top {{top}} -json {{netlist}}"
+    return yosys(source, parameters, last, f"{family}{options}-seed{seed}")
+
+
+def lut4s(netlist: Path, top: str) -> int:
+    """How many LUT4 a netlist takes on an ECP5, with those of its carry cells and its LUT RAM."""
+    cells = json.loads(netlist.read_text())["modules"][top]["cells"].values()
+    return sum(LUT4S.get(cell["type"], 0) for cell in cells)
+
+
+def overfull(log: Path) -> str:
+    """What nextpnr reports to be more than the part has."""
+    used = re.findall(r"(\w+): +(\d+)/ *(\d+)", log.read_text() if log.exists() else "")
+    return ", ".join(f"{n} {cell} of {most}" for cell, n, most in used if int(n) > int(most))
 
 
 def elaborated(source: Path, parameters: Parameters | None = None) -> float:
@@ -126,7 +144,13 @@ def placed(
         "--report",
         report,
     ]
-    run(command, "place and route", netlist.with_name("place_and_route.log"))
+    log = netlist.with_name("place_and_route.log")
+    try:
+        run(command, "place and route", log)
+    except SynthesisError:
+        if too_much := overfull(log):
+            raise SynthesisError(f"the design does not fit: it needs {too_much}") from None
+        raise
     found = json.loads(report.read_text())
     fmax = min((clock["achieved"] for clock in found["fmax"].values()), default=0.0)
     return fmax, found["utilization"]

@@ -20,7 +20,7 @@ from moire.made.bus_tables import (
     SCOPE_STATES,
     STATES,
 )
-from moire.made.registers import MAP_CRC
+from moire.made.registers import FIELDS, MAP_CRC
 
 CAUSE = {name: code for code, (name, _) in CAUSES.items()}
 STATE = {name: code for code, (name, _) in STATES.items()}
@@ -106,10 +106,10 @@ class FakeAxis:
 class FakeNode:
     """A node with its bus interface and its firmware."""
 
-    def __init__(self, address=1, axes=1, map_crc=MAP_CRC, protocol_crc=PROTOCOL_CRC, sine=True):
+    def __init__(self, address=1, axes=1, map_crc=MAP_CRC, protocol_crc=PROTOCOL_CRC, absent=()):
         self.address, self.map_crc, self.protocol_crc = address, map_crc, protocol_crc
         self.axes = [FakeAxis() for _ in range(axes)]
-        self.sine = sine
+        self.absent = absent  # fields of axis.built that are 0
         self.now, self.registers = 0.0, {0: map_crc, 0x400: 7}
         self.written = []  # (address, value)
         self.captures = []  # words of captured, captured_time and captured_position, oldest first
@@ -258,6 +258,8 @@ class FakeNode:
         )
 
     def do_enable(self, axis, on):
+        if on and "drive" in self.absent:
+            return "not_built", {}
         if on and axis.faults:
             return "faulted", {}
         axis.enabled = bool(on)
@@ -361,6 +363,9 @@ class FakeNode:
             return "busy", {}
         if not known.min <= value <= known.max:
             return "out_of_range", {}
+        missing = "stepper" if (known.name, value) == ("drive", 1) else known.needs.lower()
+        if value not in (0, known.default) and missing in self.absent:
+            return "not_built", {}
         if known.name == "feed_override":
             axis.change_override(self.now, value)
         axis.parameters[parameter] = value
@@ -410,8 +415,14 @@ class FakeNode:
         axis.correction, axis.harmonics = values, dict(axis.waiting)
         return "ok", {}
 
+    def built(self):
+        """The register axis.built."""
+        sizes = {"filters": 2, "segments": self.most_segments}
+        fields = [f for f in FIELDS if (f.block, f.register) == ("axis", "built")]
+        return sum(sizes.get(f.field, 1) << f.low for f in fields if f.field not in self.absent)
+
     def do_signal(self, axis):
-        if not self.sine:
+        if "monitor" in self.absent:
             return "not_built", {}
         return "ok", axis.signal
 
@@ -478,6 +489,10 @@ class FakeNode:
     def do_write_register(self, _, address, value):
         if not 0xC00 <= address < 0xD00:
             return "no_such_register", {}
+        if "compare" in self.absent and (
+            address == 0xC10 and value >> 8 or 0xC78 <= address < 0xC98
+        ):
+            return "not_built", {}
         self.written.append((address, value))
         self.registers[address] = value
         if address == 0xC10 and value & 1 << 6:  # the oldest capture has been read
@@ -490,9 +505,9 @@ class FakeNode:
         if self.captures and 0xC68 <= address < 0xC78:
             return "ok", {"value": self.captures[0][address - 0xC68 >> 2]}
         if address in (0xCB4, 0xCD4):  # state and error of the segment table
-            return "ok", {"value": self.most_segments if address == 0xCB4 else 0xFFFFE000}
-        if address & 0xFF == 0xA8 and 0xC00 <= address < 0x1400:  # position_source.sine
-            return "ok", {"value": self.sine << 2}
+            return "ok", {"value": 0 if address == 0xCB4 else 0xFFFFE000}
+        if address & 0xFF == 0x6C and 0x400 <= address < 0xC00:  # axis.built
+            return "ok", {"value": self.built()}
         if 0x10 <= address < 0x18:  # time stamp
             return "ok", {
                 "value": round((self.now - self.powered_up) * CLK_HZ) >> 8 * (address - 0x10)

@@ -388,10 +388,7 @@ def test_the_kind_of_drive_changes_only_with_the_drive_off(name, value):
 
 
 def test_a_drive_that_was_not_built_is_refused():
-    machine = FakeNode()
-    machine.actuators[0][DEFINES["ACTUATOR_DRIVE"]] = (
-        0b0001 << DEFINES["ACTUATOR_DRIVE_BUILT_SHIFT"]
-    )
+    machine = FakeNode(absent=("stepper", "dac", "fine_stage"))
     for name, value in (("drive", 1), ("drive", 2), ("fine_reach", 65536)):
         assert (
             machine.request("set_parameter", axis=0, parameter=PARAMETER[name]["id"], value=value)[
@@ -402,7 +399,8 @@ def test_a_drive_that_was_not_built_is_refused():
     machine.ask("set_parameter", axis=0, parameter=PARAMETER["drive"]["id"], value=0)
 
 
-SINE = [parameter for parameter in PARAMETER.values() if "needs" in parameter]
+WITHOUT_SINE = ("sine", "monitor", "harmonics", "recorder")
+SINE = [p for p in PARAMETER.values() if p.get("needs", "").lower() in WITHOUT_SINE]
 
 
 def test_without_sine_and_cosine_a_parameter_that_needs_them_accepts_only_0_and_its_default():
@@ -412,7 +410,7 @@ def test_without_sine_and_cosine_a_parameter_that_needs_them_accepts_only_0_and_
         else 1
         for p in SINE
     }
-    machine = FakeNode(sine=False)
+    machine = FakeNode(absent=WITHOUT_SINE)
     for parameter in SINE:
         request = {"axis": 0, "parameter": parameter["id"]}
         for value in (0, parameter["default"]):
@@ -434,7 +432,7 @@ def test_without_sine_and_cosine_a_parameter_that_needs_them_accepts_only_0_and_
 
 def test_without_sine_and_cosine_the_position_comes_from_counts_after_power_up():
     machine, source = (
-        FakeNode(sine=False),
+        FakeNode(absent=WITHOUT_SINE),
         {"axis": 0, "parameter": PARAMETER["position_source"]["id"]},
     )
     chosen = DEFINES["FEEDBACK_POSITION_SOURCE_COUNTS_MASK"]
@@ -461,7 +459,7 @@ def test_without_sine_and_cosine_their_operations_are_not_built_and_the_others_w
     machine = FakeNode()
     for operation, fields in operations:
         machine.ask(operation, axis=0, **fields)
-    machine = FakeNode(sine=False)
+    machine = FakeNode(absent=WITHOUT_SINE)
     for operation, fields in operations:
         assert machine.request(operation, axis=0, **fields)[0] == "not_built"
     machine.ask("encoder", axis=0)

@@ -5,7 +5,7 @@ with a zero, and it begins at the zero.
 
 import pytest
 
-from twin.compiled.node import CAUSE, PARAMETER, PERIOD, Axis, FakeNode
+from twin.compiled.node import CAUSE, DEFINES, PARAMETER, PERIOD, Axis, FakeNode
 
 POINTS = [100 * n - 500 for n in range(30)]
 LENGTH, FIRST = 1000 * PERIOD, -2000 * PERIOD
@@ -156,7 +156,7 @@ def test_points_out_of_order_too_many_or_too_large_are_refused():
 
 def test_a_node_without_a_table_reports_that():
     machine = homed()
-    machine.feedback_channels[0].most_segments = 0
+    machine.built &= ~DEFINES["AXIS_BUILT_SEGMENTS_MASK"]
     assert machine.request("set_segments", **block())[0] == "not_built"
     assert (
         refused(machine, "segments", 1) == "not_built" and refused(machine, "segments", 0) == "ok"

@@ -680,9 +680,7 @@ def test_home_stores_the_requested_method():
 
 def test_the_drive_is_reported_in_words():
     _, node, axis = homed_stage()
-    node.registers.update(
-        {0x1400: 1 | 0b1111 << 2, 0x1420: -7 & 0xFFFFFFFF, 0x143C: -16384 & 0xFFFF}
-    )
+    node.registers.update({0x1400: 1, 0x1420: -7 & 0xFFFFFFFF, 0x143C: -16384 & 0xFFFF})
     drive = axis.drive()
     assert (drive.kind, drive.built, drive.steps, drive.fine_command) == (
         "steps",

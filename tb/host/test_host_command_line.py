@@ -129,16 +129,42 @@ def test_enable_wait_stop_reset_encoder_counters():
 
 
 def test_a_node_without_sine_and_cosine_says_so():
-    node = FakeNode(sine=False)
+    node = FakeNode(absent=("sine", "monitor", "harmonics", "recorder"))
     call = Call("status -- encoder", node)
     assert (
         call.out.count("counts only: built without sine and cosine") == 2
         and "ADC counts" not in call.out
     )
     assert [told["sine"] for told in Call("status -- encoder --json", node).told] == [False, False]
-    assert "built without this function" in sentence(Call("signal", node), 1)
+    said = sentence(Call("signal", node), 1)
+    assert "built without this function (it needs HAS_MONITOR of rtl/node.sv)" in said
     call = Call("status -- encoder")
     assert "without" not in call.out and "ADC counts" in call.out
+
+
+def test_what_an_axis_was_built_with_is_listed_with_its_parameters():
+    node = FakeNode(absent=("compare", "fine_stage"))
+    rows = dict(row.split(None, 1) for row in Call("built", node).out.splitlines()[1:])
+    assert rows["HAS_COMPARE"] == rows["HAS_FINE_STAGE"] == rows["SEGMENTS"] == "not built"
+    assert rows["HAS_STEPPER"] == "built" and rows["FILTERS"] == "up to 2"
+    told = Call("built --json", node).told[0]
+    assert (told["compare"], told["drive"], told["filters"]) == (0, 1, 2)
+
+
+@pytest.mark.parametrize(
+    "command, parameter",
+    [
+        ("enable", "HAS_DRIVE"),
+        ("move 1mm", "HAS_DRIVE"),
+        ("params set kp 1", "HAS_DRIVE"),
+        ("params set drive steps", "HAS_STEPPER"),
+        ("params set fine_reach 1um", "HAS_FINE_STAGE"),
+        ("compare off", "HAS_COMPARE"),
+    ],
+)
+def test_a_refusal_names_the_parameter_that_builds_what_is_missing(command, parameter):
+    node = FakeNode(absent=("drive", "stepper", "fine_stage", "compare"))
+    assert f"(it needs {parameter} of rtl/node.sv)" in sentence(Call(command, node), 1)
 
 
 def test_registers_by_address_and_by_name():
@@ -230,8 +256,8 @@ def test_home_takes_a_method():
 
 
 def test_the_drive_and_choices_in_words():
-    node = FakeNode()
-    node.registers.update({0x1400: 1 | 0b0111 << 2, 0x1420: 25, 0x143C: 0})
+    node = FakeNode(absent=("fine_stage",))
+    node.registers.update({0x1400: 1, 0x1420: 25, 0x143C: 0})
     call = Call("drive -- params set drive steps -- register actuator.steps", node)
     assert call.code == 0, call.err
     assert (
@@ -379,8 +405,8 @@ def test_a_usage_error_names_its_command(text, command):
 
 
 def test_no_value_of_an_answer_overwrites_the_name_of_the_command():
-    node = FakeNode()
-    node.registers.update({0x1400: 1 | 0b0111 << 2, 0x1420: 25, 0x143C: 0})
+    node = FakeNode(absent=("fine_stage",))
+    node.registers.update({0x1400: 1, 0x1420: 25, 0x143C: 0})
     told = Call("drive --json", node).told[0]
     assert told["command"] == "drive" and told["drive_command"] == 0 and told["steps"] == 25
 

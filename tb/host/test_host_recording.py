@@ -14,6 +14,8 @@ from moire.made.bus_tables import PARAMETERS
 from tb.fakes.fake_node import ESTOP, FakeBus, FakeNode
 from tb.host.test_host_command_line import Call, sentence
 
+SINE = ("sine", "monitor", "harmonics", "recorder")  # what is built of sine and cosine
+
 
 def recorded(tmp_path, text="home -- move 1mm -- status", node=None):
     file = tmp_path / "session.jsonl"
@@ -212,7 +214,7 @@ def test_selftest_passes_a_sound_node():
 
 
 def test_selftest_passes_a_sound_node_without_sine_and_cosine():
-    node = FakeNode(sine=False)
+    node = FakeNode(absent=SINE)
     node.axes[0].parameters[PARAMETERS["position_source"].id] = 1
     call = Call("selftest", node)
     assert (
@@ -228,7 +230,7 @@ def test_selftest_passes_a_sound_node_without_sine_and_cosine():
 
 
 def test_fault_of_a_node_without_sine_and_cosine_reports_what_exists():
-    node = FakeNode(sine=False)
+    node = FakeNode(absent=SINE)
     node.axes[0].active_faults = node.axes[0].faults = ESTOP
     assert "emergency stop" in Call("fault", node).out and "signal" not in Call("fault", node).out
 

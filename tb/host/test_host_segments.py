@@ -220,7 +220,7 @@ def test_a_wrong_file_is_one_sentence_and_nothing_is_written(file):
 
 
 def test_a_node_without_a_table_says_so_in_one_sentence(file):
-    assert "this node was built without this function" in sentence(Call("segments status"), 1)
+    assert "was built without this function" in sentence(Call("segments status"), 1)
     assert "without a segment table" in sentence(Call(["segments", "load", str(file(*GOOD))]), 2)
 
 

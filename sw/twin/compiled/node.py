@@ -301,11 +301,10 @@ class Axis:
 
 class FakeFeedbackChannel:
     """The registers of a feedback channel. `burst(phases, every)` gives the 1024 words of a burst,
-    which is full after `delay` polls. Without `sine` nothing of sine and cosine is built.
+    which is full after `delay` polls.
     """
 
-    def __init__(self, sine: bool = True) -> None:
-        self.sine = sine
+    def __init__(self) -> None:
         self.word: dict[int, int] = {}
         self.strobes: list[int] = []
         self.records: list[tuple[bool, int]] = []  # (phases, decimation) of each recording
@@ -319,7 +318,6 @@ class FakeFeedbackChannel:
         self.loads = 0
         self.captured: int | None = None
         self.armed, self.latch = False, 0
-        self.most_segments = 255
         self.segments: dict[int, int] = {}
         self.use: dict[str, Any] | None = None  # the settings in force
         self.uses: list[bool | None] = []  # whether linear, of each use; None: out of force
@@ -349,14 +347,11 @@ class FakeFeedbackChannel:
             return self.latch
         if offset == d["FEEDBACK_SEGMENT_STATE"]:
             return (
-                self.most_segments
-                | d["FEEDBACK_SEGMENT_STATE_IN_FORCE_MASK"] * (self.use is not None)
+                d["FEEDBACK_SEGMENT_STATE_IN_FORCE_MASK"] * (self.use is not None)
                 | d["FEEDBACK_SEGMENT_STATE_KNOWN_MASK"]
             )
         if offset == d["FEEDBACK_SEGMENT_STORED"]:
             return self.segments.get(self.word[d["FEEDBACK_SEGMENT_READ"]], 0) & 0xFFFFFFFF
-        if offset == d["FEEDBACK_POSITION_SOURCE"]:
-            return self.word.get(offset, 0) | d["FEEDBACK_POSITION_SOURCE_SINE_MASK"] * self.sine
         return self.word.get(offset, 0)
 
     def wide(self, name: str, bits: int) -> int:
@@ -439,10 +434,10 @@ class FakeNode:
         address: int = 2,
         image: str = "axis",
         peripherals: Peripherals | None = None,
-        sine: bool = True,
+        absent: Sequence[str] = (),
     ) -> None:
-        """Power up. `sine`: sine and cosine are built; a `map_crc` other than that of the firmware
-        is a bitstream that does not fit it.
+        """Power up. `absent` names what is not built, as in the register axis.built; a
+        `map_crc` other than that of the firmware is a bitstream that does not fit it.
         """
         self.axes, self.address, self.map_crc, self.clk = (
             list(axes) or [Axis()],
@@ -450,11 +445,15 @@ class FakeNode:
             map_crc,
             0,
         )
-        self.feedback_channels = [FakeFeedbackChannel(sine=sine) for _ in self.axes]
-        # words by their offset; all drives are built
-        self.actuators = [
-            {DEFINES["ACTUATOR_DRIVE"]: DEFINES["ACTUATOR_DRIVE_BUILT_MASK"]} for _ in self.axes
-        ]
+        self.built = 2 << DEFINES["AXIS_BUILT_FILTERS_SHIFT"] | sum(
+            mask
+            for name, mask in DEFINES.items()
+            if re.fullmatch(r"AXIS_BUILT_(?!FILTERS)\w+_MASK", name)
+        )
+        for name in absent:
+            self.built &= ~DEFINES[f"AXIS_BUILT_{name.upper()}_MASK"]
+        self.feedback_channels = [FakeFeedbackChannel() for _ in self.axes]
+        self.actuators: list[dict[int, int]] = [{} for _ in self.axes]  # words by their offset
         self.peripherals = peripherals
         self.received: deque[int] = deque()
         self.sent: list[int] = []
@@ -482,6 +481,8 @@ class FakeNode:
             ].read(offset % d["FEEDBACK_STRIDE"])
         if offset >= d["AXIS_BASE"]:
             axis = (offset - d["AXIS_BASE"]) // d["AXIS_STRIDE"]
+            if offset % d["AXIS_STRIDE"] == d["AXIS_BUILT"]:
+                return self.built
             return self.axes[axis].read(offset % d["AXIS_STRIDE"])
         if offset >= d["PERIPHERALS_BASE"]:
             return self.peripherals.read(offset - d["PERIPHERALS_BASE"]) if self.peripherals else 0
@@ -508,14 +509,9 @@ class FakeNode:
         """Write a register, as the firmware does."""
         d = DEFINES
         if offset >= d["ACTUATOR_BASE"]:
-            built = (
-                d["ACTUATOR_DRIVE_BUILT_MASK"]
-                if offset % d["ACTUATOR_STRIDE"] == d["ACTUATOR_DRIVE"]
-                else 0
-            )
             self.actuators[(offset - d["ACTUATOR_BASE"]) // d["ACTUATOR_STRIDE"]][
                 offset % d["ACTUATOR_STRIDE"]
-            ] = value | built
+            ] = value
         elif offset >= d["FEEDBACK_BASE"]:
             axis = (offset - d["FEEDBACK_BASE"]) // d["FEEDBACK_STRIDE"]
             self.feedback_channels[axis].write(offset % d["FEEDBACK_STRIDE"], value)

@@ -52,6 +52,7 @@ else:
 CLK_HZ = 2_400_000
 START_S = 0.2  # until the soft core of a node with one axis listens, with a margin of 45 ms
 DRIVES = ("HAS_BRIDGE", "HAS_STEPPER", "HAS_DAC", "HAS_FINE_STAGE")  # of rtl/node.sv
+ALL_AXES = 255  # a mask of axes of rtl/node.sv: bit n is axis n
 PERIPHERALS = (
     "HAS_I2C",
     "HAS_PS2",
@@ -64,7 +65,7 @@ PERIPHERALS = (
 
 def drives(*built: str) -> dict[str, int]:
     """Parameters of rtl/node.sv that build these drives of each axis and no other."""
-    return {name: int(name in built) for name in DRIVES}
+    return {name: ALL_AXES * (name in built) for name in DRIVES}
 
 
 NODE = {**drives("HAS_BRIDGE"), "FILTERS": 0}  # what the stage of S0 needs of rtl/node.sv

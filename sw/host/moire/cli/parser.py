@@ -38,7 +38,7 @@ Completion of commands, options and names by the Tab key, for bash (or zsh, fish
   eval "$(_MOIRE_COMPLETE=bash_source moire)"
 """
 SECTIONS = {  # of the help, in which every command appears once
-    "Nodes": ("find", "counters", "baud", "selftest", "register"),
+    "Nodes": ("find", "built", "counters", "baud", "selftest", "register"),
     "Drives and motion": (
         "status",
         "enable",

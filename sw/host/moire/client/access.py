@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from moire import units
 from moire.bus.transport import Transport
+from moire.client.built import Built, feature_of, remedy
 from moire.client.names import bit_names, code_name
 from moire.client.records import Status
 from moire.errors import Refused, with_more
@@ -38,13 +39,22 @@ class AxisAccess:
         return self.node.bus.transport
 
     def request(self, operation: str, **fields: int) -> dict[str, int]:
-        """Sends a request for this axis; a refusal because of a fault names the fault."""
+        """Sends a request for this axis. A refusal because of a fault names the fault, one because
+        of something that is not built the parameter that builds it.
+        """
         try:
             return self.node.request(operation, axis=self.number, **fields)
         except Refused as refused:
             if refused.cause in ("faulted", "fault_persists"):
                 raise with_more(refused, self.status().fault_words or "no fault is left") from None
+            feature = feature_of(operation, fields)
+            if refused.cause == "not_built" and feature:
+                raise with_more(refused, remedy(feature)) from None
             raise
+
+    def built(self) -> Built:
+        """What this axis was built with."""
+        return Built(self.node.read_named("axis.built", self.number))
 
     def feedback(self, register: str) -> dict[str, int]:
         """The fields of a register of the feedback channel, in counts."""
@@ -52,7 +62,13 @@ class AxisAccess:
 
     def write_feedback(self, register: str, **counts: int) -> None:
         """Writes a whole register of the feedback channel."""
-        self.node.write_named(f"feedback.{register}", self.number, **counts)
+        try:
+            self.node.write_named(f"feedback.{register}", self.number, **counts)
+        except Refused as refused:
+            if refused.cause != "not_built":
+                raise
+            compare = any(name.startswith("compare") for name in (register, *counts))
+            raise with_more(refused, remedy("compare" if compare else "capture")) from None
 
     def to_nm(self, counts: int) -> float:
         """A length in nm from counts on the bus."""

@@ -46,6 +46,7 @@ if TYPE_CHECKING:
 
 HARMONICS = 10  # orders of phase error that are corrected
 SCATTER = 1 << 20  # counts of the calibration's scatter in one signal period
+OUTPUTS = ("bridge", "stepper", "dac", "fine_stage")  # in the order of the parameter drive
 CORRECTION = ("sin_offset", "cos_offset", "gain", "quadrature_error")
 
 Result = TypeVar("Result")
@@ -105,11 +106,13 @@ class Axis(AxisParameters, AxisCapture):
             self.node.read_named(f"actuator.{name}", self.number)
             for name in ("drive", "steps", "fine_command")
         )
-        kinds = CHOICES["drive"]
+        kinds, built = CHOICES["drive"], self.built()
         return Drive(
-            kind=kinds[drive["kind"]],
+            kind=kinds[drive["value"]],
             built=tuple(
-                name for bit, name in enumerate((*kinds, "fine")) if drive["built"] >> bit & 1
+                name
+                for name, feature in zip((*kinds, "fine"), OUTPUTS, strict=True)
+                if built.has(feature)
             ),
             command=self.status().drive_command,
             steps=steps["value"],
@@ -392,11 +395,11 @@ class Axis(AxisParameters, AxisCapture):
         )
 
     def has_sine(self) -> bool:
-        """Whether this node was built with sine and cosine.
+        """Whether this axis was built with sine and cosine.
 
         Without them the position is made of counts, and the node refuses what needs them.
         """
-        return bool(self.feedback("position_source")["sine"])
+        return self.built().has("sine")
 
     def signal(self) -> Signal:
         """What is wrong with sine and cosine."""

@@ -22,6 +22,7 @@ from pathlib import Path
 
 from moire import units
 from moire.client.axis import Axis
+from moire.client.built import remedy
 from moire.columns import number, rows
 from moire.errors import BadFile, MoireError, OutOfRange, UnitError
 from moire.made.bus_tables import CAUSES
@@ -79,7 +80,7 @@ class SegmentStatus:
     def words(self) -> str:
         """The status in words."""
         if not self.built:
-            return "this node was built without a segment table"
+            return f"this axis was built without a segment table ({remedy('segments')})"
         why = "" if self.reason == "ok" else f": {dict(CAUSES.values())[self.reason]}"
         if self.in_force == "off":
             return f"off{why}; {self.loaded} points loaded, at most {self.built + 1}"
@@ -202,7 +203,7 @@ class Segments:
         reply, state = self.axis.request("segments"), self.axis.feedback("segment_state")
         error = self.axis.feedback("segment_error")["value"]
         return SegmentStatus(
-            state["built"],
+            self.axis.built().sizes["segments"],
             reply["loaded"],
             USES[reply["in_force"]],
             CAUSES[reply["reason"]][0],
@@ -254,13 +255,13 @@ class Segments:
 
     def check_points(self, points: list[int]) -> None:
         """Raises OutOfRange if the node cannot hold these points."""
-        most = self.axis.feedback("segment_state")["built"]
+        most = self.axis.built().sizes["segments"]
         if not 2 <= len(points) <= most + 1:
             raise OutOfRange(
                 f"{len(points)} points are too few or too many: this node's segment table takes 2 "
                 f"to {most + 1}"
                 if most
-                else "this node was built without a segment table"
+                else f"this axis was built without a segment table ({remedy('segments')})"
             )
         if any(abs(point) > LARGEST_POINT for point in points):
             largest = format_length(self.axis.to_nm(LARGEST_POINT), 4)

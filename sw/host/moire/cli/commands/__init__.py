@@ -3,6 +3,7 @@
 
 from moire.cli.commands import (
     axis,
+    built,
     calibrate,
     capture,
     compare,
@@ -29,6 +30,7 @@ from moire.cli.commands import (
 
 __all__ = [
     "axis",
+    "built",
     "calibrate",
     "capture",
     "compare",

@@ -20,7 +20,7 @@ def show_drive(call: Call) -> None:
     values = asdict(drive)
     values["drive_command"] = values.pop("command")
     rows = [
-        ("drive", f"{drive.kind}; built: {', '.join(drive.built)}"),
+        ("drive", f"{drive.kind}; built: {', '.join(drive.built) or 'none'}"),
         ("command", f"{100 * drive.command:.1f} %"),
         ("override", f"{units.decimal(round(100 * drive.override, 3))} %"),
         ("steps", f"{drive.steps} on the wire since reset"),

@@ -18,7 +18,7 @@ def fault(call: Call) -> None:
     """Clears nothing."""
     axis = call.axis
     status, encoder = axis.status(), axis.encoder()
-    signal = axis.signal() if axis.has_sine() else Signal((), ())
+    signal = axis.signal() if axis.built().has("monitor") else Signal((), ())
     values = {
         "faults": status.faults,
         "first_fault": status.first_fault,
