@@ -232,12 +232,12 @@ module arctan_pipelined #(
         }),
         .sum(last_sum)
     );
-    wire [Z-1:0] angle = g_step[LAST-1].angle_q + Z'(last_sum);
+    wire [Z-1:0] total = g_step[LAST-1].angle_q + Z'(last_sum);
 
     always_ff @(posedge clk) begin
         coming <= strobes[LATENCY-1:0];
         if (strobes[LATENCY-1]) begin
-            phase     <= 16'(angle >> GUARD);
+            phase     <= 16'(total >> GUARD);
             amplitude <= g_step[LAST-1].size_q[W:1];
         end
         if (rst || (strobes[LATENCY-1] && g_step[LAST-1].zero_q)) begin

@@ -258,9 +258,17 @@ def test_registers(block):
     run(f"{block}_registers", __file__)
 
 
-@pytest.mark.parametrize("block", ["axis", "feedback"])
-def test_registers_without_sine(block):
-    run(f"{block}_registers", __file__, HAS_SINE=0)
+@pytest.mark.parametrize("block", ["axis", "feedback", "actuator"])
+def test_registers_without_what_they_need(block):
+    needs = next(b.parameters for b in tables.read() if b.name == block)
+    run(f"{block}_registers", __file__, **dict.fromkeys(needs, 0))
+
+
+@pytest.mark.parametrize(
+    "block, parameter", [("feedback", "HAS_COMPARE"), ("axis", "FILTERS"), ("actuator", "HAS_DAC")]
+)
+def test_registers_without_one_feature(block, parameter):
+    run(f"{block}_registers", __file__, **{parameter: 0})
 
 
 def test_all_made_files_carry_the_crc_of_the_source():

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A node whose axes differ: a stepper with a scale, an axis that only measures, and the sine axis
+of S0 with its servo and its bridge.
+"""
+
+import random
+
+import pytest
+
+from experiments.s2_stage import SCALES
+from moire.client.bus import Bus
+from moire.errors import Refused
+from tb.bench import seed
+from twin import START_S, Axis, Node, Twin, TwinTransport
+
+STEPPER, COUNTER, SERVO = range(3)
+SCALE = SCALES["Z"]
+CLK_HZ = 3_000_000
+NODE = {  # bit n: axis n
+    "HAS_SINE": 1 << SERVO,
+    "HAS_DRIVE": 1 << STEPPER | 1 << SERVO,
+    "HAS_STEPPER": 1 << STEPPER,
+    "HAS_BRIDGE": 1 << SERVO,
+    "HAS_DAC": 0,
+    "HAS_CAPTURE": 1 << COUNTER,
+    "HAS_COMPARE": 1 << COUNTER,
+    "HAS_FILTERS": 1 << SERVO,
+}
+BUILT = (
+    {"drive", "stepper"},
+    {"capture", "compare"},
+    {"sine", "monitor", "harmonics", "recorder", "drive", "bridge", "filters"},
+)
+
+
+@pytest.fixture(scope="module")
+def axes():
+    with Twin(
+        [Node(1, [SCALE.machine(), Axis("unconnected"), Axis()])],
+        clk_hz=CLK_HZ,
+        seed=seed() % 1000,
+        node_parameters=NODE,
+    ) as twin:
+        bus = Bus(TwinTransport(twin), random_source=random.Random(seed()))
+        bus.transport.wait(START_S)
+        made = [bus.axis(1, number) for number in range(3)]
+        for name, value in SCALE.settings().items():
+            made[STEPPER].set_parameter(name, value)
+        yield made
+
+
+def test_each_axis_reports_what_it_was_built_with(axes):
+    assert [set(axis.built().names) for axis in axes] == list(BUILT)
+
+
+def test_both_drives_home_and_move_in_one_node(axes):
+    stepper, servo = axes[STEPPER], axes[SERVO]
+    for axis, target in ((stepper, "2mm"), (servo, "50um")):
+        axis.enable()
+        assert axis.home().homed, "the index is captured without a queue"
+        ended = axis.move(target)
+        assert ended.ended == "ok" and abs(ended.target_nm - ended.position_nm) < 1000
+    axes[COUNTER].status()
+    for axis in (stepper, servo):
+        axis.disable()
+
+
+def test_an_axis_without_a_drive_refuses_motion_and_measures(axes):
+    counter = axes[COUNTER]
+    for refused in (counter.enable, counter.home, lambda: counter.set_parameter("kp", 1)):
+        with pytest.raises(Refused, match=r"it needs HAS_DRIVE of rtl/node\.sv"):
+            refused()
+    counter.disable()
+    counter.capture_from("software")
+    counter.capture_now()
+    assert len(counter.captures()[0]) == 1
+    assert not counter.status().enabled and not counter.status().faults
+
+
+def test_what_an_axis_lacks_is_refused_with_its_parameter(axes):
+    for axis, name, value, parameter in (
+        (axes[STEPPER], "position_source", 0, "HAS_SINE"),
+        (axes[STEPPER], "filters", 1, "FILTERS"),
+        (axes[SERVO], "drive", "steps", "HAS_STEPPER"),
+        (axes[SERVO], "steps_per_period", 4, "HAS_STEPPER"),
+        (axes[SERVO], "segments", "linear", "SEGMENTS"),
+    ):
+        with pytest.raises(Refused, match=f"it needs {parameter} of"):
+            axis.set_parameter(name, value)
+    for axis in (axes[STEPPER], axes[SERVO]):
+        with pytest.raises(Refused, match="it needs HAS_CAPTURE of"):
+            axis.capture_now()
+        with pytest.raises(Refused, match="it needs HAS_COMPARE of"):
+            axis.compare_off()
