@@ -41,7 +41,7 @@ class Bench:
 
 
 @cocotb.test()
-async def latency_of_an_index_is_1_cycle_and_it_is_held_until_it_is_read(dut):
+async def latency_is_1_cycle_and_the_index_is_held_until_it_is_read(dut):
     bench = await Bench(dut).begin()
     assert await bench.clk(index=1, position=5) == (0, 0, 0), "it is not enabled"
     assert await bench.clk(enabled=1, index=1, position=-7) == (1, -7, 0)
