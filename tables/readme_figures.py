@@ -18,6 +18,7 @@ BEGIN = "<!-- Made by tables/readme_figures.py from docs/figures.toml: do not ed
 END = "<!-- End of the made table. -->\n"
 FIRST = (  # the modules of sw/figures in the order of the table; others follow
     "s0",
+    "area",
     "fine",
     "calibration",
     "legacy",
