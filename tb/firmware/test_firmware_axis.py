@@ -400,24 +400,29 @@ def test_a_drive_that_was_not_built_is_refused():
 
 
 WITHOUT_SINE = ("sine", "monitor", "harmonics", "recorder")
-SINE = [p for p in PARAMETER.values() if p.get("needs", "").lower() in WITHOUT_SINE]
+NEEDY = {  # of each feature, the parameters that need it
+    feature: [p for p in PARAMETER.values() if p.get("needs") == feature]
+    for feature in sorted({p["needs"] for p in PARAMETER.values() if "needs" in p})
+}
 
 
-def test_without_sine_and_cosine_a_parameter_that_needs_them_accepts_only_0_and_its_default():
-    expected = {
-        p["id"]: next(value for value in (p["min"] + 1, p["min"] + 2) if value != p["default"])
-        if p["max"] > 1
-        else 1
-        for p in SINE
-    }
-    machine = FakeNode(absent=WITHOUT_SINE)
-    for parameter in SINE:
+def another_value(parameter):
+    """A value that requests what the parameter needs: neither 0 nor the default."""
+    values = (parameter["min"] + 1, parameter["min"] + 2, parameter["max"])
+    return next(v for v in values if v not in (0, parameter["default"]))
+
+
+@pytest.mark.parametrize("feature", NEEDY)
+def test_a_parameter_whose_need_was_not_built_accepts_only_0_and_its_default(feature):
+    machine = FakeNode(absent=(feature.lower(),))
+    for parameter in NEEDY[feature]:
         request = {"axis": 0, "parameter": parameter["id"]}
         for value in (0, parameter["default"]):
-            machine.ask("set_parameter", **request, value=value)
-            assert machine.ask("get_parameter", **request)["value"] == value
+            if parameter["min"] <= value <= parameter["max"]:
+                machine.ask("set_parameter", **request, value=value)
+                assert machine.ask("get_parameter", **request)["value"] == value
         assert (
-            machine.request("set_parameter", **request, value=expected[parameter["id"]])[0]
+            machine.request("set_parameter", **request, value=another_value(parameter))[0]
             == "not_built"
         )
         assert (
@@ -425,9 +430,51 @@ def test_without_sine_and_cosine_a_parameter_that_needs_them_accepts_only_0_and_
             == "out_of_range"
         )
         assert machine.ask("get_parameter", **request)["value"] == parameter["default"]
-    machine = FakeNode()
-    for number, value in expected.items():
-        machine.ask("set_parameter", axis=0, parameter=number, value=value)
+
+
+def test_every_parameter_is_accepted_where_its_need_was_built():
+    for parameter in (parameter for needy in NEEDY.values() for parameter in needy):
+        if parameter["id"] != PARAMETER["segments"]["id"]:  # it needs a table that is loaded, too
+            FakeNode().ask(
+                "set_parameter", axis=0, parameter=parameter["id"], value=another_value(parameter)
+            )
+
+
+def test_an_axis_without_a_drive_refuses_every_motion_and_still_measures():
+    machine = FakeNode(absent=("drive", "bridge", "stepper", "dac", "fine_stage", "filters"))
+    for operation, fields in (
+        ("enable", {"on": 1}),
+        ("home", {}),
+        ("move", {"target": 0}),
+        ("prepare", {"target": 0}),
+        ("arm_scope", dict(trigger=0, before=0, every=1, level=65536, amplitude=100)),
+    ):
+        assert machine.request(operation, axis=0, **fields)[0] == "not_built", operation
+    for operation, fields in (("enable", {"on": 0}), ("stop", {}), ("status", {}), ("encoder", {})):
+        machine.ask(operation, axis=0, **fields)
+    assert not machine.axes[0].word.get(DEFINES["AXIS_CONTROL"], 0)
+
+
+def test_capture_and_compare_that_were_not_built_are_refused_and_the_index_is_not():
+    base = DEFINES["FEEDBACK_BASE"]
+    sources, strobes = (
+        base + DEFINES["FEEDBACK_CAPTURE_SOURCES"],
+        base + DEFINES["FEEDBACK_STROBES"],
+    )
+    mask = {name: DEFINES[f"FEEDBACK_STROBES_{name}_MASK"] for name in (
+        "ARM_INDEX", "CAPTURE_NOW", "CAPTURE_NEXT", "COMPARE_ARM", "COMPARE_DISARM"
+    )}  # fmt: skip
+    queue = [(sources, 2), (strobes, mask["CAPTURE_NOW"])]
+    compare = [
+        *((strobes, mask[name]) for name in ("COMPARE_ARM", "COMPARE_DISARM")),
+        *((base + DEFINES[f"FEEDBACK_COMPARE_{name}"], 1) for name in ("COUNT", "PULSE", "GAP")),
+    ]
+    always = [(sources, 1), (strobes, mask["ARM_INDEX"]), (strobes, mask["CAPTURE_NEXT"])]
+    for absent, refused in (("capture", queue), ("compare", compare)):
+        machine = FakeNode(absent=(absent,))
+        for address, value in (*queue, *compare, *always):
+            cause, _ = machine.request("write_register", address=address, value=value)
+            assert cause == ("not_built" if (address, value) in refused else "ok")
 
 
 def test_without_sine_and_cosine_the_position_comes_from_counts_after_power_up():

@@ -10,7 +10,7 @@ from moire.client.built import FEATURES, SIZES, parameter_of
 @moire.command(
     "built",
     help="Show what an axis was built with, and the parameters of rtl/node.sv that build it.",
-    example="moire --port /dev/ttyUSB0 built --axis 1",
+    example="moire --port /dev/ttyUSB0 built",
 )
 def show_built(call: Call) -> None:
     """One read-back of the register axis.built."""
