@@ -24,7 +24,8 @@ module axis #(
     parameter int HAS_RECORDER = HAS_SINE,  // 1: build the recorder of bursts, likewise
     parameter int HAS_CAPTURE = 1,  // 1: build the queue of captures
     parameter int HAS_COMPARE = 1,  // 1: build compare
-    parameter int HAS_DRIVE = 1,  // 1: build profile, servo, interlock and actuator
+    parameter int HAS_VELOCITY = 1,  // 1: build the velocity estimator
+    parameter int HAS_DRIVE = 1,  // 1: build profile, servo, interlock, actuator; needs velocity
     parameter int FILTERS = 2 * HAS_DRIVE,  // biquads of the servo, 0 to 4
     parameter int HAS_BRIDGE = HAS_DRIVE,  // 1: build the bridge
     parameter int HAS_STEPPER = HAS_DRIVE,  // 1: build the step generator
@@ -80,6 +81,9 @@ module axis #(
 );
     if (HAS_DRIVE == 0 && HAS_BRIDGE + HAS_STEPPER + HAS_DAC + HAS_FINE_STAGE != 0) begin : g_check
         ACTUATORS_NEED_HAS_DRIVE u_error ();
+    end
+    if (HAS_DRIVE != 0 && HAS_VELOCITY == 0) begin : g_check_velocity
+        DRIVE_NEEDS_VELOCITY u_error ();
     end
     if (HAS_DRIVE == 0 && FILTERS != 0) begin : g_check_filters
         FILTERS_NEED_HAS_DRIVE u_error ();
@@ -168,7 +172,8 @@ module axis #(
         .HAS_HARMONICS(HAS_HARMONICS),
         .HAS_RECORDER (HAS_RECORDER),
         .HAS_CAPTURE  (HAS_CAPTURE),
-        .HAS_COMPARE  (HAS_COMPARE)
+        .HAS_COMPARE  (HAS_COMPARE),
+        .HAS_VELOCITY (HAS_VELOCITY)
     ) u_feedback (
         .clk,
         .rst,
@@ -493,6 +498,7 @@ module axis #(
         .built_recorder       (1'(HAS_RECORDER)),
         .built_capture        (1'(HAS_CAPTURE)),
         .built_compare        (1'(HAS_COMPARE)),
+        .built_velocity       (1'(HAS_VELOCITY)),
         .built_drive          (1'(HAS_DRIVE)),
         .built_bridge         (1'(HAS_BRIDGE)),
         .built_stepper        (1'(HAS_STEPPER)),

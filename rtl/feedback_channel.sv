@@ -20,7 +20,8 @@ module feedback_channel #(
     parameter int HAS_HARMONICS = HAS_SINE,  // 1: build the harmonic correction, likewise
     parameter int HAS_RECORDER = HAS_SINE,  // 1: build the recorder, likewise
     parameter int HAS_CAPTURE = 1,  // 1: build the queue of captures
-    parameter int HAS_COMPARE = 1  // 1: build compare
+    parameter int HAS_COMPARE = 1,  // 1: build compare
+    parameter int HAS_VELOCITY = 1  // 1: build the velocity estimator
 ) (
     input  wire                 clk,
     input  wire                 rst,
@@ -495,19 +496,24 @@ module feedback_channel #(
         .done    (scale_valid),
         .position(scale_position)
     );
-    velocity_estimator u_velocity (
-        .clk,
-        .rst,
-        .quantum,
-        .tick,
-        // position of the scale
-        .position(scale_position),
-        .shift,
-        .shift_periods,
-        // velocity
-        .velocity,
-        .fine    (velocity_fine)
-    );
+    if (HAS_VELOCITY != 0) begin : g_velocity
+        velocity_estimator u_velocity (
+            .clk,
+            .rst,
+            .quantum,
+            .tick,
+            // position of the scale
+            .position(scale_position),
+            .shift,
+            .shift_periods,
+            // velocity
+            .velocity,
+            .fine    (velocity_fine)
+        );
+    end else begin : g_no_velocity
+        assign {velocity, velocity_fine} = '0;
+        wire unused = &{1'b0, quantum};
+    end
 
     if (SEGMENTS != 0) begin : g_segments
         localparam int INDEX = $clog2(SEGMENTS + 1);
@@ -667,7 +673,8 @@ module feedback_channel #(
         .HAS_MONITOR  (HAS_MONITOR),
         .HAS_HARMONICS(HAS_HARMONICS),
         .HAS_RECORDER (HAS_RECORDER),
-        .HAS_COMPARE  (HAS_COMPARE)
+        .HAS_COMPARE  (HAS_COMPARE),
+        .HAS_VELOCITY (HAS_VELOCITY)
     ) u_registers (
         .clk,
         .rst,

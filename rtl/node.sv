@@ -25,6 +25,7 @@ module node #(
     parameter int HAS_SEGMENTS      = 255,        // axes with a table of SEGMENTS segments
     parameter int HAS_CAPTURE       = 255,        // axes with a queue of captures
     parameter int HAS_COMPARE       = 255,        // axes with compare
+    parameter int HAS_VELOCITY      = 255,        // axes with a velocity estimator
     parameter int HAS_DRIVE         = 255,        // axes with a drive; the others only measure
     parameter int HAS_FILTERS       = HAS_DRIVE,  // axes with FILTERS biquads, needs the drive
     parameter int HAS_BRIDGE        = HAS_DRIVE,  // axes with a bridge, needs the drive
@@ -307,6 +308,7 @@ module node #(
             .SEGMENTS      ((HAS_SEGMENTS >> n & 1) * SEGMENTS),
             .HAS_CAPTURE   (HAS_CAPTURE >> n & 1),
             .HAS_COMPARE   (HAS_COMPARE >> n & 1),
+            .HAS_VELOCITY  (HAS_VELOCITY >> n & 1),
             .HAS_DRIVE     (HAS_DRIVE >> n & 1),
             .FILTERS       ((HAS_FILTERS >> n & 1) * FILTERS),
             .HAS_BRIDGE    (HAS_BRIDGE >> n & 1),

@@ -73,6 +73,7 @@ module axis_registers #(
     input  wire                built_recorder,                  // HAS_RECORDER
     input  wire                built_capture,                   // HAS_CAPTURE
     input  wire                built_compare,                   // HAS_COMPARE: compare pulses
+    input  wire                built_velocity,                  // HAS_VELOCITY: velocity estimator
     input  wire                built_drive,                     // HAS_DRIVE
     input  wire                built_bridge,                    // HAS_BRIDGE: bridge
     input  wire                built_stepper,                   // HAS_STEPPER: step generator
@@ -159,9 +160,9 @@ module axis_registers #(
                 6'h18: rdata <= {26'd0, encoder_fault_mask};
                 6'h19: rdata <= rejected_pulses_count;
                 6'h1A: rdata <= rejected_samples_count;
-                6'h1B: rdata <= {10'd0, built_segments, built_filters, built_fine_stage, built_dac,
-                    built_stepper, built_bridge, built_drive, built_compare, built_capture,
-                    built_recorder, built_harmonics, built_monitor, built_sine};
+                6'h1B: rdata <= {9'd0, built_segments, built_filters, built_fine_stage, built_dac,
+                    built_stepper, built_bridge, built_drive, built_velocity, built_compare,
+                    built_capture, built_recorder, built_harmonics, built_monitor, built_sine};
                 6'h20: rdata <= {8'd0, kp};
                 6'h21: rdata <= {8'd0, ki};
                 6'h22: rdata <= {8'd0, kd};

@@ -14,7 +14,8 @@ module feedback_registers #(
     parameter int HAS_HARMONICS = 1,  // 0: settings that need it read 0
     parameter int HAS_MONITOR   = 1,  // 0: settings that need it read 0
     parameter int HAS_RECORDER  = 1,  // 0: settings that need it read 0
-    parameter int HAS_SINE      = 1   // 0: settings that need it read 0
+    parameter int HAS_SINE      = 1,  // 0: settings that need it read 0
+    parameter int HAS_VELOCITY  = 1   // 0: settings that need it read 0
 ) (
     input wire clk,
     input wire rst,  // settings take their first values
@@ -253,7 +254,7 @@ module feedback_registers #(
         if (HAS_COMPARE != 0 && put && word == 6'h24) compare_gap <= wdata[23:0];
         if (put && word == 6'h25 && wdata[1]) compare_state_late_held <= 1'b0;
         if (compare_state_late) compare_state_late_held <= 1'b1;
-        if (put && word == 6'h27) velocity_quantum <= wdata[15:0];
+        if (HAS_VELOCITY != 0 && put && word == 6'h27) velocity_quantum <= wdata[15:0];
         if (put && word == 6'h2A) position_source_counts <= wdata[0];
         if (put && word == 6'h2A) position_source_steps <= wdata[1];
         align_written <= put && word == 6'h2B;

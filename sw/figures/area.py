@@ -7,6 +7,7 @@ A cell of LUT RAM (TRELLIS_DPR16X4) counts as the six LUT4 that it takes on an E
 
 from collections.abc import Mapping
 from functools import cache
+from pathlib import Path
 
 from figures.common import Figure, console, seeds
 from figures.synthesis import (
@@ -58,16 +59,8 @@ S0_NODE: Parameters = {
     "HAS_STEPPER": 0,
     "FIRMWARE": "build/firmware/firmware.hex",
 }
-# it counts A/B/Z with index, filters and captures; no drives. Its firmware is in the SPRAM.
-COUNTERS: Parameters = {
-    "CLK_HZ": 20_000_000,
-    "AXES": 4,
-    "FILTERS": 0,
-    "HAS_SINE": 0,
-    "HAS_COMPARE": 0,
-    "HAS_DRIVE": 0,
-    "MEMORY_BYTES": 131072,
-}
+# a node that counts A/B/Z with index, filters and captures; its firmware is in the SPRAM
+COUNTER_BOX = Path(__file__).with_name("counter_box_bench.sv")
 SPRAM = "-spram -dsp"
 OF_BOTH: dict[str, Parameters] = {
     "compare": {"HAS_COMPARE": ALL_AXES},
@@ -161,7 +154,7 @@ def node_ecp5_lut(place: bool = True, seed: int = 1) -> float:
 @cache
 def on_up5k(seed: int) -> dict[str, float]:
     """{lc, fmax_mhz} of the node that counts, the worst of some placements."""
-    netlist = netlist_of(source_of("node"), COUNTERS, "ice40", 1, SPRAM)
+    netlist = netlist_of(COUNTER_BOX, {}, "ice40", 1, SPRAM)
     tries = [
         placed(netlist, "ice40", UP5K, 20, one, "--pcf-allow-unconstrained")
         for one in seeds(seed, PLACEMENTS)
@@ -174,7 +167,7 @@ def on_up5k(seed: int) -> dict[str, float]:
 
 
 def node_on_up5k(name: str, place: bool, seed: int) -> float:
-    return on_up5k(seed)[name] if place else elaborated(source_of("node"), COUNTERS)
+    return on_up5k(seed)[name] if place else elaborated(COUNTER_BOX)
 
 
 def node_up5k_lc(place: bool = True, seed: int = 1) -> float:

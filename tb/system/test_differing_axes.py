@@ -27,9 +27,9 @@ NODE = {  # bit n: axis n
     "HAS_FILTERS": 1 << SERVO,
 }
 BUILT = (
-    {"drive", "stepper"},
-    {"capture", "compare"},
-    {"sine", "monitor", "harmonics", "recorder", "drive", "bridge", "filters"},
+    {"velocity", "drive", "stepper"},
+    {"velocity", "capture", "compare"},
+    {"sine", "monitor", "harmonics", "recorder", "velocity", "drive", "bridge", "filters"},
 )
 
 

@@ -28,6 +28,7 @@ MODULES = {  # of a feature, which are gone without it
     "recorder": ("calibration_recorder",),
     "capture": ("position_capture",),
     "compare": ("position_compare",),
+    "velocity": ("velocity_estimator",),
     "drive": ("profile_player", "pid_servo", "drive_interlock", "actuator"),
     "bridge": ("bridge_pwm",),
     "stepper": ("step_generator", "step_follower", "step_permission"),
@@ -38,6 +39,7 @@ MODULES = {  # of a feature, which are gone without it
 }
 NEEDED_BY = {  # what goes with a feature
     "sine": ("monitor", "harmonics", "recorder"),
+    "velocity": ("drive", "filters", "bridge", "stepper", "dac", "fine_stage"),
     "drive": ("filters", "bridge", "stepper", "dac", "fine_stage"),
     "dac": ("fine_stage",),
 }
@@ -60,6 +62,7 @@ WRONG = {  # parameters of a node that cannot be built, and the rule
     "SIGNAL_MONITOR_NEEDS_SINE": dict(HAS_SINE=0, HAS_MONITOR=1),
     "HARMONICS_NEED_SINE": dict(HAS_SINE=0, HAS_HARMONICS=1),
     "RECORDER_NEEDS_SINE": dict(HAS_SINE=0, HAS_RECORDER=1),
+    "DRIVE_NEEDS_VELOCITY": dict(HAS_VELOCITY=0),
     "ACTUATORS_NEED_HAS_DRIVE": dict(HAS_DRIVE=0, HAS_STEPPER=1),
     "FILTERS_NEED_HAS_DRIVE": dict(HAS_DRIVE=0, HAS_FILTERS=1),
     "AN_ACTUATOR_NEEDS_A_DRIVE": dict(HAS_BRIDGE=0, HAS_STEPPER=0, HAS_DAC=0),
@@ -203,7 +206,7 @@ async def what_is_not_built_reads_zero_and_its_pins_are_idle(dut):
         (),
         ("monitor", "harmonics", "recorder", "capture", "compare", "fine_stage", "segments"),
         ("sine", "capture", "filters", "bridge", "dac"),
-        ("drive", "compare"),
+        ("velocity", "compare"),
     ],
     ids=lambda features: "-".join(features) or "full",
 )

@@ -3,7 +3,7 @@
 #ifndef MOIRE_BUS_PROTOCOL_H
 #define MOIRE_BUS_PROTOCOL_H
 
-#define PROTOCOL_CRC         0xA6F982BDu    // CRC-32 of bus.toml
+#define PROTOCOL_CRC         0x8D3F3B1Eu    // CRC-32 of bus.toml
 #define BUS_VERSION         1u
 #define BUS_LONGEST_BODY    64u
 #define BUS_REQUEST_HEAD    2u  // sequence, operation
@@ -1081,6 +1081,7 @@ enum bus_parameter {
     X(DISAGREEMENT_LIMIT, SINE) \
     X(PWM_FREQUENCY, BRIDGE) \
     X(AUTO_CALIBRATION, RECORDER) \
+    X(VELOCITY_QUANTUM, VELOCITY) \
     X(SIGNAL_FAULT_MASK, MONITOR) \
     X(SIGNAL_CLIP_LEVEL, MONITOR) \
     X(SIGNAL_TOLERANCE, MONITOR) \

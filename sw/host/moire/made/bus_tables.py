@@ -24,7 +24,7 @@ class Parameter(NamedTuple):
     needs: str = ""         # field of axis.built that any value but 0 and default needs
 
 
-PROTOCOL_CRC = 0xA6F982BD
+PROTOCOL_CRC = 0x8D3F3B1E
 VERSION = 1
 LONGEST_BODY = 64
 
@@ -638,7 +638,7 @@ PARAMETERS = {parameter.name: parameter for parameter in (
               "deglitcher: samples of the old level that are tolerated in between"),
     Parameter("velocity_quantum", 37, "period", Fraction(1, 65536),
               0, 65535, 128,
-              "velocity: smallest step of the position; 0 plain difference"),
+              "velocity: smallest step of the position; 0 plain difference", "VELOCITY"),
     Parameter("signal_fault_mask", 38, "", Fraction(1, 1),
               0, 32767, 0,
               "signal: signal faults that switch the drive off (bits of signal_fault)", "MONITOR"),
