@@ -3,13 +3,14 @@
 README's table that is made from it.
 """
 
+import json
 import math
 from datetime import date
 
 import pytest
 
 from figures import figure as command
-from figures import record
+from figures import record, synthesis
 from figures.common import Figure, Quick, collected, seeds, shares, within
 from tables import readme_figures
 
@@ -111,3 +112,21 @@ def test_the_table_refuses_a_record_of_another_bound():
 def test_signs_and_powers_are_typeset():
     text = "10^5 moves <= 3 um, +-2 arcsec, sum of 20 us"
     assert readme_figures.typeset(text) == "10⁵ moves ≤ 3 µm, ±2″, sum of 20 µs"
+
+
+def test_lut4s_count_carry_cells_twice_and_lut_ram_six_times(tmp_path):
+    kinds = ["LUT4", "LUT4", "CCU2C", "TRELLIS_DPR16X4", "TRELLIS_FF", "PFUMX"]
+    cells = {str(n): {"type": kind} for n, kind in enumerate(kinds)}
+    netlist = tmp_path / "netlist.json"
+    netlist.write_text(json.dumps({"modules": {"top": {"cells": cells}}}))
+    assert synthesis.lut4s(netlist, "top") == 2 + 2 + 6
+
+
+def test_a_design_that_does_not_fit_is_reported_with_what_is_too_much(tmp_path):
+    log = tmp_path / "log"
+    log.write_text(
+        "Info: \t         ICESTORM_LC: 11472/   5280   217%\n"
+        "Info: \t        ICESTORM_RAM:    30/     30   100%\n"
+    )
+    assert synthesis.overfull(log) == "11472 ICESTORM_LC of 5280"
+    assert synthesis.overfull(tmp_path / "none") == ""
