@@ -124,7 +124,7 @@ class Cut:
     angle: float
     error: float  # arcsec
     start_s: float
-    whole: bool
+    complete: bool
 
 
 @dataclass
@@ -145,7 +145,7 @@ class Outcome:
     def uncut(self) -> list[int]:
         """The stations without a complete cut."""
         return sorted(
-            set(range(len(self.stations))) - {cut.station for cut in self.cuts if cut.whole}
+            set(range(len(self.stations))) - {cut.station for cut in self.cuts if cut.complete}
         )
 
     @property
@@ -162,7 +162,7 @@ class Outcome:
         return [cut for cut in self.cuts if cut.station is None]
 
     @property
-    def whole(self) -> bool:
+    def complete(self) -> bool:
         """Whether each station was cut once, nothing else was cut, and the job has finished."""
         return (
             not (self.uncut or self.twice or self.outside_tolerance)
@@ -176,8 +176,8 @@ class Outcome:
 
     @property
     def failed(self) -> bool:
-        """Whether the job is not whole, or a cut is outside the tolerance."""
-        return not self.whole or self.worst > TOLERANCE
+        """Whether the job is not complete, or a cut is outside the tolerance."""
+        return not self.complete or self.worst > TOLERANCE
 
     @property
     def words(self) -> str:
@@ -326,7 +326,7 @@ class IndexingMachine:
             return "RESUME"
         return (
             "NEXT"
-            if any(cut.station == state.station and cut.whole for cut in self.cuts())
+            if any(cut.station == state.station and cut.complete for cut in self.cuts())
             else "AGAIN"
         )
 
@@ -366,7 +366,7 @@ class IndexingMachine:
                     angle,
                     error,
                     cut.start_s,
-                    cut.whole,
+                    cut.complete,
                 )
             )
         return found

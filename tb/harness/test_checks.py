@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The checks of tools/: each finds what is planted, and nothing in the project."""
+"""The checks of tools/: each finds a planted problem, and none in the project."""
 
 import ast
 
@@ -12,7 +12,7 @@ MODULE = """// SPDX-License-Identifier: Apache-2.0
 // thing -- adds.
 //
 // latency  2 cycles from valid to done, and 3 cycles to the sum
-// model    tb/room/thing.py
+// model    tb/block/thing.py
 `default_nettype none
 
 module thing #(
@@ -35,29 +35,29 @@ def module(tmp_path, monkeypatch):
     """A module with bare ports and latencies to be tested, in a project of its own."""
     for part in (modules, check_latency, check_ports):
         monkeypatch.setattr(part, "ROOT", tmp_path)
-    path = tmp_path / "rtl" / "room" / "thing.sv"
-    (tmp_path / "tb" / "room").mkdir(parents=True)
+    path = tmp_path / "rtl" / "block" / "thing.sv"
+    (tmp_path / "tb" / "block").mkdir(parents=True)
     path.parent.mkdir(parents=True)
     path.write_text(MODULE)
     return path
 
 
 def test_a_port_and_a_parameter_without_a_comment_are_found(module):
-    assert check_ports.problems() == ["rtl/room/thing.sv:10: N", "rtl/room/thing.sv:14: level"]
+    assert check_ports.problems() == ["rtl/block/thing.sv:10: N", "rtl/block/thing.sv:14: level"]
 
 
 @pytest.mark.parametrize(
     "names, missing",
     [
-        ([], ["rtl/room/thing.sv: no test latency_is_…"]),
-        (["latency_is_2_to_done"], ["rtl/room/thing.sv: no test latency_is_3"]),
+        ([], ["rtl/block/thing.sv: no test latency_is_…"]),
+        (["latency_is_2_to_done"], ["rtl/block/thing.sv: no test latency_is_3"]),
         (["latency_is_2_to_done", "latency_is_3_to_the_sum"], []),
         (["latency_is_2_to_done_and_3_to_the_sum"], []),
         (["latency_is_23"], ["no test latency_is_2", "no test latency_is_3"]),
     ],
 )
 def test_a_latency_without_a_test_of_its_name_is_found(module, names, missing):
-    test = module.parents[2] / "tb" / "room" / "test_thing.py"
+    test = module.parents[2] / "tb" / "block" / "test_thing.py"
     test.write_text("".join(f"async def {name}(dut):\n    pass\n" for name in names))
     found = check_latency.problems()
     assert len(found) == len(missing) and all(m in f for m, f in zip(missing, found, strict=True))

@@ -513,12 +513,14 @@ def test_a_node_that_misses_the_sync_is_named_and_the_others_are_stopped():
     fake, bus = two_nodes()
     for axis in (bus.axis(1), bus.axis(2)):
         axis.prepare(mm=1)
-    deaf, hears = fake.nodes[1], fake.nodes[1].receive_word
-    deaf.receive_word = lambda word: [] if deaf.waiting_for_sync and word == 0x120 else hears(word)
+    unreachable, receive_word = fake.nodes[1], fake.nodes[1].receive_word
+    unreachable.receive_word = lambda word: (
+        [] if unreachable.waiting_for_sync and word == 0x120 else receive_word(word)
+    )
     with pytest.raises(BusError, match="node 2 did not receive the sync"):
         bus.start(bus.axis(1), bus.axis(2))
     fake.wait(1)
-    assert bus.axis(1).status().ended == "stopped" and not deaf.waiting_for_sync
+    assert bus.axis(1).status().ended == "stopped" and not unreachable.waiting_for_sync
 
 
 def test_a_new_baud_rate_is_set_in_all_nodes_or_in_none():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rtl/peripheral/angle_frame.sv does, in integers: step(...) is one clk and returns the pins
+"""Integer model of rtl/peripheral/angle_frame.sv: step(...) is one cycle and returns the pins
 after it.
 """
 

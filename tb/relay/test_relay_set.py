@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""relay_set: a whole set by hand, every broken bit refused, and rows cut anywhere against the model
-in every cycle.
+"""relay_set: a complete set by hand, each wrong bit is refused, and rows that end anywhere are
+compared with the model in every cycle.
 """
 
 import random
@@ -28,7 +28,7 @@ WIDTHS = 32, 48, 16, 32, 16, 8, 2, 2, 1
 
 
 class Bytes:
-    """The design with the model beside it in every cycle."""
+    """The design, compared with the model in every cycle."""
 
     def __init__(self, dut):
         self.dut, self.k = dut, int(dut.K.value)
@@ -70,13 +70,13 @@ class Bytes:
             got = tuple(int(x.value) for x in (dut.term, dut.amplitude, dut.phase))
             assert got == model.write
             self.written.append(got)
-        packed, place = 0, 0
+        packed, offset = 0, 0
         for name, width in zip(SETTINGS, WIDTHS):
-            packed, place = packed | int(getattr(dut, name).value) << place, place + width
+            packed, offset = packed | int(getattr(dut, name).value) << offset, offset + width
         assert packed == model.settings % 2**157
 
     async def send(self, row, gaps=False):
-        """Returns +1 if it was good, -1 if bad, 0 if neither."""
+        """Returns +1 if the set was good, -1 if it was bad, otherwise 0."""
         await self.clk(start=1)
         verdict = 0
         for byte in [*row, None, None, None]:
@@ -184,8 +184,8 @@ async def amplitudes_that_may_overflow_the_map_are_refused(dut):
     row = await Bytes(dut).reset()
     needs(not row.segments, "a table has no amplitudes")
     for sign in (1, -1):
-        share, rest = divmod(2**29 - 1, row.k)
-        sizes = [share] * (row.k - 1) + [share + rest]
+        share, remainder = divmod(2**29 - 1, row.k)
+        sizes = [share] * (row.k - 1) + [share + remainder]
         words = [size if sign > 0 else ~size % 2**32 for size in sizes]
         assert await row.send(image([(word, 0) for word in words], 32768)) == 1
         for n in {0, row.k - 1}:
@@ -208,9 +208,9 @@ async def points_of_128_counts_are_refused(dut):
         (2**31 - 1, -1),
         (-(2**31), -1),
     ):
-        for place in (0, 2 * row.k - 1):
+        for index in (0, 2 * row.k - 1):
             words = [0] * (2 * row.k)
-            words[place] = value
+            words[index] = value
             assert (
                 await row.send(
                     image(list(zip(words[::2], words[1::2])), 32768, segments=row.segments)

@@ -20,7 +20,7 @@ def table(clk_hz=400_000, **values):
 
 
 def go(machine, pulses, rate_hz=20_000, rest_s=0.2):
-    """Slow at the start and at the end, as a profile would."""
+    """Send pulses, slowly at the start and at the end, as a profile does."""
     sign, gentle = (1 if pulses > 0 else -1), min(abs(pulses) // 2, 500)
     machine.steps(sign * gentle, 4000)
     machine.steps(sign * (abs(pulses) - 2 * gentle), rate_hz)
@@ -66,11 +66,11 @@ def test_the_way_back_loses_the_backlash():
     assert 20 < lost < 20 + 2 * 3.4 + 2 * 1
     assert (go(machine, 1000) - up) / ARC_SECOND == pytest.approx(
         0, abs=0.1
-    )  # approached from one side it is the same place
+    )  # approached from one side, it is the same angle
 
 
 def frames(levels, bit):
-    """The bytes on the line, by themselves: start bit, eight data, stop bit."""
+    """Decode the bytes on the line: start bit, eight data bits, stop bit."""
     out, n = [], 0
     while n < len(levels) - 10 * bit:
         if levels[n]:
@@ -101,8 +101,8 @@ def angle_of(frame):
 
 
 def readings(machine, seconds):
-    """[(clk of the first start bit, sequence, angle in rad)] of the frames whose check is right,
-    and the count of the others.
+    """[(cycle of the first start bit, sequence, angle in rad)] of the frames with a correct CRC,
+    and the number of the others.
     """
     data = frames(machine.watch(seconds)["sensor_rx"], machine.clk_hz / 115200)
     found = [
@@ -187,5 +187,5 @@ def test_faults_of_the_sensor():
 
 
 def test_each_machine_is_another_by_its_seed():
-    places = {Machine("worm_table", seed=seed).state.position_rad for seed in range(5)}
-    assert len(places) == 5
+    angles = {Machine("worm_table", seed=seed).state.position_rad for seed in range(5)}
+    assert len(angles) == 5
