@@ -39,7 +39,7 @@ from moire.client.nonvolatile import SavedSettings
 from moire.client.settings import Settings
 from moire.errors import MoireError
 from moire.units import Value
-from twin import START_S, Axis, BuildError, Devices, Node, Twin, TwinTransport, build
+from twin import Axis, BuildError, Devices, Node, Twin, TwinTransport, build
 from twin.nodes.twin import drives
 
 MAIN, SUB = 0, 1  # numbers of the nodes in the twin
@@ -247,7 +247,7 @@ class IndexingMachine:
         self.source, self.stations = random.Random(seed), list[float]()
         self.table_dark_s: list[float] = []
         self.twin.set_position(SUB, math.radians(self.source.uniform(0, ABOUT)))
-        self.twin.run(START_S)
+        self.twin.run_until_ready()
         for name, value in {
             "peer_mode": mode,
             "peer_role": "main",
@@ -380,7 +380,7 @@ class IndexingMachine:
         self.twin.run(DARK_S)
         for node in dark:
             self.twin.power_on(node)
-        self.twin.run(START_S)
+        self.twin.run_until_ready()
 
     def run(
         self, trouble: Trouble = CALM, watch: Callable[[JobState], object] | None = None

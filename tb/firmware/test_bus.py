@@ -8,7 +8,7 @@ import pytest
 
 from tables.bus import register_fields
 from tb.bench import seed
-from twin.compiled.host_library import ROOT
+from twin.build import ROOT
 from twin.compiled.node import CLK_HZ, DEFINES, PARAMETER, PERIOD, TABLE, Axis, FakeNode
 
 COMMAND = DEFINES["BUS_RECEIVE_COMMAND_MASK"]

@@ -63,7 +63,7 @@ def test_a_latency_without_a_test_of_its_name_is_found(module, names, missing):
     assert len(found) == len(missing) and all(m in f for m, f in zip(missing, found, strict=True))
 
 
-def test_a_cycle_and_its_way_are_found():
+def test_a_cycle_is_found_with_its_modules():
     graph = {"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}
     (found,) = check_imports.cycles(graph)
     assert found.startswith("cycle: ") and {"a", "b", "c"} <= set(found.split())
@@ -78,7 +78,23 @@ def test_an_import_in_the_wrong_direction_is_found():
     ]
 
 
-def test_relative_deferred_and_typed_imports_are_told_apart():
+def test_an_include_of_a_higher_layer_and_a_cycle_of_directories_are_found():
+    station = "sw/firmware/station/"
+    graph = {
+        "sw/firmware/axis/homing": {"sw/firmware/axis/motion", "sw/firmware/core/clock"},
+        "sw/firmware/core/clock": {"sw/firmware/axis/motion"},
+        "sw/firmware/calibration/run": {station + "job/job"},
+        station + "job/job": {station + "panel/panel"},
+        station + "panel/panel": {station + "job/states", station + "panel/keys"},
+    }
+    assert check_imports.wrong_layers(graph) == [
+        "sw/firmware/calibration/run must not include station/job/job",
+        "sw/firmware/core/clock must not include axis/motion",
+        "cycle: station/job <- station/panel <- station/job",
+    ]
+
+
+def test_relative_deferred_and_typed_imports_are_distinguished():
     tree = ast.parse(
         "from . import x\nimport a.b\nif TYPE_CHECKING:\n    import hidden\n"
         "def f():\n    from late import y\n"

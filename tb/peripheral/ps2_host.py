@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Integer model of rtl/peripheral/ps2_host.sv. pins() returns the outputs; step(...) is one cycle."""
+"""Integer model of rtl/peripheral/ps2_host.sv. pins() returns the outputs, step(...) is a cycle."""
 
 
 def frame(byte, damaged=0):

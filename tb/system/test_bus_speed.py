@@ -11,7 +11,7 @@ from moire.bus.protocol import FROM_NODE, command_byte, parse_reply, read_words
 from moire.client.bus import Bus
 from moire.errors import NoAnswer
 from tb.bench import seed
-from twin import START_S, Twin, TwinTransport
+from twin import Twin, TwinTransport
 
 BAUD = 300_000  # the highest rate of the twin: an eighth of its clock
 CLK_HZ = 2_400_000
@@ -22,7 +22,7 @@ NOISE = 1000  # noise of a position from 8-bit samples, 2^-16 period
 def bus():
     with Twin(nodes=(1, 2), clk_hz=CLK_HZ, seed=seed() % 1000) as twin:
         made = Bus(TwinTransport(twin), random_source=random.Random(seed()))
-        twin.run(START_S)
+        twin.run_until_ready()
         yield made
 
 

@@ -46,11 +46,11 @@ def axes():
         node_parameters=ALL_PERIPHERALS | NODE,
     ) as twin:
         bus = Bus(TwinTransport(twin), random_source=random.Random(seed()))
-        twin.run(START_S)
+        twin.run_until_ready()
         twin.power_cut(1)
         twin.run(random.Random(seed()).uniform(0.0101, 0.0102))
         twin.power_on(1)
-        twin.run(START_S)
+        twin.run_until_ready()
         made = [bus.axis(address) for address in ADDRESSES]
         for axis in made:
             for name, value in SETTINGS.items():

@@ -12,39 +12,11 @@ from cocotb.triggers import FallingEdge
 
 from moire.made.registers import FIELDS
 from tb.bench import needs, run, seed, start
+from tb.interpolate.feedback_inputs import INPUTS, SETTINGS
 
 TURN = [(0, 0), (1, 0), (1, 1), (0, 1)]  # a leads b: up
 QUARTER = 1 << 14
 LATENCY = 5  # cycles from the pins to position: filter 1, decoder 2, position 2; table 1
-SETTINGS = dict(
-    deglitch=0,
-    outlier_step=0,
-    outlier_hold=0,
-    amplitude_low=0,
-    amplitude_high=65535,
-    disagreement_limit=0,
-    encoder_fault_mask=0,
-)
-INPUTS = dict(
-    tick=0,
-    sample_tick=0,
-    sync=0,
-    now=0,
-    select=0,
-    write=0,
-    word=0,
-    wdata=0,
-    shift=0,
-    shift_periods=0,
-    a=0,
-    b=0,
-    z=0,
-    probe=0,
-    own_step=0,
-    own_downward=1,
-    adc_sin=1,
-    adc_cos=1,
-)
 
 
 def latency(dut):

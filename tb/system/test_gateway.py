@@ -20,7 +20,7 @@ from moire.bus.transport import open_bus
 from moire.cli import command_line
 from moire.client.bus import Bus
 from moire.errors import BusGarbled, NoAnswer
-from twin import START_S, Twin, TwinTransport
+from twin import Twin, TwinTransport
 
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.filterwarnings(
@@ -94,7 +94,7 @@ def test_two_nodes_with_one_address_are_distinguished_from_silence(apart_s):
         line.twin.power_cut(1)
         line.wait(apart_s)
         line.twin.power_on(1)
-        line.wait(START_S)
+        line.twin.run_until_ready()
         with pytest.raises(BusGarbled, match="two nodes with the address 1"):
             Bus(line).find()
 

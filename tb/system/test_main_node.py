@@ -11,35 +11,13 @@ from moire.client.indexing_table import TURN, IndexingTable
 from moire.client.job import Job
 from moire.client.settings import Settings
 from tb.bench import seed
+from tb.system.station_node import AXIS, NODE
 from twin import Twin, TwinTransport, build
 from twin.devices.devices import Devices
-from twin.nodes.twin import Axis, Node, drives
+from twin.nodes.twin import Axis, Node
 
 MAIN, SUB = 0, 1  # indices of the nodes in the twin
-NODE = {**drives("HAS_STEPPER"), "FILTERS": 0, "HAS_SINE": 0}
-AXIS = {
-    "period": "1um",
-    "drive": "steps",
-    "position_source": "own_steps",
-    "steps_per_period": 4,
-    "counts_per_period": 4,
-    "disagreement_limit": 0,
-    "encoder_fault_mask": 0,
-    "kp": 0,
-    "ki": 0,
-    "kd": 0,
-    "kv": 0,
-    "ka": 0,
-    "following_limit": "10mm",
-    "velocity": "20mm/s",
-    "acceleration": "100mm/s2",
-    "jerk": "1000mm/s3",
-    "homing_latch_speed": "0.2mm/s",
-    "settle_window": "1um",
-    "settle_time": "5ms",
-    "watchdog_time": "60s",
-}
-AROUND = Devices(
+DEVICES = Devices(
     eeprom=True,
     keypad=True,
     display=True,
@@ -51,7 +29,7 @@ AROUND = Devices(
 
 
 def test_a_job_is_cut_at_its_angles_through_a_power_cut_and_no_station_twice():
-    nodes = [Node(1, [Axis("unconnected")], AROUND), Node(2, [Axis("worm_table")])]
+    nodes = [Node(1, [Axis("unconnected")], DEVICES), Node(2, [Axis("worm_table")])]
     with Twin(
         nodes,
         seed=seed() % 1000,

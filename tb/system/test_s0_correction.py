@@ -12,7 +12,7 @@ import pytest
 from figures import calibration as figures_calibration
 from moire.client.axis import CORRECTION
 from moire.client.bus import Bus
-from twin import START_S, Twin, TwinTransport
+from twin import Twin, TwinTransport
 from twin.parameters import tables as parameters
 
 PLACES = 16  # of a period
@@ -24,7 +24,7 @@ LOADING_S = 0.6  # time until the table of the node is computed and in force
 def machine_and_axis():
     with Twin(nodes=(1,), plant=figures_calibration.HARMONICS_OF_TWIN) as twin:
         bus = Bus(TwinTransport(twin), random_source=random.Random(1))
-        bus.transport.wait(START_S)
+        twin.run_until_ready()
         yield twin.machine(), bus.axis(1)
 
 

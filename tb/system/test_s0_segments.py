@@ -16,7 +16,7 @@ import pytest
 from moire.client.bus import Bus
 from moire.client.segments import Segments, SegmentTable
 from moire.errors import Refused
-from twin import START_S, WITH_SEGMENTS, Twin, TwinTransport
+from twin import WITH_SEGMENTS, Twin, TwinTransport
 
 CYCLIC, PITCH, WALK = 150e-9, 1.5e-3, 10e-9
 SCALE = dict(scale_linear=20e-6, scale_cyclic=CYCLIC, scale_pitch=PITCH, scale_walk=WALK)
@@ -34,7 +34,7 @@ class Stage:
             twin.machine(),
             Bus(TwinTransport(twin), random_source=random.Random(1)).axis(1),
         )
-        self.axis.node.bus.transport.wait(START_S)
+        twin.run_until_ready()
         self.segments = Segments(self.axis)
         self.axis.enable()
         self.axis.home()

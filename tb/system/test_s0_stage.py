@@ -364,7 +364,9 @@ def test_nonsense_on_the_line_moves_nothing_and_the_next_command_works(stage):
 
 
 def send_frame(stage, address, body, crc_flip=0, length=None):
-    """Send a write frame by hand; returns the words that answered the command byte and the payload."""
+    """Send a write frame by hand; returns the words of the answers to the command byte and the
+    payload.
+    """
     import zlib
 
     command = 0x20 | address

@@ -19,35 +19,13 @@ from moire.client.settings import Settings
 from moire.made.bus_tables import CAUSES, FAULTS
 from tb.bench import seed
 from tb.firmware.test_firmware_peer import OPERATION, bodies, frame, poll, turn_to
+from tb.system.station_node import AXIS, NODE
 from twin import Devices, Twin, TwinTransport, build
-from twin.nodes.twin import Axis, Node, drives
+from twin.nodes.twin import Axis, Node
 
 RECIPE = Path(__file__).resolve().parents[2] / "docs" / "indexing.md"
 SUB, MAIN = 0, 1  # indices of the nodes in the twin
 ESTOP = next(bit for bit, (name, _) in FAULTS.items() if name == "estop")
-NODE = {**drives("HAS_STEPPER"), "FILTERS": 0, "HAS_SINE": 0}
-AXIS = {
-    "period": "1um",
-    "drive": "steps",
-    "position_source": "own_steps",
-    "steps_per_period": 4,
-    "counts_per_period": 4,
-    "disagreement_limit": 0,
-    "encoder_fault_mask": 0,
-    "kp": 0,
-    "ki": 0,
-    "kd": 0,
-    "kv": 0,
-    "ka": 0,
-    "following_limit": "10mm",
-    "velocity": "20mm/s",
-    "acceleration": "100mm/s2",
-    "jerk": "1000mm/s3",
-    "homing_latch_speed": "0.2mm/s",
-    "settle_window": "1um",
-    "settle_time": "5ms",
-    "watchdog_time": "60s",
-}
 QUICK = {
     "turn_allowance": "40arcsec",
     "turn_take_up": "40arcsec",

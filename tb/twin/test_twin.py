@@ -6,7 +6,7 @@ import zlib
 import numpy
 import pytest
 
-from twin import START_S, Axis, BuildError, FrameBench, Node, Twin, TwinTransport, build, cells_of
+from twin import Axis, BuildError, FrameBench, Node, Twin, TwinTransport, build, cells_of
 
 ASK = {1: 0x111, 2: 0x112}  # "slave, send data": 00 01 address, 9th bit 1
 
@@ -20,7 +20,7 @@ def empty_reply(address):
 @pytest.fixture
 def twin():
     with Twin(seed=1) as made:
-        made.run(START_S)
+        made.run_until_ready()
         yield made
 
 
@@ -62,7 +62,7 @@ def test_words_wait_until_they_are_taken(twin):
 @pytest.mark.parametrize("error", (-0.03, 0.03))
 def test_a_host_whose_baud_is_off_is_understood(error):
     with Twin(seed=1, nodes=(1,), host_baud_error=error) as twin:
-        twin.run(START_S)
+        twin.run_until_ready()
         assert poll(twin) == empty_reply(1)
 
 
@@ -99,7 +99,7 @@ def test_a_cut_node_is_silent_and_comes_back(twin, level):
 
 def test_nodes_of_one_address_collide():
     with Twin(seed=1, nodes=(1, 1)) as twin:
-        twin.run(START_S)
+        twin.run_until_ready()
         poll(twin)
         assert twin.bus().collisions > 0
 
@@ -129,7 +129,7 @@ def test_after_nonsense_and_spikes_the_nodes_answer_again(twin):
 def record(seed, **arguments):
     with Twin(seed=seed, **arguments) as twin:
         twin.trace(0, 100_000)
-        twin.run(START_S)
+        twin.run_until_ready()
         twin.push(0, 30.0)
         words = poll(twin)
         return (
@@ -207,7 +207,7 @@ def test_a_node_drives_any_machine():
         ],
         seed=1,
     ) as twin:
-        twin.run(START_S)
+        twin.run_until_ready()
         assert (
             0.5e-3 <= twin.truth(0).position_m <= 1e-3 and 5e-3 <= twin.truth(1).position_m <= 20e-3
         )

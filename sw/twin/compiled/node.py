@@ -17,8 +17,8 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Protocol
 
+from twin.build import FIRMWARE, ROOT
 from twin.compiled.firmware import READ, WRITE, library
-from twin.compiled.host_library import FIRMWARE, ROOT
 
 DEFINES = {
     name: int(value.rstrip("u"), 0)

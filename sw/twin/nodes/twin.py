@@ -301,6 +301,10 @@ class Twin:
         """Let time pass."""
         self.library.twin_run(self.handle, max(0, round(seconds * self.clk_hz)))
 
+    def run_until_ready(self) -> None:
+        """Run until the firmware of all nodes has started, so that they answer on the bus."""
+        self.run(START_S)
+
     def run_until_words(self, count: int, timeout_s: float) -> int:
         """Run until the host has received `count` words, at most timeout_s; returns their count."""
         longest = max(0, round(timeout_s * self.clk_hz))
