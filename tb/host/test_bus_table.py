@@ -106,17 +106,17 @@ def test_offsets_and_lengths_in_the_header_match_a_packed_struct():
         "i64": "q",
     }
     for name, source in TABLE["operation"].items():
-        for way, head in (("request", "BB"), ("reply", "BBB")):
+        for direction, head in (("request", "BB"), ("reply", "BBB")):
             laid = "<" + head
-            for declared in source[way]:
+            for declared in source[direction]:
                 field, kind = declared.split()
                 assert (
-                    f"#define BUS_{name}_{way}_{field} {struct.calcsize(laid)}u ".upper()
+                    f"#define BUS_{name}_{direction}_{field} {struct.calcsize(laid)}u ".upper()
                     in HEADER.upper()
                 )
                 laid += formats[kind]
             assert re.search(
-                f"#define BUS_{name}_{way}_LENGTH {struct.calcsize(laid)}u$".upper(),
+                f"#define BUS_{name}_{direction}_LENGTH {struct.calcsize(laid)}u$".upper(),
                 HEADER.upper(),
                 re.MULTILINE,
             )

@@ -373,7 +373,7 @@ def test_a_motion_that_a_fault_ends_names_the_first_fault():
 
 
 @pytest.mark.parametrize("cause", ["no_switch", "switch_stuck", "not_settled"])
-def test_a_motion_that_fails_says_why(cause):
+def test_a_motion_that_fails_reports_the_cause(cause):
     fake, node, axis = homed_stage()
     node.axes[0].end_cause = cause
     with pytest.raises(MotionFailed, match=dict(CAUSES.values())[cause]):
@@ -622,7 +622,7 @@ def test_an_interrupted_common_start_stops_all_of_them():
     assert [axis.ended for axis in fake.nodes[0].axes] == ["stopped", "stopped"]
 
 
-def test_a_prepared_move_beyond_the_travel_says_where_it_ends():
+def test_a_prepared_move_beyond_the_travel_reports_its_end():
     _, _, axis = homed_stage()
     with pytest.raises(Refused, match="target 200mm, allowed -800um to 119.6mm"):
         axis.prepare("200mm")
@@ -803,7 +803,7 @@ def test_both_ends_of_each_range_are_accepted_and_values_beyond_are_not_sent(nam
         assert len(node.axes[0].writes) == written
 
 
-def test_wrong_values_say_what_is_allowed():
+def test_wrong_values_are_refused_with_what_is_allowed():
     fake, node, axis = stage()
     with pytest.raises(OutOfRange, match="velocity allows 800nm/s to 800mm/s, not 900mm/s"):
         axis.set_parameter("velocity", "900mm/s")

@@ -107,7 +107,7 @@ def test_find_lists_the_nodes_and_marks_those_of_another_build():
     ] == [True, False]
 
 
-def test_find_tries_the_usual_baud_rates_and_says_which_it_is():
+def test_find_tries_the_usual_baud_rates_and_reports_the_one_found():
     node = FakeNode(2)
     node.baud = 1_000_000
     assert "or try all with 'find --any-baud'" in sentence(Call("find", node), 3)
@@ -128,7 +128,7 @@ def test_enable_wait_stop_reset_encoder_counters():
     assert "margin 50 %" in call.out and "frames_good" in call.out and "no_answer" in call.out
 
 
-def test_a_node_without_sine_and_cosine_says_so():
+def test_a_node_without_sine_and_cosine_reports_it():
     node = FakeNode(sine=False)
     call = Call("status -- encoder", node)
     assert (
@@ -248,7 +248,7 @@ def test_the_drive_and_choices_in_words():
     )
 
 
-def test_tune_reads_a_record_tells_gains_and_writes_them(tmp_path):
+def test_tune_reads_a_record_reports_gains_and_writes_them(tmp_path):
     node, record, picture = FakeNode(), tmp_path / "record.csv", tmp_path / "tuning.png"
     position = velocity = 0.0
     rows = ["command,position"]
@@ -321,7 +321,7 @@ def test_a_file_that_is_no_record_is_refused(tmp_path, text, message):
         "selftest",
     ],
 )
-def test_every_command_tells_one_json_object_a_line(text):
+def test_every_command_prints_one_json_object_per_line(text):
     node = FakeNode()
     node.axes[0].enabled = True
     for arguments in (text + " --json", "--json " + text):
@@ -504,7 +504,7 @@ def test_ports_are_exit_code_4(monkeypatch):
     )
 
 
-def test_without_a_checkout_the_port_twin_says_what_to_do(monkeypatch):
+def test_without_a_checkout_the_port_twin_reports_what_to_do(monkeypatch):
     monkeypatch.setattr("moire.bus.twin_port.entry_points", lambda **_: ())
     err = io.StringIO()
     assert command_line.main(["--port", "twin", "status"], err=err) == 4
@@ -726,7 +726,7 @@ def test_the_shell_keeps_the_drive_on_between_commands(monkeypatch):
     )  # on once, off once at the end
 
 
-def test_json_may_be_asked_for_a_single_line(monkeypatch):
+def test_json_may_be_selected_for_a_single_line(monkeypatch):
     monkeypatch.setattr(sys, "stdin", io.StringIO("enable\nstatus --json\ndisable\n"))
     rows = Call("shell").out.splitlines()
     assert (
@@ -819,7 +819,7 @@ def test_a_terminal_has_line_editing_completion_and_history(tmp_path):
     ]
 
 
-def test_a_shell_whose_node_falls_silent_ends(monkeypatch):
+def test_a_shell_ends_when_its_node_no_longer_answers(monkeypatch):
     class Keyboard:
         def isatty(self):
             return True
@@ -850,7 +850,7 @@ def test_a_person_may_mistype_in_the_shell(monkeypatch):
     assert "'fly'" in call.err and "'1' has no unit" in call.err and "moire> " in call.err
 
 
-def test_a_waiting_shell_talks_on_a_line_whose_time_runs(monkeypatch):
+def test_a_waiting_shell_sends_requests_on_a_bus_in_real_time(monkeypatch):
     class Keyboard:
         """A keyboard that waits until the shell has sent a request by itself."""
 

@@ -173,7 +173,7 @@ def test_a_record_that_cannot_be_written_is_one_sentence(tmp_path):
 # ------------------------------------------------------------------ watch, fault and self-test
 
 
-def test_watch_prints_the_state_as_often_as_asked_and_ends_in_time():
+def test_watch_prints_the_state_at_the_given_interval_and_ends_in_time():
     call = Call("watch --every 0.1s --for 0.5s --json")
     assert [round(reported["time_s"], 1) for reported in call.results] == [
         0.0,

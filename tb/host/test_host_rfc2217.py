@@ -59,7 +59,7 @@ def test_ff_is_doubled_both_ways():
     assert rfc2217.escaped(b"\x01\xff\x02") == b"\x01\xff\xff\x02"
 
 
-def test_settings_are_answered_and_zero_only_asks():
+def test_settings_are_answered_and_zero_only_reads():
     port = server()
     port.feed(
         subnegotiation(1, 0, 0, 0, 0)
@@ -110,9 +110,9 @@ def test_a_purge_and_controls_are_answered_and_the_modem_state_reported():
 
 def test_bytes_may_arrive_in_pieces():
     stream = subnegotiation(3, 4) + b"\x21\xff\xff" + subnegotiation(3, 5) + b"\x04"
-    whole, pieces = server(), server()
-    assert whole.feed(stream) == sum((pieces.feed(bytes([byte])) for byte in stream), [])
-    assert whole.take_answers() == pieces.take_answers()
+    at_once, pieces = server(), server()
+    assert at_once.feed(stream) == sum((pieces.feed(bytes([byte])) for byte in stream), [])
+    assert at_once.take_answers() == pieces.take_answers()
 
 
 def test_random_bytes_are_neither_stored_nor_stop_the_server():

@@ -136,7 +136,7 @@ def test_positions_count_from_the_zero_whatever_the_home_offset():
     assert node.axes[0].parameters[89] == 1000 * 65536 and segments.read() == table
 
 
-def test_without_a_zero_the_table_waits_and_says_why():
+def test_without_a_zero_the_table_waits_and_reports_why():
     node = node_with_table()
     node.axes[0].homed = False
     reported = Segments(axis_of(node)).load(SegmentTable(Fraction(0), Fraction(10**6), (0, 1)))
@@ -220,7 +220,7 @@ def test_a_wrong_file_is_one_sentence_and_nothing_is_written(file):
     assert node.axes[0].points == [] and not node.axes[0].writes
 
 
-def test_a_node_without_a_table_says_so_in_one_sentence(file):
+def test_a_node_without_a_table_reports_it_in_one_sentence(file):
     assert "this node was built without this function" in sentence(Call("segments status"), 1)
     assert "without a segment table" in sentence(Call(["segments", "load", str(file(*GOOD))]), 2)
 

@@ -168,7 +168,7 @@ def test_mark_parity_that_is_requested_and_missing_is_refused():
         ),
     ],
 )
-def test_a_port_that_does_not_open_says_why_in_one_sentence(error, sentence):
+def test_a_port_that_does_not_open_is_reported_with_the_reason_in_one_sentence(error, sentence):
     def open_port(*_, **__):
         raise error
 

@@ -83,7 +83,7 @@ async def one_frame_by_hand(dut):
 async def latency_is_2_and_age_counts_from_the_first_byte(dut):
     line = await Line(dut).begin()
     data = frame(1, 0xFFFFFFFF)
-    await line.send(data[:7], pause=3)  # 28 clk
+    await line.send(data[:7], pause=3)  # 28 cycles
     assert (await line.clk(data[7]))[0] == 0
     got = await line.clk()
     assert got[0] == 1 and got[3] == 28 + 2

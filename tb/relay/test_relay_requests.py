@@ -240,9 +240,9 @@ async def a_frame_that_begins_before_the_answer_is_out_is_dropped_whole(dut):
 @cocotb.test()
 async def a_broken_frame_moves_nothing(dut):
     host = await Requests(dut).reset()
-    whole = frame(0x21, [1, BEGIN_SET, 1, 2])
-    for n in range(1, len(whole)):
-        broken = list(whole)
+    complete = frame(0x21, [1, BEGIN_SET, 1, 2])
+    for n in range(1, len(complete)):
+        broken = list(complete)
         broken[n] = broken[n][0] ^ 1 << random.randrange(8), 0
         await host.send(broken)
         for _ in range(20):

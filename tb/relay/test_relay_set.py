@@ -103,7 +103,7 @@ def any_terms(row):
 async def by_hand(dut):
     row = await Bytes(dut).reset()
     terms = any_terms(row)
-    whole = image(
+    good_set = image(
         terms,
         1 << 15,
         minimum_edge_separation=3,
@@ -114,7 +114,7 @@ async def by_hand(dut):
         gate=2,
         segments=row.segments,
     )
-    assert await row.send(whole) == 1
+    assert await row.send(good_set) == 1
     assert row.written == [(n, a, p) for n, (a, p) in enumerate(terms)]
     assert (
         int(dut.counts_per_turn.value) == 32768
@@ -147,13 +147,13 @@ async def latency_is_2(dut):
 @cocotb.test()
 async def no_broken_bit_comes_into_force(dut):
     row = await Bytes(dut).reset()
-    whole = image(any_terms(row), 32768, segments=row.segments)
-    assert await row.send(whole) == 1
+    good_set = image(any_terms(row), 32768, segments=row.segments)
+    assert await row.send(good_set) == 1
     for _ in range(24):
         broken = bytearray(image(any_terms(row), 4000, segments=row.segments))
         for _ in range(random.choice((1, 1, 2, 3))):
             broken[random.randrange(len(broken))] ^= 1 << random.randrange(8)
-        assert await row.send(broken, gaps=True) == -1 or bytes(broken) == whole
+        assert await row.send(broken, gaps=True) == -1 or bytes(broken) == good_set
     assert int(dut.counts_per_turn.value) == 32768
 
 
@@ -231,21 +231,21 @@ async def a_set_of_harmonics_for_segments_and_the_other_way_round_is_refused(dut
 async def a_row_cut_short_changes_nothing_and_the_next_is_whole(dut):
     row = await Bytes(dut).reset()
     for _ in range(20):
-        whole = image(any_terms(row), random.getrandbits(25) | 4096, segments=row.segments)
-        assert await row.send(whole[: random.randrange(len(whole))]) == 0
-        assert await row.send(whole) == 1
+        good_set = image(any_terms(row), random.getrandbits(25) | 4096, segments=row.segments)
+        assert await row.send(good_set[: random.randrange(len(good_set))]) == 0
+        assert await row.send(good_set) == 1
         assert await row.send(b"") == 0
 
 
 @cocotb.test()
 async def reset_in_mid_flow(dut):
     row = await Bytes(dut).reset()
-    whole = image(any_terms(row), 7777, segments=row.segments)
+    good_set = image(any_terms(row), 7777, segments=row.segments)
     for _ in range(10):
-        await row.send(whole)
-        await row.send(whole[: random.randrange(len(whole))])
+        await row.send(good_set)
+        await row.send(good_set[: random.randrange(len(good_set))])
         await row.clk(rst=1)
-        for byte in whole:
+        for byte in good_set:
             await row.clk(valid=1, data=byte)  # without a start nothing is taken
         assert not row.model.loaded and int(dut.counts_per_turn.value) == 0
 

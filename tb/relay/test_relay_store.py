@@ -109,14 +109,14 @@ async def latency_is_2048_and_66_for_each_byte(dut):
     first copy, also the byte that wakes the chip.
     """
     store = await Store(dut, some(0), some(1)).reset()
-    whole = []  # cycles from reset, or from the verdict, to the last byte of each copy
+    cycles = []  # cycles from reset, or from the verdict, to the last byte of each copy
     for bytes_before in (5, 4):
         clks = 0
         while not (dut.valid.value and len(store.copies[-1]) == LENGTH):
             await store.clk()
             clks += 1
-        whole.append(clks)
-        assert clks == 2048 + 66 * (LENGTH + bytes_before), whole
+        cycles.append(clks)
+        assert clks == 2048 + 66 * (LENGTH + bytes_before), cycles
         while not (dut.bad.value or dut.good.value):
             await store.clk()
     assert (

@@ -42,7 +42,7 @@ def test_both_nodes_take_another_baud_rate_and_a_break_brings_the_first_one_back
     assert all(bus.node(n).counters()["breaks"] == 1 for n in (1, 2))
 
 
-def test_a_followed_position_is_that_of_the_moment(bus):
+def test_follow_returns_the_present_position(bus):
     twin, axis = bus.transport.twin, bus.axis(1)
     reported = axis.request("follow")["position"]
     for offset in (1e-5, 3e-5):
@@ -61,7 +61,7 @@ def test_a_followed_position_is_that_of_the_moment(bus):
         reported = axis.request("follow")["position"]
 
 
-def test_a_mark_is_captured_by_both_nodes_in_the_same_microsecond(bus):
+def test_a_sync_is_captured_by_both_nodes_in_the_same_microsecond(bus):
     for address in (1, 2):
         bus.axis(address).capture_from("software")
     for _ in range(3):

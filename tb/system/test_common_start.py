@@ -100,7 +100,7 @@ def test_two_tables_on_two_nodes_begin_to_move_within_a_microsecond(prepared):
     assert all(status.position_nm == pytest.approx(200_000, abs=500) for status in reached)
 
 
-def test_a_node_that_missed_the_mark_is_reported_and_does_not_move(prepared):
+def test_a_node_that_missed_the_sync_is_reported_and_does_not_move(prepared):
     bus, twin = prepared[0].node.bus, prepared[0].transport.twin
     steps = [twin.truth(n).steps for n in range(2)]
 

@@ -81,7 +81,7 @@ def test_homes_and_moves_over_the_network_and_another_client_sees_it(ports):
     )  # the drive is off, so the springs have relaxed
 
 
-def test_a_client_at_another_rate_hears_nobody_and_spoils_nothing(ports):
+def test_a_client_at_another_rate_receives_nothing_and_disturbs_nothing(ports):
     with open_bus(ports["rfc2217"], baud=19200, parity="mark") as port:
         with pytest.raises(NoAnswer, match="check power, wiring, baud rate and address"):
             Bus(port, tries=2).node()

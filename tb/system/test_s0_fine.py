@@ -51,7 +51,7 @@ def test_moves_end_within_5_nm(stage):
         assert converter(stage) != ZERO_VOLT, "and the piezo holds"
 
 
-def test_it_stands_within_a_nanometre(stage):
+def test_it_holds_its_position_within_a_nanometre(stage):
     stage.dwell(0.2)
     true = stage.watch(X, 0.5)["true_nm"]
     assert true.std() <= 1 and abs(true.mean() - 1e5) <= BOUND_NM

@@ -76,12 +76,12 @@ def left_nm(stage, direction):
     return {target: stage.error_nm(target) for target in targets(direction)}
 
 
-def test_the_scale_is_as_wrong_as_it_was_made(table):
+def test_the_scale_has_the_error_that_was_set(table):
     assert max(map(abs, table.errors)) > 100 and abs(table.errors[0]) < NOISE_NM
 
 
 @pytest.mark.parametrize("direction", [1, -1])
-def test_straight_lines_leave_what_theory_says_in_both_directions(stage, table, direction):
+def test_straight_lines_leave_the_theoretical_error_in_both_directions(stage, table, direction):
     assert stage.segments.load(table, "linear").in_force == "linear"
     for target, left in left_nm(stage, direction).items():
         assert abs(left) <= CURVED_NM + NOISE_NM, f"{left:.1f} nm at {target} nm"

@@ -281,7 +281,7 @@ def test_limit_switch_stops_the_drive_and_lets_the_axis_leave(stage):
     assert not axis.status().faults
 
 
-def test_emergency_stop_takes_the_drive_at_once_and_holds_until_reset(stage):
+def test_the_emergency_stop_disables_the_drive_at_once_until_it_is_reset(stage):
     axis = fault_during_move(stage, "X", lambda: stage.twin.inject("estop", AXIS["X"]))
     stage.twin.run(1e-5)
     assert not stage.twin.truth(AXIS["X"]).enabled, "off within 10 us, whatever the soft core does"
@@ -310,7 +310,7 @@ def test_cut_cable_stops_both_drives(stage):
         axis.enable()
 
 
-def test_encoder_cut_is_a_fault_and_takes_the_zero_away(stage):
+def test_a_cut_encoder_is_a_fault_and_clears_the_zero(stage):
     axis = fault_during_move(stage, "Y", lambda: stage.twin.inject("encoder_cut", AXIS["Y"]))
     stage.dwell(0.01)
     assert_stopped_by(stage, "Y", "encoder")
@@ -333,7 +333,7 @@ def test_jammed_motor_is_a_following_error(stage):
     assert_position_survived(stage, "X")
 
 
-def test_drive_fault_pin_takes_the_drive(stage):
+def test_the_drive_fault_pin_disables_the_drive(stage):
     axis = fault_during_move(
         stage, "X", lambda: stage.twin.inject("drive_fault", AXIS["X"]), distance_nm=-0.2e6
     )
@@ -348,7 +348,7 @@ def test_drive_fault_pin_takes_the_drive(stage):
 # ------------------------------------------------------------------ the bus
 
 
-def test_nonsense_on_the_line_moves_nothing_and_the_next_command_works(stage):
+def test_nonsense_on_the_bus_moves_nothing_and_the_next_command_works(stage):
     axis = stage.axes["X"]
     before = steady_state(stage, "X")
     bad = axis.node.counters()
@@ -447,7 +447,7 @@ def test_unknown_command_and_wrong_length_are_refused_in_words(stage, monkeypatc
     stage.axes["X"].status()
 
 
-def test_address_of_nobody_is_said(stage):
+def test_an_address_without_a_node_is_reported(stage):
     with pytest.raises(NoAnswer, match="nobody answers at address 7"):
         stage.bus.node(7)
 

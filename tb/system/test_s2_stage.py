@@ -94,7 +94,7 @@ def test_without_a_scale_its_own_steps_are_the_position(stage):
 # ------------------------------------------------------------------ pulses from C++
 
 
-def test_pulses_at_random_ways_and_speeds_are_all_counted_through_every_overflow():
+def test_pulses_of_random_distances_and_speeds_are_all_counted_through_every_overflow():
     axes = figures_s2s3.counted(SEED, 200_000)
     assert len(axes) == 3
     for result in axes:

@@ -36,7 +36,7 @@ def home(motor, method, start_m=None):
     return motor.twin.truth().scale_counts - status.counts
 
 
-def test_searches_from_both_sides_of_the_mark_and_from_on_it_find_the_same_count():
+def test_searches_from_both_sides_of_the_mark_and_from_the_mark_find_the_same_count():
     source, motor = random.Random(SEED), s3_zero.Motor(SEED)
     made = [motor.search()]
     for side in (-1, 1) * 4 + (0,):
@@ -100,7 +100,7 @@ def test_a_search_without_a_mark_in_reach_ends_with_its_cause_and_the_axis_under
     assert abs(motor.position_um - before) < 2  # it is at rest
 
 
-def test_a_mark_that_is_stuck_is_no_zero(motor):
+def test_an_index_mark_that_is_stuck_is_no_zero(motor):
     with motor.twin.fault("z_stuck", 0, True):
         motor.carry(-0.5e-3)
         motor.axis.set_parameter("home_method", 34)

@@ -25,7 +25,7 @@ SEED = seed()
 NEAR_BY = 0.004  # of a turn: stations 0.7 degree apart
 
 
-def test_amid_trouble_and_through_a_power_cut_of_both_nodes_each_station_is_cut_once():
+def test_with_disturbances_and_a_power_cut_of_both_nodes_each_station_is_cut_once():
     print(f"SEED={SEED}")
     source = random.Random(SEED)
     with IndexingMachine(SEED, "frames", random_worm(source)) as machine:
@@ -83,7 +83,7 @@ def test_a_job_fails_beyond_the_tolerance_or_without_an_end():
     assert outcome_of().worst == math.inf
 
 
-def test_angles_are_apart_the_short_way_round():
+def test_the_difference_of_two_angles_is_the_shorter_one():
     assert apart(1, 1296000 - 1) == 2 and apart(1296000 - 1, 1) == -2 and apart(3600, 3599.5) == 0.5
 
 

@@ -140,7 +140,7 @@ def pulls(bench, party, side):
 def test_the_keyboard_serves_a_host_that_cuts_and_orders_at_will():
     bench, host = devices_bench(), Host(CLK_HZ, cut=0.02)
     keys = [random.randrange(1, 0x84) for _ in range(60)]
-    orders = {30_000: 0xEE, 50_000: 0xED, 70_000: 0x07}  # clk
+    orders = {30_000: 0xEE, 50_000: 0xED, 70_000: 0x07}  # by cycle
     bench.type(keys)
     for n in range(250 * CLK_HZ // 1000):
         if n in orders:
@@ -159,7 +159,7 @@ def test_the_keyboard_serves_a_host_that_cuts_and_orders_at_will():
     )
 
 
-def test_the_pc_asks_for_damaged_bytes_again_and_gets_its_answers():
+def test_the_pc_requests_damaged_bytes_again_and_gets_its_answers():
     bench, keyboard = devices_bench(computer_inhibits=50.0), Keyboard(CLK_HZ, damage=0.2)
     keys = [random.randrange(1, 0x84) for _ in range(60)]
     keyboard.outbox = list(keys)
@@ -256,7 +256,7 @@ def test_an_alarm_ends_a_cut_and_holds_the_next_back():
     assert [cut.complete for cut in bench.cuts] == [False, True]
 
 
-def test_a_machine_may_never_end_and_may_be_deaf():
+def test_a_cut_may_never_end_and_the_machine_may_ignore_its_keys():
     bench = devices_bench()
     with bench.fault("edm_endless"):
         cut_once(bench, 5 * CUT_S)

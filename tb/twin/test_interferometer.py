@@ -124,7 +124,7 @@ def test_noise_is_half_a_count_before_the_conversion():
     assert abs(numpy.corrcoef(codes.T)[0, 1]) < 0.03
 
 
-def test_sample_spikes_come_as_often_as_asked():
+def test_sample_spikes_come_at_the_given_rate():
     stage = Stage(**{**IDEAL, "signal_spike_share": 0.05})
     codes = numpy.array([stage.convert(0.0)[0] for _ in range(20000)])
     assert (

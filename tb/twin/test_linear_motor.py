@@ -71,8 +71,8 @@ def test_it_swings_on_flexure_and_cable_without_losing_energy():
     machine.trace(10_000)
     machine.run(6.0)
     trace = machine.take_trace()
-    rest = 40 * 3e-3 / 140
-    x, v = trace["position_m"] - rest, trace["velocity_m_s"]
+    equilibrium = 40 * 3e-3 / 140
+    x, v = trace["position_m"] - equilibrium, trace["velocity_m_s"]
     energy = 140 * x**2 / 2 + 1.2 * v**2 / 2
     assert numpy.abs(energy / energy[0] - 1).max() < 1e-3
     rises = trace["time_s"][1:][(x[:-1] < 0) & (x[1:] >= 0)]

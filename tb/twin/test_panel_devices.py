@@ -222,7 +222,7 @@ def test_events_wait_in_order_and_the_flag_stays_until_all_are_read(panel, maste
     assert master.send(KEYPAD, [INT_STAT, 1]) and read(master, INT_STAT) == 0
 
 
-def test_the_eleventh_event_is_lost_or_the_first_and_said_so(panel, master):
+def test_the_eleventh_event_or_the_first_is_lost_and_reported(panel, master):
     for cfg, first, last in ((0x01, 0x81, 0x01 + 4), (0x21, 0x01, 0x80 | 0x01 + 5)):
         set_up(master, cfg)
         for key in range(5):

@@ -52,7 +52,7 @@ def test_both_at_once_pull_the_line_low():
     assert line.take_received() == bytes([0x0F & 0x3C])
 
 
-def test_garbage_comes_as_often_as_asked_and_ends():
+def test_garbage_comes_at_the_given_rate_and_ends():
     line = PeerLineBench()
     line.garbage(10)
     for _ in range(20):

@@ -288,7 +288,7 @@ def test_a_node_without_power_is_silent_with_its_drive_off_and_it_restarts():
         assert axis.status().position_nm is not None and twin.bus().collisions == 0
 
 
-def test_surroundings_and_peers_that_are_not_there_are_refused():
+def test_devices_and_peers_that_do_not_exist_are_refused():
     with Twin(seed=1) as twin:
         with pytest.raises(LookupError, match="no node has devices"):
             twin.devices(0)

@@ -48,7 +48,7 @@ def test_a_small_loop_is_narrow_and_hardly_moves_the_branch():
     assert positions[3:] == pytest.approx(positions[1::-1], abs=1e-13)
 
 
-def test_it_creeps_by_its_share_in_each_decade_of_time():
+def test_it_creeps_by_its_fraction_in_each_decade_of_time():
     stage = fine_stage(**DAMPED)
     go(stage, 65535, 0.0)
     stage.run(0.1)

@@ -78,6 +78,6 @@ def test_the_index_lies_on_the_measured_scale():
     assert 1000 <= counts.min() < 1000.1 and 1000.9 < counts.max() <= 1001
 
 
-def test_a_ring_is_another_by_its_seed_and_the_same_again():
+def test_a_ring_depends_on_its_seed_only():
     assert (RotaryRing(1).measured(ANGLES) == RotaryRing(1).measured(ANGLES)).all()
     assert (RotaryRing(1).measured(ANGLES) != RotaryRing(2).measured(ANGLES)).any()

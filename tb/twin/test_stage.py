@@ -173,7 +173,7 @@ def push_both_ways(stage, newton):
     return ends[0] - ends[1]
 
 
-def test_the_backlash_is_as_wide_as_the_parameter_says():
+def test_the_backlash_equals_its_parameter():
     calm = {**SMOOTH, "table_viscous": 2000.0}
     for backlash in (0, 0.4e-6, 1e-6):
         stage = Stage(screw_preload=0, screw_backlash=backlash, **calm)
@@ -207,11 +207,11 @@ def test_the_table_rings_on_the_screw_with_its_natural_frequency_and_damping():
     stage.push(10)
     stage.bridge(0.1)
     stage.push(0)
-    rest, dt = 20e-3, p["time_step"]
+    equilibrium, dt = 20e-3, p["time_step"]
     trace = []
     for _ in range(1000):
         stage.bridge(dt)
-        trace.append(stage.state.position_m - rest)
+        trace.append(stage.state.position_m - equilibrium)
     rises = [
         n + trace[n] / (trace[n] - trace[n + 1])
         for n in range(len(trace) - 1)

@@ -60,7 +60,7 @@ def test_words_wait_until_they_are_taken(twin):
 
 
 @pytest.mark.parametrize("error", (-0.03, 0.03))
-def test_a_host_whose_baud_is_off_is_understood(error):
+def test_a_host_with_a_baud_rate_error_is_received(error):
     with Twin(seed=1, nodes=(1,), host_baud_error=error) as twin:
         twin.run_until_ready()
         assert poll(twin) == empty_reply(1)

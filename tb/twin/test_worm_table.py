@@ -56,7 +56,7 @@ def test_the_worm_has_its_periodic_errors():
     )
 
 
-def test_the_way_back_loses_the_backlash():
+def test_a_reversal_loses_the_backlash():
     machine = table(worm_error=0, worm_second_error=0, worm_wheel_error=0)
     up = go(machine, 2000)
     down = go(machine, -1000)
@@ -153,7 +153,7 @@ def test_the_angle_is_as_old_as_the_latency():
         assert (angle - then) / ARC_SECOND == pytest.approx(0, abs=0.05)
 
 
-def test_frames_are_dropped_and_damaged_as_often_as_asked():
+def test_frames_are_dropped_and_damaged_at_the_given_rate():
     machine = Machine("worm_table", clk_hz=1_000_000, sensor_dropped=0.1, sensor_corrupt=0.2)
     values, bad = readings(machine, 3.0)
     state = machine.state
@@ -186,6 +186,6 @@ def test_faults_of_the_sensor():
     assert machine.state.lost_steps == 800
 
 
-def test_each_machine_is_another_by_its_seed():
+def test_each_seed_makes_another_machine():
     angles = {Machine("worm_table", seed=seed).state.position_rad for seed in range(5)}
     assert len(angles) == 5
