@@ -116,7 +116,7 @@ struct Host {
     double rest = 0;  // us that it is held low after each byte
     bool clock_low = false, data_low = false;
     std::deque<uint8_t> orders;
-    std::vector<uint8_t> heard;
+    std::vector<uint8_t> received;
     int64_t eleventh = 0;
     uint64_t damaged = 0, unanswered = 0, cuts = 0;
     bool idle() const { return state == LISTEN && places == 0 && orders.empty(); }
@@ -181,7 +181,7 @@ struct Host {
         if (!whole)
             damaged++, orders.push_front(0xFE);
         else {
-            heard.push_back(byte);
+            received.push_back(byte);
             if (rest > 0) then(BEFORE_PULL, 60), pull_us = rest;
         }
     }
@@ -236,9 +236,9 @@ struct Judge {
     size_t seen = 0, place = 0;
     uint64_t wrong = 0, bytes = 0, injections = 0, answers = 0;
     bool border = true;
-    void judge(const std::vector<uint8_t>& heard) {
-        for (; seen < heard.size(); seen++) {
-            const uint8_t byte = heard[seen];
+    void judge(const std::vector<uint8_t>& received) {
+        for (; seen < received.size(); seen++) {
+            const uint8_t byte = received[seen];
             bytes++;
             if (byte == 0xFA || byte == 0xEE)
                 answers++;
