@@ -70,7 +70,7 @@ build/lint/%.ok: %.sv $(RTL) rtl/cpu/picorv32.vlt Makefile | $(SETUP)
 
 prove: $(SETUP)   ## the properties in the modules that carry any; K=part of a path
 	$(call say,proofs)
-	@$(PYTHON) tools/prove.py $(if $K,-k '$K') -j $(JOBS)
+	@$(PYTHON) -m tools.prove $(if $K,-k '$K') -j $(JOBS)
 
 LATE       := tables/commands.py tables/modules.py tables/readme_figures.py # read what others make
 GENERATORS := $(filter-out tables/__init__.py tables/made_files.py $(LATE),$(sort $(wildcard tables/*.py))) $(LATE)
