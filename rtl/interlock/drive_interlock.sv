@@ -52,7 +52,6 @@ module drive_interlock (
     output logic               block_down         // level: no negative command passes
 );
     // Of several causes in the same cycle, first_fault takes the lowest bit.
-    // Of several causes in the same cycle, first_fault takes the lowest bit.
     // made by tables/interlock_faults.py, not to be edited
     localparam [9:0] LATCH_ALWAYS = 10'b0011000100;  // estop, drive, cpu
     // end of the made constants
