@@ -87,7 +87,9 @@ module node #(
     wire select, write, node_select, bus_select, peripherals_select;
     wire [AXES-1:0] axis_select, feedback_select, actuator_select;
     wire [15:0] bus_address;
-    wire [31:0] wdata, rdata, node_rdata, bus_rdata, peripherals_rdata;
+    wire [31:0] wdata, wdata_low, rdata;
+    wire [31:0] memory_rdata, node_rdata, bus_rdata, peripherals_rdata;
+    wire registers_ready;
     wire [32*AXES-1:0] axis_rdata, feedback_rdata, actuator_rdata;
     wire [ 5:0] word = bus_address[7:2];
     // time
@@ -108,12 +110,27 @@ module node #(
     ) u_core (
         .clk,
         .rst,
+        .ready  (registers_ready),
         .select,
         .write,
         .address(bus_address),
         .wdata,
         .rdata,
         .trap
+    );
+    register_memory #(
+        .AXES    (AXES),
+        .HAS_SINE(HAS_SINE)
+    ) u_register_memory (
+        .clk,
+        .rst,
+        .select,
+        .write,
+        .address(bus_address[15:2]),
+        .wdata,
+        .ready  (registers_ready),
+        .rdata  (memory_rdata),
+        .wdata_low
     );
     register_bus #(
         .AXES(AXES)
@@ -123,7 +140,8 @@ module node #(
         .select,
         .address(bus_address),
         .rdata,
-        // answers of the blocks
+        // answers of the memory and the blocks
+        .memory_rdata,
         .node_rdata,
         .bus_rdata,
         .peripherals_rdata,
@@ -304,6 +322,7 @@ module node #(
             .write,
             .word,
             .wdata,
+            .wdata_low,
             .rdata          (axis_rdata[32*n+:32]),
             .feedback_rdata (feedback_rdata[32*n+:32]),
             .actuator_rdata (actuator_rdata[32*n+:32]),

@@ -3,6 +3,7 @@
 //
 // latency  1 cycle from select to rdata, and from a write to the new value
 // rate     one access per cycle
+// behaviour rdata has the live bits of a register only; register_memory answers with its settings.
 // source   tables/registers.rdl
 // model    tb/registers/register_block.py, equal in every bit of every cycle
 // made     by tables/registers.py, never by hand
@@ -17,7 +18,8 @@ module axis_registers #(
     input  wire                write,                           // level: it writes wdata
     input  wire         [ 5:0] word,                            // index of the word
     input  wire         [31:0] wdata,                           // value to write
-    output logic        [31:0] rdata,                           // value read; else 0
+    input  wire         [31:0] wdata_low,                       // low word, held by register_memory
+    output logic        [31:0] rdata,                           // live bits read; else 0
     output logic               control_enable,                  // requests the drive
     output logic               control_closed_loop,             // 1
     output logic               control_homing,                  // homing
@@ -104,9 +106,9 @@ module axis_registers #(
     logic        zero_crossing_up_held;
     logic        zero_crossing_down_held;
     logic [31:0] rejected_pulses_count;
+    wire  [32:0] rejected_pulses_next = {1'b0, rejected_pulses_count} + 33'(rejected_pulses);
     logic [31:0] rejected_samples_count;
-    logic [31:0] segment_velocity_low;
-    logic [31:0] segment_acceleration_low;
+    wire  [32:0] rejected_samples_next = {1'b0, rejected_samples_count} + 33'(rejected_samples);
 
     wire         get = select && !write;
     wire         put = select && write;
@@ -115,8 +117,6 @@ module axis_registers #(
         rdata <= '0;
         if (get) begin
             case (word)
-                6'h00: rdata <= {28'd0, control_fine, control_homing, control_closed_loop,
-                    control_enable};
                 6'h02: rdata <= {18'd0, state_fine_saturated, state_armed, state_queue_free,
                     state_saturated, state_moving, state_drive_fault, state_estop, state_limit_high,
                     state_limit_low, state_enabled};
@@ -125,48 +125,20 @@ module axis_registers #(
                 6'h05: rdata <= {22'd0, first_fault};
                 6'h06: rdata <= fault_position[31:0];
                 6'h07: rdata <= {{16{fault_position_high[15]}}, fault_position_high};
-                6'h08: rdata <= following_limit;
                 6'h0A: rdata <= position[31:0];
                 6'h0B: rdata <= {{16{position_high[15]}}, position_high};
                 6'h0C: rdata <= target[31:0];
                 6'h0D: rdata <= {{16{target_high[15]}}, target_high};
                 6'h0E: rdata <= velocity;
-                6'h0F: rdata <= shift_origin;
                 6'h10: rdata <= {30'd0, zero_crossing_down_held, zero_crossing_up_held};
-                6'h11: rdata <= {sensing_outlier_hold, sensing_outlier_step, sensing_deglitch};
-                6'h12: rdata <= {amplitude_window_high, amplitude_window_low};
-                6'h13: rdata <= {12'd0, disagreement_limit};
                 6'h14: rdata <= {sample_cos, sample_sin};
                 6'h15: rdata <= {phase_amplitude, phase_phase};
                 6'h16: rdata <= quadrature_count;
                 6'h17: rdata <= {26'd0, encoder_events_held};
-                6'h18: rdata <= {26'd0, encoder_fault_mask};
                 6'h19: rdata <= rejected_pulses_count;
                 6'h1A: rdata <= rejected_samples_count;
-                6'h20: rdata <= {8'd0, kp};
-                6'h21: rdata <= {8'd0, ki};
-                6'h22: rdata <= {8'd0, kd};
-                6'h23: rdata <= {8'd0, kv};
-                6'h24: rdata <= {8'd0, ka};
-                6'h25: rdata <= {2'd0, servo_limits_integral, servo_limits_output};
-                6'h26: rdata <= {16'd0, dead_band};
                 6'h27: rdata <= following_error;
                 6'h28: rdata <= {{16{command[15]}}, command};
-                6'h29: rdata <= {{16{open_command[15]}}, open_command};
-                6'h2A: rdata <= {23'd0, filters_address, filters_in_use};
-                6'h2B: rdata <= filter_coefficient;
-                6'h2C: rdata <= segment_velocity[31:0];
-                6'h2D: rdata <= segment_velocity[63:32];
-                6'h2E: rdata <= segment_acceleration[31:0];
-                6'h2F: rdata <= segment_acceleration[63:32];
-                6'h30: rdata <= segment_jerk;
-                6'h31: rdata <= {7'd0, segment_ticks_last, segment_ticks};
-                6'h32: rdata <= stop_deceleration;
-                6'h33: rdata <= stop_jerk;
-                6'h34: rdata <= {14'd0, feed_override_pause, feed_override_fraction};
-                6'h35: rdata <= feed_override_slope;
-                6'h36: rdata <= feed_override_curve;
-                6'h37: rdata <= start_at;
                 default: rdata <= '0;
             endcase
         end
@@ -186,35 +158,33 @@ module axis_registers #(
         if (put && word == 6'h08) following_limit <= wdata[31:0];
         shift_origin_written <= put && word == 6'h0F;
         if (put && word == 6'h0F) shift_origin <= wdata[31:0];
-        if (put && word == 6'h10 && wdata[0]) zero_crossing_up_held <= 1'b0;
-        if (zero_crossing_up) zero_crossing_up_held <= 1'b1;
-        if (put && word == 6'h10 && wdata[1]) zero_crossing_down_held <= 1'b0;
-        if (zero_crossing_down) zero_crossing_down_held <= 1'b1;
+        zero_crossing_up_held <= zero_crossing_up || (zero_crossing_up_held && !(put && word ==
+            6'h10 && wdata[0]));
+        zero_crossing_down_held <= zero_crossing_down || (zero_crossing_down_held && !(put && word
+            == 6'h10 && wdata[1]));
         if (put && word == 6'h11) sensing_deglitch <= wdata[15:0];
         if (HAS_SINE != 0 && put && word == 6'h11) sensing_outlier_step <= wdata[23:16];
         if (HAS_SINE != 0 && put && word == 6'h11) sensing_outlier_hold <= wdata[31:24];
         if (HAS_SINE != 0 && put && word == 6'h12) amplitude_window_low <= wdata[15:0];
         if (HAS_SINE != 0 && put && word == 6'h12) amplitude_window_high <= wdata[31:16];
         if (HAS_SINE != 0 && put && word == 6'h13) disagreement_limit <= wdata[19:0];
-        if (put && word == 6'h17 && wdata[0]) encoder_events_held[0] <= 1'b0;
-        if (encoder_events[0]) encoder_events_held[0] <= 1'b1;
-        if (put && word == 6'h17 && wdata[1]) encoder_events_held[1] <= 1'b0;
-        if (encoder_events[1]) encoder_events_held[1] <= 1'b1;
-        if (put && word == 6'h17 && wdata[2]) encoder_events_held[2] <= 1'b0;
-        if (encoder_events[2]) encoder_events_held[2] <= 1'b1;
-        if (put && word == 6'h17 && wdata[3]) encoder_events_held[3] <= 1'b0;
-        if (encoder_events[3]) encoder_events_held[3] <= 1'b1;
-        if (put && word == 6'h17 && wdata[4]) encoder_events_held[4] <= 1'b0;
-        if (encoder_events[4]) encoder_events_held[4] <= 1'b1;
-        if (put && word == 6'h17 && wdata[5]) encoder_events_held[5] <= 1'b0;
-        if (encoder_events[5]) encoder_events_held[5] <= 1'b1;
+        encoder_events_held[0] <= encoder_events[0] || (encoder_events_held[0] && !(put && word ==
+            6'h17 && wdata[0]));
+        encoder_events_held[1] <= encoder_events[1] || (encoder_events_held[1] && !(put && word ==
+            6'h17 && wdata[1]));
+        encoder_events_held[2] <= encoder_events[2] || (encoder_events_held[2] && !(put && word ==
+            6'h17 && wdata[2]));
+        encoder_events_held[3] <= encoder_events[3] || (encoder_events_held[3] && !(put && word ==
+            6'h17 && wdata[3]));
+        encoder_events_held[4] <= encoder_events[4] || (encoder_events_held[4] && !(put && word ==
+            6'h17 && wdata[4]));
+        encoder_events_held[5] <= encoder_events[5] || (encoder_events_held[5] && !(put && word ==
+            6'h17 && wdata[5]));
         if (put && word == 6'h18) encoder_fault_mask <= wdata[5:0];
         if (put && word == 6'h19) rejected_pulses_count <= 32'(rejected_pulses);
-        else if (!(&rejected_pulses_count))
-            rejected_pulses_count <= rejected_pulses_count + 32'(rejected_pulses);
+        else if (!rejected_pulses_next[32]) rejected_pulses_count <= rejected_pulses_next[31:0];
         if (put && word == 6'h1A) rejected_samples_count <= 32'(rejected_samples);
-        else if (!(&rejected_samples_count))
-            rejected_samples_count <= rejected_samples_count + 32'(rejected_samples);
+        else if (!rejected_samples_next[32]) rejected_samples_count <= rejected_samples_next[31:0];
         kp_written <= put && word == 6'h20;
         if (put && word == 6'h20) kp <= wdata[23:0];
         if (put && word == 6'h21) ki <= wdata[23:0];
@@ -232,10 +202,8 @@ module axis_registers #(
         if (put && word == 6'h2A) filters_address <= wdata[8:4];
         filter_coefficient_written <= put && word == 6'h2B;
         if (put && word == 6'h2B) filter_coefficient <= wdata[31:0];
-        if (put && word == 6'h2C) segment_velocity_low <= wdata;
-        if (put && word == 6'h2D) segment_velocity <= {wdata, segment_velocity_low};
-        if (put && word == 6'h2E) segment_acceleration_low <= wdata;
-        if (put && word == 6'h2F) segment_acceleration <= {wdata, segment_acceleration_low};
+        if (put && word == 6'h2D) segment_velocity <= {wdata, wdata_low};
+        if (put && word == 6'h2F) segment_acceleration <= {wdata, wdata_low};
         if (put && word == 6'h30) segment_jerk <= wdata[31:0];
         segment_ticks_written <= put && word == 6'h31;
         if (put && word == 6'h31) segment_ticks <= wdata[23:0];
@@ -299,9 +267,7 @@ module axis_registers #(
             filters_address <= 5'h00;
             filter_coefficient_written <= 1'b0;
             filter_coefficient <= 32'h00000000;
-            segment_velocity_low <= '0;
             segment_velocity <= 64'h0000000000000000;
-            segment_acceleration_low <= '0;
             segment_acceleration <= 64'h0000000000000000;
             segment_jerk <= 32'h00000000;
             segment_ticks_written <= 1'b0;

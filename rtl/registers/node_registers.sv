@@ -3,6 +3,7 @@
 //
 // latency  1 cycle from select to rdata, and from a write to the new value
 // rate     one access per cycle
+// behaviour rdata has the live bits of a register only; register_memory answers with its settings.
 // source   tables/registers.rdl
 // model    tb/registers/register_block.py, equal in every bit of every cycle
 // made     by tables/registers.py, never by hand
@@ -15,7 +16,7 @@ module node_registers (
     input  wire         write,              // level: it writes wdata
     input  wire  [ 5:0] word,               // index of the word
     input  wire  [31:0] wdata,              // value to write
-    output logic [31:0] rdata,              // value read; else 0
+    output logic [31:0] rdata,              // live bits read; else 0
     input  wire  [31:0] clk_hz,             // frequency of clk [Hz]
     input  wire  [ 3:0] build_axes,         // what is built: axes
     input  wire  [ 3:0] build_address,      // what is built: address
@@ -44,8 +45,6 @@ module node_registers (
                 6'h02: rdata <= {16'd0, build_memory, build_address, build_axes};
                 6'h04: rdata <= time_stamp[31:0];
                 6'h05: rdata <= time_stamp_high;
-                6'h06: rdata <= {8'd0, tick_period};
-                6'h07: rdata <= {16'd0, sample_period};
                 default: rdata <= '0;
             endcase
         end

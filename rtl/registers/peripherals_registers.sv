@@ -4,6 +4,7 @@
 //
 // latency  1 cycle from select to rdata, and from a write to the new value
 // rate     one access per cycle
+// behaviour rdata has the live bits of a register only; register_memory answers with its settings.
 // source   tables/registers.rdl
 // model    tb/registers/register_block.py, equal in every bit of every cycle
 // made     by tables/registers.py, never by hand
@@ -16,7 +17,7 @@ module peripherals_registers (
     input  wire         write,                         // level: it writes wdata
     input  wire  [ 5:0] word,                          // index of the word
     input  wire  [31:0] wdata,                         // value to write
-    output logic [31:0] rdata,                         // value read; else 0
+    output logic [31:0] rdata,                         // live bits read; else 0
     input  wire         built_i2c,                     // which peripherals are built
     input  wire         built_ps2,                     // which peripherals are built
     input  wire         built_peer,                    // which peripherals are built
@@ -83,22 +84,35 @@ module peripherals_registers (
     input  wire         edm_status_fell_1              // strobe: input 1 went low
 );
     logic [15:0] ps2_typed_count;
-    logic [ 7:0] ps2_errors_keyboard_damaged_count;
-    logic [ 7:0] ps2_errors_command_damaged_count;
-    logic [ 7:0] ps2_errors_unsent_count;
-    logic [ 7:0] ps2_errors_aborted_count;
-    logic [ 7:0] ps2_glitches_count;
-    logic [ 7:0] peer_errors_framing_count;
-    logic [ 7:0] peer_errors_overruns_count;
+    wire [16:0] ps2_typed_next = {1'b0, ps2_typed_count} + 17'(ps2_typed);
+    logic [7:0] ps2_errors_keyboard_damaged_count;
+    wire [8:0] ps2_errors_keyboard_damaged_next = {1'b0, ps2_errors_keyboard_damaged_count} +
+        9'(ps2_errors_keyboard_damaged);
+    logic [7:0] ps2_errors_command_damaged_count;
+    wire [8:0] ps2_errors_command_damaged_next = {1'b0, ps2_errors_command_damaged_count} +
+        9'(ps2_errors_command_damaged);
+    logic [7:0] ps2_errors_unsent_count;
+    wire [8:0] ps2_errors_unsent_next = {1'b0, ps2_errors_unsent_count} + 9'(ps2_errors_unsent);
+    logic [7:0] ps2_errors_aborted_count;
+    wire [8:0] ps2_errors_aborted_next = {1'b0, ps2_errors_aborted_count} + 9'(ps2_errors_aborted);
+    logic [7:0] ps2_glitches_count;
+    wire [8:0] ps2_glitches_next = {1'b0, ps2_glitches_count} + 9'(ps2_glitches);
+    logic [7:0] peer_errors_framing_count;
+    wire [8:0] peer_errors_framing_next = {1'b0, peer_errors_framing_count} +
+        9'(peer_errors_framing);
+    logic [7:0] peer_errors_overruns_count;
+    wire [8:0] peer_errors_overruns_next = {1'b0, peer_errors_overruns_count} +
+        9'(peer_errors_overruns);
     logic [31:0] sensor_reading_high;
     logic [15:0] sensor_frames_count;
-    logic        edm_status_rose_0_held;
-    logic        edm_status_rose_1_held;
-    logic        edm_status_fell_0_held;
-    logic        edm_status_fell_1_held;
+    wire [16:0] sensor_frames_next = {1'b0, sensor_frames_count} + 17'(sensor_frames);
+    logic edm_status_rose_0_held;
+    logic edm_status_rose_1_held;
+    logic edm_status_fell_0_held;
+    logic edm_status_fell_1_held;
 
-    wire         get = select && !write;
-    wire         put = select && write;
+    wire get = select && !write;
+    wire put = select && write;
 
     assign i2c_answer_read = get && word == 6'h02;
     assign peer_receive_read = get && word == 6'h0B;
@@ -112,19 +126,14 @@ module peripherals_registers (
                 6'h02: rdata <= {21'd0, i2c_answer_present, i2c_answer_result, i2c_answer_data};
                 6'h03: rdata <= {20'd0, i2c_state_sda, i2c_state_scl, i2c_state_owned,
                     i2c_state_busy, i2c_state_free};
-                6'h04: rdata <= {16'd0, ps2_idle};
                 6'h06: rdata <= {24'd0, ps2_state_busy, ps2_state_injecting, ps2_state_free};
                 6'h07: rdata <= {16'd0, ps2_typed_count};
                 6'h08: rdata <= {ps2_errors_aborted_count, ps2_errors_unsent_count,
                     ps2_errors_command_damaged_count, ps2_errors_keyboard_damaged_count};
                 6'h09: rdata <= {24'd0, ps2_glitches_count};
-                6'h0A: rdata <= {12'd0, peer_bit_time};
                 6'h0B: rdata <= {23'd0, peer_receive_present, peer_receive_data};
                 6'h0D: rdata <= {24'd0, peer_state_sending, peer_state_transmit_free};
                 6'h0E: rdata <= {16'd0, peer_errors_overruns_count, peer_errors_framing_count};
-                6'h0F: rdata <= {12'd0, sensor_bit_time};
-                6'h10: rdata <= {8'd0, sensor_gap};
-                6'h11: rdata <= sensor_stale_after;
                 6'h12: rdata <= sensor_reading[31:0];
                 6'h13: rdata <= sensor_reading_high;
                 6'h14: rdata <= {23'd0, sensor_state_stale, sensor_state_sequence_number};
@@ -132,7 +141,6 @@ module peripherals_registers (
                     sensor_errors_crc};
                 6'h16: rdata <= {16'd0, sensor_frames_count};
                 6'h18: rdata <= {26'd0, display_state_sending, display_state_free};
-                6'h19: rdata <= {16'd0, edm_filter};
                 6'h1A: rdata <= {26'd0, edm_status_fell_1_held, edm_status_fell_0_held,
                     edm_status_rose_1_held, edm_status_rose_0_held, edm_status_inputs};
                 default: rdata <= '0;
@@ -150,53 +158,48 @@ module peripherals_registers (
         if (put && word == 6'h05) ps2_inject_last <= wdata[8];
         ps2_state_drop <= put && word == 6'h06 && wdata[8];
         if (put && word == 6'h07) ps2_typed_count <= 16'(ps2_typed);
-        else if (!(&ps2_typed_count)) ps2_typed_count <= ps2_typed_count + 16'(ps2_typed);
+        else if (!ps2_typed_next[16]) ps2_typed_count <= ps2_typed_next[15:0];
         if (put && word == 6'h08)
             ps2_errors_keyboard_damaged_count <= 8'(ps2_errors_keyboard_damaged);
-        else if (!(&ps2_errors_keyboard_damaged_count))
-            ps2_errors_keyboard_damaged_count <= ps2_errors_keyboard_damaged_count +
-                8'(ps2_errors_keyboard_damaged);
+        else if (!ps2_errors_keyboard_damaged_next[8])
+            ps2_errors_keyboard_damaged_count <= ps2_errors_keyboard_damaged_next[7:0];
         if (put && word == 6'h08)
             ps2_errors_command_damaged_count <= 8'(ps2_errors_command_damaged);
-        else if (!(&ps2_errors_command_damaged_count))
-            ps2_errors_command_damaged_count <= ps2_errors_command_damaged_count +
-                8'(ps2_errors_command_damaged);
+        else if (!ps2_errors_command_damaged_next[8])
+            ps2_errors_command_damaged_count <= ps2_errors_command_damaged_next[7:0];
         if (put && word == 6'h08) ps2_errors_unsent_count <= 8'(ps2_errors_unsent);
-        else if (!(&ps2_errors_unsent_count))
-            ps2_errors_unsent_count <= ps2_errors_unsent_count + 8'(ps2_errors_unsent);
+        else if (!ps2_errors_unsent_next[8]) ps2_errors_unsent_count <= ps2_errors_unsent_next[7:0];
         if (put && word == 6'h08) ps2_errors_aborted_count <= 8'(ps2_errors_aborted);
-        else if (!(&ps2_errors_aborted_count))
-            ps2_errors_aborted_count <= ps2_errors_aborted_count + 8'(ps2_errors_aborted);
+        else if (!ps2_errors_aborted_next[8])
+            ps2_errors_aborted_count <= ps2_errors_aborted_next[7:0];
         if (put && word == 6'h09) ps2_glitches_count <= 8'(ps2_glitches);
-        else if (!(&ps2_glitches_count))
-            ps2_glitches_count <= ps2_glitches_count + 8'(ps2_glitches);
+        else if (!ps2_glitches_next[8]) ps2_glitches_count <= ps2_glitches_next[7:0];
         if (put && word == 6'h0A) peer_bit_time <= wdata[19:0];
         peer_transmit_written <= put && word == 6'h0C;
         if (put && word == 6'h0C) peer_transmit <= wdata[7:0];
         if (put && word == 6'h0E) peer_errors_framing_count <= 8'(peer_errors_framing);
-        else if (!(&peer_errors_framing_count))
-            peer_errors_framing_count <= peer_errors_framing_count + 8'(peer_errors_framing);
+        else if (!peer_errors_framing_next[8])
+            peer_errors_framing_count <= peer_errors_framing_next[7:0];
         if (put && word == 6'h0E) peer_errors_overruns_count <= 8'(peer_errors_overruns);
-        else if (!(&peer_errors_overruns_count))
-            peer_errors_overruns_count <= peer_errors_overruns_count + 8'(peer_errors_overruns);
+        else if (!peer_errors_overruns_next[8])
+            peer_errors_overruns_count <= peer_errors_overruns_next[7:0];
         if (put && word == 6'h0F) sensor_bit_time <= wdata[19:0];
         if (put && word == 6'h10) sensor_gap <= wdata[23:0];
         if (put && word == 6'h11) sensor_stale_after <= wdata[31:0];
         sensor_errors_clear <= put && word == 6'h15 && wdata[24];
         if (put && word == 6'h16) sensor_frames_count <= 16'(sensor_frames);
-        else if (!(&sensor_frames_count))
-            sensor_frames_count <= sensor_frames_count + 16'(sensor_frames);
+        else if (!sensor_frames_next[16]) sensor_frames_count <= sensor_frames_next[15:0];
         display_written <= put && word == 6'h17;
         if (put && word == 6'h17) display <= wdata[15:0];
         if (put && word == 6'h19) edm_filter <= wdata[15:0];
-        if (put && word == 6'h1A && wdata[2]) edm_status_rose_0_held <= 1'b0;
-        if (edm_status_rose_0) edm_status_rose_0_held <= 1'b1;
-        if (put && word == 6'h1A && wdata[3]) edm_status_rose_1_held <= 1'b0;
-        if (edm_status_rose_1) edm_status_rose_1_held <= 1'b1;
-        if (put && word == 6'h1A && wdata[4]) edm_status_fell_0_held <= 1'b0;
-        if (edm_status_fell_0) edm_status_fell_0_held <= 1'b1;
-        if (put && word == 6'h1A && wdata[5]) edm_status_fell_1_held <= 1'b0;
-        if (edm_status_fell_1) edm_status_fell_1_held <= 1'b1;
+        edm_status_rose_0_held <= edm_status_rose_0 || (edm_status_rose_0_held && !(put && word ==
+            6'h1A && wdata[2]));
+        edm_status_rose_1_held <= edm_status_rose_1 || (edm_status_rose_1_held && !(put && word ==
+            6'h1A && wdata[3]));
+        edm_status_fell_0_held <= edm_status_fell_0 || (edm_status_fell_0_held && !(put && word ==
+            6'h1A && wdata[4]));
+        edm_status_fell_1_held <= edm_status_fell_1 || (edm_status_fell_1_held && !(put && word ==
+            6'h1A && wdata[5]));
 
         if (rst) begin
             rdata <= '0;

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+// register_memory -- holds the settings of all register blocks for reading back, and the low word of
+// a setting of 64 bits until its high word is written.
+//
+// latency   1 cycle from select to rdata and to wdata_low; 2048 cycles from the end of rst to ready
+// rate      one access every 2 cycles
+// behaviour After rst each setting gets its first value, one word per cycle; until ready is high
+//           there must be no access. A write of a low word changes wdata_low only; the write of the
+//           high word stores both. There is one wdata_low for all blocks.
+// source    register_layout: the layout of the memory, the bits of each setting, the first values
+// model     tb/registers/register_memory.py, equal in every bit of every cycle
+// proved    rdata is what the last write stored at its word, else the first value. The two words of
+//           a setting of 64 bits change in two cycles that follow each other, and rdata never shows
+//           one without the other.
+// proof     depth 6
+`default_nettype none
+
+module register_memory #(
+    parameter int AXES     = 1,  // axes of the node, 1 to 8
+    parameter int HAS_SINE = 1   // 0: settings of sine and cosine read 0
+) (
+    input  wire         clk,
+    input  wire         rst,
+    input  wire         select,     // strobe: an access to any block
+    input  wire         write,      // level: it writes wdata
+    input  wire  [13:0] address,    // word of the register map
+    input  wire  [31:0] wdata,      // value to write
+    output logic        ready,      // level: the settings have their first values
+    output logic [31:0] rdata,      // settings in the word read last; its other bits are 0
+    output logic [31:0] wdata_low   // low word that waits for its high word
+);
+    localparam int W = $clog2(3 + 3 * AXES) + 6;  // bits of a place in the memory
+
+    logic [31:0] memory[0:2**W-1];
+    logic [11:0] count;  // words that have their first value
+    logic commit;  // the low word is stored in this cycle
+    logic [W-1:0] low_place;
+
+    wire [W-1:0] place;
+    wire [31:0] kept, first;
+    wire low, high;
+    wire put = select && write;
+
+    assign ready = count[11];
+
+    register_layout #(
+        .AXES    (AXES),
+        .HAS_SINE(HAS_SINE)
+    ) u_layout (
+        .address(ready ? address : {3'd0, count[10:0]}),
+        .wdata,
+        .place,
+        .kept,
+        .first,
+        .low,
+        .high
+    );
+
+    wire store = !ready || commit || (put && !low);
+    wire [W-1:0] store_place = commit ? low_place : place;
+    wire [31:0] stored = !ready ? first : commit ? wdata_low : kept;
+
+    always_ff @(posedge clk) begin
+        if (store) memory[store_place] <= stored;
+        if (select && !write) rdata <= memory[place];
+    end
+
+    always_ff @(posedge clk) begin
+        if (!ready) count <= count + 12'd1;
+        if (put && low) wdata_low <= wdata;
+        commit    <= put && high;
+        low_place <= {place[W-1:1], 1'b0};
+        if (rst) begin
+            count  <= '0;
+            commit <= 1'b0;
+        end
+    end
+endmodule
+
+`default_nettype wire
