@@ -94,6 +94,23 @@ class Field:
 
 
 @dataclass(frozen=True)
+class Answer:
+    """One word of a register on rdata: its value, and the sign that fills so many bits above."""
+
+    name: str
+    word: int
+    value: str
+    fill: int
+    sign: str
+
+
+def above(parts: list[str], zeros: int) -> str:
+    """A word of these parts, the lowest first, below so many zeros."""
+    parts = [*parts, f"{zeros}'d0"] if zeros else parts
+    return parts[0] if len(parts) == 1 else "{" + ", ".join(parts[::-1]) + "}"
+
+
+@dataclass(frozen=True)
 class Register:
     name: str
     offset: int
@@ -128,34 +145,31 @@ class Register:
         """The settings that are read back from the register memory."""
         return tuple(f for f in self.fields if "r" in f.access and f.kind == "setting")
 
-    def parts(self, constant: int) -> list[str]:
-        """What is on rdata for this register of 32 bits, most significant bit first."""
-        readable = self.live
+    def answers(self, constant: int) -> list[Answer]:
+        """What the block itself answers to a read of each word."""
+        if not self.live:
+            return []
+        f = self.live[0]
         if self.vector:
-            return [f"{32 - len(readable)}'d0", readable[0].state.partition("[")[0]]
+            held = f.state.partition("[")[0]
+            return [Answer(self.name, self.word, above([held], 32 - len(self.live)), 0, "")]
+        if self.wide:
+            high, rest = f"{f.port}_high", 64 - f.width
+            sign = f"{high}[{f.width - 33}]" if f.signed and rest else ""
+            return [
+                Answer(self.name, self.word, f"{f.port}[31:0]", 0, ""),
+                Answer(f"{self.name}_high", self.word + 1, above([high], rest), rest, sign),
+            ]
         parts: list[str] = []
         at = 0
-        for f in readable:
+        for f in self.live:
             if f.low > at:
                 parts.append(f"{f.low - at}'d0")
             parts.append(f"32'h{constant:08X}" if f.kind == "constant" else f.state)
             at = f.low + f.width
-        if at < 32:
-            extended = len(self.fields) == 1 and readable[0].signed
-            parts.append(f"{{{32 - at}{{{parts[0]}[{at - 1}]}}}}" if extended else f"{32 - at}'d0")
-        return parts[::-1]
-
-    def shown(self, constant: int) -> str:
-        parts = self.parts(constant)
-        return parts[0] if len(parts) == 1 else "{" + ", ".join(parts) + "}"
-
-    @property
-    def shown_high(self) -> str:
-        """What is on rdata for the high word of a register of 64 bits."""
-        f = self.fields[0]
-        top, sign = f"{f.port}_high", f"{f.port}_high[{f.width - 33}]"
-        pad = f"{{{64 - f.width}{{{sign if f.signed else chr(49) + chr(39) + 'b0'}}}}}"
-        return top if f.width == 64 else f"{{{pad}, {top}}}"
+        extended = len(self.fields) == 1 and f.signed and at < 32
+        sign = f"{f.state}[{at - 1}]" if extended else ""
+        return [Answer(self.name, self.word, above(parts, 32 - at), 32 - at, sign)]
 
 
 @dataclass(frozen=True)
@@ -171,6 +185,14 @@ class Block:
     def fields(self) -> list[tuple[Register, Field]]:
         return [(r, f) for r in self.registers for f in r.fields]
 
+    def answers(self, constant: int) -> list[Answer]:
+        return [a for r in self.registers for a in r.answers(constant)]
+
+    def signs(self, constant: int) -> dict[int, list[Answer]]:
+        """The answers with a sign, by the number of bits that it fills."""
+        signed = [a for a in self.answers(constant) if a.sign]
+        return {n: [a for a in signed if a.fill == n] for n in sorted({a.fill for a in signed})}
+
     @property
     def parameters(self) -> list[str]:
         return sorted({f.needs for _, f in self.fields if f.needs})
@@ -184,7 +206,7 @@ class Block:
         """The lowest bit of wdata that no register of this block has; all above are unused too."""
         taken = ("setting", "pulse", "sticky")
         fields = [(r, f) for r, f in self.fields if f.kind in taken]
-        return max((32 if r.wide else f.low + f.width for r, f in fields), default=0)
+        return max((f.low + f.width - 32 * r.wide for r, f in fields), default=0)
 
     @property
     def ports(self) -> list[Fitted]:

@@ -41,20 +41,29 @@ module actuator_registers (
     output logic        [14:0] fine_limit,                 // largest |command| of the fine stage
     input  wire signed  [15:0] fine_command                // command of the fine stage
 );
+    logic get_drive;
+    logic get_steps;
+    logic get_fine_command;
 
-    wire get = select && !write;
-    wire put = select && write;
+    wire  get = select && !write;
+    wire  put = select && write;
+
+    // no register of this block has these bits
+    wire  unused = &{1'b0, wdata[31:28]};
+
+    // words read in the cycle before
+    always_comb begin
+        rdata = '0;
+        rdata |= {32{get_drive}} & {26'd0, drive_built, 2'd0};
+        rdata |= {32{get_steps}} & steps;
+        rdata |= {32{get_fine_command}} & {16'd0, fine_command};
+        if ((get_fine_command && fine_command[15])) rdata[31:16] = '1;
+    end
 
     always_ff @(posedge clk) begin
-        rdata <= '0;
-        if (get) begin
-            case (word)
-                6'h00: rdata <= {26'd0, drive_built, 2'd0};
-                6'h08: rdata <= steps;
-                6'h0F: rdata <= {{16{fine_command[15]}}, fine_command};
-                default: rdata <= '0;
-            endcase
-        end
+        get_drive <= get && word == 6'h00;
+        get_steps <= get && word == 6'h08;
+        get_fine_command <= get && word == 6'h0F;
 
         if (put && word == 6'h00) drive_kind <= wdata[1:0];
         if (put && word == 6'h01) pwm_period <= wdata[15:0];
@@ -76,7 +85,9 @@ module actuator_registers (
         if (put && word == 6'h0E) fine_limit <= wdata[14:0];
 
         if (rst) begin
-            rdata <= '0;
+            get_drive <= 1'b0;
+            get_steps <= 1'b0;
+            get_fine_command <= 1'b0;
             drive_kind <= 2'h0;
             pwm_period <= 16'h0000;
             step_pulse_high <= 14'h0001;

@@ -109,42 +109,85 @@ module axis_registers #(
     wire  [32:0] rejected_pulses_next = {1'b0, rejected_pulses_count} + 33'(rejected_pulses);
     logic [31:0] rejected_samples_count;
     wire  [32:0] rejected_samples_next = {1'b0, rejected_samples_count} + 33'(rejected_samples);
+    logic        get_state;
+    logic        get_faults;
+    logic        get_causes_now;
+    logic        get_first_fault;
+    logic        get_fault_position;
+    logic        get_fault_position_high;
+    logic        get_position;
+    logic        get_position_high;
+    logic        get_target;
+    logic        get_target_high;
+    logic        get_velocity;
+    logic        get_zero_crossing;
+    logic        get_sample;
+    logic        get_phase;
+    logic        get_quadrature_count;
+    logic        get_encoder_events;
+    logic        get_rejected_pulses;
+    logic        get_rejected_samples;
+    logic        get_following_error;
+    logic        get_command;
 
     wire         get = select && !write;
     wire         put = select && write;
 
+    // words read in the cycle before
+    always_comb begin
+        rdata = '0;
+        rdata |= {32{get_state}} & {18'd0, state_fine_saturated, state_armed, state_queue_free,
+            state_saturated, state_moving, state_drive_fault, state_estop, state_limit_high,
+            state_limit_low, state_enabled};
+        rdata |= {32{get_faults}} & {22'd0, faults};
+        rdata |= {32{get_causes_now}} & {22'd0, causes_now};
+        rdata |= {32{get_first_fault}} & {22'd0, first_fault};
+        rdata |= {32{get_fault_position}} & fault_position[31:0];
+        rdata |= {32{get_fault_position_high}} & {16'd0, fault_position_high};
+        rdata |= {32{get_position}} & position[31:0];
+        rdata |= {32{get_position_high}} & {16'd0, position_high};
+        rdata |= {32{get_target}} & target[31:0];
+        rdata |= {32{get_target_high}} & {16'd0, target_high};
+        rdata |= {32{get_velocity}} & velocity;
+        rdata |= {32{get_zero_crossing}} & {30'd0, zero_crossing_down_held, zero_crossing_up_held};
+        rdata |= {32{get_sample}} & {sample_cos, sample_sin};
+        rdata |= {32{get_phase}} & {phase_amplitude, phase_phase};
+        rdata |= {32{get_quadrature_count}} & quadrature_count;
+        rdata |= {32{get_encoder_events}} & {26'd0, encoder_events_held};
+        rdata |= {32{get_rejected_pulses}} & rejected_pulses_count;
+        rdata |= {32{get_rejected_samples}} & rejected_samples_count;
+        rdata |= {32{get_following_error}} & following_error;
+        rdata |= {32{get_command}} & {16'd0, command};
+        if ((get_fault_position_high && fault_position_high[15]) || (get_position_high &&
+            position_high[15]) || (get_target_high && target_high[15]) || (get_command &&
+            command[15]))
+            rdata[31:16] = '1;
+    end
+
     always_ff @(posedge clk) begin
-        rdata <= '0;
-        if (get) begin
-            case (word)
-                6'h02: rdata <= {18'd0, state_fine_saturated, state_armed, state_queue_free,
-                    state_saturated, state_moving, state_drive_fault, state_estop, state_limit_high,
-                    state_limit_low, state_enabled};
-                6'h03: rdata <= {22'd0, faults};
-                6'h04: rdata <= {22'd0, causes_now};
-                6'h05: rdata <= {22'd0, first_fault};
-                6'h06: rdata <= fault_position[31:0];
-                6'h07: rdata <= {{16{fault_position_high[15]}}, fault_position_high};
-                6'h0A: rdata <= position[31:0];
-                6'h0B: rdata <= {{16{position_high[15]}}, position_high};
-                6'h0C: rdata <= target[31:0];
-                6'h0D: rdata <= {{16{target_high[15]}}, target_high};
-                6'h0E: rdata <= velocity;
-                6'h10: rdata <= {30'd0, zero_crossing_down_held, zero_crossing_up_held};
-                6'h14: rdata <= {sample_cos, sample_sin};
-                6'h15: rdata <= {phase_amplitude, phase_phase};
-                6'h16: rdata <= quadrature_count;
-                6'h17: rdata <= {26'd0, encoder_events_held};
-                6'h19: rdata <= rejected_pulses_count;
-                6'h1A: rdata <= rejected_samples_count;
-                6'h27: rdata <= following_error;
-                6'h28: rdata <= {{16{command[15]}}, command};
-                default: rdata <= '0;
-            endcase
-        end
-        if (get && word == 6'h06) fault_position_high <= fault_position[47:32];
-        if (get && word == 6'h0A) position_high <= position[47:32];
-        if (get && word == 6'h0C) target_high <= target[47:32];
+        get_state <= get && word == 6'h02;
+        get_faults <= get && word == 6'h03;
+        get_causes_now <= get && word == 6'h04;
+        get_first_fault <= get && word == 6'h05;
+        get_fault_position <= get && word == 6'h06;
+        get_fault_position_high <= get && word == 6'h07;
+        get_position <= get && word == 6'h0A;
+        get_position_high <= get && word == 6'h0B;
+        get_target <= get && word == 6'h0C;
+        get_target_high <= get && word == 6'h0D;
+        get_velocity <= get && word == 6'h0E;
+        get_zero_crossing <= get && word == 6'h10;
+        get_sample <= get && word == 6'h14;
+        get_phase <= get && word == 6'h15;
+        get_quadrature_count <= get && word == 6'h16;
+        get_encoder_events <= get && word == 6'h17;
+        get_rejected_pulses <= get && word == 6'h19;
+        get_rejected_samples <= get && word == 6'h1A;
+        get_following_error <= get && word == 6'h27;
+        get_command <= get && word == 6'h28;
+        if (get_fault_position) fault_position_high <= fault_position[47:32];
+        if (get_position) position_high <= position[47:32];
+        if (get_target) target_high <= target[47:32];
 
         if (put && word == 6'h00) control_enable <= wdata[0];
         if (put && word == 6'h00) control_closed_loop <= wdata[1];
@@ -217,7 +260,26 @@ module axis_registers #(
         if (put && word == 6'h37) start_at <= wdata[31:0];
 
         if (rst) begin
-            rdata <= '0;
+            get_state <= 1'b0;
+            get_faults <= 1'b0;
+            get_causes_now <= 1'b0;
+            get_first_fault <= 1'b0;
+            get_fault_position <= 1'b0;
+            get_fault_position_high <= 1'b0;
+            get_position <= 1'b0;
+            get_position_high <= 1'b0;
+            get_target <= 1'b0;
+            get_target_high <= 1'b0;
+            get_velocity <= 1'b0;
+            get_zero_crossing <= 1'b0;
+            get_sample <= 1'b0;
+            get_phase <= 1'b0;
+            get_quadrature_count <= 1'b0;
+            get_encoder_events <= 1'b0;
+            get_rejected_pulses <= 1'b0;
+            get_rejected_samples <= 1'b0;
+            get_following_error <= 1'b0;
+            get_command <= 1'b0;
             control_enable <= 1'b0;
             control_closed_loop <= 1'b0;
             control_homing <= 1'b0;

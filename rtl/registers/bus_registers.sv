@@ -60,34 +60,54 @@ module bus_registers (
     wire  [32:0] transmit_timeouts_next = {1'b0, transmit_timeouts_count} + 33'(transmit_timeouts);
     logic [31:0] syncs_count;
     wire  [32:0] syncs_next = {1'b0, syncs_count} + 33'(syncs);
+    logic        get_receive;
+    logic        get_state;
+    logic        get_frames_good;
+    logic        get_frames_bad;
+    logic        get_framing_errors;
+    logic        get_start_glitches;
+    logic        get_overruns;
+    logic        get_crc;
+    logic        get_breaks;
+    logic        get_transmit_timeouts;
+    logic        get_syncs;
 
     wire         get = select && !write;
     wire         put = select && write;
 
     // no register of this block has these bits
     wire         unused = &{1'b0, wdata[31:20]};
+    assign receive_read = get_receive;
 
-    assign receive_read = get && word == 6'h01;
+    // words read in the cycle before
+    always_comb begin
+        rdata = '0;
+        rdata |= {32{get_receive}} & {21'd0, receive_present, receive_good, receive_command,
+            receive_data};
+        rdata |= {32{get_state}} & {23'd0, state_sending, state_transmit_free};
+        rdata |= {32{get_frames_good}} & frames_good_count;
+        rdata |= {32{get_frames_bad}} & frames_bad_count;
+        rdata |= {32{get_framing_errors}} & framing_errors_count;
+        rdata |= {32{get_start_glitches}} & start_glitches_count;
+        rdata |= {32{get_overruns}} & overruns_count;
+        rdata |= {32{get_crc}} & crc;
+        rdata |= {32{get_breaks}} & breaks_count;
+        rdata |= {32{get_transmit_timeouts}} & transmit_timeouts_count;
+        rdata |= {32{get_syncs}} & syncs_count;
+    end
 
     always_ff @(posedge clk) begin
-        rdata <= '0;
-        if (get) begin
-            case (word)
-                6'h01: rdata <= {21'd0, receive_present, receive_good, receive_command,
-                    receive_data};
-                6'h03: rdata <= {23'd0, state_sending, state_transmit_free};
-                6'h04: rdata <= frames_good_count;
-                6'h05: rdata <= frames_bad_count;
-                6'h06: rdata <= framing_errors_count;
-                6'h07: rdata <= start_glitches_count;
-                6'h08: rdata <= overruns_count;
-                6'h0B: rdata <= crc;
-                6'h0D: rdata <= breaks_count;
-                6'h0E: rdata <= transmit_timeouts_count;
-                6'h0F: rdata <= syncs_count;
-                default: rdata <= '0;
-            endcase
-        end
+        get_receive <= get && word == 6'h01;
+        get_state <= get && word == 6'h03;
+        get_frames_good <= get && word == 6'h04;
+        get_frames_bad <= get && word == 6'h05;
+        get_framing_errors <= get && word == 6'h06;
+        get_start_glitches <= get && word == 6'h07;
+        get_overruns <= get && word == 6'h08;
+        get_crc <= get && word == 6'h0B;
+        get_breaks <= get && word == 6'h0D;
+        get_transmit_timeouts <= get && word == 6'h0E;
+        get_syncs <= get && word == 6'h0F;
 
         if (put && word == 6'h00) bit_time <= wdata[19:0];
         transmit_written <= put && word == 6'h02;
@@ -117,7 +137,17 @@ module bus_registers (
         if (put && word == 6'h10) sync_axes <= wdata[7:0];
 
         if (rst) begin
-            rdata <= '0;
+            get_receive <= 1'b0;
+            get_state <= 1'b0;
+            get_frames_good <= 1'b0;
+            get_frames_bad <= 1'b0;
+            get_framing_errors <= 1'b0;
+            get_start_glitches <= 1'b0;
+            get_overruns <= 1'b0;
+            get_crc <= 1'b0;
+            get_breaks <= 1'b0;
+            get_transmit_timeouts <= 1'b0;
+            get_syncs <= 1'b0;
             bit_time <= 20'h0022B;
             transmit_written <= 1'b0;
             transmit_data <= 8'h00;

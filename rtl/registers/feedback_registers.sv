@@ -120,44 +120,86 @@ module feedback_registers #(
     logic [15:0] captured_position_high;
     logic        compare_state_late_held;
     logic [ 7:0] velocity_fine_high;
+    logic        get_index_events;
+    logic        get_index_count;
+    logic        get_edge_time;
+    logic        get_recorder_state;
+    logic        get_recorder_word;
+    logic        get_signal_faults;
+    logic        get_first_signal_faults;
+    logic        get_capture_state;
+    logic        get_captured;
+    logic        get_captured_time;
+    logic        get_captured_position;
+    logic        get_captured_position_high;
+    logic        get_compare_state;
+    logic        get_compare_passed;
+    logic        get_velocity_fine;
+    logic        get_velocity_fine_high;
+    logic        get_position_source;
+    logic        get_segment_state;
+    logic        get_segment_stored;
+    logic        get_segment_error;
 
     wire         get = select && !write;
     wire         put = select && write;
+    assign recorder_word_read = get_recorder_word;
 
-    assign recorder_word_read = get && word == 6'h0F;
+    // words read in the cycle before
+    always_comb begin
+        rdata = '0;
+        rdata |= {32{get_index_events}} & {29'd0, index_events_armed,
+            index_events_revolution_wrong_held, index_events_found_held};
+        rdata |= {32{get_index_count}} & index_count;
+        rdata |= {32{get_edge_time}} & edge_time;
+        rdata |= {32{get_recorder_state}} & {30'd0, recorder_state_invalid, recorder_state_full};
+        rdata |= {32{get_recorder_word}} & recorder_word;
+        rdata |= {32{get_signal_faults}} & {17'd0, signal_faults};
+        rdata |= {32{get_first_signal_faults}} & {17'd0, first_signal_faults};
+        rdata |= {32{get_capture_state}} & {25'd0, capture_state_overrun_held, capture_state_free,
+            capture_state_present};
+        rdata |= {32{get_captured}} & {9'd0, captured_age, captured_sources};
+        rdata |= {32{get_captured_time}} & captured_time;
+        rdata |= {32{get_captured_position}} & captured_position[31:0];
+        rdata |= {32{get_captured_position_high}} & {16'd0, captured_position_high};
+        rdata |= {32{get_compare_state}} & {30'd0, compare_state_late_held, compare_state_armed};
+        rdata |= {32{get_compare_passed}} & compare_passed;
+        rdata |= {32{get_velocity_fine}} & velocity_fine[31:0];
+        rdata |= {32{get_velocity_fine_high}} & {24'd0, velocity_fine_high};
+        rdata |= {32{get_position_source}} & {29'd0, position_source_sine, 2'd0};
+        rdata |= {32{get_segment_state}} & {21'd0, segment_state_known, segment_state_outside,
+            segment_state_in_force, segment_state_built};
+        rdata |= {32{get_segment_stored}} & {8'd0, segment_stored};
+        rdata |= {32{get_segment_error}} & {8'd0, segment_error};
+        if ((get_segment_stored && segment_stored[23]) || (get_segment_error && segment_error[23]))
+            rdata[31:24] = '1;
+        if ((get_captured_position_high && captured_position_high[15])) rdata[31:16] = '1;
+        if ((get_velocity_fine_high && velocity_fine_high[7])) rdata[31:8] = '1;
+    end
 
     always_ff @(posedge clk) begin
-        rdata <= '0;
-        if (get) begin
-            case (word)
-                6'h05: rdata <= {29'd0, index_events_armed, index_events_revolution_wrong_held,
-                    index_events_found_held};
-                6'h06: rdata <= index_count;
-                6'h07: rdata <= edge_time;
-                6'h0E: rdata <= {30'd0, recorder_state_invalid, recorder_state_full};
-                6'h0F: rdata <= recorder_word;
-                6'h10: rdata <= {17'd0, signal_faults};
-                6'h11: rdata <= {17'd0, first_signal_faults};
-                6'h19: rdata <= {25'd0, capture_state_overrun_held, capture_state_free,
-                    capture_state_present};
-                6'h1A: rdata <= {9'd0, captured_age, captured_sources};
-                6'h1B: rdata <= captured_time;
-                6'h1C: rdata <= captured_position[31:0];
-                6'h1D: rdata <= {{16{captured_position_high[15]}}, captured_position_high};
-                6'h25: rdata <= {30'd0, compare_state_late_held, compare_state_armed};
-                6'h26: rdata <= compare_passed;
-                6'h28: rdata <= velocity_fine[31:0];
-                6'h29: rdata <= {{24{velocity_fine_high[7]}}, velocity_fine_high};
-                6'h2A: rdata <= {29'd0, position_source_sine, 2'd0};
-                6'h2D: rdata <= {21'd0, segment_state_known, segment_state_outside,
-                    segment_state_in_force, segment_state_built};
-                6'h34: rdata <= {{8{segment_stored[23]}}, segment_stored};
-                6'h35: rdata <= {{8{segment_error[23]}}, segment_error};
-                default: rdata <= '0;
-            endcase
-        end
-        if (get && word == 6'h1C) captured_position_high <= captured_position[47:32];
-        if (get && word == 6'h28) velocity_fine_high <= velocity_fine[39:32];
+        get_index_events <= get && word == 6'h05;
+        get_index_count <= get && word == 6'h06;
+        get_edge_time <= get && word == 6'h07;
+        get_recorder_state <= get && word == 6'h0E;
+        get_recorder_word <= get && word == 6'h0F;
+        get_signal_faults <= get && word == 6'h10;
+        get_first_signal_faults <= get && word == 6'h11;
+        get_capture_state <= get && word == 6'h19;
+        get_captured <= get && word == 6'h1A;
+        get_captured_time <= get && word == 6'h1B;
+        get_captured_position <= get && word == 6'h1C;
+        get_captured_position_high <= get && word == 6'h1D;
+        get_compare_state <= get && word == 6'h25;
+        get_compare_passed <= get && word == 6'h26;
+        get_velocity_fine <= get && word == 6'h28;
+        get_velocity_fine_high <= get && word == 6'h29;
+        get_position_source <= get && word == 6'h2A;
+        get_segment_state <= get && word == 6'h2D;
+        get_segment_stored <= get && word == 6'h34;
+        get_segment_error <= get && word == 6'h35;
+        if (get_captured_position) captured_position_high <= captured_position[47:32];
+        if (get_velocity_fine) velocity_fine_high <= velocity_fine[39:32];
 
         if (put && word == 6'h00) edge_filter_skip <= wdata[15:0];
         if (put && word == 6'h00) edge_filter_tolerated <= wdata[19:16];
@@ -233,7 +275,26 @@ module feedback_registers #(
         if (put && word == 6'h33) segment_read_border <= wdata[7:0];
 
         if (rst) begin
-            rdata <= '0;
+            get_index_events <= 1'b0;
+            get_index_count <= 1'b0;
+            get_edge_time <= 1'b0;
+            get_recorder_state <= 1'b0;
+            get_recorder_word <= 1'b0;
+            get_signal_faults <= 1'b0;
+            get_first_signal_faults <= 1'b0;
+            get_capture_state <= 1'b0;
+            get_captured <= 1'b0;
+            get_captured_time <= 1'b0;
+            get_captured_position <= 1'b0;
+            get_captured_position_high <= 1'b0;
+            get_compare_state <= 1'b0;
+            get_compare_passed <= 1'b0;
+            get_velocity_fine <= 1'b0;
+            get_velocity_fine_high <= 1'b0;
+            get_position_source <= 1'b0;
+            get_segment_state <= 1'b0;
+            get_segment_stored <= 1'b0;
+            get_segment_error <= 1'b0;
             edge_filter_skip <= 16'h0000;
             edge_filter_tolerated <= 4'h0;
             decoder_mode <= 2'h0;

@@ -29,6 +29,11 @@ module node_registers (
     output logic        start_axes_written  // strobe: new value
 );
     logic [31:0] time_stamp_high;
+    logic        get_map_crc;
+    logic        get_clk_hz;
+    logic        get_build;
+    logic        get_time_stamp;
+    logic        get_time_stamp_high;
 
     wire         get = select && !write;
     wire         put = select && write;
@@ -36,19 +41,23 @@ module node_registers (
     // no register of this block has these bits
     wire         unused = &{1'b0, wdata[31:24]};
 
+    // words read in the cycle before
+    always_comb begin
+        rdata = '0;
+        rdata |= {32{get_map_crc}} & 32'hEB9DCC5C;
+        rdata |= {32{get_clk_hz}} & clk_hz;
+        rdata |= {32{get_build}} & {16'd0, build_memory, build_address, build_axes};
+        rdata |= {32{get_time_stamp}} & time_stamp[31:0];
+        rdata |= {32{get_time_stamp_high}} & time_stamp_high;
+    end
+
     always_ff @(posedge clk) begin
-        rdata <= '0;
-        if (get) begin
-            case (word)
-                6'h00: rdata <= 32'hEB9DCC5C;
-                6'h01: rdata <= clk_hz;
-                6'h02: rdata <= {16'd0, build_memory, build_address, build_axes};
-                6'h04: rdata <= time_stamp[31:0];
-                6'h05: rdata <= time_stamp_high;
-                default: rdata <= '0;
-            endcase
-        end
-        if (get && word == 6'h04) time_stamp_high <= time_stamp[63:32];
+        get_map_crc <= get && word == 6'h00;
+        get_clk_hz <= get && word == 6'h01;
+        get_build <= get && word == 6'h02;
+        get_time_stamp <= get && word == 6'h04;
+        get_time_stamp_high <= get && word == 6'h05;
+        if (get_time_stamp) time_stamp_high <= time_stamp[63:32];
 
         if (put && word == 6'h06) tick_period <= wdata[23:0];
         if (put && word == 6'h07) sample_period <= wdata[15:0];
@@ -57,7 +66,11 @@ module node_registers (
         if (put && word == 6'h09) start_axes <= wdata[7:0];
 
         if (rst) begin
-            rdata <= '0;
+            get_map_crc <= 1'b0;
+            get_clk_hz <= 1'b0;
+            get_build <= 1'b0;
+            get_time_stamp <= 1'b0;
+            get_time_stamp_high <= 1'b0;
             time_stamp_high <= '0;
             tick_period <= 24'h000000;
             sample_period <= 16'h0000;

@@ -110,43 +110,77 @@ module peripherals_registers (
     logic edm_status_rose_1_held;
     logic edm_status_fell_0_held;
     logic edm_status_fell_1_held;
+    logic get_built;
+    logic get_i2c_answer;
+    logic get_i2c_state;
+    logic get_ps2_state;
+    logic get_ps2_typed;
+    logic get_ps2_errors;
+    logic get_ps2_glitches;
+    logic get_peer_receive;
+    logic get_peer_state;
+    logic get_peer_errors;
+    logic get_sensor_reading;
+    logic get_sensor_reading_high;
+    logic get_sensor_state;
+    logic get_sensor_errors;
+    logic get_sensor_frames;
+    logic get_display_state;
+    logic get_edm_status;
 
     wire get = select && !write;
     wire put = select && write;
+    assign i2c_answer_read = get_i2c_answer;
+    assign peer_receive_read = get_peer_receive;
 
-    assign i2c_answer_read = get && word == 6'h02;
-    assign peer_receive_read = get && word == 6'h0B;
+    // words read in the cycle before
+    always_comb begin
+        rdata = '0;
+        rdata |= {32{get_built}} & {26'd0, built_edm, built_display, built_sensor, built_peer,
+            built_ps2, built_i2c};
+        rdata |= {32{get_i2c_answer}} & {21'd0, i2c_answer_present, i2c_answer_result,
+            i2c_answer_data};
+        rdata |= {32{get_i2c_state}} & {20'd0, i2c_state_sda, i2c_state_scl, i2c_state_owned,
+            i2c_state_busy, i2c_state_free};
+        rdata |= {32{get_ps2_state}} & {24'd0, ps2_state_busy, ps2_state_injecting, ps2_state_free};
+        rdata |= {32{get_ps2_typed}} & {16'd0, ps2_typed_count};
+        rdata |= {32{get_ps2_errors}} & {ps2_errors_aborted_count, ps2_errors_unsent_count,
+            ps2_errors_command_damaged_count, ps2_errors_keyboard_damaged_count};
+        rdata |= {32{get_ps2_glitches}} & {24'd0, ps2_glitches_count};
+        rdata |= {32{get_peer_receive}} & {23'd0, peer_receive_present, peer_receive_data};
+        rdata |= {32{get_peer_state}} & {24'd0, peer_state_sending, peer_state_transmit_free};
+        rdata |= {32{get_peer_errors}} & {16'd0, peer_errors_overruns_count,
+            peer_errors_framing_count};
+        rdata |= {32{get_sensor_reading}} & sensor_reading[31:0];
+        rdata |= {32{get_sensor_reading_high}} & sensor_reading_high;
+        rdata |= {32{get_sensor_state}} & {23'd0, sensor_state_stale, sensor_state_sequence_number};
+        rdata |= {32{get_sensor_errors}} & {8'd0, sensor_errors_missed, sensor_errors_broken,
+            sensor_errors_crc};
+        rdata |= {32{get_sensor_frames}} & {16'd0, sensor_frames_count};
+        rdata |= {32{get_display_state}} & {26'd0, display_state_sending, display_state_free};
+        rdata |= {32{get_edm_status}} & {26'd0, edm_status_fell_1_held, edm_status_fell_0_held,
+            edm_status_rose_1_held, edm_status_rose_0_held, edm_status_inputs};
+    end
 
     always_ff @(posedge clk) begin
-        rdata <= '0;
-        if (get) begin
-            case (word)
-                6'h00: rdata <= {26'd0, built_edm, built_display, built_sensor, built_peer,
-                    built_ps2, built_i2c};
-                6'h02: rdata <= {21'd0, i2c_answer_present, i2c_answer_result, i2c_answer_data};
-                6'h03: rdata <= {20'd0, i2c_state_sda, i2c_state_scl, i2c_state_owned,
-                    i2c_state_busy, i2c_state_free};
-                6'h06: rdata <= {24'd0, ps2_state_busy, ps2_state_injecting, ps2_state_free};
-                6'h07: rdata <= {16'd0, ps2_typed_count};
-                6'h08: rdata <= {ps2_errors_aborted_count, ps2_errors_unsent_count,
-                    ps2_errors_command_damaged_count, ps2_errors_keyboard_damaged_count};
-                6'h09: rdata <= {24'd0, ps2_glitches_count};
-                6'h0B: rdata <= {23'd0, peer_receive_present, peer_receive_data};
-                6'h0D: rdata <= {24'd0, peer_state_sending, peer_state_transmit_free};
-                6'h0E: rdata <= {16'd0, peer_errors_overruns_count, peer_errors_framing_count};
-                6'h12: rdata <= sensor_reading[31:0];
-                6'h13: rdata <= sensor_reading_high;
-                6'h14: rdata <= {23'd0, sensor_state_stale, sensor_state_sequence_number};
-                6'h15: rdata <= {8'd0, sensor_errors_missed, sensor_errors_broken,
-                    sensor_errors_crc};
-                6'h16: rdata <= {16'd0, sensor_frames_count};
-                6'h18: rdata <= {26'd0, display_state_sending, display_state_free};
-                6'h1A: rdata <= {26'd0, edm_status_fell_1_held, edm_status_fell_0_held,
-                    edm_status_rose_1_held, edm_status_rose_0_held, edm_status_inputs};
-                default: rdata <= '0;
-            endcase
-        end
-        if (get && word == 6'h12) sensor_reading_high <= sensor_reading[63:32];
+        get_built <= get && word == 6'h00;
+        get_i2c_answer <= get && word == 6'h02;
+        get_i2c_state <= get && word == 6'h03;
+        get_ps2_state <= get && word == 6'h06;
+        get_ps2_typed <= get && word == 6'h07;
+        get_ps2_errors <= get && word == 6'h08;
+        get_ps2_glitches <= get && word == 6'h09;
+        get_peer_receive <= get && word == 6'h0B;
+        get_peer_state <= get && word == 6'h0D;
+        get_peer_errors <= get && word == 6'h0E;
+        get_sensor_reading <= get && word == 6'h12;
+        get_sensor_reading_high <= get && word == 6'h13;
+        get_sensor_state <= get && word == 6'h14;
+        get_sensor_errors <= get && word == 6'h15;
+        get_sensor_frames <= get && word == 6'h16;
+        get_display_state <= get && word == 6'h18;
+        get_edm_status <= get && word == 6'h1A;
+        if (get_sensor_reading) sensor_reading_high <= sensor_reading[63:32];
 
         i2c_written <= put && word == 6'h01;
         if (put && word == 6'h01) i2c_data <= wdata[7:0];
@@ -202,7 +236,23 @@ module peripherals_registers (
             6'h1A && wdata[5]));
 
         if (rst) begin
-            rdata <= '0;
+            get_built <= 1'b0;
+            get_i2c_answer <= 1'b0;
+            get_i2c_state <= 1'b0;
+            get_ps2_state <= 1'b0;
+            get_ps2_typed <= 1'b0;
+            get_ps2_errors <= 1'b0;
+            get_ps2_glitches <= 1'b0;
+            get_peer_receive <= 1'b0;
+            get_peer_state <= 1'b0;
+            get_peer_errors <= 1'b0;
+            get_sensor_reading <= 1'b0;
+            get_sensor_reading_high <= 1'b0;
+            get_sensor_state <= 1'b0;
+            get_sensor_errors <= 1'b0;
+            get_sensor_frames <= 1'b0;
+            get_display_state <= 1'b0;
+            get_edm_status <= 1'b0;
             i2c_written <= 1'b0;
             i2c_data <= 8'h00;
             i2c_command <= 3'h0;

@@ -21,22 +21,22 @@ module register_memory #(
 ) (
     input  wire         clk,
     input  wire         rst,
-    input  wire         select,     // strobe: an access to any block
-    input  wire         write,      // level: it writes wdata
-    input  wire  [13:0] address,    // word of the register map
-    input  wire  [31:0] wdata,      // value to write
-    output logic        ready,      // level: the settings have their first values
-    output logic [31:0] rdata,      // settings in the word read last; its other bits are 0
-    output logic [31:0] wdata_low   // low word that waits for its high word
+    input  wire         select,    // strobe: an access to any block
+    input  wire         write,     // level: it writes wdata
+    input  wire  [13:0] address,   // word of the register map
+    input  wire  [31:0] wdata,     // value to write
+    output logic        ready,     // level: the settings have their first values
+    output logic [31:0] rdata,     // settings in the word read last; its other bits are 0
+    output logic [31:0] wdata_low  // low word that waits for its high word
 );
     localparam int W = $clog2(3 + 3 * AXES) + 6;  // bits of a place in the memory
 
-    logic [31:0] memory[0:2**W-1];
-    logic [11:0] count;  // words that have their first value
-    logic commit;  // the low word is stored in this cycle
+    logic [ 31:0] memory                                          [0:2**W-1];
+    logic [ 11:0] count;  // words that have their first value
+    logic         commit;  // the low word is stored in this cycle
     logic [W-1:0] low_place;
 
-    wire [W-1:0] place;
+    wire  [W-1:0] place;
     wire [31:0] kept, first;
     wire low, high;
     wire put = select && write;
@@ -56,9 +56,9 @@ module register_memory #(
         .high
     );
 
-    wire store = !ready || commit || (put && !low);
+    wire         store = !ready || commit || (put && !low);
     wire [W-1:0] store_place = commit ? low_place : place;
-    wire [31:0] stored = !ready ? first : commit ? wdata_low : kept;
+    wire [ 31:0] stored = !ready ? first : commit ? wdata_low : kept;
 
     always_ff @(posedge clk) begin
         if (store) memory[store_place] <= stored;
