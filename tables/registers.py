@@ -188,10 +188,14 @@ class Block:
     def answers(self, constant: int) -> list[Answer]:
         return [a for r in self.registers for a in r.answers(constant)]
 
-    def signs(self, constant: int) -> dict[int, list[Answer]]:
-        """The answers with a sign, by the number of bits that it fills."""
-        signed = [a for a in self.answers(constant) if a.sign]
-        return {n: [a for a in signed if a.fill == n] for n in sorted({a.fill for a in signed})}
+    def rdata(self, constant: int) -> str:
+        """The answers together, of which one is not 0 after a read, and the signs above them."""
+        answers = self.answers(constant)
+        texts = [f"({{32{{get_{a.name}}}}} & {a.value})" for a in answers]
+        for fill in sorted({a.fill for a in answers if a.sign}):
+            signs = [f"(get_{a.name} && {a.sign})" for a in answers if a.sign and a.fill == fill]
+            texts.append(f"{{{{{fill}{{{' || '.join(signs)}}}}}, {32 - fill}'d0}}")
+        return " | ".join(texts)
 
     @property
     def parameters(self) -> list[str]:

@@ -52,13 +52,9 @@ module actuator_registers (
     wire  unused = &{1'b0, wdata[31:28]};
 
     // words read in the cycle before
-    always_comb begin
-        rdata = '0;
-        rdata |= {32{get_drive}} & {26'd0, drive_built, 2'd0};
-        rdata |= {32{get_steps}} & steps;
-        rdata |= {32{get_fine_command}} & {16'd0, fine_command};
-        if ((get_fine_command && fine_command[15])) rdata[31:16] = '1;
-    end
+    assign rdata = ({32{get_drive}} & {26'd0, drive_built, 2'd0}) | ({32{get_steps}} & steps) |
+        ({32{get_fine_command}} & {16'd0, fine_command}) | {{16{(get_fine_command &&
+        fine_command[15])}}, 16'd0};
 
     always_ff @(posedge clk) begin
         get_drive <= get && word == 6'h00;

@@ -134,35 +134,23 @@ module axis_registers #(
     wire         put = select && write;
 
     // words read in the cycle before
-    always_comb begin
-        rdata = '0;
-        rdata |= {32{get_state}} & {18'd0, state_fine_saturated, state_armed, state_queue_free,
-            state_saturated, state_moving, state_drive_fault, state_estop, state_limit_high,
-            state_limit_low, state_enabled};
-        rdata |= {32{get_faults}} & {22'd0, faults};
-        rdata |= {32{get_causes_now}} & {22'd0, causes_now};
-        rdata |= {32{get_first_fault}} & {22'd0, first_fault};
-        rdata |= {32{get_fault_position}} & fault_position[31:0];
-        rdata |= {32{get_fault_position_high}} & {16'd0, fault_position_high};
-        rdata |= {32{get_position}} & position[31:0];
-        rdata |= {32{get_position_high}} & {16'd0, position_high};
-        rdata |= {32{get_target}} & target[31:0];
-        rdata |= {32{get_target_high}} & {16'd0, target_high};
-        rdata |= {32{get_velocity}} & velocity;
-        rdata |= {32{get_zero_crossing}} & {30'd0, zero_crossing_down_held, zero_crossing_up_held};
-        rdata |= {32{get_sample}} & {sample_cos, sample_sin};
-        rdata |= {32{get_phase}} & {phase_amplitude, phase_phase};
-        rdata |= {32{get_quadrature_count}} & quadrature_count;
-        rdata |= {32{get_encoder_events}} & {26'd0, encoder_events_held};
-        rdata |= {32{get_rejected_pulses}} & rejected_pulses_count;
-        rdata |= {32{get_rejected_samples}} & rejected_samples_count;
-        rdata |= {32{get_following_error}} & following_error;
-        rdata |= {32{get_command}} & {16'd0, command};
-        if ((get_fault_position_high && fault_position_high[15]) || (get_position_high &&
-            position_high[15]) || (get_target_high && target_high[15]) || (get_command &&
-            command[15]))
-            rdata[31:16] = '1;
-    end
+    assign rdata = ({32{get_state}} & {18'd0, state_fine_saturated, state_armed, state_queue_free,
+        state_saturated, state_moving, state_drive_fault, state_estop, state_limit_high,
+        state_limit_low, state_enabled}) | ({32{get_faults}} & {22'd0, faults}) |
+        ({32{get_causes_now}} & {22'd0, causes_now}) | ({32{get_first_fault}} & {22'd0,
+        first_fault}) | ({32{get_fault_position}} & fault_position[31:0]) |
+        ({32{get_fault_position_high}} & {16'd0, fault_position_high}) | ({32{get_position}} &
+        position[31:0]) | ({32{get_position_high}} & {16'd0, position_high}) | ({32{get_target}} &
+        target[31:0]) | ({32{get_target_high}} & {16'd0, target_high}) | ({32{get_velocity}} &
+        velocity) | ({32{get_zero_crossing}} & {30'd0, zero_crossing_down_held,
+        zero_crossing_up_held}) | ({32{get_sample}} & {sample_cos, sample_sin}) | ({32{get_phase}} &
+        {phase_amplitude, phase_phase}) | ({32{get_quadrature_count}} & quadrature_count) |
+        ({32{get_encoder_events}} & {26'd0, encoder_events_held}) | ({32{get_rejected_pulses}} &
+        rejected_pulses_count) | ({32{get_rejected_samples}} & rejected_samples_count) |
+        ({32{get_following_error}} & following_error) | ({32{get_command}} & {16'd0, command}) |
+        {{16{(get_fault_position_high && fault_position_high[15]) || (get_position_high &&
+        position_high[15]) || (get_target_high && target_high[15]) || (get_command &&
+        command[15])}}, 16'd0};
 
     always_ff @(posedge clk) begin
         get_state <= get && word == 6'h02;

@@ -80,21 +80,13 @@ module bus_registers (
     assign receive_read = get_receive;
 
     // words read in the cycle before
-    always_comb begin
-        rdata = '0;
-        rdata |= {32{get_receive}} & {21'd0, receive_present, receive_good, receive_command,
-            receive_data};
-        rdata |= {32{get_state}} & {23'd0, state_sending, state_transmit_free};
-        rdata |= {32{get_frames_good}} & frames_good_count;
-        rdata |= {32{get_frames_bad}} & frames_bad_count;
-        rdata |= {32{get_framing_errors}} & framing_errors_count;
-        rdata |= {32{get_start_glitches}} & start_glitches_count;
-        rdata |= {32{get_overruns}} & overruns_count;
-        rdata |= {32{get_crc}} & crc;
-        rdata |= {32{get_breaks}} & breaks_count;
-        rdata |= {32{get_transmit_timeouts}} & transmit_timeouts_count;
-        rdata |= {32{get_syncs}} & syncs_count;
-    end
+    assign rdata = ({32{get_receive}} & {21'd0, receive_present, receive_good, receive_command,
+        receive_data}) | ({32{get_state}} & {23'd0, state_sending, state_transmit_free}) |
+        ({32{get_frames_good}} & frames_good_count) | ({32{get_frames_bad}} & frames_bad_count) |
+        ({32{get_framing_errors}} & framing_errors_count) | ({32{get_start_glitches}} &
+        start_glitches_count) | ({32{get_overruns}} & overruns_count) | ({32{get_crc}} & crc) |
+        ({32{get_breaks}} & breaks_count) | ({32{get_transmit_timeouts}} & transmit_timeouts_count)
+        | ({32{get_syncs}} & syncs_count);
 
     always_ff @(posedge clk) begin
         get_receive <= get && word == 6'h01;

@@ -146,36 +146,26 @@ module feedback_registers #(
     assign recorder_word_read = get_recorder_word;
 
     // words read in the cycle before
-    always_comb begin
-        rdata = '0;
-        rdata |= {32{get_index_events}} & {29'd0, index_events_armed,
-            index_events_revolution_wrong_held, index_events_found_held};
-        rdata |= {32{get_index_count}} & index_count;
-        rdata |= {32{get_edge_time}} & edge_time;
-        rdata |= {32{get_recorder_state}} & {30'd0, recorder_state_invalid, recorder_state_full};
-        rdata |= {32{get_recorder_word}} & recorder_word;
-        rdata |= {32{get_signal_faults}} & {17'd0, signal_faults};
-        rdata |= {32{get_first_signal_faults}} & {17'd0, first_signal_faults};
-        rdata |= {32{get_capture_state}} & {25'd0, capture_state_overrun_held, capture_state_free,
-            capture_state_present};
-        rdata |= {32{get_captured}} & {9'd0, captured_age, captured_sources};
-        rdata |= {32{get_captured_time}} & captured_time;
-        rdata |= {32{get_captured_position}} & captured_position[31:0];
-        rdata |= {32{get_captured_position_high}} & {16'd0, captured_position_high};
-        rdata |= {32{get_compare_state}} & {30'd0, compare_state_late_held, compare_state_armed};
-        rdata |= {32{get_compare_passed}} & compare_passed;
-        rdata |= {32{get_velocity_fine}} & velocity_fine[31:0];
-        rdata |= {32{get_velocity_fine_high}} & {24'd0, velocity_fine_high};
-        rdata |= {32{get_position_source}} & {29'd0, position_source_sine, 2'd0};
-        rdata |= {32{get_segment_state}} & {21'd0, segment_state_known, segment_state_outside,
-            segment_state_in_force, segment_state_built};
-        rdata |= {32{get_segment_stored}} & {8'd0, segment_stored};
-        rdata |= {32{get_segment_error}} & {8'd0, segment_error};
-        if ((get_segment_stored && segment_stored[23]) || (get_segment_error && segment_error[23]))
-            rdata[31:24] = '1;
-        if ((get_captured_position_high && captured_position_high[15])) rdata[31:16] = '1;
-        if ((get_velocity_fine_high && velocity_fine_high[7])) rdata[31:8] = '1;
-    end
+    assign rdata = ({32{get_index_events}} & {29'd0, index_events_armed,
+        index_events_revolution_wrong_held, index_events_found_held}) | ({32{get_index_count}} &
+        index_count) | ({32{get_edge_time}} & edge_time) | ({32{get_recorder_state}} & {30'd0,
+        recorder_state_invalid, recorder_state_full}) | ({32{get_recorder_word}} & recorder_word) |
+        ({32{get_signal_faults}} & {17'd0, signal_faults}) | ({32{get_first_signal_faults}} &
+        {17'd0, first_signal_faults}) | ({32{get_capture_state}} & {25'd0,
+        capture_state_overrun_held, capture_state_free, capture_state_present}) |
+        ({32{get_captured}} & {9'd0, captured_age, captured_sources}) | ({32{get_captured_time}} &
+        captured_time) | ({32{get_captured_position}} & captured_position[31:0]) |
+        ({32{get_captured_position_high}} & {16'd0, captured_position_high}) |
+        ({32{get_compare_state}} & {30'd0, compare_state_late_held, compare_state_armed}) |
+        ({32{get_compare_passed}} & compare_passed) | ({32{get_velocity_fine}} &
+        velocity_fine[31:0]) | ({32{get_velocity_fine_high}} & {24'd0, velocity_fine_high}) |
+        ({32{get_position_source}} & {29'd0, position_source_sine, 2'd0}) | ({32{get_segment_state}}
+        & {21'd0, segment_state_known, segment_state_outside, segment_state_in_force,
+        segment_state_built}) | ({32{get_segment_stored}} & {8'd0, segment_stored}) |
+        ({32{get_segment_error}} & {8'd0, segment_error}) | {{8{(get_segment_stored &&
+        segment_stored[23]) || (get_segment_error && segment_error[23])}}, 24'd0} |
+        {{16{(get_captured_position_high && captured_position_high[15])}}, 16'd0} |
+        {{24{(get_velocity_fine_high && velocity_fine_high[7])}}, 8'd0};
 
     always_ff @(posedge clk) begin
         get_index_events <= get && word == 6'h05;

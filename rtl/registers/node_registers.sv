@@ -42,14 +42,9 @@ module node_registers (
     wire         unused = &{1'b0, wdata[31:24]};
 
     // words read in the cycle before
-    always_comb begin
-        rdata = '0;
-        rdata |= {32{get_map_crc}} & 32'hEB9DCC5C;
-        rdata |= {32{get_clk_hz}} & clk_hz;
-        rdata |= {32{get_build}} & {16'd0, build_memory, build_address, build_axes};
-        rdata |= {32{get_time_stamp}} & time_stamp[31:0];
-        rdata |= {32{get_time_stamp_high}} & time_stamp_high;
-    end
+    assign rdata = ({32{get_map_crc}} & 32'hEB9DCC5C) | ({32{get_clk_hz}} & clk_hz) |
+        ({32{get_build}} & {16'd0, build_memory, build_address, build_axes}) | ({32{get_time_stamp}}
+        & time_stamp[31:0]) | ({32{get_time_stamp_high}} & time_stamp_high);
 
     always_ff @(posedge clk) begin
         get_map_crc <= get && word == 6'h00;

@@ -134,33 +134,24 @@ module peripherals_registers (
     assign peer_receive_read = get_peer_receive;
 
     // words read in the cycle before
-    always_comb begin
-        rdata = '0;
-        rdata |= {32{get_built}} & {26'd0, built_edm, built_display, built_sensor, built_peer,
-            built_ps2, built_i2c};
-        rdata |= {32{get_i2c_answer}} & {21'd0, i2c_answer_present, i2c_answer_result,
-            i2c_answer_data};
-        rdata |= {32{get_i2c_state}} & {20'd0, i2c_state_sda, i2c_state_scl, i2c_state_owned,
-            i2c_state_busy, i2c_state_free};
-        rdata |= {32{get_ps2_state}} & {24'd0, ps2_state_busy, ps2_state_injecting, ps2_state_free};
-        rdata |= {32{get_ps2_typed}} & {16'd0, ps2_typed_count};
-        rdata |= {32{get_ps2_errors}} & {ps2_errors_aborted_count, ps2_errors_unsent_count,
-            ps2_errors_command_damaged_count, ps2_errors_keyboard_damaged_count};
-        rdata |= {32{get_ps2_glitches}} & {24'd0, ps2_glitches_count};
-        rdata |= {32{get_peer_receive}} & {23'd0, peer_receive_present, peer_receive_data};
-        rdata |= {32{get_peer_state}} & {24'd0, peer_state_sending, peer_state_transmit_free};
-        rdata |= {32{get_peer_errors}} & {16'd0, peer_errors_overruns_count,
-            peer_errors_framing_count};
-        rdata |= {32{get_sensor_reading}} & sensor_reading[31:0];
-        rdata |= {32{get_sensor_reading_high}} & sensor_reading_high;
-        rdata |= {32{get_sensor_state}} & {23'd0, sensor_state_stale, sensor_state_sequence_number};
-        rdata |= {32{get_sensor_errors}} & {8'd0, sensor_errors_missed, sensor_errors_broken,
-            sensor_errors_crc};
-        rdata |= {32{get_sensor_frames}} & {16'd0, sensor_frames_count};
-        rdata |= {32{get_display_state}} & {26'd0, display_state_sending, display_state_free};
-        rdata |= {32{get_edm_status}} & {26'd0, edm_status_fell_1_held, edm_status_fell_0_held,
-            edm_status_rose_1_held, edm_status_rose_0_held, edm_status_inputs};
-    end
+    assign rdata = ({32{get_built}} & {26'd0, built_edm, built_display, built_sensor, built_peer,
+        built_ps2, built_i2c}) | ({32{get_i2c_answer}} & {21'd0, i2c_answer_present,
+        i2c_answer_result, i2c_answer_data}) | ({32{get_i2c_state}} & {20'd0, i2c_state_sda,
+        i2c_state_scl, i2c_state_owned, i2c_state_busy, i2c_state_free}) | ({32{get_ps2_state}} &
+        {24'd0, ps2_state_busy, ps2_state_injecting, ps2_state_free}) | ({32{get_ps2_typed}} &
+        {16'd0, ps2_typed_count}) | ({32{get_ps2_errors}} & {ps2_errors_aborted_count,
+        ps2_errors_unsent_count, ps2_errors_command_damaged_count,
+        ps2_errors_keyboard_damaged_count}) | ({32{get_ps2_glitches}} & {24'd0, ps2_glitches_count})
+        | ({32{get_peer_receive}} & {23'd0, peer_receive_present, peer_receive_data}) |
+        ({32{get_peer_state}} & {24'd0, peer_state_sending, peer_state_transmit_free}) |
+        ({32{get_peer_errors}} & {16'd0, peer_errors_overruns_count, peer_errors_framing_count}) |
+        ({32{get_sensor_reading}} & sensor_reading[31:0]) | ({32{get_sensor_reading_high}} &
+        sensor_reading_high) | ({32{get_sensor_state}} & {23'd0, sensor_state_stale,
+        sensor_state_sequence_number}) | ({32{get_sensor_errors}} & {8'd0, sensor_errors_missed,
+        sensor_errors_broken, sensor_errors_crc}) | ({32{get_sensor_frames}} & {16'd0,
+        sensor_frames_count}) | ({32{get_display_state}} & {26'd0, display_state_sending,
+        display_state_free}) | ({32{get_edm_status}} & {26'd0, edm_status_fell_1_held,
+        edm_status_fell_0_held, edm_status_rose_1_held, edm_status_rose_0_held, edm_status_inputs});
 
     always_ff @(posedge clk) begin
         get_built <= get && word == 6'h00;

@@ -73,6 +73,7 @@ module register_memory #(
         if (rst) begin
             count  <= '0;
             commit <= 1'b0;
+            wdata_low <= '0;
         end
     end
 endmodule

@@ -40,7 +40,9 @@ class RegisterLayout:
 
     def low(self, address):
         register, high = self.entries.get(address, (None, 0))
-        return bool(register and register.wide and register.fields[0].kind == "setting" and not high)
+        return bool(
+            register and register.wide and register.fields[0].kind == "setting" and not high
+        )
 
     def high(self, address):
         register, high = self.entries.get(address, (None, 0))

@@ -10,11 +10,11 @@ class RegisterMemory:
     def __init__(self, axes=1, without=()):
         self.layout = RegisterLayout(axes, without)
         self.memory = [0] * self.layout.words
-        self.rdata = self.wdata_low = 0
+        self.rdata = 0
         self.reset()
 
     def reset(self):
-        self.count, self.commit = 0, None
+        self.count, self.commit, self.wdata_low = 0, None, 0
 
     @property
     def ready(self):
