@@ -33,6 +33,7 @@ INPUTS = dict(
     write=0,
     word=0,
     wdata=0,
+    wdata_low=0,
     shift=0,
     shift_periods=0,
     a=0,
@@ -97,6 +98,7 @@ class Bench:
                 self.dut.write.value,
             ) = word + more, half, 1, 1
             await FallingEdge(self.dut.clk)
+            self.dut.wdata_low.value = half
         self.dut.select.value = self.dut.write.value = 0
 
     async def rest(self):
