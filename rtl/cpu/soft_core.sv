@@ -133,8 +133,6 @@ module soft_core #(
             if (select) assert (mem_valid && !in_memory && !mem_instr && ready);
             if (select) assert (mem_wstrb == '0 || mem_wstrb == '1);
             if (write && select) assert (mem_wstrb == '1);
-            // no access is both answered and lost
-            assert (!(answered && lost && !$past(lost)));
             cover (mem_valid && in_memory && mem_instr);
         end
     end

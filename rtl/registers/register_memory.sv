@@ -9,10 +9,10 @@
 //           high word stores both. There is one wdata_low for all blocks.
 // source    register_layout: the layout of the memory, the bits of each setting, the first values
 // model     tb/registers/register_memory.py, equal in every bit of every cycle
-// proved    rdata is what the last write stored at its word, else the first value. The two words of
-//           a setting of 64 bits change in two cycles that follow each other, and rdata never shows
-//           one without the other.
-// proof     depth 6
+// proved    A read of any word gives what the last write of the word stored, else its first value;
+//           no access to another word changes it. The low word of a setting of 64 bits reads what
+//           was written before the last write of its high word.
+// proof     depth 4, AXES = 2
 `default_nettype none
 
 module register_memory #(
@@ -76,6 +76,55 @@ module register_memory #(
             wdata_low <= '0;
         end
     end
+
+`ifdef FORMAL
+    (* anyconst *)logic [13:0] observed;  // a word of the map
+    logic        past = 1'b0;
+    logic        pending;  // its high word was written in the cycle before
+    logic        fetched;  // rdata is its value
+    logic [31:0] value, fetched_value;  // what it reads, what it was when it was read
+    wire [W-1:0] observed_place;
+    wire [31:0] observed_kept, observed_first;
+    wire observed_low, observed_high;
+    register_layout #(
+        .AXES    (AXES),
+        .HAS_SINE(HAS_SINE)
+    ) u_observed (
+        .address(observed),
+        .wdata,
+        .place  (observed_place),
+        .kept   (observed_kept),
+        .first  (observed_first),
+        .low    (observed_low),
+        .high   (observed_high)
+    );
+    wire filled = ready || count[10:0] > observed[10:0];
+    always @(posedge clk) begin
+        past <= 1'b1;
+        if (!past) assume (rst);
+        assume (observed < 14'd2048);
+        assume (!select || (ready && !commit));
+        if (!ready && count[10:0] == observed[10:0]) value <= observed_first;
+        if (put && address == observed && !observed_low) value <= observed_kept;
+        if (pending) value <= wdata_low;
+        pending <= !rst && observed_low && high && put && address == {observed[13:1], 1'b1};
+        if (select && !write) begin
+            fetched       <= address == observed;
+            fetched_value <= value;
+        end
+        if (rst || !past) fetched <= 1'b0;
+        if (past) begin
+            assert (count <= 12'd2048);
+            if (filled && !rst) assert (memory[observed_place] == value);
+            assert (pending == (commit && observed_low && low_place == observed_place));
+            if (commit) assert (ready && (observed_low || low_place != observed_place));
+            if (filled && &observed_place[W-1:6]) assert (value == 0);
+            if (fetched) assert (rdata == fetched_value);
+            cover (count == 12'd1 && filled);
+        end
+    end
+    wire unused = &{1'b0, observed_high};
+`endif
 endmodule
 
 `default_nettype wire
