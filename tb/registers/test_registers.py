@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every register of every made block, together with the register memory: access, first value,
-neighbours, words of 64 bits, strobes, counters, sticky bits; and what the other made files say about
-the same map.
+neighbours, words of 64 bits, strobes, counters, sticky bits; and what the other made files say
+about the same map.
 """
 
 import random
@@ -295,7 +295,8 @@ def bench(name):
         ",\n".join(" ".join(port) for port in ports),
         "); wire [31:0] live, settings, wdata_low; logic got;",
         f"register_memory #({passed}) u_memory (.clk, .rst, .select, .write,",
-        f".address({{8'd{block.base // 256}, word}}), .wdata, .ready, .rdata(settings), .wdata_low);",
+        f".address({{8'd{block.base // 256}, word}}), .wdata, .ready, .rdata(settings),",
+        ".wdata_low);",
         f"{name}_registers #({passed}) u_block (",
         ", ".join([".clk, .rst, .select, .write, .word, .wdata, .rdata(live)", *low]),
         "".join(f", .{port}" for _, _, port in ports),
