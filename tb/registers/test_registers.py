@@ -286,10 +286,10 @@ def bench(name):
     ports = [(kind, shape, port) for kind, shape, port, _ in block.ports]
     low = [".wdata_low"] if block.wide_settings else []
     passed = ", ".join(f".{p}({p})" for p in block.parameters)
+    parameters = ", ".join(f"parameter int {p} = 1" for p in block.parameters)
     lines = [
-        f"module {name}_bench #(",
-        ", ".join(f"parameter int {p} = 1" for p in block.parameters or ["UNUSED"]),
-        ") (input wire clk, input wire rst, input wire select, input wire write,",
+        f"module {name}_bench {f'#({parameters})' if parameters else ''}",
+        "(input wire clk, input wire rst, input wire select, input wire write,",
         "input wire [5:0] word, input wire [31:0] wdata,",
         "output logic ready, output logic [31:0] rdata,",
         ",\n".join(" ".join(port) for port in ports),
@@ -303,7 +303,9 @@ def bench(name):
         "); always_ff @(posedge clk) begin",
         "got <= select && !write && !rst;",
         "rdata <= rst ? '0 : live | (got ? settings : '0);",
-        "end endmodule",
+        "end",
+        "" if low else "wire unused = &{1'b0, wdata_low};",
+        "endmodule",
     ]
     BENCHES.mkdir(parents=True, exist_ok=True)
     (BENCHES / f"{name}_bench.sv").write_text("\n".join(lines) + "\n")
