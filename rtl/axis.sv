@@ -41,9 +41,10 @@ module axis #(
     input  wire         write,             // level: the access writes
     input  wire  [ 5:0] word,              // 32-bit word of the block
     input  wire  [31:0] wdata,             // value to write
-    output logic [31:0] rdata,             // value read, in the next cycle; else 0
-    output logic [31:0] feedback_rdata,    // value read, in the next cycle; else 0
-    output logic [31:0] actuator_rdata,    // value read, in the next cycle; else 0
+    input  wire  [31:0] wdata_low,         // low word of a value of 64 bits
+    output logic [31:0] rdata,             // live bits read, in the next cycle; else 0
+    output logic [31:0] feedback_rdata,    // live bits read, in the next cycle; else 0
+    output logic [31:0] actuator_rdata,    // live bits read, in the next cycle; else 0
     // time
     input  wire         tick,              // strobe: servo tick
     input  wire  [23:0] tick_period,       // cycles
@@ -182,6 +183,7 @@ module axis #(
         .write,
         .word,
         .wdata,
+        .wdata_low,
         .rdata        (feedback_rdata),
         // time
         .tick,
@@ -395,6 +397,7 @@ module axis #(
             .write,
             .word,
             .wdata,
+            .wdata_low,
             .rdata (actuator_rdata),
             // time
             .tick,
@@ -469,6 +472,7 @@ module axis #(
         .write,
         .word,
         .wdata,
+        .wdata_low,
         .rdata,
         // requests
         .control_enable,

@@ -30,7 +30,8 @@ module feedback_channel #(
     input  wire                 write,               // level: the access writes
     input  wire         [  5:0] word,                // 32-bit word of the block
     input  wire         [ 31:0] wdata,               // value to write
-    output logic        [ 31:0] rdata,               // value read, in the next cycle; else 0
+    input  wire         [ 31:0] wdata_low,           // low word of a value of 64 bits
+    output logic        [ 31:0] rdata,               // live bits read, in the next cycle; else 0
     // time
     input  wire                 tick,                // strobe: servo tick
     input  wire                 sample_tick,         // strobe: take a sample
@@ -683,6 +684,7 @@ module feedback_channel #(
         .write,
         .word,
         .wdata,
+        .wdata_low,
         .rdata,
         // edges and index
         .edge_filter_skip                  (filter_skip),

@@ -101,7 +101,9 @@ module node #(
     wire select, write, node_select, bus_select, peripherals_select;
     wire [AXES-1:0] axis_select, feedback_select, actuator_select;
     wire [15:0] bus_address;
-    wire [31:0] wdata, rdata, node_rdata, bus_rdata, peripherals_rdata;
+    wire [31:0] wdata, wdata_low, rdata;
+    wire [31:0] memory_rdata, node_rdata, bus_rdata, peripherals_rdata;
+    wire registers_ready;
     wire [32*AXES-1:0] axis_rdata, feedback_rdata, actuator_rdata;
     wire [ 5:0] word = bus_address[7:2];
     // time
@@ -122,12 +124,38 @@ module node #(
     ) u_core (
         .clk,
         .rst,
+        .ready  (registers_ready),
         .select,
         .write,
         .address(bus_address),
         .wdata,
         .rdata,
         .trap
+    );
+    register_memory #(
+        .AXES          (AXES),
+        .FILTERS       (FILTERS == 0 ? 0 : HAS_FILTERS),
+        .HAS_BRIDGE    (HAS_BRIDGE),
+        .HAS_COMPARE   (HAS_COMPARE),
+        .HAS_DAC       (HAS_DAC),
+        .HAS_DRIVE     (HAS_DRIVE),
+        .HAS_FINE_STAGE(HAS_FINE_STAGE),
+        .HAS_HARMONICS (HAS_HARMONICS),
+        .HAS_MONITOR   (HAS_MONITOR),
+        .HAS_RECORDER  (HAS_RECORDER),
+        .HAS_SINE      (HAS_SINE),
+        .HAS_STEPPER   (HAS_STEPPER),
+        .HAS_VELOCITY  (HAS_VELOCITY)
+    ) u_register_memory (
+        .clk,
+        .rst,
+        .select,
+        .write,
+        .address(bus_address[15:2]),
+        .wdata,
+        .ready  (registers_ready),
+        .rdata  (memory_rdata),
+        .wdata_low
     );
     register_bus #(
         .AXES(AXES)
@@ -137,7 +165,8 @@ module node #(
         .select,
         .address(bus_address),
         .rdata,
-        // answers of the blocks
+        // answers of the memory and the blocks
+        .memory_rdata,
         .node_rdata,
         .bus_rdata,
         .peripherals_rdata,
@@ -325,6 +354,7 @@ module node #(
             .write,
             .word,
             .wdata,
+            .wdata_low,
             .rdata          (axis_rdata[32*n+:32]),
             .feedback_rdata (feedback_rdata[32*n+:32]),
             .actuator_rdata (actuator_rdata[32*n+:32]),

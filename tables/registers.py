@@ -7,7 +7,7 @@ import re
 import sys
 import textwrap
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -94,6 +94,23 @@ class Field:
 
 
 @dataclass(frozen=True)
+class Answer:
+    """One word of a register on rdata: its value, and the sign that fills so many bits above."""
+
+    name: str
+    word: int
+    value: str
+    fill: int
+    sign: str
+
+
+def above(parts: list[str], zeros: int) -> str:
+    """A word of these parts, the lowest first, below so many zeros."""
+    parts = [*parts, f"{zeros}'d0"] if zeros else parts
+    return parts[0] if len(parts) == 1 else "{" + ", ".join(parts[::-1]) + "}"
+
+
+@dataclass(frozen=True)
 class Register:
     name: str
     offset: int
@@ -118,36 +135,41 @@ class Register:
     def access(self) -> str:
         return "".join(c for c in "rw" if any(c in f.access for f in self.fields))
 
-    def parts(self, constant: int) -> list[str]:
-        """What is on rdata for this register of 32 bits, most significant bit first."""
-        readable = [f for f in self.fields if "r" in f.access]
+    @property
+    def live(self) -> tuple[Field, ...]:
+        """What the block itself answers; the register memory answers with the settings."""
+        return tuple(f for f in self.fields if "r" in f.access and f.kind != "setting")
+
+    @property
+    def stored(self) -> tuple[Field, ...]:
+        """The settings that are read back from the register memory."""
+        return tuple(f for f in self.fields if "r" in f.access and f.kind == "setting")
+
+    def answers(self, constant: int) -> list[Answer]:
+        """What the block itself answers to a read of each word."""
+        if not self.live:
+            return []
+        f = self.live[0]
         if self.vector:
-            return [f"{32 - len(readable)}'d0", readable[0].state.partition("[")[0]]
+            held = f.state.partition("[")[0]
+            return [Answer(self.name, self.word, above([held], 32 - len(self.live)), 0, "")]
+        if self.wide:
+            high, rest = f"{f.port}_high", 64 - f.width
+            sign = f"{high}[{f.width - 33}]" if f.signed and rest else ""
+            return [
+                Answer(self.name, self.word, f"{f.port}[31:0]", 0, ""),
+                Answer(f"{self.name}_high", self.word + 1, above([high], rest), rest, sign),
+            ]
         parts: list[str] = []
         at = 0
-        for f in readable:
+        for f in self.live:
             if f.low > at:
                 parts.append(f"{f.low - at}'d0")
             parts.append(f"32'h{constant:08X}" if f.kind == "constant" else f.state)
             at = f.low + f.width
-        if at < 32:
-            extended = len(self.fields) == 1 and readable[0].signed
-            parts.append(f"{{{32 - at}{{{parts[0]}[{at - 1}]}}}}" if extended else f"{32 - at}'d0")
-        return parts[::-1]
-
-    def shown(self, constant: int) -> str:
-        parts = self.parts(constant)
-        return parts[0] if len(parts) == 1 else "{" + ", ".join(parts) + "}"
-
-    @property
-    def shown_high(self) -> str:
-        """What is on rdata for the high word of a register of 64 bits."""
-        f = self.fields[0]
-        held = f.kind == "input"
-        top = f"{f.port}_high" if held else f"{f.port}[{f.width - 1}:32]"
-        sign = f"{f.port}_high[{f.width - 33}]" if held else f"{f.port}[{f.width - 1}]"
-        pad = f"{{{64 - f.width}{{{sign if f.signed else chr(49) + chr(39) + 'b0'}}}}}"
-        return top if f.width == 64 else f"{{{pad}, {top}}}"
+        extended = len(self.fields) == 1 and f.signed and at < 32
+        sign = f"{f.state}[{at - 1}]" if extended else ""
+        return [Answer(self.name, self.word, above(parts, 32 - at), 32 - at, sign)]
 
 
 @dataclass(frozen=True)
@@ -163,21 +185,141 @@ class Block:
     def fields(self) -> list[tuple[Register, Field]]:
         return [(r, f) for r in self.registers for f in r.fields]
 
+    def answers(self, constant: int) -> list[Answer]:
+        return [a for r in self.registers for a in r.answers(constant)]
+
+    def rdata(self, constant: int) -> str:
+        """The answers together, of which one is not 0 after a read, and the signs above them."""
+        answers = self.answers(constant)
+        texts = [f"({{32{{get_{a.name}}}}} & {a.value})" for a in answers]
+        for fill in sorted({a.fill for a in answers if a.sign}):
+            signs = [f"(get_{a.name} && {a.sign})" for a in answers if a.sign and a.fill == fill]
+            texts.append(f"{{{{{fill}{{{' || '.join(signs)}}}}}, {32 - fill}'d0}}")
+        return " | ".join(texts)
+
     @property
     def parameters(self) -> list[str]:
         return sorted({f.needs for _, f in self.fields if f.needs})
+
+    @property
+    def wide_settings(self) -> list[Register]:
+        return [r for r in self.registers if r.wide and r.fields[0].kind == "setting"]
 
     @property
     def unused(self) -> int:
         """The lowest bit of wdata that no register of this block has; all above are unused too."""
         taken = ("setting", "pulse", "sticky")
         fields = [(r, f) for r, f in self.fields if f.kind in taken]
-        return max((32 if r.wide else f.low + f.width for r, f in fields), default=0)
+        return max((f.low + f.width - 32 * r.wide for r, f in fields), default=0)
 
     @property
     def ports(self) -> list[Fitted]:
         """(direction, shape, name, text) of each port behind the register bus."""
         return fitted([port for r in self.registers for port in ports(r)])
+
+
+Texts = dict[str, list[str]]  # an expression: the words {kind, word} that it is for
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The words of all blocks as the register memory holds them: the blocks of the node first, then
+    those of each axis.
+    """
+
+    alone: tuple[Block, ...]
+    of_axes: tuple[Block, ...]
+
+    @property
+    def blocks(self) -> list[tuple[int, Block]]:
+        """Each block with its kind."""
+        return list(enumerate((*self.alone, *self.of_axes)))
+
+    @property
+    def parameters(self) -> list[str]:
+        return sorted({name for _, b in self.blocks for name in b.parameters})
+
+    @property
+    def registers(self) -> list[tuple[int, Register]]:
+        """Each register with {kind, word} of its low word."""
+        return [(kind << 6 | r.word, r) for kind, b in self.blocks for r in b.registers]
+
+    @property
+    def low(self) -> list[str]:
+        """Low words of settings of 64 bits: they wait for the high word."""
+        wide = [(at, r) for at, r in self.registers if r.wide and r.fields[0].kind == "setting"]
+        return [literal(9, at) for at, _ in wide]
+
+    @property
+    def high(self) -> Texts:
+        """High words whose write stores both words, if the setting is built."""
+        wide = [(at, r) for at, r in self.registers if r.wide and r.stored]
+        return grouped((at + 1, built(r.fields[0]) or "1'b1") for at, r in wide)
+
+    @property
+    def mask(self) -> Texts:
+        """The bits that a write stores; none without an entry."""
+        ones = [(at, r, [(f, (1 << f.width) - 1) for f in r.stored]) for at, r in self.registers]
+        return grouped((at + r.wide, in_word(fields, r.wide)) for at, r, fields in ones)
+
+    @property
+    def sign(self) -> Texts:
+        """The bit that fills the bits above a signed setting; 0 without an entry."""
+        found = []
+        for at, r in self.registers:
+            f = r.fields[0]
+            top = f.width - 32 * r.wide - 1
+            if r.stored and len(r.fields) == 1 and f.signed and top < 31:
+                bit = f"wdata[{top}]"
+                found.append((at + r.wide, f"{built(f)} && {bit}" if f.needs else bit))
+        return grouped(found)
+
+    @property
+    def first(self) -> Texts:
+        """First values that are not 0."""
+        values = [(at, r, [(f, f.reset) for f in r.stored]) for at, r in self.registers]
+        return grouped(
+            (at + high, in_word(fields, high))
+            for at, r, fields in values
+            for high in range(1 + r.wide)
+        )
+
+
+def built(field: Field) -> str:
+    """The wire of the layout that is high if the axis has what the setting needs, or nothing."""
+    return field.needs.lower()
+
+
+def grouped(entries: Iterable[tuple[int, str]]) -> Texts:
+    found: Texts = {}
+    for at, text in entries:
+        if text:
+            found.setdefault(text, []).append(literal(9, at))
+    return found
+
+
+def in_word(values: Sequence[tuple[Field, int]], high: int) -> str:
+    """The values of fields together in their low or high word; empty if they are 0."""
+    words: dict[str, int] = {}
+    for f, value in values:
+        words[built(f)] = words.get(built(f), 0) | (value << f.low >> 32 * high & 0xFFFF_FFFF)
+    texts = [
+        f"({there} ? {literal(32, word)} : 32'd0)" if there else literal(32, word)
+        for there, word in words.items()
+        if word
+    ]
+    return " | ".join(texts)
+
+
+def layout(blocks: Sequence[Block]) -> Layout:
+    if [b.stride > 0 for b in blocks] != sorted(b.stride > 0 for b in blocks):
+        raise Refused("the blocks of the axes come after those of the node")
+    if any(b.stride not in (0, SLOT) for b in blocks):
+        raise Refused(f"the blocks of one kind are {SLOT:#x} apart")
+    if len(blocks) > 7:
+        raise Refused("there are at most 7 kinds of blocks")
+    alone = tuple(b for b in blocks if not b.stride)
+    return Layout(alone, tuple(b for b in blocks if b.stride))
 
 
 def span(width: int, low: int = 0) -> str:
@@ -223,6 +365,7 @@ def field_of(node: FieldNode, register: RegNode) -> Field:
         (not wide and node.high > 31, "a field of more than 32 bits needs a register of 64"),
         (wide and (name != "value" or node.width <= 32), "64 bits are for one long `value`"),
         (wide and kind not in ("input", "setting"), "64 bits are an input or a setting"),
+        (wide and register.raw_address_offset % 8, "64 bits start at a multiple of 8 bytes"),
         (vector and (node.width > 1 or kind not in ("input", "sticky")), "not for a vector"),
     ):
         if bad:
@@ -364,6 +507,9 @@ def files() -> dict[Path, str]:
         )
         for b in blocks
     }
+    made[ROOT / "rtl" / "registers" / "register_layout.sv"] = made_files.systemverilog(
+        filled("layout.sv", layout=layout(blocks))
+    )
     made[ROOT / "sw" / "firmware" / "made" / "registers.h"] = filled("h", blocks=blocks)
     made[ROOT / "sw" / "host" / "moire" / "made" / "registers.py"] = filled("py", blocks=blocks)
     made[ROOT / "docs" / "registers.md"] = filled("md", blocks=blocks)

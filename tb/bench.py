@@ -20,6 +20,7 @@ from cocotb.triggers import RisingEdge
 from cocotb_tools.runner import as_sv_literal, get_runner
 
 ROOT = Path(__file__).resolve().parent.parent
+BENCHES = ROOT / "build" / "benches"  # tops that a test writes for itself
 WAIVERS = [
     ROOT / "rtl" / "cpu" / "picorv32.vlt"
 ]  # foreign sources only; our own waivers stand in the line they excuse
@@ -76,7 +77,8 @@ def direct_verilator(runner):
 
 def run(top, test, **parameters):
     """Build module `top` with `parameters` and run the cocotb tests in the file `test`. Files are
-    found by name: a bench top beside the test or among the figures, every other module under rtl/.
+    found by name: a bench top beside the test, among the figures or in BENCHES, every other module
+    under rtl/.
     """
     __tracebackhide__ = True
     sim, waves, here = (
@@ -84,7 +86,8 @@ def run(top, test, **parameters):
         bool(os.environ.get("WAVES")),
         Path(test).resolve(),
     )
-    benches = [folder / f"{top}.sv" for folder in (here.parent, ROOT / "sw" / "figures")]
+    folders = (here.parent, ROOT / "sw" / "figures", BENCHES)
+    benches = [folder / f"{top}.sv" for folder in folders]
     source = next((bench for bench in benches if bench.exists()), None) or source_of(top)
     name = os.environ.get("PYTEST_CURRENT_TEST", "run").split("::")[-1].split(" ")[0]
     values = {k: as_sv_literal(v) for k, v in parameters.items()}

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // register_bus -- send each access of the soft core to the register block that holds the address.
 //
-// latency   0 cycles from an access to select and write at its block, 1 cycle from an access to the
-//           answer in rdata.
+// latency   0 cycles from an access to select at its block, 1 cycle from the answers of the blocks
+//           and of register_memory to rdata.
 // rate      one access per cycle
 // source    the addresses of tables/registers.rdl: node at 0x000, RS-485 bus at 0x100, peripherals
 //           at 0x200, axis n at 0x400 + n * 0x100, its feedback channel at 0xC00 + n * 0x100, its
 //           actuator at 0x1400 + n * 0x100
 // model     tb/cpu/register_bus.py, equal in every bit of every cycle
 // proved    An access reaches at most one block, the one that holds its address, and none without
-//           select. rdata is the answer of the block that was selected one cycle before, and 0 if
-//           there was none.
+//           select. rdata has the bits of all answers of the cycle before.
 // proof     depth 4, AXES = 2
 `default_nettype none
 
@@ -20,26 +19,24 @@ module register_bus #(
     input  wire                clk,
     input  wire                select,              // strobe: an access
     input  wire  [       15:0] address,             // byte address inside the register map
-    input  wire  [       31:0] node_rdata,          // word, 1 cycle after node_select
-    input  wire  [       31:0] bus_rdata,           // word, 1 cycle after bus_select
-    input  wire  [       31:0] peripherals_rdata,   // word, 1 cycle after peripherals_select
-    input  wire  [32*AXES-1:0] axis_rdata,          // word of axis n in bits 32 n + 31 .. 32 n
-    input  wire  [32*AXES-1:0] feedback_rdata,      // word of axis n in bits 32 n + 31 .. 32 n
-    input  wire  [32*AXES-1:0] actuator_rdata,      // word of axis n in bits 32 n + 31 .. 32 n
+    input  wire  [       31:0] memory_rdata,        // settings in the word of the last access
+    input  wire  [       31:0] node_rdata,          // live bits, 1 cycle after node_select
+    input  wire  [       31:0] bus_rdata,           // live bits, 1 cycle after bus_select
+    input  wire  [       31:0] peripherals_rdata,   // live bits, 1 cycle after peripherals_select
+    input  wire  [32*AXES-1:0] axis_rdata,          // live bits, axis n: bits 32 n + 31 .. 32 n
+    input  wire  [32*AXES-1:0] feedback_rdata,      // live bits, axis n: bits 32 n + 31 .. 32 n
+    input  wire  [32*AXES-1:0] actuator_rdata,      // live bits, axis n: bits 32 n + 31 .. 32 n
     output logic               node_select,         // strobe: access to the node's block
     output logic               bus_select,          // strobe: access to the RS-485 bus block
     output logic               peripherals_select,  // strobe: access to the peripherals' block
     output logic [   AXES-1:0] axis_select,         // strobe: access to axis n
     output logic [   AXES-1:0] feedback_select,     // strobe: access to feedback channel n
     output logic [   AXES-1:0] actuator_select,     // strobe: access to actuator n
-    output logic [       31:0] rdata                // word of the last access; 0 without a block
+    output logic [       31:0] rdata                // word of the access 2 cycles before
 );
     if (AXES < 1 || AXES > 8) begin : g_check
         AXES_MUST_BE_FROM_1_TO_8 u_error ();
     end
-
-    logic node_q, bus_q, peripherals_q;
-    logic [AXES-1:0] axis_q, feedback_q, actuator_q;
 
     wire [7:0] block = address[15:8];
 
@@ -54,25 +51,18 @@ module register_bus #(
         end
     end
 
+    // a block that was not read answers 0
+    logic [31:0] answer;
     always_comb begin
-        rdata = {32{node_q}} & node_rdata;
-        rdata = rdata | ({32{bus_q}} & bus_rdata);
-        rdata = rdata | ({32{peripherals_q}} & peripherals_rdata);
+        answer = node_rdata | bus_rdata | peripherals_rdata | memory_rdata;
         for (int n = 0; n < AXES; n++) begin
-            rdata = rdata | ({32{axis_q[n]}} & axis_rdata[32*n+:32]);
-            rdata = rdata | ({32{feedback_q[n]}} & feedback_rdata[32*n+:32]);
-            rdata = rdata | ({32{actuator_q[n]}} & actuator_rdata[32*n+:32]);
+            answer = answer | axis_rdata[32*n+:32];
+            answer = answer | feedback_rdata[32*n+:32];
+            answer = answer | actuator_rdata[32*n+:32];
         end
     end
 
-    always_ff @(posedge clk) begin
-        node_q        <= node_select;
-        bus_q         <= bus_select;
-        peripherals_q <= peripherals_select;
-        axis_q        <= axis_select;
-        feedback_q    <= feedback_select;
-        actuator_q    <= actuator_select;
-    end
+    always_ff @(posedge clk) rdata <= answer;
 
     wire unused = &{1'b0, address[7:0]};
 
@@ -85,18 +75,18 @@ module register_bus #(
     wire [32*BLOCKS-1:0] answers = {
         actuator_rdata, feedback_rdata, axis_rdata, peripherals_rdata, bus_rdata, node_rdata
     };
-    logic [BLOCKS-1:0] chosen_q;
+    logic [31:0] together;
+    always_comb begin
+        together = memory_rdata;
+        for (int n = 0; n < BLOCKS; n++) together = together | answers[32*n+:32];
+    end
     always @(posedge clk) begin
-        past     <= 1'b1;
-        chosen_q <= chosen;
+        past <= 1'b1;
         assert ((chosen & (chosen - 1'b1)) == '0);
         assert (select || chosen == '0);
         assert (node_select == (select && block == 0) && bus_select == (select && block == 1));
-        for (int n = 0; n < BLOCKS; n++) begin
-            if (past && chosen_q[n]) assert (rdata == answers[32*n+:32]);
-        end
-        if (past && chosen_q == '0) assert (rdata == 0);
-        cover (past && chosen_q[BLOCKS-1] && chosen[0] && rdata == 3);
+        if (past) assert (rdata == $past(together));
+        cover (past && chosen[BLOCKS-1] && $past(chosen[0]) && rdata == 3);
     end
 `endif
 endmodule

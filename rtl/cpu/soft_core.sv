@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // soft_core -- RISC-V processor (rv32im) with its memory, the master of the register bus.
 //
-// latency   0 wait cycles for an access to memory, 1 wait cycle for an access to a register.
-// rate      An operation takes 3 cycles, a memory access 5, a register access or a product 6, a
+// latency   0 wait cycles for an access to memory, 2 wait cycles for an access to a register, and
+//           as many more as ready is low.
+// rate      An operation takes 3 cycles, a memory access 5, a product 6, a register access 7, a
 //           quotient 40.
 // behaviour The memory is at 0000_0000 (start address 0, stack from its end), the registers are at
 //           8000_0000 (64 KiB, whole words only). Any other access, a misaligned access and an
@@ -13,7 +14,8 @@
 // model     tb/cpu/soft_core.py, the results of the program tb/cpu/core_test.c
 // proved    Whatever the core does: an access to no valid address raises trap in the next cycle,
 //           and trap stays high until rst. select is a strobe, only for an access to a whole word
-//           of the registers, and never for an instruction.
+//           of the registers, only while ready is high, never for an instruction, and never in
+//           two cycles that follow each other.
 // proof     depth 6, MEMORY_BYTES = 1024
 `default_nettype none
 
@@ -23,11 +25,12 @@ module soft_core #(
 ) (
     input  wire         clk,
     input  wire         rst,
+    input  wire         ready,    // level: the registers take an access
     output logic        select,   // strobe: one access to the registers
     output logic        write,    // level: with select, wdata is to be written
     output logic [15:0] address,  // byte address of a register
     output logic [31:0] wdata,    // word to be written
-    input  wire  [31:0] rdata,    // word read, 1 cycle after select
+    input  wire  [31:0] rdata,    // word read, 2 cycles after select
     output logic        trap      // level: the core has stopped
 );
     localparam int A = $clog2(MEMORY_BYTES);
@@ -38,23 +41,25 @@ module soft_core #(
     wire [31:0] mem_la_addr;  // of a word: bits 1:0 are zero
     // verilator lint_on UNUSEDSIGNAL
     wire [3:0] mem_wstrb, mem_la_wstrb;
-    // the registers have answered; an access had no valid address
-    logic answered, lost;
+    // the registers will answer in the next cycle, have answered; an access had no valid address
+    logic awaited, answered, lost;
 
     wire in_memory = mem_addr < 32'(MEMORY_BYTES);
     wire in_registers = mem_addr[31:16] == 16'h8000 && !mem_instr && (&mem_wstrb || ~|mem_wstrb);
     wire la_in_memory = mem_la_addr < 32'(MEMORY_BYTES);
 
-    assign select  = mem_valid && in_registers && !answered;
+    assign select  = mem_valid && in_registers && ready && !awaited && !answered;
     assign write   = mem_wstrb[0];
     assign address = mem_addr[15:0];
     assign wdata   = mem_wdata;
     assign trap    = core_trap || lost;
 
     always_ff @(posedge clk) begin
-        answered <= select;
+        awaited  <= select;
+        answered <= awaited;
         if (mem_valid && !in_memory && !in_registers) lost <= 1'b1;
         if (rst) begin
+            awaited  <= 1'b0;
             answered <= 1'b0;
             lost     <= 1'b0;
         end
@@ -125,11 +130,9 @@ module soft_core #(
             if ($past(mem_valid && !in_memory && !in_registers)) assert (trap);
             if ($past(lost)) assert (trap);
             assert (!(select && $past(select)));
-            if (select) assert (mem_valid && !in_memory && !mem_instr);
+            if (select) assert (mem_valid && !in_memory && !mem_instr && ready);
             if (select) assert (mem_wstrb == '0 || mem_wstrb == '1);
             if (write && select) assert (mem_wstrb == '1);
-            // no access is both answered and lost
-            assert (!(answered && lost && !$past(lost)));
             cover (mem_valid && in_memory && mem_instr);
         end
     end

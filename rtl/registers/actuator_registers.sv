@@ -4,6 +4,7 @@
 //
 // latency  1 cycle from select to rdata, and from a write to the new value
 // rate     one access per cycle
+// behaviour rdata has the live bits of a register only; register_memory answers with its settings.
 // source   tables/registers.rdl
 // model    tb/registers/register_block.py, equal in every bit of every cycle
 // made     by tables/registers.py, never by hand
@@ -21,7 +22,8 @@ module actuator_registers #(
     input  wire                write,                      // level: it writes wdata
     input  wire         [ 5:0] word,                       // index of the word
     input  wire         [31:0] wdata,                      // value to write
-    output logic        [31:0] rdata,                      // value read; else 0
+    input  wire         [31:0] wdata_low,                  // low word, held by register_memory
+    output logic        [31:0] rdata,                      // live bits read; else 0
     output logic        [ 1:0] drive,                      // kind of drive
     output logic        [15:0] pwm_period,                 // PWM period of the bridge [cycle]
     output logic        [13:0] step_pulse_high,            // shortest times of a step pulse, cycle
@@ -43,33 +45,22 @@ module actuator_registers #(
     output logic        [14:0] fine_limit,                 // largest |command| of the fine stage
     input  wire signed  [15:0] fine_command                // command of the fine stage
 );
-    logic [31:0] step_ratio_low;
+    logic get_steps;
+    logic get_fine_command;
 
-    wire         get = select && !write;
-    wire         put = select && write;
+    wire  get = select && !write;
+    wire  put = select && write;
+
+    // no register of this block has these bits
+    wire  unused = &{1'b0, wdata[31:28]};
+
+    // words read in the cycle before
+    assign rdata = ({32{get_steps}} & steps) | ({32{get_fine_command}} & {16'd0, fine_command}) |
+        {{16{(get_fine_command && fine_command[15])}}, 16'd0};
 
     always_ff @(posedge clk) begin
-        rdata <= '0;
-        if (get) begin
-            case (word)
-                6'h00: rdata <= {30'd0, drive};
-                6'h01: rdata <= {16'd0, pwm_period};
-                6'h02: rdata <= {4'd0, step_pulse_low, step_pulse_high};
-                6'h03: rdata <= {4'd0, step_direction_hold, step_direction_setup};
-                6'h04: rdata <= {24'd0, step_output_trim, step_output_direction_low,
-                    step_output_step_low, step_output_mode};
-                6'h06: rdata <= step_ratio[31:0];
-                6'h07: rdata <= {{16{step_ratio[47]}}, step_ratio[47:32]};
-                6'h08: rdata <= steps;
-                6'h09: rdata <= {8'd0, dac_refresh, dac_half_period};
-                6'h0A: rdata <= {{16{dac_trim[15]}}, dac_trim};
-                6'h0C: rdata <= {8'd0, fine_kp};
-                6'h0D: rdata <= {8'd0, fine_ki};
-                6'h0E: rdata <= {17'd0, fine_limit};
-                6'h0F: rdata <= {{16{fine_command[15]}}, fine_command};
-                default: rdata <= '0;
-            endcase
-        end
+        get_steps <= get && word == 6'h08;
+        get_fine_command <= get && word == 6'h0F;
 
         if (put && word == 6'h00) drive <= wdata[1:0];
         if (HAS_BRIDGE != 0 && put && word == 6'h01) pwm_period <= wdata[15:0];
@@ -81,8 +72,7 @@ module actuator_registers #(
         if (HAS_STEPPER != 0 && put && word == 6'h04) step_output_step_low <= wdata[2];
         if (HAS_STEPPER != 0 && put && word == 6'h04) step_output_direction_low <= wdata[3];
         if (HAS_STEPPER != 0 && put && word == 6'h04) step_output_trim <= wdata[7:4];
-        if (HAS_STEPPER != 0 && put && word == 6'h06) step_ratio_low <= wdata;
-        if (HAS_STEPPER != 0 && put && word == 6'h07) step_ratio <= {wdata[15:0], step_ratio_low};
+        if (HAS_STEPPER != 0 && put && word == 6'h07) step_ratio <= {wdata[15:0], wdata_low};
         if (HAS_DAC != 0 && put && word == 6'h09) dac_half_period <= wdata[7:0];
         if (HAS_DAC != 0 && put && word == 6'h09) dac_refresh <= wdata[23:8];
         if (HAS_DAC != 0 && put && word == 6'h0A) dac_trim <= wdata[15:0];
@@ -92,7 +82,8 @@ module actuator_registers #(
         if (HAS_FINE_STAGE != 0 && put && word == 6'h0E) fine_limit <= wdata[14:0];
 
         if (rst) begin
-            rdata <= '0;
+            get_steps <= 1'b0;
+            get_fine_command <= 1'b0;
             drive <= 2'h0;
             pwm_period <= 16'h0000;
             step_pulse_high <= HAS_STEPPER == 0 ? '0 : 14'h0001;
@@ -103,7 +94,6 @@ module actuator_registers #(
             step_output_step_low <= 1'b0;
             step_output_direction_low <= 1'b0;
             step_output_trim <= 4'h0;
-            step_ratio_low <= '0;
             step_ratio <= 48'h000000000000;
             dac_half_period <= HAS_DAC == 0 ? '0 : 8'h01;
             dac_refresh <= HAS_DAC == 0 ? '0 : 16'hFFFF;

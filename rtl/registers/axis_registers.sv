@@ -3,6 +3,7 @@
 //
 // latency  1 cycle from select to rdata, and from a write to the new value
 // rate     one access per cycle
+// behaviour rdata has the live bits of a register only; register_memory answers with its settings.
 // source   tables/registers.rdl
 // model    tb/registers/register_block.py, equal in every bit of every cycle
 // made     by tables/registers.py, never by hand
@@ -20,7 +21,8 @@ module axis_registers #(
     input  wire                write,                           // level: it writes wdata
     input  wire         [ 5:0] word,                            // index of the word
     input  wire         [31:0] wdata,                           // value to write
-    output logic        [31:0] rdata,                           // value read; else 0
+    input  wire         [31:0] wdata_low,                       // low word, held by register_memory
+    output logic        [31:0] rdata,                           // live bits read; else 0
     output logic               control_enable,                  // requests the drive
     output logic               control_closed_loop,             // 1
     output logic               control_homing,                  // homing
@@ -121,78 +123,80 @@ module axis_registers #(
     logic        zero_crossing_up_held;
     logic        zero_crossing_down_held;
     logic [31:0] rejected_pulses_count;
+    wire  [32:0] rejected_pulses_next = {1'b0, rejected_pulses_count} + 33'(rejected_pulses);
     logic [31:0] rejected_samples_count;
-    logic [31:0] segment_velocity_low;
-    logic [31:0] segment_acceleration_low;
+    wire  [32:0] rejected_samples_next = {1'b0, rejected_samples_count} + 33'(rejected_samples);
+    logic        get_state;
+    logic        get_faults;
+    logic        get_causes_now;
+    logic        get_first_fault;
+    logic        get_fault_position;
+    logic        get_fault_position_high;
+    logic        get_position;
+    logic        get_position_high;
+    logic        get_target;
+    logic        get_target_high;
+    logic        get_velocity;
+    logic        get_zero_crossing;
+    logic        get_sample;
+    logic        get_phase;
+    logic        get_quadrature_count;
+    logic        get_encoder_events;
+    logic        get_rejected_pulses;
+    logic        get_rejected_samples;
+    logic        get_built;
+    logic        get_following_error;
+    logic        get_command;
 
     wire         get = select && !write;
     wire         put = select && write;
 
+    // words read in the cycle before
+    assign rdata = ({32{get_state}} & {18'd0, state_fine_saturated, state_armed, state_queue_free,
+        state_saturated, state_moving, state_drive_fault, state_estop, state_limit_high,
+        state_limit_low, state_enabled}) | ({32{get_faults}} & {22'd0, faults}) |
+        ({32{get_causes_now}} & {22'd0, causes_now}) | ({32{get_first_fault}} & {22'd0,
+        first_fault}) | ({32{get_fault_position}} & fault_position[31:0]) |
+        ({32{get_fault_position_high}} & {16'd0, fault_position_high}) | ({32{get_position}} &
+        position[31:0]) | ({32{get_position_high}} & {16'd0, position_high}) | ({32{get_target}} &
+        target[31:0]) | ({32{get_target_high}} & {16'd0, target_high}) | ({32{get_velocity}} &
+        velocity) | ({32{get_zero_crossing}} & {30'd0, zero_crossing_down_held,
+        zero_crossing_up_held}) | ({32{get_sample}} & {sample_cos, sample_sin}) | ({32{get_phase}} &
+        {phase_amplitude, phase_phase}) | ({32{get_quadrature_count}} & quadrature_count) |
+        ({32{get_encoder_events}} & {26'd0, encoder_events_held}) | ({32{get_rejected_pulses}} &
+        rejected_pulses_count) | ({32{get_rejected_samples}} & rejected_samples_count) |
+        ({32{get_built}} & {9'd0, built_segments, built_filters, built_fine_stage, built_dac,
+        built_stepper, built_bridge, built_drive, built_velocity, built_compare, built_capture,
+        built_recorder, built_harmonics, built_monitor, built_sine}) | ({32{get_following_error}} &
+        following_error) | ({32{get_command}} & {16'd0, command}) | {{16{(get_fault_position_high &&
+        fault_position_high[15]) || (get_position_high && position_high[15]) || (get_target_high &&
+        target_high[15]) || (get_command && command[15])}}, 16'd0};
+
     always_ff @(posedge clk) begin
-        rdata <= '0;
-        if (get) begin
-            case (word)
-                6'h00: rdata <= {28'd0, control_fine, control_homing, control_closed_loop,
-                    control_enable};
-                6'h02: rdata <= {18'd0, state_fine_saturated, state_armed, state_queue_free,
-                    state_saturated, state_moving, state_drive_fault, state_estop, state_limit_high,
-                    state_limit_low, state_enabled};
-                6'h03: rdata <= {22'd0, faults};
-                6'h04: rdata <= {22'd0, causes_now};
-                6'h05: rdata <= {22'd0, first_fault};
-                6'h06: rdata <= fault_position[31:0];
-                6'h07: rdata <= {{16{fault_position_high[15]}}, fault_position_high};
-                6'h08: rdata <= following_limit;
-                6'h0A: rdata <= position[31:0];
-                6'h0B: rdata <= {{16{position_high[15]}}, position_high};
-                6'h0C: rdata <= target[31:0];
-                6'h0D: rdata <= {{16{target_high[15]}}, target_high};
-                6'h0E: rdata <= velocity;
-                6'h0F: rdata <= shift_origin;
-                6'h10: rdata <= {30'd0, zero_crossing_down_held, zero_crossing_up_held};
-                6'h11: rdata <= {sensing_outlier_hold, sensing_outlier_step, sensing_deglitch};
-                6'h12: rdata <= {amplitude_window_high, amplitude_window_low};
-                6'h13: rdata <= {12'd0, disagreement_limit};
-                6'h14: rdata <= {sample_cos, sample_sin};
-                6'h15: rdata <= {phase_amplitude, phase_phase};
-                6'h16: rdata <= quadrature_count;
-                6'h17: rdata <= {26'd0, encoder_events_held};
-                6'h18: rdata <= {26'd0, encoder_fault_mask};
-                6'h19: rdata <= rejected_pulses_count;
-                6'h1A: rdata <= rejected_samples_count;
-                6'h1B: rdata <= {9'd0, built_segments, built_filters, built_fine_stage, built_dac,
-                    built_stepper, built_bridge, built_drive, built_velocity, built_compare,
-                    built_capture, built_recorder, built_harmonics, built_monitor, built_sine};
-                6'h20: rdata <= {8'd0, kp};
-                6'h21: rdata <= {8'd0, ki};
-                6'h22: rdata <= {8'd0, kd};
-                6'h23: rdata <= {8'd0, kv};
-                6'h24: rdata <= {8'd0, ka};
-                6'h25: rdata <= {2'd0, servo_limits_integral, servo_limits_output};
-                6'h26: rdata <= {16'd0, dead_band};
-                6'h27: rdata <= following_error;
-                6'h28: rdata <= {{16{command[15]}}, command};
-                6'h29: rdata <= {{16{open_command[15]}}, open_command};
-                6'h2A: rdata <= {23'd0, filters_address, filters_in_use};
-                6'h2B: rdata <= filter_coefficient;
-                6'h2C: rdata <= segment_velocity[31:0];
-                6'h2D: rdata <= segment_velocity[63:32];
-                6'h2E: rdata <= segment_acceleration[31:0];
-                6'h2F: rdata <= segment_acceleration[63:32];
-                6'h30: rdata <= segment_jerk;
-                6'h31: rdata <= {7'd0, segment_ticks_last, segment_ticks};
-                6'h32: rdata <= stop_deceleration;
-                6'h33: rdata <= stop_jerk;
-                6'h34: rdata <= {14'd0, feed_override_pause, feed_override_fraction};
-                6'h35: rdata <= feed_override_slope;
-                6'h36: rdata <= feed_override_curve;
-                6'h37: rdata <= start_at;
-                default: rdata <= '0;
-            endcase
-        end
-        if (get && word == 6'h06) fault_position_high <= fault_position[47:32];
-        if (get && word == 6'h0A) position_high <= position[47:32];
-        if (get && word == 6'h0C) target_high <= target[47:32];
+        get_state <= get && word == 6'h02;
+        get_faults <= get && word == 6'h03;
+        get_causes_now <= get && word == 6'h04;
+        get_first_fault <= get && word == 6'h05;
+        get_fault_position <= get && word == 6'h06;
+        get_fault_position_high <= get && word == 6'h07;
+        get_position <= get && word == 6'h0A;
+        get_position_high <= get && word == 6'h0B;
+        get_target <= get && word == 6'h0C;
+        get_target_high <= get && word == 6'h0D;
+        get_velocity <= get && word == 6'h0E;
+        get_zero_crossing <= get && word == 6'h10;
+        get_sample <= get && word == 6'h14;
+        get_phase <= get && word == 6'h15;
+        get_quadrature_count <= get && word == 6'h16;
+        get_encoder_events <= get && word == 6'h17;
+        get_rejected_pulses <= get && word == 6'h19;
+        get_rejected_samples <= get && word == 6'h1A;
+        get_built <= get && word == 6'h1B;
+        get_following_error <= get && word == 6'h27;
+        get_command <= get && word == 6'h28;
+        if (get_fault_position) fault_position_high <= fault_position[47:32];
+        if (get_position) position_high <= position[47:32];
+        if (get_target) target_high <= target[47:32];
 
         if (HAS_DRIVE != 0 && put && word == 6'h00) control_enable <= wdata[0];
         if (HAS_DRIVE != 0 && put && word == 6'h00) control_closed_loop <= wdata[1];
@@ -206,35 +210,33 @@ module axis_registers #(
         if (HAS_DRIVE != 0 && put && word == 6'h08) following_limit <= wdata[31:0];
         shift_origin_written <= put && word == 6'h0F;
         if (put && word == 6'h0F) shift_origin <= wdata[31:0];
-        if (put && word == 6'h10 && wdata[0]) zero_crossing_up_held <= 1'b0;
-        if (zero_crossing_up) zero_crossing_up_held <= 1'b1;
-        if (put && word == 6'h10 && wdata[1]) zero_crossing_down_held <= 1'b0;
-        if (zero_crossing_down) zero_crossing_down_held <= 1'b1;
+        zero_crossing_up_held <= zero_crossing_up || (zero_crossing_up_held && !(put && word ==
+            6'h10 && wdata[0]));
+        zero_crossing_down_held <= zero_crossing_down || (zero_crossing_down_held && !(put && word
+            == 6'h10 && wdata[1]));
         if (put && word == 6'h11) sensing_deglitch <= wdata[15:0];
         if (HAS_SINE != 0 && put && word == 6'h11) sensing_outlier_step <= wdata[23:16];
         if (HAS_SINE != 0 && put && word == 6'h11) sensing_outlier_hold <= wdata[31:24];
         if (HAS_MONITOR != 0 && put && word == 6'h12) amplitude_window_low <= wdata[15:0];
         if (HAS_MONITOR != 0 && put && word == 6'h12) amplitude_window_high <= wdata[31:16];
         if (HAS_SINE != 0 && put && word == 6'h13) disagreement_limit <= wdata[19:0];
-        if (put && word == 6'h17 && wdata[0]) encoder_events_held[0] <= 1'b0;
-        if (encoder_events[0]) encoder_events_held[0] <= 1'b1;
-        if (put && word == 6'h17 && wdata[1]) encoder_events_held[1] <= 1'b0;
-        if (encoder_events[1]) encoder_events_held[1] <= 1'b1;
-        if (put && word == 6'h17 && wdata[2]) encoder_events_held[2] <= 1'b0;
-        if (encoder_events[2]) encoder_events_held[2] <= 1'b1;
-        if (put && word == 6'h17 && wdata[3]) encoder_events_held[3] <= 1'b0;
-        if (encoder_events[3]) encoder_events_held[3] <= 1'b1;
-        if (put && word == 6'h17 && wdata[4]) encoder_events_held[4] <= 1'b0;
-        if (encoder_events[4]) encoder_events_held[4] <= 1'b1;
-        if (put && word == 6'h17 && wdata[5]) encoder_events_held[5] <= 1'b0;
-        if (encoder_events[5]) encoder_events_held[5] <= 1'b1;
+        encoder_events_held[0] <= encoder_events[0] || (encoder_events_held[0] && !(put && word ==
+            6'h17 && wdata[0]));
+        encoder_events_held[1] <= encoder_events[1] || (encoder_events_held[1] && !(put && word ==
+            6'h17 && wdata[1]));
+        encoder_events_held[2] <= encoder_events[2] || (encoder_events_held[2] && !(put && word ==
+            6'h17 && wdata[2]));
+        encoder_events_held[3] <= encoder_events[3] || (encoder_events_held[3] && !(put && word ==
+            6'h17 && wdata[3]));
+        encoder_events_held[4] <= encoder_events[4] || (encoder_events_held[4] && !(put && word ==
+            6'h17 && wdata[4]));
+        encoder_events_held[5] <= encoder_events[5] || (encoder_events_held[5] && !(put && word ==
+            6'h17 && wdata[5]));
         if (put && word == 6'h18) encoder_fault_mask <= wdata[5:0];
         if (put && word == 6'h19) rejected_pulses_count <= 32'(rejected_pulses);
-        else if (!(&rejected_pulses_count))
-            rejected_pulses_count <= rejected_pulses_count + 32'(rejected_pulses);
+        else if (!rejected_pulses_next[32]) rejected_pulses_count <= rejected_pulses_next[31:0];
         if (put && word == 6'h1A) rejected_samples_count <= 32'(rejected_samples);
-        else if (!(&rejected_samples_count))
-            rejected_samples_count <= rejected_samples_count + 32'(rejected_samples);
+        else if (!rejected_samples_next[32]) rejected_samples_count <= rejected_samples_next[31:0];
         kp_written <= put && word == 6'h20;
         if (HAS_DRIVE != 0 && put && word == 6'h20) kp <= wdata[23:0];
         if (HAS_DRIVE != 0 && put && word == 6'h21) ki <= wdata[23:0];
@@ -252,12 +254,8 @@ module axis_registers #(
         if (FILTERS != 0 && put && word == 6'h2A) filters_address <= wdata[8:4];
         filter_coefficient_written <= put && word == 6'h2B;
         if (FILTERS != 0 && put && word == 6'h2B) filter_coefficient <= wdata[31:0];
-        if (HAS_DRIVE != 0 && put && word == 6'h2C) segment_velocity_low <= wdata;
-        if (HAS_DRIVE != 0 && put && word == 6'h2D)
-            segment_velocity <= {wdata, segment_velocity_low};
-        if (HAS_DRIVE != 0 && put && word == 6'h2E) segment_acceleration_low <= wdata;
-        if (HAS_DRIVE != 0 && put && word == 6'h2F)
-            segment_acceleration <= {wdata, segment_acceleration_low};
+        if (HAS_DRIVE != 0 && put && word == 6'h2D) segment_velocity <= {wdata, wdata_low};
+        if (HAS_DRIVE != 0 && put && word == 6'h2F) segment_acceleration <= {wdata, wdata_low};
         if (HAS_DRIVE != 0 && put && word == 6'h30) segment_jerk <= wdata[31:0];
         segment_ticks_written <= put && word == 6'h31;
         if (HAS_DRIVE != 0 && put && word == 6'h31) segment_ticks <= wdata[23:0];
@@ -271,7 +269,27 @@ module axis_registers #(
         if (HAS_DRIVE != 0 && put && word == 6'h37) start_at <= wdata[31:0];
 
         if (rst) begin
-            rdata <= '0;
+            get_state <= 1'b0;
+            get_faults <= 1'b0;
+            get_causes_now <= 1'b0;
+            get_first_fault <= 1'b0;
+            get_fault_position <= 1'b0;
+            get_fault_position_high <= 1'b0;
+            get_position <= 1'b0;
+            get_position_high <= 1'b0;
+            get_target <= 1'b0;
+            get_target_high <= 1'b0;
+            get_velocity <= 1'b0;
+            get_zero_crossing <= 1'b0;
+            get_sample <= 1'b0;
+            get_phase <= 1'b0;
+            get_quadrature_count <= 1'b0;
+            get_encoder_events <= 1'b0;
+            get_rejected_pulses <= 1'b0;
+            get_rejected_samples <= 1'b0;
+            get_built <= 1'b0;
+            get_following_error <= 1'b0;
+            get_command <= 1'b0;
             control_enable <= 1'b0;
             control_closed_loop <= 1'b0;
             control_homing <= 1'b0;
@@ -321,9 +339,7 @@ module axis_registers #(
             filters_address <= 5'h00;
             filter_coefficient_written <= 1'b0;
             filter_coefficient <= 32'h00000000;
-            segment_velocity_low <= '0;
             segment_velocity <= 64'h0000000000000000;
-            segment_acceleration_low <= '0;
             segment_acceleration <= 64'h0000000000000000;
             segment_jerk <= 32'h00000000;
             segment_ticks_written <= 1'b0;

@@ -4,6 +4,7 @@
 //
 // latency  1 cycle from select to rdata, and from a write to the new value
 // rate     one access per cycle
+// behaviour rdata has the live bits of a register only; register_memory answers with its settings.
 // source   tables/registers.rdl
 // model    tb/registers/register_block.py, equal in every bit of every cycle
 // made     by tables/registers.py, never by hand
@@ -23,7 +24,8 @@ module feedback_registers #(
     input wire write,  // level: it writes wdata
     input wire [5:0] word,  // index of the word
     input wire [31:0] wdata,  // value to write
-    output logic [31:0] rdata,  // value read; else 0
+    input wire [31:0] wdata_low,  // low word, held by register_memory
+    output logic [31:0] rdata,  // live bits read; else 0
     output logic [15:0] edge_filter_skip,  // cycle
     output logic [3:0] edge_filter_tolerated,  // tolerated samples
     output logic [1:0] decoder_mode,  // 0 x4
@@ -119,79 +121,75 @@ module feedback_registers #(
     logic        index_events_revolution_wrong_held;
     logic        capture_state_overrun_held;
     logic [15:0] captured_position_high;
-    logic [31:0] compare_start_low;
-    logic [31:0] compare_step_low;
     logic        compare_state_late_held;
     logic [ 7:0] velocity_fine_high;
-    logic [31:0] segment_origin_low;
-    logic [31:0] segment_length_low;
+    logic        get_index_events;
+    logic        get_index_count;
+    logic        get_edge_time;
+    logic        get_recorder_state;
+    logic        get_recorder_word;
+    logic        get_signal_faults;
+    logic        get_first_signal_faults;
+    logic        get_capture_state;
+    logic        get_captured;
+    logic        get_captured_time;
+    logic        get_captured_position;
+    logic        get_captured_position_high;
+    logic        get_compare_state;
+    logic        get_compare_passed;
+    logic        get_velocity_fine;
+    logic        get_velocity_fine_high;
+    logic        get_segment_state;
+    logic        get_segment_stored;
+    logic        get_segment_error;
 
     wire         get = select && !write;
     wire         put = select && write;
+    assign recorder_word_read = get_recorder_word;
 
-    assign recorder_word_read = get && word == 6'h0F;
+    // words read in the cycle before
+    assign rdata = ({32{get_index_events}} & {29'd0, index_events_armed,
+        index_events_revolution_wrong_held, index_events_found_held}) | ({32{get_index_count}} &
+        index_count) | ({32{get_edge_time}} & edge_time) | ({32{get_recorder_state}} & {30'd0,
+        recorder_state_invalid, recorder_state_full}) | ({32{get_recorder_word}} & recorder_word) |
+        ({32{get_signal_faults}} & {17'd0, signal_faults}) | ({32{get_first_signal_faults}} &
+        {17'd0, first_signal_faults}) | ({32{get_capture_state}} & {25'd0,
+        capture_state_overrun_held, capture_state_free, capture_state_present}) |
+        ({32{get_captured}} & {9'd0, captured_age, captured_sources}) | ({32{get_captured_time}} &
+        captured_time) | ({32{get_captured_position}} & captured_position[31:0]) |
+        ({32{get_captured_position_high}} & {16'd0, captured_position_high}) |
+        ({32{get_compare_state}} & {30'd0, compare_state_late_held, compare_state_armed}) |
+        ({32{get_compare_passed}} & compare_passed) | ({32{get_velocity_fine}} &
+        velocity_fine[31:0]) | ({32{get_velocity_fine_high}} & {24'd0, velocity_fine_high}) |
+        ({32{get_segment_state}} & {29'd0, segment_state_known, segment_state_outside,
+        segment_state_in_force}) | ({32{get_segment_stored}} & {8'd0, segment_stored}) |
+        ({32{get_segment_error}} & {8'd0, segment_error}) | {{8{(get_segment_stored &&
+        segment_stored[23]) || (get_segment_error && segment_error[23])}}, 24'd0} |
+        {{16{(get_captured_position_high && captured_position_high[15])}}, 16'd0} |
+        {{24{(get_velocity_fine_high && velocity_fine_high[7])}}, 8'd0};
 
     always_ff @(posedge clk) begin
-        rdata <= '0;
-        if (get) begin
-            case (word)
-                6'h00: rdata <= {12'd0, edge_filter_tolerated, edge_filter_skip};
-                6'h01: rdata <= {30'd0, decoder_mode};
-                6'h02: rdata <= {24'd0, index_each, index_down, index_up, index_gate,
-                    index_gate_mask, index_active_low};
-                6'h03: rdata <= counts_per_revolution;
-                6'h05: rdata <= {29'd0, index_events_armed, index_events_revolution_wrong_held,
-                    index_events_found_held};
-                6'h06: rdata <= index_count;
-                6'h07: rdata <= edge_time;
-                6'h08: rdata <= {correction_offset_cos, correction_offset_sin};
-                6'h09: rdata <= {15'd0, correction_gain};
-                6'h0A: rdata <= {{15{correction_quadrature_error[16]}},
-                    correction_quadrature_error};
-                6'h0B: rdata <= {31'd0, harmonic_enable};
-                6'h0C: rdata <= {6'd0, harmonic_point_point, harmonic_point};
-                6'h0D: rdata <= {15'd0, recorder_phases, recorder_decimation};
-                6'h0E: rdata <= {30'd0, recorder_state_invalid, recorder_state_full};
-                6'h0F: rdata <= recorder_word;
-                6'h10: rdata <= {17'd0, signal_faults};
-                6'h11: rdata <= {17'd0, first_signal_faults};
-                6'h12: rdata <= {17'd0, signal_fault_mask};
-                6'h13: rdata <= {lissajous_limits_tolerance, lissajous_limits_clip_level};
-                6'h14: rdata <= {jump_limits_no_noise_samples, jump_limits_jump};
-                6'h15: rdata <= {8'd0, channel_limits_band, channel_limits_span};
-                6'h16: rdata <= {drift_limits_balance, drift_limits_offset};
-                6'h17: rdata <= {quadrature_limits_sign_threshold,
-                    quadrature_limits_quadrature_error};
-                6'h18: rdata <= {25'd0, capture_sources};
-                6'h19: rdata <= {25'd0, capture_state_overrun_held, capture_state_free,
-                    capture_state_present};
-                6'h1A: rdata <= {9'd0, captured_age, captured_sources};
-                6'h1B: rdata <= captured_time;
-                6'h1C: rdata <= captured_position[31:0];
-                6'h1D: rdata <= {{16{captured_position_high[15]}}, captured_position_high};
-                6'h1E: rdata <= compare_start[31:0];
-                6'h1F: rdata <= {{16{compare_start[47]}}, compare_start[47:32]};
-                6'h20: rdata <= compare_step[31:0];
-                6'h21: rdata <= {{16{compare_step[47]}}, compare_step[47:32]};
-                6'h22: rdata <= compare_count;
-                6'h23: rdata <= {8'd0, compare_pulse};
-                6'h24: rdata <= {8'd0, compare_gap};
-                6'h25: rdata <= {30'd0, compare_state_late_held, compare_state_armed};
-                6'h26: rdata <= compare_passed;
-                6'h27: rdata <= {16'd0, velocity_quantum};
-                6'h28: rdata <= velocity_fine[31:0];
-                6'h29: rdata <= {{24{velocity_fine_high[7]}}, velocity_fine_high};
-                6'h2A: rdata <= {30'd0, position_source_steps, position_source_counts};
-                6'h2B: rdata <= {{29{align[2]}}, align};
-                6'h2D: rdata <= {29'd0, segment_state_known, segment_state_outside,
-                    segment_state_in_force};
-                6'h34: rdata <= {{8{segment_stored[23]}}, segment_stored};
-                6'h35: rdata <= {{8{segment_error[23]}}, segment_error};
-                default: rdata <= '0;
-            endcase
-        end
-        if (get && word == 6'h1C) captured_position_high <= captured_position[47:32];
-        if (get && word == 6'h28) velocity_fine_high <= velocity_fine[39:32];
+        get_index_events <= get && word == 6'h05;
+        get_index_count <= get && word == 6'h06;
+        get_edge_time <= get && word == 6'h07;
+        get_recorder_state <= get && word == 6'h0E;
+        get_recorder_word <= get && word == 6'h0F;
+        get_signal_faults <= get && word == 6'h10;
+        get_first_signal_faults <= get && word == 6'h11;
+        get_capture_state <= get && word == 6'h19;
+        get_captured <= get && word == 6'h1A;
+        get_captured_time <= get && word == 6'h1B;
+        get_captured_position <= get && word == 6'h1C;
+        get_captured_position_high <= get && word == 6'h1D;
+        get_compare_state <= get && word == 6'h25;
+        get_compare_passed <= get && word == 6'h26;
+        get_velocity_fine <= get && word == 6'h28;
+        get_velocity_fine_high <= get && word == 6'h29;
+        get_segment_state <= get && word == 6'h2D;
+        get_segment_stored <= get && word == 6'h34;
+        get_segment_error <= get && word == 6'h35;
+        if (get_captured_position) captured_position_high <= captured_position[47:32];
+        if (get_velocity_fine) velocity_fine_high <= velocity_fine[39:32];
 
         if (put && word == 6'h00) edge_filter_skip <= wdata[15:0];
         if (put && word == 6'h00) edge_filter_tolerated <= wdata[19:16];
@@ -213,10 +211,10 @@ module feedback_registers #(
         strobes_capture_clear <= put && word == 6'h04 && wdata[7];
         strobes_compare_arm <= put && word == 6'h04 && wdata[8];
         strobes_compare_disarm <= put && word == 6'h04 && wdata[9];
-        if (put && word == 6'h05 && wdata[0]) index_events_found_held <= 1'b0;
-        if (index_events_found) index_events_found_held <= 1'b1;
-        if (put && word == 6'h05 && wdata[1]) index_events_revolution_wrong_held <= 1'b0;
-        if (index_events_revolution_wrong) index_events_revolution_wrong_held <= 1'b1;
+        index_events_found_held <= index_events_found || (index_events_found_held && !(put && word
+            == 6'h05 && wdata[0]));
+        index_events_revolution_wrong_held <= index_events_revolution_wrong ||
+            (index_events_revolution_wrong_held && !(put && word == 6'h05 && wdata[1]));
         if (HAS_SINE != 0 && put && word == 6'h08) correction_offset_sin <= wdata[15:0];
         if (HAS_SINE != 0 && put && word == 6'h08) correction_offset_cos <= wdata[31:16];
         if (HAS_SINE != 0 && put && word == 6'h09) correction_gain <= wdata[16:0];
@@ -241,19 +239,15 @@ module feedback_registers #(
         if (HAS_MONITOR != 0 && put && word == 6'h17)
             quadrature_limits_sign_threshold <= wdata[31:16];
         if (put && word == 6'h18) capture_sources <= wdata[6:0];
-        if (put && word == 6'h19 && wdata[6]) capture_state_overrun_held <= 1'b0;
-        if (capture_state_overrun) capture_state_overrun_held <= 1'b1;
-        if (HAS_COMPARE != 0 && put && word == 6'h1E) compare_start_low <= wdata;
-        if (HAS_COMPARE != 0 && put && word == 6'h1F)
-            compare_start <= {wdata[15:0], compare_start_low};
-        if (HAS_COMPARE != 0 && put && word == 6'h20) compare_step_low <= wdata;
-        if (HAS_COMPARE != 0 && put && word == 6'h21)
-            compare_step <= {wdata[15:0], compare_step_low};
+        capture_state_overrun_held <= capture_state_overrun || (capture_state_overrun_held && !(put
+            && word == 6'h19 && wdata[6]));
+        if (HAS_COMPARE != 0 && put && word == 6'h1F) compare_start <= {wdata[15:0], wdata_low};
+        if (HAS_COMPARE != 0 && put && word == 6'h21) compare_step <= {wdata[15:0], wdata_low};
         if (HAS_COMPARE != 0 && put && word == 6'h22) compare_count <= wdata[31:0];
         if (HAS_COMPARE != 0 && put && word == 6'h23) compare_pulse <= wdata[23:0];
         if (HAS_COMPARE != 0 && put && word == 6'h24) compare_gap <= wdata[23:0];
-        if (put && word == 6'h25 && wdata[1]) compare_state_late_held <= 1'b0;
-        if (compare_state_late) compare_state_late_held <= 1'b1;
+        compare_state_late_held <= compare_state_late || (compare_state_late_held && !(put && word
+            == 6'h25 && wdata[1]));
         if (HAS_VELOCITY != 0 && put && word == 6'h27) velocity_quantum <= wdata[15:0];
         if (put && word == 6'h2A) position_source_counts <= wdata[0];
         if (put && word == 6'h2A) position_source_steps <= wdata[1];
@@ -263,10 +257,8 @@ module feedback_registers #(
         if (put && word == 6'h2C) segment_use_linear <= wdata[1];
         if (put && word == 6'h2C) segment_use_segments <= wdata[9:2];
         segment_origin_written <= put && word == 6'h2F;
-        if (put && word == 6'h2E) segment_origin_low <= wdata;
-        if (put && word == 6'h2F) segment_origin <= {wdata[15:0], segment_origin_low};
-        if (put && word == 6'h30) segment_length_low <= wdata;
-        if (put && word == 6'h31) segment_length <= {wdata[15:0], segment_length_low};
+        if (put && word == 6'h2F) segment_origin <= {wdata[15:0], wdata_low};
+        if (put && word == 6'h31) segment_length <= {wdata[15:0], wdata_low};
         segment_point_written <= put && word == 6'h32;
         if (put && word == 6'h32) segment_point <= wdata[23:0];
         if (put && word == 6'h32) segment_point_border <= wdata[31:24];
@@ -274,7 +266,25 @@ module feedback_registers #(
         if (put && word == 6'h33) segment_read_border <= wdata[7:0];
 
         if (rst) begin
-            rdata <= '0;
+            get_index_events <= 1'b0;
+            get_index_count <= 1'b0;
+            get_edge_time <= 1'b0;
+            get_recorder_state <= 1'b0;
+            get_recorder_word <= 1'b0;
+            get_signal_faults <= 1'b0;
+            get_first_signal_faults <= 1'b0;
+            get_capture_state <= 1'b0;
+            get_captured <= 1'b0;
+            get_captured_time <= 1'b0;
+            get_captured_position <= 1'b0;
+            get_captured_position_high <= 1'b0;
+            get_compare_state <= 1'b0;
+            get_compare_passed <= 1'b0;
+            get_velocity_fine <= 1'b0;
+            get_velocity_fine_high <= 1'b0;
+            get_segment_state <= 1'b0;
+            get_segment_stored <= 1'b0;
+            get_segment_error <= 1'b0;
             edge_filter_skip <= 16'h0000;
             edge_filter_tolerated <= 4'h0;
             decoder_mode <= 2'h0;
@@ -321,9 +331,7 @@ module feedback_registers #(
             capture_sources <= 7'h00;
             capture_state_overrun_held <= '0;
             captured_position_high <= '0;
-            compare_start_low <= '0;
             compare_start <= 48'h000000000000;
-            compare_step_low <= '0;
             compare_step <= 48'h000000000000;
             compare_count <= 32'h00000000;
             compare_pulse <= HAS_COMPARE == 0 ? '0 : 24'h000001;
@@ -339,9 +347,7 @@ module feedback_registers #(
             segment_use_linear <= 1'b0;
             segment_use_segments <= 8'h01;
             segment_origin_written <= 1'b0;
-            segment_origin_low <= '0;
             segment_origin <= 48'h000000000000;
-            segment_length_low <= '0;
             segment_length <= 48'h000000000000;
             segment_point_written <= 1'b0;
             segment_point <= 24'h000000;

@@ -3,6 +3,7 @@
 //
 // latency  1 cycle from select to rdata, and from a write to the new value
 // rate     one access per cycle
+// behaviour rdata has the live bits of a register only; register_memory answers with its settings.
 // source   tables/registers.rdl
 // model    tb/registers/register_block.py, equal in every bit of every cycle
 // made     by tables/registers.py, never by hand
@@ -15,7 +16,7 @@ module node_registers (
     input  wire         write,              // level: it writes wdata
     input  wire  [ 5:0] word,               // index of the word
     input  wire  [31:0] wdata,              // value to write
-    output logic [31:0] rdata,              // value read; else 0
+    output logic [31:0] rdata,              // live bits read; else 0
     input  wire  [31:0] clk_hz,             // frequency of clk [Hz]
     input  wire  [ 3:0] build_axes,         // what is built: axes
     input  wire  [ 3:0] build_address,      // what is built: address
@@ -28,6 +29,11 @@ module node_registers (
     output logic        start_axes_written  // strobe: new value
 );
     logic [31:0] time_stamp_high;
+    logic        get_map_crc;
+    logic        get_clk_hz;
+    logic        get_build;
+    logic        get_time_stamp;
+    logic        get_time_stamp_high;
 
     wire         get = select && !write;
     wire         put = select && write;
@@ -35,21 +41,18 @@ module node_registers (
     // no register of this block has these bits
     wire         unused = &{1'b0, wdata[31:24]};
 
+    // words read in the cycle before
+    assign rdata = ({32{get_map_crc}} & 32'h073EBD88) | ({32{get_clk_hz}} & clk_hz) |
+        ({32{get_build}} & {16'd0, build_memory, build_address, build_axes}) | ({32{get_time_stamp}}
+        & time_stamp[31:0]) | ({32{get_time_stamp_high}} & time_stamp_high);
+
     always_ff @(posedge clk) begin
-        rdata <= '0;
-        if (get) begin
-            case (word)
-                6'h00: rdata <= 32'h073EBD88;
-                6'h01: rdata <= clk_hz;
-                6'h02: rdata <= {16'd0, build_memory, build_address, build_axes};
-                6'h04: rdata <= time_stamp[31:0];
-                6'h05: rdata <= time_stamp_high;
-                6'h06: rdata <= {8'd0, tick_period};
-                6'h07: rdata <= {16'd0, sample_period};
-                default: rdata <= '0;
-            endcase
-        end
-        if (get && word == 6'h04) time_stamp_high <= time_stamp[63:32];
+        get_map_crc <= get && word == 6'h00;
+        get_clk_hz <= get && word == 6'h01;
+        get_build <= get && word == 6'h02;
+        get_time_stamp <= get && word == 6'h04;
+        get_time_stamp_high <= get && word == 6'h05;
+        if (get_time_stamp) time_stamp_high <= time_stamp[63:32];
 
         if (put && word == 6'h06) tick_period <= wdata[23:0];
         if (put && word == 6'h07) sample_period <= wdata[15:0];
@@ -58,7 +61,11 @@ module node_registers (
         if (put && word == 6'h09) start_axes <= wdata[7:0];
 
         if (rst) begin
-            rdata <= '0;
+            get_map_crc <= 1'b0;
+            get_clk_hz <= 1'b0;
+            get_build <= 1'b0;
+            get_time_stamp <= 1'b0;
+            get_time_stamp_high <= 1'b0;
             time_stamp_high <= '0;
             tick_period <= 24'h000000;
             sample_period <= 16'h0000;

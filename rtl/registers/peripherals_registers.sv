@@ -4,6 +4,7 @@
 //
 // latency  1 cycle from select to rdata, and from a write to the new value
 // rate     one access per cycle
+// behaviour rdata has the live bits of a register only; register_memory answers with its settings.
 // source   tables/registers.rdl
 // model    tb/registers/register_block.py, equal in every bit of every cycle
 // made     by tables/registers.py, never by hand
@@ -16,7 +17,7 @@ module peripherals_registers (
     input  wire         write,                         // level: it writes wdata
     input  wire  [ 5:0] word,                          // index of the word
     input  wire  [31:0] wdata,                         // value to write
-    output logic [31:0] rdata,                         // value read; else 0
+    output logic [31:0] rdata,                         // live bits read; else 0
     input  wire         built_i2c,                     // which peripherals are built
     input  wire         built_ps2,                     // which peripherals are built
     input  wire         built_peer,                    // which peripherals are built
@@ -83,62 +84,94 @@ module peripherals_registers (
     input  wire         edm_status_fell_1              // strobe: input 1 went low
 );
     logic [15:0] ps2_typed_count;
-    logic [ 7:0] ps2_errors_keyboard_damaged_count;
-    logic [ 7:0] ps2_errors_command_damaged_count;
-    logic [ 7:0] ps2_errors_unsent_count;
-    logic [ 7:0] ps2_errors_aborted_count;
-    logic [ 7:0] ps2_glitches_count;
-    logic [ 7:0] peer_errors_framing_count;
-    logic [ 7:0] peer_errors_overruns_count;
+    wire [16:0] ps2_typed_next = {1'b0, ps2_typed_count} + 17'(ps2_typed);
+    logic [7:0] ps2_errors_keyboard_damaged_count;
+    wire [8:0] ps2_errors_keyboard_damaged_next = {1'b0, ps2_errors_keyboard_damaged_count} +
+        9'(ps2_errors_keyboard_damaged);
+    logic [7:0] ps2_errors_command_damaged_count;
+    wire [8:0] ps2_errors_command_damaged_next = {1'b0, ps2_errors_command_damaged_count} +
+        9'(ps2_errors_command_damaged);
+    logic [7:0] ps2_errors_unsent_count;
+    wire [8:0] ps2_errors_unsent_next = {1'b0, ps2_errors_unsent_count} + 9'(ps2_errors_unsent);
+    logic [7:0] ps2_errors_aborted_count;
+    wire [8:0] ps2_errors_aborted_next = {1'b0, ps2_errors_aborted_count} + 9'(ps2_errors_aborted);
+    logic [7:0] ps2_glitches_count;
+    wire [8:0] ps2_glitches_next = {1'b0, ps2_glitches_count} + 9'(ps2_glitches);
+    logic [7:0] peer_errors_framing_count;
+    wire [8:0] peer_errors_framing_next = {1'b0, peer_errors_framing_count} +
+        9'(peer_errors_framing);
+    logic [7:0] peer_errors_overruns_count;
+    wire [8:0] peer_errors_overruns_next = {1'b0, peer_errors_overruns_count} +
+        9'(peer_errors_overruns);
     logic [31:0] sensor_reading_high;
     logic [15:0] sensor_frames_count;
-    logic        edm_status_rose_0_held;
-    logic        edm_status_rose_1_held;
-    logic        edm_status_fell_0_held;
-    logic        edm_status_fell_1_held;
+    wire [16:0] sensor_frames_next = {1'b0, sensor_frames_count} + 17'(sensor_frames);
+    logic edm_status_rose_0_held;
+    logic edm_status_rose_1_held;
+    logic edm_status_fell_0_held;
+    logic edm_status_fell_1_held;
+    logic get_built;
+    logic get_i2c_answer;
+    logic get_i2c_state;
+    logic get_ps2_state;
+    logic get_ps2_typed;
+    logic get_ps2_errors;
+    logic get_ps2_glitches;
+    logic get_peer_receive;
+    logic get_peer_state;
+    logic get_peer_errors;
+    logic get_sensor_reading;
+    logic get_sensor_reading_high;
+    logic get_sensor_state;
+    logic get_sensor_errors;
+    logic get_sensor_frames;
+    logic get_display_state;
+    logic get_edm_status;
 
-    wire         get = select && !write;
-    wire         put = select && write;
+    wire get = select && !write;
+    wire put = select && write;
+    assign i2c_answer_read = get_i2c_answer;
+    assign peer_receive_read = get_peer_receive;
 
-    assign i2c_answer_read = get && word == 6'h02;
-    assign peer_receive_read = get && word == 6'h0B;
+    // words read in the cycle before
+    assign rdata = ({32{get_built}} & {26'd0, built_edm, built_display, built_sensor, built_peer,
+        built_ps2, built_i2c}) | ({32{get_i2c_answer}} & {21'd0, i2c_answer_present,
+        i2c_answer_result, i2c_answer_data}) | ({32{get_i2c_state}} & {20'd0, i2c_state_sda,
+        i2c_state_scl, i2c_state_owned, i2c_state_busy, i2c_state_free}) | ({32{get_ps2_state}} &
+        {24'd0, ps2_state_busy, ps2_state_injecting, ps2_state_free}) | ({32{get_ps2_typed}} &
+        {16'd0, ps2_typed_count}) | ({32{get_ps2_errors}} & {ps2_errors_aborted_count,
+        ps2_errors_unsent_count, ps2_errors_command_damaged_count,
+        ps2_errors_keyboard_damaged_count}) | ({32{get_ps2_glitches}} & {24'd0, ps2_glitches_count})
+        | ({32{get_peer_receive}} & {23'd0, peer_receive_present, peer_receive_data}) |
+        ({32{get_peer_state}} & {24'd0, peer_state_sending, peer_state_transmit_free}) |
+        ({32{get_peer_errors}} & {16'd0, peer_errors_overruns_count, peer_errors_framing_count}) |
+        ({32{get_sensor_reading}} & sensor_reading[31:0]) | ({32{get_sensor_reading_high}} &
+        sensor_reading_high) | ({32{get_sensor_state}} & {23'd0, sensor_state_stale,
+        sensor_state_sequence_number}) | ({32{get_sensor_errors}} & {8'd0, sensor_errors_missed,
+        sensor_errors_broken, sensor_errors_crc}) | ({32{get_sensor_frames}} & {16'd0,
+        sensor_frames_count}) | ({32{get_display_state}} & {26'd0, display_state_sending,
+        display_state_free}) | ({32{get_edm_status}} & {26'd0, edm_status_fell_1_held,
+        edm_status_fell_0_held, edm_status_rose_1_held, edm_status_rose_0_held, edm_status_inputs});
 
     always_ff @(posedge clk) begin
-        rdata <= '0;
-        if (get) begin
-            case (word)
-                6'h00: rdata <= {26'd0, built_edm, built_display, built_sensor, built_peer,
-                    built_ps2, built_i2c};
-                6'h02: rdata <= {21'd0, i2c_answer_present, i2c_answer_result, i2c_answer_data};
-                6'h03: rdata <= {20'd0, i2c_state_sda, i2c_state_scl, i2c_state_owned,
-                    i2c_state_busy, i2c_state_free};
-                6'h04: rdata <= {16'd0, ps2_idle};
-                6'h06: rdata <= {24'd0, ps2_state_busy, ps2_state_injecting, ps2_state_free};
-                6'h07: rdata <= {16'd0, ps2_typed_count};
-                6'h08: rdata <= {ps2_errors_aborted_count, ps2_errors_unsent_count,
-                    ps2_errors_command_damaged_count, ps2_errors_keyboard_damaged_count};
-                6'h09: rdata <= {24'd0, ps2_glitches_count};
-                6'h0A: rdata <= {12'd0, peer_bit_time};
-                6'h0B: rdata <= {23'd0, peer_receive_present, peer_receive_data};
-                6'h0D: rdata <= {24'd0, peer_state_sending, peer_state_transmit_free};
-                6'h0E: rdata <= {16'd0, peer_errors_overruns_count, peer_errors_framing_count};
-                6'h0F: rdata <= {12'd0, sensor_bit_time};
-                6'h10: rdata <= {8'd0, sensor_gap};
-                6'h11: rdata <= sensor_stale_after;
-                6'h12: rdata <= sensor_reading[31:0];
-                6'h13: rdata <= sensor_reading_high;
-                6'h14: rdata <= {23'd0, sensor_state_stale, sensor_state_sequence_number};
-                6'h15: rdata <= {8'd0, sensor_errors_missed, sensor_errors_broken,
-                    sensor_errors_crc};
-                6'h16: rdata <= {16'd0, sensor_frames_count};
-                6'h18: rdata <= {26'd0, display_state_sending, display_state_free};
-                6'h19: rdata <= {16'd0, edm_filter};
-                6'h1A: rdata <= {26'd0, edm_status_fell_1_held, edm_status_fell_0_held,
-                    edm_status_rose_1_held, edm_status_rose_0_held, edm_status_inputs};
-                default: rdata <= '0;
-            endcase
-        end
-        if (get && word == 6'h12) sensor_reading_high <= sensor_reading[63:32];
+        get_built <= get && word == 6'h00;
+        get_i2c_answer <= get && word == 6'h02;
+        get_i2c_state <= get && word == 6'h03;
+        get_ps2_state <= get && word == 6'h06;
+        get_ps2_typed <= get && word == 6'h07;
+        get_ps2_errors <= get && word == 6'h08;
+        get_ps2_glitches <= get && word == 6'h09;
+        get_peer_receive <= get && word == 6'h0B;
+        get_peer_state <= get && word == 6'h0D;
+        get_peer_errors <= get && word == 6'h0E;
+        get_sensor_reading <= get && word == 6'h12;
+        get_sensor_reading_high <= get && word == 6'h13;
+        get_sensor_state <= get && word == 6'h14;
+        get_sensor_errors <= get && word == 6'h15;
+        get_sensor_frames <= get && word == 6'h16;
+        get_display_state <= get && word == 6'h18;
+        get_edm_status <= get && word == 6'h1A;
+        if (get_sensor_reading) sensor_reading_high <= sensor_reading[63:32];
 
         i2c_written <= put && word == 6'h01;
         if (put && word == 6'h01) i2c_data <= wdata[7:0];
@@ -150,56 +183,67 @@ module peripherals_registers (
         if (put && word == 6'h05) ps2_inject_last <= wdata[8];
         ps2_state_drop <= put && word == 6'h06 && wdata[8];
         if (put && word == 6'h07) ps2_typed_count <= 16'(ps2_typed);
-        else if (!(&ps2_typed_count)) ps2_typed_count <= ps2_typed_count + 16'(ps2_typed);
+        else if (!ps2_typed_next[16]) ps2_typed_count <= ps2_typed_next[15:0];
         if (put && word == 6'h08)
             ps2_errors_keyboard_damaged_count <= 8'(ps2_errors_keyboard_damaged);
-        else if (!(&ps2_errors_keyboard_damaged_count))
-            ps2_errors_keyboard_damaged_count <= ps2_errors_keyboard_damaged_count +
-                8'(ps2_errors_keyboard_damaged);
+        else if (!ps2_errors_keyboard_damaged_next[8])
+            ps2_errors_keyboard_damaged_count <= ps2_errors_keyboard_damaged_next[7:0];
         if (put && word == 6'h08)
             ps2_errors_command_damaged_count <= 8'(ps2_errors_command_damaged);
-        else if (!(&ps2_errors_command_damaged_count))
-            ps2_errors_command_damaged_count <= ps2_errors_command_damaged_count +
-                8'(ps2_errors_command_damaged);
+        else if (!ps2_errors_command_damaged_next[8])
+            ps2_errors_command_damaged_count <= ps2_errors_command_damaged_next[7:0];
         if (put && word == 6'h08) ps2_errors_unsent_count <= 8'(ps2_errors_unsent);
-        else if (!(&ps2_errors_unsent_count))
-            ps2_errors_unsent_count <= ps2_errors_unsent_count + 8'(ps2_errors_unsent);
+        else if (!ps2_errors_unsent_next[8]) ps2_errors_unsent_count <= ps2_errors_unsent_next[7:0];
         if (put && word == 6'h08) ps2_errors_aborted_count <= 8'(ps2_errors_aborted);
-        else if (!(&ps2_errors_aborted_count))
-            ps2_errors_aborted_count <= ps2_errors_aborted_count + 8'(ps2_errors_aborted);
+        else if (!ps2_errors_aborted_next[8])
+            ps2_errors_aborted_count <= ps2_errors_aborted_next[7:0];
         if (put && word == 6'h09) ps2_glitches_count <= 8'(ps2_glitches);
-        else if (!(&ps2_glitches_count))
-            ps2_glitches_count <= ps2_glitches_count + 8'(ps2_glitches);
+        else if (!ps2_glitches_next[8]) ps2_glitches_count <= ps2_glitches_next[7:0];
         if (put && word == 6'h0A) peer_bit_time <= wdata[19:0];
         peer_transmit_written <= put && word == 6'h0C;
         if (put && word == 6'h0C) peer_transmit <= wdata[7:0];
         if (put && word == 6'h0E) peer_errors_framing_count <= 8'(peer_errors_framing);
-        else if (!(&peer_errors_framing_count))
-            peer_errors_framing_count <= peer_errors_framing_count + 8'(peer_errors_framing);
+        else if (!peer_errors_framing_next[8])
+            peer_errors_framing_count <= peer_errors_framing_next[7:0];
         if (put && word == 6'h0E) peer_errors_overruns_count <= 8'(peer_errors_overruns);
-        else if (!(&peer_errors_overruns_count))
-            peer_errors_overruns_count <= peer_errors_overruns_count + 8'(peer_errors_overruns);
+        else if (!peer_errors_overruns_next[8])
+            peer_errors_overruns_count <= peer_errors_overruns_next[7:0];
         if (put && word == 6'h0F) sensor_bit_time <= wdata[19:0];
         if (put && word == 6'h10) sensor_gap <= wdata[23:0];
         if (put && word == 6'h11) sensor_stale_after <= wdata[31:0];
         sensor_errors_clear <= put && word == 6'h15 && wdata[24];
         if (put && word == 6'h16) sensor_frames_count <= 16'(sensor_frames);
-        else if (!(&sensor_frames_count))
-            sensor_frames_count <= sensor_frames_count + 16'(sensor_frames);
+        else if (!sensor_frames_next[16]) sensor_frames_count <= sensor_frames_next[15:0];
         display_written <= put && word == 6'h17;
         if (put && word == 6'h17) display <= wdata[15:0];
         if (put && word == 6'h19) edm_filter <= wdata[15:0];
-        if (put && word == 6'h1A && wdata[2]) edm_status_rose_0_held <= 1'b0;
-        if (edm_status_rose_0) edm_status_rose_0_held <= 1'b1;
-        if (put && word == 6'h1A && wdata[3]) edm_status_rose_1_held <= 1'b0;
-        if (edm_status_rose_1) edm_status_rose_1_held <= 1'b1;
-        if (put && word == 6'h1A && wdata[4]) edm_status_fell_0_held <= 1'b0;
-        if (edm_status_fell_0) edm_status_fell_0_held <= 1'b1;
-        if (put && word == 6'h1A && wdata[5]) edm_status_fell_1_held <= 1'b0;
-        if (edm_status_fell_1) edm_status_fell_1_held <= 1'b1;
+        edm_status_rose_0_held <= edm_status_rose_0 || (edm_status_rose_0_held && !(put && word ==
+            6'h1A && wdata[2]));
+        edm_status_rose_1_held <= edm_status_rose_1 || (edm_status_rose_1_held && !(put && word ==
+            6'h1A && wdata[3]));
+        edm_status_fell_0_held <= edm_status_fell_0 || (edm_status_fell_0_held && !(put && word ==
+            6'h1A && wdata[4]));
+        edm_status_fell_1_held <= edm_status_fell_1 || (edm_status_fell_1_held && !(put && word ==
+            6'h1A && wdata[5]));
 
         if (rst) begin
-            rdata <= '0;
+            get_built <= 1'b0;
+            get_i2c_answer <= 1'b0;
+            get_i2c_state <= 1'b0;
+            get_ps2_state <= 1'b0;
+            get_ps2_typed <= 1'b0;
+            get_ps2_errors <= 1'b0;
+            get_ps2_glitches <= 1'b0;
+            get_peer_receive <= 1'b0;
+            get_peer_state <= 1'b0;
+            get_peer_errors <= 1'b0;
+            get_sensor_reading <= 1'b0;
+            get_sensor_reading_high <= 1'b0;
+            get_sensor_state <= 1'b0;
+            get_sensor_errors <= 1'b0;
+            get_sensor_frames <= 1'b0;
+            get_display_state <= 1'b0;
+            get_edm_status <= 1'b0;
             i2c_written <= 1'b0;
             i2c_data <= 8'h00;
             i2c_command <= 3'h0;

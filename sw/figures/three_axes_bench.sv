@@ -53,6 +53,7 @@ module three_axes_bench (
             .write,
             .word,
             .wdata,
+            .wdata_low       (32'd0),               // no setting of 64 bits is written
             .rdata           (answer[n]),
             .feedback_select (feedback_select[n]),
             .feedback_rdata  (feedback[n]),

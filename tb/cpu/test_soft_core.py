@@ -9,7 +9,7 @@ import subprocess
 from pathlib import Path
 
 import cocotb
-from cocotb.triggers import FallingEdge, RisingEdge
+from cocotb.triggers import FallingEdge, RisingEdge, Timer
 
 from firmware import build as firmware_build
 from tb.bench import ROOT, run, start
@@ -23,12 +23,13 @@ ROUND = len(results(0, 0))  # results of one round of the program
 
 
 class Registers:
-    """The other side of the register bus: answers one cycle after select, and keeps what was
+    """The other side of the register bus: answers two cycles after select, and keeps what was
     written.
     """
 
     def __init__(self, dut):
         self.dut, self.words, self.written, self.selects = dut, {0: 0, 4: 0, 8: 0}, [], 0
+        self.answer = None  # to the access of the cycle before
 
     async def clk(self, rst=0):
         """Advance one cycle; what the bus shows before its clock edge counts."""
@@ -40,12 +41,10 @@ class Registers:
             address = int(dut.address.value)
             if int(dut.write.value):
                 self.written.append((address, int(dut.wdata.value)))
+        read = strobe and not int(dut.write.value)
         await RisingEdge(dut.clk)
-        dut.rdata.value = (
-            self.words.get(address, 0)
-            if strobe and not int(dut.write.value)
-            else random.getrandbits(32)
-        )
+        dut.rdata.value = random.getrandbits(32) if self.answer is None else self.answer
+        self.answer = self.words.get(address, 0) if read else None
         await FallingEdge(dut.clk)
         return int(dut.trap.value)
 
@@ -61,7 +60,7 @@ class Registers:
 
 
 async def begin(dut):
-    await start(dut, rdata=0)
+    await start(dut, rdata=0, ready=1)
     registers = Registers(dut)
     for _ in range(3):
         await registers.clk(rst=1)
@@ -123,7 +122,7 @@ async def every_wrong_access_traps_and_reset_starts_the_core_again(dut):
 
 
 @cocotb.test()
-async def an_operation_takes_3_cycles_a_product_6_a_quotient_40_and_a_register_access_6(dut):
+async def an_operation_takes_3_cycles_a_product_6_a_quotient_40_and_a_register_access_7(dut):
     registers = await begin(dut)
     registers.words[0], registers.words[4] = 0x12345678, 0x9ABC
     times = []
@@ -131,7 +130,7 @@ async def an_operation_takes_3_cycles_a_product_6_a_quotient_40_and_a_register_a
         before = len(registers.taken(0xFFFC))
         await registers.clk()
         times += [n] * (len(registers.taken(0xFFFC)) - before)
-    took = [b - a - 6 for a, b in zip(times, times[1:])]  # an operation and a write to RESULT
+    took = [b - a - 7 for a, b in zip(times, times[1:])]  # an operation and a write to RESULT
     dut._log.info(f"cycles for sub … remu: {took[:17]}")
     assert took[:9] == [3] * 9 and took[9:13] == [6] * 4 and took[13:17] == [40] * 4
 
@@ -148,8 +147,8 @@ async def a_register_access_is_one_strobe(dut):
 
 
 @cocotb.test()
-async def latency_is_0_wait_cycles_for_memory_and_1_for_a_register(dut):
-    """`mem_ready` comes in the first cycle of a memory access, the second of a register access."""
+async def latency_is_0_wait_cycles_for_memory_and_2_for_a_register(dut):
+    """`mem_ready` comes in the first cycle of a memory access, the third of a register access."""
     registers, waited = await begin(dut), {True: set(), False: set()}
     core, cycles = dut.u_core, 0
     for _ in range(3000):
@@ -159,7 +158,25 @@ async def latency_is_0_wait_cycles_for_memory_and_1_for_a_register(dut):
         if int(core.mem_ready.value):
             waited[int(core.mem_addr.value) < BYTES].add(cycles)
         cycles = 0 if int(core.mem_ready.value) else cycles + 1
-    assert waited == {True: {0}, False: {1}}
+    assert waited == {True: {0}, False: {2}}
+
+
+@cocotb.test()
+async def a_register_access_waits_until_the_registers_are_ready(dut):
+    registers = await begin(dut)
+    await registers.until(lambda: registers.taken(0x10))
+    dut.ready.value = 0
+    await registers.clk()
+    selects = registers.selects
+    for _ in range(100):
+        await registers.clk()
+    assert registers.selects == selects and int(dut.u_core.mem_valid.value)
+    dut.ready.value = 1
+    await Timer(1, "ns")  # select follows ready
+    await registers.clk()
+    assert registers.selects == selects + 1, "the access that waited is the next one"
+    await registers.until(lambda: len(registers.taken(0xFFFC)) >= ROUND)
+    assert not int(dut.trap.value)
 
 
 def compiled():

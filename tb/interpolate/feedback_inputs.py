@@ -19,6 +19,7 @@ INPUTS = dict(
     write=0,
     word=0,
     wdata=0,
+    wdata_low=0,
     shift=0,
     shift_periods=0,
     a=0,

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What any rtl/registers/*_registers.sv does, in integers: step(...) is one clk and returns every
-output after it, by port name.
+"""What a register block does together with register_memory, in integers: step(...) is one clk and
+returns every output after it, by port name; rdata is the answer to the read of the clk before.
 """
 
 WORD = (1 << 32) - 1
@@ -14,8 +14,8 @@ def extend(value, width, signed, to):
 
 class RegisterBlock:
     """`block` is a block of tables/registers.py, `constant` the CRC-32 that word 0 of the map
-    shows. A setting that needs a
-    parameter named in `without` has no bits."""
+    shows. A setting that needs a parameter named in `without` has no bits.
+    """
 
     def __init__(self, block, constant, without=()):
         self.block, self.constant, self.without = block, constant, without
@@ -33,18 +33,19 @@ class RegisterBlock:
         self.upper = {
             r.name: 0 for r in self.block.registers if r.wide
         }  # latched by a read of the low word
-        self.lower = {
-            r.name: 0 for r in self.block.registers if r.wide
-        }  # waits for a write of the high word
+        self.lower = 0  # waits for a write of its high word
+        self.awaited, self.settings = None, 0  # word that is read, its settings
         self.rdata = 0
 
-    def shown(self, register, inputs):
-        """The register as software sees it, all its words in one number."""
+    def shown(self, register, inputs, settings):
+        """The settings of a register, or its live bits, as software sees them, all its words in one
+        number.
+        """
         whole, size = 0, 64 if register.wide else 32
         for f in register.fields:
             port = f.port
             source = {"constant": {port: self.constant}, "input": inputs}.get(f.kind, self.value)
-            if "r" in f.access:
+            if "r" in f.access and (f.kind == "setting") == settings:
                 whole |= (
                     extend(
                         source[port], f.width, f.signed and len(register.fields) == 1, size - f.low
@@ -54,28 +55,33 @@ class RegisterBlock:
         return whole
 
     def step(self, select, write, word, wdata, inputs, rst=0):
-        read = {
-            f"{r.name}_read": int(select and not write and word == r.word)
-            for r in self.block.registers
-            if r.on_read
-        }
         if rst:
             self.reset()
         else:
-            self.get(word, inputs) if select and not write else setattr(self, "rdata", 0)
+            self.answer(inputs)
+            self.get(word if select and not write else None)
             self.put(word if select and write else None, wdata, inputs)
+        read = {
+            f"{r.name}_read": int(self.awaited == r.word) for r in self.block.registers if r.on_read
+        }
         outputs = {f.port: self.value[f.port] for r, f in self.block.fields if f.kind == "setting"}
         return {"rdata": self.rdata, **outputs, **self.pulse, **read}
 
-    def get(self, word, inputs):
-        self.rdata = 0
+    def get(self, word):
+        self.awaited, self.settings = word, 0
         for r in self.block.registers:
-            whole = self.shown(r, inputs)
-            if word == r.word:
-                self.rdata = whole & WORD
-                self.upper[r.name] = whole >> 32 if r.wide else 0
-            elif r.wide and word == r.word + 1:
-                self.rdata = self.upper[r.name] if r.fields[0].kind == "input" else whole >> 32
+            if word in range(r.word, r.word + 1 + r.wide):
+                self.settings = self.shown(r, {}, True) >> 32 * (word - r.word) & WORD
+
+    def answer(self, inputs):
+        self.rdata = self.settings
+        for r in self.block.registers:
+            live = self.shown(r, inputs, False)
+            if self.awaited == r.word:
+                self.rdata |= live & WORD
+                self.upper[r.name] = live >> 32
+            elif r.wide and self.awaited == r.word + 1:
+                self.rdata |= self.upper[r.name]
 
     def put(self, word, wdata, inputs):
         for r in self.block.registers:
@@ -96,9 +102,7 @@ class RegisterBlock:
                     )
                 elif f.kind == "setting" and commit and f.needs not in self.without:
                     self.value[port] = (
-                        (wdata << 32 | self.lower[r.name]) & ((1 << f.width) - 1)
-                        if r.wide
-                        else bits
+                        (wdata << 32 | self.lower) & ((1 << f.width) - 1) if r.wide else bits
                     )
-            if r.wide and hit:
-                self.lower[r.name] = wdata
+            if r.wide and hit and r.fields[0].kind == "setting":
+                self.lower = wdata

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every register of every made block: access, first value, neighbours, words of 64 bits, strobes,
-counters, sticky bits; and
-what the other made files say about the same map."""
+"""Every register of every made block, together with the register memory: access, first value,
+neighbours, words of 64 bits, strobes, counters, sticky bits; and what the other made files say
+about the same map.
+"""
 
 import random
 import re
@@ -14,7 +15,7 @@ from cocotb.triggers import FallingEdge, RisingEdge
 from moire.made import bus_tables
 from moire.made import registers as host
 from tables import registers as tables
-from tb.bench import ROOT, run, start
+from tb.bench import BENCHES, ROOT, run, start
 from tb.registers.register_block import WORD, RegisterBlock
 
 
@@ -23,7 +24,7 @@ class Bus:
 
     def __init__(self, dut):
         self.dut = dut
-        self.block = next(b for b in tables.read() if f"{b.name}_registers" == dut._name)
+        self.block = next(b for b in tables.read() if f"{b.name}_bench" == dut._name)
         without = [
             parameter
             for parameter in self.block.parameters
@@ -34,11 +35,19 @@ class Bus:
         self.inputs = {
             f.port: 0 for r, f in self.block.fields if f.kind in ("input", "counter", "sticky")
         }
+        self.wide = [r.word + 1 for r in self.block.wide_settings]
+        self.stored = False  # a high word was written in the cycle before
         self.width = {f.port: f.width if f.kind == "input" else 1 for r, f in self.block.fields}
 
     async def begin(self):
         await start(self.dut, select=0, write=0, word=0, wdata=0, **self.pins(self.inputs))
+        await self.ready()
         return self
+
+    async def ready(self):
+        """The memory takes its first values; the inputs are idle."""
+        await RisingEdge(self.dut.ready)
+        await FallingEdge(self.dut.clk)
 
     def pins(self, inputs):
         """The levels of the ports; the bits of a vector are one port."""
@@ -51,7 +60,13 @@ class Bus:
         return [(r, f) for r, f in self.block.fields if f.kind in kinds and self.there[f]]
 
     async def clk(self, select=0, write=0, word=0, wdata=0, rst=0, **inputs):
-        """Inputs named here stand for this clk only."""
+        """Inputs named here stand for this clk only. The memory wants a clk without an access after
+        the write of a high word.
+        """
+        if self.stored and select:
+            self.stored = False
+            await self.clk()
+        self.stored = select and write and word in self.wide
         now = self.inputs | inputs
         for name, level in [
             *self.pins(now).items(),
@@ -73,10 +88,17 @@ class Bus:
         ]
         access = "write" if write else "read" if select else "idle"
         assert not wrong, f"word {word:#x} {access}: {'; '.join(wrong)}"
+        if rst:
+            self.dut.rst.value = self.dut.select.value = 0
+            for name, level in self.pins(self.inputs).items():
+                getattr(self.dut, name).value = level
+            await self.ready()
+            self.model.step(0, 0, 0, 0, self.inputs)
         return got
 
     async def read(self, word, **inputs):
-        return (await self.clk(1, 0, word, **inputs))["rdata"]
+        await self.clk(1, 0, word, **inputs)
+        return (await self.clk(**inputs))["rdata"]
 
     async def write(self, word, wdata, **inputs):
         return await self.clk(1, 1, word, wdata, **inputs)
@@ -87,12 +109,20 @@ class Bus:
 
 @cocotb.test()
 async def latency_is_1(dut):
-    """clk() looks at the outputs right after the edge that took the access."""
+    """clk() looks at the outputs right after the edge that took the access. The rdata of the bench
+    is one cycle behind the rdata of the block.
+    """
     bus = await Bus(dut).begin()
     r, f = next((r, f) for r, f in bus.of("setting") if not r.wide and "r" in f.access)
     assert (await bus.write(r.word, 1 << f.low))[f.port] == 1
     assert await bus.read(r.word) >> f.low & 1 == 1
     assert (await bus.clk())["rdata"] == 0
+    r, f = next((r, f) for r, f in bus.of("input"))
+    bus.inputs[f.port] = 1
+    await bus.clk(1, 0, r.word)
+    assert int(dut.u_block.rdata.value) >> f.low & 1 == 1
+    await bus.clk()
+    assert int(dut.u_block.rdata.value) == 0
 
 
 @cocotb.test()
@@ -188,12 +218,9 @@ async def strobes_last_one_clk(dut):
         )
         assert (await bus.clk())[f"{r.name}_written"] == 0
     for r in (r for r in bus.block.registers if r.on_read):
-        dut.select.value, dut.write.value, dut.word.value = 1, 0, r.word
-        await cocotb.triggers.Timer(1, "ns")
-        assert getattr(dut, f"{r.name}_read").value == 1, (
-            "the strobe goes with the read, not after it"
-        )
-        await bus.clk()
+        got = await bus.clk(1, 0, r.word)
+        assert got[f"{r.name}_read"] == 1, "the strobe is in the cycle in which rdata has the word"
+        assert (await bus.clk())[f"{r.name}_read"] == 0
 
 
 @cocotb.test()
@@ -206,7 +233,7 @@ async def counters_count_clear_and_stop_at_the_end(dut):
         assert await bus.read(r.word) == 3 << f.low
         await bus.write(r.word, WORD, **{port: 1})
         assert await bus.read(r.word) == 1 << f.low, "an event in the clk of the write is counted"
-        getattr(dut, f"{port}_count").value = bus.model.value[port] = (1 << f.width) - 2
+        getattr(dut.u_block, f"{port}_count").value = bus.model.value[port] = (1 << f.width) - 2
         await FallingEdge(dut.clk)
         for _ in range(3):
             await bus.clk(**{port: 1})
@@ -253,28 +280,60 @@ async def a_setting_whose_need_was_not_built_reads_zero_whatever_is_written(dut)
         assert got[f.port] == 0 and await bus.read(r.word) >> f.low & (1 << f.width) - 1 == 0
 
 
+def bench(name):
+    """Write the top that joins a block with the register memory, as the soft core reads them."""
+    block = next(b for b in tables.read() if b.name == name)
+    ports = [(kind, shape, port) for kind, shape, port, _ in block.ports]
+    low = [".wdata_low"] if block.wide_settings else []
+    passed = ", ".join(f".{p}({p})" for p in block.parameters)
+    parameters = ", ".join(f"parameter int {p} = 1" for p in block.parameters)
+    lines = [
+        f"module {name}_bench {f'#({parameters})' if parameters else ''}",
+        "(input wire clk, input wire rst, input wire select, input wire write,",
+        "input wire [5:0] word, input wire [31:0] wdata,",
+        "output logic ready, output logic [31:0] rdata,",
+        ",\n".join(" ".join(port) for port in ports),
+        "); wire [31:0] live, settings, wdata_low; logic got;",
+        f"register_memory #({passed}) u_memory (.clk, .rst, .select, .write,",
+        f".address({{8'd{block.base // 256}, word}}), .wdata, .ready, .rdata(settings),",
+        ".wdata_low);",
+        f"{name}_registers #({passed}) u_block (",
+        ", ".join([".clk, .rst, .select, .write, .word, .wdata, .rdata(live)", *low]),
+        "".join(f", .{port}" for _, _, port in ports),
+        "); always_ff @(posedge clk) begin",
+        "got <= select && !write && !rst;",
+        "rdata <= rst ? '0 : live | (got ? settings : '0);",
+        "end",
+        "" if low else "wire unused = &{1'b0, wdata_low};",
+        "endmodule",
+    ]
+    BENCHES.mkdir(parents=True, exist_ok=True)
+    (BENCHES / f"{name}_bench.sv").write_text("\n".join(lines) + "\n")
+    return f"{name}_bench"
+
+
 @pytest.mark.parametrize("block", ["node", "bus", "peripherals", "axis", "feedback", "actuator"])
 def test_registers(block):
-    run(f"{block}_registers", __file__)
+    run(bench(block), __file__)
 
 
 @pytest.mark.parametrize("block", ["axis", "feedback", "actuator"])
 def test_registers_without_what_they_need(block):
     needs = next(b.parameters for b in tables.read() if b.name == block)
-    run(f"{block}_registers", __file__, **dict.fromkeys(needs, 0))
+    run(bench(block), __file__, **dict.fromkeys(needs, 0))
 
 
 @pytest.mark.parametrize(
     "block, parameter", [("feedback", "HAS_COMPARE"), ("axis", "FILTERS"), ("actuator", "HAS_DAC")]
 )
 def test_registers_without_one_feature(block, parameter):
-    run(f"{block}_registers", __file__, **{parameter: 0})
+    run(bench(block), __file__, **{parameter: 0})
 
 
 def test_all_made_files_carry_the_crc_of_the_source():
     source = (ROOT / "tables" / "registers.rdl").read_bytes().replace(b"\r\n", b"\n")
     made = {
-        "rtl/registers/node_registers.sv": r"6'h00: rdata <= 32'h(\w{8});",
+        "rtl/registers/node_registers.sv": r"get_map_crc\}\} & 32'h(\w{8})\)",
         "sw/firmware/made/registers.h": r"MAP_CRC 0x(\w{8})u",
         "sw/host/moire/made/registers.py": r"MAP_CRC = 0x(\w{8})",
         "docs/registers.md": r"CRC-32 `0x(\w{8})`",

@@ -70,6 +70,7 @@ class Bench:
                 self.dut.write.value,
             ) = word + more, half, 1, 1
             await FallingEdge(self.dut.clk)
+            self.dut.wdata_low.value = half
         self.dut.select.value = self.dut.write.value = 0
 
     async def settle_segments(self):

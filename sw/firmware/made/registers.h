@@ -41,6 +41,7 @@ void register_write(uint32_t offset, uint32_t value);
 #endif
 
 // 64 bits: reading the low word latches the high one, writing the high word commits both.
+// One low word can wait at a time: these functions write both words at once.
 static inline uint64_t register_read_wide(uint32_t offset) {
     uint32_t low = register_read(offset);
     return (uint64_t)register_read(offset + 4) << 32 | low;

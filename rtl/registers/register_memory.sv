@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+// register_memory -- holds the settings of all register blocks for reading back, and the low word of
+// a setting of 64 bits until its high word is written.
+//
+// latency   1 cycle from select to rdata and to wdata_low; 2048 cycles from the end of rst to ready
+// rate      one access every 2 cycles
+// behaviour After rst each setting gets its first value, one word per cycle; until ready is high
+//           there must be no access. A write of a low word changes wdata_low only; the write of the
+//           high word stores both. There is one wdata_low for all blocks.
+// source    register_layout: the layout of the memory, the bits of each setting, the first values
+// model     tb/registers/register_memory.py, equal in every bit of every cycle
+// proved    A read of any word gives what the last write of the word stored, else its first value;
+//           no access to another word changes it. The low word of a setting of 64 bits reads what
+//           was written before the last write of its high word.
+// limits    The settings that need what an axis has not read 0: the HAS_... parameters and FILTERS are
+//           masks, bit n for axis n.
+// proof     depth 4, AXES = 2
+`default_nettype none
+
+module register_memory #(
+    parameter int AXES           = 1,    // axes of the node, 1 to 8
+    parameter int FILTERS        = 255,  // bit n: axes with biquads of the servo
+    parameter int HAS_BRIDGE     = 255,  // axes with a bridge
+    parameter int HAS_COMPARE    = 255,  // axes with compare
+    parameter int HAS_DAC        = 255,  // axes with a DAC
+    parameter int HAS_DRIVE      = 255,  // axes with a drive
+    parameter int HAS_FINE_STAGE = 255,  // axes with a fine stage
+    parameter int HAS_HARMONICS  = 255,  // axes with harmonic correction
+    parameter int HAS_MONITOR    = 255,  // axes with a signal monitor
+    parameter int HAS_RECORDER   = 255,  // axes with a recorder
+    parameter int HAS_SINE       = 255,  // axes with sine and cosine
+    parameter int HAS_STEPPER    = 255,  // axes with a step generator
+    parameter int HAS_VELOCITY   = 255   // axes with a velocity estimator
+) (
+    input  wire         clk,
+    input  wire         rst,
+    input  wire         select,    // strobe: an access to any block
+    input  wire         write,     // level: it writes wdata
+    input  wire  [13:0] address,   // word of the register map
+    input  wire  [31:0] wdata,     // value to write
+    output logic        ready,     // level: the settings have their first values
+    output logic [31:0] rdata,     // settings in the word read last; its other bits are 0
+    output logic [31:0] wdata_low  // low word that waits for its high word
+);
+    localparam int W = $clog2(3 + 3 * AXES) + 6;  // bits of a place in the memory
+
+    logic [ 31:0] memory                                          [0:2**W-1];
+    logic [ 11:0] count;  // words that have their first value
+    logic         commit;  // the low word is stored in this cycle
+    logic [W-1:0] low_place;
+
+    wire  [W-1:0] place;
+    wire [31:0] kept, first;
+    wire low, high;
+    wire put = select && write;
+
+    assign ready = count[11];
+
+    register_layout #(
+        .AXES          (AXES),
+        .FILTERS       (FILTERS),
+        .HAS_BRIDGE    (HAS_BRIDGE),
+        .HAS_COMPARE   (HAS_COMPARE),
+        .HAS_DAC       (HAS_DAC),
+        .HAS_DRIVE     (HAS_DRIVE),
+        .HAS_FINE_STAGE(HAS_FINE_STAGE),
+        .HAS_HARMONICS (HAS_HARMONICS),
+        .HAS_MONITOR   (HAS_MONITOR),
+        .HAS_RECORDER  (HAS_RECORDER),
+        .HAS_SINE      (HAS_SINE),
+        .HAS_STEPPER   (HAS_STEPPER),
+        .HAS_VELOCITY  (HAS_VELOCITY)
+    ) u_layout (
+        .address(ready ? address : {3'd0, count[10:0]}),
+        .wdata,
+        .place,
+        .kept,
+        .first,
+        .low,
+        .high
+    );
+
+    wire         store = !ready || commit || (put && !low);
+    wire [W-1:0] store_place = commit ? low_place : place;
+    wire [ 31:0] stored = !ready ? first : commit ? wdata_low : kept;
+
+    always_ff @(posedge clk) begin
+        if (store) memory[store_place] <= stored;
+        if (select && !write) rdata <= memory[place];
+    end
+
+    always_ff @(posedge clk) begin
+        if (!ready) count <= count + 12'd1;
+        if (put && low) wdata_low <= wdata;
+        commit    <= put && high;
+        low_place <= {place[W-1:1], 1'b0};
+        if (rst) begin
+            count  <= '0;
+            commit <= 1'b0;
+            wdata_low <= '0;
+        end
+    end
+
+`ifdef FORMAL
+    (* anyconst *)logic [13:0] observed;  // a word of the map
+    logic        past = 1'b0;
+    logic        pending;  // its high word was written in the cycle before
+    logic        fetched;  // rdata is its value
+    logic [31:0] value, fetched_value;  // what it reads, what it was when it was read
+    wire [W-1:0] observed_place;
+    wire [31:0] observed_kept, observed_first;
+    wire observed_low, observed_high;
+    register_layout #(
+        .AXES          (AXES),
+        .FILTERS       (FILTERS),
+        .HAS_BRIDGE    (HAS_BRIDGE),
+        .HAS_COMPARE   (HAS_COMPARE),
+        .HAS_DAC       (HAS_DAC),
+        .HAS_DRIVE     (HAS_DRIVE),
+        .HAS_FINE_STAGE(HAS_FINE_STAGE),
+        .HAS_HARMONICS (HAS_HARMONICS),
+        .HAS_MONITOR   (HAS_MONITOR),
+        .HAS_RECORDER  (HAS_RECORDER),
+        .HAS_SINE      (HAS_SINE),
+        .HAS_STEPPER   (HAS_STEPPER),
+        .HAS_VELOCITY  (HAS_VELOCITY)
+    ) u_observed (
+        .address(observed),
+        .wdata,
+        .place  (observed_place),
+        .kept   (observed_kept),
+        .first  (observed_first),
+        .low    (observed_low),
+        .high   (observed_high)
+    );
+    wire filled = ready || count[10:0] > observed[10:0];
+    always @(posedge clk) begin
+        past <= 1'b1;
+        if (!past) assume (rst);
+        assume (observed < 14'd2048);
+        assume (!select || (ready && !commit));
+        if (!ready && count[10:0] == observed[10:0]) value <= observed_first;
+        if (put && address == observed && !observed_low) value <= observed_kept;
+        if (pending) value <= wdata_low;
+        pending <= !rst && observed_low && high && put && address == {observed[13:1], 1'b1};
+        if (select && !write) begin
+            fetched       <= address == observed;
+            fetched_value <= value;
+        end
+        if (rst || !past) fetched <= 1'b0;
+        if (past) begin
+            assert (count <= 12'd2048);
+            if (filled && !rst) assert (memory[observed_place] == value);
+            assert (pending == (commit && observed_low && low_place == observed_place));
+            if (commit) assert (ready && (observed_low || low_place != observed_place));
+            if (filled && &observed_place[W-1:6]) assert (value == 0);
+            if (fetched) assert (rdata == fetched_value);
+            cover (count == 12'd1 && filled);
+        end
+    end
+    wire unused = &{1'b0, observed_high};
+`endif
+endmodule
+
+`default_nettype wire
