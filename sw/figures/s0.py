@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of S0: the X-Y stage, its bus, its node, its twin."""
+"""Figures of S0: the X-Y stage, its bus, its node."""
 
 import itertools
 import random
@@ -25,8 +25,7 @@ from moire.bus.protocol import (
 )
 from moire.errors import BusError
 from moire.made.bus_tables import PARAMETERS
-from twin import FrameBench, build, cells_of, realtime_factor
-from twin.nodes.twin import CLK_HZ
+from twin import FrameBench, build, cells_of
 
 SEED = 1
 SETTLE_TIME = PARAMETERS["settle_time"].id
@@ -229,7 +228,7 @@ def s0_bus_wrong(
     return wrong + wrong_host
 
 
-# ------------------------------------------------------------------ node and twin
+# ------------------------------------------------------------------ node
 
 
 def node_ecp5_mhz(place: bool = True, seed: int = 1) -> float:
@@ -248,11 +247,6 @@ def node_ecp5_mhz(place: bool = True, seed: int = 1) -> float:
     )
     console.print(f"LFE5U-25F-6, one axis with bridge, ADC, fine stage and filters: {used}")
     return found["fmax_mhz"]
-
-
-def twin_realtime(simulated_s: float = 0.5) -> float:
-    console.print(f"CLK_HZ {CLK_HZ}, two nodes and their machines, one core")
-    return realtime_factor(simulated_s)
 
 
 FIGURES = {
@@ -291,15 +285,6 @@ FIGURES = {
         ">= 60",
         ELABORATED,
         1,
-    ),
-    "twin_realtime": Figure(
-        twin_realtime,
-        "s/s",
-        "simulated seconds per second of one core, two nodes and their machines, drives off, "
-        f"CLK_HZ = {CLK_HZ / 1e6:g} MHz, best of five",
-        ">= 0.3",
-        Quick({"simulated_s": 0.05}, "0.05 s each", "> 0.05"),
-        2,
     ),
 }
 
