@@ -400,10 +400,10 @@ def twin_library(
         trained = folder / f"{TWIN.stem}.o"
         objects = [folder / f"{file.stem}.o" for file in (*machine_sources(), BUS)]
 
-        def node(mode: Sequence[str], library: Path) -> None:
+        def compiled(mode: Sequence[str], library: Path) -> None:
             command = [tool, *COMPILE, *VERILATED, *mode, *include, "-c", TWIN, "-o", trained]
             run(command, f"g++ of {TWIN.name}")
-            if others.result():
+            if own_objects.result():
                 command = [tool, "-shared", "-pthread", *mode, trained, *objects, support]
                 run([*command, "-o", library], "linking the twin")
 
@@ -414,15 +414,15 @@ def twin_library(
             return True
 
         with ThreadPoolExecutor(1) as pool:
-            others = pool.submit(own)
-            node(TRAIN, folder / "training.so")
+            own_objects = pool.submit(own)
+            compiled(TRAIN, folder / "training.so")
             run(
                 [sys.executable, "-m", "twin.nodes.training", folder / "training.so", axes, clk_hz],
                 "training of the twin",
                 environment={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
             )
             say(f"trained after {time.monotonic() - start:.0f} s")
-            node(TRAINED, folder / "libtwin.so")
+            compiled(TRAINED, folder / "libtwin.so")
         (folder / "training.so").unlink()
 
     library = made_once(folder, "libtwin.so", make)
