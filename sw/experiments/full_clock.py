@@ -187,7 +187,9 @@ def s2(
         axis.enable()
         axis.home()
         stage.twin.trace(stage.number(name), TRACE_HZ)
-    made = stage.move("fast", {name: way_mm(scale.top_mm_s) * 1e3 for name, scale in scales.items()})
+    made = stage.move(
+        "fast", {name: way_mm(scale.top_mm_s) * 1e3 for name, scale in scales.items()}
+    )
     numbers = range(len(made))
     traces = [stage.twin.take_trace(number)["velocity_m_s"] for number in numbers]
     truths = [stage.twin.truth(number) for number in numbers]

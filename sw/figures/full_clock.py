@@ -112,9 +112,7 @@ def show_s2(results: Sequence[S2Result]) -> None:
 
 def short_form(seed: int) -> float:
     """One second of one axis of S0, without homing to the switch."""
-    (errors,) = in_threads(
-        [("S0, one axis", partial(full_clock.one_second, FULL_CLK_HZ, seed))]
-    )
+    (errors,) = in_threads([("S0, one axis", partial(full_clock.one_second, FULL_CLK_HZ, seed))])
     console.print(f"{len(errors)} moves within one simulated second")
     return max(map(abs, errors)) / 1000
 

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs an instrumented library of the twin, so that the compiler learns which branches of the
-Verilated code are taken.
+"""A short run of a library of the twin that counts its branches, for twin/build.py.
 
-    python -m twin.nodes.training LIBRARY AXES CLK_HZ
+python training.py LIBRARY AXES CLK_HZ
 """
 
 import ctypes
@@ -15,7 +14,7 @@ from twin.machines.machine import FUNCTIONS as MACHINE_FUNCTIONS
 from twin.machines.machine import declare, pack
 from twin.nodes.twin import BAUD, FUNCTIONS
 
-CYCLES = 600_000  # two thirds of them with the firmware polling its axes at any clock
+CYCLES = 600_000  # the firmware of a node with one axis needs two thirds of them to start
 ASK_CYCLES = 100_000  # from one question of the host to the next
 QUESTION = [0x111]  # to node 1: send your last reply
 MACHINE = "stage"
