@@ -12,6 +12,7 @@ from fractions import Fraction
 
 from experiments import s0_stage, s2_stage
 from experiments.s2_stage import Scale
+from moire.analysis import report
 from moire.client.bus import Bus
 from twin import START_S, Twin, TwinTransport
 from twin.nodes.twin import CLK_HZ as S0_CLK_HZ
@@ -68,10 +69,10 @@ def from_phase_zero_nm(stage: s0_stage.Stage, name: str) -> float:
 def s0(clk_hz: int, moves: int, seed: int = 1, progress: Progress = quiet) -> S0Result:
     """Homes the stage of S0 and moves it."""
     stage = s0_stage.Stage.power_up(seed, clk_hz=clk_hz)
-    now, made = stage.bus.transport.now, []
-    identity, began, zeros = stage.find()[0], now(), []
+    now, made, zeros = stage.bus.transport.now, list[report.Move](), list[float]()
+    identity, began = stage.find()[0], now()
     for name in stage.axes:
-        stage.home(name, lambda _, name=name: progress(now(), f"homing {name}"))
+        stage.home(name, lambda _: progress(now(), "homing"))
         zeros.append(from_phase_zero_nm(stage, name))
     homing_s = now() - began
     s0_stage.random_moves(
@@ -210,8 +211,9 @@ def s2(
 
 
 FAST_MM_S: Mapping[int, tuple[int, ...]] = {  # of X, Y and Z
-    # 1, 1 and 1 million counts per second: the node counts at most one in each cycle
+    # one million counts per second: the node counts at most one in each cycle
     SLOW_CLK_HZ["s2"]: (500, 500, 100),
-    # 1, 1 and 5 million
-    FULL_CLK_HZ: (500, 500, 500),
+    # 1, 1 and 4 million: a node moves an axis by at most one million periods per second, which are
+    # 400 mm/s of the scale of Z
+    FULL_CLK_HZ: (500, 500, 400),
 }
