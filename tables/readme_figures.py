@@ -37,6 +37,8 @@ FIRST = (  # the modules of sw/figures in the order of the table; others follow
     "job",
     "bus",
     "gateway",
+    "full_clock",
+    "twin_speed",
 )
 SIGNS = {"<=": "≤", ">=": "≥", "+-": "±", "um": "µm", "us": "µs", " arcsec": "″", " - ": " − "}
 SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")

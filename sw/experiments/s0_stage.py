@@ -29,6 +29,7 @@ from moire.client.bus import Bus
 from moire.client.records import Identity, Status
 from moire.errors import MoireError
 from twin import BuildError, Twin, TwinTransport
+from twin.nodes.twin import CLK_HZ
 
 ADDRESSES = {"X": 1, "Y": 2}  # on the bus; the axes of the twin have the same order
 PERIOD_NM = 800.0
@@ -51,9 +52,9 @@ class Stage:
     zero_nm: dict[str, float] = field(default_factory=dict)
 
     @classmethod
-    def power_up(cls, seed: int = 1, **plant: Any) -> Self:
+    def power_up(cls, seed: int = 1, *, clk_hz: int = CLK_HZ, **plant: Any) -> Self:
         """The machine after power-up; `plant` overrides parameters of its model."""
-        twin = Twin(seed=seed, nodes=tuple(ADDRESSES.values()), plant=plant)
+        twin = Twin(seed=seed, nodes=tuple(ADDRESSES.values()), clk_hz=clk_hz, plant=plant)
         bus = Bus(TwinTransport(twin), random_source=random.Random(seed), poll_s=POLL_S)
         twin.run_until_ready()
         return cls(twin, bus, {})

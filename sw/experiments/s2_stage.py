@@ -50,8 +50,9 @@ class Scale:
 
     count_um: Fraction
     travel_mm: int
-    step_um: Fraction  # one microstep of the driver on the 5 mm screw
+    step_um: Fraction  # one microstep of the driver on the screw
     top_mm_s: int
+    lead_mm: int = 5  # of the screw
 
     @property
     def period_um(self) -> Fraction:
@@ -78,7 +79,8 @@ class Scale:
                 "scale_index_position": count / 2,
                 "scale_index_width": count,
                 "scale_index_scatter": count / 25,
-                "stepper_microsteps": round(Fraction(5000, 200) / self.step_um),
+                "stepper_microsteps": round(Fraction(1000 * self.lead_mm, 200) / self.step_um),
+                "screw_lead": self.lead_mm * 1e-3,
                 "switch_high": self.travel_mm * 1e-3 + 2e-3,
                 "travel_high_stop": self.travel_mm * 1e-3 + 3e-3,
             },
@@ -155,23 +157,29 @@ class Stage:
     twin: Twin
     bus: Bus
     axes: dict[str, ClientAxis]
-    seen: dict[str, list[tuple[float, int]]] = field(  # (time, counts)
-        default_factory=lambda: {name: [] for name in SCALES}
-    )
+    scales: Mapping[str, Scale] = field(default_factory=lambda: SCALES)
+    polled: Callable[[], object] = lambda: None  # called at each poll of a motion
+    seen: dict[str, list[tuple[float, int]]] = field(init=False)  # (time, counts)
+
+    def __post_init__(self) -> None:
+        self.seen = {name: [] for name in self.scales}
 
     @classmethod
-    def power_up(cls, seed: int = 1) -> Self:
+    def power_up(
+        cls, seed: int = 1, clk_hz: int = CLK_HZ, scales: Mapping[str, Scale] = SCALES
+    ) -> Self:
         """The machine after power-up, with the parameters of this experiment."""
         twin = Twin(
-            [Node(1, [scale.machine() for scale in SCALES.values()])],
+            [Node(1, [scale.machine() for scale in scales.values()])],
             seed=seed,
-            clk_hz=CLK_HZ,
+            clk_hz=clk_hz,
             node_parameters=NODE,
         )
         bus = Bus(TwinTransport(twin), random_source=random.Random(seed), poll_s=POLL_S)
         twin.run_until_ready()
-        stage = cls(twin, bus, {name: bus.axis(1, number) for number, name in enumerate(SCALES)})
-        for name, scale in SCALES.items():
+        axes = {name: bus.axis(1, number) for number, name in enumerate(scales)}
+        stage = cls(twin, bus, axes, scales)
+        for name, scale in scales.items():
             for parameter, value in scale.settings().items():
                 stage.axes[name].set_parameter(parameter, value)
             stage.axes[name].set_parameter(
@@ -181,7 +189,7 @@ class Stage:
 
     def number(self, name: str) -> int:
         """The number of this axis."""
-        return list(SCALES).index(name)
+        return list(self.scales).index(name)
 
     def together(
         self, begin: Callable[[str, ClientAxis], object], names: Iterable[str]
@@ -192,6 +200,7 @@ class Stage:
         waiting, ended = set(names), dict[str, Status]()
         while waiting:
             self.bus.transport.wait(POLL_S)
+            self.polled()
             for name in sorted(waiting):
                 status = self.axes[name].status()
                 self.seen[name].append((self.bus.transport.now(), status.counts))
@@ -227,8 +236,9 @@ class Stage:
         """Moves all named axes at once. Without a speed, each axis moves at its top speed."""
         before = {name: self.both(name) for name in targets_um}
         made: list[Move] = []
-        for name in targets_um:
-            self.axes[name].set_parameter("velocity", f"{speed_mm_s or SCALES[name].top_mm_s}mm/s")
+        speeds = {name: speed_mm_s or self.scales[name].top_mm_s for name in targets_um}
+        for name, speed in speeds.items():
+            self.axes[name].set_parameter("velocity", f"{speed}mm/s")
         self.together(
             lambda name, axis: axis.request("move", target=axis.to_counts(targets_um[name] * 1000)),
             targets_um,
@@ -236,12 +246,12 @@ class Stage:
         for name, target in targets_um.items():
             now = self.both(name)
             given, counted = now[0] - before[name][0], now[1] - before[name][1]
-            apart = now[2] - before[name][2] - counted * float(SCALES[name].count_um)
+            apart = now[2] - before[name][2] - counted * float(self.scales[name].count_um)
             made.append(
                 Move(
                     name,
                     what,
-                    speed_mm_s or SCALES[name].top_mm_s,
+                    speeds[name],
                     target,
                     now[1],
                     given,
@@ -256,7 +266,7 @@ class Stage:
         """Sets the present position of an axis to this value (homing method 35). The limits of the
         travel are shifted with it.
         """
-        axis, scale = self.axes[name], SCALES[name]
+        axis, scale = self.axes[name], self.scales[name]
         for end, side in (("travel_low", -1), ("travel_high", 1)):
             axis.write_parameter(end, (periods + side * scale.middle) << 16)
         axis.set_parameter("home_method", 35)

