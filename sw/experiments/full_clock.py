@@ -47,7 +47,7 @@ class S0Result:
     homing_s: float  # of both axes, one after the other
     errors_nm: tuple[float, ...]  # true position - target of each move
     moves_s: tuple[float, ...]  # duration of each move
-    repeats: int  # of exchanges on the bus
+    repeats: int  # of exchanges on the bus, after the search for nodes
     simulated_s: float
 
     @property
@@ -71,6 +71,7 @@ def s0(clk_hz: int, moves: int, seed: int = 1, progress: Progress = quiet) -> S0
     stage = s0_stage.Stage.power_up(seed, clk_hz=clk_hz)
     now, made, zeros = stage.bus.transport.now, list[report.Move](), list[float]()
     identity, began = stage.find()[0], now()
+    searching = stage.bus.statistics.repeats  # one for each address that nobody has
     for name in stage.axes:
         stage.home(name, lambda _: progress(now(), "homing"))
         zeros.append(from_phase_zero_nm(stage, name))
@@ -86,7 +87,7 @@ def s0(clk_hz: int, moves: int, seed: int = 1, progress: Progress = quiet) -> S0
         homing_s,
         tuple(move.error_nm for move in made),
         tuple(move.time_s for move in made),
-        stage.bus.statistics.repeats,
+        stage.bus.statistics.repeats - searching,
         now(),
     )
 

@@ -29,7 +29,15 @@ from twin import BuildError
 
 PAGE = ROOT / "build" / "report" / "figures.html"
 PROCESSES = 2
-LONG = ("s4", "s0", "fine", "bus", "calibration", "profile")  # modules that take longest: first
+LONG = (
+    "full_clock",
+    "s4",
+    "s0",
+    "fine",
+    "bus",
+    "calibration",
+    "profile",
+)  # modules that take longest: first
 
 
 @dataclass(frozen=True)
