@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// soft_core -- RISC-V processor (rv32im) with its memory, the master of the register bus.
+// soft_core -- RISC-V processor (rv32imc) with its memory, the master of the register bus.
 //
 // latency   0 wait cycles for an access to memory, 1 wait cycle for an access to a register.
 // rate      An operation takes 3 cycles, a memory access 5, a register access or a product 6, a
-//           quotient 40.
+//           quotient 38.
 // behaviour The memory is at 0000_0000 (start address 0, stack from its end), the registers are at
 //           8000_0000 (64 KiB, whole words only). Any other access, a misaligned access and an
 //           illegal instruction stop the core: trap is high until rst, which starts the core at
@@ -38,6 +38,9 @@ module soft_core #(
     wire [31:0] mem_la_addr;  // of a word: bits 1:0 are zero
     // verilator lint_on UNUSEDSIGNAL
     wire [3:0] mem_wstrb, mem_la_wstrb;
+    // divisions
+    wire pcpi_valid, pcpi_wait, pcpi_ready;
+    wire [31:0] pcpi_insn, pcpi_rs1, pcpi_rs2, pcpi_rd;
     // the registers have answered; an access had no valid address
     logic answered, lost;
 
@@ -72,16 +75,28 @@ module soft_core #(
         .rdata  (memory_rdata)
     );
 
+    core_divider u_divider (
+        .clk,
+        .rst,
+        .valid      (pcpi_valid),
+        .instruction(pcpi_insn),
+        .a          (pcpi_rs1),
+        .b          (pcpi_rs2),
+        .working    (pcpi_wait),
+        .ready      (pcpi_ready),
+        .result     (pcpi_rd)
+    );
+
     picorv32 #(
         .ENABLE_COUNTERS  (0),
         .ENABLE_COUNTERS64(0),
         .BARREL_SHIFTER   (1),
         .ENABLE_MUL       (1),
         .ENABLE_FAST_MUL  (1),
-        .ENABLE_DIV       (1),
+        .ENABLE_PCPI      (1),
+        .COMPRESSED_ISA   (1),
         .CATCH_MISALIGN   (1),
         .CATCH_ILLINSN    (1),
-        .REGS_INIT_ZERO   (1),
         .STACKADDR        (32'(MEMORY_BYTES))
     ) u_core (
         .clk,
@@ -99,17 +114,17 @@ module soft_core #(
         .mem_la_addr,
         .mem_la_wdata,
         .mem_la_wstrb,
-        .pcpi_wr    (1'b0),
-        .pcpi_rd    (32'd0),
-        .pcpi_wait  (1'b0),
-        .pcpi_ready (1'b0),
+        .pcpi_valid,
+        .pcpi_insn,
+        .pcpi_rs1,
+        .pcpi_rs2,
+        .pcpi_wr    (pcpi_ready),
+        .pcpi_rd,
+        .pcpi_wait,
+        .pcpi_ready,
         .irq        (32'd0),
-        // no co-processor, no interrupts, no trace:
+        // no interrupts, no trace:
         // verilator lint_off PINCONNECTEMPTY
-        .pcpi_valid (),
-        .pcpi_insn  (),
-        .pcpi_rs1   (),
-        .pcpi_rs2   (),
         .eoi        (),
         .trace_valid(),
         .trace_data ()

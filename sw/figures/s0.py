@@ -233,7 +233,7 @@ def s0_bus_wrong(
 
 
 def node_ecp5_mhz(place: bool = True, seed: int = 1) -> float:
-    build.firmware()
+    build.firmware(axes=1)
     if not place:
         return elaborated(source_of("node"), S0_NODE)
     found = synthesise("node", S0_NODE, seed=seed)

@@ -218,7 +218,9 @@ class Twin:
             )
             for n, axis in enumerate(fitted)
         ]
-        image = memory_image(self.library, build.firmware() if firmware is None else firmware)
+        image = memory_image(
+            self.library, build.firmware(axes=self.node_axes) if firmware is None else firmware
+        )
         addresses = array(self.addresses, numpy.uint8)
         kinds = (ctypes.c_char_p * self.axes)(*(axis.machine.encode() for axis in fitted))
         tables = (ctypes.c_void_p * self.axes)(*(ctypes.addressof(table) for table in packed))
@@ -577,7 +579,7 @@ class FrameBench:
     ) -> None:
         self.handle: int | None = None
         self.library, self.clk_hz = library(clk_hz, 1, NODE), clk_hz
-        image = memory_image(self.library, build.firmware() if firmware is None else firmware)
+        image = memory_image(self.library, build.firmware(axes=1) if firmware is None else firmware)
         self.handle = self.library.frame_bench_new(
             address, image.ctypes.data, len(image), clk_hz / baud
         )
