@@ -48,11 +48,13 @@ module core_divider #(
     logic [W-1:0] quotient;  // bits of the amount of a that are not used yet, then the quotient
 
     // An amount is a number without its sign. The remainder minus the amount of b, and whether it
-    // is 0 or more:
+    // is 0 or more; the lowest bits of both operands make the carry that a subtraction needs.
     wire [W:0] wide = {remainder, quotient[W-1]};
     wire [W:0] subtrahend = {b_negative, b} ^ {W + 1{!b_negative}};
-    wire [W+1:0] difference = wide + subtrahend + {{W + 1{1'b0}}, !b_negative};
-    wire fits = difference[W+1];
+    wire [W+2:0] sum = {wide, 1'b1} + {subtrahend, !b_negative};
+    wire [W-1:0] difference = sum[W:1];
+    wire fits = sum[W+2];
+    wire unused = &{1'b0, sum[W+1], sum[0]};
 
     // A quotient of 3/4 of its range or more comes from a divisor of 0, and is -1 already.
     wire negative = of_remainder ? a_negative : (a_negative != b_negative) && !(&quotient[W-1:W-2]);
@@ -72,7 +74,7 @@ module core_divider #(
         end else if (left == '0) begin
             busy <= 1'b0;
         end else begin
-            remainder <= fits ? difference[W-1:0] : wide[W-1:0];
+            remainder <= fits ? difference : wide[W-1:0];
             quotient  <= {quotient[W-2:0], fits};
         end
         if (rst) begin

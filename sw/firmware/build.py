@@ -65,11 +65,13 @@ IMAGES = {
 }
 LARGEST_PARTS = 4  # that the message about a firmware that does not fit names
 SMALL, FAST = "-Os", "-O2"
-HOT = ("arithmetic.c",)  # the only file in which speed counts more than size
-OUTLINE = [
-    "-mllvm",
-    "-enable-machine-outliner=always",
-]  # for zig: sequences of instructions that repeat become functions
+HOT = (  # files in which speed counts more than size: planning, and answers to the host
+    "arithmetic.c",
+    "bus.c",
+    "plan.c",
+    "planner.c",
+    "retarget.c",
+)
 ZIG = [
     "-target",
     "riscv32-freestanding-none",
@@ -213,9 +215,7 @@ def stem_of(name: str, axes: int) -> str:
 
 
 def flags_of(path: Path) -> list[str]:
-    if path.name in HOT:
-        return [FAST]
-    return [SMALL] if os.environ.get("CROSS") else [SMALL, *OUTLINE]
+    return [FAST if path.name in HOT else SMALL]
 
 
 def fingerprint(sources: Iterable[Path], command: list[str], memory: int) -> str:
