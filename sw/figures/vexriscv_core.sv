@@ -18,16 +18,19 @@ module vexriscv_core #(
 );
     localparam int A = $clog2(MEMORY_BYTES);
 
-    logic [31:0] memory[0:MEMORY_BYTES/4-1];
+    logic [31:0] memory[0:(1<<(A-2))-1];
     initial $readmemh(FIRMWARE, memory);
 
     wire fetch, fetch_strobe, access, access_strobe, store;
-    wire [29:0] fetch_word, access_word;
-    wire [31:0] access_wdata;
-    wire [ 3:0] access_bytes;
-    logic answered;
+    // verilator lint_off UNUSEDSIGNAL
+    wire  [29:0] fetch_word;  // of an instruction outside the memory, any word is read
+    // verilator lint_on UNUSEDSIGNAL
+    wire  [29:0] access_word;
+    wire  [31:0] access_wdata;
+    wire  [ 3:0] access_bytes;
+    logic        answered;
 
-    wire in_registers = access_word[29:14] == 16'h8000;
+    wire         in_registers = access_word[29:14] == 16'h8000;
 
     assign select  = access && access_strobe && in_registers && !answered;
     assign write   = store;
@@ -36,7 +39,9 @@ module vexriscv_core #(
 
     always_ff @(posedge clk) begin
         answered <= select && !rst;
-        if (fetch && access_word[29:14] != '0 && !in_registers && access) trap <= 1'b1;
+        if (access && access_strobe && !in_registers && access_word >= 30'(MEMORY_BYTES / 4)) begin
+            trap <= 1'b1;
+        end
         for (int n = 0; n < 4; n++) begin
             if (access && access_strobe && store && !in_registers && access_bytes[n]) begin
                 memory[access_word[A-3:0]][8*n+:8] <= access_wdata[8*n+:8];
@@ -45,6 +50,8 @@ module vexriscv_core #(
         if (rst) trap <= 1'b0;
     end
 
+    // what the simple memory does not need:
+    // verilator lint_off PINCONNECTEMPTY
     VexRiscv u_core (
         .clk,
         .reset                 (rst),
@@ -75,6 +82,7 @@ module vexriscv_core #(
         .dBusWishbone_CTI      (),
         .dBusWishbone_BTE      ()
     );
+    // verilator lint_on PINCONNECTEMPTY
 endmodule
 
 `default_nettype wire

@@ -3,7 +3,7 @@
 
 import pytest
 
-from twin.compiled.node import FAULT, PERIOD, Axis, FakeNode
+from twin.compiled.node import FAULT, PARAMETER, PERIOD, Axis, FakeNode
 
 OF_DRIVES = {
     "enable": dict(axis=0, on=1),
@@ -35,20 +35,22 @@ def test_a_record_that_excites_the_axis_is_not_built_and_any_other_is_made(machi
 
 def test_each_axis_reports_its_position(machine):
     for n, axis in enumerate(machine.axes):
-        axis.position = (n + 1) * PERIOD
+        axis.machine = (n + 1) * PERIOD
     assert [machine.status(n)["position"] for n in range(4)] == [
         (n + 1) * PERIOD for n in range(4)
     ]
 
 
 def test_a_fault_is_reported_until_it_is_reset(machine):
-    machine.axes[2].faults = FAULT["encoder"]
+    machine.axes[2].causes = FAULT["estop"]
     machine.run(2)
     assert machine.status(2)["state"] == "faulted" and machine.status(1)["state"] == "off"
+    machine.axes[2].causes = 0
     assert machine.request("reset_faults", axis=2)[0] == "ok"
     assert machine.status(2)["state"] == "off"
 
 
 def test_parameters_are_set_and_read_back(machine):
     machine.set(3, counts_per_period=4, decoder_mode=1)
-    assert machine.get(3, "decoder_mode") == 1
+    reply = machine.ask("get_parameter", axis=3, parameter=PARAMETER["decoder_mode"]["id"])
+    assert reply["value"] == 1

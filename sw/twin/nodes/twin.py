@@ -50,7 +50,7 @@ else:
     Transport = object  # the twin runs without the host package
 
 CLK_HZ = 2_400_000
-START_S = 0.2  # until the soft core of a node with one axis listens, with a margin of 45 ms
+START_S = 0.05  # until the soft core of a node with one axis listens, with a margin of 30 ms
 DRIVES = ("HAS_BRIDGE", "HAS_STEPPER", "HAS_DAC", "HAS_FINE_STAGE")  # of rtl/node.sv
 PERIPHERALS = (
     "HAS_I2C",
