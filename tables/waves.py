@@ -51,8 +51,9 @@ def motion_sums() -> list[list[int]]:
 
 def wrapped(values: list[int]) -> str:
     text = ", ".join(map(str, values))
-    return " \\\n".join(textwrap.wrap(text, made_files.COLUMNS - 6, initial_indent="    ",
-                                      subsequent_indent="    "))
+    return " \\\n".join(
+        textwrap.wrap(text, made_files.COLUMNS - 6, initial_indent="    ", subsequent_indent="    ")
+    )
 
 
 def text() -> str:

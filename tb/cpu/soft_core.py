@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The results that tb/cpu/core_test.c must write: those of rv32imc for two operands, in the order in
-which the program writes them.
+"""The results that tb/cpu/core_test.c must write: those of rv32imc for two operands, in the order
+in which the program writes them.
 """
 
 MASK = (1 << 32) - 1

@@ -59,9 +59,7 @@ def test_the_report_adds_up(made):
     assert program == (made[0] / "firmware.bin").stat().st_size
 
 
-def test_a_firmware_that_does_not_fit_names_the_missing_bytes_and_the_largest_parts(
-    made, tmp_path
-):
+def test_a_firmware_that_does_not_fit_names_the_missing_bytes_and_the_largest_parts(made, tmp_path):
     used = MEMORY - int(re.search(r"(\d+) free", made[1])[1])
     error = build(tmp_path, "--memory", str(used - 40)).stderr
     assert "the image axis for 1 axis is 40 bytes too large" in error

@@ -36,9 +36,7 @@ def test_a_record_that_excites_the_axis_is_not_built_and_any_other_is_made(machi
 def test_each_axis_reports_its_position(machine):
     for n, axis in enumerate(machine.axes):
         axis.machine = (n + 1) * PERIOD
-    assert [machine.status(n)["position"] for n in range(4)] == [
-        (n + 1) * PERIOD for n in range(4)
-    ]
+    assert [machine.status(n)["position"] for n in range(4)] == [(n + 1) * PERIOD for n in range(4)]
 
 
 def test_a_fault_is_reported_until_it_is_reset(machine):

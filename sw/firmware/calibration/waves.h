@@ -13,7 +13,9 @@ extern const int16_t sine_table[WAVES_POINTS + WAVES_POINTS / 4];
 
 static inline int32_t sine_at(uint32_t point) { return sine_table[point % WAVES_POINTS]; }
 
-static inline int32_t cosine_at(uint32_t point) { return sine_table[point % WAVES_POINTS + WAVES_POINTS / 4]; }
+static inline int32_t cosine_at(uint32_t point) {
+    return sine_table[point % WAVES_POINTS + WAVES_POINTS / 4];
+}
 
 // Of any phase, one period = 2^16; within 3 LSB.
 int32_t sine_of(uint32_t phase);
