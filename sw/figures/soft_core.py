@@ -169,7 +169,8 @@ def area_of(core: Core) -> str:
     else:
         source = SOFT_CORE
         netlist = netlist_of(source, {"MEMORY_BYTES": MEMORY_BYTES}, "ecp5", 1)
-    clocks, used = [], {}
+    clocks: list[str] = []
+    used: dict[str, dict[str, int]] = {}
     for seed in SEEDS:
         alone = ["--lpf-allow-unconstrained", "--out-of-context"]
         mhz, used = placed(netlist, "ecp5", ECP5, 70, seed, *alone)
