@@ -33,20 +33,32 @@ module soft_core #(
     localparam int A = $clog2(MEMORY_BYTES);
 
     wire core_trap, mem_valid, mem_instr, mem_la_read, mem_la_write;
-    wire [31:0] mem_addr, mem_wdata, mem_la_wdata, memory_rdata;
+    wire [31:0] mem_addr, mem_wdata, memory_rdata;
     // verilator lint_off UNUSEDSIGNAL
     wire [31:0] mem_la_addr;  // of a word: bits 1:0 are zero
     // verilator lint_on UNUSEDSIGNAL
-    wire [3:0] mem_wstrb, mem_la_wstrb;
+    wire [ 3:0] mem_wstrb;
     // divisions
     wire pcpi_valid, pcpi_wait, pcpi_ready;
     wire [31:0] pcpi_insn, pcpi_rs1, pcpi_rs2, pcpi_rd;
     // the registers have answered; an access had no valid address
     logic answered, lost;
+    // what the memory has just read: a word for the core; ahead, the word after the last instruction
+    logic for_core, ahead;
+    logic [31:0] word;  // what the memory read in the cycle before that
+    logic has_core, has_ahead;  // word is that for the core, and is the one after the instruction
+    logic storing;  // the core writes into the memory
+    logic [A-3:0] next;  // number of the word that is read ahead
 
     wire in_memory = mem_addr < 32'(MEMORY_BYTES);
     wire in_registers = mem_addr[31:16] == 16'h8000 && !mem_instr && (&mem_wstrb || ~|mem_wstrb);
     wire la_in_memory = mem_la_addr < 32'(MEMORY_BYTES);
+
+    // A word passes through a register: the block RAMs and the selection among them take most of a
+    // cycle. So that instructions in sequence do not wait, the memory reads ahead in every cycle in
+    // which the core does not use it.
+    wire [A-3:0] following = mem_valid && mem_instr ? mem_addr[A-1:2] + (A - 2)'(1) : next;
+    wire memory_ready = has_core || has_ahead || storing;
 
     assign select  = mem_valid && in_registers && !answered;
     assign write   = mem_wstrb[0];
@@ -55,11 +67,24 @@ module soft_core #(
     assign trap    = core_trap || lost;
 
     always_ff @(posedge clk) begin
-        answered <= select;
+        answered  <= select;
+        word      <= memory_rdata;
+        next      <= following;
+        for_core  <= mem_la_read && la_in_memory;
+        ahead     <= !mem_la_read && !storing;
+        storing   <= mem_la_write && la_in_memory;
+        has_core  <= for_core && !has_ahead;
+        has_ahead <= ahead && mem_la_read && la_in_memory && mem_la_addr[A-1:2] == following;
         if (mem_valid && !in_memory && !in_registers) lost <= 1'b1;
         if (rst) begin
-            answered <= 1'b0;
-            lost     <= 1'b0;
+            answered  <= 1'b0;
+            lost      <= 1'b0;
+            next      <= '0;
+            for_core  <= 1'b0;
+            ahead     <= 1'b0;
+            storing   <= 1'b0;
+            has_core  <= 1'b0;
+            has_ahead <= 1'b0;
         end
     end
 
@@ -68,11 +93,11 @@ module soft_core #(
         .FIRMWARE(FIRMWARE)
     ) u_memory (
         .clk,
-        .read   (mem_la_read),
-        .write  (mem_la_wstrb & {4{mem_la_write && la_in_memory}}),
-        .address(mem_la_addr[A-1:2]),
-        .wdata  (mem_la_wdata),
-        .rdata  (memory_rdata)
+        .write        (mem_wstrb & {4{storing}}),
+        .write_address(mem_addr[A-1:2]),
+        .wdata        (mem_wdata),
+        .read_address (mem_la_read ? mem_la_addr[A-1:2] : following),
+        .rdata        (memory_rdata)
     );
 
     core_divider u_divider (
@@ -100,34 +125,37 @@ module soft_core #(
         .STACKADDR        (32'(MEMORY_BYTES))
     ) u_core (
         .clk,
-        .resetn     (!rst),
-        .trap       (core_trap),
+        .resetn      (!rst),
+        .trap        (core_trap),
         .mem_valid,
         .mem_instr,
-        .mem_ready  (answered || (mem_valid && in_memory)),
+        .mem_ready   (answered || memory_ready),
         .mem_addr,
         .mem_wdata,
         .mem_wstrb,
-        .mem_rdata  (answered ? rdata : memory_rdata),
+        .mem_rdata   (answered ? rdata : word),
         .mem_la_read,
         .mem_la_write,
         .mem_la_addr,
-        .mem_la_wdata,
-        .mem_la_wstrb,
+        // writes do not look ahead:
+        // verilator lint_off PINCONNECTEMPTY
+        .mem_la_wdata(),
+        .mem_la_wstrb(),
+        // verilator lint_on PINCONNECTEMPTY
         .pcpi_valid,
         .pcpi_insn,
         .pcpi_rs1,
         .pcpi_rs2,
-        .pcpi_wr    (pcpi_ready),
+        .pcpi_wr     (pcpi_ready),
         .pcpi_rd,
         .pcpi_wait,
         .pcpi_ready,
-        .irq        (32'd0),
+        .irq         (32'd0),
         // no interrupts, no trace:
         // verilator lint_off PINCONNECTEMPTY
-        .eoi        (),
-        .trace_valid(),
-        .trace_data ()
+        .eoi         (),
+        .trace_valid (),
+        .trace_data  ()
     );
     // verilator lint_on PINCONNECTEMPTY
 
