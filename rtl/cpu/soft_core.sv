@@ -1,19 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 // soft_core -- RISC-V processor (rv32imc) with its memory, the master of the register bus.
 //
-// latency   0 wait cycles for an access to memory, 1 wait cycle for an access to a register.
-// rate      An operation takes 3 cycles, a memory access 5, a register access or a product 6, a
-//           quotient 38.
+// latency   0 wait cycles for a write to memory, 1 wait cycle for a word read from memory, 1 wait
+//           cycle for an access to a register; 0 wait cycles for an instruction that the memory has
+//           read ahead, 1 wait cycle for any other one.
+// rate      An operation takes 3 cycles, a write to memory 5, a word read from memory, a register
+//           access or a product 6, a quotient 38.
 // behaviour The memory is at 0000_0000 (start address 0, stack from its end), the registers are at
 //           8000_0000 (64 KiB, whole words only). Any other access, a misaligned access and an
 //           illegal instruction stop the core: trap is high until rst, which starts the core at
-//           address 0 and leaves the memory as it is.
+//           address 0 and leaves the memory as it is. In each cycle in which the core does not use
+//           the memory, the memory reads the word after the last instruction.
 // source    PicoRV32, from the package pythondata_cpu_picorv32; its look-ahead address reaches the
 //           memory one cycle early
 // model     tb/cpu/soft_core.py, the results of the program tb/cpu/core_test.c
 // proved    Whatever the core does: an access to no valid address raises trap in the next cycle,
 //           and trap stays high until rst. select is a strobe, only for an access to a whole word
-//           of the registers, and never for an instruction.
+//           of the registers, and never for an instruction. Each word that the core takes from the
+//           memory was read at the address of the access, after the last write to that address.
 // proof     depth 6, MEMORY_BYTES = 1024
 `default_nettype none
 
@@ -43,21 +47,21 @@ module soft_core #(
     wire [31:0] pcpi_insn, pcpi_rs1, pcpi_rs2, pcpi_rd;
     // the registers have answered; an access had no valid address
     logic answered, lost;
-    // what the memory has just read: a word for the core; ahead, the word after the last instruction
+    // the memory has just read a word for the core; or the word after the last instruction
     logic for_core, ahead;
-    logic [31:0] word;  // what the memory read in the cycle before that
-    logic has_core, has_ahead;  // word is that for the core, and is the one after the instruction
-    logic storing;  // the core writes into the memory
-    logic [A-3:0] next;  // number of the word that is read ahead
+    logic [31:0] word;  // what the memory had read one cycle earlier
+    logic has_core, has_ahead;  // word is for the core; and it was read ahead
+    logic storing;  // the core writes to the memory
+    logic [A-3:0] next;  // number of the word after the last instruction
 
     wire in_memory = mem_addr < 32'(MEMORY_BYTES);
     wire in_registers = mem_addr[31:16] == 16'h8000 && !mem_instr && (&mem_wstrb || ~|mem_wstrb);
     wire la_in_memory = mem_la_addr < 32'(MEMORY_BYTES);
 
-    // A word passes through a register: the block RAMs and the selection among them take most of a
-    // cycle. So that instructions in sequence do not wait, the memory reads ahead in every cycle in
-    // which the core does not use it.
+    // A word that is read passes through a register, since the block RAMs, the selection among them
+    // and the expansion of a compressed instruction together take longer than a cycle.
     wire [A-3:0] following = mem_valid && mem_instr ? mem_addr[A-1:2] + (A - 2)'(1) : next;
+    wire [A-3:0] read_address = mem_la_read ? mem_la_addr[A-1:2] : following;
     wire memory_ready = has_core || has_ahead || storing;
 
     assign select  = mem_valid && in_registers && !answered;
@@ -72,8 +76,8 @@ module soft_core #(
         next      <= following;
         for_core  <= mem_la_read && la_in_memory;
         ahead     <= !mem_la_read && !storing;
-        storing   <= mem_la_write && la_in_memory;
-        has_core  <= for_core && !has_ahead;
+        storing   <= mem_la_write && la_in_memory && !core_trap;
+        has_core  <= for_core && mem_valid && !memory_ready;
         has_ahead <= ahead && mem_la_read && la_in_memory && mem_la_addr[A-1:2] == following;
         if (mem_valid && !in_memory && !in_registers) lost <= 1'b1;
         if (rst) begin
@@ -96,7 +100,7 @@ module soft_core #(
         .write        (mem_wstrb & {4{storing}}),
         .write_address(mem_addr[A-1:2]),
         .wdata        (mem_wdata),
-        .read_address (mem_la_read ? mem_la_addr[A-1:2] : following),
+        .read_address,
         .rdata        (memory_rdata)
     );
 
@@ -160,10 +164,21 @@ module soft_core #(
     // verilator lint_on PINCONNECTEMPTY
 
 `ifdef FORMAL
+    // of the word at the output of the memory, and of the one in word: its number, and whether it
+    // was written after it was read
+    logic [A-3:0] read_number, word_number;
+    logic read_old, word_old;
+    wire  overwritten = storing && mem_addr[A-1:2] == read_number;
     logic past = 1'b0;
     always @(posedge clk) begin
-        past <= 1'b1;
+        past        <= 1'b1;
+        word_number <= read_number;
+        word_old    <= read_old || overwritten;
+        read_old    <= storing && (read_old || overwritten);
+        if (!storing) read_number <= read_address;
         if (!past) assume (rst);
+        // the core begins no access before the last one is done
+        if (mem_la_read || mem_la_write) assume (!mem_valid || answered || memory_ready);
         if (past && !$past(rst)) begin
             if ($past(mem_valid && !in_memory && !in_registers)) assert (trap);
             if ($past(lost)) assert (trap);
@@ -171,6 +186,12 @@ module soft_core #(
             if (select) assert (mem_valid && !in_memory && !mem_instr);
             if (select) assert (mem_wstrb == '0 || mem_wstrb == '1);
             if (write && select) assert (mem_wstrb == '1);
+            if (storing) assert (mem_valid && in_memory);
+            if (mem_valid && memory_ready && !storing && !core_trap) begin
+                assert (in_memory && mem_wstrb == '0);
+                assert (word_number == mem_addr[A-1:2] && !word_old);
+            end
+            cover (mem_valid && has_ahead && mem_instr);
             // no access is both answered and lost
             assert (!(answered && lost && !$past(lost)));
             cover (mem_valid && in_memory && mem_instr);
