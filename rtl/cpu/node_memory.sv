@@ -2,9 +2,9 @@
 // node_memory -- block memory of the soft core, written byte by byte, which holds the firmware at
 // power-up.
 //
-// latency   1 cycle from address to rdata
+// latency   1 cycle from read_address to rdata
 // rate      one access per cycle, a read or a write
-// behaviour There is one port: rdata keeps the last word read during a write.
+// behaviour The memory reads in every cycle without a write; rdata keeps its word during a write.
 // model     tb/cpu/node_memory.py, equal in every bit of every cycle
 `default_nettype none
 
@@ -13,11 +13,11 @@ module node_memory #(
     parameter     FIRMWARE = ""      // name of a file of 32-bit words for $readmemh; "": none
 ) (
     input  wire                      clk,
-    input  wire                      read,     // strobe: read the word at address
-    input  wire  [              3:0] write,    // strobe: write byte n of the word for each bit n
-    input  wire  [$clog2(BYTES)-3:0] address,  // number of a word
-    input  wire  [             31:0] wdata,    // word to be written
-    output logic [             31:0] rdata     // word read last
+    input  wire  [              3:0] write,          // strobe: write byte n of the word for bit n
+    input  wire  [$clog2(BYTES)-3:0] write_address,  // number of a word
+    input  wire  [             31:0] wdata,          // word to be written
+    input  wire  [$clog2(BYTES)-3:0] read_address,   // number of a word
+    output logic [             31:0] rdata           // word read last
 );
     if (BYTES < 1024 || BYTES % 1024 != 0) begin : g_check
         BYTES_MUST_BE_A_MULTIPLE_OF_1024 u_error ();
@@ -28,8 +28,8 @@ module node_memory #(
     initial if (FIRMWARE != "") $readmemh(FIRMWARE, memory);
 
     always_ff @(posedge clk) begin
-        for (int n = 0; n < 4; n++) if (write[n]) memory[address][8*n+:8] <= wdata[8*n+:8];
-        if (read && write == '0) rdata <= memory[address];
+        for (int n = 0; n < 4; n++) if (write[n]) memory[write_address][8*n+:8] <= wdata[8*n+:8];
+        if (write == '0) rdata <= memory[read_address];
     end
 endmodule
 

@@ -1,21 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-// soft_core -- RISC-V processor (rv32im) with its memory, the master of the register bus.
+// soft_core -- RISC-V processor (rv32imc) with its memory, the master of the register bus.
 //
-// latency   0 wait cycles for an access to memory, 2 wait cycles for an access to a register, and
-//           as many more as ready is low.
-// rate      An operation takes 3 cycles, a memory access 5, a product 6, a register access 7, a
-//           quotient 40.
+// latency   0 wait cycles for a write to memory, 1 wait cycle for a word read from memory, 2 wait
+//           cycles for an access to a register, and as many more as ready is low; 0 wait cycles for
+//           an instruction that the memory has read ahead, 1 wait cycle for any other one.
+// rate      An operation takes 3 cycles, a write to memory 5, a word read from memory or a product
+//           6, a register access 7, a quotient 38.
 // behaviour The memory is at 0000_0000 (start address 0, stack from its end), the registers are at
 //           8000_0000 (64 KiB, whole words only). Any other access, a misaligned access and an
 //           illegal instruction stop the core: trap is high until rst, which starts the core at
-//           address 0 and leaves the memory as it is.
+//           address 0 and leaves the memory as it is. In each cycle in which the core does not use
+//           the memory, the memory reads the word after the last instruction.
 // source    PicoRV32, from the package pythondata_cpu_picorv32; its look-ahead address reaches the
 //           memory one cycle early
 // model     tb/cpu/soft_core.py, the results of the program tb/cpu/core_test.c
 // proved    Whatever the core does: an access to no valid address raises trap in the next cycle,
 //           and trap stays high until rst. select is a strobe, only for an access to a whole word
 //           of the registers, only while ready is high, never for an instruction, and never in
-//           two cycles that follow each other.
+//           two cycles that follow each other. Each word that the core takes from the memory was
+//           read at the address of the access, after the last write to that address.
 // proof     depth 6, MEMORY_BYTES = 1024
 `default_nettype none
 
@@ -36,17 +39,32 @@ module soft_core #(
     localparam int A = $clog2(MEMORY_BYTES);
 
     wire core_trap, mem_valid, mem_instr, mem_la_read, mem_la_write;
-    wire [31:0] mem_addr, mem_wdata, mem_la_wdata, memory_rdata;
+    wire [31:0] mem_addr, mem_wdata, memory_rdata;
     // verilator lint_off UNUSEDSIGNAL
     wire [31:0] mem_la_addr;  // of a word: bits 1:0 are zero
     // verilator lint_on UNUSEDSIGNAL
-    wire [3:0] mem_wstrb, mem_la_wstrb;
+    wire [ 3:0] mem_wstrb;
+    // divisions
+    wire pcpi_valid, pcpi_wait, pcpi_ready;
+    wire [31:0] pcpi_insn, pcpi_rs1, pcpi_rs2, pcpi_rd;
     // the registers will answer in the next cycle, have answered; an access had no valid address
     logic awaited, answered, lost;
+    // the memory has just read a word for the core; or the word after the last instruction
+    logic for_core, ahead;
+    logic [31:0] word;  // what the memory had read one cycle earlier
+    logic has_core, has_ahead;  // word is for the core; and it was read ahead
+    logic storing;  // the core writes to the memory
+    logic [A-3:0] next;  // number of the word after the last instruction
 
     wire in_memory = mem_addr < 32'(MEMORY_BYTES);
     wire in_registers = mem_addr[31:16] == 16'h8000 && !mem_instr && (&mem_wstrb || ~|mem_wstrb);
     wire la_in_memory = mem_la_addr < 32'(MEMORY_BYTES);
+
+    // A word that is read passes through a register, since the block RAMs, the selection among them
+    // and the expansion of a compressed instruction together take longer than a cycle.
+    wire [A-3:0] following = mem_valid && mem_instr ? mem_addr[A-1:2] + (A - 2)'(1) : next;
+    wire [A-3:0] read_address = mem_la_read ? mem_la_addr[A-1:2] : following;
+    wire memory_ready = has_core || has_ahead || storing;
 
     assign select  = mem_valid && in_registers && ready && !awaited && !answered;
     assign write   = mem_wstrb[0];
@@ -55,13 +73,26 @@ module soft_core #(
     assign trap    = core_trap || lost;
 
     always_ff @(posedge clk) begin
-        awaited  <= select;
-        answered <= awaited;
+        awaited   <= select;
+        answered  <= awaited;
+        word      <= memory_rdata;
+        next      <= following;
+        for_core  <= mem_la_read && la_in_memory;
+        ahead     <= !mem_la_read && !storing;
+        storing   <= mem_la_write && la_in_memory && !core_trap;
+        has_core  <= for_core && mem_valid && !memory_ready;
+        has_ahead <= ahead && mem_la_read && la_in_memory && mem_la_addr[A-1:2] == following;
         if (mem_valid && !in_memory && !in_registers) lost <= 1'b1;
         if (rst) begin
-            awaited  <= 1'b0;
-            answered <= 1'b0;
-            lost     <= 1'b0;
+            awaited   <= 1'b0;
+            answered  <= 1'b0;
+            lost      <= 1'b0;
+            next      <= '0;
+            for_core  <= 1'b0;
+            ahead     <= 1'b0;
+            storing   <= 1'b0;
+            has_core  <= 1'b0;
+            has_ahead <= 1'b0;
         end
     end
 
@@ -70,11 +101,23 @@ module soft_core #(
         .FIRMWARE(FIRMWARE)
     ) u_memory (
         .clk,
-        .read   (mem_la_read),
-        .write  (mem_la_wstrb & {4{mem_la_write && la_in_memory}}),
-        .address(mem_la_addr[A-1:2]),
-        .wdata  (mem_la_wdata),
-        .rdata  (memory_rdata)
+        .write        (mem_wstrb & {4{storing}}),
+        .write_address(mem_addr[A-1:2]),
+        .wdata        (mem_wdata),
+        .read_address,
+        .rdata        (memory_rdata)
+    );
+
+    core_divider u_divider (
+        .clk,
+        .rst,
+        .valid      (pcpi_valid),
+        .instruction(pcpi_insn),
+        .a          (pcpi_rs1),
+        .b          (pcpi_rs2),
+        .working    (pcpi_wait),
+        .ready      (pcpi_ready),
+        .result     (pcpi_rd)
     );
 
     picorv32 #(
@@ -83,49 +126,63 @@ module soft_core #(
         .BARREL_SHIFTER   (1),
         .ENABLE_MUL       (1),
         .ENABLE_FAST_MUL  (1),
-        .ENABLE_DIV       (1),
+        .ENABLE_PCPI      (1),
+        .COMPRESSED_ISA   (1),
         .CATCH_MISALIGN   (1),
         .CATCH_ILLINSN    (1),
-        .REGS_INIT_ZERO   (1),
         .STACKADDR        (32'(MEMORY_BYTES))
     ) u_core (
         .clk,
-        .resetn     (!rst),
-        .trap       (core_trap),
+        .resetn      (!rst),
+        .trap        (core_trap),
         .mem_valid,
         .mem_instr,
-        .mem_ready  (answered || (mem_valid && in_memory)),
+        .mem_ready   (answered || memory_ready),
         .mem_addr,
         .mem_wdata,
         .mem_wstrb,
-        .mem_rdata  (answered ? rdata : memory_rdata),
+        .mem_rdata   (answered ? rdata : word),
         .mem_la_read,
         .mem_la_write,
         .mem_la_addr,
-        .mem_la_wdata,
-        .mem_la_wstrb,
-        .pcpi_wr    (1'b0),
-        .pcpi_rd    (32'd0),
-        .pcpi_wait  (1'b0),
-        .pcpi_ready (1'b0),
-        .irq        (32'd0),
-        // no co-processor, no interrupts, no trace:
+        // writes do not look ahead:
         // verilator lint_off PINCONNECTEMPTY
-        .pcpi_valid (),
-        .pcpi_insn  (),
-        .pcpi_rs1   (),
-        .pcpi_rs2   (),
-        .eoi        (),
-        .trace_valid(),
-        .trace_data ()
+        .mem_la_wdata(),
+        .mem_la_wstrb(),
+        // verilator lint_on PINCONNECTEMPTY
+        .pcpi_valid,
+        .pcpi_insn,
+        .pcpi_rs1,
+        .pcpi_rs2,
+        .pcpi_wr     (pcpi_ready),
+        .pcpi_rd,
+        .pcpi_wait,
+        .pcpi_ready,
+        .irq         (32'd0),
+        // no interrupts, no trace:
+        // verilator lint_off PINCONNECTEMPTY
+        .eoi         (),
+        .trace_valid (),
+        .trace_data  ()
     );
     // verilator lint_on PINCONNECTEMPTY
 
 `ifdef FORMAL
+    // of the word at the output of the memory, and of the one in word: its number, and whether it
+    // was written after it was read
+    logic [A-3:0] read_number, word_number;
+    logic read_old, word_old;
+    wire  overwritten = storing && mem_addr[A-1:2] == read_number;
     logic past = 1'b0;
     always @(posedge clk) begin
-        past <= 1'b1;
+        past        <= 1'b1;
+        word_number <= read_number;
+        word_old    <= read_old || overwritten;
+        read_old    <= storing && (read_old || overwritten);
+        if (!storing) read_number <= read_address;
         if (!past) assume (rst);
+        // the core begins no access before the last one is done
+        if (mem_la_read || mem_la_write) assume (!mem_valid || answered || memory_ready);
         if (past && !$past(rst)) begin
             if ($past(mem_valid && !in_memory && !in_registers)) assert (trap);
             if ($past(lost)) assert (trap);
@@ -133,6 +190,12 @@ module soft_core #(
             if (select) assert (mem_valid && !in_memory && !mem_instr && ready);
             if (select) assert (mem_wstrb == '0 || mem_wstrb == '1);
             if (write && select) assert (mem_wstrb == '1);
+            if (storing) assert (mem_valid && in_memory);
+            if (mem_valid && memory_ready && !storing && !core_trap) begin
+                assert (in_memory && mem_wstrb == '0);
+                assert (word_number == mem_addr[A-1:2] && !word_old);
+            end
+            cover (mem_valid && has_ahead && mem_instr);
             cover (mem_valid && in_memory && mem_instr);
         end
     end

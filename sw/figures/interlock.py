@@ -9,6 +9,7 @@ host resets them; and some stop the soft core itself. The campaign of 10^6 fault
 """
 
 import random
+import struct
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -154,11 +155,14 @@ def node_faults(count: int, seed: int, done: Callable[[int], None]) -> list[str]
 
 
 def spoilt_firmware(instruction: int) -> list[int]:
-    """The firmware's words, with this instruction where the request to reset faults begins."""
-    words = list(build.firmware())
+    """The firmware's words, with this instruction of 32 bits where the request to reset faults
+    begins.
+    """
+    words = build.firmware(axes=1)
     _, symbols = firmware_build.read_elf(ROOT / "build" / "firmware" / "firmware.elf")
-    words[symbols["axis_reset_faults"] // 4] = instruction
-    return words
+    content = bytearray(struct.pack(f"<{len(words)}I", *words))
+    struct.pack_into("<I", content, symbols["axis_reset_faults"], instruction)
+    return [word for (word,) in struct.iter_unpack("<I", content)]
 
 
 def core_fault(twin: Twin, axis: BusAxis, kind: str) -> str | None:

@@ -1,15 +1,17 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Build the firmware: build/firmware/firmware.elf, .bin and .hex; another image than `axis` gets
-its own name.
+"""Build the firmware: build/firmware/firmware.elf, .bin and .hex; another image than `axis` and
+another number of axes have names of their own.
 
-An image consists of the parts that its image_NAME.c lists; the linker drops what they do not reach.
+An image is the firmware of one kind of node. It consists of the parts that its image_NAME.c lists;
+the linker drops what they do not reach. Its arrays have as many elements as the node has axes.
 The compiler is zig (PyPI ziglang, of the running Python), or GNU with CROSS=riscv64-unknown-elf-
 in the environment.
 The .hex is for $readmemh: one 32-bit word per line, little endian in memory, filled with zeros up
 to the size of the memory.
-Nothing is built if nothing has changed. The exit code is 1, with one line of explanation, if a tool
-is missing, a source is wrong or the image does not fit.
+The .parts lists how many bytes each source takes. Nothing is built if nothing has changed. The exit
+code is 1, with one line of explanation, if a tool is missing, a source is wrong or the image does
+not fit: then the line says by how many bytes, and which parts are the largest.
 """
 
 import argparse
@@ -25,7 +27,7 @@ import tempfile
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import cast
+from typing import NamedTuple, cast
 
 from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
@@ -46,24 +48,40 @@ FLAGS = [
     "-static",
     "-Wframe-larger-than=1536",
 ]  # the stack has 4096
-IMAGES = sorted(path.stem.removeprefix("image_") for path in (HERE / "images").glob("image_*.c"))
-AXES = {"station": 2}  # most axes that an image serves, where it is not the default
+
+
+class Image(NamedTuple):
+    """What is known of an image besides its parts."""
+
+    usual_axes: int  # of a node, if the caller names no other number
+    most_axes: int  # that the image can serve
+    drives: bool = True  # False: its nodes measure and have no drives
+
+
+IMAGES = {
+    "axis": Image(usual_axes=1, most_axes=8),
+    "counter": Image(usual_axes=4, most_axes=8, drives=False),
+    "station": Image(usual_axes=2, most_axes=2),
+}
+LARGEST_PARTS = 4  # that the message about a firmware that does not fit names
 SMALL, FAST = "-Os", "-O2"
-HOT = ("arithmetic.c",)  # the only file in which speed counts more than size
-OUTLINE = [
-    "-mllvm",
-    "-enable-machine-outliner=always",
-]  # for zig: sequences of instructions that repeat become functions
+HOT = (  # files in which speed counts more than size: planning, and answers to the host
+    "arithmetic.c",
+    "bus.c",
+    "plan.c",
+    "planner.c",
+    "retarget.c",
+)
 ZIG = [
     "-target",
     "riscv32-freestanding-none",
-    "-mcpu=generic_rv32+m-a-f-d-c",
+    "-mcpu=generic_rv32+m-a-f-d+c",
     "-mabi=ilp32",
     "-fno-sanitize=all",
     "-fno-stack-protector",
 ]
 GNU = [
-    "-march=rv32im",
+    "-march=rv32imc",
     "-misa-spec=2.2",
     "-mabi=ilp32",
     "-nostdlib",
@@ -103,7 +121,7 @@ def read_elf(path: Path) -> tuple[list[tuple[int, bytes]], dict[str, int]]:
     return segments, symbols
 
 
-def image(segments: list[tuple[int, bytes]], memory: int) -> tuple[bytes, int]:
+def contents(segments: list[tuple[int, bytes]], memory: int) -> tuple[bytes, int]:
     """The contents of a memory of so many bytes, and how many of them are used."""
     words = bytearray(memory)
     used = 0
@@ -115,6 +133,55 @@ def image(segments: list[tuple[int, bytes]], memory: int) -> tuple[bytes, int]:
         words[address : address + len(content)] = content
         used = max(used, address + len(content))
     return bytes(words), used
+
+
+def sized_symbols(path: Path) -> Iterable[tuple[str, str, bool, int]]:
+    """(file, name, whether only that file sees it, bytes) of each function and variable."""
+    with open(path, "rb") as file:
+        table = cast(SymbolTableSection, ELFFile(file).get_section_by_name(".symtab"))
+        source, seen = "", set()
+        for symbol in table.iter_symbols():
+            kind, local = symbol["st_info"]["type"], symbol["st_info"]["bind"] == "STB_LOCAL"
+            if kind == "STT_FILE":
+                source = symbol.name
+            place = symbol["st_value"], symbol["st_size"], symbol["st_shndx"]
+            known = kind in ("STT_FUNC", "STT_OBJECT") and symbol["st_shndx"] != "SHN_UNDEF"
+            if not known or local and symbol.name.startswith(".L") or place in seen:
+                continue
+            seen.add(place)  # a function may have two names
+            yield source, symbol.name, local, symbol["st_size"]
+
+
+def sizes_of(elf: Path, objects: dict[str, Path], total: int) -> dict[str, int]:
+    """{source: bytes of its functions and variables} of a linked firmware, the largest first;
+    `objects` are those of the sources. The difference to the total are constants without a name
+    and the compiler's own functions.
+    """
+    of_file = {Path(source).name: source for source in objects}
+    of_name = {
+        name: source
+        for source, made in objects.items()
+        for _, name, local, _ in sized_symbols(made)
+        if not local
+    }
+    sizes = dict.fromkeys(objects, 0)
+    for file, name, local, size in sized_symbols(elf):
+        source = of_file.get(file) if local else of_name.get(name)
+        if source:
+            sizes[source] += size
+    sizes["compiler, constants without a name"] = total - sum(sizes.values())
+    return dict(sorted(sizes.items(), key=lambda item: -item[1]))
+
+
+def largest_parts(sizes: dict[str, int]) -> str:
+    """The largest parts of the firmware; a part is a directory of sw/firmware."""
+    parts: dict[str, int] = {}
+    for source, size in sizes.items():
+        part = source.rpartition("/")[0]
+        if part:
+            parts[part] = parts.get(part, 0) + size
+    first = sorted(parts.items(), key=lambda item: -item[1])[:LARGEST_PARTS]
+    return ", ".join(f"{part} {size}" for part, size in first)
 
 
 def sources_of(name: str, folder: Path = HERE) -> list[Path]:
@@ -132,14 +199,23 @@ def sources_of(name: str, folder: Path = HERE) -> list[Path]:
     return sources
 
 
-def defines_of(name: str) -> list[str]:
-    return [f"-DHARDWARE_AXES={AXES[name]}u"] if name in AXES else []
+def defines_of(name: str, axes: int | None = None) -> list[str]:
+    """Macros of an image: it serves as many axes as it can, if no number is named."""
+    image = IMAGES[name]
+    return [
+        f"-DHARDWARE_AXES={axes or image.most_axes}u",
+        f"-DHARDWARE_DRIVES={int(image.drives)}",
+    ]
+
+
+def stem_of(name: str, axes: int) -> str:
+    """The name of the files of an image for nodes of so many axes."""
+    stem = "firmware" if name == "axis" else name
+    return stem if axes == IMAGES[name].usual_axes else f"{stem}_{axes}_axes"
 
 
 def flags_of(path: Path) -> list[str]:
-    if path.name in HOT:
-        return [FAST]
-    return [SMALL] if os.environ.get("CROSS") else [SMALL, *OUTLINE]
+    return [FAST if path.name in HOT else SMALL]
 
 
 def fingerprint(sources: Iterable[Path], command: list[str], memory: int) -> str:
@@ -156,19 +232,26 @@ def run(command: Sequence[str]) -> None:
         errors = [
             line
             for line in lines
-            if re.search(r"error|undefined reference|does not fit|would not survive", line)
+            if re.search(r"error|undefined reference|would not survive", line)
         ]
         raise BuildError((errors or lines)[0].strip())
 
 
-def build(memory: int, out: Path, force: bool, name: str = "axis") -> str:
+def build(memory: int, out: Path, force: bool, name: str = "axis", axes: int | None = None) -> str:
+    """Build an image for nodes of so many axes, or of as many as is usual, and report its size."""
+    image = IMAGES[name]
+    axes = image.usual_axes if axes is None else axes
+    if not 1 <= axes <= image.most_axes:
+        raise BuildError(f"the image {name} serves 1 to {image.most_axes} axes, not {axes}")
     command, libraries = compiler()
-    command += defines_of(name)
+    command += defines_of(name, axes)
     sources = [*sources_of(name), LINK, HERE / "build.py"]
-    stem = "firmware" if name == "axis" else name
-    elf, binary, text, note = (out / f"{stem}.{end}" for end in ("elf", "bin", "hex", "note"))
+    stem = stem_of(name, axes)
+    elf, binary, text, parts, note = (
+        out / f"{stem}.{end}" for end in ("elf", "bin", "hex", "parts", "note")
+    )
     state = fingerprint(sources, command, memory)
-    if not force and all(path.exists() for path in (elf, binary, text, note)):
+    if not force and all(path.exists() for path in (elf, binary, text, parts, note)):
         old_state, _, report = note.read_text().partition("\n")
         if old_state == state:
             return report.strip()
@@ -199,14 +282,27 @@ def build(memory: int, out: Path, force: bool, name: str = "axis") -> str:
             ]
         )
 
-    segments, symbols = read_elf(elf)
-    content, program = image(segments, memory)
+        segments, symbols = read_elf(elf)
+        made = {
+            path.relative_to(HERE).as_posix(): path_made
+            for path, path_made in zip(inputs, objects, strict=True)
+        }
+        sizes = sizes_of(elf, made, symbols["_zero_end"])
+
     used, stack = symbols["_zero_end"], symbols["_stack_top"] - symbols["_stack_limit"]
+    free = memory - used - stack
+    if free < 0:
+        raise BuildError(
+            f"the image {name} for {axes} {'axis' if axes == 1 else 'axes'} is {-free} bytes too "
+            f"large for a memory of {memory} bytes; its largest parts: {largest_parts(sizes)}"
+        )
+    content, program = contents(segments, memory)
     binary.write_bytes(content[:program])
     text.write_text("".join(f"{word:08x}\n" for (word,) in struct.iter_unpack("<I", content)))
+    parts.write_text("".join(f"{size:7} {source}\n" for source, size in sizes.items() if size))
     report = (
         f"{stem}: {program} bytes program + {used - program} data + {stack} stack"
-        f" = {used + stack} of {memory}, {memory - used - stack} free"
+        f" = {used + stack} of {memory}, {free} free"
     )
     note.write_text(f"{state}\n{report}\n")
     return report
@@ -215,7 +311,10 @@ def build(memory: int, out: Path, force: bool, name: str = "axis") -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     parser.add_argument(
-        "--image", choices=IMAGES, default="axis", help="kind of node (default axis)"
+        "--image", choices=sorted(IMAGES), default="axis", help="kind of node (default axis)"
+    )
+    parser.add_argument(
+        "--axes", type=int, help="axes of the node (default axis 1, counter 4, station 2)"
     )
     parser.add_argument(
         "--memory", type=int, default=98304, help="bytes of the soft core's memory (default 98304)"
@@ -226,7 +325,7 @@ def main() -> None:
     parser.add_argument("--force", action="store_true", help="build even if nothing changed")
     options = parser.parse_args()
     try:
-        print(build(options.memory, options.out, options.force, options.image))
+        print(build(options.memory, options.out, options.force, options.image, options.axes))
     except BuildError as error:
         sys.exit(f"firmware: {error}")
 

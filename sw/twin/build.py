@@ -445,18 +445,22 @@ def twin_library(
     return library
 
 
-def firmware(image: str = "axis") -> list[int]:
-    """The words of an image of the firmware, built first when it is not fresh."""
+def firmware(image: str = "axis", axes: int | None = None) -> list[int]:
+    """The words of an image of the firmware for nodes of so many axes, or of as many as is usual,
+    built first when it is not fresh.
+    """
+    axes = firmware_build.IMAGES[image].usual_axes if axes is None else axes
     BUILD.mkdir(parents=True, exist_ok=True)
     with open(BUILD / "firmware.lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         run(
-            [sys.executable, "-m", "firmware.build", "--image", image, "--memory", MEMORY_BYTES],
+            [
+                *[sys.executable, "-m", "firmware.build", "--image", image, "--axes", axes],
+                *["--memory", MEMORY_BYTES],
+            ],
             "the firmware's build",
         )
-        return words_of(
-            ROOT / "build" / "firmware" / f"{'firmware' if image == 'axis' else image}.hex"
-        )
+        return words_of(ROOT / "build" / "firmware" / f"{firmware_build.stem_of(image, axes)}.hex")
 
 
 def words_of(file: Path) -> list[int]:

@@ -8,10 +8,10 @@ class NodeMemory:
     def __init__(self, words):
         self.words, self.rdata = list(words), None
 
-    def step(self, read, write, address, wdata):
+    def step(self, write, write_address, wdata, read_address):
         if write:
             mask = sum(0xFF << 8 * n for n in range(4) if write >> n & 1)
-            self.words[address] = self.words[address] & ~mask | wdata & mask
-        elif read:
-            self.rdata = self.words[address]
+            self.words[write_address] = self.words[write_address] & ~mask | wdata & mask
+        else:
+            self.rdata = self.words[read_address]
         return self.rdata

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The results that tb/cpu/core_test.c must write: those of rv32im for two operands, in the order in
-which the program writes them.
+"""The results that tb/cpu/core_test.c must write: those of rv32imc for two operands, in the order
+in which the program writes them.
 """
 
 MASK = (1 << 32) - 1
@@ -10,12 +10,10 @@ def signed(x, w=32):
     return (x & (1 << w) - 1) - (1 << w if x >> w - 1 & 1 else 0)
 
 
-def divide(a, b, w_signed):
+def divide(a, b):
     """Quotient and remainder as RISC-V defines them: rounded towards zero, and with fixed results
-    for a divisor of 0 and for overflow.
+    for a divisor of 0. Overflow needs no rule: the lowest bits of the quotient are its result.
     """
-    if w_signed:
-        a, b = signed(a), signed(b)
     if b == 0:
         return -1, a
     quotient = abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)
@@ -40,8 +38,12 @@ def results(a, b):
         sa * b >> 32,
         a * b >> 32,
     ]
-    (div, rem), (divu, remu) = divide(a, b, True), divide(a, b, False)
+    (div, rem), (divu, remu) = divide(sa, sb), divide(a, b)
     out += [div, divu, rem, remu]
+    word = 1 << 32
+    out += [a + b, a - b, a & b, a | b, a ^ b, b, a - 32, a & 21, a << 7, a >> 31, sa >> 3, -7]
+    out += [-31 << 12, b, a + b, (a != 0) + 2 * (b == 0), a + 1, a, a]
+    out += [(a + b) % word ^ a, a + b + 1000, a + 5 * b]
     memory = a.to_bytes(4, "little") + b.to_bytes(4, "little")
     halves = [int.from_bytes(memory[k : k + 2], "little") for k in range(0, 8, 2)]
     out += [*memory, *(signed(x, 8) for x in memory), *halves, *(signed(x, 16) for x in halves)]

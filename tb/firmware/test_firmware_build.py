@@ -2,6 +2,7 @@
 """build.py: what it makes, when it makes it, and how it reports that it cannot."""
 
 import os
+import re
 import struct
 import subprocess
 import sys
@@ -58,6 +59,47 @@ def test_the_report_adds_up(made):
     assert program == (made[0] / "firmware.bin").stat().st_size
 
 
+def test_a_firmware_that_does_not_fit_names_the_missing_bytes_and_the_largest_parts(made, tmp_path):
+    used = MEMORY - int(re.search(r"(\d+) free", made[1])[1])
+    error = build(tmp_path, "--memory", str(used - 40)).stderr
+    assert "the image axis for 1 axis is 40 bytes too large" in error
+    parts = re.findall(r"(\w+) (\d+)(?:,|$)", error.strip().partition("largest parts: ")[2])
+    assert [name for name, _ in parts[:2]] == ["calibration", "planner"]
+    sizes = [int(size) for _, size in parts]
+    assert sizes == sorted(sizes, reverse=True) and sum(sizes) > used // 2
+    assert build(tmp_path, "--memory", str(used)).returncode == 0
+
+
+def test_the_list_of_parts_accounts_for_every_byte(made):
+    lines = (made[0] / "firmware.parts").read_text().splitlines()
+    sizes = {name: int(size) for size, name in (line.split(maxsplit=1) for line in lines)}
+    _, symbols = firmware_build.read_elf(made[0] / "firmware.elf")
+    assert sum(sizes.values()) == symbols["_zero_end"]
+    assert sizes["compiler, constants without a name"] < 0.1 * symbols["_zero_end"]
+    assert sizes["planner/retarget.c"] > 4000 and list(sizes.values())[0] == max(sizes.values())
+
+
+def test_each_axis_more_takes_more_data(made, tmp_path):
+    run = build(tmp_path, "--axes", "3")
+    assert run.returncode == 0 and run.stdout.startswith("firmware_3_axes: ")
+    one, three = (int(re.search(r"(\d+) data", text)[1]) for text in (made[1], run.stdout))
+    assert 2000 < (three - one) / 2 < 3000
+
+
+def test_each_image_has_a_list_of_its_parts():
+    files = {path.stem for path in (firmware_build.HERE / "images").glob("image_*.c")}
+    assert files == {f"image_{name}" for name in firmware_build.IMAGES}
+
+
+def test_a_counter_has_no_planner_and_needs_a_quarter_of_the_memory(made, tmp_path):
+    run = build(tmp_path, "--image", "counter", "--axes", "1")
+    assert run.returncode == 0, run.stderr
+    names = functions(tmp_path / "counter_1_axes.elf")
+    assert "bus_execute" in names and not {"planner_move", "motion_feed", "homing_poll"} & names
+    program, whole = (int(re.search(r"(\d+) bytes", t)[1]) for t in (run.stdout, made[1]))
+    assert program < whole / 4
+
+
 def test_nothing_is_built_twice(made):
     before = (made[0] / "firmware.elf").stat().st_mtime_ns
     assert build(made[0]).stdout == made[1]
@@ -67,7 +109,9 @@ def test_nothing_is_built_twice(made):
 @pytest.mark.parametrize(
     "options, environment, words",
     [
-        (["--memory", "16384"], {}, "does not fit"),
+        (["--memory", "16384"], {}, "too large for a memory of 16384 bytes; its largest parts: "),
+        (["--axes", "9"], {}, "the image axis serves 1 to 8 axes, not 9"),
+        (["--image", "station", "--axes", "3"], {}, "serves 1 to 2 axes, not 3"),
         ([], {"CROSS": "no-such-machine-"}, "no-such-machine-gcc was not found"),
     ],
 )

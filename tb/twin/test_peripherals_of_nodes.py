@@ -46,7 +46,7 @@ def program(tmp_path_factory):
             *libraries,
         ]
     )
-    content, used = firmware_build.image(firmware_build.read_elf(elf)[0], memory)
+    content, used = firmware_build.contents(firmware_build.read_elf(elf)[0], memory)
     return [word for (word,) in struct.iter_unpack("<I", content[: (used + 3) // 4 * 4])]
 
 

@@ -105,6 +105,7 @@ static void fault(unsigned n, uint32_t faults) {
     a->state = BUS_STATE_FAULTED;
     a->homing = a->leaving = a->fine = a->near = false;
     if (is_busy(a)) a->ended = BUS_CAUSE_ENDED_BY_FAULT;
+    if (!HARDWARE_DRIVES) return;
     write_control(n, false);
     motion_set_target_to_position(n);
 }
@@ -115,7 +116,7 @@ void axis_poll(unsigned n) {
     uint8_t outcome;
 
     if (faults) fault(n, faults);
-    if (a->state == BUS_STATE_OFF || a->state == BUS_STATE_FAULTED) return;
+    if (!HARDWARE_DRIVES || a->state == BUS_STATE_OFF || a->state == BUS_STATE_FAULTED) return;
     motion_feed(n);
     state = axis_read(n, AXIS_STATE);  // read last, so that homing sees the present state
     if (a->leaving && !pressed(state)) {
@@ -307,6 +308,7 @@ uint8_t axis_stop(unsigned n) {
 
 uint8_t axis_excite(unsigned n, bool on) {
     struct axis* a = &axes[n];
+    if (!HARDWARE_DRIVES) return on ? BUS_CAUSE_NOT_BUILT : BUS_CAUSE_OK;
     if (!on) {
         if (a->state != BUS_STATE_EXCITED) return BUS_CAUSE_OK;
         motion_set_target_to_position(n);
@@ -397,7 +399,8 @@ uint8_t axis_flags(unsigned n) {
                      (state & AXIS_STATE_LIMIT_LOW_MASK ? BUS_FLAG_LIMIT_LOW : 0) |
                      (state & AXIS_STATE_LIMIT_HIGH_MASK ? BUS_FLAG_LIMIT_HIGH : 0) |
                      (state & AXIS_STATE_ESTOP_MASK ? BUS_FLAG_ESTOP : 0) |
-                     (on && motion_inside(n, parameters_get(n, BUS_PARAMETER_SETTLE_WINDOW))
+                     (HARDWARE_DRIVES && on &&
+                              motion_inside(n, parameters_get(n, BUS_PARAMETER_SETTLE_WINDOW))
                           ? BUS_FLAG_SETTLED
                           : 0) |
                      (state & AXIS_STATE_SATURATED_MASK ? BUS_FLAG_SATURATED : 0));

@@ -51,6 +51,7 @@ uint32_t parameters_sample_hz(void) {
 }
 
 static void apply_motion(unsigned axis) {
+    if (!HARDWARE_DRIVES) return;
     const int64_t* p = parameters[axis];
     uint32_t slope, curve;
     limits[axis] =
@@ -172,15 +173,13 @@ static const struct {
 _Static_assert(FEEDBACK_STRIDE == AXIS_STRIDE && ACTUATOR_STRIDE == AXIS_STRIDE,
                "the blocks of an axis have the same stride");
 
-static void write_target(unsigned axis, uint8_t id) {
-    unsigned row = 0;
-    while (row < TARGETS && targets[row].id != id) row++;
-    if (row == TARGETS) return;
+// Writes the register whose fields begin in this row. Returns the row of the next register.
+static unsigned write_target(unsigned axis, unsigned row) {
     uint32_t address = targets[row].address, value = 0;
-    while (row > 0 && targets[row - 1].address == address) row--;
     for (; row < TARGETS && targets[row].address == address; row++)
         value |= (uint32_t)parameters[axis][targets[row].id] << targets[row].shift;
     register_write(address + axis * AXIS_STRIDE, value);
+    return row;
 }
 
 // Writes the registers that follow from this parameter.
@@ -190,14 +189,23 @@ static void apply(unsigned axis, uint8_t id) {
             functions[applied[row].function](axis);
             return;
         }
-    write_target(axis, id);
+    for (unsigned row = 0, first = 0; row < TARGETS; row++) {
+        if (targets[row].address != targets[first].address) first = row;
+        if (targets[row].id == id) write_target(axis, first);
+    }
+}
+
+// Writes each register once.
+static void apply_all(unsigned axis) {
+    for (unsigned n = 0; n < sizeof functions / sizeof *functions; n++) functions[n](axis);
+    for (unsigned row = 0; row < TARGETS;) row = write_target(axis, row);
 }
 
 void parameters_start(unsigned axis) {
     for (uint8_t id = 1; id <= BUS_PARAMETER_COUNT; id++) parameters[axis][id] = table[id].value;
     if (!hardware_built(axis, AXIS_BUILT_SINE_MASK))
         parameters[axis][BUS_PARAMETER_POSITION_SOURCE] = COUNTS;
-    for (uint8_t id = 1; id <= BUS_PARAMETER_COUNT; id++) apply(axis, id);
+    apply_all(axis);
 }
 
 // Whether the axis was built with what this value of a parameter requests.

@@ -232,10 +232,37 @@ static uint8_t start_at_sync(uint32_t mask) {
 }
 
 static void poll_sync(void) {
-    if (!sync_axes || bus_read(BUS_SYNCS) == syncs) return;
+    if (!HARDWARE_DRIVES || !sync_axes || bus_read(BUS_SYNCS) == syncs) return;
     bus_write(BUS_SYNC_AXES, 0);
     axis_started(axes, sync_axes);
     sync_axes = 0;
+}
+
+static bool is_of_drive(uint8_t operation) {
+    switch (operation) {
+    case BUS_OPERATION_ENABLE:
+    case BUS_OPERATION_HOME:
+    case BUS_OPERATION_MOVE:
+    case BUS_OPERATION_PREPARE:
+    case BUS_OPERATION_START:
+    case BUS_OPERATION_START_AT_SYNC:
+    case BUS_OPERATION_STOP: return true;
+    default: return false;
+    }
+}
+
+static uint8_t drive_operation(uint8_t operation, unsigned axis) {
+    switch (operation) {
+    case BUS_OPERATION_ENABLE: return enable(axis);
+    case BUS_OPERATION_HOME: return axis_home(axis);
+    case BUS_OPERATION_MOVE: return motion(axis, axis_move);
+    case BUS_OPERATION_PREPARE: return motion(axis, axis_prepare);
+    case BUS_OPERATION_START:
+        return axis_start_prepared(axes, current_request[BUS_START_REQUEST_AXES]);
+    case BUS_OPERATION_START_AT_SYNC:
+        return start_at_sync(current_request[BUS_START_AT_SYNC_REQUEST_AXES]);
+    default: return axis_stop(axis);
+    }
 }
 
 static uint8_t image_operation(uint8_t operation) {
@@ -254,21 +281,14 @@ static uint8_t execute(uint8_t operation, uint8_t length) {
     if (length != shapes[operation].request) return BUS_CAUSE_WRONG_LENGTH;
     if (shapes[operation].of_axis && axis >= axes) return BUS_CAUSE_NO_SUCH_AXIS;
 
+    if (is_of_drive(operation))
+        return HARDWARE_DRIVES ? drive_operation(operation, axis) : BUS_CAUSE_NOT_BUILT;
     switch (operation) {
     case BUS_OPERATION_IDENTIFY: return identify();
     case BUS_OPERATION_COUNTERS: return counters();
     case BUS_OPERATION_READ_REGISTER: return read_register();
     case BUS_OPERATION_WRITE_REGISTER: return write_register();
-    case BUS_OPERATION_START:
-        return axis_start_prepared(axes, current_request[BUS_START_REQUEST_AXES]);
-    case BUS_OPERATION_START_AT_SYNC:
-        return start_at_sync(current_request[BUS_START_AT_SYNC_REQUEST_AXES]);
     case BUS_OPERATION_STATUS: return status(axis);
-    case BUS_OPERATION_ENABLE: return enable(axis);
-    case BUS_OPERATION_HOME: return axis_home(axis);
-    case BUS_OPERATION_MOVE: return motion(axis, axis_move);
-    case BUS_OPERATION_PREPARE: return motion(axis, axis_prepare);
-    case BUS_OPERATION_STOP: return axis_stop(axis);
     case BUS_OPERATION_RESET_FAULTS: return reset_faults(axis);
     case BUS_OPERATION_GET_PARAMETER: return get_parameter(axis);
     case BUS_OPERATION_SET_PARAMETER: return set_parameter(axis);

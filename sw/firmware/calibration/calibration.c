@@ -69,10 +69,6 @@ void calibration_forget(struct calibration* calibration) {
 }
 
 void calibration_start(struct calibration* calibration) {
-    if (!waves_filled()) {  // once for all axes
-        waves_fill();
-        harmonics_fill_motion();
-    }
     release_burst(calibration);
     *calibration =
         (struct calibration){.amplitude_high = UINT16_MAX, .scatter_limit = SCATTER_LIMIT};

@@ -28,7 +28,8 @@
 #define LEAST_INFORMATION 256  // 2^-15 burst
 
 // Sums over the blocks of window times products of 1, time and its square.
-static int32_t motion[3][3];
+static const int32_t motion[3][3] = {WAVES_MOTION_SUMS};
+_Static_assert(BLOCKS == WAVES_BLOCKS, "the made sums are of the blocks of a burst");
 
 static int32_t clamp_residual(int32_t value) {
     return value > LARGEST_RESIDUAL    ? LARGEST_RESIDUAL
@@ -106,17 +107,6 @@ static int32_t position_of_motion(const int32_t base[3]) {
 static int32_t position_of_vibration(const int32_t waves[2]) {
     const int64_t* s = burst.fit.solution;
     return clamp((s[3] * waves[0] + s[4] * waves[1]) >> 19, LARGEST_VIBRATION);
-}
-
-void harmonics_fill_motion(void) {
-    for (uint32_t i = 0; i < 3; i++) motion[i][0] = motion[i][1] = motion[i][2] = 0;
-    for (uint32_t n = 0; n < BLOCKS; n++) {
-        int32_t base[3], window = spectrum_window(n);
-        motion_of(n, base);
-        for (uint32_t i = 0; i < 3; i++)
-            for (uint32_t j = 0; j < 3; j++)
-                motion[i][j] += (window * base[i] >> 15) * base[j] >> 10;
-    }
 }
 
 void harmonics_begin_first_reading(void) {

@@ -15,9 +15,6 @@
 // Entry 0 … CALIBRATION_POINTS - 1 of the table of harmonic_correction, 2^-20 period.
 int32_t harmonics_table_entry(const struct calibration_values* values, uint32_t point);
 
-// Fills the sums that do not depend on the burst; once, after waves_fill.
-void harmonics_fill_motion(void);
-
 // The candidate becomes what the pass has found so far, and the table of the burst follows it.
 bool harmonics_update_candidate(const struct calibration_pass* pass, uint32_t next);
 bool harmonics_fill_table(uint32_t next);

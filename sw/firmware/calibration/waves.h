@@ -3,20 +3,19 @@
 #ifndef MOIRE_WAVES_H
 #define MOIRE_WAVES_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
-extern int16_t sine_table[640];  // the sine of a circle and a quarter
+#include "made/waves.h"
 
-void waves_fill(void);
+extern const int16_t sine_table[WAVES_POINTS + WAVES_POINTS / 4];
 
-static inline bool waves_filled(void) { return sine_table[128] != 0; }
+// Of a point of the circle.
 
-// Of a point of the circle, which has 512.
+static inline int32_t sine_at(uint32_t point) { return sine_table[point % WAVES_POINTS]; }
 
-static inline int32_t sine_at(uint32_t point) { return sine_table[point % 512]; }
-
-static inline int32_t cosine_at(uint32_t point) { return sine_table[point % 512 + 128]; }
+static inline int32_t cosine_at(uint32_t point) {
+    return sine_table[point % WAVES_POINTS + WAVES_POINTS / 4];
+}
 
 // Of any phase, one period = 2^16; within 3 LSB.
 int32_t sine_of(uint32_t phase);

@@ -15,6 +15,9 @@
 #ifndef HARDWARE_AXES
 #define HARDWARE_AXES 8u  // most axes that the firmware serves
 #endif
+#ifndef HARDWARE_DRIVES
+#define HARDWARE_DRIVES 1  // 0: the nodes of this image measure and have no drives
+#endif
 
 // A position of 48 bits.
 static inline int64_t axis_read_position(unsigned axis, uint32_t offset) {

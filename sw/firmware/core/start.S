@@ -7,14 +7,14 @@ _start:
     la      sp, _stack_top
     la      t0, _zero_start
     la      t1, _zero_end
-1:  bgeu    t0, t1, 2f                      # both are multiples of 16
-    sw      zero, 0(t0)
+    j       2f
+1:  sw      zero, 0(t0)                     # both are multiples of 16
     sw      zero, 4(t0)
     sw      zero, 8(t0)
     sw      zero, 12(t0)
     addi    t0, t0, 16
-    j       1b
-2:  la      t0, _stack_limit
+2:  bltu    t0, t1, 1b
+    la      t0, _stack_limit
     li      t1, 0x4d6f6972                  # STACK_MARK
     sw      t1, 0(t0)
     call    main

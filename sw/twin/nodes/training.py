@@ -14,7 +14,7 @@ from twin.machines.machine import FUNCTIONS as MACHINE_FUNCTIONS
 from twin.machines.machine import declare, pack
 from twin.nodes.twin import BAUD, FUNCTIONS
 
-CYCLES = 600_000  # the firmware of a node with one axis needs two thirds of them to start
+CYCLES = 600_000  # firmware starts within a tenth of them
 ASK_CYCLES = 100_000  # from one question of the host to the next
 QUESTION = [0x111]  # to node 1: send your last reply
 MACHINE = "stage"
@@ -25,7 +25,7 @@ def main() -> None:
     path, axes, clk_hz = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
     library = ctypes.CDLL(path)
     declare(library, {**FUNCTIONS, **MACHINE_FUNCTIONS})
-    image = numpy.array(build.firmware(), dtype=numpy.uint32)
+    image = numpy.array(build.firmware(axes=axes), dtype=numpy.uint32)
     addresses = numpy.array([1, 2], dtype=numpy.uint8)
     question = numpy.array(QUESTION, dtype=numpy.uint16)
     count = axes * len(addresses)

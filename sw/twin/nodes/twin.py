@@ -50,7 +50,7 @@ else:
     Transport = object  # the twin runs without the host package
 
 CLK_HZ = 2_400_000
-START_S = 0.2  # until the soft core of a node with one axis listens, with a margin of 45 ms
+START_S = 0.05  # until the soft core of a node with one axis listens, with a margin of 30 ms
 DRIVES = ("HAS_BRIDGE", "HAS_STEPPER", "HAS_DAC", "HAS_FINE_STAGE")  # of rtl/node.sv
 ALL_AXES = 255  # a mask of axes of rtl/node.sv: bit n is axis n
 PERIPHERALS = (
@@ -219,7 +219,9 @@ class Twin:
             )
             for n, axis in enumerate(fitted)
         ]
-        image = memory_image(self.library, build.firmware() if firmware is None else firmware)
+        image = memory_image(
+            self.library, build.firmware(axes=self.node_axes) if firmware is None else firmware
+        )
         addresses = array(self.addresses, numpy.uint8)
         kinds = (ctypes.c_char_p * self.axes)(*(axis.machine.encode() for axis in fitted))
         tables = (ctypes.c_void_p * self.axes)(*(ctypes.addressof(table) for table in packed))
@@ -582,7 +584,7 @@ class FrameBench:
     ) -> None:
         self.handle: int | None = None
         self.library, self.clk_hz = library(clk_hz, 1, NODE), clk_hz
-        image = memory_image(self.library, build.firmware() if firmware is None else firmware)
+        image = memory_image(self.library, build.firmware(axes=1) if firmware is None else firmware)
         self.handle = self.library.frame_bench_new(
             address, image.ctypes.data, len(image), clk_hz / baud
         )

@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The figure of the soft core's memory, and a comparison of soft cores by the firmware's own work.
+
+python -m figures.soft_core             bytes of program, cycles of each section of core_work.c on
+                                        the Verilated core
+python -m figures.soft_core --area      LUT and MHz of each core on an ECP5
+python -m figures.soft_core --options   LUT of PicoRV32 with and without each of its options
+
+VexRiscv is measured if its package pythondata-cpu-vexriscv is installed. docs/soft_core.md has the
+results.
+"""
+
+import argparse
+import itertools
+import json
+import re
+import shutil
+import struct
+import tempfile
+from collections.abc import Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from typing import NamedTuple
+
+from figures.common import Figure, Quick, console
+from figures.synthesis import BUILD, ECP5, ROOT, netlist_of, placed, source_of
+from firmware import build as tools
+from moire.made.registers import MAP_CRC
+from twin import build
+
+HERE = Path(__file__).resolve().parent
+MEMORY_BYTES = 98304
+CLK_HZ = 60_000_000
+MOST_CYCLES = 20_000_000
+SECTIONS = ("start", "rounds", "requests", "plans", "pieces", "retarget", "waves")
+# what the firmware reads of a node with one axis that has sine and cosine, {address: value}
+NODE = {0x000: MAP_CRC, 0x004: CLK_HZ, 0x008: 1, 0xCA8: 4}
+SEEDS = (1, 2, 3)
+LUT = {"LUT4": 1, "CCU2C": 2, "TRELLIS_DPR16X4": 6}  # LUT4 that a cell takes
+
+
+class Core(NamedTuple):
+    instructions: str  # that the compiler may use, as zig names them
+    source: Path  # of the top module of the simulation
+    package: str = ""  # whose Verilog the core needs besides ours
+    file: str = ""  # of the package
+
+
+SOFT_CORE = source_of("soft_core")
+VEXRISCV = "pythondata_cpu_vexriscv"
+IN_ITS_PLACE = HERE / "vexriscv_core.sv"
+CORES = {
+    "soft_core, rv32im": Core("generic_rv32+m-a-f-d-c", SOFT_CORE),
+    "soft_core, rv32imc": Core("generic_rv32+m-a-f-d+c", SOFT_CORE),
+    "VexRiscv_IMAC, rv32imc": Core(
+        "generic_rv32+m-a-f-d+c", IN_ITS_PLACE, VEXRISCV, "VexRiscv_IMAC.v"
+    ),
+    "VexRiscv_Lite, rv32im": Core(
+        "generic_rv32+m-a-f-d-c", IN_ITS_PLACE, VEXRISCV, "VexRiscv_Lite.v"
+    ),
+}
+PICORV32 = {  # the options of soft_core.sv, and what is changed of them
+    "COMPRESSED_ISA": 1,
+    "ENABLE_PCPI": 1,
+    "ENABLE_COUNTERS": 0,
+    "ENABLE_COUNTERS64": 0,
+    "BARREL_SHIFTER": 1,
+    "ENABLE_MUL": 1,
+    "ENABLE_FAST_MUL": 1,
+}
+CHANGES: Mapping[str, Mapping[str, int]] = {
+    "as it is": {},
+    "without compressed instructions": {"COMPRESSED_ISA": 0},
+    "with its own divider": {"ENABLE_DIV": 1},
+    "with registers that begin at 0": {"REGS_INIT_ZERO": 1},
+    "without the barrel shifter": {"BARREL_SHIFTER": 0},
+    "without products": {"ENABLE_MUL": 0, "ENABLE_FAST_MUL": 0},
+    "with products bit by bit": {"ENABLE_FAST_MUL": 0},
+    "with comparisons in two cycles": {"TWO_CYCLE_COMPARE": 1},
+    "with sums in two cycles": {"TWO_CYCLE_COMPARE": 1, "TWO_CYCLE_ALU": 1},
+    "without the check of alignment": {"CATCH_MISALIGN": 0},
+    "without the check of instructions": {"CATCH_ILLINSN": 0},
+    "with one port to read its registers": {"ENABLE_REGS_DUALPORT": 0},
+}
+
+
+def folder_of(package: str) -> Path:
+    spec = find_spec(package)
+    if not spec or not spec.submodule_search_locations:
+        raise build.BuildError(f"not measured, pip install {package.replace('_', '-')}")
+    return Path(spec.submodule_search_locations[0]) / "verilog"
+
+
+def program(core: Core, folder: Path) -> tuple[Path, int]:
+    """The file of words of core_work.c with the whole firmware, and the bytes of its program."""
+    command, libraries = tools.compiler()
+    command = [f"-mcpu={core.instructions}" if "-mcpu" in word else word for word in command]
+    command += tools.defines_of("axis", 1)
+    sources = [path for path in tools.sources_of("axis") if path.suffix != ".h"]
+    objects = []
+    for path in [*sources, HERE / "core_work.c"]:
+        objects.append(folder / f"{path.stem}.o")
+        other = ["-Dmain=firmware_main"] if path.name == "main.c" else []
+        flags = [*tools.FLAGS, *tools.flags_of(path), *other, f"-I{tools.HERE}"]
+        tools.run([*command, *flags, "-c", str(path), "-o", str(objects[-1])])
+    script, elf, words = (folder / f"work.{end}" for end in ("ld", "elf", "hex"))
+    script.write_text(f"MEMORY_BYTES = {MEMORY_BYTES};\n" + tools.LINK.read_text())
+    link = ["-Wl,--gc-sections", f"-Wl,-T,{script}", "-o", str(elf), *libraries]
+    tools.run([*command, *tools.FLAGS, *map(str, objects), *link])
+    contents, used = tools.contents(tools.read_elf(elf)[0], MEMORY_BYTES)
+    words.write_text("".join(f"{word:08x}\n" for (word,) in struct.iter_unpack("<I", contents)))
+    return words, used
+
+
+def simulated(core: Core, words: Path, folder: Path) -> Path:
+    """The Verilated core with core_run.cpp."""
+    more = []
+    if core.package:
+        waiver = folder / "foreign.vlt"
+        waiver.write_text('`verilator_config\nlint_off -file "*/VexRiscv.v"\n')
+        more = [waiver, named_by_its_module(folder_of(core.package) / core.file, "VexRiscv")]
+    tool, verilator = build.compiler(), build.package("verilator", "it makes C++ of the RTL")
+    values = {"MEMORY_BYTES": MEMORY_BYTES, "FIRMWARE": f'"{words}"'}
+    waivers = ROOT / "rtl" / "cpu" / "picorv32.vlt"
+    build.verilate(folder, verilator, core.source, "Vtop", values, waivers, *more)
+    headers = verilator / "include"
+    include = [f"-I{path}" for path in (folder, HERE.parent, headers, headers / "vltstd")]
+    sources = [HERE / "core_run.cpp", *sorted(folder.glob("Vtop*.cpp"))]
+    support, made = build.runtime(tool, verilator), folder / "run"
+    flags = [*build.COMPILE, *build.VERILATED, "-DMOIRE_REGISTER_ACCESS", *include]
+    build.run([tool, *flags, *sources, support, "-o", made], "g++ of core_run.cpp")
+    return made
+
+
+def cycles_of(run: Path) -> dict[str, int]:
+    """{section of core_work.c: cycles}."""
+    words = [f"{address}={value}" for address, value in NODE.items()]
+    lines = build.run([run, MOST_CYCLES, *words], "core_run").splitlines()
+    times = [int(line.split()[1]) for line in lines]
+    spent = [after - before for before, after in itertools.pairwise(times)]
+    return dict(zip(SECTIONS, spent, strict=True))
+
+
+def work_of(core: Core) -> str:
+    with tempfile.TemporaryDirectory(dir=ROOT / "build") as made:
+        folder = Path(made)
+        words, size = program(core, folder)
+        cycles = cycles_of(simulated(core, words, folder))
+    return f"{size} bytes of program; cycles: " + ", ".join(f"{n} {c}" for n, c in cycles.items())
+
+
+def named_by_its_module(source: Path, module: str) -> Path:
+    """A copy of a source file of a package, for Yosys."""
+    BUILD.mkdir(parents=True, exist_ok=True)
+    copy = BUILD / f"{module}.v"
+    shutil.copyfile(source, copy)
+    return copy
+
+
+def lut_of(netlist: Path, module: str) -> int:
+    cells = json.loads(netlist.read_text())["modules"][module]["cells"].values()
+    return sum(LUT.get(cell["type"], 0) for cell in cells)
+
+
+def area_of(core: Core) -> str:
+    if core.package:
+        source = named_by_its_module(folder_of(core.package) / core.file, "VexRiscv")
+        netlist = netlist_of(source, {}, "ecp5", 1)
+    else:
+        source = SOFT_CORE
+        netlist = netlist_of(source, {"MEMORY_BYTES": MEMORY_BYTES}, "ecp5", 1)
+    clocks: list[str] = []
+    used: dict[str, dict[str, int]] = {}
+    for seed in SEEDS:
+        alone = ["--lpf-allow-unconstrained", "--out-of-context"]
+        mhz, used = placed(netlist, "ecp5", ECP5, 70, seed, *alone)
+        clocks.append(f"{mhz:.1f}")
+    rams = used.get("DP16KD", {"used": 0})["used"]
+    return f"{lut_of(netlist, source.stem)} LUT, {rams} block RAM, {', '.join(clocks)} MHz"
+
+
+def options() -> None:
+    source = folder_of("pythondata_cpu_picorv32") / "picorv32.v"
+    copy = named_by_its_module(source, "picorv32")
+    for words, change in CHANGES.items():
+        netlist = netlist_of(copy, {**PICORV32, **change}, "ecp5", 1)
+        print(f"PicoRV32 {words}: {lut_of(netlist, 'picorv32')} LUT", flush=True)
+
+
+def firmware_free_pct() -> float:
+    """Of the memory of the S0 node: what program, data and stack leave."""
+    report = tools.build(MEMORY_BYTES, tools.OUT, False, "axis", 1)
+    console.print(report, (tools.OUT / "firmware.parts").read_text())
+    free = re.search(r"(\d+) free", report)
+    assert free
+    return 100 * int(free[1]) / MEMORY_BYTES
+
+
+FIGURES = {
+    "firmware_free_pct": Figure(
+        firmware_free_pct,
+        "%",
+        "free in the memory of the S0 node (96 KiB) beside program, data and stack of the firmware",
+        ">= 25",
+        Quick(),
+        1,
+    ),
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n\n")[0])
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--area", action="store_true", help="LUT and MHz instead of cycles")
+    what.add_argument("--options", action="store_true", help="LUT of the options of PicoRV32")
+    chosen = parser.parse_args()
+    if chosen.options:
+        options()
+        return
+    for name, core in CORES.items():
+        if chosen.area and core.source == SOFT_CORE and core.instructions.endswith("-c"):
+            continue  # the same hardware
+        try:
+            print(f"{name}: {(area_of if chosen.area else work_of)(core)}", flush=True)
+        except build.BuildError as why:
+            print(f"{name}: {why}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
