@@ -65,6 +65,7 @@ module soft_core #(
     wire [A-3:0] following = mem_valid && mem_instr ? mem_addr[A-1:2] + (A - 2)'(1) : next;
     wire [A-3:0] read_address = mem_la_read ? mem_la_addr[A-1:2] : following;
     wire memory_ready = has_core || has_ahead || storing;
+    wire mem_ready = answered || memory_ready;
 
     assign select  = mem_valid && in_registers && ready && !awaited && !answered;
     assign write   = mem_wstrb[0];
@@ -80,7 +81,7 @@ module soft_core #(
         for_core  <= mem_la_read && la_in_memory;
         ahead     <= !mem_la_read && !storing;
         storing   <= mem_la_write && la_in_memory && !core_trap;
-        has_core  <= for_core && mem_valid && !memory_ready;
+        has_core  <= for_core && mem_valid && !mem_ready;
         has_ahead <= ahead && mem_la_read && la_in_memory && mem_la_addr[A-1:2] == following;
         if (mem_valid && !in_memory && !in_registers) lost <= 1'b1;
         if (rst) begin
@@ -182,7 +183,7 @@ module soft_core #(
         if (!storing) read_number <= read_address;
         if (!past) assume (rst);
         // the core begins no access before the last one is done
-        if (mem_la_read || mem_la_write) assume (!mem_valid || answered || memory_ready);
+        if (mem_la_read || mem_la_write) assume (!mem_valid || mem_ready);
         if (past && !$past(rst)) begin
             if ($past(mem_valid && !in_memory && !in_registers)) assert (trap);
             if ($past(lost)) assert (trap);

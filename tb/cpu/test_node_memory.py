@@ -112,5 +112,6 @@ for step in ['read_verilog -sv {source_of("node_memory")}',
     )
     netlist = (tmp_path / "netlist.v").read_text()
     assert netlist.count("DP16KD #(") == 16
+    assert netlist.count("LUT4 #(") <= 1, "8192 x 2 bits: no selection among the block RAMs"
     assert len(re.findall(r"TRELLIS_FF #\(|TRELLIS_DPR16X4", netlist)) == 0
     assert len(re.findall(r"\.INITVAL_00\(320'h(?=[0-9a-f]*[1-9a-f])", netlist)) == 16
