@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // soft_core -- RISC-V processor (rv32imc) with its memory, the master of the register bus.
 //
-// latency   0 wait cycles for a write to memory, 1 wait cycle for a word read from memory, 2 wait
-//           cycles for an access to a register, and as many more as ready is low; 0 wait cycles for
-//           an instruction that the memory has read ahead, 1 wait cycle for any other one.
+// latency   0 wait cycles for a write to memory, 1 wait cycle for a word read from memory; 0 wait
+//           cycles for an instruction that the memory has read ahead, 1 wait cycle for any other
+//           one; 2 wait cycles for an access to a register, and as many more as ready is low.
 // rate      An operation takes 3 cycles, a write to memory 5, a word read from memory or a product
 //           6, a register access 7, a quotient 38.
 // behaviour The memory is at 0000_0000 (start address 0, stack from its end), the registers are at

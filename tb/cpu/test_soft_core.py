@@ -156,8 +156,8 @@ def kind(core):
 
 
 @cocotb.test()
-async def latency_is_0_wait_cycles_for_a_write_or_a_word_read_ahead_1_or_2_for_others(dut):
-    """`mem_ready` comes in the first, the second or the third cycle of an access."""
+async def latency_is_0_1_or_2_wait_cycles(dut):
+    """Others wait for 1 cycle: `mem_ready` comes in the first, second or third cycle."""
     registers, waited = await begin(dut), {}
     core, cycles = dut.u_core, 0
     for _ in range(3000):
