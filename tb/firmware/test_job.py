@@ -329,7 +329,7 @@ def test_a_machine_that_cuts_or_alarms_is_not_started():
 
 @pytest.mark.parametrize("missing", [2, 32])
 def test_a_node_without_keyboard_or_status_inputs_does_no_job(missing):
-    assert node(built=63 & ~missing).do("start") == "not_built"
+    assert node(peripherals_built=63 & ~missing).do("start") == "not_built"
 
 
 # the sub-node

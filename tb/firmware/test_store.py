@@ -147,7 +147,7 @@ def test_a_stuck_bus_is_reported_until_it_is_free():
 
 
 def test_a_node_without_i2c_reports_a_missing_eeprom():
-    station = Station(built=0)
+    station = Station(peripherals_built=0)
     station.run(500)
     assert station.job()["cause"] == "eeprom_missing"
 

@@ -346,12 +346,12 @@ class Edm:
 
 class Station(FakeNode):
     """The node, powered up. `absent` names the devices that are missing: eeprom, keypad, display.
-    `built` is the register of that name, `seed` that of the damage by power cuts.
+    `peripherals_built` is the register peripherals.built, `seed` that of the damage by power cuts.
     """
 
     CLK_HZ, POLL_CLK = CLK_HZ, CLK_HZ // 2000
 
-    def __init__(self, absent: Sequence[str] = (), built: int = 63, seed: int = 0) -> None:
+    def __init__(self, absent: Sequence[str] = (), peripherals_built: int = 63, seed: int = 0) -> None:
         self.source = random.Random(seed)
         self.eeprom, self.keypad, self.display, self.edm, self.bus = (
             Eeprom(),
@@ -361,7 +361,7 @@ class Station(FakeNode):
             I2cBus(),
         )
         self.sub_node: SubNode | None = None
-        self.built = built
+        self.peripherals_built = peripherals_built
         self.peer_received: deque[int] = deque()
         self.bus.devices = {
             address: device
@@ -394,7 +394,7 @@ class Station(FakeNode):
         if not 0 <= at < 0x100:
             return super().read(offset)
         if at == d["PERIPHERALS_BUILT"]:
-            return self.built
+            return self.peripherals_built
         if at == d["PERIPHERALS_I2C_ANSWER"]:
             return self.bus.take(self.clk)
         if at == d["PERIPHERALS_I2C_STATE"]:
