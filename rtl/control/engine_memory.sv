@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// engine_memory -- the words of all axes of motion_engine: state, settings, queues, filters and
+// constants.
+//
+// latency   1 cycle from read_at to stored; a setting is written as soon as the engine neither
+//           writes nor reads its word
+// rate      one word read and one written per cycle; one setting, then the next one when
+//           setting_waits is low
+// made      by tables/engine_microcode.py, not to be edited
+// model     tb/control/engine_memory.py, equal in every bit of every cycle
+// proved    A setting that was taken is written, unchanged, and no other word is written meanwhile
+//           in its place.
+// proof     depth 12, AXES = 1
+`default_nettype none
+
+module engine_memory #(
+    parameter int AXES    = 1,                       // axes of the engine, 1 to 8
+    parameter int FILTERS = 0,                       // filters of each axis, 0 to 4
+    localparam int WORDS  = FILTERS == 0 ? 128 : 256,  // of each axis
+    localparam int A      = $clog2(AXES * WORDS)     // bits of an address
+) (
+    input  wire                clk,
+    input  wire                rst,
+    input  wire        [A-1:0] read_at,         // address of the word to be read
+    output logic       [ 71:0] stored,          // word that was read
+    input  wire                write,           // strobe: the engine writes a word
+    input  wire        [A-1:0] write_at,        // address of that word
+    input  wire        [ 71:0] word,            // value of that word
+    input  wire                setting_write,   // strobe: write a setting
+    input  wire        [A-1:0] setting_at,      // address of the setting
+    input  wire signed [ 63:0] setting,         // value of the setting
+    output logic               setting_waits    // level: a setting waits to be written
+);
+    (* no_rw_check *) logic [71:0] words[0:AXES*WORDS-1];
+
+    initial begin
+        for (int n = 0; n < AXES * WORDS; n++) words[n] = '0;
+        for (int n = 0; n < AXES; n++) begin
+            words[n*WORDS+59] = 72'h1;  // one
+            words[n*WORDS+60] = 72'h100;  // byte
+            words[n*WORDS+61] = 72'h80;  // half_byte
+            words[n*WORDS+62] = 72'h10000;  // two16
+            words[n*WORDS+63] = 72'h100000;  // two20
+            words[n*WORDS+67] = 72'h800000;  // half_step
+            words[n*WORDS+71] = 72'h1000000;  // two24
+            words[n*WORDS+75] = 72'hffffff;  // longest
+            words[n*WORDS+79] = 72'h7fffffff;  // top
+            words[n*WORDS+83] = 72'h80000000;  // two31
+            words[n*WORDS+87] = 72'hffffffff;  // range
+            words[n*WORDS+91] = 72'h100000000;  // full
+            words[n*WORDS+95] = 72'h200000000;  // two33
+            words[n*WORDS+99] = 72'h1ffffffff;  // top34
+            words[n*WORDS+103] = 72'h3ffffffff;  // range34
+            words[n*WORDS+107] = 72'h1000000000;  // two36
+            words[n*WORDS+111] = 72'h7fffffff00;  // top_fine
+            words[n*WORDS+115] = 72'h8000000000;  // two39
+            words[n*WORDS+119] = 72'h40000000000000000;  // two66
+        end
+    end
+
+    logic [A-1:0] waiting_at;
+    logic [63:0] waiting;
+
+    wire settles = setting_waits && !write && read_at != waiting_at;
+
+    always_ff @(posedge clk) begin
+        if (write || settles)
+            words[write ? write_at : waiting_at] <= write ? word : {{8{waiting[63]}}, waiting};
+        stored <= words[read_at];
+        if (setting_write) {waiting_at, waiting} <= {setting_at, setting};
+        setting_waits <= !rst && (setting_write || (setting_waits && !settles));
+    end
+endmodule
+
+`default_nettype wire

@@ -1,0 +1,351 @@
+// SPDX-License-Identifier: Apache-2.0
+// motion_engine -- compute velocity, profile, servo and motor steps of all axes of a node in one
+// datapath, one axis after the other at each servo tick.
+`default_nettype none
+
+module motion_engine #(
+    parameter int AXES    = 1,  // axes, 1 to 8
+    parameter int FILTERS = 0,  // filters of each servo, 0 to 4
+    localparam int WORD_W = FILTERS == 0 ? 7 : 8  // bits of the address of a word of an axis
+) (
+    input  wire                      clk,
+    input  wire                      rst,
+    input  wire                      tick,                    // strobe: servo tick
+    input  wire        [       31:0] now,                     // cycles, time stamp, wraps
+    // settings
+    input  wire                      setting_write,           // strobe: write a setting
+    input  wire        [        2:0] setting_axis,            // number of its axis
+    input  wire        [ WORD_W-1:0] setting_word,            // address of its word
+    input  wire signed [       63:0] setting,                 // value
+    output logic                     setting_waits,           // level: it is not written yet
+    // the axes
+    input  wire        [48*AXES-1:0] position,                // 2^-16 period, of each axis
+    input  wire        [   AXES-1:0] stepped,                 // strobes: position made a step
+    input  wire        [   AXES-1:0] downward,                // level: that step went down
+    input  wire        [   AXES-1:0] block_up,                // level: no positive command passes
+    input  wire        [   AXES-1:0] block_down,              // level: no negative command passes
+    input  wire        [   AXES-1:0] closed_loop,             // level: 0: command is open_command
+    // requests
+    input  wire        [   AXES-1:0] start,                   // strobes: play the queue
+    input  wire        [   AXES-1:0] arm,                     // strobes: start at start_at
+    input  wire        [   AXES-1:0] controlled_stop,         // strobes: stop and empty the queue
+    input  wire        [   AXES-1:0] set_target_to_position,  // strobes: target := position
+    input  wire        [   AXES-1:0] push,                    // strobes: queue the segment
+    input  wire        [   AXES-1:0] gains_changed,           // strobes: a gain is new
+    input  wire        [   AXES-1:0] shift,                   // strobes: the origin moves
+    output logic       [   AXES-1:0] waits,                   // level: a request is not done yet
+    // results
+    output logic                     result_valid,            // strobe: result is new
+    output logic       [        2:0] result_axis,             // number of its axis
+    output logic       [        2:0] result_kind,             // number of what it is
+    output logic signed [      47:0] result,                  // value
+    output logic                     result_flag,             // level: its flag
+    // schedule
+    output logic                     ready,                   // level: settings may be written
+    output logic                     busy,                    // level: a tick is being served
+    output logic                     overrun,                 // strobe: a tick came too soon
+    output logic       [       15:0] cycles                   // cycles that a tick needs at most
+);
+    if (AXES < 1 || AXES > 8) begin : g_check_axes
+        AXES_MUST_BE_FROM_1_TO_8 u_error ();
+    end
+    if (FILTERS < 0 || FILTERS > 4) begin : g_check_filters
+        FILTERS_MUST_BE_FROM_0_TO_4 u_error ();
+    end
+
+    localparam int A = $clog2(AXES) + WORD_W;
+
+    // as in tables/engine_microcode.py
+    localparam [3:0] TEST = 4'd1, BELOW = 4'd2, ABOVE = 4'd3, SHIFT_8 = 4'd4, SHIFT_24 = 4'd5;
+    localparam [3:0] X = 4'd6, X_LOW = 4'd7, X_HIGH = 4'd8, Y = 4'd9, Y_LOW = 4'd10;
+    localparam [3:0] Y_HIGH = 4'd11, DIVIDE = 4'd12, UPWARD = 4'd13, ALONG = 4'd14;
+    localparam [3:0] PRODUCT = 4'd1, PRODUCT_HIGH = 4'd2, PRODUCT_LOW = 4'd3, HALVE = 4'd4;
+    localparam [3:0] POSITION = 4'd5, ELAPSED = 4'd6, PERIOD = 4'd7, NOW = 4'd8, FLAGS = 4'd9;
+    localparam [5:0] LOOP = 6'd25;
+    localparam [7:0] LOAD_CONTEXT = 8'h20, FIRST_AXIS = 8'h21, NEXT_AXIS = 8'h22, SAMPLE = 8'h23;
+    localparam [7:0] STAND = 8'h24, FINISHED = 8'h25, POP = 8'h26, PUSH = 8'h27, EMPTY = 8'h28;
+    localparam [7:0] BOOTED = 8'h29, FIRST_FILTER = 8'h2A, NEXT_FILTER = 8'h2B;
+    localparam [2:0] SET = 3'd2, CLEAR = 3'd3, GIVE = 3'd4, COUNT = 3'd5, DONE = 3'd6;
+    localparam [2:0] COMMAND = 3'd5, STEPS = 3'd6;
+    localparam int TICKING = 16, HALTING = 19, LIMITED_UP = 10, LIMITED_DOWN = 11, REBASED = 13;
+    localparam [15:0] MOTION = 16'b0000_0000_1111_1110;  // the flags that STAND clears
+    localparam [5:0] NOWHERE = 6'h3F;
+
+    // the axis that is served, and its flags; 16 and above are cleared with each axis
+    logic [2:0] axis;
+    logic [20:0] flags;
+    logic [3:0] head;  // slot of the next segment
+    logic [4:0] queued;  // segments in the queue
+    logic [2:0] filter;
+    logic negative, upward, due;
+    logic [4:0] count;
+    logic [31:0] seen_now;
+    logic [23:0] elapsed, period;
+
+    // what the axes show
+    wire [48*AXES-1:0] seen_position;
+    wire [24*AXES-1:0] seen_elapsed;
+    wire [7*AXES-1:0] seen, levels;
+    wire [AXES-1:0] asked, gains;
+    wire [23:0] elapsed_now = tick ? '0 : elapsed == '1 ? elapsed : elapsed + 1'b1;
+
+    // the lines in work: fetched, and its operand is being read; then the operand is there; then it
+    // is added
+    wire [35:0] code;
+    logic [9:0] line;
+    logic [3:0] source;  // of the operand: 0 memory or nothing
+    logic reads;  // the operand is in memory
+    logic [47:0] outside;
+    logic [7:0] action, action_e;
+    logic [5:0] word, word_e;
+    logic with_acc, sign, sign_e;
+    logic [3:0] effect, effect_e;
+    logic [71:0] term, acc;
+    logic signed [34:0] x, y;
+    wire signed [69:0] product;
+    wire [71:0] stored;
+
+    // fetch
+    wire [9:0] target_line = code[35:26];
+    wire unless = code[25];
+    wire [5:0] condition = code[24:19];
+    wire [6:0] operand = code[12:6];
+    wire [72:0] wide = {acc, 1'b1} + {term, sign_e};
+    wire [71:0] sum = wide[72:1];
+    wire negative_now = effect_e == TEST ? sum[71] : negative;
+    wire [6:0] requested = seen[7*axis+:7];
+    wire [6:0] level = levels[7*axis+:7];
+    wire off = level[2] && level[3];
+    wire [7:0] gains_all = 8'(gains), asked_all = 8'(asked);
+    wire [63:0] conditions = {
+        14'd0,
+        1'(FILTERS == 0),
+        requested[3] && requested[2:1] == 2'd0 && !requested[5],
+        off,
+        !level[4] || off,
+        level,
+        gains_all[axis],
+        requested[5:0],
+        filter != 3'(FILTERS),
+        queued[4],
+        queued == 5'd0,
+        axis == 3'd0,
+        asked_all[axis],
+        due,
+        count != 5'd1,
+        negative_now,
+        3'd0,
+        flags
+    };
+    wire jump = conditions[condition] != unless;
+    wire [9:0] next = rst ? '0 : jump ? target_line : line + 1'b1;
+    wire acts = condition == '0 && !unless;
+
+    engine_microcode #(
+        .AXES   (AXES),
+        .FILTERS(FILTERS)
+    ) u_microcode (
+        .clk,
+        .next,
+        .code,
+        .cycles
+    );
+
+    // addresses of words
+    logic [7:0] read_word, write_word;
+    wire [3:0] tail = head + queued[3:0];
+
+    always_comb begin
+        casez (operand)
+            7'b0??_????: read_word = operand[6] ? '0 : {2'd0, operand[5:0]};
+            7'b100_????: read_word = {2'b01, operand[3:0], 2'b11};
+            7'b101_????: read_word = {2'b10, filter[1:0], operand[3:0]};
+            7'b110_0???: read_word = {2'b01, head, operand[1:0]};
+            default:     read_word = {4'd0, flags[HALTING], operand[2:0]};
+        endcase
+        casez (word_e)
+            6'b11_00??: write_word = {4'd0, flags[HALTING], 1'b0, word_e[1:0]};
+            6'b11_01??: write_word = {2'b01, tail, word_e[1:0]};
+            6'b11_1???: write_word = {2'b10, filter[1:0], word_e[3:0]};
+            default:    write_word = {2'd0, word_e};
+        endcase
+    end
+
+    engine_memory #(
+        .AXES   (AXES),
+        .FILTERS(FILTERS)
+    ) u_memory (
+        .clk,
+        .rst,
+        .read_at   (A'({axis, read_word[WORD_W-1:0]})),
+        .stored,
+        .write     (word_e != NOWHERE),
+        .write_at  (A'({axis, write_word[WORD_W-1:0]})),
+        .word      (sum),
+        .setting_write,
+        .setting_at(A'({setting_axis, setting_word})),
+        .setting,
+        .setting_waits
+    );
+
+    // the operand
+    engine_multiplier u_multiplier (
+        .clk,
+        .x,
+        .y,
+        .product
+    );
+
+    wire minus = sign ^ (effect == ALONG && !upward);
+    logic [71:0] from;
+
+    always_comb begin
+        case (source)
+            PRODUCT:      from = {{2{product[69]}}, product};
+            PRODUCT_HIGH: from = {product[39:0], 32'd0};
+            PRODUCT_LOW:  from = {{34{product[69]}}, product[69:32]};
+            default:      from = reads ? stored : {{24{outside[47]}}, outside};
+        endcase
+    end
+
+    // requests
+    wire [20:0] named = 21'd1 << action_e[4:0];
+    wire [6:0] done = action_e[7:5] == DONE ? 7'd1 << action_e[2:0] : '0;
+
+    for (genvar n = 0; n < AXES; n++) begin : g_axis
+        engine_inputs u_inputs (
+            .clk,
+            .rst,
+            .tick,
+            .sample       (action_e == SAMPLE && axis == 3'(n) && !due),
+            .elapsed      (elapsed_now),
+            .position     (position[48*n+:48]),
+            .stepped      (stepped[n]),
+            .downward     (downward[n]),
+            .block_up     (block_up[n]),
+            .block_down   (block_down[n]),
+            .closed_loop  (closed_loop[n]),
+            .request      ({
+                gains_changed[n],
+                controlled_stop[n],
+                arm[n],
+                start[n],
+                push[n],
+                set_target_to_position[n],
+                shift[n]
+            }),
+            .done         (axis == 3'(n) ? done : '0),
+            .seen_position(seen_position[48*n+:48]),
+            .seen_elapsed (seen_elapsed[24*n+:24]),
+            .seen         (seen[7*n+:7]),
+            .levels       (levels[7*n+:7]),
+            .asked        (asked[n]),
+            .gains        (gains[n])
+        );
+    end
+
+    assign waits = asked;
+    assign busy  = due;
+
+    wire unused = &{1'b0, wide[0], requested[6], read_word, write_word};
+
+    always_ff @(posedge clk) begin
+        line <= next;
+        if (condition == LOOP) count <= count - 1'b1;
+
+        // the operand is read
+        action   <= acts ? code[33:26] : '0;
+        word     <= code[18:13];
+        with_acc <= code[5];
+        sign     <= code[4];
+        effect   <= code[3:0];
+        source   <= operand[6:4] == 3'd7 ? operand[3:0] : '0;
+        reads    <= operand[6:4] != 3'd7;
+        case (operand[3:0])
+            POSITION: outside <= seen_position[48*axis+:48];
+            ELAPSED:  outside <= {24'd0, seen_elapsed[24*axis+:24]};
+            PERIOD:   outside <= {24'd0, period};
+            NOW:      outside <= {16'd0, seen_now};
+            FLAGS:    outside <= {23'd0, queued, head, flags[15:0]};
+            default:  outside <= '0;
+        endcase
+
+        // the operand is there
+        action_e <= action;
+        word_e   <= word;
+        sign_e   <= source == HALVE ? sign : minus;
+        effect_e <= effect;
+        term     <= source == HALVE ? {term[71], term[71:1]} : from ^ {72{minus}};
+
+        // it is added
+        negative <= negative_now;
+        if (effect_e == UPWARD) upward <= sum[71];
+        if (!with_acc || (effect_e == BELOW && !sum[71]) || (effect_e == ABOVE && sum[71]))
+            acc <= '0;
+        else if (effect_e != DIVIDE || !sum[71])
+            acc <= effect_e == SHIFT_8 ? {{8{sum[71]}}, sum[71:8]} :
+                   effect_e == SHIFT_24 ? {{24{sum[71]}}, sum[71:24]} : sum;
+        case (effect_e)
+            X:       x <= sum[34:0];
+            X_LOW:   x <= {3'd0, sum[31:0]};
+            X_HIGH:  x <= sum[66:32];
+            Y:       y <= sum[34:0];
+            Y_LOW:   y <= {3'd0, sum[31:0]};
+            Y_HIGH:  y <= sum[66:32];
+            DIVIDE:  y <= {y[33:0], !sum[71]};
+            default: ;
+        endcase
+
+        // and acts
+        case (action_e)
+            LOAD_CONTEXT: begin
+                {queued, head, flags[15:0]} <= sum[24:0];
+                flags[20:17] <= '0;
+            end
+            FIRST_AXIS:   axis <= '0;
+            NEXT_AXIS:    axis <= axis == 3'(AXES - 1) ? '0 : axis + 1'b1;
+            STAND:        flags[15:0] <= flags[15:0] & ~MOTION;
+            POP:          {queued, head} <= {queued - 1'b1, head + 1'b1};
+            PUSH:         queued <= queued + 1'b1;
+            EMPTY:        queued <= '0;
+            BOOTED:       ready <= 1'b1;
+            FIRST_FILTER: filter <= '0;
+            NEXT_FILTER:  filter <= filter + 1'b1;
+            FINISHED:     flags[TICKING] <= 1'b0;
+            default:      ;
+        endcase
+        if (action_e[7:5] == SET) flags <= flags | named;
+        if (action_e[7:5] == CLEAR) flags <= flags & ~named;
+        if (action_e[7:5] == COUNT) count <= action_e[4:0];
+        result_valid <= action_e[7:5] == GIVE;
+        if (action_e[7:5] == GIVE) begin
+            result      <= sum[47:0];
+            result_axis <= axis;
+            result_kind <= action_e[2:0];
+            case (action_e[2:0])
+                COMMAND: result_flag <= flags[LIMITED_UP] || flags[LIMITED_DOWN];
+                STEPS:   result_flag <= flags[REBASED] || level[6];
+                default: result_flag <= negative;
+            endcase
+        end
+
+        // time
+        elapsed <= elapsed_now;
+        if (tick) begin
+            period   <= elapsed == '1 ? elapsed : elapsed + 1'b1;
+            seen_now <= now;
+        end
+        due     <= tick || (due && action_e != FINISHED);
+        overrun <= tick && due && action_e != FINISHED;
+
+        if (rst) begin
+            {action, action_e, source, reads} <= '0;
+            {word, word_e} <= '1;
+            {effect, effect_e} <= '0;
+            {axis, filter, flags, elapsed, period} <= '0;
+            {due, overrun, ready, result_valid} <= '0;
+        end
+    end
+endmodule
+
+`default_nettype wire
