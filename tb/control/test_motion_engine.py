@@ -58,7 +58,11 @@ class Engine:
         while not int(self.dut.ready.value):
             await self.clk()
         for n in range(self.axes):
-            await self.settings(n, override=1 << 32)
+            await self.settings(
+                n,
+                **self.models[n].settings | dict(override=1 << 32),
+                filters=[([0] * 5, 0)] * int(self.dut.FILTERS.value),
+            )
         return self
 
     async def drive_levels(self):
@@ -86,6 +90,10 @@ class Engine:
         if tick:
             dut.tick.value = 1
             dut.now.value = self.now
+        if os.environ.get("DUMP"):
+            self.pipe = [int(dut.line.value), *self.pipe][:3]
+            s = dut.sum.value
+            self.trace.append((self.pipe[2], s.to_signed() if s.is_resolvable else s))
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
         for name in dict(strobes):
@@ -121,6 +129,8 @@ class Engine:
         assert not int(dut.overrun.value)
 
     stepping = False
+    pipe = [0, 0, 0]
+    trace = []
 
     async def settings(self, n, **values):
         """Write settings of axis n; `filters` is a list of (coefficients, in use)."""
@@ -150,6 +160,19 @@ class Engine:
             (kind,) if kind == "underrun" else (kind, wrap(rest[0], 48), *rest[1:])
             for kind, *rest in wanted
         ]
+        if self.got[n] != wanted and os.environ.get("DUMP"):
+            print(vars(self.models[n]), self.levels[n], self.seen)
+            print("GOT", self.got[n]); print("WANT", wanted)
+            from tables.engine_microcode import codes
+            cc = codes()
+            for l, s in self.trace[-700:]:
+                print("TRACE", l, cc[l][0] if l < len(cc) else "?", s)
+            for name, at in ADDRESS.items():
+                if at >= 128: continue
+                v = self.dut.u_memory.words[n * (256 if int(self.dut.FILTERS.value) else 128) + at].value
+                m = getattr(self.models[n], name, self.models[n].settings.get(name, ""))
+                v = v.to_signed() if v.is_resolvable else v
+                print(f"{name:20} {v:30} {m}", "" if v == m else "DIFFERS")
         assert self.got[n] == wanted, (
             f"tick {self.ticks}, axis {n}:\n{self.got[n]}, the model has\n{wanted}"
         )
@@ -212,6 +235,9 @@ class Engine:
                 gains_changed=self.gains[n],
                 requests=[name for name, bits in requests.items() if bits >> n & 1],
             )
+            # the engine may have seen the request just before the tick
+            if requests and self.got[n][:1] and self.got[n][0][0] == "state":
+                del self.got[n][0]
             self.check(n, wanted)
         self.gains = [0] * self.axes
         self.ticks += 1
@@ -236,3 +262,104 @@ async def the_targets_of_a_short_profile_are_as_worked_out_by_hand(dut):
 
 def test_motion_engine_by_hand():
     run("motion_engine", __file__, AXES=1, FILTERS=0)
+
+
+def magnitude(bits):
+    """A random number of up to so many bits, mostly small or near the ends."""
+    top = (1 << bits) - 1
+    return random.choice(
+        (0, 1, top, top // 2, random.randrange(1 << bits), random.getrandbits(random.randint(0, bits)))
+    )
+
+
+def signed(bits):
+    return random.choice((1, -1)) * magnitude(bits - 1)
+
+
+def nasty_settings():
+    fraction = random.choice((0, 1, 65535, 65536, 65536, random.randrange(65536)))
+    slope = random.choice((0, 0, magnitude(32)))
+    return dict(
+        override=fraction << 16,
+        override_slope=slope,
+        override_curve=random.choice((0, magnitude(32), slope >> random.randint(0, 9))),
+        stop_deceleration=random.choice((0, magnitude(32) << 8)),
+        stop_jerk=random.choice((0, magnitude(32))),
+        kp=magnitude(24),
+        ki=random.choice((0, magnitude(24))),
+        kd=magnitude(24),
+        kv=magnitude(24),
+        ka=magnitude(24) << 8,
+        output_limit=magnitude(15) << 16,
+        integral_limit=magnitude(15) << 24,
+        dead_band=magnitude(16),
+        open_command=signed(16),
+        following_limit=random.choice((0, magnitude(32))),
+        step_ratio=signed(48),
+        trim_scale=1 << random.randrange(16),
+        quantum=magnitude(16),
+    )
+
+
+async def random_ticks(engine, ticks, realistic):
+    """Random settings, requests and motions of all axes."""
+    filters = int(engine.dut.FILTERS.value)
+    for _ in range(ticks):
+        for n, model in enumerate(engine.models):
+            if random.random() < 0.1:
+                values = nasty_settings()
+                names = random.sample(sorted(values), random.randint(1, len(values)))
+                await engine.settings(n, **{name: values[name] for name in names})
+            if filters and random.random() < 0.1:
+                sets = [
+                    ([signed(32) << 2 if not realistic else signed(31) for _ in range(5)],
+                     random.getrandbits(1))
+                    for _ in range(filters)
+                ]
+                await engine.settings(n, filters=sets)
+            if random.random() < 0.3:
+                bits = 40 if realistic else random.choice((36, 44, 60))
+                segment = (
+                    signed(bits), signed(bits - 4), signed(32), random.choice((0, 1, 2, 3, 7)),
+                    random.getrandbits(1),
+                )
+                await engine.push(n, *segment)
+            if random.random() < 0.15:
+                await engine.request(n, random.choice(("start", "start", "stop", "set")))
+            if random.random() < 0.05:
+                await engine.settings(n, shift_by=signed(40))
+                engine.position[n] += model.settings["shift_by"]
+                engine.dut.position.value = sum(
+                    (p & (1 << 48) - 1) << 48 * m for m, p in enumerate(engine.position)
+                )
+                await engine.request(n, "shift")
+            if random.random() < 0.1:
+                engine.levels[n] = dict(
+                    block_up=random.getrandbits(1),
+                    block_down=random.getrandbits(1),
+                    closed_loop=int(random.random() < 0.8),
+                )
+            elif random.random() < 0.3:
+                engine.levels[n] = dict(block_up=0, block_down=0, closed_loop=1)
+            for _ in range(random.choice((0, 0, 1, 2))):
+                step = signed(random.choice((16, 16, 20, 34)))
+                await engine.clk(stepped={n: (step, int(step < 0))})
+        await engine.drive_levels()
+        requests = {}
+        if random.random() < 0.2:
+            requests["gains"] = random.getrandbits(engine.axes)
+        if random.random() < 0.2:
+            requests["start"] = random.getrandbits(engine.axes)
+        await engine.tick(random.randrange(1, 40), requests)
+
+
+@cocotb.test()
+async def random_motions_match_the_model(dut):
+    engine = await Engine(dut).reset()
+    await random_ticks(engine, int(os.environ.get("TICKS", 150)), realistic=True)
+
+
+@cocotb.test()
+async def nasty_motions_match_the_model(dut):
+    engine = await Engine(dut).reset()
+    await random_ticks(engine, int(os.environ.get("TICKS", 150)), realistic=False)
