@@ -26,6 +26,7 @@ MEMORY = RTL / "engine_memory.sv"
 
 DISTANCE = 3  # lines from a change to the first line that can read it
 SIGN_DISTANCE = 2  # from a test to the first jump that depends on it
+SEEN_DISTANCE = 4  # from a change of the axis to what is seen of it
 LINES = 1024
 FINISH = 12  # cycles between two axes, the scan and the tick, at most
 
@@ -182,6 +183,7 @@ FLAGS = (  # of an axis, saved in its word `context`
     "limited_down",
     "anchored",
     "rebased",
+    "upward",
 )
 PASSING = ("ticking", "crossed", "first", "halting", "bounding")  # while an axis is served
 REQUESTS = ("shift", "set", "push", "start", "arm", "stop", "gains")
@@ -405,9 +407,11 @@ made:   target
         acc - position
         acc - top                       ; below
         acc + range                     ; above
-        acc - two31 -> error            ; upward
-        - following_limit               ; test
-        against error -> magnitude
+        acc - two31 -> error            ; test
+        acc
+        acc -> magnitude                ; unless negative positive
+        - error -> magnitude
+positive: - following_limit             ; test
         following_limit
                                         ; unless negative unlimited
         acc - magnitude                 ; test
@@ -873,18 +877,18 @@ def dependences(line: Line) -> None:
     if operand == "flags":
         line.reads |= {*FLAGS, "queue"}
     if operand in ("position", "elapsed"):
-        line.reads |= {"axis", "seen"}
+        line.reads.add("seen")
     condition = line.condition
     line.reads.add("queue" if condition in QUEUE else condition)
     if condition.endswith("_seen") or CONDITIONS[condition] >= CONDITIONS["stepped"]:
-        line.reads |= {"axis", "seen"}
+        line.reads.add("seen")
     if condition == "asked":
-        line.reads |= {"axis", "seen"}
+        line.reads.add("seen")
     if condition == "wrapped":
         line.reads.add("axis")
     action = line.action
-    if line.effect == "test":
-        line.changes.add("negative")
+    if line.effect in ("test", "upward"):
+        line.changes.add("negative" if line.effect == "test" else "upward")
     if action.split(" ")[0] in ("set", "clear"):
         line.changes.add(action.split(" ")[1])
     if action == "load_context":
@@ -892,7 +896,7 @@ def dependences(line: Line) -> None:
     if action == "stand":
         line.changes |= {*FLAGS}
     if action in ("first_axis", "next_axis"):
-        line.changes.add("axis")
+        line.changes |= {"axis", "seen"}
     if action in ("pop", "push", "empty"):
         line.changes.add("queue")
     if action == "sample" or action.startswith("done"):
@@ -940,7 +944,7 @@ def missing(lines: list[Line]) -> tuple[int, int] | None:
                 before[m].append(n)
     for n, line in enumerate(lines):
         reached = {n}
-        for distance in range(1, DISTANCE):
+        for distance in range(1, SEEN_DISTANCE):
             reached = {b for r in reached for b in before[r]}
             for b in reached:
                 change = lines[b].changes & line.reads
@@ -948,9 +952,13 @@ def missing(lines: list[Line]) -> tuple[int, int] | None:
                     change -= {"negative"}
                 if change == {"negative"}:
                     return n, SIGN_DISTANCE - distance
+                if "seen" in change:
+                    return n, SEEN_DISTANCE - distance
+                if distance >= DISTANCE:
+                    continue
                 if "product" in line.operand and "earlier_" not in line.text and lines[b].loads():
                     change = {"product"}
-                if line.effect == "along" and lines[b].effect == "upward" and distance == 1:
+                if line.effect == "along" and "upward" in lines[b].changes and distance == 1:
                     return n, 1
                 if change:
                     return n, DISTANCE - distance
@@ -1094,8 +1102,8 @@ def text() -> str:
 // engine_microcode -- the microcode of motion_engine: what it does at a tick and between two ticks,
 // line by line.
 //
-// latency   1 cycle from next to code
-// rate      one line per cycle
+// latency   1 cycle from next and target to their codes
+// rate      two lines per cycle: the one that follows, and the one that a jump leads to
 // method    A code is target or action 10 bits, unless 1, condition 6, word 6, operand 7, acc 1,
 //           sign 1, effect 4.
 // model     codes() and worst() of tables/engine_microcode.py
@@ -1107,9 +1115,11 @@ module engine_microcode #(
     parameter int FILTERS = 0   // filters of each axis, 0 to 4
 ) (
     input  wire         clk,
-    input  wire  [ 9:0] next,   // number of the line to be read
-    output logic [35:0] code,   // code of the line
-    output logic [15:0] cycles  // cycles that a tick needs at most
+    input  wire  [ 9:0] next,        // number of a line to be read
+    input  wire  [ 9:0] target,      // number of another one
+    output logic [35:0] next_code,   // code of the line `next`
+    output logic [35:0] target_code, // code of the line `target`
+    output logic [15:0] cycles       // cycles that a tick needs at most
 );""",
             f"    localparam logic [15:0] AXIS = {choice} : 16'd{bounds[-1][1]};",
             "",
@@ -1122,7 +1132,10 @@ module engine_microcode #(
             f"        for (int n = {len(rows)}; n < {LINES}; n++) lines[n] = '0;",
             """    end
 
-    always_ff @(posedge clk) code <= lines[next];
+    always_ff @(posedge clk) begin
+        next_code   <= lines[next];
+        target_code <= lines[target];
+    end
 endmodule
 
 `default_nettype wire

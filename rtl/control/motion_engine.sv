@@ -68,6 +68,7 @@ module motion_engine #(
     localparam [2:0] SET = 3'd2, CLEAR = 3'd3, GIVE = 3'd4, COUNT = 3'd5, DONE = 3'd6;
     localparam [2:0] COMMAND = 3'd5, STEPS = 3'd6;
     localparam int TICKING = 16, HALTING = 19, LIMITED_UP = 10, LIMITED_DOWN = 11, REBASED = 13;
+    localparam int UPWARDS = 14;
     localparam [15:0] MOTION = 16'b0000_0000_1111_1110;  // the flags that STAND clears
     localparam [5:0] NOWHERE = 6'h3F;
 
@@ -77,8 +78,14 @@ module motion_engine #(
     logic [3:0] head;  // slot of the next segment
     logic [4:0] queued;  // segments in the queue
     logic [2:0] filter;
-    logic negative, upward, due;
+    logic negative, due;
     logic [4:0] count;
+    // what is seen of this axis
+    logic [47:0] axis_position;
+    logic [23:0] axis_elapsed;
+    logic [6:0] requested, level;
+    logic axis_asked, axis_gains;
+    // time
     logic [31:0] seen_now;
     logic [23:0] elapsed, period;
 
@@ -87,15 +94,16 @@ module motion_engine #(
     wire [24*AXES-1:0] seen_elapsed;
     wire [7*AXES-1:0] seen, levels;
     wire [AXES-1:0] asked, gains;
+    wire [7:0] gains_all = 8'(gains), asked_all = 8'(asked);
     wire [23:0] elapsed_now = tick ? '0 : elapsed == '1 ? elapsed : elapsed + 1'b1;
 
     // the lines in work: fetched, and its operand is being read; then the operand is there; then it
     // is added
-    wire [35:0] code;
-    logic [9:0] line;
+    wire [35:0] next_code, target_code;
+    logic [9:0] next_line, target_line;
+    logic jumped;  // the line before jumped
     logic [3:0] source;  // of the operand: 0 memory or nothing
     logic reads;  // the operand is in memory
-    logic [47:0] outside;
     logic [7:0] action, action_e;
     logic [5:0] word, word_e;
     logic with_acc, sign, sign_e;
@@ -106,17 +114,15 @@ module motion_engine #(
     wire [71:0] stored;
 
     // fetch
-    wire [9:0] target_line = code[35:26];
+    wire [35:0] code = jumped ? target_code : next_code;
+    wire [9:0] line = jumped ? target_line : next_line;
     wire unless = code[25];
     wire [5:0] condition = code[24:19];
     wire [6:0] operand = code[12:6];
     wire [72:0] wide = {acc, 1'b1} + {term, sign_e};
     wire [71:0] sum = wide[72:1];
     wire negative_now = effect_e == TEST ? sum[71] : negative;
-    wire [6:0] requested = seen[7*axis+:7];
-    wire [6:0] level = levels[7*axis+:7];
     wire off = level[2] && level[3];
-    wire [7:0] gains_all = 8'(gains), asked_all = 8'(asked);
     wire [63:0] conditions = {
         14'd0,
         1'(FILTERS == 0),
@@ -124,13 +130,13 @@ module motion_engine #(
         off,
         !level[4] || off,
         level,
-        gains_all[axis],
+        axis_gains,
         requested[5:0],
         filter != 3'(FILTERS),
         queued[4],
         queued == 5'd0,
         axis == 3'd0,
-        asked_all[axis],
+        axis_asked,
         due,
         count != 5'd1,
         negative_now,
@@ -138,7 +144,7 @@ module motion_engine #(
         flags
     };
     wire jump = conditions[condition] != unless;
-    wire [9:0] next = rst ? '0 : jump ? target_line : line + 1'b1;
+    wire [9:0] next = rst ? '0 : line + 1'b1;
     wire acts = condition == '0 && !unless;
 
     engine_microcode #(
@@ -147,7 +153,9 @@ module motion_engine #(
     ) u_microcode (
         .clk,
         .next,
-        .code,
+        .target(code[35:26]),
+        .next_code,
+        .target_code,
         .cycles
     );
 
@@ -196,10 +204,19 @@ module motion_engine #(
         .product
     );
 
-    wire minus = sign ^ (effect == ALONG && !upward);
+    wire minus = sign ^ (effect == ALONG && !flags[UPWARDS]);
     logic [71:0] from;
+    logic [47:0] outside;
 
     always_comb begin
+        case (source)
+            POSITION: outside = axis_position;
+            ELAPSED:  outside = {24'd0, axis_elapsed};
+            PERIOD:   outside = {24'd0, period};
+            NOW:      outside = {16'd0, seen_now};
+            FLAGS:    outside = {23'd0, queued, head, flags[15:0]};
+            default:  outside = '0;
+        endcase
         case (source)
             PRODUCT:      from = {{2{product[69]}}, product};
             PRODUCT_HIGH: from = {product[39:0], 32'd0};
@@ -250,7 +267,9 @@ module motion_engine #(
     wire unused = &{1'b0, wide[0], requested[6], read_word, write_word};
 
     always_ff @(posedge clk) begin
-        line <= next;
+        next_line   <= next;
+        target_line <= code[35:26];
+        jumped      <= jump;
         if (condition == LOOP) count <= count - 1'b1;
 
         // the operand is read
@@ -261,14 +280,6 @@ module motion_engine #(
         effect   <= code[3:0];
         source   <= operand[6:4] == 3'd7 ? operand[3:0] : '0;
         reads    <= operand[6:4] != 3'd7;
-        case (operand[3:0])
-            POSITION: outside <= seen_position[48*axis+:48];
-            ELAPSED:  outside <= {24'd0, seen_elapsed[24*axis+:24]};
-            PERIOD:   outside <= {24'd0, period};
-            NOW:      outside <= {16'd0, seen_now};
-            FLAGS:    outside <= {23'd0, queued, head, flags[15:0]};
-            default:  outside <= '0;
-        endcase
 
         // the operand is there
         action_e <= action;
@@ -279,7 +290,7 @@ module motion_engine #(
 
         // it is added
         negative <= negative_now;
-        if (effect_e == UPWARD) upward <= sum[71];
+        if (effect_e == UPWARD) flags[UPWARDS] <= sum[71];
         if (!with_acc || (effect_e == BELOW && !sum[71]) || (effect_e == ABOVE && sum[71]))
             acc <= '0;
         else if (effect_e != DIVIDE || !sum[71])
@@ -329,6 +340,14 @@ module motion_engine #(
             endcase
         end
 
+        // the axis
+        axis_position <= seen_position[48*axis+:48];
+        axis_elapsed  <= seen_elapsed[24*axis+:24];
+        requested     <= seen[7*axis+:7];
+        level         <= levels[7*axis+:7];
+        axis_asked    <= asked_all[axis];
+        axis_gains    <= gains_all[axis];
+
         // time
         elapsed <= elapsed_now;
         if (tick) begin
@@ -343,7 +362,7 @@ module motion_engine #(
             {word, word_e} <= '1;
             {effect, effect_e} <= '0;
             {axis, filter, flags, elapsed, period} <= '0;
-            {due, overrun, ready, result_valid} <= '0;
+            {due, overrun, ready, result_valid, jumped} <= '0;
         end
     end
 endmodule

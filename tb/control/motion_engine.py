@@ -109,7 +109,7 @@ class Axis:
         self.moved = 0
 
     def state(self):
-        flags = sum(getattr(self, name) << n for n, name in enumerate(FLAGS, start=1))
+        flags = sum(getattr(self, name, 0) << n for n, name in enumerate(FLAGS, start=1))
         return "state", flags | self.head << 16 | len(self.queue) << 20
 
     # requests

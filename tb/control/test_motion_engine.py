@@ -10,7 +10,7 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from tables.engine_microcode import ADDRESS, FILTER_SETTINGS, FLAGS, GIVEN
+from tables.engine_microcode import ADDRESS, CONDITIONS, FILTER_SETTINGS, FLAGS, GIVEN
 from tb.bench import run, start
 from tb.control.motion_engine import LAST, Axis
 from tb.control.profile_player import moved, wrap
@@ -93,7 +93,9 @@ class Engine:
         if os.environ.get("DUMP"):
             self.pipe = [int(dut.line.value), *self.pipe][:3]
             s = dut.sum.value
-            self.trace.append((self.pipe[2], s.to_signed() if s.is_resolvable else s))
+            self.executed.add(self.pipe[2])
+            if os.environ["DUMP"] == "2":
+                self.trace.append((self.pipe[2], (int(dut.axis.value), self.ticks, s.to_signed() if s.is_resolvable else s)))
         await RisingEdge(dut.clk)
         await FallingEdge(dut.clk)
         for name in dict(strobes):
@@ -122,6 +124,8 @@ class Engine:
             kind = GIVEN[int(dut.result_kind.value)]
             value = dut.result.value.to_signed()
             flag = int(dut.result_flag.value)
+            if kind == "state":
+                value &= ~(1 << CONDITIONS["upward"])
             shown = (kind,) if kind == "underrun" else (kind, value)
             if kind in ("error", "command", "steps"):
                 shown = (kind, value, flag)
@@ -131,6 +135,7 @@ class Engine:
     stepping = False
     pipe = [0, 0, 0]
     trace = []
+    executed = set()
 
     async def settings(self, n, **values):
         """Write settings of axis n; `filters` is a list of (coefficients, in use)."""
@@ -165,7 +170,7 @@ class Engine:
             print("GOT", self.got[n]); print("WANT", wanted)
             from tables.engine_microcode import codes
             cc = codes()
-            for l, s in self.trace[-700:]:
+            for l, s in self.trace[-6000:]:
                 print("TRACE", l, cc[l][0] if l < len(cc) else "?", s)
             for name, at in ADDRESS.items():
                 if at >= 128: continue
@@ -260,8 +265,9 @@ async def the_targets_of_a_short_profile_are_as_worked_out_by_hand(dut):
     assert [target / 65536 for target in await engine.finish(0)] == [1.5, 2.5, 3.25, 3.5]
 
 
-def test_motion_engine_by_hand():
-    run("motion_engine", __file__, AXES=1, FILTERS=0)
+@pytest.mark.parametrize("axes, filters", [(1, 0), (1, 2), (3, 4), (8, 0)])
+def test_motion_engine(axes, filters):
+    run("motion_engine", __file__, AXES=axes, FILTERS=filters)
 
 
 def magnitude(bits):
@@ -363,3 +369,11 @@ async def random_motions_match_the_model(dut):
 async def nasty_motions_match_the_model(dut):
     engine = await Engine(dut).reset()
     await random_ticks(engine, int(os.environ.get("TICKS", 150)), realistic=False)
+
+
+@cocotb.test()
+async def zz_lines(dut):
+    if os.environ.get("DUMP"):
+        from tables.engine_microcode import codes
+        for n, (text, _) in enumerate(codes()):
+            if n not in Engine.executed: print("NEVER", n, text)
