@@ -2,35 +2,27 @@
 // engine_memory -- the words of all axes of motion_engine: state, settings, queues, filters and
 // constants.
 //
-// latency   1 cycle from read_at to stored; a setting is written as soon as the engine neither
-//           writes nor reads its word
-// rate      one word read and one written per cycle; one setting, then the next one when
-//           setting_waits is low
-// made      by tables/engine_microcode.py, not to be edited
+// latency   1 cycle from read_at to stored, and from write to the new word
+// rate      one word read and one written per cycle, which must not be the same
+// limits    A word that is read in the cycle in which it is written has no certain value.
 // model     tb/control/engine_memory.py, equal in every bit of every cycle
-// proved    A setting that was taken is written, unchanged, and no other word is written meanwhile
-//           in its place.
-// proof     depth 12, AXES = 1
+// made      by tables/engine_microcode.py, not to be edited
 `default_nettype none
 
 module engine_memory #(
-    parameter int AXES    = 1,                       // axes of the engine, 1 to 8
-    parameter int FILTERS = 0,                       // filters of each axis, 0 to 4
-    localparam int WORDS  = FILTERS == 0 ? 128 : 256,  // of each axis
-    localparam int A      = $clog2(AXES * WORDS)     // bits of an address
+    parameter int AXES = 1,  // axes of the engine, 1 to 8
+    parameter int WORD_W = 7,  // bits of the address of a word of an axis: 7, or 8 with filters
+    localparam int A = WORD_W + $clog2(AXES)  // bits of an address
 ) (
-    input  wire                clk,
-    input  wire                rst,
-    input  wire        [A-1:0] read_at,         // address of the word to be read
-    output logic       [ 71:0] stored,          // word that was read
-    input  wire                write,           // strobe: the engine writes a word
-    input  wire        [A-1:0] write_at,        // address of that word
-    input  wire        [ 71:0] word,            // value of that word
-    input  wire                setting_write,   // strobe: write a setting
-    input  wire        [A-1:0] setting_at,      // address of the setting
-    input  wire signed [ 63:0] setting,         // value of the setting
-    output logic               setting_waits    // level: a setting waits to be written
+    input  wire         clk,
+    input  wire  [A-1:0] read_at,   // address of the word to be read
+    output logic [71:0] stored,     // word that was read
+    input  wire         write,      // strobe: write a word
+    input  wire  [A-1:0] write_at,  // address of that word
+    input  wire  [71:0] word        // value of that word
 );
+    localparam int WORDS = 1 << WORD_W;
+
     (* no_rw_check *) logic [71:0] words[0:AXES*WORDS-1];
 
     initial begin
@@ -58,17 +50,9 @@ module engine_memory #(
         end
     end
 
-    logic [A-1:0] waiting_at;
-    logic [63:0] waiting;
-
-    wire settles = setting_waits && !write && read_at != waiting_at;
-
     always_ff @(posedge clk) begin
-        if (write || settles)
-            words[write ? write_at : waiting_at] <= write ? word : {{8{waiting[63]}}, waiting};
+        if (write) words[write_at] <= word;
         stored <= words[read_at];
-        if (setting_write) {waiting_at, waiting} <= {setting_at, setting};
-        setting_waits <= !rst && (setting_write || (setting_waits && !settles));
     end
 endmodule
 

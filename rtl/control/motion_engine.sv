@@ -15,7 +15,8 @@ module motion_engine #(
     // settings
     input  wire                      setting_write,           // strobe: write a setting
     input  wire        [        2:0] setting_axis,            // number of its axis
-    input  wire        [ WORD_W-1:0] setting_word,            // address of its word
+    input  wire        [        6:0] setting_word,            // number of its word
+    input  wire        [        1:0] setting_filter,          // number of its filter
     input  wire signed [       63:0] setting,                 // value
     output logic                     setting_waits,           // level: it is not written yet
     // the axes
@@ -179,21 +180,42 @@ module motion_engine #(
         endcase
     end
 
-    engine_memory #(
-        .AXES   (AXES),
-        .FILTERS(FILTERS)
-    ) u_memory (
+    wire write;
+    wire [WORD_W+2:0] write_at;
+    wire [71:0] written;
+
+    engine_settings #(
+        .WORD_W(WORD_W)
+    ) u_settings (
         .clk,
         .rst,
-        .read_at   (A'({axis, read_word[WORD_W-1:0]})),
-        .stored,
-        .write     (word_e != NOWHERE),
-        .write_at  (A'({axis, write_word[WORD_W-1:0]})),
-        .word      (sum),
+        // settings
         .setting_write,
-        .setting_at(A'({setting_axis, setting_word})),
+        .setting_axis,
+        .setting_word,
+        .setting_filter,
         .setting,
-        .setting_waits
+        .waits       (setting_waits),
+        // the engine
+        .operand,
+        .write       (word_e != NOWHERE),
+        .write_at    ({axis, write_word[WORD_W-1:0]}),
+        .word        (sum),
+        // to the memory
+        .write_out   (write),
+        .write_out_at(write_at),
+        .word_out    (written)
+    );
+    engine_memory #(
+        .AXES  (AXES),
+        .WORD_W(WORD_W)
+    ) u_memory (
+        .clk,
+        .read_at (A'({axis, read_word[WORD_W-1:0]})),
+        .stored,
+        .write,
+        .write_at(write_at[A-1:0]),
+        .word    (written)
     );
 
     // the operand
@@ -264,7 +286,7 @@ module motion_engine #(
     assign waits = asked;
     assign busy  = due;
 
-    wire unused = &{1'b0, wide[0], requested[6], read_word, write_word};
+    wire unused = &{1'b0, wide[0], requested[6], read_word, write_word, write_at};
 
     always_ff @(posedge clk) begin
         next_line   <= next;

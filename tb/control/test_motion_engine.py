@@ -10,7 +10,7 @@ import cocotb
 import pytest
 from cocotb.triggers import FallingEdge, RisingEdge
 
-from tables.engine_microcode import ADDRESS, CONDITIONS, FILTER_SETTINGS, FLAGS, GIVEN
+from tables.engine_microcode import ADDRESS, CONDITIONS, FILTER_SETTINGS, GIVEN, OPERANDS
 from tb.bench import run, start
 from tb.control.motion_engine import LAST, Axis
 from tb.control.profile_player import moved, wrap
@@ -28,8 +28,8 @@ STROBES = dict(
 )
 LEVELS = ("block_up", "block_down", "closed_loop")
 IDLE = dict.fromkeys(
-    ("tick", "now", "setting_write", "setting_axis", "setting_word", "setting", "position")
-    + ("stepped", "downward", *LEVELS, *STROBES.values()),
+    ("tick", "now", "setting_write", "setting_axis", "setting_word", "setting_filter", "setting")
+    + ("position", "stepped", "downward", *LEVELS, *STROBES.values()),
     0,
 )
 
@@ -146,13 +146,14 @@ class Engine:
                     self.models[n].filters[m].coefficients = coefficients
                     self.models[n].filters[m].in_use = in_use
                     for which, number in zip(FILTER_SETTINGS, (*coefficients, in_use)):
-                        words.append((ADDRESS[which] + 16 * m, number))
+                        words.append((OPERANDS[which], m, number))
             else:
                 self.models[n].settings[name] = value
-                words.append((ADDRESS[name], value))
-        for word, value in words:
+                words.append((OPERANDS[name], 0, value))
+        for word, which, value in words:
             self.dut.setting_axis.value = n
             self.dut.setting_word.value = word
+            self.dut.setting_filter.value = which
             self.dut.setting.value = value & (1 << 64) - 1
             self.dut.setting_write.value = 1
             await self.clk()
