@@ -2,9 +2,11 @@
 // engine_settings -- writes the settings of motion_engine into its memory, in cycles in which the
 // engine does not write, and not into the word that the engine is reading.
 //
-// latency   1 cycle from setting_write to write_out when the engine neither writes nor reads that
-//           word; a word of the engine is passed on at once
+// latency   1 cycle from setting_write to write_out when the engine neither writes nor reads a word
+//           whose number ends with the same three bits; a word of the engine is passed on at once
 // rate      one setting, then the next one when waits is low
+// method    The words of the two banks, which are also read by other numbers, keep their last three
+//           bits, so these three decide whether a word may be the one that is read.
 // model     tb/control/engine_settings.py, equal in every bit of every cycle
 // proved    Every word of the engine is written in its cycle. A setting that was taken is written
 //           once, unchanged, and never while its word is read.
@@ -38,9 +40,7 @@ module engine_settings #(
     logic [1:0] filter;
     logic [63:0] value;
 
-    // the banks have words that are also read by other numbers
-    wire read = operand == number || operand[6:3] == 4'b1101;
-    wire settles = waits && !write && !read;
+    wire settles = waits && !write && operand[2:0] != number[2:0];
     wire [7:0] plain = {2'd0, number[5:0]};
     wire [7:0] above = {2'b01, number[3:0], 2'b11};
     wire [7:0] banked = {2'b10, filter, number[3:0]};
@@ -57,7 +57,7 @@ module engine_settings #(
         if (rst) waits <= 1'b0;
     end
 
-    wire unused = &{1'b0, address};
+    wire unused = &{1'b0, address, operand[6:3]};
 
 `ifdef FORMAL
     logic past = 1'b0;
@@ -71,6 +71,7 @@ module engine_settings #(
         if (setting_write) owed_value <= setting;
         if (past) begin
             assert (owed == waits);
+            if (waits) assert (value == owed_value);
             if (write) assert (write_out && write_out_at == write_at && word_out == word);
             if (write_out && !write) begin
                 assert (owed && operand != number);
