@@ -14,7 +14,7 @@ the program wants it sooner, the assembler inserts lines that only pass acc on.
 
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -101,15 +101,18 @@ CONSTANTS = {
     "top34": (1 << 33) - 1,
     "range34": (1 << 34) - 1,
     "two36": 1 << 36,
-    "top_fine": ((1 << 31) - 1) << 8,
-    "two39": 1 << 39,
     "two66": 1 << 66,
 }
 FILTER_SETTINGS = ("b0", "b1", "b2", "c1", "c2", "in_use")  # one bank of words per filter
 FILTER_STATE = ("cut_off", "x1", "x2", "y1", "y2", "known", "filtering")
-FILTER = {name: n for n, name in enumerate(FILTER_SETTINGS)} | {
+FILTER = {name: 1 + n for n, name in enumerate(FILTER_SETTINGS)} | {
     name: 8 + n for n, name in enumerate(FILTER_STATE)
 }
+
+
+def number_of(at: int) -> int:
+    """How a line names the word at this address."""
+    return at if at < 64 else 64 + (at >> 2) % 16
 
 
 def addresses() -> dict[str, int]:
@@ -117,11 +120,15 @@ def addresses() -> dict[str, int]:
     found = {name: n for n, name in enumerate(RAMP)} | {name: 8 + n for n, name in enumerate(STOP)}
     low = [6, 7, 14, 15, *range(16, 48)]  # what the engine writes is here
     high = [*range(48, 64), *(4 * n + 3 for n in range(16, 32))]
-    written = [*STATE, *SCRATCH]
-    names = [*written, *SETTINGS, *CONSTANTS]
-    free = [*low, *high]
-    if len(written) > len(low) or len(names) > len(free):
-        raise ValueError(f"{len(written)} and {len(names)} words for {len(low)} and {len(free)}")
+    free = [*low[len(STATE) + len(SCRATCH) :], *high]
+    # a setting is not written while a word with the same last bits is read, and a line that reads
+    # nothing has the number 0 there
+    changing = [at for at in free if number_of(at) % 8][: len(SETTINGS)]
+    constant = [at for at in free if at not in changing]
+    names = [*STATE, *SCRATCH, *SETTINGS, *CONSTANTS]
+    if len(STATE) + len(SCRATCH) > len(low) or len(CONSTANTS) > len(constant):
+        raise ValueError(f"{len(names)} words for {len(low)} and {len(high)} addresses")
+    free = [*low[: len(STATE) + len(SCRATCH)], *changing, *constant]
     return found | dict(zip(names, free)) | {name: 128 + n for name, n in FILTER.items()}
 
 
@@ -135,7 +142,7 @@ OUTSIDE = ("0", "product", "product_high", "product_low", "halve") + (
     "flags",
 )
 OPERANDS = (  # how a line names what it adds
-    {name: at if at < 64 else 64 + (at >> 2) % 16 for name, at in ADDRESS.items() if at < 128}
+    {name: number_of(at) for name, at in ADDRESS.items() if at < 128}
     | {name: 0x50 + n for name, n in FILTER.items()}
     | {f"head_{name}": 0x60 + n for n, name in enumerate(SLOT)}
     | {name: 0x68 + n for n, name in enumerate(BANK)}
@@ -815,8 +822,8 @@ class Line:
 def parsed(text: str) -> Line:
     """The line of this text. A ValueError says what is wrong with it."""
     found = re.fullmatch(
-        r"(?:(\w+):)?\s*(?:(acc)\b ?)?(?:(\+|-|along|against)? ?(\w+))?(?: >> (8|24))?(?: -> (\w+))?"
-        r"(?: ?; (.*))?",
+        r"(?:(\w+):)?\s*(?:(acc)\b ?)?(?:(\+|-|along|against)? ?(\w+))?(?: >> (8|24))?"
+        r"(?: -> (\w+))?(?: ?; (.*))?",
         text,
     )
     if not found:
@@ -1052,7 +1059,7 @@ def worst(lines: list[Line], filters: int) -> tuple[int, int]:
     wrapped = [n for n, line in enumerate(lines) if line.condition == "wrapped"]
     scan = next(n for n, line in enumerate(lines) if line.text.endswith("; goto scan"))
     # a tick may find the engine at the beginning of a request; the scan goes on to the next axis
-    request = len(longest(lines, "requests", scan, filters, ticking=False))
+    request = len(longest(lines, "requests", scan, filters, ticking=False)) + FINISH
     return request, len(longest(lines, "axis", wrapped[-1], filters, ticking=True))
 
 
@@ -1092,8 +1099,8 @@ def text() -> str:
         f"        lines[{n}] = 36'h{code:09x};  // {line}".rstrip()
         for n, (line, code) in enumerate(codes())
     ]
+    between = worst(lines, 0)[0]
     bounds = [worst(lines, filters) for filters in range(5)]
-    between = max(request for request, _ in bounds) + FINISH
     choice = " : ".join(f"FILTERS == {n} ? 16'd{axis}" for n, (_, axis) in enumerate(bounds[:-1]))
     return "\n".join(
         [
@@ -1124,7 +1131,7 @@ module engine_microcode #(
             "",
             f"    assign cycles = 16'd{between} + 16'(AXES) * AXIS;",
             "",
-            f"    (* rom_style = \"block\" *) logic [35:0] lines[0:{LINES - 1}];",
+            f'    (* rom_style = "block" *) logic [35:0] lines[0:{LINES - 1}];',
             "",
             "    initial begin",
             *rows,

@@ -28,9 +28,9 @@ module engine_memory #(
     initial begin
         for (int n = 0; n < AXES * WORDS; n++) words[n] = '0;
         for (int n = 0; n < AXES; n++) begin
-            words[n*WORDS+59] = 72'h1;  // one
-            words[n*WORDS+60] = 72'h100;  // byte
-            words[n*WORDS+61] = 72'h80;  // half_byte
+            words[n*WORDS+40] = 72'h1;  // one
+            words[n*WORDS+48] = 72'h100;  // byte
+            words[n*WORDS+56] = 72'h80;  // half_byte
             words[n*WORDS+62] = 72'h10000;  // two16
             words[n*WORDS+63] = 72'h100000;  // two20
             words[n*WORDS+67] = 72'h800000;  // half_step
@@ -44,9 +44,7 @@ module engine_memory #(
             words[n*WORDS+99] = 72'h1ffffffff;  // top34
             words[n*WORDS+103] = 72'h3ffffffff;  // range34
             words[n*WORDS+107] = 72'h1000000000;  // two36
-            words[n*WORDS+111] = 72'h7fffffff00;  // top_fine
-            words[n*WORDS+115] = 72'h8000000000;  // two39
-            words[n*WORDS+119] = 72'h40000000000000000;  // two66
+            words[n*WORDS+111] = 72'h40000000000000000;  // two66
         end
     end
 

@@ -4,8 +4,8 @@ between two ticks, tick(...) a servo tick; both return what the engine reports, 
 """
 
 from tables.engine_microcode import FLAGS
-from tb.control.profile_player import FULL, Ramp, wrap
 
+FULL = 1 << 32  # of a rate
 DEPTH = 16  # segments in the queue
 SLOT_HALF = 1 << 23  # half an LSB of target in 2^-40 period
 LONGEST = (1 << 24) - 1  # cycles: the longest time without a step
@@ -53,6 +53,56 @@ def clamped(value, bits=32):
     return between(value, -(1 << bits - 1), (1 << bits - 1) - 1)
 
 
+def wrap(value, bits):
+    """value as a two's complement number of so many bits."""
+    return (value + (1 << bits - 1)) % (1 << bits) - (1 << bits - 1)
+
+
+def moved(velocity, acceleration, jerk, ticks):
+    """The distance of a segment in 2^-40 period: the closed form of the recursion."""
+    n = ticks
+    return velocity * n + acceleration * (n * (n - 1) // 2) + jerk * (n * (n - 1) * (n - 2) // 6)
+
+
+class Ramp:
+    """A ramp of a value to zero: its slope, a whole number of increments, and the area that the
+    slope still adds while it falls to zero.
+    """
+
+    def __init__(self):
+        self.slope = self.area = self.increment = self.upward = 0
+
+    def choose(self, limit, curve):
+        """Choose the increment of a new ramp."""
+        self.increment = limit if curve == 0 or curve > limit else curve
+
+    def decide(self, value, limit):
+        """What the slope must do."""
+        turn = self.slope == 0
+        if turn:
+            self.upward = int(value < 0)
+        left = -value if self.upward else value
+        if turn and left < self.increment:
+            return "last"
+        if not turn and (left < self.area or self.slope > limit):
+            return "fall"
+        if left < self.area + self.slope + self.increment:
+            return "stay"
+        return "stay" if self.slope + self.increment > limit else "grow"
+
+    def change(self, what):
+        """Change the slope so."""
+        if what == "grow":
+            self.slope += self.increment
+            self.area += self.slope
+        elif what == "fall":
+            self.area -= self.slope
+            self.slope -= self.increment
+
+    def signed(self):
+        return self.slope if self.upward else -self.slope
+
+
 class Filter:
     """A second-order filter with error feedback; coefficients in 2^-32."""
 
@@ -67,9 +117,9 @@ class Filter:
         works = not passing and self.filtering and self.in_use
         y = x
         if works:
-            total = sum(
-                c * s for c, s in zip(self.coefficients, (x, *self.x, *self.y))
-            ) + self.cut_off
+            total = (
+                sum(c * s for c, s in zip(self.coefficients, (x, *self.x, *self.y))) + self.cut_off
+            )
             y, self.cut_off = total >> FILTER_FRACTION, total % (1 << FILTER_FRACTION)
             if clamped(y) != y:
                 y, self.cut_off = clamped(y), 0
@@ -128,7 +178,7 @@ class Axis:
             self.queue.append(
                 tuple(s[f"segment_{n}"] for n in ("velocity", "acceleration", "jerk", "ticks"))
             )
-        if "start" in requests and not "stop" in requests:
+        if "start" in requests and "stop" not in requests:
             self.start()
         if "arm" in requests:
             self.armed = 1
@@ -242,14 +292,10 @@ class Axis:
         if lost:
             self.integral = self.powered = 0
             self.sum = 0 if lost_off else self.command << 16
-        blocked = (
-            block_down or self.limited_down if error < 0 else block_up or self.limited_up
-        )
+        blocked = block_down or self.limited_down if error < 0 else block_up or self.limited_up
         constant = blocked or not self.moving and abs(error) <= s["dead_band"]
         limit = s["integral_limit"]
-        self.integral = between(
-            self.integral + (0 if constant else s["ki"] * error), -limit, limit
-        )
+        self.integral = between(self.integral + (0 if constant else s["ki"] * error), -limit, limit)
         total = self.integral >> 8
         total += s["kp"] * error + s["kd"] * (self.target_velocity - velocity)
         total += s["kv"] * self.target_velocity + s["ka"] * self.target_acceleration
@@ -313,7 +359,7 @@ class Axis:
             ramp.choose(slope, s["override_curve"])
         distance = self.rate - s["override"]
         new = ramp.slope == 0
-        what, _ = ramp.decide(distance, slope)
+        what = ramp.decide(distance, slope)
         if new and self.arrived:  # one tick without change before the next ramp
             self.arrived = 0
         elif what == "last":
@@ -349,8 +395,7 @@ class Axis:
                 >> 1
             )
             self.offset = (self.velocity >> 1) + (
-                wrap(slope >> 32, 35) * self.fraction
-                + ((slope & FULL - 1) * self.fraction >> 32)
+                wrap(slope >> 32, 35) * self.fraction + ((slope & FULL - 1) * self.fraction >> 32)
                 if self.fraction
                 else 0
             )
@@ -386,7 +431,7 @@ class Axis:
         if first:
             what = "last" if limit == 0 else self.begin_to_stop(limit)
         if what is None:
-            what, _ = ramp.decide(self.step, limit)
+            what = ramp.decide(self.step, limit)
             if first and what in ("last", "fall"):
                 what = "stay"
             ramp.change(what)

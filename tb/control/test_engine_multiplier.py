@@ -54,7 +54,9 @@ async def the_ends_of_the_range_and_of_the_halves_match_the_model(dut):
 async def random_products_match_the_model(dut):
     multiplier = await begin(dut)
     for _ in range(3000):
-        await multiplier.clk(*(random.randrange(-TOP - 1, TOP + 1) >> random.randrange(34) for _ in "xy"))
+        await multiplier.clk(
+            *(random.randrange(-TOP - 1, TOP + 1) >> random.randrange(34) for _ in "xy")
+        )
 
 
 def test_engine_multiplier():
