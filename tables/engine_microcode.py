@@ -23,6 +23,7 @@ from tables import made_files
 RTL = Path(__file__).resolve().parent.parent / "rtl" / "control"
 MADE = RTL / "engine_microcode.sv"
 MEMORY = RTL / "engine_memory.sv"
+PROOF = RTL / "engine_regions.sv"
 
 DISTANCE = 3  # lines from a change to the first line that can read it
 SIGN_DISTANCE = 2  # from a test to the first jump that depends on it
@@ -1203,8 +1204,97 @@ endmodule
     )
 
 
+def reached(lines: list[Line], begin: int, ticking: bool, ends: set[int]) -> set[int]:
+    """The lines that can be reached from one line, up to the lines that end it."""
+    follow, found, left = successors(lines), set[int](), [begin]
+    labels = {line.label: n for n, line in enumerate(lines) if line.label}
+    while left:
+        n = left.pop()
+        if n in found:
+            continue
+        found.add(n)
+        line = lines[n]
+        after = follow[n]
+        if line.condition == "ticking":
+            jumps = ticking != line.unless
+            after = [m for m in follow[n] if (m == labels[line.target]) == jumps]
+        if n not in ends:
+            left += after
+    return found
+
+
+REGIONS = ("idle", "shared", "serve", "leave", "enter")
+
+
+def regions(lines: list[Line]) -> list[str]:
+    """Where each line belongs: to the time between two ticks, to the service of an axis at a tick,
+    to both, or to the steps from one axis to the next."""
+    labels = {line.label: n for n, line in enumerate(lines) if line.label}
+    last = max(n for n, line in enumerate(lines) if line.action == "next_axis")
+    finished = next(n for n, line in enumerate(lines) if line.action == "finished")
+    first = next(n for n, line in enumerate(lines) if line.action == "first_axis")
+    leave, enter = set(range(last + 1, finished + 1)), set(range(labels["tick"] + 1, first + 1))
+    serve = reached(lines, labels["axis"], True, {last})
+    idle = reached(lines, 0, False, {labels["tick"]})
+    found = []
+    for n in range(len(lines)):
+        if n in leave or n in enter:
+            found.append("leave" if n in leave else "enter")
+        elif n in serve:
+            found.append("shared" if n in idle else "serve")
+        else:
+            found.append("idle")
+    return found
+
+
+def regions_text() -> str:
+    found = regions(assembled())
+    rows, begin = [], 0
+    for n in range(1, len(found) + 1):
+        if n == len(found) or found[n] != found[begin]:
+            number = REGIONS.index(found[begin])
+            if number:
+                rows.append(
+                    f"        if (line >= 10'd{begin} && line <= 10'd{n - 1}) region = 3'd{number};"
+                    f"  // {found[begin]}"
+                )
+            begin = n
+    return "\n".join(
+        [
+            """// SPDX-License-Identifier: Apache-2.0
+// engine_regions -- what the lines of engine_microcode belong to, for a proof.
+//
+// latency   0 cycles, combinational
+// rate      one line per cycle
+// model     regions() of tables/engine_microcode.py
+// made      by tables/engine_microcode.py, not to be edited
+`default_nettype none
+
+module engine_regions (
+    input  wire  [9:0] line,   // number of a line
+    output logic [2:0] region  // 0 idle, 1 idle and service, 2 service, 3 to the next axis, 4 begin
+);
+    always_comb begin
+        region = 3'd0;""",
+            *rows,
+            """    end
+endmodule
+
+`default_nettype wire
+""",
+        ]
+    )
+
+
 def main(arguments: list[str] | None = None) -> int:
-    return made_files.main(__doc__, lambda: {MADE: text(), MEMORY: memory_text()}, arguments)
+    def make() -> dict[Path, str | None]:
+        return {
+            MADE: made_files.systemverilog(text()),
+            MEMORY: made_files.systemverilog(memory_text()),
+            PROOF: made_files.systemverilog(regions_text()),
+        }
+
+    return made_files.main(__doc__, make, arguments)
 
 
 if __name__ == "__main__":

@@ -14,12 +14,12 @@ module engine_memory #(
     parameter int WORD_W = 7,  // bits of the address of a word of an axis: 7, or 8 with filters
     localparam int A = WORD_W + $clog2(AXES)  // bits of an address
 ) (
-    input  wire         clk,
+    input  wire          clk,
     input  wire  [A-1:0] read_at,   // address of the word to be read
-    output logic [71:0] stored,     // word that was read
-    input  wire         write,      // strobe: write a word
+    output logic [ 71:0] stored,    // word that was read
+    input  wire          write,     // strobe: write a word
     input  wire  [A-1:0] write_at,  // address of that word
-    input  wire  [71:0] word        // value of that word
+    input  wire  [ 71:0] word       // value of that word
 );
     localparam int WORDS = 1 << WORD_W;
 

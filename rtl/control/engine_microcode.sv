@@ -15,13 +15,14 @@ module engine_microcode #(
     parameter int FILTERS = 0   // filters of each axis, 0 to 4
 ) (
     input  wire         clk,
-    input  wire  [ 9:0] next,        // number of a line to be read
-    input  wire  [ 9:0] target,      // number of another one
-    output logic [35:0] next_code,   // code of the line `next`
-    output logic [35:0] target_code, // code of the line `target`
-    output logic [15:0] cycles       // cycles that a tick needs at most
+    input  wire  [ 9:0] next,         // number of a line to be read
+    input  wire  [ 9:0] target,       // number of another one
+    output logic [35:0] next_code,    // code of the line `next`
+    output logic [35:0] target_code,  // code of the line `target`
+    output logic [15:0] cycles        // cycles that a tick needs at most
 );
-    localparam logic [15:0] AXIS = FILTERS == 0 ? 16'd365 : FILTERS == 1 ? 16'd430 : FILTERS == 2 ? 16'd484 : FILTERS == 3 ? 16'd538 : 16'd592;
+    localparam logic [15:0] AXIS = FILTERS == 0 ? 16'd365 : FILTERS == 1 ? 16'd430 : FILTERS == 2 ?
+        16'd484 : FILTERS == 3 ? 16'd538 : 16'd592;
 
     assign cycles = 16'd76 + 16'(AXES) * AXIS;
 

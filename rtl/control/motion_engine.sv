@@ -62,25 +62,23 @@ module motion_engine #(
     localparam [3:0] Y_HIGH = 4'd11, DIVIDE = 4'd12, UPWARD = 4'd13, ALONG = 4'd14;
     localparam [3:0] PRODUCT = 4'd1, PRODUCT_HIGH = 4'd2, PRODUCT_LOW = 4'd3, HALVE = 4'd4;
     localparam [3:0] POSITION = 4'd5, ELAPSED = 4'd6, PERIOD = 4'd7, NOW = 4'd8, FLAGS = 4'd9;
-    localparam [5:0] LOOP = 6'd25;
-    localparam [7:0] LOAD_CONTEXT = 8'h20, FIRST_AXIS = 8'h21, NEXT_AXIS = 8'h22, SAMPLE = 8'h23;
-    localparam [7:0] STAND = 8'h24, FINISHED = 8'h25, POP = 8'h26, PUSH = 8'h27, EMPTY = 8'h28;
+    localparam [7:0] LOAD_CONTEXT = 8'h20, SAMPLE = 8'h23;
+    localparam [7:0] STAND = 8'h24, POP = 8'h26, PUSH = 8'h27, EMPTY = 8'h28;
     localparam [7:0] BOOTED = 8'h29, FIRST_FILTER = 8'h2A, NEXT_FILTER = 8'h2B;
-    localparam [2:0] SET = 3'd2, CLEAR = 3'd3, GIVE = 3'd4, COUNT = 3'd5, DONE = 3'd6;
+    localparam [2:0] SET = 3'd2, CLEAR = 3'd3, GIVE = 3'd4, DONE = 3'd6;
     localparam [2:0] COMMAND = 3'd5, STEPS = 3'd6;
-    localparam int TICKING = 16, HALTING = 19, LIMITED_UP = 10, LIMITED_DOWN = 11, REBASED = 13;
+    localparam int HALTING = 19, LIMITED_UP = 10, LIMITED_DOWN = 11, REBASED = 13;
     localparam int UPWARDS = 14;
     localparam [15:0] MOTION = 16'b0000_0000_1111_1110;  // the flags that STAND clears
     localparam [5:0] NOWHERE = 6'h3F;
 
     // the axis that is served, and its flags; 16 and above are cleared with each axis
-    logic [2:0] axis;
+    wire [2:0] axis;
     logic [20:0] flags;
     logic [3:0] head;  // slot of the next segment
     logic [4:0] queued;  // segments in the queue
     logic [2:0] filter;
-    logic negative, due;
-    logic [4:0] count;
+    logic negative;
     // what is seen of this axis
     logic [47:0] axis_position;
     logic [23:0] axis_elapsed;
@@ -100,12 +98,10 @@ module motion_engine #(
 
     // the lines in work: fetched, and its operand is being read; then the operand is there; then it
     // is added
-    wire [35:0] next_code, target_code;
-    logic [9:0] next_line, target_line;
-    logic jumped;  // the line before jumped
+    wire [35:0] code;
+    wire [7:0] action_e;
     logic [3:0] source;  // of the operand: 0 memory or nothing
     logic reads;  // the operand is in memory
-    logic [7:0] action, action_e;
     logic [5:0] word, word_e;
     logic with_acc, sign, sign_e;
     logic [3:0] effect, effect_e;
@@ -114,49 +110,43 @@ module motion_engine #(
     wire signed [69:0] product;
     wire [71:0] stored;
 
-    // fetch
-    wire [35:0] code = jumped ? target_code : next_code;
-    wire [9:0] line = jumped ? target_line : next_line;
-    wire unless = code[25];
-    wire [5:0] condition = code[24:19];
     wire [6:0] operand = code[12:6];
     wire [72:0] wide = {acc, 1'b1} + {term, sign_e};
     wire [71:0] sum = wide[72:1];
     wire negative_now = effect_e == TEST ? sum[71] : negative;
     wire off = level[2] && level[3];
-    wire [63:0] conditions = {
-        14'd0,
-        1'(FILTERS == 0),
-        requested[3] && requested[2:1] == 2'd0 && !requested[5],
-        off,
-        !level[4] || off,
-        level,
-        axis_gains,
-        requested[5:0],
-        filter != 3'(FILTERS),
-        queued[4],
-        queued == 5'd0,
-        axis == 3'd0,
-        axis_asked,
-        due,
-        count != 5'd1,
-        negative_now,
-        3'd0,
-        flags
-    };
-    wire jump = conditions[condition] != unless;
-    wire [9:0] next = rst ? '0 : line + 1'b1;
-    wire acts = condition == '0 && !unless;
 
-    engine_microcode #(
+    engine_sequencer #(
         .AXES   (AXES),
         .FILTERS(FILTERS)
-    ) u_microcode (
+    ) u_sequencer (
         .clk,
-        .next,
-        .target(code[35:26]),
-        .next_code,
-        .target_code,
+        .rst,
+        .tick,
+        .conditions({
+            14'd0,
+            1'(FILTERS == 0),
+            requested[3] && requested[2:1] == 2'd0 && !requested[5],
+            off,
+            !level[4] || off,
+            level,
+            axis_gains,
+            requested[5:0],
+            filter != 3'(FILTERS),
+            queued[4],
+            queued == 5'd0,
+            1'b0,
+            axis_asked,
+            2'd0,
+            negative_now,
+            3'd0,
+            flags
+        }),
+        .code,
+        .action    (action_e),
+        .axis,
+        .busy,
+        .overrun,
         .cycles
     );
 
@@ -256,7 +246,7 @@ module motion_engine #(
             .clk,
             .rst,
             .tick,
-            .sample       (action_e == SAMPLE && axis == 3'(n) && !due),
+            .sample       (action_e == SAMPLE && axis == 3'(n) && !busy),
             .elapsed      (elapsed_now),
             .position     (position[48*n+:48]),
             .stepped      (stepped[n]),
@@ -284,18 +274,11 @@ module motion_engine #(
     end
 
     assign waits = asked;
-    assign busy  = due;
 
-    wire unused = &{1'b0, wide[0], requested[6], read_word, write_word, write_at};
+    wire unused = &{1'b0, code, wide[0], requested[6], read_word, write_word, write_at};
 
     always_ff @(posedge clk) begin
-        next_line   <= next;
-        target_line <= code[35:26];
-        jumped      <= jump;
-        if (condition == LOOP) count <= count - 1'b1;
-
         // the operand is read
-        action   <= acts ? code[33:26] : '0;
         word     <= code[18:13];
         with_acc <= code[5];
         sign     <= code[4];
@@ -304,7 +287,6 @@ module motion_engine #(
         reads    <= operand[6:4] != 3'd7;
 
         // the operand is there
-        action_e <= action;
         word_e   <= word;
         sign_e   <= source == HALVE ? sign : minus;
         effect_e <= effect;
@@ -335,8 +317,6 @@ module motion_engine #(
                 {queued, head, flags[15:0]} <= sum[24:0];
                 flags[20:17] <= '0;
             end
-            FIRST_AXIS:   axis <= '0;
-            NEXT_AXIS:    axis <= axis == 3'(AXES - 1) ? '0 : axis + 1'b1;
             STAND:        flags[15:0] <= flags[15:0] & ~MOTION;
             POP:          {queued, head} <= {queued - 1'b1, head + 1'b1};
             PUSH:         queued <= queued + 1'b1;
@@ -344,12 +324,10 @@ module motion_engine #(
             BOOTED:       ready <= 1'b1;
             FIRST_FILTER: filter <= '0;
             NEXT_FILTER:  filter <= filter + 1'b1;
-            FINISHED:     flags[TICKING] <= 1'b0;
             default:      ;
         endcase
         if (action_e[7:5] == SET) flags <= flags | named;
         if (action_e[7:5] == CLEAR) flags <= flags & ~named;
-        if (action_e[7:5] == COUNT) count <= action_e[4:0];
         result_valid <= action_e[7:5] == GIVE;
         if (action_e[7:5] == GIVE) begin
             result      <= sum[47:0];
@@ -376,15 +354,12 @@ module motion_engine #(
             period   <= elapsed == '1 ? elapsed : elapsed + 1'b1;
             seen_now <= now;
         end
-        due     <= tick || (due && action_e != FINISHED);
-        overrun <= tick && due && action_e != FINISHED;
 
         if (rst) begin
-            {action, action_e, source, reads} <= '0;
+            {source, reads} <= '0;
             {word, word_e} <= '1;
             {effect, effect_e} <= '0;
-            {axis, filter, flags, elapsed, period} <= '0;
-            {due, overrun, ready, result_valid, jumped} <= '0;
+            {filter, flags, elapsed, period, ready, result_valid} <= '0;
         end
     end
 endmodule

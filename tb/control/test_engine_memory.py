@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""engine_memory: the constants of every axis, and random accesses against the model in every cycle."""
+"""engine_memory: the constants of every axis, and random accesses against the model."""
 
 import random
 
