@@ -44,9 +44,9 @@ module engine_inputs (
     logic step_live, step_down, lost_live, lost_off_live;
     logic [23:0] step_elapsed;
 
-    wire off = block_up && block_down;
-    wire powerless = !closed_loop || off;
-    wire [6:0] taken = {tick, {6{tick || sample}}};
+    wire         off = block_up && block_down;
+    wire         powerless = !closed_loop || off;
+    wire  [ 6:0] taken = {tick, {6{tick || sample}}};
 
     assign asked = |{live[5:0], seen[5:0]};
     assign gains = live[6] || seen[6];
@@ -81,7 +81,7 @@ module engine_inputs (
     end
 
 `ifdef FORMAL
-    logic past = 1'b0;
+    logic       past = 1'b0;
     logic [6:0] owed;  // requests that are neither done nor joined with one that waits
     always @(posedge clk) begin
         past <= 1'b1;
@@ -90,7 +90,8 @@ module engine_inputs (
         if (past) begin
             assert ((owed & ~(live | seen)) == '0);
             assert (asked == |((live | seen) & 7'h3F));
-            if (!$past(rst) && !$past(tick || sample)) assert (seen_position == $past(seen_position));
+            if (!$past(rst) && !$past(tick || sample))
+                assert (seen_position == $past(seen_position));
             cover (owed[2] && seen[2] && live[2]);
         end
     end

@@ -2,8 +2,7 @@
 // engine_multiplier -- multiply two signed numbers of 35 bits in four hardware multipliers of 18
 // bits.
 //
-// latency   2 cycles from x and y to product: one for the four parts, and they are added in the
-//           second
+// latency   1 cycle from x and y to product: the four parts are kept, and added as they are read
 // rate      one product per cycle
 // accuracy  exact
 // method    Each factor is split at bit 17: the low part is a positive number, the high part is

@@ -3,7 +3,7 @@
 //
 // latency   0 cycles, combinational
 // rate      one line per cycle
-// model     regions() of tables/engine_microcode.py
+// model     tb/control/engine_regions.py, equal for every line
 // made      by tables/engine_microcode.py, not to be edited
 `default_nettype none
 

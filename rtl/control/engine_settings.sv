@@ -16,35 +16,35 @@
 module engine_settings #(
     parameter int WORD_W = 7  // bits of the address of a word of an axis: 7, or 8 with filters
 ) (
-    input  wire                        clk,
-    input  wire                        rst,
+    input  wire                       clk,
+    input  wire                       rst,
     // settings; words are numbered as the operands in tables/engine_microcode.py
-    input  wire                        setting_write,   // strobe: write a setting
-    input  wire         [         2:0] setting_axis,    // number of its axis
-    input  wire         [         6:0] setting_word,    // number of its word
-    input  wire         [         1:0] setting_filter,  // number of its filter
-    input  wire  signed [        63:0] setting,         // value
-    output logic                       waits,           // level: it is not written yet
+    input  wire                       setting_write,   // strobe: write a setting
+    input  wire        [         2:0] setting_axis,    // number of its axis
+    input  wire        [         6:0] setting_word,    // number of its word
+    input  wire        [         1:0] setting_filter,  // number of its filter
+    input  wire signed [        63:0] setting,         // value
+    output logic                      waits,           // level: it is not written yet
     // the engine
-    input  wire         [         6:0] operand,         // word that the engine reads
-    input  wire                        write,           // strobe: the engine writes a word
-    input  wire         [WORD_W + 2:0] write_at,        // address of that word
-    input  wire         [        71:0] word,            // value of that word
+    input  wire        [         6:0] operand,         // word that the engine reads
+    input  wire                       write,           // strobe: the engine writes a word
+    input  wire        [WORD_W + 2:0] write_at,        // address of that word
+    input  wire        [        71:0] word,            // value of that word
     // to the memory
-    output logic                       write_out,       // strobe: write a word
-    output logic        [WORD_W + 2:0] write_out_at,    // address of that word
-    output logic        [        71:0] word_out         // value of that word
+    output logic                      write_out,       // strobe: write a word
+    output logic       [WORD_W + 2:0] write_out_at,    // address of that word
+    output logic       [        71:0] word_out         // value of that word
 );
-    logic [2:0] axis;
-    logic [6:0] number;
-    logic [1:0] filter;
+    logic [ 2:0] axis;
+    logic [ 6:0] number;
+    logic [ 1:0] filter;
     logic [63:0] value;
 
-    wire settles = waits && !write && operand[2:0] != number[2:0];
-    wire [7:0] plain = {2'd0, number[5:0]};
-    wire [7:0] above = {2'b01, number[3:0], 2'b11};
-    wire [7:0] banked = {2'b10, filter, number[3:0]};
-    wire [7:0] address = !number[6] ? plain : number[4] ? banked : above;
+    wire         settles = waits && !write && operand[2:0] != number[2:0];
+    wire  [ 7:0] plain = {2'd0, number[5:0]};
+    wire  [ 7:0] above = {2'b01, number[3:0], 2'b11};
+    wire  [ 7:0] banked = {2'b10, filter, number[3:0]};
+    wire  [ 7:0] address = !number[6] ? plain : number[4] ? banked : above;
 
     assign write_out    = write || settles;
     assign write_out_at = write ? write_at : {axis, address[WORD_W-1:0]};
@@ -60,8 +60,8 @@ module engine_settings #(
     wire unused = &{1'b0, address, operand[6:3]};
 
 `ifdef FORMAL
-    logic past = 1'b0;
-    logic owed = 1'b0;  // a setting was taken and is not written
+    logic        past = 1'b0;
+    logic        owed = 1'b0;  // a setting was taken and is not written
     logic [63:0] owed_value;
     always @(posedge clk) begin
         past <= 1'b1;

@@ -36,7 +36,7 @@ async def begin(dut):
 
 
 @cocotb.test()
-async def latency_is_1_to_the_product_and_a_new_one_comes_in_each_cycle(dut):
+async def latency_is_1_and_a_new_product_comes_in_each_cycle(dut):
     multiplier = await begin(dut)
     assert await multiplier.clk(3, -5) == -15
     assert await multiplier.clk(-(1 << 34), -(1 << 34)) == 1 << 68
